@@ -1,0 +1,167 @@
+//! The three contacts of a tooth: materials, stiffness, Hertz stress (docs/theory.md sections 4 and 5).
+
+use std::f64::consts::PI;
+
+use crate::violation::Parameter;
+
+/// A part with a material of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Part {
+    /// The elliptic cam.
+    WaveGenerator,
+    /// The discrete teeth.
+    Teeth,
+    /// The rigid internal wheel.
+    Ring,
+    /// The slotted annulus.
+    Carrier,
+}
+
+/// A contact of a tooth with another part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Contact {
+    /// With the wave generator.
+    WaveGenerator,
+    /// With the ring's flank.
+    Ring,
+    /// With the wall of its slot in the carrier.
+    Carrier,
+}
+
+/// One value for each contact.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PerContact<T> {
+    /// At the wave generator.
+    pub wave_generator: T,
+    /// At the ring.
+    pub ring: T,
+    /// At the carrier.
+    pub carrier: T,
+}
+
+impl<T> PerContact<T> {
+    /// The same function of each contact.
+    pub fn of(mut function: impl FnMut(Contact) -> T) -> Self {
+        Self {
+            wave_generator: function(Contact::WaveGenerator),
+            ring: function(Contact::Ring),
+            carrier: function(Contact::Carrier),
+        }
+    }
+
+    /// The value at one contact.
+    pub const fn get(&self, contact: Contact) -> &T {
+        match contact {
+            Contact::WaveGenerator => &self.wave_generator,
+            Contact::Ring => &self.ring,
+            Contact::Carrier => &self.carrier,
+        }
+    }
+
+    /// The contacts with their values.
+    pub fn iter(&self) -> impl Iterator<Item = (Contact, &T)> {
+        [(Contact::WaveGenerator, &self.wave_generator), (Contact::Ring, &self.ring), (Contact::Carrier, &self.carrier)]
+            .into_iter()
+    }
+}
+
+/// An isotropic elastic material.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Material {
+    /// Young's modulus E.
+    pub youngs_modulus_gpa: f64,
+    /// Poisson's ratio ν.
+    pub poissons_ratio: f64,
+}
+
+impl Material {
+    /// Steel as the paper has it.
+    pub const STEEL: Self = Self { youngs_modulus_gpa: 210.0, poissons_ratio: 0.3 };
+
+    /// `(1 - ν²)/E`, in 1/MPa.
+    fn compliance_per_mpa(&self) -> f64 {
+        (1.0 - self.poissons_ratio) * (1.0 + self.poissons_ratio) / (1e3 * self.youngs_modulus_gpa)
+    }
+}
+
+/// The materials of all parts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Materials {
+    /// Of the wave generator.
+    pub wave_generator: Material,
+    /// Of the teeth.
+    pub teeth: Material,
+    /// Of the ring.
+    pub ring: Material,
+    /// Of the carrier.
+    pub carrier: Material,
+}
+
+impl Materials {
+    pub(crate) fn parameters(&self) -> impl Iterator<Item = (Parameter, f64)> {
+        [
+            (Part::WaveGenerator, self.wave_generator),
+            (Part::Teeth, self.teeth),
+            (Part::Ring, self.ring),
+            (Part::Carrier, self.carrier),
+        ]
+        .into_iter()
+        .flat_map(|(part, material)| {
+            [
+                (Parameter::YoungsModulus(part), material.youngs_modulus_gpa),
+                (Parameter::PoissonsRatio(part), material.poissons_ratio),
+            ]
+        })
+    }
+
+    /// The contact modulus E* of a contact: `1/E* = (1 - ν1²)/E1 + (1 - ν2²)/E2`.
+    pub fn contact_modulus_mpa(&self, contact: Contact) -> f64 {
+        let partner = match contact {
+            Contact::WaveGenerator => self.wave_generator,
+            Contact::Ring => self.ring,
+            Contact::Carrier => self.carrier,
+        };
+        1.0 / (self.teeth.compliance_per_mpa() + partner.compliance_per_mpa())
+    }
+}
+
+/// How force and approach of a contact go together: `F = k δ` [7].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ContactLaw {
+    /// `k = π L1 E*/2`, of two parallel cylinders in line contact (Yang and Sun 1985).
+    Linear,
+    /// Stiffnesses that the designer gives, in N/mm.
+    Fixed(PerContact<f64>),
+}
+
+impl ContactLaw {
+    /// The stiffness of each contact, in N/mm.
+    pub fn stiffness_n_per_mm(&self, materials: &Materials, tooth_width_mm: f64) -> PerContact<f64> {
+        match self {
+            Self::Linear => {
+                PerContact::of(|contact| 0.5 * PI * tooth_width_mm * materials.contact_modulus_mpa(contact))
+            }
+            Self::Fixed(stiffness_n_per_mm) => *stiffness_n_per_mm,
+        }
+    }
+}
+
+/// Hertz stress of a line contact [8]: `σ = √(F/(π L1) · (1/ρ1 + 1/ρ2) · E*)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HertzLine {
+    /// `E*/(π L1)`.
+    modulus_per_width_mpa_per_mm: f64,
+}
+
+impl HertzLine {
+    /// Of a contact, for teeth of this width.
+    pub fn new(materials: &Materials, contact: Contact, tooth_width_mm: f64) -> Self {
+        let modulus = materials.contact_modulus_mpa(contact);
+        Self { modulus_per_width_mpa_per_mm: modulus / (PI * tooth_width_mm) }
+    }
+
+    /// The largest pressure under `force_n`, for bodies whose curvatures (convex positive) sum to `curvature_per_mm`.
+    pub fn stress_mpa(&self, force_n: f64, curvature_per_mm: f64) -> f64 {
+        (force_n * curvature_per_mm * self.modulus_per_width_mpa_per_mm).sqrt()
+    }
+}

@@ -1,0 +1,164 @@
+//! What a designer should be told about a drive that can exist (docs/findings.md).
+
+use crate::contact::{Contact, PerContact};
+use crate::drive::Drive;
+use crate::mesh::Mesh;
+use crate::ring::FlankEnd;
+use crate::root::NotConverged;
+use crate::sweep::ContactPeaks;
+
+/// Contact stress at the fatigue limit of bearing steel (ISO 281:2007).
+pub const FATIGUE_LIMIT_STRESS_MPA: f64 = 1500.0;
+
+/// A wall thinner than this share of its slot's width is reported: a rule of thumb, not a strength calculation.
+pub const THIN_WALL_SHARE_OF_SLOT: f64 = 0.25;
+
+/// A ring pressure angle beyond this is reported: there the ring carries more than three times the cam's radial force, and
+/// friction, which the model leaves out, begins to decide whether the drive turns at all.
+pub const STEEP_FLANK_DEG: f64 = 70.0;
+
+/// The edge of the carrier's annulus that a tooth passes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Edge {
+    /// Towards the wave generator.
+    Inner,
+    /// Towards the ring.
+    Outer,
+}
+
+/// Something questionable about a drive or its load.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Finding {
+    /// The ring's tips are cut away by their own envelope.
+    Undercut {
+        /// `r`.
+        tooth_radius_mm: f64,
+        /// The least radius that undercuts.
+        critical_tooth_radius_mm: f64,
+        /// Where teeth then start to touch the flank.
+        engagement_start_deg: f64,
+        /// Whether a bore takes more away than undercut does.
+        is_bored_away: bool,
+    },
+    /// The bore ends the flank before its natural tip: teeth enter under load.
+    BoreShortensFlank {
+        /// The bore.
+        tip_radius_mm: f64,
+        /// The tip without it.
+        natural_tip_radius_mm: f64,
+        /// Where teeth then start to touch the flank.
+        engagement_start_deg: f64,
+    },
+    /// The bore lies inside the natural tip.
+    BoreWithoutEffect {
+        /// The bore.
+        tip_radius_mm: f64,
+        /// The tip without it.
+        natural_tip_radius_mm: f64,
+    },
+    /// At some input angle fewer than two teeth of a zone mesh.
+    FewTeethInMesh {
+        /// How many.
+        min: u64,
+    },
+    /// The wall between two slots is thin.
+    ThinSlotWall {
+        /// Its least thickness.
+        slot_wall_mm: f64,
+        /// What it is measured against.
+        limit_mm: f64,
+    },
+    /// A loaded tooth's centre leaves the annulus between wave generator and ring tips: it presses on a slot's edge.
+    ToothBeyondCarrier {
+        /// Which edge it passes.
+        edge: Edge,
+        /// How far its centre goes.
+        center_radius_mm: f64,
+        /// The edge of the annulus.
+        limit_mm: f64,
+    },
+    /// The flank stands steep to the radius.
+    SteepRingFlank {
+        /// Largest pressure angle β on the engaged flank.
+        pressure_angle_deg: f64,
+    },
+    /// A stress above the fatigue limit of bearing steel.
+    StressAboveFatigueLimit {
+        /// Where.
+        contact: Contact,
+        /// The peak.
+        stress_mpa: f64,
+    },
+}
+
+/// The findings about the drive itself.
+///
+/// # Errors
+/// [`NotConverged`] from the geometry.
+pub fn of_drive(drive: &Drive) -> Result<Vec<Finding>, NotConverged> {
+    let mut findings = Vec::new();
+    let p = drive.parameters();
+    let flank = drive.flank();
+    let limit = drive.flank_limit();
+    let engagement_start_deg = limit.position.from_major_deg();
+    let natural_tip_radius_mm = drive.natural_tip_radius_mm();
+    if flank.is_undercut()
+        && let Some(critical_tooth_radius_mm) = flank.critical_tooth_radius_mm()
+    {
+        findings.push(Finding::Undercut {
+            tooth_radius_mm: p.tooth_radius_mm,
+            critical_tooth_radius_mm,
+            engagement_start_deg,
+            is_bored_away: limit.end == FlankEnd::Bore,
+        });
+    }
+    match p.tip_radius_mm {
+        Some(tip_radius_mm) if limit.end == FlankEnd::Bore => {
+            findings.push(Finding::BoreShortensFlank { tip_radius_mm, natural_tip_radius_mm, engagement_start_deg });
+        }
+        Some(tip_radius_mm) => {
+            findings.push(Finding::BoreWithoutEffect { tip_radius_mm, natural_tip_radius_mm });
+        }
+        None => {}
+    }
+    let min = Mesh::new(drive).teeth_in_mesh().min;
+    if min < 2 {
+        findings.push(Finding::FewTeethInMesh { min });
+    }
+    let slot_wall_mm = drive.slot_wall_mm();
+    let limit_mm = THIN_WALL_SHARE_OF_SLOT * 2.0 * p.tooth_radius_mm;
+    if slot_wall_mm < limit_mm {
+        findings.push(Finding::ThinSlotWall { slot_wall_mm, limit_mm });
+    }
+    let innermost_mm = flank.locus().at(limit.position)?.center_radius_mm;
+    if innermost_mm < p.semi_major_mm {
+        findings.push(Finding::ToothBeyondCarrier {
+            edge: Edge::Inner,
+            center_radius_mm: innermost_mm,
+            limit_mm: p.semi_major_mm,
+        });
+    }
+    let outermost_mm = p.semi_major_mm + p.tooth_radius_mm;
+    if outermost_mm > drive.tip_radius_mm() {
+        findings.push(Finding::ToothBeyondCarrier {
+            edge: Edge::Outer,
+            center_radius_mm: outermost_mm,
+            limit_mm: drive.tip_radius_mm(),
+        });
+    }
+    let pressure_angle_deg = drive.steepest_engaged()?.tan_pressure_angle * flank.teeth_per_wave();
+    let pressure_angle_deg = pressure_angle_deg.atan().to_degrees();
+    if pressure_angle_deg > STEEP_FLANK_DEG {
+        findings.push(Finding::SteepRingFlank { pressure_angle_deg });
+    }
+    Ok(findings)
+}
+
+/// The findings about a drive's contacts under a load.
+pub fn of_peaks(peaks: &PerContact<ContactPeaks>) -> Vec<Finding> {
+    peaks
+        .iter()
+        .filter(|(_, peaks)| peaks.stress_mpa.value > FATIGUE_LIMIT_STRESS_MPA)
+        .map(|(contact, peaks)| Finding::StressAboveFatigueLimit { contact, stress_mpa: peaks.stress_mpa.value })
+        .collect()
+}

@@ -1,0 +1,250 @@
+//! The mating parts' profiles, sampled to a chord tolerance.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nalgebra::{Point2, Rotation2, Unit, Vector2};
+
+use crate::drive::Drive;
+use crate::position::Position;
+use crate::ring::FlankEnd;
+use crate::root::NotConverged;
+use crate::{SolveError, Stop};
+
+/// A polyline in mm.
+pub type Polyline = Vec<Point2<f64>>;
+
+/// How much of the ring is wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extent {
+    /// From one tooth's symmetry line to the next, angles ∓π/Z_K.
+    Tooth,
+    /// The closed ring, its last point equal to its first.
+    Full,
+}
+
+/// What profiles are asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ProfileParameters {
+    /// How far a chord may be from its curve.
+    pub chord_tolerance_mm: f64,
+    /// How much of the ring.
+    pub extent: Extent,
+    /// How many points at most, over all profiles.
+    pub max_points: u64,
+}
+
+/// The profiles of the mating parts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Profiles {
+    /// The ring, in its own frame.
+    pub ring: Polyline,
+    /// The path of the teeth's centres, in the ring's frame.
+    pub tooth_center_path: Polyline,
+    /// The closed wave generator, in its own frame.
+    pub wave_generator: Polyline,
+}
+
+/// A point of a curve with its tangent.
+#[derive(Debug, Clone, Copy)]
+struct CurvePoint {
+    point: Point2<f64>,
+    tangent: Unit<Vector2<f64>>,
+}
+
+/// Pieces that a quarter wave starts with, so that no piece can hide more than one inflection.
+const PIECES: u32 = 16;
+
+/// Halvings of a piece at most: 2^40 chords of a piece are beyond every tolerance that the ranges allow.
+const MAX_DEPTH: u32 = 40;
+
+/// The profiles of a drive.
+///
+/// # Errors
+/// [`SolveError::TooManyPoints`], [`SolveError::Stopped`], and [`SolveError::NotConverged`] from the geometry.
+pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &impl Stop) -> Result<Profiles, SolveError> {
+    let ring_teeth = drive.parameters().ring_teeth.unsigned_abs();
+    let flank = ring_half_tooth(drive, parameters.chord_tolerance_mm, stop)?;
+    let path = path_half_tooth(drive, parameters.chord_tolerance_mm, stop)?;
+    let quarter = cam_quarter(drive, parameters.chord_tolerance_mm, stop)?;
+
+    let copies = match parameters.extent {
+        Extent::Tooth => 1,
+        Extent::Full => ring_teeth,
+    };
+    let spans = |half: &Polyline| 2 * (half.len() as u64 - 1);
+    let points = copies * (spans(&flank) + spans(&path)) + 2 * spans(&quarter) + 3;
+    if points > parameters.max_points {
+        return Err(SolveError::TooManyPoints { points, limit: parameters.max_points });
+    }
+    let cam_half = mirrored(&quarter, Vector2::new(-1.0, 1.0));
+    Ok(Profiles {
+        ring: repeated(&from_tip_to_tip(&flank), ring_teeth, parameters.extent),
+        tooth_center_path: repeated(&from_tip_to_tip(&path), ring_teeth, parameters.extent),
+        wave_generator: closed(&mirrored(&cam_half, Vector2::new(1.0, -1.0))),
+    })
+}
+
+/// The ring from the middle of its tooth space to its tooth's symmetry line, land of a bored tip included.
+fn ring_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &impl Stop) -> Result<Polyline, SolveError> {
+    let flank = drive.flank();
+    let limit = drive.flank_limit();
+    let mut points = sampled(limit.position, tolerance_mm, stop, |position| {
+        let tooth = flank.locus().at(position)?;
+        let point = flank.at(&tooth);
+        Ok(CurvePoint { point: flank.point(&tooth, &point), tangent: flank.tangent(&tooth, &point) })
+    })?;
+    let tip_rad = PI / drive.parameters().ring_teeth as f64;
+    match limit.end {
+        FlankEnd::RegularTip | FlankEnd::Undercut => {
+            points.pop();
+        }
+        FlankEnd::Bore => {
+            let radius_mm = drive.tip_radius_mm();
+            let start_rad = points.last().map_or(0.0, |point| point.y.atan2(point.x));
+            let land_rad = tip_rad - start_rad;
+            // A chord over the angle 4 asin(√(t/2R)) is t away from its arc.
+            let step_rad = 4.0 * (0.5 * tolerance_mm / radius_mm).min(1.0).sqrt().asin();
+            let steps = (land_rad / step_rad).ceil().max(1.0);
+            let mut step = 1.0;
+            while step < steps {
+                points.push(on_circle(radius_mm, start_rad + land_rad * (step / steps)));
+                step += 1.0;
+            }
+        }
+    }
+    points.push(on_circle(drive.tip_radius_mm(), tip_rad));
+    Ok(points)
+}
+
+/// The path of a tooth's centre from the middle of the tooth space to the symmetry line of the ring's tooth.
+fn path_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &impl Stop) -> Result<Polyline, SolveError> {
+    let flank = drive.flank();
+    let mut points = sampled(Position::TIP, tolerance_mm, stop, |position| {
+        let tooth = flank.locus().at(position)?;
+        let point = flank.at(&tooth);
+        let angle_rad = position.from_major_rad / flank.teeth_per_wave();
+        Ok(CurvePoint { point: on_circle(tooth.center_radius_mm, angle_rad), tangent: flank.tangent(&tooth, &point) })
+    })?;
+    points.pop();
+    let p = drive.parameters();
+    points.push(on_circle(p.semi_minor_mm + p.tooth_radius_mm, PI / p.ring_teeth as f64));
+    Ok(points)
+}
+
+/// The wave generator from its major to its minor axis.
+fn cam_quarter(drive: &Drive, tolerance_mm: f64, stop: &impl Stop) -> Result<Polyline, SolveError> {
+    let cam = drive.flank().locus().cam();
+    // Here a position is taken as the angle φ of the normal.
+    sampled(Position::TIP, tolerance_mm, stop, |normal| {
+        let contact = cam.contact(normal.cos, normal.sin);
+        Ok(CurvePoint { point: cam.point(&contact), tangent: cam.tangent(&contact) })
+    })
+}
+
+fn on_circle(radius_mm: f64, angle_rad: f64) -> Point2<f64> {
+    let (sin, cos) = angle_rad.sin_cos();
+    Point2::new(radius_mm * cos, radius_mm * sin)
+}
+
+/// The curve over positions from the root to `end`, both included, by halving pieces until each chord is true.
+fn sampled(
+    end: Position,
+    tolerance_mm: f64,
+    stop: &impl Stop,
+    curve: impl Fn(Position) -> Result<CurvePoint, NotConverged>,
+) -> Result<Polyline, SolveError> {
+    // Measured from the minor axis, where cusps are; beyond 45° a `Position` is as good from the other side.
+    let at = |x: f64| {
+        if x <= end.from_minor_rad {
+            curve(end)
+        } else if x < 0.5 * FRAC_PI_2 {
+            curve(Position::from_minor(x))
+        } else {
+            curve(Position::from_major(FRAC_PI_2 - x))
+        }
+    };
+    let span = FRAC_PI_2 - end.from_minor_rad;
+    let mut from = (FRAC_PI_2, curve(Position::ROOT)?);
+    let mut points = vec![from.1.point];
+    for piece in 1..=PIECES {
+        let x = FRAC_PI_2 - span * (f64::from(piece) / f64::from(PIECES));
+        let mut pending = vec![(x.max(end.from_minor_rad), at(x)?, 0)];
+        while let Some(to) = pending.pop() {
+            let (x, to_point, depth) = to;
+            if chord_deviation_mm(&from.1, &to_point) <= tolerance_mm || depth == MAX_DEPTH {
+                points.push(to_point.point);
+                from = (x, to_point);
+            } else {
+                if stop.stopped() {
+                    return Err(SolveError::Stopped);
+                }
+                let middle = 0.5 * (from.0 + x);
+                pending.push((x, to_point, depth + 1));
+                pending.push((middle, at(middle)?, depth + 1));
+            }
+        }
+    }
+    Ok(points)
+}
+
+/// An upper bound of the distance between an arc and its chord.
+///
+/// A convex arc lies in the triangle of its chord and its end tangents, whose height is
+/// `c sin α sin β / sin(α + β)`; an arc with one inflection lies within `c max(sin α, sin β)`.
+fn chord_deviation_mm(from: &CurvePoint, to: &CurvePoint) -> f64 {
+    let chord = to.point - from.point;
+    let length = chord.norm();
+    if length == 0.0 {
+        return 0.0;
+    }
+    let direction = chord / length;
+    let (sin_from, cos_from) = (direction.perp(&from.tangent), direction.dot(&from.tangent));
+    let (sin_to, cos_to) = (-direction.perp(&to.tangent), direction.dot(&to.tangent));
+    if cos_from <= 0.0 || cos_to <= 0.0 {
+        return length;
+    }
+    let sin_sum = sin_from * cos_to + cos_from * sin_to;
+    if sin_from * sin_to > 0.0 {
+        length * (sin_from * sin_to / sin_sum).abs()
+    } else {
+        length * sin_from.abs().max(sin_to.abs())
+    }
+}
+
+/// The curve followed by its mirror image, the shared point once; a factor of -1 mirrors its coordinate.
+fn mirrored(half: &Polyline, factors: Vector2<f64>) -> Polyline {
+    // Adding zero turns -0.0 into 0.0.
+    let image = half.iter().rev().skip(1).map(|p| Point2::new(p.x * factors.x + 0.0, p.y * factors.y + 0.0));
+    half.iter().copied().chain(image).collect()
+}
+
+/// From a half that starts in the middle of the tooth space: from tip to tip, counter-clockwise.
+fn from_tip_to_tip(half: &Polyline) -> Polyline {
+    let image = half.iter().rev().map(|p| Point2::new(p.x, -p.y));
+    image.chain(half.iter().skip(1).copied()).collect()
+}
+
+fn repeated(tooth: &Polyline, ring_teeth: u64, extent: Extent) -> Polyline {
+    match extent {
+        Extent::Tooth => tooth.clone(),
+        Extent::Full => {
+            let open = &tooth[..tooth.len() - 1];
+            let turned = |copy: u64| {
+                let rotation = Rotation2::new(2.0 * PI * (copy as f64 / ring_teeth as f64));
+                open.iter().map(move |point| rotation * point)
+            };
+            closed(&(0..ring_teeth).flat_map(turned).collect())
+        }
+    }
+}
+
+/// The same curve with its first point as its last.
+fn closed(curve: &Polyline) -> Polyline {
+    let mut points = curve.clone();
+    if let (Some(&first), Some(last)) = (points.first(), points.last())
+        && *last != first
+    {
+        points.push(first);
+    }
+    points
+}

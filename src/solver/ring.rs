@@ -1,0 +1,240 @@
+//! The ring's flank: the outer parallel curve of the centres' path at the tooth radius (docs/theory.md section 2).
+
+use std::f64::consts::FRAC_PI_4;
+
+use nalgebra::{Point2, Unit, Vector2};
+
+use crate::locus::{Locus, ToothCenter};
+use crate::position::Position;
+use crate::root::{NotConverged, bracketed};
+
+/// The flank of the ring's teeth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RingFlank {
+    locus: Locus,
+    teeth_per_wave: f64,
+}
+
+/// The flank where a tooth touches it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FlankPoint {
+    /// `tan β = k T`, β the ring's pressure angle (its normal against the radius).
+    pub tan_pressure_angle: f64,
+    /// cos β.
+    pub cos_pressure_angle: f64,
+    /// `1 + rκ`, κ the curvature of the centres' path: positive on the flank, small where it comes near a cusp.
+    pub regularity: f64,
+}
+
+/// What ends the flank towards the tip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FlankEnd {
+    /// The minor axis: a regular tip.
+    RegularTip,
+    /// Undercut: both flanks of the ring's tooth cross on its symmetry line.
+    Undercut,
+    /// A bore at the tip-circle radius.
+    Bore,
+}
+
+/// Where and why the flank ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FlankLimit {
+    /// ψ_e: beyond it a tooth touches no ring.
+    pub position: Position,
+    /// What ends it.
+    pub end: FlankEnd,
+}
+
+impl RingFlank {
+    pub(crate) const fn new(locus: Locus, teeth_per_wave: f64) -> Self {
+        Self { locus, teeth_per_wave }
+    }
+
+    /// The path that the flank is parallel to.
+    pub const fn locus(&self) -> &Locus {
+        &self.locus
+    }
+
+    /// `k = Z_K / U`.
+    pub const fn teeth_per_wave(&self) -> f64 {
+        self.teeth_per_wave
+    }
+
+    /// The flank where `tooth` touches it.
+    pub fn at(&self, tooth: &ToothCenter) -> FlankPoint {
+        let k = self.teeth_per_wave;
+        let tan_pressure_angle = k * tooth.tan_pressure_angle;
+        let secant_squared = 1.0 + tan_pressure_angle * tan_pressure_angle;
+        let cos_pressure_angle = 1.0 / secant_squared.sqrt();
+        let turning = 1.0 + k * k * self.locus.tan_pressure_angle_derivative(tooth) / secant_squared;
+        let regularity = 1.0 + self.locus.tooth_radius_mm() * (cos_pressure_angle / tooth.center_radius_mm) * turning;
+        // Positive wherever a tooth meshes; nearer to zero than its own rounding it is not known, and a curvature of
+        // 1/0 or below would be neither.
+        let regularity = regularity.max(f64::EPSILON);
+        FlankPoint { tan_pressure_angle, cos_pressure_angle, regularity }
+    }
+
+    /// Angle of the contact point from the tooth's centre line, seen from the axis: `atan(r sin β / (d + r cos β))`.
+    pub fn lead_rad(&self, tooth: &ToothCenter, point: &FlankPoint) -> f64 {
+        let normal_mm = self.locus.tooth_radius_mm() * point.cos_pressure_angle;
+        (normal_mm * point.tan_pressure_angle / (tooth.center_radius_mm + normal_mm)).atan()
+    }
+
+    /// Angle of the contact point from the middle of the tooth space.
+    pub fn angle_from_space_rad(&self, tooth: &ToothCenter, point: &FlankPoint) -> f64 {
+        tooth.position.from_major_rad / self.teeth_per_wave + self.lead_rad(tooth, point)
+    }
+
+    /// Angle φ_K of the contact point from the symmetry line of the ring's tooth.
+    pub fn angle_from_tip_rad(&self, tooth: &ToothCenter, point: &FlankPoint) -> f64 {
+        tooth.position.from_minor_rad / self.teeth_per_wave - self.lead_rad(tooth, point)
+    }
+
+    /// Distance `R` of the contact point from the axis.
+    pub fn radius_mm(&self, tooth: &ToothCenter, point: &FlankPoint) -> f64 {
+        let normal_mm = self.locus.tooth_radius_mm() * point.cos_pressure_angle;
+        (tooth.center_radius_mm + normal_mm).hypot(normal_mm * point.tan_pressure_angle)
+    }
+
+    /// The contact point in the ring's frame.
+    pub fn point(&self, tooth: &ToothCenter, point: &FlankPoint) -> Point2<f64> {
+        let (sin, cos) = self.angle_from_space_rad(tooth, point).sin_cos();
+        Point2::from(Vector2::new(cos, sin) * self.radius_mm(tooth, point))
+    }
+
+    /// The tangent of flank and path alike, towards the tip, in the ring's frame.
+    pub fn tangent(&self, tooth: &ToothCenter, point: &FlankPoint) -> Unit<Vector2<f64>> {
+        let normal_rad = tooth.position.from_major_rad / self.teeth_per_wave + point.tan_pressure_angle.atan();
+        Unit::new_unchecked(Vector2::new(-normal_rad.sin(), normal_rad.cos()))
+    }
+
+    /// `(b + r)(1 + rκ)` at the tip: `b + 2r - r k² (a² - b²)/(a² + br)`.
+    fn tip_regularity_mm(&self) -> f64 {
+        let (a, b, r) = self.lengths();
+        let k = self.teeth_per_wave;
+        b + 2.0 * r - r * (k * k * self.locus.cam().difference_of_squares_mm2() / (a * a + b * r))
+    }
+
+    fn lengths(&self) -> (f64, f64, f64) {
+        let cam = self.locus.cam();
+        (cam.semi_major_mm(), cam.semi_minor_mm(), self.locus.tooth_radius_mm())
+    }
+
+    /// Whether the ring's tips are cut away by their own envelope: whether the parallel curve is irregular at the tip.
+    pub fn is_undercut(&self) -> bool {
+        self.tip_regularity_mm() < 0.0
+    }
+
+    /// The least tooth radius that undercuts: the lower root of
+    /// `2b r² + (b² + 2a² - k²(a² - b²)) r + a²b = 0`; none where the roots are not real.
+    pub fn critical_tooth_radius_mm(&self) -> Option<f64> {
+        let (a, b, _) = self.lengths();
+        let k = self.teeth_per_wave;
+        let linear = k * k * self.locus.cam().difference_of_squares_mm2() - b * b - 2.0 * a * a;
+        let least = 2.0 * std::f64::consts::SQRT_2 * a * b;
+        if linear < least {
+            return None;
+        }
+        // The stable form of the lower root: no difference of near values.
+        let root = ((linear - least) * (linear + least)).sqrt();
+        Some(2.0 * a * (a * b / (linear + root)))
+    }
+
+    /// Where the flank ends if nothing is bored away.
+    ///
+    /// The flank crosses the symmetry line of the ring's tooth where `tan(x/k)(d + r cos β) = r sin β`, `x = π/2 - ψ`.
+    /// Divided by `cos β sin x / k` the trivial root `x = 0` is gone, and at the threshold of undercut the
+    /// other one leaves from there like a square root.
+    ///
+    /// # Errors
+    /// [`NotConverged`] if the crossing is not found.
+    pub fn natural_limit(&self) -> Result<FlankLimit, NotConverged> {
+        if !self.is_undercut() {
+            return Ok(FlankLimit { position: Position::TIP, end: FlankEnd::RegularTip });
+        }
+        let k = self.teeth_per_wave;
+        let gap = |position: Position| -> Result<f64, NotConverged> {
+            let tooth = self.locus.at(position)?;
+            let point = self.at(&tooth);
+            let r = self.locus.tooth_radius_mm();
+            let widening = k * (position.from_minor_rad / k).tan() / position.cos;
+            Ok(widening * (tooth.center_radius_mm / point.cos_pressure_angle + r)
+                - r * k * k * (tooth.tan_pressure_angle / position.cos))
+        };
+        let position = self.crossing("end of the undercut flank", self.tip_regularity_mm(), gap)?;
+        Ok(FlankLimit { position, end: FlankEnd::Undercut })
+    }
+
+    /// Where the flank reaches the radius `bore_mm`, which lies between `b + 2r` and `a + 2r`.
+    ///
+    /// # Errors
+    /// [`NotConverged`] if the crossing is not found.
+    pub fn position_at_radius(&self, bore_mm: f64) -> Result<Position, NotConverged> {
+        let (a, b, r) = self.lengths();
+        let above_tip_mm = bore_mm - b - 2.0 * r;
+        let below_root_mm = a - bore_mm + 2.0 * r;
+        let above_tip_mm2 = above_tip_mm * (bore_mm + b + 2.0 * r);
+        let below_root_mm2 = below_root_mm * (bore_mm + a + 2.0 * r);
+        let excess = |position: Position| -> Result<f64, NotConverged> {
+            let tooth = self.locus.at(position)?;
+            Ok(if position.from_minor_rad < position.from_major_rad {
+                self.rise_above_tip_mm2(&tooth) - above_tip_mm2
+            } else {
+                below_root_mm2 - self.drop_below_root_mm2(&tooth)
+            })
+        };
+        self.crossing("flank at the bore", -above_tip_mm2, excess)
+    }
+
+    /// The position between tip and root where `function`, of negative value `at_tip` at the tip, changes its sign;
+    /// solved in the angle from whichever axis is nearer.
+    fn crossing(
+        &self,
+        what: &'static str,
+        at_tip: f64,
+        function: impl Fn(Position) -> Result<f64, NotConverged>,
+    ) -> Result<Position, NotConverged> {
+        let middle = function(Position::from_minor(FRAC_PI_4))?;
+        Ok(if middle > 0.0 {
+            Position::from_minor(bracketed(what, 0.0, at_tip, FRAC_PI_4, |x| function(Position::from_minor(x)))?)
+        } else {
+            Position::from_major(bracketed(what, FRAC_PI_4, middle, 0.0, |x| function(Position::from_major(x)))?)
+        })
+    }
+
+    /// `R² - (b + 2r)²`, free of cancellation but for that of the flank itself near the threshold of undercut.
+    fn rise_above_tip_mm2(&self, tooth: &ToothCenter) -> f64 {
+        let (a, b, r) = self.lengths();
+        let contact = &tooth.cam_contact;
+        let h = contact.support_mm;
+        let cos_squared = contact.normal_cos * contact.normal_cos;
+        // d² - (b + r)², with h² - b² = (a² - b²) cos²φ and h'² = (h² - b²)(a² - h²)/h².
+        let center_rise_mm2 =
+            self.locus.cam().difference_of_squares_mm2() * cos_squared * (2.0 * r / (h + b) + (a / h) * (a / h));
+        let center_rise_mm = center_rise_mm2 / (tooth.center_radius_mm + b + r);
+        let point = self.at(tooth);
+        center_rise_mm2 + 2.0 * r * (center_rise_mm * point.cos_pressure_angle - (b + r) * versine(&point))
+    }
+
+    /// `(a + 2r)² - R²`, a sum of positive terms.
+    fn drop_below_root_mm2(&self, tooth: &ToothCenter) -> f64 {
+        let (a, b, r) = self.lengths();
+        let contact = &tooth.cam_contact;
+        let h = contact.support_mm;
+        let sin_squared = contact.normal_sin * contact.normal_sin;
+        // (a + r)² - d², with a² - h² = (a² - b²) sin²φ.
+        let center_drop_mm2 =
+            self.locus.cam().difference_of_squares_mm2() * sin_squared * (2.0 * r / (a + h) + (b / h) * (b / h));
+        let center_drop_mm = center_drop_mm2 / (a + r + tooth.center_radius_mm);
+        let point = self.at(tooth);
+        center_drop_mm2 + 2.0 * r * (center_drop_mm + tooth.center_radius_mm * versine(&point))
+    }
+}
+
+/// `1 - cos β` without cancellation.
+fn versine(point: &FlankPoint) -> f64 {
+    let tan = point.tan_pressure_angle;
+    let cos = point.cos_pressure_angle;
+    (tan * cos) * (tan * cos) / (1.0 + cos)
+}

@@ -1,0 +1,113 @@
+//! Roots of one unknown inside a bracket: the two iterations that everything else uses.
+
+/// An iteration that hit its cap.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("{what}: no convergence within {iterations} iterations, the bracket is still {bracket_width} wide")]
+pub struct NotConverged {
+    /// What was solved for.
+    pub what: &'static str,
+    /// The cap.
+    pub iterations: u32,
+    /// Width of the bracket that was left.
+    pub bracket_width: f64,
+}
+
+/// Far above what is ever needed: bisection in the logarithm from the widest bracket that the ranges of
+/// the parameters allow (a/b = 1e12) takes below 60 steps, and a bisection stands behind every step.
+const MAX_ITERATIONS: u32 = 200;
+
+/// A function's value and derivative.
+#[derive(Debug, Clone, Copy)]
+pub struct ValueAndSlope {
+    /// The value.
+    pub value: f64,
+    /// The derivative.
+    pub slope: f64,
+}
+
+/// The root of an increasing function in `[low, high]`, `0 < low <= high`, by Newton's method from `guess`, with
+/// bisection in the logarithm where a step would leave the bracket or shrink too slowly.
+///
+/// # Errors
+/// [`NotConverged`] after 200 iterations.
+pub fn newton_in_bracket(
+    what: &'static str,
+    low: f64,
+    high: f64,
+    guess: f64,
+    function: impl Fn(f64) -> ValueAndSlope,
+) -> Result<f64, NotConverged> {
+    let (mut low, mut high) = (low, high);
+    let mut x = guess.clamp(low, high);
+    let mut last_step = f64::INFINITY;
+    for _ in 0..MAX_ITERATIONS {
+        let ValueAndSlope { value, slope } = function(x);
+        if value > 0.0 {
+            high = x;
+        } else if value < 0.0 {
+            low = x;
+        } else {
+            return Ok(x);
+        }
+        let newton = x - value / slope;
+        // The negated comparison also catches a slope of zero, where `newton` is not a number.
+        let next = if !(newton >= low && newton <= high) || (newton - x).abs() > 0.5 * last_step {
+            (low * high).sqrt()
+        } else {
+            newton
+        };
+        let step = (next - x).abs();
+        x = next;
+        if step <= f64::EPSILON * x || high - low <= f64::EPSILON * low {
+            return Ok(x);
+        }
+        last_step = step;
+    }
+    Err(NotConverged { what, iterations: MAX_ITERATIONS, bracket_width: high - low })
+}
+
+/// The root between `start`, where the function's value is known, and `end`, where it has the other sign:
+/// inverse quadratic interpolation where it is safe, bisection elsewhere (Chandrupatla 1997).
+///
+/// # Errors
+/// [`NotConverged`] after 200 iterations, or from `function` itself.
+pub fn bracketed(
+    what: &'static str,
+    start: f64,
+    value_at_start: f64,
+    end: f64,
+    function: impl Fn(f64) -> Result<f64, NotConverged>,
+) -> Result<f64, NotConverged> {
+    let (mut a, mut value_a) = (start, value_at_start);
+    let (mut b, mut value_b) = (end, function(end)?);
+    let (mut c, mut value_c);
+    let mut fraction = 0.5;
+    for _ in 0..MAX_ITERATIONS {
+        let x = a + fraction * (b - a);
+        let value = function(x)?;
+        // `a` is the newest point, `b` the nearest one of the other sign, `c` the one before.
+        if (value > 0.0) == (value_a > 0.0) {
+            (c, value_c) = (a, value_a);
+        } else {
+            (c, value_c, b, value_b) = (b, value_b, a, value_a);
+        }
+        (a, value_a) = (x, value);
+        let (best, least) = if value_a.abs() < value_b.abs() { (a, value_a) } else { (b, value_b) };
+        let width = (b - a).abs();
+        let tolerance = 0.5 * f64::EPSILON * best.abs() / width;
+        // Also true where the bracket has no width left and the quotient is infinite or not a number.
+        if least == 0.0 || !(tolerance < 0.5) {
+            return Ok(best);
+        }
+        let xi = (a - b) / (c - b);
+        let phi = (value_a - value_b) / (value_c - value_b);
+        fraction = if phi * phi < xi && (1.0 - phi) * (1.0 - phi) < 1.0 - xi {
+            value_a / (value_b - value_a) * (value_c / (value_b - value_c))
+                + (c - a) / (b - a) * (value_a / (value_c - value_a)) * (value_b / (value_c - value_b))
+        } else {
+            0.5
+        };
+        fraction = fraction.clamp(tolerance, 1.0 - tolerance);
+    }
+    Err(NotConverged { what, iterations: MAX_ITERATIONS, bracket_width: (b - a).abs() })
+}

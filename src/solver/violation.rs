@@ -1,0 +1,202 @@
+//! Reasons why a drive, a load or a request cannot exist.
+
+use crate::contact::{Contact, Part};
+
+/// A parameter that a violation can be about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Parameter {
+    /// `a`, mm.
+    SemiMajor,
+    /// `b`, mm.
+    SemiMinor,
+    /// `Z_G`.
+    ToothCount,
+    /// `Z'_G`.
+    InstalledTeeth,
+    /// `r`, mm.
+    ToothRadius,
+    /// `L1`, mm.
+    ToothWidth,
+    /// `Z_K`.
+    RingTeeth,
+    /// Tip-circle radius, mm.
+    TipRadius,
+    /// `E`, GPa.
+    YoungsModulus(Part),
+    /// ν.
+    PoissonsRatio(Part),
+    /// `M0`, N·m.
+    InputTorque,
+    /// Torque at the carrier, N·m.
+    OutputTorque,
+    /// Fixed stiffness, N/mm.
+    Stiffness(Contact),
+    /// Intervals of a sweep.
+    Samples,
+    /// Chord tolerance, mm.
+    ChordTolerance,
+}
+
+/// The range of a parameter and its unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Whether the ends themselves are allowed.
+    pub closed: bool,
+    /// Unit, empty for a pure number.
+    pub unit: &'static str,
+}
+
+impl Range {
+    const fn closed(low: f64, high: f64, unit: &'static str) -> Self {
+        Self { low, high, closed: true, unit }
+    }
+
+    /// The end that `value` is beyond, if it is; not-a-number is beyond the lower one.
+    pub fn limit_exceeded_by(&self, value: f64) -> Option<f64> {
+        let above_low = if self.closed { value >= self.low } else { value > self.low };
+        let below_high = if self.closed { value <= self.high } else { value < self.high };
+        if !above_low { Some(self.low) } else { (!below_high).then_some(self.high) }
+    }
+}
+
+/// Most teeth of carrier and ring.
+pub const MAX_TEETH: i64 = 10_000;
+
+/// Most intervals of a sweep.
+pub const MAX_SAMPLES: i64 = 10_000_000;
+
+impl Parameter {
+    /// The range that the parameter has to lie in.
+    pub const fn range(self) -> Range {
+        match self {
+            Self::SemiMajor
+            | Self::SemiMinor
+            | Self::ToothRadius
+            | Self::ToothWidth
+            | Self::TipRadius
+            | Self::ChordTolerance => Range::closed(1e-6, 1e6, "mm"),
+            Self::ToothCount | Self::InstalledTeeth | Self::RingTeeth => Range::closed(2.0, MAX_TEETH as f64, ""),
+            Self::YoungsModulus(_) => Range::closed(1e-3, 1e5, "GPa"),
+            Self::PoissonsRatio(_) => Range { low: -1.0, high: 0.5, closed: false, unit: "" },
+            Self::InputTorque | Self::OutputTorque => Range::closed(1e-12, 1e15, "N·m"),
+            Self::Stiffness(_) => Range::closed(1e-3, 1e15, "N/mm"),
+            Self::Samples => Range::closed(1.0, MAX_SAMPLES as f64, ""),
+        }
+    }
+
+    /// The violation of the parameter's range by `value`, if there is one.
+    pub fn check(self, value: f64) -> Option<Violation> {
+        let range = self.range();
+        let limit = range.limit_exceeded_by(value)?;
+        Some(Violation::OutOfRange { parameter: self, value, limit })
+    }
+}
+
+/// A reason why a drive, a load or a request cannot exist. Its text says what to change.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Violation {
+    /// A value outside its range.
+    OutOfRange {
+        /// Which.
+        parameter: Parameter,
+        /// Its value.
+        value: f64,
+        /// The end of the range that it is beyond.
+        limit: f64,
+    },
+    /// `a ≤ b`.
+    CamNotElongated {
+        /// `a`.
+        semi_major_mm: f64,
+        /// `b`.
+        semi_minor_mm: f64,
+    },
+    /// `|Z_G - Z_K| ≠ 2`.
+    ToothDifference {
+        /// `Z_G`.
+        teeth: i64,
+        /// `Z_K`.
+        ring_teeth: i64,
+    },
+    /// `Z'_G` odd.
+    InstalledOdd {
+        /// `Z'_G`.
+        installed: i64,
+    },
+    /// `Z'_G` no divisor of `Z_G`.
+    InstalledNoDivisor {
+        /// `Z'_G`.
+        installed: i64,
+        /// `Z_G`.
+        teeth: i64,
+    },
+    /// Neighbouring installed teeth touch somewhere on their path.
+    TeethTouch {
+        /// `2r`.
+        tooth_diameter_mm: f64,
+        /// Least distance of two neighbouring centres.
+        center_distance_mm: f64,
+    },
+    /// The ring's tips reach in to the wave generator: no annulus is left for the carrier.
+    NoCarrierAnnulus {
+        /// `a`.
+        semi_major_mm: f64,
+        /// The ring's actual tip radius.
+        tip_radius_mm: f64,
+    },
+    /// The bore takes the whole flank away.
+    BoreLeavesNoFlank {
+        /// The bore.
+        tip_radius_mm: f64,
+        /// `a + 2r`.
+        root_radius_mm: f64,
+    },
+}
+
+impl std::fmt::Display for Violation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match *self {
+            Self::OutOfRange { parameter, value, .. } => {
+                let Range { low, high, closed, unit } = parameter.range();
+                let bounds = if closed { "from" } else { "strictly between" };
+                let joint = if closed { "to" } else { "and" };
+                write!(f, "{value:?} is out of range: choose a value {bounds} {low:?} {joint} {high:?}")?;
+                if unit.is_empty() { Ok(()) } else { write!(f, " {unit}") }
+            }
+            Self::CamNotElongated { semi_major_mm, semi_minor_mm } => write!(
+                f,
+                "the semi-major axis ({semi_major_mm:?} mm) must exceed the semi-minor axis ({semi_minor_mm:?} mm): a round cam moves no tooth"
+            ),
+            Self::ToothDifference { teeth, ring_teeth } => write!(
+                f,
+                "carrier and ring must differ by 2 teeth, one for each lobe of the ellipse: with {teeth} teeth the ring has {} or {}, not {ring_teeth}",
+                teeth - 2,
+                teeth + 2
+            ),
+            Self::InstalledOdd { installed } => write!(
+                f,
+                "{installed} installed teeth are odd: the two meshing zones are alike only for an even number"
+            ),
+            Self::InstalledNoDivisor { installed, teeth } => write!(
+                f,
+                "{installed} installed teeth do not divide {teeth}: teeth are removed evenly, every m-th slot keeps its tooth"
+            ),
+            Self::TeethTouch { tooth_diameter_mm, center_distance_mm } => write!(
+                f,
+                "neighbouring teeth of {tooth_diameter_mm:?} mm diameter come as near as {center_distance_mm:?} mm from centre to centre: make the teeth thinner, install fewer, or enlarge the wave generator"
+            ),
+            Self::NoCarrierAnnulus { semi_major_mm, tip_radius_mm } => write!(
+                f,
+                "the ring's tips ({tip_radius_mm:?} mm) must stay outside the wave generator ({semi_major_mm:?} mm), or no annulus is left for the carrier: make the teeth thicker or the ellipse rounder"
+            ),
+            Self::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => write!(
+                f,
+                "a bore of {tip_radius_mm:?} mm takes the whole flank away: choose less than the root radius of {root_radius_mm:?} mm"
+            ),
+        }
+    }
+}
