@@ -1,1 +1,19 @@
-//! x
+//! toothwave: the calculation service for discrete-tooth harmonic drives.
+//!
+//! A request walks one way: document → drive → key → cache → solver → columns → bytes. This crate is HTTP and the command
+//! line; every formula is in `toothwave_solver`.
+
+pub mod api;
+pub mod cache;
+pub mod cli;
+pub mod compute;
+pub mod config;
+pub mod design;
+pub mod examples;
+pub mod findings;
+pub mod json;
+pub mod negotiation;
+pub mod observe;
+pub mod problem;
+pub mod router;
+pub mod serve;

@@ -1,1 +1,7 @@
-fn main() {}
+//! The `toothwave` binary.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    toothwave::cli::run()
+}

@@ -95,8 +95,7 @@ pub fn bracketed(
         let (best, least) = if value_a.abs() < value_b.abs() { (a, value_a) } else { (b, value_b) };
         let width = (b - a).abs();
         let tolerance = 0.5 * f64::EPSILON * best.abs() / width;
-        // Also true where the bracket has no width left and the quotient is infinite or not a number.
-        if least == 0.0 || !(tolerance < 0.5) {
+        if least == 0.0 || width == 0.0 || tolerance >= 0.5 {
             return Ok(best);
         }
         let xi = (a - b) / (c - b);

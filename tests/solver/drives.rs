@@ -6,7 +6,7 @@ use toothwave_solver::{
 };
 
 /// The paper's case 5.1: no undercut.
-pub const PAPER_5_1: DriveParameters = DriveParameters {
+pub(crate) const PAPER_5_1: DriveParameters = DriveParameters {
     semi_major_mm: 58.0,
     semi_minor_mm: 56.0,
     teeth: 28,
@@ -18,7 +18,7 @@ pub const PAPER_5_1: DriveParameters = DriveParameters {
 };
 
 /// The paper's case 5.2: undercut, every second slot filled.
-pub const PAPER_5_2: DriveParameters = DriveParameters {
+pub(crate) const PAPER_5_2: DriveParameters = DriveParameters {
     semi_major_mm: 50.7,
     semi_minor_mm: 49.3,
     teeth: 80,
@@ -30,14 +30,14 @@ pub const PAPER_5_2: DriveParameters = DriveParameters {
 };
 
 /// Case 5.2 with the bore that reproduces the paper's figures 20-25.
-pub const PAPER_5_2_BORED: DriveParameters = DriveParameters { tip_radius_mm: Some(52.8227), ..PAPER_5_2 };
+pub(crate) const PAPER_5_2_BORED: DriveParameters = DriveParameters { tip_radius_mm: Some(52.8227), ..PAPER_5_2 };
 
-pub fn drive(parameters: &DriveParameters) -> Drive {
+pub(crate) fn drive(parameters: &DriveParameters) -> Drive {
     Drive::new(parameters).expect("a possible drive")
 }
 
 /// Steel throughout, linear stiffness.
-pub fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParameters {
+pub(crate) fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParameters {
     LoadParameters {
         materials: Materials {
             wave_generator: Material::STEEL,
@@ -51,7 +51,7 @@ pub fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParameters {
     }
 }
 
-pub fn swept(parameters: &DriveParameters, load: &LoadParameters, samples: u64) -> Sweep {
+pub(crate) fn swept(parameters: &DriveParameters, load: &LoadParameters, samples: u64) -> Sweep {
     let load = LoadCase::new(load).expect("a possible load");
     sweep::sweep(&drive(parameters), &load, samples, &Never).expect("a solvable sweep")
 }

@@ -1,4 +1,6 @@
 //! What is true of drives: against closed forms, independent constructions and a 60-digit calculation.
+#![allow(clippy::float_cmp, clippy::unwrap_used, reason = "tests compare exactly where values are exact")]
 
 mod drives;
 mod paper;
+mod reference;

@@ -1,0 +1,287 @@
+//! The endpoints: one file each, with its answer's type and its handler. What they share, the walk from document to bytes,
+//! stands here.
+
+use std::io::{self, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use axum::body::Body;
+use axum::extract::Request;
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use serde::Serialize;
+use toothwave_solver::drive::DriveError;
+use toothwave_solver::{Drive, Violation};
+use utoipa::IntoResponses;
+
+use crate::cache::{Cache, Key, Served, Stored};
+use crate::compute::Pool;
+use crate::config::Limits;
+use crate::design::Design;
+use crate::json;
+use crate::negotiation::{self, Format, Representation};
+use crate::problem::{Problem, ProblemCode};
+
+pub mod coincidence_degree;
+pub mod geometry;
+pub mod side;
+pub mod sweep;
+
+/// What handlers share.
+#[derive(Debug, Clone)]
+pub struct App {
+    /// Limits of the service.
+    pub limits: Limits,
+    /// Where solves run.
+    pub pool: Pool,
+    /// Finished answers.
+    pub cache: Cache,
+    /// Whether the service wants requests: false while it drains.
+    pub ready: Arc<AtomicBool>,
+}
+
+impl App {
+    /// An idle service within these limits.
+    pub fn new(limits: Limits) -> Self {
+        Self {
+            limits,
+            pool: Pool::new(limits),
+            cache: Cache::new(limits.cache_max_bytes),
+            ready: Arc::new(AtomicBool::new(true)),
+        }
+    }
+}
+
+/// A question that a design document can be put to.
+pub trait Endpoint {
+    /// Its name, as command and in the cache's key.
+    const NAME: &'static str;
+    /// The formats that it answers in over HTTP, the first by default.
+    const FORMATS: &'static [Format];
+    /// The checked parameters that the answer follows from.
+    type Question: Send + 'static;
+    /// The answer; its serialisation is the JSON that goes over the wire.
+    type Answer: Serialize + Tabular;
+
+    /// The parts of a normalised document that the answer depends on.
+    fn reads(design: &Design) -> impl Serialize + '_;
+
+    /// Checks those parts, reporting every impossible value.
+    ///
+    /// # Errors
+    /// A problem that names the fields at fault.
+    fn question(design: &Design, limits: &Limits) -> Result<Self::Question, Problem>;
+
+    /// Solves.
+    ///
+    /// # Errors
+    /// A problem where there is no answer, or where `stop` was set.
+    fn answer(question: &Self::Question, stop: &AtomicBool) -> Result<Self::Answer, Problem>;
+}
+
+/// An answer's forms beside JSON.
+pub trait Tabular {
+    /// As CSV, with the names of the JSON's columns.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()>;
+
+    /// As text for a terminal.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    fn write_table(&self, writer: &mut dyn Write) -> io::Result<()>;
+}
+
+/// The statuses that every solving endpoint can answer with beside 200 and 304.
+#[derive(IntoResponses)]
+pub enum Problems {
+    /// The body is no JSON.
+    #[response(status = 400, content_type = "application/problem+json")]
+    Malformed(#[to_schema] Problem),
+    /// No representation that the client accepts.
+    #[response(status = 406, content_type = "application/problem+json")]
+    NotAcceptable(#[to_schema] Problem),
+    /// The body did not arrive in time.
+    #[response(status = 408, content_type = "application/problem+json")]
+    RequestTimeout(#[to_schema] Problem),
+    /// The body exceeds `max_body_bytes`.
+    #[response(status = 413, content_type = "application/problem+json")]
+    BodyTooLarge(#[to_schema] Problem),
+    /// The body is not sent as plain JSON.
+    #[response(status = 415, content_type = "application/problem+json")]
+    UnsupportedMediaType(#[to_schema] Problem),
+    /// JSON that is no design document, or describes no possible drive, load or request.
+    #[response(status = 422, content_type = "application/problem+json")]
+    Unprocessable(#[to_schema] Problem),
+    /// A fault of the service itself.
+    #[response(status = 500, content_type = "application/problem+json")]
+    Internal(#[to_schema] Problem),
+    /// The service is full, or the deadline stopped the computation; `Retry-After` says when to try again.
+    #[response(status = 503, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))]
+    Unavailable(#[to_schema] Problem),
+}
+
+/// The walk of a request: document → question → key → cache → solver → bytes.
+pub async fn respond<E: Endpoint>(app: App, request: Request) -> Response {
+    match walk::<E>(app, request).await {
+        Ok(response) => response,
+        Err(problem) => problem.into_response(),
+    }
+}
+
+async fn walk<E: Endpoint>(app: App, request: Request) -> Result<Response, Problem> {
+    let (parts, body) = request.into_parts();
+    negotiation::require_json(&parts.headers)?;
+    let representation = Representation::negotiate(&parts.headers, E::FORMATS)?;
+    let body = read_body(&parts.headers, body, &app.limits).await?;
+    let design = json::read::<Design>(&body)?.normalised();
+    let question = E::question(&design, &app.limits)?;
+    let key = Key::new(E::NAME, &E::reads(&design), representation)?;
+    let etag = key.etag();
+    tracing::Span::current().record("design", tracing::field::display(key));
+    if negotiation::is_not_modified(&parts.headers, &etag) {
+        return Ok(not_modified(&etag, Served::Hit));
+    }
+    let pool = app.pool.clone();
+    let solve = async move { pool.run(move |stop| solve::<E>(&question, representation, stop)).await };
+    let (stored, served) = app.cache.get_or_solve(key, solve).await?;
+    if negotiation::matches_any(&parts.headers) {
+        return Ok(not_modified(&etag, served));
+    }
+    Ok(found(stored, served, representation, &etag))
+}
+
+async fn read_body(headers: &HeaderMap, body: Body, limits: &Limits) -> Result<bytes::Bytes, Problem> {
+    let limit = limits.max_body_bytes;
+    let too_large = |found: String| {
+        Problem::new(
+            ProblemCode::BodyTooLarge,
+            format!("the body has {found}, more than the {limit} bytes of `max_body_bytes`"),
+        )
+    };
+    let announced = headers.get(header::CONTENT_LENGTH).and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
+    if let Some(length) = announced.filter(|&length| length > limit as u64) {
+        return Err(too_large(format!("{length} bytes")));
+    }
+    let reading = axum::body::to_bytes(body, limit);
+    let arrived = tokio::time::timeout(Duration::from_millis(limits.deadline_ms), reading).await;
+    let arrived = arrived.map_err(|_| {
+        let detail = format!("the body did not arrive within {} ms", limits.deadline_ms);
+        Problem::new(ProblemCode::RequestTimeout, detail)
+    })?;
+    // What else can go wrong here is a client that left, which nobody is told of.
+    arrived.map_err(|_| too_large(format!("more than {limit} bytes")))
+}
+
+/// Solves and writes the final bytes, on a blocking thread.
+fn solve<E: Endpoint>(
+    question: &E::Question,
+    representation: Representation,
+    stop: &AtomicBool,
+) -> Result<Stored, Problem> {
+    let started = Instant::now();
+    let answer = E::answer(question, stop)?;
+    let solve = started.elapsed();
+    let writer = Stoppable { inner: Vec::new(), stop };
+    let written = if representation.gzip {
+        let mut encoder = GzEncoder::new(writer, Compression::fast());
+        write(&answer, representation.format, &mut encoder).and_then(|()| encoder.finish())
+    } else {
+        let mut writer = writer;
+        write(&answer, representation.format, &mut writer).map(|()| writer)
+    };
+    match written {
+        Ok(writer) => Ok(Stored { body: writer.inner.into(), solve }),
+        Err(_) if stop.load(Ordering::Relaxed) => Err(toothwave_solver::SolveError::Stopped.into()),
+        Err(error) => Err(Problem::internal(&error)),
+    }
+}
+
+fn write(answer: &(impl Serialize + Tabular), format: Format, writer: &mut impl Write) -> io::Result<()> {
+    match format {
+        Format::Json => Ok(serde_json::to_writer(writer, answer)?),
+        Format::Csv => answer.write_csv(writer),
+    }
+}
+
+/// A buffer that fails once the stop signal is set, so that writing a large answer stops too.
+struct Stoppable<'a> {
+    inner: Vec<u8>,
+    stop: &'a AtomicBool,
+}
+
+impl Write for Stoppable<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.stop.load(Ordering::Relaxed) {
+            return Err(io::Error::other("stopped"));
+        }
+        self.inner.extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+fn found(stored: Stored, served: Served, representation: Representation, etag: &str) -> Response {
+    let mut response = (StatusCode::OK, stored.body).into_response();
+    let headers = response.headers_mut();
+    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(representation.format.content_type()));
+    if representation.gzip {
+        headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+    }
+    let timing = format!("solve;dur={:.3}", 1e3 * stored.solve.as_secs_f64());
+    if let Ok(timing) = HeaderValue::from_str(&timing) {
+        headers.insert("server-timing", timing);
+    }
+    caching(response, served, etag)
+}
+
+fn not_modified(etag: &str, served: Served) -> Response {
+    caching(StatusCode::NOT_MODIFIED.into_response(), served, etag)
+}
+
+/// The headers about caching that 200 and 304 share.
+fn caching(mut response: Response, served: Served, etag: &str) -> Response {
+    response.extensions_mut().insert(served);
+    let headers = response.headers_mut();
+    if let Ok(etag) = HeaderValue::from_str(etag) {
+        headers.insert(header::ETAG, etag);
+    }
+    headers.insert(header::VARY, HeaderValue::from_static("accept, accept-encoding"));
+    headers.insert("cache-status", HeaderValue::from_static(served.cache_status()));
+    response
+}
+
+/// Guards the promise that no answer holds anything but numbers: serde_json would write `null` and say nothing.
+///
+/// # Errors
+/// An internal problem.
+fn require_finite<'a>(columns: impl IntoIterator<Item = &'a Vec<f64>>) -> Result<(), Problem> {
+    if columns.into_iter().all(|column| column.iter().all(|value| value.is_finite())) {
+        Ok(())
+    } else {
+        Err(Problem::internal(&"a result is not finite"))
+    }
+}
+
+/// The drive of a document; an impossible one adds its violations to the others.
+///
+/// # Errors
+/// An internal problem where the geometry does not converge.
+fn checked_drive(design: &Design, violations: &mut Vec<Violation>) -> Result<Option<Drive>, Problem> {
+    match Drive::new(&design.drive_parameters()) {
+        Ok(drive) => Ok(Some(drive)),
+        Err(DriveError::Impossible(found)) => {
+            violations.extend(found);
+            Ok(None)
+        }
+        Err(error @ DriveError::NotConverged(_)) => Err(error.into()),
+    }
+}

@@ -1,0 +1,145 @@
+//! Final bytes by the parameters that made them: key, single flight, weight.
+
+use std::future::Future;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use bytes::Bytes;
+use serde::Serialize;
+use tracing::Instrument;
+
+use crate::negotiation::Representation;
+use crate::problem::Problem;
+
+/// A hash of everything that an answer's bytes depend on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Key([u8; 32]);
+
+impl Key {
+    /// The key of an endpoint's answer to `parameters`, which are normalised, in one representation.
+    ///
+    /// # Errors
+    /// An internal problem if the parameters do not serialise.
+    pub fn new(endpoint: &str, parameters: &impl Serialize, representation: Representation) -> Result<Self, Problem> {
+        let parts = (toothwave_solver::VERSION, endpoint, parameters, representation);
+        let bytes = postcard::to_stdvec(&parts).map_err(|error| Problem::internal(&error))?;
+        Ok(Self(blake3::hash(&bytes).into()))
+    }
+
+    /// The strong entity tag of the representation: the answer's bytes follow from the key alone.
+    pub fn etag(&self) -> String {
+        format!("\"{self}\"")
+    }
+}
+
+impl std::fmt::Display for Key {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        // Half of the hash is enough to tell every design ever asked for apart.
+        self.0[..16].iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
+/// A finished answer.
+#[derive(Debug, Clone)]
+pub struct Stored {
+    /// The body, encoded as its representation says.
+    pub body: Bytes,
+    /// How long the solve took.
+    pub solve: Duration,
+}
+
+/// How an answer came about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Served {
+    /// From the cache.
+    Hit,
+    /// Solved for this request.
+    Miss,
+    /// Solved for another request that came first and asked the same.
+    Collapsed,
+}
+
+impl Served {
+    /// As `Cache-Status` has it (RFC 9211).
+    pub const fn cache_status(self) -> &'static str {
+        match self {
+            Self::Hit => "toothwave; hit",
+            Self::Miss => "toothwave; fwd=miss; stored",
+            Self::Collapsed => "toothwave; fwd=miss; collapsed",
+        }
+    }
+
+    /// As metrics have it.
+    pub const fn label(self) -> &'static str {
+        match self {
+            Self::Hit => "hit",
+            Self::Miss => "miss",
+            Self::Collapsed => "collapsed",
+        }
+    }
+}
+
+/// Answers by key, bounded by their bytes.
+#[derive(Debug, Clone)]
+pub struct Cache(moka::future::Cache<Key, Stored>);
+
+/// What an entry costs beside its body.
+const ENTRY_OVERHEAD_BYTES: usize = 256;
+
+impl Cache {
+    /// A cache of at most `max_bytes`.
+    pub fn new(max_bytes: u64) -> Self {
+        let cache = moka::future::Cache::builder()
+            .max_capacity(max_bytes)
+            // A body beyond 4 GiB weighs as much as can be said, and is not kept.
+            .weigher(|_, stored: &Stored| u32::try_from(stored.body.len() + ENTRY_OVERHEAD_BYTES).unwrap_or(u32::MAX))
+            .build();
+        Self(cache)
+    }
+
+    /// Bytes and entries kept now, eviction under way not counted.
+    pub fn size(&self) -> CacheSize {
+        CacheSize { bytes: self.0.weighted_size(), entries: self.0.entry_count() }
+    }
+
+    /// The answer under `key`; where there is none, `solve` makes it, once for all who ask meanwhile.
+    ///
+    /// The flight runs in a task of its own: when the client that started it leaves, those who joined do not start over, and
+    /// the deadline bounds what is computed for nobody.
+    ///
+    /// # Errors
+    /// What `solve` returns; failures are not kept.
+    pub async fn get_or_solve(
+        &self,
+        key: Key,
+        solve: impl Future<Output = Result<Stored, Problem>> + Send + 'static,
+    ) -> Result<(Stored, Served), Problem> {
+        if let Some(stored) = self.0.get(&key).await {
+            return Ok((stored, Served::Hit));
+        }
+        let is_own = Arc::new(AtomicBool::new(false));
+        let started = Arc::clone(&is_own);
+        let cache = self.0.clone();
+        let flight = async move {
+            let solve = async {
+                started.store(true, Ordering::Relaxed);
+                solve.await
+            };
+            cache.try_get_with(key, solve).await
+        };
+        let joined = tokio::spawn(flight.in_current_span()).await;
+        let stored = joined.map_err(|panic| Problem::internal(&panic))?.map_err(Arc::unwrap_or_clone)?;
+        let served = if is_own.load(Ordering::Relaxed) { Served::Miss } else { Served::Collapsed };
+        Ok((stored, served))
+    }
+}
+
+/// How full the cache is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CacheSize {
+    /// Bytes.
+    pub bytes: u64,
+    /// Entries.
+    pub entries: u64,
+}

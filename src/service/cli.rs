@@ -1,0 +1,184 @@
+//! The command line: the service, the same answers without it, and what containers need.
+
+use std::fs::File;
+use std::io::{self, Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use tracing_subscriber::EnvFilter;
+
+use crate::api::Tabular as _;
+use crate::api::{Endpoint, coincidence_degree::CoincidenceDegree, geometry::Geometry, sweep::Sweep};
+use crate::config::{Limits, Settings};
+use crate::design::Design;
+use crate::problem::Problem;
+use crate::{json, router, serve};
+
+/// Bad input, as most tools have it.
+const EXIT_BAD_INPUT: u8 = 2;
+
+/// Forces and contact stresses of discrete-tooth harmonic drives.
+#[derive(Debug, Parser)]
+#[command(name = "toothwave", version, args_conflicts_with_subcommands = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    serve: Settings,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Serve over HTTP; what happens without a command too
+    Serve(Box<Settings>),
+    /// Profiles of the mating parts
+    Geometry(Offline),
+    /// How many teeth share the load
+    CoincidenceDegree(Offline),
+    /// Forces and contact stresses over one period
+    Sweep(Offline),
+    /// Ask a running service whether it is well; exit status 0 if so
+    Health {
+        /// Where it listens
+        #[arg(long, env = "TOOTHWAVE_LISTEN", value_name = "ADDR", default_value = "127.0.0.1:8080")]
+        address: SocketAddr,
+    },
+    /// Print the API document
+    Openapi,
+}
+
+#[derive(Debug, Args)]
+struct Offline {
+    /// A design document, or `-` for standard input
+    file: PathBuf,
+    /// Form of the answer
+    #[arg(long, value_enum, default_value_t = OutputFormat::Table)]
+    format: OutputFormat,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum OutputFormat {
+    /// As the service answers
+    Json,
+    /// Columns
+    Csv,
+    /// For a terminal
+    Table,
+}
+
+/// Runs the command that the process was started with.
+pub fn run() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match cli.command {
+        None => run_service(&cli.serve),
+        Some(Command::Serve(settings)) => run_service(&settings),
+        Some(Command::Geometry(offline)) => answer::<Geometry>(&offline),
+        Some(Command::CoincidenceDegree(offline)) => answer::<CoincidenceDegree>(&offline),
+        Some(Command::Sweep(offline)) => answer::<Sweep>(&offline),
+        Some(Command::Health { address }) => health(address),
+        Some(Command::Openapi) => print(|writer| writer.write_all(router::openapi_json().as_bytes())),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Failure::BadInput(text)) => {
+            eprintln!("toothwave: {text}");
+            ExitCode::from(EXIT_BAD_INPUT)
+        }
+        Err(Failure::Io(error)) => {
+            eprintln!("toothwave: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+#[derive(Debug)]
+enum Failure {
+    /// The document is at fault.
+    BadInput(String),
+    /// The surroundings are.
+    Io(io::Error),
+}
+
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        Self::Io(error)
+    }
+}
+
+impl From<Problem> for Failure {
+    fn from(problem: Problem) -> Self {
+        Self::BadInput(problem.to_string())
+    }
+}
+
+fn run_service(settings: &Settings) -> Result<(), Failure> {
+    let filter = EnvFilter::try_new(&settings.log)
+        .map_err(|error| Failure::BadInput(format!("the log filter cannot be read: {error}")))?;
+    tracing_subscriber::fmt().json().with_env_filter(filter).with_writer(io::stderr).init();
+    let runtime = tokio::runtime::Runtime::new()?;
+    let result = runtime.block_on(serve::serve(settings));
+    // A solve beyond its bound must not hold up the exit.
+    runtime.shutdown_background();
+    result.map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", settings.listen)).into())
+}
+
+/// Without a server only the document itself limits what is computed.
+const UNLIMITED: Limits = Limits {
+    max_states: u64::MAX,
+    max_profile_points: u64::MAX,
+    max_body_bytes: usize::MAX,
+    max_concurrent_solves: 1,
+    max_queued_solves: 0,
+    deadline_ms: u64::MAX,
+    cache_max_bytes: 0,
+};
+
+fn answer<E: Endpoint>(offline: &Offline) -> Result<(), Failure> {
+    let mut text = Vec::new();
+    if offline.file.as_os_str() == "-" {
+        io::stdin().read_to_end(&mut text)?;
+    } else {
+        File::open(&offline.file)
+            .and_then(|mut file| file.read_to_end(&mut text))
+            .map_err(|error| Failure::BadInput(format!("{}: {error}", offline.file.display())))?;
+    }
+    let design = json::read::<Design>(&text).map_err(Problem::from)?.normalised();
+    let question = E::question(&design, &UNLIMITED)?;
+    let answer = E::answer(&question, &AtomicBool::new(false))?;
+    print(|writer| match offline.format {
+        OutputFormat::Json => {
+            serde_json::to_writer(&mut *writer, &answer)?;
+            writeln!(writer)
+        }
+        OutputFormat::Csv => answer.write_csv(writer),
+        OutputFormat::Table => answer.write_table(writer),
+    })
+}
+
+/// Writes to standard output; a reader that has seen enough is no failure.
+fn print(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
+    let mut writer = io::BufWriter::new(io::stdout().lock());
+    match write(&mut writer).and_then(|()| writer.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
+}
+
+fn health(mut address: SocketAddr) -> Result<(), Failure> {
+    const PATIENCE: Duration = Duration::from_secs(2);
+    if address.ip().is_unspecified() {
+        // What listens everywhere also answers here.
+        address.set_ip(if address.is_ipv4() { [127, 0, 0, 1].into() } else { std::net::Ipv6Addr::LOCALHOST.into() });
+    }
+    let mut stream = TcpStream::connect_timeout(&address, PATIENCE)?;
+    stream.set_read_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    write!(stream, "GET /health/live HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n")?;
+    let mut head = [0; 12];
+    stream.read_exact(&mut head)?;
+    if head == *b"HTTP/1.1 200" { Ok(()) } else { Err(io::Error::other("the service is not well").into()) }
+}

@@ -1,0 +1,98 @@
+//! The only place that leaves the async executor: permits, a bounded queue, the deadline, cancellation.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use metrics::{counter, histogram};
+use tokio::sync::Semaphore;
+use tokio::time::Instant;
+use tracing::Span;
+
+use crate::config::Limits;
+use crate::problem::{Problem, ProblemCode};
+
+/// Runs solves on blocking threads, a bounded number at once and a bounded number waiting.
+#[derive(Debug, Clone)]
+pub struct Pool {
+    /// One for each solve that runs.
+    permits: Arc<Semaphore>,
+    /// One for each solve that runs or waits.
+    places: Arc<Semaphore>,
+    limits: Limits,
+}
+
+impl Pool {
+    /// A pool within these limits.
+    pub fn new(limits: Limits) -> Self {
+        Self {
+            permits: Arc::new(Semaphore::new(limits.max_concurrent_solves)),
+            places: Arc::new(Semaphore::new(limits.max_concurrent_solves + limits.max_queued_solves)),
+            limits,
+        }
+    }
+
+    /// Solves that run now.
+    pub fn running(&self) -> usize {
+        self.limits.max_concurrent_solves - self.permits.available_permits()
+    }
+
+    /// Solves that run or wait now.
+    pub fn admitted(&self) -> usize {
+        self.limits.max_concurrent_solves + self.limits.max_queued_solves - self.places.available_permits()
+    }
+
+    /// Runs `job` and hands it the signal that stops it at the deadline.
+    ///
+    /// # Errors
+    /// `queue_full` at once where no place is free, `deadline_exceeded` when the time is over, `internal_error` where
+    /// the job panicked, and whatever the job returns.
+    pub async fn run<T: Send + 'static>(
+        &self,
+        job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let deadline = Instant::now() + Duration::from_millis(self.limits.deadline_ms);
+        let Ok(place) = Arc::clone(&self.places).try_acquire_owned() else {
+            counter!("toothwave_refusals_total", "reason" => "queue_full").increment(1);
+            return Err(self.queue_full());
+        };
+        let waited = tokio::time::timeout_at(deadline, Arc::clone(&self.permits).acquire_owned()).await;
+        let Ok(permit) = waited else { return Err(self.deadline_exceeded()) };
+        let stop = Arc::new(AtomicBool::new(false));
+        let signal = Arc::clone(&stop);
+        // spawn_blocking loses the span, and cannot be aborted: span, permit and place go along.
+        let span = Span::current();
+        let running = tokio::task::spawn_blocking(move || {
+            let _held = (place, permit);
+            let started = Instant::now();
+            let result = span.in_scope(|| job(&signal));
+            histogram!("toothwave_solve_duration_seconds").record(started.elapsed());
+            result
+        });
+        match tokio::time::timeout_at(deadline, running).await {
+            Ok(Ok(Err(Problem { code: ProblemCode::DeadlineExceeded, .. }))) | Err(_) => {
+                stop.store(true, Ordering::Relaxed);
+                Err(self.deadline_exceeded())
+            }
+            Ok(Ok(result)) => result,
+            Ok(Err(panic)) => Err(Problem::internal(&panic)),
+        }
+    }
+
+    fn queue_full(&self) -> Problem {
+        let Limits { max_concurrent_solves, max_queued_solves, .. } = self.limits;
+        let detail = format!(
+            "{max_concurrent_solves} solves run and {max_queued_solves} wait, as many as the service admits; try again in a moment"
+        );
+        Problem::new(ProblemCode::QueueFull, detail)
+    }
+
+    fn deadline_exceeded(&self) -> Problem {
+        counter!("toothwave_refusals_total", "reason" => "deadline_exceeded").increment(1);
+        let detail = format!(
+            "the computation did not finish within {} ms, waiting included; ask for less or try again in a moment",
+            self.limits.deadline_ms
+        );
+        Problem::new(ProblemCode::DeadlineExceeded, detail)
+    }
+}

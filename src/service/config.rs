@@ -1,0 +1,100 @@
+//! Settings of the service: each a flag and a `TOOTHWAVE_…` variable.
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::num::NonZeroUsize;
+use std::time::Duration;
+
+use clap::Args;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// The settings of `toothwave serve`.
+#[derive(Debug, Clone, Args)]
+pub struct Settings {
+    /// Address and port to listen on
+    #[arg(long, env = "TOOTHWAVE_LISTEN", value_name = "ADDR", default_value_t = SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)))]
+    pub listen: SocketAddr,
+
+    /// Largest request body
+    #[arg(long, env = "TOOTHWAVE_MAX_BODY_BYTES", value_name = "BYTES", default_value_t = 65_536)]
+    pub max_body_bytes: usize,
+
+    /// Most states of a sweep
+    #[arg(long, env = "TOOTHWAVE_MAX_STATES", value_name = "N", default_value_t = 1_000_000)]
+    pub max_states: u64,
+
+    /// Most points of all profiles of a geometry
+    #[arg(long, env = "TOOTHWAVE_MAX_PROFILE_POINTS", value_name = "N", default_value_t = 1_000_000)]
+    pub max_profile_points: u64,
+
+    /// Solves that run at once [default: the cores that the process may use]
+    #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_SOLVES", value_name = "N")]
+    pub max_concurrent_solves: Option<NonZeroUsize>,
+
+    /// Solves that may wait for their turn
+    #[arg(long, env = "TOOTHWAVE_MAX_QUEUED_SOLVES", value_name = "N", default_value_t = 32)]
+    pub max_queued_solves: usize,
+
+    /// Milliseconds from a request's arrival after which its computation is stopped
+    #[arg(long, env = "TOOTHWAVE_DEADLINE_MS", value_name = "MS", default_value_t = 10_000)]
+    pub deadline_ms: u64,
+
+    /// Most bytes of answers that the cache keeps
+    #[arg(long, env = "TOOTHWAVE_CACHE_MAX_BYTES", value_name = "BYTES", default_value_t = 268_435_456)]
+    pub cache_max_bytes: u64,
+
+    /// Origin that browsers may call from, or `*`; may be given several times, in the variable separated by commas
+    #[arg(long = "cors-origin", env = "TOOTHWAVE_CORS_ORIGINS", value_name = "ORIGIN", value_delimiter = ',')]
+    pub cors_origins: Vec<String>,
+
+    /// Milliseconds that running requests get to finish after a signal to stop
+    #[arg(long, env = "TOOTHWAVE_SHUTDOWN_MS", value_name = "MS", default_value_t = 10_000)]
+    pub shutdown_ms: u64,
+
+    /// What is logged, as tracing-subscriber's EnvFilter reads it
+    #[arg(long, env = "TOOTHWAVE_LOG", value_name = "FILTER", default_value = "info")]
+    pub log: String,
+}
+
+/// The limits that a client can read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+pub struct Limits {
+    /// Most states of a sweep.
+    pub max_states: u64,
+    /// Most points of all profiles of a geometry.
+    pub max_profile_points: u64,
+    /// Largest request body.
+    pub max_body_bytes: usize,
+    /// Solves that run at once.
+    pub max_concurrent_solves: usize,
+    /// Solves that may wait for their turn.
+    pub max_queued_solves: usize,
+    /// Milliseconds from a request's arrival after which its computation is stopped.
+    pub deadline_ms: u64,
+    /// Most bytes of answers that the cache keeps.
+    pub cache_max_bytes: u64,
+}
+
+impl Settings {
+    /// The limits among the settings.
+    pub fn limits(&self) -> Limits {
+        let max_concurrent_solves = self
+            .max_concurrent_solves
+            .or_else(|| std::thread::available_parallelism().ok())
+            .map_or(1, NonZeroUsize::get);
+        Limits {
+            max_states: self.max_states,
+            max_profile_points: self.max_profile_points,
+            max_body_bytes: self.max_body_bytes,
+            max_concurrent_solves,
+            max_queued_solves: self.max_queued_solves,
+            deadline_ms: self.deadline_ms,
+            cache_max_bytes: self.cache_max_bytes,
+        }
+    }
+
+    /// The bound on a shutdown.
+    pub const fn shutdown(&self) -> Duration {
+        Duration::from_millis(self.shutdown_ms)
+    }
+}

@@ -1,0 +1,417 @@
+//! The design document: wire types, and their one conversion into the solver's.
+
+use serde::{Deserialize, Deserializer, Serialize};
+use toothwave_solver::profile::{Extent, ProfileParameters};
+use toothwave_solver::{
+    Compatibility, ContactLaw, DriveParameters, LoadCase, LoadParameters, Material, Materials, Parameter, PerContact,
+    Torque, Violation,
+};
+use utoipa::ToSchema;
+
+use crate::json::Fault;
+use crate::problem::FieldCode;
+
+/// One document for every endpoint: each reads only what it needs. Lengths in mm, torques in N·m, moduli in GPa, stiffnesses in N/mm.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+#[schema(example = json!({
+    "drive": {
+        "wave_generator": { "semi_major_mm": 58.0, "semi_minor_mm": 56.0 },
+        "teeth": { "count": 28, "radius_mm": 5.0, "width_mm": 15.0 },
+        "ring": { "teeth": 26 }
+    },
+    "load": { "input_torque_nm": 20.0 }
+}))]
+pub struct Design {
+    /// The drive itself.
+    pub drive: DriveDocument,
+    /// Materials by part; steel where left out.
+    #[serde(default)]
+    pub materials: MaterialsDocument,
+    /// The load; only a sweep needs it.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub load: Option<LoadDocument>,
+    /// The model of load sharing.
+    #[serde(default)]
+    pub model: ModelDocument,
+    /// The input angles of a sweep.
+    #[serde(default)]
+    pub sweep: SweepDocument,
+    /// The sampling of profiles.
+    #[serde(default)]
+    pub profile: ProfileDocument,
+}
+
+/// Wave generator, teeth and ring.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct DriveDocument {
+    /// The elliptic cam.
+    pub wave_generator: WaveGeneratorDocument,
+    /// The discrete teeth.
+    pub teeth: TeethDocument,
+    /// The rigid internal wheel.
+    pub ring: RingDocument,
+}
+
+/// The elliptic cam; `semi_major_mm` exceeds `semi_minor_mm`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct WaveGeneratorDocument {
+    /// Semi-major axis a.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub semi_major_mm: f64,
+    /// Semi-minor axis b.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub semi_minor_mm: f64,
+}
+
+/// The discrete teeth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct TeethDocument {
+    /// Teeth in theory, Z_G: two more or two fewer than the ring's.
+    #[schema(value_type = i64, minimum = 2, maximum = 10000)]
+    pub count: Whole,
+    /// Installed teeth Z'_G, an even divisor of `count`; only they have a slot. Left out: `count`.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = i64, minimum = 2, maximum = 10000, required = false)]
+    pub installed: Option<Whole>,
+    /// Radius r of a tooth.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub radius_mm: f64,
+    /// Width L1 of a tooth along the axis.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub width_mm: f64,
+}
+
+/// The rigid internal wheel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct RingDocument {
+    /// Teeth Z_K: two fewer or two more than the carrier's.
+    #[schema(value_type = i64, minimum = 2, maximum = 10000)]
+    pub teeth: Whole,
+    /// Radius of a bore that truncates the teeth; null or left out, the ring keeps its natural tip.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub tip_radius_mm: Option<f64>,
+}
+
+/// Materials by part.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
+pub struct MaterialsDocument {
+    /// Of the wave generator.
+    pub wave_generator: MaterialDocument,
+    /// Of the teeth.
+    pub teeth: MaterialDocument,
+    /// Of the ring.
+    pub ring: MaterialDocument,
+    /// Of the carrier.
+    pub carrier: MaterialDocument,
+}
+
+/// An isotropic elastic material.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
+pub struct MaterialDocument {
+    /// Young's modulus E.
+    #[schema(minimum = 1e-3, maximum = 1e5, default = 210.0)]
+    pub youngs_modulus_gpa: f64,
+    /// Poisson's ratio ν.
+    #[schema(exclusive_minimum = -1.0, exclusive_maximum = 0.5, default = 0.3)]
+    pub poissons_ratio: f64,
+}
+
+impl Default for MaterialDocument {
+    fn default() -> Self {
+        let Material { youngs_modulus_gpa, poissons_ratio } = Material::STEEL;
+        Self { youngs_modulus_gpa, poissons_ratio }
+    }
+}
+
+/// The torque: exactly one of the two, at the wave generator or at the carrier, ring fixed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct LoadDocument {
+    /// Torque M0 at the wave generator.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
+    pub input_torque_nm: Option<f64>,
+    /// Torque at the carrier, losses neglected.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
+    pub output_torque_nm: Option<f64>,
+}
+
+/// The model of load sharing.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
+pub struct ModelDocument {
+    /// How the approaches at a tooth's contacts add up.
+    pub compatibility: CompatibilityDocument,
+    /// The contact law.
+    pub stiffness: StiffnessDocument,
+}
+
+/// How the approaches at a tooth's contacts add up to the rotation of the wave generator.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CompatibilityDocument {
+    /// The paper's: each projected on the direction of the wave generator's force.
+    #[default]
+    Projection,
+    /// Virtual work: the frictionless solution for a tooth whose centre is free to move.
+    VirtualWork,
+}
+
+/// The contact law.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
+#[serde(tag = "law", rename_all = "snake_case", deny_unknown_fields)]
+pub enum StiffnessDocument {
+    /// `k = π L1 E*/2` at each contact.
+    #[default]
+    Linear,
+    /// Given stiffnesses.
+    Fixed {
+        /// At the wave generator.
+        #[schema(minimum = 1e-3, maximum = 1e15)]
+        wave_generator_n_per_mm: f64,
+        /// At the ring.
+        #[schema(minimum = 1e-3, maximum = 1e15)]
+        ring_n_per_mm: f64,
+        /// At the carrier.
+        #[schema(minimum = 1e-3, maximum = 1e15)]
+        carrier_n_per_mm: f64,
+    },
+}
+
+/// The input angles of a sweep.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
+pub struct SweepDocument {
+    /// Equal intervals of one period; both ends are included.
+    #[schema(value_type = i64, minimum = 1, maximum = 10000000, default = 50)]
+    pub samples: Whole,
+}
+
+impl Default for SweepDocument {
+    fn default() -> Self {
+        Self { samples: Whole(50) }
+    }
+}
+
+/// The sampling of profiles.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
+pub struct ProfileDocument {
+    /// How far a chord may be from its curve.
+    #[schema(minimum = 1e-6, maximum = 1e6, default = 0.001)]
+    pub chord_tolerance_mm: f64,
+    /// How much of the ring.
+    pub extent: ExtentDocument,
+}
+
+impl Default for ProfileDocument {
+    fn default() -> Self {
+        Self { chord_tolerance_mm: 1e-3, extent: ExtentDocument::default() }
+    }
+}
+
+/// How much of the ring.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ExtentDocument {
+    /// From one tooth's symmetry line to the next, so that copies join.
+    #[default]
+    Tooth,
+    /// The closed ring, its last point equal to its first.
+    Full,
+}
+
+/// A whole number, spelled `28`, `28.0` or `2.8e1`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Whole(pub i64);
+
+impl<'de> Deserialize<'de> for Whole {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        /// Every whole number up to here is a double.
+        const LARGEST: f64 = 9_007_199_254_740_992.0;
+        let value = f64::deserialize(deserializer)?;
+        if value.fract() != 0.0 || value.abs() > LARGEST {
+            let message = format_args!("a whole number is wanted here, not {value}").to_string();
+            return Err(serde::de::Error::custom(message));
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "whole and bounded")]
+        Ok(Self(value as i64))
+    }
+}
+
+/// For fields that may be left out but not be null.
+fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<Option<T>, D::Error> {
+    T::deserialize(deserializer).map(Some)
+}
+
+impl<'de> Deserialize<'de> for StiffnessDocument {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        use serde::de::Error;
+
+        #[derive(Default, Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        enum Law {
+            #[default]
+            Linear,
+            Fixed,
+        }
+
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields, expecting = "an object")]
+        struct Fields {
+            #[serde(default)]
+            law: Law,
+            #[serde(default, deserialize_with = "given")]
+            wave_generator_n_per_mm: Option<f64>,
+            #[serde(default, deserialize_with = "given")]
+            ring_n_per_mm: Option<f64>,
+            #[serde(default, deserialize_with = "given")]
+            carrier_n_per_mm: Option<f64>,
+        }
+
+        let fields = Fields::deserialize(deserializer)?;
+        let stiffnesses = [
+            ("wave_generator_n_per_mm", fields.wave_generator_n_per_mm),
+            ("ring_n_per_mm", fields.ring_n_per_mm),
+            ("carrier_n_per_mm", fields.carrier_n_per_mm),
+        ];
+        match fields.law {
+            Law::Linear => match stiffnesses.iter().find(|(_, stiffness)| stiffness.is_some()) {
+                Some((name, _)) => Err(D::Error::unknown_field(name, &["law"])),
+                None => Ok(Self::Linear),
+            },
+            Law::Fixed => {
+                let required = |index: usize| {
+                    let (name, stiffness) = stiffnesses[index];
+                    stiffness.ok_or_else(|| D::Error::missing_field(name))
+                };
+                Ok(Self::Fixed {
+                    wave_generator_n_per_mm: required(0)?,
+                    ring_n_per_mm: required(1)?,
+                    carrier_n_per_mm: required(2)?,
+                })
+            }
+        }
+    }
+}
+
+impl Design {
+    /// The document with what may be left out filled in and zeros of one sign, so that equal designs are equal bytes.
+    pub fn normalised(mut self) -> Self {
+        self.drive.teeth.installed.get_or_insert(self.drive.teeth.count);
+        let materials = &mut self.materials;
+        for material in
+            [&mut materials.wave_generator, &mut materials.teeth, &mut materials.ring, &mut materials.carrier]
+        {
+            // The one number that may be zero.
+            material.poissons_ratio += 0.0;
+        }
+        self
+    }
+
+    /// The drive's parameters.
+    pub fn drive_parameters(&self) -> DriveParameters {
+        let DriveDocument { wave_generator, teeth, ring } = &self.drive;
+        DriveParameters {
+            semi_major_mm: wave_generator.semi_major_mm,
+            semi_minor_mm: wave_generator.semi_minor_mm,
+            teeth: teeth.count.0,
+            installed: teeth.installed.unwrap_or(teeth.count).0,
+            tooth_radius_mm: teeth.radius_mm,
+            tooth_width_mm: teeth.width_mm,
+            ring_teeth: ring.teeth.0,
+            tip_radius_mm: ring.tip_radius_mm,
+        }
+    }
+
+    /// The load's parameters.
+    ///
+    /// # Errors
+    /// A fault where the document has no load, or not exactly one torque.
+    pub fn load_parameters(&self) -> Result<LoadParameters, Fault> {
+        let load = self.load.as_ref().ok_or_else(|| {
+            let detail = "forces need a load: give `load` an `input_torque_nm` or an `output_torque_nm`";
+            Fault::of_field(FieldCode::MissingField, "load", detail.into())
+        })?;
+        let torque = match (load.input_torque_nm, load.output_torque_nm) {
+            (Some(torque_nm), None) => Torque::Input(torque_nm),
+            (None, Some(torque_nm)) => Torque::Output(torque_nm),
+            (given, _) => {
+                let code = if given.is_some() { FieldCode::ConflictingFields } else { FieldCode::MissingField };
+                let detail = "exactly one of `input_torque_nm` and `output_torque_nm` is wanted here";
+                return Err(Fault::of_field(code, "load", detail.into()));
+            }
+        };
+        let material = |document: &MaterialDocument| Material {
+            youngs_modulus_gpa: document.youngs_modulus_gpa,
+            poissons_ratio: document.poissons_ratio,
+        };
+        let compatibility = match self.model.compatibility {
+            CompatibilityDocument::Projection => Compatibility::Projection,
+            CompatibilityDocument::VirtualWork => Compatibility::VirtualWork,
+        };
+        let law = match self.model.stiffness {
+            StiffnessDocument::Linear => ContactLaw::Linear,
+            StiffnessDocument::Fixed { wave_generator_n_per_mm, ring_n_per_mm, carrier_n_per_mm } => {
+                ContactLaw::Fixed(PerContact {
+                    wave_generator: wave_generator_n_per_mm,
+                    ring: ring_n_per_mm,
+                    carrier: carrier_n_per_mm,
+                })
+            }
+        };
+        Ok(LoadParameters {
+            materials: Materials {
+                wave_generator: material(&self.materials.wave_generator),
+                teeth: material(&self.materials.teeth),
+                ring: material(&self.materials.ring),
+                carrier: material(&self.materials.carrier),
+            },
+            torque,
+            compatibility,
+            law,
+        })
+    }
+
+    /// The checked load.
+    ///
+    /// # Errors
+    /// A fault as in [`Self::load_parameters`]; inside, every value out of its range.
+    pub fn load_case(&self) -> Result<Result<LoadCase, Vec<Violation>>, Fault> {
+        Ok(LoadCase::new(&self.load_parameters()?))
+    }
+
+    /// The intervals of a sweep.
+    ///
+    /// # Errors
+    /// The violation of their range.
+    pub fn samples(&self) -> Result<u64, Violation> {
+        let samples = self.sweep.samples.0;
+        Parameter::Samples.check(samples as f64).map_or(Ok(samples.unsigned_abs()), Err)
+    }
+
+    /// What profiles are asked for.
+    ///
+    /// # Errors
+    /// The violation of the tolerance's range.
+    pub fn profile_parameters(&self, max_points: u64) -> Result<ProfileParameters, Violation> {
+        let chord_tolerance_mm = self.profile.chord_tolerance_mm;
+        let extent = match self.profile.extent {
+            ExtentDocument::Tooth => Extent::Tooth,
+            ExtentDocument::Full => Extent::Full,
+        };
+        Parameter::ChordTolerance
+            .check(chord_tolerance_mm)
+            .map_or(Ok(ProfileParameters { chord_tolerance_mm, extent, max_points }), Err)
+    }
+}

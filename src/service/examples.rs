@@ -1,0 +1,41 @@
+//! Ready design documents, compiled in from `examples/`.
+
+/// A design document by name.
+#[derive(Debug, Clone, Copy)]
+pub struct Example {
+    /// Its name in the path.
+    pub name: &'static str,
+    /// What it shows.
+    pub title: &'static str,
+    /// The document.
+    pub document: &'static str,
+}
+
+/// All of them.
+pub const EXAMPLES: [Example; 4] = [
+    Example {
+        name: "paper-5.1",
+        title: "The paper's case 5.1: no undercut, seven teeth in each zone",
+        document: include_str!("../../examples/paper-5.1.json"),
+    },
+    Example {
+        name: "paper-5.2",
+        title: "The paper's case 5.2: undercut, every second slot filled",
+        document: include_str!("../../examples/paper-5.2.json"),
+    },
+    Example {
+        name: "paper-5.2-bored",
+        title: "Case 5.2 bored at 52.8227 mm, which reproduces the paper's figures 20 to 25",
+        document: include_str!("../../examples/paper-5.2-bored.json"),
+    },
+    Example {
+        name: "ring-with-more-teeth",
+        title: "A ring with two teeth more than the carrier, fixed stiffnesses, virtual work",
+        document: include_str!("../../examples/ring-with-more-teeth.json"),
+    },
+];
+
+/// The example of that name.
+pub fn by_name(name: &str) -> Option<&'static Example> {
+    EXAMPLES.iter().find(|example| example.name == name)
+}

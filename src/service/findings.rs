@@ -1,0 +1,187 @@
+//! Findings as they go over the wire, with what each means and what to change.
+
+use serde::Serialize;
+use toothwave_solver::Finding;
+use toothwave_solver::findings::{Edge, FATIGUE_LIMIT_STRESS_MPA, STEEP_FLANK_DEG};
+use utoipa::ToSchema;
+
+use crate::problem::contact_name;
+
+/// What a designer should be told about a drive that can exist; docs/findings.md has the formula behind each code.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct FindingAnswer {
+    /// The kind of finding, a stable word.
+    pub code: FindingCode,
+    /// How grave it is.
+    pub severity: Severity,
+    /// JSON pointers to the fields that it is about.
+    pub pointers: Vec<String>,
+    /// What was found.
+    pub value: f64,
+    /// What it is measured against.
+    pub limit: f64,
+    /// Unit of value and limit; empty for a count.
+    pub unit: String,
+    /// What it means.
+    pub detail: String,
+    /// What to change.
+    pub advice: String,
+}
+
+/// How grave a finding is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// Good to know.
+    Info,
+    /// Likely to trouble the drive.
+    Warning,
+}
+
+/// Kinds of finding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FindingCode {
+    /// The ring's tips are cut away by their own envelope.
+    Undercut,
+    /// The bore ends the flank before its natural tip.
+    BoreShortensFlank,
+    /// The bore lies inside the natural tip.
+    BoreWithoutEffect,
+    /// At some input angle fewer than two teeth of a zone mesh.
+    FewTeethInMesh,
+    /// The wall between two slots is thin.
+    ThinSlotWall,
+    /// A loaded tooth's centre leaves the carrier's annulus.
+    ToothBeyondCarrier,
+    /// The ring's flank stands steep to the radius.
+    SteepRingFlank,
+    /// A stress above the fatigue limit of bearing steel.
+    StressAboveFatigueLimit,
+}
+
+const RADIUS: &str = "/drive/teeth/radius_mm";
+const INSTALLED: &str = "/drive/teeth/installed";
+const SEMI_MAJOR: &str = "/drive/wave_generator/semi_major_mm";
+const SEMI_MINOR: &str = "/drive/wave_generator/semi_minor_mm";
+const TIP_RADIUS: &str = "/drive/ring/tip_radius_mm";
+const WIDTH: &str = "/drive/teeth/width_mm";
+const LOAD: &str = "/load";
+
+impl From<&Finding> for FindingAnswer {
+    fn from(finding: &Finding) -> Self {
+        use FindingCode as Code;
+        use Severity::{Info, Warning};
+        let new = |code, severity, pointers: &[&str], value, limit, unit: &str, detail: String, advice: &str| Self {
+            code,
+            severity,
+            pointers: pointers.iter().map(|&pointer| pointer.into()).collect(),
+            value,
+            limit,
+            unit: unit.into(),
+            detail,
+            advice: advice.into(),
+        };
+        match *finding {
+            Finding::Undercut { tooth_radius_mm, critical_tooth_radius_mm, engagement_start_deg, is_bored_away } => new(
+                Code::Undercut,
+                if is_bored_away { Info } else { Warning },
+                &[RADIUS, SEMI_MAJOR, SEMI_MINOR],
+                tooth_radius_mm,
+                critical_tooth_radius_mm,
+                "mm",
+                if is_bored_away {
+                    "the ring's tooth tips would be undercut, but the bore takes more away than undercut does".into()
+                } else {
+                    format!(
+                        "the ring's tooth tips are cut away by their own envelope: teeth start to touch the flank only {engagement_start_deg:.4} deg from the major axis, fewer of them mesh, and loads jump when one enters"
+                    )
+                },
+                "make the teeth thinner than the critical radius, or the ellipse rounder",
+            ),
+            Finding::BoreShortensFlank { tip_radius_mm, natural_tip_radius_mm, engagement_start_deg } => new(
+                Code::BoreShortensFlank,
+                Info,
+                &[TIP_RADIUS],
+                tip_radius_mm,
+                natural_tip_radius_mm,
+                "mm",
+                format!(
+                    "the bore ends the flank before its natural tip: teeth start to touch it {engagement_start_deg:.4} deg from the major axis and take load at once, so loads jump"
+                ),
+                "bore less, or not at all, where the jump matters",
+            ),
+            Finding::BoreWithoutEffect { tip_radius_mm, natural_tip_radius_mm } => new(
+                Code::BoreWithoutEffect,
+                Info,
+                &[TIP_RADIUS],
+                tip_radius_mm,
+                natural_tip_radius_mm,
+                "mm",
+                "the bore lies inside the ring's natural tips and takes nothing away".into(),
+                "leave it out, or bore beyond the natural tip radius",
+            ),
+            #[expect(clippy::cast_precision_loss, reason = "a count of teeth")]
+            Finding::FewTeethInMesh { min } => new(
+                Code::FewTeethInMesh,
+                Warning,
+                &[INSTALLED, RADIUS],
+                min as f64,
+                2.0,
+                "",
+                "at some input angle fewer than two teeth of a zone mesh: one tooth carries all, or none does".into(),
+                "install more teeth, or bring the flank further out: less undercut, a smaller bore",
+            ),
+            Finding::ThinSlotWall { slot_wall_mm, limit_mm } => new(
+                Code::ThinSlotWall,
+                Warning,
+                &[RADIUS, INSTALLED],
+                slot_wall_mm,
+                limit_mm,
+                "mm",
+                if slot_wall_mm > 0.0 {
+                    "the wall between two slots of the carrier is thinner at its inner edge than a quarter of a slot's width".into()
+                } else {
+                    "the slots of the carrier run into each other at its inner edge".into()
+                },
+                "make the teeth thinner or install fewer",
+            ),
+            Finding::ToothBeyondCarrier { edge, center_radius_mm, limit_mm } => new(
+                Code::ToothBeyondCarrier,
+                Warning,
+                &[SEMI_MAJOR, SEMI_MINOR, RADIUS],
+                center_radius_mm,
+                limit_mm,
+                "mm",
+                match edge {
+                    Edge::Inner => "the centre of a loaded tooth comes nearer to the axis than the carrier's annulus begins: it presses on a slot's edge, not on its wall".into(),
+                    Edge::Outer => "the centre of a loaded tooth goes further out than the ring's tips leave room for the carrier: it presses on a slot's edge, not on its wall".into(),
+                },
+                "make the ellipse rounder or the teeth thicker",
+            ),
+            Finding::SteepRingFlank { pressure_angle_deg } => new(
+                Code::SteepRingFlank,
+                Warning,
+                &[SEMI_MAJOR, SEMI_MINOR, "/drive/ring/teeth"],
+                pressure_angle_deg,
+                STEEP_FLANK_DEG,
+                "deg",
+                "the ring's flank stands steep to the radius: its force is several times the wave generator's, and friction, which the model leaves out, may keep the drive from turning".into(),
+                "make the ellipse rounder, or take fewer teeth",
+            ),
+            Finding::StressAboveFatigueLimit { contact, stress_mpa } => new(
+                Code::StressAboveFatigueLimit,
+                Warning,
+                &[LOAD, WIDTH, RADIUS],
+                stress_mpa,
+                FATIGUE_LIMIT_STRESS_MPA,
+                "MPa",
+                format!(
+                    "the contact stress at the {} exceeds the fatigue limit of bearing steel (ISO 281:2007)",
+                    contact_name(contact).replace('_', " ")
+                ),
+                "lower the torque, widen the teeth, or let more of them mesh",
+            ),
+        }
+    }
+}

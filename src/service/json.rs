@@ -1,0 +1,279 @@
+//! From JSON text to wire types, with faults that name a code and a place.
+//!
+//! serde_json alone would take an array for an object, keep no place, and tell kinds of fault apart only by their text. So
+//! the text becomes a tree first (no JSON: the first kind of fault), and the tree feeds serde through a deserializer whose error is a
+//! [`Fault`].
+
+use serde::Deserialize;
+use serde::de::{self, IntoDeserializer, MapAccess, Unexpected, Visitor};
+
+use crate::problem::FieldCode;
+
+/// Why a text is no document of the wanted form.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ReadError {
+    /// The text is no JSON.
+    Malformed {
+        /// What the parser says, with line and column.
+        detail: String,
+    },
+    /// It is JSON of another form.
+    Fault(Fault),
+}
+
+/// A structural fault: the first one found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fault {
+    /// JSON pointer to the field.
+    pub pointer: String,
+    /// Kind of fault.
+    pub code: FieldCode,
+    /// What is wrong and what would be right.
+    pub detail: String,
+}
+
+/// Reads a document.
+///
+/// # Errors
+/// See [`ReadError`].
+pub fn read<'de, T: Deserialize<'de>>(text: &[u8]) -> Result<T, ReadError> {
+    let mut parser = serde_json::Deserializer::from_slice(text);
+    let tree: Node = serde_path_to_error::deserialize(&mut parser).map_err(|error| {
+        let detail = error.inner().to_string();
+        // serde_json counts a number beyond the doubles as bad syntax; it is JSON all the same.
+        if detail.starts_with("number out of range") {
+            let pointer = error.path().iter().filter_map(|segment| match segment {
+                serde_path_to_error::Segment::Map { key } => Some(format!("/{}", escaped(key))),
+                _ => None,
+            });
+            ReadError::Fault(Fault {
+                pointer: pointer.collect(),
+                code: FieldCode::NumberTooLarge,
+                detail: "the number is beyond what a double can hold".into(),
+            })
+        } else {
+            ReadError::Malformed { detail }
+        }
+    })?;
+    parser.end().map_err(|error| ReadError::Malformed { detail: error.to_string() })?;
+    T::deserialize(&tree).map_err(ReadError::Fault)
+}
+
+/// JSON as it stands in the text; of arrays, which no document has, only that they are there.
+#[derive(Debug)]
+enum Node {
+    Null,
+    Bool(bool),
+    Number(f64),
+    Text(String),
+    Array,
+    Object(Vec<(String, Self)>),
+}
+
+impl<'de> Deserialize<'de> for Node {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(NodeVisitor)
+    }
+}
+
+struct NodeVisitor;
+
+impl<'de> Visitor<'de> for NodeVisitor {
+    type Value = Node;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("JSON")
+    }
+
+    fn visit_unit<E>(self) -> Result<Node, E> {
+        Ok(Node::Null)
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<Node, E> {
+        Ok(Node::Bool(value))
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Node, E> {
+        Ok(Node::Number(value as f64))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Node, E> {
+        Ok(Node::Number(value as f64))
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<Node, E> {
+        Ok(Node::Number(value))
+    }
+
+    fn visit_str<E>(self, value: &str) -> Result<Node, E> {
+        Ok(Node::Text(value.to_owned()))
+    }
+
+    fn visit_seq<A: de::SeqAccess<'de>>(self, mut items: A) -> Result<Node, A::Error> {
+        while items.next_element::<Node>()?.is_some() {}
+        Ok(Node::Array)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Node, A::Error> {
+        let mut fields = Vec::new();
+        while let Some(entry) = entries.next_entry()? {
+            fields.push(entry);
+        }
+        Ok(Node::Object(fields))
+    }
+}
+
+impl Node {
+    fn unexpected(&self) -> Unexpected<'_> {
+        match self {
+            Self::Null => Unexpected::Unit,
+            Self::Bool(value) => Unexpected::Bool(*value),
+            Self::Number(value) => Unexpected::Float(*value),
+            Self::Text(value) => Unexpected::Str(value),
+            Self::Array => Unexpected::Seq,
+            Self::Object(_) => Unexpected::Map,
+        }
+    }
+}
+
+impl<'de> serde::Deserializer<'de> for &Node {
+    type Error = Fault;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        match self {
+            Node::Null => visitor.visit_unit(),
+            Node::Bool(value) => visitor.visit_bool(*value),
+            Node::Number(value) => visitor.visit_f64(*value),
+            Node::Text(value) => visitor.visit_str(value),
+            Node::Object(fields) => visitor.visit_map(Fields { fields: fields.iter(), current: None }),
+            Node::Array => Err(de::Error::invalid_type(self.unexpected(), &visitor)),
+        }
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        match self {
+            Node::Null => visitor.visit_none(),
+            _ => visitor.visit_some(self),
+        }
+    }
+
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        _: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Fault> {
+        match self {
+            Node::Text(value) => visitor.visit_enum(value.as_str().into_deserializer()),
+            _ => Err(de::Error::invalid_type(self.unexpected(), &"a word")),
+        }
+    }
+
+    fn deserialize_newtype_struct<V: Visitor<'de>>(self, _: &'static str, visitor: V) -> Result<V::Value, Fault> {
+        visitor.visit_newtype_struct(self)
+    }
+
+    serde::forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct seq tuple
+        tuple_struct map struct identifier ignored_any
+    }
+}
+
+struct Fields<'a> {
+    fields: std::slice::Iter<'a, (String, Node)>,
+    current: Option<&'a (String, Node)>,
+}
+
+impl<'de> MapAccess<'de> for Fields<'_> {
+    type Error = Fault;
+
+    fn next_key_seed<K: de::DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, Fault> {
+        self.current = self.fields.next();
+        self.current.map(|(key, _)| seed.deserialize(key.as_str().into_deserializer())).transpose()
+    }
+
+    fn next_value_seed<S: de::DeserializeSeed<'de>>(&mut self, seed: S) -> Result<S::Value, Fault> {
+        let Some((key, value)) = self.current else {
+            return Err(de::Error::custom("a value was asked for before its key"));
+        };
+        seed.deserialize(value).map_err(|fault| fault.within(key))
+    }
+}
+
+impl Fault {
+    /// The same fault seen from the object that holds it under `key`.
+    fn within(mut self, key: &str) -> Self {
+        self.pointer.insert_str(0, &format!("/{}", escaped(key)));
+        self
+    }
+
+    /// A fault of a field, seen from the object that holds it.
+    pub fn of_field(code: FieldCode, field: &str, detail: String) -> Self {
+        Self { pointer: format!("/{}", escaped(field)), code, detail }
+    }
+}
+
+/// A key as a JSON pointer spells it (RFC 6901).
+fn escaped(key: &str) -> String {
+    key.replace('~', "~0").replace('/', "~1")
+}
+
+fn listed(names: &[&str]) -> String {
+    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+}
+
+impl de::Error for Fault {
+    fn custom<T: std::fmt::Display>(message: T) -> Self {
+        Self { pointer: String::new(), code: FieldCode::WrongType, detail: message.to_string() }
+    }
+
+    fn invalid_type(unexpected: Unexpected<'_>, expected: &dyn de::Expected) -> Self {
+        let found = match unexpected {
+            Unexpected::Unit => "null".into(),
+            Unexpected::Seq => "an array".into(),
+            Unexpected::Map => "an object".into(),
+            Unexpected::Float(value) => format!("the number {value}"),
+            Unexpected::Str(value) => format!("the text {value:?}"),
+            other => other.to_string(),
+        };
+        let expected = match expected.to_string() {
+            name if name == "f64" => "a number".into(),
+            // serde's derive names the Rust type here; its reader knows only objects.
+            name if name.starts_with("struct ") => "an object".into(),
+            name => name,
+        };
+        Self::custom(format_args!("{expected} is wanted here, not {found}"))
+    }
+
+    fn unknown_field(field: &str, known: &'static [&'static str]) -> Self {
+        Self::of_field(
+            FieldCode::UnknownField,
+            field,
+            format!("the document knows no field `{field}` here; it knows {}", listed(known)),
+        )
+    }
+
+    fn missing_field(field: &'static str) -> Self {
+        Self::of_field(FieldCode::MissingField, field, format!("the field `{field}` is required here"))
+    }
+
+    fn duplicate_field(field: &'static str) -> Self {
+        Self::of_field(FieldCode::DuplicateField, field, format!("the field `{field}` stands here twice"))
+    }
+
+    fn unknown_variant(word: &str, known: &'static [&'static str]) -> Self {
+        Self {
+            pointer: String::new(),
+            code: FieldCode::UnknownChoice,
+            detail: format!("`{word}` is no choice here; choose one of {}", listed(known)),
+        }
+    }
+}
+
+impl std::fmt::Display for Fault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}", self.pointer, self.detail)
+    }
+}
+
+impl std::error::Error for Fault {}

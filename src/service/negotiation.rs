@@ -1,0 +1,128 @@
+//! What the client sends and accepts: media types and codings.
+
+use std::str::FromStr;
+
+use axum::http::{HeaderMap, HeaderName, header};
+use headers_accept::Accept;
+use mediatype::{MediaType, Name, names};
+use serde::Serialize;
+
+use crate::problem::{Problem, ProblemCode};
+
+/// A format of answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Format {
+    /// `application/json`.
+    Json,
+    /// `text/csv`.
+    Csv,
+}
+
+impl Format {
+    /// Its media type.
+    pub const fn media_type(self) -> MediaType<'static> {
+        match self {
+            Self::Json => MediaType::new(names::APPLICATION, names::JSON),
+            Self::Csv => MediaType::new(names::TEXT, Name::new_unchecked("csv")),
+        }
+    }
+
+    /// The `Content-Type` of an answer.
+    pub const fn content_type(self) -> &'static str {
+        match self {
+            Self::Json => "application/json",
+            Self::Csv => "text/csv; charset=utf-8; header=present",
+        }
+    }
+}
+
+/// A format with its coding: what an entity tag stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Representation {
+    /// The format.
+    pub format: Format,
+    /// Whether it is compressed.
+    pub gzip: bool,
+}
+
+impl Representation {
+    /// The best of `formats`, in the service's order, for what the request accepts.
+    ///
+    /// # Errors
+    /// `not_acceptable` where the client accepts none of them.
+    pub fn negotiate(headers: &HeaderMap, formats: &[Format]) -> Result<Self, Problem> {
+        let accepted = joined(headers, &header::ACCEPT);
+        let format = if accepted.trim().is_empty() {
+            formats.first().copied()
+        } else {
+            let media_types: Vec<_> = formats.iter().map(|format| format.media_type()).collect();
+            // A header that cannot be read accepts nothing.
+            let best = Accept::from_str(&accepted).ok().and_then(|accept| accept.negotiate(&media_types).cloned());
+            formats.iter().copied().find(|format| best.as_ref() == Some(&format.media_type()))
+        };
+        let format = format.ok_or_else(|| {
+            let offered: Vec<_> = formats.iter().map(|format| format.media_type().to_string()).collect();
+            Problem::new(
+                ProblemCode::NotAcceptable,
+                format!("this path answers with {}, and the request accepts none of it", offered.join(" or ")),
+            )
+        })?;
+        Ok(Self { format, gzip: accepts_gzip(headers) })
+    }
+}
+
+/// Checks that the body is sent as JSON without a content coding.
+///
+/// # Errors
+/// `unsupported_media_type`.
+pub fn require_json(headers: &HeaderMap) -> Result<(), Problem> {
+    let unsupported = |detail: String| Err(Problem::new(ProblemCode::UnsupportedMediaType, detail));
+    let coding = joined(headers, &header::CONTENT_ENCODING);
+    if !coding.is_empty() && !coding.eq_ignore_ascii_case("identity") {
+        return unsupported(format!("the body is coded as `{coding}`; send it without a content coding"));
+    }
+    let content_type = joined(headers, &header::CONTENT_TYPE);
+    let is_json = MediaType::parse(&content_type).is_ok_and(|media_type| {
+        media_type.ty == names::APPLICATION
+            && (media_type.subty == names::JSON || media_type.suffix == Some(names::JSON))
+    });
+    if is_json {
+        Ok(())
+    } else if content_type.is_empty() {
+        unsupported("the request has no `Content-Type`; send a design document as `application/json`".into())
+    } else {
+        unsupported(format!("the body is sent as `{content_type}`; send a design document as `application/json`"))
+    }
+}
+
+/// Whether the request prefers gzip to no coding at all.
+fn accepts_gzip(headers: &HeaderMap) -> bool {
+    let accepted = joined(headers, &header::ACCEPT_ENCODING);
+    let quality = |coding: &str| {
+        accepted.split(',').find_map(|item| {
+            let mut parts = item.split(';').map(str::trim);
+            let is_meant = parts.next().is_some_and(|name| name.eq_ignore_ascii_case(coding));
+            let weight = parts.find_map(|parameter| parameter.strip_prefix("q=")).unwrap_or("1");
+            is_meant.then(|| weight.parse::<f64>().unwrap_or(0.0))
+        })
+    };
+    let gzip = quality("gzip").or_else(|| quality("x-gzip")).or_else(|| quality("*")).unwrap_or(0.0);
+    gzip > 0.0 && gzip >= quality("identity").unwrap_or(0.0)
+}
+
+/// All lines of a header as one list; a value that is no text counts as absent.
+fn joined(headers: &HeaderMap, name: &HeaderName) -> String {
+    let values: Vec<_> = headers.get_all(name).iter().filter_map(|value| value.to_str().ok()).collect();
+    values.join(",")
+}
+
+/// Whether `If-None-Match` names this entity tag, compared weakly as the header wants it (RFC 9110).
+pub fn is_not_modified(headers: &HeaderMap, etag: &str) -> bool {
+    let listed = joined(headers, &header::IF_NONE_MATCH);
+    listed.split(',').map(str::trim).any(|tag| tag.strip_prefix("W/").unwrap_or(tag) == etag)
+}
+
+/// Whether `If-None-Match` is `*`: any representation will do, if there is one.
+pub fn matches_any(headers: &HeaderMap) -> bool {
+    joined(headers, &header::IF_NONE_MATCH).trim() == "*"
+}

@@ -1,0 +1,386 @@
+//! What bad input and trouble get: RFC 9457 problems, and the one map from the solver's errors to them.
+
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use toothwave_solver::drive::DriveError;
+use toothwave_solver::violation::Violation;
+use toothwave_solver::{Contact, Parameter, Part, SolveError};
+use utoipa::ToSchema;
+
+use crate::json::{Fault, ReadError};
+
+/// The media type of problems.
+pub const PROBLEM_JSON: &str = "application/problem+json";
+
+/// Seconds after which a refused request may be worth trying again.
+const RETRY_AFTER_S: u32 = 1;
+
+/// A problem as it goes over the wire (RFC 9457).
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Problem {
+    /// `urn:toothwave:problem:` and the code.
+    #[serde(rename = "type")]
+    pub kind: String,
+    /// The kind of problem in words.
+    pub title: String,
+    /// HTTP status.
+    #[schema(minimum = 400, maximum = 599)]
+    pub status: u16,
+    /// What happened, and what to do about it.
+    pub detail: String,
+    /// The kind of problem, a stable word.
+    pub code: ProblemCode,
+    /// Where fields are at fault: each of them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(required = false)]
+    pub errors: Vec<FieldError>,
+}
+
+/// A field at fault.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct FieldError {
+    /// JSON pointer (RFC 6901) to the field.
+    pub pointer: String,
+    /// The kind of fault, a stable word.
+    pub code: FieldCode,
+    /// What is wrong and what would be right.
+    pub detail: String,
+    /// The field's value, where it is a number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub value: Option<f64>,
+    /// The limit that the value is beyond.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub limit: Option<f64>,
+}
+
+/// Kinds of problem.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ProblemCode {
+    /// 400: the body is no JSON.
+    MalformedJson,
+    /// 404: nothing stands at this path.
+    NotFound,
+    /// 405: the path knows other methods.
+    MethodNotAllowed,
+    /// 406: no representation that the client accepts.
+    NotAcceptable,
+    /// 408: the body did not arrive in time.
+    RequestTimeout,
+    /// 413: the body exceeds `max_body_bytes`.
+    BodyTooLarge,
+    /// 415: the body is not sent as plain JSON.
+    UnsupportedMediaType,
+    /// 422: JSON of another form than the design document's.
+    InvalidDocument,
+    /// 422: values that no drive, load or request can have.
+    ImpossibleDesign,
+    /// 422: at some input angle no tooth has a lever arm.
+    NoToothInMesh,
+    /// 422: a `projection` whose stiffnesses give a tooth a compliance that is not positive.
+    ComplianceNotPositive,
+    /// 422: the sweep has more states than `max_states`.
+    TooManyStates,
+    /// 422: the profiles have more points than `max_profile_points`.
+    TooManyPoints,
+    /// 503: as many solves run and wait as the service admits.
+    QueueFull,
+    /// 503: the deadline stopped the computation.
+    DeadlineExceeded,
+    /// 500: a fault of the service itself.
+    InternalError,
+}
+
+/// Kinds of fault of a field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FieldCode {
+    /// A field that the document does not know.
+    UnknownField,
+    /// A required field that is not there.
+    MissingField,
+    /// The same field twice.
+    DuplicateField,
+    /// A value of another type.
+    WrongType,
+    /// A word that is not one of the choices.
+    UnknownChoice,
+    /// A number that no double can hold.
+    NumberTooLarge,
+    /// Two fields of which only one may be there.
+    ConflictingFields,
+    /// A value outside its range.
+    OutOfRange,
+    /// The semi-major axis does not exceed the semi-minor one.
+    CamNotElongated,
+    /// Carrier and ring do not differ by two teeth.
+    ToothDifference,
+    /// An odd number of installed teeth.
+    InstalledOdd,
+    /// Installed teeth that do not divide the theoretical ones.
+    InstalledNoDivisor,
+    /// Neighbouring teeth touch somewhere on their path.
+    TeethTouch,
+    /// The ring's tips reach in to the wave generator.
+    NoCarrierAnnulus,
+    /// The bore takes the whole flank away.
+    BoreLeavesNoFlank,
+    /// More states than `max_states`.
+    TooManyStates,
+    /// More profile points than `max_profile_points`.
+    TooManyPoints,
+}
+
+impl ProblemCode {
+    /// Its HTTP status.
+    pub const fn status(self) -> StatusCode {
+        match self {
+            Self::MalformedJson => StatusCode::BAD_REQUEST,
+            Self::NotFound => StatusCode::NOT_FOUND,
+            Self::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
+            Self::NotAcceptable => StatusCode::NOT_ACCEPTABLE,
+            Self::RequestTimeout => StatusCode::REQUEST_TIMEOUT,
+            Self::BodyTooLarge => StatusCode::PAYLOAD_TOO_LARGE,
+            Self::UnsupportedMediaType => StatusCode::UNSUPPORTED_MEDIA_TYPE,
+            Self::InvalidDocument
+            | Self::ImpossibleDesign
+            | Self::NoToothInMesh
+            | Self::ComplianceNotPositive
+            | Self::TooManyStates
+            | Self::TooManyPoints => StatusCode::UNPROCESSABLE_ENTITY,
+            Self::QueueFull | Self::DeadlineExceeded => StatusCode::SERVICE_UNAVAILABLE,
+            Self::InternalError => StatusCode::INTERNAL_SERVER_ERROR,
+        }
+    }
+
+    const fn title(self) -> &'static str {
+        match self {
+            Self::MalformedJson => "The body is no JSON",
+            Self::NotFound => "Nothing stands at this path",
+            Self::MethodNotAllowed => "The path knows other methods",
+            Self::NotAcceptable => "No representation that the client accepts",
+            Self::RequestTimeout => "The body did not arrive in time",
+            Self::BodyTooLarge => "The body is too large",
+            Self::UnsupportedMediaType => "The body is not sent as plain JSON",
+            Self::InvalidDocument => "The document is no design document",
+            Self::ImpossibleDesign => "The design cannot exist",
+            Self::NoToothInMesh => "At some input angle no tooth carries load",
+            Self::ComplianceNotPositive => "The projection form has no solution",
+            Self::TooManyStates => "The sweep has too many states",
+            Self::TooManyPoints => "The profiles have too many points",
+            Self::QueueFull => "The service is full",
+            Self::DeadlineExceeded => "The deadline stopped the computation",
+            Self::InternalError => "The service failed",
+        }
+    }
+}
+
+impl Problem {
+    /// A problem without fields.
+    pub fn new(code: ProblemCode, detail: impl Into<String>) -> Self {
+        Self::at_fields(code, detail, Vec::new())
+    }
+
+    /// A problem of these fields.
+    pub fn at_fields(code: ProblemCode, detail: impl Into<String>, errors: Vec<FieldError>) -> Self {
+        // An enum of plain words always serialises.
+        let word = serde_json::to_value(code).unwrap_or_default();
+        Self {
+            kind: format!("urn:toothwave:problem:{}", word.as_str().unwrap_or_default()),
+            title: code.title().into(),
+            status: code.status().as_u16(),
+            detail: detail.into(),
+            code,
+            errors,
+        }
+    }
+
+    /// All violations of a design.
+    pub fn impossible(violations: &[Violation]) -> Self {
+        let errors: Vec<_> = violations.iter().map(field_error).collect();
+        let detail = match errors.as_slice() {
+            [only] => format!("{}: {}", only.pointer, only.detail),
+            several => format!("{} values are impossible; `errors` names each", several.len()),
+        };
+        Self::at_fields(ProblemCode::ImpossibleDesign, detail, errors)
+    }
+
+    /// An internal fault, logged here once; the client learns only that there was one.
+    pub fn internal(cause: &dyn std::fmt::Display) -> Self {
+        tracing::error!(%cause, "internal error");
+        Self::new(ProblemCode::InternalError, "the service failed at this request; its log says why")
+    }
+}
+
+impl std::fmt::Display for Problem {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}", self.title, self.detail)?;
+        if self.errors.len() > 1 {
+            for error in &self.errors {
+                write!(f, "\n  {}: {}", error.pointer, error.detail)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let status = self.code.status();
+        let body = serde_json::to_vec(&self).unwrap_or_default();
+        let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], body).into_response();
+        if status == StatusCode::SERVICE_UNAVAILABLE {
+            response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from(RETRY_AFTER_S));
+        }
+        response
+    }
+}
+
+impl From<ReadError> for Problem {
+    fn from(error: ReadError) -> Self {
+        match error {
+            ReadError::Malformed { detail } => Self::new(ProblemCode::MalformedJson, detail),
+            ReadError::Fault(fault) => fault.into(),
+        }
+    }
+}
+
+impl From<Fault> for Problem {
+    fn from(Fault { pointer, code, detail }: Fault) -> Self {
+        let text = if pointer.is_empty() { detail.clone() } else { format!("{pointer}: {detail}") };
+        let error = FieldError { pointer, code, detail, value: None, limit: None };
+        Self::at_fields(ProblemCode::InvalidDocument, text, vec![error])
+    }
+}
+
+impl From<DriveError> for Problem {
+    fn from(error: DriveError) -> Self {
+        match error {
+            DriveError::Impossible(violations) => Self::impossible(&violations),
+            DriveError::NotConverged(error) => Self::internal(&error),
+        }
+    }
+}
+
+impl From<SolveError> for Problem {
+    fn from(error: SolveError) -> Self {
+        let detail = error.to_string();
+        match error {
+            SolveError::NoToothInMesh { .. } => Self::new(
+                ProblemCode::NoToothInMesh,
+                format!("{detail}. Install more teeth, or bring the flank further out: less undercut, a smaller bore"),
+            ),
+            SolveError::ComplianceNotPositive { .. } => Self::new(
+                ProblemCode::ComplianceNotPositive,
+                format!("{detail}. Choose `virtual_work`, or stiffnesses that differ less"),
+            ),
+            SolveError::TooManyPoints { points, limit } => {
+                let pointer = "/profile/chord_tolerance_mm";
+                too_many(ProblemCode::TooManyPoints, FieldCode::TooManyPoints, pointer, &detail, points, limit)
+            }
+            SolveError::Stopped => {
+                Self::new(ProblemCode::DeadlineExceeded, "the computation took longer than the service allows")
+            }
+            SolveError::NotConverged(error) => Self::internal(&error),
+        }
+    }
+}
+
+/// The problem of a request that is larger than a limit, which it names with its own value.
+#[expect(clippy::cast_precision_loss, reason = "counts far below 2^53")]
+pub fn too_many(
+    code: ProblemCode,
+    field_code: FieldCode,
+    pointer: &str,
+    detail: &str,
+    value: u64,
+    limit: u64,
+) -> Problem {
+    let error = FieldError {
+        pointer: pointer.into(),
+        code: field_code,
+        detail: detail.into(),
+        value: Some(value as f64),
+        limit: Some(limit as f64),
+    };
+    Problem::at_fields(code, detail, vec![error])
+}
+
+/// A violation as the field that it is about.
+fn field_error(violation: &Violation) -> FieldError {
+    use Parameter::{InstalledTeeth, RingTeeth, SemiMajor, TipRadius, ToothRadius};
+    let (code, parameter, value, limit) = match *violation {
+        Violation::OutOfRange { parameter, value, limit } => (FieldCode::OutOfRange, parameter, value, limit),
+        Violation::CamNotElongated { semi_major_mm, semi_minor_mm } => {
+            (FieldCode::CamNotElongated, SemiMajor, semi_major_mm, semi_minor_mm)
+        }
+        Violation::ToothDifference { teeth, ring_teeth } => {
+            let nearest = if ring_teeth > teeth { teeth + 2 } else { teeth - 2 };
+            (FieldCode::ToothDifference, RingTeeth, ring_teeth as f64, nearest as f64)
+        }
+        Violation::InstalledOdd { installed } => {
+            (FieldCode::InstalledOdd, InstalledTeeth, installed as f64, (installed + 1) as f64)
+        }
+        Violation::InstalledNoDivisor { installed, teeth } => {
+            (FieldCode::InstalledNoDivisor, InstalledTeeth, installed as f64, teeth as f64)
+        }
+        Violation::TeethTouch { tooth_diameter_mm, center_distance_mm } => {
+            (FieldCode::TeethTouch, ToothRadius, 0.5 * tooth_diameter_mm, 0.5 * center_distance_mm)
+        }
+        Violation::NoCarrierAnnulus { semi_major_mm, tip_radius_mm } => {
+            (FieldCode::NoCarrierAnnulus, SemiMajor, semi_major_mm, tip_radius_mm)
+        }
+        Violation::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => {
+            (FieldCode::BoreLeavesNoFlank, TipRadius, tip_radius_mm, root_radius_mm)
+        }
+    };
+    FieldError {
+        pointer: pointer(parameter),
+        code,
+        detail: violation.to_string(),
+        value: Some(value),
+        limit: Some(limit),
+    }
+}
+
+/// Where a parameter stands in the design document.
+pub fn pointer(parameter: Parameter) -> String {
+    match parameter {
+        Parameter::SemiMajor => "/drive/wave_generator/semi_major_mm".into(),
+        Parameter::SemiMinor => "/drive/wave_generator/semi_minor_mm".into(),
+        Parameter::ToothCount => "/drive/teeth/count".into(),
+        Parameter::InstalledTeeth => "/drive/teeth/installed".into(),
+        Parameter::ToothRadius => "/drive/teeth/radius_mm".into(),
+        Parameter::ToothWidth => "/drive/teeth/width_mm".into(),
+        Parameter::RingTeeth => "/drive/ring/teeth".into(),
+        Parameter::TipRadius => "/drive/ring/tip_radius_mm".into(),
+        Parameter::YoungsModulus(part) => format!("/materials/{}/youngs_modulus_gpa", part_name(part)),
+        Parameter::PoissonsRatio(part) => format!("/materials/{}/poissons_ratio", part_name(part)),
+        Parameter::InputTorque => "/load/input_torque_nm".into(),
+        Parameter::OutputTorque => "/load/output_torque_nm".into(),
+        Parameter::Stiffness(contact) => format!("/model/stiffness/{}_n_per_mm", contact_name(contact)),
+        Parameter::Samples => "/sweep/samples".into(),
+        Parameter::ChordTolerance => "/profile/chord_tolerance_mm".into(),
+    }
+}
+
+const fn part_name(part: Part) -> &'static str {
+    match part {
+        Part::WaveGenerator => "wave_generator",
+        Part::Teeth => "teeth",
+        Part::Ring => "ring",
+        Part::Carrier => "carrier",
+    }
+}
+
+/// A contact as documents spell it.
+pub const fn contact_name(contact: Contact) -> &'static str {
+    match contact {
+        Contact::WaveGenerator => "wave_generator",
+        Contact::Ring => "ring",
+        Contact::Carrier => "carrier",
+    }
+}

@@ -1,0 +1,113 @@
+//! Every path on one screen, and the layers around them in order.
+
+use axum::Router;
+use axum::extract::Request;
+use axum::http::{HeaderValue, header};
+use axum::middleware;
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use tower::util::option_layer;
+use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::cors::{AllowOrigin, Any, CorsLayer};
+use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
+use tower_http::set_header::SetResponseHeaderLayer;
+use utoipa::OpenApi;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+use utoipa_swagger_ui::{Config, SwaggerUi};
+
+use crate::api::{App, coincidence_degree, geometry, side, sweep};
+use crate::observe;
+use crate::problem::{Problem, ProblemCode};
+
+#[derive(OpenApi)]
+#[openapi(
+    info(
+        title = "toothwave",
+        description = "Forces and contact stresses of discrete-tooth harmonic drives. Every number's name ends in its unit.",
+        license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
+    ),
+    tags(
+        (name = "drive", description = "One design document for every endpoint."),
+        (name = "service", description = "Beside the drive.")
+    )
+)]
+struct Document;
+
+fn api() -> OpenApiRouter<App> {
+    OpenApiRouter::with_openapi(Document::openapi())
+        .routes(routes!(geometry::geometry))
+        .routes(routes!(coincidence_degree::coincidence_degree))
+        .routes(routes!(sweep::sweep))
+        .routes(routes!(side::limits))
+        .routes(routes!(side::examples))
+        .routes(routes!(side::example))
+        .routes(routes!(side::live))
+        .routes(routes!(side::ready))
+        .routes(routes!(side::metrics))
+}
+
+/// The API document as it is committed and served.
+pub fn openapi_json() -> String {
+    let mut text = api().into_openapi().to_pretty_json().unwrap_or_default();
+    text.push('\n');
+    text
+}
+
+/// The whole service.
+pub fn router(app: App, cors_origins: &[String]) -> Router {
+    let openapi = openapi_json();
+    // The bundled page alone: without "none" it would ask a validator elsewhere.
+    let config = Config::new(["/openapi.json"]).validator_url("none");
+    let docs: Router<App> = SwaggerUi::new("/docs").config(config).into();
+    let (paths, _) = api().split_for_parts();
+    paths
+        .route("/openapi.json", get(move || openapi_document(openapi.clone())))
+        .merge(docs)
+        .fallback(not_found)
+        .method_not_allowed_fallback(method_not_allowed)
+        // From the inside out: a panic becomes a problem before it is counted, logged and given its headers.
+        .layer(CatchPanicLayer::custom(panicked))
+        .layer(middleware::from_fn(observe::observe))
+        .layer(PropagateRequestIdLayer::x_request_id())
+        .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid))
+        .layer(SetResponseHeaderLayer::overriding(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")))
+        .layer(option_layer((!cors_origins.is_empty()).then(|| cors(cors_origins))))
+        .with_state(app)
+}
+
+async fn openapi_document(document: String) -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], document).into_response()
+}
+
+async fn not_found(request: Request) -> Problem {
+    let detail = format!("nothing stands at `{}`; `/docs` lists the paths", request.uri().path());
+    Problem::new(ProblemCode::NotFound, detail)
+}
+
+async fn method_not_allowed(request: Request) -> Problem {
+    let detail = format!("`{}` does not know {}; `Allow` lists what it knows", request.uri().path(), request.method());
+    Problem::new(ProblemCode::MethodNotAllowed, detail)
+}
+
+fn panicked(panic: Box<dyn std::any::Any + Send>) -> Response {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("a panic without text");
+    Problem::internal(&text).into_response()
+}
+
+fn cors(origins: &[String]) -> CorsLayer {
+    let allowed = if origins.iter().any(|origin| origin == "*") {
+        AllowOrigin::any()
+    } else {
+        // An origin that is no header value could never be sent by a browser either.
+        AllowOrigin::list(origins.iter().filter_map(|origin| HeaderValue::from_str(origin).ok()))
+    };
+    CorsLayer::new().allow_origin(allowed).allow_methods(Any).allow_headers(Any).expose_headers([
+        header::ETAG,
+        header::RETRY_AFTER,
+        header::HeaderName::from_static("cache-status"),
+        header::HeaderName::from_static("server-timing"),
+        header::HeaderName::from_static("x-request-id"),
+    ])
+}

@@ -1,0 +1,209 @@
+//! Against the 60-digit calculation of `tests/reference/reference.py`, which was written without sight of this code.
+//!
+//! Each case states its *condition*: what rounding the input alone does to each answer. Nothing can be right to more than that;
+//! beyond it every column is right to 1e-12 of its peak.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+use toothwave_solver::mesh::Mesh;
+use toothwave_solver::sweep::{self, States, Sweep};
+use toothwave_solver::{
+    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Never,
+    PerContact, SolveError, Torque,
+};
+
+/// What is allowed beside the condition, relative to the value or the column's peak.
+const TOLERANCE: f64 = 1e-14;
+
+/// How many times the condition is allowed: each parameter enters several operations.
+const CONDITION_MULTIPLE: f64 = 1.0;
+
+struct Case(Value);
+
+impl Case {
+    fn all() -> Vec<Self> {
+        let file: Value = serde_json::from_str(include_str!("../reference/cases.json")).unwrap();
+        file["cases"].as_array().unwrap().iter().cloned().map(Self).collect()
+    }
+
+    fn name(&self) -> String {
+        format!("{}/{}", self.0["group"].as_str().unwrap(), self.0["name"].as_str().unwrap())
+    }
+
+    fn drive(&self) -> Drive {
+        let drive = &self.0["document"]["drive"];
+        let (cam, teeth, ring) = (&drive["wave_generator"], &drive["teeth"], &drive["ring"]);
+        Drive::new(&DriveParameters {
+            semi_major_mm: cam["semi_major_mm"].as_f64().unwrap(),
+            semi_minor_mm: cam["semi_minor_mm"].as_f64().unwrap(),
+            teeth: teeth["count"].as_i64().unwrap(),
+            installed: teeth["installed"].as_i64().unwrap(),
+            tooth_radius_mm: teeth["radius_mm"].as_f64().unwrap(),
+            tooth_width_mm: teeth["width_mm"].as_f64().unwrap(),
+            ring_teeth: ring["teeth"].as_i64().unwrap(),
+            tip_radius_mm: ring["tip_radius_mm"].as_f64(),
+        })
+        .unwrap_or_else(|error| panic!("{}: {error:?}", self.name()))
+    }
+
+    fn load(&self) -> LoadCase {
+        let document = &self.0["document"];
+        let material = |part: &str| {
+            let material = &document["materials"][part];
+            Material {
+                youngs_modulus_gpa: material["youngs_modulus_gpa"].as_f64().unwrap(),
+                poissons_ratio: material["poissons_ratio"].as_f64().unwrap(),
+            }
+        };
+        let stiffness = &document["model"]["stiffness"];
+        let fixed = |contact: &str| stiffness[contact].as_f64().unwrap();
+        let load = &document["load"];
+        LoadCase::new(&LoadParameters {
+            materials: Materials {
+                wave_generator: material("wave_generator"),
+                teeth: material("teeth"),
+                ring: material("ring"),
+                carrier: material("carrier"),
+            },
+            torque: load["input_torque_nm"]
+                .as_f64()
+                .map_or_else(|| Torque::Output(load["output_torque_nm"].as_f64().unwrap()), Torque::Input),
+            compatibility: match document["model"]["compatibility"].as_str().unwrap() {
+                "projection" => Compatibility::Projection,
+                _ => Compatibility::VirtualWork,
+            },
+            law: match stiffness["law"].as_str().unwrap() {
+                "linear" => ContactLaw::Linear,
+                _ => ContactLaw::Fixed(PerContact {
+                    wave_generator: fixed("wave_generator_n_per_mm"),
+                    ring: fixed("ring_n_per_mm"),
+                    carrier: fixed("carrier_n_per_mm"),
+                }),
+            },
+        })
+        .unwrap()
+    }
+
+    fn samples(&self) -> u64 {
+        self.0["document"]["sweep"]["samples"].as_u64().unwrap()
+    }
+
+    fn sweep(&self) -> Result<Sweep, SolveError> {
+        sweep::sweep(&self.drive(), &self.load(), self.samples(), &Never)
+    }
+
+    /// An expected scalar with what its input's rounding does to it.
+    fn scalar(&self, name: &str) -> Option<(f64, f64)> {
+        let value = number(&self.0["expected"][name])?;
+        Some((value, self.0["condition"][name].as_f64().unwrap_or(0.0)))
+    }
+}
+
+fn number(value: &Value) -> Option<f64> {
+    value.as_str().map(|text| text.parse().unwrap()).or_else(|| value.as_f64())
+}
+
+/// The worst error of each kind, in units of what is allowed.
+#[derive(Default)]
+struct Worst(BTreeMap<String, (f64, String)>);
+
+impl Worst {
+    fn see(&mut self, kind: &str, case: &str, error: f64, allowed: f64) {
+        let ratio = if error == 0.0 { 0.0 } else { error / allowed };
+        let entry = self.0.entry(kind.into()).or_insert((0.0, String::new()));
+        if ratio.is_nan() || ratio > entry.0 {
+            *entry = (ratio, format!("{case}: error {error:.2e}, allowed {allowed:.2e}"));
+        }
+    }
+
+    fn assert_all_within(&self) {
+        for (kind, (ratio, case)) in &self.0 {
+            println!("{kind:<44} {ratio:.3} of what is allowed, at {case}");
+        }
+        for (kind, (ratio, case)) in &self.0 {
+            assert!(*ratio <= 1.0, "{kind} is {ratio:.3} times off what is allowed, at {case}");
+        }
+    }
+}
+
+fn columns(states: &States) -> [(&'static str, &Vec<f64>); 11] {
+    [
+        ("input_angle_deg", &states.input_angle_deg),
+        ("position_deg", &states.position_deg),
+        ("center_radius_mm", &states.center_radius_mm),
+        ("wave_generator_angle_deg", &states.wave_generator_angle_deg),
+        ("ring_angle_deg", &states.ring_angle_deg),
+        ("force_wave_generator_n", &states.force_n.wave_generator),
+        ("force_ring_n", &states.force_n.ring),
+        ("force_carrier_n", &states.force_n.carrier),
+        ("stress_wave_generator_mpa", &states.stress_mpa.wave_generator),
+        ("stress_ring_mpa", &states.stress_mpa.ring),
+        ("stress_carrier_mpa", &states.stress_mpa.carrier),
+    ]
+}
+
+#[test]
+fn geometry_and_mesh_agree_with_60_digits() {
+    let mut worst = Worst::default();
+    for case in Case::all() {
+        let (name, drive) = (case.name(), case.drive());
+        let mesh = Mesh::new(&drive);
+        let expected = &case.0["expected"];
+        assert_eq!(drive.flank().is_undercut(), expected["undercut"].as_bool().unwrap(), "{name}");
+        let teeth = mesh.teeth_in_mesh();
+        assert_eq!(Some(teeth.min), expected["teeth_in_mesh_min"].as_u64(), "{name}");
+        assert_eq!(Some(teeth.max), expected["teeth_in_mesh_max"].as_u64(), "{name}");
+        let critical = drive.flank().critical_tooth_radius_mm();
+        assert_eq!(critical.is_some(), !expected["critical_tooth_radius_mm"].is_null(), "{name}");
+        let found = [
+            ("critical_tooth_radius_mm", critical.unwrap_or_default()),
+            ("engagement_start_deg", drive.flank_limit().position.from_major_deg()),
+            ("coincidence_degree", mesh.coincidence_degree()),
+            ("period_deg", mesh.period_deg()),
+            ("transmission_ratio", drive.transmission_ratio()),
+            ("transmission_ratio_carrier_fixed", drive.transmission_ratio_carrier_fixed()),
+            ("root_radius_mm", drive.root_radius_mm()),
+            ("tip_radius_mm", drive.tip_radius_mm()),
+        ];
+        for (kind, found) in found {
+            if let Some((value, condition)) = case.scalar(kind) {
+                let allowed = TOLERANCE * value.abs() + CONDITION_MULTIPLE * condition;
+                worst.see(kind, &name, (found - value).abs(), allowed);
+            }
+        }
+    }
+    worst.assert_all_within();
+}
+
+#[test]
+fn every_column_of_a_sweep_agrees_with_60_digits() {
+    let mut worst = Worst::default();
+    for case in Case::all() {
+        let name = case.name();
+        let expected = &case.0["expected"];
+        let Some(count) = expected["state_count"].as_u64() else {
+            assert!(matches!(case.sweep(), Err(SolveError::NoToothInMesh { .. })), "{name}");
+            continue;
+        };
+        let (sweep, samples) = (case.sweep().unwrap(), case.samples());
+        assert_eq!(sweep.states.len() as u64, count, "{name}");
+        let mesh = Mesh::new(&case.drive());
+        let rows = &expected["rows"];
+        let tooth = rows["tooth"].as_array().unwrap();
+        let input_index = rows["input_index"].as_array().unwrap();
+        for (kind, column) in columns(&sweep.states) {
+            let peak = number(&expected["column_peak"][kind]).unwrap();
+            let condition = case.0["condition"]["columns"][kind].as_f64().unwrap_or(0.0);
+            for (row, value) in rows[kind].as_array().unwrap().iter().enumerate() {
+                let (tooth, sample) = (tooth[row].as_u64().unwrap(), input_index[row].as_u64().unwrap());
+                let before: usize = (0..sample).map(|sample| mesh.teeth_at(sample, samples).count()).sum();
+                let index = before + usize::try_from(tooth - mesh.teeth_at(sample, samples).start()).unwrap();
+                let error = (column[index] - number(value).unwrap()).abs();
+                let allowed = (TOLERANCE + CONDITION_MULTIPLE * condition) * peak;
+                worst.see(kind, &name, error, allowed);
+            }
+        }
+    }
+    worst.assert_all_within();
+}
