@@ -220,7 +220,8 @@ fn mirrored(half: &Polyline, factors: Vector2<f64>) -> Polyline {
 
 /// From a half that starts in the middle of the tooth space: from tip to tip, counter-clockwise.
 fn from_tip_to_tip(half: &Polyline) -> Polyline {
-    let image = half.iter().rev().map(|p| Point2::new(p.x, -p.y));
+    // Subtracting from zero, because -0.0 is no better a 0.0.
+    let image = half.iter().rev().map(|p| Point2::new(p.x, 0.0 - p.y));
     image.chain(half.iter().skip(1).copied()).collect()
 }
 

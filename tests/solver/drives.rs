@@ -1,5 +1,7 @@
 //! Drives and loads that many tests speak of.
 
+use proptest::prelude::*;
+use toothwave_solver::mesh::Mesh;
 use toothwave_solver::{
     Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Never, Torque,
     sweep::{self, Sweep},
@@ -54,4 +56,43 @@ pub(crate) fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParamete
 pub(crate) fn swept(parameters: &DriveParameters, load: &LoadParameters, samples: u64) -> Sweep {
     let load = LoadCase::new(load).expect("a possible load");
     sweep::sweep(&drive(parameters), &load, samples, &Never).expect("a solvable sweep")
+}
+
+/// Possible drives of many shapes, swept ones (`always_carries`) among them.
+pub(crate) fn any_drive() -> impl Strategy<Value = DriveParameters> {
+    (
+        (1.0_f64..3.0).prop_map(|exponent| 10.0_f64.powf(exponent)),
+        (-3.0_f64..-0.8).prop_map(|exponent| 10.0_f64.powf(exponent)),
+        3_i64..60,
+        prop::sample::select(vec![1_i64, 1, 1, 2, 3]),
+        0.15_f64..0.85,
+        any::<bool>(),
+        prop::option::of(0.0_f64..1.0),
+    )
+        .prop_filter_map("an impossible drive", |(a, flattening, half, removal, thickness, more, bore)| {
+            let installed = 2 * half;
+            let teeth = installed * removal;
+            let semi_minor_mm = a * (1.0 - flattening);
+            // Thick enough to fill that share of the room between neighbours.
+            let sin = (std::f64::consts::PI / installed as f64).sin();
+            let tooth_radius_mm = thickness * semi_minor_mm * sin / (1.0 - sin);
+            let parameters = DriveParameters {
+                semi_major_mm: a,
+                semi_minor_mm,
+                teeth,
+                installed,
+                tooth_radius_mm,
+                tooth_width_mm: 10.0,
+                ring_teeth: if more { teeth + 2 } else { teeth - 2 },
+                tip_radius_mm: bore
+                    .map(|share| semi_minor_mm + 2.0 * tooth_radius_mm + share * 0.9 * (a - semi_minor_mm)),
+            };
+            Drive::new(&parameters).ok().map(|_| parameters)
+        })
+}
+
+/// Those that can be swept.
+pub(crate) fn any_swept_drive() -> impl Strategy<Value = DriveParameters> {
+    any_drive()
+        .prop_filter("no tooth in mesh at some angle", |parameters| Mesh::new(&drive(parameters)).always_carries())
 }

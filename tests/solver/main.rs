@@ -2,5 +2,9 @@
 #![allow(clippy::float_cmp, clippy::unwrap_used, reason = "tests compare exactly where values are exact")]
 
 mod drives;
+mod limits;
+mod oracles;
 mod paper;
+mod profiles;
+mod properties;
 mod reference;
