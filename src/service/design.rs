@@ -1,4 +1,7 @@
 //! The design document: wire types, and their one conversion into the solver's.
+//!
+//! They are serialised for the cache's key alone, in a form without field names: every field is written always, because one that
+//! may be left out would let two designs share a key.
 
 use serde::{Deserialize, Deserializer, Serialize};
 use toothwave_solver::profile::{Extent, ProfileParameters};
@@ -29,7 +32,7 @@ pub struct Design {
     #[serde(default)]
     pub materials: MaterialsDocument,
     /// The load; only a sweep needs it.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "given")]
     #[schema(nullable = false)]
     pub load: Option<LoadDocument>,
     /// The model of load sharing.
@@ -75,7 +78,7 @@ pub struct TeethDocument {
     #[schema(value_type = i64, minimum = 2, maximum = 10000)]
     pub count: Whole,
     /// Installed teeth Z'_G, an even divisor of `count`; only they have a slot. Left out: `count`.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "given")]
     #[schema(value_type = i64, minimum = 2, maximum = 10000, required = false)]
     pub installed: Option<Whole>,
     /// Radius r of a tooth.
@@ -94,7 +97,7 @@ pub struct RingDocument {
     #[schema(value_type = i64, minimum = 2, maximum = 10000)]
     pub teeth: Whole,
     /// Radius of a bore that truncates the teeth; null or left out, the ring keeps its natural tip.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default)]
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub tip_radius_mm: Option<f64>,
 }
@@ -137,11 +140,11 @@ impl Default for MaterialDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct LoadDocument {
     /// Torque M0 at the wave generator.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "given")]
     #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
     pub input_torque_nm: Option<f64>,
     /// Torque at the carrier, losses neglected.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "given")]
     #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
     pub output_torque_nm: Option<f64>,
 }
