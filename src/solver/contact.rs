@@ -125,24 +125,56 @@ impl Materials {
     }
 }
 
-/// How force and approach of a contact go together: `F = k δ` [7].
+/// How force and approach of a contact go together.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ContactLaw {
-    /// `k = π L1 E*/2`, of two parallel cylinders in line contact (Yang and Sun 1985).
+    /// `F = k δ` [7] with `k = π L1 E*/2`, of two parallel cylinders in line contact (Yang and Sun 1985).
     Linear,
-    /// Stiffnesses that the designer gives, in N/mm.
+    /// `F = k δ` with stiffnesses that the designer gives, in N/mm.
     Fixed(PerContact<f64>),
+    /// Palmgren's `δ = 3.84e-5 F^0.9/L^0.8` (steel on steel, N and mm).
+    Palmgren,
+}
+
+/// The approach of a contact as a power of its force: `δ = coefficient F^exponent`, one exponent for all three.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Approach {
+    /// `1/n`: 1 for a linear law.
+    pub exponent: f64,
+    /// `K^(-1/n)` of each contact, in mm/N^exponent.
+    pub coefficient: PerContact<f64>,
 }
 
 impl ContactLaw {
-    /// The stiffness of each contact, in N/mm.
-    pub fn stiffness_n_per_mm(&self, materials: &Materials, tooth_width_mm: f64) -> PerContact<f64> {
+    /// The law of teeth of this width.
+    pub fn approach(&self, materials: &Materials, tooth_width_mm: f64) -> Approach {
         match self {
             Self::Linear => {
-                PerContact::of(|contact| 0.5 * PI * tooth_width_mm * materials.contact_modulus_mpa(contact))
+                let stiffness = |contact| 0.5 * PI * tooth_width_mm * materials.contact_modulus_mpa(contact);
+                Approach { exponent: 1.0, coefficient: PerContact::of(|contact| 1.0 / stiffness(contact)) }
             }
-            Self::Fixed(stiffness_n_per_mm) => *stiffness_n_per_mm,
+            Self::Fixed(stiffness_n_per_mm) => {
+                let coefficient = PerContact::of(|contact| 1.0 / stiffness_n_per_mm.get(contact));
+                Approach { exponent: 1.0, coefficient }
+            }
+            Self::Palmgren => {
+                let coefficient = 3.84e-5 / tooth_width_mm.powf(0.8);
+                Approach { exponent: 0.9, coefficient: PerContact::of(|_| coefficient) }
+            }
         }
+    }
+}
+
+impl Approach {
+    /// `F^exponent`.
+    pub fn power(&self, force: f64) -> f64 {
+        // The common law is linear, and a power costs as much as all the rest of a state.
+        if self.exponent < 1.0 { force.powf(self.exponent) } else { force }
+    }
+
+    /// The inverse of [`Self::power`].
+    pub fn root(&self, power: f64) -> f64 {
+        if self.exponent < 1.0 { power.powf(1.0 / self.exponent) } else { power }
     }
 }
 
@@ -164,4 +196,21 @@ impl HertzLine {
     pub fn stress_mpa(&self, force_n: f64, curvature_per_mm: f64) -> f64 {
         (force_n * curvature_per_mm * self.modulus_per_width_mpa_per_mm).sqrt()
     }
+
+    /// The force that makes the largest pressure `stress_mpa`: the inverse of [`Self::stress_mpa`].
+    pub fn force_n(&self, stress_mpa: f64, curvature_per_mm: f64) -> f64 {
+        stress_mpa * (stress_mpa / (curvature_per_mm * self.modulus_per_width_mpa_per_mm))
+    }
 }
+
+/// Half the width of a line contact, `2F/(π L1 σ)`.
+pub fn half_width_mm(force_n: f64, stress_mpa: f64, tooth_width_mm: f64) -> f64 {
+    2.0 * force_n / (PI * tooth_width_mm * stress_mpa)
+}
+
+/// The largest shear stress below a line contact, over its largest pressure: `τ/σ = ζ - ζ²/√(1 + ζ²)` at the depth ζ in half-widths,
+/// with its maximum at `ζ² = (√5 - 1)/2` (both bodies alike, any Poisson's ratio: the largest shear lies in the plane of the section).
+pub const SHEAR_SHARE: f64 = 0.300_283_106_000_777_6;
+
+/// The depth of that shear stress in half-widths, `√((√5 - 1)/2)`.
+pub const SHEAR_DEPTH: f64 = 0.786_151_377_757_423_3;

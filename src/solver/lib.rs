@@ -28,6 +28,7 @@
 //! [`Drive::new`] checks parameters once and reports every reason why a drive cannot exist. A [`Drive`] answers for
 //! its geometry and its mesh; with a [`LoadCase`] it answers a [`sweep()`](sweep::sweep) over one period.
 
+pub mod adaptive;
 pub mod cam;
 pub mod contact;
 pub mod drive;
@@ -46,6 +47,7 @@ pub use contact::{Contact, ContactLaw, Material, Materials, Part, PerContact};
 pub use drive::{Drive, DriveParameters};
 pub use findings::Finding;
 pub use load_sharing::{Compatibility, LoadCase, LoadParameters, Torque};
+
 pub use position::Position;
 pub use violation::{Parameter, Violation};
 
@@ -80,6 +82,12 @@ pub enum SolveError {
     TooManyPoints {
         /// Points that the profiles need.
         points: u64,
+        /// The limit that was given.
+        limit: u64,
+    },
+    /// More states than asked for at most.
+    #[error("the sweep has more than {limit} states (input angles times teeth in mesh) at this tolerance")]
+    TooManyStates {
         /// The limit that was given.
         limit: u64,
     },

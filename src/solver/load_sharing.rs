@@ -1,13 +1,13 @@
 //! Equilibrium of a tooth and compatibility of all of them at one input angle (docs/theory.md section 4).
 
 use crate::SolveError;
-use crate::contact::{ContactLaw, HertzLine, Materials, PerContact};
+use crate::contact::{Approach, Contact, ContactLaw, HertzLine, Materials, PerContact};
 use crate::drive::{Drive, WAVES};
 use crate::locus::ToothCenter;
 use crate::mesh::Mesh;
 use crate::position::Position;
 use crate::ring::FlankPoint;
-use crate::root::NotConverged;
+use crate::root::{NotConverged, ValueAndSlope, newton_in_bracket};
 use crate::violation::{Parameter, Violation};
 
 /// How the three approaches of a tooth add up to the rotation of the wave generator.
@@ -39,6 +39,10 @@ pub struct LoadParameters {
     pub compatibility: Compatibility,
     /// The contact law.
     pub law: ContactLaw,
+    /// Gap along the normal of each contact, in µm.
+    pub clearance_um: PerContact<f64>,
+    /// The contact stress that the torque capacity is asked for.
+    pub allowable_stress_mpa: Option<f64>,
 }
 
 /// A load that was checked.
@@ -60,6 +64,9 @@ impl LoadCase {
         if let ContactLaw::Fixed(stiffness) = &parameters.law {
             values.extend(stiffness.iter().map(|(contact, &value)| (Parameter::Stiffness(contact), value)));
         }
+        let gaps = parameters.clearance_um.iter();
+        values.extend(gaps.map(|(contact, &value)| (Parameter::Clearance(contact), value)));
+        values.extend(parameters.allowable_stress_mpa.map(|value| (Parameter::AllowableStress, value)));
         let violations: Vec<_> = values.into_iter().filter_map(|(parameter, value)| parameter.check(value)).collect();
         if violations.is_empty() { Ok(Self(*parameters)) } else { Err(violations) }
     }
@@ -67,6 +74,65 @@ impl LoadCase {
     /// The parameters, as given.
     pub const fn parameters(&self) -> &LoadParameters {
         &self.0
+    }
+
+    /// Whether any contact has a gap.
+    pub fn has_clearance(&self) -> bool {
+        self.0.clearance_um.iter().any(|(_, &gap)| gap > 0.0)
+    }
+
+    /// The gaps that this drive cannot have under `projection`: those that it weighs negatively somewhere on the engaged flank,
+    /// where more gap would mean more load. Virtual work weighs none so.
+    ///
+    /// # Errors
+    /// [`NotConverged`] from the path.
+    pub fn clearance_violations(&self, drive: &Drive) -> Result<Vec<Violation>, NotConverged> {
+        if self.0.compatibility == Compatibility::VirtualWork || !self.has_clearance() {
+            return Ok(Vec::new());
+        }
+        // Both weights fall with the pressure angle (or, for s = -1, one is negative throughout).
+        let weight = Weights::of(Compatibility::Projection, drive, &drive.steepest_engaged()?).0;
+        let gaps = self.0.clearance_um.iter();
+        Ok(gaps
+            .filter(|&(contact, &gap)| gap > 0.0 && *weight.get(contact) < 0.0)
+            .map(|(contact, &clearance_um)| Violation::ClearanceNotMonotone { contact, clearance_um })
+            .collect())
+    }
+}
+
+/// What an approach at each contact adds to the displacement ξ along `F_H`.
+struct Weights(PerContact<f64>);
+
+impl Weights {
+    fn of(compatibility: Compatibility, drive: &Drive, center: &ToothCenter) -> Self {
+        let force_ratio = force_ratio(drive, center);
+        match compatibility {
+            Compatibility::VirtualWork => Self(force_ratio),
+            // The paper's cos(γ + sβ) and s sin γ. With tan β = k tan γ the first, times F_K/F_H = cos γ/cos β, is 1 - (1 + sk) sin²γ.
+            Compatibility::Projection => {
+                let t = center.tan_pressure_angle;
+                let sin_squared = t * t / (1.0 + t * t);
+                let sense = drive.sense();
+                let along_ring = 1.0 - (1.0 + sense * drive.flank().teeth_per_wave()) * sin_squared;
+                Self(PerContact {
+                    wave_generator: 1.0,
+                    ring: along_ring / force_ratio.ring,
+                    carrier: sense * sin_squared.sqrt(),
+                })
+            }
+        }
+    }
+}
+
+/// Forces over `F_H`: 1, `F_K/F_H = cos γ/cos β`, `F_S/F_H = sin γ Z_G/U` [1].
+fn force_ratio(drive: &Drive, center: &ToothCenter) -> PerContact<f64> {
+    let t = center.tan_pressure_angle;
+    let tan_ring = drive.flank().teeth_per_wave() * t;
+    let cos_cam = 1.0 / (1.0 + t * t).sqrt();
+    PerContact {
+        wave_generator: 1.0,
+        ring: (1.0 + tan_ring * tan_ring).sqrt() * cos_cam,
+        carrier: t * cos_cam * drive.teeth_per_wave(),
     }
 }
 
@@ -77,12 +143,14 @@ pub struct ToothState {
     pub center: ToothCenter,
     /// Its contact with the ring.
     pub flank: FlankPoint,
-    /// Forces over `F_H`: 1, `F_K/F_H = cos γ/cos β`, `F_S/F_H = sin γ Z_G/U` [1].
+    /// Forces over `F_H`.
     pub force_ratio: PerContact<f64>,
     /// Relative curvature of each contact, in 1/mm.
     pub curvature_per_mm: PerContact<f64>,
-    /// `c = ξ/F_H`: displacement along `F_H` per force.
-    pub compliance_mm_per_n: f64,
+    /// `c` in `ξ = c F_H^(1/n)`: displacement along `F_H`, in mm/N^(1/n).
+    pub compliance: f64,
+    /// `g/|h'|`: how far the wave generator turns before the clearances at this tooth are closed; infinite where it has no lever arm.
+    pub closing_rad: f64,
 }
 
 /// A drive under a load: everything that does not depend on the position, worked out once.
@@ -91,9 +159,36 @@ pub struct LoadedDrive<'a> {
     drive: &'a Drive,
     compatibility: Compatibility,
     input_torque_nmm: f64,
-    /// `1/k` of each contact.
-    contact_compliance_mm_per_n: PerContact<f64>,
+    approach: Approach,
+    clearance_mm: PerContact<f64>,
     hertz: PerContact<HertzLine>,
+}
+
+/// How far the wave generator turns under the load at one input angle, and how stiffly.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WindUp {
+    /// Where the first tooth's clearances are closed.
+    pub closing_rad: f64,
+    /// What is turned beyond that. Kept apart, because it may be small against the clearances and alone makes the forces.
+    pub excess_rad: f64,
+    /// `dM0/dΔφ` at the load.
+    pub stiffness_nmm_per_rad: f64,
+}
+
+impl WindUp {
+    /// `Δφ`.
+    pub const fn rotation_rad(&self) -> f64 {
+        self.closing_rad + self.excess_rad
+    }
+}
+
+/// A stress that limits the torque at one input angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TorqueLimit {
+    /// The torque at the wave generator under which it is reached.
+    pub input_torque_nmm: f64,
+    /// The contact that reaches it first.
+    pub contact: Contact,
 }
 
 impl<'a> LoadedDrive<'a> {
@@ -108,12 +203,12 @@ impl<'a> LoadedDrive<'a> {
             Torque::Input(torque) => torque,
             Torque::Output(torque) => torque / drive.teeth_per_wave(),
         };
-        let stiffness = p.law.stiffness_n_per_mm(&p.materials, width_mm);
         let loaded = Self {
             drive,
             compatibility: p.compatibility,
             input_torque_nmm: 1e3 * input_torque_nm,
-            contact_compliance_mm_per_n: PerContact::of(|contact| 1.0 / stiffness.get(contact)),
+            approach: p.law.approach(&p.materials, width_mm),
+            clearance_mm: PerContact::of(|contact| 1e-3 * p.clearance_um.get(contact)),
             hertz: PerContact::of(|contact| HertzLine::new(&p.materials, contact, width_mm)),
         };
         let mesh = Mesh::new(drive);
@@ -123,13 +218,13 @@ impl<'a> LoadedDrive<'a> {
                 spacing_deg: mesh.spacing_deg(),
             });
         }
-        // Only `projection` can fall to zero. It is linear in sin²γ and positive at the root, so its least value stands there or
-        // where γ is largest.
+        // Only `projection` can fall to zero, and only with unlike stiffnesses. It is then linear in sin²γ and positive at the root, so its
+        // least value stands there or where γ is largest.
         if p.compatibility == Compatibility::Projection {
-            let ToothState { center, compliance_mm_per_n, .. } = loaded.state(drive.steepest_engaged()?);
-            if compliance_mm_per_n <= 0.0 {
+            let ToothState { center, compliance, .. } = loaded.state(drive.steepest_engaged()?);
+            if compliance <= 0.0 {
                 let position_deg = center.position.from_major_deg();
-                return Err(SolveError::ComplianceNotPositive { position_deg, compliance_mm_per_n });
+                return Err(SolveError::ComplianceNotPositive { position_deg, compliance_mm_per_n: compliance });
             }
         }
         Ok(loaded)
@@ -145,11 +240,6 @@ impl<'a> LoadedDrive<'a> {
         self.input_torque_nmm
     }
 
-    /// Hertz stress of each contact.
-    pub const fn hertz(&self) -> &PerContact<HertzLine> {
-        &self.hertz
-    }
-
     /// The tooth at a position.
     ///
     /// # Errors
@@ -163,59 +253,164 @@ impl<'a> LoadedDrive<'a> {
         let flank_curve = self.drive.flank();
         let flank = flank_curve.at(&center);
         let r = self.drive.parameters().tooth_radius_mm;
-        let t = center.tan_pressure_angle;
-        let cos_cam = 1.0 / (1.0 + t * t).sqrt();
-        let force_ratio = PerContact {
-            wave_generator: 1.0,
-            ring: cos_cam / flank.cos_pressure_angle,
-            carrier: t * cos_cam * self.drive.teeth_per_wave(),
-        };
+        let force_ratio = force_ratio(self.drive, &center);
+        let weights = Weights::of(self.compatibility, self.drive, &center).0;
         let cam = flank_curve.locus().cam();
         let curvature_per_mm = PerContact {
             wave_generator: 1.0 / r + 1.0 / cam.curvature_radius_mm(&center.cam_contact),
             ring: 1.0 / (r * flank.regularity),
             carrier: 1.0 / r,
         };
-        let compliance_mm_per_n = self.compliance_mm_per_n(&force_ratio, t * cos_cam);
-        ToothState { center, flank, force_ratio, curvature_per_mm, compliance_mm_per_n }
+        let (mut compliance, mut gap_mm) = (0.0, 0.0);
+        for (contact, weight) in weights.iter() {
+            let approach = self.approach.coefficient.get(contact) * self.approach.power(*force_ratio.get(contact));
+            compliance += weight * approach;
+            gap_mm += weight * self.clearance_mm.get(contact);
+        }
+        let closing_rad = if gap_mm > 0.0 { gap_mm / center.cam_contact.lever_arm_mm } else { 0.0 };
+        ToothState { center, flank, force_ratio, curvature_per_mm, compliance, closing_rad }
     }
 
-    fn compliance_mm_per_n(&self, force_ratio: &PerContact<f64>, sin_cam: f64) -> f64 {
-        let contact = &self.contact_compliance_mm_per_n;
-        match self.compatibility {
-            // The paper's δ_H + δ_K cos(γ + sβ) + s δ_S sin γ over F_H. With tan β = k tan γ and Z_G/U = k + s
-            // its ring term is (1 - (1 + sk) sin²γ)/k_K and its carrier term (1 + sk) sin²γ/k_S.
-            Compatibility::Projection => {
-                let sense = self.drive.sense();
-                let carrier_share = (1.0 + sense * self.drive.flank().teeth_per_wave()) * sin_cam * sin_cam;
-                contact.wave_generator + contact.ring * (1.0 - carrier_share) + contact.carrier * carrier_share
-            }
-            Compatibility::VirtualWork => {
-                contact.wave_generator
-                    + contact.ring * force_ratio.ring * force_ratio.ring
-                    + contact.carrier * force_ratio.carrier * force_ratio.carrier
+    /// The forces on a tooth when the wave generator has turned by `Δφ`, from `F_H = ((Δφ |h'| - g)/c)^n`; none where a gap is
+    /// still open.
+    pub fn forces_n(&self, tooth: &ToothState, wind_up: &WindUp) -> PerContact<f64> {
+        let cam_force_n = self.cam_force_n(tooth, tooth.displacement_mm(wind_up.closing_rad, wind_up.excess_rad));
+        PerContact::of(|contact| cam_force_n * tooth.force_ratio.get(contact))
+    }
+
+    fn cam_force_n(&self, tooth: &ToothState, displacement_mm: f64) -> f64 {
+        self.approach.root(displacement_mm / tooth.compliance)
+    }
+
+    /// The three forces and the three stresses on a tooth when the wave generator has turned by `Δφ`.
+    pub(crate) fn loads(&self, tooth: &ToothState, wind_up: &WindUp) -> [f64; 6] {
+        let force_n = self.forces_n(tooth, wind_up);
+        let stress_mpa = self.stress_mpa(tooth, &force_n);
+        [
+            force_n.wave_generator,
+            force_n.ring,
+            force_n.carrier,
+            stress_mpa.wave_generator,
+            stress_mpa.ring,
+            stress_mpa.carrier,
+        ]
+    }
+
+    /// The Hertz stresses under the forces on a tooth.
+    pub fn stress_mpa(&self, tooth: &ToothState, force_n: &PerContact<f64>) -> PerContact<f64> {
+        PerContact::of(|contact| {
+            self.hertz.get(contact).stress_mpa(*force_n.get(contact), *tooth.curvature_per_mm.get(contact))
+        })
+    }
+
+    /// The torque `U Σ F_H |h'|` [2] of these teeth of one zone, and its derivative by `Δφ`.
+    fn torque(&self, teeth: &[ToothState], closing_rad: f64, excess_rad: f64) -> ValueAndSlope {
+        let mut torque = ValueAndSlope { value: 0.0, slope: 0.0 };
+        for tooth in teeth {
+            let displacement_mm = tooth.displacement_mm(closing_rad, excess_rad);
+            if displacement_mm > 0.0 {
+                let lever_arm_mm = tooth.center.cam_contact.lever_arm_mm;
+                let torque_nmm = WAVES * self.cam_force_n(tooth, displacement_mm) * lever_arm_mm;
+                torque.value += torque_nmm;
+                // dF/dΔφ = n F |h'|/(Δφ |h'| - g)
+                torque.slope += torque_nmm * (lever_arm_mm / displacement_mm) / self.approach.exponent;
             }
         }
+        torque
     }
 
-    /// `Δφ`, in rad, that balances the input torque over these teeth of one zone: with `F_H = Δφ |h'|/c` the torque balance [2] is
-    /// `M0 = U Δφ Σ h'²/c`.
-    pub fn wind_up_rad(&self, teeth: &[ToothState]) -> f64 {
-        let torque_per_rotation: f64 = teeth
+    /// The `Δφ` that balances the input torque over these teeth of one zone.
+    ///
+    /// Without clearance all teeth carry, and `Δφ = (M0/(U Σ |h'| (|h'|/c)^n))^(1/n)`. With clearance a tooth carries from `Δφ = g/|h'|` on;
+    /// in that order the teeth are taken in until the torque is reached: for a linear law the sum over those that carry is closed
+    /// again, for a power law one increasing equation is left.
+    ///
+    /// # Errors
+    /// [`NotConverged`] where that equation is not solved.
+    pub fn wind_up(&self, teeth: &[ToothState]) -> Result<WindUp, NotConverged> {
+        let closing_rad = teeth.iter().map(|tooth| tooth.closing_rad).fold(f64::INFINITY, f64::min);
+        let excess_rad = if teeth.iter().all(|tooth| tooth.closing_rad == 0.0) {
+            self.gapless_rotation_rad(teeth)
+        } else {
+            self.excess_rad(teeth, closing_rad)?
+        };
+        let stiffness_nmm_per_rad = self.torque(teeth, closing_rad, excess_rad).slope;
+        Ok(WindUp { closing_rad, excess_rad, stiffness_nmm_per_rad })
+    }
+
+    fn gapless_rotation_rad(&self, teeth: &[ToothState]) -> f64 {
+        let torque_of_unit: f64 = teeth
             .iter()
             .map(|tooth| {
                 let lever_arm_mm = tooth.center.cam_contact.lever_arm_mm;
-                lever_arm_mm * (lever_arm_mm / tooth.compliance_mm_per_n)
+                lever_arm_mm * self.approach.root(lever_arm_mm / tooth.compliance)
             })
             .sum();
-        self.input_torque_nmm / (WAVES * torque_per_rotation)
+        self.approach.power(self.input_torque_nmm / (WAVES * torque_of_unit))
+    }
+
+    /// What is turned beyond the first closing angle, by an exact active set.
+    fn excess_rad(&self, teeth: &[ToothState], closing_rad: f64) -> Result<f64, NotConverged> {
+        let mut order: Vec<ToothState> = teeth.iter().filter(|tooth| tooth.closing_rad.is_finite()).copied().collect();
+        order.sort_by(|one, other| one.closing_rad.total_cmp(&other.closing_rad));
+        // The next tooth is taken in if those before make less than the torque when it begins to carry.
+        let mut carrying = 1;
+        while let Some(next) = order.get(carrying)
+            && self.torque(&order[..carrying], closing_rad, next.closing_rad - closing_rad).value
+                < self.input_torque_nmm
+        {
+            carrying += 1;
+        }
+        let order = &order[..carrying];
+        if self.approach.exponent < 1.0 {
+            // With all gaps closed from the start these teeth would need less, and from the last closing angle on they need no more.
+            let gapless_rad = self.gapless_rotation_rad(order);
+            let last_rad = order[carrying - 1].closing_rad - closing_rad;
+            let (low, high) = (last_rad.max(gapless_rad), last_rad + gapless_rad);
+            newton_in_bracket("rotation that closes the gaps", low, high, high, |excess_rad| {
+                let torque = self.torque(order, closing_rad, excess_rad);
+                ValueAndSlope { value: torque.value - self.input_torque_nmm, slope: torque.slope }
+            })
+        } else {
+            let (mut stiffness, mut torque_of_gaps) = (0.0, 0.0);
+            for tooth in order {
+                let lever_arm_mm = tooth.center.cam_contact.lever_arm_mm;
+                let share = lever_arm_mm * (lever_arm_mm / tooth.compliance);
+                stiffness += share;
+                torque_of_gaps += share * (tooth.closing_rad - closing_rad);
+            }
+            Ok((self.input_torque_nmm / WAVES + torque_of_gaps) / stiffness)
+        }
+    }
+
+    /// The largest input torque under which no contact of these teeth exceeds a stress, and the contact that reaches it.
+    ///
+    /// Loads grow with `Δφ` and `Δφ` with the torque, so the first contact to reach the stress sets `Δφ`, and that the torque.
+    pub fn torque_limit(&self, teeth: &[ToothState], allowable_stress_mpa: f64) -> TorqueLimit {
+        let closing_rad = teeth.iter().map(|tooth| tooth.closing_rad).fold(f64::INFINITY, f64::min);
+        let mut limit = (f64::INFINITY, Contact::WaveGenerator);
+        for tooth in teeth {
+            let lever_arm_mm = tooth.center.cam_contact.lever_arm_mm;
+            for (contact, hertz) in self.hertz.iter() {
+                let ratio = *tooth.force_ratio.get(contact);
+                if ratio > 0.0 && lever_arm_mm > 0.0 {
+                    let allowed_n = hertz.force_n(allowable_stress_mpa, *tooth.curvature_per_mm.get(contact));
+                    let displacement_mm = tooth.compliance * self.approach.power(allowed_n / ratio);
+                    let excess_rad = displacement_mm / lever_arm_mm + (tooth.closing_rad - closing_rad);
+                    if excess_rad < limit.0 {
+                        limit = (excess_rad, contact);
+                    }
+                }
+            }
+        }
+        TorqueLimit { input_torque_nmm: self.torque(teeth, closing_rad, limit.0).value, contact: limit.1 }
     }
 }
 
 impl ToothState {
-    /// The forces on the tooth once `Δφ` is known, in N.
-    pub fn forces_n(&self, wind_up_rad: f64) -> PerContact<f64> {
-        let force_n = wind_up_rad * (self.center.cam_contact.lever_arm_mm / self.compliance_mm_per_n);
-        PerContact::of(|contact| force_n * self.force_ratio.get(contact))
+    /// `Δφ |h'| - g`, or nothing while the gap is open, for a rotation of `excess_rad` beyond `closing_rad`.
+    fn displacement_mm(&self, closing_rad: f64, excess_rad: f64) -> f64 {
+        let closed_rad = excess_rad - (self.closing_rad - closing_rad);
+        if closed_rad > 0.0 { closed_rad * self.center.cam_contact.lever_arm_mm } else { 0.0 }
     }
 }

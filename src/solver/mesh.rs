@@ -41,6 +41,11 @@ impl Mesh {
         }
     }
 
+    /// Where and why the flank ends.
+    pub const fn flank_limit(&self) -> &FlankLimit {
+        &self.limit
+    }
+
     /// `ε = ψ_e Z'_G/π`, counted over both zones.
     pub fn coincidence_degree(&self) -> f64 {
         match self.limit.end {
@@ -117,6 +122,24 @@ impl Mesh {
     /// The same position in degrees, rounded once.
     pub fn position_deg(&self, tooth: u64, sample: u64, samples: u64) -> f64 {
         (360 * (tooth * samples - sample)) as f64 / (samples * self.installed) as f64
+    }
+
+    /// How many spacings of the installed teeth the engagement spans, `ψ_e Z'_G/2π`.
+    pub fn engaged_spacings(&self) -> f64 {
+        0.5 * self.coincidence_degree()
+    }
+
+    /// The position of a tooth when a fraction of the period has passed: `tooth - fraction` spacings from the major axis. Both are
+    /// exact, so the distance to the minor axis keeps its digits too.
+    pub fn position_between(&self, tooth: u64, fraction: f64) -> Position {
+        let spacing_rad = 2.0 * PI / self.installed as f64;
+        let from_major_rad = (tooth as f64 - fraction) * spacing_rad;
+        let from_minor_rad = ((0.25 * self.installed as f64 - tooth as f64) + fraction) * spacing_rad;
+        if from_major_rad < from_minor_rad {
+            Position::from_major(from_major_rad)
+        } else {
+            Position::from_minor(from_minor_rad.max(0.0))
+        }
     }
 
     /// The input angle of a sample, rounded once.

@@ -1,10 +1,26 @@
-//! One period of the input angle: columns of tooth states, peaks, residuals.
+//! One period of the input angle: columns of tooth states, peaks, residuals, wind-up, capacity.
 
-use crate::contact::{Contact, PerContact};
+use crate::adaptive;
+use crate::contact::{Contact, PerContact, half_width_mm};
 use crate::drive::{Drive, WAVES};
-use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
+use crate::load_sharing::{LoadCase, LoadedDrive, ToothState, WindUp};
 use crate::mesh::Mesh;
+use crate::position::Position;
 use crate::{SolveError, Stop};
+
+/// Where a sweep looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Points {
+    /// So many equal intervals of one period, both ends included; at least 1.
+    Samples(u64),
+    /// Wherever it takes to find the true extremes of every force and stress to a relative tolerance, both sides of every jump included.
+    Tolerance {
+        /// The relative tolerance.
+        tolerance: f64,
+        /// Most states.
+        max_states: u64,
+    },
+}
 
 /// The states of a sweep, by input angle and then tooth number: columns of equal length, one entry a state.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -27,6 +43,19 @@ pub struct States {
     pub stress_mpa: PerContact<Vec<f64>>,
 }
 
+/// What holds for all teeth at an input angle: columns of equal length, one entry an input angle.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct InputAngles {
+    /// Input angle j.
+    pub input_angle_deg: Vec<f64>,
+    /// `Δφ`: how far the wave generator turns under the load, clearances included.
+    pub wind_up_deg: Vec<f64>,
+    /// `(Z_G/U)² dM0/dΔφ`: output torque over output rotation, input held, at the load.
+    pub torsional_stiffness_nm_per_rad: Vec<f64>,
+    /// Teeth of one zone that carry load.
+    pub loaded_teeth: Vec<u32>,
+}
+
 /// The largest value of a column, and the state where it stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
@@ -45,6 +74,21 @@ pub struct ContactPeaks {
     pub force_n: Peak,
     /// Of the stress, in MPa.
     pub stress_mpa: Peak,
+    /// Half the width of the contact where the stress has its peak.
+    pub half_width_mm: f64,
+}
+
+/// What limits the torque.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TorqueCapacity {
+    /// The largest torque at the wave generator under which no contact exceeds the allowable stress.
+    pub input_torque_nm: f64,
+    /// The same at the carrier.
+    pub output_torque_nm: f64,
+    /// The contact that limits it.
+    pub contact: Contact,
+    /// The input angle where it does.
+    pub input_angle_deg: f64,
 }
 
 /// A sweep over one period.
@@ -52,13 +96,26 @@ pub struct ContactPeaks {
 pub struct Sweep {
     /// The states.
     pub states: States,
+    /// What holds at each input angle.
+    pub input_angles: InputAngles,
     /// Peaks over the states.
     pub peaks: PerContact<ContactPeaks>,
+    /// The torque capacity, given an allowable stress.
+    pub torque_capacity: Option<TorqueCapacity>,
     /// Largest relative deviation of the input, ring and carrier torques from `M0`, `M0 Z_K/U`, `M0 Z_G/U`.
     pub torque_balance_residual: f64,
     /// Largest difference of a force or stress between the last input angle and the first, teeth renumbered, over
     /// the column's peak.
     pub period_closure_residual: f64,
+}
+
+impl Sweep {
+    /// How far the carrier lags and leads over the period under the load: the range of the wind-up at the output.
+    pub fn transmission_error_peak_to_peak_deg(&self, drive: &Drive) -> f64 {
+        let wind_up_deg = self.input_angles.wind_up_deg.iter().copied();
+        let most = wind_up_deg.clone().fold(f64::NEG_INFINITY, f64::max);
+        (most - wind_up_deg.fold(f64::INFINITY, f64::min)) / drive.teeth_per_wave()
+    }
 }
 
 impl States {
@@ -86,100 +143,199 @@ impl States {
         self.tooth.is_empty()
     }
 
-    fn peak(&self, column: &[f64]) -> Peak {
+    fn peak(&self, column: &[f64]) -> (usize, Peak) {
         let mut at = 0;
         for (index, value) in column.iter().enumerate() {
             if *value > column[at] {
                 at = index;
             }
         }
-        Peak { value: column[at], input_angle_deg: self.input_angle_deg[at], position_deg: self.position_deg[at] }
+        let (input_angle_deg, position_deg) = (self.input_angle_deg[at], self.position_deg[at]);
+        (at, Peak { value: column[at], input_angle_deg, position_deg })
     }
 }
 
-/// The sweep over one period in `samples` equal intervals, both ends included; `samples` is at least 1.
+/// The sweep over one period.
 ///
 /// # Errors
 /// [`SolveError::NoToothInMesh`] and [`SolveError::ComplianceNotPositive`] where no finite forces exist,
+/// [`SolveError::TooManyStates`] at a tolerance that takes more of them than allowed,
 /// [`SolveError::Stopped`] when `stop` says so.
-pub fn sweep(drive: &Drive, load: &LoadCase, samples: u64, stop: &impl Stop) -> Result<Sweep, SolveError> {
+pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -> Result<Sweep, SolveError> {
     let loaded = LoadedDrive::new(drive, load)?;
     let mesh = Mesh::new(drive);
-    // A count that memory can hold; the caller has bounded it.
-    let count = usize::try_from(mesh.state_count(samples)).unwrap_or(usize::MAX);
-    let mut states = States::with_capacity(count);
-    let mut torque_balance_residual = 0.0_f64;
-    let mut teeth: Vec<ToothState> = Vec::new();
-    for sample in 0..=samples {
-        if stop.stopped() {
-            return Err(SolveError::Stopped);
+    let mut columns = Columns::new(&loaded, load.parameters().allowable_stress_mpa);
+    match points {
+        Points::Samples(samples) => {
+            columns.reserve(mesh.state_count(samples));
+            for sample in 0..=samples {
+                if stop.stopped() {
+                    return Err(SolveError::Stopped);
+                }
+                let teeth = mesh.teeth_at(sample, samples).map(|number| PlacedTooth {
+                    number,
+                    position: mesh.position(number, sample, samples),
+                    position_deg: mesh.position_deg(number, sample, samples),
+                });
+                columns.add(mesh.input_angle_deg(sample, samples), teeth)?;
+            }
         }
-        teeth.clear();
-        let numbers = mesh.teeth_at(sample, samples);
-        let input_angle_deg = mesh.input_angle_deg(sample, samples);
-        for number in numbers {
-            let tooth = loaded.tooth(mesh.position(number, sample, samples))?;
-            states.input_angle_deg.push(input_angle_deg);
-            states.tooth.push(u32::try_from(number).unwrap_or(u32::MAX));
-            states.position_deg.push(mesh.position_deg(number, sample, samples));
-            teeth.push(tooth);
+        Points::Tolerance { tolerance, max_states } => {
+            for moment in adaptive::moments(&loaded, tolerance, max_states, stop)? {
+                columns.add(moment.fraction * mesh.period_deg(), moment.teeth(&mesh))?;
+            }
         }
-        torque_balance_residual = torque_balance_residual.max(share_load(&loaded, &teeth, &mut states));
     }
-    let peaks = PerContact::of(|contact| ContactPeaks {
-        force_n: states.peak(states.force_n.get(contact)),
-        stress_mpa: states.peak(states.stress_mpa.get(contact)),
-    });
-    let period_closure_residual = period_closure(&states, &peaks, &mesh, samples);
-    Ok(Sweep { states, peaks, torque_balance_residual, period_closure_residual })
+    Ok(columns.finish())
 }
 
-/// Appends geometry, forces and stresses of the teeth at one input angle, and returns the largest relative
-/// deviation of the torques that these forces make from those they must balance.
-fn share_load(loaded: &LoadedDrive<'_>, teeth: &[ToothState], states: &mut States) -> f64 {
-    let drive = loaded.drive();
-    let flank = drive.flank();
-    let wind_up_rad = loaded.wind_up_rad(teeth);
-    let mut torque_nmm = PerContact::<f64>::default();
-    for tooth in teeth {
-        let ToothState { center, flank: point, .. } = tooth;
-        states.center_radius_mm.push(center.center_radius_mm);
-        let cam_angle_rad = flank.locus().cam().contact_angle_from_minor_rad(&center.cam_contact);
-        states.wave_generator_angle_deg.push(cam_angle_rad.to_degrees());
-        states.ring_angle_deg.push(flank.angle_from_tip_rad(center, point).to_degrees());
+/// A tooth in mesh at an input angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PlacedTooth {
+    pub(crate) number: u64,
+    pub(crate) position: Position,
+    pub(crate) position_deg: f64,
+}
 
-        let force_n = tooth.forces_n(wind_up_rad);
-        let stress_mpa = PerContact::of(|contact| {
-            let curvature_per_mm = *tooth.curvature_per_mm.get(contact);
-            loaded.hertz().get(contact).stress_mpa(*force_n.get(contact), curvature_per_mm)
+/// A sweep as it grows by input angles.
+struct Columns<'a> {
+    loaded: &'a LoadedDrive<'a>,
+    allowable_stress_mpa: Option<f64>,
+    states: States,
+    input_angles: InputAngles,
+    torque_capacity: Option<TorqueCapacity>,
+    torque_balance_residual: f64,
+    /// Teeth at the first and at the last input angle.
+    teeth_at_ends: (usize, usize),
+    teeth: Vec<ToothState>,
+}
+
+impl<'a> Columns<'a> {
+    fn new(loaded: &'a LoadedDrive<'a>, allowable_stress_mpa: Option<f64>) -> Self {
+        Self {
+            loaded,
+            allowable_stress_mpa,
+            states: States::default(),
+            input_angles: InputAngles::default(),
+            torque_capacity: None,
+            torque_balance_residual: 0.0,
+            teeth_at_ends: (0, 0),
+            teeth: Vec::new(),
+        }
+    }
+
+    fn reserve(&mut self, states: u64) {
+        // A count that memory can hold; the caller has bounded it.
+        self.states = States::with_capacity(usize::try_from(states).unwrap_or(usize::MAX));
+    }
+
+    /// Appends the states of the teeth in mesh at one input angle.
+    fn add(&mut self, input_angle_deg: f64, placed: impl Iterator<Item = PlacedTooth>) -> Result<(), SolveError> {
+        self.teeth.clear();
+        for PlacedTooth { number, position, position_deg } in placed {
+            self.teeth.push(self.loaded.tooth(position)?);
+            self.states.input_angle_deg.push(input_angle_deg);
+            self.states.tooth.push(u32::try_from(number).unwrap_or(u32::MAX));
+            self.states.position_deg.push(position_deg);
+        }
+        let wind_up = self.loaded.wind_up(&self.teeth)?;
+        let loaded_teeth = self.share_load(&wind_up);
+        let torque_ratio = self.loaded.drive().teeth_per_wave();
+        let angles = &mut self.input_angles;
+        angles.input_angle_deg.push(input_angle_deg);
+        angles.wind_up_deg.push(wind_up.rotation_rad().to_degrees());
+        angles.torsional_stiffness_nm_per_rad.push(1e-3 * wind_up.stiffness_nmm_per_rad * torque_ratio * torque_ratio);
+        angles.loaded_teeth.push(loaded_teeth);
+        if angles.input_angle_deg.len() == 1 {
+            self.teeth_at_ends.0 = self.teeth.len();
+        }
+        self.teeth_at_ends.1 = self.teeth.len();
+        if let Some(allowable_stress_mpa) = self.allowable_stress_mpa {
+            let limit = self.loaded.torque_limit(&self.teeth, allowable_stress_mpa);
+            let input_torque_nm = 1e-3 * limit.input_torque_nmm;
+            if self.torque_capacity.is_none_or(|capacity| input_torque_nm < capacity.input_torque_nm) {
+                let output_torque_nm = input_torque_nm * torque_ratio;
+                let contact = limit.contact;
+                let capacity = TorqueCapacity { input_torque_nm, output_torque_nm, contact, input_angle_deg };
+                self.torque_capacity = Some(capacity);
+            }
+        }
+        Ok(())
+    }
+
+    /// Appends geometry, forces and stresses of the teeth, and returns how many carry load.
+    fn share_load(&mut self, wind_up: &WindUp) -> u32 {
+        let drive = self.loaded.drive();
+        let flank = drive.flank();
+        let states = &mut self.states;
+        let mut loaded_teeth = 0;
+        let mut torque_nmm = PerContact::<f64>::default();
+        for tooth in &self.teeth {
+            let ToothState { center, flank: point, .. } = tooth;
+            states.center_radius_mm.push(center.center_radius_mm);
+            let cam_angle_rad = flank.locus().cam().contact_angle_from_minor_rad(&center.cam_contact);
+            states.wave_generator_angle_deg.push(cam_angle_rad.to_degrees());
+            states.ring_angle_deg.push(flank.angle_from_tip_rad(center, point).to_degrees());
+
+            let force_n = self.loaded.forces_n(tooth, wind_up);
+            loaded_teeth += u32::from(force_n.wave_generator > 0.0);
+            let stress_mpa = self.loaded.stress_mpa(tooth, &force_n);
+            states.force_n.push(force_n);
+            states.stress_mpa.push(stress_mpa);
+
+            let sin_ring = point.tan_pressure_angle * point.cos_pressure_angle;
+            torque_nmm.wave_generator += WAVES * force_n.wave_generator * center.cam_contact.lever_arm_mm;
+            torque_nmm.ring += WAVES * force_n.ring * sin_ring * center.center_radius_mm;
+            torque_nmm.carrier += WAVES * force_n.carrier * center.center_radius_mm;
+        }
+        let input_nmm = self.loaded.input_torque_nmm();
+        let balanced = PerContact {
+            wave_generator: torque_nmm.wave_generator / input_nmm,
+            ring: torque_nmm.ring / (input_nmm * flank.teeth_per_wave()),
+            carrier: torque_nmm.carrier / (input_nmm * drive.teeth_per_wave()),
+        };
+        let residual = balanced.iter().map(|(_, ratio)| (ratio - 1.0).abs()).fold(0.0, f64::max);
+        self.torque_balance_residual = self.torque_balance_residual.max(residual);
+        loaded_teeth
+    }
+
+    fn finish(self) -> Sweep {
+        let states = self.states;
+        let tooth_width_mm = self.loaded.drive().parameters().tooth_width_mm;
+        let peaks = PerContact::of(|contact| {
+            let force = states.force_n.get(contact);
+            let (at, stress_mpa) = states.peak(states.stress_mpa.get(contact));
+            ContactPeaks {
+                force_n: states.peak(force).1,
+                stress_mpa,
+                half_width_mm: half_width_mm(force[at], stress_mpa.value, tooth_width_mm),
+            }
         });
-        states.force_n.push(force_n);
-        states.stress_mpa.push(stress_mpa);
-
-        let sin_ring = point.tan_pressure_angle * point.cos_pressure_angle;
-        torque_nmm.wave_generator += WAVES * force_n.wave_generator * center.cam_contact.lever_arm_mm;
-        torque_nmm.ring += WAVES * force_n.ring * sin_ring * center.center_radius_mm;
-        torque_nmm.carrier += WAVES * force_n.carrier * center.center_radius_mm;
+        let period_closure_residual = period_closure(&states, &peaks, self.teeth_at_ends);
+        Sweep {
+            states,
+            input_angles: self.input_angles,
+            peaks,
+            torque_capacity: self.torque_capacity,
+            torque_balance_residual: self.torque_balance_residual,
+            period_closure_residual,
+        }
     }
-    let input_nmm = loaded.input_torque_nmm();
-    let balanced = PerContact {
-        wave_generator: torque_nmm.wave_generator / input_nmm,
-        ring: torque_nmm.ring / (input_nmm * flank.teeth_per_wave()),
-        carrier: torque_nmm.carrier / (input_nmm * drive.teeth_per_wave()),
-    };
-    balanced.iter().map(|(_, ratio)| (ratio - 1.0).abs()).fold(0.0, f64::max)
 }
 
-fn period_closure(states: &States, peaks: &PerContact<ContactPeaks>, mesh: &Mesh, samples: u64) -> f64 {
-    let last = states.len() - mesh.teeth_at(samples, samples).count();
+fn period_closure(
+    states: &States,
+    peaks: &PerContact<ContactPeaks>,
+    (teeth_at_start, teeth_at_end): (usize, usize),
+) -> f64 {
+    let last = states.len() - teeth_at_end;
     let residual = |column: &[f64], peak: f64| {
-        let (first, last) = (column.iter(), column[last..].iter());
-        last.zip(first).map(|(end, start)| (end - start).abs() / peak).fold(0.0, f64::max)
+        let pairs = column[last..].iter().zip(&column[..teeth_at_start]);
+        pairs.map(|(end, start)| (end - start).abs() / peak).fold(0.0, f64::max)
     };
-    [Contact::WaveGenerator, Contact::Ring, Contact::Carrier]
-        .into_iter()
-        .map(|contact| {
-            let ContactPeaks { force_n, stress_mpa } = peaks.get(contact);
+    peaks
+        .iter()
+        .map(|(contact, ContactPeaks { force_n, stress_mpa, .. })| {
             let force = residual(states.force_n.get(contact), force_n.value);
             force.max(residual(states.stress_mpa.get(contact), stress_mpa.value))
         })

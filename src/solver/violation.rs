@@ -31,8 +31,14 @@ pub enum Parameter {
     OutputTorque,
     /// Fixed stiffness, N/mm.
     Stiffness(Contact),
+    /// Gap along a contact's normal, µm.
+    Clearance(Contact),
+    /// Allowable contact stress, MPa.
+    AllowableStress,
     /// Intervals of a sweep.
     Samples,
+    /// Relative tolerance of a sweep.
+    SweepTolerance,
     /// Chord tolerance, mm.
     ChordTolerance,
 }
@@ -84,7 +90,10 @@ impl Parameter {
             Self::PoissonsRatio(_) => Range { low: -1.0, high: 0.5, closed: false, unit: "" },
             Self::InputTorque | Self::OutputTorque => Range::closed(1e-12, 1e15, "N·m"),
             Self::Stiffness(_) => Range::closed(1e-3, 1e15, "N/mm"),
+            Self::Clearance(_) => Range::closed(0.0, 1e6, "µm"),
+            Self::AllowableStress => Range::closed(1e-3, 1e6, "MPa"),
             Self::Samples => Range::closed(1.0, MAX_SAMPLES as f64, ""),
+            Self::SweepTolerance => Range::closed(1e-12, 0.1, ""),
         }
     }
 
@@ -148,6 +157,13 @@ pub enum Violation {
         /// The ring's actual tip radius.
         tip_radius_mm: f64,
     },
+    /// A clearance under `projection` that would push a tooth instead of leaving it free.
+    ClearanceNotMonotone {
+        /// At which contact.
+        contact: Contact,
+        /// The clearance.
+        clearance_um: f64,
+    },
     /// The bore takes the whole flank away.
     BoreLeavesNoFlank {
         /// The bore.
@@ -192,6 +208,10 @@ impl std::fmt::Display for Violation {
             Self::NoCarrierAnnulus { semi_major_mm, tip_radius_mm } => write!(
                 f,
                 "the ring's tips ({tip_radius_mm:?} mm) must stay outside the wave generator ({semi_major_mm:?} mm), or no annulus is left for the carrier: make the teeth thicker or the ellipse rounder"
+            ),
+            Self::ClearanceNotMonotone { clearance_um, .. } => write!(
+                f,
+                "`projection` weighs this gap of {clearance_um:?} µm negatively at some position, so that it would load a tooth instead of freeing it: choose `virtual_work` or no gap here"
             ),
             Self::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => write!(
                 f,

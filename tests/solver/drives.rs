@@ -3,8 +3,9 @@
 use proptest::prelude::*;
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::{
-    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Never, Torque,
-    sweep::{self, Sweep},
+    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Never,
+    PerContact, Torque,
+    sweep::{self, Points, Sweep},
 };
 
 /// The paper's case 5.1: no undercut.
@@ -50,12 +51,14 @@ pub(crate) fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParamete
         torque: Torque::Input(torque_nm),
         compatibility,
         law: ContactLaw::Linear,
+        clearance_um: PerContact::default(),
+        allowable_stress_mpa: None,
     }
 }
 
 pub(crate) fn swept(parameters: &DriveParameters, load: &LoadParameters, samples: u64) -> Sweep {
     let load = LoadCase::new(load).expect("a possible load");
-    sweep::sweep(&drive(parameters), &load, samples, &Never).expect("a solvable sweep")
+    sweep::sweep(&drive(parameters), &load, Points::Samples(samples), &Never).expect("a solvable sweep")
 }
 
 /// Possible drives of many shapes, swept ones (`always_carries`) among them.

@@ -3,7 +3,8 @@
 use toothwave_solver::drive::DriveError;
 use toothwave_solver::{
     Compatibility, ContactLaw, Drive, DriveParameters, Finding, LoadCase, Never, Parameter, PerContact, SolveError,
-    Torque, Violation, findings, sweep,
+    Torque, Violation, findings,
+    sweep::{self, Points},
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, load, swept};
@@ -82,7 +83,7 @@ fn four_teeth_have_a_geometry_but_no_sweep() {
         ..PAPER_5_1
     };
     let load = LoadCase::new(&load(1.0, Compatibility::Projection)).unwrap();
-    let refused = sweep::sweep(&drive(&p), &load, 10, &Never).unwrap_err();
+    let refused = sweep::sweep(&drive(&p), &load, Points::Samples(10), &Never).unwrap_err();
     assert!(matches!(refused, SolveError::NoToothInMesh { .. }));
 }
 
@@ -91,7 +92,8 @@ fn stiffnesses_that_differ_much_make_projection_meaningless_and_virtual_work_doe
     let mut soft_ring = load(20.0, Compatibility::Projection);
     soft_ring.law = ContactLaw::Fixed(PerContact { wave_generator: 1e9, ring: 1e9, carrier: 1e3 });
     let p = DriveParameters { ring_teeth: 30, tooth_radius_mm: 4.0, ..PAPER_5_1 };
-    let refused = sweep::sweep(&drive(&p), &LoadCase::new(&soft_ring).unwrap(), 10, &Never).unwrap_err();
+    let refused =
+        sweep::sweep(&drive(&p), &LoadCase::new(&soft_ring).unwrap(), Points::Samples(10), &Never).unwrap_err();
     assert!(
         matches!(refused, SolveError::ComplianceNotPositive { compliance_mm_per_n, .. } if compliance_mm_per_n <= 0.0)
     );
@@ -144,5 +146,5 @@ fn a_bore_inside_the_natural_tip_changes_nothing_but_is_a_finding() {
 fn a_sweep_stops_when_it_is_told_to() {
     let stop = std::sync::atomic::AtomicBool::new(true);
     let load = LoadCase::new(&load(20.0, Compatibility::Projection)).unwrap();
-    assert_eq!(sweep::sweep(&drive(&PAPER_5_1), &load, 50, &stop), Err(SolveError::Stopped));
+    assert_eq!(sweep::sweep(&drive(&PAPER_5_1), &load, Points::Samples(50), &stop), Err(SolveError::Stopped));
 }

@@ -144,12 +144,12 @@ fn worst_difference(parameters: &DriveParameters, compatibility: Compatibility, 
             .map(|tooth| loaded.tooth(mesh.position(tooth, sample, SAMPLES)).unwrap())
             .filter(|tooth| tooth.center.tan_pressure_angle > 0.0)
             .collect();
-        let wind_up_rad = loaded.wind_up_rad(&teeth);
+        let wind_up = loaded.wind_up(&teeth).unwrap();
         let dense = match compatibility {
             Projection => forces_by_projection(&drive, &teeth, &stiffness, loaded.input_torque_nmm()),
             VirtualWork => forces_by_springs(&drive, &teeth, &stiffness, loaded.input_torque_nmm()),
         };
-        let closed: Vec<_> = teeth.iter().map(|tooth| tooth.forces_n(wind_up_rad)).collect();
+        let closed: Vec<_> = teeth.iter().map(|tooth| loaded.forces_n(tooth, &wind_up)).collect();
         let peak = closed.iter().map(|force| force.wave_generator).fold(0.0, f64::max);
         for (closed, dense) in closed.iter().zip(&dense) {
             for (contact, force) in closed.iter() {

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 use toothwave_solver::mesh::Mesh;
-use toothwave_solver::sweep::{self, States, Sweep};
+use toothwave_solver::sweep::{self, Points, States, Sweep};
 use toothwave_solver::{
     Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Never,
     PerContact, SolveError, Torque,
@@ -23,7 +23,16 @@ struct Case(Value);
 
 impl Case {
     fn all() -> Vec<Self> {
-        let file: Value = serde_json::from_str(include_str!("../reference/cases.json")).unwrap();
+        Self::of(include_str!("../reference/cases.json"))
+    }
+
+    /// Palmgren's law and clearances.
+    fn all_of_contact() -> Vec<Self> {
+        Self::of(include_str!("../reference/cases_contact.json"))
+    }
+
+    fn of(file: &str) -> Vec<Self> {
+        let file: Value = serde_json::from_str(file).unwrap();
         file["cases"].as_array().unwrap().iter().cloned().map(Self).collect()
     }
 
@@ -58,6 +67,7 @@ impl Case {
         };
         let stiffness = &document["model"]["stiffness"];
         let fixed = |contact: &str| stiffness[contact].as_f64().unwrap();
+        let gap = |contact: &str| document["model"]["clearance"][contact].as_f64().unwrap_or(0.0);
         let load = &document["load"];
         LoadCase::new(&LoadParameters {
             materials: Materials {
@@ -75,12 +85,19 @@ impl Case {
             },
             law: match stiffness["law"].as_str().unwrap() {
                 "linear" => ContactLaw::Linear,
+                "palmgren" => ContactLaw::Palmgren,
                 _ => ContactLaw::Fixed(PerContact {
                     wave_generator: fixed("wave_generator_n_per_mm"),
                     ring: fixed("ring_n_per_mm"),
                     carrier: fixed("carrier_n_per_mm"),
                 }),
             },
+            clearance_um: PerContact {
+                wave_generator: gap("wave_generator_um"),
+                ring: gap("ring_um"),
+                carrier: gap("carrier_um"),
+            },
+            allowable_stress_mpa: None,
         })
         .unwrap()
     }
@@ -90,7 +107,7 @@ impl Case {
     }
 
     fn sweep(&self) -> Result<Sweep, SolveError> {
-        sweep::sweep(&self.drive(), &self.load(), self.samples(), &Never)
+        sweep::sweep(&self.drive(), &self.load(), Points::Samples(self.samples()), &Never)
     }
 
     /// An expected scalar with what its input's rounding does to it.
@@ -176,34 +193,56 @@ fn geometry_and_mesh_agree_with_60_digits() {
     worst.assert_all_within();
 }
 
+fn see_sweep(case: &Case, worst: &mut Worst) {
+    let name = case.name();
+    let expected = &case.0["expected"];
+    let Some(count) = expected["state_count"].as_u64() else {
+        assert!(matches!(case.sweep(), Err(SolveError::NoToothInMesh { .. })), "{name}");
+        return;
+    };
+    let (sweep, samples) = (case.sweep().unwrap(), case.samples());
+    assert_eq!(sweep.states.len() as u64, count, "{name}");
+    let mesh = Mesh::new(&case.drive());
+    let rows = &expected["rows"];
+    let at = |row: usize| {
+        let (tooth, sample) = (rows["tooth"][row].as_u64().unwrap(), rows["input_index"][row].as_u64().unwrap());
+        let before: usize = (0..sample).map(|sample| mesh.teeth_at(sample, samples).count()).sum();
+        before + usize::try_from(tooth - mesh.teeth_at(sample, samples).start()).unwrap()
+    };
+    for (kind, column) in columns(&sweep.states) {
+        let peak = number(&expected["column_peak"][kind]).unwrap();
+        let condition = case.0["condition"]["columns"][kind].as_f64().unwrap_or(0.0);
+        for (row, value) in rows[kind].as_array().unwrap().iter().enumerate() {
+            let error = (column[at(row)] - number(value).unwrap()).abs();
+            worst.see(kind, &name, error, (TOLERANCE + CONDITION_MULTIPLE * condition) * peak);
+        }
+    }
+    for (row, loaded) in rows["loaded"].as_array().into_iter().flatten().enumerate() {
+        assert_eq!(sweep.states.force_n.wave_generator[at(row)] > 0.0, loaded.as_bool().unwrap(), "{name}");
+    }
+    let wind_up = &expected["wind_up_deg"];
+    let most = wind_up.as_array().unwrap().iter().filter_map(number).fold(0.0, f64::max);
+    let condition = case.0["condition"]["wind_up_deg"].as_f64().unwrap_or(0.0);
+    for (sample, found) in sweep.input_angles.wind_up_deg.iter().enumerate() {
+        let error = (found - number(&wind_up[sample]).unwrap()).abs();
+        worst.see("wind_up_deg", &name, error, (TOLERANCE + CONDITION_MULTIPLE * condition) * most);
+    }
+}
+
 #[test]
 fn every_column_of_a_sweep_agrees_with_60_digits() {
     let mut worst = Worst::default();
     for case in Case::all() {
-        let name = case.name();
-        let expected = &case.0["expected"];
-        let Some(count) = expected["state_count"].as_u64() else {
-            assert!(matches!(case.sweep(), Err(SolveError::NoToothInMesh { .. })), "{name}");
-            continue;
-        };
-        let (sweep, samples) = (case.sweep().unwrap(), case.samples());
-        assert_eq!(sweep.states.len() as u64, count, "{name}");
-        let mesh = Mesh::new(&case.drive());
-        let rows = &expected["rows"];
-        let tooth = rows["tooth"].as_array().unwrap();
-        let input_index = rows["input_index"].as_array().unwrap();
-        for (kind, column) in columns(&sweep.states) {
-            let peak = number(&expected["column_peak"][kind]).unwrap();
-            let condition = case.0["condition"]["columns"][kind].as_f64().unwrap_or(0.0);
-            for (row, value) in rows[kind].as_array().unwrap().iter().enumerate() {
-                let (tooth, sample) = (tooth[row].as_u64().unwrap(), input_index[row].as_u64().unwrap());
-                let before: usize = (0..sample).map(|sample| mesh.teeth_at(sample, samples).count()).sum();
-                let index = before + usize::try_from(tooth - mesh.teeth_at(sample, samples).start()).unwrap();
-                let error = (column[index] - number(value).unwrap()).abs();
-                let allowed = (TOLERANCE + CONDITION_MULTIPLE * condition) * peak;
-                worst.see(kind, &name, error, allowed);
-            }
-        }
+        see_sweep(&case, &mut worst);
+    }
+    worst.assert_all_within();
+}
+
+#[test]
+fn palmgrens_law_and_clearances_agree_with_60_digits() {
+    let mut worst = Worst::default();
+    for case in Case::all_of_contact() {
+        see_sweep(&case, &mut worst);
     }
     worst.assert_all_within();
 }
