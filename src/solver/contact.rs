@@ -181,7 +181,6 @@ impl Approach {
 /// Hertz stress of a line contact [8]: `σ = √(F/(π L1) · (1/ρ1 + 1/ρ2) · E*)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HertzLine {
-    /// `E*/(π L1)`.
     modulus_per_width_mpa_per_mm: f64,
 }
 
@@ -190,6 +189,11 @@ impl HertzLine {
     pub fn new(materials: &Materials, contact: Contact, tooth_width_mm: f64) -> Self {
         let modulus = materials.contact_modulus_mpa(contact);
         Self { modulus_per_width_mpa_per_mm: modulus / (PI * tooth_width_mm) }
+    }
+
+    /// `E*/(π L1)`.
+    pub(crate) const fn modulus_per_width_mpa_per_mm(&self) -> f64 {
+        self.modulus_per_width_mpa_per_mm
     }
 
     /// The largest pressure under `force_n`, for bodies whose curvatures (convex positive) sum to `curvature_per_mm`.

@@ -28,7 +28,8 @@
 //! [`Drive::new`] checks parameters once and reports every reason why a drive cannot exist. A [`Drive`] answers for
 //! its geometry and its mesh; with a [`LoadCase`] it answers a [`sweep()`](sweep::sweep) over one period.
 
-pub mod adaptive;
+mod adaptive;
+mod batch;
 pub mod cam;
 pub mod contact;
 pub mod drive;

@@ -235,6 +235,22 @@ impl<'a> LoadedDrive<'a> {
         self.drive
     }
 
+    /// The form of compatibility.
+    pub const fn compatibility(&self) -> Compatibility {
+        self.compatibility
+    }
+
+    /// `1/k` of each contact, where the law is linear and no contact has a gap: where unit loads only have to be scaled.
+    pub(crate) fn linear_compliance_mm_per_n(&self) -> Option<PerContact<f64>> {
+        let is_gapless = self.clearance_mm.iter().all(|(_, &gap)| gap == 0.0);
+        (is_gapless && self.approach.exponent >= 1.0).then_some(self.approach.coefficient)
+    }
+
+    /// Hertz stress of a contact.
+    pub(crate) const fn hertz(&self, contact: Contact) -> &HertzLine {
+        self.hertz.get(contact)
+    }
+
     /// `M0` in N·mm.
     pub const fn input_torque_nmm(&self) -> f64 {
         self.input_torque_nmm

@@ -1,6 +1,7 @@
 //! One period of the input angle: columns of tooth states, peaks, residuals, wind-up, capacity.
 
 use crate::adaptive;
+use crate::batch::{self, BatchSweep};
 use crate::contact::{Contact, PerContact, half_width_mm};
 use crate::drive::{Drive, WAVES};
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState, WindUp};
@@ -119,7 +120,7 @@ impl Sweep {
 }
 
 impl States {
-    fn with_capacity(count: usize) -> Self {
+    pub(crate) fn with_capacity(count: usize) -> Self {
         let column = || Vec::with_capacity(count);
         Self {
             input_angle_deg: column(),
@@ -144,14 +145,54 @@ impl States {
     }
 
     fn peak(&self, column: &[f64]) -> (usize, Peak) {
-        let mut at = 0;
-        for (index, value) in column.iter().enumerate() {
-            if *value > column[at] {
-                at = index;
+        /// Values looked at together: few enough to find the largest among them again quickly.
+        const STRETCH: usize = 512;
+        let (mut value, mut start) = (0.0, 0);
+        for (index, stretch) in column.chunks(STRETCH).enumerate() {
+            // The largest of each lane first: one running value could not be vectorised.
+            let mut largest = [0.0_f64; 16];
+            for lanes in stretch.chunks(largest.len()) {
+                for (largest, value) in largest.iter_mut().zip(lanes) {
+                    *largest = if *value > *largest { *value } else { *largest };
+                }
+            }
+            let largest = largest.into_iter().fold(0.0, f64::max);
+            if largest > value {
+                (value, start) = (largest, index * STRETCH);
             }
         }
+        let at = start + column[start..].iter().position(|&each| each >= value).unwrap_or(0);
         let (input_angle_deg, position_deg) = (self.input_angle_deg[at], self.position_deg[at]);
-        (at, Peak { value: column[at], input_angle_deg, position_deg })
+        (at, Peak { value, input_angle_deg, position_deg })
+    }
+}
+
+impl InputAngles {
+    pub(crate) fn with_capacity(count: usize) -> Self {
+        let column = || Vec::with_capacity(count);
+        Self {
+            input_angle_deg: column(),
+            wind_up_deg: column(),
+            torsional_stiffness_nm_per_rad: column(),
+            loaded_teeth: Vec::with_capacity(count),
+        }
+    }
+
+    /// Appends an input angle; the stiffness `dM0/dΔφ` becomes that of the output.
+    pub(crate) fn push(&mut self, drive: &Drive, input_angle_deg: f64, wind_up: &WindUp, loaded_teeth: usize) {
+        let torque_ratio = drive.teeth_per_wave();
+        self.input_angle_deg.push(input_angle_deg);
+        self.wind_up_deg.push(wind_up.rotation_rad().to_degrees());
+        self.torsional_stiffness_nm_per_rad.push(1e-3 * wind_up.stiffness_nmm_per_rad * torque_ratio * torque_ratio);
+        self.loaded_teeth.push(u32::try_from(loaded_teeth).unwrap_or(u32::MAX));
+    }
+
+    /// Appends the first input angle again, a period on.
+    pub(crate) fn repeat_first(&mut self, input_angle_deg: f64) {
+        self.input_angle_deg.push(input_angle_deg);
+        self.wind_up_deg.push(self.wind_up_deg[0]);
+        self.torsional_stiffness_nm_per_rad.push(self.torsional_stiffness_nm_per_rad[0]);
+        self.loaded_teeth.push(self.loaded_teeth[0]);
     }
 }
 
@@ -163,8 +204,29 @@ impl States {
 /// [`SolveError::Stopped`] when `stop` says so.
 pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -> Result<Sweep, SolveError> {
     let loaded = LoadedDrive::new(drive, load)?;
-    let mesh = Mesh::new(drive);
-    let mut columns = Columns::new(&loaded, load.parameters().allowable_stress_mpa);
+    // The capacity is worked out tooth by tooth.
+    if let (Points::Samples(samples), None) = (points, load.parameters().allowable_stress_mpa)
+        && let Some(batch) = batch::sweep(&loaded, samples, stop)?
+    {
+        let mesh = Mesh::new(drive);
+        let teeth_at_ends = (mesh.teeth_at(0, samples).count(), mesh.teeth_at(samples, samples).count());
+        let BatchSweep { states, input_angles, torque_balance_residual } = batch;
+        return Ok(finished(drive, states, input_angles, None, torque_balance_residual, teeth_at_ends));
+    }
+    plain(&loaded, load, points, stop)
+}
+
+/// The same sweep, state by state: what the fast path is held against, and what is left where it does not reach.
+///
+/// # Errors
+/// As [`sweep`].
+pub fn sweep_plain(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -> Result<Sweep, SolveError> {
+    plain(&LoadedDrive::new(drive, load)?, load, points, stop)
+}
+
+fn plain(loaded: &LoadedDrive<'_>, load: &LoadCase, points: Points, stop: &impl Stop) -> Result<Sweep, SolveError> {
+    let mesh = Mesh::new(loaded.drive());
+    let mut columns = Columns::new(loaded, load.parameters().allowable_stress_mpa);
     match points {
         Points::Samples(samples) => {
             columns.reserve(mesh.state_count(samples));
@@ -181,7 +243,7 @@ pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -
             }
         }
         Points::Tolerance { tolerance, max_states } => {
-            for moment in adaptive::moments(&loaded, tolerance, max_states, stop)? {
+            for moment in adaptive::moments(loaded, tolerance, max_states, stop)? {
                 columns.add(moment.fraction * mesh.period_deg(), moment.teeth(&mesh))?;
             }
         }
@@ -240,13 +302,8 @@ impl<'a> Columns<'a> {
         }
         let wind_up = self.loaded.wind_up(&self.teeth)?;
         let loaded_teeth = self.share_load(&wind_up);
-        let torque_ratio = self.loaded.drive().teeth_per_wave();
-        let angles = &mut self.input_angles;
-        angles.input_angle_deg.push(input_angle_deg);
-        angles.wind_up_deg.push(wind_up.rotation_rad().to_degrees());
-        angles.torsional_stiffness_nm_per_rad.push(1e-3 * wind_up.stiffness_nmm_per_rad * torque_ratio * torque_ratio);
-        angles.loaded_teeth.push(loaded_teeth);
-        if angles.input_angle_deg.len() == 1 {
+        self.input_angles.push(self.loaded.drive(), input_angle_deg, &wind_up, loaded_teeth);
+        if self.input_angles.input_angle_deg.len() == 1 {
             self.teeth_at_ends.0 = self.teeth.len();
         }
         self.teeth_at_ends.1 = self.teeth.len();
@@ -254,7 +311,7 @@ impl<'a> Columns<'a> {
             let limit = self.loaded.torque_limit(&self.teeth, allowable_stress_mpa);
             let input_torque_nm = 1e-3 * limit.input_torque_nmm;
             if self.torque_capacity.is_none_or(|capacity| input_torque_nm < capacity.input_torque_nm) {
-                let output_torque_nm = input_torque_nm * torque_ratio;
+                let output_torque_nm = input_torque_nm * self.loaded.drive().teeth_per_wave();
                 let contact = limit.contact;
                 let capacity = TorqueCapacity { input_torque_nm, output_torque_nm, contact, input_angle_deg };
                 self.torque_capacity = Some(capacity);
@@ -264,7 +321,7 @@ impl<'a> Columns<'a> {
     }
 
     /// Appends geometry, forces and stresses of the teeth, and returns how many carry load.
-    fn share_load(&mut self, wind_up: &WindUp) -> u32 {
+    fn share_load(&mut self, wind_up: &WindUp) -> usize {
         let drive = self.loaded.drive();
         let flank = drive.flank();
         let states = &mut self.states;
@@ -278,7 +335,7 @@ impl<'a> Columns<'a> {
             states.ring_angle_deg.push(flank.angle_from_tip_rad(center, point).to_degrees());
 
             let force_n = self.loaded.forces_n(tooth, wind_up);
-            loaded_teeth += u32::from(force_n.wave_generator > 0.0);
+            loaded_teeth += usize::from(force_n.wave_generator > 0.0);
             let stress_mpa = self.loaded.stress_mpa(tooth, &force_n);
             states.force_n.push(force_n);
             states.stress_mpa.push(stress_mpa);
@@ -300,27 +357,32 @@ impl<'a> Columns<'a> {
     }
 
     fn finish(self) -> Sweep {
-        let states = self.states;
-        let tooth_width_mm = self.loaded.drive().parameters().tooth_width_mm;
-        let peaks = PerContact::of(|contact| {
-            let force = states.force_n.get(contact);
-            let (at, stress_mpa) = states.peak(states.stress_mpa.get(contact));
-            ContactPeaks {
-                force_n: states.peak(force).1,
-                stress_mpa,
-                half_width_mm: half_width_mm(force[at], stress_mpa.value, tooth_width_mm),
-            }
-        });
-        let period_closure_residual = period_closure(&states, &peaks, self.teeth_at_ends);
-        Sweep {
-            states,
-            input_angles: self.input_angles,
-            peaks,
-            torque_capacity: self.torque_capacity,
-            torque_balance_residual: self.torque_balance_residual,
-            period_closure_residual,
-        }
+        let Self { loaded, states, input_angles, torque_capacity, torque_balance_residual, teeth_at_ends, .. } = self;
+        finished(loaded.drive(), states, input_angles, torque_capacity, torque_balance_residual, teeth_at_ends)
     }
+}
+
+/// A sweep with what follows from its states: peaks and closure.
+fn finished(
+    drive: &Drive,
+    states: States,
+    input_angles: InputAngles,
+    torque_capacity: Option<TorqueCapacity>,
+    torque_balance_residual: f64,
+    teeth_at_ends: (usize, usize),
+) -> Sweep {
+    let tooth_width_mm = drive.parameters().tooth_width_mm;
+    let peaks = PerContact::of(|contact| {
+        let force = states.force_n.get(contact);
+        let (at, stress_mpa) = states.peak(states.stress_mpa.get(contact));
+        ContactPeaks {
+            force_n: states.peak(force).1,
+            stress_mpa,
+            half_width_mm: half_width_mm(force[at], stress_mpa.value, tooth_width_mm),
+        }
+    });
+    let period_closure_residual = period_closure(&states, &peaks, teeth_at_ends);
+    Sweep { states, input_angles, peaks, torque_capacity, torque_balance_residual, period_closure_residual }
 }
 
 fn period_closure(
