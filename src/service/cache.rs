@@ -58,6 +58,8 @@ pub enum Served {
     Miss,
     /// Solved for another request that came first and asked the same.
     Collapsed,
+    /// Not at all: the client has it already.
+    Unneeded,
 }
 
 impl Served {
@@ -65,8 +67,9 @@ impl Served {
     pub const fn cache_status(self) -> &'static str {
         match self {
             Self::Hit => "toothwave; hit",
-            Self::Miss => "toothwave; fwd=miss; stored",
+            Self::Miss => "toothwave; fwd=miss",
             Self::Collapsed => "toothwave; fwd=miss; collapsed",
+            Self::Unneeded => "toothwave; fwd=bypass",
         }
     }
 
@@ -76,6 +79,7 @@ impl Served {
             Self::Hit => "hit",
             Self::Miss => "miss",
             Self::Collapsed => "collapsed",
+            Self::Unneeded => "unneeded",
         }
     }
 }
@@ -103,21 +107,23 @@ impl Cache {
         CacheSize { bytes: self.0.weighted_size(), entries: self.0.entry_count() }
     }
 
-    /// The answer under `key`; where there is none, `solve` makes it, once for all who ask meanwhile.
+    /// The answer under `key`, if it is kept.
+    pub async fn get(&self, key: Key) -> Option<Stored> {
+        self.0.get(&key).await
+    }
+
+    /// The answer under `key`, which `solve` makes once for all who ask meanwhile.
     ///
     /// The flight runs in a task of its own: when the client that started it leaves, those who joined do not start over, and
     /// the deadline bounds what is computed for nobody.
     ///
     /// # Errors
     /// What `solve` returns; failures are not kept.
-    pub async fn get_or_solve(
+    pub async fn solve_once(
         &self,
         key: Key,
         solve: impl Future<Output = Result<Stored, Problem>> + Send + 'static,
     ) -> Result<(Stored, Served), Problem> {
-        if let Some(stored) = self.0.get(&key).await {
-            return Ok((stored, Served::Hit));
-        }
         let is_own = Arc::new(AtomicBool::new(false));
         let started = Arc::clone(&is_own);
         let cache = self.0.clone();

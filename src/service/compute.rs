@@ -42,6 +42,11 @@ impl Pool {
         self.limits.max_concurrent_solves + self.limits.max_queued_solves - self.places.available_permits()
     }
 
+    /// The deadline of a request that arrives now.
+    pub fn deadline(&self) -> Instant {
+        Instant::now() + Duration::from_millis(self.limits.deadline_ms)
+    }
+
     /// Runs `job` and hands it the signal that stops it at the deadline.
     ///
     /// # Errors
@@ -49,9 +54,9 @@ impl Pool {
     /// the job panicked, and whatever the job returns.
     pub async fn run<T: Send + 'static>(
         &self,
+        deadline: Instant,
         job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
-        let deadline = Instant::now() + Duration::from_millis(self.limits.deadline_ms);
         let Ok(place) = Arc::clone(&self.places).try_acquire_owned() else {
             counter!("toothwave_refusals_total", "reason" => "queue_full").increment(1);
             return Err(self.queue_full());

@@ -8,6 +8,9 @@ use clap::Args;
 use serde::Serialize;
 use utoipa::ToSchema;
 
+/// Solves that may be allowed to run or to wait: more than any machine can, fewer than a semaphore can count.
+const MOST_SOLVES: i64 = 1_000_000;
+
 /// The settings of `toothwave serve`.
 #[derive(Debug, Clone, Args)]
 pub struct Settings {
@@ -28,12 +31,12 @@ pub struct Settings {
     pub max_profile_points: u64,
 
     /// Solves that run at once [default: the cores that the process may use]
-    #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_SOLVES", value_name = "N")]
-    pub max_concurrent_solves: Option<NonZeroUsize>,
+    #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_SOLVES", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_SOLVES))]
+    pub max_concurrent_solves: Option<u32>,
 
     /// Solves that may wait for their turn
-    #[arg(long, env = "TOOTHWAVE_MAX_QUEUED_SOLVES", value_name = "N", default_value_t = 32)]
-    pub max_queued_solves: usize,
+    #[arg(long, env = "TOOTHWAVE_MAX_QUEUED_SOLVES", value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(..=MOST_SOLVES))]
+    pub max_queued_solves: u32,
 
     /// Milliseconds from a request's arrival after which its computation is stopped
     #[arg(long, env = "TOOTHWAVE_DEADLINE_MS", value_name = "MS", default_value_t = 10_000)]
@@ -78,16 +81,14 @@ pub struct Limits {
 impl Settings {
     /// The limits among the settings.
     pub fn limits(&self) -> Limits {
-        let max_concurrent_solves = self
-            .max_concurrent_solves
-            .or_else(|| std::thread::available_parallelism().ok())
-            .map_or(1, NonZeroUsize::get);
+        let cores = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        let max_concurrent_solves = self.max_concurrent_solves.map_or_else(cores, |solves| solves as usize);
         Limits {
             max_states: self.max_states,
             max_profile_points: self.max_profile_points,
             max_body_bytes: self.max_body_bytes,
             max_concurrent_solves,
-            max_queued_solves: self.max_queued_solves,
+            max_queued_solves: self.max_queued_solves as usize,
             deadline_ms: self.deadline_ms,
             cache_max_bytes: self.cache_max_bytes,
         }

@@ -3,13 +3,19 @@
 //! They are serialised for the cache's key alone, in a form without field names: every field is written always, because one that
 //! may be left out would let two designs share a key.
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Deserializer, Serialize};
+use toothwave_solver::Contact;
 use toothwave_solver::profile::{Extent, ProfileParameters};
+use toothwave_solver::violation::Range;
 use toothwave_solver::{
     Compatibility, ContactLaw, DriveParameters, LoadCase, LoadParameters, Material, Materials, Parameter, PerContact,
     Torque, Violation,
 };
-use utoipa::ToSchema;
+use utoipa::openapi::RefOr;
+use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, OneOfBuilder, Schema, Type};
+use utoipa::{PartialSchema, ToSchema};
 
 use crate::json::Fault;
 use crate::problem::FieldCode;
@@ -171,8 +177,8 @@ pub enum CompatibilityDocument {
 }
 
 /// The contact law.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
-#[serde(tag = "law", rename_all = "snake_case", deny_unknown_fields)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[serde(tag = "law", rename_all = "snake_case")]
 pub enum StiffnessDocument {
     /// `k = π L1 E*/2` at each contact.
     #[default]
@@ -180,15 +186,41 @@ pub enum StiffnessDocument {
     /// Given stiffnesses.
     Fixed {
         /// At the wave generator.
-        #[schema(minimum = 1e-3, maximum = 1e15)]
         wave_generator_n_per_mm: f64,
         /// At the ring.
-        #[schema(minimum = 1e-3, maximum = 1e15)]
         ring_n_per_mm: f64,
         /// At the carrier.
-        #[schema(minimum = 1e-3, maximum = 1e15)]
         carrier_n_per_mm: f64,
     },
+}
+
+/// Written out, because a derived one could neither leave the default law out nor refuse what a law does not know.
+impl PartialSchema for StiffnessDocument {
+    fn schema() -> RefOr<Schema> {
+        let law = |word: &str, description: &str| {
+            ObjectBuilder::new()
+                .additional_properties(Some(AdditionalProperties::FreeForm(false)))
+                .description(Some(description))
+                .property("law", ObjectBuilder::new().schema_type(Type::String).enum_values(Some([word])))
+        };
+        let Range { low, high, .. } = Parameter::Stiffness(Contact::Ring).range();
+        let fixed = ["wave_generator", "ring", "carrier"].iter().fold(
+            law("fixed", "Given stiffnesses at the wave generator, the ring and the carrier.").required("law"),
+            |schema, contact| {
+                let name = format!("{contact}_n_per_mm");
+                let stiffness = ObjectBuilder::new().schema_type(Type::Number).minimum(Some(low)).maximum(Some(high));
+                schema.property(&name, stiffness).required(name)
+            },
+        );
+        let linear = law("linear", "k = π L1 E*/2 at each contact; what is used where no law is named.");
+        OneOfBuilder::new().description(Some("The contact law.")).item(linear).item(fixed).into()
+    }
+}
+
+impl ToSchema for StiffnessDocument {
+    fn name() -> Cow<'static, str> {
+        "StiffnessDocument".into()
+    }
 }
 
 /// The input angles of a sweep.
@@ -202,7 +234,7 @@ pub struct SweepDocument {
 
 impl Default for SweepDocument {
     fn default() -> Self {
-        Self { samples: Whole(50) }
+        Self { samples: Whole(50.0) }
     }
 }
 
@@ -234,21 +266,27 @@ pub enum ExtentDocument {
     Full,
 }
 
-/// A whole number, spelled `28`, `28.0` or `2.8e1`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Whole(pub i64);
+/// A whole number of any size, spelled `28`, `28.0` or `2.8e1`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Whole(f64);
+
+impl Whole {
+    /// As the solver counts; what lies beyond that lies beyond every range too.
+    #[expect(clippy::cast_possible_truncation, reason = "whole, and saturating")]
+    const fn count(self) -> i64 {
+        self.0 as i64
+    }
+}
 
 impl<'de> Deserialize<'de> for Whole {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        /// Every whole number up to here is a double.
-        const LARGEST: f64 = 9_007_199_254_740_992.0;
         let value = f64::deserialize(deserializer)?;
-        if value.fract() != 0.0 || value.abs() > LARGEST {
+        if value.fract() == 0.0 {
+            Ok(Self(value))
+        } else {
             let message = format_args!("a whole number is wanted here, not {value}").to_string();
-            return Err(serde::de::Error::custom(message));
+            Err(serde::de::Error::custom(message))
         }
-        #[expect(clippy::cast_possible_truncation, reason = "whole and bounded")]
-        Ok(Self(value as i64))
     }
 }
 
@@ -328,12 +366,29 @@ impl Design {
         DriveParameters {
             semi_major_mm: wave_generator.semi_major_mm,
             semi_minor_mm: wave_generator.semi_minor_mm,
-            teeth: teeth.count.0,
-            installed: teeth.installed.unwrap_or(teeth.count).0,
+            teeth: teeth.count.count(),
+            installed: teeth.installed.unwrap_or(teeth.count).count(),
             tooth_radius_mm: teeth.radius_mm,
             tooth_width_mm: teeth.width_mm,
-            ring_teeth: ring.teeth.0,
+            ring_teeth: ring.teeth.count(),
             tip_radius_mm: ring.tip_radius_mm,
+        }
+    }
+
+    /// A violation with the number that stands in the document, where the solver's count could not hold it.
+    pub fn as_written(&self, violation: Violation) -> Violation {
+        let TeethDocument { count, installed, .. } = &self.drive.teeth;
+        match violation {
+            Violation::OutOfRange { parameter, limit, value } => {
+                let value = match parameter {
+                    Parameter::ToothCount => count.0,
+                    Parameter::InstalledTeeth => installed.unwrap_or(*count).0,
+                    Parameter::RingTeeth => self.drive.ring.teeth.0,
+                    _ => value,
+                };
+                Violation::OutOfRange { parameter, value, limit }
+            }
+            other => other,
         }
     }
 
@@ -399,8 +454,8 @@ impl Design {
     /// # Errors
     /// The violation of their range.
     pub fn samples(&self) -> Result<u64, Violation> {
-        let samples = self.sweep.samples.0;
-        Parameter::Samples.check(samples as f64).map_or(Ok(samples.unsigned_abs()), Err)
+        let samples = self.sweep.samples;
+        Parameter::Samples.check(samples.0).map_or(Ok(samples.count().unsigned_abs()), Err)
     }
 
     /// What profiles are asked for.

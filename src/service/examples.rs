@@ -25,7 +25,7 @@ pub const EXAMPLES: [Example; 4] = [
     },
     Example {
         name: "paper-5.2-bored",
-        title: "Case 5.2 bored at 52.8227 mm, which reproduces the paper's figures 20 to 25",
+        title: "Case 5.2 bored at 52.8227 mm: three or four teeth in each zone, as in the paper's figures 20 to 25",
         document: include_str!("../../examples/paper-5.2-bored.json"),
     },
     Example {

@@ -130,7 +130,7 @@ impl From<&Finding> for FindingAnswer {
                 2.0,
                 "",
                 "at some input angle fewer than two teeth of a zone mesh: one tooth carries all, or none does".into(),
-                "install more teeth, or bring the flank further out: less undercut, a smaller bore",
+                "install more teeth, or lengthen the flank: less undercut, a smaller bore",
             ),
             Finding::ThinSlotWall { slot_wall_mm, limit_mm } => new(
                 Code::ThinSlotWall,
@@ -157,7 +157,7 @@ impl From<&Finding> for FindingAnswer {
                     Edge::Inner => "the centre of a loaded tooth comes nearer to the axis than the carrier's annulus begins: it presses on a slot's edge, not on its wall".into(),
                     Edge::Outer => "the centre of a loaded tooth goes further out than the ring's tips leave room for the carrier: it presses on a slot's edge, not on its wall".into(),
                 },
-                "make the ellipse rounder or the teeth thicker",
+                "make the ellipse rounder or the teeth thicker, or bore the ring",
             ),
             Finding::SteepRingFlank { pressure_angle_deg } => new(
                 Code::SteepRingFlank,
@@ -172,7 +172,7 @@ impl From<&Finding> for FindingAnswer {
             Finding::StressAboveFatigueLimit { contact, stress_mpa } => new(
                 Code::StressAboveFatigueLimit,
                 Warning,
-                &[LOAD, WIDTH, RADIUS],
+                &[LOAD, WIDTH, RADIUS, &format!("/materials/{}", contact_name(contact))],
                 stress_mpa,
                 FATIGUE_LIMIT_STRESS_MPA,
                 "MPa",

@@ -39,20 +39,26 @@ pub struct Fault {
 pub fn read<'de, T: Deserialize<'de>>(text: &[u8]) -> Result<T, ReadError> {
     let mut parser = serde_json::Deserializer::from_slice(text);
     let tree: Node = serde_path_to_error::deserialize(&mut parser).map_err(|error| {
-        let detail = error.inner().to_string();
-        // serde_json counts a number beyond the doubles as bad syntax; it is JSON all the same.
-        if detail.starts_with("number out of range") {
-            let pointer = error.path().iter().filter_map(|segment| match segment {
-                serde_path_to_error::Segment::Map { key } => Some(format!("/{}", escaped(key))),
-                _ => None,
-            });
-            ReadError::Fault(Fault {
-                pointer: pointer.collect(),
-                code: FieldCode::NumberTooLarge,
-                detail: "the number is beyond what a double can hold".into(),
-            })
-        } else {
-            ReadError::Malformed { detail }
+        // serde_json takes a number beyond the doubles and deep nesting for bad syntax; they are JSON all the same, if the rest is.
+        let fault = match error.inner().to_string() {
+            text if text.starts_with("number out of range") => {
+                Some((FieldCode::NumberTooLarge, "the number is beyond what a double can hold"))
+            }
+            text if text.starts_with("recursion limit exceeded") => {
+                Some((FieldCode::WrongType, "no document nests as deep as this"))
+            }
+            _ => None,
+        };
+        match (fault, serde_json::from_slice::<de::IgnoredAny>(text)) {
+            (Some((code, detail)), Ok(_)) => {
+                let pointer = error.path().iter().filter_map(|segment| match segment {
+                    serde_path_to_error::Segment::Map { key } => Some(format!("/{}", escaped(key))),
+                    _ => None,
+                });
+                ReadError::Fault(Fault { pointer: pointer.collect(), code, detail: detail.into() })
+            }
+            (_, Err(malformed)) => ReadError::Malformed { detail: malformed.to_string() },
+            (None, Ok(_)) => ReadError::Malformed { detail: error.inner().to_string() },
         }
     })?;
     parser.end().map_err(|error| ReadError::Malformed { detail: error.to_string() })?;

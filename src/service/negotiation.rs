@@ -102,8 +102,11 @@ fn accepts_gzip(headers: &HeaderMap) -> bool {
         accepted.split(',').find_map(|item| {
             let mut parts = item.split(';').map(str::trim);
             let is_meant = parts.next().is_some_and(|name| name.eq_ignore_ascii_case(coding));
-            let weight = parts.find_map(|parameter| parameter.strip_prefix("q=")).unwrap_or("1");
-            is_meant.then(|| weight.parse::<f64>().unwrap_or(0.0))
+            let weight = parts.find_map(|parameter| {
+                let (name, value) = parameter.split_once('=')?;
+                name.trim().eq_ignore_ascii_case("q").then_some(value.trim())
+            });
+            is_meant.then(|| weight.map_or(1.0, |weight| weight.parse().unwrap_or(0.0)))
         })
     };
     let gzip = quality("gzip").or_else(|| quality("x-gzip")).or_else(|| quality("*")).unwrap_or(0.0);

@@ -166,7 +166,7 @@ impl ProblemCode {
             Self::BodyTooLarge => "The body is too large",
             Self::UnsupportedMediaType => "The body is not sent as plain JSON",
             Self::InvalidDocument => "The document is no design document",
-            Self::ImpossibleDesign => "The design cannot exist",
+            Self::ImpossibleDesign => "Values that no design can have",
             Self::NoToothInMesh => "At some input angle no tooth carries load",
             Self::ComplianceNotPositive => "The projection form has no solution",
             Self::TooManyStates => "The sweep has too many states",
@@ -271,13 +271,14 @@ impl From<SolveError> for Problem {
         match error {
             SolveError::NoToothInMesh { .. } => Self::new(
                 ProblemCode::NoToothInMesh,
-                format!("{detail}. Install more teeth, or bring the flank further out: less undercut, a smaller bore"),
+                format!("{detail}. Install more teeth, or lengthen the flank: less undercut, a smaller bore"),
             ),
             SolveError::ComplianceNotPositive { .. } => Self::new(
                 ProblemCode::ComplianceNotPositive,
                 format!("{detail}. Choose `virtual_work`, or stiffnesses that differ less"),
             ),
             SolveError::TooManyPoints { points, limit } => {
+                let detail = format!("{detail} by `max_profile_points`");
                 let pointer = "/profile/chord_tolerance_mm";
                 too_many(ProblemCode::TooManyPoints, FieldCode::TooManyPoints, pointer, &detail, points, limit)
             }

@@ -2,7 +2,7 @@
 
 use axum::Router;
 use axum::extract::Request;
-use axum::http::{HeaderValue, header};
+use axum::http::{HeaderValue, StatusCode, header};
 use axum::middleware;
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
@@ -60,6 +60,7 @@ pub fn router(app: App, cors_origins: &[String]) -> Router {
     // The bundled page alone: without "none" it would ask a validator elsewhere.
     let config = Config::new(["/openapi.json"]).validator_url("none");
     let docs: Router<App> = SwaggerUi::new("/docs").config(config).into();
+    let docs = docs.layer(middleware::map_response(as_problem));
     let (paths, _) = api().split_for_parts();
     paths
         .route("/openapi.json", get(move || openapi_document(openapi.clone())))
@@ -68,11 +69,11 @@ pub fn router(app: App, cors_origins: &[String]) -> Router {
         .method_not_allowed_fallback(method_not_allowed)
         // From the inside out: a panic becomes a problem before it is counted, logged and given its headers.
         .layer(CatchPanicLayer::custom(panicked))
+        .layer(option_layer((!cors_origins.is_empty()).then(|| cors(cors_origins))))
         .layer(middleware::from_fn(observe::observe))
         .layer(PropagateRequestIdLayer::x_request_id())
         .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid))
         .layer(SetResponseHeaderLayer::overriding(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")))
-        .layer(option_layer((!cors_origins.is_empty()).then(|| cors(cors_origins))))
         .with_state(app)
 }
 
@@ -83,6 +84,15 @@ async fn openapi_document(document: String) -> Response {
 async fn not_found(request: Request) -> Problem {
     let detail = format!("nothing stands at `{}`; `/docs` lists the paths", request.uri().path());
     Problem::new(ProblemCode::NotFound, detail)
+}
+
+/// The documentation's pages say 404 in words of their own.
+async fn as_problem(response: Response) -> Response {
+    if response.status() == StatusCode::NOT_FOUND {
+        Problem::new(ProblemCode::NotFound, "the documentation has no such page").into_response()
+    } else {
+        response
+    }
 }
 
 async fn method_not_allowed(request: Request) -> Problem {

@@ -13,7 +13,7 @@ pub const FATIGUE_LIMIT_STRESS_MPA: f64 = 1500.0;
 /// A wall thinner than this share of its slot's width is reported: a rule of thumb, not a strength calculation.
 pub const THIN_WALL_SHARE_OF_SLOT: f64 = 0.25;
 
-/// A ring pressure angle beyond this is reported: there the ring carries more than three times the cam's radial force, and
+/// A ring pressure angle beyond this is reported: there the ring carries about three times the cam's radial force, and
 /// friction, which the model leaves out, begins to decide whether the drive turns at all.
 pub const STEEP_FLANK_DEG: f64 = 70.0;
 
@@ -116,10 +116,10 @@ pub fn of_drive(drive: &Drive) -> Result<Vec<Finding>, NotConverged> {
         Some(tip_radius_mm) if limit.end == FlankEnd::Bore => {
             findings.push(Finding::BoreShortensFlank { tip_radius_mm, natural_tip_radius_mm, engagement_start_deg });
         }
-        Some(tip_radius_mm) => {
+        Some(tip_radius_mm) if tip_radius_mm < natural_tip_radius_mm => {
             findings.push(Finding::BoreWithoutEffect { tip_radius_mm, natural_tip_radius_mm });
         }
-        None => {}
+        Some(_) | None => {}
     }
     let min = Mesh::new(drive).teeth_in_mesh().min;
     if min < 2 {

@@ -13,7 +13,8 @@
 //!
 //! - Wave generator's frame: x along the major axis. A tooth's *position* ψ is the polar angle of its centre there,
 //!   0 on the major axis (root of the ring's tooth space), π/2 on the minor axis (tip of the ring's tooth).
-//! - Ring's frame: x along the middle of a tooth space; the tooth's centre stands at the angle ψ/k, `k = Z_K / 2`.
+//! - Ring's frame: x along the middle of a tooth space; the tooth's centre stands at the angle `-s ψ/k`, `k = Z_K / 2`,
+//!   `s = sign(Z_G - Z_K)`. The profile is symmetric, and is drawn with ψ/k.
 //! - Near the tip everything is worked from `x = π/2 - ψ`, which a [`Position`] carries beside ψ, because cos(π/2)
 //!   is 6e-17 in doubles and would enter stresses through a square root.
 //! - The two meshing zones are point reflections of each other; sums are over one zone, torques over both.

@@ -25,7 +25,7 @@ pub struct ValueAndSlope {
     pub slope: f64,
 }
 
-/// The root of an increasing function in `[low, high]`, `0 < low <= high`, by Newton's method from `guess`, with
+/// The root in `[low, high]`, `0 < low <= high`, of a function that is negative below it and positive above, by Newton's method from `guess`, with
 /// bisection in the logarithm where a step would leave the bracket or shrink too slowly.
 ///
 /// # Errors

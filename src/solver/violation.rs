@@ -173,6 +173,11 @@ pub enum Violation {
     },
 }
 
+/// A number as a person would write it.
+fn readable(value: f64) -> String {
+    if value == 0.0 || (1e-3..1e7).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
+}
+
 impl std::fmt::Display for Violation {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match *self {
@@ -180,7 +185,8 @@ impl std::fmt::Display for Violation {
                 let Range { low, high, closed, unit } = parameter.range();
                 let bounds = if closed { "from" } else { "strictly between" };
                 let joint = if closed { "to" } else { "and" };
-                write!(f, "{value:?} is out of range: choose a value {bounds} {low:?} {joint} {high:?}")?;
+                let [value, low, high] = [value, low, high].map(readable);
+                write!(f, "{value} is out of range: choose a value {bounds} {low} {joint} {high}")?;
                 if unit.is_empty() { Ok(()) } else { write!(f, " {unit}") }
             }
             Self::CamNotElongated { semi_major_mm, semi_minor_mm } => write!(
@@ -207,7 +213,7 @@ impl std::fmt::Display for Violation {
             ),
             Self::NoCarrierAnnulus { semi_major_mm, tip_radius_mm } => write!(
                 f,
-                "the ring's tips ({tip_radius_mm:?} mm) must stay outside the wave generator ({semi_major_mm:?} mm), or no annulus is left for the carrier: make the teeth thicker or the ellipse rounder"
+                "the ring's tips ({tip_radius_mm:?} mm) must stay outside the wave generator ({semi_major_mm:?} mm), or no annulus is left for the carrier: make the teeth thicker or the ellipse rounder, or bore the ring"
             ),
             Self::ClearanceNotMonotone { clearance_um, .. } => write!(
                 f,

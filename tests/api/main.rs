@@ -1,1 +1,26 @@
-//! What is true of the service.
+//! What is true of the service, told by asking it: over HTTP, and on the command line.
+#![allow(
+    clippy::float_cmp,
+    clippy::unwrap_used,
+    reason = "tests compare exactly where values are exact, and fail by panicking"
+)]
+
+mod asking;
+mod caching;
+mod codes;
+mod command_line;
+mod designs;
+mod documents;
+mod endpoints;
+mod examples;
+mod extremes;
+mod findings;
+mod openapi;
+mod operations;
+mod overload;
+mod paper;
+mod problems;
+mod profiles;
+mod ranges;
+mod serving;
+mod violations;

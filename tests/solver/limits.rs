@@ -135,9 +135,12 @@ fn undercut_is_a_finding_and_a_bore_beyond_it_says_so() {
 
 #[test]
 fn a_bore_inside_the_natural_tip_changes_nothing_but_is_a_finding() {
-    let p = DriveParameters { tip_radius_mm: Some(66.0), ..PAPER_5_1 };
+    let p = DriveParameters { tip_radius_mm: Some(65.9), ..PAPER_5_1 };
     let found = findings::of_drive(&drive(&p)).unwrap();
     assert!(matches!(found[..], [Finding::BoreWithoutEffect { .. }]), "{found:?}");
+    // A bore that just meets the natural tip says what is there anyway.
+    let exact = drive(&DriveParameters { tip_radius_mm: Some(66.0), ..PAPER_5_1 });
+    assert_eq!(findings::of_drive(&exact).unwrap(), []);
     let load = load(20.0, Compatibility::Projection);
     assert_eq!(swept(&p, &load, 10), swept(&PAPER_5_1, &load, 10));
 }

@@ -106,12 +106,10 @@ fn largest_step(parameters: &DriveParameters, samples: u64) -> f64 {
     let force = &states.force_n.ring;
     let mut before = std::collections::BTreeMap::new();
     let mut largest = 0.0_f64;
-    for i in 0..states.len() {
-        let tooth = states.tooth[i];
-        if let Some((angle, last)) = before.insert(tooth, (states.input_angle_deg[i], force[i]))
-            && states.input_angle_deg[i] > angle
-        {
-            largest = largest.max((force[i] - last).abs());
+    for (tooth, force) in states.tooth.iter().zip(force) {
+        // A tooth stands once at each angle, so what it bore last it bore at the angle before.
+        if let Some(last) = before.insert(tooth, force) {
+            largest = largest.max((force - last).abs());
         }
     }
     largest / sweep.peaks.ring.force_n.value

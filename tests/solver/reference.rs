@@ -1,7 +1,7 @@
 //! Against the 60-digit calculation of `tests/reference/reference.py`, which was written without sight of this code.
 //!
-//! Each case states its *condition*: what rounding the input alone does to each answer. Nothing can be right to more than that;
-//! beyond it every column is right to 1e-12 of its peak.
+//! Each case states its *condition*: what rounding the input alone does to each answer. Nothing can be right to more than that,
+//! and beside it next to nothing is allowed.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ use toothwave_solver::{
 /// What is allowed beside the condition, relative to the value or the column's peak.
 const TOLERANCE: f64 = 1e-14;
 
-/// How many times the condition is allowed: each parameter enters several operations.
+/// How many times the condition is allowed.
 const CONDITION_MULTIPLE: f64 = 1.0;
 
 struct Case(Value);

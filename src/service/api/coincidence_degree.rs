@@ -11,7 +11,7 @@ use toothwave_solver::mesh::{Mesh, TeethInMesh};
 use utoipa::ToSchema;
 
 use super::geometry::{EngagementAnswer, UndercutAnswer, drive_findings, write_findings};
-use super::{App, Endpoint, Problems, Tabular, checked_drive, respond};
+use super::{App, Endpoint, Problems, Tabular, checked_drive, csv_error, respond};
 use crate::config::Limits;
 use crate::design::Design;
 use crate::findings::FindingAnswer;
@@ -90,7 +90,8 @@ impl Tabular for CoincidenceDegreeAnswer {
             "teeth_in_mesh_per_zone_min",
             "teeth_in_mesh_per_zone_max",
             "period_deg",
-        ])?;
+        ])
+        .map_err(csv_error)?;
         csv.serialize((
             self.coincidence_degree,
             self.engagement.start_deg,
@@ -98,7 +99,8 @@ impl Tabular for CoincidenceDegreeAnswer {
             self.teeth_in_mesh_per_zone.min,
             self.teeth_in_mesh_per_zone.max,
             self.period_deg,
-        ))?;
+        ))
+        .map_err(csv_error)?;
         csv.flush()
     }
 

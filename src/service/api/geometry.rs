@@ -11,7 +11,7 @@ use toothwave_solver::profile::{self, Polyline, ProfileParameters};
 use toothwave_solver::{Drive, SolveError, findings};
 use utoipa::ToSchema;
 
-use super::{App, Endpoint, Problems, Tabular, checked_drive, require_finite, respond};
+use super::{App, Endpoint, Problems, Tabular, checked_drive, csv_error, require_finite, respond};
 use crate::config::Limits;
 use crate::design::Design;
 use crate::findings::FindingAnswer;
@@ -228,7 +228,7 @@ impl Endpoint for Geometry {
 impl Tabular for GeometryAnswer {
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
         let mut csv = csv::Writer::from_writer(writer);
-        csv.write_record(["profile", "x_mm", "y_mm"])?;
+        csv.write_record(["profile", "x_mm", "y_mm"]).map_err(csv_error)?;
         let profiles = [
             ("ring", &self.ring.profile),
             ("wave_generator", &self.wave_generator.profile),
@@ -236,7 +236,7 @@ impl Tabular for GeometryAnswer {
         ];
         for (name, profile) in profiles {
             for point in profile.x_mm.iter().zip(&profile.y_mm) {
-                csv.serialize((name, point.0, point.1))?;
+                csv.serialize((name, point.0, point.1)).map_err(csv_error)?;
             }
         }
         csv.flush()

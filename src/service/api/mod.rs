@@ -4,7 +4,7 @@
 use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use axum::body::Body;
 use axum::extract::Request;
@@ -135,28 +135,39 @@ pub async fn respond<E: Endpoint>(app: App, request: Request) -> Response {
 }
 
 async fn walk<E: Endpoint>(app: App, request: Request) -> Result<Response, Problem> {
+    let deadline = app.pool.deadline();
     let (parts, body) = request.into_parts();
     negotiation::require_json(&parts.headers)?;
     let representation = Representation::negotiate(&parts.headers, E::FORMATS)?;
-    let body = read_body(&parts.headers, body, &app.limits).await?;
+    let body = read_body(&parts.headers, body, &app.limits, deadline).await?;
     let design = json::read::<Design>(&body)?.normalised();
-    let question = E::question(&design, &app.limits)?;
     let key = Key::new(E::NAME, &E::reads(&design), representation)?;
     let etag = key.etag();
     tracing::Span::current().record("design", tracing::field::display(key));
-    if negotiation::is_not_modified(&parts.headers, &etag) {
-        return Ok(not_modified(&etag, Served::Hit));
-    }
-    let pool = app.pool.clone();
-    let solve = async move { pool.run(move |stop| solve::<E>(&question, representation, stop)).await };
-    let (stored, served) = app.cache.get_or_solve(key, solve).await?;
-    if negotiation::matches_any(&parts.headers) {
+    // What is kept was checked when it was solved.
+    let (stored, served) = if let Some(stored) = app.cache.get(key).await {
+        (stored, Served::Hit)
+    } else {
+        let question = E::question(&design, &app.limits)?;
+        if negotiation::is_not_modified(&parts.headers, &etag) {
+            return Ok(not_modified(&etag, Served::Unneeded));
+        }
+        let pool = app.pool.clone();
+        let solve = async move { pool.run(deadline, move |stop| solve::<E>(&question, representation, stop)).await };
+        app.cache.solve_once(key, solve).await?
+    };
+    if negotiation::is_not_modified(&parts.headers, &etag) || negotiation::matches_any(&parts.headers) {
         return Ok(not_modified(&etag, served));
     }
     Ok(found(stored, served, representation, &etag))
 }
 
-async fn read_body(headers: &HeaderMap, body: Body, limits: &Limits) -> Result<bytes::Bytes, Problem> {
+async fn read_body(
+    headers: &HeaderMap,
+    body: Body,
+    limits: &Limits,
+    deadline: tokio::time::Instant,
+) -> Result<bytes::Bytes, Problem> {
     let limit = limits.max_body_bytes;
     let too_large = |found: String| {
         Problem::new(
@@ -169,7 +180,7 @@ async fn read_body(headers: &HeaderMap, body: Body, limits: &Limits) -> Result<b
         return Err(too_large(format!("{length} bytes")));
     }
     let reading = axum::body::to_bytes(body, limit);
-    let arrived = tokio::time::timeout(Duration::from_millis(limits.deadline_ms), reading).await;
+    let arrived = tokio::time::timeout_at(deadline, reading).await;
     let arrived = arrived.map_err(|_| {
         let detail = format!("the body did not arrive within {} ms", limits.deadline_ms);
         Problem::new(ProblemCode::RequestTimeout, detail)
@@ -259,6 +270,14 @@ fn caching(mut response: Response, served: Served, etag: &str) -> Response {
     response
 }
 
+/// A CSV error as what it is: one of the writer, whose kind tells a closed pipe from a full disk.
+fn csv_error(error: csv::Error) -> io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        other => io::Error::other(format!("{other:?}")),
+    }
+}
+
 /// Guards the promise that no answer holds anything but numbers: serde_json would write `null` and say nothing.
 ///
 /// # Errors
@@ -279,7 +298,7 @@ fn checked_drive(design: &Design, violations: &mut Vec<Violation>) -> Result<Opt
     match Drive::new(&design.drive_parameters()) {
         Ok(drive) => Ok(Some(drive)),
         Err(DriveError::Impossible(found)) => {
-            violations.extend(found);
+            violations.extend(found.into_iter().map(|violation| design.as_written(violation)));
             Ok(None)
         }
         Err(error @ DriveError::NotConverged(_)) => Err(error.into()),

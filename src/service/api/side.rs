@@ -3,6 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use axum::Json;
+use axum::extract::rejection::PathRejection;
 use axum::extract::{Path, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -62,7 +63,9 @@ pub async fn examples() -> Json<ExamplesAnswer> {
         (status = 404, description = "No example has this name.", body = Problem, content_type = "application/problem+json")
     )
 )]
-pub async fn example(Path(name): Path<String>) -> Response {
+pub async fn example(name: Result<Path<String>, PathRejection>) -> Response {
+    // A name that is no text is no example's either.
+    let name = name.map(|Path(name)| name).unwrap_or_default();
     match examples::by_name(&name) {
         Some(example) => ([(header::CONTENT_TYPE, "application/json")], example.document).into_response(),
         None => {

@@ -12,7 +12,7 @@ use toothwave_solver::{Drive, LoadCase, PerContact, findings};
 use utoipa::ToSchema;
 
 use super::geometry::{drive_findings, write_findings};
-use super::{App, Endpoint, Problems, Tabular, checked_drive, require_finite, respond};
+use super::{App, Endpoint, Problems, Tabular, checked_drive, csv_error, require_finite, respond};
 use crate::config::Limits;
 use crate::design::Design;
 use crate::findings::FindingAnswer;
@@ -240,7 +240,8 @@ impl Tabular for SweepAnswer {
             "stress_wave_generator_mpa",
             "stress_ring_mpa",
             "stress_carrier_mpa",
-        ])?;
+        ])
+        .map_err(csv_error)?;
         let states = &self.states;
         for i in 0..states.tooth.len() {
             csv.serialize((
@@ -256,7 +257,8 @@ impl Tabular for SweepAnswer {
                 states.stress_wave_generator_mpa[i],
                 states.stress_ring_mpa[i],
                 states.stress_carrier_mpa[i],
-            ))?;
+            ))
+            .map_err(csv_error)?;
         }
         csv.flush()
     }

@@ -1,0 +1,325 @@
+//! Results are kept by what they depend on, and solved once however many ask.
+
+use std::io::Read as _;
+use std::sync::{Arc, Barrier};
+
+use flate2::read::GzDecoder;
+use serde_json::json;
+use toothwave::config::Limits;
+
+use crate::asking::{Answer, ENDPOINTS, LIMITS, Listening, Occupied, Question, Service, ask_at, until};
+use crate::designs::{bored, in_reverse, shortest, spelled_out, undercut, with};
+
+fn question(path: &str) -> Question {
+    Question::post(path, spelled_out().to_string())
+}
+
+#[tokio::test]
+async fn the_first_request_is_a_miss_and_the_same_again_a_hit_with_the_same_bytes() {
+    for path in ENDPOINTS {
+        let service = Service::new();
+        let (first, second) = (service.ask(&question(path)).await, service.ask(&question(path)).await);
+        assert!(first.is_miss() && !first.is_hit(), "{}", first.header("cache-status"));
+        assert!(second.is_hit() && !second.is_miss(), "{}", second.header("cache-status"));
+        assert_eq!(
+            (first.etag(), first.header("vary"), &first.body),
+            (second.etag(), second.header("vary"), &second.body)
+        );
+    }
+}
+
+#[tokio::test]
+async fn an_identical_request_is_a_cache_hit_however_it_is_spelled() {
+    let service = Service::new();
+    for (path, document) in ENDPOINTS.into_iter().zip([spelled_out(), undercut(), bored()]) {
+        assert!(service.post(path, &document).await.is_miss());
+        assert!(service.post_text(path, in_reverse(&document)).await.is_hit());
+    }
+    assert!(service.post("/v1/geometry", &shortest()).await.is_hit());
+}
+
+#[tokio::test]
+async fn an_entity_tag_stays_the_same_from_one_service_to_the_next() {
+    for path in ENDPOINTS {
+        let (one, other) = (Service::new().ask(&question(path)).await, Service::new().ask(&question(path)).await);
+        assert_eq!(one.etag(), other.etag(), "{path}");
+        assert!(one.body == other.body, "{path}");
+    }
+}
+
+#[tokio::test]
+async fn cache_status_names_one_cache_first() {
+    let answer = Service::new().ask(&question("/v1/sweep")).await;
+    assert!(answer.header("cache-status").starts_with("toothwave;"), "{}", answer.header("cache-status"));
+}
+
+#[tokio::test]
+async fn server_timing_says_how_long_the_solve_took_on_hits_too() {
+    let service = Service::new();
+    let duration = |answer: &Answer| {
+        let timing = answer.header("server-timing").to_owned();
+        let (_, duration) = timing.split_once("dur=").unwrap_or_else(|| panic!("no `dur` in `{timing}`"));
+        duration.split([';', ',']).next().unwrap().parse::<f64>().unwrap()
+    };
+    let (miss, hit) = (service.ask(&question("/v1/sweep")).await, service.ask(&question("/v1/sweep")).await);
+    assert!(duration(&miss) >= 0.0 && duration(&miss).is_finite());
+    assert_eq!(duration(&miss), duration(&hit), "that of the solve which made the bytes");
+}
+
+/// Every representation of a sweep.
+async fn representations(service: &Service) -> Vec<(&'static str, &'static str, Answer)> {
+    let mut answers = Vec::new();
+    for accept in ["application/json", "text/csv"] {
+        for coding in ["identity", "gzip"] {
+            let question = question("/v1/sweep").with("accept", accept).with("accept-encoding", coding);
+            answers.push((accept, coding, service.ask(&question).await));
+        }
+    }
+    answers
+}
+
+#[tokio::test]
+async fn every_representation_has_an_entity_tag_of_its_own() {
+    let service = Service::new();
+    let answers = representations(&service).await;
+    for (accept, coding, answer) in &answers {
+        assert_eq!(answer.status, 200);
+        assert_eq!(answer.header("content-type").split(';').next(), Some(*accept));
+        assert_eq!(answer.header("content-encoding"), if *coding == "gzip" { "gzip" } else { "" });
+    }
+    let mut tags: Vec<_> = answers.iter().map(|(.., answer)| answer.etag()).collect();
+    tags.sort_unstable();
+    tags.dedup();
+    assert_eq!(tags.len(), 4);
+    for (.., again) in representations(&service).await {
+        assert!(again.is_hit());
+    }
+}
+
+#[tokio::test]
+async fn every_answer_varies_by_accept_and_accept_encoding() {
+    let service = Service::new();
+    let tag = service.ask(&question("/v1/geometry")).await.etag().to_owned();
+    let mut answers: Vec<_> = representations(&service).await.into_iter().map(|(.., answer)| answer).collect();
+    answers.push(service.ask(&question("/v1/geometry")).await);
+    answers.push(service.ask(&question("/v1/geometry").with("if-none-match", &tag)).await);
+    assert_eq!(answers.last().unwrap().status, 304);
+    for answer in answers {
+        let vary = answer.header("vary").to_ascii_lowercase();
+        let fields: Vec<_> = vary.split(',').map(str::trim).collect();
+        assert!(fields.contains(&"accept") && fields.contains(&"accept-encoding"), "{vary}");
+    }
+}
+
+#[tokio::test]
+async fn a_compressed_body_decodes_to_the_plain_one() {
+    let service = Service::new();
+    for path in ENDPOINTS {
+        let plain = service.ask(&question(path)).await;
+        let compressed = service.ask(&question(path).with("accept-encoding", "gzip")).await;
+        assert_eq!((plain.header("content-encoding"), compressed.header("content-encoding")), ("", "gzip"));
+        let mut decoded = Vec::new();
+        GzDecoder::new(compressed.body.as_slice()).read_to_end(&mut decoded).unwrap();
+        assert!(decoded == plain.body, "{path}");
+    }
+}
+
+#[tokio::test]
+async fn an_answer_is_compressed_for_those_who_prefer_it_so() {
+    let service = Service::new();
+    for (accepted, is_compressed) in [
+        ("gzip", true),
+        ("GZIP", true),
+        ("x-gzip", true),
+        ("br, gzip, deflate", true),
+        ("gzip;q=0.5", true),
+        ("gzip; q=1.0, identity; q=0.5", true),
+        ("*", true),
+        ("", false),
+        ("br", false),
+        ("identity", false),
+        ("gzip;q=0", false),
+        ("gzip; q=0.000", false),
+        ("gzip;q=0.1, identity;q=0.9", false),
+        ("*;q=0, identity", false),
+        ("gzip;q=0, *", false),
+    ] {
+        let answer = service.ask(&question("/v1/coincidence-degree").with("accept-encoding", accepted)).await;
+        assert_eq!(answer.header("content-encoding") == "gzip", is_compressed, "{accepted}");
+    }
+}
+
+#[tokio::test]
+async fn a_weight_may_be_spelled_in_capitals() {
+    let question = question("/v1/coincidence-degree").with("accept-encoding", "gzip;Q=0");
+    assert_eq!(Service::new().ask(&question).await.header("content-encoding"), "", "RFC 9110, 12.4.2: gzip is refused");
+}
+
+#[tokio::test]
+async fn a_client_that_has_the_representation_gets_304_without_a_body() {
+    let service = Service::new();
+    for path in ENDPOINTS {
+        let first = service.ask(&question(path)).await;
+        let tag = first.etag();
+        for condition in
+            [tag, &format!("W/{tag}"), &format!("\"other\", {tag}"), &format!("W/\"a\" ,W/{tag},\"b\""), "*"]
+        {
+            let answer = service.ask(&question(path).with("if-none-match", condition)).await;
+            assert_eq!((answer.status, answer.body.len()), (304, 0), "{path}: {condition}");
+            assert_eq!((answer.etag(), answer.header("vary")), (tag, first.header("vary")));
+            assert!(answer.is_hit(), "{}", answer.header("cache-status"));
+        }
+        let two_lines = question(path).with("if-none-match", "\"other\"").with("if-none-match", tag);
+        assert_eq!(service.ask(&two_lines).await.status, 304, "a list may stand on several lines");
+    }
+}
+
+#[tokio::test]
+async fn a_client_that_has_something_else_gets_the_answer() {
+    let service = Service::new();
+    let json = service.ask(&question("/v1/sweep")).await;
+    let other = service.post("/v1/sweep", &undercut()).await;
+    for condition in ["\"other\"", other.etag(), "", json.etag().trim_matches('"'), "\"*\""] {
+        let answer = service.ask(&question("/v1/sweep").with("if-none-match", condition)).await;
+        assert_eq!((answer.status, &answer.body), (200, &json.body), "{condition}");
+    }
+    let as_csv = question("/v1/sweep").with("accept", "text/csv").with("if-none-match", json.etag());
+    assert_eq!(service.ask(&as_csv).await.status, 200, "another representation");
+    let compressed = question("/v1/sweep").with("accept-encoding", "gzip").with("if-none-match", json.etag());
+    assert_eq!(service.ask(&compressed).await.status, 200, "another representation");
+}
+
+#[tokio::test]
+async fn the_tag_alone_is_enough_where_nothing_is_kept_any_more() {
+    let tag = Service::new().ask(&question("/v1/sweep")).await.etag().to_owned();
+    let answer = Service::new().ask(&question("/v1/sweep").with("if-none-match", &tag)).await;
+    assert_eq!(answer.status, 304, "the bytes follow from the parameters, and so does the tag");
+}
+
+#[tokio::test]
+async fn a_design_that_gets_no_answer_is_never_304() {
+    let service = Service::new();
+    let tag = service.ask(&question("/v1/sweep")).await.etag().to_owned();
+    for (document, code) in [
+        (with(&spelled_out(), "/drive/teeth/radius_mm", json!(0.0)), "impossible_design"),
+        (with(&spelled_out(), "/drive/teeth/installed", json!(4)), "no_tooth_in_mesh"),
+        (with(&spelled_out(), "/sweep/samples", json!(10_000_000)), "too_many_states"),
+        (with(&spelled_out(), "/colour", json!("red")), "invalid_document"),
+    ] {
+        for condition in ["*", tag.as_str()] {
+            let question = Question::post("/v1/sweep", document.to_string()).with("if-none-match", condition);
+            service.ask(&question).await.refused(422, code);
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_design_that_gets_no_answer_gets_none_again() {
+    let service = Service::new();
+    let unloaded = with(&spelled_out(), "/drive/teeth/installed", json!(4));
+    for _ in 0..3 {
+        service.post("/v1/sweep", &unloaded).await.refused(422, "no_tooth_in_mesh");
+    }
+}
+
+#[tokio::test]
+async fn what_is_not_kept_is_solved_anew_to_the_same_bytes() {
+    let service = Service::within(Limits { cache_max_bytes: 0, ..LIMITS });
+    let (first, second) = (service.ask(&question("/v1/sweep")).await, service.ask(&question("/v1/sweep")).await);
+    assert!(first.is_miss());
+    assert_eq!((first.etag(), &first.body), (second.etag(), &second.body));
+}
+
+#[tokio::test]
+async fn a_cache_that_keeps_nothing_does_not_say_that_it_stored_the_answer() {
+    let service = Service::within(Limits { cache_max_bytes: 0, ..LIMITS });
+    let answer = service.ask(&question("/v1/sweep")).await;
+    assert!(!answer.header("cache-status").contains("stored"), "{}", answer.header("cache-status"));
+}
+
+#[test]
+fn a_hundred_identical_requests_at_once_solve_once() {
+    let service = Listening::within(LIMITS);
+    let document = with(&spelled_out(), "/sweep/samples", json!(200)).to_string();
+    let start = Arc::new(Barrier::new(100));
+    let askers: Vec<_> = (0..100)
+        .map(|i| {
+            let (address, start) = (service.address, Arc::clone(&start));
+            // Each spells the document its own way.
+            let text = format!("{document}{}", " ".repeat(i));
+            std::thread::spawn(move || {
+                start.wait();
+                ask_at(address, &Question::post("/v1/sweep", text))
+            })
+        })
+        .collect();
+    let answers: Vec<_> = askers.into_iter().map(|asker| asker.join().unwrap()).collect();
+    assert!(answers.iter().all(|answer| answer.status == 200));
+    assert_eq!(answers.iter().filter(|answer| answer.is_miss()).count(), 1);
+    assert_eq!(answers.iter().filter(|answer| answer.is_hit() || answer.is_collapsed()).count(), 99);
+    assert!(answers.iter().all(|answer| answer.body == answers[0].body && answer.etag() == answers[0].etag()));
+}
+
+/// Asks in a task of its own, as a connection would.
+fn asked(service: &Service, question: Question) -> tokio::task::JoinHandle<Answer> {
+    let service = service.clone();
+    tokio::spawn(async move { service.ask(&question).await })
+}
+
+/// Lets every task go as far as it can without the pool.
+async fn settle() {
+    for _ in 0..1_000 {
+        tokio::task::yield_now().await;
+    }
+}
+
+#[tokio::test]
+async fn those_who_ask_while_it_is_solved_wait_for_that_solve() {
+    let service = Service::within(Limits { max_concurrent_solves: 1, max_queued_solves: 1, ..LIMITS });
+    let occupied = Occupied::by_one(&service.app.pool).await;
+    // The queue has one place: a second solve would be refused.
+    let askers: Vec<_> = (0..100).map(|_| asked(&service, question("/v1/sweep"))).collect();
+    settle().await;
+    assert_eq!(service.app.pool.admitted(), 2);
+    occupied.end().await;
+    let mut answers = Vec::new();
+    for asker in askers {
+        answers.push(asker.await.unwrap());
+    }
+    assert!(answers.iter().all(|answer| answer.status == 200));
+    assert_eq!(answers.iter().filter(|answer| answer.is_miss()).count(), 1);
+    assert_eq!(answers.iter().filter(|answer| answer.is_collapsed()).count(), 99);
+}
+
+#[tokio::test]
+async fn those_who_wait_get_their_answer_even_if_the_first_to_ask_leaves() {
+    let service = Service::within(Limits { max_concurrent_solves: 1, max_queued_solves: 1, ..LIMITS });
+    let occupied = Occupied::by_one(&service.app.pool).await;
+    let first = asked(&service, question("/v1/sweep"));
+    until("the first is admitted", || service.app.pool.admitted() == 2).await;
+    let followers: Vec<_> = (0..10).map(|_| asked(&service, question("/v1/sweep"))).collect();
+    settle().await;
+    first.abort();
+    assert!(first.await.unwrap_err().is_cancelled());
+    settle().await;
+    assert_eq!(service.app.pool.admitted(), 2, "its solve goes on");
+    occupied.end().await;
+    for follower in followers {
+        let answer = follower.await.unwrap();
+        assert_eq!(answer.status, 200);
+        assert!(answer.is_collapsed(), "{}", answer.header("cache-status"));
+    }
+}
+
+#[tokio::test]
+async fn those_who_wait_for_a_solve_that_fails_are_told_so() {
+    let service = Service::within(Limits { max_concurrent_solves: 1, max_queued_solves: 1, ..LIMITS });
+    let occupied = Occupied::by_one(&service.app.pool).await;
+    let unloaded = with(&spelled_out(), "/drive/teeth/installed", json!(4)).to_string();
+    let askers: Vec<_> = (0..10).map(|_| asked(&service, Question::post("/v1/sweep", unloaded.clone()))).collect();
+    settle().await;
+    occupied.end().await;
+    for asker in askers {
+        asker.await.unwrap().refused(422, "no_tooth_in_mesh");
+    }
+}

@@ -1,0 +1,119 @@
+//! Every code there is. Each list is built by a `match` without a wildcard, so that a new code cannot be forgotten here.
+
+use serde::Serialize;
+use serde_json::Value;
+use toothwave::findings::FindingCode;
+use toothwave::problem::{FieldCode, ProblemCode};
+
+/// Steps through an enum from its first value to its last.
+macro_rules! all {
+    ($type:ident: $first:ident $(, $from:ident => $to:ident)* ; $last:ident) => {{
+        let next = |code: $type| match code {
+            $($type::$from => Some($type::$to),)*
+            $type::$last => None,
+        };
+        std::iter::successors(Some($type::$first), |&code| next(code)).collect::<Vec<_>>()
+    }};
+}
+
+pub(crate) fn problem_codes() -> Vec<ProblemCode> {
+    all!(ProblemCode: MalformedJson,
+        MalformedJson => NotFound,
+        NotFound => MethodNotAllowed,
+        MethodNotAllowed => NotAcceptable,
+        NotAcceptable => RequestTimeout,
+        RequestTimeout => BodyTooLarge,
+        BodyTooLarge => UnsupportedMediaType,
+        UnsupportedMediaType => InvalidDocument,
+        InvalidDocument => ImpossibleDesign,
+        ImpossibleDesign => NoToothInMesh,
+        NoToothInMesh => ComplianceNotPositive,
+        ComplianceNotPositive => TooManyStates,
+        TooManyStates => TooManyPoints,
+        TooManyPoints => QueueFull,
+        QueueFull => DeadlineExceeded,
+        DeadlineExceeded => InternalError;
+        InternalError)
+}
+
+pub(crate) fn field_codes() -> Vec<FieldCode> {
+    all!(FieldCode: UnknownField,
+        UnknownField => MissingField,
+        MissingField => DuplicateField,
+        DuplicateField => WrongType,
+        WrongType => UnknownChoice,
+        UnknownChoice => NumberTooLarge,
+        NumberTooLarge => ConflictingFields,
+        ConflictingFields => OutOfRange,
+        OutOfRange => CamNotElongated,
+        CamNotElongated => ToothDifference,
+        ToothDifference => InstalledOdd,
+        InstalledOdd => InstalledNoDivisor,
+        InstalledNoDivisor => TeethTouch,
+        TeethTouch => NoCarrierAnnulus,
+        NoCarrierAnnulus => BoreLeavesNoFlank,
+        BoreLeavesNoFlank => TooManyStates,
+        TooManyStates => TooManyPoints;
+        TooManyPoints)
+}
+
+pub(crate) fn finding_codes() -> Vec<FindingCode> {
+    all!(FindingCode: Undercut,
+        Undercut => BoreShortensFlank,
+        BoreShortensFlank => BoreWithoutEffect,
+        BoreWithoutEffect => FewTeethInMesh,
+        FewTeethInMesh => ThinSlotWall,
+        ThinSlotWall => ToothBeyondCarrier,
+        ToothBeyondCarrier => SteepRingFlank,
+        SteepRingFlank => StressAboveFatigueLimit;
+        StressAboveFatigueLimit)
+}
+
+/// The words of codes, as documents spell them, in alphabetical order.
+pub(crate) fn words(codes: &[impl Serialize]) -> Vec<String> {
+    let word = |code| serde_json::to_value(code).unwrap().as_str().unwrap().to_owned();
+    let mut words: Vec<_> = codes.iter().map(word).collect();
+    words.sort_unstable();
+    words
+}
+
+/// The `code`s among these objects, each once, in alphabetical order.
+pub(crate) fn codes_of<'a>(objects: impl IntoIterator<Item = &'a Value>) -> Vec<String> {
+    let mut codes: Vec<_> = objects.into_iter().map(|object| object["code"].as_str().unwrap().to_owned()).collect();
+    codes.sort_unstable();
+    codes.dedup();
+    codes
+}
+
+#[test]
+fn every_kind_of_problem_has_its_status_and_a_type_of_its_own() {
+    use toothwave::problem::Problem;
+    let expected = |code| match code {
+        ProblemCode::MalformedJson => 400,
+        ProblemCode::NotFound => 404,
+        ProblemCode::MethodNotAllowed => 405,
+        ProblemCode::NotAcceptable => 406,
+        ProblemCode::RequestTimeout => 408,
+        ProblemCode::BodyTooLarge => 413,
+        ProblemCode::UnsupportedMediaType => 415,
+        ProblemCode::InvalidDocument
+        | ProblemCode::ImpossibleDesign
+        | ProblemCode::NoToothInMesh
+        | ProblemCode::ComplianceNotPositive
+        | ProblemCode::TooManyStates
+        | ProblemCode::TooManyPoints => 422,
+        ProblemCode::QueueFull | ProblemCode::DeadlineExceeded => 503,
+        ProblemCode::InternalError => 500,
+    };
+    let mut types: Vec<_> = problem_codes()
+        .into_iter()
+        .map(|code| {
+            let problem = Problem::new(code, "what happened");
+            assert_eq!((problem.status, code.status().as_u16()), (expected(code), expected(code)), "{code:?}");
+            problem.kind
+        })
+        .collect();
+    types.sort_unstable();
+    types.dedup();
+    assert_eq!(types.len(), problem_codes().len());
+}

@@ -1,0 +1,230 @@
+//! The command line gives the service's answers without the service.
+
+use std::io::Write as _;
+use std::net::TcpListener;
+use std::process::{Command, Output, Stdio};
+
+use serde_json::{Value, json};
+
+use crate::asking::{Question, Service};
+use crate::designs::{shortest, spelled_out, undercut, with, without};
+use crate::serving::Process;
+
+/// Commands and the paths that answer the same.
+const COMMANDS: [(&str, &str); 3] =
+    [("geometry", "/v1/geometry"), ("coincidence-degree", "/v1/coincidence-degree"), ("sweep", "/v1/sweep")];
+
+fn run(arguments: &[&str], input: &[u8]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_toothwave"));
+    let command = command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    // A process that does not read its input has closed it, and that is its right.
+    let _ = child.stdin.take().unwrap().write_all(input);
+    child.wait_with_output().unwrap()
+}
+
+fn stdout(output: &Output) -> &str {
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    std::str::from_utf8(&output.stdout).unwrap()
+}
+
+fn stderr(output: &Output) -> &str {
+    std::str::from_utf8(&output.stderr).unwrap()
+}
+
+fn example(name: &str) -> String {
+    format!("{}/../../examples/{name}.json", env!("CARGO_MANIFEST_DIR"))
+}
+
+#[tokio::test]
+async fn json_is_the_body_that_the_service_answers_with() {
+    for name in ["paper-5.1", "paper-5.2", "paper-5.2-bored", "ring-with-more-teeth"] {
+        for (command, path) in COMMANDS {
+            let served = Service::new().post_text(path, std::fs::read(example(name)).unwrap()).await;
+            let output = run(&[command, &example(name), "--format", "json"], b"");
+            assert!(stdout(&output).strip_suffix('\n') == Some(served.text()), "{command} {name}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn csv_of_a_sweep_is_the_body_that_the_service_answers_with() {
+    let question = Question::post("/v1/sweep", std::fs::read(example("paper-5.2")).unwrap()).with("accept", "text/csv");
+    let served = Service::new().ask(&question).await;
+    let output = run(&["sweep", "--format", "csv", &example("paper-5.2")], b"");
+    assert!(stdout(&output) == served.text());
+}
+
+#[tokio::test]
+async fn csv_of_a_geometry_holds_the_points_of_its_json() {
+    let found = Service::new().post_text("/v1/geometry", std::fs::read(example("paper-5.2")).unwrap()).await.found();
+    let output = run(&["geometry", "--format", "csv", &example("paper-5.2")], b"");
+    let mut csv = csv::Reader::from_reader(stdout(&output).as_bytes());
+    assert_eq!(csv.headers().unwrap(), vec!["profile", "x_mm", "y_mm"]);
+    let mut rows = csv.records().map(|row| row.unwrap());
+    let profiles = [
+        ("ring", &found["ring"]["profile"]),
+        ("wave_generator", &found["wave_generator"]["profile"]),
+        ("tooth_center_path", &found["tooth_center_path"]),
+    ];
+    for (name, profile) in profiles {
+        for (x, y) in profile["x_mm"].as_array().unwrap().iter().zip(profile["y_mm"].as_array().unwrap()) {
+            let row = rows.next().unwrap();
+            let point = (row[1].parse::<f64>().ok(), row[2].parse::<f64>().ok());
+            assert_eq!((&row[0], point), (name, (x.as_f64(), y.as_f64())));
+        }
+    }
+    assert!(rows.next().is_none());
+}
+
+#[test]
+fn csv_of_a_coincidence_degree_is_one_line() {
+    let output = run(&["coincidence-degree", "--format", "csv", &example("paper-5.1")], b"");
+    let mut csv = csv::Reader::from_reader(stdout(&output).as_bytes());
+    let names: Vec<_> = csv.headers().unwrap().iter().map(str::to_owned).collect();
+    let rows: Vec<_> = csv.records().map(|row| row.unwrap()).collect();
+    assert_eq!(rows.len(), 1);
+    let value = |name: &str| rows[0][names.iter().position(|known| known == name).unwrap()].parse::<f64>().unwrap();
+    assert_eq!((value("coincidence_degree"), value("teeth_in_mesh_per_zone_min")), (14.0, 7.0));
+}
+
+#[test]
+fn a_table_is_what_comes_by_default_and_holds_the_main_numbers() {
+    for (command, numbers) in [
+        ("geometry", &["14", "-13", "66.000000", "6.749190"][..]),
+        ("coincidence-degree", &["14.000000000000", "7 to 7", "13.846154"]),
+        ("sweep", &["1429.443", "1549.279", "645.337", "872.606", "980.437", "562.162", "357"]),
+    ] {
+        let by_default = run(&[command, &example("paper-5.1")], b"");
+        let table = run(&[command, "--format", "table", &example("paper-5.1")], b"");
+        assert_eq!(stdout(&by_default), stdout(&table));
+        for number in numbers {
+            assert!(stdout(&table).contains(number), "no {number} in\n{}", stdout(&table));
+        }
+    }
+}
+
+#[test]
+fn a_table_tells_the_findings() {
+    let output = run(&["coincidence-degree", &example("paper-5.2")], b"");
+    assert!(stdout(&output).contains("cut away by their own envelope"), "{}", stdout(&output));
+}
+
+#[test]
+fn a_dash_reads_standard_input() {
+    for (command, _) in COMMANDS {
+        let from_file = run(&[command, &example("paper-5.2"), "--format", "json"], b"");
+        let from_input = run(&[command, "-", "--format", "json"], &std::fs::read(example("paper-5.2")).unwrap());
+        assert!(stdout(&from_file) == stdout(&from_input), "{command}");
+    }
+}
+
+/// Documents that get no answer, of each kind.
+fn bad_documents() -> Vec<String> {
+    vec![
+        String::new(),
+        "{".into(),
+        "[]".into(),
+        "{}".into(),
+        with(&shortest(), "/drive/teeth/colour", json!("red")).to_string(),
+        with(&shortest(), "/drive/teeth/count", json!("28")).to_string(),
+        without(&shortest(), "/load").to_string(),
+        with(&shortest(), "/drive/ring/teeth", json!(27)).to_string(),
+        with(&shortest(), "/drive/teeth/installed", json!(4)).to_string(),
+        with(&with(&shortest(), "/drive/teeth/installed", json!(9)), "/drive/ring/teeth", json!(27)).to_string(),
+    ]
+}
+
+#[tokio::test]
+async fn bad_input_ends_with_status_2_and_the_details_that_the_service_gives() {
+    for document in bad_documents() {
+        let problem = Service::new().post_text("/v1/sweep", document.clone()).await.problem();
+        for format in ["json", "csv", "table"] {
+            let output = run(&["sweep", "-", "--format", format], document.as_bytes());
+            assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0), "{document}");
+            assert!(
+                stderr(&output).contains(problem["detail"].as_str().unwrap()),
+                "{problem} is not\n{}",
+                stderr(&output)
+            );
+            for error in problem["errors"].as_array().into_iter().flatten() {
+                for member in ["pointer", "detail"] {
+                    let text = error[member].as_str().unwrap();
+                    assert!(stderr(&output).contains(text), "{text} is not in\n{}", stderr(&output));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_file_that_cannot_be_read_ends_with_status_2_and_its_name() {
+    for file in ["/nowhere/at/all.json", env!("CARGO_MANIFEST_DIR")] {
+        let output = run(&["sweep", file], b"");
+        assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0));
+        assert!(stderr(&output).contains(file), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn a_command_that_is_misspelled_ends_with_status_2() {
+    for arguments in [
+        &["swep"][..],
+        &["sweep"],
+        &["sweep", "-", "--format", "xml"],
+        &["sweep", "-", "--colour"],
+        &["--listen", "nowhere"],
+    ] {
+        assert_eq!(run(arguments, b"").status.code(), Some(2), "{arguments:?}");
+    }
+}
+
+#[test]
+fn without_a_server_no_limit_but_the_documents_own_applies() {
+    let many = with(&undercut(), "/sweep", json!({ "samples": 250_000 })).to_string();
+    let output = run(&["sweep", "-", "--format", "table"], many.as_bytes());
+    assert!(stdout(&output).contains("coincidence degree"));
+    let too_many = with(&undercut(), "/sweep", json!({ "samples": 10_000_001 })).to_string();
+    assert_eq!(run(&["sweep", "-"], too_many.as_bytes()).status.code(), Some(2));
+}
+
+#[test]
+fn openapi_prints_the_committed_document() {
+    assert_eq!(stdout(&run(&["openapi"], b"")), crate::openapi::COMMITTED);
+}
+
+#[test]
+fn version_is_the_solvers() {
+    assert_eq!(stdout(&run(&["--version"], b"")).trim(), format!("toothwave {}", toothwave_solver::VERSION));
+    let output = run(&["coincidence-degree", "-", "--format", "json"], spelled_out().to_string().as_bytes());
+    let answer: Value = serde_json::from_str(stdout(&output)).unwrap();
+    assert_eq!(answer["solver_version"], toothwave_solver::VERSION);
+}
+
+#[test]
+fn health_is_well_where_the_service_is() {
+    let process = Process::started(&["serve"]);
+    let output = run(&["health", "--address", &process.address.to_string()], b"");
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    // What listens everywhere is asked here, and what is said by a variable need not be said again.
+    let everywhere = format!("0.0.0.0:{}", process.address.port());
+    let mut command = Command::new(env!("CARGO_BIN_EXE_toothwave"));
+    assert!(command.arg("health").env("TOOTHWAVE_LISTEN", everywhere).status().unwrap().success());
+}
+
+#[test]
+fn health_is_not_well_where_nothing_listens_or_something_else_does() {
+    let closed = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let output = run(&["health", "--address", &closed.to_string()], b"");
+    assert!(!output.status.success());
+    assert!(!stderr(&output).is_empty());
+    let other = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = other.local_addr().unwrap().to_string();
+    let answering = std::thread::spawn(move || {
+        let (mut stream, _) = other.accept().unwrap();
+        // The asker may be gone before it has heard everything.
+        let _ = stream.write_all(b"HTTP/1.1 503 Service Unavailable\r\n\r\n");
+    });
+    assert!(!run(&["health", "--address", &address], b"").status.success());
+    answering.join().unwrap();
+}

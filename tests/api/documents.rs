@@ -1,0 +1,521 @@
+//! What a design document may leave out, how it may be spelled, and what it may not say.
+
+use serde_json::{Value, json};
+
+use crate::asking::{Answer, ENDPOINTS, Service};
+use crate::designs::{
+    self, every_number, fixed, in_reverse, pointers, shortest, spelled_out, with, with_twice, without,
+};
+
+/// That the text is the same question as the document, whose answer the service has already.
+async fn assert_same(service: &Service, path: &str, document: &Answer, text: &str) {
+    let answer = service.post_text(path, text).await;
+    assert_eq!(answer.status, 200, "{path}: {text}: {}", answer.text());
+    assert_eq!(answer.etag(), document.etag(), "{path}: {text}");
+    assert!(answer.body == document.body, "{path}: another body for {text}");
+    assert!(answer.is_hit(), "{path}: solved anew for {text}");
+}
+
+/// That all of these spell one design.
+async fn assert_all_same(document: &Value, spellings: impl IntoIterator<Item = String>) {
+    let spellings: Vec<_> = spellings.into_iter().collect();
+    for path in ENDPOINTS {
+        let service = Service::new();
+        let first = service.post(path, document).await;
+        assert_eq!(first.status, 200, "{}", first.text());
+        assert!(first.is_miss());
+        for text in &spellings {
+            assert_same(&service, path, &first, text).await;
+        }
+    }
+}
+
+/// All that may be left out of a document, each with another value than its default.
+fn defaults() -> Vec<(&'static str, Value)> {
+    vec![
+        ("/drive/teeth/installed", json!(14)),
+        ("/drive/ring/tip_radius_mm", json!(67.0)),
+        ("/materials", json!({ "teeth": { "poissons_ratio": 0.25 } })),
+        ("/materials/wave_generator", json!({ "youngs_modulus_gpa": 70.0 })),
+        ("/materials/wave_generator/youngs_modulus_gpa", json!(70.0)),
+        ("/materials/wave_generator/poissons_ratio", json!(0.25)),
+        ("/materials/teeth", json!({ "youngs_modulus_gpa": 70.0 })),
+        ("/materials/teeth/youngs_modulus_gpa", json!(70.0)),
+        ("/materials/teeth/poissons_ratio", json!(0.25)),
+        ("/materials/ring", json!({ "youngs_modulus_gpa": 70.0 })),
+        ("/materials/ring/youngs_modulus_gpa", json!(70.0)),
+        ("/materials/ring/poissons_ratio", json!(0.25)),
+        ("/materials/carrier", json!({ "youngs_modulus_gpa": 70.0 })),
+        ("/materials/carrier/youngs_modulus_gpa", json!(70.0)),
+        ("/materials/carrier/poissons_ratio", json!(0.25)),
+        ("/model", json!({ "compatibility": "virtual_work" })),
+        ("/model/compatibility", json!("virtual_work")),
+        ("/model/stiffness", fixed(4e5, 5e5, 3e5)),
+        ("/sweep", json!({ "samples": 51 })),
+        ("/sweep/samples", json!(51)),
+        ("/profile", json!({ "extent": "full" })),
+        ("/profile/chord_tolerance_mm", json!(0.002)),
+        ("/profile/extent", json!("full")),
+    ]
+}
+
+#[tokio::test]
+async fn each_field_left_out_means_its_default() {
+    let document = spelled_out();
+    let fields = defaults().into_iter().map(|(pointer, _)| pointer);
+    // The law alone is no field to be set to another value: other laws have more fields.
+    let shortened = fields.chain(["/model/stiffness/law"]).map(|pointer| without(&document, pointer).to_string());
+    assert_all_same(&document, shortened).await;
+}
+
+#[tokio::test]
+async fn everything_optional_left_out_at_once_means_all_defaults() {
+    let empty =
+        ["/materials", "/model", "/sweep", "/profile"].map(|pointer| with(&shortest(), pointer, json!({})).to_string());
+    let empty_law = with(&shortest(), "/model", json!({ "stiffness": {} })).to_string();
+    let nulled = with(&shortest(), "/drive/ring/tip_radius_mm", Value::Null).to_string();
+    assert_all_same(&spelled_out(), [shortest().to_string(), empty_law, nulled].into_iter().chain(empty)).await;
+}
+
+#[tokio::test]
+async fn a_value_other_than_the_default_is_another_question_to_some_endpoint() {
+    for (pointer, other) in defaults() {
+        let service = Service::new();
+        let mut changed = 0;
+        for path in ENDPOINTS {
+            let by_default = service.post(path, &spelled_out()).await;
+            let otherwise = service.post(path, &with(&spelled_out(), pointer, other.clone())).await;
+            changed += usize::from(otherwise.etag() != by_default.etag());
+        }
+        assert!(changed > 0, "{pointer} = {other} changes nothing");
+    }
+}
+
+#[tokio::test]
+async fn field_order_and_white_space_are_irrelevant() {
+    let document = every_number();
+    let pretty = serde_json::to_string_pretty(&document).unwrap();
+    let reversed = in_reverse(&document);
+    assert_ne!(document.to_string(), reversed);
+    assert_all_same(&document, [reversed, pretty, format!("\r\n\t {document} \n")]).await;
+}
+
+#[tokio::test]
+async fn a_number_means_its_value_however_it_is_spelled() {
+    let text = spelled_out().to_string();
+    let replaced = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from} is not in {text}");
+        text.replace(from, to)
+    };
+    assert_all_same(
+        &spelled_out(),
+        [
+            replaced("\"count\":28", "\"count\":28.0"),
+            replaced("\"count\":28", "\"count\":2.8e1"),
+            replaced("\"count\":28", "\"count\":2.8E+01"),
+            replaced("\"count\":28", "\"count\":280e-1"),
+            replaced("\"installed\":28", "\"installed\":28.000"),
+            replaced("\"installed\":28", "\"installed\":2.8e1"),
+            replaced("\"teeth\":26", "\"teeth\":26.0"),
+            replaced("\"teeth\":26", "\"teeth\":0.26e2"),
+            replaced("\"samples\":50", "\"samples\":50.0"),
+            replaced("\"samples\":50", "\"samples\":5e1"),
+            replaced(":58.0", ":58"),
+            replaced(":58.0", ":5.8e1"),
+            replaced(":58.0", ":58.000000000000000000000000000000000000000000000"),
+            replaced(":20.0", ":2E1"),
+            replaced(":210.0", ":210"),
+            replaced(":0.001", ":1e-3"),
+            replaced(":0.001", ":0.1e-2"),
+            replaced(":0.3", ":3e-1"),
+        ],
+    )
+    .await;
+}
+
+#[tokio::test]
+async fn a_name_means_its_letters_however_they_are_escaped() {
+    let text = spelled_out().to_string();
+    assert_all_same(
+        &spelled_out(),
+        [
+            text.replace("\"drive\"", "\"\\u0064rive\""),
+            text.replace("\"tooth\"", "\"t\\u006f\\u006Fth\""),
+            text.replace("\"law\"", "\"la\\u0077\""),
+        ],
+    )
+    .await;
+}
+
+#[tokio::test]
+async fn minus_zero_is_zero() {
+    for part in ["wave_generator", "teeth", "ring", "carrier"] {
+        let pointer = format!("/materials/{part}/poissons_ratio");
+        let document = with(&spelled_out(), &pointer, json!(0.0));
+        let text = |zero: &str| {
+            let text = with(&spelled_out(), &pointer, json!(0.125)).to_string().replace("0.125", zero);
+            assert!(text.contains(&format!(":{zero}")), "{text}");
+            text
+        };
+        assert_all_same(&document, ["0", "-0", "-0.0", "-0e5", "0.0e-7", "-1e-400"].map(text)).await;
+    }
+}
+
+#[tokio::test]
+async fn a_field_that_the_document_does_not_know_is_refused_by_name_at_every_level_by_every_endpoint() {
+    let service = Service::new();
+    for document in [spelled_out(), every_number()] {
+        for object in pointers(&document, Value::is_object) {
+            let pointer = format!("{object}/colour");
+            for value in [json!("red"), json!(null), json!({}), json!(7.0)] {
+                for path in ENDPOINTS {
+                    let (at, code, detail) =
+                        service.post(path, &with(&document, &pointer, value.clone())).await.faulty_field();
+                    assert_eq!((at.as_str(), code.as_str()), (pointer.as_str(), "unknown_field"));
+                    assert!(detail.contains("`colour`"), "{detail}");
+                }
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_pointer_escapes_what_json_pointers_escape() {
+    let document = with(&shortest(), "/drive/ring", json!({ "teeth": 26, "a/b~c": 1 }));
+    let (at, code, detail) = Service::new().post("/v1/sweep", &document).await.faulty_field();
+    assert_eq!((at.as_str(), code.as_str()), ("/drive/ring/a~1b~0c", "unknown_field"));
+    assert!(detail.contains("a/b~c"), "{detail}");
+}
+
+#[tokio::test]
+async fn a_typo_is_never_a_silent_default() {
+    let service = Service::new();
+    for (right, wrong) in [
+        ("/drive/teeth/installed", "/drive/teeth/Installed"),
+        ("/drive/ring/tip_radius_mm", "/drive/ring/tip_radius"),
+        ("/materials/carrier", "/materials/carier"),
+        ("/materials/ring/poissons_ratio", "/materials/ring/poisson_ratio"),
+        ("/model/compatibility", "/model/compatability"),
+        ("/sweep/samples", "/sweep/sample"),
+        ("/profile/chord_tolerance_mm", "/profile/chord_tolerance"),
+    ] {
+        let document = with(&without(&spelled_out(), right), wrong, spelled_out().pointer(right).unwrap().clone());
+        for path in ENDPOINTS {
+            let (at, code, _) = service.post(path, &document).await.faulty_field();
+            assert_eq!((at.as_str(), code.as_str()), (wrong, "unknown_field"));
+        }
+    }
+}
+
+#[tokio::test]
+async fn stiffnesses_are_unknown_to_the_linear_law() {
+    for law in [json!({ "law": "linear", "ring_n_per_mm": 5e5 }), json!({ "ring_n_per_mm": 5e5 })] {
+        let document = with(&spelled_out(), "/model/stiffness", law);
+        let (at, code, _) = Service::new().post("/v1/sweep", &document).await.faulty_field();
+        assert_eq!((at.as_str(), code.as_str()), ("/model/stiffness/ring_n_per_mm", "unknown_field"));
+    }
+}
+
+#[tokio::test]
+async fn an_array_is_no_object_at_any_level() {
+    let service = Service::new();
+    for document in [spelled_out(), every_number()] {
+        for pointer in pointers(&document, Value::is_object) {
+            // The values of the object's fields in order, which a lenient reader would take for it.
+            let fields = document.pointer(&pointer).unwrap().as_object().unwrap();
+            for array in [json!([]), fields.values().cloned().collect::<Value>()] {
+                for path in ENDPOINTS {
+                    let (at, code, detail) =
+                        service.post(path, &with(&document, &pointer, array.clone())).await.faulty_field();
+                    assert_eq!((at.as_str(), code.as_str()), (pointer.as_str(), "wrong_type"), "{detail}");
+                }
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn null_is_refused_everywhere_but_for_the_tip_radius() {
+    let service = Service::new();
+    let null_may_stand_here = |pointer: &str| pointer == "/drive/ring/tip_radius_mm";
+    for document in [spelled_out(), every_number()] {
+        for pointer in pointers(&document, |_| true) {
+            let document = with(&document, &pointer, Value::Null);
+            for path in ENDPOINTS {
+                let answer = service.post(path, &document).await;
+                if null_may_stand_here(&pointer) {
+                    assert_eq!(answer.status, 200, "{}", answer.text());
+                } else {
+                    let (at, code, detail) = answer.faulty_field();
+                    assert_eq!((at.as_str(), code.as_str()), (pointer.as_str(), "wrong_type"), "{detail}");
+                }
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn an_output_torque_is_not_null_either() {
+    let document = with(&spelled_out(), "/load/output_torque_nm", Value::Null);
+    let (at, code, _) = Service::new().post("/v1/sweep", &document).await.faulty_field();
+    assert_eq!((at.as_str(), code.as_str()), ("/load/output_torque_nm", "wrong_type"));
+}
+
+#[tokio::test]
+async fn a_required_field_that_is_missing_is_named() {
+    let service = Service::new();
+    for pointer in [
+        "/drive",
+        "/drive/wave_generator",
+        "/drive/wave_generator/semi_major_mm",
+        "/drive/wave_generator/semi_minor_mm",
+        "/drive/teeth",
+        "/drive/teeth/count",
+        "/drive/teeth/radius_mm",
+        "/drive/teeth/width_mm",
+        "/drive/ring",
+        "/drive/ring/teeth",
+        "/model/stiffness/wave_generator_n_per_mm",
+        "/model/stiffness/ring_n_per_mm",
+        "/model/stiffness/carrier_n_per_mm",
+    ] {
+        for path in ENDPOINTS {
+            let (at, code, detail) = service.post(path, &without(&every_number(), pointer)).await.faulty_field();
+            assert_eq!((at.as_str(), code.as_str()), (pointer, "missing_field"));
+            assert!(detail.contains(pointer.rsplit('/').next().unwrap()), "{detail}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_sweep_needs_a_load_with_exactly_one_torque() {
+    let service = Service::new();
+    for (load, expected) in [
+        (None, "missing_field"),
+        (Some(json!({})), "missing_field"),
+        (Some(json!({ "input_torque_nm": 20.0, "output_torque_nm": 280.0 })), "conflicting_fields"),
+    ] {
+        let document = match load {
+            None => without(&spelled_out(), "/load"),
+            Some(load) => with(&spelled_out(), "/load", load),
+        };
+        let (at, code, detail) = service.post("/v1/sweep", &document).await.faulty_field();
+        assert_eq!((at.as_str(), code.as_str()), ("/load", expected));
+        assert!(detail.contains("`input_torque_nm`") && detail.contains("`output_torque_nm`"), "{detail}");
+    }
+}
+
+#[tokio::test]
+async fn a_field_that_stands_twice_is_refused_at_every_level() {
+    let service = Service::new();
+    for document in [spelled_out(), every_number()] {
+        for pointer in pointers(&document, |_| true).into_iter().filter(|pointer| !pointer.is_empty()) {
+            for path in ENDPOINTS {
+                let (at, code, _) = service.post_text(path, with_twice(&document, &pointer)).await.faulty_field();
+                assert_eq!((at, code.as_str()), (pointer.clone(), "duplicate_field"));
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_value_of_another_type_is_refused_with_its_place() {
+    let service = Service::new();
+    let document = every_number();
+    let others = [json!("58.0"), json!(true), json!({}), json!([58.0])];
+    for pointer in pointers(&document, Value::is_number) {
+        for other in &others {
+            let (at, code, detail) =
+                service.post("/v1/sweep", &with(&document, &pointer, other.clone())).await.faulty_field();
+            assert_eq!((at.as_str(), code.as_str()), (pointer.as_str(), "wrong_type"), "{detail}");
+        }
+    }
+    for pointer in pointers(&document, Value::is_string) {
+        for other in [json!(1), json!(true), json!({ "projection": null }), json!(["tooth"])] {
+            let (at, code, detail) = service.post("/v1/sweep", &with(&document, &pointer, other)).await.faulty_field();
+            assert_eq!((at.as_str(), code.as_str()), (pointer.as_str(), "wrong_type"), "{detail}");
+        }
+    }
+    for pointer in pointers(&document, Value::is_object) {
+        for other in [json!(1), json!("text"), json!(false)] {
+            let (at, code, detail) = service.post("/v1/sweep", &with(&document, &pointer, other)).await.faulty_field();
+            assert_eq!((at.as_str(), code.as_str()), (pointer.as_str(), "wrong_type"), "{detail}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_word_that_is_no_choice_is_refused_with_the_choices() {
+    for (pointer, choices) in [
+        ("/model/compatibility", &["projection", "virtual_work"][..]),
+        ("/model/stiffness/law", &["linear", "fixed"]),
+        ("/profile/extent", &["tooth", "full"]),
+    ] {
+        for word in ["", "Projection", "LINEAR", "tooth ", "palmgren"] {
+            let document = with(&spelled_out(), pointer, json!(word));
+            let (at, code, detail) = Service::new().post("/v1/sweep", &document).await.faulty_field();
+            assert_eq!((at.as_str(), code.as_str()), (pointer, "unknown_choice"));
+            for choice in choices {
+                assert!(detail.contains(choice), "{detail}");
+            }
+        }
+    }
+}
+
+const COUNTS: [&str; 4] = ["/drive/teeth/count", "/drive/teeth/installed", "/drive/ring/teeth", "/sweep/samples"];
+
+#[tokio::test]
+async fn a_count_that_is_not_whole_is_refused() {
+    for pointer in COUNTS {
+        for value in [28.5, 0.1, -0.5, 28.000_000_000_000_004, 1e-300] {
+            let document = with(&spelled_out(), pointer, json!(value));
+            let (at, code, _) = Service::new().post("/v1/sweep", &document).await.faulty_field();
+            assert_eq!((at.as_str(), code.as_str()), (pointer, "wrong_type"), "{value}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_whole_count_of_any_size_is_out_of_range_and_not_of_another_type() {
+    for (pointer, limit) in COUNTS.into_iter().zip([1e4, 1e4, 1e4, 1e7]) {
+        for value in [1e8, 9_007_199_254_740_993.0, 1e17, 1e300] {
+            let document = with(&spelled_out(), pointer, json!(value));
+            let problem = Service::new().post("/v1/sweep", &document).await.refused(422, "impossible_design");
+            let error = problem["errors"].as_array().unwrap().iter().find(|error| error["pointer"] == pointer).unwrap();
+            assert_eq!(
+                (&error["code"], &error["value"], &error["limit"]),
+                (&json!("out_of_range"), &json!(value), &json!(limit))
+            );
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_number_beyond_the_doubles_is_json_but_no_value() {
+    let service = Service::new();
+    let document = every_number();
+    let many_digits = "9".repeat(400);
+    for pointer in pointers(&document, Value::is_number) {
+        for number in ["1e999", "-1e999", "1E+0400", many_digits.as_str()] {
+            let text = with(&document, &pointer, json!("HERE")).to_string().replace("\"HERE\"", number);
+            for path in ENDPOINTS {
+                let (at, code, _) = service.post_text(path, text.clone()).await.faulty_field();
+                assert_eq!((at, code.as_str()), (pointer.clone(), "number_too_large"), "{number}");
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn json_that_is_no_object_is_no_design_document() {
+    for text in ["null", "true", "28", "-1.5e3", "\"drive\"", "[]", "[{}]", " [ ] "] {
+        let (at, code, _) = Service::new().post_text("/v1/sweep", text).await.faulty_field();
+        assert_eq!((at.as_str(), code.as_str()), ("", "wrong_type"), "{text}");
+    }
+}
+
+#[tokio::test]
+async fn a_body_that_is_no_json_is_refused_as_such() {
+    let service = Service::new();
+    let whole = spelled_out().to_string();
+    let commented = format!("// a drive\n{whole}");
+    let mut texts: Vec<Vec<u8>> = [
+        "",
+        " ",
+        "\n\n",
+        "{",
+        "}",
+        "{]",
+        "drive",
+        "{'drive': {}}",
+        "{\"drive\": {},}",
+        "{\"drive\": NaN}",
+        "{\"drive\": Infinity}",
+        "{\"drive\": +1}",
+        "{\"drive\": 01}",
+        "{\"drive\": .5}",
+        "{\"drive\": 5.}",
+        "{\"drive\": 0x1c}",
+        "{\"drive\": tru}",
+        "{\"drive\" {}}",
+        "{drive: {}}",
+        "{\"drive\": \"\n\"}",
+        "{\"drive\": \"\\x\"}",
+        "nullnull",
+        commented.as_str(),
+    ]
+    .iter()
+    .map(|text| text.as_bytes().to_vec())
+    .collect();
+    for cut in [1, whole.len() / 2, whole.len() - 1] {
+        texts.push(whole.as_bytes()[..cut].to_vec());
+    }
+    for garbage in ["x", "{}", ",", "]", "}", "\0", " 1", "\u{feff}"] {
+        texts.push(format!("{whole}{garbage}").into_bytes());
+    }
+    for text in texts {
+        for path in ENDPOINTS {
+            let problem = service.post_text(path, text.clone()).await.refused(400, "malformed_json");
+            assert!(problem.get("errors").is_none(), "{problem}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn text_that_is_not_utf_8_is_no_json() {
+    let whole = spelled_out().to_string();
+    let (head, tail) = whole.split_at(whole.find("28").unwrap());
+    for bytes in [&b"\xff"[..], b"\xc3\x28", b"\xed\xa0\x80", b"\xf8\x88\x80\x80\x80"] {
+        let texts = [
+            bytes.to_vec(),
+            [head.as_bytes(), bytes, tail.as_bytes()].concat(),
+            [&b"{\"dri"[..], bytes, b"ve\": {}}"].concat(),
+            [&b"{\"drive\": \""[..], bytes, b"\"}"].concat(),
+        ];
+        for text in texts {
+            Service::new().post_text("/v1/sweep", text).await.refused(400, "malformed_json");
+        }
+    }
+}
+
+#[tokio::test]
+async fn no_json_is_no_json_whatever_stands_before_the_fault() {
+    let service = Service::new();
+    // Each would be the first structural fault of a document; but there is no document.
+    for text in [
+        "{\"colour\": 1, ",
+        "{\"drive\": 1e999, ",
+        "{\"drive\": [1e999",
+        "[{\"drive\": 1e999}, nothing]",
+        "1e999 1e999",
+    ] {
+        service.post_text("/v1/sweep", text).await.refused(400, "malformed_json");
+    }
+}
+
+#[tokio::test]
+async fn json_nested_deeper_than_any_document_is_refused_as_no_design_document() {
+    let service = Service::new();
+    for depth in [100, 127, 128, 200, 5_000] {
+        for (open, close) in [("[", "]"), ("{\"drive\":", "}")] {
+            let text = format!("{}0{}", open.repeat(depth), close.repeat(depth));
+            for path in ENDPOINTS {
+                service.post_text(path, text.clone()).await.refused(422, "invalid_document");
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn of_several_structural_faults_one_is_named() {
+    let document = with(&without(&spelled_out(), "/drive/teeth/count"), "/colour", json!(1));
+    let (at, ..) = Service::new().post("/v1/sweep", &document).await.faulty_field();
+    assert!(["/drive/teeth/count", "/colour"].contains(&at.as_str()), "{at}");
+}
+
+#[tokio::test]
+async fn the_contracts_own_document_is_answered_by_every_endpoint_as_it_is_printed() {
+    for path in ENDPOINTS {
+        assert_eq!(Service::new().post_text(path, designs::CONTRACT).await.status, 200, "{path}");
+    }
+}

@@ -1,0 +1,133 @@
+//! Each endpoint reads only what it needs, requires only that, and caches by only that.
+
+use serde_json::{Value, json};
+
+use crate::asking::Service;
+use crate::designs::{spelled_out, with, without};
+
+async fn etag(path: &str, document: &Value) -> String {
+    let answer = Service::new().post(path, document).await;
+    assert_eq!(answer.status, 200, "{}", answer.text());
+    answer.etag().to_owned()
+}
+
+/// Values that no drive or load can have, in the parts of a document that an endpoint does not read.
+fn impossible(part: &str) -> Value {
+    match part {
+        "materials" => json!({ "ring": { "youngs_modulus_gpa": -210.0, "poissons_ratio": 7.0 } }),
+        "load" => json!({ "input_torque_nm": -1.0, "output_torque_nm": 0.0 }),
+        "model" => json!({ "compatibility": "virtual_work", "stiffness": crate::designs::fixed(0.0, -1.0, 1e99) }),
+        "sweep" => json!({ "samples": -50 }),
+        "profile" => json!({ "chord_tolerance_mm": -1.0, "extent": "full" }),
+        _ => unreachable!("{part}"),
+    }
+}
+
+const READS: [(&str, &[&str], &[&str]); 3] = [
+    ("/v1/geometry", &["profile"], &["materials", "load", "model", "sweep"]),
+    ("/v1/coincidence-degree", &[], &["materials", "load", "model", "sweep", "profile"]),
+    ("/v1/sweep", &["materials", "load", "model", "sweep"], &["profile"]),
+];
+
+#[tokio::test]
+async fn what_an_endpoint_does_not_read_changes_neither_its_answer_nor_its_entity_tag() {
+    for (path, _, unread) in READS {
+        let service = Service::new();
+        let first = service.post(path, &spelled_out()).await;
+        assert_eq!(first.status, 200);
+        for part in unread {
+            let pointer = format!("/{part}");
+            for document in [without(&spelled_out(), &pointer), with(&spelled_out(), &pointer, impossible(part))] {
+                let answer = service.post(path, &document).await;
+                assert_eq!(answer.status, 200, "{path} reads {part}: {}", answer.text());
+                assert_eq!(answer.etag(), first.etag(), "{path} caches by {part}");
+                assert!(answer.is_hit() && answer.body == first.body);
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn what_an_endpoint_reads_must_be_possible() {
+    for (path, read, _) in READS {
+        for part in read {
+            let document = with(&spelled_out(), &format!("/{part}"), impossible(part));
+            assert_eq!(Service::new().post(path, &document).await.status, 422, "{path} does not read {part}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn the_drive_is_all_that_geometry_and_coincidence_degree_require() {
+    let document = json!({ "drive": spelled_out()["drive"] });
+    for path in ["/v1/geometry", "/v1/coincidence-degree"] {
+        assert_eq!(etag(path, &document).await, etag(path, &spelled_out()).await);
+    }
+    let (at, code, _) = Service::new().post("/v1/sweep", &document).await.faulty_field();
+    assert_eq!((at.as_str(), code.as_str()), ("/load", "missing_field"));
+}
+
+#[tokio::test]
+async fn an_unknown_field_is_refused_even_where_it_would_not_be_read() {
+    let document = with(&spelled_out(), "/load/torque", json!(20.0));
+    let (at, ..) = Service::new().post("/v1/geometry", &document).await.faulty_field();
+    assert_eq!(at, "/load/torque");
+}
+
+#[tokio::test]
+async fn geometry_depends_on_every_field_of_its_profile() {
+    let first = etag("/v1/geometry", &spelled_out()).await;
+    for (pointer, value) in [("/profile/chord_tolerance_mm", json!(0.002)), ("/profile/extent", json!("full"))] {
+        assert_ne!(etag("/v1/geometry", &with(&spelled_out(), pointer, value)).await, first, "{pointer}");
+    }
+}
+
+#[tokio::test]
+async fn a_sweep_depends_on_everything_but_the_profile() {
+    let first = etag("/v1/sweep", &spelled_out()).await;
+    let mut seen = vec![first.clone()];
+    for (pointer, value) in [
+        ("/drive/wave_generator/semi_major_mm", json!(58.1)),
+        ("/drive/wave_generator/semi_minor_mm", json!(56.1)),
+        ("/drive/teeth/installed", json!(14)),
+        ("/drive/teeth/radius_mm", json!(5.1)),
+        ("/drive/teeth/width_mm", json!(15.1)),
+        ("/drive/ring/teeth", json!(30)),
+        ("/drive/ring/tip_radius_mm", json!(66.1)),
+        ("/materials/wave_generator/youngs_modulus_gpa", json!(211.0)),
+        ("/materials/wave_generator/poissons_ratio", json!(0.31)),
+        ("/materials/teeth/youngs_modulus_gpa", json!(211.0)),
+        ("/materials/teeth/poissons_ratio", json!(0.31)),
+        ("/materials/ring/youngs_modulus_gpa", json!(211.0)),
+        ("/materials/ring/poissons_ratio", json!(0.31)),
+        ("/materials/carrier/youngs_modulus_gpa", json!(211.0)),
+        ("/materials/carrier/poissons_ratio", json!(0.31)),
+        ("/load/input_torque_nm", json!(20.000_000_000_000_004)),
+        ("/model/compatibility", json!("virtual_work")),
+        ("/model/stiffness", crate::designs::fixed(1e6, 1e6, 1e6)),
+        ("/model/stiffness", crate::designs::fixed(1e6, 1e6, 2e6)),
+        ("/model/stiffness", crate::designs::fixed(1e6, 2e6, 1e6)),
+        ("/model/stiffness", crate::designs::fixed(2e6, 1e6, 1e6)),
+        ("/sweep/samples", json!(51)),
+    ] {
+        let etag = etag("/v1/sweep", &with(&spelled_out(), pointer, value)).await;
+        assert!(!seen.contains(&etag), "{pointer} changes nothing");
+        seen.push(etag);
+    }
+    let by_output = with(&spelled_out(), "/load", json!({ "output_torque_nm": 20.0 }));
+    assert!(!seen.contains(&etag("/v1/sweep", &by_output).await), "a torque at the carrier is another");
+}
+
+#[tokio::test]
+async fn endpoints_do_not_answer_for_each_other() {
+    let service = Service::new();
+    let mut tags = Vec::new();
+    for (path, ..) in READS {
+        let answer = service.post(path, &spelled_out()).await;
+        assert!(answer.is_miss(), "{path}");
+        tags.push(answer.etag().to_owned());
+    }
+    tags.sort_unstable();
+    tags.dedup();
+    assert_eq!(tags.len(), 3);
+}

@@ -1,0 +1,65 @@
+//! The ready design documents.
+
+use serde_json::Value;
+
+use crate::asking::{ENDPOINTS, Service};
+
+async fn names(service: &Service) -> Vec<String> {
+    let found = service.get("/v1/examples").await.found();
+    let examples = found["examples"].as_array().unwrap();
+    examples.iter().map(|example| example["name"].as_str().unwrap().to_owned()).collect()
+}
+
+#[tokio::test]
+async fn the_papers_cases_are_among_the_examples() {
+    let names = names(&Service::new()).await;
+    for name in ["paper-5.1", "paper-5.2", "paper-5.2-bored"] {
+        assert!(names.contains(&name.to_owned()), "{names:?}");
+    }
+}
+
+#[tokio::test]
+async fn an_example_stands_where_the_list_says() {
+    let service = Service::new();
+    let found = service.get("/v1/examples").await.found();
+    for example in found["examples"].as_array().unwrap() {
+        assert!(example["title"].as_str().is_some_and(|title| !title.is_empty()), "{example}");
+        service.get(example["href"].as_str().unwrap()).await.found();
+        assert_eq!(example["href"], format!("/v1/examples/{}", example["name"].as_str().unwrap()));
+    }
+}
+
+#[tokio::test]
+async fn an_example_as_it_is_served_is_answered_by_every_endpoint_that_it_has_data_for() {
+    let service = Service::new();
+    for name in names(&service).await {
+        let example = service.get(&format!("/v1/examples/{name}")).await;
+        let document: Value = example.found();
+        for path in ENDPOINTS {
+            let answer = service.post_text(path, example.body.clone()).await;
+            if path == "/v1/sweep" && document.get("load").is_none() {
+                assert_eq!(answer.status, 422, "{name} has no load");
+            } else {
+                answer.found();
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn an_example_is_the_file_of_its_name() {
+    let service = Service::new();
+    for name in names(&service).await {
+        let file = format!("{}/../../examples/{name}.json", env!("CARGO_MANIFEST_DIR"));
+        assert_eq!(service.get(&format!("/v1/examples/{name}")).await.text(), std::fs::read_to_string(file).unwrap());
+    }
+}
+
+#[tokio::test]
+async fn an_unknown_example_is_answered_with_the_known_ones() {
+    let service = Service::new();
+    let problem = service.get("/v1/examples/paper-5.3").await.refused(404, "not_found");
+    for name in names(&service).await {
+        assert!(problem["detail"].as_str().unwrap().contains(&name), "{problem}");
+    }
+}

@@ -1,0 +1,198 @@
+//! What a designer is told about drives that can exist.
+
+use serde_json::{Value, json};
+
+use crate::asking::{ENDPOINTS, Service};
+use crate::codes::{codes_of, finding_codes, words};
+use crate::designs::{bored, shortest, spelled_out, undercut, with};
+
+/// The findings of an endpoint, each well formed.
+async fn findings_at(path: &str, document: &Value) -> Vec<Value> {
+    let found = Service::new().post(path, document).await.found();
+    let findings = found["findings"].as_array().unwrap().clone();
+    let spelled_out = with(&spelled_out(), "/drive/ring/tip_radius_mm", json!(1.0));
+    for finding in &findings {
+        for member in ["code", "severity", "detail", "advice"] {
+            assert!(finding[member].as_str().is_some_and(|text| !text.is_empty()), "`{member}` of {finding}");
+        }
+        assert!(["info", "warning"].contains(&finding["severity"].as_str().unwrap()), "{finding}");
+        assert!(
+            finding["unit"].is_string() && finding["value"].is_number() && finding["limit"].is_number(),
+            "{finding}"
+        );
+        let pointers = finding["pointers"].as_array().unwrap();
+        assert!(!pointers.is_empty(), "{finding}");
+        for pointer in pointers {
+            let pointer = pointer.as_str().unwrap();
+            assert!(spelled_out.pointer(pointer).is_some(), "no document has {pointer}");
+        }
+        assert_eq!(finding.as_object().unwrap().len(), 8, "{finding}");
+    }
+    findings
+}
+
+async fn findings(document: &Value) -> Vec<Value> {
+    findings_at("/v1/sweep", document).await
+}
+
+/// The one finding of its kind.
+async fn finding(document: &Value, code: &str) -> Value {
+    let mut findings = findings(document).await;
+    findings.retain(|finding| finding["code"] == code);
+    assert_eq!(findings.len(), 1, "{code}: {findings:?}");
+    findings.remove(0)
+}
+
+fn assert_numbers(finding: &Value, value: f64, limit: f64, unit: &str) {
+    for (name, expected) in [("value", value), ("limit", limit)] {
+        let found = finding[name].as_f64().unwrap();
+        assert!((found - expected).abs() <= 1e-9 * expected.abs().max(1.0), "{name} of {finding} is not {expected}");
+    }
+    assert_eq!(finding["unit"], unit);
+}
+
+#[tokio::test]
+async fn undercut_is_a_warning_with_the_critical_radius() {
+    let finding = finding(&undercut(), "undercut").await;
+    let found = Service::new().post("/v1/geometry", &undercut()).await.found();
+    assert_numbers(&finding, 1.5, found["undercut"]["critical_tooth_radius_mm"].as_f64().unwrap(), "mm");
+    assert_eq!(finding["severity"], "warning");
+    assert!(finding["pointers"].as_array().unwrap().contains(&json!("/drive/teeth/radius_mm")));
+    assert!(finding["detail"].as_str().unwrap().contains("43.607"), "{finding}");
+}
+
+#[tokio::test]
+async fn undercut_that_a_bore_takes_away_is_no_more_than_information() {
+    assert_eq!(finding(&bored(), "undercut").await["severity"], "info");
+}
+
+#[tokio::test]
+async fn a_bore_that_ends_the_flank_early_is_a_finding_with_the_natural_tip() {
+    let natural =
+        Service::new().post("/v1/geometry", &undercut()).await.found()["ring"]["tip_radius_mm"].as_f64().unwrap();
+    assert_numbers(&finding(&bored(), "bore_shortens_flank").await, 52.8227, natural, "mm");
+}
+
+#[tokio::test]
+async fn a_bore_inside_the_natural_tip_changes_nothing_and_is_a_finding() {
+    let document = with(&spelled_out(), "/drive/ring/tip_radius_mm", json!(65.9));
+    let found = finding(&document, "bore_without_effect").await;
+    assert_numbers(&found, 65.9, 66.0, "mm");
+    assert_eq!((&found["severity"], &found["pointers"]), (&json!("info"), &json!(["/drive/ring/tip_radius_mm"])));
+    let service = Service::new();
+    for path in ENDPOINTS {
+        let mut with_bore = service.post(path, &document).await.found();
+        let mut without = service.post(path, &spelled_out()).await.found();
+        assert_ne!(with_bore["findings"], without["findings"]);
+        with_bore["findings"].take();
+        without["findings"].take();
+        assert!(with_bore == without, "{path}");
+    }
+}
+
+/// Case 5.1 with thirty teeth, every fifth slot filled: one or two teeth in each zone.
+fn sparse() -> Value {
+    let document =
+        with(&shortest(), "/drive/teeth", json!({ "count": 30, "installed": 6, "radius_mm": 5.0, "width_mm": 15.0 }));
+    with(&document, "/drive/ring/teeth", json!(28))
+}
+
+#[tokio::test]
+async fn few_teeth_in_mesh_are_a_warning() {
+    let finding = finding(&sparse(), "few_teeth_in_mesh").await;
+    assert_numbers(&finding, 1.0, 2.0, "");
+    assert_eq!(finding["severity"], "warning");
+}
+
+/// Case 5.1 with teeth so thick that the slots' walls are not.
+fn thick() -> Value {
+    with(&shortest(), "/drive/teeth/radius_mm", json!(5.5))
+}
+
+#[tokio::test]
+async fn a_thin_wall_between_slots_is_a_warning() {
+    let half = std::f64::consts::PI / 28.0;
+    let wall = 2.0 * ((58.0_f64 * 58.0 - 5.5 * 5.5).sqrt() * half.sin() - 5.5 * half.cos());
+    assert_numbers(&finding(&thick(), "thin_slot_wall").await, wall, 2.75, "mm");
+}
+
+/// Case 5.1 with teeth thinner than the cam's stroke, or as thick, or a little thicker.
+fn thin(radius_mm: f64) -> Value {
+    with(&shortest(), "/drive/teeth/radius_mm", json!(radius_mm))
+}
+
+#[tokio::test]
+async fn a_loaded_tooth_that_leaves_the_carriers_annulus_is_a_warning_for_each_edge() {
+    // Centres run from b + r to a + r; the annulus reaches from a to b + 2r.
+    let findings = findings(&thin(1.9)).await;
+    let beyond: Vec<_> = findings.iter().filter(|finding| finding["code"] == "tooth_beyond_carrier").collect();
+    assert_eq!(beyond.len(), 2, "{findings:?}");
+    assert_numbers(beyond[0], 57.9, 58.0, "mm");
+    assert_numbers(beyond[1], 59.9, 59.8, "mm");
+    let stays = findings_at("/v1/geometry", &thin(2.1)).await;
+    assert!(!codes_of(&stays).contains(&"tooth_beyond_carrier".to_owned()));
+}
+
+/// A deep ellipse under many small teeth.
+fn steep() -> Value {
+    json!({
+        "drive": {
+            "wave_generator": { "semi_major_mm": 58.0, "semi_minor_mm": 50.0 },
+            "teeth": { "count": 62, "radius_mm": 2.5, "width_mm": 15.0 },
+            "ring": { "teeth": 60 }
+        },
+        "load": { "input_torque_nm": 20.0 }
+    })
+}
+
+#[tokio::test]
+async fn a_steep_ring_flank_is_a_warning_with_its_pressure_angle() {
+    let finding = finding(&steep(), "steep_ring_flank").await;
+    let geometry = Service::new().post("/v1/geometry", &steep()).await.found();
+    assert_numbers(&finding, geometry["ring"]["pressure_angle_max_deg"].as_f64().unwrap(), 70.0, "deg");
+    assert!(finding["value"].as_f64().unwrap() > 70.0);
+}
+
+/// Case 5.1 under a hundred times its torque: ten times its stresses, all beyond 1500 MPa.
+fn overloaded() -> Value {
+    with(&shortest(), "/load/input_torque_nm", json!(2000.0))
+}
+
+#[tokio::test]
+async fn a_stress_above_the_fatigue_limit_is_a_warning_for_each_contact() {
+    let found = Service::new().post("/v1/sweep", &overloaded()).await.found();
+    let findings = findings(&overloaded()).await;
+    assert_eq!(findings.len(), 3, "{findings:?}");
+    for (finding, contact) in findings.iter().zip(["wave_generator", "ring", "carrier"]) {
+        assert_eq!(finding["code"], "stress_above_fatigue_limit");
+        assert_numbers(finding, found["peaks"][contact]["stress_mpa"]["value"].as_f64().unwrap(), 1500.0, "MPa");
+        assert!(finding["detail"].as_str().unwrap().contains(&contact.replace('_', " ")), "{finding}");
+    }
+}
+
+#[tokio::test]
+async fn stresses_are_no_finding_where_no_load_is_read() {
+    for path in ["/v1/geometry", "/v1/coincidence-degree"] {
+        assert!(findings_at(path, &overloaded()).await.is_empty());
+    }
+}
+
+#[tokio::test]
+async fn all_endpoints_tell_the_same_of_the_drive_itself() {
+    for document in [undercut(), bored(), sparse(), thick(), thin(1.9), steep()] {
+        let of_geometry = findings_at("/v1/geometry", &document).await;
+        assert_eq!(findings_at("/v1/coincidence-degree", &document).await, of_geometry);
+        let of_sweep = findings_at("/v1/sweep", &document).await;
+        assert_eq!(of_sweep[..of_geometry.len()], of_geometry, "a sweep adds to them");
+    }
+}
+
+#[tokio::test]
+async fn every_kind_of_finding_can_be_met_over_http() {
+    let bore_without_effect = with(&shortest(), "/drive/ring/tip_radius_mm", json!(60.0));
+    let mut all = Vec::new();
+    for document in [undercut(), bored(), bore_without_effect, sparse(), thick(), thin(1.9), steep(), overloaded()] {
+        all.extend(findings(&document).await);
+    }
+    assert_eq!(codes_of(&all), words(&finding_codes()));
+}

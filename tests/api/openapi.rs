@@ -1,0 +1,453 @@
+//! The API document: it is the one that is committed, it holds together, and the service does what it says.
+
+use std::collections::BTreeSet;
+use std::sync::LazyLock;
+
+use serde_json::{Value, json};
+use toothwave::config::Limits;
+use toothwave::problem::pointer;
+use toothwave_solver::{Contact, Parameter, Part};
+
+use crate::asking::{Answer, ENDPOINTS, LIMITS, Occupied, Question, Service};
+use crate::codes::{field_codes, finding_codes, problem_codes, words};
+use crate::designs::{self, bored, every_number, shortest, spelled_out, undercut, with, without};
+
+/// The document as it is committed.
+pub(crate) const COMMITTED: &str = include_str!("../../openapi/openapi.json");
+
+fn document() -> &'static Value {
+    static DOCUMENT: LazyLock<Value> =
+        LazyLock::new(|| serde_json::from_str(&toothwave::router::openapi_json()).unwrap());
+    &DOCUMENT
+}
+
+#[test]
+fn the_committed_document_is_the_one_that_the_code_describes() {
+    assert!(
+        COMMITTED == toothwave::router::openapi_json(),
+        "openapi/openapi.json is not what the code describes; write it anew with `cargo run -p toothwave -- openapi > openapi/openapi.json` and look at the difference"
+    );
+}
+
+#[test]
+fn every_reference_leads_somewhere() {
+    let document = document();
+    let mut references = 0;
+    let mut pending = vec![document];
+    while let Some(value) = pending.pop() {
+        match value {
+            Value::Object(fields) => {
+                if let Some(reference) = fields.get("$ref").and_then(Value::as_str) {
+                    let pointer = reference.strip_prefix('#').unwrap_or_else(|| panic!("{reference} leads outside"));
+                    assert!(document.pointer(pointer).is_some(), "{reference} leads nowhere");
+                    references += 1;
+                }
+                pending.extend(fields.values());
+            }
+            Value::Array(items) => pending.extend(items),
+            _ => {}
+        }
+    }
+    assert!(references > 20, "{references} references");
+}
+
+#[test]
+fn every_schema_is_used() {
+    let text = document().to_string();
+    for name in document()["components"]["schemas"].as_object().unwrap().keys() {
+        assert!(text.contains(&format!("#/components/schemas/{name}\"")), "nothing refers to {name}");
+    }
+}
+
+#[test]
+fn every_path_and_every_status_that_it_can_have_is_described() {
+    let solving = ["200", "304", "400", "406", "408", "413", "415", "422", "500", "503"];
+    let mut expected: Vec<(&str, &str, &[&str])> = ENDPOINTS.iter().map(|&path| (path, "post", &solving[..])).collect();
+    expected.extend([
+        ("/v1/limits", "get", &["200"][..]),
+        ("/v1/examples", "get", &["200"]),
+        ("/v1/examples/{name}", "get", &["200", "404"]),
+        ("/health/live", "get", &["200"]),
+        ("/health/ready", "get", &["200", "503"]),
+        ("/metrics", "get", &["200"]),
+    ]);
+    let document = document();
+    let paths = document["paths"].as_object().unwrap();
+    assert_eq!(paths.len(), expected.len(), "{:?}", paths.keys());
+    for (path, method, statuses) in expected {
+        let operations = paths[path].as_object().unwrap();
+        assert_eq!(operations.keys().collect::<Vec<_>>(), [method], "{path}");
+        let responses = operations[method]["responses"].as_object().unwrap();
+        for status in statuses {
+            assert!(responses.contains_key(*status), "{path} can answer {status}");
+        }
+        assert!(operations[method]["summary"].is_string() && operations[method]["operationId"].is_string(), "{path}");
+    }
+}
+
+#[test]
+fn every_problem_is_described_as_problem_json_and_every_503_of_a_solve_says_when_to_try_again() {
+    let document = document();
+    for path in ENDPOINTS {
+        let responses = document["paths"][path]["post"]["responses"].as_object().unwrap();
+        for (status, response) in responses.iter().filter(|(status, _)| status.as_str() >= "400") {
+            let types: Vec<_> = response["content"].as_object().unwrap().keys().collect();
+            assert_eq!(types, ["application/problem+json"], "{path} {status}");
+        }
+        assert!(responses["503"]["headers"]["Retry-After"].is_object(), "{path}");
+        let found: BTreeSet<_> = responses["200"]["content"].as_object().unwrap().keys().map(String::as_str).collect();
+        let expected = if path == "/v1/sweep" { &["application/json", "text/csv"][..] } else { &["application/json"] };
+        assert_eq!(found, expected.iter().copied().collect(), "{path}");
+    }
+}
+
+/// Every parameter that has a range.
+fn parameters() -> Vec<Parameter> {
+    let parts = [Part::WaveGenerator, Part::Teeth, Part::Ring, Part::Carrier];
+    let contacts = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
+    let mut parameters = vec![
+        Parameter::SemiMajor,
+        Parameter::SemiMinor,
+        Parameter::ToothCount,
+        Parameter::InstalledTeeth,
+        Parameter::ToothRadius,
+        Parameter::ToothWidth,
+        Parameter::RingTeeth,
+        Parameter::TipRadius,
+        Parameter::InputTorque,
+        Parameter::OutputTorque,
+        Parameter::Samples,
+        Parameter::ChordTolerance,
+    ];
+    parameters.extend(parts.map(Parameter::YoungsModulus));
+    parameters.extend(parts.map(Parameter::PoissonsRatio));
+    parameters.extend(contacts.map(Parameter::Stiffness));
+    parameters
+}
+
+/// The schemas of a schema's fields by name, references and alternatives followed.
+fn fields_of<'a>(document: &'a Value, schema: &'a Value) -> Vec<(&'a str, &'a Value)> {
+    let mut fields = Vec::new();
+    if let Some(reference) = schema["$ref"].as_str() {
+        fields.extend(fields_of(document, document.pointer(&reference[1..]).unwrap()));
+    }
+    for alternatives in ["oneOf", "anyOf", "allOf"] {
+        for alternative in schema[alternatives].as_array().into_iter().flatten() {
+            fields.extend(fields_of(document, alternative));
+        }
+    }
+    fields.extend(schema["properties"].as_object().into_iter().flatten().map(|(name, schema)| (name.as_str(), schema)));
+    fields
+}
+
+/// The schemas of all fields below a schema, by pointer.
+fn below<'a>(document: &'a Value, schema: &'a Value, pointer: &str) -> Vec<(String, &'a Value)> {
+    let mut all = Vec::new();
+    for (name, schema) in fields_of(document, schema) {
+        let pointer = format!("{pointer}/{name}");
+        all.extend(below(document, schema, &pointer));
+        all.push((pointer, schema));
+    }
+    all
+}
+
+fn is_numeric(schema: &Value) -> bool {
+    let names_number = |kind: &Value| kind == "number" || kind == "integer";
+    names_number(&schema["type"]) || schema["type"].as_array().is_some_and(|kinds| kinds.iter().any(names_number))
+}
+
+#[test]
+fn every_number_of_the_design_document_has_the_range_that_is_checked() {
+    let document = document();
+    let all = below(document, &document["components"]["schemas"]["Design"], "");
+    let parameters = parameters();
+    for parameter in &parameters {
+        let pointer = pointer(*parameter);
+        let (_, schema) =
+            all.iter().find(|(at, _)| *at == pointer).unwrap_or_else(|| panic!("no schema for {pointer}"));
+        let range = parameter.range();
+        let (low, high) = if range.closed { ("minimum", "maximum") } else { ("exclusiveMinimum", "exclusiveMaximum") };
+        assert_eq!(
+            (schema[low].as_f64(), schema[high].as_f64()),
+            (Some(range.low), Some(range.high)),
+            "{pointer}: {schema}"
+        );
+        let bounds = ["minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum"];
+        assert_eq!(bounds.iter().filter(|bound| schema.get(bound).is_some()).count(), 2, "{pointer}: {schema}");
+    }
+    let known: BTreeSet<_> = parameters.into_iter().map(pointer).collect();
+    let numbers: BTreeSet<_> = all.iter().filter(|(_, schema)| is_numeric(schema)).map(|(at, _)| at.clone()).collect();
+    assert_eq!(numbers, known, "numbers of the schema and parameters with a range");
+}
+
+#[test]
+fn every_default_of_the_schema_is_the_one_that_is_taken() {
+    let document = document();
+    let all = below(document, &document["components"]["schemas"]["Design"], "");
+    let mut defaults = 0;
+    for (pointer, schema) in &all {
+        let expected = spelled_out();
+        if let (Some(default), Some(expected)) = (schema.get("default"), expected.pointer(pointer)) {
+            let same = default.as_f64().is_some() && default.as_f64() == expected.as_f64()
+                || !default.is_number() && equal(default, expected);
+            assert!(same, "{pointer}: {default} is not {expected}");
+            defaults += 1;
+        }
+    }
+    assert!(defaults >= 8, "{defaults} defaults");
+}
+
+/// Equal as JSON, where 210 is 210.0.
+fn equal(one: &Value, other: &Value) -> bool {
+    match (one, other) {
+        (Value::Number(one), Value::Number(other)) => one.as_f64() == other.as_f64(),
+        (Value::Object(one), Value::Object(other)) => {
+            one.len() == other.len()
+                && one.iter().all(|(name, value)| other.get(name).is_some_and(|other| equal(value, other)))
+        }
+        _ => one == other,
+    }
+}
+
+#[test]
+fn every_code_is_in_the_document() {
+    let document = document();
+    for (schema, words) in [
+        ("ProblemCode", words(&problem_codes())),
+        ("FieldCode", words(&field_codes())),
+        ("FindingCode", words(&finding_codes())),
+    ] {
+        let schema = &document["components"]["schemas"][schema];
+        let mut found: Vec<_> = schema["enum"].as_array().unwrap().iter().map(|word| word.as_str().unwrap()).collect();
+        found.sort_unstable();
+        assert_eq!(found, words);
+    }
+}
+
+fn documentation(name: &str) -> String {
+    let path = format!("{}/../../docs/{name}", env!("CARGO_MANIFEST_DIR"));
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+#[test]
+fn docs_findings_explains_every_finding() {
+    let text = documentation("findings.md");
+    for word in words(&finding_codes()) {
+        assert!(text.contains(&format!("`{word}`")), "docs/findings.md does not name `{word}`");
+    }
+}
+
+#[test]
+fn docs_problems_explains_every_problem_and_every_fault_of_a_field() {
+    let text = documentation("problems.md");
+    for word in words(&problem_codes()).into_iter().chain(words(&field_codes())) {
+        assert!(text.contains(&format!("`{word}`")), "docs/problems.md does not name `{word}`");
+    }
+}
+
+/// A schema of the document, with all that it refers to.
+fn validator(schema: &Value) -> jsonschema::Validator {
+    let schema = json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "allOf": [schema],
+        "components": document()["components"]
+    });
+    jsonschema::validator_for(&schema).unwrap()
+}
+
+fn assert_valid(schema: &Value, instance: &Value, what: &str) {
+    let errors: Vec<_> =
+        validator(schema).iter_errors(instance).map(|error| format!("{}: {error}", error.instance_path())).collect();
+    assert!(errors.is_empty(), "{what}: {errors:#?}");
+}
+
+/// That the answer is one which the document describes for the path.
+fn assert_described(method: &str, path: &str, answer: &Answer) {
+    let document = document();
+    let what = format!("{method} {path}: {}", answer.status);
+    let response = &document["paths"][path][method]["responses"][answer.status.to_string()];
+    assert!(response.is_object(), "{what} is not described");
+    if answer.status == 304 {
+        assert!(response.get("content").is_none(), "{what}");
+        return;
+    }
+    let content_type = answer.header("content-type").split(';').next().unwrap();
+    let schema = &response["content"][content_type]["schema"];
+    assert!(schema.is_object(), "{what}: {content_type} is not described");
+    let instance = if content_type.ends_with("json") { answer.json() } else { Value::from(answer.text()) };
+    assert_valid(schema, &instance, &what);
+    assert_all_described(document, schema, &instance, &what);
+}
+
+/// That every field of the instance stands in its schema: schemas of answers admit more, so that answers may grow.
+fn assert_all_described(document: &Value, schema: &Value, instance: &Value, what: &str) {
+    if let Some(items) = schema.get("items").or_else(|| {
+        let reference = schema["$ref"].as_str()?;
+        document.pointer(&reference[1..])?.get("items")
+    }) {
+        // All items are alike: a few thousand numbers more tell nothing.
+        for item in instance.as_array().into_iter().flatten().take(3) {
+            assert_all_described(document, items, item, what);
+        }
+    }
+    let fields = fields_of(document, schema);
+    if !fields.is_empty() {
+        for (name, value) in instance.as_object().into_iter().flatten() {
+            let field = fields.iter().find(|(known, _)| known == name);
+            let (_, schema) = field.unwrap_or_else(|| panic!("{what}: `{name}` is not described"));
+            assert_all_described(document, schema, value, &format!("{what}/{name}"));
+        }
+    }
+}
+
+#[tokio::test]
+async fn every_success_is_as_described() {
+    let service = Service::new();
+    let bore_without_effect = serde_json::from_str(designs::CONTRACT).unwrap();
+    let overloaded = with(&spelled_out(), "/load/input_torque_nm", json!(2000.0));
+    let never_undercut = with(&shortest(), "/drive/wave_generator/semi_minor_mm", json!(57.9));
+    for document in [
+        spelled_out(),
+        shortest(),
+        undercut(),
+        bored(),
+        every_number(),
+        bore_without_effect,
+        overloaded,
+        never_undercut,
+    ] {
+        for path in ENDPOINTS {
+            let answer = service.post(path, &document).await;
+            assert_eq!(answer.status, 200, "{}", answer.text());
+            assert_described("post", path, &answer);
+        }
+    }
+    let csv = Question::post("/v1/sweep", shortest().to_string()).with("accept", "text/csv");
+    assert_described("post", "/v1/sweep", &service.ask(&csv).await);
+    for path in ["/v1/limits", "/v1/examples", "/health/live", "/health/ready", "/metrics"] {
+        assert_described("get", path, &service.get(path).await);
+    }
+    for name in ["paper-5.1", "paper-5.2", "paper-5.2-bored", "ring-with-more-teeth"] {
+        assert_described("get", "/v1/examples/{name}", &service.get(&format!("/v1/examples/{name}")).await);
+    }
+}
+
+#[tokio::test]
+async fn every_304_is_as_described() {
+    let service = Service::new();
+    for path in ENDPOINTS {
+        let question = Question::post(path, shortest().to_string()).with("if-none-match", "*");
+        let answer = service.ask(&question).await;
+        assert_eq!(answer.status, 304);
+        assert_described("post", path, &answer);
+    }
+}
+
+#[tokio::test]
+async fn every_problem_is_as_described() {
+    let limits =
+        Limits { max_states: 300, max_profile_points: 300, max_concurrent_solves: 1, max_queued_solves: 0, ..LIMITS };
+    let service = Service::within(limits);
+    let occupied = Occupied::by_one(&service.app.pool).await;
+    let mut statuses = BTreeSet::new();
+    for path in ENDPOINTS {
+        let invalid = without(&spelled_out(), "/drive/teeth/count");
+        let impossible =
+            with(&with(&spelled_out(), "/drive/teeth/radius_mm", json!(0.0)), "/drive/teeth/installed", json!(9));
+        let questions = [
+            Question::post(path, "{"),
+            Question::post(path, spelled_out().to_string()).with("accept", "image/png"),
+            Question::post(path, " ".repeat(LIMITS.max_body_bytes + 1)),
+            Question::of("POST", path),
+            Question::post(path, invalid.to_string()),
+            Question::post(path, impossible.to_string()),
+            // 357 states, many points: a limit, or a full service.
+            Question::post(path, spelled_out().to_string()),
+        ];
+        for question in questions {
+            let answer = service.ask(&question).await;
+            assert_described("post", path, &answer);
+            statuses.insert(answer.status);
+        }
+    }
+    assert_eq!(statuses, [400, 406, 413, 415, 422, 503].into());
+    assert_described("get", "/v1/examples/{name}", &service.get("/v1/examples/nothing").await);
+    service.app.ready.store(false, std::sync::atomic::Ordering::Relaxed);
+    assert_described("get", "/health/ready", &service.get("/health/ready").await);
+    occupied.end().await;
+    let geometry = service.post("/v1/geometry", &spelled_out()).await;
+    geometry.refused(422, "too_many_points");
+    assert_described("post", "/v1/geometry", &geometry);
+    let unloaded = with(&spelled_out(), "/drive/teeth/installed", json!(4));
+    let sweep = service.post("/v1/sweep", &unloaded).await;
+    sweep.refused(422, "no_tooth_in_mesh");
+    assert_described("post", "/v1/sweep", &sweep);
+}
+
+fn design_schema() -> Value {
+    json!({ "$ref": "#/components/schemas/Design" })
+}
+
+#[tokio::test]
+async fn what_the_service_takes_the_schema_takes_too() {
+    let service = Service::new();
+    let documents = [
+        spelled_out(),
+        shortest(),
+        undercut(),
+        bored(),
+        every_number(),
+        serde_json::from_str(designs::CONTRACT).unwrap(),
+        with(&shortest(), "/load", json!({ "output_torque_nm": 280 })),
+        with(&shortest(), "/drive/teeth/count", json!(28.0)),
+        with(&shortest(), "/materials", json!({})),
+        with(&shortest(), "/materials", json!({ "ring": {} })),
+        with(&shortest(), "/model", json!({})),
+        with(&shortest(), "/sweep", json!({})),
+        with(&shortest(), "/profile", json!({})),
+    ];
+    for document in documents {
+        service.post("/v1/sweep", &document).await.found();
+        assert_valid(&design_schema(), &document, &document.to_string());
+    }
+}
+
+#[tokio::test]
+async fn a_stiffness_that_leaves_its_law_to_the_default_is_valid_by_the_schema_too() {
+    let document = with(&shortest(), "/model", json!({ "stiffness": {} }));
+    Service::new().post("/v1/sweep", &document).await.found();
+    assert_valid(&design_schema(), &document, &document.to_string());
+}
+
+#[tokio::test]
+async fn what_the_service_refuses_by_form_or_range_the_schema_refuses_too() {
+    let service = Service::new();
+    let schema = validator(&design_schema());
+    let mut refused = vec![json!(null), json!([]), json!({}), json!("drive")];
+    for document in [spelled_out(), every_number()] {
+        for pointer in designs::pointers(&document, |_| true) {
+            refused.extend([json!([1]), json!(true), json!("text")].map(|other| with(&document, &pointer, other)));
+        }
+        for pointer in designs::pointers(&document, Value::is_object) {
+            refused.push(with(&document, &format!("{pointer}/colour"), json!(1)));
+        }
+        for pointer in ["/drive/teeth/count", "/drive/teeth/installed", "/drive/ring/teeth", "/sweep/samples"] {
+            refused.push(with(&document, pointer, json!(28.5)));
+        }
+    }
+    for document in refused {
+        // A value out of its range is refused by those endpoints that read it: no single one reads all.
+        let statuses =
+            [service.post("/v1/sweep", &document).await.status, service.post("/v1/geometry", &document).await.status];
+        assert!(statuses.contains(&422), "{document}");
+        assert!(!schema.is_valid(&document), "the schema takes {document}");
+    }
+}
+
+#[test]
+fn the_example_in_the_document_is_a_design() {
+    let document = document();
+    let example = &document["components"]["schemas"]["Design"]["example"];
+    assert!(example.is_object());
+    assert_valid(&design_schema(), example, "the example");
+}

@@ -1,0 +1,157 @@
+//! Health, limits, metrics, and the documentation page.
+
+use std::sync::atomic::Ordering;
+
+use serde_json::{Value, json};
+use toothwave::config::Limits;
+
+use crate::asking::{ENDPOINTS, LIMITS, Service};
+use crate::designs::spelled_out;
+
+#[tokio::test]
+async fn a_service_that_drains_is_live_but_not_ready() {
+    let service = Service::new();
+    for path in ["/health/live", "/health/ready"] {
+        assert_eq!(service.get(path).await.status, 200, "{path}");
+    }
+    service.app.ready.store(false, Ordering::Relaxed);
+    assert_eq!(service.get("/health/live").await.status, 200);
+    assert_eq!(service.get("/health/ready").await.status, 503);
+    for path in ENDPOINTS {
+        assert_eq!(service.post(path, &spelled_out()).await.status, 200, "what arrives all the same is answered");
+    }
+}
+
+#[tokio::test]
+async fn the_limits_can_be_read() {
+    let limits = Limits {
+        max_states: 1,
+        max_profile_points: 2,
+        max_body_bytes: 3,
+        max_concurrent_solves: 4,
+        max_queued_solves: 5,
+        deadline_ms: 6,
+        cache_max_bytes: 7,
+    };
+    let expected = json!({
+        "max_states": 1,
+        "max_profile_points": 2,
+        "max_body_bytes": 3,
+        "max_concurrent_solves": 4,
+        "max_queued_solves": 5,
+        "deadline_ms": 6,
+        "cache_max_bytes": 7
+    });
+    assert_eq!(Service::within(limits).get("/v1/limits").await.found(), expected);
+}
+
+#[tokio::test]
+async fn metrics_are_prometheus_text_and_tell_of_requests_cache_and_solves() {
+    toothwave::observe::install_recorder();
+    let service = Service::new();
+    service.post("/v1/sweep", &spelled_out()).await.found();
+    service.post("/v1/sweep", &spelled_out()).await.found();
+    service.get("/nowhere").await.problem();
+    let answer = service.get("/metrics").await;
+    assert_eq!(answer.status, 200);
+    assert!(
+        answer.header("content-type").starts_with("text/plain; version=0.0.4"),
+        "{}",
+        answer.header("content-type")
+    );
+    let text = answer.text();
+    for line in text.lines().filter(|line| !line.starts_with('#') && !line.is_empty()) {
+        let (_, value) = line.rsplit_once(' ').unwrap();
+        assert!(value.parse::<f64>().is_ok(), "{line}");
+    }
+    for sample in [
+        "toothwave_http_requests_total{route=\"/v1/sweep\",method=\"POST\",status=\"200\"}",
+        "toothwave_http_requests_total{route=\"none\",method=\"GET\",status=\"404\"}",
+        "toothwave_http_request_duration_seconds_bucket{route=\"/v1/sweep\",le=",
+        "toothwave_cache_requests_total{status=\"hit\"}",
+        "toothwave_cache_requests_total{status=\"miss\"}",
+        "toothwave_cache_bytes ",
+        "toothwave_cache_entries ",
+        "toothwave_solve_duration_seconds_count ",
+        "toothwave_solves_running ",
+        "toothwave_solves_queued ",
+    ] {
+        assert!(text.contains(sample), "no `{sample}` in\n{text}");
+    }
+}
+
+#[tokio::test]
+async fn a_path_that_nothing_stands_at_makes_no_metric_of_its_own() {
+    toothwave::observe::install_recorder();
+    let service = Service::new();
+    service.get("/a-path-that-a-scanner-made-up").await.problem();
+    service.get("/v1/examples/a-name-that-a-scanner-made-up").await.problem();
+    assert!(!service.get("/metrics").await.text().contains("scanner"));
+}
+
+/// Everything the page at `/docs/` loads, and the page itself.
+async fn pages(service: &Service) -> Vec<(String, String)> {
+    let page = service.get("/docs/").await;
+    assert_eq!((page.status, page.header("content-type").split(';').next()), (200, Some("text/html")));
+    let html = page.text().to_owned();
+    let mut pages = vec![("/docs/".to_owned(), html.clone())];
+    for attribute in ["src=\"", "href=\""] {
+        for (_, rest) in html.match_indices(attribute).map(|(at, _)| html.split_at(at + attribute.len())) {
+            let target = rest.split('"').next().unwrap();
+            assert!(!target.contains("//"), "the page loads {target}");
+            let path = format!("/docs/{}", target.trim_start_matches("./"));
+            let part = service.get(&path).await;
+            assert_eq!(part.status, 200, "{path}");
+            pages.push((path, String::from_utf8_lossy(&part.body).into_owned()));
+        }
+    }
+    pages
+}
+
+#[tokio::test]
+async fn the_documentation_page_loads_from_this_service_alone() {
+    let service = Service::new();
+    let pages = pages(&service).await;
+    assert!(pages.len() > 3, "page, style, and scripts");
+    for (path, text) in &pages {
+        if path.ends_with('/') || path.contains("initializer") || path.ends_with("index.css") {
+            assert!(!text.contains("http:") && !text.contains("https:"), "{path} names an outside host");
+        }
+    }
+    let (_, initializer) = pages.iter().find(|(path, _)| path.contains("initializer")).expect("the initializer");
+    let compact: String = initializer.split_whitespace().collect();
+    assert!(
+        compact.contains("\"validatorUrl\":\"none\"") || compact.contains("\"validatorUrl\":null"),
+        "{initializer}"
+    );
+    assert!(compact.contains("\"url\":\"/openapi.json\""), "{initializer}");
+}
+
+#[tokio::test]
+async fn the_documentation_is_found_without_the_slash_too() {
+    let answer = Service::new().get("/docs").await;
+    assert!((300..400).contains(&answer.status), "{}", answer.status);
+    assert_eq!(answer.header("location"), "/docs/");
+}
+
+#[tokio::test]
+async fn the_api_document_is_served_as_it_is_committed() {
+    let answer = Service::new().get("/openapi.json").await;
+    assert_eq!(answer.header("content-type"), "application/json");
+    assert_eq!(answer.text(), crate::openapi::COMMITTED);
+}
+
+#[tokio::test]
+async fn no_answer_of_any_kind_holds_a_null() {
+    let service = Service::within(LIMITS);
+    let mut answers = Vec::new();
+    for path in ["/v1/limits", "/v1/examples"] {
+        answers.push(service.get(path).await.found());
+    }
+    for path in ENDPOINTS {
+        answers.push(service.post(path, &spelled_out()).await.found());
+    }
+    for answer in answers {
+        assert!(crate::designs::pointers(&answer, Value::is_null).is_empty());
+    }
+}

@@ -1,0 +1,184 @@
+//! The ranges that the contract promises: both ends belong to them, and what is just beyond is refused.
+
+use serde_json::{Value, json};
+
+use crate::asking::{LIMITS, Service};
+use crate::designs::{every_number, fixed, spelled_out, with};
+use toothwave::config::Limits;
+
+/// A field, the endpoint that reads it, a document that holds it, and its range.
+struct Field {
+    pointer: String,
+    path: &'static str,
+    document: Value,
+    low: f64,
+    high: f64,
+    is_whole: bool,
+}
+
+fn fields() -> Vec<Field> {
+    let field = |pointer: &str, low, high| Field {
+        pointer: pointer.into(),
+        path: "/v1/sweep",
+        document: every_number(),
+        low,
+        high,
+        is_whole: false,
+    };
+    let count = |pointer: &str, high| Field { is_whole: true, ..field(pointer, 2.0, high) };
+    let mut fields: Vec<_> = [
+        "/drive/wave_generator/semi_major_mm",
+        "/drive/wave_generator/semi_minor_mm",
+        "/drive/teeth/radius_mm",
+        "/drive/teeth/width_mm",
+        "/drive/ring/tip_radius_mm",
+    ]
+    .map(|pointer| field(pointer, 1e-6, 1e6))
+    .into();
+    fields.push(Field { path: "/v1/geometry", ..field("/profile/chord_tolerance_mm", 1e-6, 1e6) });
+    fields.extend(
+        ["/drive/teeth/count", "/drive/teeth/installed", "/drive/ring/teeth"].map(|pointer| count(pointer, 1e4)),
+    );
+    fields.push(Field { low: 1.0, ..count("/sweep/samples", 1e7) });
+    fields.push(field("/load/input_torque_nm", 1e-12, 1e15));
+    let by_output = with(&every_number(), "/load", json!({ "output_torque_nm": 280.0 }));
+    fields.push(Field { document: by_output, ..field("/load/output_torque_nm", 1e-12, 1e15) });
+    for part in ["wave_generator", "teeth", "ring", "carrier"] {
+        fields.push(field(&format!("/materials/{part}/youngs_modulus_gpa"), 1e-3, 1e5));
+    }
+    for contact in ["wave_generator", "ring", "carrier"] {
+        fields.push(field(&format!("/model/stiffness/{contact}_n_per_mm"), 1e-3, 1e15));
+    }
+    fields
+}
+
+/// The limit that the service says the value is beyond, if it says so of this field.
+async fn limit_exceeded(field: &Field, value: f64) -> Option<f64> {
+    // A small limit, so that a sweep of many samples is refused for that alone, and soon.
+    let service = Service::within(Limits { max_states: 1_000, ..LIMITS });
+    let document = with(&field.document, &field.pointer, json!(value));
+    let answer = service.post(field.path, &document).await;
+    if answer.status == 200 {
+        assert!(!answer.text().contains("null"), "{}", answer.text());
+        return None;
+    }
+    let problem = answer.problem();
+    assert_eq!(answer.status, 422, "{problem}");
+    let errors = problem.get("errors").and_then(Value::as_array).cloned().unwrap_or_default();
+    let error =
+        errors.iter().find(|error| error["pointer"] == field.pointer.as_str() && error["code"] == "out_of_range")?;
+    assert_eq!(error["value"].as_f64(), Some(value), "{error}");
+    Some(error["limit"].as_f64().unwrap())
+}
+
+#[tokio::test]
+async fn both_ends_of_every_range_are_accepted() {
+    for field in fields() {
+        for value in [field.low, field.high] {
+            assert_eq!(limit_exceeded(&field, value).await, None, "{} = {value:?}", field.pointer);
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_value_just_beyond_its_range_is_refused_with_the_limit() {
+    for field in fields() {
+        let beyond = if field.is_whole {
+            [field.low - 1.0, field.high + 1.0]
+        } else {
+            [field.low.next_down(), field.high.next_up()]
+        };
+        for (value, limit) in beyond.into_iter().zip([field.low, field.high]) {
+            assert_eq!(limit_exceeded(&field, value).await, Some(limit), "{} = {value:?}", field.pointer);
+        }
+        for value in if field.is_whole { [0.0, -28.0] } else { [0.0, -58.0] } {
+            assert_eq!(limit_exceeded(&field, value).await, Some(field.low), "{} = {value:?}", field.pointer);
+        }
+    }
+}
+
+#[tokio::test]
+async fn poissons_ratio_lies_strictly_between_its_limits() {
+    for part in ["wave_generator", "teeth", "ring", "carrier"] {
+        let field = Field {
+            pointer: format!("/materials/{part}/poissons_ratio"),
+            path: "/v1/sweep",
+            document: spelled_out(),
+            low: -1.0,
+            high: 0.5,
+            is_whole: false,
+        };
+        for inside in [field.low.next_up(), -0.5, 0.0, field.high.next_down()] {
+            assert_eq!(limit_exceeded(&field, inside).await, None, "{inside:?}");
+        }
+        for (beyond, limit) in [(field.low, field.low), (field.high, field.high), (-2.0, field.low), (0.6, field.high)]
+        {
+            assert_eq!(limit_exceeded(&field, beyond).await, Some(limit), "{beyond:?}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn every_number_of_the_document_has_a_range() {
+    let known: Vec<_> = fields().into_iter().map(|field| field.pointer).collect();
+    for pointer in crate::designs::pointers(&every_number(), Value::is_number) {
+        assert!(known.contains(&pointer) || pointer.ends_with("/poissons_ratio"), "{pointer}");
+    }
+}
+
+/// A drive of this size, all else in proportion.
+fn scaled(scale: f64) -> Value {
+    json!({
+        "drive": {
+            "wave_generator": { "semi_major_mm": 58.0 * scale, "semi_minor_mm": 56.0 * scale },
+            "teeth": { "count": 28, "radius_mm": 5.0 * scale, "width_mm": 15.0 * scale },
+            "ring": { "teeth": 26 }
+        },
+        "load": { "input_torque_nm": 20.0 },
+        "profile": { "chord_tolerance_mm": (1e-3 * scale).max(1e-6) }
+    })
+}
+
+#[tokio::test]
+async fn the_smallest_and_the_largest_drive_are_answered_like_any_other() {
+    let service = Service::new();
+    for scale in [1e-6 / 5.0, 1e-3, 1.0, 1e3, 1e6 / 58.0] {
+        for path in crate::asking::ENDPOINTS {
+            let found = service.post(path, &scaled(scale)).await.found();
+            assert_eq!(
+                found["findings"].as_array().unwrap().len(),
+                usize::from(scale < 1e-2 && path == "/v1/sweep") * 3,
+                "{scale}"
+            );
+        }
+        let found = service.post("/v1/sweep", &scaled(scale)).await.found();
+        // Forces go with torque over length, stresses with the root of torque over volume.
+        let force_n = found["peaks"]["wave_generator"]["force_n"]["value"].as_f64().unwrap() * scale;
+        assert!((force_n / 1_429.443_293_502_519 - 1.0).abs() < 1e-9, "{force_n}");
+        let stress_mpa = found["peaks"]["wave_generator"]["stress_mpa"]["value"].as_f64().unwrap() * scale.powf(1.5);
+        assert!((stress_mpa / 872.605_946_496_1 - 1.0).abs() < 1e-9, "{stress_mpa}");
+    }
+}
+
+#[tokio::test]
+async fn the_weakest_and_the_strongest_of_everything_else_is_answered_with_numbers() {
+    let service = Service::new();
+    let soft = json!({ "youngs_modulus_gpa": 1e-3, "poissons_ratio": (-1.0_f64).next_up() });
+    let hard = json!({ "youngs_modulus_gpa": 1e5, "poissons_ratio": 0.5_f64.next_down() });
+    for torque in [1e-12, 1e15] {
+        for materials in [&soft, &hard] {
+            for stiffness in [1e-3, 1e15] {
+                for law in [json!({ "law": "linear" }), fixed(stiffness, stiffness, stiffness)] {
+                    let document = with(&spelled_out(), "/load", json!({ "input_torque_nm": torque }));
+                    let parts =
+                        ["wave_generator", "teeth", "ring", "carrier"].map(|part| (part.to_owned(), materials.clone()));
+                    let document = with(&document, "/materials", parts.into_iter().collect());
+                    let document = with(&document, "/model/stiffness", law);
+                    let answer = service.post("/v1/sweep", &document).await;
+                    answer.found();
+                    assert!(!answer.text().contains("null"));
+                }
+            }
+        }
+    }
+}

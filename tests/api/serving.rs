@@ -1,0 +1,171 @@
+//! The service as a process: started, asked, and told to stop.
+
+use std::io::{BufRead as _, BufReader};
+use std::net::{SocketAddr, TcpListener};
+use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
+use std::time::Duration;
+
+use serde_json::json;
+
+use crate::asking::{LIMITS, Question, ask_at};
+use crate::designs::{shortest, with};
+
+/// A running service that ends with the test.
+pub(crate) struct Process {
+    child: Child,
+    pub(crate) address: SocketAddr,
+    /// Kept open: a process that greets into a closed pipe would fail for that.
+    _greeting: BufReader<ChildStdout>,
+}
+
+impl Process {
+    /// Started with these arguments on a port of the system's choice, which its greeting names.
+    pub(crate) fn started(arguments: &[&str]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_toothwave"));
+        command.args(arguments).args(["--listen", "127.0.0.1:0", "--log", "off"]);
+        let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        let mut greeting = BufReader::new(child.stdout.take().unwrap());
+        let mut line = String::new();
+        greeting.read_line(&mut line).unwrap();
+        let address = line.trim().rsplit_once("http://").map(|(_, address)| address.parse().unwrap());
+        Self { child, address: address.unwrap_or_else(|| panic!("no address in {line:?}")), _greeting: greeting }
+    }
+
+    fn signalled(&self, signal: &str) {
+        let status = Command::new("kill").args([signal, &self.child.id().to_string()]).status().unwrap();
+        assert!(status.success());
+    }
+
+    /// Its exit status; a process that does not end fails the test instead of holding it up.
+    fn ended(mut self) -> ExitStatus {
+        for _ in 0..60_000 {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                return status;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        panic!("the process does not end");
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // Already gone where the test asked it to end.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn sweep(samples: u32) -> Question {
+    Question::post("/v1/sweep", with(&shortest(), "/sweep", json!({ "samples": samples })).to_string())
+}
+
+#[test]
+fn the_service_serves_with_and_without_saying_serve() {
+    for arguments in [&["serve"][..], &[]] {
+        let process = Process::started(arguments);
+        ask_at(process.address, &sweep(50)).found();
+        assert_eq!(ask_at(process.address, &Question::of("GET", "/health/ready")).status, 200);
+        assert!(
+            ask_at(process.address, &Question::of("GET", "/metrics")).text().contains("toothwave_http_requests_total")
+        );
+    }
+}
+
+#[test]
+fn settings_become_limits() {
+    let arguments = [
+        "serve",
+        "--max-body-bytes",
+        "1000",
+        "--max-states",
+        "2000",
+        "--max-profile-points",
+        "3000",
+        "--max-concurrent-solves",
+        "4",
+        "--max-queued-solves",
+        "5",
+        "--deadline-ms",
+        "6000",
+        "--cache-max-bytes",
+        "7000",
+    ];
+    let process = Process::started(&arguments);
+    let expected = json!({
+        "max_body_bytes": 1000,
+        "max_states": 2000,
+        "max_profile_points": 3000,
+        "max_concurrent_solves": 4,
+        "max_queued_solves": 5,
+        "deadline_ms": 6000,
+        "cache_max_bytes": 7000
+    });
+    assert_eq!(ask_at(process.address, &Question::of("GET", "/v1/limits")).found(), expected);
+}
+
+#[test]
+fn an_origin_that_was_named_may_call_from_a_browser() {
+    let process = Process::started(&["serve", "--cors-origin", "https://one.example,https://two.example"]);
+    let answer = ask_at(process.address, &sweep(50).with("origin", "https://two.example"));
+    assert_eq!(answer.header("access-control-allow-origin"), "https://two.example");
+}
+
+#[test]
+fn a_process_that_is_told_to_stop_exits_with_0() {
+    for signal in ["-TERM", "-INT"] {
+        let process = Process::started(&["serve"]);
+        ask_at(process.address, &sweep(50)).found();
+        process.signalled(signal);
+        assert_eq!(process.ended().code(), Some(0), "{signal}");
+    }
+}
+
+#[test]
+fn a_request_that_runs_when_the_process_is_told_to_stop_is_answered_first() {
+    let process = Process::started(&["serve", "--deadline-ms", "600000", "--shutdown-ms", "600000"]);
+    let address = process.address;
+    let asker = std::thread::spawn(move || ask_at(address, &sweep(30_000)));
+    // Some rounds until the solve has begun; should it be quick, the answer is there before the signal all the same.
+    for _ in 0..10_000 {
+        let metrics = ask_at(address, &Question::of("GET", "/metrics"));
+        if metrics.text().contains("toothwave_solves_running 1") || asker.is_finished() {
+            break;
+        }
+    }
+    process.signalled("-TERM");
+    let answer = asker.join().unwrap();
+    assert_eq!(answer.status, 200);
+    assert!(answer.body.ends_with(b"}"), "whole");
+    assert_eq!(process.ended().code(), Some(0));
+}
+
+#[test]
+fn an_address_that_is_taken_is_an_error_that_names_it() {
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    let output = Command::new(env!("CARGO_BIN_EXE_toothwave")).args(["serve", "--listen", &address]).output().unwrap();
+    assert!(!output.status.success());
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(stderr.contains(&address), "{stderr}");
+}
+
+#[test]
+fn a_limit_that_nothing_can_hold_is_no_reason_to_panic() {
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    for limit in ["--max-queued-solves", "--max-concurrent-solves"] {
+        // Whether it is refused or taken for "no limit": with this address the process ends in any case.
+        let arguments = ["serve", "--listen", &address, limit, "18446744073709551615"];
+        let output = Command::new(env!("CARGO_BIN_EXE_toothwave")).args(arguments).output().unwrap();
+        assert!(matches!(output.status.code(), Some(1 | 2)), "{limit}: {:?}", output.status);
+    }
+}
+
+#[test]
+fn a_body_larger_than_the_limit_is_refused_over_a_connection_too() {
+    let process = Process::started(&["serve"]);
+    let question = Question::post("/v1/sweep", " ".repeat(LIMITS.max_body_bytes + 1));
+    let problem = ask_at(process.address, &question).refused(413, "body_too_large");
+    assert!(problem["detail"].as_str().unwrap().contains("65537"), "{problem}");
+}

@@ -1,0 +1,395 @@
+//! Every reason why a drive, a load or a request cannot exist, as it comes over HTTP.
+
+use serde_json::{Value, json};
+use toothwave::config::Limits;
+
+use crate::asking::{ENDPOINTS, LIMITS, Service};
+use crate::codes::{codes_of, field_codes, words};
+use crate::designs::{every_number, fixed, spelled_out, undercut, with, with_twice, without};
+
+async fn errors_at(path: &str, document: &Value) -> Vec<Value> {
+    let problem = Service::new().post(path, document).await.refused(422, "impossible_design");
+    problem["errors"].as_array().unwrap().clone()
+}
+
+/// That a change of case 5.1 makes one value impossible, to every endpoint.
+async fn assert_impossible(changes: &[(&str, Value)], code: &str, pointer: &str, value: f64, limit: f64) {
+    let document =
+        changes.iter().fold(spelled_out(), |document, (pointer, value)| with(&document, pointer, value.clone()));
+    for path in ENDPOINTS {
+        let errors = errors_at(path, &document).await;
+        let [error] = errors.as_slice() else { panic!("{errors:?}") };
+        assert_eq!((&error["code"], &error["pointer"]), (&json!(code), &json!(pointer)));
+        for (name, expected) in [("value", value), ("limit", limit)] {
+            let found = error[name].as_f64().unwrap();
+            assert!((found - expected).abs() <= 1e-6 * expected.abs(), "{name} of {error} is not {expected}");
+        }
+    }
+}
+
+const SEMI_MAJOR: &str = "/drive/wave_generator/semi_major_mm";
+const SEMI_MINOR: &str = "/drive/wave_generator/semi_minor_mm";
+const COUNT: &str = "/drive/teeth/count";
+const INSTALLED: &str = "/drive/teeth/installed";
+const RADIUS: &str = "/drive/teeth/radius_mm";
+const WIDTH: &str = "/drive/teeth/width_mm";
+const RING_TEETH: &str = "/drive/ring/teeth";
+const TIP_RADIUS: &str = "/drive/ring/tip_radius_mm";
+
+#[tokio::test]
+async fn a_length_of_nothing_is_out_of_range() {
+    assert_impossible(&[(WIDTH, json!(0))], "out_of_range", WIDTH, 0.0, 1e-6).await;
+    assert_impossible(&[(RADIUS, json!(-5.0))], "out_of_range", RADIUS, -5.0, 1e-6).await;
+    assert_impossible(&[(TIP_RADIUS, json!(2e6))], "out_of_range", TIP_RADIUS, 2e6, 1e6).await;
+}
+
+#[tokio::test]
+async fn a_cam_is_elongated() {
+    assert_impossible(&[(SEMI_MINOR, json!(58.0))], "cam_not_elongated", SEMI_MAJOR, 58.0, 58.0).await;
+    assert_impossible(&[(SEMI_MINOR, json!(58.5))], "cam_not_elongated", SEMI_MAJOR, 58.0, 58.5).await;
+}
+
+#[tokio::test]
+async fn ring_and_carrier_differ_by_two_teeth() {
+    for (teeth, nearest) in [(28, 26), (27, 26), (25, 26), (29, 30), (31, 30), (100, 30), (2, 26)] {
+        let expected = (f64::from(teeth), f64::from(nearest));
+        assert_impossible(&[(RING_TEETH, json!(teeth))], "tooth_difference", RING_TEETH, expected.0, expected.1).await;
+    }
+}
+
+#[tokio::test]
+async fn installed_teeth_are_even() {
+    assert_impossible(&[(INSTALLED, json!(7))], "installed_odd", INSTALLED, 7.0, 8.0).await;
+}
+
+#[tokio::test]
+async fn an_odd_count_that_is_installed_in_full_is_refused_as_installed_odd() {
+    assert_impossible(
+        &[(COUNT, json!(27)), (INSTALLED, json!(27)), (RING_TEETH, json!(25))],
+        "installed_odd",
+        INSTALLED,
+        27.0,
+        28.0,
+    )
+    .await;
+}
+
+#[tokio::test]
+async fn installed_teeth_divide_the_theoretical_ones() {
+    assert_impossible(&[(INSTALLED, json!(8))], "installed_no_divisor", INSTALLED, 8.0, 28.0).await;
+    assert_impossible(&[(INSTALLED, json!(56))], "installed_no_divisor", INSTALLED, 56.0, 28.0).await;
+}
+
+#[tokio::test]
+async fn neighbouring_teeth_do_not_touch() {
+    // b + r = 63 mm at the minor axis: the pair there is 14.1 mm apart, and nowhere nearer.
+    let nearest = 2.0 * 63.2 * (std::f64::consts::PI / 28.0).sin();
+    let document = with(&with(&spelled_out(), RADIUS, json!(7.2)), SEMI_MAJOR, json!(56.000_001));
+    let errors = errors_at("/v1/coincidence-degree", &document).await;
+    assert_eq!(errors.len(), 1, "{errors:?}");
+    assert_eq!((&errors[0]["code"], &errors[0]["pointer"]), (&json!("teeth_touch"), &json!(RADIUS)));
+    assert_eq!(errors[0]["value"], 7.2);
+    assert!((errors[0]["limit"].as_f64().unwrap() - 0.5 * nearest).abs() < 1e-5, "{errors:?}");
+    let thinner = with(&document, RADIUS, json!(7.0));
+    assert_eq!(Service::new().post("/v1/coincidence-degree", &thinner).await.status, 200);
+}
+
+#[tokio::test]
+async fn an_annulus_is_left_for_the_carrier() {
+    // The tips stand at b + 2r = 57.8 mm, inside the cam's 58.
+    assert_impossible(&[(RADIUS, json!(0.9))], "no_carrier_annulus", SEMI_MAJOR, 58.0, 57.8).await;
+    assert_impossible(&[(RADIUS, json!(1.0))], "no_carrier_annulus", SEMI_MAJOR, 58.0, 58.0).await;
+}
+
+#[tokio::test]
+async fn a_bore_may_make_room_for_the_carrier() {
+    let document = with(&with(&spelled_out(), RADIUS, json!(0.9)), TIP_RADIUS, json!(58.5));
+    assert_eq!(Service::new().post("/v1/geometry", &document).await.status, 200);
+}
+
+#[tokio::test]
+async fn a_bore_leaves_a_flank() {
+    assert_impossible(&[(TIP_RADIUS, json!(68.0))], "bore_leaves_no_flank", TIP_RADIUS, 68.0, 68.0).await;
+    assert_impossible(&[(TIP_RADIUS, json!(70.0))], "bore_leaves_no_flank", TIP_RADIUS, 70.0, 68.0).await;
+}
+
+#[tokio::test]
+async fn every_impossible_value_is_reported_at_once_with_value_and_limit() {
+    let mut document = every_number();
+    let mut expected = Vec::new();
+    for (pointer, value, limit) in [
+        (SEMI_MAJOR, 2e6, 1e6),
+        (SEMI_MINOR, 0.0, 1e-6),
+        (COUNT, 10_001.0, 1e4),
+        (INSTALLED, 0.0, 2.0),
+        (RADIUS, 1e-7, 1e-6),
+        (WIDTH, -15.0, 1e-6),
+        (RING_TEETH, 1.0, 2.0),
+        (TIP_RADIUS, 3e6, 1e6),
+        ("/materials/wave_generator/youngs_modulus_gpa", 1e6, 1e5),
+        ("/materials/wave_generator/poissons_ratio", 0.5, 0.5),
+        ("/materials/teeth/youngs_modulus_gpa", 0.0, 1e-3),
+        ("/materials/teeth/poissons_ratio", -1.0, -1.0),
+        ("/materials/ring/youngs_modulus_gpa", -210.0, 1e-3),
+        ("/materials/ring/poissons_ratio", 30.0, 0.5),
+        ("/materials/carrier/youngs_modulus_gpa", 210e9, 1e5),
+        ("/materials/carrier/poissons_ratio", -7.0, -1.0),
+        ("/load/input_torque_nm", 0.0, 1e-12),
+        ("/model/stiffness/wave_generator_n_per_mm", 0.0, 1e-3),
+        ("/model/stiffness/ring_n_per_mm", 1e16, 1e15),
+        ("/model/stiffness/carrier_n_per_mm", -1.0, 1e-3),
+        ("/sweep/samples", 0.0, 1.0),
+    ] {
+        document = with(&document, pointer, json!(value));
+        expected.push((pointer.to_owned(), "out_of_range".to_owned(), value, limit));
+    }
+    let mut found: Vec<_> = errors_at("/v1/sweep", &document)
+        .await
+        .iter()
+        .map(|error| {
+            let text = |member: &str| error[member].as_str().unwrap().to_owned();
+            (text("pointer"), text("code"), error["value"].as_f64().unwrap(), error["limit"].as_f64().unwrap())
+        })
+        .collect();
+    found.sort_by(|a, b| a.0.cmp(&b.0));
+    expected.sort_by(|a, b| a.0.cmp(&b.0));
+    assert_eq!(found, expected);
+}
+
+#[tokio::test]
+async fn values_that_do_not_fit_each_other_are_reported_at_once_and_beside_values_out_of_range() {
+    let document = [
+        (SEMI_MINOR, json!(58.0)),
+        (INSTALLED, json!(9)),
+        (RING_TEETH, json!(27)),
+        (TIP_RADIUS, json!(68.0)),
+        (WIDTH, json!(0.0)),
+        ("/materials/ring/poissons_ratio", json!(0.7)),
+        ("/load/input_torque_nm", json!(-20.0)),
+        ("/sweep/samples", json!(0)),
+    ]
+    .into_iter()
+    .fold(spelled_out(), |document, (pointer, value)| with(&document, pointer, value));
+    let errors = errors_at("/v1/sweep", &document).await;
+    let expected = [
+        "bore_leaves_no_flank",
+        "cam_not_elongated",
+        "installed_no_divisor",
+        "installed_odd",
+        "out_of_range",
+        "tooth_difference",
+    ];
+    assert_eq!(codes_of(&errors), expected);
+    assert_eq!(errors.len(), 9, "{errors:?}");
+}
+
+#[tokio::test]
+async fn what_only_geometry_can_tell_is_reported_beside_values_out_of_range() {
+    // Thick teeth on a small cam touch; a deep ellipse leaves no annulus.
+    let document = json!({
+        "drive": {
+            "wave_generator": { "semi_major_mm": 20.0, "semi_minor_mm": 10.0 },
+            "teeth": { "count": 28, "radius_mm": 4.0, "width_mm": 0.0 },
+            "ring": { "teeth": 26 }
+        },
+        "load": { "input_torque_nm": 0.0 },
+        "sweep": { "samples": 0 },
+        "profile": { "chord_tolerance_mm": 0.0 }
+    });
+    let errors = errors_at("/v1/sweep", &document).await;
+    assert!(codes_of(&errors).contains(&"teeth_touch".to_owned()), "{errors:?}");
+    assert_eq!(errors.iter().filter(|error| error["code"] == "out_of_range").count(), 3, "{errors:?}");
+    let errors = errors_at("/v1/geometry", &document).await;
+    assert_eq!(errors.iter().filter(|error| error["code"] == "out_of_range").count(), 2, "{errors:?}");
+}
+
+#[tokio::test]
+async fn touching_teeth_and_a_missing_annulus_are_reported_together() {
+    let document = json!({
+        "drive": {
+            "wave_generator": { "semi_major_mm": 58.0, "semi_minor_mm": 2.0 },
+            "teeth": { "count": 6, "radius_mm": 4.0, "width_mm": 15.0 },
+            "ring": { "teeth": 4 }
+        }
+    });
+    assert_eq!(codes_of(&errors_at("/v1/geometry", &document).await), ["no_carrier_annulus", "teeth_touch"]);
+}
+
+#[tokio::test]
+async fn a_detail_names_the_field_where_there_is_one_and_counts_them_where_there_are_several() {
+    let one = with(&spelled_out(), RADIUS, json!(0.0));
+    let problem = Service::new().post("/v1/sweep", &one).await.refused(422, "impossible_design");
+    assert!(problem["detail"].as_str().unwrap().contains(RADIUS), "{problem}");
+    let two = with(&one, WIDTH, json!(0.0));
+    let problem = Service::new().post("/v1/sweep", &two).await.refused(422, "impossible_design");
+    assert!(problem["detail"].as_str().unwrap().contains('2'), "{problem}");
+}
+
+#[tokio::test]
+async fn a_sweep_without_a_lever_arm_at_every_input_angle_has_no_tooth_in_mesh() {
+    let service = Service::new();
+    // ψ_e = 90° and exactly one spacing of four teeth: at j = 0 the only tooth stands on the minor axis.
+    let four = with(&spelled_out(), INSTALLED, json!(4));
+    // ψ_e = 34.08° and a spacing of 36°.
+    let ten = with(&crate::designs::bored(), INSTALLED, json!(10));
+    let two = with(&spelled_out(), INSTALLED, json!(2));
+    for document in [four, ten, two] {
+        let problem = service.post("/v1/sweep", &document).await.refused(422, "no_tooth_in_mesh");
+        assert!(problem["detail"].as_str().unwrap().contains("deg"), "{problem}");
+        for path in ["/v1/geometry", "/v1/coincidence-degree"] {
+            service.post(path, &document).await.found();
+        }
+    }
+    // ψ_e = 43.6° and a spacing of 36°; ψ_e = 90° and one of 60°.
+    let enough = with(&undercut(), INSTALLED, json!(10));
+    let six = json!({
+        "drive": {
+            "wave_generator": { "semi_major_mm": 58.0, "semi_minor_mm": 56.0 },
+            "teeth": { "count": 30, "installed": 6, "radius_mm": 5.0, "width_mm": 15.0 },
+            "ring": { "teeth": 28 }
+        },
+        "load": { "input_torque_nm": 20.0 }
+    });
+    for document in [enough, six] {
+        service.post("/v1/sweep", &document).await.found();
+    }
+}
+
+/// A ring with more teeth than the carrier, soft at the slots: the projection of their approach turns against the rest.
+fn softly_held(compatibility: &str, carrier_n_per_mm: f64) -> Value {
+    json!({
+        "drive": {
+            "wave_generator": { "semi_major_mm": 40.6, "semi_minor_mm": 39.4 },
+            "teeth": { "count": 30, "radius_mm": 3.0, "width_mm": 12.0 },
+            "ring": { "teeth": 32 }
+        },
+        "load": { "input_torque_nm": 6.0 },
+        "model": { "compatibility": compatibility, "stiffness": fixed(1e9, 1e9, carrier_n_per_mm) }
+    })
+}
+
+#[tokio::test]
+async fn a_projection_whose_stiffnesses_leave_a_tooth_no_compliance_is_refused_and_virtual_work_is_not() {
+    let service = Service::new();
+    let problem =
+        service.post("/v1/sweep", &softly_held("projection", 1e3)).await.refused(422, "compliance_not_positive");
+    assert!(problem["detail"].as_str().unwrap().contains("virtual_work"), "{problem}");
+    service.post("/v1/sweep", &softly_held("virtual_work", 1e3)).await.found();
+    service.post("/v1/sweep", &softly_held("projection", 1e9)).await.found();
+}
+
+#[tokio::test]
+async fn the_carrier_may_have_more_teeth_or_fewer_than_the_ring() {
+    for (ring, ratio, other) in [(26, 14.0, -13.0), (30, -14.0, 15.0)] {
+        let document = with(&spelled_out(), RING_TEETH, json!(ring));
+        let found = Service::new().post("/v1/geometry", &document).await.found();
+        assert_eq!(
+            (&found["transmission_ratio"], &found["transmission_ratio_carrier_fixed"]),
+            (&json!(ratio), &json!(other))
+        );
+    }
+}
+
+#[tokio::test]
+async fn a_sweep_larger_than_max_states_is_refused_with_value_and_limit_and_one_as_large_is_not() {
+    // 7 teeth at each of 51 input angles.
+    let service = Service::within(Limits { max_states: 357, ..LIMITS });
+    service.post("/v1/sweep", &spelled_out()).await.found();
+    let service = Service::within(Limits { max_states: 356, ..LIMITS });
+    let problem = service.post("/v1/sweep", &spelled_out()).await.refused(422, "too_many_states");
+    let detail = problem["detail"].as_str().unwrap();
+    assert!(detail.contains("357") && detail.contains("356") && detail.contains("`max_states`"), "{detail}");
+    let error = &problem["errors"][0];
+    assert_eq!((&error["pointer"], &error["code"]), (&json!("/sweep/samples"), &json!("too_many_states")));
+    assert_eq!((error["value"].as_f64(), error["limit"].as_f64()), (Some(357.0), Some(356.0)));
+}
+
+#[tokio::test]
+async fn states_are_counted_as_they_are_swept() {
+    for document in [undercut(), crate::designs::bored()] {
+        for samples in [1, 2, 7, 50, 51] {
+            let document = with(&document, "/sweep", json!({ "samples": samples }));
+            let found = Service::new().post("/v1/sweep", &document).await.found();
+            let states = found["states"]["tooth"].as_array().unwrap().len() as u64;
+            Service::within(Limits { max_states: states, ..LIMITS }).post("/v1/sweep", &document).await.found();
+            let service = Service::within(Limits { max_states: states - 1, ..LIMITS });
+            let problem = service.post("/v1/sweep", &document).await.refused(422, "too_many_states");
+            assert_eq!(problem["errors"][0]["value"].as_f64(), Some(states as f64));
+        }
+    }
+}
+
+#[tokio::test]
+async fn profiles_larger_than_max_profile_points_are_refused_with_value_and_limit_and_as_large_ones_are_not() {
+    for extent in ["tooth", "full"] {
+        let document = with(&spelled_out(), "/profile/extent", json!(extent));
+        let found = Service::new().post("/v1/geometry", &document).await.found();
+        let length = |profile: &Value| profile["x_mm"].as_array().unwrap().len() as u64;
+        let points = length(&found["ring"]["profile"])
+            + length(&found["wave_generator"]["profile"])
+            + length(&found["tooth_center_path"]);
+        Service::within(Limits { max_profile_points: points, ..LIMITS }).post("/v1/geometry", &document).await.found();
+        let service = Service::within(Limits { max_profile_points: points - 1, ..LIMITS });
+        let problem = service.post("/v1/geometry", &document).await.refused(422, "too_many_points");
+        let error = &problem["errors"][0];
+        assert_eq!(
+            (&error["pointer"], &error["code"]),
+            (&json!("/profile/chord_tolerance_mm"), &json!("too_many_points"))
+        );
+        assert_eq!(
+            (error["value"].as_f64(), error["limit"].as_f64()),
+            (Some(points as f64), Some((points - 1) as f64))
+        );
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(detail.contains(&points.to_string()) && detail.contains(&(points - 1).to_string()), "{detail}");
+    }
+}
+
+#[tokio::test]
+async fn a_refusal_for_a_limit_names_the_limit_as_it_can_be_read() {
+    let service = Service::within(Limits { max_states: 1, max_profile_points: 1, max_body_bytes: 2_000, ..LIMITS });
+    let limits = service.get("/v1/limits").await.found();
+    let long = format!("{}{}", spelled_out(), " ".repeat(2_000));
+    for (path, body, limit) in [
+        ("/v1/sweep", spelled_out().to_string(), "max_states"),
+        ("/v1/geometry", spelled_out().to_string(), "max_profile_points"),
+        ("/v1/sweep", long, "max_body_bytes"),
+    ] {
+        let problem = service.post_text(path, body).await.problem();
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(detail.contains(&format!("`{limit}`")) && detail.contains(&limits[limit].to_string()), "{detail}");
+    }
+}
+
+#[tokio::test]
+async fn every_kind_of_fault_of_a_field_can_be_met_over_http() {
+    let document = spelled_out();
+    let huge = with(&document, RADIUS, json!("HERE")).to_string().replace("\"HERE\"", "1e999");
+    let texts = [
+        with(&document, "/colour", json!(1)).to_string(),
+        without(&document, COUNT).to_string(),
+        with_twice(&document, COUNT),
+        with(&document, COUNT, json!("28")).to_string(),
+        with(&document, "/profile/extent", json!("half")).to_string(),
+        huge,
+        with(&document, "/load/output_torque_nm", json!(280.0)).to_string(),
+        with(&document, RADIUS, json!(0.0)).to_string(),
+        with(&document, SEMI_MINOR, json!(58.0)).to_string(),
+        with(&document, RING_TEETH, json!(27)).to_string(),
+        with(&document, INSTALLED, json!(7)).to_string(),
+        with(&document, INSTALLED, json!(8)).to_string(),
+        with(&document, RADIUS, json!(7.2)).to_string(),
+        with(&document, RADIUS, json!(0.9)).to_string(),
+        with(&document, TIP_RADIUS, json!(68.0)).to_string(),
+    ];
+    let service = Service::within(Limits { max_states: 1, max_profile_points: 1, ..LIMITS });
+    let mut errors = Vec::new();
+    for text in texts.into_iter().chain([document.to_string()]) {
+        for path in ["/v1/sweep", "/v1/geometry"] {
+            let answer = service.post_text(path, text.clone()).await;
+            assert_eq!(answer.status, 422, "{}", answer.text());
+            errors.extend(answer.problem()["errors"].as_array().unwrap().clone());
+        }
+    }
+    assert_eq!(codes_of(&errors), words(&field_codes()));
+}
