@@ -8,6 +8,7 @@ use std::borrow::Cow;
 use serde::{Deserialize, Deserializer, Serialize};
 use toothwave_solver::Contact;
 use toothwave_solver::profile::{Extent, ProfileParameters};
+use toothwave_solver::sweep::Points;
 use toothwave_solver::violation::Range;
 use toothwave_solver::{
     Compatibility, ContactLaw, DriveParameters, LoadCase, LoadParameters, Material, Materials, Parameter, PerContact,
@@ -141,7 +142,7 @@ impl Default for MaterialDocument {
     }
 }
 
-/// The torque: exactly one of the two, at the wave generator or at the carrier, ring fixed.
+/// The torque: exactly one of the two, at the wave generator or at the carrier, ring fixed; and the stress that may be.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct LoadDocument {
@@ -153,6 +154,10 @@ pub struct LoadDocument {
     #[serde(default, deserialize_with = "given")]
     #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
     pub output_torque_nm: Option<f64>,
+    /// The contact stress that the torque capacity is asked for.
+    #[serde(default, deserialize_with = "given")]
+    #[schema(minimum = 1e-3, maximum = 1e6, nullable = false)]
+    pub allowable_stress_mpa: Option<f64>,
 }
 
 /// The model of load sharing.
@@ -163,6 +168,25 @@ pub struct ModelDocument {
     pub compatibility: CompatibilityDocument,
     /// The contact law.
     pub stiffness: StiffnessDocument,
+    /// Gaps at the contacts; left out, there are none.
+    #[serde(deserialize_with = "given")]
+    #[schema(nullable = false)]
+    pub clearance: Option<ClearanceDocument>,
+}
+
+/// Uniform gaps along the normals: a tooth carries load only where they are closed.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
+pub struct ClearanceDocument {
+    /// At the wave generator.
+    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
+    pub wave_generator_um: f64,
+    /// At the ring.
+    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
+    pub ring_um: f64,
+    /// At the carrier.
+    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
+    pub carrier_um: f64,
 }
 
 /// How the approaches at a tooth's contacts add up to the rotation of the wave generator.
@@ -192,6 +216,8 @@ pub enum StiffnessDocument {
         /// At the carrier.
         carrier_n_per_mm: f64,
     },
+    /// Palmgren's `δ = 3.84e-5 F^0.9/L^0.8`, steel on steel.
+    Palmgren,
 }
 
 /// Written out, because a derived one could neither leave the default law out nor refuse what a law does not know.
@@ -213,7 +239,8 @@ impl PartialSchema for StiffnessDocument {
             },
         );
         let linear = law("linear", "k = π L1 E*/2 at each contact; what is used where no law is named.");
-        OneOfBuilder::new().description(Some("The contact law.")).item(linear).item(fixed).into()
+        let palmgren = law("palmgren", "Palmgren's δ = 3.84e-5 F^0.9/L1^0.8 (N, mm), steel on steel.").required("law");
+        OneOfBuilder::new().description(Some("The contact law.")).item(linear).item(fixed).item(palmgren).into()
     }
 }
 
@@ -224,19 +251,25 @@ impl ToSchema for StiffnessDocument {
 }
 
 /// The input angles of a sweep.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct SweepDocument {
-    /// Equal intervals of one period; both ends are included.
-    #[schema(value_type = i64, minimum = 1, maximum = 10000000, default = 50)]
-    pub samples: Whole,
+    /// Equal intervals of one period; both ends are included. 50 where neither this nor `tolerance` is given.
+    #[serde(deserialize_with = "given")]
+    #[schema(value_type = i64, minimum = 1, maximum = 10000000, required = false)]
+    pub samples: Option<Whole>,
+    /// Instead of `samples`: the true extremes of every force and stress to this relative tolerance, input angles placed where they are
+    /// needed, and the instant at which a tooth enters twice, without it and with it.
+    #[serde(deserialize_with = "given")]
+    #[schema(minimum = 1e-12, maximum = 0.1, nullable = false)]
+    pub tolerance: Option<f64>,
+    /// Whether wind-up and torsional stiffness are wanted too.
+    #[schema(default = false)]
+    pub wind_up: bool,
 }
 
-impl Default for SweepDocument {
-    fn default() -> Self {
-        Self { samples: Whole(50.0) }
-    }
-}
+/// The paper's number of intervals.
+const DEFAULT_SAMPLES: Whole = Whole(50.0);
 
 /// The sampling of profiles.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -305,6 +338,7 @@ impl<'de> Deserialize<'de> for StiffnessDocument {
             #[default]
             Linear,
             Fixed,
+            Palmgren,
         }
 
         #[derive(Deserialize)]
@@ -327,8 +361,9 @@ impl<'de> Deserialize<'de> for StiffnessDocument {
             ("carrier_n_per_mm", fields.carrier_n_per_mm),
         ];
         match fields.law {
-            Law::Linear => match stiffnesses.iter().find(|(_, stiffness)| stiffness.is_some()) {
+            Law::Linear | Law::Palmgren => match stiffnesses.iter().find(|(_, stiffness)| stiffness.is_some()) {
                 Some((name, _)) => Err(D::Error::unknown_field(name, &["law"])),
+                None if matches!(fields.law, Law::Palmgren) => Ok(Self::Palmgren),
                 None => Ok(Self::Linear),
             },
             Law::Fixed => {
@@ -350,11 +385,18 @@ impl Design {
     /// The document with what may be left out filled in and zeros of one sign, so that equal designs are equal bytes.
     pub fn normalised(mut self) -> Self {
         self.drive.teeth.installed.get_or_insert(self.drive.teeth.count);
+        if self.sweep.tolerance.is_none() {
+            self.sweep.samples.get_or_insert(DEFAULT_SAMPLES);
+        }
+        if let Some(clearance) = &mut self.model.clearance {
+            for gap in [&mut clearance.wave_generator_um, &mut clearance.ring_um, &mut clearance.carrier_um] {
+                *gap += 0.0;
+            }
+        }
         let materials = &mut self.materials;
         for material in
             [&mut materials.wave_generator, &mut materials.teeth, &mut materials.ring, &mut materials.carrier]
         {
-            // The one number that may be zero.
             material.poissons_ratio += 0.0;
         }
         self
@@ -420,6 +462,7 @@ impl Design {
         };
         let law = match self.model.stiffness {
             StiffnessDocument::Linear => ContactLaw::Linear,
+            StiffnessDocument::Palmgren => ContactLaw::Palmgren,
             StiffnessDocument::Fixed { wave_generator_n_per_mm, ring_n_per_mm, carrier_n_per_mm } => {
                 ContactLaw::Fixed(PerContact {
                     wave_generator: wave_generator_n_per_mm,
@@ -438,6 +481,12 @@ impl Design {
             torque,
             compatibility,
             law,
+            clearance_um: self.model.clearance.as_ref().map_or_else(PerContact::default, |clearance| PerContact {
+                wave_generator: clearance.wave_generator_um,
+                ring: clearance.ring_um,
+                carrier: clearance.carrier_um,
+            }),
+            allowable_stress_mpa: load.allowable_stress_mpa,
         })
     }
 
@@ -449,13 +498,27 @@ impl Design {
         Ok(LoadCase::new(&self.load_parameters()?))
     }
 
-    /// The intervals of a sweep.
+    /// Where a sweep looks.
     ///
     /// # Errors
-    /// The violation of their range.
-    pub fn samples(&self) -> Result<u64, Violation> {
-        let samples = self.sweep.samples;
-        Parameter::Samples.check(samples.0).map_or(Ok(samples.count().unsigned_abs()), Err)
+    /// A fault where the document wants samples and a tolerance; inside, the violation of a range.
+    pub fn sweep_points(&self, max_states: u64) -> Result<Result<Points, Violation>, Fault> {
+        let SweepDocument { samples, tolerance, .. } = self.sweep;
+        match (samples, tolerance) {
+            (Some(_), Some(_)) => {
+                let detail = "at most one of `samples` and `tolerance` is wanted here";
+                Err(Fault::of_field(FieldCode::ConflictingFields, "sweep", detail.into()))
+            }
+            (None, Some(tolerance)) => {
+                let violation = Parameter::SweepTolerance.check(tolerance);
+                Ok(violation.map_or(Ok(Points::Tolerance { tolerance, max_states }), Err))
+            }
+            (samples, None) => {
+                let samples = samples.unwrap_or(DEFAULT_SAMPLES);
+                let violation = Parameter::Samples.check(samples.0);
+                Ok(violation.map_or(Ok(Points::Samples(samples.count().unsigned_abs())), Err))
+            }
+        }
     }
 
     /// What profiles are asked for.

@@ -56,6 +56,10 @@ pub enum FindingCode {
     ToothBeyondCarrier,
     /// The ring's flank stands steep to the radius.
     SteepRingFlank,
+    /// The linear law where wind-up or clearance was asked for: it is several times too stiff.
+    LinearLawTooStiff,
+    /// Palmgren's law for a contact that is not steel on steel.
+    PalmgrenBeyondSteel,
     /// A stress above the fatigue limit of bearing steel.
     StressAboveFatigueLimit,
 }
@@ -168,6 +172,29 @@ impl From<&Finding> for FindingAnswer {
                 "deg",
                 "the ring's flank stands steep to the radius: its force is several times the wave generator's, and friction, which the model leaves out, may keep the drive from turning".into(),
                 "make the ellipse rounder, or take fewer teeth",
+            ),
+            Finding::LinearLawTooStiff { linear_um, palmgren_um } => new(
+                Code::LinearLawTooStiff,
+                Info,
+                &["/model/stiffness/law"],
+                linear_um,
+                palmgren_um,
+                "µm",
+                "under the peak force the linear law lets the wave generator's contact approach by far less than real line contacts do: wind-up comes out too small and the effect of clearances too large".into(),
+                "choose the law `palmgren`, or `fixed` with stiffnesses of your own",
+            ),
+            Finding::PalmgrenBeyondSteel { contact, contact_modulus_gpa, steel_gpa } => new(
+                Code::PalmgrenBeyondSteel,
+                Warning,
+                &["/model/stiffness/law", "/materials/teeth", &format!("/materials/{}", contact_name(contact))],
+                contact_modulus_gpa,
+                steel_gpa,
+                "GPa",
+                format!(
+                    "Palmgren's law holds for steel on steel, and the contact modulus at the {} is another",
+                    contact_name(contact).replace('_', " ")
+                ),
+                "choose the law `fixed` with stiffnesses of your own",
             ),
             Finding::StressAboveFatigueLimit { contact, stress_mpa } => new(
                 Code::StressAboveFatigueLimit,

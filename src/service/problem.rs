@@ -128,6 +128,8 @@ pub enum FieldCode {
     NoCarrierAnnulus,
     /// The bore takes the whole flank away.
     BoreLeavesNoFlank,
+    /// A clearance under `projection` that would load a tooth instead of freeing it.
+    ClearanceNotMonotone,
     /// More states than `max_states`.
     TooManyStates,
     /// More profile points than `max_profile_points`.
@@ -280,7 +282,12 @@ impl From<SolveError> for Problem {
             SolveError::TooManyPoints { points, limit } => {
                 let detail = format!("{detail} by `max_profile_points`");
                 let pointer = "/profile/chord_tolerance_mm";
-                too_many(ProblemCode::TooManyPoints, FieldCode::TooManyPoints, pointer, &detail, points, limit)
+                too_many(ProblemCode::TooManyPoints, FieldCode::TooManyPoints, pointer, &detail, Some(points), limit)
+            }
+            SolveError::TooManyStates { limit } => {
+                let detail = format!("{detail}, the limit by `max_states`");
+                let pointer = "/sweep/tolerance";
+                too_many(ProblemCode::TooManyStates, FieldCode::TooManyStates, pointer, &detail, None, limit)
             }
             SolveError::Stopped => {
                 Self::new(ProblemCode::DeadlineExceeded, "the computation took longer than the service allows")
@@ -290,21 +297,21 @@ impl From<SolveError> for Problem {
     }
 }
 
-/// The problem of a request that is larger than a limit, which it names with its own value.
+/// The problem of a request that is larger than a limit, which it names with its own value, where that is known.
 #[expect(clippy::cast_precision_loss, reason = "counts far below 2^53")]
 pub fn too_many(
     code: ProblemCode,
     field_code: FieldCode,
     pointer: &str,
     detail: &str,
-    value: u64,
+    value: Option<u64>,
     limit: u64,
 ) -> Problem {
     let error = FieldError {
         pointer: pointer.into(),
         code: field_code,
         detail: detail.into(),
-        value: Some(value as f64),
+        value: value.map(|value| value as f64),
         limit: Some(limit as f64),
     };
     Problem::at_fields(code, detail, vec![error])
@@ -333,6 +340,9 @@ fn field_error(violation: &Violation) -> FieldError {
         }
         Violation::NoCarrierAnnulus { semi_major_mm, tip_radius_mm } => {
             (FieldCode::NoCarrierAnnulus, SemiMajor, semi_major_mm, tip_radius_mm)
+        }
+        Violation::ClearanceNotMonotone { contact, clearance_um } => {
+            (FieldCode::ClearanceNotMonotone, Parameter::Clearance(contact), clearance_um, 0.0)
         }
         Violation::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => {
             (FieldCode::BoreLeavesNoFlank, TipRadius, tip_radius_mm, root_radius_mm)
@@ -363,7 +373,10 @@ pub fn pointer(parameter: Parameter) -> String {
         Parameter::InputTorque => "/load/input_torque_nm".into(),
         Parameter::OutputTorque => "/load/output_torque_nm".into(),
         Parameter::Stiffness(contact) => format!("/model/stiffness/{}_n_per_mm", contact_name(contact)),
+        Parameter::Clearance(contact) => format!("/model/clearance/{}_um", contact_name(contact)),
+        Parameter::AllowableStress => "/load/allowable_stress_mpa".into(),
         Parameter::Samples => "/sweep/samples".into(),
+        Parameter::SweepTolerance => "/sweep/tolerance".into(),
         Parameter::ChordTolerance => "/profile/chord_tolerance_mm".into(),
     }
 }

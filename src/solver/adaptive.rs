@@ -250,8 +250,10 @@ impl<S: Stop> Search<'_, S> {
         let (mut second, mut third) = (best.moment.fraction, best.moment.fraction);
         let (mut at_second, mut at_third) = (best.of(number)[kind], best.of(number)[kind]);
         let (mut step, mut last_step) = (0.0_f64, 0.0_f64);
-        // Around a smooth peak the value is off by the square of this, times what it varies by over the bracket.
-        let nearest = (0.1 * tolerance.sqrt() * (high - low)).max(f64::EPSILON);
+        // Around a smooth peak the value is off by the square of this, times what it varies by over the bracket; with clearance a peak
+        // may be a kink, where another tooth begins to carry, and the value is off by as much as the place.
+        let share = if self.loaded.linear_compliance_mm_per_n().is_some() { tolerance.sqrt() } else { tolerance };
+        let nearest = (0.1 * share * (high - low)).max(f64::EPSILON);
         for _ in 0..MAX_STEPS {
             let x = best.moment.fraction;
             let value = best.of(number)[kind];

@@ -1,7 +1,8 @@
 //! What a designer should be told about a drive that can exist (docs/findings.md).
 
-use crate::contact::{Contact, PerContact};
+use crate::contact::{Contact, ContactLaw, Material, Materials, PerContact};
 use crate::drive::Drive;
+use crate::load_sharing::LoadCase;
 use crate::mesh::Mesh;
 use crate::ring::FlankEnd;
 use crate::root::NotConverged;
@@ -16,6 +17,11 @@ pub const THIN_WALL_SHARE_OF_SLOT: f64 = 0.25;
 /// A ring pressure angle beyond this is reported: there the ring carries about three times the cam's radial force, and
 /// friction, which the model leaves out, begins to decide whether the drive turns at all.
 pub const STEEP_FLANK_DEG: f64 = 70.0;
+
+/// How far a contact modulus may be from that of steel on steel for Palmgren's constant to hold without a word: steels differ by less.
+pub const STEEL_TOLERANCE: f64 = 0.1;
+
+const STEEL: Material = Material::STEEL;
 
 /// The edge of the carrier's annulus that a tooth passes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,6 +87,22 @@ pub enum Finding {
     SteepRingFlank {
         /// Largest pressure angle β on the engaged flank.
         pressure_angle_deg: f64,
+    },
+    /// The linear law where approaches matter: it is several times too stiff.
+    LinearLawTooStiff {
+        /// The approach at the wave generator under the peak force by the linear law.
+        linear_um: f64,
+        /// The same by Palmgren's law.
+        palmgren_um: f64,
+    },
+    /// Palmgren's law for a contact that is not steel on steel.
+    PalmgrenBeyondSteel {
+        /// Which.
+        contact: Contact,
+        /// Its contact modulus.
+        contact_modulus_gpa: f64,
+        /// That of steel on steel.
+        steel_gpa: f64,
     },
     /// A stress above the fatigue limit of bearing steel.
     StressAboveFatigueLimit {
@@ -154,11 +176,45 @@ pub fn of_drive(drive: &Drive) -> Result<Vec<Finding>, NotConverged> {
     Ok(findings)
 }
 
-/// The findings about a drive's contacts under a load.
-pub fn of_peaks(peaks: &PerContact<ContactPeaks>) -> Vec<Finding> {
-    peaks
-        .iter()
-        .filter(|(_, peaks)| peaks.stress_mpa.value > FATIGUE_LIMIT_STRESS_MPA)
-        .map(|(contact, peaks)| Finding::StressAboveFatigueLimit { contact, stress_mpa: peaks.stress_mpa.value })
-        .collect()
+/// The findings about a drive's contacts under a load. `approaches_matter` where wind-up or clearance was asked for.
+pub fn of_contacts(
+    drive: &Drive,
+    load: &LoadCase,
+    peaks: &PerContact<ContactPeaks>,
+    approaches_matter: bool,
+) -> Vec<Finding> {
+    let p = load.parameters();
+    let width_mm = drive.parameters().tooth_width_mm;
+    let mut findings = Vec::new();
+    if p.law == ContactLaw::Linear && approaches_matter {
+        let force_n = peaks.wave_generator.force_n.value;
+        let approach_um = |law: ContactLaw| {
+            let approach = law.approach(&p.materials, width_mm);
+            1e3 * approach.coefficient.wave_generator * approach.power(force_n)
+        };
+        findings.push(Finding::LinearLawTooStiff {
+            linear_um: approach_um(ContactLaw::Linear),
+            palmgren_um: approach_um(ContactLaw::Palmgren),
+        });
+    }
+    if p.law == ContactLaw::Palmgren {
+        let steel = Materials { wave_generator: STEEL, teeth: STEEL, ring: STEEL, carrier: STEEL };
+        let steel_mpa = steel.contact_modulus_mpa(Contact::Ring);
+        for (contact, _) in peaks.iter() {
+            let contact_mpa = p.materials.contact_modulus_mpa(contact);
+            if (contact_mpa / steel_mpa - 1.0).abs() > STEEL_TOLERANCE {
+                findings.push(Finding::PalmgrenBeyondSteel {
+                    contact,
+                    contact_modulus_gpa: 1e-3 * contact_mpa,
+                    steel_gpa: 1e-3 * steel_mpa,
+                });
+            }
+        }
+    }
+    let stressed = peaks.iter().filter(|(_, peaks)| peaks.stress_mpa.value > FATIGUE_LIMIT_STRESS_MPA);
+    findings.extend(
+        stressed
+            .map(|(contact, peaks)| Finding::StressAboveFatigueLimit { contact, stress_mpa: peaks.stress_mpa.value }),
+    );
+    findings
 }

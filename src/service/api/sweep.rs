@@ -6,9 +6,10 @@ use std::sync::atomic::AtomicBool;
 use axum::extract::{Request, State};
 use axum::response::Response;
 use serde::Serialize;
+use toothwave_solver::contact::{SHEAR_DEPTH, SHEAR_SHARE};
 use toothwave_solver::mesh::Mesh;
-use toothwave_solver::sweep::{self as solver, ContactPeaks, Peak, States};
-use toothwave_solver::{Drive, LoadCase, PerContact, findings};
+use toothwave_solver::sweep::{self as solver, ContactPeaks, InputAngles, Peak, Points, States, TorqueCapacity};
+use toothwave_solver::{Contact, Drive, LoadCase, PerContact, SolveError, findings};
 use utoipa::ToSchema;
 
 use super::geometry::{drive_findings, write_findings};
@@ -32,6 +33,14 @@ pub struct SweepAnswer {
     pub peaks: PeaksAnswer,
     /// The states.
     pub states: StatesAnswer,
+    /// Wind-up and torsional stiffness, given `sweep.wind_up`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub wind_up: Option<WindUpAnswer>,
+    /// The torque capacity, given `load.allowable_stress_mpa`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub torque_capacity: Option<TorqueCapacityAnswer>,
     /// How well the results fulfil what must hold.
     pub checks: ChecksAnswer,
     /// What a designer should be told.
@@ -56,6 +65,12 @@ pub struct ContactPeaksAnswer {
     pub force_n: PeakAnswer,
     /// Of its Hertz stress, in MPa.
     pub stress_mpa: PeakAnswer,
+    /// Half the width of the contact where the stress has its peak.
+    pub half_width_mm: f64,
+    /// The largest shear stress below the surface there, in the plane of the section.
+    pub shear_stress_mpa: f64,
+    /// How deep it stands.
+    pub shear_depth_mm: f64,
 }
 
 /// A largest value and where it stands.
@@ -96,6 +111,81 @@ pub struct StatesAnswer {
     pub stress_ring_mpa: Vec<f64>,
     /// Hertz stress σ_S between tooth and carrier.
     pub stress_carrier_mpa: Vec<f64>,
+    /// Whether the tooth carries load, given `model.clearance`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub loaded: Option<Vec<bool>>,
+}
+
+/// What holds for all teeth at an input angle, in columns of equal length: one entry an input angle.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct WindUpAnswer {
+    /// Range of the wind-up over the period, at the output.
+    pub transmission_error_peak_to_peak_deg: f64,
+    /// Input angle j.
+    pub input_angle_deg: Vec<f64>,
+    /// How far the wave generator turns under the load, carrier held, clearances included.
+    pub wind_up_deg: Vec<f64>,
+    /// Output torque over output rotation at the load, wave generator held.
+    pub torsional_stiffness_nm_per_rad: Vec<f64>,
+    /// Teeth of one zone that carry load.
+    pub loaded_teeth: Vec<u32>,
+}
+
+/// The largest torque under which no contact exceeds the allowable stress, over the input angles of the sweep.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct TorqueCapacityAnswer {
+    /// At the wave generator.
+    pub input_torque_nm: f64,
+    /// At the carrier.
+    pub output_torque_nm: f64,
+    /// The contact that limits it.
+    pub limited_by: ContactName,
+    /// The input angle where it does.
+    pub input_angle_deg: f64,
+}
+
+/// A contact of a tooth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ContactName {
+    /// With the wave generator.
+    WaveGenerator,
+    /// With the ring.
+    Ring,
+    /// With the carrier.
+    Carrier,
+}
+
+impl From<Contact> for ContactName {
+    fn from(contact: Contact) -> Self {
+        match contact {
+            Contact::WaveGenerator => Self::WaveGenerator,
+            Contact::Ring => Self::Ring,
+            Contact::Carrier => Self::Carrier,
+        }
+    }
+}
+
+impl WindUpAnswer {
+    fn new(drive: &Drive, sweep: &solver::Sweep) -> Self {
+        let InputAngles { input_angle_deg, wind_up_deg, torsional_stiffness_nm_per_rad, loaded_teeth } =
+            sweep.input_angles.clone();
+        Self {
+            transmission_error_peak_to_peak_deg: sweep.transmission_error_peak_to_peak_deg(drive),
+            input_angle_deg,
+            wind_up_deg,
+            torsional_stiffness_nm_per_rad,
+            loaded_teeth,
+        }
+    }
+}
+
+impl From<TorqueCapacity> for TorqueCapacityAnswer {
+    fn from(capacity: TorqueCapacity) -> Self {
+        let TorqueCapacity { input_torque_nm, output_torque_nm, contact, input_angle_deg } = capacity;
+        Self { input_torque_nm, output_torque_nm, limited_by: contact.into(), input_angle_deg }
+    }
 }
 
 /// How well the results fulfil what must hold.
@@ -107,9 +197,11 @@ pub struct ChecksAnswer {
     pub period_closure_residual: f64,
 }
 
-impl From<States> for StatesAnswer {
-    fn from(states: States) -> Self {
+impl StatesAnswer {
+    fn new(states: States, with_clearance: bool) -> Self {
+        let forces = &states.force_n.wave_generator;
         Self {
+            loaded: with_clearance.then(|| forces.iter().map(|force| *force > 0.0).collect()),
             input_angle_deg: states.input_angle_deg,
             tooth: states.tooth,
             position_deg: states.position_deg,
@@ -133,8 +225,14 @@ impl From<Peak> for PeakAnswer {
 }
 
 impl From<ContactPeaks> for ContactPeaksAnswer {
-    fn from(ContactPeaks { force_n, stress_mpa }: ContactPeaks) -> Self {
-        Self { force_n: force_n.into(), stress_mpa: stress_mpa.into() }
+    fn from(ContactPeaks { force_n, stress_mpa, half_width_mm }: ContactPeaks) -> Self {
+        Self {
+            shear_stress_mpa: SHEAR_SHARE * stress_mpa.value,
+            shear_depth_mm: SHEAR_DEPTH * half_width_mm,
+            half_width_mm,
+            force_n: force_n.into(),
+            stress_mpa: stress_mpa.into(),
+        }
     }
 }
 
@@ -149,7 +247,9 @@ impl From<PerContact<ContactPeaks>> for PeaksAnswer {
 pub struct SweepQuestion {
     drive: Drive,
     load: LoadCase,
-    samples: u64,
+    points: Points,
+    with_clearance: bool,
+    with_wind_up: bool,
 }
 
 /// The endpoint.
@@ -168,44 +268,54 @@ impl Endpoint for Sweep {
 
     fn question(design: &Design, limits: &Limits) -> Result<SweepQuestion, Problem> {
         let load = design.load_case()?;
+        let points = design.sweep_points(limits.max_states)?;
         let mut violations = Vec::new();
         let drive = checked_drive(design, &mut violations)?;
-        let (drive, load, samples) = match (drive, load, design.samples()) {
-            (Some(drive), Ok(load), Ok(samples)) => (drive, load, samples),
-            (_, load, samples) => {
+        if let (Some(drive), Ok(load)) = (&drive, &load) {
+            violations.extend(load.clearance_violations(drive).map_err(SolveError::from)?);
+        }
+        let (drive, load, points) = match (drive, load, points) {
+            (Some(drive), Ok(load), Ok(points)) if violations.is_empty() => (drive, load, points),
+            (_, load, points) => {
                 violations.extend(load.err().into_iter().flatten());
-                violations.extend(samples.err());
+                violations.extend(points.err());
                 return Err(Problem::impossible(&violations));
             }
         };
-        let states = Mesh::new(&drive).state_count(samples);
-        let limit = limits.max_states;
-        if states > limit {
-            let detail = format!(
-                "the sweep has {states} states (input angles times teeth in mesh), more than the {limit} of `max_states`"
-            );
-            let (code, field_code) = (ProblemCode::TooManyStates, FieldCode::TooManyStates);
-            return Err(too_many(code, field_code, "/sweep/samples", &detail, states, limit));
+        if let Points::Samples(samples) = points {
+            let (states, limit) = (Mesh::new(&drive).state_count(samples), limits.max_states);
+            if states > limit {
+                let detail = format!(
+                    "the sweep has {states} states (input angles times teeth in mesh), more than the {limit} of `max_states`"
+                );
+                let (code, field_code) = (ProblemCode::TooManyStates, FieldCode::TooManyStates);
+                return Err(too_many(code, field_code, "/sweep/samples", &detail, Some(states), limit));
+            }
         }
-        Ok(SweepQuestion { drive, load, samples })
+        let (with_clearance, with_wind_up) = (design.model.clearance.is_some(), design.sweep.wind_up);
+        Ok(SweepQuestion { drive, load, points, with_clearance, with_wind_up })
     }
 
     fn answer(question: &SweepQuestion, stop: &AtomicBool) -> Result<SweepAnswer, Problem> {
-        let SweepQuestion { drive, load, samples } = question;
-        let sweep = solver::sweep(drive, load, *samples, stop)?;
+        let SweepQuestion { drive, load, points, with_clearance, with_wind_up } = question;
+        let sweep = solver::sweep(drive, load, *points, stop)?;
         let mesh = Mesh::new(drive);
         let mut findings = drive_findings(drive)?;
-        findings.extend(findings::of_peaks(&sweep.peaks).iter().map(FindingAnswer::from));
+        let approaches_matter = *with_wind_up || load.has_clearance();
+        let of_contacts = findings::of_contacts(drive, load, &sweep.peaks, approaches_matter);
+        findings.extend(of_contacts.iter().map(FindingAnswer::from));
         let answer = SweepAnswer {
             solver_version: toothwave_solver::VERSION,
             coincidence_degree: mesh.coincidence_degree(),
             period_deg: mesh.period_deg(),
             peaks: sweep.peaks.into(),
-            states: sweep.states.into(),
+            wind_up: with_wind_up.then(|| WindUpAnswer::new(drive, &sweep)),
+            torque_capacity: sweep.torque_capacity.map(Into::into),
             checks: ChecksAnswer {
                 torque_balance_residual: sweep.torque_balance_residual,
                 period_closure_residual: sweep.period_closure_residual,
             },
+            states: StatesAnswer::new(sweep.states, *with_clearance),
             findings,
         };
         let states = &answer.states;
@@ -224,27 +334,30 @@ impl Endpoint for Sweep {
     }
 }
 
+/// The columns of the states, as JSON and CSV name them.
+const STATE_COLUMNS: [&str; 12] = [
+    "input_angle_deg",
+    "tooth",
+    "position_deg",
+    "center_radius_mm",
+    "wave_generator_angle_deg",
+    "ring_angle_deg",
+    "force_wave_generator_n",
+    "force_ring_n",
+    "force_carrier_n",
+    "stress_wave_generator_mpa",
+    "stress_ring_mpa",
+    "stress_carrier_mpa",
+];
+
 impl Tabular for SweepAnswer {
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
-        let mut csv = csv::Writer::from_writer(writer);
-        csv.write_record([
-            "input_angle_deg",
-            "tooth",
-            "position_deg",
-            "center_radius_mm",
-            "wave_generator_angle_deg",
-            "ring_angle_deg",
-            "force_wave_generator_n",
-            "force_ring_n",
-            "force_carrier_n",
-            "stress_wave_generator_mpa",
-            "stress_ring_mpa",
-            "stress_carrier_mpa",
-        ])
-        .map_err(csv_error)?;
         let states = &self.states;
+        let mut csv = csv::Writer::from_writer(writer);
+        let names = STATE_COLUMNS.iter().chain(states.loaded.as_ref().map(|_| &"loaded"));
+        csv.write_record(names).map_err(csv_error)?;
         for i in 0..states.tooth.len() {
-            csv.serialize((
+            let state = (
                 states.input_angle_deg[i],
                 states.tooth[i],
                 states.position_deg[i],
@@ -257,7 +370,11 @@ impl Tabular for SweepAnswer {
                 states.stress_wave_generator_mpa[i],
                 states.stress_ring_mpa[i],
                 states.stress_carrier_mpa[i],
-            ))
+            );
+            match &states.loaded {
+                Some(loaded) => csv.serialize((state, loaded[i])),
+                None => csv.serialize(state),
+            }
             .map_err(csv_error)?;
         }
         csv.flush()
@@ -283,6 +400,25 @@ impl Tabular for SweepAnswer {
                     peak.value, peak.input_angle_deg, peak.position_deg
                 )?;
             }
+        }
+        if let Some(capacity) = &self.torque_capacity {
+            writeln!(
+                writer,
+                "\ntorque capacity, input and output   {:.6} and {:.6} N·m, limited by {:?} at {:.4} deg",
+                capacity.input_torque_nm, capacity.output_torque_nm, capacity.limited_by, capacity.input_angle_deg
+            )?;
+        }
+        if let Some(wind_up) = &self.wind_up {
+            let range = |column: &[f64]| {
+                let least = column.iter().copied().fold(f64::INFINITY, f64::min);
+                (least, column.iter().copied().fold(f64::NEG_INFINITY, f64::max))
+            };
+            let (least, most) = range(&wind_up.wind_up_deg);
+            let (softest, stiffest) = range(&wind_up.torsional_stiffness_nm_per_rad);
+            let error_deg = wind_up.transmission_error_peak_to_peak_deg;
+            writeln!(writer, "\nwind-up of the input                {least:.6} to {most:.6} deg")?;
+            writeln!(writer, "torsional stiffness at the output   {softest:.6e} to {stiffest:.6e} N·m/rad")?;
+            writeln!(writer, "transmission error, peak to peak    {error_deg:.3e} deg")?;
         }
         write_findings(&self.findings, writer)
     }
