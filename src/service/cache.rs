@@ -58,8 +58,6 @@ pub enum Served {
     Miss,
     /// Solved for another request that came first and asked the same.
     Collapsed,
-    /// Not at all: the client has it already.
-    Unneeded,
 }
 
 impl Served {
@@ -69,7 +67,6 @@ impl Served {
             Self::Hit => "toothwave; hit",
             Self::Miss => "toothwave; fwd=miss",
             Self::Collapsed => "toothwave; fwd=miss; collapsed",
-            Self::Unneeded => "toothwave; fwd=bypass",
         }
     }
 
@@ -79,7 +76,6 @@ impl Served {
             Self::Hit => "hit",
             Self::Miss => "miss",
             Self::Collapsed => "collapsed",
-            Self::Unneeded => "unneeded",
         }
     }
 }

@@ -50,8 +50,8 @@ pub struct Settings {
     #[arg(long = "cors-origin", env = "TOOTHWAVE_CORS_ORIGINS", value_name = "ORIGIN", value_delimiter = ',')]
     pub cors_origins: Vec<String>,
 
-    /// Milliseconds that running requests get to finish after a signal to stop
-    #[arg(long, env = "TOOTHWAVE_SHUTDOWN_MS", value_name = "MS", default_value_t = 10_000)]
+    /// Milliseconds that running requests get to finish after a signal to stop; below the ten seconds that container engines wait
+    #[arg(long, env = "TOOTHWAVE_SHUTDOWN_MS", value_name = "MS", default_value_t = 8_000)]
     pub shutdown_ms: u64,
 
     /// What is logged, as tracing-subscriber's EnvFilter reads it

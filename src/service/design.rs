@@ -256,7 +256,7 @@ impl ToSchema for StiffnessDocument {
 pub struct SweepDocument {
     /// Equal intervals of one period; both ends are included. 50 where neither this nor `tolerance` is given.
     #[serde(deserialize_with = "given")]
-    #[schema(value_type = i64, minimum = 1, maximum = 10000000, required = false)]
+    #[schema(value_type = i64, minimum = 1, maximum = 10000000, default = 50, required = false)]
     pub samples: Option<Whole>,
     /// Instead of `samples`: the true extremes of every force and stress to this relative tolerance, input angles placed where they are
     /// needed, and the instant at which a tooth enters twice, without it and with it.

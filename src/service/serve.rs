@@ -3,6 +3,7 @@
 use std::io;
 use std::net::SocketAddr;
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
@@ -12,6 +13,9 @@ use crate::api::App;
 use crate::config::Settings;
 use crate::observe;
 use crate::router::router;
+
+/// How long the service still listens after it has said that it is not ready, so that whoever asks can learn it.
+const NOTICE: Duration = Duration::from_millis(200);
 
 /// Serves until a signal, then drains within the bound of the settings.
 ///
@@ -32,6 +36,7 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
         }
         tracing::info!("stopping: no longer ready, draining");
         ready.store(false, Ordering::Relaxed);
+        tokio::time::sleep(NOTICE).await;
         // Nobody listens any more only if serving has ended already.
         let _ = stopping.send(());
     };

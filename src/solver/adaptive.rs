@@ -96,8 +96,8 @@ pub(crate) fn moments(
     }
     for seen in &mut moments {
         let mut extremes = Vec::new();
-        for triple in seen.windows(3) {
-            search.extremes_between(triple, tolerance, &mut extremes)?;
+        for [before, middle, after] in neighbours(seen) {
+            search.extremes_around(before, middle, after, tolerance, &mut extremes)?;
         }
         seen.extend(extremes);
         seen.sort_by(|one, other| one.moment.fraction.total_cmp(&other.moment.fraction));
@@ -139,6 +139,12 @@ fn smooth_pieces(mesh: &Mesh) -> Vec<Piece> {
     } else {
         vec![Piece { start, end }]
     }
+}
+
+/// Each moment of a piece between its neighbours; those at the ends are their own, so that an extreme beside an end is seen too.
+fn neighbours(seen: &[Seen]) -> impl Iterator<Item = [&Seen; 3]> {
+    let last = seen.len() - 1;
+    (0..seen.len()).map(move |index| [&seen[index.saturating_sub(1)], &seen[index], &seen[(index + 1).min(last)]])
 }
 
 impl<S: Stop> Search<'_, S> {
@@ -212,13 +218,14 @@ impl<S: Stop> Search<'_, S> {
     }
 
     /// Closes in on every extreme around the middle one of three moments that may be the largest of its kind.
-    fn extremes_between(
+    fn extremes_around(
         &mut self,
-        triple: &[Seen],
+        before: &Seen,
+        middle: &Seen,
+        after: &Seen,
         tolerance: f64,
         extremes: &mut Vec<Seen>,
     ) -> Result<(), SolveError> {
-        let [before, middle, after] = triple else { return Ok(()) };
         for number in middle.moment.first..=middle.moment.last {
             let (low, top, high) = (before.of(number), middle.of(number), after.of(number));
             for kind in 0..top.len() {

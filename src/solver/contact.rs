@@ -128,7 +128,7 @@ impl Materials {
 /// How force and approach of a contact go together.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ContactLaw {
-    /// `F = k δ` [7] with `k = π L1 E*/2`, of two parallel cylinders in line contact (Yang and Sun 1985).
+    /// `F = k δ` \[7\] with `k = π L1 E*/2`, of two parallel cylinders in line contact (Yang and Sun 1985).
     Linear,
     /// `F = k δ` with stiffnesses that the designer gives, in N/mm.
     Fixed(PerContact<f64>),
@@ -178,7 +178,7 @@ impl Approach {
     }
 }
 
-/// Hertz stress of a line contact [8]: `σ = √(F/(π L1) · (1/ρ1 + 1/ρ2) · E*)`.
+/// Hertz stress of a line contact \[8\]: `σ = √(F/(π L1) · (1/ρ1 + 1/ρ2) · E*)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HertzLine {
     modulus_per_width_mpa_per_mm: f64,

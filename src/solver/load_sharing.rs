@@ -13,7 +13,7 @@ use crate::violation::{Parameter, Violation};
 /// How the three approaches of a tooth add up to the rotation of the wave generator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Compatibility {
-    /// The paper's [3]-[6]: each approach projected on the direction of `F_H`.
+    /// The paper's \[3\]-\[6\]: each approach projected on the direction of `F_H`.
     Projection,
     /// Virtual work: the frictionless solution for a tooth whose centre is free to move.
     VirtualWork,
@@ -124,7 +124,7 @@ impl Weights {
     }
 }
 
-/// Forces over `F_H`: 1, `F_K/F_H = cos γ/cos β`, `F_S/F_H = sin γ Z_G/U` [1].
+/// Forces over `F_H`: 1, `F_K/F_H = cos γ/cos β`, `F_S/F_H = sin γ Z_G/U` \[1\].
 fn force_ratio(drive: &Drive, center: &ToothCenter) -> PerContact<f64> {
     let t = center.tan_pressure_angle;
     let tan_ring = drive.flank().teeth_per_wave() * t;
@@ -319,7 +319,7 @@ impl<'a> LoadedDrive<'a> {
         })
     }
 
-    /// The torque `U Σ F_H |h'|` [2] of these teeth of one zone, and its derivative by `Δφ`.
+    /// The torque `U Σ F_H |h'|` \[2\] of these teeth of one zone, and its derivative by `Δφ`.
     fn torque(&self, teeth: &[ToothState], closing_rad: f64, excess_rad: f64) -> ValueAndSlope {
         let mut torque = ValueAndSlope { value: 0.0, slope: 0.0 };
         for tooth in teeth {

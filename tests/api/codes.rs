@@ -52,7 +52,8 @@ pub(crate) fn field_codes() -> Vec<FieldCode> {
         InstalledNoDivisor => TeethTouch,
         TeethTouch => NoCarrierAnnulus,
         NoCarrierAnnulus => BoreLeavesNoFlank,
-        BoreLeavesNoFlank => TooManyStates,
+        BoreLeavesNoFlank => ClearanceNotMonotone,
+        ClearanceNotMonotone => TooManyStates,
         TooManyStates => TooManyPoints;
         TooManyPoints)
 }
@@ -65,7 +66,9 @@ pub(crate) fn finding_codes() -> Vec<FindingCode> {
         FewTeethInMesh => ThinSlotWall,
         ThinSlotWall => ToothBeyondCarrier,
         ToothBeyondCarrier => SteepRingFlank,
-        SteepRingFlank => StressAboveFatigueLimit;
+        SteepRingFlank => LinearLawTooStiff,
+        LinearLawTooStiff => PalmgrenBeyondSteel,
+        PalmgrenBeyondSteel => StressAboveFatigueLimit;
         StressAboveFatigueLimit)
 }
 

@@ -190,8 +190,18 @@ async fn all_endpoints_tell_the_same_of_the_drive_itself() {
 #[tokio::test]
 async fn every_kind_of_finding_can_be_met_over_http() {
     let bore_without_effect = with(&shortest(), "/drive/ring/tip_radius_mm", json!(60.0));
+    let linear = with(&spelled_out(), "/sweep", json!({ "wind_up": true }));
+    let brass = [
+        ("/model/stiffness", json!({ "law": "palmgren" })),
+        ("/materials/ring", json!({ "youngs_modulus_gpa": 100.0 })),
+    ]
+    .into_iter()
+    .fold(spelled_out(), |document, (pointer, value)| with(&document, pointer, value));
     let mut all = Vec::new();
     for document in [undercut(), bored(), bore_without_effect, sparse(), thick(), thin(1.9), steep(), overloaded()] {
+        all.extend(findings(&document).await);
+    }
+    for document in [linear, brass] {
         all.extend(findings(&document).await);
     }
     assert_eq!(codes_of(&all), words(&finding_codes()));

@@ -9,6 +9,7 @@ mod asking;
 mod caching;
 mod codes;
 mod command_line;
+mod contact;
 mod designs;
 mod documents;
 mod endpoints;

@@ -116,12 +116,15 @@ fn parameters() -> Vec<Parameter> {
         Parameter::TipRadius,
         Parameter::InputTorque,
         Parameter::OutputTorque,
+        Parameter::AllowableStress,
         Parameter::Samples,
+        Parameter::SweepTolerance,
         Parameter::ChordTolerance,
     ];
     parameters.extend(parts.map(Parameter::YoungsModulus));
     parameters.extend(parts.map(Parameter::PoissonsRatio));
     parameters.extend(contacts.map(Parameter::Stiffness));
+    parameters.extend(contacts.map(Parameter::Clearance));
     parameters
 }
 

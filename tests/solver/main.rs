@@ -2,6 +2,8 @@
 #![allow(clippy::float_cmp, clippy::unwrap_used, reason = "tests compare exactly where values are exact")]
 
 mod drives;
+mod extremes;
+mod fast;
 mod limits;
 mod oracles;
 mod paper;

@@ -19,7 +19,7 @@ const TOLERANCE: f64 = 1e-14;
 /// How many times the condition is allowed.
 const CONDITION_MULTIPLE: f64 = 1.0;
 
-struct Case(Value);
+pub(crate) struct Case(pub(crate) Value);
 
 impl Case {
     fn all() -> Vec<Self> {
@@ -31,16 +31,17 @@ impl Case {
         Self::of(include_str!("../reference/cases_contact.json"))
     }
 
-    fn of(file: &str) -> Vec<Self> {
+    /// The cases of a file.
+    pub(crate) fn of(file: &str) -> Vec<Self> {
         let file: Value = serde_json::from_str(file).unwrap();
         file["cases"].as_array().unwrap().iter().cloned().map(Self).collect()
     }
 
-    fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         format!("{}/{}", self.0["group"].as_str().unwrap(), self.0["name"].as_str().unwrap())
     }
 
-    fn drive(&self) -> Drive {
+    pub(crate) fn drive(&self) -> Drive {
         let drive = &self.0["document"]["drive"];
         let (cam, teeth, ring) = (&drive["wave_generator"], &drive["teeth"], &drive["ring"]);
         Drive::new(&DriveParameters {
@@ -56,7 +57,7 @@ impl Case {
         .unwrap_or_else(|error| panic!("{}: {error:?}", self.name()))
     }
 
-    fn load(&self) -> LoadCase {
+    pub(crate) fn load(&self) -> LoadCase {
         let document = &self.0["document"];
         let material = |part: &str| {
             let material = &document["materials"][part];
@@ -97,7 +98,7 @@ impl Case {
                 ring: gap("ring_um"),
                 carrier: gap("carrier_um"),
             },
-            allowable_stress_mpa: None,
+            allowable_stress_mpa: load["allowable_stress_mpa"].as_f64(),
         })
         .unwrap()
     }
@@ -106,8 +107,15 @@ impl Case {
         self.0["document"]["sweep"]["samples"].as_u64().unwrap()
     }
 
-    fn sweep(&self) -> Result<Sweep, SolveError> {
-        sweep::sweep(&self.drive(), &self.load(), Points::Samples(self.samples()), &Never)
+    pub(crate) fn points(&self) -> Points {
+        match self.0["document"]["sweep"]["tolerance"].as_f64() {
+            Some(tolerance) => Points::Tolerance { tolerance, max_states: 10_000_000 },
+            None => Points::Samples(self.samples()),
+        }
+    }
+
+    pub(crate) fn sweep(&self) -> Result<Sweep, SolveError> {
+        sweep::sweep(&self.drive(), &self.load(), self.points(), &Never)
     }
 
     /// An expected scalar with what its input's rounding does to it.
@@ -117,16 +125,16 @@ impl Case {
     }
 }
 
-fn number(value: &Value) -> Option<f64> {
+pub(crate) fn number(value: &Value) -> Option<f64> {
     value.as_str().map(|text| text.parse().unwrap()).or_else(|| value.as_f64())
 }
 
 /// The worst error of each kind, in units of what is allowed.
 #[derive(Default)]
-struct Worst(BTreeMap<String, (f64, String)>);
+pub(crate) struct Worst(BTreeMap<String, (f64, String)>);
 
 impl Worst {
-    fn see(&mut self, kind: &str, case: &str, error: f64, allowed: f64) {
+    pub(crate) fn see(&mut self, kind: &str, case: &str, error: f64, allowed: f64) {
         let ratio = if error == 0.0 { 0.0 } else { error / allowed };
         let entry = self.0.entry(kind.into()).or_insert((0.0, String::new()));
         if ratio.is_nan() || ratio > entry.0 {
@@ -134,7 +142,7 @@ impl Worst {
         }
     }
 
-    fn assert_all_within(&self) {
+    pub(crate) fn assert_all_within(&self) {
         for (kind, (ratio, case)) in &self.0 {
             println!("{kind:<44} {ratio:.3} of what is allowed, at {case}");
         }

@@ -121,8 +121,13 @@ impl Tabular for CoincidenceDegreeAnswer {
     path = "/v1/coincidence-degree",
     tag = "drive",
     request_body(content = Design, description = "Reads `drive`."),
+    params(("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
     responses(
-        (status = 200, description = "The coincidence degree.", body = CoincidenceDegreeAnswer),
+        (status = 200, description = "The coincidence degree.", body = CoincidenceDegreeAnswer, headers(
+                ("ETag" = String, description = "Entity tag of this representation."),
+                ("Cache-Status" = String, description = "RFC 9211: `hit`, `fwd=miss`, `collapsed`."),
+                ("Server-Timing" = String, description = "`solve;dur=` and the milliseconds of the solve.")
+            )),
         (status = 304, description = "The client has this representation already (`If-None-Match`)."),
         Problems
     )

@@ -299,8 +299,13 @@ pub(super) fn write_findings(findings: &[FindingAnswer], writer: &mut dyn Write)
     path = "/v1/geometry",
     tag = "drive",
     request_body(content = Design, description = "Reads `drive` and `profile`."),
+    params(("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
     responses(
-        (status = 200, description = "The geometry.", body = GeometryAnswer),
+        (status = 200, description = "The geometry.", body = GeometryAnswer, headers(
+                ("ETag" = String, description = "Entity tag of this representation."),
+                ("Cache-Status" = String, description = "RFC 9211: `hit`, `fwd=miss`, `collapsed`."),
+                ("Server-Timing" = String, description = "`solve;dur=` and the milliseconds of the solve.")
+            )),
         (status = 304, description = "The client has this representation already (`If-None-Match`)."),
         Problems
     )

@@ -149,9 +149,6 @@ async fn walk<E: Endpoint>(app: App, request: Request) -> Result<Response, Probl
         (stored, Served::Hit)
     } else {
         let question = E::question(&design, &app.limits)?;
-        if negotiation::is_not_modified(&parts.headers, &etag) {
-            return Ok(not_modified(&etag, Served::Unneeded));
-        }
         let pool = app.pool.clone();
         let solve = async move { pool.run(deadline, move |stop| solve::<E>(&question, representation, stop)).await };
         app.cache.solve_once(key, solve).await?

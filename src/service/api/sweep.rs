@@ -430,9 +430,14 @@ impl Tabular for SweepAnswer {
     path = "/v1/sweep",
     tag = "drive",
     request_body(content = Design, description = "Reads all but `profile`; `load` is required."),
+    params(("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
     responses(
         (status = 200, description = "The sweep. As CSV: one line a state, with the names of the columns of `states`.",
-            content((SweepAnswer = "application/json"), (String = "text/csv"))),
+            content((SweepAnswer = "application/json"), (String = "text/csv")), headers(
+                ("ETag" = String, description = "Entity tag of this representation."),
+                ("Cache-Status" = String, description = "RFC 9211: `hit`, `fwd=miss`, `collapsed`."),
+                ("Server-Timing" = String, description = "`solve;dur=` and the milliseconds of the solve.")
+            )),
         (status = 304, description = "The client has this representation already (`If-None-Match`)."),
         Problems
     )

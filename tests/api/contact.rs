@@ -1,0 +1,160 @@
+//! Contact that is real: Palmgren's law, clearances, wind-up, torque capacity, sweeps to a tolerance.
+
+use serde_json::{Value, json};
+
+use crate::asking::Service;
+use crate::designs::{spelled_out, with};
+
+/// Case 5.1 by virtual work and Palmgren's law, with a gap at the ring's normal.
+fn palmgren(ring_um: f64) -> Value {
+    let model = json!({
+        "compatibility": "virtual_work",
+        "stiffness": { "law": "palmgren" },
+        "clearance": { "ring_um": ring_um }
+    });
+    with(&with(&spelled_out(), "/model", model), "/sweep", json!({ "samples": 50, "wind_up": true }))
+}
+
+fn numbers(column: &Value) -> Vec<f64> {
+    column.as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect()
+}
+
+fn codes(answer: &Value) -> Vec<&str> {
+    answer["findings"].as_array().unwrap().iter().map(|finding| finding["code"].as_str().unwrap()).collect()
+}
+
+#[tokio::test]
+async fn gaps_at_the_ring_raise_the_peak_and_leave_fewer_teeth_loaded() {
+    // Two independent calculations; the means are over a finer sweep than 50 intervals, where a tooth on the minor axis counts for none.
+    let known = [(0.0, 1395.05, 7.00), (5.0, 1640.15, 5.31), (10.0, 1837.15, 4.60), (20.0, 2169.7, 3.89)];
+    for (ring_um, peak_n, loaded) in known {
+        let document = with(&palmgren(ring_um), "/sweep", json!({ "samples": 2000, "wind_up": true }));
+        let answer = Service::new().post("/v1/sweep", &document).await.found();
+        let teeth = numbers(&answer["wind_up"]["loaded_teeth"]);
+        let period = &teeth[..teeth.len() - 1];
+        let mean = period.iter().sum::<f64>() / period.len() as f64;
+        assert!((mean - loaded).abs() < 0.006, "{ring_um} µm: {mean} teeth");
+
+        let answer = Service::new().post("/v1/sweep", &palmgren(ring_um)).await.found();
+        let found = answer["peaks"]["wave_generator"]["force_n"]["value"].as_f64().unwrap();
+        assert!((found - peak_n).abs() < 0.06, "{ring_um} µm: {found} N");
+    }
+}
+
+#[tokio::test]
+async fn with_clearance_the_states_say_which_teeth_carry_load() {
+    let answer = Service::new().post("/v1/sweep", &palmgren(10.0)).await.found();
+    let states = &answer["states"];
+    let forces = numbers(&states["force_ring_n"]);
+    let loaded: Vec<_> = states["loaded"].as_array().unwrap().iter().map(|loaded| loaded.as_bool().unwrap()).collect();
+    assert_eq!(loaded, forces.iter().map(|force| *force > 0.0).collect::<Vec<_>>());
+    assert!(loaded.contains(&false) && loaded.contains(&true));
+    let without = Service::new().post("/v1/sweep", &spelled_out()).await.found();
+    assert!(without["states"].get("loaded").is_none());
+}
+
+#[tokio::test]
+async fn wind_up_is_told_when_asked_for_and_the_linear_law_then_says_that_it_is_too_stiff() {
+    let asked = with(&spelled_out(), "/sweep", json!({ "wind_up": true }));
+    let linear = Service::new().post("/v1/sweep", &asked).await.found();
+    assert_eq!(codes(&linear), ["linear_law_too_stiff"]);
+    let finding = &linear["findings"][0];
+    let ratio = finding["limit"].as_f64().unwrap() / finding["value"].as_f64().unwrap();
+    assert!((4.0..8.0).contains(&ratio), "several times too stiff: {ratio}");
+    let palmgren = Service::new().post("/v1/sweep", &palmgren(0.0)).await.found();
+    assert!(codes(&palmgren).is_empty());
+    let wind_up = |answer: &Value| numbers(&answer["wind_up"]["wind_up_deg"])[0];
+    assert!(wind_up(&palmgren) > 4.0 * wind_up(&linear));
+    let unasked = Service::new().post("/v1/sweep", &spelled_out()).await.found();
+    assert!(unasked.get("wind_up").is_none() && codes(&unasked).is_empty());
+}
+
+#[tokio::test]
+async fn output_torque_over_output_rotation_is_the_torsional_stiffness_of_a_linear_law() {
+    let asked = with(&spelled_out(), "/sweep", json!({ "wind_up": true }));
+    let answer = Service::new().post("/v1/sweep", &asked).await.found();
+    let wind_up_deg = numbers(&answer["wind_up"]["wind_up_deg"]);
+    for (wind_up_deg, found) in wind_up_deg.iter().zip(numbers(&answer["wind_up"]["torsional_stiffness_nm_per_rad"])) {
+        let secant = 20.0 * 14.0 / (wind_up_deg.to_radians() / 14.0);
+        assert!((found - secant).abs() < 1e-12 * secant);
+    }
+    let range = wind_up_deg.iter().fold(0.0_f64, |most, one| most.max(*one))
+        - wind_up_deg.iter().fold(f64::INFINITY, |least, one| least.min(*one));
+    let error_deg = answer["wind_up"]["transmission_error_peak_to_peak_deg"].as_f64().unwrap();
+    assert!((error_deg - range / 14.0).abs() < 1e-15);
+}
+
+#[tokio::test]
+async fn at_its_capacity_the_limiting_contact_bears_just_the_allowable_stress() {
+    for base in [spelled_out(), palmgren(10.0)] {
+        let asked = with(&base, "/load", json!({ "input_torque_nm": 20.0, "allowable_stress_mpa": 1500.0 }));
+        let capacity = Service::new().post("/v1/sweep", &asked).await.found()["torque_capacity"].clone();
+        let torque = capacity["input_torque_nm"].as_f64().unwrap();
+        assert!((capacity["output_torque_nm"].as_f64().unwrap() - 14.0 * torque).abs() < 1e-12 * torque * 14.0);
+        let at_capacity = with(&base, "/load", json!({ "input_torque_nm": torque }));
+        let peaks = Service::new().post("/v1/sweep", &at_capacity).await.found()["peaks"].clone();
+        let limiting = capacity["limited_by"].as_str().unwrap();
+        for contact in ["wave_generator", "ring", "carrier"] {
+            let stress = peaks[contact]["stress_mpa"]["value"].as_f64().unwrap();
+            assert!(stress <= 1500.0 * (1.0 + 1e-11), "{contact}: {stress}");
+            assert!(contact != limiting || stress > 1500.0 * (1.0 - 1e-11), "{contact}: {stress}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_clearance_that_projection_would_turn_into_load_is_refused() {
+    let more_ring_teeth = [("/drive/ring/teeth", json!(30)), ("/drive/teeth/radius_mm", json!(4.0))]
+        .into_iter()
+        .fold(spelled_out(), |document, (pointer, value)| with(&document, pointer, value));
+    let model = json!({ "compatibility": "projection", "clearance": { "carrier_um": 5.0 } });
+    let refused = Service::new().post("/v1/sweep", &with(&more_ring_teeth, "/model", model)).await;
+    let problem = refused.refused(422, "impossible_design");
+    assert_eq!(problem["errors"][0]["pointer"], "/model/clearance/carrier_um");
+    assert_eq!(problem["errors"][0]["code"], "clearance_not_monotone");
+    // With fewer ring teeth it weighs the same gap positively, and virtual work weighs every gap so.
+    let model = json!({ "compatibility": "projection", "clearance": { "carrier_um": 5.0 } });
+    Service::new().post("/v1/sweep", &with(&spelled_out(), "/model", model)).await.found();
+    let model = json!({ "compatibility": "virtual_work", "clearance": { "carrier_um": 5.0 } });
+    Service::new().post("/v1/sweep", &with(&more_ring_teeth, "/model", model)).await.found();
+}
+
+#[tokio::test]
+async fn palmgrens_law_for_other_materials_than_steel_is_a_finding() {
+    let brass = with(&palmgren(0.0), "/materials/carrier", json!({ "youngs_modulus_gpa": 100.0 }));
+    let answer = Service::new().post("/v1/sweep", &brass).await.found();
+    assert_eq!(codes(&answer), ["palmgren_beyond_steel"]);
+    assert!(answer["findings"][0]["pointers"].as_array().unwrap().contains(&json!("/materials/carrier")));
+}
+
+#[tokio::test]
+async fn samples_and_a_tolerance_exclude_each_other() {
+    let both = with(&spelled_out(), "/sweep", json!({ "samples": 50, "tolerance": 1e-6 }));
+    let (at, code, _) = Service::new().post("/v1/sweep", &both).await.faulty_field();
+    assert_eq!((at.as_str(), code.as_str()), ("/sweep", "conflicting_fields"));
+}
+
+#[tokio::test]
+async fn a_sweep_to_a_tolerance_stands_on_both_sides_of_the_jump() {
+    let document: Value = serde_json::from_str(include_str!("../../examples/paper-5.2.json")).unwrap();
+    let answer =
+        Service::new().post("/v1/sweep", &with(&document, "/sweep", json!({ "tolerance": 1e-9 }))).await.found();
+    // 40 digits of it are in tests/reference/extremes.json: it stands just before a tooth enters.
+    let peak = &answer["peaks"]["wave_generator"]["force_n"];
+    assert!((peak["value"].as_f64().unwrap() - 525.554_176_523).abs() < 1e-6, "{peak}");
+    let entry_deg = peak["input_angle_deg"].as_f64().unwrap();
+    assert!((entry_deg - 1.428_103_736).abs() < 1e-8, "{peak}");
+    let angles = numbers(&answer["states"]["input_angle_deg"]);
+    let at_entry = angles.iter().filter(|angle| **angle == entry_deg).count();
+    assert_eq!(at_entry, 4 + 5, "without the tooth that enters, and with it");
+}
+
+#[tokio::test]
+async fn a_tolerance_that_takes_too_many_states_is_refused_with_the_limit() {
+    let limits = crate::asking::LIMITS;
+    let few = toothwave::config::Limits { max_states: 100, ..limits };
+    let fine = with(&spelled_out(), "/sweep", json!({ "tolerance": 1e-9 }));
+    let problem = Service::within(few).post("/v1/sweep", &fine).await.refused(422, "too_many_states");
+    assert_eq!(problem["errors"][0]["pointer"], "/sweep/tolerance");
+    assert_eq!(problem["errors"][0]["limit"], 100.0);
+}
