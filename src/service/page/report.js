@@ -1,0 +1,44 @@
+// What only paper shows: the design as a table, with its name, date and address. The rest of the report is the page itself.
+
+import { GROUPS, at, fieldsOf } from './design.js';
+import { html } from './dom.js';
+import { withUnit } from './format.js';
+
+function shownValue(field, design) {
+  const value = at(design, field.pointer);
+  if (field.kind === 'variant') return field.options.find((option) => option.value === (value?.[field.tag] ?? field.options[0].value))?.label;
+  if (field.kind === 'choice') return field.options.find((option) => option.value === (value ?? field.options[0].value))?.label;
+  if (field.kind === 'oneOf') return undefined;
+  const shown = value ?? field.preset;
+  return typeof shown === 'number' ? withUnit(String(shown), field.unit) : undefined;
+}
+
+/** Fields of a contact law that was not chosen have no value in the document, only a preset. */
+const isGiven = (field, design) => !field.pointer.startsWith('/model/stiffness/') || at(design, field.pointer) !== undefined;
+
+export function reportOf(name, { design, shown, reference }, address) {
+  const groups = GROUPS.filter((group) => group.pointer !== '/materials').map((group) => {
+    const rows = [...fieldsOf(group)]
+      .filter((field) => isGiven(field, design))
+      .map((field) => [field.label, shownValue(field, design)])
+      .filter(([, value]) => value !== undefined)
+      .map(([label, value]) => html('tr', {}, html('th', {}, label), html('td', {}, value)));
+    return rows.length ? html('table', {}, html('caption', {}, group.title), html('tbody', {}, rows)) : undefined;
+  });
+  const materials = GROUPS.find((group) => group.pointer === '/materials');
+  const parts = materials.parts.map(({ title, fields }) =>
+    html('tr', {}, html('th', {}, title), html('td', {}, fields.map((field) => shownValue(field, design)).join(', ν '))),
+  );
+  return [
+    html('h1', {}, name),
+    html(
+      'p',
+      { class: 'imprint' },
+      `Calculated ${new Date().toISOString().slice(0, 10)} by toothwave ${shown?.answers.geometry.solver_version ?? ''}`,
+      reference ? `; compared with the reference ${reference.name}` : '',
+      ' · ',
+      html('a', { href: address }, 'this design on line'),
+    ),
+    html('div', { class: 'report-design' }, groups.filter(Boolean), html('table', {}, html('caption', {}, materials.title), html('tbody', {}, parts))),
+  ];
+}
