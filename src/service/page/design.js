@@ -43,10 +43,10 @@ export const GROUPS = [
         },
       }),
       number('/drive/teeth/width_mm', 'Tooth width', 'L_1', 'mm', { slider: WIDE }),
-      whole('/drive/teeth/count', 'Teeth in theory', 'Z_G', { step: 2 }),
+      whole('/drive/teeth/count', 'Slots in theory', 'Z_G', { step: 2 }),
       whole('/drive/teeth/installed', 'Teeth installed', 'Z′_G', {
         step: 2,
-        optional: (design) => `as in theory: ${at(design, '/drive/teeth/count') ?? '–'}`,
+        optional: (design) => `all ${at(design, '/drive/teeth/count') ?? ''}`,
       }),
     ],
   },
@@ -60,7 +60,7 @@ export const GROUPS = [
         slider: 0.01,
         optional: (_, answers) => {
           const radius = answers.geometry?.ring.tip_radius_mm;
-          return radius === undefined ? 'not bored' : `not bored: ${radius.toFixed(3)}`;
+          return radius === undefined ? 'natural' : `natural ${radius.toFixed(2)}`;
         },
       }),
     ],

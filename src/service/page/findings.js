@@ -42,7 +42,10 @@ const words = (code) => code.replaceAll('_', ' ').replace(/^./, (letter) => lett
 
 export const titleOf = ({ code }) => KINDS[code]?.title ?? words(code);
 
-const sentence = (text) => `${text[0].toUpperCase()}${text.slice(1)}${text.endsWith('.') ? '' : '.'}`;
+/** The service spells numbers with all their digits; in a sentence a designer wants those that matter. */
+export const readable = (text) => text.replace(/\d+\.\d{5,}/g, (digits) => number(Number(digits), 6));
+
+export const sentence = (text) => `${text[0].toUpperCase()}${text.slice(1)}${text.endsWith('.') ? '' : '.'}`;
 
 /** What a finding tests, why it matters and what to change. `goTo(pointer)` leads to a field. */
 export function explanation(finding, labelOf, goTo) {
@@ -57,7 +60,7 @@ export function explanation(finding, labelOf, goTo) {
     html('dt', {}, 'What is tested'),
     html('dd', {}, KINDS[code] ? `${sentence(KINDS[code].tests)} Here: ${measured}.` : `Here: ${measured}.`),
     html('dt', {}, 'Why it matters'),
-    html('dd', {}, sentence(detail)),
+    html('dd', {}, sentence(readable(detail))),
     html('dt', {}, 'What to change'),
     html('dd', {}, `${sentence(advice)} `, html('span', { class: 'fields' }, fields)),
   );
@@ -78,9 +81,7 @@ export function reasonsOf(problems) {
   const unique = new Map();
   for (const problem of problems) {
     const errors = problem.errors?.length ? problem.errors : [{ pointer: '', code: problem.code, detail: problem.detail }];
-    for (const error of errors) unique.set(`${error.pointer} ${error.code} ${error.detail}`, { ...error, title: problem.title });
+    for (const error of errors) unique.set(`${error.pointer} ${error.code} ${error.detail}`, { ...error, detail: readable(error.detail), title: problem.title });
   }
   return [...unique.values()];
 }
-
-export { sentence };

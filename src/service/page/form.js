@@ -306,7 +306,7 @@ export class Form {
     if (code === 'unknown_field') {
       note.append(html('button', { type: 'button', class: 'link', onclick: () => this.#fix(pointer, undefined) }, 'Remove it'));
     } else if (LIMIT_WOULD_DO.has(code) && limit !== undefined && pointer === place && !pointer.endsWith('poissons_ratio')) {
-      note.append(html('button', { type: 'button', class: 'link', onclick: () => this.#fix(pointer, limit) }, `Set to ${limit}`));
+      note.append(html('button', { type: 'button', class: 'link', onclick: () => this.#fix(pointer, limit) }, `Set to ${number(limit)}`));
     }
     return note;
   }
@@ -332,7 +332,9 @@ export class Form {
       if (panel.hidden) this.#open.delete(key);
       else this.#open.add(key);
     });
-    return html('div', { class: `note ${finding.severity}` }, button, panel);
+    // The first field is the one to change first; the others only refer to the finding.
+    const isMinor = this.#placeOf(finding.pointers[0]) !== place;
+    return html('div', { class: `note ${finding.severity}${isMinor ? ' minor' : ''}` }, button, panel);
   }
 
   labelOf(pointer) {

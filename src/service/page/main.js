@@ -137,10 +137,11 @@ function onResult({ design, answers, problems, solveMs }) {
     pass = answers.sweep && passOf(design, answers.geometry, answers.sweep);
     if (state.selected >= motion.installed) state.selected = 0;
     mechanism.setMotion(motion);
-    setText(byId('solved'), `Solver ${answers.geometry.solver_version}, ${number(solveMs, 2)} ms`);
+    setText(byId('solved'), `Solver ${answers.geometry.solver_version}, solved in ${number(solveMs, 2)} ms`);
   }
   const findings = isDrawn ? findingsOf(answers) : [];
-  form.setResult(answers, state.reasons, findings);
+  // Hints beside the fields stand on the last drive that could exist.
+  form.setResult(state.shown?.answers ?? {}, state.reasons, findings);
   showFindings(findings);
   showReasons(isDrawn);
   showComparison();
@@ -375,7 +376,7 @@ function nextTheme() {
 }
 
 function showTheme() {
-  setText(byId('theme'), `Theme: ${document.documentElement.dataset.theme ?? 'system'}`);
+  setText(byId('theme'), `Theme: ${document.documentElement.dataset.theme ?? 'auto'}`);
 }
 
 function listen() {

@@ -7,7 +7,7 @@ import { CONTACTS, polar } from './motion.js';
 
 /** The ring's body beyond its root and the longest arrow, as shares of what is seen; neither is a result. */
 const RING_BODY = 0.045;
-const LONGEST_ARROW = 0.13;
+const LONGEST_ARROW = 0.09;
 const ARROW_HEAD = 0.016;
 
 const points = (curve) => curve.x_mm.map((x, index) => ({ x, y: curve.y_mm[index] }));
@@ -158,6 +158,7 @@ export class Mechanism {
     this.legend = legend;
     this.#buildLegend();
     this.zoom = 1;
+    this.outermost = 0;
     this.#listen(onTurn, onSelect);
   }
 
@@ -197,8 +198,6 @@ export class Mechanism {
     };
     this.#whole.shape({ ...outlines, track: '' });
     this.#detail.shape({ ...outlines, zones: '' });
-    const half = this.outer * 1.05;
-    setAttributes(this.wholeSvg, { viewBox: `${-half} ${-half} ${2 * half} ${2 * half}` });
     const peaks = motion.sweep && Object.values(motion.sweep.peaks);
     this.most = {
       force: peaks ? Math.max(...peaks.map((peak) => peak.force_n.value)) : 1,
@@ -221,6 +220,7 @@ export class Mechanism {
       setAttributes(body.ghostCam, { d: outlines.cam });
     }
     this.ghostItem.hidden = !reference;
+    this.outermost = reference?.geometry.ring.root_radius_mm ?? 0;
   }
 
   /** Draws the drive at an input angle, seen from one of its members. */
@@ -231,6 +231,8 @@ export class Mechanism {
     const loaded = { teeth: motion.loaded(inputDeg), mostForce: this.most.force, mostStress: this.most.stress };
     const viewDeg = { ring: 0, carrier: motion.carrierDeg(inputDeg), wave_generator: inputDeg }[from];
     this.viewDeg = viewDeg;
+    const half = Math.max(this.outer * (1 + 2 * LONGEST_ARROW - RING_BODY), this.outermost * 1.02);
+    setAttributes(this.wholeSvg, { viewBox: `${-half} ${-half} ${2 * half} ${2 * half}` });
     const seen = 2 * this.outer;
     setAttributes(this.#whole.world, { transform: `rotate(${-viewDeg})` });
     this.#whole.place(motion, inputDeg, loaded, selected, { longest: LONGEST_ARROW * seen, head: ARROW_HEAD * seen });
@@ -254,7 +256,7 @@ export class Mechanism {
     setAttributes(this.#detail.world, { transform: `rotate(${90 - deg})` });
     setAttributes(this.#detail.track, { transform: `rotate(${space * Math.round(deg / space)})` });
     const near = loaded.teeth.filter(({ center }) => Math.cos(((center.deg - deg) * Math.PI) / 180) > 0.5);
-    const scale = { longest: LONGEST_ARROW * 2.2 * width, head: ARROW_HEAD * 2.2 * width };
+    const scale = { longest: LONGEST_ARROW * 3 * width, head: ARROW_HEAD * 2.2 * width };
     this.#detail.place(motion, inputDeg, { ...loaded, teeth: near }, selected, scale);
   }
 

@@ -59,6 +59,7 @@ class Plot {
       dash: isReference ? [5, 4] : undefined,
       points: { show: false },
       spanGaps: false,
+      pxAlign: 0,
       show: owner.visible.has(key),
     });
     const options = {

@@ -13,33 +13,40 @@ const peakRows = (field, name, sign, unit) =>
     }),
   );
 
-const largest = (field) => (answers) =>
-  answers.sweep && Math.max(...CONTACTS.map(({ key }) => answers.sweep.peaks[key][field].value));
+/** The contact that carries the largest of a quantity. */
+function largest(field, { sweep }) {
+  if (!sweep) return undefined;
+  const peaks = CONTACTS.map(({ key, name }) => ({ name, peak: sweep.peaks[key][field] }));
+  return peaks.reduce((most, candidate) => (candidate.peak.value > most.peak.value ? candidate : most));
+}
+
+const largestRow = (label, field, unit) =>
+  row(label, '', unit, (answers) => largest(field, answers)?.peak.value, {
+    note: (answers) => {
+      const { name, peak } = largest(field, answers);
+      return `${name.toLowerCase()}, ψ ${number(peak.position_deg, 3)}°`;
+    },
+  });
 
 /** Always in sight, however far one scrolls. */
 const KEY_ROWS = [
-  row('Ratio', 'i_HG', '', ({ geometry }) => geometry?.transmission_ratio),
-  row('Coincidence degree', 'ε', '', ({ coincidence }) => coincidence?.coincidence_degree),
-  row('Teeth in mesh, a zone', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, {
-    text: ({ coincidence }) => span(coincidence.teeth_in_mesh_per_zone),
+  row('Ratio, ring fixed', '', '', ({ geometry }) => geometry?.transmission_ratio),
+  row('Coincidence degree', '', '', ({ coincidence }) => coincidence?.coincidence_degree, {
+    note: ({ coincidence }) => `engaged from ψ ${number(coincidence.engagement.start_deg, 4)}°`,
   }),
-  row('Largest force', 'F', 'N', largest('force_n')),
-  row('Largest stress', 'σ', 'MPa', largest('stress_mpa')),
-  row('Undercut', '', 'mm', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
-    text: ({ geometry }) => undercutText(geometry.undercut),
+  row('Teeth in mesh, a zone', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, {
+    text: ({ coincidence: { teeth_in_mesh_per_zone: { min, max } } }) => (min === max ? `${min}` : `${min} to ${max}`),
+  }),
+  largestRow('Largest force', 'force_n', 'N'),
+  largestRow('Largest stress', 'stress_mpa', 'MPa'),
+  row('Undercut', '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
+    text: ({ geometry }) => (geometry.undercut.occurs ? 'yes' : 'no'),
+    note: ({ geometry: { undercut } }) =>
+      undercut.critical_tooth_radius_mm === undefined ? 'at no radius' : `from r ${number(undercut.critical_tooth_radius_mm, 4)} mm`,
     state: ({ geometry }) => (geometry.undercut.occurs ? 'warning' : 'good'),
-    isWord: true,
+    keepsNote: true,
   }),
 ];
-
-function span({ min, max }) {
-  return min === max ? `${min}` : `${min} to ${max}`;
-}
-
-function undercutText({ occurs, critical_tooth_radius_mm: critical }) {
-  if (critical === undefined) return 'none at any radius';
-  return `${occurs ? 'yes' : 'no'}: from r = ${number(critical, 5)} mm`;
-}
 
 export const GROUPS = [
   {
@@ -54,7 +61,6 @@ export const GROUPS = [
       row('Engagement begins, from the major axis', 'ψ_e', 'deg', ({ geometry }) => geometry?.engagement.start_deg),
       row('Undercut', '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
         text: ({ geometry }) => (geometry.undercut.occurs ? 'yes' : 'no'),
-        isWord: true,
       }),
       row('Critical tooth radius', 'r_c', 'mm', ({ geometry }) => geometry?.undercut.critical_tooth_radius_mm, { significant: 6 }),
     ],
@@ -93,8 +99,9 @@ function compare(entry, answers, reference) {
   const value = entry.get(answers);
   const other = entry.get(reference);
   if (value === undefined || other === undefined || entry.noDifference) return '';
-  if (entry.isWord) return value === other ? '=' : 'differs';
-  return difference(value, other);
+  if (!entry.text) return difference(value, other);
+  const text = entry.text(reference);
+  return entry.text(answers) === text ? '=' : `reference: ${text}`;
 }
 
 export class Results {
@@ -106,9 +113,9 @@ export class Results {
     for (const entry of KEY_ROWS) {
       const value = html('data', { class: 'value number' });
       const unit = entry.unit && !entry.text ? html('span', { class: 'unit' }, entry.unit) : undefined;
-      const delta = html('span', { class: 'delta number' });
-      const tile = html('div', { class: 'tile' }, html('dt', {}, entry.label), html('dd', {}, value, unit && [' ', unit], delta));
-      this.#tiles.push({ entry, tile, value, delta });
+      const note = html('span', { class: 'tile-note number' });
+      const tile = html('div', { class: 'tile' }, html('dt', {}, entry.label), html('dd', {}, value, unit && [' ', unit], note));
+      this.#tiles.push({ entry, tile, value, note });
       keyFigures.append(tile);
     }
     this.table = table;
@@ -142,12 +149,12 @@ export class Results {
   /** Shows answers, and beside them those of a reference. What has no answer keeps its place but no number. */
   update(answers, reference) {
     this.table.classList.toggle('comparing', Boolean(reference));
-    for (const { entry, tile, value, delta } of this.#tiles) {
+    for (const { entry, tile, value, note } of this.#tiles) {
       const shown = show(entry, answers);
       setText(value, shown?.text ?? DASH);
       if (shown) value.value = shown.value;
       tile.dataset.state = (shown && entry.state?.(answers)) ?? '';
-      setText(delta, reference ? compare(entry, answers, reference) : '');
+      setText(note, reference && !entry.keepsNote ? compare(entry, answers, reference) : ((shown && entry.note?.(answers)) ?? ''));
     }
     for (const cell of this.#cells) {
       const { entry, line, value, reference: other, delta, place } = cell;
