@@ -42,7 +42,7 @@ let pass;
 let gesture;
 
 const history = new History();
-const service = new Service(onResult, onServiceState);
+const service = new Service({ onResult, onAway, onBusy: (isBusy) => byId('results').setAttribute('aria-busy', String(isBusy)) });
 
 const form = new Form(byId('form'), {
   onEdit(design, pointer) {
@@ -208,7 +208,7 @@ function announce(findings) {
   }, ANNOUNCE_DELAY_MS);
 }
 
-function onServiceState({ away, detail }) {
+function onAway(away, detail) {
   const banner = byId('away');
   banner.hidden = !away;
   document.body.classList.toggle('is-away', away);
@@ -220,8 +220,11 @@ function onServiceState({ away, detail }) {
 
 async function keepReference(design, answers) {
   const name = nameOf(design);
-  const known = answers ?? (await evaluate(design)).answers;
-  if (!known.geometry) return;
+  const known = answers ?? (await evaluate(design).catch(() => ({ answers: {} }))).answers;
+  if (!known.geometry) {
+    setText(byId('announcer'), 'The reference could not be calculated.');
+    return;
+  }
   state.reference = { design, name, answers: known, geometry: known.geometry, pass: known.sweep && passOf(design, known.geometry, known.sweep) };
   showComparison();
   render();
@@ -485,7 +488,7 @@ async function start() {
     try {
       state.examples = await loadExamples();
     } catch {
-      onServiceState({ away: true, detail: 'The calculation service does not answer.' });
+      onAway(true, 'The calculation service does not answer.');
       await new Promise((resolve) => setTimeout(resolve, 1000));
     }
   }

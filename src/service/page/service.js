@@ -72,12 +72,14 @@ export class Service {
   #retryMs = FIRST_RETRY_MS;
   #isAway = false;
   #onResult;
-  #onState;
+  #onAway;
+  #onBusy;
 
-  /** `onResult(result)` for each evaluation that is still wanted; `onState({ away, detail })` when that changes. */
-  constructor(onResult, onState) {
+  /** `onResult(result)` for each evaluation that is finished; `onAway(isAway, detail)` and `onBusy(isBusy)` when that changes. */
+  constructor({ onResult, onAway, onBusy }) {
     this.#onResult = onResult;
-    this.#onState = onState;
+    this.#onAway = onAway;
+    this.#onBusy = onBusy;
     setInterval(() => this.#beat(), HEARTBEAT_MS);
   }
 
@@ -100,6 +102,7 @@ export class Service {
     const controller = new AbortController();
     const running = { controller, since: performance.now() };
     this.#running = running;
+    this.#onBusy(true);
     try {
       const result = await evaluate(design, controller.signal);
       this.#retryMs = FIRST_RETRY_MS;
@@ -118,6 +121,7 @@ export class Service {
       clearTimeout(running.abortTimer);
       this.#running = undefined;
       if (this.#waiting) this.#run();
+      else this.#onBusy(false);
     }
   }
 
@@ -135,6 +139,6 @@ export class Service {
   #setAway(away, detail) {
     if (away === this.#isAway) return;
     this.#isAway = away;
-    this.#onState({ away, detail });
+    this.#onAway(away, detail);
   }
 }
