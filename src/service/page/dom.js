@@ -27,6 +27,12 @@ export function setAttributes(element, attributes) {
   }
 }
 
+/** Replaces children only where they differ: taking a node out and in again would lose the focus inside it. */
+export function setChildren(parent, nodes) {
+  const isSame = nodes.length === parent.childNodes.length && nodes.every((node, index) => node === parent.childNodes[index]);
+  if (!isSame) parent.replaceChildren(...nodes);
+}
+
 /** A symbol with its index set low: `F_H`, `i_HG`. */
 export function symbol(text) {
   const [base, index] = text.split('_');

@@ -66,14 +66,18 @@ export function explanation(finding, labelOf, goTo) {
   );
 }
 
-/** All findings of a result, each once. */
+/** All findings of a result, each once, with a key that stays while numbers change. */
 export function findingsOf(answers) {
   const unique = new Map();
   for (const finding of [answers.sweep, answers.geometry, answers.coincidence].flatMap((answer) => answer?.findings ?? [])) {
-    const key = JSON.stringify([finding.code, finding.detail]);
-    if (!unique.has(key)) unique.set(key, finding);
+    unique.set(JSON.stringify([finding.code, finding.detail]), finding);
   }
-  return [...unique.values()];
+  const counts = new Map();
+  return [...unique.values()].map((finding) => {
+    const count = (counts.get(finding.code) ?? 0) + 1;
+    counts.set(finding.code, count);
+    return { ...finding, key: `${finding.code}-${count}` };
+  });
 }
 
 /** All reasons of a result's problems, each once; a problem without fields is a reason of the whole design. */

@@ -1,7 +1,7 @@
 // The form, built from the field table in design.js, with problems and findings at the fields that they point at.
 
-import { GROUPS, at, changed, fieldsOf } from './design.js';
-import { html, setText, symbol } from './dom.js';
+import { GROUPS, at, changed, fieldsOf, isSame } from './design.js';
+import { html, setChildren, setText, symbol } from './dom.js';
 import { explanation, sentence, titleOf } from './findings.js';
 import { number } from './format.js';
 
@@ -27,7 +27,7 @@ export class Form {
   #fields = new Map();
   #notes = new Map();
   #groups = [];
-  #open = new Set();
+  #built = new Map();
   #onEdit;
   #onEnd;
   #design = {};
@@ -262,30 +262,31 @@ export class Form {
   #renderNotes() {
     const contents = new Map([...this.#notes.keys()].map((pointer) => [pointer, []]));
     const worst = new Map();
+    const built = new Map();
+    // What was built stays as long as it is wanted, with the focus that may be in it.
+    const add = (pointer, severity, key, build) => {
+      const id = `${pointer} ${key}`;
+      const note = this.#built.get(id) ?? build();
+      built.set(id, note);
+      contents.get(pointer).push(note);
+      if (!worst.has(pointer)) worst.set(pointer, severity);
+    };
     for (const reason of this.reasons ?? []) {
       const place = this.#placeOf(reason.pointer);
-      contents.get(place).push({ key: JSON.stringify(reason), build: () => this.#problemNote(reason, place) });
-      worst.set(place, 'problem');
+      add(place, 'problem', JSON.stringify(reason), () => ({ element: this.#problemNote(reason, place) }));
     }
     for (const [pointer, { isNoNumber }] of this.#fields) {
-      if (!isNoNumber) continue;
-      contents.get(pointer).push({ key: 'no number', build: () => html('p', { class: 'note problem' }, 'This is no number; the last one stands.') });
-      worst.set(pointer, 'problem');
+      if (isNoNumber) add(pointer, 'problem', 'no number', () => ({ element: html('p', { class: 'note problem' }, 'This is no number; the last one stands.') }));
     }
     for (const finding of this.#findings) {
       for (const place of new Set(finding.pointers.map((pointer) => this.#placeOf(pointer)))) {
-        contents.get(place).push({ key: JSON.stringify(finding), build: () => this.#findingNote(finding, place) });
-        if (!worst.has(place)) worst.set(place, finding.severity);
+        add(place, finding.severity, finding.key, () => this.#findingNote(finding, place));
+        built.get(`${place} ${finding.key}`).show(finding);
       }
     }
+    this.#built = built;
     for (const [pointer, notes] of contents) {
-      const element = this.#notes.get(pointer);
-      const key = notes.map((note) => note.key).join('\n');
-      // Notes that say the same stay, with the focus that may be in them.
-      if (element.dataset.key !== key) {
-        element.dataset.key = key;
-        element.replaceChildren(...notes.map((note) => note.build()));
-      }
+      setChildren(this.#notes.get(pointer), notes.map((note) => note.element));
       const entry = this.#fields.get(pointer);
       if (entry) {
         entry.element.dataset.state = worst.get(pointer) ?? '';
@@ -318,23 +319,24 @@ export class Form {
     this.goTo(pointer);
   }
 
-  #findingNote(finding, place) {
-    const key = `${finding.code} ${place}`;
-    const panel = html('div', { id: `${idOf(place, 'why')}-${finding.code}`, hidden: !this.#open.has(key) }, explanation(finding, (pointer) => this.labelOf(pointer), (pointer) => this.goTo(pointer)));
-    const button = html(
-      'button',
-      { type: 'button', class: 'finding', 'aria-expanded': String(this.#open.has(key)), 'aria-controls': panel.id },
-      titleOf(finding),
-    );
+  #findingNote({ key, code, pointers }, place) {
+    const panel = html('div', { id: `${idOf(place, 'why')}-${key}`, hidden: true });
+    const button = html('button', { type: 'button', class: 'finding', 'aria-expanded': 'false', 'aria-controls': panel.id }, titleOf({ code }));
     button.addEventListener('click', () => {
       panel.hidden = !panel.hidden;
       button.setAttribute('aria-expanded', String(!panel.hidden));
-      if (panel.hidden) this.#open.delete(key);
-      else this.#open.add(key);
     });
+    const element = html('div', {}, button, panel);
     // The first field is the one to change first; the others only refer to the finding.
-    const isMinor = this.#placeOf(finding.pointers[0]) !== place;
-    return html('div', { class: `note ${finding.severity}${isMinor ? ' minor' : ''}` }, button, panel);
+    const isMinor = this.#placeOf(pointers[0]) !== place;
+    let shown;
+    const show = (finding) => {
+      if (isSame(finding, shown)) return;
+      shown = finding;
+      element.className = `note ${finding.severity}${isMinor ? ' minor' : ''}`;
+      panel.replaceChildren(explanation(finding, (pointer) => this.labelOf(pointer), (pointer) => this.goTo(pointer)));
+    };
+    return { element, show };
   }
 
   labelOf(pointer) {

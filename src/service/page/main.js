@@ -2,7 +2,7 @@
 // follows from these; each part of it is asked to show them, none keeps a second copy.
 
 import { isSame } from './design.js';
-import { html, oncePerFrame, setText } from './dom.js';
+import { html, oncePerFrame, setChildren, setText } from './dom.js';
 import { explanation, findingsOf, reasonsOf, titleOf } from './findings.js';
 import { Form } from './form.js';
 import { fixed, number } from './format.js';
@@ -162,22 +162,30 @@ function showReasons(isDrawn) {
   banner.replaceChildren(html('strong', {}, `${title}.`), ` ${state.shown ? kept : ''}`, html('ul', {}, reasons));
 }
 
+const findingNotes = new Map();
+
+function findingNote(finding) {
+  const text = JSON.stringify(finding);
+  let note = findingNotes.get(finding.key);
+  if (!note) {
+    note = { element: html('details', {}, html('summary', {}, titleOf(finding))) };
+    findingNotes.set(finding.key, note);
+  }
+  if (note.text !== text) {
+    note.text = text;
+    note.element.className = `note ${finding.severity}`;
+    note.explanation?.remove();
+    note.explanation = explanation(finding, (pointer) => form.labelOf(pointer), (pointer) => form.goTo(pointer));
+    note.element.append(note.explanation);
+  }
+  return note.element;
+}
+
+const noFindings = html('p', { class: 'none' });
+
 function showFindings(findings) {
-  const container = byId('findings');
-  const key = JSON.stringify([findings, state.reasons.length > 0]);
-  if (container.dataset.key === key) return;
-  container.dataset.key = key;
-  const open = new Set([...container.querySelectorAll('details[open]')].map((details) => details.dataset.code));
-  const items = findings.map((finding) =>
-    html(
-      'details',
-      { class: `note ${finding.severity}`, 'data-code': finding.code, open: open.has(finding.code) },
-      html('summary', {}, titleOf(finding)),
-      explanation(finding, (pointer) => form.labelOf(pointer), (pointer) => form.goTo(pointer)),
-    ),
-  );
-  const none = state.reasons.length > 0 ? 'The reasons above come first.' : 'Nothing to report about this design.';
-  container.replaceChildren(...(items.length ? items : [html('p', { class: 'none' }, none)]));
+  setText(noFindings, state.reasons.length > 0 ? 'The reasons why the design cannot exist come first.' : 'Nothing to report about this design.');
+  setChildren(byId('findings'), findings.length > 0 ? findings.map(findingNote) : [noFindings]);
 }
 
 function showComparison() {
@@ -211,7 +219,6 @@ function announce(findings) {
 function onAway(away, detail) {
   const banner = byId('away');
   banner.hidden = !away;
-  document.body.classList.toggle('is-away', away);
   if (away) banner.replaceChildren(html('strong', {}, detail), ' Your design is kept; the page asks again until it answers.');
   else setText(byId('announcer'), 'The calculation service answers again.');
 }

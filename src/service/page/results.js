@@ -1,7 +1,7 @@
 // What a designer decides by, as a table: each row is one entry here. A result that the service does not answer is not shown.
 
 import { html, setText, symbol } from './dom.js';
-import { DASH, difference, number, withUnit } from './format.js';
+import { DASH, difference, number } from './format.js';
 import { CONTACTS } from './motion.js';
 
 const row = (label, sign, unit, get, more) => ({ label, symbol: sign, unit, get, ...more });
@@ -100,8 +100,7 @@ function compare(entry, answers, reference) {
   const other = entry.get(reference);
   if (value === undefined || other === undefined || entry.noDifference) return '';
   if (!entry.text) return difference(value, other);
-  const text = entry.text(reference);
-  return entry.text(answers) === text ? '=' : `reference: ${text}`;
+  return entry.text(answers) === entry.text(reference) ? '=' : 'differs';
 }
 
 export class Results {
@@ -127,7 +126,7 @@ export class Results {
       const body = html('tbody', {}, html('tr', { class: 'group' }, html('th', { scope: 'rowgroup', colspan: 5 }, group.title)));
       for (const entry of group.rows) {
         const value = html('data', { class: 'number' });
-        const reference = html('td', { class: 'numeric compared number' });
+        const reference = html('span', { class: 'number' });
         const delta = html('td', { class: 'numeric compared number' });
         const place = entry.place && html('button', { type: 'button', class: 'link number', title: 'Show in mechanism and plots' });
         const cell = { entry, value, reference, delta, place };
@@ -136,14 +135,21 @@ export class Results {
           'tr',
           {},
           html('th', { scope: 'row' }, entry.label, entry.symbol && [' ', symbol(entry.symbol)]),
-          html('td', { class: 'numeric' }, value, entry.unit && html('span', { class: 'unit' }, ` ${entry.unit}`)),
-          [reference, delta, html('td', { class: 'place' }, place)],
+          html('td', { class: 'numeric' }, value, html('span', { class: 'unit' }, entry.unit)),
+          html('td', { class: 'numeric compared' }, reference, html('span', { class: 'unit' }, entry.unit)),
+          [delta, html('td', { class: 'place' }, place)],
         );
         this.#cells.push(Object.assign(cell, { line }));
         body.append(line);
       }
       table.append(body);
     }
+  }
+
+  #noteOf(entry, answers, reference) {
+    if (!reference || entry.keepsNote) return entry.note?.(answers) ?? '';
+    const difference = compare(entry, answers, reference);
+    return difference === 'differs' ? `reference: ${entry.text(reference)}` : difference;
   }
 
   /** Shows answers, and beside them those of a reference. What has no answer keeps its place but no number. */
@@ -154,7 +160,7 @@ export class Results {
       setText(value, shown?.text ?? DASH);
       if (shown) value.value = shown.value;
       tile.dataset.state = (shown && entry.state?.(answers)) ?? '';
-      setText(note, reference && !entry.keepsNote ? compare(entry, answers, reference) : ((shown && entry.note?.(answers)) ?? ''));
+      setText(note, shown ? this.#noteOf(entry, answers, reference) : '');
     }
     for (const cell of this.#cells) {
       const { entry, line, value, reference: other, delta, place } = cell;
@@ -163,7 +169,7 @@ export class Results {
       line.hidden = !shown && !otherShown;
       setText(value, shown?.text ?? DASH);
       if (shown) value.value = shown.value;
-      setText(other, otherShown ? withUnit(otherShown.text, entry.unit) : '');
+      setText(other, otherShown?.text ?? DASH);
       setText(delta, reference ? compare(entry, answers, reference) : '');
       if (place && shown) {
         cell.at = entry.place(answers);
