@@ -193,12 +193,8 @@ function showComparison() {
   plots.setPasses(pass, reference?.pass);
   mechanism.setReference(reference);
   if (shown) results.update(shown.answers, reference?.answers);
-  const line = byId('comparing');
-  line.hidden = !reference;
-  if (reference) setText(line, `Compared with the reference: ${reference.name}`);
-  byId('swap').hidden = !reference;
-  byId('clear').hidden = !reference;
-  setText(byId('keep'), reference ? 'Renew reference' : 'Keep as reference');
+  byId('comparing').hidden = !reference;
+  if (reference) setText(byId('reference-name'), reference.name);
 }
 
 let announceTimer;

@@ -10,6 +10,12 @@ const RING_BODY = 0.045;
 const LONGEST_ARROW = 0.09;
 const ARROW_HEAD = 0.016;
 
+/** Points of the whole ring are this share of its radius apart at least: less than a pixel, also in print. */
+const FINEST = 4000;
+
+/** Tooth spaces, slots and teeth that the enlarged view has on either side. */
+const NEAR = 5;
+
 const points = (curve) => curve.x_mm.map((x, index) => ({ x, y: curve.y_mm[index] }));
 
 const xy = ({ x, y }) => `${x.toFixed(4)} ${y.toFixed(4)}`;
@@ -19,21 +25,27 @@ const polyline = (list) => `M${list.map(xy).join('L')}`;
 const circle = (radius) =>
   `M${radius} 0A${radius} ${radius} 0 1 1 ${-radius} 0A${radius} ${radius} 0 1 1 ${radius} 0Z`;
 
-/** The ring's closed outline from the profile of one tooth. */
-function ringOutline(geometry, teeth) {
+/** The ring's flanks over `count` tooth spaces from the `first` on, from the profile of one. Points nearer to each other than
+ *  `spacing` are left out: in the whole drive they would fall on the same pixel. */
+function flanks(geometry, teeth, first, count, spacing) {
   const tooth = points(geometry.ring.profile);
   const all = [];
-  for (let index = 0; index < teeth; index += 1) {
+  let last = { x: Infinity, y: Infinity };
+  for (let index = first; index < first + count; index += 1) {
     const angle = (2 * Math.PI * index) / teeth;
     const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
-    // The last point of a copy is the first of the next.
-    for (const { x, y } of tooth.slice(0, -1)) all.push({ x: cos * x - sin * y, y: sin * x + cos * y });
+    for (const { x, y } of tooth) {
+      const point = { x: cos * x - sin * y, y: sin * x + cos * y };
+      if (Math.abs(point.x - last.x) + Math.abs(point.y - last.y) < spacing) continue;
+      all.push(point);
+      last = point;
+    }
   }
-  return `${polyline(all)}Z`;
+  return all;
 }
 
-/** The carrier: the annulus that the mechanics leave it, cut by radial slots as wide as a tooth. */
-function carrierOutline(geometry, installed, toothRadius) {
+/** The carrier: the annulus that the mechanics leave it, cut by radial slots as wide as a tooth; `count` pieces of it. */
+function carrierOutline({ geometry, installed, toothRadius }, first, count) {
   const half = Math.PI / installed;
   const outer = geometry.carrier.outer_radius_limit_mm;
   // Where slots run into each other, the walls begin further out.
@@ -42,7 +54,7 @@ function carrierOutline(geometry, installed, toothRadius) {
   const deg = 180 / Math.PI;
   const wallAt = (radius) => Math.asin(Math.min(1, toothRadius / radius)) * deg;
   const parts = [];
-  for (let index = 0; index < installed; index += 1) {
+  for (let index = first; index < first + count; index += 1) {
     const [from, to] = [(index * 360) / installed, ((index + 1) * 360) / installed];
     const corners = [
       polar(inner, from + wallAt(inner)),
@@ -100,35 +112,34 @@ class Body {
   }
 
   shape(outlines) {
-    for (const part of ['ring', 'carrier', 'cam', 'axis', 'zones', 'track']) setAttributes(this[part], { d: outlines[part] });
-    while (this.circles.length > outlines.installed) this.circles.pop().remove();
-    while (this.circles.length < outlines.installed) {
-      const tooth = svg('circle', { class: 'tooth', 'data-tooth': this.circles.length });
+    for (const part of ['ring', 'carrier', 'cam', 'axis', 'zones', 'track']) setAttributes(this[part], { d: outlines[part] ?? '' });
+    while (this.circles.length > outlines.teeth) this.circles.pop().remove();
+    while (this.circles.length < outlines.teeth) {
+      const tooth = svg('circle', { class: 'tooth' });
       this.circles.push(tooth);
       this.teeth.append(tooth);
     }
     for (const tooth of this.circles) setAttributes(tooth, { r: outlines.toothRadius });
   }
 
-  place(motion, inputDeg, loaded, selected, arrowScale) {
-    setAttributes(this.carrier, { transform: `rotate(${motion.carrierDeg(inputDeg)})` });
-    setAttributes(this.camGroup, { transform: `rotate(${inputDeg})` });
-    setAttributes(this.zoneGroup, { transform: `rotate(${inputDeg})` });
-    setAttributes(this.ghostCam, { transform: `rotate(${inputDeg})` });
+  /** Places cam, carrier, teeth from the `first` on, and arrows; `turns` are those of ring and carrier pieces. */
+  place(motion, inputDeg, loaded, { selected, first, turns, arrows }) {
+    for (const part of [this.camGroup, this.zoneGroup, this.ghostCam]) setAttributes(part, { transform: `rotate(${inputDeg})` });
+    for (const part of [this.ring, this.track]) setAttributes(part, { transform: `rotate(${turns.ring})` });
+    setAttributes(this.carrier, { transform: `rotate(${turns.carrier})` });
     const byTooth = new Map(loaded.teeth.map((tooth) => [tooth.tooth, tooth]));
-    this.circles.forEach((element, tooth) => {
+    this.circles.forEach((element, index) => {
+      const tooth = (first + index + motion.installed) % motion.installed;
       const { x, y } = motion.center(tooth, inputDeg);
-      element.setAttribute('cx', x.toFixed(4));
-      element.setAttribute('cy', y.toFixed(4));
       const state = byTooth.get(tooth);
-      const share = state ? Math.max(...Object.values(state.stress)) / loaded.mostStress : undefined;
-      element.style.fill = share === undefined ? '' : stressColor(share);
+      const share = state && Math.max(...Object.values(state.stress)) / loaded.mostStress;
+      setAttributes(element, { 'data-tooth': tooth, cx: x.toFixed(4), cy: y.toFixed(4) });
+      element.style.fill = state ? stressColor(share) : '';
       element.classList.toggle('selected', tooth === selected);
     });
+    const lengthPerNewton = arrows.longest / loaded.mostForce;
     for (const { key } of CONTACTS) {
-      const lengthPerNewton = arrowScale.longest / loaded.mostForce;
-      const all = loaded.teeth.map((tooth) => arrow(tooth, key, lengthPerNewton, arrowScale.head));
-      this.arrows[key].setAttribute('d', all.join(''));
+      setAttributes(this.arrows[key], { d: loaded.teeth.map((tooth) => arrow(tooth, key, lengthPerNewton, arrows.head)).join('') });
     }
   }
 }
@@ -186,18 +197,31 @@ export class Mechanism {
     const zone = this.outer * 1.025;
     const cam = points(geometry.wave_generator.profile);
     const major = cam[0].x;
-    const outlines = {
-      ring: circle(this.outer) + ringOutline(geometry, motion.ringTeeth),
-      carrier: carrierOutline(geometry, installed, toothRadius),
+    const whole = {
+      ring: `${circle(this.outer)}${polyline(flanks(geometry, motion.ringTeeth, 0, motion.ringTeeth, this.outer / FINEST))}Z`,
+      carrier: carrierOutline(motion, 0, installed),
       cam: `${polyline(cam.slice(0, -1))}Z`,
       axis: `M${-major} 0H${major}M0 ${-major * 0.05}V${major * 0.05}`,
       zones: arc(zone, endDeg, startDeg) + arc(zone, 180 + endDeg, 180 + startDeg),
-      track: polyline(points(geometry.tooth_center_path)),
-      installed,
+      teeth: installed,
       toothRadius,
     };
-    this.#whole.shape({ ...outlines, track: '' });
-    this.#detail.shape({ ...outlines, zones: '' });
+    this.#whole.shape(whole);
+    // Enlarged, only what is near is built, but with every point: it is turned to where the selected tooth stands.
+    const spaces = Math.min(motion.ringTeeth, 2 * NEAR + 1);
+    const near = flanks(geometry, motion.ringTeeth, -Math.floor(spaces / 2), spaces, 0);
+    const ends = [near.at(-1), near[0]].map(({ x, y }) => (Math.atan2(y, x) * 180) / Math.PI);
+    const back = [polar(this.outer, ends[0]), polar(this.outer, ends[1])].map(xy);
+    const isWhole = spaces === motion.ringTeeth;
+    this.shownTeeth = Math.min(installed, 2 * NEAR + 1);
+    this.#detail.shape({
+      ...whole,
+      ring: isWhole ? `${circle(this.outer)}${polyline(near)}Z` : `${polyline(near)}L${back[0]}A${this.outer} ${this.outer} 0 0 0 ${back[1]}Z`,
+      carrier: carrierOutline(motion, -Math.floor(this.shownTeeth / 2), this.shownTeeth),
+      track: polyline(points(geometry.tooth_center_path)),
+      zones: '',
+      teeth: this.shownTeeth,
+    });
     const peaks = motion.sweep && Object.values(motion.sweep.peaks);
     this.most = {
       force: peaks ? Math.max(...peaks.map((peak) => peak.force_n.value)) : 1,
@@ -209,12 +233,15 @@ export class Mechanism {
 
   /** Outlines another drive's ring and cam over this one; nothing takes them away. */
   setReference(reference) {
-    const outlines = reference
-      ? {
-          ring: ringOutline(reference.geometry, reference.design.drive.ring.teeth),
-          cam: `${polyline(points(reference.geometry.wave_generator.profile).slice(0, -1))}Z`,
-        }
-      : { ring: '', cam: '' };
+    if (reference === this.reference) return;
+    this.reference = reference;
+    const outlines = { ring: '', cam: '' };
+    if (reference) {
+      const { geometry, design } = reference;
+      const { teeth } = design.drive.ring;
+      outlines.ring = `${polyline(flanks(geometry, teeth, 0, teeth, geometry.ring.root_radius_mm / FINEST))}Z`;
+      outlines.cam = `${polyline(points(geometry.wave_generator.profile).slice(0, -1))}Z`;
+    }
     for (const body of [this.#whole, this.#detail]) {
       setAttributes(body.ghostRing, { d: outlines.ring });
       setAttributes(body.ghostCam, { d: outlines.cam });
@@ -235,7 +262,12 @@ export class Mechanism {
     setAttributes(this.wholeSvg, { viewBox: `${-half} ${-half} ${2 * half} ${2 * half}` });
     const seen = 2 * this.outer;
     setAttributes(this.#whole.world, { transform: `rotate(${-viewDeg})` });
-    this.#whole.place(motion, inputDeg, loaded, selected, { longest: LONGEST_ARROW * seen, head: ARROW_HEAD * seen });
+    this.#whole.place(motion, inputDeg, loaded, {
+      selected,
+      first: 0,
+      turns: { ring: 0, carrier: motion.carrierDeg(inputDeg) },
+      arrows: { longest: LONGEST_ARROW * seen, head: ARROW_HEAD * seen },
+    });
     this.#renderDetail(loaded, inputDeg, selected);
     return loaded.teeth;
   }
@@ -254,10 +286,13 @@ export class Mechanism {
     const space = 360 / ringTeeth;
     setAttributes(this.detailSvg, { viewBox: `${-width / 2} ${-middle - height / 2} ${width} ${height}` });
     setAttributes(this.#detail.world, { transform: `rotate(${90 - deg})` });
-    setAttributes(this.#detail.track, { transform: `rotate(${space * Math.round(deg / space)})` });
-    const near = loaded.teeth.filter(({ center }) => Math.cos(((center.deg - deg) * Math.PI) / 180) > 0.5);
-    const scale = { longest: LONGEST_ARROW * 3 * width, head: ARROW_HEAD * 2.2 * width };
-    this.#detail.place(motion, inputDeg, { ...loaded, teeth: near }, selected, scale);
+    const teeth = loaded.teeth.filter(({ center }) => Math.cos(((center.deg - deg) * Math.PI) / 180) > 0.5);
+    this.#detail.place(motion, inputDeg, { ...loaded, teeth }, {
+      selected,
+      first: selected - Math.floor(this.shownTeeth / 2),
+      turns: { ring: space * Math.round(deg / space), carrier: deg },
+      arrows: { longest: LONGEST_ARROW * 3 * width, head: ARROW_HEAD * 2.2 * width },
+    });
   }
 
   #listen(onTurn, onSelect) {
@@ -280,7 +315,9 @@ export class Mechanism {
       drag.moved ||= Math.hypot(at.x - drag.start.x, at.y - drag.start.y) > 4;
       const step = at.deg - drag.deg;
       drag.deg = at.deg;
-      drag.inputDeg += step - 360 * Math.round(step / 360);
+      // Seen from the wave generator it is the ring that is dragged, and the other way round.
+      const sense = this.#shown.from === 'wave_generator' ? -1 : 1;
+      drag.inputDeg += sense * (step - 360 * Math.round(step / 360));
       if (drag.moved) onTurn(drag.inputDeg);
     });
     const release = (event) => {

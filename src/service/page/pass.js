@@ -29,6 +29,8 @@ export function passOf(design, geometry, sweep) {
   const position = column('position_deg');
   const pass = {
     position,
+    // Ascending, as the columns of x are.
+    travelled: position.map((deg) => -deg),
     x: {
       input: position.map((deg) => (90 - deg) * rate),
       ring: column('ring_angle_deg'),
@@ -95,7 +97,7 @@ export function readAt(pass, abscissa, x) {
 
 /** The abscissa's value at a position, or nothing where the tooth carries no load. */
 export function abscissaAt(pass, abscissa, positionDeg) {
-  const place = placeOf(pass.position.map((deg) => -deg), -positionDeg);
+  const place = placeOf(pass.travelled, -positionDeg);
   if (!place) return undefined;
   const xs = pass.x[abscissa];
   return xs[place.low] + place.share * (xs[place.high] - xs[place.low]);

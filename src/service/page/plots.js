@@ -12,6 +12,9 @@ const QUANTITIES = [
   { key: 'stress', title: 'Contact stress', unit: 'MPa', symbol: 'σ', peak: 'stress_mpa' },
 ];
 
+/** Room on either side of the pass, so that its first jump does not fall on the axis. */
+const MARGIN = 0.02;
+
 const HEIGHT = 260;
 const PRINT_HEIGHT = 200;
 const PRINT_WIDTH = 340;
@@ -73,7 +76,7 @@ class Plot {
         sync: { key: 'pass', scales: ['x', null] },
       },
       scales: {
-        x: { time: false },
+        x: { time: false, range: (_, min, max) => [min - MARGIN * (max - min), max + MARGIN * (max - min)] },
         y: { range: (_, __, max) => [0, (max > 0 ? max : 1) * 1.14] },
       },
       axes: [
@@ -170,13 +173,13 @@ class Plot {
       context.stroke();
       labels.push({ left, top: top - 8 * ratio, text: number(peak.value, 4), color: colors[`contact-${key}`] });
     }
-    // From the top down, each label clear of the one above it.
+    // A label that would touch the one above it goes below its peak.
     labels.sort((one, other) => one.top - other.top);
     let floor = -Infinity;
     context.textAlign = 'center';
     for (const label of labels) {
-      const isCrowded = label.top - floor < 12 * ratio;
-      const top = isCrowded ? floor + 24 * ratio : label.top;
+      const isCrowded = label.top - floor < 18 * ratio;
+      const top = isCrowded ? Math.max(label.top + 25 * ratio, floor + 13 * ratio) : label.top;
       context.lineWidth = 3 * ratio;
       context.strokeStyle = colors.surface;
       context.strokeText(label.text, label.left, top);

@@ -42,7 +42,7 @@ const KEY_ROWS = [
   row('Undercut', '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
     text: ({ geometry }) => (geometry.undercut.occurs ? 'yes' : 'no'),
     note: ({ geometry: { undercut } }) =>
-      undercut.critical_tooth_radius_mm === undefined ? 'at no radius' : `from r ${number(undercut.critical_tooth_radius_mm, 4)} mm`,
+      undercut.critical_tooth_radius_mm === undefined ? 'at no radius' : `critical r ${number(undercut.critical_tooth_radius_mm, 4)} mm`,
     state: ({ geometry }) => (geometry.undercut.occurs ? 'warning' : 'good'),
     keepsNote: true,
   }),
