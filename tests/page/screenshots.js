@@ -39,7 +39,7 @@ for (const example of ['paper-5.1', 'paper-5.2']) {
   });
 }
 
-await take('undercut', WIDE, async (page) => {
+await take('undercut', { viewport: { ...WIDE.viewport, height: 1000 } }, async (page) => {
   await page.click('#keep');
   await enter(page, '/drive/teeth/radius_mm', 7);
   await page.locator(`${notes('/drive/teeth/radius_mm')} .finding`).first().click();

@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use axum::extract::Path;
-use axum::http::{HeaderMap, HeaderValue, Uri, header};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 
 use crate::negotiation;
@@ -92,10 +92,36 @@ fn serve(asset: &Asset, headers: &HeaderMap) -> Response {
     let cache_control = (header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
     let tag = (header::ETAG, etag.to_owned());
     if negotiation::is_not_modified(headers, etag) || negotiation::matches_any(headers) {
-        return (axum::http::StatusCode::NOT_MODIFIED, [cache_control], [tag]).into_response();
+        return (StatusCode::NOT_MODIFIED, [cache_control], [tag]).into_response();
     }
     let content_type = (header::CONTENT_TYPE, HeaderValue::from_static(asset.content_type));
     let policy = (header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY);
     let referrer = (header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
     ([cache_control, content_type, policy, referrer], [tag], asset.body).into_response()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::path::Path;
+
+    use super::{ASSETS, INDEX};
+
+    fn files(folder: &Path, prefix: &str) -> BTreeSet<String> {
+        let entries = std::fs::read_dir(folder).expect("the folder is there").map(|entry| entry.expect("readable"));
+        entries
+            .flat_map(|entry| {
+                let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
+                if entry.path().is_dir() { files(&entry.path(), &format!("{name}/")) } else { BTreeSet::from([name]) }
+            })
+            .collect()
+    }
+
+    /// A module that is not served fails only in a browser.
+    #[test]
+    fn every_file_of_the_page_is_served() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("page");
+        let served = ASSETS.iter().chain([&INDEX]).map(|asset| asset.name.to_owned()).collect();
+        assert_eq!(files(&folder, ""), served);
+    }
 }

@@ -73,6 +73,7 @@ export const GROUPS = [
       {
         kind: 'oneOf',
         pointer: '/load',
+        name: 'Torque',
         label: 'Torque given at the',
         options: [
           {

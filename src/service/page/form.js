@@ -58,7 +58,8 @@ export class Form {
       { class: 'group', open: group.open },
       html('summary', {}, html('h3', {}, group.title), summary),
     );
-    if (group.pointer !== '/load') this.#notesFor(group.pointer, details);
+    // A field that is the whole group has the group's notes too.
+    if (!(group.fields ?? []).some((field) => field.pointer === group.pointer)) this.#notesFor(group.pointer, details);
     for (const part of group.parts ?? [group]) {
       const set = html('div', { class: 'set', role: 'group', 'aria-label': part.title });
       if (group.parts) set.append(html('h4', {}, part.title));
@@ -116,7 +117,7 @@ export class Form {
     const element = this.#buildChoice(field, (key) => {
       const given = field.options.find((option) => at(this.#design, option.field.pointer) !== undefined);
       const option = field.options.find((candidate) => candidate.key === key);
-      const value = given && field.convert(at(this.#design, given.field.pointer), key, this.#answers);
+      const value = given && field.convert?.(at(this.#design, given.field.pointer), key, this.#answers);
       this.#edit(field.pointer, { [key]: Number.isFinite(value) ? Number(value.toPrecision(12)) : option.preset });
     });
     for (const option of field.options) element.append(this.#buildNumber(option.field));
@@ -343,8 +344,7 @@ export class Form {
     const place = this.#placeOf(pointer);
     const { field } = this.#fields.get(place) ?? {};
     const group = GROUPS.find((candidate) => candidate.pointer === place);
-    if (pointer === '/load') return 'Torque';
-    return field?.label ?? group?.title ?? pointer;
+    return field?.name ?? field?.label ?? group?.title ?? pointer;
   }
 
   /** Leads to a field: opens its group, moves the focus there. */

@@ -443,12 +443,16 @@ function listen() {
   });
   addEventListener('hashchange', fromAddress);
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => plots.restyle());
+  let folded = [];
   addEventListener('beforeprint', () => {
+    folded = [...byId('findings').querySelectorAll('details:not([open])')];
+    for (const details of folded) details.open = true;
     byId('report').replaceChildren(...reportOf(nameOf(state.design), state, location.href));
     document.documentElement.classList.add('printing');
     plots.restyle(true);
   });
   addEventListener('afterprint', () => {
+    for (const details of folded) details.open = false;
     document.documentElement.classList.remove('printing');
     plots.restyle();
   });
@@ -491,7 +495,7 @@ async function start() {
     try {
       state.examples = await loadExamples();
     } catch {
-      onAway(true, 'The calculation service does not answer.');
+      if (byId('away').hidden) onAway(true, 'The calculation service does not answer.');
       await new Promise((resolve) => setTimeout(resolve, 1000));
     }
   }

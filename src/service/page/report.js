@@ -13,13 +13,12 @@ function shownValue(field, design) {
   return typeof shown === 'number' ? withUnit(String(shown), field.unit) : undefined;
 }
 
-/** Fields of a contact law that was not chosen have no value in the document, only a preset. */
-const isGiven = (field, design) => !field.pointer.startsWith('/model/stiffness/') || at(design, field.pointer) !== undefined;
-
 export function reportOf(name, { design, shown, reference }, address) {
   const groups = GROUPS.filter((group) => group.pointer !== '/materials').map((group) => {
+    // Of several options only the given one has a value of its own; the others have presets for when they are chosen.
+    const options = new Set((group.fields ?? []).flatMap((field) => field.options ?? []).flatMap((option) => option.fields ?? option.field ?? []));
     const rows = [...fieldsOf(group)]
-      .filter((field) => isGiven(field, design))
+      .filter((field) => !options.has(field) || at(design, field.pointer) !== undefined)
       .map((field) => [field.label, shownValue(field, design)])
       .filter(([, value]) => value !== undefined)
       .map(([label, value]) => html('tr', {}, html('th', {}, label), html('td', {}, value)));
