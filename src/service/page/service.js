@@ -1,9 +1,11 @@
 // The client of the calculation service: the newest design wins, stale requests are aborted, and a service that went away is
 // asked again until it answers.
 
-/** A running evaluation younger than this is left to finish although a newer design waits: a dragged slider then shows
- *  every answer that it can get, instead of aborting each one just before it arrives. */
-const GRACE_MS = 80;
+/** A running evaluation is left to finish although a newer design waits, unless it takes much longer than the last one took:
+ *  a dragged slider then shows every answer that it can get, instead of aborting each one just before it arrives. */
+const GRACE = 2;
+const LEAST_GRACE_MS = 80;
+const MOST_GRACE_MS = 1000;
 const FIRST_RETRY_MS = 500;
 const LONGEST_RETRY_MS = 5000;
 const HEARTBEAT_MS = 5000;
@@ -67,6 +69,7 @@ export const getJson = async (path) => {
 
 export class Service {
   #last;
+  #lastMs = 0;
   #waiting;
   #running;
   #retryMs = FIRST_RETRY_MS;
@@ -89,8 +92,9 @@ export class Service {
     this.#waiting = design;
     if (this.#running) {
       const age = performance.now() - this.#running.since;
+      const grace = Math.min(MOST_GRACE_MS, Math.max(LEAST_GRACE_MS, GRACE * this.#lastMs));
       clearTimeout(this.#running.abortTimer);
-      this.#running.abortTimer = setTimeout(() => this.#running?.controller.abort(), Math.max(0, GRACE_MS - age));
+      this.#running.abortTimer = setTimeout(() => this.#running?.controller.abort(), Math.max(0, grace - age));
     } else {
       this.#run();
     }
@@ -105,6 +109,7 @@ export class Service {
     this.#onBusy(true);
     try {
       const result = await evaluate(design, controller.signal);
+      this.#lastMs = performance.now() - running.since;
       this.#retryMs = FIRST_RETRY_MS;
       this.#setAway(false);
       this.#onResult(result);
