@@ -32,7 +32,7 @@ const largestRow = (label, field, unit) =>
 const KEY_ROWS = [
   row('Ratio, ring fixed', '', '', ({ geometry }) => geometry?.transmission_ratio),
   row('Coincidence degree', '', '', ({ coincidence }) => coincidence?.coincidence_degree, {
-    note: ({ coincidence }) => `engaged from ψ ${number(coincidence.engagement.start_deg, 4)}°`,
+    note: ({ coincidence }) => `from ψ ${number(coincidence.engagement.start_deg, 4)}°`,
   }),
   row('Teeth in mesh, a zone', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, {
     text: ({ coincidence: { teeth_in_mesh_per_zone: { min, max } } }) => (min === max ? `${min}` : `${min} to ${max}`),
