@@ -16,7 +16,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
-use crate::api::{App, coincidence_degree, geometry, side, sweep};
+use crate::api::{App, coincidence_degree, geometry, page, side, sweep};
 use crate::observe;
 use crate::problem::{Problem, ProblemCode};
 
@@ -63,6 +63,8 @@ pub fn router(app: App, cors_origins: &[String]) -> Router {
     let docs = docs.layer(middleware::map_response(as_problem));
     let (paths, _) = api().split_for_parts();
     paths
+        .route("/", get(page::index))
+        .route("/page/{*name}", get(page::asset))
         .route("/openapi.json", get(move || openapi_document(openapi.clone())))
         .merge(docs)
         .fallback(not_found)

@@ -27,6 +27,7 @@ use crate::problem::{Problem, ProblemCode};
 
 pub mod coincidence_degree;
 pub mod geometry;
+pub mod page;
 pub mod side;
 pub mod sweep;
 

@@ -1,0 +1,127 @@
+//! `GET /`: the designer's page, compiled in, so that it needs neither Node nor any network.
+
+use std::sync::LazyLock;
+
+use axum::extract::Path;
+use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
+use axum::response::{IntoResponse, Response};
+
+use crate::negotiation;
+use crate::problem::{Problem, ProblemCode};
+
+/// Everything the page may load comes from this origin; nothing may be inline, framed or sent elsewhere.
+const CONTENT_SECURITY_POLICY: HeaderValue = HeaderValue::from_static(
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; \
+     base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+);
+
+/// A file of the page.
+struct Asset {
+    name: &'static str,
+    content_type: &'static str,
+    body: &'static [u8],
+}
+
+macro_rules! assets {
+    ($($name:literal as $content_type:expr),* $(,)?) => {
+        &[$(Asset { name: $name, content_type: $content_type, body: include_bytes!(concat!("../page/", $name)) }),*]
+    };
+}
+
+const HTML: &str = "text/html; charset=utf-8";
+const CSS: &str = "text/css; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const TEXT: &str = "text/plain; charset=utf-8";
+const SVG: &str = "image/svg+xml";
+
+const INDEX: Asset = Asset { name: "index.html", content_type: HTML, body: include_bytes!("../page/index.html") };
+
+const ASSETS: &[Asset] = assets![
+    "style.css" as CSS,
+    "icon.svg" as SVG,
+    "theme.js" as SCRIPT,
+    "main.js" as SCRIPT,
+    "design.js" as SCRIPT,
+    "dom.js" as SCRIPT,
+    "findings.js" as SCRIPT,
+    "form.js" as SCRIPT,
+    "format.js" as SCRIPT,
+    "history.js" as SCRIPT,
+    "mechanism.js" as SCRIPT,
+    "motion.js" as SCRIPT,
+    "pass.js" as SCRIPT,
+    "plots.js" as SCRIPT,
+    "report.js" as SCRIPT,
+    "results.js" as SCRIPT,
+    "service.js" as SCRIPT,
+    "share.js" as SCRIPT,
+    "vendor/uplot.js" as SCRIPT,
+    "vendor/uplot.css" as CSS,
+    "vendor/uplot.LICENSE" as TEXT,
+];
+
+/// The entity tag of all files together: a page is only ever whole, so one changed file renews them all.
+static ETAG: LazyLock<String> = LazyLock::new(|| {
+    let mut hasher = blake3::Hasher::new();
+    for asset in ASSETS.iter().chain([&INDEX]) {
+        hasher.update(asset.name.as_bytes()).update(asset.body);
+    }
+    let hash = hasher.finalize().to_hex();
+    format!("\"{}\"", &hash[..32])
+});
+
+/// The page itself.
+pub async fn index(headers: HeaderMap) -> Response {
+    serve(&INDEX, &headers)
+}
+
+/// The files that it loads.
+pub async fn asset(Path(name): Path<String>, uri: Uri, headers: HeaderMap) -> Response {
+    match ASSETS.iter().find(|asset| asset.name == name) {
+        Some(asset) => serve(asset, &headers),
+        None => {
+            let detail = format!("nothing stands at `{}`; the page is at `/`", uri.path());
+            Problem::new(ProblemCode::NotFound, detail).into_response()
+        }
+    }
+}
+
+fn serve(asset: &Asset, headers: &HeaderMap) -> Response {
+    let etag = ETAG.as_str();
+    // Asked for anew each time, so that a page never mixes with the modules of an older service.
+    let cache_control = (header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
+    let tag = (header::ETAG, etag.to_owned());
+    if negotiation::is_not_modified(headers, etag) || negotiation::matches_any(headers) {
+        return (StatusCode::NOT_MODIFIED, [cache_control], [tag]).into_response();
+    }
+    let content_type = (header::CONTENT_TYPE, HeaderValue::from_static(asset.content_type));
+    let policy = (header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY);
+    let referrer = (header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
+    ([cache_control, content_type, policy, referrer], [tag], asset.body).into_response()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::path::Path;
+
+    use super::{ASSETS, INDEX};
+
+    fn files(folder: &Path, prefix: &str) -> BTreeSet<String> {
+        let entries = std::fs::read_dir(folder).expect("the folder is there").map(|entry| entry.expect("readable"));
+        entries
+            .flat_map(|entry| {
+                let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
+                if entry.path().is_dir() { files(&entry.path(), &format!("{name}/")) } else { BTreeSet::from([name]) }
+            })
+            .collect()
+    }
+
+    /// A module that is not served fails only in a browser.
+    #[test]
+    fn every_file_of_the_page_is_served() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("page");
+        let served = ASSETS.iter().chain([&INDEX]).map(|asset| asset.name.to_owned()).collect();
+        assert_eq!(files(&folder, ""), served);
+    }
+}

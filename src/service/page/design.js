@@ -1,0 +1,186 @@
+// The design document: which fields the form shows, in the document's own groups. A field that the service learns to read
+// is one entry here; nothing else in the page knows field names except what is drawn from them.
+
+/** Shares of the value on either side that a slider spans. */
+const NARROW = 0.05;
+const WIDE = 0.75;
+
+const number = (pointer, label, symbol, unit, more) => ({ kind: 'number', pointer, label, symbol, unit, ...more });
+const whole = (pointer, label, symbol, more) => ({ kind: 'number', whole: true, pointer, label, symbol, ...more });
+const choice = (pointer, label, options, more) => ({ kind: 'choice', pointer, label, options, ...more });
+
+/** Steel, as the service fills in what a document leaves out. */
+const material = (part, label) => ({
+  title: label,
+  fields: [
+    number(`/materials/${part}/youngs_modulus_gpa`, 'Young’s modulus', 'E', 'GPa', { preset: 210, of: label }),
+    number(`/materials/${part}/poissons_ratio`, 'Poisson’s ratio', 'ν', '', { preset: 0.3, of: label, step: 0.01 }),
+  ],
+});
+
+export const GROUPS = [
+  {
+    title: 'Wave generator',
+    pointer: '/drive/wave_generator',
+    open: true,
+    fields: [
+      number('/drive/wave_generator/semi_major_mm', 'Semi-major axis', 'a', 'mm', { slider: NARROW }),
+      number('/drive/wave_generator/semi_minor_mm', 'Semi-minor axis', 'b', 'mm', { slider: NARROW }),
+    ],
+  },
+  {
+    title: 'Teeth',
+    pointer: '/drive/teeth',
+    open: true,
+    fields: [
+      number('/drive/teeth/radius_mm', 'Tooth radius', 'r', 'mm', {
+        slider: WIDE,
+        mark: (answers) => {
+          const radius = answers.geometry?.undercut.critical_tooth_radius_mm;
+          return radius === undefined
+            ? { text: 'no radius undercuts this ellipse' }
+            : { value: radius, text: 'ring tips are undercut from' };
+        },
+      }),
+      number('/drive/teeth/width_mm', 'Tooth width', 'L_1', 'mm', { slider: WIDE }),
+      whole('/drive/teeth/count', 'Slots in theory', 'Z_G', { step: 2 }),
+      whole('/drive/teeth/installed', 'Teeth installed', 'Z′_G', {
+        step: 2,
+        optional: (design) => `all ${at(design, '/drive/teeth/count') ?? ''}`,
+      }),
+    ],
+  },
+  {
+    title: 'Ring',
+    pointer: '/drive/ring',
+    open: true,
+    fields: [
+      whole('/drive/ring/teeth', 'Ring teeth', 'Z_K', { step: 2 }),
+      number('/drive/ring/tip_radius_mm', 'Bored tip radius', '', 'mm', {
+        slider: 0.01,
+        optional: (_, answers) => {
+          const radius = answers.geometry?.ring.tip_radius_mm;
+          return radius === undefined ? 'natural' : `natural ${radius.toFixed(2)}`;
+        },
+      }),
+    ],
+  },
+  {
+    title: 'Load',
+    pointer: '/load',
+    open: true,
+    fields: [
+      {
+        kind: 'oneOf',
+        pointer: '/load',
+        name: 'Torque',
+        label: 'Torque given at the',
+        options: [
+          {
+            key: 'input_torque_nm',
+            label: 'wave generator (input)',
+            preset: 20,
+            field: number('/load/input_torque_nm', 'Input torque', 'M_0', 'N·m', { slider: 0.95 }),
+          },
+          {
+            key: 'output_torque_nm',
+            label: 'carrier (output)',
+            preset: 280,
+            field: number('/load/output_torque_nm', 'Output torque', 'M_G', 'N·m', { slider: 0.95 }),
+          },
+        ],
+        // The same load seen from the other shaft, so that switching changes no result.
+        convert: (value, to, answers) => {
+          const ratio = Math.abs(answers.geometry?.transmission_ratio ?? NaN);
+          return to === 'output_torque_nm' ? value * ratio : value / ratio;
+        },
+      },
+    ],
+  },
+  {
+    title: 'Model',
+    pointer: '/model',
+    open: true,
+    fields: [
+      choice('/model/compatibility', 'Compatibility', [
+        { value: 'projection', label: 'Projection (the paper’s)' },
+        { value: 'virtual_work', label: 'Virtual work' },
+      ]),
+      {
+        kind: 'variant',
+        pointer: '/model/stiffness',
+        tag: 'law',
+        label: 'Contact law',
+        options: [
+          { value: 'linear', label: 'Linear, from the materials', fields: [] },
+          {
+            value: 'fixed',
+            label: 'Fixed stiffnesses',
+            fields: [
+              number('/model/stiffness/wave_generator_n_per_mm', 'At the wave generator', 'k_H', 'N/mm', { preset: 500000 }),
+              number('/model/stiffness/ring_n_per_mm', 'At the ring', 'k_K', 'N/mm', { preset: 500000 }),
+              number('/model/stiffness/carrier_n_per_mm', 'At the carrier', 'k_S', 'N/mm', { preset: 500000 }),
+            ],
+          },
+        ],
+      },
+    ],
+  },
+  {
+    title: 'Materials',
+    pointer: '/materials',
+    summary: (design) => {
+      const moduli = ['wave_generator', 'teeth', 'ring', 'carrier'].map(
+        (part) => at(design, `/materials/${part}/youngs_modulus_gpa`) ?? 210,
+      );
+      return moduli.every((modulus) => modulus === moduli[0]) ? `all ${moduli[0]} GPa` : moduli.join(' · ') + ' GPa';
+    },
+    parts: [
+      material('wave_generator', 'Wave generator'),
+      material('teeth', 'Teeth'),
+      material('ring', 'Ring'),
+      material('carrier', 'Carrier'),
+    ],
+  },
+  {
+    title: 'Sweep and profile',
+    pointer: '/sweep',
+    summary: (design) => `${at(design, '/sweep/samples') ?? 50} samples`,
+    fields: [
+      whole('/sweep/samples', 'Samples of a period', 'N', { preset: 50 }),
+      number('/profile/chord_tolerance_mm', 'Chord tolerance', '', 'mm', { preset: 0.001, step: 0.001 }),
+      choice('/profile/extent', 'Exported ring profile', [
+        { value: 'tooth', label: 'One tooth' },
+        { value: 'full', label: 'The whole ring' },
+      ]),
+    ],
+  },
+];
+
+/** Every field that can stand in the form, with the group that holds it. */
+export function* fieldsOf(group) {
+  for (const part of group.parts ?? [group]) {
+    for (const field of part.fields) {
+      yield field;
+      for (const option of field.options ?? []) yield* option.fields ?? (option.field ? [option.field] : []);
+    }
+  }
+}
+
+const keys = (pointer) => pointer.split('/').slice(1);
+
+export function at(design, pointer) {
+  return keys(pointer).reduce((value, key) => value?.[key], design);
+}
+
+/** The document with one value changed, `undefined` to leave it out; the old document stays as it is. */
+export function changed(design, pointer, value) {
+  const [key, ...rest] = keys(pointer);
+  const copy = { ...design };
+  const inner = rest.length === 0 ? value : changed(design?.[key] ?? {}, `/${rest.join('/')}`, value);
+  if (inner === undefined) delete copy[key];
+  else copy[key] = inner;
+  return copy;
+}
+
+export const isSame = (one, other) => JSON.stringify(one) === JSON.stringify(other);

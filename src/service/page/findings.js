@@ -1,0 +1,111 @@
+// Findings and reasons in words. Why a finding matters and what to change come with it; what it tests stands here.
+
+import { html } from './dom.js';
+import { number, withUnit } from './format.js';
+
+const GEOMETRY = 'The limit is geometry, exact.';
+const RULE_OF_THUMB = 'The limit is a rule of thumb: it marks where to look again.';
+
+/** By code: a title, what is tested and where its limit comes from, and what `detail` and `advice` leave to be said. */
+const KINDS = {
+  undercut: {
+    title: 'Undercut ring tips',
+    tests: 'The tooth radius against the critical radius, from which the envelope of the passing tooth cuts into the ring’s own tips.',
+    basis: GEOMETRY,
+    change: 'Fewer ring teeth help too. Or live with it: bore the tips, and judge the loads by the plots.',
+  },
+  bore_shortens_flank: {
+    title: 'Bore shortens the flank',
+    tests: 'The bored tip radius against the ring’s natural tip radius.',
+    basis: GEOMETRY,
+    change: 'A bore that only breaks a pointed tip costs little.',
+  },
+  bore_without_effect: {
+    title: 'Bore without effect',
+    tests: 'The bored tip radius against the ring’s natural tip radius.',
+    basis: GEOMETRY,
+    why: 'The results are those of a ring without a bore, which may not be what the number was meant to say.',
+  },
+  few_teeth_in_mesh: {
+    title: 'Few teeth in mesh',
+    tests: 'The fewest teeth that carry load at once in a zone, at any input angle, against two.',
+    basis: RULE_OF_THUMB,
+  },
+  thin_slot_wall: {
+    title: 'Thin wall between slots',
+    tests: 'The carrier’s wall between two slots at its inner edge against a quarter of a slot’s width.',
+    basis: RULE_OF_THUMB,
+    why: 'The wall takes the slot’s force as a bending load, and it is thinnest just where the carrier ends.',
+  },
+  tooth_beyond_carrier: {
+    title: 'Tooth leaves the carrier',
+    tests: 'The radius that a loaded tooth’s centre reaches against the edge of the annulus between cam and ring tips.',
+    basis: 'The limit is that of a carrier without clearance; a real one is smaller.',
+    why: 'The contact stress of a flat wall is then too favourable.',
+  },
+  steep_ring_flank: {
+    title: 'Steep ring flank',
+    tests: 'The largest pressure angle on the engaged flank of the ring.',
+    basis: RULE_OF_THUMB,
+  },
+  stress_above_fatigue_limit: {
+    title: 'Stress above the fatigue limit',
+    tests: 'The peak contact stress over a period against the fatigue limit of bearing steel.',
+    basis: 'The limit is that of ISO 281:2007 for rolling bearings of common high-quality steel.',
+    why: 'Above it, hardened bearing steel has to be expected to fatigue in the end, softer steel earlier; below it nothing is proven.',
+    change: 'Stress grows with the square root of the torque.',
+  },
+};
+
+const words = (code) => code.replaceAll('_', ' ').replace(/^./, (letter) => letter.toUpperCase());
+
+export const titleOf = ({ code }) => KINDS[code]?.title ?? words(code);
+
+/** The service spells numbers with all their digits; in a sentence a designer wants those that matter. */
+export const readable = (text) => text.replace(/\d+\.\d{5,}/g, (digits) => number(Number(digits), 6));
+
+export const sentence = (text) => `${text[0].toUpperCase()}${text.slice(1)}${text.endsWith('.') ? '' : '.'}`;
+
+/** What a finding tests, why it matters and what to change. `goTo(pointer)` leads to a field. */
+export function explanation(finding, labelOf, goTo) {
+  const { code, value, limit, unit, detail, advice, pointers } = finding;
+  const measured = `${withUnit(number(value, 5), unit)} against ${withUnit(number(limit, 5), unit)}`;
+  const { tests = '', basis = '', why = '', change = '' } = KINDS[code] ?? {};
+  const fields = pointers.map((pointer) =>
+    html('button', { type: 'button', class: 'link', onclick: () => goTo(pointer) }, labelOf(pointer)),
+  );
+  return html(
+    'dl',
+    { class: 'explanation' },
+    html('dt', {}, 'What is tested'),
+    html('dd', {}, `${tests} Here: ${measured}. ${basis}`.trim()),
+    html('dt', {}, 'Why it matters'),
+    html('dd', {}, `${sentence(readable(detail))} ${why}`),
+    html('dt', {}, 'What to change'),
+    html('dd', {}, `${sentence(advice)} ${change} `, html('span', { class: 'fields' }, fields)),
+  );
+}
+
+/** All findings of a result, each once, with a key that stays while numbers change. */
+export function findingsOf(answers) {
+  const unique = new Map();
+  for (const finding of [answers.sweep, answers.geometry, answers.coincidence].flatMap((answer) => answer?.findings ?? [])) {
+    unique.set(JSON.stringify([finding.code, finding.detail]), finding);
+  }
+  const counts = new Map();
+  return [...unique.values()].map((finding) => {
+    const count = (counts.get(finding.code) ?? 0) + 1;
+    counts.set(finding.code, count);
+    return { ...finding, key: `${finding.code}-${count}` };
+  });
+}
+
+/** All reasons of a result's problems, each once; a problem without fields is a reason of the whole design. */
+export function reasonsOf(problems) {
+  const unique = new Map();
+  for (const problem of problems) {
+    const errors = problem.errors?.length ? problem.errors : [{ pointer: '', code: problem.code, detail: problem.detail }];
+    for (const error of errors) unique.set(`${error.pointer} ${error.code} ${error.detail}`, { ...error, detail: readable(error.detail), title: problem.title });
+  }
+  return [...unique.values()];
+}

@@ -1,0 +1,44 @@
+// Numbers as a designer reads them: enough significant digits to tell designs apart, no more.
+
+const MINUS = '\u2212';
+const THIN_SPACE = '\u202f';
+const SUPERSCRIPTS = '⁰¹²³⁴⁵⁶⁷⁸⁹';
+
+export const DASH = '–';
+
+export function number(value, significant = 5) {
+  if (!Number.isFinite(value)) return DASH;
+  if (value === 0) return '0';
+  const sign = value < 0 ? MINUS : '';
+  const size = Math.abs(value);
+  if (size < 1e-3 || size >= 1e7) {
+    const [digits, exponent] = size.toExponential(Math.min(significant, 3) - 1).split('e');
+    const raised = [...String(Math.abs(Number(exponent)))].map((digit) => SUPERSCRIPTS[digit]).join('');
+    return `${sign}${digits}·10${Number(exponent) < 0 ? '⁻' : ''}${raised}`;
+  }
+  const places = Math.max(0, significant - 1 - Math.floor(Math.log10(size)));
+  const [whole, fraction] = size.toFixed(Math.min(places, 12)).split('.');
+  const grouped = whole.length > 4 ? whole.replace(/\B(?=(\d{3})+$)/g, THIN_SPACE) : whole;
+  const shown = fraction?.replace(/0+$/, '');
+  return sign + grouped + (shown ? `.${shown}` : '');
+}
+
+/** A fixed number of places, for readings that move and must not jump about. */
+export function fixed(value, places) {
+  if (!Number.isFinite(value)) return DASH;
+  const text = Math.abs(value).toFixed(places);
+  return (value < 0 && Number(text) !== 0 ? MINUS : '') + text;
+}
+
+/** A difference with its sign, and its share of the reference. */
+export function difference(value, reference, significant = 3) {
+  if (!Number.isFinite(value) || !Number.isFinite(reference)) return '';
+  const delta = value - reference;
+  const size = Math.max(Math.abs(value), Math.abs(reference));
+  if (size === 0 || Math.abs(delta) <= 1e-9 * size) return '=';
+  const sign = delta > 0 ? '+' : '';
+  const share = reference === 0 ? '' : ` (${sign}${fixed((100 * delta) / Math.abs(reference), 1)}${THIN_SPACE}%)`;
+  return `${sign}${number(delta, significant)}${share}`;
+}
+
+export const withUnit = (text, unit) => (unit && text !== DASH ? `${text}${THIN_SPACE}${unit}` : text);

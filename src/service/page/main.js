@@ -1,0 +1,513 @@
+// What the page shows: one design, its answers, an input angle, a selected tooth and perhaps a reference. Everything on the page
+// follows from these; each part of it is asked to show them, none keeps a second copy.
+
+import { isSame } from './design.js';
+import { html, oncePerFrame, setChildren, setText } from './dom.js';
+import { explanation, findingsOf, reasonsOf, titleOf } from './findings.js';
+import { Form } from './form.js';
+import { fixed, number } from './format.js';
+import { History } from './history.js';
+import { Mechanism, stressColor } from './mechanism.js';
+import { CONTACTS, Motion } from './motion.js';
+import { passOf } from './pass.js';
+import { Plots } from './plots.js';
+import { reportOf } from './report.js';
+import { Results } from './results.js';
+import { Service, evaluate, getJson } from './service.js';
+import * as share from './share.js';
+
+const FIRST_EXAMPLE = 'paper-5.1';
+/** Degrees of the input angle per second while it plays: a turn takes 20 seconds. */
+const PLAY_SPEED = 18;
+const ADDRESS_DELAY_MS = 400;
+const ANNOUNCE_DELAY_MS = 700;
+
+const byId = (id) => document.getElementById(id);
+
+const state = {
+  design: undefined,
+  /** The last result that could be drawn: `{ design, answers }`. */
+  shown: undefined,
+  reference: undefined,
+  reasons: [],
+  examples: [],
+  origin: '',
+  inputDeg: 0,
+  selected: 3,
+  from: 'ring',
+  isPlaying: false,
+};
+let motion;
+let pass;
+let gesture;
+
+const history = new History();
+const service = new Service({ onResult, onAway, onBusy: (isBusy) => byId('results').setAttribute('aria-busy', String(isBusy)) });
+
+const form = new Form(byId('form'), {
+  onEdit(design, pointer) {
+    setDesign(design, { gesture: pointer, fromForm: true });
+  },
+  onEnd() {
+    gesture = undefined;
+  },
+});
+
+const mechanism = new Mechanism(
+  { whole: byId('whole'), detail: byId('detail'), legend: byId('legend') },
+  {
+    onTurn(deg) {
+      play(false);
+      turnTo(deg);
+    },
+    onSelect: select,
+  },
+);
+
+const plots = new Plots(
+  { abscissae: byId('abscissae'), contacts: byId('contacts'), charts: byId('charts'), readout: byId('readout') },
+  (positionDeg) => {
+    play(false);
+    turnTo(motion.inputDegAt(state.selected, positionDeg, state.inputDeg));
+  },
+);
+
+const results = new Results({ keyFigures: byId('key-figures'), table: byId('table') }, showPeak);
+
+// ---- the design
+
+function setDesign(design, { gesture: newGesture, fromForm = false, respan = false } = {}) {
+  if (state.design && isSame(design, state.design)) return;
+  if (state.design && !(newGesture && newGesture === gesture)) history.record(state.design);
+  gesture = newGesture;
+  replaceDesign(design, { fromForm, respan });
+}
+
+function replaceDesign(design, { fromForm = false, respan = false } = {}) {
+  state.design = design;
+  form.setDesign(design, { respan: respan && !fromForm });
+  service.request(design);
+  byId('undo').disabled = !history.canUndo;
+  byId('redo').disabled = !history.canRedo;
+  showName();
+  addressLater();
+}
+
+function step(design) {
+  if (design === undefined) return;
+  gesture = undefined;
+  replaceDesign(design);
+}
+
+const undo = () => step(history.undo(state.design));
+const redo = () => step(history.redo(state.design));
+
+function nameOf(design) {
+  const example = state.examples.find((candidate) => isSame(candidate.design, design));
+  if (example) return example.title;
+  return state.origin ? `${state.origin} (changed)` : 'A design of your own';
+}
+
+function showName() {
+  const name = nameOf(state.design);
+  setText(byId('design-name'), name);
+  document.title = `${name.split(':')[0]} – toothwave`;
+  for (const { button, design } of state.examples) button.setAttribute('aria-pressed', String(isSame(design, state.design)));
+}
+
+let addressTimer;
+function addressLater() {
+  clearTimeout(addressTimer);
+  addressTimer = setTimeout(writeAddress, ADDRESS_DELAY_MS);
+}
+
+function writeAddress() {
+  clearTimeout(addressTimer);
+  window.history.replaceState(null, '', share.toAddress(state.design, state.reference?.design));
+}
+
+// ---- what the service says
+
+function onResult({ design, answers, problems, solveMs }) {
+  state.reasons = reasonsOf(problems);
+  const isDrawn = answers.geometry !== undefined;
+  if (isDrawn) {
+    state.shown = { design, answers };
+    motion = new Motion(design, answers.geometry, answers.sweep);
+    pass = answers.sweep && passOf(design, answers.geometry, answers.sweep);
+    if (state.selected >= motion.installed) state.selected = 0;
+    mechanism.setMotion(motion);
+    setText(byId('solved'), `Solver ${answers.geometry.solver_version}, solved in ${number(solveMs, 2)} ms`);
+  }
+  const findings = isDrawn ? findingsOf(answers) : [];
+  // Hints beside the fields stand on the last drive that could exist.
+  form.setResult(state.shown?.answers ?? {}, state.reasons, findings);
+  showFindings(findings);
+  showReasons(isDrawn);
+  showComparison();
+  render();
+  announce(findings);
+}
+
+function showReasons(isDrawn) {
+  const banner = byId('impossible');
+  banner.hidden = state.reasons.length === 0;
+  document.body.classList.toggle('stale', !isDrawn);
+  if (banner.hidden) return;
+  const [{ title }] = state.reasons;
+  const kept = isDrawn ? 'Geometry is shown; forces are not.' : 'The last possible design stays in the picture.';
+  const reasons = state.reasons.map(({ pointer, detail }) =>
+    html('li', {}, pointer ? html('button', { type: 'button', class: 'link', onclick: () => form.goTo(pointer) }, `${form.labelOf(pointer)}: ${detail}`) : detail),
+  );
+  banner.replaceChildren(html('strong', {}, `${title}.`), ` ${state.shown ? kept : ''}`, html('ul', {}, reasons));
+}
+
+const findingNotes = new Map();
+
+function findingNote(finding) {
+  const text = JSON.stringify(finding);
+  let note = findingNotes.get(finding.key);
+  if (!note) {
+    note = { element: html('details', {}, html('summary', {}, titleOf(finding))) };
+    findingNotes.set(finding.key, note);
+  }
+  if (note.text !== text) {
+    note.text = text;
+    note.element.className = `note ${finding.severity}`;
+    note.explanation?.remove();
+    note.explanation = explanation(finding, (pointer) => form.labelOf(pointer), (pointer) => form.goTo(pointer));
+    note.element.append(note.explanation);
+  }
+  return note.element;
+}
+
+const noFindings = html('p', { class: 'none' });
+
+function showFindings(findings) {
+  setText(noFindings, state.reasons.length > 0 ? 'The reasons why the design cannot exist come first.' : 'Nothing to report about this design.');
+  setChildren(byId('findings'), findings.length > 0 ? findings.map(findingNote) : [noFindings]);
+}
+
+function showComparison() {
+  const { reference, shown } = state;
+  plots.setPasses(pass, reference?.pass);
+  mechanism.setReference(reference);
+  if (shown) results.update(shown.answers, reference?.answers);
+  byId('comparing').hidden = !reference;
+  if (reference) setText(byId('reference-name'), reference.name);
+}
+
+let announceTimer;
+function announce(findings) {
+  clearTimeout(announceTimer);
+  announceTimer = setTimeout(() => {
+    const { reasons } = state;
+    const list = findings.map(titleOf).join(', ');
+    setText(
+      byId('announcer'),
+      reasons.length > 0
+        ? `${reasons[0].title}. ${reasons.map(({ pointer, detail }) => `${pointer ? `${form.labelOf(pointer)}: ` : ''}${detail}`).join('. ')}`
+        : `Results are up to date. ${list ? `Findings: ${list}.` : 'No findings.'}`,
+    );
+  }, ANNOUNCE_DELAY_MS);
+}
+
+function onAway(away, detail) {
+  const banner = byId('away');
+  banner.hidden = !away;
+  if (away) banner.replaceChildren(html('strong', {}, detail), ' Your design is kept; the page asks again until it answers.');
+  else setText(byId('announcer'), 'The calculation service answers again.');
+}
+
+// ---- the reference
+
+async function keepReference(design, answers) {
+  const name = nameOf(design);
+  const known = answers ?? (await evaluate(design).catch(() => ({ answers: {} }))).answers;
+  if (!known.geometry) {
+    setText(byId('announcer'), 'The reference could not be calculated.');
+    return;
+  }
+  state.reference = { design, name, answers: known, geometry: known.geometry, pass: known.sweep && passOf(design, known.geometry, known.sweep) };
+  showComparison();
+  render();
+  addressLater();
+}
+
+function clearReference() {
+  state.reference = undefined;
+  showComparison();
+  render();
+  addressLater();
+  byId('keep').focus();
+}
+
+function swapReference() {
+  const { design } = state.reference;
+  if (state.shown) keepReference(state.shown.design, state.shown.answers);
+  setDesign(design, { respan: true });
+}
+
+// ---- motion
+
+const render = oncePerFrame(() => {
+  if (!motion) return;
+  const loaded = mechanism.render(state);
+  plots.drawTeeth(loaded, state.selected);
+  const inTurn = ((state.inputDeg % 360) + 360) % 360;
+  const angle = byId('angle');
+  if (Number(angle.value) !== Math.round(inTurn * 10) / 10) angle.value = inTurn;
+  const carrierDeg = motion.carrierDeg(state.inputDeg) % 360;
+  angle.setAttribute('aria-valuetext', `${fixed(inTurn, 1)} degrees, carrier ${fixed(carrierDeg, 2)} degrees`);
+  setText(byId('angle-input'), `${fixed(inTurn, 1)}°`);
+  setText(byId('angle-carrier'), `${fixed(carrierDeg, 2)}°`);
+  setText(byId('tooth-name'), `Tooth ${state.selected}`);
+  const tooth = loaded.find((candidate) => candidate.tooth === state.selected);
+  setText(
+    byId('tooth-state'),
+    tooth
+      ? `ψ ${fixed(tooth.positionDeg, 1)}°, σ up to ${fixed(Math.max(...Object.values(tooth.stress)), 0)} MPa`
+      : `ψ ${fixed(motion.positionDeg(state.selected, state.inputDeg), 1)}°, no load`,
+  );
+  if (byId('teeth-table').open && !state.isPlaying) showTeeth(loaded);
+});
+
+function showTeeth(loaded) {
+  const head = ['Tooth', 'ψ, deg', ...CONTACTS.map(({ index }) => `F ${index}, N`), ...CONTACTS.map(({ index }) => `σ ${index}, MPa`)];
+  const row = ({ tooth, positionDeg, force, stress }) =>
+    html(
+      'tr',
+      {},
+      html('th', { scope: 'row' }, String(tooth)),
+      [fixed(positionDeg, 2), ...CONTACTS.map(({ key }) => fixed(force[key], 1)), ...CONTACTS.map(({ key }) => fixed(stress[key], 1))].map((text) =>
+        html('td', { class: 'numeric number' }, text),
+      ),
+    );
+  byId('teeth').replaceChildren(
+    html('thead', {}, html('tr', {}, head.map((text) => html('th', { scope: 'col', class: 'numeric' }, text)))),
+    html('tbody', {}, loaded.map(row)),
+  );
+}
+
+function turnTo(deg) {
+  state.inputDeg = deg;
+  render();
+}
+
+function select(tooth) {
+  state.selected = ((tooth % motion.installed) + motion.installed) % motion.installed;
+  render();
+}
+
+/** Turns the drive to where a peak stands and selects the tooth that carries it. */
+function showPeak({ input_angle_deg: inputDeg, position_deg: positionDeg }) {
+  play(false);
+  const distance = (tooth) => Math.abs(motion.positionDeg(tooth, inputDeg) - positionDeg);
+  const teeth = [...Array(motion.installed / 2).keys()];
+  state.selected = teeth.reduce((best, tooth) => (distance(tooth) < distance(best) ? tooth : best));
+  turnTo(inputDeg);
+}
+
+let lastFrame;
+function advance(now) {
+  if (!state.isPlaying) return;
+  // A frame after a hidden tab or a slow moment is not caught up with.
+  const seconds = Math.min(0.1, (now - (lastFrame ?? now)) / 1000);
+  lastFrame = now;
+  turnTo(state.inputDeg + seconds * PLAY_SPEED);
+  requestAnimationFrame(advance);
+}
+
+function play(isPlaying) {
+  if (isPlaying === state.isPlaying) return;
+  state.isPlaying = isPlaying;
+  setText(byId('play'), isPlaying ? 'Pause' : 'Play');
+  lastFrame = undefined;
+  if (isPlaying) requestAnimationFrame(advance);
+  else render();
+}
+
+// ---- the tools
+
+async function copy(text, button) {
+  const label = button.textContent;
+  let isDone = false;
+  try {
+    await navigator.clipboard.writeText(text);
+    isDone = true;
+  } catch {
+    // Browsers give the clipboard only to secure origins; the old way works on the others.
+    const area = html('textarea', { readonly: true, class: 'hidden', value: text });
+    button.parentElement.append(area);
+    area.select();
+    isDone = document.execCommand('copy');
+    area.remove();
+    button.focus();
+  }
+  const message = isDone ? 'Copied' : 'Copying failed';
+  setText(button, message);
+  setText(byId('announcer'), message);
+  setTimeout(() => setText(button, label), 1500);
+}
+
+function applyText(text, origin) {
+  const error = byId('document-error');
+  try {
+    const design = share.fromText(text);
+    state.origin = origin;
+    setDesign(design, { respan: true });
+    error.hidden = true;
+    byId('document').close();
+  } catch (failure) {
+    error.hidden = false;
+    setText(error, failure.message);
+  }
+}
+
+const fileName = () => `${document.title.replace(/ – toothwave$/, '').replace(/[^\w.]+/g, '-').replace(/^-|-$/g, '').toLowerCase()}.json`;
+
+function nextTheme() {
+  const root = document.documentElement;
+  const themes = ['system', 'light', 'dark'];
+  const theme = themes[(themes.indexOf(root.dataset.theme ?? 'system') + 1) % themes.length];
+  if (theme === 'system') delete root.dataset.theme;
+  else root.dataset.theme = theme;
+  try {
+    localStorage.setItem('theme', theme);
+  } catch {
+    // Storage may be forbidden; the theme then lasts as long as the page.
+  }
+  showTheme();
+  plots.restyle();
+}
+
+function showTheme() {
+  setText(byId('theme'), `Theme: ${document.documentElement.dataset.theme ?? 'auto'}`);
+}
+
+function listen() {
+  const click = (id, action) => byId(id).addEventListener('click', action);
+  click('undo', undo);
+  click('redo', redo);
+  click('keep', () => state.shown && keepReference(state.shown.design, state.shown.answers));
+  click('clear', clearReference);
+  click('swap', swapReference);
+  click('copy-link', ({ currentTarget }) => {
+    writeAddress();
+    copy(location.href, currentTarget);
+  });
+  click('print', () => window.print());
+  click('theme', nextTheme);
+  click('play', () => play(!state.isPlaying));
+  click('tooth-before', () => select(state.selected - 1));
+  click('tooth-after', () => select(state.selected + 1));
+  const zoomBy = (factor) => {
+    mechanism.zoom = Math.min(8, Math.max(0.5, mechanism.zoom * factor));
+    render();
+  };
+  click('zoom-in', () => zoomBy(Math.SQRT2));
+  click('zoom-out', () => zoomBy(Math.SQRT1_2));
+  click('open-document', () => {
+    byId('document-text').value = share.toText(state.design);
+    byId('document-error').hidden = true;
+    byId('document').showModal();
+  });
+  click('document-close', () => byId('document').close());
+  click('document-apply', () => applyText(byId('document-text').value, state.origin));
+  click('document-copy', ({ currentTarget }) => copy(byId('document-text').value, currentTarget));
+  click('document-save', () => share.save(state.design, fileName()));
+  click('document-load', () => byId('document-file').click());
+  byId('document-file').addEventListener('change', async ({ currentTarget: input }) => {
+    const [file] = input.files;
+    if (file) applyText(await file.text(), file.name);
+    input.value = '';
+  });
+  byId('form').addEventListener('submit', (event) => event.preventDefault());
+  byId('angle').addEventListener('input', ({ currentTarget }) => {
+    play(false);
+    // Whole turns are kept: the carrier has not come round yet when the wave generator has.
+    turnTo(360 * Math.floor(state.inputDeg / 360) + Number(currentTarget.value));
+  });
+  byId('from').addEventListener('change', ({ currentTarget }) => {
+    state.from = currentTarget.value;
+    render();
+  });
+  byId('teeth-table').addEventListener('toggle', render);
+  addEventListener('keydown', (event) => {
+    if (!(event.ctrlKey || event.metaKey) || event.altKey || byId('document').open) return;
+    const key = event.key.toLowerCase();
+    if (key === 'z' && !event.shiftKey) undo();
+    else if (key === 'y' || key === 'z') redo();
+    else return;
+    event.preventDefault();
+  });
+  addEventListener('hashchange', fromAddress);
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => plots.restyle());
+  let folded = [];
+  addEventListener('beforeprint', () => {
+    folded = [...byId('findings').querySelectorAll('details:not([open])')];
+    for (const details of folded) details.open = true;
+    byId('report').replaceChildren(...reportOf(nameOf(state.design), state, location.href));
+    document.documentElement.classList.add('printing');
+    plots.restyle(true);
+  });
+  addEventListener('afterprint', () => {
+    for (const details of folded) details.open = false;
+    document.documentElement.classList.remove('printing');
+    plots.restyle();
+  });
+}
+
+function fromAddress() {
+  try {
+    const { design, reference } = share.fromAddress(location.hash);
+    if (reference && !isSame(reference, state.reference?.design)) keepReference(reference);
+    if (design) setDesign(design, { respan: true });
+    return design !== undefined;
+  } catch {
+    setText(byId('announcer'), 'The address holds no design that can be read.');
+    return false;
+  }
+}
+
+async function loadExamples() {
+  const { examples } = await getJson('v1/examples');
+  return Promise.all(examples.map(async ({ name, title, href }) => ({ name, title, design: await getJson(href.slice(1)) })));
+}
+
+function showExamples() {
+  for (const example of state.examples) {
+    const label = example.name.replace('paper-', 'Case ').replaceAll('-', ' ');
+    example.button = html('button', { type: 'button', title: example.title, 'data-example': example.name }, label[0].toUpperCase() + label.slice(1));
+    example.button.addEventListener('click', () => {
+      gesture = undefined;
+      state.origin = example.title.split(':')[0];
+      setDesign(example.design, { respan: true });
+    });
+    byId('examples').append(example.button);
+  }
+}
+
+async function start() {
+  showTheme();
+  listen();
+  while (state.examples.length === 0) {
+    try {
+      state.examples = await loadExamples();
+    } catch {
+      if (byId('away').hidden) onAway(true, 'The calculation service does not answer.');
+      await new Promise((resolve) => setTimeout(resolve, 1000));
+    }
+  }
+  byId('away').hidden = true;
+  showExamples();
+  if (!fromAddress()) {
+    const first = state.examples.find(({ name }) => name === FIRST_EXAMPLE) ?? state.examples[0];
+    state.origin = first.title.split(':')[0];
+    setDesign(first.design, { respan: true });
+  }
+  byId('legend').querySelector('.ramp').style.background = `linear-gradient(to right, ${[0, 0.25, 0.5, 0.75, 1].map(stressColor).join(', ')})`;
+  if (!matchMedia('(prefers-reduced-motion: reduce)').matches) play(true);
+}
+
+start();

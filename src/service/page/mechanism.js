@@ -1,0 +1,336 @@
+// The drive drawn to scale, twice: whole, and one tooth enlarged with its slot upright. Every outline is a profile of the
+// geometry or a circle of the document; every place and force comes from `Motion`.
+
+import { html, setAttributes, setText, svg } from './dom.js';
+import { number, withUnit } from './format.js';
+import { CONTACTS, polar } from './motion.js';
+
+/** The ring's body beyond its root and the longest arrow, as shares of what is seen; neither is a result. */
+const RING_BODY = 0.045;
+const LONGEST_ARROW = 0.09;
+const ARROW_HEAD = 0.016;
+
+/** Points of the whole ring are this share of its radius apart at least: less than a pixel, also in print. */
+const FINEST = 4000;
+
+/** Tooth spaces, slots and teeth that the enlarged view has on either side. */
+const NEAR = 5;
+
+const points = (curve) => curve.x_mm.map((x, index) => ({ x, y: curve.y_mm[index] }));
+
+const xy = ({ x, y }) => `${x.toFixed(4)} ${y.toFixed(4)}`;
+
+const polyline = (list) => `M${list.map(xy).join('L')}`;
+
+const circle = (radius) =>
+  `M${radius} 0A${radius} ${radius} 0 1 1 ${-radius} 0A${radius} ${radius} 0 1 1 ${radius} 0Z`;
+
+/** The ring's flanks over `count` tooth spaces from the `first` on, from the profile of one. Points nearer to each other than
+ *  `spacing` are left out: in the whole drive they would fall on the same pixel. */
+function flanks(geometry, teeth, first, count, spacing) {
+  const tooth = points(geometry.ring.profile);
+  const all = [];
+  let last = { x: Infinity, y: Infinity };
+  for (let index = first; index < first + count; index += 1) {
+    const angle = (2 * Math.PI * index) / teeth;
+    const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
+    for (const { x, y } of tooth) {
+      const point = { x: cos * x - sin * y, y: sin * x + cos * y };
+      if (Math.abs(point.x - last.x) + Math.abs(point.y - last.y) < spacing) continue;
+      all.push(point);
+      last = point;
+    }
+  }
+  return all;
+}
+
+/** The carrier: the annulus that the mechanics leave it, cut by radial slots as wide as a tooth; `count` pieces of it. */
+function carrierOutline({ geometry, installed, toothRadius }, first, count) {
+  const half = Math.PI / installed;
+  const outer = geometry.carrier.outer_radius_limit_mm;
+  // Where slots run into each other, the walls begin further out.
+  const inner = Math.max(geometry.carrier.inner_radius_limit_mm, toothRadius / Math.sin(half));
+  if (outer <= inner) return '';
+  const deg = 180 / Math.PI;
+  const wallAt = (radius) => Math.asin(Math.min(1, toothRadius / radius)) * deg;
+  const parts = [];
+  for (let index = first; index < first + count; index += 1) {
+    const [from, to] = [(index * 360) / installed, ((index + 1) * 360) / installed];
+    const corners = [
+      polar(inner, from + wallAt(inner)),
+      polar(outer, from + wallAt(outer)),
+      polar(outer, to - wallAt(outer)),
+      polar(inner, to - wallAt(inner)),
+    ].map(xy);
+    parts.push(
+      `M${corners[0]}L${corners[1]}A${outer} ${outer} 0 0 1 ${corners[2]}L${corners[3]}A${inner} ${inner} 0 0 0 ${corners[0]}Z`,
+    );
+  }
+  return parts.join('');
+}
+
+function arc(radius, fromDeg, toDeg) {
+  return `M${xy(polar(radius, fromDeg))}A${radius} ${radius} 0 0 1 ${xy(polar(radius, toDeg))}`;
+}
+
+/** A pushing force: an arrow whose head is at the contact. */
+function arrow({ center, contacts, force }, key, lengthPerNewton, head) {
+  const tip = contacts[key];
+  const length = force[key] * lengthPerNewton;
+  const reach = Math.hypot(center.x - tip.x, center.y - tip.y);
+  if (length < head * 0.1 || reach === 0) return '';
+  const [ux, uy] = [(center.x - tip.x) / reach, (center.y - tip.y) / reach];
+  const size = Math.min(head, 0.7 * length);
+  const barb = (side) => ({ x: tip.x - size * (ux + side * 0.45 * uy), y: tip.y - size * (uy - side * 0.45 * ux) });
+  const tail = { x: tip.x - length * ux, y: tip.y - length * uy };
+  return `M${xy(tail)}L${xy(tip)}M${xy(barb(1))}L${xy(tip)}L${xy(barb(-1))}`;
+}
+
+/** The parts as SVG elements, for one of the two views. */
+class Body {
+  constructor() {
+    this.ring = svg('path', { class: 'part part-ring', 'fill-rule': 'evenodd' });
+    this.carrier = svg('path', { class: 'part part-carrier' });
+    this.cam = svg('path', { class: 'part part-wave_generator' });
+    this.axis = svg('path', { class: 'cam-axis' });
+    this.camGroup = svg('g', {}, this.cam, this.axis);
+    this.zones = svg('path', { class: 'zones' });
+    this.zoneGroup = svg('g', {}, this.zones);
+    this.track = svg('path', { class: 'track' });
+    this.ghostRing = svg('path', { class: 'ghost' });
+    this.ghostCam = svg('path', { class: 'ghost' });
+    this.teeth = svg('g', { class: 'teeth' });
+    this.arrows = Object.fromEntries(CONTACTS.map(({ key }) => [key, svg('path', { class: `arrow contact-${key}` })]));
+    this.world = svg(
+      'g',
+      {},
+      [this.ring, this.carrier, this.camGroup, this.zoneGroup, this.teeth],
+      [this.track, this.ghostRing, this.ghostCam],
+      Object.values(this.arrows),
+    );
+    this.circles = [];
+  }
+
+  shape(outlines) {
+    for (const part of ['ring', 'carrier', 'cam', 'axis', 'zones', 'track']) setAttributes(this[part], { d: outlines[part] ?? '' });
+    while (this.circles.length > outlines.teeth) this.circles.pop().remove();
+    while (this.circles.length < outlines.teeth) {
+      const tooth = svg('circle', { class: 'tooth' });
+      this.circles.push(tooth);
+      this.teeth.append(tooth);
+    }
+    for (const tooth of this.circles) setAttributes(tooth, { r: outlines.toothRadius });
+  }
+
+  /** Places cam, carrier, teeth from the `first` on, and arrows; `turns` are those of ring and carrier pieces. */
+  place(motion, inputDeg, loaded, { selected, first, turns, arrows }) {
+    for (const part of [this.camGroup, this.zoneGroup, this.ghostCam]) setAttributes(part, { transform: `rotate(${inputDeg})` });
+    for (const part of [this.ring, this.track]) setAttributes(part, { transform: `rotate(${turns.ring})` });
+    setAttributes(this.carrier, { transform: `rotate(${turns.carrier})` });
+    const byTooth = new Map(loaded.teeth.map((tooth) => [tooth.tooth, tooth]));
+    this.circles.forEach((element, index) => {
+      const tooth = (first + index + motion.installed) % motion.installed;
+      const { x, y } = motion.center(tooth, inputDeg);
+      const state = byTooth.get(tooth);
+      const share = state && Math.max(...Object.values(state.stress)) / loaded.mostStress;
+      setAttributes(element, { 'data-tooth': tooth, cx: x.toFixed(4), cy: y.toFixed(4) });
+      element.style.fill = state ? stressColor(share) : '';
+      element.classList.toggle('selected', tooth === selected);
+    });
+    const lengthPerNewton = arrows.longest / loaded.mostForce;
+    for (const { key } of CONTACTS) {
+      setAttributes(this.arrows[key], { d: loaded.teeth.map((tooth) => arrow(tooth, key, lengthPerNewton, arrows.head)).join('') });
+    }
+  }
+}
+
+/** Colour of a share of the largest stress: three stops, mixed by the style sheet so that each theme has its own. */
+export function stressColor(share) {
+  const percent = (part) => `${(100 * Math.min(1, Math.max(0, part))).toFixed(1)}%`;
+  return share < 0.5
+    ? `color-mix(in oklab, var(--stress-mid) ${percent(2 * share)}, var(--stress-low))`
+    : `color-mix(in oklab, var(--stress-high) ${percent(2 * share - 1)}, var(--stress-mid))`;
+}
+
+export class Mechanism {
+  #whole = new Body();
+  #detail = new Body();
+  #motion;
+  #shown;
+
+  /** `onTurn(deg)` while the drawing is dragged, `onSelect(tooth)` when a tooth is clicked. */
+  constructor({ whole, detail, legend }, { onTurn, onSelect }) {
+    this.wholeSvg = whole;
+    this.detailSvg = detail;
+    this.wholeFlip = svg('g', { transform: 'scale(1 -1)' }, this.#whole.world);
+    this.detailFlip = svg('g', { transform: 'scale(1 -1)' }, this.#detail.world);
+    whole.append(this.wholeFlip);
+    detail.append(this.detailFlip);
+    this.legend = legend;
+    this.#buildLegend();
+    this.zoom = 1;
+    this.outermost = 0;
+    this.#listen(onTurn, onSelect);
+  }
+
+  #buildLegend() {
+    this.mostStress = html('span', { class: 'number' });
+    this.mostForce = html('span', { class: 'number' });
+    const contacts = CONTACTS.map(({ key, name }) =>
+      html('li', {}, html('span', { class: `swatch part-${key}`, 'aria-hidden': 'true' }), name),
+    );
+    this.ghostItem = html('li', { hidden: true }, html('span', { class: 'swatch ghost', 'aria-hidden': 'true' }), 'Reference');
+    this.legend.append(
+      html('ul', { class: 'key' }, contacts, html('li', {}, html('span', { class: 'swatch zone', 'aria-hidden': 'true' }), 'Meshing zones'), this.ghostItem),
+      html('p', { class: 'scale' }, 'Tooth’s highest contact stress: 0 ', html('span', { class: 'ramp', 'aria-hidden': 'true' }), ' ', this.mostStress),
+      html('p', { class: 'scale' }, 'Longest arrow, over the whole period: ', this.mostForce),
+    );
+  }
+
+  /** Takes a new drive; the places follow with the next `render`. */
+  setMotion(motion) {
+    this.#motion = motion;
+    const { geometry, installed, toothRadius } = motion;
+    const { start_deg: startDeg, end_deg: endDeg } = geometry.engagement;
+    const root = geometry.ring.root_radius_mm;
+    this.outer = root * (1 + RING_BODY);
+    const zone = this.outer * 1.025;
+    const cam = points(geometry.wave_generator.profile);
+    const major = cam[0].x;
+    const whole = {
+      ring: `${circle(this.outer)}${polyline(flanks(geometry, motion.ringTeeth, 0, motion.ringTeeth, this.outer / FINEST))}Z`,
+      carrier: carrierOutline(motion, 0, installed),
+      cam: `${polyline(cam.slice(0, -1))}Z`,
+      axis: `M${-major} 0H${major}M0 ${-major * 0.05}V${major * 0.05}`,
+      zones: arc(zone, endDeg, startDeg) + arc(zone, 180 + endDeg, 180 + startDeg),
+      teeth: installed,
+      toothRadius,
+    };
+    this.#whole.shape(whole);
+    // Enlarged, only what is near is built, but with every point: it is turned to where the selected tooth stands.
+    const spaces = Math.min(motion.ringTeeth, 2 * NEAR + 1);
+    const near = flanks(geometry, motion.ringTeeth, -Math.floor(spaces / 2), spaces, 0);
+    const ends = [near.at(-1), near[0]].map(({ x, y }) => (Math.atan2(y, x) * 180) / Math.PI);
+    const back = [polar(this.outer, ends[0]), polar(this.outer, ends[1])].map(xy);
+    const isWhole = spaces === motion.ringTeeth;
+    this.shownTeeth = Math.min(installed, 2 * NEAR + 1);
+    this.#detail.shape({
+      ...whole,
+      ring: isWhole ? `${circle(this.outer)}${polyline(near)}Z` : `${polyline(near)}L${back[0]}A${this.outer} ${this.outer} 0 0 0 ${back[1]}Z`,
+      carrier: carrierOutline(motion, -Math.floor(this.shownTeeth / 2), this.shownTeeth),
+      track: polyline(points(geometry.tooth_center_path)),
+      zones: '',
+      teeth: this.shownTeeth,
+    });
+    const peaks = motion.sweep && Object.values(motion.sweep.peaks);
+    this.most = {
+      force: peaks ? Math.max(...peaks.map((peak) => peak.force_n.value)) : 1,
+      stress: peaks ? Math.max(...peaks.map((peak) => peak.stress_mpa.value)) : 1,
+    };
+    setText(this.mostStress, peaks ? withUnit(number(this.most.stress, 4), 'MPa') : '–');
+    setText(this.mostForce, peaks ? withUnit(number(this.most.force, 4), 'N') : '–');
+  }
+
+  /** Outlines another drive's ring and cam over this one; nothing takes them away. */
+  setReference(reference) {
+    if (reference === this.reference) return;
+    this.reference = reference;
+    const outlines = { ring: '', cam: '' };
+    if (reference) {
+      const { geometry, design } = reference;
+      const { teeth } = design.drive.ring;
+      outlines.ring = `${polyline(flanks(geometry, teeth, 0, teeth, geometry.ring.root_radius_mm / FINEST))}Z`;
+      outlines.cam = `${polyline(points(geometry.wave_generator.profile).slice(0, -1))}Z`;
+    }
+    for (const body of [this.#whole, this.#detail]) {
+      setAttributes(body.ghostRing, { d: outlines.ring });
+      setAttributes(body.ghostCam, { d: outlines.cam });
+    }
+    this.ghostItem.hidden = !reference;
+    this.outermost = reference?.geometry.ring.root_radius_mm ?? 0;
+  }
+
+  /** Draws the drive at an input angle, seen from one of its members. */
+  render({ inputDeg, selected, from }) {
+    const motion = this.#motion;
+    if (!motion) return;
+    this.#shown = { inputDeg, selected, from };
+    const loaded = { teeth: motion.loaded(inputDeg), mostForce: this.most.force, mostStress: this.most.stress };
+    const viewDeg = { ring: 0, carrier: motion.carrierDeg(inputDeg), wave_generator: inputDeg }[from];
+    this.viewDeg = viewDeg;
+    const half = Math.max(this.outer * (1 + 2 * LONGEST_ARROW - RING_BODY), this.outermost * 1.02);
+    setAttributes(this.wholeSvg, { viewBox: `${-half} ${-half} ${2 * half} ${2 * half}` });
+    const seen = 2 * this.outer;
+    setAttributes(this.#whole.world, { transform: `rotate(${-viewDeg})` });
+    this.#whole.place(motion, inputDeg, loaded, {
+      selected,
+      first: 0,
+      turns: { ring: 0, carrier: motion.carrierDeg(inputDeg) },
+      arrows: { longest: LONGEST_ARROW * seen, head: ARROW_HEAD * seen },
+    });
+    this.#renderDetail(loaded, inputDeg, selected);
+    return loaded.teeth;
+  }
+
+  #renderDetail(loaded, inputDeg, selected) {
+    const motion = this.#motion;
+    const { geometry, toothRadius, ringTeeth } = motion;
+    const root = geometry.ring.root_radius_mm;
+    const pitch = (2 * Math.PI * root) / ringTeeth;
+    const width = Math.max(5 * toothRadius, 2.3 * pitch) / this.zoom;
+    const height = 0.92 * width;
+    const inner = geometry.carrier.inner_radius_limit_mm;
+    // Zoomed in, the view closes in on where tooth and ring meet.
+    const middle = root - Math.min(0.44 * height, (root - inner) / 2 + toothRadius * 0.3);
+    const deg = motion.toothDeg(selected, inputDeg);
+    const space = 360 / ringTeeth;
+    setAttributes(this.detailSvg, { viewBox: `${-width / 2} ${-middle - height / 2} ${width} ${height}` });
+    setAttributes(this.#detail.world, { transform: `rotate(${90 - deg})` });
+    const teeth = loaded.teeth.filter(({ center }) => Math.cos(((center.deg - deg) * Math.PI) / 180) > 0.5);
+    this.#detail.place(motion, inputDeg, { ...loaded, teeth }, {
+      selected,
+      first: selected - Math.floor(this.shownTeeth / 2),
+      turns: { ring: space * Math.round(deg / space), carrier: deg },
+      arrows: { longest: LONGEST_ARROW * 3 * width, head: ARROW_HEAD * 2.2 * width },
+    });
+  }
+
+  #listen(onTurn, onSelect) {
+    const place = (event) => {
+      const box = this.wholeSvg.getBoundingClientRect();
+      const x = event.clientX - box.left - box.width / 2;
+      const y = box.top + box.height / 2 - event.clientY;
+      return { deg: (Math.atan2(y, x) * 180) / Math.PI, x: event.clientX, y: event.clientY };
+    };
+    let drag;
+    this.wholeSvg.addEventListener('pointerdown', (event) => {
+      if (!this.#shown || event.button !== 0) return;
+      this.wholeSvg.setPointerCapture(event.pointerId);
+      const at = place(event);
+      drag = { start: at, deg: at.deg, inputDeg: this.#shown.inputDeg, moved: false };
+    });
+    this.wholeSvg.addEventListener('pointermove', (event) => {
+      if (!drag) return;
+      const at = place(event);
+      drag.moved ||= Math.hypot(at.x - drag.start.x, at.y - drag.start.y) > 4;
+      const step = at.deg - drag.deg;
+      drag.deg = at.deg;
+      // Seen from the wave generator it is the ring that is dragged, and the other way round.
+      const sense = this.#shown.from === 'wave_generator' ? -1 : 1;
+      drag.inputDeg += sense * (step - 360 * Math.round(step / 360));
+      if (drag.moved) onTurn(drag.inputDeg);
+    });
+    const release = (event) => {
+      if (drag && !drag.moved && event.type === 'pointerup') {
+        const motion = this.#motion;
+        const slot = 360 / motion.installed;
+        const deg = drag.start.deg + this.viewDeg - motion.carrierDeg(this.#shown.inputDeg);
+        const count = motion.installed;
+        onSelect(((Math.round(deg / slot) % count) + count) % count);
+      }
+      drag = undefined;
+    };
+    this.wholeSvg.addEventListener('pointerup', release);
+    this.wholeSvg.addEventListener('pointercancel', release);
+  }
+}

@@ -1,0 +1,209 @@
+// Where everything stands at an input angle, and what it carries. All numbers are the service's: the path of a tooth's centre
+// from the geometry, the loaded teeth from the sweep. What happens here is turning frames, renumbering teeth from one period
+// to the next, and interpolation between neighbouring samples.
+//
+// Frame: the ring's, x along the middle of a tooth space; angles in degrees, counter-clockwise.
+
+const RAD = Math.PI / 180;
+
+export const CONTACTS = [
+  { key: 'wave_generator', name: 'Wave generator', short: 'cam', index: 'H' },
+  { key: 'ring', name: 'Ring', short: 'ring', index: 'K' },
+  { key: 'carrier', name: 'Carrier', short: 'slot', index: 'S' },
+];
+
+/** The columns of a sweep's states, apart from angle and tooth number. */
+const COLUMNS = ['position_deg', 'wave_generator_angle_deg', 'ring_angle_deg'].concat(
+  ...CONTACTS.map(({ key }) => [`force_${key}_n`, `stress_${key}_mpa`]),
+);
+
+export const polar = (radius, deg) => ({ x: radius * Math.cos(deg * RAD), y: radius * Math.sin(deg * RAD) });
+
+const modulo = (value, base) => ((value % base) + base) % base;
+
+/** A sweep's states by input angle: `[{ angle, rows: Map(tooth → row) }]`. */
+export function framesOf(states) {
+  const frames = [];
+  states.input_angle_deg.forEach((angle, index) => {
+    let frame = frames.at(-1);
+    if (frame?.angle !== angle) {
+      frame = { angle, rows: new Map() };
+      frames.push(frame);
+    }
+    const row = { tooth: states.tooth[index], center_radius_mm: states.center_radius_mm[index] };
+    for (const column of COLUMNS) row[column] = states[column][index];
+    frame.rows.set(row.tooth, row);
+  });
+  return frames;
+}
+
+/** Whether a tooth takes load at once when it enters: its flank ends before the place where the lever arm is zero. */
+export const entersUnderLoad = (geometry) => geometry.engagement.start_deg < 90 - 1e-9;
+
+export class Motion {
+  constructor(design, geometry, sweep) {
+    const { teeth, ring } = design.drive;
+    this.theoretical = teeth.count;
+    this.installed = teeth.installed ?? teeth.count;
+    this.ringTeeth = ring.teeth;
+    this.toothRadius = teeth.radius_mm;
+    this.geometry = geometry;
+    this.sweep = sweep;
+    this.period = geometry.period_deg;
+    this.ratio = geometry.transmission_ratio;
+    this.frames = sweep ? framesOf(sweep.states) : [];
+    const { x_mm: x, y_mm: y } = geometry.tooth_center_path;
+    this.path = x.map((value, index) => ({
+      deg: Math.atan2(y[index], value) / RAD,
+      radius: Math.hypot(value, y[index]),
+    }));
+  }
+
+  carrierDeg(inputDeg) {
+    return inputDeg / this.ratio;
+  }
+
+  /** Polar angle of a tooth's slot in the ring's frame. */
+  toothDeg(tooth, inputDeg) {
+    return (tooth * 360) / this.installed + this.carrierDeg(inputDeg);
+  }
+
+  /** Position ψ of a tooth from the nearer end of the major axis, in (-90, 90]. */
+  positionDeg(tooth, inputDeg) {
+    return 90 - modulo(90 - (this.toothDeg(tooth, inputDeg) - inputDeg), 180);
+  }
+
+  /** The input angle nearest to `nearDeg` at which a tooth stands at position ψ. */
+  inputDegAt(tooth, positionDeg, nearDeg) {
+    // ψ falls by Z_K/Z_G of the input angle.
+    const rate = this.ringTeeth / this.theoretical;
+    const pass = 180 / rate;
+    const off = (this.positionDeg(tooth, nearDeg) - positionDeg) / rate;
+    return nearDeg + off - pass * Math.round(off / pass);
+  }
+
+  /** Distance of a tooth's centre from the axis, on its path. */
+  centerRadius(toothDeg) {
+    const pitch = 360 / this.ringTeeth;
+    const deg = toothDeg - pitch * Math.round(toothDeg / pitch);
+    const { path } = this;
+    let low = 0;
+    let high = path.length - 1;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (path[middle].deg <= deg) low = middle;
+      else high = middle;
+    }
+    const span = path[high].deg - path[low].deg;
+    const share = span > 0 ? Math.min(1, Math.max(0, (deg - path[low].deg) / span)) : 0;
+    return path[low].radius + share * (path[high].radius - path[low].radius);
+  }
+
+  center(tooth, inputDeg) {
+    const deg = this.toothDeg(tooth, inputDeg);
+    return { ...polar(this.centerRadius(deg), deg), deg };
+  }
+
+  /** The loaded teeth of both zones: `{ tooth, zone, positionDeg, force, stress, contacts }`, by tooth number. */
+  loaded(inputDeg) {
+    if (this.frames.length === 0) return [];
+    const periods = Math.floor(inputDeg / this.period);
+    const within = inputDeg - periods * this.period;
+    const last = this.frames.length - 1;
+    const place = Math.min((within / this.period) * last, last);
+    const index = Math.min(Math.floor(place), last - 1);
+    const loaded = [];
+    for (const row of this.#between(index, place - index)) {
+      // One period on, each tooth stands where the one before it stood.
+      for (const zone of [0, 1]) {
+        const tooth = modulo(row.tooth + periods + (zone * this.installed) / 2, this.installed);
+        loaded.push(this.#loadedTooth(tooth, zone, row, inputDeg));
+      }
+    }
+    return loaded.sort((one, other) => one.tooth - other.tooth);
+  }
+
+  /** The rows of one zone at a share of the way from sample `index` to the next. */
+  *#between(index, share) {
+    const before = this.frames[index].rows;
+    const after = this.frames[index + 1].rows;
+    const start = this.geometry.engagement.start_deg;
+    const blend = (one, other, t) => {
+      const row = { tooth: one.tooth };
+      for (const column of COLUMNS) row[column] = one[column] + t * (other[column] - one[column]);
+      return row;
+    };
+    // A tooth that enters under load makes every force jump there, so nothing is interpolated across its entry.
+    const entering = entersUnderLoad(this.geometry) && [...after.values()].find((row) => !before.has(row.tooth));
+    const rate = (this.ringTeeth / this.theoretical) * (this.frames[index + 1].angle - this.frames[index].angle);
+    const hasEntered = entering && entering.position_deg + (1 - share) * rate <= start;
+    for (const row of before.values()) {
+      const next = after.get(row.tooth);
+      if (next) {
+        const blended = blend(row, next, share);
+        if (entering) {
+          const held = hasEntered ? next : row;
+          for (const column of COLUMNS) if (!column.endsWith('_deg')) blended[column] = held[column];
+        }
+        yield blended;
+      } else {
+        // It leaves at the root, where force and lever arm end together.
+        const positionDeg = row.position_deg - share * rate;
+        if (positionDeg <= 0) continue;
+        const left = positionDeg / row.position_deg;
+        const faded = { ...row, position_deg: positionDeg };
+        for (const column of COLUMNS) if (!column.endsWith('_deg')) faded[column] *= left;
+        faded.wave_generator_angle_deg = 90 - left * (90 - row.wave_generator_angle_deg);
+        faded.ring_angle_deg = 180 / this.ringTeeth - left * (180 / this.ringTeeth - row.ring_angle_deg);
+        yield faded;
+      }
+    }
+    for (const row of after.values()) {
+      if (before.has(row.tooth)) continue;
+      if (entering ? hasEntered : row.position_deg + (1 - share) * rate <= start) {
+        yield { ...row, position_deg: row.position_deg + (1 - share) * rate };
+      }
+    }
+  }
+
+  #loadedTooth(tooth, zone, row, inputDeg) {
+    const center = this.center(tooth, inputDeg);
+    const radius = Math.hypot(center.x, center.y);
+    const turn = zone * 180;
+    // φ_H counts from the cam's minor axis, φ_K from the tip of the ring's tooth, both as seen from the axis.
+    const camDeg = inputDeg + turn + 90 - row.wave_generator_angle_deg;
+    const spaceDeg = center.deg + (2 * Math.sign(this.ratio) * row.position_deg) / this.ringTeeth;
+    const ringDeg = spaceDeg - Math.sign(this.ratio) * (180 / this.ringTeeth - row.ring_angle_deg);
+    const contacts = {
+      wave_generator: this.#onTooth(radius, center.deg, camDeg, -1),
+      ring: this.#onTooth(radius, center.deg, ringDeg, 1),
+    };
+    const force = {};
+    const stress = {};
+    for (const { key } of CONTACTS) {
+      force[key] = row[`force_${key}_n`];
+      stress[key] = row[`stress_${key}_mpa`];
+    }
+    contacts.carrier = this.#slotContact(center, contacts, force);
+    return { tooth, zone, positionDeg: row.position_deg, center, force, stress, contacts };
+  }
+
+  /** The point of a tooth's outline that is seen from the axis at an angle, on the near or the far side. */
+  #onTooth(radius, centerDeg, deg, side) {
+    const off = (deg - centerDeg) * RAD;
+    const reach = Math.sqrt(Math.max(0, this.toothRadius ** 2 - (radius * Math.sin(off)) ** 2));
+    return polar(radius * Math.cos(off) + side * reach, deg);
+  }
+
+  /** The slot's wall pushes across the slot, on the side that the other two forces press the tooth to. */
+  #slotContact(center, contacts, force) {
+    const along = { x: -Math.sin(center.deg * RAD), y: Math.cos(center.deg * RAD) };
+    let push = 0;
+    for (const key of ['wave_generator', 'ring']) {
+      const contact = contacts[key];
+      push += (force[key] * ((center.x - contact.x) * along.x + (center.y - contact.y) * along.y)) / this.toothRadius;
+    }
+    const side = Math.sign(push) || 1;
+    return { x: center.x + side * this.toothRadius * along.x, y: center.y + side * this.toothRadius * along.y };
+  }
+}

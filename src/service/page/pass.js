@@ -1,0 +1,104 @@
+// One tooth's pass through the meshing zone, from where it enters to the root, put together from the samples of one period
+// as the paper does it (its figures 8 to 10): each loaded tooth stands for a part of the pass.
+
+import { CONTACTS, entersUnderLoad, framesOf } from './motion.js';
+
+export const ABSCISSAE = [
+  { key: 'input', label: 'Input angle', axis: 'input angle since the minor axis, deg', unit: 'deg', symbol: 'j' },
+  { key: 'ring', label: 'Ring flank', axis: 'φ_K on the ring, from the tooth tip, deg', unit: 'deg', symbol: 'φ_K' },
+  { key: 'cam', label: 'Cam', axis: 'φ_H on the cam, from the minor axis, deg', unit: 'deg', symbol: 'φ_H' },
+  { key: 'slot', label: 'Slot', axis: 'distance of the tooth’s centre from the axis, mm', unit: 'mm', symbol: 'ρ' },
+];
+
+/** `{ x: { abscissa: [] }, force: { contact: [] }, stress: { contact: [] }, position: [], breaks: Set of indices }`; a break at an
+ *  index stands between that point and the one before it. */
+export function passOf(design, geometry, sweep) {
+  const frames = framesOf(sweep.states);
+  const jumps = entersUnderLoad(geometry);
+  const rate = design.drive.teeth.count / design.drive.ring.teeth;
+  const points = [];
+  // The last sample repeats the first, teeth renumbered.
+  for (let index = 0; index < frames.length - 1; index += 1) {
+    const { rows } = frames[index];
+    const following = [...frames[index + 1].rows.keys()];
+    const breaksAfter = jumps && following.some((tooth) => !rows.has(tooth));
+    for (const row of rows.values()) points.push({ row, breaksAfter });
+  }
+  points.sort((one, other) => other.row.position_deg - one.row.position_deg);
+  const column = (name) => points.map(({ row }) => row[name]);
+  const position = column('position_deg');
+  const pass = {
+    position,
+    // Ascending, as the columns of x are.
+    travelled: position.map((deg) => -deg),
+    x: {
+      input: position.map((deg) => (90 - deg) * rate),
+      ring: column('ring_angle_deg'),
+      cam: column('wave_generator_angle_deg'),
+      slot: column('center_radius_mm'),
+    },
+    force: {},
+    stress: {},
+    entersUnderLoad: jumps,
+    breaks: new Set(),
+    peaks: sweep.peaks,
+  };
+  for (const { key } of CONTACTS) {
+    pass.force[key] = column(`force_${key}_n`);
+    pass.stress[key] = column(`stress_${key}_mpa`);
+  }
+  points.forEach(({ breaksAfter }, index) => {
+    if (breaksAfter && index + 1 < points.length) pass.breaks.add(index + 1);
+  });
+  return pass;
+}
+
+/** The columns x and y's of a plot, with a gap at each break. */
+export function plotted(pass, abscissa, quantity, contacts) {
+  const xs = [];
+  const columns = contacts.map(() => []);
+  pass.x[abscissa].forEach((x, index) => {
+    if (pass.breaks.has(index)) {
+      xs.push((x + pass.x[abscissa][index - 1]) / 2);
+      for (const column of columns) column.push(null);
+    }
+    xs.push(x);
+    contacts.forEach((key, which) => columns[which].push(pass[quantity][key][index]));
+  });
+  return [xs, ...columns];
+}
+
+/** The place of an abscissa's value between two points of the pass, or nothing outside it. */
+function placeOf(xs, x) {
+  if (xs.length < 2 || x < xs[0] || x > xs.at(-1)) return undefined;
+  let low = 0;
+  let high = xs.length - 1;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (xs[middle] <= x) low = middle;
+    else high = middle;
+  }
+  return { low, high, share: xs[high] > xs[low] ? (x - xs[low]) / (xs[high] - xs[low]) : 0 };
+}
+
+/** Reads the pass where an abscissa has a value; across a jump, at the nearer side. */
+export function readAt(pass, abscissa, x) {
+  const place = placeOf(pass.x[abscissa], x);
+  if (!place) return undefined;
+  const share = pass.breaks.has(place.high) ? Math.round(place.share) : place.share;
+  const value = (column) => column[place.low] + share * (column[place.high] - column[place.low]);
+  const reading = { position: value(pass.position), force: {}, stress: {} };
+  for (const { key } of CONTACTS) {
+    reading.force[key] = value(pass.force[key]);
+    reading.stress[key] = value(pass.stress[key]);
+  }
+  return reading;
+}
+
+/** The abscissa's value at a position, or nothing where the tooth carries no load. */
+export function abscissaAt(pass, abscissa, positionDeg) {
+  const place = placeOf(pass.travelled, -positionDeg);
+  if (!place) return undefined;
+  const xs = pass.x[abscissa];
+  return xs[place.low] + place.share * (xs[place.high] - xs[place.low]);
+}

@@ -1,0 +1,43 @@
+// What only paper shows: the design as a table, with its name, date and address. The rest of the report is the page itself.
+
+import { GROUPS, at, fieldsOf } from './design.js';
+import { html } from './dom.js';
+import { withUnit } from './format.js';
+
+function shownValue(field, design) {
+  const value = at(design, field.pointer);
+  if (field.kind === 'variant') return field.options.find((option) => option.value === (value?.[field.tag] ?? field.options[0].value))?.label;
+  if (field.kind === 'choice') return field.options.find((option) => option.value === (value ?? field.options[0].value))?.label;
+  if (field.kind === 'oneOf') return undefined;
+  const shown = value ?? field.preset;
+  return typeof shown === 'number' ? withUnit(String(shown), field.unit) : undefined;
+}
+
+export function reportOf(name, { design, shown, reference }, address) {
+  const groups = GROUPS.filter((group) => group.pointer !== '/materials').map((group) => {
+    // Of several options only the given one has a value of its own; the others have presets for when they are chosen.
+    const options = new Set((group.fields ?? []).flatMap((field) => field.options ?? []).flatMap((option) => option.fields ?? option.field ?? []));
+    const rows = [...fieldsOf(group)]
+      .filter((field) => !options.has(field) || at(design, field.pointer) !== undefined)
+      .map((field) => [field.label, shownValue(field, design)])
+      .filter(([, value]) => value !== undefined)
+      .map(([label, value]) => html('tr', {}, html('th', {}, label), html('td', {}, value)));
+    return rows.length ? html('table', {}, html('caption', {}, group.title), html('tbody', {}, rows)) : undefined;
+  });
+  const materials = GROUPS.find((group) => group.pointer === '/materials');
+  const parts = materials.parts.map(({ title, fields }) =>
+    html('tr', {}, html('th', {}, title), html('td', {}, fields.map((field) => shownValue(field, design)).join(', ν '))),
+  );
+  return [
+    html('h1', {}, name),
+    html(
+      'p',
+      { class: 'imprint' },
+      `Calculated ${new Date().toISOString().slice(0, 10)} by toothwave ${shown?.answers.geometry.solver_version ?? ''}`,
+      reference ? `; compared with the reference ${reference.name}` : '',
+      ' · ',
+      html('a', { href: address }, 'this design on line'),
+    ),
+    html('div', { class: 'report-design' }, groups.filter(Boolean), html('table', {}, html('caption', {}, materials.title), html('tbody', {}, parts))),
+  ];
+}

@@ -1,0 +1,180 @@
+// What a designer decides by, as a table: each row is one entry here. A result that the service does not answer is not shown.
+
+import { html, setText, symbol } from './dom.js';
+import { DASH, difference, number } from './format.js';
+import { CONTACTS } from './motion.js';
+
+const row = (label, sign, unit, get, more) => ({ label, symbol: sign, unit, get, ...more });
+
+const peakRows = (field, name, sign, unit) =>
+  CONTACTS.map(({ key, name: contact, index }) =>
+    row(`${name}, ${contact.toLowerCase()}`, `${sign}_${index}`, unit, ({ sweep }) => sweep?.peaks[key][field].value, {
+      place: ({ sweep }) => sweep.peaks[key][field],
+    }),
+  );
+
+/** The contact that carries the largest of a quantity. */
+function largest(field, { sweep }) {
+  if (!sweep) return undefined;
+  const peaks = CONTACTS.map(({ key, name }) => ({ name, peak: sweep.peaks[key][field] }));
+  return peaks.reduce((most, candidate) => (candidate.peak.value > most.peak.value ? candidate : most));
+}
+
+const largestRow = (label, field, unit) =>
+  row(label, '', unit, (answers) => largest(field, answers)?.peak.value, {
+    note: (answers) => {
+      const { name, peak } = largest(field, answers);
+      return `${name.toLowerCase()}, ψ ${number(peak.position_deg, 3)}°`;
+    },
+  });
+
+/** Always in sight, however far one scrolls. */
+const KEY_ROWS = [
+  row('Ratio, ring fixed', '', '', ({ geometry }) => geometry?.transmission_ratio),
+  row('Coincidence degree', '', '', ({ coincidence }) => coincidence?.coincidence_degree, {
+    note: ({ coincidence }) => `from ψ ${number(coincidence.engagement.start_deg, 4)}°`,
+  }),
+  row('Teeth in mesh, a zone', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, {
+    text: ({ coincidence: { teeth_in_mesh_per_zone: { min, max } } }) => (min === max ? `${min}` : `${min} to ${max}`),
+  }),
+  largestRow('Largest force', 'force_n', 'N'),
+  largestRow('Largest stress', 'stress_mpa', 'MPa'),
+  row('Undercut', '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
+    text: ({ geometry }) => (geometry.undercut.occurs ? 'yes' : 'no'),
+    note: ({ geometry: { undercut } }) =>
+      undercut.critical_tooth_radius_mm === undefined ? 'at no radius' : `critical r ${number(undercut.critical_tooth_radius_mm, 4)} mm`,
+    state: ({ geometry }) => (geometry.undercut.occurs ? 'warning' : 'good'),
+    keepsNote: true,
+  }),
+];
+
+export const GROUPS = [
+  {
+    title: 'Motion and mesh',
+    rows: [
+      row('Ratio, ring fixed', 'i_HG', '', ({ geometry }) => geometry?.transmission_ratio),
+      row('Ratio, carrier fixed', 'i_HK', '', ({ geometry }) => geometry?.transmission_ratio_carrier_fixed),
+      row('Period of the load pattern', '', 'deg', ({ geometry }) => geometry?.period_deg),
+      row('Coincidence degree, both zones', 'ε', '', ({ coincidence }) => coincidence?.coincidence_degree, { significant: 7 }),
+      row('Fewest teeth in mesh, each zone', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.min),
+      row('Most teeth in mesh, each zone', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max),
+      row('Engagement begins, from the major axis', 'ψ_e', 'deg', ({ geometry }) => geometry?.engagement.start_deg),
+      row('Undercut', '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
+        text: ({ geometry }) => (geometry.undercut.occurs ? 'yes' : 'no'),
+      }),
+      row('Critical tooth radius', 'r_c', 'mm', ({ geometry }) => geometry?.undercut.critical_tooth_radius_mm, { significant: 6 }),
+    ],
+  },
+  { title: 'Peaks over a period', rows: [...peakRows('force_n', 'Force', 'F', 'N'), ...peakRows('stress_mpa', 'Contact stress', 'σ', 'MPa')] },
+  {
+    title: 'Parts and room',
+    rows: [
+      row('Ring root radius', '', 'mm', ({ geometry }) => geometry?.ring.root_radius_mm),
+      row('Ring tip radius', '', 'mm', ({ geometry }) => geometry?.ring.tip_radius_mm),
+      row('Ring tooth height', '', 'mm', ({ geometry }) => geometry?.ring.tooth_height_mm),
+      row('Largest pressure angle, ring', 'β', 'deg', ({ geometry }) => geometry?.ring.pressure_angle_max_deg),
+      row('Largest pressure angle, cam', 'γ', 'deg', ({ geometry }) => geometry?.wave_generator.pressure_angle_max_deg),
+      row('Radial space for the carrier', '', 'mm', ({ geometry }) => geometry?.carrier.radial_space_mm),
+      row('Thinnest wall between slots', '', 'mm', ({ geometry }) => geometry?.carrier.slot_wall_mm),
+      row('Least gap between teeth', '', 'mm', ({ geometry }) => geometry?.teeth.gap_min_mm),
+    ],
+  },
+  {
+    title: 'Checks of the calculation',
+    rows: [
+      row('Torque balance, residual', '', '', ({ sweep }) => sweep?.checks.torque_balance_residual, { noDifference: true }),
+      row('Period closure, residual', '', '', ({ sweep }) => sweep?.checks.period_closure_residual, { noDifference: true }),
+    ],
+  },
+];
+
+function show(entry, answers) {
+  const value = entry.get(answers);
+  if (value === undefined) return undefined;
+  const text = entry.text?.(answers) ?? number(value, entry.significant ?? 5);
+  return { value, text };
+}
+
+function compare(entry, answers, reference) {
+  const value = entry.get(answers);
+  const other = entry.get(reference);
+  if (value === undefined || other === undefined || entry.noDifference) return '';
+  if (!entry.text) return difference(value, other);
+  return entry.text(answers) === entry.text(reference) ? '=' : 'differs';
+}
+
+export class Results {
+  #cells = [];
+  #tiles = [];
+
+  /** `onShow({ input_angle_deg, position_deg })` when a peak's place is picked. */
+  constructor({ keyFigures, table }, onShow) {
+    for (const entry of KEY_ROWS) {
+      const value = html('data', { class: 'value number' });
+      const unit = entry.unit && !entry.text ? html('span', { class: 'unit' }, entry.unit) : undefined;
+      const note = html('span', { class: 'tile-note number' });
+      const tile = html('div', { class: 'tile' }, html('dt', {}, entry.label), html('dd', {}, value, unit && [' ', unit], note));
+      this.#tiles.push({ entry, tile, value, note });
+      keyFigures.append(tile);
+    }
+    this.table = table;
+    const head = html('tr', {}, html('th', { scope: 'col' }, 'Result'), html('th', { scope: 'col', class: 'numeric' }, 'This design'));
+    this.headings = ['Reference', 'Difference'].map((text) => html('th', { scope: 'col', class: 'numeric compared' }, text));
+    head.append(...this.headings, html('th', { scope: 'col' }, 'Where'));
+    table.append(html('thead', {}, head));
+    for (const group of GROUPS) {
+      const body = html('tbody', {}, html('tr', { class: 'group' }, html('th', { scope: 'rowgroup', colspan: 5 }, group.title)));
+      for (const entry of group.rows) {
+        const value = html('data', { class: 'number' });
+        const reference = html('span', { class: 'number' });
+        const delta = html('td', { class: 'numeric compared number' });
+        const place = entry.place && html('button', { type: 'button', class: 'link number', title: 'Show in mechanism and plots' });
+        const cell = { entry, value, reference, delta, place };
+        place?.addEventListener('click', () => onShow(cell.at));
+        const line = html(
+          'tr',
+          {},
+          html('th', { scope: 'row' }, entry.label, entry.symbol && [' ', symbol(entry.symbol)]),
+          html('td', { class: 'numeric' }, value, html('span', { class: 'unit' }, entry.unit)),
+          html('td', { class: 'numeric compared' }, reference, html('span', { class: 'unit' }, entry.unit)),
+          [delta, html('td', { class: 'place' }, place)],
+        );
+        this.#cells.push(Object.assign(cell, { line }));
+        body.append(line);
+      }
+      table.append(body);
+    }
+  }
+
+  #noteOf(entry, answers, reference) {
+    if (!reference || entry.keepsNote) return entry.note?.(answers) ?? '';
+    const difference = compare(entry, answers, reference);
+    return difference === 'differs' ? `reference: ${entry.text(reference)}` : difference;
+  }
+
+  /** Shows answers, and beside them those of a reference. What has no answer keeps its place but no number. */
+  update(answers, reference) {
+    this.table.classList.toggle('comparing', Boolean(reference));
+    for (const { entry, tile, value, note } of this.#tiles) {
+      const shown = show(entry, answers);
+      setText(value, shown?.text ?? DASH);
+      if (shown) value.value = shown.value;
+      tile.dataset.state = (shown && entry.state?.(answers)) ?? '';
+      setText(note, shown ? this.#noteOf(entry, answers, reference) : '');
+    }
+    for (const cell of this.#cells) {
+      const { entry, line, value, reference: other, delta, place } = cell;
+      const shown = show(entry, answers);
+      const otherShown = reference && show(entry, reference);
+      line.hidden = !shown && !otherShown;
+      setText(value, shown?.text ?? DASH);
+      if (shown) value.value = shown.value;
+      setText(other, otherShown?.text ?? DASH);
+      setText(delta, reference ? compare(entry, answers, reference) : '');
+      if (place && shown) {
+        cell.at = entry.place(answers);
+        setText(place, `j ${number(cell.at.input_angle_deg, 4)}°, ψ ${number(cell.at.position_deg, 4)}°`);
+      }
+    }
+  }
+}

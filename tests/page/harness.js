@@ -1,0 +1,135 @@
+// The real binary and a real Chromium.
+
+import { spawn } from 'node:child_process';
+import { once } from 'node:events';
+import { createServer } from 'node:net';
+import { chromium } from 'playwright-core';
+
+const BINARY = process.env.TOOTHWAVE_BIN ?? '../../target/debug/toothwave';
+const CHROMIUM = process.env.CHROMIUM ?? '/usr/bin/chromium';
+
+async function freePort() {
+  const probe = createServer().listen(0, '127.0.0.1');
+  await once(probe, 'listening');
+  const { port } = probe.address();
+  probe.close();
+  return port;
+}
+
+export class Server {
+  static async start(port) {
+    const server = new Server();
+    server.port = port ?? (await freePort());
+    server.origin = `http://127.0.0.1:${server.port}`;
+    server.process = spawn(BINARY, ['serve', '--listen', `127.0.0.1:${server.port}`, '--log', 'warn'], { stdio: 'ignore' });
+    for (let attempt = 0; ; attempt += 1) {
+      try {
+        await fetch(`${server.origin}/health/ready`);
+        return server;
+      } catch (error) {
+        if (attempt > 100) throw error;
+        await new Promise((resolve) => setTimeout(resolve, 50));
+      }
+    }
+  }
+
+  async stop() {
+    this.process.kill('SIGKILL');
+    if (this.process.exitCode === null && this.process.signalCode === null) await once(this.process, 'exit');
+  }
+
+  async ask(path, design) {
+    const response = await fetch(this.origin + path, {
+      method: 'POST',
+      headers: { 'content-type': 'application/json' },
+      body: JSON.stringify(design),
+    });
+    return response.json();
+  }
+
+  async answers(design) {
+    const [geometry, coincidence, sweep] = await Promise.all(
+      ['/v1/geometry', '/v1/coincidence-degree', '/v1/sweep'].map((path) => this.ask(path, design)),
+    );
+    return { geometry, coincidence, sweep };
+  }
+
+  async example(name) {
+    return (await fetch(`${this.origin}/v1/examples/${name}`)).json();
+  }
+}
+
+export const launch = () =>
+  chromium.launch({
+    executablePath: CHROMIUM,
+    headless: true,
+    args: ['--no-sandbox', '--disable-gpu', '--disable-quic', '--disable-background-networking', '--no-first-run', '--disable-component-update', '--disable-sync'],
+  });
+
+/** A page that remembers what must not happen: errors, violations of its policy, requests to elsewhere. */
+export async function open(browser, server, { address = '', ...options } = {}) {
+  const context = await browser.newContext({
+    viewport: { width: 1366, height: 900 },
+    colorScheme: 'light',
+    reducedMotion: 'reduce',
+    ...options,
+  });
+  const page = await context.newPage();
+  page.faults = [];
+  page.expectsOutage = false;
+  page.on('pageerror', (error) => page.faults.push(`error: ${error.stack}`));
+  page.on('console', (message) => {
+    if (!['error', 'warning'].includes(message.type())) return;
+    const text = message.text();
+    // The browser itself logs each refused or failed request; refusals are what some tests are about.
+    if (text.includes('status of 422')) return;
+    if (page.expectsOutage && /Failed to load resource: net::ERR_/.test(text)) return;
+    page.faults.push(`${message.type()}: ${text}`);
+  });
+  context.on('request', (request) => {
+    const url = request.url();
+    if (!url.startsWith(server.origin) && !url.startsWith('blob:') && !url.startsWith('data:')) page.faults.push(`request to ${url}`);
+  });
+  await page.goto(`${server.origin}/${address}`);
+  await settled(page);
+  return page;
+}
+
+/** Waits until the page shows the answers about the design that stands in its form. */
+export async function settled(page) {
+  await page.waitForFunction(() => document.querySelector('#results').getAttribute('aria-busy') === 'false', undefined, { timeout: 10_000 });
+  // One frame more, for what is drawn once a frame.
+  await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+}
+
+export async function choose(page, example) {
+  await page.click(`[data-example="${example}"]`);
+  await settled(page);
+}
+
+export async function enter(page, pointer, value) {
+  await page.fill(field(pointer), String(value));
+  await settled(page);
+}
+
+export const field = (pointer) => `#field${pointer.replaceAll('/', '-')}`;
+export const notes = (pointer) => `#notes${pointer.replaceAll('/', '-')}`;
+
+/** The design in the page, as its JSON. */
+export async function designOf(page) {
+  await page.click('#open-document');
+  const design = JSON.parse(await page.inputValue('#document-text'));
+  await page.click('#document-close');
+  return design;
+}
+
+/** The number in the results' row of this label. */
+export const resultOf = (page, label) =>
+  page.$$eval(
+    '#table tbody tr',
+    (rows, wanted) => {
+      const row = rows.find((candidate) => !candidate.hidden && candidate.querySelector('th').textContent.startsWith(wanted));
+      return row && Number(row.querySelector('data').value);
+    },
+    label,
+  );

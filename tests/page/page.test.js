@@ -1,0 +1,577 @@
+import assert from 'node:assert/strict';
+import { createRequire } from 'node:module';
+import { readFile } from 'node:fs/promises';
+import { after, afterEach, before, test } from 'node:test';
+import { Server, choose, designOf, enter, field, launch, notes, open, resultOf, settled } from './harness.js';
+
+const AXE = createRequire(import.meta.url).resolve('axe-core/axe.min.js');
+const RADIUS = '/drive/teeth/radius_mm';
+const SEMI_MAJOR = '/drive/wave_generator/semi_major_mm';
+const SEMI_MINOR = '/drive/wave_generator/semi_minor_mm';
+
+let server;
+let browser;
+let page;
+
+before(async () => {
+  server = await Server.start();
+  browser = await launch();
+});
+
+after(async () => {
+  await browser?.close();
+  await server?.stop();
+});
+
+afterEach(async () => {
+  const faults = page?.faults ?? [];
+  await page?.context().close();
+  page = undefined;
+  assert.deepEqual(faults, [], 'no console error, no violation of the policy, no request to elsewhere');
+});
+
+/** What the results must show, by label, from the answers themselves. */
+function expected({ geometry, coincidence, sweep }) {
+  const { peaks } = sweep;
+  return {
+    'Ratio, ring fixed': geometry.transmission_ratio,
+    'Ratio, carrier fixed': geometry.transmission_ratio_carrier_fixed,
+    'Period of the load pattern': geometry.period_deg,
+    'Coincidence degree': coincidence.coincidence_degree,
+    'Fewest teeth in mesh': coincidence.teeth_in_mesh_per_zone.min,
+    'Most teeth in mesh': coincidence.teeth_in_mesh_per_zone.max,
+    'Engagement begins': geometry.engagement.start_deg,
+    'Critical tooth radius': geometry.undercut.critical_tooth_radius_mm,
+    'Force, wave generator': peaks.wave_generator.force_n.value,
+    'Force, ring': peaks.ring.force_n.value,
+    'Force, carrier': peaks.carrier.force_n.value,
+    'Contact stress, wave generator': peaks.wave_generator.stress_mpa.value,
+    'Contact stress, ring': peaks.ring.stress_mpa.value,
+    'Contact stress, carrier': peaks.carrier.stress_mpa.value,
+    'Ring root radius': geometry.ring.root_radius_mm,
+    'Ring tip radius': geometry.ring.tip_radius_mm,
+    'Ring tooth height': geometry.ring.tooth_height_mm,
+    'Largest pressure angle, ring': geometry.ring.pressure_angle_max_deg,
+    'Largest pressure angle, cam': geometry.wave_generator.pressure_angle_max_deg,
+    'Radial space for the carrier': geometry.carrier.radial_space_mm,
+    'Thinnest wall between slots': geometry.carrier.slot_wall_mm,
+    'Least gap between teeth': geometry.teeth.gap_min_mm,
+    'Torque balance': sweep.checks.torque_balance_residual,
+    'Period closure': sweep.checks.period_closure_residual,
+  };
+}
+
+async function assertShows(design) {
+  for (const [label, value] of Object.entries(expected(await server.answers(design)))) {
+    assert.equal(await resultOf(page, label), value, label);
+  }
+}
+
+async function violations() {
+  await page.evaluate(await readFile(AXE, 'utf8'));
+  const { violations: found } = await page.evaluate(() => window.axe.run());
+  return found.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html).join(' | ')}`);
+}
+
+test('every example loads, and the table shows the service’s numbers', async () => {
+  page = await open(browser, server);
+  const { examples } = await (await fetch(`${server.origin}/v1/examples`)).json();
+  assert.ok(examples.length >= 4);
+  for (const { name } of examples) {
+    await choose(page, name);
+    assert.equal(await page.getAttribute(`[data-example="${name}"]`, 'aria-pressed'), 'true');
+    await assertShows(await server.example(name));
+  }
+});
+
+test('numbers are rounded for reading, not changed', async () => {
+  page = await open(browser, server);
+  assert.match(await page.textContent('#key-figures'), /Largest force1549\.3 Nring, ψ 43\.7°/);
+  assert.match(await page.textContent('#key-figures'), /Undercutnocritical r 6\.749 mm/);
+});
+
+test('a dragged slider answers live and is one step to undo', async () => {
+  page = await open(browser, server);
+  const slider = await page.$(`.field:has(${field(RADIUS)}) input[type=range]`);
+  const box = await slider.boundingBox();
+  const [middle, height] = [box.x + box.width / 2, box.y + box.height / 2];
+  await page.mouse.move(middle, height);
+  await page.mouse.down();
+  for (let step = 1; step <= 8; step += 1) {
+    const before = await page.textContent('#key-figures');
+    await page.mouse.move(middle - step * 6, height);
+    // While the pointer is still down the numbers follow, and the picture never goes away.
+    await page.waitForFunction((old) => document.querySelector('#key-figures').textContent !== old, before);
+    assert.ok((await page.getAttribute('#whole .part-ring', 'd')).length > 1000);
+  }
+  await page.mouse.up();
+  await settled(page);
+  const design = await designOf(page);
+  assert.ok(design.drive.teeth.radius_mm < 5);
+  await assertShows(design);
+  await page.click('#undo');
+  await settled(page);
+  assert.equal((await designOf(page)).drive.teeth.radius_mm, 5);
+  assert.ok(await page.isDisabled('#undo'));
+});
+
+test('the newest design wins over slow answers to older ones', async () => {
+  page = await open(browser, server);
+  let aborted = 0;
+  page.on('requestfailed', (request) => (aborted += request.failure().errorText.includes('ABORTED') ? 1 : 0));
+  await page.route('**/v1/sweep', async (route) => {
+    const { radius_mm: radius } = route.request().postDataJSON().drive.teeth;
+    // Browser and service race: the older the design, the later its answer.
+    await new Promise((resolve) => setTimeout(resolve, radius < 4.5 ? 0 : 3000));
+    await route.continue().catch(() => undefined);
+  });
+  for (const radius of [4.9, 4.8, 4.7, 4.6, 4.4]) await page.fill(field(RADIUS), String(radius));
+  await settled(page);
+  await assertShows(await designOf(page));
+  assert.ok(aborted > 0, 'stale requests are aborted');
+  await page.unroute('**/v1/sweep');
+});
+
+test('an impossible drive shows its reasons at the fields, and nothing breaks', async () => {
+  page = await open(browser, server);
+  await enter(page, SEMI_MINOR, 60);
+  assert.match(await page.textContent(notes(SEMI_MAJOR)), /must exceed the semi-minor axis/);
+  assert.equal(await page.getAttribute(field(SEMI_MAJOR), 'aria-invalid'), 'true');
+  assert.match(await page.textContent('#impossible'), /The design cannot exist/);
+  assert.equal(await resultOf(page, 'Force, ring'), (await server.answers(await server.example('paper-5.1'))).sweep.peaks.ring.force_n.value);
+  // Every reason at once, also in a folded group, each at its field.
+  await enter(page, '/drive/teeth/count', 31);
+  await page.click('summary:has-text("Materials")');
+  await enter(page, '/materials/ring/poissons_ratio', 0.7);
+  for (const pointer of [SEMI_MAJOR, '/drive/ring/teeth', '/materials/ring/poissons_ratio']) {
+    assert.ok((await page.textContent(notes(pointer))).length > 20, pointer);
+  }
+  await enter(page, '/materials/ring/poissons_ratio', 0.3);
+  await enter(page, SEMI_MINOR, 56);
+  // A reason whose limit would do offers it.
+  await enter(page, '/drive/teeth/count', 30);
+  await enter(page, '/drive/teeth/installed', '');
+  await page.click(`${notes('/drive/ring/teeth')} button`);
+  await settled(page);
+  assert.ok(await page.isHidden('#impossible'));
+  const design = await designOf(page);
+  assert.equal(design.drive.ring.teeth, 28);
+  assert.equal(design.drive.teeth.installed, undefined);
+  await assertShows(design);
+});
+
+test('without a load the geometry stands, and the load’s field says what is missing', async () => {
+  page = await open(browser, server);
+  await page.fill(field('/load/input_torque_nm'), '');
+  await settled(page);
+  assert.match(await page.textContent(notes('/load')), /input_torque_nm/);
+  assert.equal(await resultOf(page, 'Ring tip radius'), 66);
+  assert.equal(await resultOf(page, 'Force, ring'), undefined);
+  assert.equal(await page.getAttribute('#whole .arrow', 'd'), '');
+});
+
+test('raising r of case 5.1 beyond 6.749 mm shows undercut and the critical radius', async () => {
+  page = await open(browser, server);
+  assert.match(await page.textContent('.field:has(#field-drive-teeth-radius_mm) .mark-text'), /undercut from 6\.749 mm/);
+  await enter(page, RADIUS, 6.74);
+  assert.doesNotMatch(await page.textContent(notes(RADIUS)), /Undercut/);
+  await enter(page, RADIUS, 6.8);
+  const finding = page.locator(`${notes(RADIUS)} .finding`, { hasText: 'Undercut ring tips' });
+  assert.equal(await finding.getAttribute('aria-expanded'), 'false');
+  await finding.click();
+  const explanation = await page.textContent(`${notes(RADIUS)} .note:has-text("Undercut") .explanation`);
+  assert.match(explanation, /What is tested.*critical radius.*6\.8.mm against 6\.7492.mm/);
+  assert.match(explanation, /Why it matters.*cut away/);
+  assert.match(explanation, /What to change.*thinner/);
+  assert.match(await page.textContent('#key-figures'), /Undercutyescritical r 6\.749 mm/);
+  assert.match(await page.textContent('#findings'), /Undercut ring tips/);
+  // From the finding to the other fields that it is about.
+  await page.click(`${notes(RADIUS)} .explanation button:has-text("Semi-minor axis")`);
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'field-drive-wave_generator-semi_minor_mm');
+});
+
+test('undo and redo, by button and by keyboard', async () => {
+  page = await open(browser, server);
+  await enter(page, RADIUS, 4.5);
+  await page.locator(field(RADIUS)).blur();
+  await choose(page, 'paper-5.2');
+  await page.keyboard.press('Control+z');
+  await settled(page);
+  assert.equal((await designOf(page)).drive.teeth.radius_mm, 4.5);
+  await page.click('#undo');
+  await settled(page);
+  assert.deepEqual(await designOf(page), await server.example('paper-5.1'));
+  await page.keyboard.press('Control+Shift+z');
+  await page.click('#redo');
+  await settled(page);
+  const design = await designOf(page);
+  assert.deepEqual(design, await server.example('paper-5.2'));
+  await assertShows(design);
+});
+
+test('the address holds design and reference', async () => {
+  page = await open(browser, server);
+  await page.click('#keep');
+  await choose(page, 'paper-5.2');
+  await enter(page, RADIUS, 1.25);
+  await page.waitForFunction(() => {
+    const parameters = new URLSearchParams(location.hash.slice(1));
+    return parameters.has('reference') && atob(parameters.get('design').replaceAll('-', '+').replaceAll('_', '/')).includes('1.25');
+  });
+  const address = await page.evaluate(() => location.hash);
+  const design = await designOf(page);
+  await page.context().close();
+  page = await open(browser, server, { address });
+  assert.deepEqual(await designOf(page), design);
+  await assertShows(design);
+  await page.waitForFunction(() => document.querySelector('#comparing').textContent.includes('case 5.1'));
+  // A link pasted into an open page is followed too, and a broken one does no harm.
+  await page.evaluate(() => (location.hash = '#design=broken'));
+  await settled(page);
+  assert.deepEqual(await designOf(page), design);
+});
+
+test('the document is saved and loaded as a file', async () => {
+  page = await open(browser, server);
+  await enter(page, RADIUS, 4.25);
+  await page.click('#open-document');
+  const [download] = await Promise.all([page.waitForEvent('download'), page.click('#document-save')]);
+  const saved = JSON.parse(await readFile(await download.path(), 'utf8'));
+  assert.equal(saved.drive.teeth.radius_mm, 4.25);
+  const upload = { name: 'mine.json', mimeType: 'application/json', buffer: Buffer.from(JSON.stringify({ ...saved, load: { output_torque_nm: 140 } })) };
+  await page.setInputFiles('#document-file', upload);
+  await settled(page);
+  assert.ok(!(await page.isVisible('#document')));
+  const design = await designOf(page);
+  assert.deepEqual(design.load, { output_torque_nm: 140 });
+  await assertShows(design);
+  await page.click('#open-document');
+  await page.fill('#document-text', '{ "drive": ');
+  await page.click('#document-apply');
+  assert.match(await page.textContent('#document-error'), /no JSON/);
+  // A document with a field that the service does not know is shown, with the reason and a way out.
+  await page.fill('#document-text', JSON.stringify({ ...design, colour: 'blue' }));
+  await page.click('#document-apply');
+  await settled(page);
+  assert.match(await page.textContent('#impossible'), /colour/);
+  await page.click('#notes button:has-text("Remove it")');
+  await settled(page);
+  assert.deepEqual(await designOf(page), design);
+});
+
+test('switching the torque’s shaft keeps the load; fixed stiffnesses come with their fields', async () => {
+  page = await open(browser, server);
+  const force = await resultOf(page, 'Force, ring');
+  await page.selectOption(field('/load'), 'output_torque_nm');
+  await settled(page);
+  assert.deepEqual((await designOf(page)).load, { output_torque_nm: 280 });
+  assert.ok(Math.abs((await resultOf(page, 'Force, ring')) / force - 1) < 1e-12);
+  assert.ok(await page.isHidden(field('/model/stiffness/ring_n_per_mm')));
+  await page.selectOption(field('/model/stiffness'), 'fixed');
+  await page.selectOption(field('/model/compatibility'), 'virtual_work');
+  await enter(page, '/model/stiffness/ring_n_per_mm', 250000);
+  const design = await designOf(page);
+  assert.deepEqual(design.model, {
+    compatibility: 'virtual_work',
+    stiffness: { law: 'fixed', wave_generator_n_per_mm: 500000, ring_n_per_mm: 250000, carrier_n_per_mm: 500000 },
+  });
+  await assertShows(design);
+});
+
+test('the drawing stands where the service says', async () => {
+  page = await open(browser, server);
+  for (const name of ['paper-5.1', 'paper-5.2', 'ring-with-more-teeth']) {
+    await choose(page, name);
+    const design = await server.example(name);
+    const { sweep } = await server.answers(design);
+    const installed = design.drive.teeth.installed ?? design.drive.teeth.count;
+    await page.locator('#angle').fill('0');
+    if (await page.isHidden('#teeth')) await page.click('#teeth-table summary');
+    await settled(page);
+    const table = await page.$$eval('#teeth tbody tr', (rows) => rows.map((row) => [...row.children].map((cell) => Number(cell.textContent))));
+    const { states } = sweep;
+    const count = states.input_angle_deg.filter((angle) => angle === 0).length;
+    assert.equal(table.length, 2 * count, `${name}: both zones`);
+    for (let index = 0; index < count; index += 1) {
+      for (const turn of [0, installed / 2]) {
+        const tooth = (states.tooth[index] + turn) % installed;
+        const row = table.find(([number]) => number === tooth);
+        const columns = ['position_deg', 'force_wave_generator_n', 'force_ring_n', 'force_carrier_n', 'stress_wave_generator_mpa', 'stress_ring_mpa', 'stress_carrier_mpa'];
+        columns.forEach((column, place) => assert.ok(Math.abs(row[place + 1] - states[column][index]) <= 0.0501, `${name} ${tooth} ${column}`));
+        const circle = await page.$eval(`#whole [data-tooth="${tooth}"]`, (element) => ['cx', 'cy'].map((axis) => Number(element.getAttribute(axis))));
+        const angle = ((states.position_deg[index] + (turn ? 180 : 0)) * Math.PI) / 180;
+        const radius = states.center_radius_mm[index];
+        assert.ok(Math.hypot(circle[0] - radius * Math.cos(angle), circle[1] - radius * Math.sin(angle)) < 0.002, `${name}: centre of tooth ${tooth}`);
+      }
+    }
+  }
+});
+
+test('forces balance in the drawing: both contacts lie on the tooth, and one period on the pattern repeats', async () => {
+  page = await open(browser, server);
+  await choose(page, 'paper-5.2');
+  const result = await page.evaluate(async () => {
+    const { Motion } = await import('/page/motion.js');
+    const design = await (await fetch('/v1/examples/paper-5.2')).json();
+    const ask = async (path) => (await fetch(path, { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify(design) })).json();
+    const [geometry, sweep] = [await ask('/v1/geometry'), await ask('/v1/sweep')];
+    const motion = new Motion(design, geometry, sweep);
+    let residual = 0;
+    let reach = 0;
+    for (const { angle } of motion.frames) {
+      for (const { center, contacts, force } of motion.loaded(angle)) {
+        const sum = { x: 0, y: 0 };
+        for (const [key, contact] of Object.entries(contacts)) {
+          const distance = Math.hypot(center.x - contact.x, center.y - contact.y);
+          reach = Math.max(reach, Math.abs(distance - design.drive.teeth.radius_mm));
+          sum.x += (force[key] * (center.x - contact.x)) / distance;
+          sum.y += (force[key] * (center.y - contact.y)) / distance;
+        }
+        residual = Math.max(residual, Math.hypot(sum.x, sum.y) / force.ring);
+      }
+    }
+    const now = motion.loaded(3).map(({ tooth, force }) => [tooth, force.ring]);
+    const later = motion.loaded(3 + motion.period).map(({ tooth, force }) => [(tooth + 39) % 40, force.ring]);
+    const byTooth = (one, other) => one[0] - other[0];
+    return { residual, reach, now: now.sort(byTooth), later: later.sort(byTooth) };
+  });
+  assert.ok(result.reach < 1e-6, `contacts off the tooth by ${result.reach} mm`);
+  assert.ok(result.residual < 2e-3, `forces out of balance by ${result.residual}`);
+  result.now.forEach(([tooth, force], index) => {
+    assert.equal(result.later[index][0], tooth);
+    assert.ok(Math.abs(result.later[index][1] - force) < 1e-6 * force);
+  });
+});
+
+test('a jump is a break in the plots, and only where a tooth enters under load', async () => {
+  page = await open(browser, server);
+  const breaks = (name) =>
+    page.evaluate(async (example) => {
+      const { passOf, plotted } = await import('/page/pass.js');
+      const design = await (await fetch(`/v1/examples/${example}`)).json();
+      const ask = async (path) => (await fetch(path, { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify(design) })).json();
+      const pass = passOf(design, await ask('/v1/geometry'), await ask('/v1/sweep'));
+      const columns = plotted(pass, 'ring', 'force', ['ring']);
+      const sorted = columns[0].every((x, index) => index === 0 || x >= columns[0][index - 1]);
+      return { nulls: columns[1].filter((value) => value === null).length, sorted };
+    }, name);
+  assert.deepEqual(await breaks('paper-5.1'), { nulls: 0, sorted: true });
+  assert.deepEqual(await breaks('paper-5.2'), { nulls: 4, sorted: true });
+});
+
+test('plots and mechanism are linked; peaks lead to their place', async () => {
+  page = await open(browser, server);
+  for (const abscissa of ['input', 'ring', 'cam', 'slot']) {
+    await page.check(`#abscissae input[value=${abscissa}]`, { force: true });
+    const over = page.locator('#charts .u-over').first();
+    await over.scrollIntoViewIfNeeded();
+    const box = await over.boundingBox();
+    await page.mouse.move(box.x + box.width * 0.4, box.y + box.height / 2);
+    assert.match(await page.textContent('#readout caption'), /At the cursor/);
+    await page.mouse.down();
+    await page.mouse.up();
+    await page.mouse.move(2, 2);
+    await settled(page);
+    assert.match(await page.textContent('#readout caption'), /^Tooth 3: /, abscissa);
+    assert.match(await page.textContent('#tooth-state'), /MPa/, 'the selected tooth was turned to the place that was clicked');
+  }
+  const row = page.locator('#table tr', { hasText: 'Contact stress, ring' });
+  await row.locator('button').click();
+  await settled(page);
+  assert.match(await page.textContent('#tooth-state'), /ψ 70\.2°, σ up to 980 MPa/);
+});
+
+test('a reference shows differences in tiles, table, plots and drawing', async () => {
+  page = await open(browser, server);
+  await page.click('#keep');
+  await choose(page, 'paper-5.2');
+  const row = page.locator('#table tr', { hasText: 'Force, ring' });
+  assert.match(await row.textContent(), /739\.47N1549\.3N−810 \(−52\.3.%\)/);
+  assert.match(await page.textContent('#key-figures'), /40\+26/);
+  assert.ok((await page.getAttribute('#whole .ghost', 'd')).length > 1000);
+  assert.match(await page.textContent('#readout'), /−\d/);
+  await page.click('#swap');
+  await settled(page);
+  assert.match(await row.textContent(), /1549\.3N739\.47N\+810/);
+  await page.click('#clear');
+  await settled(page);
+  assert.ok(await page.isHidden('#comparing'));
+  assert.equal(await page.getAttribute('#whole .ghost', 'd'), '');
+});
+
+test('play, pause, drag; both angles are read out', async () => {
+  page = await open(browser, server);
+  const angle = async () => Number.parseFloat(await page.textContent('#angle-input'));
+  assert.equal(await angle(), 0, 'at rest where reduced motion is wanted');
+  const turned = () => page.waitForFunction(() => Number.parseFloat(document.querySelector('#angle-input').textContent) > 1);
+  await page.click('#play');
+  await turned();
+  await page.click('#play');
+  await settled(page);
+  const atRest = await angle();
+  await settled(page);
+  assert.equal(await angle(), atRest, 'paused');
+  await page.locator('#angle').fill('140');
+  await settled(page);
+  assert.equal(await page.textContent('#angle-carrier'), '10.00°');
+  const box = await page.locator('#whole').boundingBox();
+  const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+  await page.mouse.move(x + 100, y);
+  await page.mouse.down();
+  await page.mouse.move(x + 90, y - 52);
+  await page.mouse.move(x, y - 100);
+  await page.mouse.up();
+  await settled(page);
+  assert.ok(Math.abs((await angle()) - 230) < 1);
+  await page.mouse.click(x + 0.72 * (box.width / 2), y);
+  await settled(page);
+  assert.notEqual(await page.textContent('#tooth-name'), 'Tooth 3');
+  await page.context().close();
+  page = await open(browser, server, { reducedMotion: 'no-preference' });
+  // It moves by itself where motion is welcome.
+  await turned();
+});
+
+test('all of it by keyboard', async () => {
+  page = await open(browser, server);
+  const tabTo = async (id) => {
+    for (let presses = 0; presses < 80; presses += 1) {
+      await page.keyboard.press('Tab');
+      const found = await page.evaluate((wanted) => document.activeElement.matches(wanted), id);
+      if (found) {
+        const outline = await page.evaluate(() => getComputedStyle(document.activeElement).outlineStyle);
+        assert.notEqual(outline, 'none', `${id} shows its focus`);
+        return;
+      }
+    }
+    assert.fail(`${id} is not reached`);
+  };
+  await page.keyboard.press('Tab');
+  assert.equal(await page.evaluate(() => document.activeElement.className), 'skip');
+  await tabTo('[data-example="paper-5.2"]');
+  await page.keyboard.press('Enter');
+  await settled(page);
+  await tabTo(field(RADIUS));
+  await page.keyboard.press('ArrowDown');
+  await settled(page);
+  assert.ok((await designOf(page)).drive.teeth.radius_mm < 1.5);
+  await page.focus(field(RADIUS));
+  await tabTo('input[type=range]');
+  await page.keyboard.press('ArrowRight');
+  await tabTo('.finding');
+  await page.keyboard.press('Enter');
+  assert.equal(await page.evaluate(() => document.activeElement.getAttribute('aria-expanded')), 'true');
+  await tabTo('#play');
+  await tabTo('#angle');
+  await page.keyboard.press('PageUp');
+  await settled(page);
+  assert.notEqual(await page.textContent('#angle-input'), '0.0°');
+  await tabTo('#tooth-after');
+  await page.keyboard.press('Space');
+  await settled(page);
+  assert.equal(await page.textContent('#tooth-name'), 'Tooth 4');
+  await tabTo('#abscissae input');
+  await page.keyboard.press('ArrowRight');
+  assert.ok(await page.isChecked('#abscissae input[value=ring]'));
+  await page.focus('#open-document');
+  await page.keyboard.press('Enter');
+  assert.ok(await page.isVisible('#document'));
+  await page.keyboard.press('Escape');
+  assert.ok(!(await page.isVisible('#document')));
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'open-document');
+});
+
+test('results and findings are announced', async () => {
+  page = await open(browser, server);
+  await enter(page, RADIUS, 6.8);
+  await page.waitForFunction(() => document.querySelector('#announcer').textContent.includes('Undercut ring tips'));
+  await enter(page, RADIUS, 60);
+  await page.waitForFunction(() => document.querySelector('#announcer').textContent.startsWith('The design cannot exist'));
+});
+
+test('the service goes away and comes back', async () => {
+  page = await open(browser, server);
+  page.expectsOutage = true;
+  const { port } = server;
+  await server.stop();
+  await page.fill(field(RADIUS), '4.75');
+  await page.waitForSelector('#away:not([hidden])');
+  assert.match(await page.textContent('#away'), /does not answer.*design is kept/);
+  assert.ok((await page.getAttribute('#whole .part-ring', 'd')).length > 1000, 'the last picture stays');
+  server = await Server.start(port);
+  await page.waitForSelector('#away', { state: 'hidden', timeout: 8000 });
+  await settled(page);
+  const design = await designOf(page);
+  assert.equal(design.drive.teeth.radius_mm, 4.75);
+  await assertShows(design);
+  // An idle page notices too.
+  await server.stop();
+  await page.waitForSelector('#away:not([hidden])', { timeout: 9000 });
+  server = await Server.start(port);
+  await page.waitForSelector('#away', { state: 'hidden', timeout: 8000 });
+});
+
+for (const [name, options] of Object.entries({
+  light: {},
+  dark: { colorScheme: 'dark' },
+  narrow: { viewport: { width: 390, height: 844 } },
+  tablet: { viewport: { width: 820, height: 1180 }, colorScheme: 'dark' },
+})) {
+  test(`axe finds nothing: ${name}`, async () => {
+    page = await open(browser, server, { bypassCSP: false, ...options });
+    await page.click('#keep');
+    await choose(page, 'paper-5.2');
+    for (const details of await page.$$('main details:not([open]) > summary')) await details.click();
+    await page.locator(`${notes(RADIUS)} .finding`).first().click();
+    await settled(page);
+    assert.deepEqual(await violations(), [], 'a design with findings, compared');
+    const overflow = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+    assert.ok(overflow <= 0, `nothing is wider than the screen (${overflow} px)`);
+    await enter(page, SEMI_MINOR, 60);
+    assert.deepEqual(await violations(), [], 'an impossible design');
+    await page.click('#open-document');
+    assert.deepEqual(await violations(), [], 'the document');
+  });
+}
+
+test('the theme is chosen and remembered', async () => {
+  page = await open(browser, server);
+  const background = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+  const light = await background();
+  await page.click('#theme');
+  await page.click('#theme');
+  assert.equal(await page.textContent('#theme'), 'Theme: dark');
+  const dark = await background();
+  assert.notEqual(dark, light);
+  await page.reload();
+  await settled(page);
+  assert.equal(await background(), dark);
+});
+
+test('the report has one or two pages', async () => {
+  page = await open(browser, server, { colorScheme: 'dark' });
+  for (const name of ['paper-5.1', 'paper-5.2']) {
+    await choose(page, name);
+    const pdf = (await page.pdf({ preferCSSPageSize: true, printBackground: true })).toString('latin1');
+    const pages = pdf.match(/\/Type\s*\/Page\b/g).length;
+    assert.ok(pages <= 2, `${name} takes ${pages} pages`);
+    await page.click('#keep');
+  }
+});
+
+test('headers: a strict policy, and files that are asked for anew', async () => {
+  const index = await fetch(`${server.origin}/`);
+  const policy = index.headers.get('content-security-policy');
+  for (const part of ["default-src 'none'", "script-src 'self'", "style-src 'self'", "connect-src 'self'", "frame-ancestors 'none'"]) {
+    assert.ok(policy.includes(part), part);
+  }
+  assert.ok(!policy.includes('unsafe'));
+  const etag = index.headers.get('etag');
+  const again = await fetch(`${server.origin}/page/main.js`, { headers: { 'if-none-match': etag } });
+  assert.equal(again.status, 304);
+  const missing = await fetch(`${server.origin}/page/nothing.js`);
+  assert.equal(missing.status, 404);
+  assert.equal(missing.headers.get('content-type'), 'application/problem+json');
+  const license = await (await fetch(`${server.origin}/page/vendor/uplot.LICENSE`)).text();
+  assert.match(license, /MIT License/);
+});
