@@ -12,7 +12,9 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use tracing_subscriber::EnvFilter;
 
 use crate::api::Tabular as _;
-use crate::api::{Endpoint, coincidence_degree::CoincidenceDegree, geometry::Geometry, sweep::Sweep};
+use crate::api::{
+    Endpoint, accuracy::Accuracy, coincidence_degree::CoincidenceDegree, geometry::Geometry, sweep::Sweep,
+};
 use crate::config::{Limits, Settings};
 use crate::design::Design;
 use crate::problem::Problem;
@@ -41,6 +43,8 @@ enum Command {
     CoincidenceDegree(Offline),
     /// Forces and contact stresses over one period
     Sweep(Offline),
+    /// Each way of computing a design, with its error and its time
+    Accuracy(Offline),
     /// Ask a running service whether it is well; exit status 0 if so
     Health {
         /// Where it listens
@@ -79,6 +83,7 @@ pub fn run() -> ExitCode {
         Some(Command::Geometry(offline)) => answer::<Geometry>(&offline),
         Some(Command::CoincidenceDegree(offline)) => answer::<CoincidenceDegree>(&offline),
         Some(Command::Sweep(offline)) => answer::<Sweep>(&offline),
+        Some(Command::Accuracy(offline)) => answer::<Accuracy>(&offline),
         Some(Command::Health { address }) => health(address),
         Some(Command::Openapi) => print(|writer| writer.write_all(router::openapi_json().as_bytes())),
     };

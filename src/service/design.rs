@@ -51,6 +51,9 @@ pub struct Design {
     /// The sampling of profiles.
     #[serde(default)]
     pub profile: ProfileDocument,
+    /// What is asked of `/v1/accuracy`.
+    #[serde(default)]
+    pub accuracy: AccuracyDocument,
 }
 
 /// Wave generator, teeth and ring.
@@ -288,6 +291,21 @@ impl Default for ProfileDocument {
     }
 }
 
+/// What is asked of `/v1/accuracy`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
+pub struct AccuracyDocument {
+    /// The relative error of the peaks that the cheapest way has to meet.
+    #[schema(minimum = 1e-12, maximum = 1.0, default = 1e-6)]
+    pub requested_error: f64,
+}
+
+impl Default for AccuracyDocument {
+    fn default() -> Self {
+        Self { requested_error: 1e-6 }
+    }
+}
+
 /// How much of the ring.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -519,6 +537,15 @@ impl Design {
                 Ok(violation.map_or(Ok(Points::Samples(samples.count().unsigned_abs())), Err))
             }
         }
+    }
+
+    /// The relative error that is asked for.
+    ///
+    /// # Errors
+    /// The violation of its range.
+    pub fn requested_error(&self) -> Result<f64, Violation> {
+        let requested_error = self.accuracy.requested_error;
+        Parameter::RequestedError.check(requested_error).map_or(Ok(requested_error), Err)
     }
 
     /// What profiles are asked for.

@@ -376,6 +376,7 @@ pub fn pointer(parameter: Parameter) -> String {
         Parameter::Clearance(contact) => format!("/model/clearance/{}_um", contact_name(contact)),
         Parameter::AllowableStress => "/load/allowable_stress_mpa".into(),
         Parameter::Samples => "/sweep/samples".into(),
+        Parameter::RequestedError => "/accuracy/requested_error".into(),
         Parameter::SweepTolerance => "/sweep/tolerance".into(),
         Parameter::ChordTolerance => "/profile/chord_tolerance_mm".into(),
     }

@@ -16,7 +16,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
-use crate::api::{App, coincidence_degree, geometry, page, side, sweep};
+use crate::api::{App, accuracy, coincidence_degree, geometry, page, side, sweep};
 use crate::observe;
 use crate::problem::{Problem, ProblemCode};
 
@@ -39,6 +39,7 @@ fn api() -> OpenApiRouter<App> {
         .routes(routes!(geometry::geometry))
         .routes(routes!(coincidence_degree::coincidence_degree))
         .routes(routes!(sweep::sweep))
+        .routes(routes!(accuracy::accuracy))
         .routes(routes!(side::limits))
         .routes(routes!(side::examples))
         .routes(routes!(side::example))

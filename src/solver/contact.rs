@@ -213,7 +213,7 @@ pub fn half_width_mm(force_n: f64, stress_mpa: f64, tooth_width_mm: f64) -> f64 
 }
 
 /// The largest shear stress below a line contact, over its largest pressure: `τ/σ = ζ - ζ²/√(1 + ζ²)` at the depth ζ in half-widths,
-/// with its maximum at `ζ² = (√5 - 1)/2` (both bodies alike, any Poisson's ratio: the largest shear lies in the plane of the section).
+/// with its maximum at `ζ² = (√5 - 1)/2` (in the plane of the section, where it does not depend on Poisson's ratio).
 pub const SHEAR_SHARE: f64 = 0.300_283_106_000_777_6;
 
 /// The depth of that shear stress in half-widths, `√((√5 - 1)/2)`.

@@ -39,6 +39,8 @@ pub enum Parameter {
     Samples,
     /// Relative tolerance of a sweep.
     SweepTolerance,
+    /// Relative error that is asked for.
+    RequestedError,
     /// Chord tolerance, mm.
     ChordTolerance,
 }
@@ -93,6 +95,7 @@ impl Parameter {
             Self::Clearance(_) => Range::closed(0.0, 1e6, "µm"),
             Self::AllowableStress => Range::closed(1e-3, 1e6, "MPa"),
             Self::Samples => Range::closed(1.0, MAX_SAMPLES as f64, ""),
+            Self::RequestedError => Range::closed(1e-12, 1.0, ""),
             Self::SweepTolerance => Range::closed(1e-12, 0.1, ""),
         }
     }

@@ -5,6 +5,7 @@
     reason = "tests compare exactly where values are exact, and fail by panicking"
 )]
 
+mod accuracy;
 mod asking;
 mod caching;
 mod codes;

@@ -64,7 +64,9 @@ fn every_path_and_every_status_that_it_can_have_is_described() {
     let solving = ["200", "304", "400", "406", "408", "413", "415", "422", "500", "503"];
     let mut expected: Vec<(&str, &str, &[&str])> = ENDPOINTS.iter().map(|&path| (path, "post", &solving[..])).collect();
     expected.extend([
-        ("/v1/limits", "get", &["200"][..]),
+        // Measured for each answer, so there is nothing that a client could have already.
+        ("/v1/accuracy", "post", &["200", "400", "406", "408", "413", "415", "422", "500", "503"][..]),
+        ("/v1/limits", "get", &["200"]),
         ("/v1/examples", "get", &["200"]),
         ("/v1/examples/{name}", "get", &["200", "404"]),
         ("/health/live", "get", &["200"]),
@@ -119,6 +121,7 @@ fn parameters() -> Vec<Parameter> {
         Parameter::AllowableStress,
         Parameter::Samples,
         Parameter::SweepTolerance,
+        Parameter::RequestedError,
         Parameter::ChordTolerance,
     ];
     parameters.extend(parts.map(Parameter::YoungsModulus));

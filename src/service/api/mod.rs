@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use axum::body::Body;
 use axum::extract::Request;
+use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use flate2::Compression;
@@ -25,6 +26,7 @@ use crate::json;
 use crate::negotiation::{self, Format, Representation};
 use crate::problem::{Problem, ProblemCode};
 
+pub mod accuracy;
 pub mod coincidence_degree;
 pub mod geometry;
 pub mod page;
@@ -136,12 +138,7 @@ pub async fn respond<E: Endpoint>(app: App, request: Request) -> Response {
 }
 
 async fn walk<E: Endpoint>(app: App, request: Request) -> Result<Response, Problem> {
-    let deadline = app.pool.deadline();
-    let (parts, body) = request.into_parts();
-    negotiation::require_json(&parts.headers)?;
-    let representation = Representation::negotiate(&parts.headers, E::FORMATS)?;
-    let body = read_body(&parts.headers, body, &app.limits, deadline).await?;
-    let design = json::read::<Design>(&body)?.normalised();
+    let Asked { headers, design, representation, deadline } = Asked::read(&app, request, E::FORMATS).await?;
     let key = Key::new(E::NAME, &E::reads(&design), representation)?;
     let etag = key.etag();
     tracing::Span::current().record("design", tracing::field::display(key));
@@ -154,10 +151,43 @@ async fn walk<E: Endpoint>(app: App, request: Request) -> Result<Response, Probl
         let solve = async move { pool.run(deadline, move |stop| solve::<E>(&question, representation, stop)).await };
         app.cache.solve_once(key, solve).await?
     };
-    if negotiation::is_not_modified(&parts.headers, &etag) || negotiation::matches_any(&parts.headers) {
+    if negotiation::is_not_modified(&headers, &etag) || negotiation::matches_any(&headers) {
         return Ok(not_modified(&etag, served));
     }
     Ok(found(stored, served, representation, &etag))
+}
+
+/// A request as far as all endpoints read it alike.
+struct Asked {
+    headers: HeaderMap,
+    design: Design,
+    representation: Representation,
+    deadline: tokio::time::Instant,
+}
+
+impl Asked {
+    async fn read(app: &App, request: Request, formats: &[Format]) -> Result<Self, Problem> {
+        let deadline = app.pool.deadline();
+        let (Parts { headers, .. }, body) = request.into_parts();
+        negotiation::require_json(&headers)?;
+        let representation = Representation::negotiate(&headers, formats)?;
+        let body = read_body(&headers, body, &app.limits, deadline).await?;
+        let design = json::read::<Design>(&body)?.normalised();
+        Ok(Self { headers, design, representation, deadline })
+    }
+}
+
+/// The same walk for an answer that is measured there and then: never cached.
+async fn respond_afresh<E: Endpoint>(app: App, request: Request) -> Response {
+    let walk = async {
+        let Asked { design, representation, deadline, .. } = Asked::read(&app, request, E::FORMATS).await?;
+        let question = E::question(&design, &app.limits)?;
+        let stored = app.pool.run(deadline, move |stop| solve::<E>(&question, representation, stop)).await?;
+        Ok::<_, Problem>(with_body(stored, representation))
+    };
+    let mut response = walk.await.unwrap_or_else(IntoResponse::into_response);
+    response.headers_mut().insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+    response
 }
 
 async fn read_body(
@@ -239,6 +269,10 @@ impl Write for Stoppable<'_> {
 }
 
 fn found(stored: Stored, served: Served, representation: Representation, etag: &str) -> Response {
+    caching(with_body(stored, representation), served, etag)
+}
+
+fn with_body(stored: Stored, representation: Representation) -> Response {
     let mut response = (StatusCode::OK, stored.body).into_response();
     let headers = response.headers_mut();
     headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(representation.format.content_type()));
@@ -249,7 +283,7 @@ fn found(stored: Stored, served: Served, representation: Representation, etag: &
     if let Ok(timing) = HeaderValue::from_str(&timing) {
         headers.insert("server-timing", timing);
     }
-    caching(response, served, etag)
+    response
 }
 
 fn not_modified(etag: &str, served: Served) -> Response {
@@ -266,6 +300,11 @@ fn caching(mut response: Response, served: Served, etag: &str) -> Response {
     headers.insert(header::VARY, HeaderValue::from_static("accept, accept-encoding"));
     headers.insert("cache-status", HeaderValue::from_static(served.cache_status()));
     response
+}
+
+/// A word of the API, as JSON spells it.
+fn word(value: &impl Serialize) -> String {
+    serde_json::to_value(value).ok().and_then(|value| Some(value.as_str()?.to_owned())).unwrap_or_default()
 }
 
 /// A CSV error as what it is: one of the writer, whose kind tells a closed pipe from a full disk.

@@ -13,7 +13,7 @@ use toothwave_solver::{Contact, Drive, LoadCase, PerContact, SolveError, finding
 use utoipa::ToSchema;
 
 use super::geometry::{drive_findings, write_findings};
-use super::{App, Endpoint, Problems, Tabular, checked_drive, csv_error, require_finite, respond};
+use super::{App, Endpoint, Problems, Tabular, checked_drive, csv_error, require_finite, respond, word};
 use crate::config::Limits;
 use crate::design::Design;
 use crate::findings::FindingAnswer;
@@ -404,8 +404,11 @@ impl Tabular for SweepAnswer {
         if let Some(capacity) = &self.torque_capacity {
             writeln!(
                 writer,
-                "\ntorque capacity, input and output   {:.6} and {:.6} N·m, limited by {:?} at {:.4} deg",
-                capacity.input_torque_nm, capacity.output_torque_nm, capacity.limited_by, capacity.input_angle_deg
+                "\ntorque capacity, input and output   {:.6} and {:.6} N·m, limited by {} at {:.4} deg",
+                capacity.input_torque_nm,
+                capacity.output_torque_nm,
+                word(&capacity.limited_by),
+                capacity.input_angle_deg
             )?;
         }
         if let Some(wind_up) = &self.wind_up {

@@ -1,0 +1,126 @@
+//! How wrong and how slow each way is, held against 40 digits.
+
+use serde_json::{Value, json};
+
+use crate::asking::Service;
+use crate::designs::{spelled_out, with};
+
+const CONTACTS: [&str; 3] = ["wave_generator", "ring", "carrier"];
+
+/// Cases of the reference with their true extremes: the paper's, a bored one and a hard one.
+fn cases() -> Vec<Value> {
+    let file: Value = serde_json::from_str(include_str!("../reference/extremes.json")).unwrap();
+    let cases = file["cases"].as_array().unwrap().iter().filter(|case| {
+        let name = case["name"].as_str().unwrap();
+        case["group"] == "extremes"
+            && ["5.1 ", "5.2 ", "1e-6 above undercut"].iter().any(|start| name.starts_with(start))
+            && !name.contains("palmgren")
+            && !name.contains("um")
+    });
+    cases.cloned().collect()
+}
+
+fn ways(answer: &Value) -> &Vec<Value> {
+    answer["ways"].as_array().unwrap()
+}
+
+/// The largest relative error of the peaks of a sweep against 40 digits.
+fn true_error(sweep: &Value, case: &Value) -> f64 {
+    let mut worst = 0.0_f64;
+    for contact in CONTACTS {
+        for kind in ["force_n", "stress_mpa"] {
+            let found = sweep["peaks"][contact][kind]["value"].as_f64().unwrap();
+            let value: f64 = case["expected"]["peaks"][contact][kind]["value"].as_str().unwrap().parse().unwrap();
+            worst = worst.max((found - value).abs() / value);
+        }
+    }
+    worst
+}
+
+#[tokio::test]
+async fn the_errors_that_are_told_are_the_errors_against_40_digits() {
+    let cases = cases();
+    assert!(cases.len() >= 6, "{}", cases.len());
+    for case in &cases {
+        let service = Service::new();
+        let answer = service.post("/v1/accuracy", &case["document"]).await.found();
+        let compatibility = &case["document"]["model"]["compatibility"];
+        let law = &case["document"]["model"]["stiffness"]["law"];
+        let own = ways(&answer).iter().filter(|way| way["compatibility"] == *compatibility && way["law"] == *law);
+        let mut seen = 0;
+        for way in own {
+            let points = match way.get("samples") {
+                Some(samples) => json!({ "samples": samples }),
+                None => json!({ "tolerance": way["tolerance"] }),
+            };
+            let sweep = service.post("/v1/sweep", &with(&case["document"], "/sweep", points)).await.found();
+            let (told, known) = (way["error"].as_f64().unwrap(), true_error(&sweep, case));
+            // The hardest of them has a condition of 1e-9.
+            assert!((told - known).abs() <= 1e-6 * known + 2e-9, "{}: {told:e}, not {known:e}: {way}", case["name"]);
+            assert_eq!(way["states"], sweep["states"]["tooth"].as_array().unwrap().len());
+            seen += 1;
+        }
+        assert_eq!(seen, 14);
+    }
+}
+
+#[tokio::test]
+async fn the_cheapest_way_meets_the_requested_error_and_none_that_meets_it_is_faster() {
+    for requested in [1e-2, 1e-4, 1e-8] {
+        let document = with(&spelled_out(), "/accuracy", json!({ "requested_error": requested }));
+        let answer = Service::new().post("/v1/accuracy", &document).await.found();
+        let cheapest = &answer["cheapest"];
+        assert!(cheapest["error"].as_f64().unwrap() <= requested);
+        assert_eq!((&cheapest["compatibility"], &cheapest["law"]), (&json!("projection"), &json!("linear")));
+        for way in ways(&answer) {
+            let is_own = way["compatibility"] == "projection" && way["law"] == "linear";
+            if is_own && way["error"].as_f64().unwrap() <= requested {
+                assert!(way["solve_us"].as_f64().unwrap() >= cheapest["solve_us"].as_f64().unwrap());
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn every_form_and_law_is_tried_and_told_how_far_it_is_from_the_designs_own() {
+    let answer = Service::new().post("/v1/accuracy", &spelled_out()).await.found();
+    let models: std::collections::BTreeSet<_> = ways(&answer)
+        .iter()
+        .map(|way| (way["compatibility"].as_str().unwrap(), way["law"].as_str().unwrap()))
+        .collect();
+    let all = ["projection", "virtual_work"].into_iter().flat_map(|form| [(form, "linear"), (form, "palmgren")]);
+    assert_eq!(models, all.collect());
+    for way in ways(&answer) {
+        let is_own = way["compatibility"] == "projection" && way["law"] == "linear";
+        let difference = way["model_difference"].as_f64().unwrap();
+        assert!(if is_own { difference == 0.0 } else { difference > 1e-3 && difference < 0.1 }, "{way}");
+    }
+    assert_eq!(answer["unavailable"], json!([]));
+}
+
+#[tokio::test]
+async fn a_model_without_an_answer_is_named_with_the_reason() {
+    let document = [
+        ("/drive/ring/teeth", json!(30)),
+        ("/drive/teeth/radius_mm", json!(4.0)),
+        ("/model", json!({ "compatibility": "virtual_work", "clearance": { "carrier_um": 5.0 } })),
+    ]
+    .into_iter()
+    .fold(spelled_out(), |document, (pointer, value)| with(&document, pointer, value));
+    let answer = Service::new().post("/v1/accuracy", &document).await.found();
+    let unavailable = answer["unavailable"].as_array().unwrap();
+    assert_eq!(unavailable.len(), 2, "{unavailable:?}");
+    assert!(unavailable.iter().all(|model| model["compatibility"] == "projection"));
+    assert!(ways(&answer).iter().all(|way| way["compatibility"] == "virtual_work"));
+}
+
+#[tokio::test]
+async fn what_is_measured_is_never_cached() {
+    let service = Service::new();
+    for _ in 0..2 {
+        let answer = service.post("/v1/accuracy", &spelled_out()).await;
+        assert_eq!(answer.status, 200);
+        assert_eq!(answer.header("cache-control"), "no-store");
+        assert!(!answer.headers.contains_key("etag") && !answer.headers.contains_key("cache-status"));
+    }
+}
