@@ -366,6 +366,7 @@ fn scaling(effort: Effort, directory: &Path) -> Result<String, Failure> {
         title: "Case 5.1: time over the number of states",
         x_label: "states",
         y_label: "ms",
+        decades_per_tick: 1.0,
         series: vec![Series::line("linear", linear), Series::points("toothwave", drawn)],
     }
     .write(&directory.join(PLOTS).join("scaling.svg"))?;
@@ -446,6 +447,7 @@ fn error_over_time(effort: Effort, directory: &Path, reference: &Reference) -> R
             title,
             x_label: "solve time in µs",
             y_label: "largest relative error of a peak",
+            decades_per_tick: 2.0,
             series: vec![Series::points("equal intervals", by_samples), Series::points("tolerance", by_tolerance)],
         }
         .write(&directory.join(PLOTS).join(format!("{file}.svg")))?;

@@ -1,8 +1,11 @@
 //! Plots with two logarithmic axes.
+//!
+//! kuva's own logarithmic axes end at 1e-10, and errors do not: it is given the logarithms, and labels that undo them.
 
 use std::error::Error;
 use std::fs;
 use std::path::Path;
+use std::sync::Arc;
 
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::{LinePlot, ScatterPlot};
@@ -19,6 +22,8 @@ pub(crate) struct Plot<'a> {
     pub(crate) title: &'a str,
     pub(crate) x_label: &'a str,
     pub(crate) y_label: &'a str,
+    /// Decades from one label of the vertical axis to the next.
+    pub(crate) decades_per_tick: f64,
     pub(crate) series: Vec<Series<'a>>,
 }
 
@@ -47,22 +52,25 @@ impl Plot<'_> {
     pub(crate) fn write(self, path: &Path) -> Result<(), Box<dyn Error>> {
         let mut drawn = Vec::new();
         for (series, color) in self.series.into_iter().zip(COLORS) {
-            let line = LinePlot::new().with_data(series.points.clone()).with_color(color);
+            let logarithms = || series.points.iter().map(|(x, y)| (x.log10(), y.log10()));
+            let line = LinePlot::new().with_data(logarithms()).with_color(color);
             if series.marked {
                 drawn.push(Drawn::Line(line.with_stroke_width(1.5)));
-                let points = ScatterPlot::new().with_data(series.points).with_color(color).with_size(4.0);
+                let points = ScatterPlot::new().with_data(logarithms()).with_color(color).with_size(4.0);
                 drawn.push(Drawn::Scatter(points.with_legend(series.name)));
             } else {
                 drawn.push(Drawn::Line(line.with_stroke_width(1.0).with_dashed().with_legend(series.name)));
             }
         }
+        let power = || TickFormat::Custom(Arc::new(|exponent: f64| format!("1e{exponent:.0}")));
         let layout = Layout::auto_from_plots(&drawn)
-            .with_log_scale()
             .with_title(self.title)
             .with_x_label(self.x_label)
             .with_y_label(self.y_label)
-            .with_x_tick_format(TickFormat::Sci)
-            .with_y_tick_format(TickFormat::Sci)
+            .with_x_tick_step(1.0)
+            .with_y_tick_step(self.decades_per_tick)
+            .with_x_tick_format(power())
+            .with_y_tick_format(power())
             .with_width(760.0)
             .with_height(440.0);
         fs::write(path, SvgBackend.render_scene(&render_multiple(drawn, layout)))?;
