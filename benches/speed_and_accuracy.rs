@@ -25,9 +25,7 @@ use reference::{Reference, Setup};
 use toothwave_solver::drive::Drive;
 use toothwave_solver::load_sharing::LoadCase;
 use toothwave_solver::mesh::Mesh;
-use toothwave_solver::sweep::{Points, Sweep, sweep};
-// The per-state path, which the fast one is measured and checked against.
-use toothwave_solver::sweep::sweep as sweep_plain;
+use toothwave_solver::sweep::{Points, Sweep, sweep, sweep_plain};
 use toothwave_solver::{Never, SolveError};
 
 /// Counts allocations; it costs every contestant a few nanoseconds for each.
