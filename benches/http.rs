@@ -48,6 +48,8 @@ fn main() -> Result<(), Failure> {
     }
     let effort = Effort::of(&arguments);
     let cores = Cores::of_this_process()?;
+    // Before this thread is pinned, which leaves it one core to count.
+    let machine = machine();
     let toothwave = {
         let mut command = Command::new(env!("CARGO_BIN_EXE_toothwave"));
         command.args(["serve", "--listen", "127.0.0.1:0", "--log", "warn"]);
@@ -60,7 +62,7 @@ fn main() -> Result<(), Failure> {
     };
     cores.enter(cores.client)?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    let report = runtime.block_on(measure(effort, &toothwave, &bare))?;
+    let report = runtime.block_on(measure(effort, &machine, &toothwave, &bare))?;
     println!("{report}");
     let directory = effort.directory();
     fs::create_dir_all(&directory)?;
@@ -293,7 +295,7 @@ struct Comparison<'a> {
     goal_percent: u32,
 }
 
-async fn measure(effort: Effort, toothwave: &Server, bare: &Server) -> Result<String, Failure> {
+async fn measure(effort: Effort, machine: &str, toothwave: &Server, bare: &Server) -> Result<String, Failure> {
     let comparisons = [
         Comparison {
             name: "not in the cache, against an axum handler that serialises the same structure",
@@ -316,12 +318,12 @@ async fn measure(effort: Effort, toothwave: &Server, bare: &Server) -> Result<St
         }
         ours.len()
     };
-    let mut text = introduction(effort, body_bytes, comparisons[1].toothwave.before_torque.len());
+    let mut text = introduction(effort, machine, body_bytes, comparisons[1].toothwave.before_torque.len());
     let (rounds, duration) = effort.choose((9, Duration::from_secs(1)), (3, Duration::from_millis(200)));
     for Comparison { name, toothwave: ours, bare: theirs, goal_percent } in &comparisons {
         write!(text, "\n## A sweep {name}\n\n")?;
-        text += "| connections | toothwave, requests a second | bare axum, requests a second | share of the bare one's | goal | server's µs a request: toothwave, bare |\n";
-        text += "|---|---|---|---|---|---|\n";
+        text += "| connections | toothwave, requests a second | bare axum, requests a second | share of the bare one's | goal | server's processor µs a request: toothwave, bare | share by these |\n";
+        text += "|---|---|---|---|---|---|---|\n";
         for connections in [1, 8] {
             let mut measured = Vec::new();
             closed_loop(toothwave, ours, connections, duration / 2).await?;
@@ -333,24 +335,27 @@ async fn measure(effort: Effort, toothwave: &Server, bare: &Server) -> Result<St
             let ours = Spread::of(measured.iter().map(|(ours, _)| ours.per_second));
             let theirs = Spread::of(measured.iter().map(|(_, theirs)| theirs.per_second));
             let share = Spread::of(measured.iter().map(|(ours, theirs)| 100.0 * ours.per_second / theirs.per_second));
+            let by_processor =
+                Spread::of(measured.iter().map(|(ours, theirs)| 100.0 * theirs.processor_s / ours.processor_s));
             let processor = |of: fn(&(Throughput, Throughput)) -> f64| {
                 three_digits(1e6 * Spread::of(measured.iter().map(of)).median)
             };
             writeln!(
                 text,
-                "| {connections} | {} | {} | {} % | {goal_percent} % | {}, {} |",
+                "| {connections} | {} | {} | {} % | {goal_percent} % | {}, {} | {} % |",
                 ours.show(1.0),
                 theirs.show(1.0),
                 share.show(1.0),
                 processor(|(ours, _)| ours.processor_s),
                 processor(|(_, theirs)| theirs.processor_s),
+                by_processor.show(1.0),
             )?;
         }
     }
     Ok(text)
 }
 
-fn introduction(effort: Effort, body_bytes: usize, request_bytes: usize) -> String {
+fn introduction(effort: Effort, machine: &str, body_bytes: usize, request_bytes: usize) -> String {
     let length = effort.choose("one second", "0.2 s");
     format!(
         "# Speed of the whole request\n\n\
@@ -361,8 +366,8 @@ fn introduction(effort: Effort, body_bytes: usize, request_bytes: usize) -> Stri
          and has one worker thread of tokio's usual runtime; the client is pinned to another core. Connections are kept, and each asks again \
          when it has its answer (closed loop). Torques differ by 1e-10 N·m where the cache must not know the answer. Rounds of {length} alternate between the two; a number is the median over the rounds, \
          with the quartiles in brackets, and a share is the median of the rounds' shares.\n\n\
-         The server's processor time of a request says what the request costs where the client would otherwise be the slower of the two.\n\n\
+         The servers' processor time, the kernel's share included, says what a request costs where the client is the slower of the two or others use the cores too.\n\n\
          ## Machine\n\n{}.\n",
-        machine().replace(" | ", ".\n"),
+        machine.replace(" | ", ".\n"),
     )
 }

@@ -104,7 +104,7 @@ const BASELINES: &str = "\
     - (ii) [dense.rs](../benches/baselines/dense.rs): the geometry of (i); the paper's 3n equations assembled and solved by nalgebra's LU at each input angle.\n\
     - (iii) [paper.py](../benches/baselines/paper.py): the paper's method as a plain NumPy script, Newton's method tooth by tooth; and once more with \
     all teeth of an input angle in one array, which is the kindest to NumPy.\n\
-    - *plain path*: toothwave's own solver state by state, without the series: the oracle of the fast path.\n";
+    - *plain path*: toothwave's own solver state by state, the oracle of the fast path.\n";
 
 /// Runs so many times and says how long that took.
 type Run<'a> = Box<dyn FnMut(u32) -> Result<Duration, Failure> + 'a>;
