@@ -12,7 +12,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -100,6 +100,8 @@ impl Cores {
 struct Server {
     child: Child,
     address: SocketAddr,
+    /// Open as long as the server runs, which may print more.
+    _output: BufReader<ChildStdout>,
 }
 
 impl Server {
@@ -108,10 +110,11 @@ impl Server {
         cores.enter(cores.server)?;
         let mut child = command.stdout(Stdio::piped()).spawn()?;
         let mut line = String::new();
-        BufReader::new(child.stdout.take().ok_or("no pipe")?).read_line(&mut line)?;
+        let mut output = BufReader::new(child.stdout.take().ok_or("no pipe")?);
+        output.read_line(&mut line)?;
         let word = line.split_whitespace().last().ok_or("the server said nothing")?;
         let address = word.trim_start_matches("http://").parse()?;
-        Ok(Self { child, address })
+        Ok(Self { child, address, _output: output })
     }
 
     /// Processor time that it has used.
