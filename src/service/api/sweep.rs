@@ -351,6 +351,11 @@ const STATE_COLUMNS: [&str; 12] = [
 ];
 
 impl Tabular for SweepAnswer {
+    fn expected_bytes(&self) -> usize {
+        // Eleven numbers of about 18 characters and a short one, each with its comma.
+        4096 + 220 * self.states.tooth.len()
+    }
+
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
         let states = &self.states;
         let mut csv = csv::Writer::from_writer(writer);
