@@ -120,8 +120,10 @@ impl Cache {
         Self { answers, keys: moka::sync::Cache::new(MOST_SPELLINGS) }
     }
 
-    /// Bytes and entries kept now, eviction under way not counted.
-    pub fn size(&self) -> CacheSize {
+    /// Bytes and entries kept now.
+    pub async fn size(&self) -> CacheSize {
+        // The cache counts lazily.
+        self.answers.run_pending_tasks().await;
         CacheSize { bytes: self.answers.weighted_size(), entries: self.answers.entry_count() }
     }
 

@@ -25,7 +25,7 @@ use crate::problem::{Problem, ProblemCode};
 #[openapi(
     info(
         title = "toothwave",
-        description = "Forces and contact stresses of discrete-tooth harmonic drives. Every number's name ends in its unit.",
+        description = "Forces and contact stresses of discrete-tooth harmonic drives. Names of numbers end in their unit; where a finding or a problem has a value and a limit, the unit stands beside them.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     tags(

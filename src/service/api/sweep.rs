@@ -286,7 +286,7 @@ impl Endpoint for Sweep {
             let (states, limit) = (Mesh::new(&drive).state_count(samples), limits.max_states);
             if states > limit {
                 let detail = format!(
-                    "the sweep has {states} states (input angles times teeth in mesh), more than the {limit} of `max_states`"
+                    "the sweep has {states} states (input angles times teeth in mesh), more than the {limit} of `max_states`; take fewer samples"
                 );
                 let (code, field_code) = (ProblemCode::TooManyStates, FieldCode::TooManyStates);
                 return Err(too_many(code, field_code, "/sweep/samples", &detail, Some(states), limit));
