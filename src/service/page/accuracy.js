@@ -125,7 +125,7 @@ export class Accuracy {
       const cells = [way.error, way.solve_us, way.states].map((value, index) =>
         html('td', { class: 'numeric' }, html('data', { class: 'number', value }, number(value, index === 2 ? 7 : 2))),
       );
-      const row = html('tr', { class: isCheapest && 'cheapest' }, html('th', { scope: 'row' }, button, isCheapest && ' fastest of this model'), cells);
+      const row = html('tr', { class: isCheapest && 'cheapest' }, html('th', { scope: 'row' }, button, isCheapest && ` fastest within ${number(this.#measured.answer.requested_error, 2)}`), cells);
       row.addEventListener('click', () => this.onApply(applied(way, this.#design, this.#measured.design)));
       this.#rows.push({ way, button });
       return row;

@@ -111,8 +111,8 @@ export const GROUPS = [
     rows: [
       row('Least wind-up of the input', 'Δφ', 'deg', ({ sweep }) => least(sweep?.wind_up?.wind_up_deg)),
       row('Most wind-up of the input', 'Δφ', 'deg', ({ sweep }) => greatest(sweep?.wind_up?.wind_up_deg)),
-      row('Least torsional stiffness, output', '', 'N·m/rad', ({ sweep }) => least(sweep?.wind_up?.torsional_stiffness_nm_per_rad)),
-      row('Most torsional stiffness, output', '', 'N·m/rad', ({ sweep }) => greatest(sweep?.wind_up?.torsional_stiffness_nm_per_rad)),
+      row('Least torsional stiffness of the output, N·m/rad', '', '', ({ sweep }) => least(sweep?.wind_up?.torsional_stiffness_nm_per_rad)),
+      row('Most torsional stiffness of the output, N·m/rad', '', '', ({ sweep }) => greatest(sweep?.wind_up?.torsional_stiffness_nm_per_rad)),
       row('Transmission error, peak to peak', '', 'deg', ({ sweep }) => sweep?.wind_up?.transmission_error_peak_to_peak_deg),
     ],
   },
