@@ -36,7 +36,9 @@ impl Key {
 impl std::fmt::Display for Key {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         // Half of the hash is enough to tell every design ever asked for apart.
-        self.0[..16].iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+        let mut half = [0; 16];
+        half.copy_from_slice(&self.0[..16]);
+        write!(f, "{:032x}", u128::from_be_bytes(half))
     }
 }
 
@@ -80,9 +82,29 @@ impl Served {
     }
 }
 
-/// Answers by key, bounded by their bytes.
+/// A hash of a request as it was written: the same bytes ask the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Spelling([u8; 32]);
+
+impl Spelling {
+    /// Of a body sent to an endpoint for one representation.
+    pub fn new(endpoint: &str, representation: Representation, body: &[u8]) -> Self {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(&[representation.format as u8, u8::from(representation.gzip)]);
+        hasher.update(endpoint.as_bytes()).update(b"\0").update(body);
+        Self(hasher.finalize().into())
+    }
+}
+
+/// Answers by key, bounded by their bytes; and the keys of requests that were read before, so that the same bytes are not read again.
 #[derive(Debug, Clone)]
-pub struct Cache(moka::future::Cache<Key, Stored>);
+pub struct Cache {
+    answers: moka::future::Cache<Key, Stored>,
+    keys: moka::sync::Cache<Spelling, Key>,
+}
+
+/// Spellings that are remembered: some ten megabytes.
+const MOST_SPELLINGS: u64 = 65_536;
 
 /// What an entry costs beside its body.
 const ENTRY_OVERHEAD_BYTES: usize = 256;
@@ -90,22 +112,34 @@ const ENTRY_OVERHEAD_BYTES: usize = 256;
 impl Cache {
     /// A cache of at most `max_bytes`.
     pub fn new(max_bytes: u64) -> Self {
-        let cache = moka::future::Cache::builder()
+        let answers = moka::future::Cache::builder()
             .max_capacity(max_bytes)
             // A body beyond 4 GiB weighs as much as can be said, and is not kept.
             .weigher(|_, stored: &Stored| u32::try_from(stored.body.len() + ENTRY_OVERHEAD_BYTES).unwrap_or(u32::MAX))
             .build();
-        Self(cache)
+        Self { answers, keys: moka::sync::Cache::new(MOST_SPELLINGS) }
     }
 
-    /// Bytes and entries kept now, eviction under way not counted.
-    pub fn size(&self) -> CacheSize {
-        CacheSize { bytes: self.0.weighted_size(), entries: self.0.entry_count() }
+    /// Bytes and entries kept now.
+    pub async fn size(&self) -> CacheSize {
+        // The cache counts lazily.
+        self.answers.run_pending_tasks().await;
+        CacheSize { bytes: self.answers.weighted_size(), entries: self.answers.entry_count() }
     }
 
     /// The answer under `key`, if it is kept.
     pub async fn get(&self, key: Key) -> Option<Stored> {
-        self.0.get(&key).await
+        self.answers.get(&key).await
+    }
+
+    /// The key of a request that was read and found possible before.
+    pub fn key(&self, spelling: Spelling) -> Option<Key> {
+        self.keys.get(&spelling)
+    }
+
+    /// Remembers the key of a request that was read and found possible.
+    pub fn remember(&self, spelling: Spelling, key: Key) {
+        self.keys.insert(spelling, key);
     }
 
     /// The answer under `key`, which `solve` makes once for all who ask meanwhile.
@@ -122,7 +156,7 @@ impl Cache {
     ) -> Result<(Stored, Served), Problem> {
         let is_own = Arc::new(AtomicBool::new(false));
         let started = Arc::clone(&is_own);
-        let cache = self.0.clone();
+        let cache = self.answers.clone();
         let flight = async move {
             let solve = async {
                 started.store(true, Ordering::Relaxed);

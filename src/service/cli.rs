@@ -17,7 +17,7 @@ use crate::api::{
 };
 use crate::config::{Limits, Settings};
 use crate::design::Design;
-use crate::problem::Problem;
+use crate::problem::{Problem, ProblemCode};
 use crate::{json, router, serve};
 
 /// Bad input, as most tools have it.
@@ -116,14 +116,17 @@ impl From<io::Error> for Failure {
 
 impl From<Problem> for Failure {
     fn from(problem: Problem) -> Self {
-        Self::BadInput(problem.to_string())
+        match problem.code {
+            ProblemCode::InternalError => Self::Io(io::Error::other(problem.to_string())),
+            _ => Self::BadInput(problem.to_string()),
+        }
     }
 }
 
 fn run_service(settings: &Settings) -> Result<(), Failure> {
     let filter = EnvFilter::try_new(&settings.log)
         .map_err(|error| Failure::BadInput(format!("the log filter cannot be read: {error}")))?;
-    tracing_subscriber::fmt().json().with_env_filter(filter).with_writer(io::stderr).init();
+    tracing_subscriber::fmt().json().with_span_list(false).with_env_filter(filter).with_writer(io::stderr).init();
     let runtime = tokio::runtime::Runtime::new()?;
     let result = runtime.block_on(serve::serve(settings));
     // A solve beyond its bound must not hold up the exit.
@@ -131,10 +134,10 @@ fn run_service(settings: &Settings) -> Result<(), Failure> {
     result.map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", settings.listen)).into())
 }
 
-/// Without a server only the document itself limits what is computed.
-const UNLIMITED: Limits = Limits {
-    max_states: u64::MAX,
-    max_profile_points: u64::MAX,
+/// Without a server only memory limits what is computed: some two gigabytes of it.
+const OFFLINE: Limits = Limits {
+    max_states: 20_000_000,
+    max_profile_points: 20_000_000,
     max_body_bytes: usize::MAX,
     max_concurrent_solves: 1,
     max_queued_solves: 0,
@@ -143,6 +146,8 @@ const UNLIMITED: Limits = Limits {
 };
 
 fn answer<E: Endpoint>(offline: &Offline) -> Result<(), Failure> {
+    // What fails inside says why in the log.
+    tracing_subscriber::fmt().with_max_level(tracing::Level::ERROR).with_writer(io::stderr).init();
     let mut text = Vec::new();
     if offline.file.as_os_str() == "-" {
         io::stdin().read_to_end(&mut text)?;
@@ -152,7 +157,7 @@ fn answer<E: Endpoint>(offline: &Offline) -> Result<(), Failure> {
             .map_err(|error| Failure::BadInput(format!("{}: {error}", offline.file.display())))?;
     }
     let design = json::read::<Design>(&text).map_err(Problem::from)?.normalised();
-    let question = E::question(&design, &UNLIMITED)?;
+    let question = E::question(&design, &OFFLINE)?;
     let answer = E::answer(&question, &AtomicBool::new(false))?;
     print(|writer| match offline.format {
         OutputFormat::Json => {
@@ -179,7 +184,8 @@ fn health(mut address: SocketAddr) -> Result<(), Failure> {
         // What listens everywhere also answers here.
         address.set_ip(if address.is_ipv4() { [127, 0, 0, 1].into() } else { std::net::Ipv6Addr::LOCALHOST.into() });
     }
-    let mut stream = TcpStream::connect_timeout(&address, PATIENCE)?;
+    let connected = TcpStream::connect_timeout(&address, PATIENCE);
+    let mut stream = connected.map_err(|error| io::Error::new(error.kind(), format!("{address}: {error}")))?;
     stream.set_read_timeout(Some(PATIENCE))?;
     stream.set_write_timeout(Some(PATIENCE))?;
     write!(stream, "GET /health/live HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n")?;

@@ -165,14 +165,16 @@ pub struct LoadDocument {
 
 /// The model of load sharing.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, default, expecting = "an object")]
+#[serde(deny_unknown_fields, expecting = "an object")]
 pub struct ModelDocument {
     /// How the approaches at a tooth's contacts add up.
+    #[serde(default)]
     pub compatibility: CompatibilityDocument,
     /// The contact law.
+    #[serde(default)]
     pub stiffness: StiffnessDocument,
     /// Gaps at the contacts; left out, there are none.
-    #[serde(deserialize_with = "given")]
+    #[serde(default, deserialize_with = "given")]
     #[schema(nullable = false)]
     pub clearance: Option<ClearanceDocument>,
 }
@@ -255,18 +257,19 @@ impl ToSchema for StiffnessDocument {
 
 /// The input angles of a sweep.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, default, expecting = "an object")]
+#[serde(deny_unknown_fields, expecting = "an object")]
 pub struct SweepDocument {
     /// Equal intervals of one period; both ends are included. 50 where neither this nor `tolerance` is given.
-    #[serde(deserialize_with = "given")]
+    #[serde(default, deserialize_with = "given")]
     #[schema(value_type = i64, minimum = 1, maximum = 10000000, default = 50, required = false)]
     pub samples: Option<Whole>,
     /// Instead of `samples`: the true extremes of every force and stress to this relative tolerance, input angles placed where they are
     /// needed, and the instant at which a tooth enters twice, without it and with it.
-    #[serde(deserialize_with = "given")]
+    #[serde(default, deserialize_with = "given")]
     #[schema(minimum = 1e-12, maximum = 0.1, nullable = false)]
     pub tolerance: Option<f64>,
     /// Whether wind-up and torsional stiffness are wanted too.
+    #[serde(default)]
     #[schema(default = false)]
     pub wind_up: bool,
 }
@@ -466,7 +469,10 @@ impl Design {
             (None, Some(torque_nm)) => Torque::Output(torque_nm),
             (given, _) => {
                 let code = if given.is_some() { FieldCode::ConflictingFields } else { FieldCode::MissingField };
-                let detail = "exactly one of `input_torque_nm` and `output_torque_nm` is wanted here";
+                let detail = match given {
+                    Some(_) => "only one of `input_torque_nm` and `output_torque_nm` may stand here",
+                    None => "`input_torque_nm` or `output_torque_nm` is required here",
+                };
                 return Err(Fault::of_field(code, "load", detail.into()));
             }
         };

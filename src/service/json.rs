@@ -37,6 +37,9 @@ pub struct Fault {
 /// # Errors
 /// See [`ReadError`].
 pub fn read<'de, T: Deserialize<'de>>(text: &[u8]) -> Result<T, ReadError> {
+    if text.trim_ascii().is_empty() {
+        return Err(ReadError::Malformed { detail: "nothing was sent; send a design document".into() });
+    }
     let mut parser = serde_json::Deserializer::from_slice(text);
     let tree: Node = serde_path_to_error::deserialize(&mut parser).map_err(|error| {
         // serde_json takes a number beyond the doubles and deep nesting for bad syntax; they are JSON all the same, if the rest is.

@@ -30,8 +30,8 @@ pub fn install_recorder() {
 }
 
 /// The metrics as text; levels are read at this moment.
-pub fn render(app: &App) -> String {
-    let size = app.cache.size();
+pub async fn render(app: &App) -> String {
+    let size = app.cache.size().await;
     let running = app.pool.running();
     #[expect(clippy::cast_precision_loss, reason = "a gauge")]
     {
@@ -49,7 +49,11 @@ pub async fn observe(request: Request, next: Next) -> Response {
     let started = Instant::now();
     // The route and not the path: labels must stay few.
     let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str).to_owned();
-    let method = request.method().clone();
+    let method = match request.method().as_str() {
+        known @ ("GET" | "HEAD" | "POST" | "PUT" | "PATCH" | "DELETE" | "OPTIONS") => known.to_owned(),
+        // Clients can invent methods without end, and each would be a series of its own.
+        _ => "other".to_owned(),
+    };
     let id = request.headers().get("x-request-id").and_then(|value| value.to_str().ok()).unwrap_or_default();
     let span = tracing::info_span!("request", id, design = tracing::field::Empty);
     let response = next.run(request).instrument(span.clone()).await;
@@ -57,13 +61,13 @@ pub async fn observe(request: Request, next: Next) -> Response {
     let status = response.status().as_u16();
     let cache = response.extensions().get::<Served>().map(|served| served.label());
 
-    counter!("toothwave_http_requests_total", "route" => route.clone(), "method" => method.to_string(), "status" => status.to_string())
+    counter!("toothwave_http_requests_total", "route" => route.clone(), "method" => method.clone(), "status" => status.to_string())
         .increment(1);
     histogram!("toothwave_http_request_duration_seconds", "route" => route.clone()).record(elapsed);
     if let Some(cache) = cache {
         counter!("toothwave_cache_requests_total", "status" => cache).increment(1);
     }
     let elapsed_ms = 1e3 * elapsed.as_secs_f64();
-    span.in_scope(|| tracing::info!(%method, route, status, cache, elapsed_ms, "request"));
+    span.in_scope(|| tracing::info!(method, route, status, cache, elapsed_ms, "request"));
     response
 }

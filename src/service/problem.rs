@@ -285,7 +285,7 @@ impl From<SolveError> for Problem {
                 too_many(ProblemCode::TooManyPoints, FieldCode::TooManyPoints, pointer, &detail, Some(points), limit)
             }
             SolveError::TooManyStates { limit } => {
-                let detail = format!("{detail}, the limit by `max_states`");
+                let detail = format!("{detail} by `max_states`; widen the tolerance");
                 let pointer = "/sweep/tolerance";
                 too_many(ProblemCode::TooManyStates, FieldCode::TooManyStates, pointer, &detail, None, limit)
             }

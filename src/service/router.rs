@@ -6,6 +6,7 @@ use axum::http::{HeaderValue, StatusCode, header};
 use axum::middleware;
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+use tower::ServiceBuilder;
 use tower::util::option_layer;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::cors::{AllowOrigin, Any, CorsLayer};
@@ -24,7 +25,7 @@ use crate::problem::{Problem, ProblemCode};
 #[openapi(
     info(
         title = "toothwave",
-        description = "Forces and contact stresses of discrete-tooth harmonic drives. Every number's name ends in its unit.",
+        description = "Forces and contact stresses of discrete-tooth harmonic drives. Names of numbers end in their unit; where a finding or a problem has a value and a limit, the unit stands beside them.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     tags(
@@ -70,13 +71,20 @@ pub fn router(app: App, cors_origins: &[String]) -> Router {
         .merge(docs)
         .fallback(not_found)
         .method_not_allowed_fallback(method_not_allowed)
-        // From the inside out: a panic becomes a problem before it is counted, logged and given its headers.
-        .layer(CatchPanicLayer::custom(panicked))
-        .layer(option_layer((!cors_origins.is_empty()).then(|| cors(cors_origins))))
-        .layer(middleware::from_fn(observe::observe))
-        .layer(PropagateRequestIdLayer::x_request_id())
-        .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid))
-        .layer(SetResponseHeaderLayer::overriding(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")))
+        .layer(
+            // From the outside in; one stack, because every layer of a router boxes all its routes once more. A panic becomes a problem
+            // before it is counted, logged and given its headers.
+            ServiceBuilder::new()
+                .layer(SetResponseHeaderLayer::overriding(
+                    header::X_CONTENT_TYPE_OPTIONS,
+                    HeaderValue::from_static("nosniff"),
+                ))
+                .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid))
+                .layer(PropagateRequestIdLayer::x_request_id())
+                .layer(middleware::from_fn(observe::observe))
+                .layer(option_layer((!cors_origins.is_empty()).then(|| cors(cors_origins))))
+                .layer(CatchPanicLayer::custom(panicked)),
+        )
         .with_state(app)
 }
 

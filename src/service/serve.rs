@@ -1,6 +1,6 @@
 //! The running service: listening, and stopping in order.
 
-use std::io;
+use std::io::{self, Write};
 use std::net::SocketAddr;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -56,11 +56,16 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
 
 /// Where the service is and what to try.
 fn greet(address: SocketAddr) {
-    println!("toothwave {} listens on http://{address}", env!("CARGO_PKG_VERSION"));
-    println!("Try, in another terminal:");
-    println!(
-        "  curl -s http://{address}/v1/examples/paper-5.1 | curl -s --json @- http://{address}/v1/coincidence-degree"
+    let text = format!(
+        "toothwave {} listens on http://{address}
+The designer's page: http://{address}/
+To try in another terminal:
+  curl -s http://{address}/v1/examples/paper-5.1 | curl -s --json @- http://{address}/v1/coincidence-degree
+  curl -s http://{address}/v1/examples/paper-5.1 | curl -s --json @- http://{address}/v1/sweep
+The API: http://{address}/docs
+",
+        env!("CARGO_PKG_VERSION")
     );
-    println!("  curl -s http://{address}/v1/examples/paper-5.1 | curl -s --json @- http://{address}/v1/sweep");
-    println!("The API, to try in a browser: http://{address}/docs");
+    // Whoever started the service may have closed its output; it serves all the same.
+    let _ = io::stdout().write_all(text.as_bytes());
 }

@@ -88,7 +88,9 @@ pub enum SolveError {
         limit: u64,
     },
     /// More states than asked for at most.
-    #[error("the sweep has more than {limit} states (input angles times teeth in mesh) at this tolerance")]
+    #[error(
+        "the sweep takes more states at this tolerance (input angles times teeth in mesh) than the {limit} allowed"
+    )]
     TooManyStates {
         /// The limit that was given.
         limit: u64,

@@ -12,9 +12,13 @@ pub struct NotConverged {
     pub bracket_width: f64,
 }
 
-/// Far above what is ever needed: bisection in the logarithm from the widest bracket that the ranges of
-/// the parameters allow (a/b = 1e12) takes below 60 steps, and a bisection stands behind every step.
+/// Above what is ever needed: bisection takes below 60 steps, in the logarithm from the widest bracket that the ranges of the parameters
+/// allow (a/b = 1e12) as well as down to [`NOTHING`], and a bisection stands behind every step.
 const MAX_ITERATIONS: u32 = 200;
+
+/// A root of [`bracketed`] this near to zero is zero for every purpose: its unknowns are angles in rad and shares of one. Without it a root
+/// that only rounding has put on this side of zero would be halved for without end.
+const NOTHING: f64 = 1e-16;
 
 /// A function's value and derivative.
 #[derive(Debug, Clone, Copy)]
@@ -94,7 +98,7 @@ pub fn bracketed(
         (a, value_a) = (x, value);
         let (best, least) = if value_a.abs() < value_b.abs() { (a, value_a) } else { (b, value_b) };
         let width = (b - a).abs();
-        let tolerance = 0.5 * f64::EPSILON * best.abs() / width;
+        let tolerance = (0.5 * f64::EPSILON * best.abs()).max(NOTHING) / width;
         if least == 0.0 || width == 0.0 || tolerance >= 0.5 {
             return Ok(best);
         }

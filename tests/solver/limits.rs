@@ -151,3 +151,45 @@ fn a_sweep_stops_when_it_is_told_to() {
     let load = LoadCase::new(&load(20.0, Compatibility::Projection)).unwrap();
     assert_eq!(sweep::sweep(&drive(&PAPER_5_1), &load, Points::Samples(50), &stop), Err(SolveError::Stopped));
 }
+
+#[test]
+fn a_tooth_of_the_critical_radius_or_a_few_roundings_beside_it_is_a_drive() {
+    // Found by fuzzing: rounding alone decides here on which side of the threshold the drive is.
+    let known = DriveParameters {
+        semi_major_mm: 46.8,
+        semi_minor_mm: 42.0,
+        teeth: 16,
+        installed: 2,
+        tooth_radius_mm: 6.479_544_353_139_002,
+        tooth_width_mm: 10.0,
+        ring_teeth: 14,
+        tip_radius_mm: None,
+    };
+    assert!(Drive::new(&known).is_ok());
+    let mut tried = 0;
+    for a in 41..400_i32 {
+        for teeth in [12, 16, 20, 28, 40] {
+            let base = DriveParameters {
+                semi_major_mm: 40.0 + f64::from(a) / 37.0,
+                semi_minor_mm: 40.0,
+                teeth,
+                installed: 2,
+                ring_teeth: teeth - 2,
+                tooth_radius_mm: 1.0,
+                ..known
+            };
+            let Some(critical) = Drive::new(&base).ok().and_then(|drive| drive.flank().critical_tooth_radius_mm())
+            else {
+                continue;
+            };
+            let bits = critical.to_bits();
+            for tooth_radius_mm in (bits - 8..=bits + 8).map(f64::from_bits) {
+                match Drive::new(&DriveParameters { tooth_radius_mm, ..base }) {
+                    Ok(_) | Err(DriveError::Impossible(_)) => tried += 1,
+                    Err(error) => panic!("{tooth_radius_mm} on {base:?}: {error}"),
+                }
+            }
+        }
+    }
+    assert!(tried > 1_000, "{tried}");
+}

@@ -201,6 +201,13 @@ fn geometry_and_mesh_agree_with_60_digits() {
     worst.assert_all_within();
 }
 
+/// Where a recorded row stands among the states.
+fn index_of(mesh: &Mesh, samples: u64, rows: &Value, row: usize) -> usize {
+    let (tooth, sample) = (rows["tooth"][row].as_u64().unwrap(), rows["input_index"][row].as_u64().unwrap());
+    let before: usize = (0..sample).map(|sample| mesh.teeth_at(sample, samples).count()).sum();
+    before + usize::try_from(tooth - mesh.teeth_at(sample, samples).start()).unwrap()
+}
+
 fn see_sweep(case: &Case, worst: &mut Worst) {
     let name = case.name();
     let expected = &case.0["expected"];
@@ -212,11 +219,7 @@ fn see_sweep(case: &Case, worst: &mut Worst) {
     assert_eq!(sweep.states.len() as u64, count, "{name}");
     let mesh = Mesh::new(&case.drive());
     let rows = &expected["rows"];
-    let at = |row: usize| {
-        let (tooth, sample) = (rows["tooth"][row].as_u64().unwrap(), rows["input_index"][row].as_u64().unwrap());
-        let before: usize = (0..sample).map(|sample| mesh.teeth_at(sample, samples).count()).sum();
-        before + usize::try_from(tooth - mesh.teeth_at(sample, samples).start()).unwrap()
-    };
+    let at = |row: usize| index_of(&mesh, samples, rows, row);
     for (kind, column) in columns(&sweep.states) {
         let peak = number(&expected["column_peak"][kind]).unwrap();
         let condition = case.0["condition"]["columns"][kind].as_f64().unwrap_or(0.0);
@@ -253,4 +256,59 @@ fn palmgrens_law_and_clearances_agree_with_60_digits() {
         see_sweep(&case, &mut worst);
     }
     worst.assert_all_within();
+}
+
+/// What a group of cases comes to.
+#[derive(Default)]
+struct Row {
+    cases: usize,
+    /// Worst error of geometry, forces and stresses, over the column's peak.
+    errors: [f64; 3],
+    /// Largest condition of a column.
+    condition: f64,
+    /// Worst error over the condition of its column, beside which one unit of rounding is allowed.
+    multiple: f64,
+}
+
+/// The table of docs/hard-cases.md: `cargo test -p toothwave-solver hard_cases -- --nocapture` prints it.
+#[test]
+fn hard_cases_stay_within_a_small_multiple_of_their_condition() {
+    let mut table: BTreeMap<String, Row> = BTreeMap::new();
+    for case in Case::all().into_iter().chain(Case::all_of_contact()) {
+        let row = table.entry(case.0["group"].as_str().unwrap().into()).or_default();
+        row.cases += 1;
+        if case.0["expected"]["state_count"].is_null() {
+            continue;
+        }
+        let sweep = case.sweep().unwrap();
+        for (kind, error) in errors_over_peak(&case, &sweep) {
+            let class = if kind.starts_with("force") { 1 } else { 2 * usize::from(kind.starts_with("stress")) };
+            let condition = case.0["condition"]["columns"][kind].as_f64().unwrap_or(0.0);
+            row.errors[class] = row.errors[class].max(error);
+            row.condition = row.condition.max(condition);
+            row.multiple = row.multiple.max(error / (condition + f64::EPSILON));
+        }
+    }
+    println!("| cases | number | geometry | forces | stresses | condition | error over condition |");
+    println!("|---|---|---|---|---|---|---|");
+    for (group, Row { cases, errors: [geometry, forces, stresses], condition, multiple }) in &table {
+        println!(
+            "| {group} | {cases} | {geometry:.1e} | {forces:.1e} | {stresses:.1e} | {condition:.1e} | {multiple:.1} |"
+        );
+        assert!(*multiple < 10.0, "{group}: {multiple}");
+    }
+}
+
+/// The worst error of each column over the recorded rows, over the column's peak.
+fn errors_over_peak(case: &Case, sweep: &Sweep) -> Vec<(&'static str, f64)> {
+    let (mesh, samples) = (Mesh::new(&case.drive()), case.samples());
+    let rows = &case.0["expected"]["rows"];
+    let at = |row: usize| index_of(&mesh, samples, rows, row);
+    let error_of = |kind: &str, column: &[f64]| {
+        let peak = number(&case.0["expected"]["column_peak"][kind]).unwrap();
+        let values = rows[kind].as_array().unwrap().iter().enumerate();
+        let errors = values.map(|(row, value)| (column[at(row)] - number(value).unwrap()).abs() / peak);
+        errors.fold(0.0, f64::max)
+    };
+    columns(&sweep.states).into_iter().map(|(kind, column)| (kind, error_of(kind, column))).collect()
 }

@@ -160,7 +160,14 @@ impl Endpoint for Accuracy {
     fn answer(question: &AccuracyQuestion, stop: &AtomicBool) -> Result<AccuracyAnswer, Problem> {
         let AccuracyQuestion { drive, load, requested_error, max_states } = question;
         let own = *load.parameters();
-        let own_peaks = converged(drive, load, *max_states, stop)?;
+        let own_peaks = converged(drive, load, *max_states, stop).map_err(|error| match error {
+            // There is no field to blame: the reference's tolerance is ours.
+            SolveError::TooManyStates { limit } => Problem::new(
+                ProblemCode::TooManyStates,
+                format!("a converged reference for this drive takes more states than the {limit} of `max_states`"),
+            ),
+            error => error.into(),
+        })?;
         let (mut ways, mut unavailable) = (Vec::new(), Vec::new());
         for model in models(&own) {
             let (compatibility, law) = (model.compatibility.into(), model.law.into());
@@ -351,7 +358,7 @@ impl WayAnswer {
     }
 }
 
-/// How wrong and how slow each way of computing a design is, measured there and then; never cached.
+/// How wrong and how slow each way of computing a design is, measured there and then beside whatever else the service does; never cached.
 #[utoipa::path(
     post,
     path = "/v1/accuracy",

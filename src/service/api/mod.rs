@@ -18,7 +18,7 @@ use toothwave_solver::drive::DriveError;
 use toothwave_solver::{Drive, Violation};
 use utoipa::IntoResponses;
 
-use crate::cache::{Cache, Key, Served, Stored};
+use crate::cache::{Cache, Key, Served, Spelling, Stored};
 use crate::compute::Pool;
 use crate::config::Limits;
 use crate::design::Design;
@@ -87,6 +87,11 @@ pub trait Endpoint {
 
 /// An answer's forms beside JSON.
 pub trait Tabular {
+    /// About how many bytes the JSON takes, so that its buffer need not grow.
+    fn expected_bytes(&self) -> usize {
+        4096
+    }
+
     /// As CSV, with the names of the JSON's columns.
     ///
     /// # Errors
@@ -138,29 +143,53 @@ pub async fn respond<E: Endpoint>(app: App, request: Request) -> Response {
 }
 
 async fn walk<E: Endpoint>(app: App, request: Request) -> Result<Response, Problem> {
-    let Asked { headers, design, representation, deadline } = Asked::read(&app, request, E::FORMATS).await?;
-    let key = Key::new(E::NAME, &E::reads(&design), representation)?;
-    let etag = key.etag();
-    tracing::Span::current().record("design", tracing::field::display(key));
-    // What is kept was checked when it was solved.
-    let (stored, served) = if let Some(stored) = app.cache.get(key).await {
-        (stored, Served::Hit)
-    } else {
-        let question = E::question(&design, &app.limits)?;
-        let pool = app.pool.clone();
-        let solve = async move { pool.run(deadline, move |stop| solve::<E>(&question, representation, stop)).await };
-        app.cache.solve_once(key, solve).await?
+    let Asked { headers, body, representation, deadline } = Asked::read(&app, request, E::FORMATS).await?;
+    let spelling = Spelling::new(E::NAME, representation, &body);
+    let known = match app.cache.key(spelling) {
+        Some(key) => app.cache.get(key).await.map(|stored| (key, stored)),
+        None => None,
     };
+    let (key, stored, served) = match known {
+        Some((key, stored)) => {
+            log_design(key);
+            (key, stored, Served::Hit)
+        }
+        None => {
+            let design = json::read::<Design>(&body)?.normalised();
+            let key = Key::new(E::NAME, &E::reads(&design), representation)?;
+            log_design(key);
+            let (stored, served) = match app.cache.get(key).await {
+                // What is kept was checked when it was solved.
+                Some(stored) => (stored, Served::Hit),
+                None => {
+                    let question = E::question(&design, &app.limits)?;
+                    let pool = app.pool.clone();
+                    let solve = async move {
+                        pool.run(deadline, move |stop| solve::<E>(&question, representation, stop)).await
+                    };
+                    app.cache.solve_once(key, solve).await?
+                }
+            };
+            app.cache.remember(spelling, key);
+            (key, stored, served)
+        }
+    };
+    let etag = key.etag();
     if negotiation::is_not_modified(&headers, &etag) || negotiation::matches_any(&headers) {
         return Ok(not_modified(&etag, served));
     }
     Ok(found(stored, served, representation, &etag))
 }
 
+/// The design's hash, for the request's log line.
+fn log_design(key: Key) {
+    tracing::Span::current().record("design", tracing::field::display(key));
+}
+
 /// A request as far as all endpoints read it alike.
 struct Asked {
     headers: HeaderMap,
-    design: Design,
+    body: bytes::Bytes,
     representation: Representation,
     deadline: tokio::time::Instant,
 }
@@ -172,15 +201,15 @@ impl Asked {
         negotiation::require_json(&headers)?;
         let representation = Representation::negotiate(&headers, formats)?;
         let body = read_body(&headers, body, &app.limits, deadline).await?;
-        let design = json::read::<Design>(&body)?.normalised();
-        Ok(Self { headers, design, representation, deadline })
+        Ok(Self { headers, body, representation, deadline })
     }
 }
 
 /// The same walk for an answer that is measured there and then: never cached.
 async fn respond_afresh<E: Endpoint>(app: App, request: Request) -> Response {
     let walk = async {
-        let Asked { design, representation, deadline, .. } = Asked::read(&app, request, E::FORMATS).await?;
+        let Asked { body, representation, deadline, .. } = Asked::read(&app, request, E::FORMATS).await?;
+        let design = json::read::<Design>(&body)?.normalised();
         let question = E::question(&design, &app.limits)?;
         let stored = app.pool.run(deadline, move |stop| solve::<E>(&question, representation, stop)).await?;
         Ok::<_, Problem>(with_body(stored, representation))
@@ -226,7 +255,8 @@ fn solve<E: Endpoint>(
     let started = Instant::now();
     let answer = E::answer(question, stop)?;
     let solve = started.elapsed();
-    let writer = Stoppable { inner: Vec::new(), stop };
+    let expected_bytes = if representation.gzip { 0 } else { answer.expected_bytes() };
+    let writer = Stoppable { inner: Vec::with_capacity(expected_bytes), next_look: LOOK_EVERY_BYTES, stop };
     let written = if representation.gzip {
         let mut encoder = GzEncoder::new(writer, Compression::fast());
         write(&answer, representation.format, &mut encoder).and_then(|()| encoder.finish())
@@ -235,7 +265,8 @@ fn solve<E: Endpoint>(
         write(&answer, representation.format, &mut writer).map(|()| writer)
     };
     match written {
-        Ok(writer) => Ok(Stored { body: writer.inner.into(), solve }),
+        // To its size: the cache keeps it, and weighs its length.
+        Ok(writer) => Ok(Stored { body: writer.inner.into_boxed_slice().into(), solve }),
         Err(_) if stop.load(Ordering::Relaxed) => Err(toothwave_solver::SolveError::Stopped.into()),
         Err(error) => Err(Problem::internal(&error)),
     }
@@ -248,19 +279,32 @@ fn write(answer: &(impl Serialize + Tabular), format: Format, writer: &mut impl 
     }
 }
 
+/// How much of a large answer is written between two looks at the stop signal.
+const LOOK_EVERY_BYTES: usize = 1 << 16;
+
 /// A buffer that fails once the stop signal is set, so that writing a large answer stops too.
 struct Stoppable<'a> {
     inner: Vec<u8>,
+    next_look: usize,
     stop: &'a AtomicBool,
 }
 
 impl Write for Stoppable<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.stop.load(Ordering::Relaxed) {
-            return Err(io::Error::other("stopped"));
-        }
+        self.write_all(bytes).map(|()| bytes.len())
+    }
+
+    // Numbers come one by one: this is called for each.
+    #[inline]
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.inner.extend_from_slice(bytes);
-        Ok(bytes.len())
+        if self.inner.len() >= self.next_look {
+            self.next_look = self.inner.len() + LOOK_EVERY_BYTES;
+            if self.stop.load(Ordering::Relaxed) {
+                return Err(io::Error::other("stopped"));
+            }
+        }
+        Ok(())
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -275,6 +319,8 @@ fn found(stored: Stored, served: Served, representation: Representation, etag: &
 fn with_body(stored: Stored, representation: Representation) -> Response {
     let mut response = (StatusCode::OK, stored.body).into_response();
     let headers = response.headers_mut();
+    // Those here and those of the layers around.
+    headers.reserve(12);
     headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(representation.format.content_type()));
     if representation.gzip {
         headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));

@@ -286,7 +286,7 @@ impl Endpoint for Sweep {
             let (states, limit) = (Mesh::new(&drive).state_count(samples), limits.max_states);
             if states > limit {
                 let detail = format!(
-                    "the sweep has {states} states (input angles times teeth in mesh), more than the {limit} of `max_states`"
+                    "the sweep has {states} states (input angles times teeth in mesh), more than the {limit} of `max_states`; take fewer samples"
                 );
                 let (code, field_code) = (ProblemCode::TooManyStates, FieldCode::TooManyStates);
                 return Err(too_many(code, field_code, "/sweep/samples", &detail, Some(states), limit));
@@ -351,6 +351,11 @@ const STATE_COLUMNS: [&str; 12] = [
 ];
 
 impl Tabular for SweepAnswer {
+    fn expected_bytes(&self) -> usize {
+        // Eleven numbers of about 18 characters and a short one, each with its comma.
+        4096 + 220 * self.states.tooth.len()
+    }
+
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
         let states = &self.states;
         let mut csv = csv::Writer::from_writer(writer);

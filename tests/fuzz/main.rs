@@ -1,0 +1,138 @@
+//! Whatever the document, there is an answer in numbers or a reason: no panic, no number that is none, no endless loop.
+//!
+//! `cargo test` replays the committed corpus and tries some more at random beside it; `cargo bolero test NAME -p toothwave`
+//! hands the same targets to a coverage-guided fuzzer.
+#![allow(clippy::unwrap_used, reason = "a fuzz target fails by panicking")]
+
+use std::sync::atomic::AtomicBool;
+
+use serde_json::{Value, json};
+use toothwave::api::Endpoint;
+use toothwave::api::accuracy::Accuracy;
+use toothwave::api::coincidence_degree::CoincidenceDegree;
+use toothwave::api::geometry::Geometry;
+use toothwave::api::sweep::Sweep;
+use toothwave::config::Limits;
+use toothwave::design::Design;
+use toothwave::json;
+use toothwave::problem::{Problem, ProblemCode};
+
+/// Small enough for thousands of answers.
+const LIMITS: Limits = Limits {
+    max_states: 2_000,
+    max_profile_points: 20_000,
+    max_body_bytes: 65_536,
+    max_concurrent_solves: 1,
+    max_queued_solves: 0,
+    deadline_ms: 10_000,
+    cache_max_bytes: 0,
+};
+
+fn assert_answered<E: Endpoint>(design: &Design) {
+    let answered = E::question(design, &LIMITS).and_then(|question| E::answer(&question, &AtomicBool::new(false)));
+    match answered {
+        // serde_json writes null where a number is none.
+        Ok(answer) => assert!(!serde_json::to_string(&answer).unwrap().contains("null"), "{design:?}"),
+        Err(problem) => assert_refused_for_a_reason(&problem),
+    }
+}
+
+fn assert_refused_for_a_reason(problem: &Problem) {
+    assert_ne!(problem.code, ProblemCode::InternalError, "{problem}");
+    assert!(!problem.detail.is_empty());
+}
+
+fn assert_text_is_answered(text: &[u8]) {
+    match json::read::<Design>(text) {
+        Ok(design) => {
+            let design = design.normalised();
+            assert_answered::<Geometry>(&design);
+            assert_answered::<CoincidenceDegree>(&design);
+            assert_answered::<Sweep>(&design);
+        }
+        Err(error) => assert_refused_for_a_reason(&error.into()),
+    }
+}
+
+#[test]
+fn any_text() {
+    bolero::check!().with_iterations(3_000).for_each(assert_text_is_answered);
+}
+
+/// A length between the ends of its range, most often an ordinary one.
+fn length_mm(byte: u8) -> f64 {
+    match byte {
+        0..16 => 1e-6 * f64::from(byte + 1),
+        240.. => 1e6 / f64::from(256 - u32::from(byte)),
+        _ => 1.0 + f64::from(byte) / 4.0,
+    }
+}
+
+/// A document of the right form: ratios of lengths that drives have, and numbers from all over the ranges.
+fn document(bytes: &[u8; 20]) -> Value {
+    let [scale, flattening, half, removal, thickness, more, bore, torque, form, law, rest @ ..] = *bytes;
+    let a = length_mm(scale);
+    let b = a * (1.0 - 10.0_f64.powf(-f64::from(flattening) / 16.0 - 0.1));
+    let installed = 2 * (1 + i64::from(half) % 64);
+    let teeth = installed * (1 + i64::from(removal) % 4);
+    let sin = (std::f64::consts::PI / installed as f64).sin();
+    let r = f64::from(thickness) / 255.0 * b * sin / (1.0 - sin).max(0.05);
+    let mut ring = json!({ "teeth": if more % 2 == 0 { teeth - 2 } else { teeth + 2 } });
+    if bore % 2 == 0 {
+        ring["tip_radius_mm"] = json!(b + 2.0 * r + f64::from(bore) / 255.0 * (a - b));
+    }
+    let stiffness = match law % 3 {
+        0 => json!({ "law": "linear" }),
+        1 => json!({ "law": "palmgren" }),
+        _ => json!({
+            "law": "fixed",
+            "wave_generator_n_per_mm": 10.0_f64.powi(i32::from(rest[0] % 19) - 3),
+            "ring_n_per_mm": 10.0_f64.powi(i32::from(rest[1] % 19) - 3),
+            "carrier_n_per_mm": 10.0_f64.powi(i32::from(rest[2] % 19) - 3)
+        }),
+    };
+    let mut model = json!({
+        "compatibility": if form % 2 == 0 { "projection" } else { "virtual_work" },
+        "stiffness": stiffness
+    });
+    if rest[3] % 3 == 0 {
+        let gap = |byte: u8| if byte < 128 { 0.0 } else { 10.0_f64.powi(i32::from(byte % 10) - 4) };
+        model["clearance"] =
+            json!({ "wave_generator_um": gap(rest[4]), "ring_um": gap(rest[5]), "carrier_um": gap(rest[6]) });
+    }
+    let sweep = if rest[7] % 2 == 0 {
+        json!({ "samples": 1 + rest[7] / 8, "wind_up": rest[8] % 2 == 0 })
+    } else {
+        json!({ "tolerance": 10.0_f64.powi(-1 - i32::from(rest[7] % 12)), "wind_up": rest[8] % 2 == 0 })
+    };
+    let mut load = json!({ "input_torque_nm": 10.0_f64.powi(i32::from(torque % 28) - 12) });
+    if rest[9] % 2 == 0 {
+        load["allowable_stress_mpa"] = json!(10.0_f64.powi(i32::from(rest[9] % 10) - 3));
+    }
+    json!({
+        "drive": {
+            "wave_generator": { "semi_major_mm": a, "semi_minor_mm": b },
+            "teeth": { "count": teeth, "installed": installed, "radius_mm": r, "width_mm": length_mm(rest[8]) },
+            "ring": ring
+        },
+        "load": load,
+        "model": model,
+        "sweep": sweep,
+        "profile": { "chord_tolerance_mm": 1e-3 * a, "extent": if form % 3 == 0 { "full" } else { "tooth" } }
+    })
+}
+
+#[test]
+fn any_drive() {
+    bolero::check!().with_type::<[u8; 20]>().with_iterations(1_000).for_each(|bytes| {
+        assert_text_is_answered(document(bytes).to_string().as_bytes());
+    });
+}
+
+#[test]
+fn any_accuracy() {
+    bolero::check!().with_type::<[u8; 20]>().with_iterations(8).for_each(|bytes| {
+        let text = document(bytes).to_string();
+        assert_answered::<Accuracy>(&json::read::<Design>(text.as_bytes()).unwrap().normalised());
+    });
+}
