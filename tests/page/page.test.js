@@ -48,6 +48,13 @@ function expected({ geometry, coincidence, sweep }) {
     'Contact stress, wave generator': peaks.wave_generator.stress_mpa.value,
     'Contact stress, ring': peaks.ring.stress_mpa.value,
     'Contact stress, carrier': peaks.carrier.stress_mpa.value,
+    ...Object.fromEntries(
+      ['wave_generator', 'ring', 'carrier'].flatMap((contact) => {
+        const name = contact.replace('_', ' ');
+        const { half_width_mm, shear_stress_mpa, shear_depth_mm } = peaks[contact];
+        return [[`Half-width of the contact, ${name}`, half_width_mm], [`Largest shear stress, ${name}`, shear_stress_mpa], [`Its depth, ${name}`, shear_depth_mm]];
+      }),
+    ),
     'Ring root radius': geometry.ring.root_radius_mm,
     'Ring tip radius': geometry.ring.tip_radius_mm,
     'Ring tooth height': geometry.ring.tooth_height_mm,
@@ -137,7 +144,7 @@ test('an impossible drive shows its reasons at the fields, and nothing breaks', 
   await enter(page, SEMI_MINOR, 60);
   assert.match(await page.textContent(notes(SEMI_MAJOR)), /must exceed the semi-minor axis/);
   assert.equal(await page.getAttribute(field(SEMI_MAJOR), 'aria-invalid'), 'true');
-  assert.match(await page.textContent('#impossible'), /The design cannot exist/);
+  assert.match(await page.textContent('#impossible'), /Values that no design can have/);
   assert.equal(await resultOf(page, 'Force, ring'), (await server.answers(await server.example('paper-5.1'))).sweep.peaks.ring.force_n.value);
   // Every reason at once, also in a folded group, each at its field.
   await enter(page, '/drive/teeth/count', 31);
@@ -276,6 +283,240 @@ test('switching the torque’s shaft keeps the load; fixed stiffnesses come with
     stiffness: { law: 'fixed', wave_generator_n_per_mm: 500000, ring_n_per_mm: 250000, carrier_n_per_mm: 500000 },
   });
   await assertShows(design);
+});
+
+/** The columns of a sweep's states by instant: `[{ angle, teeth: Map(tooth → index) }]`. */
+function instants({ states }) {
+  const found = [];
+  states.tooth.forEach((tooth, index) => {
+    const angle = states.input_angle_deg[index];
+    const last = found.at(-1);
+    if (last?.angle !== angle || last.teeth.has(tooth) || tooth < Math.max(...last.teeth.keys())) found.push({ angle, teeth: new Map() });
+    found.at(-1).teeth.set(tooth, index);
+  });
+  return found;
+}
+
+const range = (values) => [Math.min(...values), Math.max(...values)];
+
+test('law, clearance, capacity, tolerance and wind-up are asked for in the form and answered in the table', async () => {
+  page = await open(browser, server);
+  assert.equal(await resultOf(page, 'Least wind-up'), undefined);
+  assert.equal(await resultOf(page, 'Most teeth that carry'), undefined);
+  await page.selectOption(field('/model/stiffness'), 'palmgren');
+  await page.selectOption(field('/model/compatibility'), 'virtual_work');
+  await enter(page, '/model/clearance/ring_um', 4);
+  await enter(page, '/model/clearance/carrier_um', 1.5);
+  // What the design does not ask for yet leads to where it does.
+  await page.click('#table button[aria-label^="Torque capacity"]');
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'field-load-allowable_stress_mpa');
+  await enter(page, '/load/allowable_stress_mpa', 1500);
+  await page.click('#table button[aria-label^="Wind-up"]');
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'field-sweep-wind_up');
+  await page.keyboard.press('Space');
+  await page.selectOption(field('/sweep'), 'tolerance');
+  await enter(page, '/sweep/tolerance', 1e-7);
+  const design = await designOf(page);
+  const example = await server.example('paper-5.1');
+  assert.deepEqual(design, {
+    ...example,
+    load: { input_torque_nm: 20, allowable_stress_mpa: 1500 },
+    model: { compatibility: 'virtual_work', stiffness: { law: 'palmgren' }, clearance: { ring_um: 4, carrier_um: 1.5 } },
+    sweep: { wind_up: true, tolerance: 1e-7 },
+  });
+  await assertShows(design);
+  const { sweep } = await server.answers(design);
+  const { wind_up: windUp, torque_capacity: capacity, states } = sweep;
+  const carrying = instants(sweep).map(({ teeth }) => [...teeth.values()].filter((index) => states.loaded[index]).length);
+  const [leastWindUp, mostWindUp] = range(windUp.wind_up_deg);
+  const [softest, stiffest] = range(windUp.torsional_stiffness_nm_per_rad);
+  const [fewest, most] = range(carrying);
+  assert.deepEqual([fewest, most], range(windUp.loaded_teeth));
+  for (const [label, value] of Object.entries({
+    'Least wind-up': leastWindUp,
+    'Most wind-up': mostWindUp,
+    'Least torsional stiffness': softest,
+    'Most torsional stiffness': stiffest,
+    'Transmission error': windUp.transmission_error_peak_to_peak_deg,
+    'Fewest teeth that carry': fewest,
+    'Most teeth that carry': most,
+    'Input torque': capacity.input_torque_nm,
+    'Output torque': capacity.output_torque_nm,
+    'At the input angle': capacity.input_angle_deg,
+  })) {
+    assert.equal(await resultOf(page, label), value, label);
+  }
+  const limit = page.locator('#table tr', { hasText: 'Limited by' });
+  assert.match(await limit.textContent(), new RegExp(capacity.limited_by.replace('_', ' ')));
+  // Each has its reference and its difference.
+  await page.click('#keep');
+  await enter(page, '/model/clearance/ring_um', 8);
+  assert.match(await page.locator('#table tr', { hasText: 'Most wind-up' }).textContent(), /deg.*deg\+.*%/);
+  assert.match(await page.locator('#table tr', { hasText: 'Output torque' }).textContent(), /N·m.*N·m[−+].*%/);
+  // The torque's other shaft keeps the rest of the load, and what is emptied is left out of the document.
+  await page.selectOption(field('/load'), 'output_torque_nm');
+  await page.selectOption(field('/sweep'), 'samples');
+  await page.uncheck(field('/sweep/wind_up'));
+  await enter(page, '/model/clearance/ring_um', '');
+  await enter(page, '/model/clearance/carrier_um', '');
+  const back = await designOf(page);
+  assert.deepEqual(back.load, { output_torque_nm: 280, allowable_stress_mpa: 1500 });
+  assert.deepEqual(back.sweep, { samples: 50 });
+  assert.deepEqual(back.model, { compatibility: 'virtual_work', stiffness: { law: 'palmgren' } });
+  await assertShows(back);
+});
+
+test('new findings explain themselves, new reasons stand at their fields', async () => {
+  page = await open(browser, server);
+  await enter(page, '/model/clearance/ring_um', 3);
+  await page.click(`${notes('/model/stiffness')} .finding`);
+  assert.match(await page.textContent(notes('/model/stiffness')), /Linear law is too stiff.*What is tested.*µm against.*µm.*palmgren/);
+  await page.selectOption(field('/model/stiffness'), 'palmgren');
+  await page.click('summary:has-text("Materials")');
+  await enter(page, '/materials/ring/youngs_modulus_gpa', 100);
+  assert.match(await page.textContent(notes('/model/stiffness')), /Palmgren’s law is for steel/);
+  await choose(page, 'ring-with-more-teeth');
+  await page.selectOption(field('/model/compatibility'), 'projection');
+  await enter(page, '/model/clearance/carrier_um', 2);
+  assert.match(await page.textContent(notes('/model/clearance/carrier_um')), /negatively.*virtual_work/);
+  assert.equal(await page.getAttribute(field('/model/clearance/carrier_um'), 'aria-invalid'), 'true');
+  await page.click(`${notes('/model/clearance/carrier_um')} button:has-text("Set to 0")`);
+  await settled(page);
+  assert.ok(await page.isHidden('#impossible'));
+  // Two of which only one may be given.
+  const design = await server.example('paper-5.1');
+  await page.click('#open-document');
+  await page.fill('#document-text', JSON.stringify({ ...design, load: { input_torque_nm: 20, output_torque_nm: 280, allowable_stress_mpa: 900 }, sweep: { samples: 20, tolerance: 1e-4 } }));
+  await page.click('#document-apply');
+  await settled(page);
+  assert.match(await page.textContent(notes('/load')), /input_torque_nm.*output_torque_nm/);
+  await page.click(`${notes('/load')} button:has-text("Keep output torque")`);
+  await settled(page);
+  assert.match(await page.textContent(notes('/sweep')), /samples.*tolerance/);
+  await page.click(`${notes('/sweep')} button:has-text("Keep relative tolerance")`);
+  await settled(page);
+  const kept = await designOf(page);
+  assert.deepEqual([kept.load, kept.sweep], [{ output_torque_nm: 280, allowable_stress_mpa: 900 }, { tolerance: 1e-4 }]);
+  assert.ok(await page.isHidden('#impossible'));
+});
+
+test('with clearance, teeth that carry nothing are drawn and told so', async () => {
+  page = await open(browser, server);
+  await enter(page, '/model/clearance/ring_um', 20);
+  const design = await designOf(page);
+  const { sweep } = await server.answers(design);
+  await page.locator('#angle').fill('0');
+  await page.click('#teeth-table summary');
+  await settled(page);
+  const states = [...instants(sweep)[0].teeth].map(([tooth, index]) => ({ tooth, loaded: sweep.states.loaded[index] }));
+  const idle = states.filter(({ loaded }) => !loaded).map(({ tooth }) => tooth);
+  const busy = states.filter(({ loaded }) => loaded).map(({ tooth }) => tooth);
+  assert.ok(idle.length > 0 && busy.length > 0);
+  const fill = (tooth) => page.$eval(`#whole [data-tooth="${tooth}"]`, (element) => element.style.fill);
+  for (const tooth of idle) assert.equal(await fill(tooth), '', `tooth ${tooth}`);
+  for (const tooth of busy) assert.notEqual(await fill(tooth), '', `tooth ${tooth}`);
+  const arrows = async (contact) => ((await page.getAttribute(`#whole .arrow.contact-${contact}`, 'd')).match(/M/g) ?? []).length / 2;
+  assert.equal(await arrows('ring'), 2 * busy.length);
+  const listed = await page.$$eval('#teeth tbody th', (cells) => cells.map((cell) => Number(cell.textContent)));
+  assert.deepEqual(listed, [...busy, ...busy.map((tooth) => tooth + 14)].sort((one, other) => one - other));
+  for (let presses = 0; presses < 28 && !idle.includes(Number((await page.textContent('#tooth-name')).slice(6))); presses += 1) {
+    await page.click('#tooth-after');
+    await settled(page);
+  }
+  assert.match(await page.textContent('#tooth-state'), /no load/);
+});
+
+test('a jump that stands twice at one input angle is a jump in mechanism and plots', async () => {
+  page = await open(browser, server);
+  const found = await page.evaluate(async () => {
+    const { Motion } = await import('/page/motion.js');
+    const { passOf, plotted, readAt } = await import('/page/pass.js');
+    const design = { ...(await (await fetch('/v1/examples/paper-5.2')).json()), sweep: { tolerance: 1e-6 } };
+    const ask = async (path) => (await fetch(path, { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify(design) })).json();
+    const [geometry, sweep] = [await ask('/v1/geometry'), await ask('/v1/sweep')];
+    const motion = new Motion(design, geometry, sweep);
+    const pass = passOf(design, geometry, sweep);
+    const at = motion.frames.findIndex(({ angle }, index) => angle === motion.frames[index + 1]?.angle);
+    const [without, within] = [motion.frames[at], motion.frames[at + 1]].map(({ rows }) => [...rows.values()].map(({ tooth, force_ring_n: force }) => [tooth, force]));
+    const near = (deg) => motion.loaded(deg).filter(({ zone }) => zone === 0).map(({ tooth, force }) => [tooth, force.ring]);
+    const { angle } = motion.frames[at];
+    const columns = plotted(pass, 'ring', 'force', ['ring']);
+    return {
+      without,
+      within,
+      before: near(angle - 1e-9),
+      after: near(angle + 1e-9),
+      nulls: columns[1].filter((value) => value === null).length,
+      ascends: columns[0].every((x, index) => index === 0 || x > columns[0][index - 1]),
+      breaks: [...pass.breaks].map((index) => [pass.force.ring[index - 1], pass.force.ring[index]]),
+      peak: [sweep.peaks.ring.force_n.value, Math.max(...pass.force.ring)],
+      sides: [...pass.breaks].map((index) => readAt(pass, 'input', pass.x.input[index - 1] - 1e-7).force.ring),
+    };
+  });
+  const assertNear = (got, wanted, what) => {
+    assert.deepEqual(got.map(([tooth]) => tooth), wanted.map(([tooth]) => tooth), what);
+    got.forEach(([, force], index) => assert.ok(Math.abs(force - wanted[index][1]) < 1e-5 * wanted[index][1], what));
+  };
+  assert.equal(found.within.length, found.without.length + 1);
+  assertNear(found.before, found.without, 'just before');
+  assertNear(found.after, found.within, 'just after');
+  assert.equal(found.nulls, found.without.length);
+  assert.ok(found.ascends);
+  for (const [before, after] of found.breaks) assert.ok(after < 0.9 * before, 'the others are relieved when a tooth enters');
+  found.sides.forEach((force, index) => assert.ok(Math.abs(force / found.breaks[index][0] - 1) < 1e-5));
+  assert.equal(found.peak[0], found.peak[1]);
+});
+
+async function measure() {
+  await page.click('#measure');
+  await page.waitForFunction(() => /Fastest within|No choice/.test(document.querySelector('#accuracy-state').textContent));
+}
+
+test('accuracy: measured on demand, equal to the API, and a row applies its choice', async () => {
+  page = await open(browser, server);
+  assert.equal(await page.textContent('#accuracy-list'), '');
+  await measure();
+  const original = await designOf(page);
+  const answer = await server.ask('/v1/accuracy', original);
+  const shown = await page.$$eval('#accuracy-list details', (models) =>
+    models.flatMap((model) =>
+      [...model.querySelectorAll('tbody tr')].map((row) => {
+        const [error, time, states] = [...row.querySelectorAll('data')].map(({ value }) => Number(value));
+        return { name: row.querySelector('button').getAttribute('aria-label'), error, time, states, note: model.querySelector('summary').textContent };
+      }),
+    ),
+  );
+  assert.deepEqual(shown.map(({ error, states }) => [error, states]), answer.ways.map(({ error, states }) => [error, states]));
+  assert.ok(shown.every(({ time }) => time > 0));
+  assert.match(shown[0].note, /^Projection, linear this design’s own$/);
+  const palmgren = answer.ways.findIndex(({ compatibility, law }) => compatibility === 'virtual_work' && law === 'palmgren');
+  assert.match(shown[palmgren].note, new RegExp(`^Virtual work, Palmgren peaks differ by ${(100 * answer.ways[palmgren].model_difference).toFixed(2)}`));
+  assert.equal(await page.getAttribute('#accuracy-list button:has-text("50 samples")', 'aria-pressed'), 'true');
+  // Another number of samples is no other question; another model is.
+  await page.click('#accuracy-list button[aria-label="200 samples: use with Projection, linear"]');
+  await settled(page);
+  assert.deepEqual(await designOf(page), { ...original, sweep: { samples: 200 } });
+  assert.match(await page.textContent('#accuracy-state'), /^Fastest within/);
+  await page.click('#accuracy-list summary:has-text("Virtual work, Palmgren")');
+  await page.focus('#accuracy-list button[aria-label^="to 1·10⁻⁸"][aria-label$="Virtual work, Palmgren"]');
+  await page.keyboard.press('Enter');
+  await settled(page);
+  const design = await designOf(page);
+  assert.deepEqual(design, { ...original, model: { compatibility: 'virtual_work', stiffness: { law: 'palmgren' } }, sweep: { tolerance: 1e-8 } });
+  await assertShows(design);
+  assert.match(await page.textContent('#accuracy-state'), /another design; measure again/);
+  await page.click('#undo');
+  await settled(page);
+  assert.deepEqual(await designOf(page), { ...original, sweep: { samples: 200 } });
+  // The error that is wanted is part of the design, and asks anew.
+  await page.selectOption('#accuracy-wanted', '0.01');
+  await page.waitForFunction(() => document.querySelector('#accuracy-state').textContent.startsWith('Fastest within 0.01'));
+  assert.equal((await designOf(page)).accuracy.requested_error, 0.01);
+  assert.equal(await page.locator('#accuracy-list .cheapest').count(), 1);
+  // A design that cannot exist has no accuracy, but reasons.
+  await enter(page, SEMI_MINOR, 60);
+  await page.click('#measure');
+  await page.waitForFunction(() => document.querySelector('#accuracy-state').textContent.includes('must exceed'));
 });
 
 test('the drawing stands where the service says', async () => {
@@ -486,7 +727,7 @@ test('results and findings are announced', async () => {
   await enter(page, RADIUS, 6.8);
   await page.waitForFunction(() => document.querySelector('#announcer').textContent.includes('Undercut ring tips'));
   await enter(page, RADIUS, 60);
-  await page.waitForFunction(() => document.querySelector('#announcer').textContent.startsWith('The design cannot exist'));
+  await page.waitForFunction(() => document.querySelector('#announcer').textContent.startsWith('Values that no design can have'));
 });
 
 test('the service goes away and comes back', async () => {
@@ -521,7 +762,11 @@ for (const [name, options] of Object.entries({
     page = await open(browser, server, { bypassCSP: false, ...options });
     await page.click('#keep');
     await choose(page, 'paper-5.2');
+    await measure();
+    await enter(page, '/load/allowable_stress_mpa', 1500);
+    await enter(page, '/model/clearance/ring_um', 2);
     for (const details of await page.$$('main details:not([open]) > summary')) await details.click();
+    await page.check(field('/sweep/wind_up'));
     await page.locator(`${notes(RADIUS)} .finding`).first().click();
     await settled(page);
     assert.deepEqual(await violations(), [], 'a design with findings, compared');
@@ -550,12 +795,17 @@ test('the theme is chosen and remembered', async () => {
 
 test('the report has one or two pages', async () => {
   page = await open(browser, server, { colorScheme: 'dark' });
-  for (const name of ['paper-5.1', 'paper-5.2']) {
-    await choose(page, name);
+  for (const name of ['paper-5.1', 'paper-5.2', undefined]) {
+    if (name) await choose(page, name);
     const pdf = (await page.pdf({ preferCSSPageSize: true, printBackground: true })).toString('latin1');
     const pages = pdf.match(/\/Type\s*\/Page\b/g).length;
     assert.ok(pages <= 2, `${name} takes ${pages} pages`);
     await page.click('#keep');
+    // With every result that can be asked for.
+    await enter(page, '/load/allowable_stress_mpa', 1500);
+    await page.evaluate(() => document.querySelectorAll('#form details').forEach((details) => (details.open = true)));
+    await page.check(field('/sweep/wind_up'));
+    await settled(page);
   }
 });
 

@@ -41,6 +41,7 @@ const ASSETS: &[Asset] = assets![
     "icon.svg" as SVG,
     "theme.js" as SCRIPT,
     "main.js" as SCRIPT,
+    "accuracy.js" as SCRIPT,
     "design.js" as SCRIPT,
     "dom.js" as SCRIPT,
     "findings.js" as SCRIPT,

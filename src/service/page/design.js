@@ -8,6 +8,11 @@ const WIDE = 0.75;
 const number = (pointer, label, symbol, unit, more) => ({ kind: 'number', pointer, label, symbol, unit, ...more });
 const whole = (pointer, label, symbol, more) => ({ kind: 'number', whole: true, pointer, label, symbol, ...more });
 const choice = (pointer, label, options, more) => ({ kind: 'choice', pointer, label, options, ...more });
+const flag = (pointer, label) => ({ kind: 'flag', pointer, label });
+
+/** A gap at a contact; without any, the document has no clearance at all. */
+const clearance = (contact, label, symbol) =>
+  number(`/model/clearance/${contact}_um`, label, symbol, 'µm', { slider: WIDE, optional: () => 'none', step: 1 });
 
 /** Steel, as the service fills in what a document leaves out. */
 const material = (part, label) => ({
@@ -95,6 +100,7 @@ export const GROUPS = [
           return to === 'output_torque_nm' ? value * ratio : value / ratio;
         },
       },
+      number('/load/allowable_stress_mpa', 'Allowable stress', 'σ', 'MPa', { slider: WIDE, optional: () => 'not asked' }),
     ],
   },
   {
@@ -113,6 +119,7 @@ export const GROUPS = [
         label: 'Contact law',
         options: [
           { value: 'linear', label: 'Linear, from the materials', fields: [] },
+          { value: 'palmgren', label: 'Palmgren, steel on steel', fields: [] },
           {
             value: 'fixed',
             label: 'Fixed stiffnesses',
@@ -124,6 +131,9 @@ export const GROUPS = [
           },
         ],
       },
+      clearance('wave_generator', 'Gap at the wave generator', ''),
+      clearance('ring', 'Gap at the ring', ''),
+      clearance('carrier', 'Gap at the carrier', ''),
     ],
   },
   {
@@ -145,9 +155,22 @@ export const GROUPS = [
   {
     title: 'Sweep and profile',
     pointer: '/sweep',
-    summary: (design) => `${at(design, '/sweep/samples') ?? 50} samples`,
+    summary: (design) => {
+      const tolerance = at(design, '/sweep/tolerance');
+      return tolerance === undefined ? `${at(design, '/sweep/samples') ?? 50} samples` : `to ${tolerance}`;
+    },
     fields: [
-      whole('/sweep/samples', 'Samples of a period', 'N', { preset: 50 }),
+      {
+        kind: 'oneOf',
+        pointer: '/sweep',
+        name: 'Sweep',
+        label: 'Input angles',
+        options: [
+          { key: 'samples', label: 'equally spaced', preset: 50, field: whole('/sweep/samples', 'Samples of a period', 'N', { preset: 50 }) },
+          { key: 'tolerance', label: 'where the true peaks need them', preset: 1e-6, field: number('/sweep/tolerance', 'Relative tolerance', '', '') },
+        ],
+      },
+      flag('/sweep/wind_up', 'Wind-up and torsional stiffness too'),
       number('/profile/chord_tolerance_mm', 'Chord tolerance', '', 'mm', { preset: 0.001, step: 0.001 }),
       choice('/profile/extent', 'Exported ring profile', [
         { value: 'tooth', label: 'One tooth' },
@@ -173,12 +196,14 @@ export function at(design, pointer) {
   return keys(pointer).reduce((value, key) => value?.[key], design);
 }
 
-/** The document with one value changed, `undefined` to leave it out; the old document stays as it is. */
+/** The document with one value changed, `undefined` to leave it out, with an object that it was the last of; the old document
+ *  stays as it is. */
 export function changed(design, pointer, value) {
   const [key, ...rest] = keys(pointer);
   const copy = { ...design };
   const inner = rest.length === 0 ? value : changed(design?.[key] ?? {}, `/${rest.join('/')}`, value);
-  if (inner === undefined) delete copy[key];
+  const isEmptied = value === undefined && rest.length > 0 && Object.keys(inner).length === 0;
+  if (inner === undefined || isEmptied) delete copy[key];
   else copy[key] = inner;
   return copy;
 }

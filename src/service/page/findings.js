@@ -55,6 +55,19 @@ const KINDS = {
     why: 'Above it, hardened bearing steel has to be expected to fatigue in the end, softer steel earlier; below it nothing is proven.',
     change: 'Stress grows with the square root of the torque.',
   },
+  linear_law_too_stiff: {
+    title: 'Linear law is too stiff',
+    tests: 'How far the tooth and the wave generator approach under the peak force by the linear law, against the same by Palmgren’s.',
+    basis: 'The limit is measured: Palmgren’s formula for steel rollers.',
+    why: 'Without clearance the forces hardly notice; torsional stiffness comes out as much too large.',
+  },
+  palmgren_beyond_steel: {
+    title: 'Palmgren’s law is for steel',
+    tests: 'The contact’s elastic modulus against that of steel on steel.',
+    basis: 'The limit is a rule of thumb: steels differ by less than 10 %.',
+    why: 'The law knows no modulus: load sharing, wind-up and stiffness are those of steel, only the stresses see the material.',
+    change: 'The linear law follows the modulus too, but is too stiff.',
+  },
 };
 
 const words = (code) => code.replaceAll('_', ' ').replace(/^./, (letter) => letter.toUpperCase());

@@ -6,7 +6,7 @@ import { explanation, sentence, titleOf } from './findings.js';
 import { number } from './format.js';
 
 /** Faults whose limit is itself a value that would do. */
-const LIMIT_WOULD_DO = new Set(['tooth_difference', 'installed_odd', 'installed_no_divisor', 'out_of_range']);
+const LIMIT_WOULD_DO = new Set(['tooth_difference', 'installed_odd', 'installed_no_divisor', 'out_of_range', 'clearance_not_monotone']);
 
 const SLIDER_STEPS = 250;
 
@@ -74,6 +74,7 @@ export class Form {
     if (field.kind === 'choice') return this.#buildChoice(field, (value) => this.#edit(field.pointer, value));
     if (field.kind === 'variant') return this.#buildVariant(field);
     if (field.kind === 'oneOf') return this.#buildOneOf(field);
+    if (field.kind === 'flag') return this.#buildFlag(field);
     return this.#buildNumber(field);
   }
 
@@ -112,13 +113,28 @@ export class Form {
     return element;
   }
 
-  /** An object with exactly one of several fields. */
+  /** What the service does only where it is asked for it; left out, it is not. */
+  #buildFlag(field) {
+    const id = idOf(field.pointer, 'field');
+    const input = html('input', { id, type: 'checkbox', 'aria-describedby': idOf(field.pointer, 'notes') });
+    input.addEventListener('change', () => {
+      this.#edit(field.pointer, input.checked || undefined);
+      this.#onEnd();
+    });
+    const element = html('div', { class: 'field flag' }, input, html('label', { for: id }, field.label));
+    this.#notesFor(field.pointer, element);
+    this.#fields.set(field.pointer, { field, element, input });
+    return element;
+  }
+
+  /** An object with exactly one of several fields, and perhaps others that stay. */
   #buildOneOf(field) {
     const element = this.#buildChoice(field, (key) => {
       const given = field.options.find((option) => at(this.#design, option.field.pointer) !== undefined);
       const option = field.options.find((candidate) => candidate.key === key);
       const value = given && field.convert?.(at(this.#design, given.field.pointer), key, this.#answers);
-      this.#edit(field.pointer, { [key]: Number.isFinite(value) ? Number(value.toPrecision(12)) : option.preset });
+      const others = Object.entries(at(this.#design, field.pointer) ?? {}).filter(([name]) => !field.options.some((candidate) => candidate.key === name));
+      this.#edit(field.pointer, { [key]: Number.isFinite(value) ? Number(value.toPrecision(12)) : option.preset, ...Object.fromEntries(others) });
     });
     for (const option of field.options) element.append(this.#buildNumber(option.field));
     return element;
@@ -206,6 +222,10 @@ export class Form {
       for (const option of field.options) {
         this.#fields.get(option.field.pointer).element.hidden = given.length ? !given.includes(option) : option !== field.options[0];
       }
+      return;
+    }
+    if (field.kind === 'flag') {
+      input.checked = at(design, field.pointer) === true;
       return;
     }
     if (field.kind === 'choice') {
@@ -305,7 +325,11 @@ export class Form {
     const { pointer, code, detail, limit } = reason;
     const missing = pointer !== place && pointer ? `${pointer}: ` : '';
     const note = html('p', { class: 'note problem' }, `${missing}${sentence(detail)} `);
-    if (code === 'unknown_field') {
+    if (code === 'conflicting_fields') {
+      for (const { field } of this.#fields.get(place)?.field.options ?? []) {
+        note.append(html('button', { type: 'button', class: 'link', onclick: () => this.#keepOnly(place, field) }, `Keep ${field.label.toLowerCase()}`), ' ');
+      }
+    } else if (code === 'unknown_field') {
       note.append(html('button', { type: 'button', class: 'link', onclick: () => this.#fix(pointer, undefined) }, 'Remove it'));
     } else if (LIMIT_WOULD_DO.has(code) && limit !== undefined && pointer === place && !pointer.endsWith('poissons_ratio')) {
       note.append(html('button', { type: 'button', class: 'link', onclick: () => this.#fix(pointer, limit) }, `Set to ${number(limit)}`));
@@ -315,6 +339,17 @@ export class Form {
 
   #fix(pointer, value) {
     this.#edit(pointer, value);
+    this.#settle(pointer);
+  }
+
+  /** Of the options of an object with exactly one of them. */
+  #keepOnly(place, kept) {
+    const others = this.#fields.get(place).field.options.filter(({ field }) => field !== kept);
+    this.#edit(place, others.reduce((design, { field }) => changed(design, field.pointer, undefined), this.#design)[place.slice(1)]);
+    this.#settle(kept.pointer);
+  }
+
+  #settle(pointer) {
     this.#onEnd();
     this.setDesign(this.#design);
     this.goTo(pointer);

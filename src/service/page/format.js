@@ -14,7 +14,7 @@ export function number(value, significant = 5) {
   if (size < 1e-3 || size >= 1e7) {
     const [digits, exponent] = size.toExponential(Math.min(significant, 3) - 1).split('e');
     const raised = [...String(Math.abs(Number(exponent)))].map((digit) => SUPERSCRIPTS[digit]).join('');
-    return `${sign}${digits}·10${Number(exponent) < 0 ? '⁻' : ''}${raised}`;
+    return `${sign}${Number(digits)}·10${Number(exponent) < 0 ? '⁻' : ''}${raised}`;
   }
   const places = Math.max(0, significant - 1 - Math.floor(Math.log10(size)));
   const [whole, fraction] = size.toFixed(Math.min(places, 12)).split('.');

@@ -1,6 +1,7 @@
 // What the page shows: one design, its answers, an input angle, a selected tooth and perhaps a reference. Everything on the page
 // follows from these; each part of it is asked to show them, none keeps a second copy.
 
+import { Accuracy } from './accuracy.js';
 import { isSame } from './design.js';
 import { html, oncePerFrame, setChildren, setText } from './dom.js';
 import { explanation, findingsOf, reasonsOf, titleOf } from './findings.js';
@@ -72,7 +73,12 @@ const plots = new Plots(
   },
 );
 
-const results = new Results({ keyFigures: byId('key-figures'), table: byId('table') }, showPeak);
+const results = new Results({ keyFigures: byId('key-figures'), table: byId('table') }, showPeak, (pointer) => form.goTo(pointer));
+
+const accuracy = new Accuracy(
+  { panel: byId('accuracy'), measure: byId('measure'), wanted: byId('accuracy-wanted'), state: byId('accuracy-state'), list: byId('accuracy-list') },
+  (design) => setDesign(design),
+);
 
 // ---- the design
 
@@ -86,6 +92,7 @@ function setDesign(design, { gesture: newGesture, fromForm = false, respan = fal
 function replaceDesign(design, { fromForm = false, respan = false } = {}) {
   state.design = design;
   form.setDesign(design, { respan: respan && !fromForm });
+  accuracy.setDesign(design);
   service.request(design);
   byId('undo').disabled = !history.canUndo;
   byId('redo').disabled = !history.canRedo;

@@ -21,24 +21,33 @@ export const polar = (radius, deg) => ({ x: radius * Math.cos(deg * RAD), y: rad
 
 const modulo = (value, base) => ((value % base) + base) % base;
 
-/** A sweep's states by input angle: `[{ angle, rows: Map(tooth → row) }]`. */
+/** A sweep's states by input angle: `[{ angle, rows: Map(tooth → row) }]`. Where loads jump an angle may stand twice, without the
+ *  tooth that enters and then with it; teeth ascend within a frame, so a lower one begins the next. */
 export function framesOf(states) {
   const frames = [];
+  let lastTooth;
   states.input_angle_deg.forEach((angle, index) => {
     let frame = frames.at(-1);
-    if (frame?.angle !== angle) {
+    if (frame?.angle !== angle || states.tooth[index] <= lastTooth) {
       frame = { angle, rows: new Map() };
       frames.push(frame);
     }
     const row = { tooth: states.tooth[index], center_radius_mm: states.center_radius_mm[index] };
     for (const column of COLUMNS) row[column] = states[column][index];
+    // Only a drive with clearance has teeth in mesh that carry nothing.
+    row.loaded = states.loaded?.[index] ?? true;
     frame.rows.set(row.tooth, row);
+    lastTooth = row.tooth;
   });
   return frames;
 }
 
-/** Whether a tooth takes load at once when it enters: its flank ends before the place where the lever arm is zero. */
+/** Whether a tooth can take load at once when it enters: its flank ends before the place where the lever arm is zero. */
 export const entersUnderLoad = (geometry) => geometry.engagement.start_deg < 90 - 1e-9;
+
+/** The tooth that makes every force jump between two frames, by entering under load. */
+export const enteringBetween = (geometry, before, after) =>
+  entersUnderLoad(geometry) ? [...after.rows.values()].find((row) => !before.rows.has(row.tooth) && row.loaded) : undefined;
 
 export class Motion {
   constructor(design, geometry, sweep) {
@@ -109,11 +118,11 @@ export class Motion {
     if (this.frames.length === 0) return [];
     const periods = Math.floor(inputDeg / this.period);
     const within = inputDeg - periods * this.period;
-    const last = this.frames.length - 1;
-    const place = Math.min((within / this.period) * last, last);
-    const index = Math.min(Math.floor(place), last - 1);
+    const index = this.#frameAt(within);
+    const [from, to] = [this.frames[index].angle, this.frames[index + 1].angle];
     const loaded = [];
-    for (const row of this.#between(index, place - index)) {
+    for (const row of this.#between(index, to > from ? Math.min(1, Math.max(0, (within - from) / (to - from))) : 0)) {
+      if (!row.loaded) continue;
       // One period on, each tooth stands where the one before it stood.
       for (const zone of [0, 1]) {
         const tooth = modulo(row.tooth + periods + (zone * this.installed) / 2, this.installed);
@@ -123,18 +132,30 @@ export class Motion {
     return loaded.sort((one, other) => one.tooth - other.tooth);
   }
 
+  /** The last frame but one at most that does not stand behind an angle of the period. */
+  #frameAt(angle) {
+    let low = 0;
+    let high = this.frames.length - 1;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (this.frames[middle].angle <= angle) low = middle;
+      else high = middle;
+    }
+    return low;
+  }
+
   /** The rows of one zone at a share of the way from sample `index` to the next. */
   *#between(index, share) {
     const before = this.frames[index].rows;
     const after = this.frames[index + 1].rows;
     const start = this.geometry.engagement.start_deg;
     const blend = (one, other, t) => {
-      const row = { tooth: one.tooth };
+      const row = { tooth: one.tooth, loaded: (one.loaded && t < 1) || (other.loaded && t > 0) };
       for (const column of COLUMNS) row[column] = one[column] + t * (other[column] - one[column]);
       return row;
     };
     // A tooth that enters under load makes every force jump there, so nothing is interpolated across its entry.
-    const entering = entersUnderLoad(this.geometry) && [...after.values()].find((row) => !before.has(row.tooth));
+    const entering = enteringBetween(this.geometry, this.frames[index], this.frames[index + 1]);
     const rate = (this.ringTeeth / this.theoretical) * (this.frames[index + 1].angle - this.frames[index].angle);
     const hasEntered = entering && entering.position_deg + (1 - share) * rate <= start;
     for (const row of before.values()) {
@@ -143,6 +164,7 @@ export class Motion {
         const blended = blend(row, next, share);
         if (entering) {
           const held = hasEntered ? next : row;
+          blended.loaded = held.loaded;
           for (const column of COLUMNS) if (!column.endsWith('_deg')) blended[column] = held[column];
         }
         yield blended;

@@ -1,7 +1,7 @@
 // One tooth's pass through the meshing zone, from where it enters to the root, put together from the samples of one period
 // as the paper does it (its figures 8 to 10): each loaded tooth stands for a part of the pass.
 
-import { CONTACTS, entersUnderLoad, framesOf } from './motion.js';
+import { CONTACTS, enteringBetween, entersUnderLoad, framesOf } from './motion.js';
 
 export const ABSCISSAE = [
   { key: 'input', label: 'Input angle', axis: 'input angle since the minor axis, deg', unit: 'deg', symbol: 'j' },
@@ -10,21 +10,26 @@ export const ABSCISSAE = [
   { key: 'slot', label: 'Slot', axis: 'distance of the tooth’s centre from the axis, mm', unit: 'mm', symbol: 'ρ' },
 ];
 
+/** Positions closer than this are one and the same, on both sides of a jump. */
+const SAME_DEG = 1e-9;
+
 /** `{ x: { abscissa: [] }, force: { contact: [] }, stress: { contact: [] }, position: [], breaks: Set of indices }`; a break at an
  *  index stands between that point and the one before it. */
 export function passOf(design, geometry, sweep) {
   const frames = framesOf(sweep.states);
-  const jumps = entersUnderLoad(geometry);
   const rate = design.drive.teeth.count / design.drive.ring.teeth;
   const points = [];
   // The last sample repeats the first, teeth renumbered.
   for (let index = 0; index < frames.length - 1; index += 1) {
     const { rows } = frames[index];
-    const following = [...frames[index + 1].rows.keys()];
-    const breaksAfter = jumps && following.some((tooth) => !rows.has(tooth));
+    const breaksAfter = enteringBetween(geometry, frames[index], frames[index + 1]) !== undefined;
     for (const row of rows.values()) points.push({ row, breaksAfter });
   }
-  points.sort((one, other) => other.row.position_deg - one.row.position_deg);
+  // Where an angle stands twice, what was before the jump comes first.
+  points.sort((one, other) => {
+    const ahead = other.row.position_deg - one.row.position_deg;
+    return Math.abs(ahead) > SAME_DEG ? ahead : other.breaksAfter - one.breaksAfter;
+  });
   const column = (name) => points.map(({ row }) => row[name]);
   const position = column('position_deg');
   const pass = {
@@ -39,7 +44,7 @@ export function passOf(design, geometry, sweep) {
     },
     force: {},
     stress: {},
-    entersUnderLoad: jumps,
+    entersUnderLoad: entersUnderLoad(geometry),
     breaks: new Set(),
     peaks: sweep.peaks,
   };
@@ -65,6 +70,11 @@ export function plotted(pass, abscissa, quantity, contacts) {
     xs.push(x);
     contacts.forEach((key, which) => columns[which].push(pass[quantity][key][index]));
   });
+  // A jump at one place has the width of a hair, because the plots keep one value for one x.
+  const hair = 1e-9 * (xs.at(-1) - xs[0]);
+  for (let index = 1; index < xs.length; index += 1) {
+    if (xs[index] <= xs[index - 1]) xs[index] = xs[index - 1] + hair;
+  }
   return [xs, ...columns];
 }
 

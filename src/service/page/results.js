@@ -2,7 +2,7 @@
 
 import { html, setText, symbol } from './dom.js';
 import { DASH, difference, number } from './format.js';
-import { CONTACTS } from './motion.js';
+import { CONTACTS, framesOf } from './motion.js';
 
 const row = (label, sign, unit, get, more) => ({ label, symbol: sign, unit, get, ...more });
 
@@ -12,6 +12,23 @@ const peakRows = (field, name, sign, unit) =>
       place: ({ sweep }) => sweep.peaks[key][field],
     }),
   );
+
+/** What goes with the largest stress of each contact. */
+const contactRows = (field, name, sign, unit) =>
+  CONTACTS.map(({ key, name: contact, index }) =>
+    row(`${name}, ${contact.toLowerCase()}`, `${sign}_${index}`, unit, ({ sweep }) => sweep?.peaks[key][field]),
+  );
+
+const least = (column) => column?.reduce((most, value) => Math.min(most, value));
+const greatest = (column) => column?.reduce((most, value) => Math.max(most, value));
+
+/** Teeth of a zone that carry, by input angle, where the service tells them from those that only mesh. */
+const carrying = new WeakMap();
+function carryingTeeth({ sweep }) {
+  if (!sweep?.states.loaded) return undefined;
+  if (!carrying.has(sweep)) carrying.set(sweep, framesOf(sweep.states).map(({ rows }) => [...rows.values()].filter(({ loaded }) => loaded).length));
+  return carrying.get(sweep);
+}
 
 /** The contact that carries the largest of a quantity. */
 function largest(field, { sweep }) {
@@ -58,6 +75,8 @@ export const GROUPS = [
       row('Coincidence degree, both zones', 'ε', '', ({ coincidence }) => coincidence?.coincidence_degree, { significant: 7 }),
       row('Fewest teeth in mesh, each zone', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.min),
       row('Most teeth in mesh, each zone', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max),
+      row('Fewest teeth that carry, each zone', '', '', (answers) => least(carryingTeeth(answers))),
+      row('Most teeth that carry, each zone', '', '', (answers) => greatest(carryingTeeth(answers))),
       row('Engagement begins, from the major axis', 'ψ_e', 'deg', ({ geometry }) => geometry?.engagement.start_deg),
       row('Undercut', '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
         text: ({ geometry }) => (geometry.undercut.occurs ? 'yes' : 'no'),
@@ -66,6 +85,37 @@ export const GROUPS = [
     ],
   },
   { title: 'Peaks over a period', rows: [...peakRows('force_n', 'Force', 'F', 'N'), ...peakRows('stress_mpa', 'Contact stress', 'σ', 'MPa')] },
+  {
+    title: 'Below the surface, where the stress peaks',
+    rows: [
+      ...contactRows('half_width_mm', 'Half-width of the contact', 'w', 'mm'),
+      ...contactRows('shear_stress_mpa', 'Largest shear stress', 'τ', 'MPa'),
+      ...contactRows('shear_depth_mm', 'Its depth', 'z', 'mm'),
+    ],
+  },
+  {
+    title: 'Torque capacity at the allowable stress',
+    offer: '/load/allowable_stress_mpa',
+    rows: [
+      row('Input torque', 'M_0', 'N·m', ({ sweep }) => sweep?.torque_capacity?.input_torque_nm),
+      row('Output torque', 'M_G', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm),
+      row('Limited by', '', '', ({ sweep }) => sweep?.torque_capacity?.limited_by, {
+        text: ({ sweep }) => CONTACTS.find(({ key }) => key === sweep.torque_capacity.limited_by).name.toLowerCase(),
+      }),
+      row('At the input angle', 'j', 'deg', ({ sweep }) => sweep?.torque_capacity?.input_angle_deg),
+    ],
+  },
+  {
+    title: 'Wind-up and stiffness',
+    offer: '/sweep/wind_up',
+    rows: [
+      row('Least wind-up of the input', 'Δφ', 'deg', ({ sweep }) => least(sweep?.wind_up?.wind_up_deg)),
+      row('Most wind-up of the input', 'Δφ', 'deg', ({ sweep }) => greatest(sweep?.wind_up?.wind_up_deg)),
+      row('Least torsional stiffness of the output, N·m/rad', '', '', ({ sweep }) => least(sweep?.wind_up?.torsional_stiffness_nm_per_rad)),
+      row('Most torsional stiffness of the output, N·m/rad', '', '', ({ sweep }) => greatest(sweep?.wind_up?.torsional_stiffness_nm_per_rad)),
+      row('Transmission error, peak to peak', '', 'deg', ({ sweep }) => sweep?.wind_up?.transmission_error_peak_to_peak_deg),
+    ],
+  },
   {
     title: 'Parts and room',
     rows: [
@@ -106,9 +156,11 @@ function compare(entry, answers, reference) {
 export class Results {
   #cells = [];
   #tiles = [];
+  #offers = [];
 
-  /** `onShow({ input_angle_deg, position_deg })` when a peak's place is picked. */
-  constructor({ keyFigures, table }, onShow) {
+  /** `onShow({ input_angle_deg, position_deg })` when a peak's place is picked, `onAsk(pointer)` when a result is wanted that the
+   *  design has to ask for. */
+  constructor({ keyFigures, table }, onShow, onAsk) {
     for (const entry of KEY_ROWS) {
       const value = html('data', { class: 'value number' });
       const unit = entry.unit && !entry.text ? html('span', { class: 'unit' }, entry.unit) : undefined;
@@ -123,7 +175,10 @@ export class Results {
     head.append(...this.headings, html('th', { scope: 'col' }, 'Where'));
     table.append(html('thead', {}, head));
     for (const group of GROUPS) {
-      const body = html('tbody', {}, html('tr', { class: 'group' }, html('th', { scope: 'rowgroup', colspan: 5 }, group.title)));
+      const offer = group.offer && html('button', { type: 'button', class: 'link', 'aria-label': `${group.title}: ask for it`, onclick: () => onAsk(group.offer) }, 'ask for it');
+      const heading = html('tr', { class: 'group' }, html('th', { scope: 'rowgroup', colspan: 5 }, group.title, offer && [' ', offer]));
+      const body = html('tbody', {}, heading);
+      if (offer) this.#offers.push({ group, offer, heading });
       for (const entry of group.rows) {
         const value = html('data', { class: 'number' });
         const reference = html('span', { class: 'number' });
@@ -155,6 +210,12 @@ export class Results {
   /** Shows answers, and beside them those of a reference. What has no answer keeps its place but no number. */
   update(answers, reference) {
     this.table.classList.toggle('comparing', Boolean(reference));
+    for (const { group, offer, heading } of this.#offers) {
+      const isAnswered = (given) => given && group.rows[0].get(given) !== undefined;
+      offer.hidden = Boolean(isAnswered(answers));
+      // Paper shows only what was asked for.
+      heading.classList.toggle('unasked', !isAnswered(answers) && !isAnswered(reference));
+    }
     for (const { entry, tile, value, note } of this.#tiles) {
       const shown = show(entry, answers);
       setText(value, shown?.text ?? DASH);

@@ -20,7 +20,8 @@ class Unavailable extends Error {
   }
 }
 
-async function ask(path, design, signal) {
+/** One answer, or the problem in its place. */
+export async function ask(path, design, signal) {
   let response;
   let body;
   try {

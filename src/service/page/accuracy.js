@@ -1,0 +1,151 @@
+// How wrong and how slow each choice of model and input angles is, as the service measures it for the design at hand.
+
+import { at, changed, isSame } from './design.js';
+import { html, setText } from './dom.js';
+import { fixed, number } from './format.js';
+import { ask } from './service.js';
+
+const COMPATIBILITIES = { projection: 'Projection', virtual_work: 'Virtual work' };
+const LAWS = { linear: 'linear', fixed: 'fixed', palmgren: 'Palmgren' };
+const WANTED = '/accuracy/requested_error';
+const WANTED_ERRORS = [1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10];
+const WANTED_PRESET = 1e-6;
+
+const modelName = ({ compatibility, law }) => `${COMPATIBILITIES[compatibility]}, ${LAWS[law]}`;
+const pointsName = ({ samples, tolerance }) => (samples === undefined ? `to ${number(tolerance, 1)}` : `${samples} samples`);
+
+/** What of a design the measurement depends on. */
+const questionOf = ({ drive, materials, load, model, accuracy }) => ({ drive, materials, load, model, accuracy });
+
+/** The choice that a design makes. */
+function choiceOf(design) {
+  const tolerance = at(design, '/sweep/tolerance');
+  return {
+    compatibility: at(design, '/model/compatibility') ?? 'projection',
+    law: at(design, '/model/stiffness/law') ?? 'linear',
+    samples: tolerance === undefined ? (at(design, '/sweep/samples') ?? 50) : undefined,
+    tolerance,
+  };
+}
+
+const isSameModel = (one, other) => one.compatibility === other.compatibility && one.law === other.law;
+const isSameWay = (one, other) => isSameModel(one, other) && one.samples === other.samples && one.tolerance === other.tolerance;
+
+/** The design with another choice; the stiffnesses of a fixed law are those that were measured. */
+function applied(way, design, measured) {
+  let next = design;
+  const own = choiceOf(design);
+  if (way.compatibility !== own.compatibility) next = changed(next, '/model/compatibility', way.compatibility);
+  const stiffness = way.law === 'fixed' ? measured.model.stiffness : { law: way.law };
+  if (way.law !== own.law || (way.law === 'fixed' && !isSame(stiffness, design.model.stiffness))) next = changed(next, '/model/stiffness', stiffness);
+  const { samples, tolerance, ...others } = design.sweep ?? {};
+  const points = way.tolerance === undefined ? { samples: way.samples } : { tolerance: way.tolerance };
+  return changed(next, '/sweep', { ...points, ...others });
+}
+
+export class Accuracy {
+  #design;
+  /** `{ design, answer }` of the last measurement. */
+  #measured;
+  #message = '';
+  #running;
+  #rows = [];
+  #folded = new Map();
+
+  /** `onApply(design)` when a choice is made. */
+  constructor({ panel, measure, wanted, state, list }, onApply) {
+    Object.assign(this, { panel, button: measure, wanted, state, list, onApply });
+    measure.addEventListener('click', () => this.measure());
+    wanted.addEventListener('change', () => {
+      onApply(changed(this.#design, WANTED, Number(wanted.value)));
+      if (this.#measured) this.measure();
+    });
+  }
+
+  setDesign(design) {
+    this.#design = design;
+    const value = at(design, WANTED) ?? WANTED_PRESET;
+    const errors = WANTED_ERRORS.includes(value) || typeof value !== 'number' ? WANTED_ERRORS : [value, ...WANTED_ERRORS];
+    if (this.wanted.options.length !== errors.length || !errors.includes(Number(this.wanted.value))) {
+      this.wanted.replaceChildren(...errors.map((error) => html('option', { value: error }, number(error, 2))));
+    }
+    this.wanted.value = String(value);
+    this.#message = '';
+    this.#show();
+  }
+
+  async measure() {
+    this.#running?.abort();
+    const running = new AbortController();
+    this.#running = running;
+    const design = this.#design;
+    this.#message = 'Measuring…';
+    this.#show();
+    try {
+      const { answer, problem } = await ask('v1/accuracy', design, running.signal);
+      if (answer) {
+        this.#measured = { design, answer };
+        this.#build();
+      }
+      this.#message = problem ? `${problem.title}: ${problem.detail}` : '';
+    } catch (error) {
+      if (running.signal.aborted) return;
+      this.#message = error.message;
+    }
+    this.#running = undefined;
+    this.#show();
+  }
+
+  #build() {
+    const { design, answer } = this.#measured;
+    const own = choiceOf(design);
+    const models = new Map();
+    for (const way of answer.ways) {
+      const name = modelName(way);
+      models.set(name, [...(models.get(name) ?? []), way]);
+    }
+    this.#rows = [];
+    const tables = [...models].map(([name, ways]) => {
+      const isOwn = isSameModel(ways[0], own);
+      const note = isOwn ? 'this design’s own' : `peaks differ by ${fixed(100 * ways[0].model_difference, 2)} % from this design’s`;
+      const details = html('details', { open: this.#folded.get(name) ?? isOwn }, html('summary', {}, name, ' ', html('span', { class: 'summary-note' }, note)), this.#table(name, ways));
+      details.addEventListener('toggle', () => this.#folded.set(name, details.open));
+      return details;
+    });
+    const unavailable = answer.unavailable.map((model) => html('p', { class: 'none' }, `${modelName(model)}: no answer for this design (${model.code.replaceAll('_', ' ')})`));
+    this.list.replaceChildren(...tables, ...unavailable);
+  }
+
+  #table(name, ways) {
+    const { cheapest } = this.#measured.answer;
+    const head = ['Input angles', 'Error of the peaks', 'Time, µs', 'States'].map((text, index) => html('th', { scope: 'col', class: index > 0 && 'numeric' }, text));
+    const rows = ways.map((way) => {
+      const button = html('button', { type: 'button', 'aria-label': `${pointsName(way)}: use with ${name}` }, pointsName(way));
+      const isCheapest = cheapest && isSameWay(way, cheapest);
+      const cells = [way.error, way.solve_us, way.states].map((value, index) =>
+        html('td', { class: 'numeric' }, html('data', { class: 'number', value }, number(value, index === 2 ? 7 : 2))),
+      );
+      const row = html('tr', { class: isCheapest && 'cheapest' }, html('th', { scope: 'row' }, button, isCheapest && ` fastest within ${number(this.#measured.answer.requested_error, 2)}`), cells);
+      row.addEventListener('click', () => this.onApply(applied(way, this.#design, this.#measured.design)));
+      this.#rows.push({ way, button });
+      return row;
+    });
+    return html('table', {}, html('thead', {}, html('tr', {}, head)), html('tbody', {}, rows));
+  }
+
+  #show() {
+    const measured = this.#measured;
+    const isStale = measured !== undefined && !isSame(questionOf(measured.design), questionOf(this.#design));
+    this.panel.classList.toggle('outdated', isStale);
+    setText(this.button, measured ? 'Measure again' : 'Measure');
+    const own = choiceOf(this.#design);
+    for (const { way, button } of this.#rows) button.setAttribute('aria-pressed', String(isSameWay(way, own)));
+    setText(this.state, this.#message || (isStale ? 'Measured for another design; measure again for this one.' : measured ? this.#summary() : ''));
+  }
+
+  #summary() {
+    const { requested_error: wanted, cheapest } = this.#measured.answer;
+    if (!cheapest) return `No choice of input angles is within ${number(wanted, 2)} for this design’s own model.`;
+    return `Fastest within ${number(wanted, 2)} for this design’s own model: ${pointsName(cheapest)}, ${number(cheapest.solve_us, 2)} µs.`;
+  }
+}
