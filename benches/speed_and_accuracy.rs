@@ -89,7 +89,7 @@ fn introduction(paper: Option<&Paper>) -> String {
          - One thread. All contestants of a table run in one process (Python in one beside it, without its start) and take turns: in each round each of them \
          runs a batch of at least {} ms, one run where that takes longer, and the round starts with another one each time. A number is the median over the \
          rounds, with the quartiles in brackets. A ratio is the median of the rounds' ratios.\n\
-         - *Error*: the largest difference from the calculation with 60 digits (tests/reference), over the column's peak, over all eleven columns of numbers \
+         - *Error*: the largest difference from the calculation to 40 digits (tests/reference), over the column's peak, over all eleven columns of numbers \
          and {} states of case 5.1. Those states are among the 5000 intervals too.\n\n\
          ## Machine\n\n{}{}\n",
         BATCH.as_millis(),

@@ -12,7 +12,7 @@ use toothwave_solver::sweep::{ContactPeaks, Points, sweep};
 use toothwave_solver::{Compatibility, ContactLaw, Drive, LoadCase, LoadParameters, PerContact, SolveError};
 use utoipa::ToSchema;
 
-use super::{App, Endpoint, Problems, Tabular, checked_drive, csv_error, respond_afresh, word};
+use super::{App, Endpoint, Problems, Tabular, checked_drive, checked_load, csv_error, respond_afresh, word};
 use crate::config::Limits;
 use crate::design::{CompatibilityDocument, Design};
 use crate::negotiation::Format;
@@ -139,18 +139,14 @@ impl Endpoint for Accuracy {
     }
 
     fn question(design: &Design, limits: &Limits) -> Result<AccuracyQuestion, Problem> {
-        let load = design.load_case()?;
         let mut violations = Vec::new();
         let drive = checked_drive(design, &mut violations)?;
-        if let (Some(drive), Ok(load)) = (&drive, &load) {
-            violations.extend(load.clearance_violations(drive).map_err(SolveError::from)?);
-        }
+        let load = checked_load(design, drive.as_ref(), &mut violations)?;
         match (drive, load, design.requested_error()) {
-            (Some(drive), Ok(load), Ok(requested_error)) if violations.is_empty() => {
+            (Some(drive), Some(load), Ok(requested_error)) if violations.is_empty() => {
                 Ok(AccuracyQuestion { drive, load, requested_error, max_states: limits.max_states })
             }
-            (_, load, requested_error) => {
-                violations.extend(load.err().into_iter().flatten());
+            (_, _, requested_error) => {
                 violations.extend(requested_error.err());
                 Err(Problem::impossible(&violations))
             }

@@ -15,7 +15,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use serde::Serialize;
 use toothwave_solver::drive::DriveError;
-use toothwave_solver::{Drive, Violation};
+use toothwave_solver::{Drive, LoadCase, SolveError, Violation};
 use utoipa::IntoResponses;
 
 use crate::cache::{Cache, Key, Served, Spelling, Stored};
@@ -267,7 +267,7 @@ fn solve<E: Endpoint>(
     match written {
         // To its size: the cache keeps it, and weighs its length.
         Ok(writer) => Ok(Stored { body: writer.inner.into_boxed_slice().into(), solve }),
-        Err(_) if stop.load(Ordering::Relaxed) => Err(toothwave_solver::SolveError::Stopped.into()),
+        Err(_) if stop.load(Ordering::Relaxed) => Err(SolveError::Stopped.into()),
         Err(error) => Err(Problem::internal(&error)),
     }
 }
@@ -385,5 +385,28 @@ fn checked_drive(design: &Design, violations: &mut Vec<Violation>) -> Result<Opt
             Ok(None)
         }
         Err(error @ DriveError::NotConverged(_)) => Err(error.into()),
+    }
+}
+
+/// The load of a document for a drive that was checked before; what is impossible adds its violations to the others.
+///
+/// # Errors
+/// A problem where the document has no load or not exactly one torque, and an internal one where the geometry does not converge.
+fn checked_load(
+    design: &Design,
+    drive: Option<&Drive>,
+    violations: &mut Vec<Violation>,
+) -> Result<Option<LoadCase>, Problem> {
+    match design.load_case()? {
+        Ok(load) => {
+            if let Some(drive) = drive {
+                violations.extend(load.clearance_violations(drive).map_err(SolveError::from)?);
+            }
+            Ok(Some(load))
+        }
+        Err(found) => {
+            violations.extend(found);
+            Ok(None)
+        }
     }
 }

@@ -9,11 +9,11 @@ use serde::Serialize;
 use toothwave_solver::contact::{SHEAR_DEPTH, SHEAR_SHARE};
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::sweep::{self as solver, ContactPeaks, InputAngles, Peak, Points, States, TorqueCapacity};
-use toothwave_solver::{Contact, Drive, LoadCase, PerContact, SolveError, findings};
+use toothwave_solver::{Contact, Drive, LoadCase, PerContact, findings};
 use utoipa::ToSchema;
 
 use super::geometry::{drive_findings, write_findings};
-use super::{App, Endpoint, Problems, Tabular, checked_drive, csv_error, require_finite, respond, word};
+use super::{App, Endpoint, Problems, Tabular, checked_drive, checked_load, csv_error, require_finite, respond, word};
 use crate::config::Limits;
 use crate::design::Design;
 use crate::findings::FindingAnswer;
@@ -267,17 +267,13 @@ impl Endpoint for Sweep {
     }
 
     fn question(design: &Design, limits: &Limits) -> Result<SweepQuestion, Problem> {
-        let load = design.load_case()?;
         let points = design.sweep_points(limits.max_states)?;
         let mut violations = Vec::new();
         let drive = checked_drive(design, &mut violations)?;
-        if let (Some(drive), Ok(load)) = (&drive, &load) {
-            violations.extend(load.clearance_violations(drive).map_err(SolveError::from)?);
-        }
+        let load = checked_load(design, drive.as_ref(), &mut violations)?;
         let (drive, load, points) = match (drive, load, points) {
-            (Some(drive), Ok(load), Ok(points)) if violations.is_empty() => (drive, load, points),
-            (_, load, points) => {
-                violations.extend(load.err().into_iter().flatten());
+            (Some(drive), Some(load), Ok(points)) if violations.is_empty() => (drive, load, points),
+            (_, _, points) => {
                 violations.extend(points.err());
                 return Err(Problem::impossible(&violations));
             }
