@@ -306,6 +306,14 @@ async fn a_sweep_needs_a_load_with_exactly_one_torque() {
 }
 
 #[tokio::test]
+async fn of_structural_faults_the_first_in_the_documents_order_is_told() {
+    let both_torques = with(&spelled_out(), "/load", json!({ "input_torque_nm": 20.0, "output_torque_nm": 280.0 }));
+    let document = with(&both_torques, "/sweep", json!({ "samples": 50, "tolerance": 1e-6 }));
+    let (at, _, _) = Service::new().post("/v1/sweep", &document).await.faulty_field();
+    assert_eq!(at, "/load");
+}
+
+#[tokio::test]
 async fn a_field_that_stands_twice_is_refused_at_every_level() {
     let service = Service::new();
     for document in [spelled_out(), every_number()] {
