@@ -2,8 +2,9 @@
 
 use std::fs::File;
 use std::io::{self, Read, Write};
+use std::iter;
 use std::net::{SocketAddr, TcpStream};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -11,12 +12,15 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use tracing_subscriber::EnvFilter;
 
-use crate::api::Tabular as _;
-use crate::api::{
-    Endpoint, accuracy::Accuracy, coincidence_degree::CoincidenceDegree, geometry::Geometry, sweep::Sweep,
-};
+use crate::api::accuracy::Accuracy;
+use crate::api::coincidence_degree::CoincidenceDegree;
+use crate::api::drawings::{Drawing, DrawnPart};
+use crate::api::geometry::Geometry;
+use crate::api::sweep::Sweep;
+use crate::api::{Endpoint, Forms};
 use crate::config::{Limits, Settings};
 use crate::design::Design;
+use crate::negotiation::Format;
 use crate::problem::{Problem, ProblemCode};
 use crate::{json, router, serve};
 
@@ -45,6 +49,17 @@ enum Command {
     Sweep(Offline),
     /// Each way of computing a design, with its error and its time
     Accuracy(Offline),
+    /// A part, or all of them, as DXF or SVG
+    Draw {
+        /// Which part
+        #[arg(value_enum)]
+        part: DrawnPart,
+        /// A design document, or `-` for standard input
+        file: PathBuf,
+        /// Form of the answer
+        #[arg(long, value_enum, default_value_t = Format::Dxf)]
+        format: Format,
+    },
     /// Ask a running service whether it is well; exit status 0 if so
     Health {
         /// Where it listens
@@ -60,18 +75,8 @@ struct Offline {
     /// A design document, or `-` for standard input
     file: PathBuf,
     /// Form of the answer
-    #[arg(long, value_enum, default_value_t = OutputFormat::Table)]
-    format: OutputFormat,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum OutputFormat {
-    /// As the service answers
-    Json,
-    /// Columns
-    Csv,
-    /// For a terminal
-    Table,
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
 }
 
 /// Runs the command that the process was started with.
@@ -80,10 +85,11 @@ pub fn run() -> ExitCode {
     let result = match cli.command {
         None => run_service(&cli.serve),
         Some(Command::Serve(settings)) => run_service(&settings),
-        Some(Command::Geometry(offline)) => answer::<Geometry>(&offline),
-        Some(Command::CoincidenceDegree(offline)) => answer::<CoincidenceDegree>(&offline),
-        Some(Command::Sweep(offline)) => answer::<Sweep>(&offline),
-        Some(Command::Accuracy(offline)) => answer::<Accuracy>(&offline),
+        Some(Command::Geometry(offline)) => answer(Geometry, &offline.file, offline.format),
+        Some(Command::CoincidenceDegree(offline)) => answer(CoincidenceDegree, &offline.file, offline.format),
+        Some(Command::Sweep(offline)) => answer(Sweep, &offline.file, offline.format),
+        Some(Command::Accuracy(offline)) => answer(Accuracy, &offline.file, offline.format),
+        Some(Command::Draw { part, file, format }) => answer(Drawing(part), &file, format),
         Some(Command::Health { address }) => health(address),
         Some(Command::Openapi) => print(|writer| writer.write_all(router::openapi_json().as_bytes())),
     };
@@ -145,32 +151,40 @@ const OFFLINE: Limits = Limits {
     cache_max_bytes: 0,
 };
 
-fn answer<E: Endpoint>(offline: &Offline) -> Result<(), Failure> {
+fn answer<E: Endpoint>(endpoint: E, file: &Path, format: Format) -> Result<(), Failure> {
     // What fails inside says why in the log.
     tracing_subscriber::fmt().with_max_level(tracing::Level::ERROR).with_writer(io::stderr).init();
+    require_form::<E::Answer>(format)?;
     let mut text = Vec::new();
-    if offline.file.as_os_str() == "-" {
+    if file.as_os_str() == "-" {
         io::stdin().read_to_end(&mut text)?;
     } else {
-        File::open(&offline.file)
+        File::open(file)
             .and_then(|mut file| file.read_to_end(&mut text))
-            .map_err(|error| Failure::BadInput(format!("{}: {error}", offline.file.display())))?;
+            .map_err(|error| Failure::BadInput(format!("{}: {error}", file.display())))?;
     }
     let design = json::read::<Design>(&text).map_err(Problem::from)?.normalised();
-    let question = E::question(&design, &OFFLINE)?;
+    let question = endpoint.question(&design, &OFFLINE)?;
     let answer = E::answer(&question, &AtomicBool::new(false))?;
-    print(|writer| match offline.format {
-        OutputFormat::Json => {
-            serde_json::to_writer(&mut *writer, &answer)?;
-            writeln!(writer)
-        }
-        OutputFormat::Csv => answer.write_csv(writer),
-        OutputFormat::Table => answer.write_table(writer),
+    print(|writer| {
+        answer.write(format, writer)?;
+        // The other formats end their last line themselves.
+        if format == Format::Json { writeln!(writer) } else { Ok(()) }
     })
 }
 
+fn require_form<A: Forms>(format: Format) -> Result<(), Failure> {
+    let known: Vec<_> = iter::once(Format::Json).chain(A::FORMS.iter().map(|(format, _)| *format)).collect();
+    if known.contains(&format) {
+        return Ok(());
+    }
+    let name = |format: &Format| format.to_possible_value().map_or_else(String::new, |value| value.get_name().into());
+    let (name, known) = (name(&format), known.iter().map(name).collect::<Vec<_>>());
+    Err(Failure::BadInput(format!("this answer has no form `{name}`; choose one of {}", known.join(", "))))
+}
+
 /// Writes to standard output; a reader that has seen enough is no failure.
-fn print(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
+fn print(write: impl FnOnce(&mut io::BufWriter<io::StdoutLock<'static>>) -> io::Result<()>) -> Result<(), Failure> {
     let mut writer = io::BufWriter::new(io::stdout().lock());
     match write(&mut writer).and_then(|()| writer.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),

@@ -7,6 +7,8 @@ use std::borrow::Cow;
 
 use serde::{Deserialize, Deserializer, Serialize};
 use toothwave_solver::Contact;
+use toothwave_solver::drawing::DrawingParameters;
+use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::profile::{Extent, ProfileParameters};
 use toothwave_solver::sweep::Points;
 use toothwave_solver::violation::Range;
@@ -54,6 +56,12 @@ pub struct Design {
     /// What is asked of `/v1/accuracy`.
     #[serde(default)]
     pub accuracy: AccuracyDocument,
+    /// The parts as they are made: what the mechanics leave free. Only drawings read it.
+    #[serde(default)]
+    pub parts: PartsDocument,
+    /// How the parts stand in a drawing of all of them.
+    #[serde(default)]
+    pub assembly: AssemblyDocument,
 }
 
 /// Wave generator, teeth and ring.
@@ -309,6 +317,85 @@ impl Default for AccuracyDocument {
     }
 }
 
+/// The parts as they are made. A part's clearance sets its working surface back into the part along the surface's normal; the
+/// gap at a contact is the sum of its two parts' clearances. Forces are computed with the gaps of `model.clearance`, not with these.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
+pub struct PartsDocument {
+    /// The wave generator.
+    pub wave_generator: WaveGeneratorPartDocument,
+    /// The teeth.
+    pub teeth: ToothPartDocument,
+    /// The ring.
+    pub ring: RingPartDocument,
+    /// The carrier.
+    pub carrier: CarrierPartDocument,
+}
+
+/// The wave generator as it is made.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct WaveGeneratorPartDocument {
+    /// Radius of its bore; null or left out, it has none.
+    #[serde(default)]
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub bore_radius_mm: Option<f64>,
+    /// How far the cam is set back inward.
+    #[serde(default)]
+    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
+    pub clearance_um: f64,
+}
+
+/// The teeth as they are made.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
+pub struct ToothPartDocument {
+    /// How much smaller their radius is than `drive.teeth.radius_mm`.
+    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
+    pub clearance_um: f64,
+}
+
+/// The ring as it is made.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct RingPartDocument {
+    /// Outer radius; left out, 1.2 times the root radius.
+    #[serde(default, deserialize_with = "given")]
+    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    pub outer_radius_mm: Option<f64>,
+    /// How far the flank is set back outward; a bored tip stays where it is.
+    #[serde(default)]
+    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
+    pub clearance_um: f64,
+}
+
+/// The carrier as it is made.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct CarrierPartDocument {
+    /// Inner radius; left out, a tenth of the annulus between cam and ring tips is left free inside.
+    #[serde(default, deserialize_with = "given")]
+    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    pub inner_radius_mm: Option<f64>,
+    /// Outer radius; left out, a tenth of that annulus is left free outside.
+    #[serde(default, deserialize_with = "given")]
+    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    pub outer_radius_mm: Option<f64>,
+    /// How far each wall of a slot is set back.
+    #[serde(default)]
+    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
+    pub clearance_um: f64,
+}
+
+/// How the parts stand in a drawing of all of them.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
+pub struct AssemblyDocument {
+    /// Angle of the wave generator from the start position, in which its major axis and tooth 0 stand in the middle of a tooth space.
+    #[schema(minimum = -1e7, maximum = 1e7, default = 0.0)]
+    pub input_angle_deg: f64,
+}
+
 /// How much of the ring.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -413,6 +500,16 @@ impl Design {
             for gap in [&mut clearance.wave_generator_um, &mut clearance.ring_um, &mut clearance.carrier_um] {
                 *gap += 0.0;
             }
+        }
+        let PartsDocument { wave_generator, teeth, ring, carrier } = &mut self.parts;
+        let clearances = [
+            &mut wave_generator.clearance_um,
+            &mut teeth.clearance_um,
+            &mut ring.clearance_um,
+            &mut carrier.clearance_um,
+        ];
+        for zero in clearances.into_iter().chain([&mut self.assembly.input_angle_deg]) {
+            *zero += 0.0;
         }
         let materials = &mut self.materials;
         for material in
@@ -552,6 +649,30 @@ impl Design {
     pub fn requested_error(&self) -> Result<f64, Violation> {
         let requested_error = self.accuracy.requested_error;
         Parameter::RequestedError.check(requested_error).map_or(Ok(requested_error), Err)
+    }
+
+    /// What the mechanics leave free.
+    pub fn parts_parameters(&self) -> PartsParameters {
+        let PartsDocument { wave_generator, teeth, ring, carrier } = &self.parts;
+        PartsParameters {
+            ring_outer_radius_mm: ring.outer_radius_mm,
+            carrier_inner_radius_mm: carrier.inner_radius_mm,
+            carrier_outer_radius_mm: carrier.outer_radius_mm,
+            bore_radius_mm: wave_generator.bore_radius_mm,
+            wave_generator_clearance_um: wave_generator.clearance_um,
+            teeth_clearance_um: teeth.clearance_um,
+            ring_clearance_um: ring.clearance_um,
+            carrier_clearance_um: carrier.clearance_um,
+        }
+    }
+
+    /// What a drawing is asked for.
+    pub fn drawing_parameters(&self, max_points: u64) -> DrawingParameters {
+        DrawingParameters {
+            chord_tolerance_mm: self.profile.chord_tolerance_mm,
+            max_points,
+            input_angle_deg: self.assembly.input_angle_deg,
+        }
     }
 
     /// What profiles are asked for.

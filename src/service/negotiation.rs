@@ -1,8 +1,10 @@
 //! What the client sends and accepts: media types and codings.
 
+use std::iter;
 use std::str::FromStr;
 
 use axum::http::{HeaderMap, HeaderName, header};
+use clap::ValueEnum;
 use headers_accept::Accept;
 use mediatype::{MediaType, Name, names};
 use serde::Serialize;
@@ -10,12 +12,19 @@ use serde::Serialize;
 use crate::problem::{Problem, ProblemCode};
 
 /// A format of answers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 pub enum Format {
-    /// `application/json`.
+    /// As programs read it
     Json,
-    /// `text/csv`.
+    /// Columns
     Csv,
+    /// For a terminal
+    #[value(alias = "table")]
+    Text,
+    /// A picture
+    Svg,
+    /// For CAD and workshops
+    Dxf,
 }
 
 impl Format {
@@ -24,6 +33,9 @@ impl Format {
         match self {
             Self::Json => MediaType::new(names::APPLICATION, names::JSON),
             Self::Csv => MediaType::new(names::TEXT, Name::new_unchecked("csv")),
+            Self::Text => MediaType::new(names::TEXT, names::PLAIN),
+            Self::Svg => MediaType::from_parts(names::IMAGE, names::SVG, Some(names::XML), &[]),
+            Self::Dxf => MediaType::new(names::IMAGE, Name::new_unchecked("vnd.dxf")),
         }
     }
 
@@ -32,6 +44,9 @@ impl Format {
         match self {
             Self::Json => "application/json",
             Self::Csv => "text/csv; charset=utf-8; header=present",
+            Self::Text => "text/plain; charset=utf-8",
+            Self::Svg => "image/svg+xml",
+            Self::Dxf => "image/vnd.dxf",
         }
     }
 }
@@ -46,14 +61,18 @@ pub struct Representation {
 }
 
 impl Representation {
-    /// The best of `formats`, in the service's order, for what the request accepts.
+    /// JSON, uncompressed.
+    pub const JSON: Self = Self { format: Format::Json, gzip: false };
+
+    /// The best of JSON and, after it, `others`, in the service's order, for what the request accepts.
     ///
     /// # Errors
     /// `not_acceptable` where the client accepts none of them.
-    pub fn negotiate(headers: &HeaderMap, formats: &[Format]) -> Result<Self, Problem> {
+    pub fn negotiate(headers: &HeaderMap, others: impl Iterator<Item = Format>) -> Result<Self, Problem> {
         let accepted = joined(headers, &header::ACCEPT);
+        let formats: Vec<_> = iter::once(Format::Json).chain(others).collect();
         let format = if accepted.trim().is_empty() {
-            formats.first().copied()
+            Some(Format::Json)
         } else {
             let media_types: Vec<_> = formats.iter().map(|format| format.media_type()).collect();
             // A header that cannot be read accepts nothing.

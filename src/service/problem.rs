@@ -4,7 +4,7 @@ use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use toothwave_solver::drive::DriveError;
-use toothwave_solver::violation::Violation;
+use toothwave_solver::violation::{Misfit, Violation};
 use toothwave_solver::{Contact, Parameter, Part, SolveError};
 use utoipa::ToSchema;
 
@@ -130,6 +130,22 @@ pub enum FieldCode {
     BoreLeavesNoFlank,
     /// A clearance under `projection` that would load a tooth instead of freeing it.
     ClearanceNotMonotone,
+    /// The ring's outer radius does not exceed its root radius.
+    RingWithoutRim,
+    /// The carrier's inner radius does not exceed the semi-major axis.
+    CarrierMeetsCam,
+    /// The carrier's outer radius reaches the ring's tips.
+    CarrierMeetsRing,
+    /// The carrier's outer radius does not exceed its inner one.
+    CarrierWithoutWall,
+    /// The slots run into each other all the way to the carrier's outer radius.
+    SlotsTakeCarrier,
+    /// The wave generator's bore cuts it open.
+    BoreTakesCam,
+    /// The wave generator's clearance gives it a cusp.
+    ClearanceTakesCam,
+    /// The teeth's clearance reaches their radius.
+    ClearanceTakesTooth,
     /// More states than `max_states`.
     TooManyStates,
     /// More profile points than `max_profile_points`.
@@ -347,6 +363,19 @@ fn field_error(violation: &Violation) -> FieldError {
         Violation::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => {
             (FieldCode::BoreLeavesNoFlank, TipRadius, tip_radius_mm, root_radius_mm)
         }
+        Violation::PartDoesNotFit { misfit, value, limit } => {
+            let code = match misfit {
+                Misfit::RingWithoutRim => FieldCode::RingWithoutRim,
+                Misfit::CarrierMeetsCam => FieldCode::CarrierMeetsCam,
+                Misfit::CarrierMeetsRing => FieldCode::CarrierMeetsRing,
+                Misfit::CarrierWithoutWall => FieldCode::CarrierWithoutWall,
+                Misfit::SlotsTakeCarrier => FieldCode::SlotsTakeCarrier,
+                Misfit::BoreTakesCam => FieldCode::BoreTakesCam,
+                Misfit::ClearanceTakesCam => FieldCode::ClearanceTakesCam,
+                Misfit::ClearanceTakesTooth => FieldCode::ClearanceTakesTooth,
+            };
+            (code, misfit.parameter(), value, limit)
+        }
     };
     FieldError {
         pointer: pointer(parameter),
@@ -379,10 +408,17 @@ pub fn pointer(parameter: Parameter) -> String {
         Parameter::RequestedError => "/accuracy/requested_error".into(),
         Parameter::SweepTolerance => "/sweep/tolerance".into(),
         Parameter::ChordTolerance => "/profile/chord_tolerance_mm".into(),
+        Parameter::RingOuterRadius => "/parts/ring/outer_radius_mm".into(),
+        Parameter::CarrierInnerRadius => "/parts/carrier/inner_radius_mm".into(),
+        Parameter::CarrierOuterRadius => "/parts/carrier/outer_radius_mm".into(),
+        Parameter::BoreRadius => "/parts/wave_generator/bore_radius_mm".into(),
+        Parameter::PartClearance(part) => format!("/parts/{}/clearance_um", part_name(part)),
+        Parameter::InputAngle => "/assembly/input_angle_deg".into(),
     }
 }
 
-const fn part_name(part: Part) -> &'static str {
+/// A part as documents spell it.
+pub const fn part_name(part: Part) -> &'static str {
     match part {
         Part::WaveGenerator => "wave_generator",
         Part::Teeth => "teeth",

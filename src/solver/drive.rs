@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use crate::cam::Cam;
 use crate::locus::{Locus, ToothCenter};
 use crate::position::Position;
-use crate::ring::{FlankEnd, FlankLimit, RingFlank};
+use crate::ring::{FlankLimit, RingFlank, RingTooth};
 use crate::root::NotConverged;
 use crate::violation::{Parameter, Violation};
 
@@ -37,9 +37,7 @@ pub struct DriveParameters {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drive {
     parameters: DriveParameters,
-    flank: RingFlank,
-    limit: FlankLimit,
-    natural_tip_radius_mm: f64,
+    ring: RingTooth,
 }
 
 /// Why there is no [`Drive`].
@@ -67,22 +65,7 @@ impl Drive {
         let p = *parameters;
         let locus = Locus::new(Cam::new(p.semi_major_mm, p.semi_minor_mm), p.tooth_radius_mm);
         let flank = RingFlank::new(locus, p.ring_teeth as f64 / WAVES);
-        let natural = flank.natural_limit()?;
-        let natural_tip_radius_mm = match natural.end {
-            FlankEnd::Undercut => {
-                let tooth = locus.at(natural.position)?;
-                flank.radius_mm(&tooth, &flank.at(&tooth))
-            }
-            FlankEnd::RegularTip | FlankEnd::Bore => p.semi_minor_mm + 2.0 * p.tooth_radius_mm,
-        };
-        let mut drive = Self { parameters: p, flank, limit: natural, natural_tip_radius_mm };
-        if let Some(bore_mm) = drive.effective_bore_mm() {
-            let position = flank.position_at_radius(bore_mm)?;
-            // Beside an undercut tip rounding could otherwise move the end outward.
-            if position.from_minor_rad > natural.position.from_minor_rad {
-                drive.limit = FlankLimit { position, end: FlankEnd::Bore };
-            }
-        }
+        let drive = Self { parameters: p, ring: RingTooth::new(flank, p.tip_radius_mm)? };
         if drive.tip_radius_mm() <= p.semi_major_mm {
             violations.push(Violation::NoCarrierAnnulus {
                 semi_major_mm: p.semi_major_mm,
@@ -106,12 +89,17 @@ impl Drive {
 
     /// The ring's flank; through it the path of the teeth and the wave generator.
     pub const fn flank(&self) -> &RingFlank {
-        &self.flank
+        &self.ring.flank
+    }
+
+    /// One tooth of the ring.
+    pub const fn ring_tooth(&self) -> &RingTooth {
+        &self.ring
     }
 
     /// Where and why the flank ends towards the tip.
     pub const fn flank_limit(&self) -> &FlankLimit {
-        &self.limit
+        &self.ring.limit
     }
 
     /// `s = sign(Z_G - Z_K)`.
@@ -131,27 +119,22 @@ impl Drive {
 
     /// `i_HK = -Z_K/(Z_G - Z_K)`: input speed over ring speed, carrier fixed.
     pub fn transmission_ratio_carrier_fixed(&self) -> f64 {
-        -self.sense() * self.flank.teeth_per_wave()
+        -self.sense() * self.ring.flank.teeth_per_wave()
     }
 
     /// Radius of the ring at the middle of its tooth space, `a + 2r`.
     pub fn root_radius_mm(&self) -> f64 {
-        self.parameters.semi_major_mm + 2.0 * self.parameters.tooth_radius_mm
+        self.ring.flank.root_radius_mm()
     }
 
     /// Radius of the ring's tips before any bore.
     pub const fn natural_tip_radius_mm(&self) -> f64 {
-        self.natural_tip_radius_mm
-    }
-
-    /// The bore, where it has one that takes something away.
-    pub fn effective_bore_mm(&self) -> Option<f64> {
-        self.parameters.tip_radius_mm.filter(|&bore| bore > self.natural_tip_radius_mm)
+        self.ring.natural_tip_radius_mm
     }
 
     /// Radius of the ring's tips: natural, trimmed by undercut, or bored.
-    pub fn tip_radius_mm(&self) -> f64 {
-        self.effective_bore_mm().unwrap_or(self.natural_tip_radius_mm)
+    pub const fn tip_radius_mm(&self) -> f64 {
+        self.ring.tip_radius_mm
     }
 
     /// The engaged tooth with the largest pressure angles: at the steepest place of the path, or where the flank ends
@@ -160,12 +143,12 @@ impl Drive {
     /// # Errors
     /// [`NotConverged`] from the path.
     pub fn steepest_engaged(&self) -> Result<ToothCenter, NotConverged> {
-        let locus = self.flank.locus();
+        let locus = self.ring.flank.locus();
         let steepest = locus.steepest()?;
-        if steepest.position.from_minor_rad >= self.limit.position.from_minor_rad {
+        if steepest.position.from_minor_rad >= self.ring.limit.position.from_minor_rad {
             Ok(steepest)
         } else {
-            locus.at(self.limit.position)
+            locus.at(self.ring.limit.position)
         }
     }
 
@@ -215,14 +198,14 @@ impl Drive {
     }
 
     /// `d` at any angle from the major axis.
-    fn center_radius_at_mm(&self, angle_rad: f64) -> Result<f64, NotConverged> {
+    pub(crate) fn center_radius_at_mm(&self, angle_rad: f64) -> Result<f64, NotConverged> {
         let folded = angle_rad.rem_euclid(PI);
         let position = if folded > 0.5 * FRAC_PI_2 && folded < 1.5 * FRAC_PI_2 {
             Position::from_minor((folded - FRAC_PI_2).abs())
         } else {
             Position::from_major(folded.min(PI - folded))
         };
-        Ok(self.flank.locus().at(position)?.center_radius_mm)
+        Ok(self.ring.flank.locus().at(position)?.center_radius_mm)
     }
 
     /// Thickness of the wall between two neighbouring slots where it is thinnest, at the carrier's inner edge on

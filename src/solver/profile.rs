@@ -4,9 +4,10 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Point2, Rotation2, Unit, Vector2};
 
+use crate::cam::Cam;
 use crate::drive::Drive;
 use crate::position::Position;
-use crate::ring::FlankEnd;
+use crate::ring::{FlankEnd, FlankLimit, RingFlank};
 use crate::root::NotConverged;
 use crate::{SolveError, Stop};
 
@@ -51,6 +52,12 @@ struct CurvePoint {
     tangent: Unit<Vector2<f64>>,
 }
 
+/// A sampled curve with its direction at the end.
+pub(crate) struct SampledCurve {
+    pub(crate) points: Polyline,
+    pub(crate) end_tangent: Unit<Vector2<f64>>,
+}
+
 /// Pieces that a quarter wave starts with, so that no piece can hide more than one inflection.
 const PIECES: u32 = 16;
 
@@ -65,7 +72,8 @@ pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &impl Stop)
     let ring_teeth = drive.parameters().ring_teeth.unsigned_abs();
     let flank = ring_half_tooth(drive, parameters.chord_tolerance_mm, stop)?;
     let path = path_half_tooth(drive, parameters.chord_tolerance_mm, stop)?;
-    let quarter = cam_quarter(drive, parameters.chord_tolerance_mm, stop)?;
+    let cam = drive.flank().locus().cam();
+    let quarter = cam_quarter(cam, 0.0, parameters.chord_tolerance_mm, stop)?.points;
 
     let copies = match parameters.extent {
         Extent::Tooth => 1,
@@ -86,15 +94,9 @@ pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &impl Stop)
 
 /// The ring from the middle of its tooth space to its tooth's symmetry line, land of a bored tip included.
 fn ring_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &impl Stop) -> Result<Polyline, SolveError> {
-    let flank = drive.flank();
-    let limit = drive.flank_limit();
-    let mut points = sampled(limit.position, tolerance_mm, stop, |position| {
-        let tooth = flank.locus().at(position)?;
-        let point = flank.at(&tooth);
-        Ok(CurvePoint { point: flank.point(&tooth, &point), tangent: flank.tangent(&tooth, &point) })
-    })?;
+    let mut points = flank_curve(drive.flank(), drive.flank_limit(), tolerance_mm, stop)?.points;
     let tip_rad = PI / drive.parameters().ring_teeth as f64;
-    match limit.end {
+    match drive.flank_limit().end {
         FlankEnd::RegularTip | FlankEnd::Undercut => {
             points.pop();
         }
@@ -116,6 +118,20 @@ fn ring_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &impl Stop) -> Result
     Ok(points)
 }
 
+/// The ring's flank from the middle of its tooth space to its end.
+pub(crate) fn flank_curve(
+    flank: &RingFlank,
+    limit: &FlankLimit,
+    tolerance_mm: f64,
+    stop: &impl Stop,
+) -> Result<SampledCurve, SolveError> {
+    sampled(limit.position, tolerance_mm, stop, |position| {
+        let tooth = flank.locus().at(position)?;
+        let point = flank.at(&tooth);
+        Ok(CurvePoint { point: flank.point(&tooth, &point), tangent: flank.tangent(&tooth, &point) })
+    })
+}
+
 /// The path of a tooth's centre from the middle of the tooth space to the symmetry line of the ring's tooth.
 fn path_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &impl Stop) -> Result<Polyline, SolveError> {
     let flank = drive.flank();
@@ -124,20 +140,26 @@ fn path_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &impl Stop) -> Result
         let point = flank.at(&tooth);
         let angle_rad = position.from_major_rad / flank.teeth_per_wave();
         Ok(CurvePoint { point: on_circle(tooth.center_radius_mm, angle_rad), tangent: flank.tangent(&tooth, &point) })
-    })?;
+    })?
+    .points;
     points.pop();
     let p = drive.parameters();
     points.push(on_circle(p.semi_minor_mm + p.tooth_radius_mm, PI / p.ring_teeth as f64));
     Ok(points)
 }
 
-/// The wave generator from its major to its minor axis.
-fn cam_quarter(drive: &Drive, tolerance_mm: f64, stop: &impl Stop) -> Result<Polyline, SolveError> {
-    let cam = drive.flank().locus().cam();
+/// The wave generator from its major to its minor axis, set back along its normal by less than its least radius of curvature.
+pub(crate) fn cam_quarter(
+    cam: &Cam,
+    clearance_mm: f64,
+    tolerance_mm: f64,
+    stop: &impl Stop,
+) -> Result<SampledCurve, SolveError> {
     // Here a position is taken as the angle φ of the normal.
     sampled(Position::TIP, tolerance_mm, stop, |normal| {
         let contact = cam.contact(normal.cos, normal.sin);
-        Ok(CurvePoint { point: cam.point(&contact), tangent: cam.tangent(&contact) })
+        let point = cam.point(&contact) - clearance_mm * Vector2::new(normal.cos, normal.sin);
+        Ok(CurvePoint { point, tangent: cam.tangent(&contact) })
     })
 }
 
@@ -152,7 +174,7 @@ fn sampled(
     tolerance_mm: f64,
     stop: &impl Stop,
     curve: impl Fn(Position) -> Result<CurvePoint, NotConverged>,
-) -> Result<Polyline, SolveError> {
+) -> Result<SampledCurve, SolveError> {
     // Measured from the minor axis, where cusps are; beyond 45° a `Position` is as good from the other side.
     let at = |x: f64| {
         if x <= end.from_minor_rad {
@@ -184,7 +206,7 @@ fn sampled(
             }
         }
     }
-    Ok(points)
+    Ok(SampledCurve { points, end_tangent: from.1.tangent })
 }
 
 /// An upper bound of the distance between an arc and its chord.
@@ -212,7 +234,7 @@ fn chord_deviation_mm(from: &CurvePoint, to: &CurvePoint) -> f64 {
 }
 
 /// The curve followed by its mirror image, the shared point once; a factor of -1 mirrors its coordinate.
-fn mirrored(half: &Polyline, factors: Vector2<f64>) -> Polyline {
+pub(crate) fn mirrored(half: &Polyline, factors: Vector2<f64>) -> Polyline {
     // Adding zero turns -0.0 into 0.0.
     let image = half.iter().rev().skip(1).map(|p| Point2::new(p.x * factors.x + 0.0, p.y * factors.y + 0.0));
     half.iter().copied().chain(image).collect()

@@ -1,4 +1,5 @@
-//! The ring's flank: the outer parallel curve of the centres' path at the tooth radius (docs/theory.md section 2).
+//! The ring's flank: the outer parallel curve of the centres' path at the tooth radius (docs/theory.md section 2), or, in a ring
+//! made with clearance, a little farther out.
 
 use std::f64::consts::FRAC_PI_4;
 
@@ -13,6 +14,7 @@ use crate::root::{NotConverged, bracketed};
 pub struct RingFlank {
     locus: Locus,
     teeth_per_wave: f64,
+    distance_mm: f64,
 }
 
 /// The flank where a tooth touches it.
@@ -46,9 +48,68 @@ pub struct FlankLimit {
     pub end: FlankEnd,
 }
 
+/// One tooth of the ring: its flank and what ends it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RingTooth {
+    /// The flank.
+    pub flank: RingFlank,
+    /// Where and why it ends.
+    pub limit: FlankLimit,
+    /// Radius of the tip before any bore.
+    pub natural_tip_radius_mm: f64,
+    /// Radius of the tip: natural, trimmed by undercut, or bored.
+    pub tip_radius_mm: f64,
+}
+
+impl RingTooth {
+    /// The tooth of this flank, truncated by a bore where it has one, which lies inside the root.
+    pub(crate) fn new(flank: RingFlank, bore_mm: Option<f64>) -> Result<Self, NotConverged> {
+        let natural = flank.natural_limit()?;
+        let natural_tip_radius_mm = match natural.end {
+            FlankEnd::Undercut => {
+                let tooth = flank.locus.at(natural.position)?;
+                flank.radius_mm(&tooth, &flank.at(&tooth))
+            }
+            FlankEnd::RegularTip | FlankEnd::Bore => flank.regular_tip_radius_mm(),
+        };
+        let unbored = Self { flank, limit: natural, natural_tip_radius_mm, tip_radius_mm: natural_tip_radius_mm };
+        let Some(tip_radius_mm) = bore_mm.filter(|&bore_mm| bore_mm > natural_tip_radius_mm) else {
+            return Ok(unbored);
+        };
+        let position = flank.position_at_radius(tip_radius_mm)?;
+        // Beside an undercut tip rounding could otherwise move the end outward.
+        let limit = if position.from_minor_rad > natural.position.from_minor_rad {
+            FlankLimit { position, end: FlankEnd::Bore }
+        } else {
+            natural
+        };
+        Ok(Self { limit, tip_radius_mm, ..unbored })
+    }
+}
+
 impl RingFlank {
     pub(crate) const fn new(locus: Locus, teeth_per_wave: f64) -> Self {
-        Self { locus, teeth_per_wave }
+        Self { locus, teeth_per_wave, distance_mm: locus.tooth_radius_mm() }
+    }
+
+    /// The same flank cut back along its normal.
+    pub(crate) fn set_back_by(self, clearance_mm: f64) -> Self {
+        Self { distance_mm: self.distance_mm + clearance_mm, ..self }
+    }
+
+    /// Radius of the ring at the middle of its tooth space, `a + 2r` without clearance.
+    pub fn root_radius_mm(&self) -> f64 {
+        self.locus.cam().semi_major_mm() + self.height_over_cam_mm()
+    }
+
+    /// Radius of a regular tip, `b + 2r` without clearance.
+    fn regular_tip_radius_mm(&self) -> f64 {
+        self.locus.cam().semi_minor_mm() + self.height_over_cam_mm()
+    }
+
+    /// Distance of cam and flank along a common normal, `2r` without clearance.
+    fn height_over_cam_mm(&self) -> f64 {
+        self.locus.tooth_radius_mm() + self.distance_mm
     }
 
     /// The path that the flank is parallel to.
@@ -68,7 +129,7 @@ impl RingFlank {
         let secant_squared = 1.0 + tan_pressure_angle * tan_pressure_angle;
         let cos_pressure_angle = 1.0 / secant_squared.sqrt();
         let turning = 1.0 + k * k * self.locus.tan_pressure_angle_derivative(tooth) / secant_squared;
-        let regularity = 1.0 + self.locus.tooth_radius_mm() * (cos_pressure_angle / tooth.center_radius_mm) * turning;
+        let regularity = 1.0 + self.distance_mm * (cos_pressure_angle / tooth.center_radius_mm) * turning;
         // Positive wherever a tooth meshes; nearer to zero than its own rounding it is not known, and a curvature of
         // 1/0 or below would be neither.
         let regularity = regularity.max(f64::EPSILON);
@@ -77,7 +138,7 @@ impl RingFlank {
 
     /// Angle of the contact point from the tooth's centre line, seen from the axis: `atan(r sin β / (d + r cos β))`.
     pub fn lead_rad(&self, tooth: &ToothCenter, point: &FlankPoint) -> f64 {
-        let normal_mm = self.locus.tooth_radius_mm() * point.cos_pressure_angle;
+        let normal_mm = self.distance_mm * point.cos_pressure_angle;
         (normal_mm * point.tan_pressure_angle / (tooth.center_radius_mm + normal_mm)).atan()
     }
 
@@ -93,7 +154,7 @@ impl RingFlank {
 
     /// Distance `R` of the contact point from the axis.
     pub fn radius_mm(&self, tooth: &ToothCenter, point: &FlankPoint) -> f64 {
-        let normal_mm = self.locus.tooth_radius_mm() * point.cos_pressure_angle;
+        let normal_mm = self.distance_mm * point.cos_pressure_angle;
         (tooth.center_radius_mm + normal_mm).hypot(normal_mm * point.tan_pressure_angle)
     }
 
@@ -109,11 +170,12 @@ impl RingFlank {
         Unit::new_unchecked(Vector2::new(-normal_rad.sin(), normal_rad.cos()))
     }
 
-    /// `(b + r)(1 + rκ)` at the tip: `b + 2r - r k² (a² - b²)/(a² + br)`.
+    /// `(b + r)(1 + rκ)` at the tip: `b + 2r - r k² (a² - b²)/(a² + br)`, the last but one r being the flank's distance.
     fn tip_regularity_mm(&self) -> f64 {
         let (a, b, r) = self.lengths();
         let k = self.teeth_per_wave;
-        b + 2.0 * r - r * (k * k * self.locus.cam().difference_of_squares_mm2() / (a * a + b * r))
+        let narrowing = k * k * self.locus.cam().difference_of_squares_mm2() / (a * a + b * r);
+        self.regular_tip_radius_mm() - self.distance_mm * narrowing
     }
 
     fn lengths(&self) -> (f64, f64, f64) {
@@ -157,7 +219,7 @@ impl RingFlank {
         let gap = |position: Position| -> Result<f64, NotConverged> {
             let tooth = self.locus.at(position)?;
             let point = self.at(&tooth);
-            let r = self.locus.tooth_radius_mm();
+            let r = self.distance_mm;
             let widening = k * (position.from_minor_rad / k).tan() / position.cos;
             Ok(widening * (tooth.center_radius_mm / point.cos_pressure_angle + r)
                 - r * k * k * (tooth.tan_pressure_angle / position.cos))
@@ -166,16 +228,18 @@ impl RingFlank {
         Ok(FlankLimit { position, end: FlankEnd::Undercut })
     }
 
-    /// Where the flank reaches the radius `bore_mm`, which lies between `b + 2r` and `a + 2r`.
+    /// Where the flank reaches the radius `bore_mm`, which lies between those of a regular tip and of the root.
     ///
     /// # Errors
     /// [`NotConverged`] if the crossing is not found.
     pub fn position_at_radius(&self, bore_mm: f64) -> Result<Position, NotConverged> {
-        let (a, b, r) = self.lengths();
-        let above_tip_mm = bore_mm - b - 2.0 * r;
-        let below_root_mm = a - bore_mm + 2.0 * r;
-        let above_tip_mm2 = above_tip_mm * (bore_mm + b + 2.0 * r);
-        let below_root_mm2 = below_root_mm * (bore_mm + a + 2.0 * r);
+        let (a, b, _) = self.lengths();
+        let height_mm = self.height_over_cam_mm();
+        // Differences first: a bore may be as near to tip or root as its digits can say.
+        let above_tip_mm = bore_mm - b - height_mm;
+        let below_root_mm = a - bore_mm + height_mm;
+        let above_tip_mm2 = above_tip_mm * (bore_mm + b + height_mm);
+        let below_root_mm2 = below_root_mm * (bore_mm + a + height_mm);
         let excess = |position: Position| -> Result<f64, NotConverged> {
             let tooth = self.locus.at(position)?;
             Ok(if position.from_minor_rad < position.from_major_rad {
@@ -203,7 +267,7 @@ impl RingFlank {
         })
     }
 
-    /// `R² - (b + 2r)²`, free of cancellation but for that of the flank itself near the threshold of undercut.
+    /// `R² - (b + 2r)²`, without clearance, free of cancellation but for that of the flank itself near the threshold of undercut.
     fn rise_above_tip_mm2(&self, tooth: &ToothCenter) -> f64 {
         let (a, b, r) = self.lengths();
         let contact = &tooth.cam_contact;
@@ -214,10 +278,11 @@ impl RingFlank {
             self.locus.cam().difference_of_squares_mm2() * cos_squared * (2.0 * r / (h + b) + (a / h) * (a / h));
         let center_rise_mm = center_rise_mm2 / (tooth.center_radius_mm + b + r);
         let point = self.at(tooth);
-        center_rise_mm2 + 2.0 * r * (center_rise_mm * point.cos_pressure_angle - (b + r) * versine(&point))
+        center_rise_mm2
+            + 2.0 * self.distance_mm * (center_rise_mm * point.cos_pressure_angle - (b + r) * versine(&point))
     }
 
-    /// `(a + 2r)² - R²`, a sum of positive terms.
+    /// `(a + 2r)² - R²`, without clearance, a sum of positive terms.
     fn drop_below_root_mm2(&self, tooth: &ToothCenter) -> f64 {
         let (a, b, r) = self.lengths();
         let contact = &tooth.cam_contact;
@@ -228,7 +293,7 @@ impl RingFlank {
             self.locus.cam().difference_of_squares_mm2() * sin_squared * (2.0 * r / (a + h) + (b / h) * (b / h));
         let center_drop_mm = center_drop_mm2 / (a + r + tooth.center_radius_mm);
         let point = self.at(tooth);
-        center_drop_mm2 + 2.0 * r * (center_drop_mm + tooth.center_radius_mm * versine(&point))
+        center_drop_mm2 + 2.0 * self.distance_mm * (center_drop_mm + tooth.center_radius_mm * versine(&point))
     }
 }
 

@@ -43,6 +43,18 @@ pub enum Parameter {
     RequestedError,
     /// Chord tolerance, mm.
     ChordTolerance,
+    /// Outer radius of the ring, mm.
+    RingOuterRadius,
+    /// Inner radius of the carrier, mm.
+    CarrierInnerRadius,
+    /// Outer radius of the carrier, mm.
+    CarrierOuterRadius,
+    /// Radius of the wave generator's bore, mm.
+    BoreRadius,
+    /// How far a part's working surface is set back, µm.
+    PartClearance(Part),
+    /// Input angle of an assembly, deg.
+    InputAngle,
 }
 
 /// The range of a parameter and its unit.
@@ -86,13 +98,19 @@ impl Parameter {
             | Self::ToothRadius
             | Self::ToothWidth
             | Self::TipRadius
+            | Self::RingOuterRadius
+            | Self::CarrierInnerRadius
+            | Self::CarrierOuterRadius
+            | Self::BoreRadius
             | Self::ChordTolerance => Range::closed(1e-6, 1e6, "mm"),
             Self::ToothCount | Self::InstalledTeeth | Self::RingTeeth => Range::closed(2.0, MAX_TEETH as f64, ""),
             Self::YoungsModulus(_) => Range::closed(1e-3, 1e5, "GPa"),
             Self::PoissonsRatio(_) => Range { low: -1.0, high: 0.5, closed: false, unit: "" },
             Self::InputTorque | Self::OutputTorque => Range::closed(1e-12, 1e15, "N·m"),
             Self::Stiffness(_) => Range::closed(1e-3, 1e15, "N/mm"),
-            Self::Clearance(_) => Range::closed(0.0, 1e6, "µm"),
+            Self::Clearance(_) | Self::PartClearance(_) => Range::closed(0.0, 1e6, "µm"),
+            // Some thousand turns of the slowest carrier; its rounding is then 2e-9 deg.
+            Self::InputAngle => Range::closed(-1e7, 1e7, "deg"),
             Self::AllowableStress => Range::closed(1e-3, 1e6, "MPa"),
             Self::Samples => Range::closed(1.0, MAX_SAMPLES as f64, ""),
             Self::RequestedError => Range::closed(1e-12, 1.0, ""),
@@ -174,6 +192,50 @@ pub enum Violation {
         /// `a + 2r`.
         root_radius_mm: f64,
     },
+    /// A part whose dimension or clearance leaves no room for it or for another.
+    PartDoesNotFit {
+        /// What does not fit.
+        misfit: Misfit,
+        /// The value, given or by default, in the unit of its parameter.
+        value: f64,
+        /// What it has to stay above or below.
+        limit: f64,
+    },
+}
+
+/// Why a part cannot be made, or not beside the others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Misfit {
+    /// The ring's outer radius does not exceed its root radius.
+    RingWithoutRim,
+    /// The carrier's inner radius does not exceed the cam's semi-major axis.
+    CarrierMeetsCam,
+    /// The carrier's outer radius reaches the ring's tips.
+    CarrierMeetsRing,
+    /// The carrier's outer radius does not exceed its inner one.
+    CarrierWithoutWall,
+    /// The slots run into each other all the way to the carrier's outer radius.
+    SlotsTakeCarrier,
+    /// The bore reaches the cam.
+    BoreTakesCam,
+    /// The cam is set back by its least radius of curvature or more.
+    ClearanceTakesCam,
+    /// The teeth's clearance reaches their radius.
+    ClearanceTakesTooth,
+}
+
+impl Misfit {
+    /// The parameter at fault.
+    pub const fn parameter(self) -> Parameter {
+        match self {
+            Self::RingWithoutRim => Parameter::RingOuterRadius,
+            Self::CarrierMeetsCam => Parameter::CarrierInnerRadius,
+            Self::CarrierMeetsRing | Self::CarrierWithoutWall | Self::SlotsTakeCarrier => Parameter::CarrierOuterRadius,
+            Self::BoreTakesCam => Parameter::BoreRadius,
+            Self::ClearanceTakesCam => Parameter::PartClearance(Part::WaveGenerator),
+            Self::ClearanceTakesTooth => Parameter::PartClearance(Part::Teeth),
+        }
+    }
 }
 
 /// A number as a person would write it.
@@ -226,6 +288,40 @@ impl std::fmt::Display for Violation {
                 f,
                 "a bore of {tip_radius_mm:?} mm takes the whole flank away: choose less than the root radius of {root_radius_mm:?} mm"
             ),
+            Self::PartDoesNotFit { misfit, value, limit } => match misfit {
+                Misfit::RingWithoutRim => write!(
+                    f,
+                    "an outer radius of {value:?} mm leaves the ring no rim: choose more than its root radius of {limit:?} mm"
+                ),
+                Misfit::CarrierMeetsCam => write!(
+                    f,
+                    "a carrier of {value:?} mm inner radius meets the wave generator: choose more than its semi-major axis of {limit:?} mm"
+                ),
+                Misfit::CarrierMeetsRing => write!(
+                    f,
+                    "a carrier of {value:?} mm outer radius meets the ring: choose less than the ring's tip radius of {limit:?} mm"
+                ),
+                Misfit::CarrierWithoutWall => write!(
+                    f,
+                    "an outer radius of {value:?} mm leaves the carrier no wall: choose more than its inner radius of {limit:?} mm"
+                ),
+                Misfit::SlotsTakeCarrier => write!(
+                    f,
+                    "up to {limit:?} mm from the axis the slots run into each other, which leaves nothing of a carrier of {value:?} mm outer radius: make the teeth thinner or install fewer"
+                ),
+                Misfit::BoreTakesCam => write!(
+                    f,
+                    "a bore of {value:?} mm cuts the wave generator open: choose less than its least radius of {limit:?} mm"
+                ),
+                Misfit::ClearanceTakesCam => write!(
+                    f,
+                    "set back by {value:?} µm the wave generator gets a cusp: choose less than its least radius of curvature, {limit:?} µm"
+                ),
+                Misfit::ClearanceTakesTooth => write!(
+                    f,
+                    "a clearance of {value:?} µm leaves nothing of the teeth: choose less than their radius of {limit:?} µm"
+                ),
+            },
         }
     }
 }

@@ -12,7 +12,7 @@ use toothwave_solver::sweep::{ContactPeaks, Points, sweep};
 use toothwave_solver::{Compatibility, ContactLaw, Drive, LoadCase, LoadParameters, PerContact, SolveError};
 use utoipa::ToSchema;
 
-use super::{App, Endpoint, Problems, Tabular, checked_drive, checked_load, csv_error, respond_afresh, word};
+use super::{App, Endpoint, Form, Forms, Problems, checked_drive, checked_load, csv_error, respond_afresh, word};
 use crate::config::Limits;
 use crate::design::{CompatibilityDocument, Design};
 use crate::negotiation::Format;
@@ -129,16 +129,18 @@ pub struct AccuracyQuestion {
 pub struct Accuracy;
 
 impl Endpoint for Accuracy {
-    const NAME: &'static str = "accuracy";
-    const FORMATS: &'static [Format] = &[Format::Json];
     type Question = AccuracyQuestion;
     type Answer = AccuracyAnswer;
 
-    fn reads(design: &Design) -> impl Serialize + '_ {
+    fn name(&self) -> &'static str {
+        "accuracy"
+    }
+
+    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
         (&design.drive, &design.materials, &design.load, &design.model, &design.accuracy)
     }
 
-    fn question(design: &Design, limits: &Limits) -> Result<AccuracyQuestion, Problem> {
+    fn question(&self, design: &Design, limits: &Limits) -> Result<AccuracyQuestion, Problem> {
         let mut violations = Vec::new();
         let drive = checked_drive(design, &mut violations)?;
         let load = checked_load(design, drive.as_ref(), &mut violations)?;
@@ -296,7 +298,11 @@ impl<'a> Model<'a> {
     }
 }
 
-impl Tabular for AccuracyAnswer {
+impl Forms for AccuracyAnswer {
+    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Text, Self::write_text), (Format::Csv, Self::write_csv)];
+}
+
+impl AccuracyAnswer {
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
         let mut csv = csv::Writer::from_writer(writer);
         let names = ["compatibility", "law", "samples", "tolerance", "error", "model_difference", "solve_us", "states"];
@@ -317,7 +323,7 @@ impl Tabular for AccuracyAnswer {
         csv.flush()
     }
 
-    fn write_table(&self, writer: &mut dyn Write) -> io::Result<()> {
+    fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
         writeln!(writer, "compatibility  law       points            error   from own model      solve    states")?;
         for way in &self.ways {
             way.write_line(writer)?;
@@ -363,5 +369,5 @@ impl WayAnswer {
     responses((status = 200, description = "The ways, each with its error and its time.", body = AccuracyAnswer), Problems)
 )]
 pub async fn accuracy(State(app): State<App>, request: Request) -> Response {
-    respond_afresh::<Accuracy>(app, request).await
+    respond_afresh(Accuracy, app, request).await
 }

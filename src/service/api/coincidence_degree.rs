@@ -11,7 +11,7 @@ use toothwave_solver::mesh::{Mesh, TeethInMesh};
 use utoipa::ToSchema;
 
 use super::geometry::{EngagementAnswer, UndercutAnswer, drive_findings, write_findings};
-use super::{App, Endpoint, Problems, Tabular, checked_drive, csv_error, respond};
+use super::{App, Endpoint, Form, Forms, Problems, checked_drive, csv_error, respond};
 use crate::config::Limits;
 use crate::design::Design;
 use crate::findings::FindingAnswer;
@@ -51,16 +51,18 @@ pub struct TeethInMeshAnswer {
 pub struct CoincidenceDegree;
 
 impl Endpoint for CoincidenceDegree {
-    const NAME: &'static str = "coincidence-degree";
-    const FORMATS: &'static [Format] = &[Format::Json];
     type Question = Drive;
     type Answer = CoincidenceDegreeAnswer;
 
-    fn reads(design: &Design) -> impl Serialize + '_ {
+    fn name(&self) -> &'static str {
+        "coincidence-degree"
+    }
+
+    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
         &design.drive
     }
 
-    fn question(design: &Design, _: &Limits) -> Result<Drive, Problem> {
+    fn question(&self, design: &Design, _: &Limits) -> Result<Drive, Problem> {
         let mut violations = Vec::new();
         checked_drive(design, &mut violations)?.ok_or_else(|| Problem::impossible(&violations))
     }
@@ -80,7 +82,11 @@ impl Endpoint for CoincidenceDegree {
     }
 }
 
-impl Tabular for CoincidenceDegreeAnswer {
+impl Forms for CoincidenceDegreeAnswer {
+    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Text, Self::write_text), (Format::Csv, Self::write_csv)];
+}
+
+impl CoincidenceDegreeAnswer {
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
         let mut csv = csv::Writer::from_writer(writer);
         csv.write_record([
@@ -104,13 +110,13 @@ impl Tabular for CoincidenceDegreeAnswer {
         csv.flush()
     }
 
-    fn write_table(&self, writer: &mut dyn Write) -> io::Result<()> {
+    fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
         let TeethInMeshAnswer { min, max } = self.teeth_in_mesh_per_zone;
         writeln!(writer, "coincidence degree                  {:.12}", self.coincidence_degree)?;
         writeln!(writer, "teeth in mesh, each zone            {min} to {max}")?;
         writeln!(writer, "period of the input angle           {:.6} deg", self.period_deg)?;
-        self.engagement.write_table(writer)?;
-        self.undercut.write_table(writer)?;
+        self.engagement.write_text(writer)?;
+        self.undercut.write_text(writer)?;
         write_findings(&self.findings, writer)
     }
 }
@@ -133,5 +139,5 @@ impl Tabular for CoincidenceDegreeAnswer {
     )
 )]
 pub async fn coincidence_degree(State(app): State<App>, request: Request) -> Response {
-    respond::<CoincidenceDegree>(app, request).await
+    respond(CoincidenceDegree, app, request).await
 }

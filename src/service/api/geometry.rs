@@ -11,7 +11,7 @@ use toothwave_solver::profile::{self, Polyline, ProfileParameters};
 use toothwave_solver::{Drive, SolveError, findings};
 use utoipa::ToSchema;
 
-use super::{App, Endpoint, Problems, Tabular, checked_drive, csv_error, require_finite, respond};
+use super::{App, Endpoint, Form, Forms, Problems, checked_drive, csv_error, require_finite, respond};
 use crate::config::Limits;
 use crate::design::Design;
 use crate::findings::FindingAnswer;
@@ -159,16 +159,18 @@ pub(super) fn drive_findings(drive: &Drive) -> Result<Vec<FindingAnswer>, Proble
 pub struct Geometry;
 
 impl Endpoint for Geometry {
-    const NAME: &'static str = "geometry";
-    const FORMATS: &'static [Format] = &[Format::Json];
     type Question = (Drive, ProfileParameters);
     type Answer = GeometryAnswer;
 
-    fn reads(design: &Design) -> impl Serialize + '_ {
+    fn name(&self) -> &'static str {
+        "geometry"
+    }
+
+    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
         (&design.drive, &design.profile)
     }
 
-    fn question(design: &Design, limits: &Limits) -> Result<Self::Question, Problem> {
+    fn question(&self, design: &Design, limits: &Limits) -> Result<Self::Question, Problem> {
         let mut violations = Vec::new();
         let drive = checked_drive(design, &mut violations)?;
         let profile = design.profile_parameters(limits.max_profile_points);
@@ -225,7 +227,11 @@ impl Endpoint for Geometry {
     }
 }
 
-impl Tabular for GeometryAnswer {
+impl Forms for GeometryAnswer {
+    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Text, Self::write_text), (Format::Csv, Self::write_csv)];
+}
+
+impl GeometryAnswer {
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
         let mut csv = csv::Writer::from_writer(writer);
         csv.write_record(["profile", "x_mm", "y_mm"]).map_err(csv_error)?;
@@ -242,13 +248,13 @@ impl Tabular for GeometryAnswer {
         csv.flush()
     }
 
-    fn write_table(&self, writer: &mut dyn Write) -> io::Result<()> {
+    fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
         let (ring, carrier) = (&self.ring, &self.carrier);
         writeln!(writer, "transmission ratio, ring fixed      {}", self.transmission_ratio)?;
         writeln!(writer, "transmission ratio, carrier fixed   {}", self.transmission_ratio_carrier_fixed)?;
         writeln!(writer, "period of the input angle           {:.6} deg", self.period_deg)?;
-        self.undercut.write_table(writer)?;
-        self.engagement.write_table(writer)?;
+        self.undercut.write_text(writer)?;
+        self.engagement.write_text(writer)?;
         writeln!(writer, "ring root radius                    {:.6} mm", ring.root_radius_mm)?;
         writeln!(writer, "ring tip radius                     {:.6} mm", ring.tip_radius_mm)?;
         writeln!(writer, "ring tooth height                   {:.6} mm", ring.tooth_height_mm)?;
@@ -269,7 +275,7 @@ impl Tabular for GeometryAnswer {
 }
 
 impl UndercutAnswer {
-    pub(super) fn write_table(&self, writer: &mut dyn Write) -> io::Result<()> {
+    pub(super) fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
         writeln!(writer, "undercut                            {}", if self.occurs { "yes" } else { "no" })?;
         match self.critical_tooth_radius_mm {
             Some(radius) => writeln!(writer, "critical tooth radius               {radius:.6} mm"),
@@ -279,7 +285,7 @@ impl UndercutAnswer {
 }
 
 impl EngagementAnswer {
-    pub(super) fn write_table(&self, writer: &mut dyn Write) -> io::Result<()> {
+    pub(super) fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
         writeln!(writer, "engagement from the major axis      {:.6} to {} deg", self.start_deg, self.end_deg)
     }
 }
@@ -311,5 +317,5 @@ pub(super) fn write_findings(findings: &[FindingAnswer], writer: &mut dyn Write)
     )
 )]
 pub async fn geometry(State(app): State<App>, request: Request) -> Response {
-    respond::<Geometry>(app, request).await
+    respond(Geometry, app, request).await
 }

@@ -28,6 +28,7 @@ use crate::problem::{Problem, ProblemCode};
 
 pub mod accuracy;
 pub mod coincidence_degree;
+pub mod drawings;
 pub mod geometry;
 pub mod page;
 pub mod side;
@@ -59,24 +60,23 @@ impl App {
 }
 
 /// A question that a design document can be put to.
-pub trait Endpoint {
-    /// Its name, as command and in the cache's key.
-    const NAME: &'static str;
-    /// The formats that it answers in over HTTP, the first by default.
-    const FORMATS: &'static [Format];
+pub trait Endpoint: Send + 'static {
     /// The checked parameters that the answer follows from.
     type Question: Send + 'static;
     /// The answer; its serialisation is the JSON that goes over the wire.
-    type Answer: Serialize + Tabular;
+    type Answer: Forms;
+
+    /// Its name, in the cache's key.
+    fn name(&self) -> &'static str;
 
     /// The parts of a normalised document that the answer depends on.
-    fn reads(design: &Design) -> impl Serialize + '_;
+    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a;
 
     /// Checks those parts, reporting every impossible value.
     ///
     /// # Errors
     /// A problem that names the fields at fault.
-    fn question(design: &Design, limits: &Limits) -> Result<Self::Question, Problem>;
+    fn question(&self, design: &Design, limits: &Limits) -> Result<Self::Question, Problem>;
 
     /// Solves.
     ///
@@ -85,24 +85,29 @@ pub trait Endpoint {
     fn answer(question: &Self::Question, stop: &AtomicBool) -> Result<Self::Answer, Problem>;
 }
 
-/// An answer's forms beside JSON.
-pub trait Tabular {
+/// Writes an answer in one form.
+pub type Form<A> = fn(&A, &mut dyn Write) -> io::Result<()>;
+
+/// What an answer can be written as.
+pub trait Forms: Serialize + Sized + 'static {
+    /// The formats beside JSON, in the service's order, each with what writes it.
+    const FORMS: &'static [(Format, Form<Self>)];
+
     /// About how many bytes the JSON takes, so that its buffer need not grow.
     fn expected_bytes(&self) -> usize {
         4096
     }
 
-    /// As CSV, with the names of the JSON's columns.
+    /// Writes the answer in one of its formats, or in JSON.
     ///
     /// # Errors
     /// Those of the writer.
-    fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()>;
-
-    /// As text for a terminal.
-    ///
-    /// # Errors
-    /// Those of the writer.
-    fn write_table(&self, writer: &mut dyn Write) -> io::Result<()>;
+    fn write(&self, format: Format, writer: &mut impl Write) -> io::Result<()> {
+        match Self::FORMS.iter().find(|(known, _)| *known == format) {
+            Some((_, form)) => form(self, writer),
+            None => Ok(serde_json::to_writer(writer, self)?),
+        }
+    }
 }
 
 /// The statuses that every solving endpoint can answer with beside 200 and 304.
@@ -135,16 +140,16 @@ pub enum Problems {
 }
 
 /// The walk of a request: document → question → key → cache → solver → bytes.
-pub async fn respond<E: Endpoint>(app: App, request: Request) -> Response {
-    match walk::<E>(app, request).await {
+pub async fn respond<E: Endpoint>(endpoint: E, app: App, request: Request) -> Response {
+    match walk(endpoint, app, request).await {
         Ok(response) => response,
         Err(problem) => problem.into_response(),
     }
 }
 
-async fn walk<E: Endpoint>(app: App, request: Request) -> Result<Response, Problem> {
-    let Asked { headers, body, representation, deadline } = Asked::read(&app, request, E::FORMATS).await?;
-    let spelling = Spelling::new(E::NAME, representation, &body);
+async fn walk<E: Endpoint>(endpoint: E, app: App, request: Request) -> Result<Response, Problem> {
+    let Asked { headers, body, representation, deadline } = Asked::read::<E>(&app, request).await?;
+    let spelling = Spelling::new(endpoint.name(), representation, &body);
     let known = match app.cache.key(spelling) {
         Some(key) => app.cache.get(key).await.map(|stored| (key, stored)),
         None => None,
@@ -156,13 +161,13 @@ async fn walk<E: Endpoint>(app: App, request: Request) -> Result<Response, Probl
         }
         None => {
             let design = json::read::<Design>(&body)?.normalised();
-            let key = Key::new(E::NAME, &E::reads(&design), representation)?;
+            let key = Key::new(endpoint.name(), &endpoint.reads(&design), representation)?;
             log_design(key);
             let (stored, served) = match app.cache.get(key).await {
                 // What is kept was checked when it was solved.
                 Some(stored) => (stored, Served::Hit),
                 None => {
-                    let question = E::question(&design, &app.limits)?;
+                    let question = endpoint.question(&design, &app.limits)?;
                     let pool = app.pool.clone();
                     let solve = async move {
                         pool.run(deadline, move |stop| solve::<E>(&question, representation, stop)).await
@@ -195,22 +200,22 @@ struct Asked {
 }
 
 impl Asked {
-    async fn read(app: &App, request: Request, formats: &[Format]) -> Result<Self, Problem> {
+    async fn read<E: Endpoint>(app: &App, request: Request) -> Result<Self, Problem> {
         let deadline = app.pool.deadline();
         let (Parts { headers, .. }, body) = request.into_parts();
         negotiation::require_json(&headers)?;
-        let representation = Representation::negotiate(&headers, formats)?;
+        let representation = Representation::negotiate(&headers, E::Answer::FORMS.iter().map(|(format, _)| *format))?;
         let body = read_body(&headers, body, &app.limits, deadline).await?;
         Ok(Self { headers, body, representation, deadline })
     }
 }
 
 /// The same walk for an answer that is measured there and then: never cached.
-async fn respond_afresh<E: Endpoint>(app: App, request: Request) -> Response {
+async fn respond_afresh<E: Endpoint>(endpoint: E, app: App, request: Request) -> Response {
     let walk = async {
-        let Asked { body, representation, deadline, .. } = Asked::read(&app, request, E::FORMATS).await?;
+        let Asked { body, representation, deadline, .. } = Asked::read::<E>(&app, request).await?;
         let design = json::read::<Design>(&body)?.normalised();
-        let question = E::question(&design, &app.limits)?;
+        let question = endpoint.question(&design, &app.limits)?;
         let stored = app.pool.run(deadline, move |stop| solve::<E>(&question, representation, stop)).await?;
         Ok::<_, Problem>(with_body(stored, representation))
     };
@@ -259,23 +264,16 @@ fn solve<E: Endpoint>(
     let writer = Stoppable { inner: Vec::with_capacity(expected_bytes), next_look: LOOK_EVERY_BYTES, stop };
     let written = if representation.gzip {
         let mut encoder = GzEncoder::new(writer, Compression::fast());
-        write(&answer, representation.format, &mut encoder).and_then(|()| encoder.finish())
+        answer.write(representation.format, &mut encoder).and_then(|()| encoder.finish())
     } else {
         let mut writer = writer;
-        write(&answer, representation.format, &mut writer).map(|()| writer)
+        answer.write(representation.format, &mut writer).map(|()| writer)
     };
     match written {
         // To its size: the cache keeps it, and weighs its length.
         Ok(writer) => Ok(Stored { body: writer.inner.into_boxed_slice().into(), solve }),
         Err(_) if stop.load(Ordering::Relaxed) => Err(SolveError::Stopped.into()),
         Err(error) => Err(Problem::internal(&error)),
-    }
-}
-
-fn write(answer: &(impl Serialize + Tabular), format: Format, writer: &mut impl Write) -> io::Result<()> {
-    match format {
-        Format::Json => Ok(serde_json::to_writer(writer, answer)?),
-        Format::Csv => answer.write_csv(writer),
     }
 }
 
@@ -349,7 +347,7 @@ fn caching(mut response: Response, served: Served, etag: &str) -> Response {
 }
 
 /// A word of the API, as JSON spells it.
-fn word(value: &impl Serialize) -> String {
+pub fn word(value: &impl Serialize) -> String {
     serde_json::to_value(value).ok().and_then(|value| Some(value.as_str()?.to_owned())).unwrap_or_default()
 }
 

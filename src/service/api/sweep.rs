@@ -13,7 +13,9 @@ use toothwave_solver::{Contact, Drive, LoadCase, PerContact, findings};
 use utoipa::ToSchema;
 
 use super::geometry::{drive_findings, write_findings};
-use super::{App, Endpoint, Problems, Tabular, checked_drive, checked_load, csv_error, require_finite, respond, word};
+use super::{
+    App, Endpoint, Form, Forms, Problems, checked_drive, checked_load, csv_error, require_finite, respond, word,
+};
 use crate::config::Limits;
 use crate::design::Design;
 use crate::findings::FindingAnswer;
@@ -257,16 +259,18 @@ pub struct SweepQuestion {
 pub struct Sweep;
 
 impl Endpoint for Sweep {
-    const NAME: &'static str = "sweep";
-    const FORMATS: &'static [Format] = &[Format::Json, Format::Csv];
     type Question = SweepQuestion;
     type Answer = SweepAnswer;
 
-    fn reads(design: &Design) -> impl Serialize + '_ {
+    fn name(&self) -> &'static str {
+        "sweep"
+    }
+
+    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
         (&design.drive, &design.materials, &design.load, &design.model, &design.sweep)
     }
 
-    fn question(design: &Design, limits: &Limits) -> Result<SweepQuestion, Problem> {
+    fn question(&self, design: &Design, limits: &Limits) -> Result<SweepQuestion, Problem> {
         let mut violations = Vec::new();
         let drive = checked_drive(design, &mut violations)?;
         // In the document's order: of structural faults the first is told.
@@ -347,12 +351,16 @@ const STATE_COLUMNS: [&str; 12] = [
     "stress_carrier_mpa",
 ];
 
-impl Tabular for SweepAnswer {
+impl Forms for SweepAnswer {
+    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Text, Self::write_text), (Format::Csv, Self::write_csv)];
+
     fn expected_bytes(&self) -> usize {
         // Eleven numbers of about 18 characters and a short one, each with its comma.
         4096 + 220 * self.states.tooth.len()
     }
+}
 
+impl SweepAnswer {
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
         let states = &self.states;
         let mut csv = csv::Writer::from_writer(writer);
@@ -382,7 +390,7 @@ impl Tabular for SweepAnswer {
         csv.flush()
     }
 
-    fn write_table(&self, writer: &mut dyn Write) -> io::Result<()> {
+    fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
         writeln!(writer, "coincidence degree                  {:.12}", self.coincidence_degree)?;
         writeln!(writer, "period of the input angle           {:.6} deg", self.period_deg)?;
         writeln!(writer, "states                              {}", self.states.tooth.len())?;
@@ -448,5 +456,5 @@ impl Tabular for SweepAnswer {
     )
 )]
 pub async fn sweep(State(app): State<App>, request: Request) -> Response {
-    respond::<Sweep>(app, request).await
+    respond(Sweep, app, request).await
 }

@@ -1,0 +1,300 @@
+//! Drawings as DXF of AutoCAD 2000: the oldest with light polylines and declared units, read by every CAD and CAM program.
+//!
+//! Written here because the one library for it (crate dxf 0.6) leaves its tables without handles, which readers have to mend.
+//! Structure and group codes are those of Autodesk's DXF reference.
+
+use std::io::{self, Write};
+
+use crate::api::drawings::{BodyPart, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
+use crate::svg;
+
+/// The application under whose name every outline carries what it belongs to, as extended data.
+const APPLICATION: &str = "TOOTHWAVE";
+
+/// Handles of what others refer to; entities have those from [`FIRST_FREE`] on.
+const MODEL_SPACE: u32 = 0x10;
+const PAPER_SPACE: u32 = 0x11;
+const ROOT_DICTIONARY: u32 = 0x12;
+const GROUP_DICTIONARY: u32 = 0x13;
+const FIRST_FREE: u32 = 0x20;
+
+/// A layer's name and its colour in the AutoCAD index.
+struct Layer(&'static str, u8);
+
+const fn layer_of(part: BodyPart) -> Layer {
+    match part {
+        BodyPart::WaveGenerator => Layer("WAVE_GENERATOR", 6),
+        BodyPart::Teeth => Layer("TEETH", 2),
+        BodyPart::Ring => Layer("RING", 5),
+        BodyPart::Carrier => Layer("CARRIER", 3),
+    }
+}
+
+/// Writes a drawing.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
+    let mut dxf = Dxf { writer, next_handle: FIRST_FREE };
+    let title = svg::title(drawing);
+    dxf.text(999, &title)?;
+    let outlines: usize = drawing.bodies.iter().map(|body| body.placements.len() * (1 + body.holes.len())).sum();
+    dxf.header(drawing, outlines)?;
+    dxf.tables(drawing)?;
+    dxf.blocks()?;
+    dxf.section("ENTITIES")?;
+    for body in &drawing.bodies {
+        let layer = layer_of(body.part);
+        for placement in &body.placements {
+            for outline in [&body.outer].into_iter().chain(&body.holes) {
+                dxf.outline(outline, placement, &layer)?;
+                dxf.text(1001, APPLICATION)?;
+                dxf.text(1000, &title)?;
+            }
+        }
+    }
+    dxf.text(0, "ENDSEC")?;
+    dxf.objects()?;
+    dxf.text(0, "EOF")
+}
+
+/// The file as it is written: pairs of a group code and a value.
+struct Dxf<'a> {
+    writer: &'a mut dyn Write,
+    next_handle: u32,
+}
+
+impl Dxf<'_> {
+    fn text(&mut self, code: u16, value: &str) -> io::Result<()> {
+        write!(self.writer, "{code:>3}\r\n{value}\r\n")
+    }
+
+    fn integer(&mut self, code: u16, value: i64) -> io::Result<()> {
+        write!(self.writer, "{code:>3}\r\n{value}\r\n")
+    }
+
+    /// In the fewest digits that are read back as the same number, never without a point.
+    fn number(&mut self, code: u16, value: f64) -> io::Result<()> {
+        write!(self.writer, "{code:>3}\r\n{value:?}\r\n")
+    }
+
+    fn handle(&mut self, code: u16, handle: u32) -> io::Result<()> {
+        write!(self.writer, "{code:>3}\r\n{handle:X}\r\n")
+    }
+
+    fn point(&mut self, code: u16, [x, y]: [f64; 2]) -> io::Result<()> {
+        self.number(code, x)?;
+        self.number(code + 10, y)
+    }
+
+    fn section(&mut self, name: &str) -> io::Result<()> {
+        self.text(0, "SECTION")?;
+        self.text(2, name)
+    }
+
+    /// The start of an object: its type, its handle, its owner.
+    fn object(&mut self, kind: &str, owner: u32) -> io::Result<u32> {
+        let handle = self.next_handle;
+        self.next_handle += 1;
+        self.object_as(kind, handle, owner)?;
+        Ok(handle)
+    }
+
+    fn object_as(&mut self, kind: &str, handle: u32, owner: u32) -> io::Result<()> {
+        self.text(0, kind)?;
+        // Dimension styles alone keep their handle elsewhere.
+        self.handle(if kind == "DIMSTYLE" { 105 } else { 5 }, handle)?;
+        self.handle(330, owner)
+    }
+
+    fn header(&mut self, drawing: &DrawingAnswer, outlines: usize) -> io::Result<()> {
+        let reach_mm = svg::reach_mm(&drawing.bodies);
+        self.section("HEADER")?;
+        self.text(9, "$ACADVER")?;
+        self.text(1, "AC1015")?;
+        self.text(9, "$DWGCODEPAGE")?;
+        self.text(3, "ANSI_1252")?;
+        for (name, corner_mm) in [("$EXTMIN", -reach_mm), ("$EXTMAX", reach_mm)] {
+            self.text(9, name)?;
+            self.point(10, [corner_mm; 2])?;
+            self.number(30, 0.0)?;
+        }
+        // Metric, and a unit is a millimetre.
+        for (name, value) in [("$MEASUREMENT", 1), ("$INSUNITS", 4)] {
+            self.text(9, name)?;
+            self.integer(70, value)?;
+        }
+        // Beyond every handle of the tables and of the outlines.
+        let beyond = u32::try_from(outlines).unwrap_or(u32::MAX).saturating_add(0x100);
+        self.text(9, "$HANDSEED")?;
+        self.handle(5, beyond)?;
+        self.text(0, "ENDSEC")
+    }
+
+    fn tables(&mut self, drawing: &DrawingAnswer) -> io::Result<()> {
+        self.section("TABLES")?;
+        self.table("VPORT", 0, |_, _| Ok(()))?;
+        self.table("LTYPE", 3, |dxf, table| {
+            for name in ["ByBlock", "ByLayer", "Continuous"] {
+                dxf.record("LTYPE", "AcDbLinetypeTableRecord", table, name)?;
+                dxf.text(3, "")?;
+                dxf.integer(72, 65)?;
+                dxf.integer(73, 0)?;
+                dxf.number(40, 0.0)?;
+            }
+            Ok(())
+        })?;
+        let layers = drawing.bodies.iter().map(|body| layer_of(body.part));
+        self.table("LAYER", 1 + drawing.bodies.len(), |dxf, table| {
+            for Layer(name, color) in [Layer("0", 7)].into_iter().chain(layers) {
+                dxf.record("LAYER", "AcDbLayerTableRecord", table, name)?;
+                dxf.integer(62, color.into())?;
+                dxf.text(6, "Continuous")?;
+            }
+            Ok(())
+        })?;
+        self.table("STYLE", 1, |dxf, table| {
+            dxf.record("STYLE", "AcDbTextStyleTableRecord", table, "Standard")?;
+            for (code, value) in [(40, 0.0), (41, 1.0), (50, 0.0)] {
+                dxf.number(code, value)?;
+            }
+            dxf.integer(71, 0)?;
+            dxf.number(42, 2.5)?;
+            dxf.text(3, "txt")?;
+            dxf.text(4, "")
+        })?;
+        self.table("VIEW", 0, |_, _| Ok(()))?;
+        self.table("UCS", 0, |_, _| Ok(()))?;
+        self.table("APPID", 2, |dxf, table| {
+            dxf.record("APPID", "AcDbRegAppTableRecord", table, "ACAD")?;
+            dxf.record("APPID", "AcDbRegAppTableRecord", table, APPLICATION)
+        })?;
+        self.table("DIMSTYLE", 1, |dxf, table| dxf.record("DIMSTYLE", "AcDbDimStyleTableRecord", table, "Standard"))?;
+        self.table("BLOCK_RECORD", 2, |dxf, table| {
+            for (name, handle) in [("*Model_Space", MODEL_SPACE), ("*Paper_Space", PAPER_SPACE)] {
+                dxf.object_as("BLOCK_RECORD", handle, table)?;
+                dxf.text(100, "AcDbSymbolTableRecord")?;
+                dxf.text(100, "AcDbBlockTableRecord")?;
+                dxf.text(2, name)?;
+            }
+            Ok(())
+        })?;
+        self.text(0, "ENDSEC")
+    }
+
+    fn table(
+        &mut self,
+        name: &str,
+        records: usize,
+        write: impl FnOnce(&mut Self, u32) -> io::Result<()>,
+    ) -> io::Result<()> {
+        self.text(0, "TABLE")?;
+        self.text(2, name)?;
+        let handle = self.next_handle;
+        self.next_handle += 1;
+        self.handle(5, handle)?;
+        self.handle(330, 0)?;
+        self.text(100, "AcDbSymbolTable")?;
+        write!(self.writer, " 70\r\n{records}\r\n")?;
+        if name == "DIMSTYLE" {
+            self.text(100, "AcDbDimStyleTable")?;
+        }
+        write(self, handle)?;
+        self.text(0, "ENDTAB")
+    }
+
+    fn record(&mut self, kind: &str, class: &str, table: u32, name: &str) -> io::Result<()> {
+        self.object(kind, table)?;
+        self.text(100, "AcDbSymbolTableRecord")?;
+        self.text(100, class)?;
+        self.text(2, name)?;
+        self.integer(70, 0)
+    }
+
+    fn blocks(&mut self) -> io::Result<()> {
+        self.section("BLOCKS")?;
+        for (name, owner) in [("*Model_Space", MODEL_SPACE), ("*Paper_Space", PAPER_SPACE)] {
+            self.object("BLOCK", owner)?;
+            self.text(100, "AcDbEntity")?;
+            self.text(8, "0")?;
+            self.text(100, "AcDbBlockBegin")?;
+            self.text(2, name)?;
+            self.integer(70, 0)?;
+            self.point(10, [0.0; 2])?;
+            self.number(30, 0.0)?;
+            self.text(3, name)?;
+            self.text(1, "")?;
+            self.object("ENDBLK", owner)?;
+            self.text(100, "AcDbEntity")?;
+            self.text(8, "0")?;
+            self.text(100, "AcDbBlockEnd")?;
+        }
+        self.text(0, "ENDSEC")
+    }
+
+    fn outline(
+        &mut self,
+        outline: &OutlineAnswer,
+        placement: &PlacementAnswer,
+        &Layer(layer, _): &Layer,
+    ) -> io::Result<()> {
+        let (kind, class) = match outline {
+            OutlineAnswer::Circle { .. } => ("CIRCLE", "AcDbCircle"),
+            OutlineAnswer::Path { .. } => ("LWPOLYLINE", "AcDbPolyline"),
+        };
+        self.object(kind, MODEL_SPACE)?;
+        self.text(100, "AcDbEntity")?;
+        self.text(8, layer)?;
+        self.text(100, class)?;
+        match outline {
+            OutlineAnswer::Circle { radius_mm } => {
+                self.point(10, [placement.x_mm, placement.y_mm])?;
+                self.number(30, 0.0)?;
+                self.number(40, *radius_mm)
+            }
+            OutlineAnswer::Path { edges } => {
+                let vertices: usize = edges.iter().map(vertex_count).sum();
+                write!(self.writer, " 90\r\n{vertices}\r\n")?;
+                self.integer(70, 1)?; // closed
+                let place = placement.placing();
+                for edge in edges {
+                    match edge {
+                        EdgeAnswer::Line { .. } => self.point(10, place(edge.start()))?,
+                        EdgeAnswer::Arc { sweep_deg, .. } => {
+                            self.point(10, place(edge.start()))?;
+                            // The bulge of a polyline is the tangent of a quarter of its arc's angle.
+                            self.number(42, (0.25 * sweep_deg.to_radians()).tan())?;
+                        }
+                        EdgeAnswer::Curve { x_mm, y_mm, .. } => {
+                            for (&x, &y) in x_mm.iter().zip(y_mm).take(vertex_count(edge)) {
+                                self.point(10, place([x, y]))?;
+                            }
+                        }
+                    }
+                }
+                Ok(())
+            }
+        }
+    }
+
+    fn objects(&mut self) -> io::Result<()> {
+        self.section("OBJECTS")?;
+        self.object_as("DICTIONARY", ROOT_DICTIONARY, 0)?;
+        self.text(100, "AcDbDictionary")?;
+        self.integer(281, 1)?;
+        self.text(3, "ACAD_GROUP")?;
+        self.handle(350, GROUP_DICTIONARY)?;
+        self.object_as("DICTIONARY", GROUP_DICTIONARY, ROOT_DICTIONARY)?;
+        self.text(100, "AcDbDictionary")?;
+        self.integer(281, 1)?;
+        self.text(0, "ENDSEC")
+    }
+}
+
+/// Vertices of an edge but its last, at which the next one starts.
+const fn vertex_count(edge: &EdgeAnswer) -> usize {
+    match edge {
+        EdgeAnswer::Line { .. } | EdgeAnswer::Arc { .. } => 1,
+        EdgeAnswer::Curve { x_mm, .. } => x_mm.len() - 1,
+    }
+}

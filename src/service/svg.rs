@@ -1,0 +1,112 @@
+//! Drawings as SVG, in millimetres, true to scale.
+
+use std::io::{self, Write};
+
+use crate::api::drawings::{BodyAnswer, BodyPart, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
+
+/// Share of the picture that is left free around the drawing.
+const MARGIN: f64 = 0.03;
+
+/// Writes a drawing.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
+    let reach_mm = reach_mm(&drawing.bodies) * (1.0 + MARGIN);
+    let size_mm = 2.0 * reach_mm;
+    writeln!(
+        writer,
+        r#"<svg xmlns="http://www.w3.org/2000/svg" width="{size_mm}mm" height="{size_mm}mm" viewBox="{} {} {size_mm} {size_mm}">"#,
+        -reach_mm, -reach_mm
+    )?;
+    writeln!(writer, "<title>{}</title>", title(drawing))?;
+    writeln!(writer, "<desc>Millimetres, chords true to {} mm.</desc>", drawing.chord_tolerance_mm)?;
+    writeln!(
+        writer,
+        r#"<g transform="scale(1 -1)" fill-rule="evenodd" stroke="black" stroke-width="1" stroke-linejoin="round">"#
+    )?;
+    for body in &drawing.bodies {
+        let (id, fill) = match body.part {
+            BodyPart::WaveGenerator => ("wave_generator", "#d9c7e8"),
+            BodyPart::Teeth => ("teeth", "#f3d9a4"),
+            BodyPart::Ring => ("ring", "#c9d6e4"),
+            BodyPart::Carrier => ("carrier", "#cfe3cd"),
+        };
+        writeln!(writer, r#"<g id="{id}" fill="{fill}">"#)?;
+        for placement in &body.placements {
+            write!(writer, r#"<path vector-effect="non-scaling-stroke" d=""#)?;
+            for outline in [&body.outer].into_iter().chain(&body.holes) {
+                write_outline(outline, placement, writer)?;
+            }
+            writeln!(writer, r#""/>"#)?;
+        }
+        writeln!(writer, "</g>")?;
+    }
+    writeln!(writer, "</g>\n</svg>")
+}
+
+/// What stands in a drawing about itself.
+pub fn title(drawing: &DrawingAnswer) -> String {
+    let DrawingAnswer { solver_version, design_hash, .. } = drawing;
+    format!("toothwave {solver_version}, {}, design {design_hash}", crate::api::word(&drawing.subject))
+}
+
+/// The farthest that a drawing reaches from its origin.
+pub fn reach_mm(bodies: &[BodyAnswer]) -> f64 {
+    let of_edge = |edge: &EdgeAnswer| match edge {
+        EdgeAnswer::Line { x_mm, y_mm } => farthest(x_mm, y_mm),
+        EdgeAnswer::Arc { radius_mm, .. } => *radius_mm,
+        EdgeAnswer::Curve { x_mm, y_mm, .. } => farthest(x_mm, y_mm),
+    };
+    let of_body = |body: &BodyAnswer| {
+        let outline_mm = match &body.outer {
+            OutlineAnswer::Circle { radius_mm } => *radius_mm,
+            OutlineAnswer::Path { edges } => edges.iter().map(of_edge).fold(0.0, f64::max),
+        };
+        body.placements.iter().map(|placement| placement.x_mm.hypot(placement.y_mm) + outline_mm).fold(0.0, f64::max)
+    };
+    bodies.iter().map(of_body).fold(0.0, f64::max)
+}
+
+fn farthest(x_mm: &[f64], y_mm: &[f64]) -> f64 {
+    x_mm.iter().zip(y_mm).map(|(x, y)| x.hypot(*y)).fold(0.0, f64::max)
+}
+
+fn write_outline(outline: &OutlineAnswer, placement: &PlacementAnswer, writer: &mut dyn Write) -> io::Result<()> {
+    match outline {
+        OutlineAnswer::Circle { radius_mm } => {
+            let PlacementAnswer { x_mm, y_mm, .. } = placement;
+            let (left, right) = (x_mm - radius_mm, x_mm + radius_mm);
+            write!(writer, "M{right} {y_mm}A{radius_mm} {radius_mm} 0 0 1 {left} {y_mm}")?;
+            write!(writer, "A{radius_mm} {radius_mm} 0 0 1 {right} {y_mm}Z")
+        }
+        OutlineAnswer::Path { edges } => {
+            let place = placement.placing();
+            for (index, edge) in edges.iter().enumerate() {
+                if index == 0 {
+                    let [x, y] = place(edge.start());
+                    write!(writer, "M{x} {y}")?;
+                }
+                match edge {
+                    EdgeAnswer::Line { x_mm, y_mm } => {
+                        let [x, y] = place([x_mm[1], y_mm[1]]);
+                        write!(writer, "L{x} {y}")?;
+                    }
+                    EdgeAnswer::Arc { x_mm, y_mm, radius_mm, sweep_deg } => {
+                        let [x, y] = place([x_mm[2], y_mm[2]]);
+                        let (large, counter_clockwise) =
+                            (u8::from(sweep_deg.abs() > 180.0), u8::from(*sweep_deg > 0.0));
+                        write!(writer, "A{radius_mm} {radius_mm} 0 {large} {counter_clockwise} {x} {y}")?;
+                    }
+                    EdgeAnswer::Curve { x_mm, y_mm, .. } => {
+                        for (&x, &y) in x_mm.iter().zip(y_mm).skip(1) {
+                            let [x, y] = place([x, y]);
+                            write!(writer, "L{x} {y}")?;
+                        }
+                    }
+                }
+            }
+            write!(writer, "Z")
+        }
+    }
+}

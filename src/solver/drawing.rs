@@ -1,0 +1,340 @@
+//! The parts' sections in the plane, as outlines of lines, arcs and sampled curves, and where each stands in the assembly
+//! (docs/theory.md section 8).
+
+use std::f64::consts::PI;
+
+use nalgebra::{Point2, Rotation2, Unit, Vector2};
+
+use crate::contact::Part;
+use crate::drive::{Drive, DriveError};
+use crate::parts::{CarrierPart, PartsParameters, RingPart, ToothPart, WaveGeneratorPart};
+use crate::profile::{Polyline, SampledCurve, cam_quarter, flank_curve, mirrored};
+use crate::ring::FlankEnd;
+use crate::violation::{Parameter, Violation};
+use crate::{SolveError, Stop};
+
+/// What is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Subject {
+    /// One part in its own frame.
+    Part(Part),
+    /// All of them in the ring's frame, at an input angle.
+    Assembly,
+}
+
+/// A closed path. Each edge starts at the very point where the one before ends, the first where the last ends.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outline {
+    /// A circle around the origin.
+    Circle {
+        /// Its radius.
+        radius_mm: f64,
+    },
+    /// Edges, counter-clockwise.
+    Edges(Vec<Edge>),
+}
+
+/// A piece of an outline.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Edge {
+    /// A straight line.
+    Line {
+        /// Where it starts.
+        start: Point2<f64>,
+        /// Where it ends.
+        end: Point2<f64>,
+    },
+    /// An arc of a circle around the origin.
+    Arc {
+        /// Where it starts.
+        start: Point2<f64>,
+        /// Where it ends.
+        end: Point2<f64>,
+        /// Radius of the circle.
+        radius_mm: f64,
+        /// Its angle, counter-clockwise positive, within a full turn.
+        sweep_rad: f64,
+    },
+    /// A smooth curve through points that are exact, its chords true to the tolerance.
+    Curve {
+        /// The points, both ends included.
+        points: Polyline,
+        /// Direction at the first point.
+        start_tangent: Unit<Vector2<f64>>,
+        /// Direction at the last point.
+        end_tangent: Unit<Vector2<f64>>,
+    },
+}
+
+impl Edge {
+    /// Where it starts.
+    pub fn start(&self) -> Point2<f64> {
+        match self {
+            Self::Line { start, .. } | Self::Arc { start, .. } => *start,
+            Self::Curve { points, .. } => points.first().copied().unwrap_or_default(),
+        }
+    }
+
+    /// Where it ends.
+    pub fn end(&self) -> Point2<f64> {
+        match self {
+            Self::Line { end, .. } | Self::Arc { end, .. } => *end,
+            Self::Curve { points, .. } => points.last().copied().unwrap_or_default(),
+        }
+    }
+}
+
+/// A face: an outline with holes in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Section {
+    /// What bounds it.
+    pub outer: Outline,
+    /// What is cut out of it.
+    pub holes: Vec<Outline>,
+}
+
+/// Where a section stands: turned about its origin, then moved.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Placement {
+    /// Where its origin goes.
+    pub origin_mm: Point2<f64>,
+    /// How far it is turned, counter-clockwise.
+    pub rotation_rad: f64,
+}
+
+/// A part as prisms of one section: one, or, of teeth and of the fingers between the carrier's slots, several alike.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Body {
+    /// Which part.
+    pub part: Part,
+    /// The section of each.
+    pub section: Section,
+    /// Where each stands.
+    pub placements: Vec<Placement>,
+}
+
+/// What a drawing is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DrawingParameters {
+    /// How far a chord may be from its curve.
+    pub chord_tolerance_mm: f64,
+    /// How many points at most, over all curves of one section.
+    pub max_points: u64,
+    /// Angle of the wave generator; only an assembly reads it.
+    pub input_angle_deg: f64,
+}
+
+/// A drawing that can be made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drawing {
+    drive: Drive,
+    parts: Vec<MadePart>,
+    subject: Subject,
+    parameters: DrawingParameters,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum MadePart {
+    Ring(RingPart),
+    Carrier(CarrierPart),
+    Teeth(ToothPart),
+    WaveGenerator(WaveGeneratorPart),
+}
+
+impl Drawing {
+    /// Checks the parameters of what is drawn.
+    ///
+    /// # Errors
+    /// Every reason why it cannot be made.
+    pub fn new(
+        drive: &Drive,
+        subject: Subject,
+        parts: &PartsParameters,
+        parameters: &DrawingParameters,
+    ) -> Result<Self, DriveError> {
+        let wanted = match subject {
+            Subject::Part(part) => vec![part],
+            Subject::Assembly => vec![Part::Ring, Part::Carrier, Part::Teeth, Part::WaveGenerator],
+        };
+        let mut violations: Vec<Violation> = Vec::new();
+        violations.extend(Parameter::ChordTolerance.check(parameters.chord_tolerance_mm));
+        violations.extend(Parameter::InputAngle.check(parameters.input_angle_deg));
+        let mut made = Vec::new();
+        for part in wanted {
+            let result = match part {
+                Part::Ring => RingPart::new(drive, parts).map(MadePart::Ring),
+                Part::Carrier => CarrierPart::new(drive, parts).map(MadePart::Carrier),
+                Part::Teeth => ToothPart::new(drive, parts).map(MadePart::Teeth),
+                Part::WaveGenerator => WaveGeneratorPart::new(drive, parts).map(MadePart::WaveGenerator),
+            };
+            match result {
+                Ok(part) => made.push(part),
+                Err(DriveError::Impossible(found)) => violations.extend(found),
+                Err(error @ DriveError::NotConverged(_)) => return Err(error),
+            }
+        }
+        if violations.is_empty() {
+            Ok(Self { drive: *drive, parts: made, subject, parameters: *parameters })
+        } else {
+            Err(DriveError::Impossible(violations))
+        }
+    }
+
+    /// Draws.
+    ///
+    /// # Errors
+    /// [`SolveError::TooManyPoints`], [`SolveError::Stopped`], and [`SolveError::NotConverged`] from the geometry.
+    pub fn bodies(&self, stop: &impl Stop) -> Result<Vec<Body>, SolveError> {
+        self.parts.iter().map(|part| self.body(part, stop)).collect()
+    }
+
+    fn body(&self, part: &MadePart, stop: &impl Stop) -> Result<Body, SolveError> {
+        let (part, section) = match part {
+            MadePart::Ring(ring) => (Part::Ring, self.ring_section(ring, stop)?),
+            MadePart::WaveGenerator(cam) => (Part::WaveGenerator, self.cam_section(cam, stop)?),
+            MadePart::Carrier(carrier) => (Part::Carrier, self.carrier_section(carrier)),
+            MadePart::Teeth(ToothPart { radius_mm }) => {
+                (Part::Teeth, Section { outer: Outline::Circle { radius_mm: *radius_mm }, holes: Vec::new() })
+            }
+        };
+        Ok(Body { part, section, placements: self.placements(part)? })
+    }
+
+    /// The ring: a circle outside, inside its tooth spaces, from tip to tip each, with the lands of a bored tip between.
+    fn ring_section(&self, ring: &RingPart, stop: &impl Stop) -> Result<Section, SolveError> {
+        let teeth = self.drive.parameters().ring_teeth.unsigned_abs();
+        let SampledCurve { mut points, end_tangent } =
+            flank_curve(&ring.tooth.flank, &ring.tooth.limit, self.parameters.chord_tolerance_mm, stop)?;
+        self.require_points(2 * (points.len() as u64 - 1) * teeth)?;
+        let tip_rad = PI / teeth as f64;
+        let tip_radius_mm = ring.tooth.tip_radius_mm;
+        let is_bored = ring.tooth.limit.end == FlankEnd::Bore;
+        if !is_bored {
+            // Both flanks end on the symmetry line; there the tip is a point, or regular.
+            points.pop();
+            points.push(Point2::from(tip_radius_mm * Vector2::new(tip_rad.cos(), tip_rad.sin())));
+        }
+        let space = points.iter().rev().map(|point| Point2::new(point.x, 0.0 - point.y));
+        let space: Polyline = space.chain(points.iter().skip(1).copied()).collect();
+        let land_rad = match (is_bored, points.last()) {
+            (true, Some(end)) => 2.0 * (tip_rad - end.y.atan2(end.x)),
+            _ => 0.0,
+        };
+        let turned = |copy: u64| Rotation2::new(2.0 * PI * ((copy % teeth) as f64 / teeth as f64));
+        let mut edges = Vec::new();
+        for copy in 0..teeth {
+            let rotation = turned(copy);
+            let mut curve: Polyline = space.iter().map(|point| rotation * point).collect();
+            let next = turned(copy + 1) * space[0];
+            let tangents = [Vector2::new(-end_tangent.x, end_tangent.y), end_tangent.into_inner()];
+            let [start_tangent, end_tangent] = tangents.map(|tangent| Unit::new_unchecked(rotation * tangent));
+            if is_bored {
+                let start = curve.last().copied().unwrap_or_default();
+                edges.push(Edge::Curve { points: curve, start_tangent, end_tangent });
+                edges.push(Edge::Arc { start, end: next, radius_mm: tip_radius_mm, sweep_rad: land_rad });
+            } else {
+                curve.pop();
+                curve.push(next);
+                edges.push(Edge::Curve { points: curve, start_tangent, end_tangent });
+            }
+        }
+        Ok(Section { outer: Outline::Circle { radius_mm: ring.outer_radius_mm }, holes: vec![Outline::Edges(edges)] })
+    }
+
+    /// The wave generator: a curve a quarter.
+    fn cam_section(&self, cam: &WaveGeneratorPart, stop: &impl Stop) -> Result<Section, SolveError> {
+        let SampledCurve { points, .. } =
+            cam_quarter(self.drive.flank().locus().cam(), cam.clearance_mm, self.parameters.chord_tolerance_mm, stop)?;
+        self.require_points(4 * (points.len() as u64 - 1))?;
+        let half = mirrored(&points, Vector2::new(-1.0, 1.0));
+        let whole = mirrored(&half, Vector2::new(1.0, -1.0));
+        let quarter = points.len() - 1;
+        let axes = [Vector2::x_axis(), Vector2::y_axis()];
+        let directions = [axes[1], -axes[0], -axes[1], axes[0]];
+        let edges = (0..4).map(|index| Edge::Curve {
+            points: whole[index * quarter..=(index + 1) * quarter].to_vec(),
+            start_tangent: directions[index],
+            end_tangent: directions[(index + 1) % 4],
+        });
+        Ok(Section {
+            outer: Outline::Edges(edges.collect()),
+            holes: cam.bore_radius_mm.map(|radius_mm| Outline::Circle { radius_mm }).into_iter().collect(),
+        })
+    }
+
+    /// One finger of the carrier: what stands between slot 0, along x, and slot 1. Where the slots run into each other
+    /// beyond the inner radius it is pointed.
+    fn carrier_section(&self, carrier: &CarrierPart) -> Section {
+        let CarrierPart { inner_radius_mm, outer_radius_mm, slot_half_width_mm: wall } = *carrier;
+        let half_spacing_rad = PI / self.drive.parameters().installed as f64;
+        let to_next = Rotation2::new(2.0 * half_spacing_rad);
+        // On the wall of slot 0 at a radius, and its mirror image on the near wall of slot 1.
+        let on_wall = |radius_mm: f64| Point2::new(((radius_mm - wall) * (radius_mm + wall)).sqrt(), wall);
+        let on_next = |point: Point2<f64>| to_next * Point2::new(point.x, -point.y);
+        let sweep_rad = |radius_mm: f64| 2.0 * (half_spacing_rad - (wall / radius_mm).asin());
+        let outer = on_wall(outer_radius_mm);
+        let rim = Edge::Arc {
+            start: outer,
+            end: on_next(outer),
+            radius_mm: outer_radius_mm,
+            sweep_rad: sweep_rad(outer_radius_mm),
+        };
+        let meet_radius_mm = wall / half_spacing_rad.sin();
+        let edges = if meet_radius_mm < inner_radius_mm {
+            let inner = on_wall(inner_radius_mm);
+            vec![
+                Edge::Line { start: inner, end: outer },
+                rim,
+                Edge::Line { start: on_next(outer), end: on_next(inner) },
+                Edge::Arc {
+                    start: on_next(inner),
+                    end: inner,
+                    radius_mm: inner_radius_mm,
+                    sweep_rad: -sweep_rad(inner_radius_mm),
+                },
+            ]
+        } else {
+            let point = Point2::new(meet_radius_mm * half_spacing_rad.cos(), wall);
+            vec![Edge::Line { start: point, end: outer }, rim, Edge::Line { start: on_next(outer), end: point }]
+        };
+        Section { outer: Outline::Edges(edges), holes: Vec::new() }
+    }
+
+    /// Where the prisms of a part stand: in the ring's frame for an assembly, in its own otherwise.
+    ///
+    /// The carrier turns by `j (Z_G - Z_K)/Z_G` and tooth i stands in slot i, at `ψ_i = i 2π/Z'_G - j Z_K/Z_G` from the major axis
+    /// (docs/theory.md section 3).
+    fn placements(&self, part: Part) -> Result<Vec<Placement>, SolveError> {
+        let p = self.drive.parameters();
+        let input_turns = match self.subject {
+            Subject::Part(_) => 0.0,
+            Subject::Assembly => self.parameters.input_angle_deg / 360.0,
+        };
+        let turned =
+            |turns: f64| Placement { origin_mm: Point2::origin(), rotation_rad: 2.0 * PI * turns.rem_euclid(1.0) };
+        let carrier_turns = input_turns / self.drive.transmission_ratio();
+        let slots = (0..p.installed).map(|slot| slot as f64 / p.installed as f64);
+        Ok(match (part, self.subject) {
+            (Part::Ring, _) | (Part::Teeth, Subject::Part(_)) => vec![Placement::default()],
+            (Part::WaveGenerator, _) => vec![turned(input_turns)],
+            (Part::Carrier, _) => slots.map(|slot| turned(slot + carrier_turns)).collect(),
+            (Part::Teeth, Subject::Assembly) => {
+                let from_major = input_turns * (p.ring_teeth as f64 / p.teeth as f64);
+                let placed = slots.map(|slot| {
+                    let placement = turned(slot + carrier_turns);
+                    let (sin, cos) = placement.rotation_rad.sin_cos();
+                    let position_rad = 2.0 * PI * (slot - from_major).rem_euclid(1.0);
+                    let center_radius_mm = self.drive.center_radius_at_mm(position_rad)?;
+                    let origin_mm = Point2::from(center_radius_mm * Vector2::new(cos, sin));
+                    Ok(Placement { origin_mm, ..placement })
+                });
+                placed.collect::<Result<_, SolveError>>()?
+            }
+        })
+    }
+
+    fn require_points(&self, points: u64) -> Result<(), SolveError> {
+        let limit = self.parameters.max_points;
+        if points > limit { Err(SolveError::TooManyPoints { points, limit }) } else { Ok(()) }
+    }
+}
