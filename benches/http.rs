@@ -151,7 +151,7 @@ struct Bare {
 fn serve_bare() -> Result<(), Failure> {
     let limits = Defaults::parse_from(["defaults"]).settings.limits();
     let design = toothwave::json::read::<Design>(DESIGN.as_bytes()).map_err(|error| format!("{error:?}"))?.normalised();
-    let question = Sweep::question(&design, &limits).map_err(|problem| problem.to_string())?;
+    let question = Sweep.question(&design, &limits).map_err(|problem| problem.to_string())?;
     let answer = Sweep::answer(&question, &AtomicBool::new(false)).map_err(|problem| problem.to_string())?;
     let bytes = serde_json::to_vec(&answer)?.into();
     let router = Router::new()

@@ -15,6 +15,7 @@ pub mod findings;
 pub mod json;
 pub mod negotiation;
 pub mod observe;
+pub mod plots;
 pub mod problem;
 pub mod router;
 pub mod serve;

@@ -124,6 +124,27 @@ pub struct DrawingParameters {
     pub input_angle_deg: f64,
 }
 
+impl Subject {
+    /// The parts that are drawn, from the outside in.
+    pub const fn parts(&self) -> &[Part] {
+        match self {
+            Self::Part(part) => std::slice::from_ref(part),
+            Self::Assembly => &[Part::Ring, Part::Carrier, Part::Teeth, Part::WaveGenerator],
+        }
+    }
+}
+
+impl DrawingParameters {
+    /// The values that are out of their ranges.
+    pub fn violations(&self, subject: Subject) -> Vec<Violation> {
+        let input_angle = match subject {
+            Subject::Part(_) => None,
+            Subject::Assembly => Parameter::InputAngle.check(self.input_angle_deg),
+        };
+        Parameter::ChordTolerance.check(self.chord_tolerance_mm).into_iter().chain(input_angle).collect()
+    }
+}
+
 /// A drawing that can be made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawing {
@@ -152,15 +173,9 @@ impl Drawing {
         parts: &PartsParameters,
         parameters: &DrawingParameters,
     ) -> Result<Self, DriveError> {
-        let wanted = match subject {
-            Subject::Part(part) => vec![part],
-            Subject::Assembly => vec![Part::Ring, Part::Carrier, Part::Teeth, Part::WaveGenerator],
-        };
-        let mut violations: Vec<Violation> = Vec::new();
-        violations.extend(Parameter::ChordTolerance.check(parameters.chord_tolerance_mm));
-        violations.extend(Parameter::InputAngle.check(parameters.input_angle_deg));
+        let mut violations = parameters.violations(subject);
         let mut made = Vec::new();
-        for part in wanted {
+        for &part in subject.parts() {
             let result = match part {
                 Part::Ring => RingPart::new(drive, parts).map(MadePart::Ring),
                 Part::Carrier => CarrierPart::new(drive, parts).map(MadePart::Carrier),

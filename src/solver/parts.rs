@@ -40,6 +40,28 @@ pub const CARRIER_PLAY: f64 = 0.1;
 
 const MM_PER_UM: f64 = 1e-3;
 
+impl PartsParameters {
+    /// The values of a part that are out of their ranges.
+    pub fn violations(&self, part: Part) -> Vec<Violation> {
+        let (clearance_um, radii) = match part {
+            Part::WaveGenerator => {
+                (self.wave_generator_clearance_um, vec![(Parameter::BoreRadius, self.bore_radius_mm)])
+            }
+            Part::Teeth => (self.teeth_clearance_um, vec![]),
+            Part::Ring => (self.ring_clearance_um, vec![(Parameter::RingOuterRadius, self.ring_outer_radius_mm)]),
+            Part::Carrier => (
+                self.carrier_clearance_um,
+                vec![
+                    (Parameter::CarrierInnerRadius, self.carrier_inner_radius_mm),
+                    (Parameter::CarrierOuterRadius, self.carrier_outer_radius_mm),
+                ],
+            ),
+        };
+        let radii = radii.into_iter().filter_map(|(parameter, radius_mm)| parameter.check(radius_mm?));
+        Parameter::PartClearance(part).check(clearance_um).into_iter().chain(radii).collect()
+    }
+}
+
 /// The ring as it is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RingPart {
@@ -74,10 +96,8 @@ impl RingPart {
     /// # Errors
     /// Every reason why it cannot be made.
     pub fn new(drive: &Drive, parameters: &PartsParameters) -> Result<Self, DriveError> {
-        let mut checks = Checks::default();
-        let clearance_mm = checks.clearance(Part::Ring, parameters.ring_clearance_um);
-        checks.radius(Parameter::RingOuterRadius, parameters.ring_outer_radius_mm);
-        checks.finish()?;
+        let mut checks = Checks::new(parameters, Part::Ring)?;
+        let clearance_mm = MM_PER_UM * parameters.ring_clearance_um;
         let flank = drive.flank().set_back_by(clearance_mm);
         let root_radius_mm = flank.root_radius_mm();
         let outer_radius_mm = parameters.ring_outer_radius_mm.unwrap_or(RIM * root_radius_mm);
@@ -94,10 +114,8 @@ impl WaveGeneratorPart {
     /// # Errors
     /// Every reason why it cannot be made.
     pub fn new(drive: &Drive, parameters: &PartsParameters) -> Result<Self, DriveError> {
-        let mut checks = Checks::default();
-        let clearance_mm = checks.clearance(Part::WaveGenerator, parameters.wave_generator_clearance_um);
-        checks.radius(Parameter::BoreRadius, parameters.bore_radius_mm);
-        checks.finish()?;
+        let mut checks = Checks::new(parameters, Part::WaveGenerator)?;
+        let clearance_mm = MM_PER_UM * parameters.wave_generator_clearance_um;
         let (a, b) = (drive.parameters().semi_major_mm, drive.parameters().semi_minor_mm);
         // Set back by its least radius of curvature, at the major axis, the cam would get a cusp there.
         checks.below(Misfit::ClearanceTakesCam, parameters.wave_generator_clearance_um, b * (b / a) / MM_PER_UM);
@@ -116,11 +134,8 @@ impl CarrierPart {
     /// Every reason why it cannot be made.
     pub fn new(drive: &Drive, parameters: &PartsParameters) -> Result<Self, DriveError> {
         let p = drive.parameters();
-        let mut checks = Checks::default();
-        let clearance_mm = checks.clearance(Part::Carrier, parameters.carrier_clearance_um);
-        checks.radius(Parameter::CarrierInnerRadius, parameters.carrier_inner_radius_mm);
-        checks.radius(Parameter::CarrierOuterRadius, parameters.carrier_outer_radius_mm);
-        checks.finish()?;
+        let mut checks = Checks::new(parameters, Part::Carrier)?;
+        let clearance_mm = MM_PER_UM * parameters.carrier_clearance_um;
         let tip_radius_mm = drive.tip_radius_mm();
         let play_mm = CARRIER_PLAY * (tip_radius_mm - p.semi_major_mm);
         let inner_radius_mm = parameters.carrier_inner_radius_mm.unwrap_or(p.semi_major_mm + play_mm);
@@ -143,27 +158,23 @@ impl ToothPart {
     /// Why it cannot be made.
     pub fn new(drive: &Drive, parameters: &PartsParameters) -> Result<Self, DriveError> {
         let radius_mm = drive.parameters().tooth_radius_mm;
-        let mut checks = Checks::default();
-        let clearance_mm = checks.clearance(Part::Teeth, parameters.teeth_clearance_um);
+        let mut checks = Checks::new(parameters, Part::Teeth)?;
+        let clearance_mm = MM_PER_UM * parameters.teeth_clearance_um;
         checks.below(Misfit::ClearanceTakesTooth, parameters.teeth_clearance_um, radius_mm / MM_PER_UM);
         checks.finish()?;
         Ok(Self { radius_mm: radius_mm - clearance_mm })
     }
 }
 
-/// Violations as they are found.
-#[derive(Debug, Default)]
+/// What does not fit, as it is found, once the values themselves are in their ranges.
+#[derive(Debug)]
 struct Checks(Vec<Violation>);
 
 impl Checks {
-    fn radius(&mut self, parameter: Parameter, radius_mm: Option<f64>) {
-        self.0.extend(radius_mm.and_then(|radius_mm| parameter.check(radius_mm)));
-    }
-
-    /// The clearance in mm.
-    fn clearance(&mut self, part: Part, clearance_um: f64) -> f64 {
-        self.0.extend(Parameter::PartClearance(part).check(clearance_um));
-        MM_PER_UM * clearance_um
+    fn new(parameters: &PartsParameters, part: Part) -> Result<Self, DriveError> {
+        let mut checks = Self(parameters.violations(part));
+        checks.finish()?;
+        Ok(checks)
     }
 
     fn above(&mut self, misfit: Misfit, value: f64, limit: f64) {

@@ -19,7 +19,8 @@ use toothwave::router::router;
 use tower::ServiceExt as _;
 
 /// Every path that a design document can be sent to.
-pub(crate) const ENDPOINTS: [&str; 3] = ["/v1/geometry", "/v1/coincidence-degree", "/v1/sweep"];
+pub(crate) const ENDPOINTS: [&str; 4] =
+    ["/v1/geometry", "/v1/coincidence-degree", "/v1/sweep", "/v1/drawings/assembly"];
 
 /// Limits that no test meets by accident; above all no test races the deadline.
 pub(crate) const LIMITS: Limits = Limits {

@@ -53,7 +53,15 @@ pub(crate) fn field_codes() -> Vec<FieldCode> {
         TeethTouch => NoCarrierAnnulus,
         NoCarrierAnnulus => BoreLeavesNoFlank,
         BoreLeavesNoFlank => ClearanceNotMonotone,
-        ClearanceNotMonotone => TooManyStates,
+        ClearanceNotMonotone => RingWithoutRim,
+        RingWithoutRim => CarrierMeetsCam,
+        CarrierMeetsCam => CarrierMeetsRing,
+        CarrierMeetsRing => CarrierWithoutWall,
+        CarrierWithoutWall => SlotsTakeCarrier,
+        SlotsTakeCarrier => BoreTakesCam,
+        BoreTakesCam => ClearanceTakesCam,
+        ClearanceTakesCam => ClearanceTakesTooth,
+        ClearanceTakesTooth => TooManyStates,
         TooManyStates => TooManyPoints;
         TooManyPoints)
 }

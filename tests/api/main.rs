@@ -13,6 +13,7 @@ mod command_line;
 mod contact;
 mod designs;
 mod documents;
+mod drawings;
 mod endpoints;
 mod examples;
 mod extremes;

@@ -21,6 +21,11 @@ fn document() -> &'static Value {
     &DOCUMENT
 }
 
+/// The path as the document has it.
+fn described(path: &str) -> &str {
+    if path.starts_with("/v1/drawings/") { "/v1/drawings/{part}" } else { path }
+}
+
 #[test]
 fn the_committed_document_is_the_one_that_the_code_describes() {
     assert!(
@@ -62,7 +67,8 @@ fn every_schema_is_used() {
 #[test]
 fn every_path_and_every_status_that_it_can_have_is_described() {
     let solving = ["200", "304", "400", "406", "408", "413", "415", "422", "500", "503"];
-    let mut expected: Vec<(&str, &str, &[&str])> = ENDPOINTS.iter().map(|&path| (path, "post", &solving[..])).collect();
+    let mut expected: Vec<(&str, &str, &[&str])> =
+        ENDPOINTS.iter().map(|&path| (described(path), "post", &solving[..])).collect();
     expected.extend([
         // Measured for each answer, so there is nothing that a client could have already.
         ("/v1/accuracy", "post", &["200", "400", "406", "408", "413", "415", "422", "500", "503"][..]),
@@ -91,14 +97,18 @@ fn every_path_and_every_status_that_it_can_have_is_described() {
 fn every_problem_is_described_as_problem_json_and_every_503_of_a_solve_says_when_to_try_again() {
     let document = document();
     for path in ENDPOINTS {
-        let responses = document["paths"][path]["post"]["responses"].as_object().unwrap();
+        let responses = document["paths"][described(path)]["post"]["responses"].as_object().unwrap();
         for (status, response) in responses.iter().filter(|(status, _)| status.as_str() >= "400") {
             let types: Vec<_> = response["content"].as_object().unwrap().keys().collect();
             assert_eq!(types, ["application/problem+json"], "{path} {status}");
         }
         assert!(responses["503"]["headers"]["Retry-After"].is_object(), "{path}");
         let found: BTreeSet<_> = responses["200"]["content"].as_object().unwrap().keys().map(String::as_str).collect();
-        let expected = if path == "/v1/sweep" { &["application/json", "text/csv"][..] } else { &["application/json"] };
+        let expected = match path {
+            "/v1/sweep" => &["application/json", "image/svg+xml", "text/csv", "text/plain"][..],
+            "/v1/drawings/assembly" => &["application/json", "image/svg+xml", "image/vnd.dxf"],
+            _ => &["application/json", "text/csv", "text/plain"],
+        };
         assert_eq!(found, expected.iter().copied().collect(), "{path}");
     }
 }
@@ -123,11 +133,17 @@ fn parameters() -> Vec<Parameter> {
         Parameter::SweepTolerance,
         Parameter::RequestedError,
         Parameter::ChordTolerance,
+        Parameter::RingOuterRadius,
+        Parameter::CarrierInnerRadius,
+        Parameter::CarrierOuterRadius,
+        Parameter::BoreRadius,
+        Parameter::InputAngle,
     ];
     parameters.extend(parts.map(Parameter::YoungsModulus));
     parameters.extend(parts.map(Parameter::PoissonsRatio));
     parameters.extend(contacts.map(Parameter::Stiffness));
     parameters.extend(contacts.map(Parameter::Clearance));
+    parameters.extend(parts.map(Parameter::PartClearance));
     parameters
 }
 
@@ -271,7 +287,7 @@ fn assert_valid(schema: &Value, instance: &Value, what: &str) {
 fn assert_described(method: &str, path: &str, answer: &Answer) {
     let document = document();
     let what = format!("{method} {path}: {}", answer.status);
-    let response = &document["paths"][path][method]["responses"][answer.status.to_string()];
+    let response = &document["paths"][described(path)][method]["responses"][answer.status.to_string()];
     assert!(response.is_object(), "{what} is not described");
     if answer.status == 304 {
         assert!(response.get("content").is_none(), "{what}");

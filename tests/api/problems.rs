@@ -256,6 +256,9 @@ async fn the_best_format_that_the_client_accepts_is_chosen() {
         ("text/csv;q=0.1, application/json;q=0.9", "application/json"),
         ("text/csv;q=0.5, */*", "application/json"),
         ("application/json;q=0, */*", "text/csv"),
+        ("text/plain", "text/plain"),
+        ("image/*", "image/svg+xml"),
+        ("image/svg+xml, text/plain;q=0.5", "image/svg+xml"),
         ("text/csv;q=0, */*;q=0.1", "application/json"),
         ("text/html, application/json;q=0.1", "application/json"),
     ] {
@@ -268,15 +271,20 @@ async fn the_best_format_that_the_client_accepts_is_chosen() {
 #[tokio::test]
 async fn a_client_that_accepts_no_format_of_a_path_is_told_which_there_are() {
     let service = Service::new();
-    for accept in ["image/png", "text/html", "application/json;q=0", "*/*;q=0", "application/xml, text/plain"] {
+    for accept in ["image/png", "text/html", "application/json;q=0", "*/*;q=0", "application/xml, image/vnd.dxf"] {
         let problem = service.ask(&sweep().with("accept", accept)).await.refused(406, "not_acceptable");
         let detail = problem["detail"].as_str().unwrap();
         assert!(detail.contains("application/json") && detail.contains("text/csv"), "{detail}");
     }
-    for path in ["/v1/geometry", "/v1/coincidence-degree"] {
-        let question = Question::post(path, shortest().to_string()).with("accept", "text/csv");
+    for (path, accept, known) in [
+        ("/v1/geometry", "image/svg+xml", "text/plain"),
+        ("/v1/coincidence-degree", "image/svg+xml", "text/csv"),
+        ("/v1/drawings/ring", "text/csv", "image/vnd.dxf"),
+    ] {
+        let question = Question::post(path, shortest().to_string()).with("accept", accept);
         let problem = service.ask(&question).await.refused(406, "not_acceptable");
-        assert!(problem["detail"].as_str().unwrap().contains("application/json"), "{problem}");
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(detail.contains("application/json") && detail.contains(known), "{detail}");
     }
 }
 

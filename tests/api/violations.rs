@@ -395,5 +395,8 @@ async fn every_kind_of_fault_of_a_field_can_be_met_over_http() {
             errors.extend(answer.problem()["errors"].as_array().unwrap().clone());
         }
     }
+    for (parts, ..) in crate::drawings::MISFITS {
+        errors.extend(errors_at("/v1/drawings/assembly", &crate::drawings::made(parts)).await);
+    }
     assert_eq!(codes_of(&errors), words(&field_codes()));
 }

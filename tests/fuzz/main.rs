@@ -7,14 +7,16 @@
 use std::sync::atomic::AtomicBool;
 
 use serde_json::{Value, json};
-use toothwave::api::Endpoint;
 use toothwave::api::accuracy::Accuracy;
 use toothwave::api::coincidence_degree::CoincidenceDegree;
+use toothwave::api::drawings::{Drawing, DrawnPart};
 use toothwave::api::geometry::Geometry;
 use toothwave::api::sweep::Sweep;
+use toothwave::api::{Endpoint, Forms};
 use toothwave::config::Limits;
 use toothwave::design::Design;
 use toothwave::json;
+use toothwave::negotiation::Format;
 use toothwave::problem::{Problem, ProblemCode};
 
 /// Small enough for thousands of answers.
@@ -28,11 +30,25 @@ const LIMITS: Limits = Limits {
     cache_max_bytes: 0,
 };
 
-fn assert_answered<E: Endpoint>(design: &Design) {
-    let answered = E::question(design, &LIMITS).and_then(|question| E::answer(&question, &AtomicBool::new(false)));
+fn assert_answered<E: Endpoint>(endpoint: E, design: &Design) {
+    let answered =
+        endpoint.question(design, &LIMITS).and_then(|question| E::answer(&question, &AtomicBool::new(false)));
     match answered {
         // serde_json writes null where a number is none.
-        Ok(answer) => assert!(!serde_json::to_string(&answer).unwrap().contains("null"), "{design:?}"),
+        Ok(answer) => {
+            for format in E::Answer::FORMS.iter().map(|(format, _)| *format).chain([Format::Json]) {
+                let mut written = Vec::new();
+                answer.write(format, &mut written).unwrap();
+                let text = String::from_utf8(written).unwrap();
+                let is_none = match format {
+                    // serde_json writes null where a number is none; elsewhere a word may be `info`.
+                    Format::Json => text.contains("null"),
+                    Format::Text => text.contains("NaN"),
+                    Format::Csv | Format::Svg | Format::Dxf => text.contains("NaN") || text.contains("inf"),
+                };
+                assert!(!is_none, "{format:?}: {design:?}");
+            }
+        }
         Err(problem) => assert_refused_for_a_reason(&problem),
     }
 }
@@ -46,9 +62,10 @@ fn assert_text_is_answered(text: &[u8]) {
     match json::read::<Design>(text) {
         Ok(design) => {
             let design = design.normalised();
-            assert_answered::<Geometry>(&design);
-            assert_answered::<CoincidenceDegree>(&design);
-            assert_answered::<Sweep>(&design);
+            assert_answered(Geometry, &design);
+            assert_answered(CoincidenceDegree, &design);
+            assert_answered(Sweep, &design);
+            assert_answered(Drawing(DrawnPart::Assembly), &design);
         }
         Err(error) => assert_refused_for_a_reason(&error.into()),
     }
@@ -109,6 +126,15 @@ fn document(bytes: &[u8; 20]) -> Value {
     if rest[9] % 2 == 0 {
         load["allowable_stress_mpa"] = json!(10.0_f64.powi(i32::from(rest[9] % 10) - 3));
     }
+    // Radii about where they have to lie, clearances from none to more than a tooth.
+    let about = |byte: u8| 0.5 + f64::from(byte) / 170.0;
+    let clearance = |byte: u8| if byte < 128 { 0.0 } else { 1e3 * r * (f64::from(byte) - 127.0) / 100.0 };
+    let parts = json!({
+        "wave_generator": { "bore_radius_mm": b * about(rest[1]), "clearance_um": clearance(rest[2]) },
+        "teeth": { "clearance_um": clearance(rest[3]) },
+        "ring": { "clearance_um": clearance(rest[4]) },
+        "carrier": { "clearance_um": clearance(rest[6]) }
+    });
     json!({
         "drive": {
             "wave_generator": { "semi_major_mm": a, "semi_minor_mm": b },
@@ -118,6 +144,8 @@ fn document(bytes: &[u8; 20]) -> Value {
         "load": load,
         "model": model,
         "sweep": sweep,
+        "parts": parts,
+        "assembly": { "input_angle_deg": 10.0 * f64::from(rest[0]) - 1000.0 },
         "profile": { "chord_tolerance_mm": 1e-3 * a, "extent": if form % 3 == 0 { "full" } else { "tooth" } }
     })
 }
@@ -133,6 +161,6 @@ fn any_drive() {
 fn any_accuracy() {
     bolero::check!().with_type::<[u8; 20]>().with_iterations(8).for_each(|bytes| {
         let text = document(bytes).to_string();
-        assert_answered::<Accuracy>(&json::read::<Design>(text.as_bytes()).unwrap().normalised());
+        assert_answered(Accuracy, &json::read::<Design>(text.as_bytes()).unwrap().normalised());
     });
 }

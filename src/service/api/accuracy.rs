@@ -299,7 +299,7 @@ impl<'a> Model<'a> {
 }
 
 impl Forms for AccuracyAnswer {
-    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Text, Self::write_text), (Format::Csv, Self::write_csv)];
+    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Csv, Self::write_csv), (Format::Text, Self::write_text)];
 }
 
 impl AccuracyAnswer {
@@ -366,7 +366,8 @@ impl WayAnswer {
     path = "/v1/accuracy",
     tag = "drive",
     request_body(content = Design, description = "Reads `drive`, `materials`, `load`, `model` and `accuracy`; `load` is required."),
-    responses((status = 200, description = "The ways, each with its error and its time.", body = AccuracyAnswer), Problems)
+    responses((status = 200, description = "The ways, each with its error and its time.",
+        content((AccuracyAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"))), Problems)
 )]
 pub async fn accuracy(State(app): State<App>, request: Request) -> Response {
     respond_afresh(Accuracy, app, request).await

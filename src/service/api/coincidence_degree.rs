@@ -83,7 +83,7 @@ impl Endpoint for CoincidenceDegree {
 }
 
 impl Forms for CoincidenceDegreeAnswer {
-    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Text, Self::write_text), (Format::Csv, Self::write_csv)];
+    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Csv, Self::write_csv), (Format::Text, Self::write_text)];
 }
 
 impl CoincidenceDegreeAnswer {
@@ -129,7 +129,8 @@ impl CoincidenceDegreeAnswer {
     request_body(content = Design, description = "Reads `drive`."),
     params(("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
     responses(
-        (status = 200, description = "The coincidence degree.", body = CoincidenceDegreeAnswer, headers(
+        (status = 200, description = "The coincidence degree.", 
+            content((CoincidenceDegreeAnswer = "application/json"), (String = "text/plain"), (String = "text/csv")), headers(
                 ("ETag" = String, description = "Entity tag of this representation."),
                 ("Cache-Status" = String, description = "RFC 9211: `hit`, `fwd=miss`, `collapsed`."),
                 ("Server-Timing" = String, description = "`solve;dur=` and the milliseconds of the solve.")

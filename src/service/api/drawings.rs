@@ -7,14 +7,16 @@ use axum::extract::{Path, Request, State};
 use axum::response::{IntoResponse, Response};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
-use toothwave_solver::Part;
 use toothwave_solver::drawing::{self, Body, Edge, Outline, Placement, Subject};
+use toothwave_solver::{Drive, Part};
 use utoipa::ToSchema;
 
+use super::geometry::drive_findings;
 use super::{App, Endpoint, Form, Forms, Problems, checked_drive, respond};
 use crate::cache::Key;
 use crate::config::Limits;
 use crate::design::Design;
+use crate::findings::FindingAnswer;
 use crate::negotiation::{Format, Representation};
 use crate::problem::{Problem, ProblemCode};
 use crate::{dxf, svg};
@@ -64,6 +66,8 @@ pub struct DrawingAnswer {
     pub input_angle_deg: Option<f64>,
     /// The parts that are drawn.
     pub bodies: Vec<BodyAnswer>,
+    /// What a designer should be told about the drive.
+    pub findings: Vec<FindingAnswer>,
 }
 
 /// A part: one prism, or, of teeth and of the fingers between the carrier's slots, several alike.
@@ -247,11 +251,11 @@ pub struct Drawing(pub DrawnPart);
 #[derive(Debug)]
 pub struct DrawingQuestion {
     drawing: drawing::Drawing,
+    drive: Drive,
     design_hash: String,
     subject: DrawnPart,
     chord_tolerance_mm: f64,
     input_angle_deg: Option<f64>,
-    width_mm: f64,
 }
 
 impl Endpoint for Drawing {
@@ -279,17 +283,21 @@ impl Endpoint for Drawing {
         let parameters = design.drawing_parameters(limits.max_profile_points);
         let mut violations = Vec::new();
         let drive = checked_drive(design, &mut violations)?;
-        let Some(drive) = drive.filter(|_| violations.is_empty()) else {
+        let parts = design.parts_parameters();
+        let Some(drive) = drive else {
+            // The parts' own values can be judged without it.
+            violations.extend(parameters.violations(subject.subject()));
+            violations.extend(subject.subject().parts().iter().flat_map(|&part| parts.violations(part)));
             return Err(Problem::impossible(&violations));
         };
-        let drawing = drawing::Drawing::new(&drive, subject.subject(), &design.parts_parameters(), &parameters)?;
+        let drawing = drawing::Drawing::new(&drive, subject.subject(), &parts, &parameters)?;
         Ok(DrawingQuestion {
             drawing,
+            drive,
             design_hash: Key::new("design", &of_design, Representation::JSON)?.to_string(),
             subject,
             chord_tolerance_mm: parameters.chord_tolerance_mm,
             input_angle_deg: (subject == DrawnPart::Assembly).then_some(parameters.input_angle_deg),
-            width_mm: drive.parameters().tooth_width_mm,
         })
     }
 
@@ -301,7 +309,11 @@ impl Endpoint for Drawing {
             subject: question.subject,
             chord_tolerance_mm: question.chord_tolerance_mm,
             input_angle_deg: question.input_angle_deg,
-            bodies: bodies.into_iter().map(|body| BodyAnswer::new(body, question.width_mm)).collect(),
+            bodies: bodies
+                .into_iter()
+                .map(|body| BodyAnswer::new(body, question.drive.parameters().tooth_width_mm))
+                .collect(),
+            findings: drive_findings(&question.drive)?,
         })
     }
 }

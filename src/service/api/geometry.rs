@@ -228,7 +228,7 @@ impl Endpoint for Geometry {
 }
 
 impl Forms for GeometryAnswer {
-    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Text, Self::write_text), (Format::Csv, Self::write_csv)];
+    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Csv, Self::write_csv), (Format::Text, Self::write_text)];
 }
 
 impl GeometryAnswer {
@@ -307,7 +307,8 @@ pub(super) fn write_findings(findings: &[FindingAnswer], writer: &mut dyn Write)
     request_body(content = Design, description = "Reads `drive` and `profile`."),
     params(("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
     responses(
-        (status = 200, description = "The geometry.", body = GeometryAnswer, headers(
+        (status = 200, description = "The geometry.", 
+            content((GeometryAnswer = "application/json"), (String = "text/plain"), (String = "text/csv")), headers(
                 ("ETag" = String, description = "Entity tag of this representation."),
                 ("Cache-Status" = String, description = "RFC 9211: `hit`, `fwd=miss`, `collapsed`."),
                 ("Server-Timing" = String, description = "`solve;dur=` and the milliseconds of the solve.")

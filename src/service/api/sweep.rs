@@ -8,6 +8,7 @@ use axum::response::Response;
 use serde::Serialize;
 use toothwave_solver::contact::{SHEAR_DEPTH, SHEAR_SHARE};
 use toothwave_solver::mesh::Mesh;
+use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self as solver, ContactPeaks, InputAngles, Peak, Points, States, TorqueCapacity};
 use toothwave_solver::{Contact, Drive, LoadCase, PerContact, findings};
 use utoipa::ToSchema;
@@ -20,6 +21,7 @@ use crate::config::Limits;
 use crate::design::Design;
 use crate::findings::FindingAnswer;
 use crate::negotiation::Format;
+use crate::plots;
 use crate::problem::{FieldCode, Problem, ProblemCode, too_many};
 
 /// Forces and contact stresses of one meshing zone over one period; the other zone is its point reflection.
@@ -47,6 +49,9 @@ pub struct SweepAnswer {
     pub checks: ChecksAnswer,
     /// What a designer should be told.
     pub findings: Vec<FindingAnswer>,
+    /// Whether a tooth takes load the moment it enters; the plots break there.
+    #[serde(skip)]
+    pub enters_under_load: bool,
 }
 
 /// The peaks of each contact.
@@ -317,6 +322,7 @@ impl Endpoint for Sweep {
                 period_closure_residual: sweep.period_closure_residual,
             },
             states: StatesAnswer::new(sweep.states, *with_clearance),
+            enters_under_load: drive.flank_limit().end != FlankEnd::RegularTip,
             findings,
         };
         let states = &answer.states;
@@ -352,7 +358,8 @@ const STATE_COLUMNS: [&str; 12] = [
 ];
 
 impl Forms for SweepAnswer {
-    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Text, Self::write_text), (Format::Csv, Self::write_csv)];
+    const FORMS: &'static [(Format, Form<Self>)] =
+        &[(Format::Csv, Self::write_csv), (Format::Text, Self::write_text), (Format::Svg, plots::write)];
 
     fn expected_bytes(&self) -> usize {
         // Eleven numbers of about 18 characters and a short one, each with its comma.
@@ -445,8 +452,8 @@ impl SweepAnswer {
     request_body(content = Design, description = "Reads all but `profile`; `load` is required."),
     params(("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
     responses(
-        (status = 200, description = "The sweep. As CSV: one line a state, with the names of the columns of `states`.",
-            content((SweepAnswer = "application/json"), (String = "text/csv")), headers(
+        (status = 200, description = "The sweep. As CSV one line a state, with the names of the columns of `states`; as text a summary; as SVG its plots.",
+            content((SweepAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"), (String = "image/svg+xml")), headers(
                 ("ETag" = String, description = "Entity tag of this representation."),
                 ("Cache-Status" = String, description = "RFC 9211: `hit`, `fwd=miss`, `collapsed`."),
                 ("Server-Timing" = String, description = "`solve;dur=` and the milliseconds of the solve.")

@@ -1,0 +1,148 @@
+//! A sweep's plots as SVG: force and stress of each contact over the place where it acts, as in the paper's figures 11 to 16.
+
+use std::io::{self, Write};
+
+use kuva::backend::svg::SvgBackend;
+use kuva::plot::{LinePlot, ScatterPlot};
+use kuva::render::figure::Figure;
+use kuva::render::layout::Layout;
+use kuva::render::plots::Plot;
+
+use crate::api::sweep::{PeakAnswer, StatesAnswer, SweepAnswer};
+
+/// Apart for readers who do not tell red from green (Okabe and Ito): force, stress.
+const COLORS: [&str; 2] = ["#0072b2", "#d55e00"];
+
+/// More points than a line of a plot this wide can show.
+const MOST_POINTS: usize = 4000;
+
+/// One plot: what is drawn over what.
+struct Panel<'a> {
+    title: String,
+    x_label: &'static str,
+    y_label: &'static str,
+    color: &'static str,
+    x: &'a [f64],
+    y: &'a [f64],
+    peak: &'a PeakAnswer,
+}
+
+/// Writes the plots.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write(sweep: &SweepAnswer, writer: &mut dyn Write) -> io::Result<()> {
+    let states = &sweep.states;
+    let pieces = pass(states, sweep.enters_under_load);
+    let (mut plots, mut layouts) = (Vec::new(), Vec::new());
+    for panel in panels(sweep) {
+        let points = |piece: &Vec<usize>| piece.iter().map(|&i| (panel.x[i], panel.y[i])).collect::<Vec<_>>();
+        let line = |points| LinePlot::new().with_data::<f64, f64, Vec<_>>(points).with_color(panel.color);
+        let mut drawn: Vec<_> =
+            pieces.iter().map(|piece| Plot::Line(line(points(piece)).with_stroke_width(1.5))).collect();
+        let at_peak = (0..panel.y.len()).min_by(|&one, &other| {
+            let away = |i: usize| {
+                (states.input_angle_deg[i] - panel.peak.input_angle_deg).abs()
+                    + (states.position_deg[i] - panel.peak.position_deg).abs()
+            };
+            away(one).total_cmp(&away(other))
+        });
+        if let Some(i) = at_peak {
+            let mark = ScatterPlot::new().with_data([(panel.x[i], panel.peak.value)]);
+            drawn.push(Plot::Scatter(mark.with_color(panel.color).with_size(4.0)));
+        }
+        let layout = Layout::auto_from_plots(&drawn).with_title(panel.title);
+        layouts.push(layout.with_x_label(panel.x_label).with_y_label(panel.y_label));
+        plots.push(drawn);
+    }
+    let figure = Figure::new(2, 3).with_plots(plots).with_layouts(layouts).with_cell_size(420.0, 300.0);
+    let mut text = SvgBackend.render_scene(&figure.render());
+    text.push('\n');
+    writer.write_all(text.as_bytes())
+}
+
+fn panels(sweep: &SweepAnswer) -> Vec<Panel<'_>> {
+    let SweepAnswer { states, peaks, .. } = sweep;
+    let contacts = [
+        (
+            "wave generator",
+            "φ_H from the minor axis, deg",
+            &states.wave_generator_angle_deg,
+            &peaks.wave_generator,
+            &states.force_wave_generator_n,
+            &states.stress_wave_generator_mpa,
+        ),
+        (
+            "ring",
+            "φ_K from the tooth tip, deg",
+            &states.ring_angle_deg,
+            &peaks.ring,
+            &states.force_ring_n,
+            &states.stress_ring_mpa,
+        ),
+        (
+            "carrier",
+            "centre's distance from the axis, mm",
+            &states.center_radius_mm,
+            &peaks.carrier,
+            &states.force_carrier_n,
+            &states.stress_carrier_mpa,
+        ),
+    ];
+    let titled = |quantity: &str, contact: &str, peak: &PeakAnswer, unit: &str| {
+        format!("{quantity}, {contact}: up to {:.1} {unit}", peak.value)
+    };
+    let forces = contacts.iter().map(|&(contact, x_label, x, peaks, force, _)| Panel {
+        title: titled("Force", contact, &peaks.force_n, "N"),
+        x_label,
+        y_label: "force, N",
+        color: COLORS[0],
+        x,
+        y: force,
+        peak: &peaks.force_n,
+    });
+    let stresses = contacts.iter().map(|&(contact, x_label, x, peaks, _, stress)| Panel {
+        title: titled("Stress", contact, &peaks.stress_mpa, "MPa"),
+        x_label,
+        y_label: "stress, MPa",
+        color: COLORS[1],
+        x,
+        y: stress,
+        peak: &peaks.stress_mpa,
+    });
+    forces.chain(stresses).collect()
+}
+
+/// A tooth's pass through the zone as pieces of states, from entry to root, put together from the teeth of one period as the
+/// paper does it (its figures 8 to 10). Where a tooth enters under load, the others' loads jump: there a piece ends.
+fn pass(states: &StatesAnswer, enters_under_load: bool) -> Vec<Vec<usize>> {
+    // States stand by input angle, then tooth; where an angle stands twice, the teeth start anew.
+    let is_new = |i: usize| {
+        i == 0 || states.tooth[i] <= states.tooth[i - 1] || states.input_angle_deg[i] > states.input_angle_deg[i - 1]
+    };
+    let starts: Vec<usize> = (0..states.tooth.len()).filter(|&i| is_new(i)).collect();
+    let frames: Vec<_> = starts.iter().zip(starts.iter().skip(1)).map(|(&from, &to)| from..to).collect();
+    let last = starts.last().map(|&from| from..states.tooth.len());
+    let mut points: Vec<(usize, bool)> = Vec::new();
+    // The last frame repeats the first, teeth renumbered; it only tells whether a tooth entered before it.
+    for (index, frame) in frames.iter().enumerate() {
+        let next = frames.get(index + 1).or(last.as_ref());
+        let newest = |frame: &std::ops::Range<usize>| frame.clone().map(|i| states.tooth[i]).max();
+        let tooth_enters = next.is_some_and(|next| newest(next) > newest(frame));
+        points.extend(frame.clone().map(|i| (i, tooth_enters && enters_under_load)));
+    }
+    points.sort_by(|&(one, _), &(other, _)| states.position_deg[other].total_cmp(&states.position_deg[one]));
+    let stride = points.len().div_ceil(MOST_POINTS).max(1);
+    let mut pieces = vec![Vec::new()];
+    for (index, (i, ends)) in points.iter().enumerate() {
+        let current = pieces.len() - 1;
+        if index % stride == 0 || *ends {
+            pieces[current].push(*i);
+        }
+        if *ends {
+            pieces.push(Vec::new());
+        }
+    }
+    pieces.retain(|piece| !piece.is_empty());
+    pieces
+}

@@ -1,0 +1,334 @@
+//! Drawings over HTTP: outlines that close, areas in closed form, and the same geometry in every format.
+
+use std::f64::consts::PI;
+
+use serde_json::{Value, json};
+
+use crate::asking::{Question, Service};
+use crate::designs::{bored, shortest, undercut, with};
+
+const PARTS: [&str; 4] = ["ring", "wave-generator", "carrier", "tooth"];
+
+/// Case 5.1 with a `parts` group.
+pub(crate) fn made(parts: &str) -> Value {
+    let document = with(&shortest(), "/parts", serde_json::from_str(parts).unwrap());
+    with(&document, "/assembly", json!({}))
+}
+
+/// Parts of case 5.1 that cannot be made: the code, the field, its value and the limit.
+pub(crate) const MISFITS: [(&str, &str, &str, f64, f64); 8] = [
+    (r#"{ "ring": { "outer_radius_mm": 68 } }"#, "ring_without_rim", "/parts/ring/outer_radius_mm", 68.0, 68.0),
+    (r#"{ "carrier": { "inner_radius_mm": 58 } }"#, "carrier_meets_cam", "/parts/carrier/inner_radius_mm", 58.0, 58.0),
+    (r#"{ "carrier": { "outer_radius_mm": 66 } }"#, "carrier_meets_ring", "/parts/carrier/outer_radius_mm", 66.0, 66.0),
+    (
+        r#"{ "carrier": { "inner_radius_mm": 65.5 } }"#,
+        "carrier_without_wall",
+        "/parts/carrier/outer_radius_mm",
+        65.2,
+        65.5,
+    ),
+    (
+        // 7.4 mm over sin(pi/28).
+        r#"{ "carrier": { "clearance_um": 2400 } }"#,
+        "slots_take_carrier",
+        "/parts/carrier/outer_radius_mm",
+        65.2,
+        66.092_391_6,
+    ),
+    (
+        r#"{ "wave_generator": { "bore_radius_mm": 55.5, "clearance_um": 500 } }"#,
+        "bore_takes_cam",
+        "/parts/wave_generator/bore_radius_mm",
+        55.5,
+        55.5,
+    ),
+    (
+        // 56 mm times 56/58, in µm.
+        r#"{ "wave_generator": { "clearance_um": 54069 } }"#,
+        "clearance_takes_cam",
+        "/parts/wave_generator/clearance_um",
+        54_069.0,
+        54_068.965_5,
+    ),
+    (r#"{ "teeth": { "clearance_um": 5000 } }"#, "clearance_takes_tooth", "/parts/teeth/clearance_um", 5000.0, 5000.0),
+];
+
+async fn drawn(part: &str, document: &Value) -> Value {
+    Service::new().post(&format!("/v1/drawings/{part}"), document).await.found()
+}
+
+async fn written(part: &str, document: &Value, accept: &str) -> String {
+    let question = Question::post(&format!("/v1/drawings/{part}"), document.to_string()).with("accept", accept);
+    let answer = Service::new().ask(&question).await;
+    assert_eq!((answer.status, answer.header("content-type")), (200, accept), "{}", answer.text());
+    answer.text().to_owned()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
+}
+
+/// The area of an outline: its chords' by the shoelace formula, and the segments between its arcs and their chords.
+fn area_mm2(outline: &Value) -> f64 {
+    if let Some(radius_mm) = outline["radius_mm"].as_f64() {
+        return PI * radius_mm * radius_mm;
+    }
+    let of_edge = |edge: &Value| {
+        let (x, y) = (numbers(&edge["x_mm"]), numbers(&edge["y_mm"]));
+        if edge["kind"] == "arc" {
+            let (radius_mm, sweep_rad) =
+                (edge["radius_mm"].as_f64().unwrap(), edge["sweep_deg"].as_f64().unwrap().to_radians());
+            // About the origin, which is the arc's centre.
+            return 0.5 * radius_mm * radius_mm * sweep_rad;
+        }
+        (1..x.len()).map(|i| 0.5 * (x[i - 1] * y[i] - x[i] * y[i - 1])).sum()
+    };
+    outline["edges"].as_array().unwrap().iter().map(of_edge).sum()
+}
+
+/// The area of all prisms of a drawing of one part.
+async fn part_area_mm2(part: &str, document: &Value) -> f64 {
+    let drawing = drawn(part, document).await;
+    let [body] = drawing["bodies"].as_array().unwrap().as_slice() else { panic!("{drawing}") };
+    let holes: f64 = body["holes"].as_array().unwrap().iter().map(area_mm2).sum();
+    body["placements"].as_array().unwrap().len() as f64 * (area_mm2(&body["outer"]) - holes)
+}
+
+#[tokio::test]
+async fn what_cannot_be_made_is_refused_with_value_and_limit() {
+    for (parts, code, pointer, value, limit) in MISFITS {
+        let problem =
+            Service::new().post("/v1/drawings/assembly", &made(parts)).await.refused(422, "impossible_design");
+        let [error] = problem["errors"].as_array().unwrap().as_slice() else { panic!("{problem}") };
+        assert_eq!((&error["code"], &error["pointer"]), (&json!(code), &json!(pointer)));
+        for (name, expected) in [("value", value), ("limit", limit)] {
+            let found = error[name].as_f64().unwrap();
+            assert!((found - expected).abs() <= 1e-8 * expected, "{name} of {error}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_part_is_drawn_though_another_cannot_be_made() {
+    let document = made(r#"{ "ring": { "outer_radius_mm": 10 } }"#);
+    drawn("carrier", &document).await;
+    Service::new().post("/v1/drawings/ring", &document).await.refused(422, "impossible_design");
+}
+
+#[tokio::test]
+async fn impossible_values_of_drive_and_parts_are_reported_together() {
+    let document = with(&made(r#"{ "teeth": { "clearance_um": -1 } }"#), "/drive/teeth/radius_mm", json!(0));
+    let problem = Service::new().post("/v1/drawings/tooth", &document).await.refused(422, "impossible_design");
+    assert_eq!(problem["errors"].as_array().unwrap().len(), 2, "{problem}");
+}
+
+#[tokio::test]
+async fn an_unknown_part_is_not_found_and_the_known_ones_are_named() {
+    let problem = Service::new().post("/v1/drawings/gearbox", &shortest()).await.refused(404, "not_found");
+    let detail = problem["detail"].as_str().unwrap();
+    assert!(PARTS.iter().chain(&["assembly"]).all(|part| detail.contains(part)), "{detail}");
+}
+
+#[tokio::test]
+async fn each_edge_starts_at_the_very_point_where_the_one_before_ends() {
+    for document in [shortest(), undercut(), bored()] {
+        for part in PARTS {
+            for body in drawn(part, &document).await["bodies"].as_array().unwrap() {
+                for outline in body["holes"].as_array().unwrap().iter().chain([&body["outer"]]) {
+                    let Some(edges) = outline["edges"].as_array() else { continue };
+                    let ends = |edge: &Value| {
+                        let (x, y) = (numbers(&edge["x_mm"]), numbers(&edge["y_mm"]));
+                        ([x[0], y[0]], [x[x.len() - 1], y[y.len() - 1]])
+                    };
+                    let ends: Vec<_> = edges.iter().map(ends).collect();
+                    for (index, (start, _)) in ends.iter().enumerate() {
+                        assert_eq!(*start, ends[(index + ends.len() - 1) % ends.len()].1, "{part} {index}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The chords are true to this, far finer than what areas are compared to.
+fn finely(document: &Value) -> Value {
+    with(document, "/profile", json!({ "chord_tolerance_mm": 1e-6 }))
+}
+
+fn assert_area(found: f64, expected: f64, what: &str) {
+    assert!((found / expected - 1.0).abs() < 1e-6, "{what}: {found} is not {expected}");
+}
+
+#[tokio::test]
+async fn cam_tooth_and_carrier_have_the_areas_of_their_closed_forms() {
+    let document = finely(&made(
+        r#"{ "wave_generator": { "bore_radius_mm": 20 }, "carrier": { "inner_radius_mm": 59, "outer_radius_mm": 65 } }"#,
+    ));
+    assert_area(part_area_mm2("wave-generator", &document).await, PI * (58.0 * 56.0 - 400.0), "cam");
+    assert_area(part_area_mm2("tooth", &document).await, PI * 25.0, "tooth");
+    // A slot's area between the radii: the strip of half-width w, its ends bounded by the circles.
+    let strip = |radius: f64, w: f64| w * (radius * radius - w * w).sqrt() + radius * radius * (w / radius).asin();
+    let carrier = |w: f64| PI * (65.0 * 65.0 - 59.0 * 59.0) - 28.0 * (strip(65.0, w) - strip(59.0, w));
+    assert_area(part_area_mm2("carrier", &document).await, carrier(5.0), "carrier");
+    let wider = with(&document, "/parts/carrier/clearance_um", json!(30.0));
+    assert_area(part_area_mm2("carrier", &wider).await, carrier(5.03), "carrier with clearance");
+    let thinner = with(&document, "/parts/teeth", json!({ "clearance_um": 10.0 }));
+    assert_area(part_area_mm2("tooth", &thinner).await, PI * 4.99 * 4.99, "tooth with clearance");
+}
+
+/// Steiner: set back by c, a smooth closed curve of length L bounds L c + π c² more outward, L c - π c² less inward.
+#[tokio::test]
+async fn a_clearance_changes_areas_by_length_times_clearance() {
+    let clearance_mm = 0.1;
+    for (part, group, outline, outward) in
+        [("ring", "ring", "/bodies/0/holes/0", 1.0), ("wave-generator", "wave_generator", "/bodies/0/outer", -1.0)]
+    {
+        let curve = async |clearance_um: f64| {
+            let parts = json!({ group: { "clearance_um": clearance_um } });
+            let drawing = drawn(part, &finely(&with(&shortest(), "/parts", parts))).await;
+            let outline = drawing.pointer(outline).unwrap().clone();
+            let chords = polygon(&outline, &json!({ "rotation_deg": 0.0 }));
+            let length_mm: f64 =
+                chords.iter().zip(chords.iter().cycle().skip(1)).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).sum();
+            (area_mm2(&outline), length_mm)
+        };
+        let ((without, length_mm), (with, _)) = (curve(0.0).await, curve(1e3 * clearance_mm).await);
+        let expected = outward * length_mm * clearance_mm + PI * clearance_mm * clearance_mm;
+        assert!(((with - without) / expected - 1.0).abs() < 1e-5, "{part}: {} is not {expected}", with - without);
+    }
+}
+
+#[tokio::test]
+async fn a_bored_ring_has_arcs_for_lands_and_an_undercut_one_points() {
+    let edges = |drawing: Value| drawing["bodies"][0]["holes"][0]["edges"].as_array().unwrap().clone();
+    let kinds = |edges: &[Value], kind: &str| edges.iter().filter(|edge| edge["kind"] == kind).count();
+    let bored = edges(drawn("ring", &bored()).await);
+    assert_eq!((kinds(&bored, "curve"), kinds(&bored, "arc")), (78, 78));
+    assert!(bored.iter().all(|edge| edge["kind"] != "arc" || edge["radius_mm"] == 52.8227));
+    let pointed = edges(drawn("ring", &undercut()).await);
+    assert_eq!((kinds(&pointed, "curve"), kinds(&pointed, "arc")), (78, 0));
+    // At a point the direction turns by twice the angle between flank and symmetry line; no spike reaches beyond.
+    let turn_deg = pointed[1]["start_tangent_deg"].as_f64().unwrap() - pointed[0]["end_tangent_deg"].as_f64().unwrap();
+    assert!(turn_deg.abs() > 10.0 && turn_deg.abs() < 170.0, "{turn_deg}");
+    let geometry = Service::new().post("/v1/geometry", &undercut()).await.found();
+    let tip_radius_mm = geometry["ring"]["tip_radius_mm"].as_f64().unwrap();
+    for edge in &pointed {
+        let (x, y) = (numbers(&edge["x_mm"]), numbers(&edge["y_mm"]));
+        assert!(x.iter().zip(&y).all(|(x, y)| x.hypot(*y) > tip_radius_mm - 1e-12));
+    }
+}
+
+#[tokio::test]
+async fn every_format_says_what_it_is_of() {
+    for part in PARTS.iter().chain(&["assembly"]) {
+        let drawing = drawn(part, &bored()).await;
+        let hash = drawing["design_hash"].as_str().unwrap();
+        for accept in ["image/svg+xml", "image/vnd.dxf"] {
+            let text = written(part, &bored(), accept).await;
+            assert!(text.contains(&format!(
+                "toothwave {}, {part}, design {hash}",
+                drawing["solver_version"].as_str().unwrap()
+            )));
+            assert!(!text.contains("NaN") && !text.contains("inf"), "{part}");
+        }
+    }
+    let at = |deg: f64| with(&bored(), "/assembly", json!({ "input_angle_deg": deg }));
+    assert_eq!(
+        drawn("assembly", &at(0.0)).await["design_hash"],
+        drawn("assembly", &at(30.0)).await["design_hash"],
+        "the design is the same at every angle"
+    );
+}
+
+#[tokio::test]
+async fn a_dxf_declares_millimetres_and_a_layer_a_part_and_closes_every_polyline() {
+    let text = written("assembly", &undercut(), "image/vnd.dxf").await;
+    let pairs: Vec<_> = text
+        .split("\r\n")
+        .collect::<Vec<_>>()
+        .chunks_exact(2)
+        .map(|pair| (pair[0].trim(), pair[1]))
+        .collect::<Vec<_>>();
+    let follows =
+        |first: (&str, &str), then: (&str, &str)| pairs.windows(2).any(|two| two[0] == first && two[1] == then);
+    assert!(follows(("9", "$INSUNITS"), ("70", "4")) && follows(("9", "$ACADVER"), ("1", "AC1015")));
+    for layer in ["RING", "CARRIER", "TEETH", "WAVE_GENERATOR"] {
+        assert!(pairs.contains(&("8", layer)) && pairs.contains(&("2", layer)), "{layer}");
+    }
+    let polylines = pairs.iter().filter(|pair| **pair == ("0", "LWPOLYLINE")).count();
+    let closed = pairs.windows(2).filter(|two| two[0].0 == "90" && two[1] == ("70", "1")).count();
+    // Ring and cam, and a finger between any two of the forty slots.
+    assert_eq!((polylines, closed), (42, 42));
+    assert_eq!(pairs.iter().filter(|pair| **pair == ("0", "CIRCLE")).count(), 41);
+}
+
+#[tokio::test]
+async fn parts_are_read_by_drawings_alone() {
+    let service = Service::new();
+    let document = made(r#"{ "ring": { "outer_radius_mm": 1, "clearance_um": -5 } }"#);
+    for path in ["/v1/geometry", "/v1/coincidence-degree", "/v1/sweep"] {
+        service.post(path, &shortest()).await.found();
+        assert!(service.post(path, &document).await.is_hit(), "{path}");
+    }
+}
+
+#[tokio::test]
+async fn a_drawing_of_one_part_does_not_ask_at_what_angle() {
+    let service = Service::new();
+    service.post("/v1/drawings/ring", &shortest()).await.found();
+    let turned = with(&shortest(), "/assembly", json!({ "input_angle_deg": 12.5 }));
+    assert!(service.post("/v1/drawings/ring", &turned).await.is_hit());
+    service.post("/v1/drawings/assembly", &shortest()).await.found();
+    assert!(service.post("/v1/drawings/assembly", &turned).await.is_miss());
+}
+
+/// In the wave generator's frame every tooth touches the cam from outside and, in the ring's, its flank from inside: the distance
+/// of its centre from the outline is its radius, to the chord tolerance, wherever it is engaged.
+#[tokio::test]
+async fn in_an_assembly_every_engaged_tooth_touches_cam_and_ring() {
+    for (design, start_deg) in [(shortest(), 90.0), (undercut(), 43.607_598_857_26), (bored(), 34.0787)] {
+        let radius_mm = design["drive"]["teeth"]["radius_mm"].as_f64().unwrap();
+        for angle_deg in [0.0, 7.0, 100.0, -33.0, 359.0, 1e5 + 0.25] {
+            let document = with(&design, "/assembly", json!({ "input_angle_deg": angle_deg }));
+            let drawing = drawn("assembly", &document).await;
+            let bodies = drawing["bodies"].as_array().unwrap();
+            let body = |part: &str| bodies.iter().find(|body| body["part"] == part).unwrap();
+            let cam = polygon(&body("wave_generator")["outer"], &body("wave_generator")["placements"][0]);
+            let ring = polygon(&body("ring")["holes"][0], &body("ring")["placements"][0]);
+            let mut engaged = 0;
+            for tooth in body("teeth")["placements"].as_array().unwrap() {
+                let center = [tooth["x_mm"].as_f64().unwrap(), tooth["y_mm"].as_f64().unwrap()];
+                let to_cam = distance(&cam, center) - radius_mm;
+                let to_ring = distance(&ring, center) - radius_mm;
+                assert!(to_cam.abs() < 2e-3, "{angle_deg}: {to_cam}");
+                assert!(to_ring > -2e-3, "{angle_deg}: {to_ring}");
+                let position_deg = (center[1].atan2(center[0]).to_degrees() - angle_deg).rem_euclid(180.0);
+                if position_deg > 0.01 && position_deg < start_deg - 0.01 {
+                    engaged += 1;
+                    assert!(to_ring < 2e-3, "{angle_deg} {position_deg}: {to_ring}");
+                }
+            }
+            assert!(engaged >= 6, "{engaged}");
+        }
+    }
+}
+
+/// The chords of an outline where it stands; arcs, which are lands here, as their three points.
+fn polygon(outline: &Value, placement: &Value) -> Vec<[f64; 2]> {
+    let (sin, cos) = placement["rotation_deg"].as_f64().unwrap().to_radians().sin_cos();
+    let edges = outline["edges"].as_array().unwrap();
+    let points = edges.iter().flat_map(|edge| numbers(&edge["x_mm"]).into_iter().zip(numbers(&edge["y_mm"])));
+    points.map(|(x, y)| [x * cos - y * sin, x * sin + y * cos]).collect()
+}
+
+/// The least distance of a point from a closed polygon.
+fn distance(polygon: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
+    let of_chord = |(from, to): (&[f64; 2], &[f64; 2])| {
+        let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+        let length2 = dx * dx + dy * dy;
+        let along = if length2 == 0.0 { 0.0 } else { ((x - from[0]) * dx + (y - from[1]) * dy) / length2 };
+        let along = along.clamp(0.0, 1.0);
+        (x - from[0] - along * dx).hypot(y - from[1] - along * dy)
+    };
+    polygon.iter().zip(polygon.iter().cycle().skip(1)).map(of_chord).fold(f64::INFINITY, f64::min)
+}
