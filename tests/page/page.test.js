@@ -353,6 +353,11 @@ test('law, clearance, capacity, tolerance and wind-up are asked for in the form 
   await enter(page, '/model/clearance/ring_um', 8);
   assert.match(await page.locator('#table tr', { hasText: 'Most wind-up' }).textContent(), /deg.*deg\+.*%/);
   assert.match(await page.locator('#table tr', { hasText: 'Output torque' }).textContent(), /N·m.*N·m[−+].*%/);
+  // What only one of both has asked for is a dash for the other, without a unit.
+  await enter(page, '/load/allowable_stress_mpa', '');
+  assert.match(await page.locator('#table tr', { hasText: 'Output torque' }).textContent(), /^Output torque MG–\d[\d.]*N·m$/);
+  await page.click('#undo');
+  await settled(page);
   // The torque's other shaft keeps the rest of the load, and what is emptied is left out of the document.
   await page.selectOption(field('/load'), 'output_torque_nm');
   await page.selectOption(field('/sweep'), 'samples');
