@@ -12,7 +12,7 @@ import { Mechanism, stressColor } from './mechanism.js';
 import { CONTACTS, Motion } from './motion.js';
 import { passOf } from './pass.js';
 import { Plots } from './plots.js';
-import { reportOf } from './report.js';
+import { findingsTable, reportOf } from './report.js';
 import { Results } from './results.js';
 import { Service, evaluate, getJson } from './service.js';
 import * as share from './share.js';
@@ -31,6 +31,7 @@ const state = {
   shown: undefined,
   reference: undefined,
   reasons: [],
+  findings: [],
   examples: [],
   origin: '',
   inputDeg: 0,
@@ -146,14 +147,14 @@ function onResult({ design, answers, problems, solveMs }) {
     mechanism.setMotion(motion);
     setText(byId('solved'), `Solver ${answers.geometry.solver_version}, solved in ${number(solveMs, 2)} ms`);
   }
-  const findings = isDrawn ? findingsOf(answers) : [];
+  state.findings = isDrawn ? findingsOf(answers) : [];
   // Hints beside the fields stand on the last drive that could exist.
-  form.setResult(state.shown?.answers ?? {}, state.reasons, findings);
-  showFindings(findings);
+  form.setResult(state.shown?.answers ?? {}, state.reasons, state.findings);
+  showFindings();
   showReasons(isDrawn);
   showComparison();
   render();
-  announce(findings);
+  announce();
 }
 
 function showReasons(isDrawn) {
@@ -190,7 +191,8 @@ function findingNote(finding) {
 
 const noFindings = html('p', { class: 'none' });
 
-function showFindings(findings) {
+function showFindings() {
+  const { findings } = state;
   setText(noFindings, state.reasons.length > 0 ? 'The reasons why the design cannot exist come first.' : 'Nothing to report about this design.');
   setChildren(byId('findings'), findings.length > 0 ? findings.map(findingNote) : [noFindings]);
 }
@@ -205,10 +207,10 @@ function showComparison() {
 }
 
 let announceTimer;
-function announce(findings) {
+function announce() {
   clearTimeout(announceTimer);
   announceTimer = setTimeout(() => {
-    const { reasons } = state;
+    const { reasons, findings } = state;
     const list = findings.map(titleOf).join(', ');
     setText(
       byId('announcer'),
@@ -450,16 +452,13 @@ function listen() {
   });
   addEventListener('hashchange', fromAddress);
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => plots.restyle());
-  let folded = [];
   addEventListener('beforeprint', () => {
-    folded = [...byId('findings').querySelectorAll('details:not([open])')];
-    for (const details of folded) details.open = true;
+    byId('findings-table').replaceChildren(...findingsTable(state.findings));
     byId('report').replaceChildren(...reportOf(nameOf(state.design), state, location.href));
     document.documentElement.classList.add('printing');
     plots.restyle(true);
   });
   addEventListener('afterprint', () => {
-    for (const details of folded) details.open = false;
     document.documentElement.classList.remove('printing');
     plots.restyle();
   });
