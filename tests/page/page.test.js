@@ -531,6 +531,32 @@ test('accuracy: measured on demand, equal to the API, and a row applies its choi
   await page.waitForFunction(() => document.querySelector('#accuracy-state').textContent.includes('must exceed'));
 });
 
+test('accuracy: a fixed law has rows of its own, and they bring back the stiffnesses that were measured', async () => {
+  page = await open(browser, server);
+  await page.selectOption(field('/model/stiffness'), 'fixed');
+  await enter(page, '/model/stiffness/ring_n_per_mm', 250000);
+  const original = await designOf(page);
+  await measure();
+  const own = page.locator('#accuracy-list details', { hasText: /^Projection, fixed/ });
+  assert.equal(await own.locator('summary').textContent(), 'Projection, fixed this design’s own');
+  const errors = await own.locator('tbody td:nth-child(2) data').evaluateAll((cells) => cells.map(({ value }) => Number(value)));
+  const { ways } = await server.ask('/v1/accuracy', original);
+  assert.deepEqual(errors, ways.filter(({ compatibility, law }) => compatibility === 'projection' && law === 'fixed').map(({ error }) => error));
+  const use = async (way) => {
+    await page.$eval(`#accuracy-list button[aria-label="${way}"]`, (button) => button.click());
+    await settled(page);
+    return designOf(page);
+  };
+  assert.deepEqual((await use('50 samples: use with Virtual work, Palmgren')).model, { compatibility: 'virtual_work', stiffness: { law: 'palmgren' } });
+  assert.deepEqual((await use('50 samples: use with Virtual work, fixed')).model, { ...original.model, compatibility: 'virtual_work' });
+  // Other stiffnesses are another question, of which the rows know nothing.
+  await enter(page, '/model/stiffness/ring_n_per_mm', 400000);
+  assert.match(await page.textContent('#accuracy-state'), /another design; measure again/);
+  const back = await use('100 samples: use with Projection, fixed');
+  assert.deepEqual(back, { ...original, model: { ...original.model, compatibility: 'projection' }, sweep: { samples: 100 } });
+  await assertShows(back);
+});
+
 test('the drawing stands where the service says', async () => {
   page = await open(browser, server);
   for (const name of ['paper-5.1', 'paper-5.2', 'ring-with-more-teeth']) {
