@@ -638,6 +638,19 @@ test('a jump is a break in the plots, and only where a tooth enters under load',
   assert.deepEqual(await breaks('paper-5.2'), { nulls: 4, sorted: true });
 });
 
+test('of thousands of teeth the whole drive shows what can be told apart, and always the selected one', async () => {
+  page = await open(browser, server);
+  const teeth = { radius_mm: 1.2, width_mm: 15, count: 10000 };
+  await setDocument({ drive: { wave_generator: { semi_major_mm: 5000.7, semi_minor_mm: 4999.3 }, teeth, ring: { teeth: 9998 } }, load: { input_torque_nm: 3 } });
+  const drawn = await page.$$eval('#whole .tooth', (circles) => circles.map((circle) => Number(circle.dataset.tooth)));
+  assert.ok(drawn.length > 1000 && drawn.length <= 1440, `${drawn.length} teeth`);
+  const tooth = [...Array(10).keys()].slice(4).find((candidate) => !drawn.includes(candidate));
+  for (let presses = 3; presses < tooth; presses += 1) await page.click('#tooth-after');
+  await settled(page);
+  assert.equal(await page.textContent('#tooth-name'), `Tooth ${tooth}`);
+  for (const view of ['#whole', '#detail']) assert.equal(await page.getAttribute(`${view} .tooth.selected`, 'data-tooth'), String(tooth));
+});
+
 test('plots and mechanism are linked; peaks lead to their place', async () => {
   page = await open(browser, server);
   for (const abscissa of ['input', 'ring', 'cam', 'slot']) {
