@@ -87,6 +87,9 @@ test('every example loads, and the table shows the service’s numbers', async (
   for (const { name } of examples) {
     await choose(page, name);
     assert.equal(await page.getAttribute(`[data-example="${name}"]`, 'aria-pressed'), 'true');
+    // The mouse still stands on it.
+    const [color, background] = await page.$eval(`[data-example="${name}"]`, (button) => ['color', 'backgroundColor'].map((key) => getComputedStyle(button)[key]));
+    assert.notEqual(color, background, 'a pressed button can be read');
     await assertShows(await server.example(name));
   }
 });
@@ -205,6 +208,7 @@ test('undo and redo, by button and by keyboard', async () => {
   await page.keyboard.press('Control+z');
   await settled(page);
   assert.equal((await designOf(page)).drive.teeth.radius_mm, 4.5);
+  assert.equal(await page.textContent('#design-name'), 'The paper\'s case 5.1 (changed)');
   await page.click('#undo');
   await settled(page);
   assert.deepEqual(await designOf(page), await server.example('paper-5.1'));
@@ -233,6 +237,7 @@ test('the address holds design and reference', async () => {
   await assertShows(design);
   await page.waitForFunction(() => document.querySelector('#comparing').textContent.includes('case 5.1'));
   // A link pasted into an open page is followed too, and a broken one does no harm.
+  assert.equal(await page.textContent('#design-name'), 'A design of your own');
   await page.evaluate(() => (location.hash = '#design=broken'));
   await settled(page);
   assert.deepEqual(await designOf(page), design);
