@@ -2,9 +2,11 @@
 
 import { html } from './dom.js';
 import { number, withUnit } from './format.js';
+import { CONTACTS } from './motion.js';
 
-const GEOMETRY = 'The limit is geometry, exact.';
-const RULE_OF_THUMB = 'The limit is a rule of thumb: it marks where to look again.';
+/** Where a limit comes from, in a word and in a sentence. */
+const GEOMETRY = ['exact', 'The limit is geometry, exact.'];
+const RULE_OF_THUMB = ['rule of thumb', 'The limit is a rule of thumb: it marks where to look again.'];
 
 /** By code: a title, what is tested and where its limit comes from, and what `detail` and `advice` leave to be said. */
 const KINDS = {
@@ -40,7 +42,7 @@ const KINDS = {
   tooth_beyond_carrier: {
     title: 'Tooth leaves the carrier',
     tests: 'The radius that a loaded tooth’s centre reaches against the edge of the annulus between cam and ring tips.',
-    basis: 'The limit is that of a carrier without clearance; a real one is smaller.',
+    basis: ['no clearance', 'The limit is that of a carrier without clearance; a real one is smaller.'],
     why: 'The contact stress of a flat wall is then too favourable.',
   },
   steep_ring_flank: {
@@ -51,20 +53,20 @@ const KINDS = {
   stress_above_fatigue_limit: {
     title: 'Stress above the fatigue limit',
     tests: 'The peak contact stress over a period against the fatigue limit of bearing steel.',
-    basis: 'The limit is that of ISO 281:2007 for rolling bearings of common high-quality steel.',
+    basis: ['ISO 281:2007', 'The limit is that of ISO 281:2007 for rolling bearings of common high-quality steel.'],
     why: 'Above it, hardened bearing steel has to be expected to fatigue in the end, softer steel earlier; below it nothing is proven.',
     change: 'Stress grows with the square root of the torque.',
   },
   linear_law_too_stiff: {
     title: 'Linear law is too stiff',
     tests: 'How far the tooth and the wave generator approach under the peak force by the linear law, against the same by Palmgren’s.',
-    basis: 'The limit is measured: Palmgren’s formula for steel rollers.',
+    basis: ['Palmgren’s law', 'The limit is measured: Palmgren’s formula for steel rollers.'],
     why: 'Without clearance the forces hardly notice; torsional stiffness comes out as much too large.',
   },
   palmgren_beyond_steel: {
     title: 'Palmgren’s law is for steel',
     tests: 'The contact’s elastic modulus against that of steel on steel.',
-    basis: 'The limit is a rule of thumb: steels differ by less than 10 %.',
+    basis: ['steel on steel', 'The limit is a rule of thumb: steels differ by less than 10 %.'],
     why: 'The law knows no modulus: load sharing, wind-up and stiffness are those of steel, only the stresses see the material.',
     change: 'The linear law follows the modulus too, but is too stiff.',
   },
@@ -72,18 +74,35 @@ const KINDS = {
 
 const words = (code) => code.replaceAll('_', ' ').replace(/^./, (letter) => letter.toUpperCase());
 
-export const titleOf = ({ code }) => KINDS[code]?.title ?? words(code);
+export const kindOf = ({ code }) => KINDS[code]?.title ?? words(code);
 
-/** The service spells numbers with all their digits; in a sentence a designer wants those that matter. */
-export const readable = (text) => text.replace(/\d+\.\d{5,}/g, (digits) => number(Number(digits), 6));
+/** The contact that a finding is about, where it is about one. */
+export const contactOf = ({ pointers }) => CONTACTS.find(({ key }) => pointers.includes(`/materials/${key}`));
+
+export function titleOf(finding) {
+  const contact = contactOf(finding);
+  return kindOf(finding) + (contact ? `, ${contact.name.toLowerCase()}` : '');
+}
+
+export const basisOf = ({ code }) => KINDS[code]?.basis[0];
+
+/** The service spells numbers with all their digits and marks words of the document; in a sentence a designer wants the digits
+ *  that matter, and quotes. */
+export const readable = (text) => text.replace(/\d+\.\d{5,}/g, (digits) => number(Number(digits), 6)).replace(/`([^`]*)`/g, '“$1”');
 
 export const sentence = (text) => `${text[0].toUpperCase()}${text.slice(1)}${text.endsWith('.') ? '' : '.'}`;
+
+/** What a finding means beyond its title, its numbers and its contact. */
+export function meaningOf(finding) {
+  const { why = '' } = KINDS[finding.code] ?? {};
+  return contactOf(finding) && why ? why : `${sentence(readable(finding.detail))} ${why}`.trim();
+}
 
 /** What a finding tests, why it matters and what to change. `goTo(pointer)` leads to a field. */
 export function explanation(finding, labelOf, goTo) {
   const { code, value, limit, unit, detail, advice, pointers } = finding;
   const measured = `${withUnit(number(value, 5), unit)} against ${withUnit(number(limit, 5), unit)}`;
-  const { tests = '', basis = '', why = '', change = '' } = KINDS[code] ?? {};
+  const { tests = '', basis: [, basis] = ['', ''], why = '', change = '' } = KINDS[code] ?? {};
   const fields = pointers.map((pointer) =>
     html('button', { type: 'button', class: 'link', onclick: () => goTo(pointer) }, labelOf(pointer)),
   );
@@ -95,7 +114,7 @@ export function explanation(finding, labelOf, goTo) {
     html('dt', {}, 'Why it matters'),
     html('dd', {}, `${sentence(readable(detail))} ${why}`),
     html('dt', {}, 'What to change'),
-    html('dd', {}, `${sentence(advice)} ${change} `, html('span', { class: 'fields' }, fields)),
+    html('dd', {}, `${sentence(readable(advice))} ${change} `, html('span', { class: 'fields' }, fields)),
   );
 }
 
@@ -107,9 +126,10 @@ export function findingsOf(answers) {
   }
   const counts = new Map();
   return [...unique.values()].map((finding) => {
-    const count = (counts.get(finding.code) ?? 0) + 1;
-    counts.set(finding.code, count);
-    return { ...finding, key: `${finding.code}-${count}` };
+    const name = `${finding.code}-${contactOf(finding)?.key ?? ''}`;
+    const count = (counts.get(name) ?? 0) + 1;
+    counts.set(name, count);
+    return { ...finding, key: `${name}-${count}` };
   });
 }
 

@@ -355,9 +355,10 @@ export class Form {
     this.goTo(pointer);
   }
 
-  #findingNote({ key, code, pointers }, place) {
+  #findingNote(first, place) {
+    const { key, pointers } = first;
     const panel = html('div', { id: `${idOf(place, 'why')}-${key}`, hidden: true });
-    const button = html('button', { type: 'button', class: 'finding', 'aria-expanded': 'false', 'aria-controls': panel.id }, titleOf({ code }));
+    const button = html('button', { type: 'button', class: 'finding', 'aria-expanded': 'false', 'aria-controls': panel.id }, titleOf(first));
     button.addEventListener('click', () => {
       panel.hidden = !panel.hidden;
       button.setAttribute('aria-expanded', String(!panel.hidden));

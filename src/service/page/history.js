@@ -1,4 +1,4 @@
-// Undo and redo over whole documents: they are small and never changed in place.
+// Undo and redo over whole documents, with where each came from: they are small and never changed in place.
 
 const MOST_STEPS = 200;
 
@@ -6,9 +6,9 @@ export class History {
   #past = [];
   #future = [];
 
-  /** Remembers the document that is about to be replaced. */
-  record(design) {
-    this.#past.push(design);
+  /** Remembers the `{ design, origin }` that is about to be replaced. */
+  record(current) {
+    this.#past.push(current);
     if (this.#past.length > MOST_STEPS) this.#past.shift();
     this.#future = [];
   }

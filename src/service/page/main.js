@@ -12,7 +12,7 @@ import { Mechanism, stressColor } from './mechanism.js';
 import { CONTACTS, Motion } from './motion.js';
 import { passOf } from './pass.js';
 import { Plots } from './plots.js';
-import { reportOf } from './report.js';
+import { findingsTable, reportOf } from './report.js';
 import { Results } from './results.js';
 import { Service, evaluate, getJson } from './service.js';
 import * as share from './share.js';
@@ -31,6 +31,7 @@ const state = {
   shown: undefined,
   reference: undefined,
   reasons: [],
+  findings: [],
   examples: [],
   origin: '',
   inputDeg: 0,
@@ -82,15 +83,16 @@ const accuracy = new Accuracy(
 
 // ---- the design
 
-function setDesign(design, { gesture: newGesture, fromForm = false, respan = false } = {}) {
+function setDesign(design, { gesture: newGesture, origin = state.origin, fromForm = false, respan = false } = {}) {
   if (state.design && isSame(design, state.design)) return;
-  if (state.design && !(newGesture && newGesture === gesture)) history.record(state.design);
+  if (state.design && !(newGesture && newGesture === gesture)) history.record(current());
   gesture = newGesture;
-  replaceDesign(design, { fromForm, respan });
+  replaceDesign(design, { origin, fromForm, respan });
 }
 
-function replaceDesign(design, { fromForm = false, respan = false } = {}) {
+function replaceDesign(design, { origin, fromForm = false, respan = false }) {
   state.design = design;
+  state.origin = origin;
   form.setDesign(design, { respan: respan && !fromForm });
   accuracy.setDesign(design);
   service.request(design);
@@ -100,19 +102,21 @@ function replaceDesign(design, { fromForm = false, respan = false } = {}) {
   addressLater();
 }
 
-function step(design) {
-  if (design === undefined) return;
+const current = () => ({ design: state.design, origin: state.origin });
+
+function step(to) {
+  if (to === undefined) return;
   gesture = undefined;
-  replaceDesign(design);
+  replaceDesign(to.design, { origin: to.origin });
 }
 
-const undo = () => step(history.undo(state.design));
-const redo = () => step(history.redo(state.design));
+const undo = () => step(history.undo(current()));
+const redo = () => step(history.redo(current()));
 
-function nameOf(design) {
+function nameOf(design, origin = state.origin) {
   const example = state.examples.find((candidate) => isSame(candidate.design, design));
   if (example) return example.title;
-  return state.origin ? `${state.origin} (changed)` : 'A design of your own';
+  return origin ? `${origin} (changed)` : 'A design of your own';
 }
 
 function showName() {
@@ -146,14 +150,14 @@ function onResult({ design, answers, problems, solveMs }) {
     mechanism.setMotion(motion);
     setText(byId('solved'), `Solver ${answers.geometry.solver_version}, solved in ${number(solveMs, 2)} ms`);
   }
-  const findings = isDrawn ? findingsOf(answers) : [];
+  state.findings = isDrawn ? findingsOf(answers) : [];
   // Hints beside the fields stand on the last drive that could exist.
-  form.setResult(state.shown?.answers ?? {}, state.reasons, findings);
-  showFindings(findings);
+  form.setResult(state.shown?.answers ?? {}, state.reasons, state.findings);
+  showFindings();
   showReasons(isDrawn);
   showComparison();
   render();
-  announce(findings);
+  announce();
 }
 
 function showReasons(isDrawn) {
@@ -190,7 +194,8 @@ function findingNote(finding) {
 
 const noFindings = html('p', { class: 'none' });
 
-function showFindings(findings) {
+function showFindings() {
+  const { findings } = state;
   setText(noFindings, state.reasons.length > 0 ? 'The reasons why the design cannot exist come first.' : 'Nothing to report about this design.');
   setChildren(byId('findings'), findings.length > 0 ? findings.map(findingNote) : [noFindings]);
 }
@@ -205,10 +210,10 @@ function showComparison() {
 }
 
 let announceTimer;
-function announce(findings) {
+function announce() {
   clearTimeout(announceTimer);
   announceTimer = setTimeout(() => {
-    const { reasons } = state;
+    const { reasons, findings } = state;
     const list = findings.map(titleOf).join(', ');
     setText(
       byId('announcer'),
@@ -228,17 +233,21 @@ function onAway(away, detail) {
 
 // ---- the reference
 
-async function keepReference(design, answers) {
-  const name = nameOf(design);
+async function keepReference({ design, origin }, answers) {
+  const name = nameOf(design, origin);
   const known = answers ?? (await evaluate(design).catch(() => ({ answers: {} }))).answers;
   if (!known.geometry) {
     setText(byId('announcer'), 'The reference could not be calculated.');
     return;
   }
-  state.reference = { design, name, answers: known, geometry: known.geometry, pass: known.sweep && passOf(design, known.geometry, known.sweep) };
+  state.reference = { design, origin, name, answers: known, geometry: known.geometry, pass: known.sweep && passOf(design, known.geometry, known.sweep) };
   showComparison();
   render();
   addressLater();
+}
+
+function keepShown() {
+  if (state.shown) keepReference({ design: state.shown.design, origin: state.origin }, state.shown.answers);
 }
 
 function clearReference() {
@@ -250,9 +259,9 @@ function clearReference() {
 }
 
 function swapReference() {
-  const { design } = state.reference;
-  if (state.shown) keepReference(state.shown.design, state.shown.answers);
-  setDesign(design, { respan: true });
+  const { design, origin } = state.reference;
+  keepShown();
+  setDesign(design, { origin, respan: true });
 }
 
 // ---- motion
@@ -361,8 +370,7 @@ function applyText(text, origin) {
   const error = byId('document-error');
   try {
     const design = share.fromText(text);
-    state.origin = origin;
-    setDesign(design, { respan: true });
+    setDesign(design, { origin, respan: true });
     error.hidden = true;
     byId('document').close();
   } catch (failure) {
@@ -396,7 +404,7 @@ function listen() {
   const click = (id, action) => byId(id).addEventListener('click', action);
   click('undo', undo);
   click('redo', redo);
-  click('keep', () => state.shown && keepReference(state.shown.design, state.shown.answers));
+  click('keep', keepShown);
   click('clear', clearReference);
   click('swap', swapReference);
   click('copy-link', ({ currentTarget }) => {
@@ -450,16 +458,13 @@ function listen() {
   });
   addEventListener('hashchange', fromAddress);
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => plots.restyle());
-  let folded = [];
   addEventListener('beforeprint', () => {
-    folded = [...byId('findings').querySelectorAll('details:not([open])')];
-    for (const details of folded) details.open = true;
+    byId('findings-table').replaceChildren(...findingsTable(state.findings));
     byId('report').replaceChildren(...reportOf(nameOf(state.design), state, location.href));
     document.documentElement.classList.add('printing');
     plots.restyle(true);
   });
   addEventListener('afterprint', () => {
-    for (const details of folded) details.open = false;
     document.documentElement.classList.remove('printing');
     plots.restyle();
   });
@@ -468,8 +473,8 @@ function listen() {
 function fromAddress() {
   try {
     const { design, reference } = share.fromAddress(location.hash);
-    if (reference && !isSame(reference, state.reference?.design)) keepReference(reference);
-    if (design) setDesign(design, { respan: true });
+    if (reference && !isSame(reference, state.reference?.design)) keepReference({ design: reference, origin: '' });
+    if (design) setDesign(design, { origin: '', respan: true });
     return design !== undefined;
   } catch {
     setText(byId('announcer'), 'The address holds no design that can be read.');
@@ -488,8 +493,7 @@ function showExamples() {
     example.button = html('button', { type: 'button', title: example.title, 'data-example': example.name }, label[0].toUpperCase() + label.slice(1));
     example.button.addEventListener('click', () => {
       gesture = undefined;
-      state.origin = example.title.split(':')[0];
-      setDesign(example.design, { respan: true });
+      setDesign(example.design, { origin: example.title.split(':')[0], respan: true });
     });
     byId('examples').append(example.button);
   }
@@ -510,8 +514,7 @@ async function start() {
   showExamples();
   if (!fromAddress()) {
     const first = state.examples.find(({ name }) => name === FIRST_EXAMPLE) ?? state.examples[0];
-    state.origin = first.title.split(':')[0];
-    setDesign(first.design, { respan: true });
+    setDesign(first.design, { origin: first.title.split(':')[0], respan: true });
   }
   byId('legend').querySelector('.ramp').style.background = `linear-gradient(to right, ${[0, 0.25, 0.5, 0.75, 1].map(stressColor).join(', ')})`;
   if (!matchMedia('(prefers-reduced-motion: reduce)').matches) play(true);

@@ -13,6 +13,10 @@ const ARROW_HEAD = 0.016;
 /** Points of the whole ring are this share of its radius apart at least: less than a pixel, also in print. */
 const FINEST = 4000;
 
+/** Of more teeth than this the whole drive shows every second, every third and so on, with their slots and arrows: those between
+ *  would fall on the same pixel. */
+const MOST_TEETH = 1440;
+
 /** Tooth spaces, slots and teeth that the enlarged view has on either side. */
 const NEAR = 5;
 
@@ -44,8 +48,9 @@ function flanks(geometry, teeth, first, count, spacing) {
   return all;
 }
 
-/** The carrier: the annulus that the mechanics leave it, cut by radial slots as wide as a tooth; `count` pieces of it. */
-function carrierOutline({ geometry, installed, toothRadius }, first, count) {
+/** The carrier: the annulus that the mechanics leave it, cut by radial slots as wide as a tooth; `count` pieces of it, each as long
+ *  as `stride` teeth are apart. */
+function carrierOutline({ geometry, installed, toothRadius }, first, count, stride = 1) {
   const half = Math.PI / installed;
   const outer = geometry.carrier.outer_radius_limit_mm;
   // Where slots run into each other, the walls begin further out.
@@ -55,7 +60,7 @@ function carrierOutline({ geometry, installed, toothRadius }, first, count) {
   const wallAt = (radius) => Math.asin(Math.min(1, toothRadius / radius)) * deg;
   const parts = [];
   for (let index = first; index < first + count; index += 1) {
-    const [from, to] = [(index * 360) / installed, ((index + 1) * 360) / installed];
+    const [from, to] = [index, index + 1].map((slot) => (Math.min(slot * stride, first + installed) * 360) / installed);
     const corners = [
       polar(inner, from + wallAt(inner)),
       polar(outer, from + wallAt(outer)),
@@ -122,14 +127,18 @@ class Body {
     for (const tooth of this.circles) setAttributes(tooth, { r: outlines.toothRadius });
   }
 
-  /** Places cam, carrier, teeth from the `first` on, and arrows; `turns` are those of ring and carrier pieces. */
-  place(motion, inputDeg, loaded, { selected, first, turns, arrows }) {
+  /** Places cam, carrier, each `stride`th tooth from the `first` on, and arrows; `turns` are those of ring and carrier pieces. */
+  place(motion, inputDeg, loaded, { selected, first, stride, turns, arrows }) {
     for (const part of [this.camGroup, this.zoneGroup, this.ghostCam]) setAttributes(part, { transform: `rotate(${inputDeg})` });
     for (const part of [this.ring, this.track]) setAttributes(part, { transform: `rotate(${turns.ring})` });
     setAttributes(this.carrier, { transform: `rotate(${turns.carrier})` });
     const byTooth = new Map(loaded.teeth.map((tooth) => [tooth.tooth, tooth]));
+    const drawn = new Set();
     this.circles.forEach((element, index) => {
-      const tooth = (first + index + motion.installed) % motion.installed;
+      // The selected tooth is never one of those left out.
+      const isSelected = stride > 1 && index === Math.floor(selected / stride);
+      const tooth = isSelected ? selected : (first + index * stride + motion.installed) % motion.installed;
+      drawn.add(tooth);
       const { x, y } = motion.center(tooth, inputDeg);
       const state = byTooth.get(tooth);
       const share = state && Math.max(...Object.values(state.stress)) / loaded.mostStress;
@@ -138,8 +147,9 @@ class Body {
       element.classList.toggle('selected', tooth === selected);
     });
     const lengthPerNewton = arrows.longest / loaded.mostForce;
+    const pushed = loaded.teeth.filter(({ tooth }) => drawn.has(tooth));
     for (const { key } of CONTACTS) {
-      setAttributes(this.arrows[key], { d: loaded.teeth.map((tooth) => arrow(tooth, key, lengthPerNewton, arrows.head)).join('') });
+      setAttributes(this.arrows[key], { d: pushed.map((tooth) => arrow(tooth, key, lengthPerNewton, arrows.head)).join('') });
     }
   }
 }
@@ -197,13 +207,15 @@ export class Mechanism {
     const zone = this.outer * 1.025;
     const cam = points(geometry.wave_generator.profile);
     const major = cam[0].x;
+    this.stride = Math.ceil(installed / MOST_TEETH);
+    const shown = Math.ceil(installed / this.stride);
     const whole = {
       ring: `${circle(this.outer)}${polyline(flanks(geometry, motion.ringTeeth, 0, motion.ringTeeth, this.outer / FINEST))}Z`,
-      carrier: carrierOutline(motion, 0, installed),
+      carrier: carrierOutline(motion, 0, shown, this.stride),
       cam: `${polyline(cam.slice(0, -1))}Z`,
       axis: `M${-major} 0H${major}M0 ${-major * 0.05}V${major * 0.05}`,
       zones: arc(zone, endDeg, startDeg) + arc(zone, 180 + endDeg, 180 + startDeg),
-      teeth: installed,
+      teeth: shown,
       toothRadius,
     };
     this.#whole.shape(whole);
@@ -265,6 +277,7 @@ export class Mechanism {
     this.#whole.place(motion, inputDeg, loaded, {
       selected,
       first: 0,
+      stride: this.stride,
       turns: { ring: 0, carrier: motion.carrierDeg(inputDeg) },
       arrows: { longest: LONGEST_ARROW * seen, head: ARROW_HEAD * seen },
     });
@@ -286,10 +299,10 @@ export class Mechanism {
     const space = 360 / ringTeeth;
     setAttributes(this.detailSvg, { viewBox: `${-width / 2} ${-middle - height / 2} ${width} ${height}` });
     setAttributes(this.#detail.world, { transform: `rotate(${90 - deg})` });
-    const teeth = loaded.teeth.filter(({ center }) => Math.cos(((center.deg - deg) * Math.PI) / 180) > 0.5);
-    this.#detail.place(motion, inputDeg, { ...loaded, teeth }, {
+    this.#detail.place(motion, inputDeg, loaded, {
       selected,
       first: selected - Math.floor(this.shownTeeth / 2),
+      stride: 1,
       turns: { ring: space * Math.round(deg / space), carrier: deg },
       arrows: { longest: LONGEST_ARROW * 3 * width, head: ARROW_HEAD * 2.2 * width },
     });

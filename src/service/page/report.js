@@ -1,8 +1,10 @@
-// What only paper shows: the design as a table, with its name, date and address. The rest of the report is the page itself.
+// What only paper shows: the design as a table, with its name, date and address, and the findings as another. The rest of the
+// report is the page itself.
 
 import { GROUPS, at, fieldsOf } from './design.js';
 import { html } from './dom.js';
-import { withUnit } from './format.js';
+import { basisOf, contactOf, kindOf, meaningOf, readable, sentence } from './findings.js';
+import { number, withUnit } from './format.js';
 
 function shownValue(field, design) {
   const value = at(design, field.pointer);
@@ -40,4 +42,30 @@ export function reportOf(name, { design, shown, reference }, address) {
     ),
     html('div', { class: 'report-design' }, groups.filter(Boolean), html('table', {}, html('caption', {}, materials.title), html('tbody', {}, parts))),
   ];
+}
+
+/** Findings of one kind share a title and an advice, and each has its line; what they mean stands below where few have to share
+ *  the page. */
+export function findingsTable(findings) {
+  const kinds = new Map();
+  for (const finding of findings) kinds.set(finding.code, [...(kinds.get(finding.code) ?? []), finding]);
+  const head = ['Finding', 'Here', 'Limit', 'What to change'].map((text) => html('th', { scope: 'col' }, text));
+  const bodies = [...kinds.values()].map((kind) => {
+    const [first] = kind;
+    const rows = kind.map((finding) => {
+      const { value, limit, unit } = finding;
+      const where = contactOf(finding)?.name.toLowerCase();
+      return html(
+        'tr',
+        {},
+        finding === first && html('th', { scope: 'rowgroup', rowspan: kind.length }, kindOf(first)),
+        html('td', {}, where && `${where} `, html('b', { class: 'number' }, withUnit(number(value, 5), unit))),
+        html('td', {}, html('span', { class: 'number' }, withUnit(number(limit, 5), unit)), finding === first && html('span', { class: 'basis' }, basisOf(first))),
+        finding === first && html('td', { rowspan: kind.length }, sentence(readable(first.advice))),
+      );
+    });
+    const meaning = html('tr', { class: 'meaning' }, html('td', { colspan: 4 }, [...new Set(kind.map(meaningOf))].join(' ')));
+    return html('tbody', { class: first.severity }, rows, meaning);
+  });
+  return findings.length > 0 ? [html('thead', {}, html('tr', {}, head)), ...bodies] : [];
 }

@@ -182,16 +182,18 @@ export class Results {
       for (const entry of group.rows) {
         const value = html('data', { class: 'number' });
         const reference = html('span', { class: 'number' });
+        // Words stand where numbers have their unit.
+        const [unit, referenceUnit] = [value, reference].map(() => !entry.text && html('span', { class: 'unit' }));
         const delta = html('td', { class: 'numeric compared number' });
         const place = entry.place && html('button', { type: 'button', class: 'link number', title: 'Show in mechanism and plots' });
-        const cell = { entry, value, reference, delta, place };
+        const cell = { entry, value, unit, reference, referenceUnit, delta, place };
         place?.addEventListener('click', () => onShow(cell.at));
         const line = html(
           'tr',
           {},
           html('th', { scope: 'row' }, entry.label, entry.symbol && [' ', symbol(entry.symbol)]),
-          html('td', { class: 'numeric' }, value, html('span', { class: 'unit' }, entry.unit)),
-          html('td', { class: 'numeric compared' }, reference, html('span', { class: 'unit' }, entry.unit)),
+          html('td', { class: 'numeric' }, value, unit),
+          html('td', { class: 'numeric compared' }, reference, referenceUnit),
           [delta, html('td', { class: 'place' }, place)],
         );
         this.#cells.push(Object.assign(cell, { line }));
@@ -224,14 +226,19 @@ export class Results {
       setText(note, shown ? this.#noteOf(entry, answers, reference) : '');
     }
     for (const cell of this.#cells) {
-      const { entry, line, value, reference: other, delta, place } = cell;
+      const { entry, line, value, unit, reference: other, referenceUnit, delta, place } = cell;
       const shown = show(entry, answers);
       const otherShown = reference && show(entry, reference);
       line.hidden = !shown && !otherShown;
       setText(value, shown?.text ?? DASH);
       if (shown) value.value = shown.value;
       setText(other, otherShown?.text ?? DASH);
+      if (unit) {
+        setText(unit, shown ? entry.unit : '');
+        setText(referenceUnit, otherShown ? entry.unit : '');
+      }
       setText(delta, reference ? compare(entry, answers, reference) : '');
+      if (place) place.hidden = !shown;
       if (place && shown) {
         cell.at = entry.place(answers);
         setText(place, `j ${number(cell.at.input_angle_deg, 4)}°, ψ ${number(cell.at.position_deg, 4)}°`);
