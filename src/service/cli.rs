@@ -10,6 +10,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+
 use tracing_subscriber::EnvFilter;
 
 use crate::api::accuracy::Accuracy;
@@ -22,7 +23,7 @@ use crate::config::{Limits, Settings};
 use crate::design::Design;
 use crate::negotiation::Format;
 use crate::problem::{Problem, ProblemCode};
-use crate::{json, router, serve};
+use crate::{json, keys, router, serve};
 
 /// Bad input, as most tools have it.
 const EXIT_BAD_INPUT: u8 = 2;
@@ -68,6 +69,11 @@ enum Command {
     },
     /// Print the API document
     Openapi,
+    /// Make a key: prints it once, with the line that the keys file holds of it
+    NewKey {
+        /// Whose it is
+        name: String,
+    },
 }
 
 #[derive(Debug, Args)]
@@ -81,7 +87,10 @@ struct Offline {
 
 /// Runs the command that the process was started with.
 pub fn run() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return refuse(&error),
+    };
     let result = match cli.command {
         None => run_service(&cli.serve),
         Some(Command::Serve(settings)) => run_service(&settings),
@@ -91,6 +100,7 @@ pub fn run() -> ExitCode {
         Some(Command::Accuracy(offline)) => answer(Accuracy, &offline.file, offline.format),
         Some(Command::Draw { part, file, format }) => answer(Drawing(part), &file, format),
         Some(Command::Health { address }) => health(address),
+        Some(Command::NewKey { name }) => new_key(&name),
         Some(Command::Openapi) => print(|writer| writer.write_all(router::openapi_json().as_bytes())),
     };
     match result {
@@ -104,6 +114,24 @@ pub fn run() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Says what is wrong with the command line. It names the first fault alone; of the settings in the environment, by which containers are
+/// configured, every one is named.
+fn refuse(error: &clap::Error) -> ExitCode {
+    let _ = error.print();
+    if error.use_stderr() {
+        let settings = Settings::augment_args(clap::Command::new("toothwave").no_binary_name(true));
+        for setting in settings.get_arguments().filter(|setting| setting.get_env().is_some()) {
+            let alone = clap::Command::new("toothwave").no_binary_name(true).arg(setting.clone());
+            if let Err(other) = alone.try_get_matches_from([""; 0])
+                && other.to_string() != error.to_string()
+            {
+                let _ = other.print();
+            }
+        }
+    }
+    ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(EXIT_BAD_INPUT))
 }
 
 #[derive(Debug)]
@@ -130,8 +158,7 @@ impl From<Problem> for Failure {
 }
 
 fn run_service(settings: &Settings) -> Result<(), Failure> {
-    let filter = EnvFilter::try_new(&settings.log)
-        .map_err(|error| Failure::BadInput(format!("the log filter cannot be read: {error}")))?;
+    let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
     tracing_subscriber::fmt().json().with_span_list(false).with_env_filter(filter).with_writer(io::stderr).init();
     let runtime = tokio::runtime::Runtime::new()?;
     let result = runtime.block_on(serve::serve(settings));
@@ -149,6 +176,9 @@ const OFFLINE: Limits = Limits {
     max_queued_solves: 0,
     deadline_ms: u64::MAX,
     cache_max_bytes: 0,
+    max_connections: 64,
+    max_header_bytes: 16_384,
+    header_timeout_ms: 600_000,
 };
 
 fn answer<E: Endpoint>(endpoint: E, file: &Path, format: Format) -> Result<(), Failure> {
@@ -190,6 +220,11 @@ fn print(write: impl FnOnce(&mut io::BufWriter<io::StdoutLock<'static>>) -> io::
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),
         _ => Ok(()),
     }
+}
+
+fn new_key(name: &str) -> Result<(), Failure> {
+    let (key, line) = keys::new_key(name).map_err(io::Error::other)?;
+    print(|writer| writeln!(writer, "key, for its holder:        {key}\nline, for the keys file:    {line}"))
 }
 
 fn health(mut address: SocketAddr) -> Result<(), Failure> {

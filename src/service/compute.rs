@@ -7,6 +7,7 @@ use std::time::Duration;
 use metrics::{counter, histogram};
 use tokio::sync::Semaphore;
 use tokio::time::Instant;
+use tokio_util::sync::CancellationToken;
 use tracing::Span;
 
 use crate::config::Limits;
@@ -17,9 +18,23 @@ use crate::problem::{Problem, ProblemCode};
 pub struct Pool {
     /// One for each solve that runs.
     permits: Arc<Semaphore>,
-    /// One for each solve that runs or waits.
+    /// One for each solve that runs or waits, those of batches apart.
     places: Arc<Semaphore>,
+    /// One for each slice of a batch that runs or waits for a permit: as many as there are permits, so that a single request
+    /// never waits for more than one round of them.
+    turns: Arc<Semaphore>,
+    /// Cancelled when the service stops and has no time left.
+    closed: CancellationToken,
     limits: Limits,
+}
+
+/// Sets the stop signal of a job that nobody waits for any more.
+struct StopOnDrop(Arc<AtomicBool>);
+
+impl Drop for StopOnDrop {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
 }
 
 impl Pool {
@@ -28,6 +43,8 @@ impl Pool {
         Self {
             permits: Arc::new(Semaphore::new(limits.max_concurrent_solves)),
             places: Arc::new(Semaphore::new(limits.max_concurrent_solves + limits.max_queued_solves)),
+            turns: Arc::new(Semaphore::new(limits.max_concurrent_solves)),
+            closed: CancellationToken::new(),
             limits,
         }
     }
@@ -37,7 +54,7 @@ impl Pool {
         self.limits.max_concurrent_solves - self.permits.available_permits()
     }
 
-    /// Solves that run or wait now.
+    /// Single solves that run or wait now.
     pub fn admitted(&self) -> usize {
         self.limits.max_concurrent_solves + self.limits.max_queued_solves - self.places.available_permits()
     }
@@ -47,11 +64,16 @@ impl Pool {
         Instant::now() + Duration::from_millis(self.limits.deadline_ms)
     }
 
-    /// Runs `job` and hands it the signal that stops it at the deadline.
+    /// Stops every solve, and lets none begin.
+    pub fn close(&self) {
+        self.closed.cancel();
+    }
+
+    /// Runs `job` and hands it the signal that stops it: at the deadline, when the pool is closed, or when nobody waits for it.
     ///
     /// # Errors
-    /// `queue_full` at once where no place is free, `deadline_exceeded` when the time is over, `internal_error` where
-    /// the job panicked, and whatever the job returns.
+    /// `queue_full` at once where no place is free, `deadline_exceeded` when the time is over, `shutting_down` when the pool is
+    /// closed, `internal_error` where the job panicked, and whatever the job returns.
     pub async fn run<T: Send + 'static>(
         &self,
         deadline: Instant,
@@ -61,10 +83,37 @@ impl Pool {
             counter!("toothwave_refusals_total", "reason" => "queue_full").increment(1);
             return Err(self.queue_full());
         };
-        let waited = tokio::time::timeout_at(deadline, Arc::clone(&self.permits).acquire_owned()).await;
+        self.run_holding(place, deadline, job).await
+    }
+
+    /// Runs a slice of a batch when its turn comes, however long that takes; its deadline begins then.
+    ///
+    /// # Errors
+    /// As [`Self::run`], but for `queue_full`.
+    pub async fn run_in_turn<T: Send + 'static>(
+        &self,
+        job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let turn = tokio::select! {
+            turn = Arc::clone(&self.turns).acquire_owned() => turn,
+            () = self.closed.cancelled() => return Err(shutting_down()),
+        };
+        self.run_holding(turn, self.deadline(), job).await
+    }
+
+    async fn run_holding<T: Send + 'static>(
+        &self,
+        place: impl Send + 'static,
+        deadline: Instant,
+        job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let waited = tokio::select! {
+            waited = tokio::time::timeout_at(deadline, Arc::clone(&self.permits).acquire_owned()) => waited,
+            () = self.closed.cancelled() => return Err(shutting_down()),
+        };
         let Ok(permit) = waited else { return Err(self.deadline_exceeded()) };
-        let stop = Arc::new(AtomicBool::new(false));
-        let signal = Arc::clone(&stop);
+        let stop = StopOnDrop(Arc::default());
+        let signal = Arc::clone(&stop.0);
         // spawn_blocking loses the span, and cannot be aborted: span, permit and place go along.
         let span = Span::current();
         let running = tokio::task::spawn_blocking(move || {
@@ -74,11 +123,12 @@ impl Pool {
             histogram!("toothwave_solve_duration_seconds").record(started.elapsed());
             result
         });
-        match tokio::time::timeout_at(deadline, running).await {
-            Ok(Ok(Err(Problem { code: ProblemCode::DeadlineExceeded, .. }))) | Err(_) => {
-                stop.store(true, Ordering::Relaxed);
-                Err(self.deadline_exceeded())
-            }
+        let finished = tokio::select! {
+            finished = tokio::time::timeout_at(deadline, running) => finished,
+            () = self.closed.cancelled() => return Err(shutting_down()),
+        };
+        match finished {
+            Ok(Ok(Err(Problem { code: ProblemCode::DeadlineExceeded, .. }))) | Err(_) => Err(self.deadline_exceeded()),
             Ok(Ok(result)) => result,
             Ok(Err(panic)) => Err(Problem::internal(&panic)),
         }
@@ -100,4 +150,12 @@ impl Pool {
         );
         Problem::new(ProblemCode::DeadlineExceeded, detail)
     }
+}
+
+fn shutting_down() -> Problem {
+    counter!("toothwave_refusals_total", "reason" => "shutting_down").increment(1);
+    Problem::new(
+        ProblemCode::ShuttingDown,
+        "the service is stopping, and had no time left for this computation; ask again",
+    )
 }

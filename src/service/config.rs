@@ -4,12 +4,19 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::time::Duration;
 
+use axum::http::Uri;
 use clap::Args;
 use serde::Serialize;
+use tracing_subscriber::EnvFilter;
 use utoipa::ToSchema;
+
+use crate::keys::Keys;
 
 /// Solves that may be allowed to run or to wait: more than any machine can, fewer than a semaphore can count.
 const MOST_SOLVES: i64 = 1_000_000;
+
+/// Bytes of a request's line and headers together, at most.
+pub const MAX_HEADER_BYTES: usize = 16_384;
 
 /// The settings of `toothwave serve`.
 #[derive(Debug, Clone, Args)]
@@ -46,8 +53,20 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_CACHE_MAX_BYTES", value_name = "BYTES", default_value_t = 268_435_456)]
     pub cache_max_bytes: u64,
 
+    /// Connections that may be open at once
+    #[arg(long, env = "TOOTHWAVE_MAX_CONNECTIONS", value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=MOST_SOLVES))]
+    pub max_connections: u32,
+
+    /// Milliseconds in which a request's line and headers have to arrive, and after which a silent connection is closed
+    #[arg(long, env = "TOOTHWAVE_HEADER_TIMEOUT_MS", value_name = "MS", default_value_t = 30_000, value_parser = clap::value_parser!(u64).range(1..))]
+    pub header_timeout_ms: u64,
+
+    /// File of key hashes (see `toothwave new-key`): with it every path but health wants a bearer token
+    #[arg(long, env = "TOOTHWAVE_KEYS_FILE", value_name = "FILE", value_parser = Keys::read)]
+    pub keys_file: Option<Keys>,
+
     /// Origin that browsers may call from, or `*`; may be given several times, in the variable separated by commas
-    #[arg(long = "cors-origin", env = "TOOTHWAVE_CORS_ORIGINS", value_name = "ORIGIN", value_delimiter = ',')]
+    #[arg(long = "cors-origin", env = "TOOTHWAVE_CORS_ORIGINS", value_name = "ORIGIN", value_delimiter = ',', value_parser = origin)]
     pub cors_origins: Vec<String>,
 
     /// Milliseconds that running requests get to finish after a signal to stop; below the ten seconds that container engines wait
@@ -55,7 +74,7 @@ pub struct Settings {
     pub shutdown_ms: u64,
 
     /// What is logged, as tracing-subscriber's EnvFilter reads it
-    #[arg(long, env = "TOOTHWAVE_LOG", value_name = "FILTER", default_value = "info")]
+    #[arg(long, env = "TOOTHWAVE_LOG", value_name = "FILTER", default_value = "info", value_parser = log_filter)]
     pub log: String,
 }
 
@@ -76,6 +95,12 @@ pub struct Limits {
     pub deadline_ms: u64,
     /// Most bytes of answers that the cache keeps.
     pub cache_max_bytes: u64,
+    /// Connections that may be open at once.
+    pub max_connections: usize,
+    /// Bytes of a request's line and headers together.
+    pub max_header_bytes: usize,
+    /// Milliseconds in which a request's line and headers have to arrive, and after which a silent connection is closed.
+    pub header_timeout_ms: u64,
 }
 
 impl Settings {
@@ -91,6 +116,9 @@ impl Settings {
             max_queued_solves: self.max_queued_solves as usize,
             deadline_ms: self.deadline_ms,
             cache_max_bytes: self.cache_max_bytes,
+            max_connections: self.max_connections as usize,
+            max_header_bytes: MAX_HEADER_BYTES,
+            header_timeout_ms: self.header_timeout_ms,
         }
     }
 
@@ -98,4 +126,21 @@ impl Settings {
     pub const fn shutdown(&self) -> Duration {
         Duration::from_millis(self.shutdown_ms)
     }
+}
+
+/// An origin as browsers write it in `Origin`, or `*`, which stands for all.
+fn origin(text: &str) -> Result<String, String> {
+    let is_origin = || {
+        let uri = text.parse::<Uri>().ok()?;
+        Some(uri.scheme().is_some() && uri.authority().is_some() && !text.ends_with('/') && uri.path() == "/")
+    };
+    if text == "*" || is_origin() == Some(true) {
+        Ok(text.into())
+    } else {
+        Err("an origin has a scheme, a host and perhaps a port, and no path".into())
+    }
+}
+
+fn log_filter(text: &str) -> Result<String, String> {
+    EnvFilter::try_new(text).map(|_| text.into()).map_err(|error| format!("no log filter: {error}"))
 }

@@ -13,6 +13,7 @@ pub mod dxf;
 pub mod examples;
 pub mod findings;
 pub mod json;
+pub mod keys;
 pub mod negotiation;
 pub mod observe;
 pub mod plots;

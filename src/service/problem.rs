@@ -62,6 +62,8 @@ pub struct FieldError {
 pub enum ProblemCode {
     /// 400: the body is no JSON.
     MalformedJson,
+    /// 401: no key, or one that opens nothing.
+    Unauthorized,
     /// 404: nothing stands at this path.
     NotFound,
     /// 405: the path knows other methods.
@@ -90,6 +92,10 @@ pub enum ProblemCode {
     QueueFull,
     /// 503: the deadline stopped the computation.
     DeadlineExceeded,
+    /// 503: the service is stopping, and the computation with it.
+    ShuttingDown,
+    /// 503: as many connections are open as the service admits.
+    TooManyConnections,
     /// 500: a fault of the service itself.
     InternalError,
 }
@@ -157,6 +163,7 @@ impl ProblemCode {
     pub const fn status(self) -> StatusCode {
         match self {
             Self::MalformedJson => StatusCode::BAD_REQUEST,
+            Self::Unauthorized => StatusCode::UNAUTHORIZED,
             Self::NotFound => StatusCode::NOT_FOUND,
             Self::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
             Self::NotAcceptable => StatusCode::NOT_ACCEPTABLE,
@@ -169,7 +176,9 @@ impl ProblemCode {
             | Self::ComplianceNotPositive
             | Self::TooManyStates
             | Self::TooManyPoints => StatusCode::UNPROCESSABLE_ENTITY,
-            Self::QueueFull | Self::DeadlineExceeded => StatusCode::SERVICE_UNAVAILABLE,
+            Self::QueueFull | Self::DeadlineExceeded | Self::ShuttingDown | Self::TooManyConnections => {
+                StatusCode::SERVICE_UNAVAILABLE
+            }
             Self::InternalError => StatusCode::INTERNAL_SERVER_ERROR,
         }
     }
@@ -177,6 +186,7 @@ impl ProblemCode {
     const fn title(self) -> &'static str {
         match self {
             Self::MalformedJson => "The body is no JSON",
+            Self::Unauthorized => "A key is wanted",
             Self::NotFound => "Nothing stands at this path",
             Self::MethodNotAllowed => "The path knows other methods",
             Self::NotAcceptable => "No representation that the client accepts",
@@ -191,6 +201,8 @@ impl ProblemCode {
             Self::TooManyPoints => "The profiles have too many points",
             Self::QueueFull => "The service is full",
             Self::DeadlineExceeded => "The deadline stopped the computation",
+            Self::ShuttingDown => "The service is stopping",
+            Self::TooManyConnections => "Too many connections are open",
             Self::InternalError => "The service failed",
         }
     }

@@ -18,6 +18,7 @@ use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use crate::api::{App, accuracy, coincidence_degree, drawings, geometry, page, side, sweep};
+use crate::keys::{self, Keys};
 use crate::observe;
 use crate::problem::{Problem, ProblemCode};
 
@@ -58,12 +59,12 @@ pub fn openapi_json() -> String {
 }
 
 /// The whole service.
-pub fn router(app: App, cors_origins: &[String]) -> Router {
+pub fn router(app: App, cors_origins: &[String], keys: Option<Keys>) -> Router {
     let openapi = openapi_json();
     // The bundled page alone: without "none" it would ask a validator elsewhere.
     let config = Config::new(["/openapi.json"]).validator_url("none");
     let docs: Router<App> = SwaggerUi::new("/docs").config(config).into();
-    let docs = docs.layer(middleware::map_response(as_problem));
+    let docs = docs.layer(middleware::map_response(as_documentation));
     let (paths, _) = api().split_for_parts();
     paths
         .route("/", get(page::index))
@@ -80,10 +81,20 @@ pub fn router(app: App, cors_origins: &[String]) -> Router {
                     header::X_CONTENT_TYPE_OPTIONS,
                     HeaderValue::from_static("nosniff"),
                 ))
+                .layer(SetResponseHeaderLayer::if_not_present(
+                    header::REFERRER_POLICY,
+                    HeaderValue::from_static("no-referrer"),
+                ))
+                // The page and the documentation have policies of their own; nothing else is a document.
+                .layer(SetResponseHeaderLayer::if_not_present(
+                    header::CONTENT_SECURITY_POLICY,
+                    HeaderValue::from_static("default-src 'none'; frame-ancestors 'none'"),
+                ))
                 .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid))
                 .layer(PropagateRequestIdLayer::x_request_id())
                 .layer(middleware::from_fn(observe::observe))
                 .layer(option_layer((!cors_origins.is_empty()).then(|| cors(cors_origins))))
+                .layer(middleware::from_fn_with_state(keys, keys::require))
                 .layer(CatchPanicLayer::custom(panicked)),
         )
         .with_state(app)
@@ -98,13 +109,18 @@ async fn not_found(request: Request) -> Problem {
     Problem::new(ProblemCode::NotFound, detail)
 }
 
-/// The documentation's pages say 404 in words of their own.
-async fn as_problem(response: Response) -> Response {
+/// Swagger UI styles its elements itself and draws with data URLs.
+const DOCS_POLICY: HeaderValue = HeaderValue::from_static(
+    "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'",
+);
+
+/// The documentation's pages say 404 in words of their own, and no policy.
+async fn as_documentation(mut response: Response) -> Response {
     if response.status() == StatusCode::NOT_FOUND {
-        Problem::new(ProblemCode::NotFound, "the documentation has no such page").into_response()
-    } else {
-        response
+        return Problem::new(ProblemCode::NotFound, "the documentation has no such page").into_response();
     }
+    response.headers_mut().insert(header::CONTENT_SECURITY_POLICY, DOCS_POLICY);
+    response
 }
 
 async fn method_not_allowed(request: Request) -> Problem {

@@ -15,6 +15,7 @@ use tokio::task::JoinHandle;
 use toothwave::api::App;
 use toothwave::compute::Pool;
 use toothwave::config::Limits;
+use toothwave::keys::Keys;
 use toothwave::router::router;
 use tower::ServiceExt as _;
 
@@ -31,6 +32,9 @@ pub(crate) const LIMITS: Limits = Limits {
     max_queued_solves: 32,
     deadline_ms: 600_000,
     cache_max_bytes: 268_435_456,
+    max_connections: 64,
+    max_header_bytes: 16_384,
+    header_timeout_ms: 600_000,
 };
 
 /// What is asked.
@@ -193,7 +197,13 @@ impl Service {
     pub(crate) fn within_for_origins(limits: Limits, origins: &[&str]) -> Self {
         let app = App::new(limits);
         let origins: Vec<_> = origins.iter().map(|&origin| origin.into()).collect();
-        Self { router: router(app.clone(), &origins), app }
+        Self { router: router(app.clone(), &origins, None), app }
+    }
+
+    /// Behind a keys file of this text.
+    pub(crate) fn behind(keys: &str) -> Self {
+        let app = App::new(LIMITS);
+        Self { router: router(app.clone(), &[], Some(Keys::parse(keys).unwrap())), app }
     }
 
     pub(crate) async fn ask(&self, question: &Question) -> Answer {
@@ -234,7 +244,7 @@ impl Listening {
     pub(crate) fn within(limits: Limits) -> Self {
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(4).enable_all().build().unwrap();
         let app = App::new(limits);
-        let router = router(app.clone(), &[]);
+        let router = router(app.clone(), &[], None);
         let listener = runtime.block_on(TcpListener::bind(("127.0.0.1", 0))).unwrap();
         let address = listener.local_addr().unwrap();
         runtime.spawn(async move { axum::serve(listener, router).await });

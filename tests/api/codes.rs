@@ -18,7 +18,8 @@ macro_rules! all {
 
 pub(crate) fn problem_codes() -> Vec<ProblemCode> {
     all!(ProblemCode: MalformedJson,
-        MalformedJson => NotFound,
+        MalformedJson => Unauthorized,
+        Unauthorized => NotFound,
         NotFound => MethodNotAllowed,
         MethodNotAllowed => NotAcceptable,
         NotAcceptable => RequestTimeout,
@@ -32,7 +33,9 @@ pub(crate) fn problem_codes() -> Vec<ProblemCode> {
         TooManyStates => TooManyPoints,
         TooManyPoints => QueueFull,
         QueueFull => DeadlineExceeded,
-        DeadlineExceeded => InternalError;
+        DeadlineExceeded => ShuttingDown,
+        ShuttingDown => TooManyConnections,
+        TooManyConnections => InternalError;
         InternalError)
 }
 
@@ -101,6 +104,7 @@ fn every_kind_of_problem_has_its_status_and_a_type_of_its_own() {
     use toothwave::problem::Problem;
     let expected = |code| match code {
         ProblemCode::MalformedJson => 400,
+        ProblemCode::Unauthorized => 401,
         ProblemCode::NotFound => 404,
         ProblemCode::MethodNotAllowed => 405,
         ProblemCode::NotAcceptable => 406,
@@ -113,7 +117,10 @@ fn every_kind_of_problem_has_its_status_and_a_type_of_its_own() {
         | ProblemCode::ComplianceNotPositive
         | ProblemCode::TooManyStates
         | ProblemCode::TooManyPoints => 422,
-        ProblemCode::QueueFull | ProblemCode::DeadlineExceeded => 503,
+        ProblemCode::QueueFull
+        | ProblemCode::DeadlineExceeded
+        | ProblemCode::ShuttingDown
+        | ProblemCode::TooManyConnections => 503,
         ProblemCode::InternalError => 500,
     };
     let mut types: Vec<_> = problem_codes()

@@ -15,6 +15,7 @@ mod designs;
 mod documents;
 mod drawings;
 mod endpoints;
+mod entry;
 mod examples;
 mod extremes;
 mod findings;

@@ -31,6 +31,9 @@ async fn the_limits_can_be_read() {
         max_concurrent_solves: 4,
         max_queued_solves: 5,
         deadline_ms: 6,
+        max_connections: 8,
+        max_header_bytes: 16_384,
+        header_timeout_ms: 9,
         cache_max_bytes: 7,
     };
     let expected = json!({
@@ -40,7 +43,10 @@ async fn the_limits_can_be_read() {
         "max_concurrent_solves": 4,
         "max_queued_solves": 5,
         "deadline_ms": 6,
-        "cache_max_bytes": 7
+        "cache_max_bytes": 7,
+        "max_connections": 8,
+        "max_header_bytes": 16384,
+        "header_timeout_ms": 9
     });
     assert_eq!(Service::within(limits).get("/v1/limits").await.found(), expected);
 }

@@ -31,13 +31,13 @@ impl Process {
         Self { child, address: address.unwrap_or_else(|| panic!("no address in {line:?}")), _greeting: greeting }
     }
 
-    fn signalled(&self, signal: &str) {
+    pub(crate) fn signalled(&self, signal: &str) {
         let status = Command::new("kill").args([signal, &self.child.id().to_string()]).status().unwrap();
         assert!(status.success());
     }
 
     /// Its exit status; a process that does not end fails the test instead of holding it up.
-    fn ended(mut self) -> ExitStatus {
+    pub(crate) fn ended(mut self) -> ExitStatus {
         for _ in 0..60_000 {
             if let Some(status) = self.child.try_wait().unwrap() {
                 return status;
@@ -90,6 +90,10 @@ fn settings_become_limits() {
         "6000",
         "--cache-max-bytes",
         "7000",
+        "--max-connections",
+        "8",
+        "--header-timeout-ms",
+        "9000",
     ];
     let process = Process::started(&arguments);
     let expected = json!({
@@ -99,7 +103,10 @@ fn settings_become_limits() {
         "max_concurrent_solves": 4,
         "max_queued_solves": 5,
         "deadline_ms": 6000,
-        "cache_max_bytes": 7000
+        "cache_max_bytes": 7000,
+        "max_connections": 8,
+        "max_header_bytes": 16384,
+        "header_timeout_ms": 9000
     });
     assert_eq!(ask_at(process.address, &Question::of("GET", "/v1/limits")).found(), expected);
 }

@@ -28,6 +28,9 @@ const LIMITS: Limits = Limits {
     max_queued_solves: 0,
     deadline_ms: 10_000,
     cache_max_bytes: 0,
+    max_connections: 64,
+    max_header_bytes: 16_384,
+    header_timeout_ms: 600_000,
 };
 
 fn assert_answered<E: Endpoint>(endpoint: E, design: &Design) {
