@@ -562,6 +562,46 @@ test('accuracy: a fixed law has rows of its own, and they bring back the stiffne
   await assertShows(back);
 });
 
+/** Parts that differ from their defaults in every value. */
+const PARTS = {
+  wave_generator: { bore_radius_mm: 20, clearance_um: 3 },
+  teeth: { clearance_um: 5 },
+  ring: { outer_radius_mm: 90, clearance_um: 10 },
+  carrier: { inner_radius_mm: 59.5, outer_radius_mm: 65, clearance_um: 15 },
+};
+
+const BORE = '/parts/wave_generator/bore_radius_mm';
+
+test('parts stand in the form with their defaults, and undo, link and document hold them', async () => {
+  page = await open(browser, server);
+  const example = await server.example('paper-5.1');
+  await page.click('summary:has-text("Parts as they are made")');
+  const entries = Object.entries(PARTS).flatMap(([part, values]) => Object.entries(values).map(([key, value]) => [`/parts/${part}/${key}`, value]));
+  for (const [pointer, value] of entries) {
+    assert.ok(await page.getAttribute(field(pointer), 'placeholder'), `${pointer} says what is taken without it`);
+    await enter(page, pointer, value);
+    await page.locator(field(pointer)).blur();
+  }
+  assert.deepEqual(await designOf(page), { ...example, parts: PARTS });
+  assert.match(await page.textContent('summary:has-text("Parts as they are made")'), /8 given/);
+  await page.click('#copy-link');
+  const address = await page.evaluate(() => location.hash);
+  await page.click('#undo');
+  assert.deepEqual((await designOf(page)).parts, { ...PARTS, carrier: { inner_radius_mm: 59.5, outer_radius_mm: 65 } });
+  for (let presses = 1; presses < entries.length; presses += 1) await page.click('#undo');
+  await settled(page);
+  assert.deepEqual(await designOf(page), example);
+  assert.ok(await page.isDisabled('#undo'));
+  await page.click('#redo');
+  assert.deepEqual((await designOf(page)).parts, { wave_generator: { bore_radius_mm: 20 } });
+  // What is emptied is left out, with the group that it was the last of.
+  await enter(page, BORE, '');
+  assert.deepEqual(await designOf(page), example);
+  await page.context().close();
+  page = await open(browser, server, { address });
+  assert.deepEqual(await designOf(page), { ...example, parts: PARTS });
+});
+
 test('the drawing stands where the service says', async () => {
   page = await open(browser, server);
   for (const name of ['paper-5.1', 'paper-5.2', 'ring-with-more-teeth']) {
@@ -859,6 +899,7 @@ const LONG_REPORTS = [
     model: { compatibility: 'virtual_work', clearance: CLEARANCE },
     materials: { ring: { youngs_modulus_gpa: 120 } },
     sweep: { wind_up: true },
+    parts: PARTS,
   },
   {
     drive: { wave_generator: { semi_major_mm: 58, semi_minor_mm: 46 }, teeth: { radius_mm: 4, width_mm: 2, count: 28, installed: 14 }, ring: { teeth: 30, tip_radius_mm: 57.23 } },
@@ -866,6 +907,7 @@ const LONG_REPORTS = [
     model: { compatibility: 'virtual_work', stiffness: { law: 'palmgren' }, clearance: CLEARANCE },
     materials: NO_STEEL,
     sweep: { wind_up: true },
+    parts: PARTS,
   },
   {
     drive: { wave_generator: { semi_major_mm: 58, semi_minor_mm: 56 }, teeth: { radius_mm: 7, width_mm: 5, count: 28, installed: 28 }, ring: { teeth: 26, tip_radius_mm: 70.5 } },
@@ -873,6 +915,7 @@ const LONG_REPORTS = [
     model: { compatibility: 'virtual_work', stiffness: { law: 'palmgren' }, clearance: CLEARANCE },
     materials: NO_STEEL,
     sweep: { wind_up: true },
+    parts: PARTS,
   },
 ];
 
@@ -909,14 +952,14 @@ test('a long report has two pages, with every finding, and can be read', async (
   for (const design of LONG_REPORTS) {
     // The reference differs in nearly every number.
     const { drive, load } = design;
-    const others = { drive: { ...drive, wave_generator: { ...drive.wave_generator, semi_major_mm: 58.1 } }, load: { ...load, input_torque_nm: 0.83 * load.input_torque_nm } };
+    const others = { parts: PARTS, drive: { ...drive, wave_generator: { ...drive.wave_generator, semi_major_mm: 58.1 } }, load: { ...load, input_torque_nm: 0.83 * load.input_torque_nm } };
     await setDocument({ ...design, ...others });
     await page.click('#keep');
     await setDocument(design);
     const { findings } = (await server.answers(design)).sweep;
     for (const { code } of findings) codes.add(code);
     assert.equal(await pagesOfReport(), 2, `${findings.length} findings`);
-    const { table, wanted, tooSmall, tooWide } = await onPaper(async (found) => {
+    const { table, parts, wanted, tooSmall, tooWide } = await onPaper(async (found) => {
       const { kindOf, readable, sentence } = await import('/page/findings.js');
       const { number, withUnit } = await import('/page/format.js');
       const small = [];
@@ -929,6 +972,7 @@ test('a long report has two pages, with every finding, and can be read', async (
       }
       return {
         table: document.querySelector('#findings-table').innerText,
+        parts: document.querySelector('.report-parts').innerText.match(/\d+(\.\d+)?/g).map(Number),
         wanted: found.map((finding) => [
           kindOf(finding),
           withUnit(number(finding.value, 5), finding.unit),
@@ -940,6 +984,7 @@ test('a long report has two pages, with every finding, and can be read', async (
       };
     }, findings);
     for (const text of wanted.flat()) assert.ok(table.includes(text), `${text} in ${table}`);
+    assert.deepEqual(parts, Object.values(PARTS).flatMap(Object.values));
     assert.deepEqual(tooSmall, []);
     assert.deepEqual(tooWide, []);
   }
