@@ -47,6 +47,16 @@ export class Server {
     return response.json();
   }
 
+  /** A file as the API answers it. */
+  async file(path, design, accept) {
+    const response = await fetch(this.origin + path, {
+      method: 'POST',
+      headers: { 'content-type': 'application/json', accept },
+      body: JSON.stringify(design),
+    });
+    return Buffer.from(await response.arrayBuffer());
+  }
+
   async answers(design) {
     const [geometry, coincidence, sweep] = await Promise.all(
       ['/v1/geometry', '/v1/coincidence-degree', '/v1/sweep'].map((path) => this.ask(path, design)),

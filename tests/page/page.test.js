@@ -562,6 +562,199 @@ test('accuracy: a fixed law has rows of its own, and they bring back the stiffne
   await assertShows(back);
 });
 
+/** Presses a file's button and gives the file: `{ name, bytes }`. */
+async function downloaded(file, press = () => page.click(`[data-file="${file}"]`)) {
+  const [download] = await Promise.all([page.waitForEvent('download'), press()]);
+  return { name: download.suggestedFilename(), bytes: await readFile(await download.path()) };
+}
+
+/** Parts that differ from their defaults in every value. */
+const PARTS = {
+  wave_generator: { bore_radius_mm: 20, clearance_um: 3 },
+  teeth: { clearance_um: 5 },
+  ring: { outer_radius_mm: 90, clearance_um: 10 },
+  carrier: { inner_radius_mm: 59.5, outer_radius_mm: 65, clearance_um: 15 },
+};
+
+const MEDIA_TYPES = { dxf: 'image/vnd.dxf', svg: 'image/svg+xml' };
+const DRAWN = ['ring', 'wave-generator', 'carrier', 'tooth'];
+const BORE = '/parts/wave_generator/bore_radius_mm';
+
+for (const [what, parts] of Object.entries({ default: undefined, given: PARTS })) {
+  test(`drawings are downloaded as the API answers them, named after the design and the part: ${what} parts`, async () => {
+    page = await open(browser, server);
+    const design = { ...(await server.example('paper-5.1')), parts };
+    await setDocument(design);
+    for (const part of DRAWN) {
+      for (const [format, mediaType] of Object.entries(MEDIA_TYPES)) {
+        const { name, bytes } = await downloaded(`${part}.${format}`);
+        assert.equal(name, `the-papers-case-5.1${parts ? '-changed' : ''}-${part}.${format}`);
+        assert.ok(bytes.equals(await server.file(`/v1/drawings/${part}`, design, mediaType)), name);
+        assert.equal(await page.textContent('#drawings-state'), `Downloaded ${name}.`);
+      }
+    }
+  });
+}
+
+test('the sweep’s plots are downloaded as the API answers them', async () => {
+  page = await open(browser, server);
+  await enter(page, RADIUS, 4.5);
+  const { name, bytes } = await downloaded('plots.svg');
+  assert.equal(name, 'the-papers-case-5.1-changed-plots.svg');
+  assert.ok(bytes.equals(await server.file('/v1/sweep', await designOf(page), MEDIA_TYPES.svg)));
+});
+
+test('nothing is drawn that was not asked for', async () => {
+  page = await open(browser, server);
+  let drawings = 0;
+  page.on('request', (request) => (drawings += request.url().includes('/v1/drawings/') ? 1 : 0));
+  await page.click('#to-parts');
+  await enter(page, BORE, 20);
+  await page.locator(`.field:has(${field(RADIUS)}) input[type=range]`).press('ArrowRight');
+  await settled(page);
+  assert.equal(drawings, 0);
+  await downloaded('ring.svg');
+  assert.equal(drawings, 1);
+  await page.locator(`.field:has(${field(RADIUS)}) input[type=range]`).press('ArrowRight');
+  await settled(page);
+  assert.equal(drawings, 1);
+  assert.equal(await page.textContent('#drawings-state'), '', 'what was said was about another design');
+});
+
+test('the assembly stands as the mechanism does, also whole turns on and while it moves', async () => {
+  page = await open(browser, server);
+  const design = { ...(await server.example('paper-5.1')), assembly: { input_angle_deg: 30 } };
+  await setDocument(design);
+  const at = (angle) => ({ ...design, assembly: { input_angle_deg: angle } });
+  const sent = async (file) => {
+    const [request, { bytes }] = await Promise.all([page.waitForRequest('**/v1/drawings/assembly'), downloaded(file)]);
+    return { document: request.postDataJSON(), bytes };
+  };
+  for (const [format, mediaType] of Object.entries(MEDIA_TYPES)) {
+    await page.locator('#angle').fill('43.7');
+    await settled(page);
+    const { document, bytes } = await sent(`assembly.${format}`);
+    assert.deepEqual(document, at(43.7));
+    assert.ok(bytes.equals(await server.file('/v1/drawings/assembly', at(43.7), mediaType)), format);
+    assert.ok(!bytes.equals(await server.file('/v1/drawings/assembly', design, mediaType)), `${format}: not as the document has it`);
+    assert.match(await page.textContent('#drawings-state'), /-assembly\.(dxf|svg), input angle 43\.7°\.$/);
+  }
+  assert.match(await page.textContent('#drawings-list'), /Assembly at 43\.7°/);
+  assert.deepEqual(await designOf(page), design, 'the document keeps its own angle');
+  // The place of a peak is exact, not as it is rounded to be read.
+  await page.locator('#table tr', { hasText: 'Contact stress, ring' }).locator('button').click();
+  await settled(page);
+  const { sweep } = await server.answers(design);
+  assert.deepEqual((await sent('assembly.svg')).document, at(sweep.peaks.ring.stress_mpa.input_angle_deg));
+  // A turn further the carrier stands elsewhere.
+  await page.locator('#angle').fill('350');
+  await page.locator('#whole').scrollIntoViewIfNeeded();
+  const box = await page.locator('#whole').boundingBox();
+  const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+  await page.mouse.move(x + 100, y);
+  await page.mouse.down();
+  await page.mouse.move(x + 94, y - 34);
+  await page.mouse.up();
+  await settled(page);
+  const { document: turned } = await sent('assembly.dxf');
+  assert.ok(Math.abs(turned.assembly.input_angle_deg - 370) < 1, `${turned.assembly.input_angle_deg}`);
+  await page.click('#play');
+  const { document: moving, bytes } = await sent('assembly.dxf');
+  assert.ok(moving.assembly.input_angle_deg >= turned.assembly.input_angle_deg);
+  assert.ok(bytes.equals(await server.file('/v1/drawings/assembly', moving, MEDIA_TYPES.dxf)));
+  assert.equal(await page.textContent('#play'), 'Pause', 'and it moves on');
+});
+
+test('a refused drawing shows its reasons at their fields, and nothing is downloaded', async () => {
+  page = await open(browser, server);
+  const downloads = [];
+  page.on('download', (download) => downloads.push(download.suggestedFilename()));
+  const refused = () => page.waitForSelector('#drawings-state .problem');
+  const group = 'details:has(> summary:has-text("Parts as they are made"))';
+  const impossible = { wave_generator: { bore_radius_mm: 57 }, carrier: { outer_radius_mm: 70 }, ring: { clearance_um: -1 } };
+  await setDocument({ ...(await server.example('paper-5.1')), parts: impossible });
+  // The drive itself is not touched by it.
+  assert.ok(await page.isHidden('#impossible'));
+  assert.equal(await page.getAttribute(group, 'open'), null);
+  await assertShows(await designOf(page));
+  await page.click('[data-file="assembly.dxf"]');
+  await refused();
+  const { errors } = await server.ask('/v1/drawings/assembly', await designOf(page));
+  assert.ok(errors.length > 0);
+  for (const { pointer } of errors) {
+    assert.ok((await page.textContent(notes(pointer))).length > 20, pointer);
+    assert.equal(await page.getAttribute(field(pointer), 'aria-invalid'), 'true', pointer);
+  }
+  assert.match(await page.textContent('#drawings-state'), /^Assembly: .*Nothing was downloaded/);
+  assert.notEqual(await page.getAttribute(group, 'open'), null, 'the group is unfolded');
+  assert.ok(await page.isHidden('#impossible'), 'the drive is possible');
+  // A reason whose limit would do offers it; changed, the design has not been refused yet.
+  await page.click('[data-file="ring.svg"]');
+  await page.waitForFunction(() => document.querySelector('#drawings-state').textContent.startsWith('Ring: '));
+  await page.click(`${notes('/parts/ring/clearance_um')} button:has-text("Set to 0")`);
+  await settled(page);
+  assert.equal(await page.textContent('#drawings-state'), '');
+  assert.equal(await page.textContent(notes('/parts/ring/clearance_um')), '');
+  // Each part answers for itself, and a reason leads to its field.
+  await page.click('[data-file="wave-generator.svg"]');
+  await refused();
+  assert.match(await page.textContent(notes(BORE)), /A bore of 57(\.0)? mm cuts the wave generator open/);
+  assert.equal(await page.textContent(notes('/parts/carrier/outer_radius_mm')), '');
+  await page.click('#drawings-state button:has-text("Bore radius, wave generator")');
+  assert.equal(await page.evaluate(() => document.activeElement.id), field(BORE).slice(1));
+  await page.keyboard.press('Control+a');
+  await page.keyboard.type('20');
+  await settled(page);
+  assert.equal(await page.textContent(notes(BORE)), '');
+  assert.deepEqual(downloads, []);
+  assert.equal((await downloaded('wave-generator.svg')).name, 'the-papers-case-5.1-changed-wave-generator.svg');
+  // A drive that cannot exist has no drawings, and its reasons stand once at their fields.
+  await enter(page, SEMI_MINOR, 60);
+  await page.click('[data-file="tooth.dxf"]');
+  await refused();
+  assert.equal(await page.locator(`${notes(SEMI_MAJOR)} .problem`).count(), 1);
+  assert.deepEqual(downloads, ['the-papers-case-5.1-changed-wave-generator.svg']);
+});
+
+test('parts stand in the form with their defaults, and undo, link and document hold them', async () => {
+  page = await open(browser, server);
+  const example = await server.example('paper-5.1');
+  await page.click('#to-parts');
+  assert.equal(await page.evaluate(() => document.activeElement.id), field(BORE).slice(1));
+  const entries = Object.entries(PARTS).flatMap(([part, values]) => Object.entries(values).map(([key, value]) => [`/parts/${part}/${key}`, value]));
+  for (const [pointer, value] of entries) {
+    assert.ok(await page.getAttribute(field(pointer), 'placeholder'), `${pointer} says what is taken without it`);
+    await enter(page, pointer, value);
+    await page.locator(field(pointer)).blur();
+  }
+  assert.deepEqual(await designOf(page), { ...example, parts: PARTS });
+  assert.match(await page.textContent('summary:has-text("Parts as they are made")'), /8 given/);
+  await page.click('#copy-link');
+  const address = await page.evaluate(() => location.hash);
+  await page.click('#undo');
+  assert.deepEqual((await designOf(page)).parts, { ...PARTS, carrier: { inner_radius_mm: 59.5, outer_radius_mm: 65 } });
+  for (let presses = 1; presses < entries.length; presses += 1) await page.click('#undo');
+  await settled(page);
+  assert.deepEqual(await designOf(page), example);
+  assert.ok(await page.isDisabled('#undo'));
+  await page.click('#redo');
+  assert.deepEqual((await designOf(page)).parts, { wave_generator: { bore_radius_mm: 20 } });
+  // What is emptied is left out, with the group that it was the last of.
+  await enter(page, BORE, '');
+  assert.deepEqual(await designOf(page), example);
+  await page.context().close();
+  page = await open(browser, server, { address });
+  assert.deepEqual(await designOf(page), { ...example, parts: PARTS });
+});
+
+test('a drawing that the service cannot be asked for says so', async () => {
+  page = await open(browser, server);
+  page.expectsOutage = true;
+  await page.route('**/v1/drawings/**', (route) => route.abort());
+  await page.click('[data-file="ring.dxf"]');
+  await page.waitForFunction(() => document.querySelector('#drawings-state').textContent === 'The calculation service does not answer.');
+});
+
 test('the drawing stands where the service says', async () => {
   page = await open(browser, server);
   for (const name of ['paper-5.1', 'paper-5.2', 'ring-with-more-teeth']) {
@@ -770,6 +963,10 @@ test('all of it by keyboard', async () => {
   await tabTo('#abscissae input');
   await page.keyboard.press('ArrowRight');
   assert.ok(await page.isChecked('#abscissae input[value=ring]'));
+  await page.focus('#measure');
+  await tabTo('#to-parts');
+  await tabTo('[data-file="carrier.dxf"]');
+  assert.match((await downloaded('carrier.dxf', () => page.keyboard.press('Enter'))).name, /-carrier\.dxf$/);
   await page.focus('#open-document');
   await page.keyboard.press('Enter');
   assert.ok(await page.isVisible('#document'));
@@ -823,6 +1020,9 @@ for (const [name, options] of Object.entries({
     await enter(page, '/model/clearance/ring_um', 2);
     for (const details of await page.$$('main details:not([open]) > summary')) await details.click();
     await page.check(field('/sweep/wind_up'));
+    await enter(page, BORE, 100);
+    await page.click('[data-file="assembly.svg"]');
+    await page.waitForSelector('#drawings-state .problem');
     await page.locator(`${notes(RADIUS)} .finding`).first().click();
     await settled(page);
     assert.deepEqual(await violations(), [], 'a design with findings, compared');
@@ -859,6 +1059,7 @@ const LONG_REPORTS = [
     model: { compatibility: 'virtual_work', clearance: CLEARANCE },
     materials: { ring: { youngs_modulus_gpa: 120 } },
     sweep: { wind_up: true },
+    parts: PARTS,
   },
   {
     drive: { wave_generator: { semi_major_mm: 58, semi_minor_mm: 46 }, teeth: { radius_mm: 4, width_mm: 2, count: 28, installed: 14 }, ring: { teeth: 30, tip_radius_mm: 57.23 } },
@@ -866,6 +1067,7 @@ const LONG_REPORTS = [
     model: { compatibility: 'virtual_work', stiffness: { law: 'palmgren' }, clearance: CLEARANCE },
     materials: NO_STEEL,
     sweep: { wind_up: true },
+    parts: PARTS,
   },
   {
     drive: { wave_generator: { semi_major_mm: 58, semi_minor_mm: 56 }, teeth: { radius_mm: 7, width_mm: 5, count: 28, installed: 28 }, ring: { teeth: 26, tip_radius_mm: 70.5 } },
@@ -873,6 +1075,7 @@ const LONG_REPORTS = [
     model: { compatibility: 'virtual_work', stiffness: { law: 'palmgren' }, clearance: CLEARANCE },
     materials: NO_STEEL,
     sweep: { wind_up: true },
+    parts: PARTS,
   },
 ];
 
@@ -909,14 +1112,14 @@ test('a long report has two pages, with every finding, and can be read', async (
   for (const design of LONG_REPORTS) {
     // The reference differs in nearly every number.
     const { drive, load } = design;
-    const others = { drive: { ...drive, wave_generator: { ...drive.wave_generator, semi_major_mm: 58.1 } }, load: { ...load, input_torque_nm: 0.83 * load.input_torque_nm } };
+    const others = { parts: PARTS, drive: { ...drive, wave_generator: { ...drive.wave_generator, semi_major_mm: 58.1 } }, load: { ...load, input_torque_nm: 0.83 * load.input_torque_nm } };
     await setDocument({ ...design, ...others });
     await page.click('#keep');
     await setDocument(design);
     const { findings } = (await server.answers(design)).sweep;
     for (const { code } of findings) codes.add(code);
     assert.equal(await pagesOfReport(), 2, `${findings.length} findings`);
-    const { table, wanted, tooSmall, tooWide } = await onPaper(async (found) => {
+    const { table, parts, wanted, tooSmall, tooWide } = await onPaper(async (found) => {
       const { kindOf, readable, sentence } = await import('/page/findings.js');
       const { number, withUnit } = await import('/page/format.js');
       const small = [];
@@ -929,6 +1132,7 @@ test('a long report has two pages, with every finding, and can be read', async (
       }
       return {
         table: document.querySelector('#findings-table').innerText,
+        parts: document.querySelector('.report-parts').innerText.match(/\d+(\.\d+)?/g).map(Number),
         wanted: found.map((finding) => [
           kindOf(finding),
           withUnit(number(finding.value, 5), finding.unit),
@@ -940,6 +1144,7 @@ test('a long report has two pages, with every finding, and can be read', async (
       };
     }, findings);
     for (const text of wanted.flat()) assert.ok(table.includes(text), `${text} in ${table}`);
+    assert.deepEqual(parts, Object.values(PARTS).flatMap(Object.values));
     assert.deepEqual(tooSmall, []);
     assert.deepEqual(tooWide, []);
   }

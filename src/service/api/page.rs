@@ -44,6 +44,7 @@ const ASSETS: &[Asset] = assets![
     "accuracy.js" as SCRIPT,
     "design.js" as SCRIPT,
     "dom.js" as SCRIPT,
+    "drawings.js" as SCRIPT,
     "findings.js" as SCRIPT,
     "form.js" as SCRIPT,
     "format.js" as SCRIPT,

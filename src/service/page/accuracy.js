@@ -82,7 +82,7 @@ export class Accuracy {
     this.#message = 'Measuring…';
     this.#show();
     try {
-      const { answer, problem } = await ask('v1/accuracy', design, running.signal);
+      const { answer, problem } = await ask('v1/accuracy', design, { signal: running.signal });
       if (answer) {
         this.#measured = { design, answer };
         this.#build();

@@ -23,6 +23,13 @@ const material = (part, label) => ({
   ],
 });
 
+/** How far a part as it is made is set back from the one that the mechanics know. */
+const setBack = (part, label, what) =>
+  number(`/parts/${part}/clearance_um`, what, '', 'µm', { of: label, optional: () => '0', step: 1 });
+
+/** A radius that the mechanics leave free, with what is taken where it is left out. */
+const freeRadius = (part, label, key, what, otherwise) => number(`/parts/${part}/${key}_mm`, what, '', 'mm', { of: label, optional: () => otherwise });
+
 export const GROUPS = [
   {
     title: 'Wave generator',
@@ -153,6 +160,38 @@ export const GROUPS = [
     ],
   },
   {
+    title: 'Parts as they are made',
+    pointer: '/parts',
+    hint: 'Only drawings read these: forces are computed with the gaps of the model. The gap at a contact is the sum of its two parts’ clearances.',
+    summary: (design) => {
+      const given = Object.values(at(design, '/parts') ?? {}).flatMap((part) => Object.values(part ?? {})).filter((value) => value !== null);
+      return given.length === 0 ? 'defaults' : `${given.length} given`;
+    },
+    parts: [
+      {
+        title: 'Wave generator',
+        fields: [
+          freeRadius('wave_generator', 'Wave generator', 'bore_radius', 'Bore radius', 'no bore'),
+          setBack('wave_generator', 'Wave generator', 'Clearance inward'),
+        ],
+      },
+      { title: 'Teeth', fields: [setBack('teeth', 'Teeth', 'Clearance in radius')] },
+      {
+        title: 'Ring',
+        fields: [freeRadius('ring', 'Ring', 'outer_radius', 'Outer radius', '1.2 × root'), setBack('ring', 'Ring', 'Clearance outward')],
+      },
+      {
+        title: 'Carrier',
+        hint: 'By default a tenth of the annulus between cam and ring tips stays free on either side.',
+        fields: [
+          freeRadius('carrier', 'Carrier', 'inner_radius', 'Inner radius', 'tenth free'),
+          freeRadius('carrier', 'Carrier', 'outer_radius', 'Outer radius', 'tenth free'),
+          setBack('carrier', 'Carrier', 'Clearance per wall'),
+        ],
+      },
+    ],
+  },
+  {
     title: 'Sweep and profile',
     pointer: '/sweep',
     summary: (design) => {
@@ -189,6 +228,9 @@ export function* fieldsOf(group) {
     }
   }
 }
+
+/** A field's label where it stands without its group. */
+export const fullLabel = ({ label, of }) => (of ? `${label}, ${of.toLowerCase()}` : label);
 
 const keys = (pointer) => pointer.split('/').slice(1);
 

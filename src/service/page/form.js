@@ -1,6 +1,6 @@
 // The form, built from the field table in design.js, with problems and findings at the fields that they point at.
 
-import { GROUPS, at, changed, fieldsOf, isSame } from './design.js';
+import { GROUPS, at, changed, fieldsOf, fullLabel, isSame } from './design.js';
 import { html, setChildren, setText, symbol } from './dom.js';
 import { explanation, sentence, titleOf } from './findings.js';
 import { number } from './format.js';
@@ -58,11 +58,12 @@ export class Form {
       { class: 'group', open: group.open },
       html('summary', {}, html('h3', {}, group.title), summary),
     );
+    if (group.hint) details.append(html('p', { class: 'hint' }, group.hint));
     // A field that is the whole group has the group's notes too.
     if (!(group.fields ?? []).some((field) => field.pointer === group.pointer)) this.#notesFor(group.pointer, details);
     for (const part of group.parts ?? [group]) {
       const set = html('div', { class: 'set', role: 'group', 'aria-label': part.title });
-      if (group.parts) set.append(html('h4', {}, part.title));
+      if (group.parts) set.append(html('h4', {}, part.title), part.hint ? html('p', { class: 'hint' }, part.hint) : '');
       for (const field of part.fields) set.append(this.#buildField(field));
       details.append(set);
     }
@@ -380,7 +381,7 @@ export class Form {
     const place = this.#placeOf(pointer);
     const { field } = this.#fields.get(place) ?? {};
     const group = GROUPS.find((candidate) => candidate.pointer === place);
-    return field?.name ?? field?.label ?? group?.title ?? pointer;
+    return field?.name ?? (field && fullLabel(field)) ?? group?.title ?? pointer;
   }
 
   /** Leads to a field: opens its group, moves the focus there. */

@@ -4,6 +4,7 @@
 import { Accuracy } from './accuracy.js';
 import { isSame } from './design.js';
 import { html, oncePerFrame, setChildren, setText } from './dom.js';
+import { Drawings } from './drawings.js';
 import { explanation, findingsOf, reasonsOf, titleOf } from './findings.js';
 import { Form } from './form.js';
 import { fixed, number } from './format.js';
@@ -30,6 +31,7 @@ const state = {
   /** The last result that could be drawn: `{ design, answers }`. */
   shown: undefined,
   reference: undefined,
+  problems: [],
   reasons: [],
   findings: [],
   examples: [],
@@ -81,6 +83,11 @@ const accuracy = new Accuracy(
   (design) => setDesign(design),
 );
 
+const drawings = new Drawings(
+  { list: byId('drawings-list'), state: byId('drawings-state') },
+  { nameOf: fileName, onRefusal: showNotes, goTo: (pointer) => form.goTo(pointer), labelOf: (pointer) => form.labelOf(pointer) },
+);
+
 // ---- the design
 
 function setDesign(design, { gesture: newGesture, origin = state.origin, fromForm = false, respan = false } = {}) {
@@ -95,6 +102,7 @@ function replaceDesign(design, { origin, fromForm = false, respan = false }) {
   state.origin = origin;
   form.setDesign(design, { respan: respan && !fromForm });
   accuracy.setDesign(design);
+  drawings.setDesign(design);
   service.request(design);
   byId('undo').disabled = !history.canUndo;
   byId('redo').disabled = !history.canRedo;
@@ -140,6 +148,7 @@ function writeAddress() {
 // ---- what the service says
 
 function onResult({ design, answers, problems, solveMs }) {
+  state.problems = problems;
   state.reasons = reasonsOf(problems);
   const isDrawn = answers.geometry !== undefined;
   if (isDrawn) {
@@ -151,13 +160,18 @@ function onResult({ design, answers, problems, solveMs }) {
     setText(byId('solved'), `Solver ${answers.geometry.solver_version}, solved in ${number(solveMs, 2)} ms`);
   }
   state.findings = isDrawn ? findingsOf(answers) : [];
-  // Hints beside the fields stand on the last drive that could exist.
-  form.setResult(state.shown?.answers ?? {}, state.reasons, state.findings);
+  showNotes();
   showFindings();
   showReasons(isDrawn);
   showComparison();
   render();
   announce();
+}
+
+/** At the fields: what keeps the drive from existing, and what a drawing was refused for. */
+function showNotes() {
+  // Hints beside the fields stand on the last drive that could exist.
+  form.setResult(state.shown?.answers ?? {}, reasonsOf([...state.problems, ...drawings.problems]), state.findings);
 }
 
 function showReasons(isDrawn) {
@@ -275,7 +289,9 @@ const render = oncePerFrame(() => {
   if (Number(angle.value) !== Math.round(inTurn * 10) / 10) angle.value = inTurn;
   const carrierDeg = motion.carrierDeg(state.inputDeg) % 360;
   angle.setAttribute('aria-valuetext', `${fixed(inTurn, 1)} degrees, carrier ${fixed(carrierDeg, 2)} degrees`);
-  setText(byId('angle-input'), `${fixed(inTurn, 1)}°`);
+  const inputText = `${fixed(inTurn, 1)}°`;
+  setText(byId('angle-input'), inputText);
+  drawings.turnTo(state.inputDeg, inputText);
   setText(byId('angle-carrier'), `${fixed(carrierDeg, 2)}°`);
   setText(byId('tooth-name'), `Tooth ${state.selected}`);
   const tooth = loaded.find((candidate) => candidate.tooth === state.selected);
@@ -379,7 +395,11 @@ function applyText(text, origin) {
   }
 }
 
-const fileName = () => `${document.title.replace(/ – toothwave$/, '').replace(/[^\w.]+/g, '-').replace(/^-|-$/g, '').toLowerCase()}.json`;
+/** Named after the design: its title without what a file cannot be called. */
+function fileName(ending) {
+  const title = document.title.replace(/ – toothwave$/, '').replace(/\.json\b|[’']/g, '');
+  return `${title.replace(/[^\w.]+/g, '-').replace(/^-|-$/g, '').toLowerCase()}${ending}`;
+}
 
 function nextTheme() {
   const root = document.documentElement;
@@ -412,6 +432,7 @@ function listen() {
     copy(location.href, currentTarget);
   });
   click('print', () => window.print());
+  click('to-parts', () => form.goTo('/parts'));
   click('theme', nextTheme);
   click('play', () => play(!state.isPlaying));
   click('tooth-before', () => select(state.selected - 1));
@@ -430,7 +451,7 @@ function listen() {
   click('document-close', () => byId('document').close());
   click('document-apply', () => applyText(byId('document-text').value, state.origin));
   click('document-copy', ({ currentTarget }) => copy(byId('document-text').value, currentTarget));
-  click('document-save', () => share.save(state.design, fileName()));
+  click('document-save', () => share.save(share.toFile(state.design), fileName('.json')));
   click('document-load', () => byId('document-file').click());
   byId('document-file').addEventListener('change', async ({ currentTarget: input }) => {
     const [file] = input.files;

@@ -16,7 +16,7 @@ function shownValue(field, design) {
 }
 
 export function reportOf(name, { design, shown, reference }, address) {
-  const groups = GROUPS.filter((group) => group.pointer !== '/materials').map((group) => {
+  const groups = GROUPS.filter((group) => !group.parts).map((group) => {
     // Of several options only the given one has a value of its own; the others have presets for when they are chosen.
     const options = new Set((group.fields ?? []).flatMap((field) => field.options ?? []).flatMap((option) => option.fields ?? option.field ?? []));
     const rows = [...fieldsOf(group)]
@@ -30,6 +30,12 @@ export function reportOf(name, { design, shown, reference }, address) {
   const parts = materials.parts.map(({ title, fields }) =>
     html('tr', {}, html('th', {}, title), html('td', {}, fields.map((field) => shownValue(field, design)).join(', ν '))),
   );
+  // Few designs give them, but then up to eight: lines across the page take less of it than a table.
+  const made = GROUPS.find((group) => group.pointer === '/parts');
+  const given = made.parts
+    .map(({ title, fields }) => [title, fields.filter((field) => shownValue(field, design)).map((field) => `${field.label.toLowerCase()} ${shownValue(field, design)}`)])
+    .filter(([, values]) => values.length > 0)
+    .map(([title, values]) => `${title}: ${values.join(', ')}`);
   return [
     html('h1', {}, name),
     html(
@@ -41,6 +47,7 @@ export function reportOf(name, { design, shown, reference }, address) {
       html('a', { href: address }, 'this design on line'),
     ),
     html('div', { class: 'report-design' }, groups.filter(Boolean), html('table', {}, html('caption', {}, materials.title), html('tbody', {}, parts))),
+    given.length > 0 ? html('p', { class: 'report-parts' }, html('b', {}, `${made.title}. `), `${given.join('. ')}.`) : '',
   ];
 }
 

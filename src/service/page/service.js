@@ -20,18 +20,20 @@ class Unavailable extends Error {
   }
 }
 
-/** One answer, or the problem in its place. */
-export async function ask(path, design, signal) {
+const JSON_TYPE = 'application/json';
+
+/** One answer, or the problem in its place; anything but JSON is answered as a `Blob`. */
+export async function ask(path, design, { signal, accept = JSON_TYPE } = {}) {
   let response;
   let body;
   try {
     response = await fetch(path, {
       method: 'POST',
-      headers: { 'content-type': 'application/json' },
+      headers: { 'content-type': JSON_TYPE, accept },
       body: JSON.stringify(design),
       signal,
     });
-    body = await response.json();
+    body = await (response.ok && accept !== JSON_TYPE ? response.blob() : response.json());
   } catch (error) {
     if (signal?.aborted) throw error;
     throw new Unavailable('The calculation service does not answer.');
@@ -50,7 +52,7 @@ export async function evaluate(design, signal) {
   const drawn = { ...design, profile: { ...design.profile, extent: 'tooth' } };
   const names = Object.keys(ENDPOINTS);
   const replies = await Promise.all(
-    names.map((name) => ask(ENDPOINTS[name], name === 'geometry' ? drawn : design, signal)),
+    names.map((name) => ask(ENDPOINTS[name], name === 'geometry' ? drawn : design, { signal })),
   );
   const result = { design, answers: {}, problems: [], solveMs: 0 };
   names.forEach((name, index) => {

@@ -44,8 +44,11 @@ export function fromText(text) {
   return design;
 }
 
-export function save(design, name) {
-  const url = URL.createObjectURL(new Blob([toText(design)], { type: 'application/json' }));
+export const toFile = (design) => new Blob([toText(design)], { type: 'application/json' });
+
+/** Hands a blob to the browser as a file to keep. */
+export function save(blob, name) {
+  const url = URL.createObjectURL(blob);
   const link = document.createElement('a');
   link.href = url;
   link.download = name;

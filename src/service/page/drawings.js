@@ -1,0 +1,95 @@
+// Drawings and plots as files, just as the service answers them. They are asked for on demand alone: parts that cannot be made
+// concern nothing but their drawings, and a slider that moves needs none.
+
+import { changed, isSame } from './design.js';
+import { html, setText } from './dom.js';
+import { reasonsOf } from './findings.js';
+import { ask } from './service.js';
+import { save } from './share.js';
+
+const MEDIA_TYPES = { dxf: 'image/vnd.dxf', svg: 'image/svg+xml' };
+
+const drawing = (part, name) => ({ part, name, path: `v1/drawings/${part}`, formats: ['dxf', 'svg'] });
+
+const FILES = [
+  drawing('assembly', 'Assembly'),
+  drawing('ring', 'Ring'),
+  drawing('wave-generator', 'Wave generator'),
+  drawing('carrier', 'Carrier'),
+  drawing('tooth', 'Tooth'),
+  { part: 'plots', name: 'Force and stress plots', path: 'v1/sweep', formats: ['svg'] },
+];
+
+export class Drawings {
+  #design;
+  #inputDeg = 0;
+  #angle = html('span', { class: 'number' });
+  /** Of the design at hand, the problem that a file was refused for. */
+  #refusal;
+
+  /** `nameOf(ending)` names a file; `onRefusal()` when `problems` changed; `goTo(pointer)` and `labelOf(pointer)` as of the form. */
+  constructor({ list, state }, callbacks) {
+    Object.assign(this, callbacks);
+    this.state = state;
+    for (const file of FILES) list.append(this.#build(file));
+  }
+
+  #build(file) {
+    const { part, name, formats } = file;
+    const buttons = formats.map((format) => {
+      const label = format.toUpperCase();
+      return html('button', { type: 'button', 'data-file': `${part}.${format}`, 'aria-label': `${label}: ${name}`, onclick: () => this.#fetch(file, format) }, label);
+    });
+    return html('li', {}, html('span', {}, name, part === 'assembly' && [' at ', this.#angle]), html('span', { class: 'cluster' }, buttons));
+  }
+
+  /** A refusal stands as long as the design that it is about. */
+  setDesign(design) {
+    this.#design = design;
+    this.#refusal = undefined;
+    this.state.replaceChildren();
+  }
+
+  /** The assembly is drawn as the mechanism stands. */
+  turnTo(inputDeg, shown) {
+    this.#inputDeg = inputDeg;
+    setText(this.#angle, shown);
+  }
+
+  /** What the form can show at its fields. */
+  get problems() {
+    return this.#refusal?.errors?.length ? [this.#refusal] : [];
+  }
+
+  async #fetch({ part, name, path }, format) {
+    const design = this.#design;
+    const asked = part === 'assembly' ? changed(design, '/assembly/input_angle_deg', this.#inputDeg) : design;
+    const angle = part === 'assembly' ? `, input angle ${this.#angle.textContent}` : '';
+    const fileName = this.nameOf(`-${part}.${format}`);
+    this.state.replaceChildren(`Drawing ${name.toLowerCase()}…`);
+    try {
+      const { answer, problem } = await ask(path, asked, { accept: MEDIA_TYPES[format] });
+      if (problem) this.#refuse(name, problem, design);
+      else {
+        save(answer, fileName);
+        this.#settle(design, undefined, `Downloaded ${fileName}${angle}.`);
+      }
+    } catch (error) {
+      this.#settle(design, undefined, error.message);
+    }
+  }
+
+  #refuse(name, problem, design) {
+    const reasons = reasonsOf([problem]).map(({ pointer, detail }) =>
+      html('li', {}, pointer ? html('button', { type: 'button', class: 'link', onclick: () => this.goTo(pointer) }, `${this.labelOf(pointer)}: ${detail}`) : detail),
+    );
+    this.#settle(design, problem, html('div', { class: 'note problem' }, html('strong', {}, `${name}: ${problem.title}. Nothing was downloaded.`), html('ul', {}, reasons)));
+  }
+
+  /** The last word about a file; fields are marked only while the design is still the one that was asked about. */
+  #settle(design, refusal, ...words) {
+    this.state.replaceChildren(...words);
+    this.#refusal = isSame(design, this.#design) ? refusal : undefined;
+    this.onRefusal();
+  }
+}
