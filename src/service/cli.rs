@@ -50,7 +50,7 @@ enum Command {
     Sweep(Offline),
     /// Each way of computing a design, with its error and its time
     Accuracy(Offline),
-    /// A part, or all of them, as DXF or SVG
+    /// A part, or all of them, as DXF, STEP or SVG
     Draw {
         /// Which part
         #[arg(value_enum)]

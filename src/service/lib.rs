@@ -20,4 +20,5 @@ pub mod plots;
 pub mod problem;
 pub mod router;
 pub mod serve;
+pub mod step;
 pub mod svg;

@@ -23,8 +23,10 @@ pub enum Format {
     Text,
     /// A picture
     Svg,
-    /// For CAD and workshops
+    /// Outlines for CAD and workshops
     Dxf,
+    /// Solids for CAD
+    Step,
 }
 
 impl Format {
@@ -36,6 +38,7 @@ impl Format {
             Self::Text => MediaType::new(names::TEXT, names::PLAIN),
             Self::Svg => MediaType::from_parts(names::IMAGE, names::SVG, Some(names::XML), &[]),
             Self::Dxf => MediaType::new(names::IMAGE, Name::new_unchecked("vnd.dxf")),
+            Self::Step => MediaType::new(names::MODEL, Name::new_unchecked("step")),
         }
     }
 
@@ -47,6 +50,7 @@ impl Format {
             Self::Text => "text/plain; charset=utf-8",
             Self::Svg => "image/svg+xml",
             Self::Dxf => "image/vnd.dxf",
+            Self::Step => "model/step",
         }
     }
 }

@@ -223,7 +223,7 @@ async fn every_format_says_what_it_is_of() {
     for part in PARTS.iter().chain(&["assembly"]) {
         let drawing = drawn(part, &bored()).await;
         let hash = drawing["design_hash"].as_str().unwrap();
-        for accept in ["image/svg+xml", "image/vnd.dxf"] {
+        for accept in ["image/svg+xml", "image/vnd.dxf", "model/step"] {
             let text = written(part, &bored(), accept).await;
             assert!(text.contains(&format!(
                 "toothwave {}, {part}, design {hash}",

@@ -47,7 +47,9 @@ fn assert_answered<E: Endpoint>(endpoint: E, design: &Design) {
                     // serde_json writes null where a number is none; elsewhere a word may be `info`.
                     Format::Json => text.contains("null"),
                     Format::Text => text.contains("NaN"),
-                    Format::Csv | Format::Svg | Format::Dxf => text.contains("NaN") || text.contains("inf"),
+                    Format::Csv | Format::Svg | Format::Dxf | Format::Step => {
+                        text.contains("NaN") || text.contains("inf")
+                    }
                 };
                 assert!(!is_none, "{format:?}: {design:?}");
             }

@@ -19,7 +19,7 @@ use crate::design::Design;
 use crate::findings::FindingAnswer;
 use crate::negotiation::{Format, Representation};
 use crate::problem::{Problem, ProblemCode};
-use crate::{dxf, svg};
+use crate::{dxf, step, svg};
 
 /// What can be drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ValueEnum, ToSchema)]
@@ -197,6 +197,15 @@ impl From<Edge> for EdgeAnswer {
 }
 
 impl EdgeAnswer {
+    /// Where it ends.
+    pub fn end(&self) -> [f64; 2] {
+        match self {
+            Self::Line { x_mm, y_mm } => [x_mm[1], y_mm[1]],
+            Self::Arc { x_mm, y_mm, .. } => [x_mm[2], y_mm[2]],
+            Self::Curve { x_mm, y_mm, .. } => [x_mm[x_mm.len() - 1], y_mm[y_mm.len() - 1]],
+        }
+    }
+
     /// Where it starts.
     pub fn start(&self) -> [f64; 2] {
         match self {
@@ -319,7 +328,8 @@ impl Endpoint for Drawing {
 }
 
 impl Forms for DrawingAnswer {
-    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Svg, svg::write), (Format::Dxf, dxf::write)];
+    const FORMS: &'static [(Format, Form<Self>)] =
+        &[(Format::Svg, svg::write), (Format::Dxf, dxf::write), (Format::Step, step::write)];
 }
 
 /// The sections of a part, or of all parts in place.
@@ -333,8 +343,8 @@ impl Forms for DrawingAnswer {
         ("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")
     ),
     responses(
-        (status = 200, description = "The drawing. As DXF (AutoCAD 2000, millimetres) a layer a part, every outline a circle or one closed polyline with arcs as bulges; as SVG the same in millimetres.",
-            content((DrawingAnswer = "application/json"), (String = "image/svg+xml"), (String = "image/vnd.dxf")), headers(
+        (status = 200, description = "The drawing. As DXF (AutoCAD 2000, millimetres) a layer a part, every outline a circle or one closed polyline with arcs as bulges; as SVG the same in millimetres; as STEP (AP214) every prism a solid in place, curves as cubic splines through their points.",
+            content((DrawingAnswer = "application/json"), (String = "image/svg+xml"), (String = "image/vnd.dxf"), (String = "model/step")), headers(
                 ("ETag" = String, description = "Entity tag of this representation."),
                 ("Cache-Status" = String, description = "RFC 9211: `hit`, `fwd=miss`, `collapsed`."),
                 ("Server-Timing" = String, description = "`solve;dur=` and the milliseconds of the solve.")
