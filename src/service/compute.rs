@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use metrics::{counter, histogram};
-use tokio::sync::Semaphore;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tracing::Span;
@@ -23,6 +23,8 @@ pub struct Pool {
     /// One for each slice of a batch that runs or waits for a permit: as many as there are permits, so that a single request
     /// never waits for more than one round of them.
     turns: Arc<Semaphore>,
+    /// One for each batch that runs.
+    batches: Arc<Semaphore>,
     /// Cancelled when the service stops and has no time left.
     closed: CancellationToken,
     limits: Limits,
@@ -44,6 +46,7 @@ impl Pool {
             permits: Arc::new(Semaphore::new(limits.max_concurrent_solves)),
             places: Arc::new(Semaphore::new(limits.max_concurrent_solves + limits.max_queued_solves)),
             turns: Arc::new(Semaphore::new(limits.max_concurrent_solves)),
+            batches: Arc::new(Semaphore::new(limits.max_concurrent_batches)),
             closed: CancellationToken::new(),
             limits,
         }
@@ -83,7 +86,33 @@ impl Pool {
             counter!("toothwave_refusals_total", "reason" => "queue_full").increment(1);
             return Err(self.queue_full());
         };
-        self.run_holding(place, deadline, job).await
+        let timed = move |stop: &AtomicBool| {
+            let started = Instant::now();
+            let result = job(stop);
+            histogram!("toothwave_solve_duration_seconds").record(started.elapsed());
+            result
+        };
+        self.run_holding(place, deadline, timed).await
+    }
+
+    /// A place for a batch, to be held while it runs.
+    ///
+    /// # Errors
+    /// `queue_full` where as many run as the service admits.
+    pub fn batch_place(&self) -> Result<OwnedSemaphorePermit, Problem> {
+        Arc::clone(&self.batches).try_acquire_owned().map_err(|_| {
+            counter!("toothwave_refusals_total", "reason" => "queue_full").increment(1);
+            let most = self.limits.max_concurrent_batches;
+            Problem::new(
+                ProblemCode::QueueFull,
+                format!("{most} batches run, as many as the service admits; try again in a moment"),
+            )
+        })
+    }
+
+    /// Batches that run now.
+    pub fn batches(&self) -> usize {
+        self.limits.max_concurrent_batches - self.batches.available_permits()
     }
 
     /// Runs a slice of a batch when its turn comes, however long that takes; its deadline begins then.
@@ -118,10 +147,7 @@ impl Pool {
         let span = Span::current();
         let running = tokio::task::spawn_blocking(move || {
             let _held = (place, permit);
-            let started = Instant::now();
-            let result = span.in_scope(|| job(&signal));
-            histogram!("toothwave_solve_duration_seconds").record(started.elapsed());
-            result
+            span.in_scope(|| job(&signal))
         });
         let finished = tokio::select! {
             finished = tokio::time::timeout_at(deadline, running) => finished,

@@ -45,6 +45,10 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_MAX_QUEUED_SOLVES", value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(..=MOST_SOLVES))]
     pub max_queued_solves: u32,
 
+    /// Batches that may run at once
+    #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_BATCHES", value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=MOST_SOLVES))]
+    pub max_concurrent_batches: u32,
+
     /// Milliseconds from a request's arrival after which its computation is stopped
     #[arg(long, env = "TOOTHWAVE_DEADLINE_MS", value_name = "MS", default_value_t = 10_000)]
     pub deadline_ms: u64,
@@ -91,6 +95,8 @@ pub struct Limits {
     pub max_concurrent_solves: usize,
     /// Solves that may wait for their turn.
     pub max_queued_solves: usize,
+    /// Batches that may run at once.
+    pub max_concurrent_batches: usize,
     /// Milliseconds from a request's arrival after which its computation is stopped.
     pub deadline_ms: u64,
     /// Most bytes of answers that the cache keeps.
@@ -114,6 +120,7 @@ impl Settings {
             max_body_bytes: self.max_body_bytes,
             max_concurrent_solves,
             max_queued_solves: self.max_queued_solves as usize,
+            max_concurrent_batches: self.max_concurrent_batches as usize,
             deadline_ms: self.deadline_ms,
             cache_max_bytes: self.cache_max_bytes,
             max_connections: self.max_connections as usize,

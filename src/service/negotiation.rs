@@ -118,6 +118,25 @@ pub fn require_json(headers: &HeaderMap) -> Result<(), Problem> {
     }
 }
 
+/// Checks that the body is sent as one JSON document a line.
+///
+/// # Errors
+/// `unsupported_media_type`.
+pub fn require_ndjson(headers: &HeaderMap) -> Result<(), Problem> {
+    let content_type = joined(headers, &header::CONTENT_TYPE);
+    let known = ["x-ndjson", "ndjson", "jsonl", "x-jsonlines"];
+    let is_ndjson = MediaType::parse(&content_type).is_ok_and(|media_type| {
+        media_type.ty == names::APPLICATION && known.iter().any(|name| media_type.subty == *name)
+    });
+    if is_ndjson {
+        Ok(())
+    } else {
+        let detail =
+            format!("the body is sent as `{content_type}`; send a design document a line as `application/x-ndjson`");
+        Err(Problem::new(ProblemCode::UnsupportedMediaType, detail))
+    }
+}
+
 /// Whether the request prefers gzip to no coding at all.
 fn accepts_gzip(headers: &HeaderMap) -> bool {
     let accepted = joined(headers, &header::ACCEPT_ENCODING);

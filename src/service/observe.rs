@@ -37,6 +37,7 @@ pub async fn render(app: &App) -> String {
     {
         gauge!("toothwave_cache_bytes").set(size.bytes as f64);
         gauge!("toothwave_cache_entries").set(size.entries as f64);
+        gauge!("toothwave_batches_running").set(app.pool.batches() as f64);
         gauge!("toothwave_solves_running").set(running as f64);
         gauge!("toothwave_solves_queued").set(app.pool.admitted().saturating_sub(running) as f64);
     }

@@ -62,6 +62,8 @@ pub struct FieldError {
 pub enum ProblemCode {
     /// 400: the body is no JSON.
     MalformedJson,
+    /// 400: a query that the path does not know.
+    InvalidQuery,
     /// 401: no key, or one that opens nothing.
     Unauthorized,
     /// 404: nothing stands at this path.
@@ -162,7 +164,7 @@ impl ProblemCode {
     /// Its HTTP status.
     pub const fn status(self) -> StatusCode {
         match self {
-            Self::MalformedJson => StatusCode::BAD_REQUEST,
+            Self::MalformedJson | Self::InvalidQuery => StatusCode::BAD_REQUEST,
             Self::Unauthorized => StatusCode::UNAUTHORIZED,
             Self::NotFound => StatusCode::NOT_FOUND,
             Self::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
@@ -186,6 +188,7 @@ impl ProblemCode {
     const fn title(self) -> &'static str {
         match self {
             Self::MalformedJson => "The body is no JSON",
+            Self::InvalidQuery => "The query is not one of this path",
             Self::Unauthorized => "A key is wanted",
             Self::NotFound => "Nothing stands at this path",
             Self::MethodNotAllowed => "The path knows other methods",

@@ -17,7 +17,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
-use crate::api::{App, accuracy, coincidence_degree, drawings, geometry, page, side, sweep};
+use crate::api::{App, accuracy, batch, coincidence_degree, drawings, geometry, page, side, sweep};
 use crate::keys::{self, Keys};
 use crate::observe;
 use crate::problem::{Problem, ProblemCode};
@@ -43,6 +43,7 @@ fn api() -> OpenApiRouter<App> {
         .routes(routes!(sweep::sweep))
         .routes(routes!(accuracy::accuracy))
         .routes(routes!(drawings::drawing))
+        .routes(routes!(batch::batch))
         .routes(routes!(side::limits))
         .routes(routes!(side::examples))
         .routes(routes!(side::example))

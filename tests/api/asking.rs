@@ -34,6 +34,7 @@ pub(crate) const LIMITS: Limits = Limits {
     cache_max_bytes: 268_435_456,
     max_connections: 64,
     max_header_bytes: 16_384,
+    max_concurrent_batches: 4,
     header_timeout_ms: 600_000,
 };
 

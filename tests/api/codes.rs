@@ -18,7 +18,8 @@ macro_rules! all {
 
 pub(crate) fn problem_codes() -> Vec<ProblemCode> {
     all!(ProblemCode: MalformedJson,
-        MalformedJson => Unauthorized,
+        MalformedJson => InvalidQuery,
+        InvalidQuery => Unauthorized,
         Unauthorized => NotFound,
         NotFound => MethodNotAllowed,
         MethodNotAllowed => NotAcceptable,
@@ -103,7 +104,7 @@ pub(crate) fn codes_of<'a>(objects: impl IntoIterator<Item = &'a Value>) -> Vec<
 fn every_kind_of_problem_has_its_status_and_a_type_of_its_own() {
     use toothwave::problem::Problem;
     let expected = |code| match code {
-        ProblemCode::MalformedJson => 400,
+        ProblemCode::MalformedJson | ProblemCode::InvalidQuery => 400,
         ProblemCode::Unauthorized => 401,
         ProblemCode::NotFound => 404,
         ProblemCode::MethodNotAllowed => 405,

@@ -33,6 +33,7 @@ async fn the_limits_can_be_read() {
         deadline_ms: 6,
         max_connections: 8,
         max_header_bytes: 16_384,
+        max_concurrent_batches: 10,
         header_timeout_ms: 9,
         cache_max_bytes: 7,
     };
@@ -46,6 +47,7 @@ async fn the_limits_can_be_read() {
         "cache_max_bytes": 7,
         "max_connections": 8,
         "max_header_bytes": 16384,
+        "max_concurrent_batches": 10,
         "header_timeout_ms": 9
     });
     assert_eq!(Service::within(limits).get("/v1/limits").await.found(), expected);

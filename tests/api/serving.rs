@@ -94,6 +94,8 @@ fn settings_become_limits() {
         "8",
         "--header-timeout-ms",
         "9000",
+        "--max-concurrent-batches",
+        "10",
     ];
     let process = Process::started(&arguments);
     let expected = json!({
@@ -106,7 +108,8 @@ fn settings_become_limits() {
         "cache_max_bytes": 7000,
         "max_connections": 8,
         "max_header_bytes": 16384,
-        "header_timeout_ms": 9000
+        "header_timeout_ms": 9000,
+        "max_concurrent_batches": 10
     });
     assert_eq!(ask_at(process.address, &Question::of("GET", "/v1/limits")).found(), expected);
 }

@@ -27,6 +27,7 @@ use crate::negotiation::{self, Format, Representation};
 use crate::problem::{Problem, ProblemCode};
 
 pub mod accuracy;
+pub mod batch;
 pub mod coincidence_degree;
 pub mod drawings;
 pub mod geometry;
