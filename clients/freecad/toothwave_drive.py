@@ -4,9 +4,8 @@ The drive asks the service, the parts and the sheet depend on it: a failed call 
 recomputes nothing whose source has an error.
 """
 
-import json
-
 import FreeCAD
+
 import toothwave_client
 import toothwave_design
 import toothwave_parts
@@ -14,12 +13,14 @@ import toothwave_parts
 DEFAULT_URL = "http://127.0.0.1:8080"
 QUANTITIES = {"mm": "App::PropertyLength", "deg": "App::PropertyAngle"}
 KINDS = {int: "App::PropertyInteger", float: "App::PropertyFloat", bool: "App::PropertyBool"}
-PARTS = {  # as the service names them: our object, its colour
-    "ring": ("Ring", (0.36, 0.42, 0.50)),
-    "carrier": ("Carrier", (0.78, 0.68, 0.48)),
-    "teeth": ("Teeth", (0.88, 0.89, 0.91)),
-    "wave_generator": ("WaveGenerator", (0.25, 0.50, 0.66)),
+PARTS = {"ring": "Ring", "carrier": "Carrier", "teeth": "Teeth", "wave_generator": "WaveGenerator"}
+COLOURS = {
+    "ring": (0.55, 0.62, 0.70),
+    "carrier": (0.93, 0.72, 0.33),
+    "teeth": (0.94, 0.95, 0.96),
+    "wave_generator": (0.33, 0.62, 0.84),
 }
+OBJECTIONS = (toothwave_client.Problem, toothwave_client.NoService)
 
 _services = {}
 
@@ -29,7 +30,7 @@ def service_at(url):
     return _services.setdefault(url, toothwave_client.Service(url))
 
 
-class _Stateless:
+class Stateless:
     """A proxy that has nothing to save: whatever it keeps can be asked for again. Two spellings, older and newer FreeCAD's."""
 
     def dumps(self):
@@ -41,11 +42,12 @@ class _Stateless:
     __getstate__, __setstate__ = dumps, loads
 
 
-class HarmonicDrive(_Stateless):
+class HarmonicDrive(Stateless):
     """Holds the design; asks for the drawing and the loads when it has changed."""
 
     drawing = None
     sweep = None
+    problem = None
 
     def __init__(self, obj):
         obj.Proxy = self
@@ -63,16 +65,27 @@ class HarmonicDrive(_Stateless):
         service, document = service_at(obj.ServiceUrl), document_of(obj)
         try:
             self.drawing = service.drawing("assembly", document)
-        except (toothwave_client.Problem, toothwave_client.NoService) as problem:
-            _tell(obj, str(problem))
+        except OBJECTIONS as problem:
+            self._tell(obj, problem)
             raise RuntimeError(str(problem)) from None
+        self.sweep = problem = None
         try:
             self.sweep = service.sweep(document)
-            _tell(obj, "")
-        except (toothwave_client.Problem, toothwave_client.NoService) as problem:
-            self.sweep = None
-            _tell(obj, str(problem))
+        except OBJECTIONS as objection:
+            problem = objection
             FreeCAD.Console.PrintError(f"{obj.Label}: {problem}\n")
+        self._tell(obj, problem)
+
+    def _tell(self, obj, problem):
+        """Keeps the problem and, where there is a window, shows it when the recomputation is over."""
+        self.problem = problem
+        text = str(problem or "")
+        if text != obj.Problem:
+            obj.Problem = text
+            if text and FreeCAD.GuiUp:
+                import toothwave_panel
+
+                toothwave_panel.show_later(text)
 
     def body(self, obj, part):
         """A part's body, asked for again where the document was just loaded."""
@@ -81,7 +94,7 @@ class HarmonicDrive(_Stateless):
         return next(body for body in self.drawing["bodies"] if body["part"] == part)
 
 
-class DrivePart(_Stateless):
+class DrivePart(Stateless):
     """The solids of one part, built anew only where its section has changed; else they just move."""
 
     section = None
@@ -100,7 +113,7 @@ class DrivePart(_Stateless):
         obj.Shape = toothwave_parts.shape_of(body, self.prism)
 
 
-class Results(_Stateless):
+class Results(Stateless):
     """The spreadsheet: peaks, what else the sweep says of the whole period, and its findings."""
 
     def __init__(self, obj, drive):
@@ -108,7 +121,12 @@ class Results(_Stateless):
         obj.addProperty("App::PropertyLink", "Drive", "Drive", "The drive that these are the results of").Drive = drive
         obj.addProperty("App::PropertyInteger", "Rows", "Drive", "How many rows are filled", 4)  # 4: hidden
 
+    def onDocumentRestored(self, obj):
+        obj.recompute()  # FreeCAD restores the cells' text but evaluates it only then
+
     def execute(self, obj):
+        if obj.Drive.Proxy.drawing is None:
+            return False  # just loaded: what the file has still holds
         rows = _rows(obj.Drive.Proxy.sweep, obj.Drive.Problem)
         for number in range(1, max(obj.Rows, len(rows)) + 1):
             row = rows[number - 1] if number <= len(rows) else ()
@@ -172,32 +190,16 @@ def make_drive(design=None, url=DEFAULT_URL, document=None):
     if design is not None:
         set_document(drive, design)
     objects = [drive]
-    for part, (name, _) in PARTS.items():
+    for part, name in PARTS.items():
         solid = document.addObject("Part::FeaturePython", name)
         DrivePart(solid, drive, part)
         objects.append(solid)
     sheet = document.addObject("Spreadsheet::SheetPython", "Results")
     Results(sheet, drive)
     objects.append(sheet)
-    group.addObjects(objects)
+    group.Group = objects
     if FreeCAD.GuiUp:
         import toothwave_panel
 
-        toothwave_panel.dress(drive, sheet, objects[1:-1])
+        toothwave_panel.dress(drive, objects[1:-1])
     return drive
-
-
-def _tell(obj, problem):
-    """Keeps the problem as a property and, where there is a window, shows it when the recomputation is over."""
-    is_new = problem and problem != obj.Problem
-    if problem != obj.Problem:
-        obj.Problem = problem
-    if is_new and FreeCAD.GuiUp:
-        import toothwave_panel
-
-        toothwave_panel.show_later(problem)
-
-
-def same(one, other):
-    """Whether two design documents say the same."""
-    return json.dumps(one, sort_keys=True) == json.dumps(other, sort_keys=True)
