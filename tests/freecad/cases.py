@@ -1,11 +1,13 @@
 """The drives that the tests build, and ways to look at FreeCAD's solids."""
 
+import functools
 import json
 import math
 
-import Part
+import FreeCAD
+import Part  # after FreeCAD: before it, it crashes
 import toothwave_parts
-from FreeCAD import Vector
+
 from service import ROOT
 from theory import Theory
 
@@ -37,6 +39,16 @@ def designs():
     return documents
 
 
+@functools.lru_cache(maxsize=64)
+def _prism(section):
+    return toothwave_parts.prism_of(json.loads(section))
+
+
+def prism_of(body):
+    """Built once for all angles, as the drive does."""
+    return _prism(json.dumps({key: body[key] for key in ("outer", "holes", "width_mm")}))
+
+
 class Assembly:
     """All parts of a design at an input angle, built from one call."""
 
@@ -47,10 +59,8 @@ class Assembly:
         self.input_angle_deg = input_angle_deg
         self.tolerance_mm = drawing["chord_tolerance_mm"]
         bodies = {body["part"]: body for body in drawing["bodies"]}
-        self.solids = {
-            part: toothwave_parts.shape_of(body, toothwave_parts.prism_of(body)).Solids for part, body in bodies.items()
-        }
-        self.centres = [Vector(place["x_mm"], place["y_mm"], 0) for place in bodies["teeth"]["placements"]]
+        self.solids = {part: toothwave_parts.shape_of(body, prism_of(body)).Solids for part, body in bodies.items()}
+        self.centres = [FreeCAD.Vector(place["x_mm"], place["y_mm"], 0) for place in bodies["teeth"]["placements"]]
 
     @property
     def ring(self):

@@ -12,7 +12,7 @@ from cases import PAPER, Assembly, base_wires, designs, example, section_area_mm
 from service import running_service
 
 STEPS_A_TURN = 24
-MASS_PROPERTIES = 5e-6  # how far FreeCAD's own Volume may be off: it takes few points along a spline, however many spans it has
+MASS_PROPERTIES = 2e-5  # how far FreeCAD's own Volume may be off: it takes few points along a spline, however many spans it has
 
 
 def setUpModule():
@@ -93,45 +93,41 @@ class Solids(unittest.TestCase):
 class Contacts(unittest.TestCase):
     """At every step of a turn: who must touch touches, and nothing runs into anything."""
 
-    def setUp(self):
-        self.maxDiff = None
-
     def assemblies(self):
-        for name, document in designs().items():
+        turned = [name for name in designs() if " with " not in name or "5.1" in name]
+        for name in turned:
             for step in range(STEPS_A_TURN):
                 angle_deg = 360.0 * step / STEPS_A_TURN
                 with self.subTest(name, input_angle_deg=angle_deg):
-                    yield Assembly(service, document, angle_deg)
+                    yield Assembly(service, designs()[name], angle_deg)
 
     def test_teeth_touch_cam_and_ring_where_they_carry_load_and_enter_neither(self):
         for assembly in self.assemblies():
             theory, tolerance_mm = assembly.theory, assembly.tolerance_mm
             cam_wire = base_wires(assembly.cam)[0]
             (ring_wire,) = base_wires(assembly.ring)[1]
-            to_cam_mm = theory.r_mm + theory.clearance_mm("wave_generator")
-            to_ring_mm = theory.r_mm + theory.clearance_mm("ring")
             engagement_rad = theory.engagement_rad()
-            ring_face, cam_face = Part.Face(ring_wire), Part.Face(cam_wire)
             loaded = 0
             for centre, position_rad in zip(assembly.centres, assembly.positions_rad()):
-                vertex = Part.Vertex(centre)
-                off = vertex.distToShape(cam_wire)[0] - to_cam_mm
+                distance_mm, outward_mm = distance_and_outward_mm(centre, cam_wire)
+                off = distance_mm - theory.r_mm - theory.clearance_mm("wave_generator")
                 worst.note("|distance to cam - r| mm", abs(off))
                 self.assertLess(abs(off), tolerance_mm)
-                self.assertFalse(cam_face.isInside(centre, 1e-9, True))
-                self.assertTrue(ring_face.isInside(centre, 1e-9, True))
-                off = vertex.distToShape(ring_wire)[0] - to_ring_mm
+                self.assertGreater(outward_mm, 0, "the tooth stands outside the cam")
+
+                distance_mm, outward_mm = distance_and_outward_mm(centre, ring_wire)
+                off = distance_mm - theory.r_mm - theory.clearance_mm("ring")
                 worst.note("entering the ring mm", -off)
                 self.assertGreater(off, -tolerance_mm)
-                # The flanks that carry load and their mirror images, which would with the other sense of rotation.
+                self.assertLess(outward_mm, 0, "the tooth stands inside the ring")
+                # The flanks that carry load, and those that would with the other sense of rotation.
                 if abs(position_rad) <= engagement_rad:
-                    loaded += 0 < position_rad
+                    loaded += position_rad > 0
                     worst.note("|distance to ring - r| mm", abs(off))
                     self.assertLess(off, tolerance_mm)
                 elif abs(position_rad) > engagement_rad + math.radians(15):
-                    self.assertGreater(off, tolerance_mm, "a tooth past the trimmed flank touches nothing")
-            expected = engagement_rad * theory.installed / math.pi
-            self.assertLess(abs(loaded - expected), 2.0 + 1e-9, "teeth in both zones")
+                    self.assertGreater(off, tolerance_mm, "past a flank that is cut short nothing touches")
+            self.assertLessEqual(abs(loaded - engagement_rad * theory.installed / math.pi), 2, "teeth in both zones")
 
     def test_slot_walls_touch_the_teeth(self):
         for assembly in self.assemblies():
@@ -140,42 +136,58 @@ class Contacts(unittest.TestCase):
             inner_mm, outer_mm = (math.sqrt(radius**2 - half_slot_mm**2) for radius in theory.carrier_radii_mm())
             fingers = assembly.solids["carrier"]
             for slot, centre in enumerate(assembly.centres):
-                vertex = Part.Vertex(centre)
                 for finger in (fingers[slot], fingers[slot - 1]):
-                    off = vertex.distToShape(finger)[0] - half_slot_mm
+                    off = Part.Vertex(centre).distToShape(finger)[0] - half_slot_mm
                     worst.note("entering a slot's wall mm", -off)
                     self.assertGreater(off, -1e-9)
                     if inner_mm <= centre.Length <= outer_mm:
                         worst.note("|distance to slot's wall - r| mm", abs(off))
                         self.assertLess(off, 1e-9)
 
-    def test_teeth_are_clear_of_each_other_cam_of_carrier_carrier_of_ring(self):
-        axis = Part.Vertex(FreeCAD.Vector())
+    def test_teeth_are_clear_of_each_other(self):
         for assembly in self.assemblies():
-            theory = assembly.theory
             for one, other in zip(assembly.centres, assembly.centres[1:] + assembly.centres[:1]):
-                self.assertGreater(one.distanceToPoint(other), 2 * theory.r_mm)
-            cam_reach_mm = max(point.Length for point in base_wires(assembly.cam)[0].discretize(2000))
-            carrier_from_mm = min(axis.distToShape(finger)[0] for finger in assembly.solids["carrier"])
-            carrier_reach_mm = max(math.hypot(v.X, v.Y) for finger in assembly.solids["carrier"] for v in finger.Vertexes)
-            ring_from_mm = axis.distToShape(base_wires(assembly.ring)[1][0])[0]
-            self.assertLess(cam_reach_mm, carrier_from_mm)
-            self.assertLess(carrier_reach_mm, ring_from_mm)
+                self.assertGreater(one.distanceToPoint(other), 2 * assembly.theory.r_mm)
+
+    def test_the_carrier_is_clear_of_cam_and_ring_however_it_stands(self):
+        axis = Part.Vertex(FreeCAD.Vector())
+        for name, document in designs().items():
+            with self.subTest(name):
+                assembly = Assembly(service, document)
+                fingers = assembly.solids["carrier"]
+                cam_reach_mm = max(point.Length for point in base_wires(assembly.cam)[0].discretize(2000))
+                carrier_reach_mm = max(math.hypot(corner.X, corner.Y) for finger in fingers for corner in finger.Vertexes)
+                self.assertLess(cam_reach_mm, min(axis.distToShape(finger)[0] for finger in fingers))
+                self.assertLess(carrier_reach_mm, axis.distToShape(base_wires(assembly.ring)[1][0])[0])
 
     def test_no_two_solids_have_a_volume_in_common(self):
+        """By booleans, with teeth thinner by the chord tolerance: of surfaces that only touch OCCT's booleans tell nothing."""
         for name in (*PAPER, "ring-with-more-teeth"):
             for angle_deg in (0.0, 131.7):
-                assembly = Assembly(service, example(name), angle_deg)
-                theory, tolerance_mm = assembly.theory, assembly.tolerance_mm
-                # A surface that is off by the tolerance makes a lens of that depth, so wide as a chord of that sagitta.
-                lens_mm3 = 2 * tolerance_mm * 2 * math.sqrt(2 * tolerance_mm * theory.r_mm) * theory.width_mm
-                parts = {part: Part.makeCompound(solids) for part, solids in assembly.solids.items()}
-                pairs = (("teeth", "ring"), ("teeth", "wave_generator"), ("teeth", "carrier"), ("wave_generator", "carrier"), ("carrier", "ring"))
-                for one, other in pairs:
+                thinner = example(name) | {"parts": {"teeth": {"clearance_um": 1.0}}}
+                solids = Assembly(service, thinner, angle_deg).solids
+                for one, other in (("ring", "teeth"), ("wave_generator", "teeth"), ("wave_generator", "carrier"), ("ring", "carrier")):
                     with self.subTest(name, input_angle_deg=angle_deg, parts=(one, other)):
-                        for solid in parts[one].common(parts[other]).Solids:
-                            worst.note("common volume mm3", solid.Volume)
-                            self.assertLess(solid.Volume, lens_mm3)
+                        self.assertLess(common_mm3(solids[one][0], solids[other]), 1e-9)
+                with self.subTest(name, input_angle_deg=angle_deg, parts=("carrier", "teeth")):
+                    self.assertLess(sum(common_mm3(solids["carrier"][i], solids["teeth"]) for i in (0, 1)), 1e-9)
+
+    def test_a_ring_half_a_tooth_off_has_a_volume_in_common_with_teeth(self):
+        solids = Assembly(service, example("paper-5.1")).solids
+        ring = solids["ring"][0].copy()
+        ring.rotate(FreeCAD.Vector(), FreeCAD.Vector(0, 0, 1), 180 / 26)
+        self.assertGreater(common_mm3(ring, solids["teeth"]), 100.0)
+
+
+def distance_and_outward_mm(centre, wire):
+    """How far it is to a wire around the axis, and how far the centre stands outside it, both from the wire's nearest point."""
+    distance_mm, ((_, foot), *_), _ = Part.Vertex(centre).distToShape(wire)
+    return distance_mm, (centre - foot).dot(foot) / foot.Length
+
+
+def common_mm3(solid, others):
+    """The volume that a solid shares with others."""
+    return sum(piece.Volume for piece in solid.common(Part.makeCompound(others)).Solids)
 
 
 if __name__ == "__main__":

@@ -4,13 +4,14 @@ Nothing here asks the service or FreeCAD. Everything is written over the angle p
 tooth's position psi is an explicit function; the service works the other way round.
 """
 
+import functools
 import math
 from dataclasses import dataclass, field
 
 POINTS = 4000  # of the coarser of two polygons along a flank; extrapolated, its area is converged far below 1e-9
 
 
-@dataclass
+@dataclass(eq=False)  # hashed by identity, for the cache
 class Theory:
     """A drive as the design document has it, with the parts' clearances."""
 
@@ -60,6 +61,7 @@ class Theory:
         along, across = self.centre_radius_mm(phi) + reach * math.cos(beta), reach * math.sin(beta)
         return math.hypot(along, across), self.position_rad(phi) / self.k + math.atan2(across, along)
 
+    @functools.cache
     def flank_end_phi(self, set_back_mm=0.0):
         """Where the flank ends, seen from the root: at the symmetry line of the ring's tooth, or at its bore."""
         tip_rad = math.pi / self.ring_teeth
