@@ -110,7 +110,8 @@ class DrivePart(Stateless):
         section = {key: body[key] for key in ("outer", "holes", "width_mm")}
         if section != self.section:
             self.section, self.prism = section, toothwave_parts.prism_of(body)
-        obj.Shape = toothwave_parts.shape_of(body, self.prism)
+        obj.Shape = shape = toothwave_parts.shape_of(body, self.prism)
+        obj.Placement = shape.Placement  # during a recomputation FreeCAD takes it from there, not from the shape
 
 
 class Results(Stateless):
