@@ -7,7 +7,7 @@ CONTACTS = (("wave_generator", "Wave generator"), ("teeth", "Teeth"), ("ring", "
 
 @dataclass(frozen=True)
 class Field:
-    """One value of the document. Lengths in mm and angles in degrees become FreeCAD's quantities; other units stand in the name."""
+    """One value of the document. Lengths in mm and angles in degrees become quantities; other units stand in the name."""
 
     pointer: str
     name: str

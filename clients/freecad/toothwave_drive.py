@@ -20,6 +20,8 @@ COLOURS = {
     "teeth": (0.94, 0.95, 0.96),
     "wave_generator": (0.33, 0.62, 0.84),
 }
+HEADINGS = ("Problem", "Peaks", "Period", "Findings", "No findings", "severity")
+WIDTHS = {"A": 210, "B": 140, "C": 110, "D": 110, "F": 700, "G": 420, "H": 420}  # of the spreadsheet's columns, in pixels
 OBJECTIONS = (toothwave_client.Problem, toothwave_client.NoService)
 
 _services = {}
@@ -51,7 +53,9 @@ class HarmonicDrive(Stateless):
 
     def __init__(self, obj):
         obj.Proxy = self
-        obj.addProperty("App::PropertyString", "ServiceUrl", "Service", "Address of the toothwave service").ServiceUrl = DEFAULT_URL
+        obj.addProperty(
+            "App::PropertyString", "ServiceUrl", "Service", "Address of the toothwave service"
+        ).ServiceUrl = DEFAULT_URL
         obj.addProperty("App::PropertyString", "Problem", "Service", "What the service objects to", 1)  # 1: read only
         for field in toothwave_design.FIELDS:
             kind = "App::PropertyEnumeration" if field.choices else QUANTITIES.get(field.unit, KINDS[type(field.default)])
@@ -120,6 +124,8 @@ class Results(Stateless):
     def __init__(self, obj, drive):
         obj.Proxy = self
         obj.addProperty("App::PropertyLink", "Drive", "Drive", "The drive that these are the results of").Drive = drive
+        for column, width in WIDTHS.items():
+            obj.setColumnWidth(column, width)
         obj.addProperty("App::PropertyInteger", "Rows", "Drive", "How many rows are filled", 4)  # 4: hidden
 
     def onDocumentRestored(self, obj):
@@ -134,6 +140,7 @@ class Results(Stateless):
             for column, letter in enumerate("ABCDEFGH"):
                 value = row[column] if column < len(row) else ""
                 obj.set(f"{letter}{number}", _cell(value))
+            obj.setStyle(f"A{number}:H{number}", "bold" if row and row[0] in HEADINGS else "", "replace")
         obj.Rows = len(rows)
         return False  # goes on with the sheet's own recomputation
 

@@ -10,7 +10,7 @@ import toothwave_drive
 
 ICON = os.path.join(os.path.dirname(__file__), "toothwave.svg")
 AT_FAULT = "border: 1px solid #c0392b; border-radius: 2px;"
-COLOURS = {"problem": "#c0392b", "finding": "#b9770e", "result": ""}
+PROBLEM, FINDING = "#c0392b", "#b9770e"
 
 
 class FieldEdit(QtGui.QWidget):
@@ -22,7 +22,7 @@ class FieldEdit(QtGui.QWidget):
         self.entry = self._new_entry()
         self.entry.setToolTip(field.tooltip)
         self.note = QtGui.QLabel(wordWrap=True, visible=False)
-        self.note.setStyleSheet(f"color: {COLOURS['problem']}")
+        self.note.setStyleSheet(f"color: {PROBLEM}")
         grid = QtGui.QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.addWidget(QtGui.QLabel(field.label, wordWrap=True), 0, 0)
@@ -97,9 +97,11 @@ class Panel:
         self.examples.wheelEvent = QtGui.QWheelEvent.ignore
         self.examples.activated.connect(self._take_example)
         self.url.editingFinished.connect(self._list_examples)
-        self.outcome = QtGui.QLabel(wordWrap=True, textInteractionFlags=QtCore.Qt.TextSelectableByMouse)
+        self.outcome, self.stresses = (
+            QtGui.QLabel(wordWrap=True, textInteractionFlags=QtCore.Qt.TextSelectableByMouse) for _ in range(2)
+        )
         column = QtGui.QVBoxLayout(box)
-        for widget in (self.url, self.examples, self.outcome):
+        for widget in (self.url, self.examples, self.outcome, self.stresses):
             widget.setMinimumWidth(60)
             column.addWidget(widget)
         self._list_examples()
@@ -122,25 +124,22 @@ class Panel:
             edit.show_value(getattr(self.drive, name))
 
     def _show_outcome(self):
-        """The problem, or the findings, or the peaks: whichever matters most."""
-        proxy = self.drive.Proxy
+        """The problem, or the findings, and the peaks where there are any."""
+        problem, sweep = self.drive.Proxy.problem, self.drive.Proxy.sweep
+        faults = {error["pointer"]: error["detail"] for error in getattr(problem, "errors", ())}
         for edit in self.edits.values():
-            edit.object_to("")
-        if self.drive.Problem:
-            self._say("problem", self.drive.Problem)
-            for error in getattr(proxy.problem, "errors", ()):
-                for edit in self.edits.values():
-                    if edit.field.pointer == error["pointer"]:
-                        edit.object_to(error["detail"])
-        elif proxy.sweep:
-            findings = [finding["detail"] for finding in proxy.sweep["findings"]]
-            peaks = proxy.sweep["peaks"].items()
-            stresses = [f"Stress at {contact.replace('_', ' ')} up to {values['stress_mpa']['value']:.1f} MPa" for contact, values in peaks]
-            self._say("finding" if findings else "result", "\n".join([*findings, *stresses]))
+            edit.object_to(faults.get(edit.field.pointer, ""))
+        findings = ["• " + finding["detail"] for finding in sweep["findings"]] if sweep else []
+        self._say(str(problem or "\n".join(findings)), PROBLEM if problem else FINDING)
+        peaks = sweep["peaks"].items() if sweep and not problem else ()
+        lines = [f"Stress at {name.replace('_', ' ')} up to {peak['stress_mpa']['value']:.1f} MPa" for name, peak in peaks]
+        self.stresses.setText("\n".join(lines))
+        self.stresses.setVisible(bool(lines))
 
-    def _say(self, kind, text):
+    def _say(self, text, colour):
         self.outcome.setText(text)
-        self.outcome.setStyleSheet(f"color: {COLOURS[kind]}" if COLOURS[kind] else "")
+        self.outcome.setVisible(bool(text))
+        self.outcome.setStyleSheet(f"color: {colour}")
 
     # --- What it does
 
@@ -151,7 +150,7 @@ class Panel:
         try:
             self.examples.addItems(toothwave_drive.service_at(self.url.text()).examples())
         except toothwave_drive.OBJECTIONS as problem:
-            self._say("problem", str(problem))
+            self._say(str(problem), PROBLEM)
         self.examples.blockSignals(False)
 
     def _take_example(self, index):
@@ -173,7 +172,9 @@ class Panel:
             try:
                 values[name] = edit.value()
             except ValueError:
-                edit.object_to("a whole number is wanted here" if isinstance(edit.field.default, int) else "a number is wanted here")
+                edit.object_to(
+                    "a whole number is wanted here" if isinstance(edit.field.default, int) else "a number is wanted here"
+                )
                 is_readable = False
         if not is_readable:
             return False
@@ -238,7 +239,11 @@ class NewDrive:
     """The command: a drive in the active document, and its dialog."""
 
     def GetResources(self):
-        return {"Pixmap": ICON, "MenuText": "New harmonic drive", "ToolTip": "A discrete-tooth harmonic drive, its parts as solids"}
+        return {
+            "Pixmap": ICON,
+            "MenuText": "New harmonic drive",
+            "ToolTip": "A discrete-tooth harmonic drive, its parts as solids",
+        }
 
     def IsActive(self):
         return not FreeCADGui.Control.activeDialog()
@@ -254,6 +259,7 @@ class NewDrive:
 def dress(drive, parts):
     """Icon and colours, which only exist where there is a window."""
     ViewDrive(drive.ViewObject)
+    drive.ViewObject.Visibility = True  # there is nothing to see of it, but grey in the tree looks switched off
     for part in parts:
         view = part.ViewObject
         view.Proxy = 0  # shows a shape as FreeCAD does
@@ -264,7 +270,12 @@ def dress(drive, parts):
 
 def show_later(problem):
     """A message when the recomputation is over; the dialog, where it is open, shows it itself."""
+    title, _, text = problem.partition("\n")
+
+    def show():
+        box = QtGui.QMessageBox(QtGui.QMessageBox.Critical, "Toothwave", title, parent=FreeCADGui.getMainWindow())
+        box.setInformativeText(text)
+        box.exec_()
+
     if not Panel.is_open:
-        title, _, text = problem.partition("\n")
-        window = FreeCADGui.getMainWindow()
-        QtCore.QTimer.singleShot(0, lambda: QtGui.QMessageBox.critical(window, title, text or title))
+        QtCore.QTimer.singleShot(0, show)

@@ -41,7 +41,11 @@ def wire_of(outline):
     """The closed wire of an outline."""
     if outline["kind"] == "circle":
         return Part.Wire(Part.Circle(Vector(), Z, outline["radius_mm"]).toShape())
-    makers = {"line": lambda edge: Part.LineSegment(*_points(edge)), "arc": lambda edge: Part.Arc(*_points(edge)), "curve": _curve}
+    makers = {
+        "line": lambda edge: Part.LineSegment(*_points(edge)),
+        "arc": lambda edge: Part.Arc(*_points(edge)),
+        "curve": _curve,
+    }
     return Part.Wire([makers[edge["kind"]](edge).toShape() for edge in outline["edges"]])
 
 

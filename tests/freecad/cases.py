@@ -6,8 +6,8 @@ import math
 
 import FreeCAD
 import Part  # after FreeCAD: before it, it crashes
-import toothwave_parts
 
+import toothwave_parts
 from service import ROOT
 from theory import Theory
 
@@ -22,12 +22,14 @@ GAUSS = (  # five points, exact for the cubic spans of a spline
 
 def example(name):
     """A design document from examples/."""
-    return json.loads((ROOT / "examples" / f"{name}.json").read_text())
+    return json.loads((ROOT / "examples" / f"{name}.json").read_text(encoding="utf-8"))
 
 
 def with_clearances(document):
     """The same drive, every working surface set back by another distance, the cam bored."""
-    parts = {part: {"clearance_um": um} for part, um in (("wave_generator", 7.0), ("teeth", 3.0), ("ring", 12.0), ("carrier", 5.0))}
+    parts = {
+        part: {"clearance_um": um} for part, um in (("wave_generator", 7.0), ("teeth", 3.0), ("ring", 12.0), ("carrier", 5.0))
+    }
     parts["wave_generator"]["bore_radius_mm"] = 20.0
     return document | {"parts": parts}
 

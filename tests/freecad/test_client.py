@@ -23,7 +23,7 @@ class Imports(unittest.TestCase):
             allowed = sys.stdlib_module_names | own
             if path.stem not in ("toothwave_client", "toothwave_design"):
                 allowed |= of_freecad
-            for node in ast.walk(ast.parse(path.read_text())):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
                 names = [name.name for name in node.names] if isinstance(node, ast.Import) else []
                 names += [node.module] if isinstance(node, ast.ImportFrom) else []
                 for name in names:
@@ -41,7 +41,7 @@ class Document(unittest.TestCase):
                     self.assertIs(service.sweep(through), service.sweep(document))
 
     def test_there_is_a_field_for_all_that_drawings_and_sweeps_read(self):
-        schemas = json.loads((ROOT / "openapi/openapi.json").read_text())["components"]["schemas"]
+        schemas = json.loads((ROOT / "openapi/openapi.json").read_text(encoding="utf-8"))["components"]["schemas"]
 
         def pointers(schema, place=""):
             options = schema.get("oneOf", [schema])

@@ -5,10 +5,11 @@ import tempfile
 import unittest
 
 import FreeCAD
+from PySide import QtGui
+
 import toothwave_client
 import toothwave_drive
 from cases import example
-from PySide import QtGui
 from service import running_service
 from theory import Theory
 
@@ -124,6 +125,10 @@ class Spreadsheet(OfDrive):
                 for row, finding in zip(findings, sweep["findings"]):
                     self.assertEqual((row[2], row[5], row[6]), (finding["value"], finding["detail"], finding["advice"]))
 
+    def test_the_readme_names_the_cell_of_the_rings_stress(self):
+        peaks = toothwave_client.Service(url).sweep(example("paper-5.1"))["peaks"]
+        self.assertEqual(self.cell("C5"), peaks["ring"]["stress_mpa"]["value"])
+
     def rows(self):
         """By their first cell; findings, which may share it, by number."""
         sheet, rows = self.document.Results, {}
@@ -153,7 +158,7 @@ class Dialog(OfDrive):
         self.enter("ToothRadius", "4,75")
         self.assertTrue(self.panel.apply())
         self.assertEqual(self.drive.ToothRadius.Value, 4.75)
-        self.assertIn("Stress at ring up to ", self.panel.outcome.text())
+        self.assertIn("Stress at ring up to ", self.panel.stresses.text())
 
     def test_a_problem_stands_at_the_top_and_beside_the_field(self):
         self.enter("SemiMajor", "50")

@@ -12,12 +12,14 @@ PROGRAM = ROOT / "clients/python/plug_in.py"
 
 
 def run(url, design):
-    return subprocess.run([sys.executable, PROGRAM, url, design], capture_output=True, text=True, check=False)
+    return subprocess.run([sys.executable, PROGRAM, url, design], capture_output=True, text=True, encoding="utf-8", check=False)
 
 
 class PlugIn(unittest.TestCase):
     def test_the_page_shows_the_file_verbatim(self):
-        self.assertIn(f"```python\n{PROGRAM.read_text()}```\n", (ROOT / "docs/plug-ins.md").read_text())
+        self.assertIn(
+            f"```python\n{PROGRAM.read_text(encoding='utf-8')}```\n", (ROOT / "docs/plug-ins.md").read_text(encoding="utf-8")
+        )
 
     def test_it_gets_every_part_and_what_it_has_is_not_sent_again(self):
         with running_service() as url:
@@ -32,7 +34,8 @@ class PlugIn(unittest.TestCase):
     def test_it_says_what_the_service_objects_to(self):
         with running_service() as url, tempfile.TemporaryDirectory() as folder:
             design = Path(folder, "design.json")
-            design.write_text((ROOT / "examples/paper-5.1.json").read_text().replace("58.0", "50.0"))
+            example = (ROOT / "examples/paper-5.1.json").read_text(encoding="utf-8")
+            design.write_text(example.replace("58.0", "50.0"), encoding="utf-8")
             done = run(url, design)
         self.assertEqual(done.returncode, 1)
         self.assertIn("Values that no design can have\n/drive/wave_generator/semi_major_mm: ", done.stderr)

@@ -1,11 +1,13 @@
 """The solids, built from the running service, against the theory: volumes, contacts, clearances, exchange by STEP."""
 
+import itertools
 import math
 import tempfile
 import unittest
 
 import FreeCAD
 import Part
+
 import toothwave_client
 import toothwave_drive
 from cases import PAPER, Assembly, base_wires, designs, example, section_area_mm2
@@ -42,7 +44,7 @@ class Solids(unittest.TestCase):
                 installed = assembly.theory.installed
                 counts = {part: len(solids) for part, solids in assembly.solids.items()}
                 self.assertEqual(counts, {"ring": 1, "wave_generator": 1, "carrier": installed, "teeth": installed})
-                for solid in sum(assembly.solids.values(), []):
+                for solid in itertools.chain(*assembly.solids.values()):
                     self.assertEqual(solid.ShapeType, "Solid")
                     self.assertTrue(solid.isValid())
                     self.assertTrue(solid.isClosed())
@@ -166,7 +168,12 @@ class Contacts(unittest.TestCase):
             for angle_deg in (0.0, 131.7):
                 thinner = example(name) | {"parts": {"teeth": {"clearance_um": 1.0}}}
                 solids = Assembly(service, thinner, angle_deg).solids
-                for one, other in (("ring", "teeth"), ("wave_generator", "teeth"), ("wave_generator", "carrier"), ("ring", "carrier")):
+                for one, other in (
+                    ("ring", "teeth"),
+                    ("wave_generator", "teeth"),
+                    ("wave_generator", "carrier"),
+                    ("ring", "carrier"),
+                ):
                     with self.subTest(name, input_angle_deg=angle_deg, parts=(one, other)):
                         self.assertLess(common_mm3(solids[one][0], solids[other]), 1e-9)
                 with self.subTest(name, input_angle_deg=angle_deg, parts=("carrier", "teeth")):

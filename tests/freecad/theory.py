@@ -61,7 +61,7 @@ class Theory:
         along, across = self.centre_radius_mm(phi) + reach * math.cos(beta), reach * math.sin(beta)
         return math.hypot(along, across), self.position_rad(phi) / self.k + math.atan2(across, along)
 
-    @functools.cache
+    @functools.cache  # noqa: B019, few drives, all alive to the end
     def flank_end_phi(self, set_back_mm=0.0):
         """Where the flank ends, seen from the root: at the symmetry line of the ring's tooth, or at its bore."""
         tip_rad = math.pi / self.ring_teeth
@@ -92,7 +92,9 @@ class Theory:
         """The ellipse, set back inward: a parallel curve's area is A - c L + pi c^2."""
         c = self.clearance_mm("wave_generator")
         steps = 400  # the trapezoid rule over a whole period converges exponentially
-        length = sum(h + h2 for h, _, h2 in map(self.support, (2 * math.pi * i / steps for i in range(steps)))) * 2 * math.pi / steps
+        length = (
+            sum(h + h2 for h, _, h2 in map(self.support, (2 * math.pi * i / steps for i in range(steps)))) * 2 * math.pi / steps
+        )
         bore = self.parts.get("wave_generator", {}).get("bore_radius_mm") or 0.0
         return math.pi * self.a_mm * self.b_mm - c * length + math.pi * (c * c - bore * bore)
 
