@@ -115,6 +115,7 @@ class Panel:
                 column.addWidget(edit)
         if group == "Assembly":
             self.slider = QtGui.QSlider(QtCore.Qt.Horizontal, maximum=720, toolTip="Turns the drive: a turn of the input")
+            self.slider.setValue(round(2 * (self.drive.InputAngle.Value % 360)))
             self.slider.valueChanged.connect(self._turn)
             column.addWidget(self.slider)
         return box
@@ -155,7 +156,11 @@ class Panel:
 
     def _take_example(self, index):
         if index > 0:
-            document = toothwave_drive.service_at(self.url.text()).example(self.examples.itemText(index))
+            try:
+                document = toothwave_drive.service_at(self.url.text()).example(self.examples.itemText(index))
+            except toothwave_drive.OBJECTIONS as problem:
+                self._say(str(problem), PROBLEM)
+                return
             for name, value in toothwave_design.values_of(document).items():
                 self.edits[name].show_value(value)
             self.apply()
@@ -166,9 +171,10 @@ class Panel:
         self.drive.Document.recompute()
 
     def apply(self):
-        """Gives the drive what was entered and recomputes; tells whether all went well."""
+        """Gives the drive what was entered and recomputes; tells whether it can be drawn."""
         values, is_readable = {}, True
         for name, edit in self.edits.items():
+            edit.object_to("")
             try:
                 values[name] = edit.value()
             except ValueError:
@@ -185,7 +191,7 @@ class Panel:
         self.drive.touch()  # asks again where only the service has changed, such as from absent to present
         self.drive.Document.recompute()
         self._show_outcome()
-        return not self.drive.Problem
+        return "Invalid" not in self.drive.State
 
     # --- As FreeCAD calls it
 

@@ -170,6 +170,12 @@ class Dialog(OfDrive):
         self.assertTrue(self.panel.apply())
         self.assertEqual(self.panel.edits["SemiMajor"].note.text(), "")
 
+    def test_a_drive_that_is_drawn_without_a_load_can_be_kept(self):
+        self.enter("InputTorqueNm", "")
+        self.assertTrue(self.panel.apply())
+        self.assertIn("/load: forces need a load", self.panel.outcome.text())
+        self.assertEqual(self.panel.stresses.text(), "")
+
     def test_what_is_no_number_is_marked_and_not_sent(self):
         self.enter("RingTeeth", "26.5")
         self.enter("SemiMajor", "")
