@@ -1,0 +1,287 @@
+"""The dialog: the design's fields in FreeCAD's task panel, with what the service says of them beside the fields it names."""
+
+import os
+
+import FreeCADGui
+from PySide import QtCore, QtGui
+
+import toothwave_design
+import toothwave_drive
+
+ICON = os.path.join(os.path.dirname(__file__), "toothwave.svg")
+AT_FAULT = "border: 1px solid #c0392b; border-radius: 2px;"
+PROBLEM, FINDING = "#c0392b", "#b9770e"
+
+
+class FieldEdit(QtGui.QWidget):
+    """One field: label, entry, unit, and below them what the service objects to."""
+
+    def __init__(self, field):
+        super().__init__()
+        self.field = field
+        self.entry = self._new_entry()
+        self.entry.setToolTip(field.tooltip)
+        self.note = QtGui.QLabel(wordWrap=True, visible=False)
+        self.note.setStyleSheet(f"color: {PROBLEM}")
+        grid = QtGui.QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.addWidget(QtGui.QLabel(field.label, wordWrap=True), 0, 0)
+        grid.addWidget(self.entry, 0, 1)
+        grid.addWidget(QtGui.QLabel(field.unit.replace("deg", "°"), minimumWidth=32), 0, 2)
+        grid.addWidget(self.note, 1, 0, 1, 3)
+        grid.setColumnStretch(0, 3)
+        grid.setColumnStretch(1, 2)
+
+    def _new_entry(self):
+        if self.field.choices:
+            entry = QtGui.QComboBox()
+            for choice in self.field.choices:
+                entry.addItem(choice.replace("_", " "), choice)
+            entry.wheelEvent = QtGui.QWheelEvent.ignore  # scrolling the panel would change the design
+        elif isinstance(self.field.default, bool):
+            entry = QtGui.QCheckBox()
+        else:
+            entry = QtGui.QLineEdit(placeholderText=self.field.blank, alignment=QtCore.Qt.AlignRight)
+        entry.setMinimumWidth(60)
+        entry.setSizePolicy(QtGui.QSizePolicy.Ignored, QtGui.QSizePolicy.Fixed)  # else it is wider than the panel
+        return entry
+
+    def show_value(self, value):
+        """Shows a property's value; a 0 that stands for nothing as its meaning."""
+        if self.field.choices:
+            self.entry.setCurrentIndex(self.field.choices.index(value))
+        elif isinstance(value, bool):
+            self.entry.setChecked(value)
+        else:
+            value = getattr(value, "Value", value)
+            self.entry.setText("" if self.field.blank and value == 0 else f"{value:.15g}")
+
+    def value(self):
+        """The value entered. Raises ValueError where it is no number, or not whole where it must be."""
+        if self.field.choices:
+            return self.entry.itemData(self.entry.currentIndex())
+        if isinstance(self.field.default, bool):
+            return self.entry.isChecked()
+        text = self.entry.text().strip().replace(",", ".")
+        return type(self.field.default)(text or ("0" if self.field.blank else ""))
+
+    def object_to(self, text):
+        """Marks the field; an empty text takes the mark away."""
+        self.note.setText(text)
+        self.note.setVisible(bool(text))
+        self.entry.setStyleSheet(AT_FAULT if text else "")
+
+
+class Panel:
+    """FreeCAD's task panel for one drive. Apply recomputes; Cancel takes everything back."""
+
+    is_open = False
+
+    def __init__(self, drive):
+        self.drive = drive
+        self.edits = {field.name: FieldEdit(field) for field in toothwave_design.FIELDS}
+        groups = dict.fromkeys(field.group for field in toothwave_design.FIELDS)
+        self.form = [self._service_box(), *map(self._group_box, groups)]
+        self._show_properties()
+        self._show_outcome()
+        drive.Document.openTransaction("Edit harmonic drive")
+        Panel.is_open = True
+
+    # --- What it looks like
+
+    def _service_box(self):
+        box = QtGui.QWidget(windowTitle="Service")
+        self.url = QtGui.QLineEdit(self.drive.ServiceUrl)
+        self.examples = QtGui.QComboBox()
+        self.examples.addItem("Start from an example…")
+        self.examples.wheelEvent = QtGui.QWheelEvent.ignore
+        self.examples.activated.connect(self._take_example)
+        self.url.editingFinished.connect(self._list_examples)
+        self.outcome, self.stresses = (
+            QtGui.QLabel(wordWrap=True, textInteractionFlags=QtCore.Qt.TextSelectableByMouse) for _ in range(2)
+        )
+        column = QtGui.QVBoxLayout(box)
+        for widget in (self.url, self.examples, self.outcome, self.stresses):
+            widget.setMinimumWidth(60)
+            column.addWidget(widget)
+        self._list_examples()
+        return box
+
+    def _group_box(self, group):
+        box = QtGui.QWidget(windowTitle=group)
+        column = QtGui.QVBoxLayout(box)
+        for edit in self.edits.values():
+            if edit.field.group == group:
+                column.addWidget(edit)
+        if group == "Assembly":
+            self.slider = QtGui.QSlider(QtCore.Qt.Horizontal, maximum=720, toolTip="Turns the drive: a turn of the input")
+            self.slider.setValue(round(2 * (self.drive.InputAngle.Value % 360)))
+            self.slider.valueChanged.connect(self._turn)
+            column.addWidget(self.slider)
+        return box
+
+    def _show_properties(self):
+        for name, edit in self.edits.items():
+            edit.show_value(getattr(self.drive, name))
+
+    def _show_outcome(self):
+        """The problem, or the findings, and the peaks where there are any."""
+        problem, sweep = self.drive.Proxy.problem, self.drive.Proxy.sweep
+        faults = {error["pointer"]: error["detail"] for error in getattr(problem, "errors", ())}
+        for edit in self.edits.values():
+            edit.object_to(faults.get(edit.field.pointer, ""))
+        findings = ["• " + finding["detail"] for finding in sweep["findings"]] if sweep else []
+        self._say(str(problem or "\n".join(findings)), PROBLEM if problem else FINDING)
+        peaks = sweep["peaks"].items() if sweep and not problem else ()
+        lines = [f"Stress at {name.replace('_', ' ')} up to {peak['stress_mpa']['value']:.1f} MPa" for name, peak in peaks]
+        self.stresses.setText("\n".join(lines))
+        self.stresses.setVisible(bool(lines))
+
+    def _say(self, text, colour):
+        self.outcome.setText(text)
+        self.outcome.setVisible(bool(text))
+        self.outcome.setStyleSheet(f"color: {colour}")
+
+    # --- What it does
+
+    def _list_examples(self):
+        self.examples.blockSignals(True)
+        while self.examples.count() > 1:
+            self.examples.removeItem(1)
+        try:
+            self.examples.addItems(toothwave_drive.service_at(self.url.text()).examples())
+        except toothwave_drive.OBJECTIONS as problem:
+            self._say(str(problem), PROBLEM)
+        self.examples.blockSignals(False)
+
+    def _take_example(self, index):
+        if index > 0:
+            try:
+                document = toothwave_drive.service_at(self.url.text()).example(self.examples.itemText(index))
+            except toothwave_drive.OBJECTIONS as problem:
+                self._say(str(problem), PROBLEM)
+                return
+            for name, value in toothwave_design.values_of(document).items():
+                self.edits[name].show_value(value)
+            self.apply()
+
+    def _turn(self, half_degrees):
+        self.edits["InputAngle"].show_value(half_degrees / 2)
+        self.drive.InputAngle = half_degrees / 2
+        self.drive.Document.recompute()
+
+    def apply(self):
+        """Gives the drive what was entered and recomputes; tells whether it can be drawn."""
+        values, is_readable = {}, True
+        for name, edit in self.edits.items():
+            edit.object_to("")
+            try:
+                values[name] = edit.value()
+            except ValueError:
+                edit.object_to(
+                    "a whole number is wanted here" if isinstance(edit.field.default, int) else "a number is wanted here"
+                )
+                is_readable = False
+        if not is_readable:
+            return False
+        self.drive.ServiceUrl = self.url.text()
+        for name, value in values.items():
+            if getattr(getattr(self.drive, name), "Value", getattr(self.drive, name)) != value:
+                setattr(self.drive, name, value)
+        self.drive.touch()  # asks again where only the service has changed, such as from absent to present
+        self.drive.Document.recompute()
+        self._show_outcome()
+        return "Invalid" not in self.drive.State
+
+    # --- As FreeCAD calls it
+
+    def getStandardButtons(self):
+        return int(QtGui.QDialogButtonBox.Ok | QtGui.QDialogButtonBox.Apply | QtGui.QDialogButtonBox.Cancel)
+
+    def clicked(self, button):
+        if button == QtGui.QDialogButtonBox.Apply:
+            self.apply()
+
+    def accept(self):
+        if not self.apply():
+            return False
+        self.drive.Document.commitTransaction()
+        return self._close()
+
+    def reject(self):
+        self.drive.Document.abortTransaction()
+        self.drive.Document.recompute()
+        return self._close()
+
+    def _close(self):
+        Panel.is_open = False
+        FreeCADGui.ActiveDocument.resetEdit()
+        FreeCADGui.Control.closeDialog()
+        return True
+
+
+class ViewDrive(toothwave_drive.Stateless):
+    """The drive in the tree: its icon, and the dialog on a double click."""
+
+    def __init__(self, view):
+        view.Proxy = self
+
+    def getIcon(self):
+        return ICON
+
+    def setEdit(self, view, _mode):
+        FreeCADGui.Control.showDialog(Panel(view.Object))
+        return True
+
+    def unsetEdit(self, _view, _mode):
+        FreeCADGui.Control.closeDialog()
+        return True
+
+    def doubleClicked(self, view):
+        return self.setEdit(view, 0)
+
+
+class NewDrive:
+    """The command: a drive in the active document, and its dialog."""
+
+    def GetResources(self):
+        return {
+            "Pixmap": ICON,
+            "MenuText": "New harmonic drive",
+            "ToolTip": "A discrete-tooth harmonic drive, its parts as solids",
+        }
+
+    def IsActive(self):
+        return not FreeCADGui.Control.activeDialog()
+
+    def Activated(self):
+        drive = toothwave_drive.make_drive()
+        drive.Document.recompute()
+        FreeCADGui.activeDocument().activeView().viewIsometric()
+        FreeCADGui.SendMsgToActiveView("ViewFit")
+        FreeCADGui.Control.showDialog(Panel(drive))
+
+
+def dress(drive, parts):
+    """Icon and colours, which only exist where there is a window."""
+    ViewDrive(drive.ViewObject)
+    drive.ViewObject.Visibility = True  # there is nothing to see of it, but grey in the tree looks switched off
+    for part in parts:
+        view = part.ViewObject
+        view.Proxy = 0  # shows a shape as FreeCAD does
+        view.ShapeColor = toothwave_drive.COLOURS[part.DrivePart]
+        view.LineWidth = 1
+        view.Deviation, view.AngularDeflection = 0.02, 5
+
+
+def show_later(problem):
+    """A message when the recomputation is over; the dialog, where it is open, shows it itself."""
+    title, _, text = problem.partition("\n")
+
+    def show():
+        box = QtGui.QMessageBox(QtGui.QMessageBox.Critical, "Toothwave", title, parent=FreeCADGui.getMainWindow())
+        box.setInformativeText(text)
+        box.exec_()
+
+    if not Panel.is_open:
+        QtCore.QTimer.singleShot(0, show)

@@ -1,0 +1,110 @@
+"""The drives that the tests build, and ways to look at FreeCAD's solids."""
+
+import functools
+import json
+import math
+
+import FreeCAD
+import Part  # after FreeCAD: before it, it crashes
+
+import toothwave_parts
+from service import ROOT
+from theory import Theory
+
+PAPER = ("paper-5.1", "paper-5.2", "paper-5.2-bored")
+PIECES = 32  # of an edge that is no spline, for quadrature
+GAUSS = (  # five points, exact for the cubic spans of a spline
+    (0.0, 128 / 225),
+    *((sign * math.sqrt(5 - 2 * math.sqrt(10 / 7)) / 3, (322 + 13 * math.sqrt(70)) / 900) for sign in (-1, 1)),
+    *((sign * math.sqrt(5 + 2 * math.sqrt(10 / 7)) / 3, (322 - 13 * math.sqrt(70)) / 900) for sign in (-1, 1)),
+)
+
+
+def example(name):
+    """A design document from examples/."""
+    return json.loads((ROOT / "examples" / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def with_clearances(document):
+    """The same drive, every working surface set back by another distance, the cam bored."""
+    parts = {
+        part: {"clearance_um": um} for part, um in (("wave_generator", 7.0), ("teeth", 3.0), ("ring", 12.0), ("carrier", 5.0))
+    }
+    parts["wave_generator"]["bore_radius_mm"] = 20.0
+    return document | {"parts": parts}
+
+
+def designs():
+    """All drives by name: the paper's, one with fewer teeth than its ring, and those with clearances."""
+    documents = {name: example(name) for name in (*PAPER, "ring-with-more-teeth")}
+    documents |= {f"{name} with clearances": with_clearances(example(name)) for name in PAPER}
+    return documents
+
+
+@functools.lru_cache(maxsize=64)
+def _prism(section):
+    return toothwave_parts.prism_of(json.loads(section))
+
+
+def prism_of(body):
+    """Built once for all angles, as the drive does."""
+    return _prism(json.dumps({key: body[key] for key in ("outer", "holes", "width_mm")}))
+
+
+class Assembly:
+    """All parts of a design at an input angle, built from one call."""
+
+    def __init__(self, service, document, input_angle_deg=0.0):
+        document = document | {"assembly": {"input_angle_deg": input_angle_deg}}
+        drawing = service.drawing("assembly", document)
+        self.theory = Theory(document)
+        self.input_angle_deg = input_angle_deg
+        self.tolerance_mm = drawing["chord_tolerance_mm"]
+        bodies = {body["part"]: body for body in drawing["bodies"]}
+        self.solids = {part: toothwave_parts.shape_of(body, prism_of(body)).Solids for part, body in bodies.items()}
+        self.centres = [FreeCAD.Vector(place["x_mm"], place["y_mm"], 0) for place in bodies["teeth"]["placements"]]
+
+    @property
+    def ring(self):
+        return self.solids["ring"][0]
+
+    @property
+    def cam(self):
+        return self.solids["wave_generator"][0]
+
+    def positions_rad(self):
+        """psi of every tooth, from the theory, to the nearer end of the major axis."""
+        return [self.theory.position_of_tooth_rad(tooth, self.input_angle_deg) for tooth in range(len(self.centres))]
+
+
+def base_wires(solid):
+    """Outer wire and holes' wires of the face on which a prism stands."""
+    (base,) = (face for face in solid.Faces if face.BoundBox.ZMax < 1e-6)
+    outer = base.OuterWire
+    return outer, [wire for wire in base.Wires if not wire.isSame(outer)]
+
+
+def enclosed_area_mm2(wire):
+    """By Green's theorem along the wire's own curves, span by span."""
+
+    def along(edge):
+        low, high = edge.ParameterRange
+        curve = edge.Curve
+        is_spline = isinstance(curve, Part.BSplineCurve)
+        ends = curve.getKnots() if is_spline else [low + (high - low) * i / PIECES for i in range(PIECES + 1)]
+        total = []
+        for start, end in zip(ends, ends[1:]):
+            for place, weight in GAUSS:
+                parameter = (start + end) / 2 + place * (end - start) / 2
+                point, tangent = edge.valueAt(parameter), edge.derivative1At(parameter)
+                total.append(weight * (end - start) / 4 * (point.x * tangent.y - point.y * tangent.x))
+        area = math.fsum(total)
+        return -area if edge.Orientation == "Reversed" else area
+
+    return abs(math.fsum(along(edge) for edge in wire.Edges))
+
+
+def section_area_mm2(solid):
+    """Area of the section of a prism."""
+    outer, holes = base_wires(solid)
+    return enclosed_area_mm2(outer) - sum(map(enclosed_area_mm2, holes))
