@@ -22,7 +22,7 @@ use futures_util::{Stream, StreamExt as _, stream};
 use metrics::{counter, histogram};
 use serde::{Deserialize, Serialize};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
-use utoipa::{IntoParams, ToSchema};
+use utoipa::ToSchema;
 
 use super::coincidence_degree::CoincidenceDegree;
 use super::geometry::Geometry;
@@ -64,7 +64,7 @@ pub enum BatchEndpoint {
 }
 
 /// How a batch is answered.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, IntoParams)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, utoipa::IntoParams)]
 #[serde(deny_unknown_fields, default)]
 #[into_params(parameter_in = Query)]
 pub struct BatchQuery {

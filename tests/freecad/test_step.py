@@ -1,0 +1,76 @@
+"""STEP straight from the service, read by FreeCAD: the theory's solids, closed, and material where it belongs."""
+
+import json
+import tempfile
+import unittest
+import urllib.request
+
+import FreeCAD
+import Part  # after FreeCAD: before it, it crashes
+
+from cases import designs, section_area_mm2
+from service import running_service
+from theory import Theory
+
+PATHS = {"ring": "ring", "wave_generator": "wave-generator", "carrier": "carrier", "teeth": "tooth", None: "assembly"}
+
+
+def setUpModule():
+    global url
+    url = unittest.enterModuleContext(running_service())
+
+
+def read(part, document):
+    """The solids of a drawing."""
+    headers = {"content-type": "application/json", "accept": "model/step"}
+    request = urllib.request.Request(f"{url}/v1/drawings/{PATHS[part]}", json.dumps(document).encode(), headers)
+    with urllib.request.urlopen(request) as response, tempfile.NamedTemporaryFile(suffix=".step") as file:
+        file.write(response.read())
+        file.flush()
+        shape = Part.Shape()
+        shape.read(file.name)
+        return shape.Solids
+
+
+class Step(unittest.TestCase):
+    def test_every_prism_is_one_valid_closed_solid_of_the_theorys_area(self):
+        worst = {}
+        for name, document in designs().items():
+            theory = Theory(document)
+            for part, area_mm2 in theory.areas_mm2().items():
+                with self.subTest(name, part=part):
+                    solids = read(part, document)
+                    self.assertEqual(len(solids), theory.installed if part == "carrier" else 1)
+                    for solid in solids:
+                        self.assertEqual((solid.ShapeType, solid.isValid(), solid.isClosed()), ("Solid", True, True))
+                        # Edges meet at their vertices: a reader that had to close gaps would widen this.
+                        self.assertLess(max(vertex.Tolerance for vertex in solid.Vertexes), 1e-6)
+                        self.assertEqual({round(vertex.Z, 9) for vertex in solid.Vertexes}, {0.0, theory.width_mm})
+                        off = abs(section_area_mm2(solid) / area_mm2 - 1)
+                        worst[part] = max(worst.get(part, 0.0), off)
+                        self.assertLess(off, 1e-6)
+        print("\nSTEP, worst area: " + ", ".join(f"{part} {off:.2e}" for part, off in worst.items()))
+
+    def test_material_is_inside_and_holes_are_outside(self):
+        for name, document in designs().items():
+            with self.subTest(name):
+                (ring,), (cam,) = read("ring", document), read("wave_generator", document)
+                height_mm = Theory(document).width_mm / 2
+                self.assertTrue(ring.isInside(FreeCAD.Vector(ring.BoundBox.XMax - 0.5, 0, height_mm), 1e-6, False))
+                self.assertFalse(ring.isInside(FreeCAD.Vector(0, 0, height_mm), 1e-6, False))
+                is_bored = "clearances" in name
+                self.assertEqual(cam.isInside(FreeCAD.Vector(0, 0, height_mm), 1e-6, False), not is_bored)
+                self.assertTrue(cam.isInside(FreeCAD.Vector(30, 0, height_mm), 1e-6, False))
+                self.assertGreater(min(ring.Volume, cam.Volume), 0.0)
+
+    def test_an_assembly_holds_every_part_in_place(self):
+        for name, document in designs().items():
+            with self.subTest(name):
+                installed = Theory(document).installed
+                solids = read(None, document | {"assembly": {"input_angle_deg": 17.0}})
+                self.assertEqual(len(solids), 2 + 2 * installed)
+                self.assertTrue(all(solid.isValid() and solid.isClosed() for solid in solids))
+
+
+if __name__ == "__main__":
+    unittest.main()
