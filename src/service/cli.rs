@@ -1,7 +1,7 @@
 //! The command line: the service, the same answers without it, and what containers need.
 
 use std::fs::File;
-use std::io::{self, Read, Write};
+use std::io::{self, BufRead, Read, Write};
 use std::iter;
 use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
@@ -11,9 +11,12 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
 use tracing_subscriber::EnvFilter;
 
 use crate::api::accuracy::Accuracy;
+use crate::api::batch::{BatchEndpoint, BatchQuery, answer_line};
 use crate::api::coincidence_degree::CoincidenceDegree;
 use crate::api::drawings::{Drawing, DrawnPart};
 use crate::api::geometry::Geometry;
@@ -61,6 +64,17 @@ enum Command {
         #[arg(long, value_enum, default_value_t = Format::Dxf)]
         format: Format,
     },
+    /// Many designs, one a line, on all cores; answers come as NDJSON in their order
+    Batch {
+        /// Design documents, one a line, or `-` for standard input
+        file: PathBuf,
+        /// What each is asked
+        #[arg(long, value_enum, default_value_t = BatchEndpoint::Sweep)]
+        endpoint: BatchEndpoint,
+        /// Of sweeps, the peaks without the states
+        #[arg(long)]
+        peaks_only: bool,
+    },
     /// Ask a running service whether it is well; exit status 0 if so
     Health {
         /// Where it listens
@@ -99,6 +113,7 @@ pub fn run() -> ExitCode {
         Some(Command::Sweep(offline)) => answer(Sweep, &offline.file, offline.format),
         Some(Command::Accuracy(offline)) => answer(Accuracy, &offline.file, offline.format),
         Some(Command::Draw { part, file, format }) => answer(Drawing(part), &file, format),
+        Some(Command::Batch { file, endpoint, peaks_only }) => batch(&file, BatchQuery { endpoint, peaks_only }),
         Some(Command::Health { address }) => health(address),
         Some(Command::NewKey { name }) => new_key(&name),
         Some(Command::Openapi) => print(|writer| writer.write_all(router::openapi_json().as_bytes())),
@@ -201,6 +216,52 @@ fn answer<E: Endpoint>(endpoint: E, file: &Path, format: Format) -> Result<(), F
         answer.write(format, writer)?;
         // The other formats end their last line themselves.
         if format == Format::Json { writeln!(writer) } else { Ok(()) }
+    })
+}
+
+/// Lines that are answered side by side before the first of them is written: some megabytes of answers without states.
+const BATCH_LINES: usize = 1024;
+
+fn batch(file: &Path, query: BatchQuery) -> Result<(), Failure> {
+    tracing_subscriber::fmt().with_max_level(tracing::Level::ERROR).with_writer(io::stderr).init();
+    query.require_possible()?;
+    let open = |error: io::Error| Failure::BadInput(format!("{}: {error}", file.display()));
+    let (input, bytes): (Box<dyn BufRead>, Option<u64>) = if file.as_os_str() == "-" {
+        (Box::new(io::stdin().lock()), None)
+    } else {
+        let opened = File::open(file).map_err(open)?;
+        let bytes = opened.metadata().map_err(open)?.len();
+        (Box::new(io::BufReader::new(opened)), Some(bytes))
+    };
+    // Drawn on standard error, and only where that is a terminal.
+    let progress = ProgressBar::new(0).with_style(
+        ProgressStyle::with_template("{bar:40} {percent}% {msg}, {elapsed} gone, {eta} to go")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
+    progress.set_length(bytes.unwrap_or(0));
+    let mut lines = input.split(b'\n');
+    let mut index = 0;
+    print(|writer| {
+        loop {
+            let chunk: Vec<_> = lines.by_ref().take(BATCH_LINES).collect::<io::Result<_>>()?;
+            if chunk.is_empty() {
+                progress.finish_and_clear();
+                return Ok(());
+            }
+            progress.inc(chunk.iter().map(|line| line.len() as u64 + 1).sum());
+            let documents: Vec<_> = chunk.iter().filter(|line| !line.trim_ascii().is_empty()).zip(index..).collect();
+            let answers: Vec<_> = documents
+                .par_iter()
+                .map(|&(document, index)| {
+                    let mut answer = Vec::new();
+                    answer_line(query, index, document, &OFFLINE, &AtomicBool::new(false), &mut answer);
+                    answer
+                })
+                .collect();
+            index += documents.len() as u64;
+            progress.set_message(format!("{index} designs"));
+            answers.iter().try_for_each(|answer| writer.write_all(answer))?;
+        }
     })
 }
 

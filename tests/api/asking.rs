@@ -8,6 +8,7 @@ use std::time::Duration;
 use axum::Router;
 use axum::body::Body;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Request};
+use axum::response::Response;
 use serde_json::Value;
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
@@ -54,8 +55,13 @@ impl Question {
 
     /// A POST of these bytes as JSON.
     pub(crate) fn post(path: &str, body: impl Into<Vec<u8>>) -> Self {
+        Self::post_as("application/json", path, body)
+    }
+
+    /// A POST of these bytes as whatever they are.
+    pub(crate) fn post_as(content_type: &str, path: &str, body: impl Into<Vec<u8>>) -> Self {
         let question = Self { body: body.into(), ..Self::of("POST", path) };
-        question.with("content-type", "application/json")
+        question.with("content-type", content_type)
     }
 
     pub(crate) fn with(mut self, name: &str, value: &str) -> Self {
@@ -211,8 +217,13 @@ impl Service {
         self.send(question.request()).await
     }
 
+    /// The answer with its body still to come.
+    pub(crate) async fn response(&self, request: Request<Body>) -> Response {
+        self.router.clone().oneshot(request).await.unwrap()
+    }
+
     pub(crate) async fn send(&self, request: Request<Body>) -> Answer {
-        let response = self.router.clone().oneshot(request).await.unwrap();
+        let response = self.response(request).await;
         let (parts, body) = response.into_parts();
         let body = axum::body::to_bytes(body, usize::MAX).await.unwrap().to_vec();
         Answer { status: parts.status.as_u16(), headers: parts.headers, body }

@@ -7,6 +7,7 @@
 
 mod accuracy;
 mod asking;
+mod batch;
 mod caching;
 mod codes;
 mod command_line;

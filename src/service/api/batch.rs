@@ -76,6 +76,20 @@ pub struct BatchQuery {
     pub peaks_only: bool,
 }
 
+impl BatchQuery {
+    /// That what is asked can be asked.
+    ///
+    /// # Errors
+    /// `invalid_query`.
+    pub fn require_possible(self) -> Result<(), Problem> {
+        if self.peaks_only && self.endpoint != BatchEndpoint::Sweep {
+            let detail = "`peaks_only` is for the endpoint `sweep`: nothing else has peaks";
+            return Err(Problem::new(ProblemCode::InvalidQuery, detail));
+        }
+        Ok(())
+    }
+}
+
 /// One line of the answer: that of the document with this index, with `answer` or `problem`.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct BatchLine<A> {
@@ -191,11 +205,11 @@ impl Lines {
     async fn next(&mut self) -> Option<Result<Bytes, Problem>> {
         loop {
             if let Some(end) = self.buffer.iter().position(|&byte| byte == b'\n') {
-                let line = self.buffer.split_to(end + 1).freeze();
+                let line = self.buffer.split_to(end + 1).freeze().slice(..end);
                 if std::mem::take(&mut self.is_skipping) {
                     continue;
                 }
-                if line.len() - 1 > self.max_line_bytes {
+                if line.len() > self.max_line_bytes {
                     return Some(Err(self.too_long()));
                 }
                 if !line.trim_ascii().is_empty() {
@@ -376,10 +390,7 @@ pub async fn batch(
 
 fn begin(app: &App, query: Result<Query<BatchQuery>, QueryRejection>, request: Request) -> Result<Response, Problem> {
     let Query(query) = query.map_err(|error| Problem::new(ProblemCode::InvalidQuery, error.body_text()))?;
-    if query.peaks_only && query.endpoint != BatchEndpoint::Sweep {
-        let detail = "`peaks_only` is for the endpoint `sweep`: nothing else has peaks";
-        return Err(Problem::new(ProblemCode::InvalidQuery, detail));
-    }
+    query.require_possible()?;
     negotiation::require_ndjson(request.headers())?;
     let place = app.pool.batch_place()?;
     let lines = Lines {

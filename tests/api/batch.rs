@@ -1,0 +1,209 @@
+//! Batches: a document a line, an answer a line, in order and whatever each comes to.
+
+use std::io::Write as _;
+use std::process::{Command, Stdio};
+
+use axum::body::{Body, Bytes};
+use axum::http::Request;
+use futures_util::{StreamExt as _, stream};
+use serde_json::{Value, json};
+use toothwave::config::Limits;
+
+use crate::asking::{Answer, LIMITS, Listening, Occupied, Question, Service, ask_at, until};
+use crate::designs::{shortest, undercut, with};
+
+fn question(query: &str, body: impl Into<Vec<u8>>) -> Question {
+    Question::post_as("application/x-ndjson", &format!("/v1/batch{query}"), body)
+}
+
+async fn batch(service: &Service, query: &str, lines: &[String]) -> Answer {
+    service.ask(&question(query, lines.join("\n"))).await
+}
+
+fn lines(answer: &Answer) -> Vec<Value> {
+    assert_eq!((answer.status, answer.header("content-type")), (200, "application/x-ndjson"), "{}", answer.text());
+    answer.text().lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+/// Case 5.1 with another torque for each index, so that every answer tells whose it is.
+fn variant(index: u64) -> Value {
+    with(&shortest(), "/load/input_torque_nm", json!(20.0 + index as f64))
+}
+
+#[tokio::test]
+async fn every_document_is_answered_in_its_place_as_it_would_be_by_itself() {
+    let service = Service::new();
+    let impossible = with(&shortest(), "/drive/teeth/radius_mm", json!(0));
+    let documents =
+        [variant(0).to_string(), "{".into(), impossible.to_string(), undercut().to_string(), variant(4).to_string()];
+    for endpoint in ["geometry", "coincidence-degree", "sweep"] {
+        let found = lines(&batch(&service, &format!("?endpoint={endpoint}"), &documents).await);
+        assert_eq!(found.len(), documents.len());
+        for (index, (line, document)) in found.iter().zip(&documents).enumerate() {
+            let single = service.post_text(&format!("/v1/{endpoint}"), document.clone()).await;
+            assert_eq!(
+                (line["index"].as_u64(), line["status"].as_u64()),
+                (Some(index as u64), Some(single.status.into()))
+            );
+            let part = if single.status == 200 { "answer" } else { "problem" };
+            assert_eq!(line[part], single.json(), "{endpoint} {index}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn answers_keep_the_order_of_a_thousand_documents() {
+    let documents: Vec<_> = (0..1000).map(|index| variant(index).to_string()).collect();
+    let found = lines(&batch(&Service::new(), "?peaks_only=true", &documents).await);
+    assert_eq!(found.len(), 1000);
+    let first = found[0]["answer"]["peaks"]["ring"]["force_n"]["value"].as_f64().unwrap();
+    for (index, line) in found.iter().enumerate() {
+        assert_eq!(line["index"], index);
+        // Forces go with the torque.
+        let force_n = line["answer"]["peaks"]["ring"]["force_n"]["value"].as_f64().unwrap();
+        assert!((force_n / first / ((20.0 + index as f64) / 20.0) - 1.0).abs() < 1e-12, "{index}");
+    }
+}
+
+#[tokio::test]
+async fn the_peaks_alone_are_those_of_the_whole_answer() {
+    let service = Service::new();
+    let document = with(&shortest(), "/load/allowable_stress_mpa", json!(1500.0)).to_string();
+    let whole = service.post_text("/v1/sweep", document.clone()).await.json();
+    let line = &lines(&batch(&service, "?peaks_only=true", &[document]).await)[0];
+    let mut expected = whole.clone();
+    expected.as_object_mut().unwrap().remove("states");
+    assert_eq!(line["answer"], expected);
+}
+
+#[tokio::test]
+async fn blank_lines_are_passed_over_and_a_line_too_long_is_a_problem_of_its_own() {
+    let service = Service::within(Limits { max_body_bytes: 1_000, ..LIMITS });
+    let long = format!("{:2000}", variant(1).to_string());
+    let documents =
+        [variant(0).to_string(), String::new(), "  ".into(), long, "\r".into(), variant(2).to_string(), String::new()];
+    let found = lines(&batch(&service, "", &documents).await);
+    let statuses: Vec<_> =
+        found.iter().map(|line| (line["index"].as_u64().unwrap(), line["status"].as_u64().unwrap())).collect();
+    assert_eq!(statuses, [(0, 200), (1, 413), (2, 200)]);
+    assert!(found[1]["problem"]["detail"].as_str().unwrap().contains("max_body_bytes"));
+}
+
+#[tokio::test]
+async fn a_line_may_arrive_in_any_pieces() {
+    let text = format!("{}\n{}", variant(0), variant(1));
+    for size in [1, 7, 100] {
+        let pieces: Vec<_> =
+            text.as_bytes().chunks(size).map(|piece| Ok::<_, std::io::Error>(Bytes::copy_from_slice(piece))).collect();
+        let request = Request::post("/v1/batch")
+            .header("content-type", "application/x-ndjson")
+            .body(Body::from_stream(stream::iter(pieces)))
+            .unwrap();
+        let found = lines(&Service::new().send(request).await);
+        assert!(found.len() == 2 && found.iter().all(|line| line["status"] == 200), "{size}");
+    }
+}
+
+#[tokio::test]
+async fn an_empty_batch_has_an_empty_answer() {
+    assert_eq!(batch(&Service::new(), "", &[]).await.text(), "");
+}
+
+#[tokio::test]
+async fn what_is_no_batch_is_refused() {
+    let service = Service::new();
+    for query in ["?endpoint=accuracy", "?states=false", "?peaks_only=1", "?endpoint=geometry&peaks_only=true"] {
+        batch(&service, query, &[variant(0).to_string()]).await.refused(400, "invalid_query");
+    }
+    let question = Question::post("/v1/batch", variant(0).to_string());
+    service.ask(&question).await.refused(415, "unsupported_media_type");
+}
+
+/// A client of two cores' worth of long sweeps: its permits are taken, and still a neighbour's request is answered before the batch is.
+#[test]
+fn a_single_request_does_not_wait_for_a_batch() {
+    let service = Listening::within(Limits { max_concurrent_solves: 1, ..LIMITS });
+    let address = service.address;
+    let slow = with(&shortest(), "/sweep", json!({ "samples": 20_000 })).to_string();
+    let lines = vec![slow; 40].join("\n");
+    let batch = std::thread::spawn(move || ask_at(address, &question("?peaks_only=true", lines)));
+    service.run(until("the batch runs", || service.app.pool.batches() == 1 && service.app.pool.running() == 1));
+    let single = ask_at(address, &Question::post("/v1/sweep", variant(7).to_string()));
+    assert_eq!(single.status, 200);
+    assert!(!batch.is_finished(), "the neighbour came in between");
+    let answer = batch.join().unwrap();
+    assert_eq!(answer.text().lines().filter(|line| line.contains("\"status\":200")).count(), 40);
+}
+
+#[tokio::test]
+async fn a_batch_whose_client_leaves_frees_its_place_and_stops() {
+    let service = Service::within(Limits { max_concurrent_solves: 1, ..LIMITS });
+    let endless = stream::repeat_with(|| Ok::<_, std::io::Error>(Bytes::from(format!("{}\n", variant(0)))));
+    let request = Request::post("/v1/batch")
+        .header("content-type", "application/x-ndjson")
+        .body(Body::from_stream(endless))
+        .unwrap();
+    let response = service.response(request).await;
+    let mut body = response.into_body().into_data_stream();
+    assert!(body.next().await.is_some(), "answers come while the batch is still sent");
+    assert_eq!(service.app.pool.batches(), 1);
+    drop(body);
+    until("it has ended", || service.app.pool.batches() == 0 && service.app.pool.running() == 0).await;
+}
+
+#[tokio::test]
+async fn more_batches_than_are_admitted_are_refused_at_once() {
+    let service = Service::within(Limits { max_concurrent_batches: 1, ..LIMITS });
+    let place = service.app.pool.batch_place().unwrap();
+    let refused = batch(&service, "", &[variant(0).to_string()]).await;
+    assert_eq!(refused.header("retry-after"), "1");
+    refused.refused(503, "queue_full");
+    drop(place);
+    assert_eq!(lines(&batch(&service, "", &[variant(0).to_string()]).await).len(), 1);
+}
+
+#[tokio::test]
+async fn a_full_queue_is_no_reason_to_refuse_a_batchs_line() {
+    let service = Service::within(Limits { max_concurrent_solves: 1, max_queued_solves: 0, ..LIMITS });
+    let occupied = Occupied::by_one(&service.app.pool).await;
+    let app = service.app.clone();
+    let batch = tokio::spawn(async move { batch(&service, "", &[variant(0).to_string()]).await });
+    until("the batch waits", || app.pool.batches() == 1).await;
+    drop(occupied);
+    assert_eq!(lines(&batch.await.unwrap())[0]["status"], 200);
+}
+
+#[tokio::test]
+async fn a_line_beyond_the_deadline_is_a_problem_and_the_others_are_answered() {
+    let service = Service::within(Limits { deadline_ms: 400, max_states: 100_000_000, ..LIMITS });
+    let endless = with(&shortest(), "/sweep", json!({ "samples": 10_000_000 })).to_string();
+    let found =
+        lines(&batch(&service, "?peaks_only=true", &[variant(0).to_string(), endless, variant(2).to_string()]).await);
+    let codes: Vec<_> = found.iter().map(|line| line["problem"]["code"].as_str()).collect();
+    assert_eq!(codes, [None, Some("deadline_exceeded"), None]);
+}
+
+#[test]
+fn without_a_server_a_batch_answers_the_same_lines() {
+    let documents = format!("{}\n\n{{\n{}\n", variant(0), undercut());
+    let mut child = Command::new(env!("CARGO_BIN_EXE_toothwave"))
+        .args(["batch", "-", "--peaks-only"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    child.stdin.take().unwrap().write_all(documents.as_bytes()).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success() && output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    let offline: Vec<Value> =
+        String::from_utf8(output.stdout).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let service = tokio::runtime::Runtime::new().unwrap();
+    let online = service.block_on(async {
+        lines(
+            &batch(&Service::new(), "?peaks_only=true", &documents.lines().map(str::to_owned).collect::<Vec<_>>())
+                .await,
+        )
+    });
+    assert_eq!(offline, online);
+}
