@@ -198,7 +198,8 @@ impl Kernel {
         let least_teeth = whole(*mesh.teeth_at(0, samples).end()).max(1);
         let most_rows = (TILE / least_teeth).max(1).min(whole(samples));
         let mut arena = vec![0.0; Tile::COLUMNS * len + Tile::ROW_COLUMNS * most_rows + 2 * most_teeth];
-        let mut tile = Tile::new(&mut arena, len, most_rows, most_teeth, SineTable::equally_spaced(step_rad, most_rows));
+        let mut tile =
+            Tile::new(&mut arena, len, most_rows, most_teeth, SineTable::equally_spaced(step_rad, most_rows));
         let mut first = 0;
         while first < samples {
             // Input angles with the same teeth, in tiles of equally many, but for the last.
@@ -225,7 +226,10 @@ impl Kernel {
         sweep.peaks = PerContact::of(|contact| {
             let [force, stress] = peaks.get(contact);
             let states = &sweep.states;
-            PeakAt { force: force.find(states.force_n.get(contact)), stress: stress.find(states.stress_mpa.get(contact)) }
+            PeakAt {
+                force: force.find(states.force_n.get(contact)),
+                stress: stress.find(states.stress_mpa.get(contact)),
+            }
         });
         // The last input angle repeats the first, every tooth one further.
         let end_deg = mesh.input_angle_deg(samples, samples);
@@ -375,7 +379,8 @@ impl Kernel {
     ) {
         let rows = tile.sum_torques(run.teeth);
         let input_nmm = loaded.input_torque_nmm();
-        let [ring_ratio, carrier_ratio] = [self.ring_teeth_per_wave, self.teeth_per_wave].map(|ratio| 1.0 / (input_nmm * ratio));
+        let [ring_ratio, carrier_ratio] =
+            [self.ring_teeth_per_wave, self.teeth_per_wave].map(|ratio| 1.0 / (input_nmm * ratio));
         let PerContact { wave_generator: cam, ring, carrier } = &mut tile.row_torque;
         let (cam, ring, carrier) = (&cam[..rows], &ring[..rows], &carrier[..rows]);
         let (rotation_rad, rotation_root) = (&mut tile.row_rotation_rad[..rows], &mut tile.row_rotation_root[..rows]);
@@ -542,6 +547,7 @@ impl Run {
             (*base.0, *base.1) = (sin, cos);
         }
         tile.tooth.clear();
+        let last_tooth = u32::try_from(teeth).unwrap_or(u32::MAX);
         for row in 0..rows {
             let of_row = row * teeth..(row + 1) * teeth;
             let (row_sin, row_cos) = (tile.row_sines.sin[row], tile.row_sines.cos[row]);
@@ -553,7 +559,7 @@ impl Run {
                 // Whole numbers below 2^53: exact.
                 step[i] = (i + 1) as f64 * self.of as f64 - row as f64;
             }
-            tile.tooth.extend((0..teeth).map(|index| index as u32 + 1));
+            tile.tooth.extend(1..=last_tooth);
         }
     }
 
