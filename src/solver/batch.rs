@@ -4,13 +4,16 @@
 //! run over columns instead of one tooth, without a branch or a call, so that the compiler makes vectors of them. Three things make
 //! that possible:
 //!
-//! - Equally spaced positions need no new sines: a tooth at a sample stands at the sum of two angles, one of the tooth and one of the
-//!   sample, and the sine of a sum is made of products. Each sum is taken from the nearer axis, so that nothing cancels there.
-//! - The support `h` follows by Newton's method for all states at once, with as many steps as the slowest of them needs: two or three.
+//! - Equally spaced positions need no new sines: a tooth at a sample stands at the sum of a few angles, and the sine of a sum is made of
+//!   products. The sums are taken so that nothing cancels near an axis.
+//! - The support `h` follows by Halley's method for all states at once, with as many steps as the slowest of them needs: one or two.
 //! - The only transcendental functions left are two arctangents of small ratios, for which a few terms of their series are enough; how many
 //!   depends on the drive alone.
 //!
-//! The width of the vectors is chosen when the program runs (`pulp`).
+//! What is left is bound by divisions and square roots, three and five a state beside that of the position.
+//!
+//! Vectors are four doubles wide where the machine has AVX2, which is found out when the program runs (`pulp`). Eight, with AVX-512, were
+//! 5 % slower on a Xeon: its divisions and roots take twice as long then.
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
 use std::iter::zip;
@@ -184,34 +187,25 @@ impl Kernel {
     ) -> Result<Option<BatchSweep>, SolveError> {
         let drive = loaded.drive();
         let mesh = Mesh::new(drive);
-        let states = whole(mesh.state_count(samples));
         let mut sweep = BatchSweep {
-            states: States::with_capacity(states),
+            states: States::with_capacity(whole(mesh.state_count(samples))),
             input_angles: InputAngles::with_capacity(whole(samples + 1)),
             peaks: PerContact::default(),
             torque_balance_residual: 0.0,
         };
         let mut peaks = PerContact::<[RunningPeak; 2]>::default();
-        let most_teeth = whole(*mesh.teeth_at(samples - 1, samples).end());
-        let len = TILE.min(states).max(most_teeth).next_multiple_of(LANES) + VECTOR;
-        let step_rad = 2.0 * PI / mesh.steps(samples) as f64;
-        let least_teeth = whole(*mesh.teeth_at(0, samples).end()).max(1);
-        let most_rows = (TILE / least_teeth).max(1).min(whole(samples));
-        let mut arena = vec![0.0; Tile::COLUMNS * len + Tile::ROW_COLUMNS * most_rows + 2 * most_teeth];
-        let mut tile =
-            Tile::new(&mut arena, len, most_rows, most_teeth, SineTable::equally_spaced(step_rad, most_rows));
+        let size = TileSize::of(&mesh, samples);
+        let mut arena = vec![0.0; size.doubles()];
+        let mut tile = Tile::new(&mut arena, &size, 2.0 * PI / mesh.steps(samples) as f64);
         let mut first = 0;
         while first < samples {
-            // Input angles with the same teeth, in tiles of equally many, but for the last.
             let run = Run::from(first, samples, &mesh);
-            let most = (TILE / run.teeth).max(1) as u64;
-            let rows = run.len().div_ceil(run.len().div_ceil(most));
-            run.lay_pattern(whole(rows), &mut tile);
-            for start in (run.samples.start..run.samples.end).step_by(whole(rows)) {
+            run.lay_pattern(&mut tile);
+            for start in run.samples.clone().step_by(run.rows) {
                 if stop.stopped() {
                     return Err(SolveError::Stopped);
                 }
-                let tile_samples = start..run.samples.end.min(start + rows);
+                let tile_samples = start..run.samples.end.min(start + run.rows as u64);
                 run.place(tile_samples.clone(), &mut tile);
                 for chunk in 0..tile.count.div_ceil(LANES) {
                     if !self.unit_states(&mut tile, chunk) {
@@ -487,8 +481,9 @@ struct SineTable {
 }
 
 impl SineTable {
-    /// Of `count` multiples of a step, from 0 to at most a quarter of a turn: those of a few steps and those of a few strides, added.
+    /// Of `count` multiples of a step, at most [`TILE`], from 0 to at most a quarter of a turn: those of a few steps and those of a few strides, added.
     fn equally_spaced(step_rad: f64, count: usize) -> Self {
+        // Strides are one or two more than a stride is long.
         const STRIDE: usize = TILE.isqrt() + 2;
         let sines = |step_rad: f64, count: usize| {
             let mut sines = [(0.0, 0.0); STRIDE];
@@ -519,6 +514,8 @@ struct Run {
     /// Samples of the period.
     of: u64,
     teeth: usize,
+    /// Samples of a tile: equally many, but for the last.
+    rows: usize,
     mesh: Mesh,
     step_rad: f64,
     /// Steps of a whole turn.
@@ -530,17 +527,15 @@ impl Run {
         let samples = first..mesh.same_teeth_until(first, of);
         let steps = mesh.steps(of) as f64;
         let teeth = whole(*mesh.teeth_at(first, of).end());
-        Self { samples, of, teeth, mesh: *mesh, step_rad: 2.0 * PI / steps, steps }
+        let count = whole(samples.end - samples.start);
+        let rows = count.div_ceil(count.div_ceil((TILE / teeth).max(1)));
+        Self { samples, of, teeth, rows, mesh: *mesh, step_rad: 2.0 * PI / steps, steps }
     }
 
-    fn len(&self) -> u64 {
-        self.samples.end - self.samples.start
-    }
-
-    /// Lays the pattern of tiles of up to so many samples.
+    /// Lays the pattern of its tiles.
     #[inline(always)]
-    fn lay_pattern(&self, rows: usize, tile: &mut Tile<'_>) {
-        let teeth = self.teeth;
+    fn lay_pattern(&self, tile: &mut Tile<'_>) {
+        let Self { teeth, rows, .. } = *self;
         let (base_sin, base_cos) = (&mut tile.base_sin[..teeth], &mut tile.base_cos[..teeth]);
         for (tooth, base) in zip(1.., zip(&mut *base_sin, &mut *base_cos)) {
             let Position { sin, cos, .. } = self.mesh.position(tooth, self.samples.start, self.of);
@@ -593,6 +588,31 @@ impl Run {
     }
 }
 
+/// The most that the tiles of a sweep hold.
+struct TileSize {
+    /// States, with those that fill the last stretch and room for [`repeat_each`].
+    len: usize,
+    /// Input angles.
+    rows: usize,
+    /// Teeth at an input angle.
+    teeth: usize,
+}
+
+impl TileSize {
+    fn of(mesh: &Mesh, samples: u64) -> Self {
+        let teeth_at = |sample| whole(*mesh.teeth_at(sample, samples).end());
+        let (least, most) = (teeth_at(0).max(1), teeth_at(samples - 1));
+        let states = TILE.min(whole(mesh.state_count(samples))).max(most);
+        let rows = whole(samples).min(TILE.div_ceil(least));
+        Self { len: states.next_multiple_of(LANES) + VECTOR, rows, teeth: most }
+    }
+
+    /// What all slices of a tile take together.
+    const fn doubles(&self) -> usize {
+        22 * self.len + 7 * self.rows + 2 * self.teeth
+    }
+}
+
 /// Columns of the states of a few input angles: where they stand, their geometry, and what a unit rotation makes of them. All lie in one
 /// stretch of memory.
 struct Tile<'a> {
@@ -632,10 +652,7 @@ struct Tile<'a> {
 }
 
 impl<'a> Tile<'a> {
-    const COLUMNS: usize = 22;
-    const ROW_COLUMNS: usize = 7;
-
-    fn new(arena: &'a mut [f64], len: usize, rows: usize, teeth: usize, row_sines: SineTable) -> Self {
+    fn new(arena: &'a mut [f64], &TileSize { len, rows, teeth }: &TileSize, step_rad: f64) -> Self {
         let mut rest = arena;
         let mut slice = |len| {
             let (slice, others) = std::mem::take(&mut rest).split_at_mut(len);
@@ -652,7 +669,7 @@ impl<'a> Tile<'a> {
         pattern_cos.fill(FRAC_1_SQRT_2);
         Self {
             count: 0,
-            row_sines,
+            row_sines: SineTable::equally_spaced(step_rad, rows),
             tooth: Vec::with_capacity(len),
             base_sin,
             base_cos,
