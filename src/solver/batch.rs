@@ -4,35 +4,43 @@
 //! run over columns instead of one tooth, without a branch or a call, so that the compiler makes vectors of them. Three things make
 //! that possible:
 //!
-//! - Equally spaced positions need no new sines: a tooth at a sample stands at the sum of two angles, one of the tooth and one of the
-//!   sample, and the sine of a sum is made of products. Each sum is taken from the nearer axis, so that nothing cancels there.
-//! - The support `h` follows by Newton's method for all states at once, with as many steps as the slowest of them needs: two or three.
+//! - Equally spaced positions need no new sines: a tooth at a sample stands at the sum of a few angles, and the sine of a sum is made of
+//!   products. The sums are taken so that nothing cancels near an axis.
+//! - The support `h` follows by Halley's method for all states at once, with as many steps as the slowest of them needs: one or two.
 //! - The only transcendental functions left are two arctangents of small ratios, for which a few terms of their series are enough; how many
 //!   depends on the drive alone.
 //!
-//! The width of the vectors is chosen when the program runs (`pulp`).
+//! What is left is bound by divisions and square roots, three and five a state beside that of the position.
+//!
+//! Vectors are four doubles wide where the machine has AVX2, which is found out when the program runs (`pulp`). Eight, with AVX-512, were
+//! 5 % slower on a Xeon: its divisions and roots take twice as long then.
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
+use std::iter::zip;
 use std::ops::Range;
 
 use crate::contact::PerContact;
-use crate::drive::{Drive, WAVES};
-use crate::load_sharing::{Compatibility, LoadedDrive, WindUp};
+use crate::drive::WAVES;
+use crate::load_sharing::{Compatibility, LoadedDrive};
 use crate::mesh::Mesh;
-use crate::sweep::{InputAngles, States};
+use crate::position::Position;
+use crate::sweep::{InputAngles, PeakAt, States};
 use crate::{SolveError, Stop};
 
 /// States worked on in one stretch of straight code; a multiple of every vector's width.
 const LANES: usize = 64;
 
 /// States of a tile, where one input angle has no more: its columns stay in the first-level cache.
-const TILE: usize = 4 * LANES;
+const TILE: usize = 128;
 
-/// Newton steps at most. A drive that needs more goes the plain way.
+/// Doubles of the widest vector.
+const VECTOR: usize = 8;
+
+/// Steps towards the support at most. A drive that needs more goes the plain way.
 const MAX_STEPS: u32 = 8;
 
-/// A relative step this small is the last: the next one would be of its square.
-const LAST_STEP: f64 = 1e-8;
+/// A relative step this small is the last: the next one would be of its cube, less than the last digit.
+const LAST_STEP: f64 = 5e-6;
 
 /// Terms of the arctangent's series at most. A drive that needs more goes the plain way.
 const MAX_TERMS: usize = 24;
@@ -41,6 +49,7 @@ const MAX_TERMS: usize = 24;
 pub(crate) struct BatchSweep {
     pub(crate) states: States,
     pub(crate) input_angles: InputAngles,
+    pub(crate) peaks: PerContact<PeakAt>,
     pub(crate) torque_balance_residual: f64,
 }
 
@@ -83,22 +92,65 @@ struct Kernel {
     ring_teeth_per_wave: f64,
     teeth_per_wave: f64,
     difference_of_squares: f64,
-    /// Coefficients of the compliance over its variable, which is chosen by the form of compatibility.
     compliance: Compliance,
     /// `E*/(π L1)` of each contact.
     hertz: PerContact<f64>,
     /// Terms of the arctangent for the angle on the cam and on the ring.
     cam_terms: usize,
     ring_terms: usize,
+    guess: Guess,
 }
 
-/// `c` of a tooth for a linear law.
+/// `c d²` of a tooth for a linear law: this much for each `(h + r)²` and `h'²`, which add up to `d²`.
 #[derive(Clone, Copy)]
 struct Compliance {
-    contact: PerContact<f64>,
-    compatibility: Compatibility,
-    /// `1 + sk`.
-    sensed_ratio: f64,
+    of_above: f64,
+    of_lever: f64,
+}
+
+impl Compliance {
+    fn new(contact: &PerContact<f64>, loaded: &LoadedDrive<'_>) -> Self {
+        let PerContact { wave_generator, ring, carrier } = *contact;
+        let drive = loaded.drive();
+        let ring_teeth_per_wave = drive.flank().teeth_per_wave();
+        let of_above = wave_generator + ring;
+        let of_lever = match loaded.compatibility() {
+            // F_K²/F_H² = cos²γ/cos²β and F_S²/F_H² = sin²γ (Z_G/U)².
+            Compatibility::VirtualWork => {
+                wave_generator + ring * ring_teeth_per_wave.powi(2) + carrier * drive.teeth_per_wave().powi(2)
+            }
+            // 1/k_H + 1/k_K + (1 + sk) sin²γ (1/k_S - 1/k_K).
+            Compatibility::Projection => of_above + (1.0 + drive.sense() * ring_teeth_per_wave) * (carrier - ring),
+        };
+        Self { of_above, of_lever }
+    }
+}
+
+/// Where the support is looked for first: the series of h in ε = (a - b)/(a + b), as far as its third power.
+#[derive(Clone, Copy)]
+struct Guess {
+    mean: f64,
+    first: f64,
+    second: f64,
+    third: f64,
+}
+
+impl Guess {
+    fn new(a: f64, b: f64, r: f64) -> Self {
+        let mean = 0.5 * (a + b);
+        let (flattening, thickness) = ((a - b) / (a + b), r / mean);
+        let round = 1.0 + thickness;
+        let first = mean * flattening;
+        let second = 2.0 * first * flattening * (thickness - 7.0) / round;
+        let third = 2.0 * first * flattening * flattening * (thickness * (thickness - 14.0) + 25.0) / (round * round);
+        Self { mean, first, second, third }
+    }
+
+    #[inline(always)]
+    fn at(&self, sin: f64, cos: f64) -> f64 {
+        let (double_cos, product) = (cos * cos - sin * sin, sin * cos);
+        self.mean + self.first * double_cos + product * product * (self.second - self.third * double_cos)
+    }
 }
 
 impl Kernel {
@@ -118,14 +170,11 @@ impl Kernel {
             ring_teeth_per_wave: drive.flank().teeth_per_wave(),
             teeth_per_wave: drive.teeth_per_wave(),
             difference_of_squares,
-            compliance: Compliance {
-                contact,
-                compatibility: loaded.compatibility(),
-                sensed_ratio: 1.0 + drive.sense() * drive.flank().teeth_per_wave(),
-            },
+            compliance: Compliance::new(&contact, loaded),
             hertz: PerContact::of(|contact| loaded.hertz(contact).modulus_per_width_mpa_per_mm()),
             cam_terms: arctangent_terms(cam_ratio)?,
             ring_terms: arctangent_terms(ring_ratio)?,
+            guess: Guess::new(a, b, r),
         })
     }
 
@@ -138,40 +187,44 @@ impl Kernel {
     ) -> Result<Option<BatchSweep>, SolveError> {
         let drive = loaded.drive();
         let mesh = Mesh::new(drive);
-        let placing = Placing::new(drive, &mesh, samples);
         let mut sweep = BatchSweep {
             states: States::with_capacity(whole(mesh.state_count(samples))),
             input_angles: InputAngles::with_capacity(whole(samples + 1)),
+            peaks: PerContact::default(),
             torque_balance_residual: 0.0,
         };
-        let mut tile = Tile::new(whole(*mesh.teeth_at(samples - 1, samples).end()));
-        let mut sample = 0;
-        while sample < samples {
-            if stop.stopped() {
-                return Err(SolveError::Stopped);
-            }
-            // Whole input angles with the same teeth.
-            let last = *mesh.teeth_at(sample, samples).end();
-            let most = (TILE as u64 / last).max(1);
-            let mut next = sample + 1;
-            while next < samples.min(sample + most) && *mesh.teeth_at(next, samples).end() == last {
-                next += 1;
-            }
-            let teeth = whole(last);
-            let count = teeth * whole(next - sample);
-            placing.place(sample..next, teeth, &mut tile);
-            for chunk in 0..count.div_ceil(LANES) {
-                if !self.unit_states(&mut tile, chunk) {
-                    return Ok(None);
+        let mut peaks = PerContact::<[RunningPeak; 2]>::default();
+        let size = TileSize::of(&mesh, samples);
+        let mut arena = vec![0.0; size.doubles()];
+        let mut tile = Tile::new(&mut arena, &size, 2.0 * PI / mesh.steps(samples) as f64);
+        let mut first = 0;
+        while first < samples {
+            let run = Run::from(first, samples, &mesh);
+            run.lay_pattern(&mut tile);
+            for start in run.samples.clone().step_by(run.rows) {
+                if stop.stopped() {
+                    return Err(SolveError::Stopped);
                 }
+                let tile_samples = start..run.samples.end.min(start + run.rows as u64);
+                run.place(tile_samples.clone(), &mut tile);
+                for chunk in 0..tile.count.div_ceil(LANES) {
+                    if !self.unit_states(&mut tile, chunk) {
+                        return Ok(None);
+                    }
+                }
+                self.share_load(loaded, &mesh, tile_samples, &run, &mut tile, &mut sweep);
+                tile.append_to(&mut sweep.states, &mut peaks);
             }
-            for (row, sample) in (sample..next).enumerate() {
-                let input_angle_deg = mesh.input_angle_deg(sample, samples);
-                self.share_load(loaded, &mut tile, row * teeth..(row + 1) * teeth, input_angle_deg, &mut sweep);
-            }
-            tile.append_to(&mut sweep.states, count);
-            sample = next;
+            first = run.samples.end;
         }
+        sweep.peaks = PerContact::of(|contact| {
+            let [force, stress] = peaks.get(contact);
+            let states = &sweep.states;
+            PeakAt {
+                force: force.find(states.force_n.get(contact)),
+                stress: stress.find(states.stress_mpa.get(contact)),
+            }
+        });
         // The last input angle repeats the first, every tooth one further.
         let end_deg = mesh.input_angle_deg(samples, samples);
         sweep.states.repeat_first(mesh.teeth_at(0, samples).count(), end_deg);
@@ -179,131 +232,86 @@ impl Kernel {
         Ok(Some(sweep))
     }
 
-    /// Geometry of a stretch of states, and their forces and stresses for `Δφ` = 1; false where Newton's method is too slow.
+    /// Geometry of a stretch of states, and their forces and stresses for `Δφ` = 1; false where the support takes too many steps.
     #[inline(always)]
-    fn unit_states(&self, tile: &mut Tile, chunk: usize) -> bool {
-        let Self { a, b, r, ring_teeth_per_wave: k, difference_of_squares, .. } = *self;
-        let (a2, b2) = (a * a, b * b);
+    fn unit_states(&self, tile: &mut Tile<'_>, chunk: usize) -> bool {
         let sin = &tile.sin.as_chunks::<LANES>().0[chunk];
         let cos = &tile.cos.as_chunks::<LANES>().0[chunk];
+        let Some(support) = self.supports(sin, cos) else { return false };
+        let Self { a, b, r, ring_teeth_per_wave: k, difference_of_squares, compliance, .. } = *self;
         let from_minor = &tile.from_minor_rad.as_chunks::<LANES>().0[chunk];
-        let lever_mm = &mut tile.lever_mm.as_chunks_mut::<LANES>().0[chunk];
-        let ring_lever_mm = &mut tile.ring_lever_mm.as_chunks_mut::<LANES>().0[chunk];
         let center_radius_mm = &mut tile.center_radius_mm.as_chunks_mut::<LANES>().0[chunk];
         let cam_angle_deg = &mut tile.wave_generator_angle_deg.as_chunks_mut::<LANES>().0[chunk];
         let ring_angle_deg = &mut tile.ring_angle_deg.as_chunks_mut::<LANES>().0[chunk];
         let cam_force = &mut tile.force.wave_generator.as_chunks_mut::<LANES>().0[chunk];
-        let ring_force_n = &mut tile.force.ring.as_chunks_mut::<LANES>().0[chunk];
-        let carrier_force_n = &mut tile.force.carrier.as_chunks_mut::<LANES>().0[chunk];
+        let ring_force = &mut tile.force.ring.as_chunks_mut::<LANES>().0[chunk];
+        let carrier_force = &mut tile.force.carrier.as_chunks_mut::<LANES>().0[chunk];
         let cam_stress = &mut tile.stress.wave_generator.as_chunks_mut::<LANES>().0[chunk];
         let ring_stress = &mut tile.stress.ring.as_chunks_mut::<LANES>().0[chunk];
         let carrier_stress = &mut tile.stress.carrier.as_chunks_mut::<LANES>().0[chunk];
-
-        // The support h: the root in [b, a] of sin² (a² + rh)² (h² - b²) - cos² (b² + rh)² (a² - h²).
-        let mut support = [0.0; LANES];
-        // Begun at the linear interpolation between the axes and its next term in (a - b)/a, as far as a nearly round cam goes.
-        let mean = 0.5 * (a + b);
-        let bulge = (a - b) * (a - b) * (0.5 / mean - 4.0 / (mean + r));
-        for i in 0..LANES {
-            let cos2 = cos[i] * cos[i];
-            let guess = b + (a - b) * cos2 + bulge * cos2 * (sin[i] * sin[i]);
-            support[i] = if guess > b { guess } else { b };
-        }
-        let mut steps = 0;
-        loop {
-            let mut settled = 0;
-            for i in 0..LANES {
-                let h = support[i];
-                let (major, minor) = (sin[i] * (a2 + r * h), cos[i] * (b2 + r * h));
-                let (above_b, below_a) = ((h - b) * (h + b), (a - h) * (a + h));
-                let value = major * major * above_b - minor * minor * below_a;
-                let slope = major * (r * sin[i] * above_b + major * h) + minor * (minor * h - r * cos[i] * below_a);
-                let step = value / (2.0 * slope);
-                support[i] = h - step;
-                settled += u64::from(step.abs() <= LAST_STEP * h);
-            }
-            steps += 1;
-            if settled == LANES as u64 {
-                break;
-            }
-            if steps == MAX_STEPS {
-                return false;
-            }
-        }
+        let cam_torque = &mut tile.torque.wave_generator.as_chunks_mut::<LANES>().0[chunk];
+        let ring_torque = &mut tile.torque.ring.as_chunks_mut::<LANES>().0[chunk];
+        let carrier_torque = &mut tile.torque.carrier.as_chunks_mut::<LANES>().0[chunk];
 
         let mut cam_ratio = [0.0; LANES];
         let mut ring_ratio = [0.0; LANES];
-        let Compliance { contact: of_contact, compatibility, sensed_ratio } = self.compliance;
-        let by_virtual_work = compatibility == Compatibility::VirtualWork;
+        let (a2, b2, ab, k2) = (a * a, b * b, a * b, k * k);
         let tooth_curvature = 1.0 / r;
         let per_squares = 1.0 / (a2 * b2);
+        let (ring_hertz, carrier_hertz) = (self.hertz.ring * tooth_curvature, self.hertz.carrier * tooth_curvature);
+        // Divisions and roots cost most here. One reciprocal of a product serves all its factors, and γ and β are written with lengths,
+        // tan γ = h'/(h + r), cos γ = (h + r)/d, tan β = k tan γ, cos β = (h + r)/e, so that d and e are the only roots.
         for i in 0..LANES {
             let h = support[i];
             let (above, sin_i, cos_i) = (h + r, sin[i], cos[i]);
-            // The normal's direction, from the position's; only squares and products of its sine and cosine are needed.
+            // The normal's direction, from the position's.
             let (along_major, along_minor) = (cos_i * (b2 + r * h), sin_i * (a2 + r * h));
             let length2 = along_major * along_major + along_minor * along_minor;
             let cube = h * h * h;
             // r + ρ_H over h³.
             let curvature_sum = r * cube + a2 * b2;
-            // Divisions cost most here: one reciprocal of a product serves all its factors.
-            let all = 1.0 / ((h * above) * (curvature_sum * length2));
-            let per_length2 = all * (h * above) * curvature_sum;
-            let per_lengths = all * length2;
-            let per_h = per_lengths * above * curvature_sum;
-            let per_above = per_lengths * h * curvature_sum;
-            let per_curvature_sum = cube * (per_lengths * h * above);
-            let (cos2, sin2) = (along_major * along_major * per_length2, along_minor * along_minor * per_length2);
-            let lever = difference_of_squares * (along_major * along_minor * per_length2) * per_h;
-            let t = lever * per_above;
-            let secant2 = 1.0 + t * t;
-            let secant = secant2.sqrt();
-            let center_radius = above * secant;
-            let curvature_root = a * b * per_h;
-            let second = (a - b) * ((b * sin2 - a * cos2) * per_h) * (curvature_root * per_h + 1.0);
-            let t_slope = secant2 * (t * lever - second) * per_curvature_sum;
-            // The ring.
-            let ring_tan = k * t;
-            let ring_secant2 = 1.0 + ring_tan * ring_tan;
-            let ring_secant = ring_secant2.sqrt();
-            let per_secants2 = 1.0 / (secant2 * ring_secant2);
-            let cam_cos = secant * (ring_secant2 * per_secants2);
-            let ring_cos2 = secant2 * per_secants2;
-            let ring_cos = ring_secant * ring_cos2;
-            let turning = 1.0 + k * k * t_slope * ring_cos2;
-            let regularity = 1.0 + r * ring_cos * (per_above * cam_cos) * turning;
-            let regularity = if regularity > f64::EPSILON { regularity } else { f64::EPSILON };
-            // Forces over that of the wave generator, and the compliance.
-            let ring_force = ring_secant * cam_cos;
-            let cam_sin = t * cam_cos;
-            let carrier_force = cam_sin * self.teeth_per_wave;
-            let projected =
-                of_contact.ring + sensed_ratio * (cam_sin * cam_sin) * (of_contact.carrier - of_contact.ring);
-            let worked =
-                of_contact.ring * (ring_force * ring_force) + of_contact.carrier * (carrier_force * carrier_force);
-            let compliance = of_contact.wave_generator + if by_virtual_work { worked } else { projected };
+            let length2_h = length2 * h;
+            let all = 1.0 / (length2_h * curvature_sum);
+            let (per_length2_h, per_curvature_sum) = (all * curvature_sum, all * length2_h);
+            let lever = difference_of_squares * (along_major * along_minor) * per_length2_h;
+            let (above2, lever2) = (above * above, lever * lever);
+            let (d2, e2) = (above2 + lever2, above2 + k2 * lever2);
+            let (d, e) = (d2.sqrt(), e2.sqrt());
+            let de = d * e;
+            // The derivative of tan γ is d² `bend` over (h + r)³.
+            let second = (a - b) * (b * along_minor * along_minor - a * along_major * along_major) * per_length2_h;
+            let bend = (lever2 * (h * h) - above * second * (ab + h * h)) * (h * per_curvature_sum);
+            // The regularity 1 + … is this over e³ d.
+            let e3_d = e2 * de;
+            let regular = e3_d + r * (above * e2 + k2 * d2 * bend);
+            let least = f64::EPSILON * e3_d;
+            let regular = if regular > least { regular } else { least };
+            let compliance_d2 = compliance.of_above * above2 + compliance.of_lever * lever2;
             // Tangents of the angles that the contact points are off the position.
-            let cam_below = b2 * (a2 + r * h) * (sin_i * sin_i) + a2 * (b2 + r * h) * (cos_i * cos_i);
-            let ring_normal = r * ring_cos;
-            let ring_below = center_radius + ring_normal;
-            let all = 1.0 / ((compliance * regularity) * (cam_below * ring_below));
-            let per_ratios = all * (compliance * regularity);
-            let per_loads = all * (cam_below * ring_below);
-            cam_ratio[i] = (cos_i * sin_i) * (difference_of_squares * r * h) * (per_ratios * ring_below);
-            ring_ratio[i] = ring_normal * ring_tan * (per_ratios * cam_below);
-            let unit = lever * (per_loads * regularity);
-            let per_regularity = per_loads * compliance;
-            center_radius_mm[i] = center_radius;
-            cam_force[i] = unit;
-            ring_force_n[i] = unit * ring_force;
-            carrier_force_n[i] = unit * carrier_force;
+            let cam_below = b2 * (along_minor * sin_i) + a2 * (along_major * cos_i);
+            let ring_below = de + r * above;
+
+            let (loads, angles) = (compliance_d2 * regular, cam_below * ring_below);
+            let angles_e = angles * e;
+            let all = 1.0 / (loads * angles_e);
+            let (per_loads, per_angles_e) = (all * angles_e, all * loads);
+            let (per_compliance_d2, per_regular) = (per_loads * regular, per_loads * compliance_d2);
+            let (per_angles, per_e) = (per_angles_e * e, per_angles_e * angles);
+            cam_ratio[i] = (cos_i * sin_i) * (difference_of_squares * r * h) * (per_angles * ring_below);
+            ring_ratio[i] = r * k * lever * (per_angles * cam_below);
+            let load = lever * per_compliance_d2;
+            let (force_h, force_k, force_s) = (load * d2, load * de, load * lever * d * self.teeth_per_wave);
+            center_radius_mm[i] = d;
+            cam_force[i] = force_h;
+            ring_force[i] = force_k;
+            carrier_force[i] = force_s;
             let cam_curvature = tooth_curvature + cube * per_squares;
-            cam_stress[i] = (unit * (cam_curvature * self.hertz.wave_generator)).sqrt();
-            ring_stress[i] = (unit * ring_force * per_regularity * (tooth_curvature * self.hertz.ring)).sqrt();
-            carrier_stress[i] = (unit * carrier_force * (tooth_curvature * self.hertz.carrier)).sqrt();
-            // What the torques are summed from.
-            lever_mm[i] = lever;
-            ring_lever_mm[i] = ring_tan * ring_cos * center_radius;
+            cam_stress[i] = (force_h * (cam_curvature * self.hertz.wave_generator)).sqrt();
+            ring_stress[i] = (force_k * (e3_d * per_regular) * ring_hertz).sqrt();
+            carrier_stress[i] = (force_s * carrier_hertz).sqrt();
+            cam_torque[i] = force_h * lever;
+            ring_torque[i] = force_k * (d * k * lever * per_e);
+            carrier_torque[i] = force_s * d;
         }
         arctangents(&mut cam_ratio, self.cam_terms);
         arctangents(&mut ring_ratio, self.ring_terms);
@@ -315,35 +323,114 @@ impl Kernel {
         true
     }
 
-    /// What the unit loads of the teeth at one input angle are to be multiplied by to balance the torque, and how well they then do.
+    /// The support h: the root in [b, a] of sin² (a² + rh)² (h² - b²) - cos² (b² + rh)² (a² - h²), by Halley's method, whose one division
+    /// does what takes Newton's two. Nothing where that is too slow.
+    #[inline(always)]
+    fn supports(&self, sin: &[f64; LANES], cos: &[f64; LANES]) -> Option<[f64; LANES]> {
+        let Self { a, b, r, .. } = *self;
+        let (a2, b2) = (a * a, b * b);
+        let mut support = [0.0; LANES];
+        for i in 0..LANES {
+            let guess = self.guess.at(sin[i], cos[i]);
+            support[i] = if guess > b { guess } else { b };
+        }
+        for _ in 0..MAX_STEPS {
+            let mut largest = [0.0; LANES];
+            for i in 0..LANES {
+                let h = support[i];
+                let (major, minor) = (sin[i] * (a2 + r * h), cos[i] * (b2 + r * h));
+                let (major_slope, minor_slope) = (r * sin[i], r * cos[i]);
+                let (above_b, below_a) = ((h - b) * (h + b), (a - h) * (a + h));
+                let value = major * major * above_b - minor * minor * below_a;
+                // Half the first and half the second derivative.
+                let (major_part, minor_part) = (major_slope * above_b, minor_slope * below_a);
+                let slope = major * (major_part + major * h) + minor * (minor * h - minor_part);
+                let bend = major * (major + 4.0 * h * major_slope)
+                    + major_slope * major_part
+                    + minor * (minor + 4.0 * h * minor_slope)
+                    - minor_slope * minor_part;
+                let step = 2.0 * value * slope / (4.0 * slope * slope - value * bend);
+                support[i] = h - step;
+                largest[i] = step.abs() - LAST_STEP * h;
+            }
+            if largest.iter().all(|&beyond| beyond <= 0.0) {
+                return Some(support);
+            }
+        }
+        None
+    }
+
+    /// Turns the wave generator at each input angle of a tile until the unit loads of its teeth balance the torque.
     #[inline(always)]
     fn share_load(
         &self,
         loaded: &LoadedDrive<'_>,
-        tile: &mut Tile,
-        teeth: Range<usize>,
-        input_angle_deg: f64,
+        mesh: &Mesh,
+        samples: Range<u64>,
+        run: &Run,
+        tile: &mut Tile<'_>,
         sweep: &mut BatchSweep,
     ) {
-        let (mut cam, mut ring, mut carrier) = (0.0, 0.0, 0.0);
-        let mut loaded_teeth = 0;
-        for i in teeth.clone() {
-            cam += tile.force.wave_generator[i] * tile.lever_mm[i];
-            ring += tile.force.ring[i] * tile.ring_lever_mm[i];
-            carrier += tile.force.carrier[i] * tile.center_radius_mm[i];
-            loaded_teeth += usize::from(tile.force.wave_generator[i] > 0.0);
-        }
+        let rows = tile.sum_torques(run.teeth);
         let input_nmm = loaded.input_torque_nmm();
-        let stiffness_nmm_per_rad = WAVES * cam;
-        let rotation_rad = input_nmm / stiffness_nmm_per_rad;
-        tile.rotation_rad[teeth.clone()].fill(rotation_rad);
-        tile.rotation_root[teeth.clone()].fill(rotation_rad.sqrt());
-        tile.input_angle_deg[teeth].fill(input_angle_deg);
-        let wind_up = WindUp { closing_rad: 0.0, excess_rad: rotation_rad, stiffness_nmm_per_rad };
-        sweep.input_angles.push(loaded.drive(), input_angle_deg, &wind_up, loaded_teeth);
-        let off = |unit_torque: f64, ratio: f64| (WAVES * unit_torque * rotation_rad / (input_nmm * ratio) - 1.0).abs();
-        let residual = off(cam, 1.0).max(off(ring, self.ring_teeth_per_wave)).max(off(carrier, self.teeth_per_wave));
-        sweep.torque_balance_residual = sweep.torque_balance_residual.max(residual);
+        let [ring_ratio, carrier_ratio] =
+            [self.ring_teeth_per_wave, self.teeth_per_wave].map(|ratio| 1.0 / (input_nmm * ratio));
+        let PerContact { wave_generator: cam, ring, carrier } = &mut tile.row_torque;
+        let (cam, ring, carrier) = (&cam[..rows], &ring[..rows], &carrier[..rows]);
+        let (rotation_rad, rotation_root) = (&mut tile.row_rotation_rad[..rows], &mut tile.row_rotation_root[..rows]);
+        let residual = &mut tile.row_residual[..rows];
+        for row in 0..rows {
+            let rotation = input_nmm / (WAVES * cam[row]);
+            rotation_rad[row] = rotation;
+            rotation_root[row] = rotation.sqrt();
+            let zones = WAVES * rotation;
+            let off_cam = (zones * cam[row] * (1.0 / input_nmm) - 1.0).abs();
+            let off_ring = (zones * ring[row] * ring_ratio - 1.0).abs();
+            let off_carrier = (zones * carrier[row] * carrier_ratio - 1.0).abs();
+            let most = if off_ring > off_carrier { off_ring } else { off_carrier };
+            residual[row] = if off_cam > most { off_cam } else { most };
+        }
+        sweep.torque_balance_residual = sweep.torque_balance_residual.max(largest(residual));
+        for (angle_deg, sample) in zip(&mut tile.row_input_angle_deg[..rows], samples) {
+            *angle_deg = mesh.input_angle_deg(sample, run.of);
+        }
+        let stiffness_nmm_per_rad = cam.iter().map(|cam| WAVES * cam);
+        // Only a tooth on the minor axis, the last one, has no lever arm and no load.
+        let lasts = tile.force.wave_generator[..tile.count].iter().skip(run.teeth - 1).step_by(run.teeth);
+        let loaded_teeth = lasts.map(|last| run.teeth - usize::from(*last <= 0.0));
+        sweep.input_angles.extend(
+            loaded.drive(),
+            &tile.row_input_angle_deg[..rows],
+            rotation_rad,
+            stiffness_nmm_per_rad,
+            loaded_teeth,
+        );
+        repeat_each(&tile.row_input_angle_deg[..rows], run.teeth, tile.input_angle_deg);
+        repeat_each(rotation_rad, run.teeth, tile.rotation_rad);
+        repeat_each(rotation_root, run.teeth, tile.rotation_root);
+    }
+}
+
+/// The largest of values that are not negative: first of each lane, since one running value could not be vectorised.
+#[inline(always)]
+fn largest(values: &[f64]) -> f64 {
+    let (stretches, rest) = values.as_chunks::<{ 2 * VECTOR }>();
+    let mut most = [0.0; 2 * VECTOR];
+    for stretch in stretches {
+        for i in 0..2 * VECTOR {
+            most[i] = if stretch[i] > most[i] { stretch[i] } else { most[i] };
+        }
+    }
+    most.iter().chain(rest).fold(0.0, |most, &value| if value > most { value } else { most })
+}
+
+/// Each value so many times in a row. Whole vectors are written, and what is too much is overwritten by the next; the last needs room.
+#[inline(always)]
+fn repeat_each(values: &[f64], times: usize, repeated: &mut [f64]) {
+    for (row, &value) in values.iter().enumerate() {
+        for start in (row * times..(row + 1) * times).step_by(VECTOR) {
+            repeated[start..start + VECTOR].fill(value);
+        }
     }
 }
 
@@ -362,13 +449,22 @@ fn arctangent_terms(largest: f64) -> Option<usize> {
     })
 }
 
+/// The coefficients of `atan q` over `q` and the powers of `q²`.
+const ARCTANGENT: [f64; MAX_TERMS] = {
+    let mut coefficients = [0.0; MAX_TERMS];
+    let (mut term, mut sign) = (0, 1.0);
+    while term < MAX_TERMS {
+        coefficients[term] = sign / (2 * term + 1) as f64;
+        (term, sign) = (term + 1, -sign);
+    }
+    coefficients
+};
+
 /// Replaces small ratios by their arctangents.
 #[inline(always)]
 fn arctangents(ratios: &mut [f64; LANES], terms: usize) {
     let mut sums = [0.0; LANES];
-    for term in (0..terms).rev() {
-        let sign = if term % 2 == 0 { 1.0 } else { -1.0 };
-        let coefficient = sign / (2 * term + 1) as f64;
+    for coefficient in ARCTANGENT[..terms].iter().rev() {
         for i in 0..LANES {
             sums[i] = sums[i] * (ratios[i] * ratios[i]) + coefficient;
         }
@@ -379,171 +475,292 @@ fn arctangents(ratios: &mut [f64; LANES], terms: usize) {
 }
 
 /// Sines and cosines of angles.
-#[derive(Default)]
 struct SineTable {
     sin: Vec<f64>,
     cos: Vec<f64>,
 }
 
 impl SineTable {
-    /// Of `count` multiples of a step, from 0 to at most a quarter of a turn: those of a few steps and those of a few strides, added.
+    /// Of `count` multiples of a step, at most [`TILE`], from 0 to at most a quarter of a turn: those of a few steps and those of a few strides, added.
     fn equally_spaced(step_rad: f64, count: usize) -> Self {
-        let stride = count.isqrt().max(1);
-        let sines = |step_rad: f64, count: usize| -> Vec<(f64, f64)> {
-            (0..count).map(|index| (step_rad * index as f64).sin_cos()).collect()
+        // Strides are one or two more than a stride is long.
+        const STRIDE: usize = TILE.isqrt() + 2;
+        let sines = |step_rad: f64, count: usize| {
+            let mut sines = [(0.0, 0.0); STRIDE];
+            for (index, sines) in sines[..count].iter_mut().enumerate() {
+                *sines = (step_rad * index as f64).sin_cos();
+            }
+            sines
         };
-        let fine = sines(step_rad, stride);
-        let coarse = sines(step_rad * stride as f64, count.div_ceil(stride));
+        let stride = count.isqrt().max(1);
+        let strides = count.div_ceil(stride);
+        let (fine, coarse) = (sines(step_rad, stride), sines(step_rad * stride as f64, strides));
         let mut table = Self { sin: Vec::with_capacity(count + stride), cos: Vec::with_capacity(count + stride) };
-        for (coarse_sin, coarse_cos) in coarse {
-            table.sin.extend(fine.iter().map(|(sin, cos)| coarse_sin * cos + coarse_cos * sin));
-            table.cos.extend(fine.iter().map(|(sin, cos)| coarse_cos * cos - coarse_sin * sin));
+        for (coarse_sin, coarse_cos) in &coarse[..strides] {
+            table.sin.extend(fine[..stride].iter().map(|(sin, cos)| coarse_sin * cos + coarse_cos * sin));
+            table.cos.extend(fine[..stride].iter().map(|(sin, cos)| coarse_cos * cos - coarse_sin * sin));
         }
         table
     }
-
-    /// Of any angles, each by itself.
-    fn of(angles_rad: impl Iterator<Item = f64>) -> Self {
-        let (sin, cos) = angles_rad.map(f64::sin_cos).unzip();
-        Self { sin, cos }
-    }
 }
 
-/// Where the teeth stand: each as the sum of an angle of its own and one of the sample.
-struct Placing {
-    samples: u64,
-    installed: u64,
-    of_samples: SineTable,
-    /// Teeth nearer to the major axis: angle from it at the end of the period.
-    low: SineTable,
-    /// Teeth nearer to the minor axis, by number less `low`'s: angle from it at the start of the period.
-    high: SineTable,
-    /// The tooth that crosses the minor axis during the period, which no such sum reaches without cancellation.
-    crossing: Option<usize>,
+/// Input angles at which the same teeth mesh.
+///
+/// There a tooth stands at the sum of three angles: its own at the start of the run, one of the tile and one of the input angle within
+/// the tile. The first and the last make a pattern that all tiles share, so that a tile takes the sine of a single angle. The teeth come
+/// nearer to the major axis, so only for the one next to it does such a sum cancel: it is counted from the end of the tile.
+struct Run {
+    samples: Range<u64>,
+    /// Samples of the period.
+    of: u64,
+    teeth: usize,
+    /// Samples of a tile: equally many, but for the last.
+    rows: usize,
     mesh: Mesh,
+    step_rad: f64,
+    /// Steps of a whole turn.
+    steps: f64,
 }
 
-impl Placing {
-    fn new(drive: &Drive, mesh: &Mesh, samples: u64) -> Self {
-        let installed = drive.parameters().installed.unsigned_abs();
-        let spacing_rad = 2.0 * PI / installed as f64;
-        let count = whole(samples + 1);
-        let low_teeth = installed / 8;
-        let high_teeth = installed / 4 - low_teeth;
-        let crosses = !installed.is_multiple_of(4);
-        let quarter = 0.25 * installed as f64;
-        Self {
-            samples,
-            installed,
-            of_samples: SineTable::equally_spaced(spacing_rad / samples as f64, count),
-            low: SineTable::of((0..low_teeth).map(|tooth| tooth as f64 * spacing_rad)),
-            high: SineTable::of((1..=high_teeth).map(|tooth| (quarter - (low_teeth + tooth) as f64) * spacing_rad)),
-            crossing: crosses.then(|| whole(low_teeth + high_teeth)),
-            mesh: *mesh,
-        }
+impl Run {
+    fn from(first: u64, of: u64, mesh: &Mesh) -> Self {
+        let samples = first..mesh.same_teeth_until(first, of);
+        let steps = mesh.steps(of) as f64;
+        let teeth = whole(*mesh.teeth_at(first, of).end());
+        let count = whole(samples.end - samples.start);
+        let rows = count.div_ceil(count.div_ceil((TILE / teeth).max(1)));
+        Self { samples, of, teeth, rows, mesh: *mesh, step_rad: 2.0 * PI / steps, steps }
     }
 
-    /// Numbers and positions of the first `teeth` teeth at some samples, by sample and then tooth.
+    /// Lays the pattern of its tiles.
     #[inline(always)]
-    fn place(&self, samples: Range<u64>, teeth: usize, tile: &mut Tile) {
-        let steps = (self.samples * self.installed) as f64;
-        let low = teeth.min(self.low.sin.len());
-        let high = (teeth - low).min(self.high.sin.len());
-        for (row, sample) in samples.enumerate() {
-            let start = row * teeth;
-            let (at_start, at_end) = (whole(sample), whole(self.samples - sample));
-            let (end_sin, end_cos) = (self.of_samples.sin[at_end], self.of_samples.cos[at_end]);
-            let (start_sin, start_cos) = (self.of_samples.sin[at_start], self.of_samples.cos[at_start]);
-            let (sin, cos) = (&mut tile.sin[start..start + teeth], &mut tile.cos[start..start + teeth]);
-            for i in 0..low {
-                sin[i] = self.low.sin[i] * end_cos + self.low.cos[i] * end_sin;
-                cos[i] = self.low.cos[i] * end_cos - self.low.sin[i] * end_sin;
-            }
-            for i in 0..high {
-                cos[low + i] = self.high.sin[i] * start_cos + self.high.cos[i] * start_sin;
-                sin[low + i] = self.high.cos[i] * start_cos - self.high.sin[i] * start_sin;
-            }
-            if let Some(tooth) = self.crossing.filter(|&tooth| tooth < teeth) {
-                let position = self.mesh.position(tooth as u64 + 1, sample, self.samples);
-                (sin[tooth], cos[tooth]) = (position.sin, position.cos);
-            }
-            let passed = sample as f64;
+    fn lay_pattern(&self, tile: &mut Tile<'_>) {
+        let Self { teeth, rows, .. } = *self;
+        let (base_sin, base_cos) = (&mut tile.base_sin[..teeth], &mut tile.base_cos[..teeth]);
+        for (tooth, base) in zip(1.., zip(&mut *base_sin, &mut *base_cos)) {
+            let Position { sin, cos, .. } = self.mesh.position(tooth, self.samples.start, self.of);
+            (*base.0, *base.1) = (sin, cos);
+        }
+        tile.tooth.clear();
+        let last_tooth = u32::try_from(teeth).unwrap_or(u32::MAX);
+        for row in 0..rows {
+            let of_row = row * teeth..(row + 1) * teeth;
+            let (row_sin, row_cos) = (tile.row_sines.sin[row], tile.row_sines.cos[row]);
+            let (sin, cos) = (&mut tile.pattern_sin[of_row.clone()], &mut tile.pattern_cos[of_row.clone()]);
+            let step = &mut tile.pattern_step[of_row];
             for i in 0..teeth {
+                sin[i] = base_sin[i] * row_cos - base_cos[i] * row_sin;
+                cos[i] = base_cos[i] * row_cos + base_sin[i] * row_sin;
                 // Whole numbers below 2^53: exact.
-                let step = (i + 1) as f64 * self.samples as f64 - passed;
-                tile.position_deg[start + i] = 360.0 * step / steps;
-                tile.from_minor_rad[start + i] = (steps - 4.0 * step) * (FRAC_PI_2 / steps);
+                step[i] = (i + 1) as f64 * self.of as f64 - row as f64;
             }
-            for (tooth, number) in tile.tooth[start..start + teeth].iter_mut().zip(1..) {
-                *tooth = number;
-            }
+            tile.tooth.extend(1..=last_tooth);
+        }
+    }
+
+    /// Positions of all teeth at some samples, by sample and then tooth.
+    #[inline(always)]
+    fn place(&self, samples: Range<u64>, tile: &mut Tile<'_>) {
+        let rows = whole(samples.end - samples.start);
+        tile.count = rows * self.teeth;
+        let len = tile.count.next_multiple_of(LANES);
+        let passed = samples.start as f64;
+        let (turn_sin, turn_cos) = ((samples.start - self.samples.start) as f64 * self.step_rad).sin_cos();
+        let (pattern_sin, pattern_cos) = (&tile.pattern_sin[..len], &tile.pattern_cos[..len]);
+        let pattern_step = &tile.pattern_step[..len];
+        let (sin, cos) = (&mut tile.sin[..len], &mut tile.cos[..len]);
+        let (position_deg, from_minor_rad) = (&mut tile.position_deg[..len], &mut tile.from_minor_rad[..len]);
+        let (steps, quarter_step_rad) = (self.steps, FRAC_PI_2 / self.steps);
+        for i in 0..len {
+            sin[i] = pattern_sin[i] * turn_cos - pattern_cos[i] * turn_sin;
+            cos[i] = pattern_cos[i] * turn_cos + pattern_sin[i] * turn_sin;
+            let step = pattern_step[i] - passed;
+            position_deg[i] = 360.0 * step / steps;
+            from_minor_rad[i] = (steps - 4.0 * step) * quarter_step_rad;
+        }
+        // The first tooth again, from where it will stand at the last sample.
+        let end = self.mesh.position(1, samples.end - 1, self.of);
+        for (row, to_end) in (0..rows).rev().enumerate() {
+            let (row_sin, row_cos) = (tile.row_sines.sin[to_end], tile.row_sines.cos[to_end]);
+            sin[row * self.teeth] = end.sin * row_cos + end.cos * row_sin;
+            cos[row * self.teeth] = end.cos * row_cos - end.sin * row_sin;
         }
     }
 }
 
-/// Columns of the states of a few input angles: where they stand, their geometry, and what a unit rotation makes of them.
-struct Tile {
-    sin: Vec<f64>,
-    cos: Vec<f64>,
-    from_minor_rad: Vec<f64>,
-    input_angle_deg: Vec<f64>,
-    tooth: Vec<u32>,
-    position_deg: Vec<f64>,
-    center_radius_mm: Vec<f64>,
-    wave_generator_angle_deg: Vec<f64>,
-    ring_angle_deg: Vec<f64>,
-    lever_mm: Vec<f64>,
-    /// `d sin β`.
-    ring_lever_mm: Vec<f64>,
-    /// Over `Δφ`.
-    force: PerContact<Vec<f64>>,
-    /// Over the root of `Δφ`.
-    stress: PerContact<Vec<f64>>,
-    rotation_rad: Vec<f64>,
-    rotation_root: Vec<f64>,
+/// The most that the tiles of a sweep hold.
+struct TileSize {
+    /// States, with those that fill the last stretch and room for [`repeat_each`].
+    len: usize,
+    /// Input angles.
+    rows: usize,
+    /// Teeth at an input angle.
+    teeth: usize,
 }
 
-impl Tile {
-    /// For up to [`TILE`] states, or those of one input angle; lanes beyond the last state hold some tooth or other.
-    fn new(teeth: usize) -> Self {
-        let len = TILE.max(teeth.next_multiple_of(LANES));
-        let column = || vec![0.0; len];
+impl TileSize {
+    fn of(mesh: &Mesh, samples: u64) -> Self {
+        let teeth_at = |sample| whole(*mesh.teeth_at(sample, samples).end());
+        let (least, most) = (teeth_at(0).max(1), teeth_at(samples - 1));
+        let states = TILE.min(whole(mesh.state_count(samples))).max(most);
+        let rows = whole(samples).min(TILE.div_ceil(least));
+        Self { len: states.next_multiple_of(LANES) + VECTOR, rows, teeth: most }
+    }
+
+    /// What all slices of a tile take together.
+    const fn doubles(&self) -> usize {
+        22 * self.len + 7 * self.rows + 2 * self.teeth
+    }
+}
+
+/// Columns of the states of a few input angles: where they stand, their geometry, and what a unit rotation makes of them. All lie in one
+/// stretch of memory.
+struct Tile<'a> {
+    /// States in it; lanes beyond the last one hold some tooth or other.
+    count: usize,
+    /// Of the steps from one input angle to the next.
+    row_sines: SineTable,
+    tooth: Vec<u32>,
+    // Of the teeth at the start of the run.
+    base_sin: &'a mut [f64],
+    base_cos: &'a mut [f64],
+    pattern_sin: &'a mut [f64],
+    pattern_cos: &'a mut [f64],
+    pattern_step: &'a mut [f64],
+    sin: &'a mut [f64],
+    cos: &'a mut [f64],
+    from_minor_rad: &'a mut [f64],
+    input_angle_deg: &'a mut [f64],
+    position_deg: &'a mut [f64],
+    center_radius_mm: &'a mut [f64],
+    wave_generator_angle_deg: &'a mut [f64],
+    ring_angle_deg: &'a mut [f64],
+    /// Over `Δφ`.
+    force: PerContact<&'a mut [f64]>,
+    /// Over the root of `Δφ`.
+    stress: PerContact<&'a mut [f64]>,
+    /// Of the forces over `Δφ`.
+    torque: PerContact<&'a mut [f64]>,
+    rotation_rad: &'a mut [f64],
+    rotation_root: &'a mut [f64],
+    // By input angle.
+    row_torque: PerContact<&'a mut [f64]>,
+    row_input_angle_deg: &'a mut [f64],
+    row_rotation_rad: &'a mut [f64],
+    row_rotation_root: &'a mut [f64],
+    row_residual: &'a mut [f64],
+}
+
+impl<'a> Tile<'a> {
+    fn new(arena: &'a mut [f64], &TileSize { len, rows, teeth }: &TileSize, step_rad: f64) -> Self {
+        let mut rest = arena;
+        let mut slice = |len| {
+            let (slice, others) = std::mem::take(&mut rest).split_at_mut(len);
+            rest = others;
+            slice
+        };
+        let (base_sin, base_cos) = (slice(teeth), slice(teeth));
+        let row_torque = PerContact::of(|_| slice(rows));
+        let (row_input_angle_deg, row_residual) = (slice(rows), slice(rows));
+        let (row_rotation_rad, row_rotation_root) = (slice(rows), slice(rows));
+        let mut column = || slice(len);
+        let (pattern_sin, pattern_cos) = (column(), column());
+        pattern_sin.fill(FRAC_1_SQRT_2);
+        pattern_cos.fill(FRAC_1_SQRT_2);
         Self {
-            sin: vec![FRAC_1_SQRT_2; len],
-            cos: vec![FRAC_1_SQRT_2; len],
+            count: 0,
+            row_sines: SineTable::equally_spaced(step_rad, rows),
+            tooth: Vec::with_capacity(len),
+            base_sin,
+            base_cos,
+            pattern_sin,
+            pattern_cos,
+            pattern_step: column(),
+            sin: column(),
+            cos: column(),
             from_minor_rad: column(),
             input_angle_deg: column(),
-            tooth: vec![0; len],
             position_deg: column(),
             center_radius_mm: column(),
             wave_generator_angle_deg: column(),
             ring_angle_deg: column(),
-            lever_mm: column(),
-            ring_lever_mm: column(),
             force: PerContact::of(|_| column()),
             stress: PerContact::of(|_| column()),
+            torque: PerContact::of(|_| column()),
             rotation_rad: column(),
             rotation_root: column(),
+            row_torque,
+            row_input_angle_deg,
+            row_rotation_rad,
+            row_rotation_root,
+            row_residual,
         }
     }
 
+    /// Torques of a unit rotation summed over the teeth at each input angle; how many of these there are.
     #[inline(always)]
-    fn append_to(&self, states: &mut States, count: usize) {
+    fn sum_torques(&mut self, teeth: usize) -> usize {
+        let rows = self.count / teeth;
+        for row in 0..rows {
+            let at = row * teeth..(row + 1) * teeth;
+            let (cam, ring) = (&self.torque.wave_generator[at.clone()], &self.torque.ring[at.clone()]);
+            let carrier = &self.torque.carrier[at];
+            let (mut of_cam, mut of_ring, mut of_carrier) = (0.0, 0.0, 0.0);
+            for ((cam, ring), carrier) in zip(zip(cam, ring), carrier) {
+                of_cam += cam;
+                of_ring += ring;
+                of_carrier += carrier;
+            }
+            self.row_torque.wave_generator[row] = of_cam;
+            self.row_torque.ring[row] = of_ring;
+            self.row_torque.carrier[row] = of_carrier;
+        }
+        rows
+    }
+
+    #[inline(always)]
+    fn append_to(&self, states: &mut States, peaks: &mut PerContact<[RunningPeak; 2]>) {
+        let count = self.count;
         states.input_angle_deg.extend_from_slice(&self.input_angle_deg[..count]);
         states.tooth.extend_from_slice(&self.tooth[..count]);
         states.position_deg.extend_from_slice(&self.position_deg[..count]);
         states.center_radius_mm.extend_from_slice(&self.center_radius_mm[..count]);
         states.wave_generator_angle_deg.extend_from_slice(&self.wave_generator_angle_deg[..count]);
         states.ring_angle_deg.extend_from_slice(&self.ring_angle_deg[..count]);
-        let scaled = |to: &mut Vec<f64>, unit: &[f64], factor: &[f64]| {
-            to.extend(unit[..count].iter().zip(&factor[..count]).map(|(unit, factor)| unit * factor));
-        };
-        scaled(&mut states.force_n.wave_generator, &self.force.wave_generator, &self.rotation_rad);
-        scaled(&mut states.force_n.ring, &self.force.ring, &self.rotation_rad);
-        scaled(&mut states.force_n.carrier, &self.force.carrier, &self.rotation_rad);
-        scaled(&mut states.stress_mpa.wave_generator, &self.stress.wave_generator, &self.rotation_root);
-        scaled(&mut states.stress_mpa.ring, &self.stress.ring, &self.rotation_root);
-        scaled(&mut states.stress_mpa.carrier, &self.stress.carrier, &self.rotation_root);
+        let PerContact { wave_generator: [force_h, stress_h], ring: [force_k, stress_k], carrier: [force_s, stress_s] } =
+            peaks;
+        let (rotation_rad, rotation_root) = (&self.rotation_rad[..count], &self.rotation_root[..count]);
+        force_h.append(&mut states.force_n.wave_generator, self.force.wave_generator, rotation_rad);
+        force_k.append(&mut states.force_n.ring, self.force.ring, rotation_rad);
+        force_s.append(&mut states.force_n.carrier, self.force.carrier, rotation_rad);
+        stress_h.append(&mut states.stress_mpa.wave_generator, self.stress.wave_generator, rotation_root);
+        stress_k.append(&mut states.stress_mpa.ring, self.stress.ring, rotation_root);
+        stress_s.append(&mut states.stress_mpa.carrier, self.stress.carrier, rotation_root);
+    }
+}
+
+/// The largest value of a growing column, and the first state of the tile that it stands in.
+#[derive(Clone, Copy, Default)]
+struct RunningPeak {
+    value: f64,
+    start: usize,
+}
+
+impl RunningPeak {
+    /// Appends unit loads times the rotations that go with them to the column, and looks at them while they are near.
+    #[inline(always)]
+    fn append(&mut self, column: &mut Vec<f64>, unit: &[f64], factor: &[f64]) {
+        let start = column.len();
+        column.extend(zip(unit, factor).map(|(unit, factor)| unit * factor));
+        let value = largest(&column[start..]);
+        if value > self.value {
+            *self = Self { value, start };
+        }
+    }
+
+    /// The state itself.
+    fn find(&self, column: &[f64]) -> usize {
+        self.start + column[self.start..].iter().position(|&value| value >= self.value).unwrap_or(0)
     }
 }
 

@@ -114,6 +114,17 @@ impl Mesh {
         first..=(self.last_step(samples) + sample) / samples
     }
 
+    /// The first sample after this one at which more teeth mesh; the last one, where none does.
+    pub(crate) fn same_teeth_until(&self, sample: u64, samples: u64) -> u64 {
+        let next_tooth = self.teeth_at(sample, samples).end() + 1;
+        samples.min(next_tooth * samples - self.last_step(samples))
+    }
+
+    /// Steps of a whole turn, for a sweep of so many samples.
+    pub(crate) const fn steps(&self, samples: u64) -> u64 {
+        samples * self.installed
+    }
+
     /// The position of a tooth in mesh at a sample.
     pub fn position(&self, tooth: u64, sample: u64, samples: u64) -> Position {
         Position::of_turn(tooth * samples - sample, samples * self.installed)

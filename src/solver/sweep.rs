@@ -144,27 +144,21 @@ impl States {
         self.tooth.is_empty()
     }
 
-    fn peak(&self, column: &[f64]) -> (usize, Peak) {
-        /// Values looked at together: few enough to find the largest among them again quickly.
-        const STRETCH: usize = 512;
-        let (mut value, mut start) = (0.0, 0);
-        for (index, stretch) in column.chunks(STRETCH).enumerate() {
-            // The largest of each lane first: one running value could not be vectorised.
-            let mut largest = [0.0_f64; 16];
-            for lanes in stretch.chunks(largest.len()) {
-                for (largest, value) in largest.iter_mut().zip(lanes) {
-                    *largest = if *value > *largest { *value } else { *largest };
-                }
-            }
-            let largest = largest.into_iter().fold(0.0, f64::max);
-            if largest > value {
-                (value, start) = (largest, index * STRETCH);
-            }
-        }
-        let at = start + column[start..].iter().position(|&each| each >= value).unwrap_or(0);
-        let (input_angle_deg, position_deg) = (self.input_angle_deg[at], self.position_deg[at]);
-        (at, Peak { value, input_angle_deg, position_deg })
+    fn peak(&self, column: &[f64], at: usize) -> Peak {
+        Peak { value: column[at], input_angle_deg: self.input_angle_deg[at], position_deg: self.position_deg[at] }
     }
+}
+
+/// The states where the force and the stress of a contact have their peaks.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct PeakAt {
+    pub(crate) force: usize,
+    pub(crate) stress: usize,
+}
+
+/// The first of the largest values of a column.
+fn peak_at(column: &[f64]) -> usize {
+    column.iter().enumerate().fold(0, |at, (index, &value)| if value > column[at] { index } else { at })
 }
 
 impl InputAngles {
@@ -180,11 +174,26 @@ impl InputAngles {
 
     /// Appends an input angle; the stiffness `dM0/dΔφ` becomes that of the output.
     pub(crate) fn push(&mut self, drive: &Drive, input_angle_deg: f64, wind_up: &WindUp, loaded_teeth: usize) {
+        let stiffness = std::iter::once(wind_up.stiffness_nmm_per_rad);
+        self.extend(drive, &[input_angle_deg], &[wind_up.rotation_rad()], stiffness, std::iter::once(loaded_teeth));
+    }
+
+    /// Appends some input angles at once.
+    #[inline(always)]
+    pub(crate) fn extend(
+        &mut self,
+        drive: &Drive,
+        input_angle_deg: &[f64],
+        rotation_rad: &[f64],
+        stiffness_nmm_per_rad: impl Iterator<Item = f64>,
+        loaded_teeth: impl Iterator<Item = usize>,
+    ) {
         let torque_ratio = drive.teeth_per_wave();
-        self.input_angle_deg.push(input_angle_deg);
-        self.wind_up_deg.push(wind_up.rotation_rad().to_degrees());
-        self.torsional_stiffness_nm_per_rad.push(1e-3 * wind_up.stiffness_nmm_per_rad * torque_ratio * torque_ratio);
-        self.loaded_teeth.push(u32::try_from(loaded_teeth).unwrap_or(u32::MAX));
+        self.input_angle_deg.extend_from_slice(input_angle_deg);
+        self.wind_up_deg.extend(rotation_rad.iter().map(|rotation_rad| rotation_rad.to_degrees()));
+        let of_output = |stiffness| 1e-3 * stiffness * torque_ratio * torque_ratio;
+        self.torsional_stiffness_nm_per_rad.extend(stiffness_nmm_per_rad.map(of_output));
+        self.loaded_teeth.extend(loaded_teeth.map(|teeth| u32::try_from(teeth).unwrap_or(u32::MAX)));
     }
 
     /// Appends the first input angle again, a period on.
@@ -210,8 +219,8 @@ pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -
     {
         let mesh = Mesh::new(drive);
         let teeth_at_ends = (mesh.teeth_at(0, samples).count(), mesh.teeth_at(samples, samples).count());
-        let BatchSweep { states, input_angles, torque_balance_residual } = batch;
-        return Ok(finished(drive, states, input_angles, None, torque_balance_residual, teeth_at_ends));
+        let BatchSweep { states, input_angles, peaks, torque_balance_residual } = batch;
+        return Ok(finished(drive, states, input_angles, &peaks, None, torque_balance_residual, teeth_at_ends));
     }
     plain(&loaded, load, points, stop)
 }
@@ -358,7 +367,11 @@ impl<'a> Columns<'a> {
 
     fn finish(self) -> Sweep {
         let Self { loaded, states, input_angles, torque_capacity, torque_balance_residual, teeth_at_ends, .. } = self;
-        finished(loaded.drive(), states, input_angles, torque_capacity, torque_balance_residual, teeth_at_ends)
+        let peaks = PerContact::of(|contact| PeakAt {
+            force: peak_at(states.force_n.get(contact)),
+            stress: peak_at(states.stress_mpa.get(contact)),
+        });
+        finished(loaded.drive(), states, input_angles, &peaks, torque_capacity, torque_balance_residual, teeth_at_ends)
     }
 }
 
@@ -367,18 +380,19 @@ fn finished(
     drive: &Drive,
     states: States,
     input_angles: InputAngles,
+    peaks: &PerContact<PeakAt>,
     torque_capacity: Option<TorqueCapacity>,
     torque_balance_residual: f64,
     teeth_at_ends: (usize, usize),
 ) -> Sweep {
     let tooth_width_mm = drive.parameters().tooth_width_mm;
     let peaks = PerContact::of(|contact| {
-        let force = states.force_n.get(contact);
-        let (at, stress_mpa) = states.peak(states.stress_mpa.get(contact));
+        let (force, at) = (states.force_n.get(contact), peaks.get(contact));
+        let stress_mpa = states.peak(states.stress_mpa.get(contact), at.stress);
         ContactPeaks {
-            force_n: states.peak(force).1,
+            force_n: states.peak(force, at.force),
             stress_mpa,
-            half_width_mm: half_width_mm(force[at], stress_mpa.value, tooth_width_mm),
+            half_width_mm: half_width_mm(force[at.stress], stress_mpa.value, tooth_width_mm),
         }
     });
     let period_closure_residual = period_closure(&states, &peaks, teeth_at_ends);
@@ -393,7 +407,7 @@ fn period_closure(
     let last = states.len() - teeth_at_end;
     let residual = |column: &[f64], peak: f64| {
         let pairs = column[last..].iter().zip(&column[..teeth_at_start]);
-        pairs.map(|(end, start)| (end - start).abs() / peak).fold(0.0, f64::max)
+        pairs.map(|(end, start)| (end - start).abs()).fold(0.0, f64::max) / peak
     };
     peaks
         .iter()
