@@ -31,11 +31,17 @@ pub struct Pool {
 }
 
 /// Sets the stop signal of a job that nobody waits for any more.
-struct StopOnDrop(Arc<AtomicBool>);
+struct StopOnDrop {
+    signal: Arc<AtomicBool>,
+    is_over: bool,
+}
 
 impl Drop for StopOnDrop {
     fn drop(&mut self) {
-        self.0.store(true, Ordering::Relaxed);
+        if !self.is_over {
+            self.signal.store(true, Ordering::Relaxed);
+            counter!("toothwave_cancellations_total").increment(1);
+        }
     }
 }
 
@@ -141,8 +147,8 @@ impl Pool {
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
         let Ok(permit) = waited else { return Err(self.deadline_exceeded()) };
-        let stop = StopOnDrop(Arc::default());
-        let signal = Arc::clone(&stop.0);
+        let mut stop = StopOnDrop { signal: Arc::default(), is_over: false };
+        let signal = Arc::clone(&stop.signal);
         // spawn_blocking loses the span, and cannot be aborted: span, permit and place go along.
         let span = Span::current();
         let running = tokio::task::spawn_blocking(move || {
@@ -153,6 +159,7 @@ impl Pool {
             finished = tokio::time::timeout_at(deadline, running) => finished,
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
+        stop.is_over = finished.is_ok();
         match finished {
             Ok(Ok(Err(Problem { code: ProblemCode::DeadlineExceeded, .. }))) | Err(_) => Err(self.deadline_exceeded()),
             Ok(Ok(result)) => result,

@@ -16,7 +16,7 @@ use crate::keys::Keys;
 const MOST_SOLVES: i64 = 1_000_000;
 
 /// Bytes of a request's line and headers together, at most.
-pub const MAX_HEADER_BYTES: usize = 16_384;
+pub const MAX_HEADER_BYTES: usize = 40_960;
 
 /// The settings of `toothwave serve`.
 #[derive(Debug, Clone, Args)]

@@ -10,10 +10,10 @@
 //! - The only transcendental functions left are two arctangents of small ratios, for which a few terms of their series are enough; how many
 //!   depends on the drive alone.
 //!
-//! What is left is bound by divisions and square roots, three and five a state beside that of the position.
+//! What is left has three divisions and five square roots a state, beside the division of the position.
 //!
 //! Vectors are four doubles wide where the machine has AVX2, which is found out when the program runs (`pulp`). Eight, with AVX-512, were
-//! 5 % slower on a Xeon: its divisions and roots take twice as long then.
+//! 5 % slower on the Xeon that this was measured on.
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
 use std::iter::zip;

@@ -1,12 +1,13 @@
 //! Health, limits, metrics, and the documentation page.
 
+use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 
 use serde_json::{Value, json};
 use toothwave::config::Limits;
 
-use crate::asking::{ENDPOINTS, LIMITS, Service};
-use crate::designs::spelled_out;
+use crate::asking::{ENDPOINTS, LIMITS, Question, Service};
+use crate::designs::{spelled_out, with};
 
 #[tokio::test]
 async fn a_service_that_drains_is_live_but_not_ready() {
@@ -51,6 +52,40 @@ async fn the_limits_can_be_read() {
         "header_timeout_ms": 9
     });
     assert_eq!(Service::within(limits).get("/v1/limits").await.found(), expected);
+}
+
+/// The names of all series in Prometheus' text, those of a histogram as its name.
+fn series(text: &str) -> BTreeSet<String> {
+    let names = text.lines().filter(|line| !line.starts_with('#') && !line.is_empty()).map(|line| {
+        let name = line.split(['{', ' ']).next().unwrap();
+        ["_bucket", "_sum", "_count"].iter().find_map(|end| name.strip_suffix(end)).unwrap_or(name).to_owned()
+    });
+    names.collect()
+}
+
+#[tokio::test]
+async fn every_series_is_documented_and_every_documented_one_is_there() {
+    toothwave::observe::install_recorder();
+    // What each of them counts, once.
+    let service = Service::within(Limits {
+        max_concurrent_solves: 1,
+        max_queued_solves: 0,
+        deadline_ms: 50,
+        max_states: 100_000_000,
+        ..LIMITS
+    });
+    service.post("/v1/sweep", &spelled_out()).await.found();
+    let line = Question::post_as("application/x-ndjson", "/v1/batch", spelled_out().to_string());
+    assert_eq!(service.ask(&line).await.status, 200);
+    let slow = with(&spelled_out(), "/sweep/samples", json!(5_000_000));
+    service.post("/v1/sweep", &slow).await.refused(503, "deadline_exceeded");
+    let text = service.get("/metrics").await.text().to_owned();
+    let documented: BTreeSet<String> = include_str!("../../docs/operations.md")
+        .split('`')
+        .filter(|word| word.starts_with("toothwave_"))
+        .map(|word| word.split('{').next().unwrap().to_owned())
+        .collect();
+    assert_eq!(series(&text), documented);
 }
 
 #[tokio::test]

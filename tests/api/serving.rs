@@ -107,7 +107,7 @@ fn settings_become_limits() {
         "deadline_ms": 6000,
         "cache_max_bytes": 7000,
         "max_connections": 8,
-        "max_header_bytes": 16384,
+        "max_header_bytes": 40960,
         "header_timeout_ms": 9000,
         "max_concurrent_batches": 10
     });
