@@ -1161,6 +1161,8 @@ test('headers: a strict policy, and files that are asked for anew', async () => 
   const etag = index.headers.get('etag');
   const again = await fetch(`${server.origin}/page/main.js`, { headers: { 'if-none-match': etag } });
   assert.equal(again.status, 304);
+  // A browser takes the headers of a 304 over those that it kept: another policy there would stop the page's own scripts.
+  assert.equal(again.headers.get('content-security-policy'), policy);
   const missing = await fetch(`${server.origin}/page/nothing.js`);
   assert.equal(missing.status, 404);
   assert.equal(missing.headers.get('content-type'), 'application/problem+json');

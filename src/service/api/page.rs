@@ -93,13 +93,14 @@ fn serve(asset: &Asset, headers: &HeaderMap) -> Response {
     // Asked for anew each time, so that a page never mixes with the modules of an older service.
     let cache_control = (header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
     let tag = (header::ETAG, etag.to_owned());
+    // On 304 too: browsers take its headers over those that they kept.
+    let policy = (header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY);
+    let common = [cache_control, policy];
     if negotiation::is_not_modified(headers, etag) || negotiation::matches_any(headers) {
-        return (StatusCode::NOT_MODIFIED, [cache_control], [tag]).into_response();
+        return (StatusCode::NOT_MODIFIED, common, [tag]).into_response();
     }
     let content_type = (header::CONTENT_TYPE, HeaderValue::from_static(asset.content_type));
-    let policy = (header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY);
-    let referrer = (header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
-    ([cache_control, content_type, policy, referrer], [tag], asset.body).into_response()
+    (common, [tag], [content_type], asset.body).into_response()
 }
 
 #[cfg(test)]
