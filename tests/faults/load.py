@@ -204,7 +204,7 @@ async def send(host, port, works, rate, until, *, leaves=False):
 
 
 async def hold(host, port, work, count, seconds):
-    """Clients that ask and then do not read; their number of answers that had begun."""
+    """Clients that ask and then do not read."""
     connections = []
     for _ in range(count):
         reader, writer = await asyncio.open_connection(host, port, limit=1 << 10)
