@@ -1,6 +1,7 @@
 """Calls to a toothwave service. Python's standard library only, so that it can be tried without FreeCAD."""
 
 import json
+import os
 import time
 import urllib.error
 import urllib.request
@@ -76,6 +77,8 @@ class Service:
 
     def _send(self, request):
         """Entity tag and answer, which is None where the one with this tag still holds."""
+        if key := os.environ.get("TOOTHWAVE_KEY"):  # of a service that wants one; never a property, so that no document carries it
+            request.add_header("Authorization", f"Bearer {key}")
         for left in reversed(range(ATTEMPTS)):
             try:
                 with urllib.request.urlopen(request, timeout=self.timeout_s) as response:
@@ -83,7 +86,7 @@ class Service:
             except urllib.error.HTTPError as error:
                 if error.code == 304:
                     return error.headers["ETag"], None
-                if error.code == 503 and left:
+                if error.code in (502, 503, 504) and left:
                     time.sleep(min(float(error.headers.get("Retry-After", 1)), LONGEST_PAUSE_S))
                     continue
                 raise self._problem(error) from None

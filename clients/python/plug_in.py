@@ -2,27 +2,34 @@
 
 import json
 import math
+import os
 import sys
 import time
 import urllib.error
 import urllib.request
 
-answers = {}  # entity tag -> drawing: what this plug-in has already
+KEPT = 32  # as many tags as a request's headers have room for
+
+answers = {}  # entity tag -> drawing: what this plug-in has already, the oldest first
 
 
 def drawing(url, design, attempts=4):
     """All parts in place; asked for again only where the design has changed in what a drawing reads."""
     request = urllib.request.Request(f"{url}/v1/drawings/assembly", json.dumps(design).encode())
     request.add_header("Content-Type", "application/json")
+    if key := os.environ.get("TOOTHWAVE_KEY"):  # where the service wants one
+        request.add_header("Authorization", f"Bearer {key}")
     if answers:
         request.add_header("If-None-Match", ", ".join(answers))
     try:
         with urllib.request.urlopen(request, timeout=30) as response:
             tag = response.headers["ETag"]
             answers[tag] = json.load(response)
+            while len(answers) > KEPT:
+                del answers[next(iter(answers))]
     except urllib.error.HTTPError as error:
-        if error.code == 503 and attempts > 1:
-            time.sleep(float(error.headers["Retry-After"]))
+        if error.code in (502, 503, 504) and attempts > 1:
+            time.sleep(float(error.headers.get("Retry-After", 1)))
             return drawing(url, design, attempts - 1)
         if error.code != 304:
             problem = json.load(error)

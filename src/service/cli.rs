@@ -1,5 +1,6 @@
 //! The command line: the service, the same answers without it, and what containers need.
 
+use std::ffi::OsString;
 use std::fs::File;
 use std::io::{self, BufRead, Read, Write};
 use std::iter;
@@ -33,12 +34,10 @@ const EXIT_BAD_INPUT: u8 = 2;
 
 /// Forces and contact stresses of discrete-tooth harmonic drives.
 #[derive(Debug, Parser)]
-#[command(name = "toothwave", version, args_conflicts_with_subcommands = true)]
+#[command(name = "toothwave", version)]
 struct Cli {
     #[command(subcommand)]
-    command: Option<Command>,
-    #[command(flatten)]
-    serve: Settings,
+    command: Command,
 }
 
 #[derive(Debug, Subcommand)]
@@ -101,22 +100,21 @@ struct Offline {
 
 /// Runs the command that the process was started with.
 pub fn run() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match Cli::try_parse_from(arguments()) {
         Ok(cli) => cli,
         Err(error) => return refuse(&error),
     };
     let result = match cli.command {
-        None => run_service(&cli.serve),
-        Some(Command::Serve(settings)) => run_service(&settings),
-        Some(Command::Geometry(offline)) => answer(Geometry, &offline.file, offline.format),
-        Some(Command::CoincidenceDegree(offline)) => answer(CoincidenceDegree, &offline.file, offline.format),
-        Some(Command::Sweep(offline)) => answer(Sweep, &offline.file, offline.format),
-        Some(Command::Accuracy(offline)) => answer(Accuracy, &offline.file, offline.format),
-        Some(Command::Draw { part, file, format }) => answer(Drawing(part), &file, format),
-        Some(Command::Batch { file, endpoint, peaks_only }) => batch(&file, BatchQuery { endpoint, peaks_only }),
-        Some(Command::Health { address }) => health(address),
-        Some(Command::NewKey { name }) => new_key(&name),
-        Some(Command::Openapi) => print(|writer| writer.write_all(router::openapi_json().as_bytes())),
+        Command::Serve(settings) => run_service(&settings),
+        Command::Geometry(offline) => answer(Geometry, &offline.file, offline.format),
+        Command::CoincidenceDegree(offline) => answer(CoincidenceDegree, &offline.file, offline.format),
+        Command::Sweep(offline) => answer(Sweep, &offline.file, offline.format),
+        Command::Accuracy(offline) => answer(Accuracy, &offline.file, offline.format),
+        Command::Draw { part, file, format } => answer(Drawing(part), &file, format),
+        Command::Batch { file, endpoint, peaks_only } => batch(&file, BatchQuery { endpoint, peaks_only }),
+        Command::Health { address } => health(address),
+        Command::NewKey { name } => new_key(&name),
+        Command::Openapi => print(|writer| writer.write_all(router::openapi_json().as_bytes())),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -172,6 +170,20 @@ impl From<Problem> for Failure {
     }
 }
 
+/// The arguments of this process, with the command that may be left out. The settings are read for that command alone, so that a fault in
+/// them is none of, say, `health`.
+fn arguments() -> Vec<OsString> {
+    let mut arguments: Vec<_> = std::env::args_os().collect();
+    let names_command = arguments.get(1).is_some_and(|first| {
+        let first = first.to_string_lossy();
+        !first.starts_with('-') || ["-h", "--help", "-V", "--version"].contains(&&*first)
+    });
+    if !names_command {
+        arguments.insert(arguments.len().min(1), "serve".into());
+    }
+    arguments
+}
+
 fn run_service(settings: &Settings) -> Result<(), Failure> {
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
     tracing_subscriber::fmt().json().with_span_list(false).with_env_filter(filter).with_writer(io::stderr).init();
@@ -219,8 +231,10 @@ fn answer<E: Endpoint>(endpoint: E, file: &Path, format: Format) -> Result<(), F
     })
 }
 
-/// Lines that are answered side by side before the first of them is written: some megabytes of answers without states.
-const BATCH_LINES: usize = 1024;
+/// Lines that are answered side by side before the first of them is written: of whole answers few, because they are long.
+const fn lines_at_once(query: BatchQuery, cores: usize) -> usize {
+    if query.peaks_only { 256 * cores } else { 2 * cores }
+}
 
 fn batch(file: &Path, query: BatchQuery) -> Result<(), Failure> {
     tracing_subscriber::fmt().with_max_level(tracing::Level::ERROR).with_writer(io::stderr).init();
@@ -243,7 +257,8 @@ fn batch(file: &Path, query: BatchQuery) -> Result<(), Failure> {
     let mut index = 0;
     print(|writer| {
         loop {
-            let chunk: Vec<_> = lines.by_ref().take(BATCH_LINES).collect::<io::Result<_>>()?;
+            let chunk: Vec<_> =
+                lines.by_ref().take(lines_at_once(query, rayon::current_num_threads())).collect::<io::Result<_>>()?;
             if chunk.is_empty() {
                 progress.finish_and_clear();
                 return Ok(());

@@ -99,23 +99,9 @@ impl Representation {
 /// # Errors
 /// `unsupported_media_type`.
 pub fn require_json(headers: &HeaderMap) -> Result<(), Problem> {
-    let unsupported = |detail: String| Err(Problem::new(ProblemCode::UnsupportedMediaType, detail));
-    let coding = joined(headers, &header::CONTENT_ENCODING);
-    if !coding.is_empty() && !coding.eq_ignore_ascii_case("identity") {
-        return unsupported(format!("the body is coded as `{coding}`; send it without a content coding"));
-    }
-    let content_type = joined(headers, &header::CONTENT_TYPE);
-    let is_json = MediaType::parse(&content_type).is_ok_and(|media_type| {
-        media_type.ty == names::APPLICATION
-            && (media_type.subty == names::JSON || media_type.suffix == Some(names::JSON))
-    });
-    if is_json {
-        Ok(())
-    } else if content_type.is_empty() {
-        unsupported("the request has no `Content-Type`; send a design document as `application/json`".into())
-    } else {
-        unsupported(format!("the body is sent as `{content_type}`; send a design document as `application/json`"))
-    }
+    require_type(headers, "a design document as `application/json`", |media_type| {
+        media_type.subty == names::JSON || media_type.suffix == Some(names::JSON)
+    })
 }
 
 /// Checks that the body is sent as one JSON document a line.
@@ -123,17 +109,28 @@ pub fn require_json(headers: &HeaderMap) -> Result<(), Problem> {
 /// # Errors
 /// `unsupported_media_type`.
 pub fn require_ndjson(headers: &HeaderMap) -> Result<(), Problem> {
-    let content_type = joined(headers, &header::CONTENT_TYPE);
     let known = ["x-ndjson", "ndjson", "jsonl", "x-jsonlines"];
-    let is_ndjson = MediaType::parse(&content_type).is_ok_and(|media_type| {
-        media_type.ty == names::APPLICATION && known.iter().any(|name| media_type.subty == *name)
-    });
-    if is_ndjson {
+    require_type(headers, "a design document a line as `application/x-ndjson`", |media_type| {
+        known.iter().any(|name| media_type.subty == *name)
+    })
+}
+
+/// Checks that the body has no coding and is an application's type that fits.
+fn require_type(headers: &HeaderMap, wanted: &str, fits: impl Fn(&MediaType<'_>) -> bool) -> Result<(), Problem> {
+    let unsupported =
+        |found: String| Err(Problem::new(ProblemCode::UnsupportedMediaType, format!("{found}; send {wanted}")));
+    let coding = joined(headers, &header::CONTENT_ENCODING);
+    if !coding.is_empty() && !coding.eq_ignore_ascii_case("identity") {
+        return unsupported(format!("the body is coded as `{coding}`, and no coding is read"));
+    }
+    let content_type = joined(headers, &header::CONTENT_TYPE);
+    if MediaType::parse(&content_type).is_ok_and(|media_type| media_type.ty == names::APPLICATION && fits(&media_type))
+    {
         Ok(())
+    } else if content_type.is_empty() {
+        unsupported("the request has no `Content-Type`".into())
     } else {
-        let detail =
-            format!("the body is sent as `{content_type}`; send a design document a line as `application/x-ndjson`");
-        Err(Problem::new(ProblemCode::UnsupportedMediaType, detail))
+        unsupported(format!("the body is sent as `{content_type}`"))
     }
 }
 
@@ -161,13 +158,8 @@ fn joined(headers: &HeaderMap, name: &HeaderName) -> String {
     values.join(",")
 }
 
-/// Whether `If-None-Match` names this entity tag, compared weakly as the header wants it (RFC 9110).
+/// Whether `If-None-Match` names this entity tag, compared weakly as the header wants it, or `*`, which stands for any (RFC 9110).
 pub fn is_not_modified(headers: &HeaderMap, etag: &str) -> bool {
     let listed = joined(headers, &header::IF_NONE_MATCH);
-    listed.split(',').map(str::trim).any(|tag| tag.strip_prefix("W/").unwrap_or(tag) == etag)
-}
-
-/// Whether `If-None-Match` is `*`: any representation will do, if there is one.
-pub fn matches_any(headers: &HeaderMap) -> bool {
-    joined(headers, &header::IF_NONE_MATCH).trim() == "*"
+    listed.split(',').map(str::trim).any(|tag| tag.strip_prefix("W/").unwrap_or(tag) == etag) || listed.trim() == "*"
 }

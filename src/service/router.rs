@@ -9,7 +9,7 @@ use axum::routing::get;
 use tower::ServiceBuilder;
 use tower::util::option_layer;
 use tower_http::catch_panic::CatchPanicLayer;
-use tower_http::cors::{AllowOrigin, Any, CorsLayer};
+use tower_http::cors::{AllowHeaders, AllowOrigin, Any, CorsLayer};
 use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
 use tower_http::set_header::SetResponseHeaderLayer;
 use utoipa::OpenApi;
@@ -142,11 +142,15 @@ fn cors(origins: &[String]) -> CorsLayer {
         // An origin that is no header value could never be sent by a browser either.
         AllowOrigin::list(origins.iter().filter_map(|origin| HeaderValue::from_str(origin).ok()))
     };
-    CorsLayer::new().allow_origin(allowed).allow_methods(Any).allow_headers(Any).expose_headers([
-        header::ETAG,
-        header::RETRY_AFTER,
-        header::HeaderName::from_static("cache-status"),
-        header::HeaderName::from_static("server-timing"),
-        header::HeaderName::from_static("x-request-id"),
-    ])
+    CorsLayer::new()
+        .allow_origin(allowed)
+        .allow_methods(Any)
+        .allow_headers(AllowHeaders::mirror_request())
+        .expose_headers([
+            header::ETAG,
+            header::RETRY_AFTER,
+            header::HeaderName::from_static("cache-status"),
+            header::HeaderName::from_static("server-timing"),
+            header::HeaderName::from_static("x-request-id"),
+        ])
 }

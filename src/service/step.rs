@@ -45,14 +45,14 @@ struct Frame {
 enum Side {
     Line { end: [f64; 2] },
     Arc { end: [f64; 2], center: [f64; 2], radius_mm: f64, is_counter_clockwise: bool },
-    Curve { points: Vec<[f64; 2]>, end_tangents: [[f64; 2]; 2] },
+    Curve(Spline),
 }
 
 impl Side {
     fn end(&self) -> [f64; 2] {
         match self {
             Self::Line { end } | Self::Arc { end, .. } => *end,
-            Self::Curve { points, .. } => points.last().copied().unwrap_or_default(),
+            Self::Curve(spline) => spline.poles.last().copied().unwrap_or_default(),
         }
     }
 }
@@ -62,6 +62,8 @@ struct Level {
     z_mm: f64,
     corners: Vec<Id>,
     edges: Vec<Id>,
+    /// Of the splines among the edges, which the surfaces over them share; none of the others.
+    poles: Vec<Vec<Id>>,
 }
 
 /// The file as it is written: numbered records.
@@ -167,18 +169,26 @@ impl Step<'_> {
         }
         // Each side ends at the corner of its index and starts at the one before.
         corners.rotate_right(1);
-        let mut edges = Vec::new();
+        let (mut edges, mut poles) = (Vec::new(), Vec::new());
         for (index, side) in sides.iter().enumerate() {
             let start = sides[(index + sides.len() - 1) % sides.len()].end();
-            let (curve, runs_along) = self.curve(side, start, z_mm)?;
+            poles.push(self.poles(side, z_mm)?);
+            let (curve, runs_along) = self.curve(side, start, z_mm, &poles[index])?;
             let (from, to) = (corners[index], corners[(index + 1) % corners.len()]);
             edges.push(self.record(format_args!("EDGE_CURVE('',{from},{to},{curve},{runs_along})"))?);
         }
-        Ok(Level { z_mm, corners, edges })
+        Ok(Level { z_mm, corners, edges, poles })
+    }
+
+    fn poles(&mut self, side: &Side, z_mm: f64) -> io::Result<Vec<Id>> {
+        match side {
+            Side::Line { .. } | Side::Arc { .. } => Ok(Vec::new()),
+            Side::Curve(spline) => spline.poles.iter().map(|[x, y]| self.point([*x, *y, z_mm])).collect(),
+        }
     }
 
     /// The curve under an edge, and whether the edge runs along it.
-    fn curve(&mut self, side: &Side, start: [f64; 2], z_mm: f64) -> io::Result<(Id, &'static str)> {
+    fn curve(&mut self, side: &Side, start: [f64; 2], z_mm: f64, poles: &[Id]) -> io::Result<(Id, &'static str)> {
         match side {
             Side::Line { end } => {
                 let point = self.point([start[0], start[1], z_mm])?;
@@ -190,15 +200,10 @@ impl Step<'_> {
                 let circle = self.record(format_args!("CIRCLE('',{place},{})", Real(*radius_mm)))?;
                 Ok((circle, if *is_counter_clockwise { ".T." } else { ".F." }))
             }
-            Side::Curve { points, end_tangents } => {
-                let Spline { poles, multiplicities, knots } = Spline::through(points, end_tangents);
-                let mut ids = Vec::new();
-                for [x, y] in poles {
-                    ids.push(self.point([x, y, z_mm])?);
-                }
+            Side::Curve(Spline { multiplicities, knots, .. }) => {
                 let spline = self.record(format_args!(
                     "B_SPLINE_CURVE_WITH_KNOTS('',3,({}),.UNSPECIFIED.,.F.,.F.,({multiplicities}),({knots}),.UNSPECIFIED.)",
-                    list(&ids)
+                    list(poles)
                 ))?;
                 Ok((spline, ".T."))
             }
@@ -217,7 +222,7 @@ impl Step<'_> {
         let mut faces = Vec::new();
         for (index, side) in sides.iter().enumerate() {
             let start = sides[(index + sides.len() - 1) % sides.len()].end();
-            let (surface, faces_outward) = self.surface(side, start, bottom.z_mm, top.z_mm)?;
+            let (surface, faces_outward) = self.surface(index, side, start, bottom, top)?;
             let next = (index + 1) % sides.len();
             let around = self.edge_loop([
                 (bottom.edges[index], true),
@@ -231,29 +236,34 @@ impl Step<'_> {
         Ok(faces)
     }
 
-    /// The surface over an edge, and whether its normal points out of the material, to the right of the edge.
-    fn surface(&mut self, side: &Side, start: [f64; 2], bottom_mm: f64, top_mm: f64) -> io::Result<(Id, &'static str)> {
+    /// The surface over the edge of an index, and whether its normal points out of the material, to the right of the edge.
+    fn surface(
+        &mut self,
+        index: usize,
+        side: &Side,
+        start: [f64; 2],
+        bottom: &Level,
+        top: &Level,
+    ) -> io::Result<(Id, &'static str)> {
         match side {
             Side::Line { end } => {
                 let [x, y] = unit([end[0] - start[0], end[1] - start[1]]);
-                let place = self.placement([start[0], start[1], bottom_mm], [y, -x, 0.0], [x, y, 0.0])?;
+                let place = self.placement([start[0], start[1], bottom.z_mm], [y, -x, 0.0], [x, y, 0.0])?;
                 Ok((self.record(format_args!("PLANE('',{place})"))?, ".T."))
             }
             Side::Arc { center: [x, y], radius_mm, is_counter_clockwise, .. } => {
-                let place = self.placement([*x, *y, bottom_mm], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
+                let place = self.placement([*x, *y, bottom.z_mm], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
                 let cylinder = self.record(format_args!("CYLINDRICAL_SURFACE('',{place},{})", Real(*radius_mm)))?;
                 // A cylinder's normal points away from its axis.
                 Ok((cylinder, if *is_counter_clockwise { ".T." } else { ".F." }))
             }
-            Side::Curve { points, end_tangents } => {
-                let Spline { poles, multiplicities, knots } = Spline::through(points, end_tangents);
-                let mut pairs = String::new();
-                for (index, [x, y]) in poles.into_iter().enumerate() {
-                    let pair = [self.point([x, y, bottom_mm])?, self.point([x, y, top_mm])?];
-                    let comma = if index == 0 { "" } else { "," };
-                    // Writing to a string does not fail.
-                    let _ = write!(pairs, "{comma}({})", list(&pair));
-                }
+            Side::Curve(Spline { multiplicities, knots, .. }) => {
+                let pairs: Vec<_> = bottom.poles[index]
+                    .iter()
+                    .zip(&top.poles[index])
+                    .map(|(low, high)| format!("({low},{high})"))
+                    .collect();
+                let pairs = pairs.join(",");
                 let surface = self.record(format_args!(
                     "B_SPLINE_SURFACE_WITH_KNOTS('',3,1,({pairs}),.UNSPECIFIED.,.F.,.F.,.F.,({multiplicities}),(2,2),({knots}),(0.,1.),.UNSPECIFIED.)"
                 ))?;
@@ -327,7 +337,7 @@ fn sides(outline: &OutlineAnswer, placement: &PlacementAnswer, is_hole: bool) ->
                             points.reverse();
                             end_tangents.reverse();
                         }
-                        Side::Curve { points, end_tangents }
+                        Side::Curve(Spline::through(&points, &end_tangents))
                     }
                 }
             })

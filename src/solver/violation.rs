@@ -109,7 +109,7 @@ impl Parameter {
             Self::InputTorque | Self::OutputTorque => Range::closed(1e-12, 1e15, "N·m"),
             Self::Stiffness(_) => Range::closed(1e-3, 1e15, "N/mm"),
             Self::Clearance(_) | Self::PartClearance(_) => Range::closed(0.0, 1e6, "µm"),
-            // Some thousand turns of the slowest carrier; its rounding is then 2e-9 deg.
+            // At its ends the rounding of the angle is 2e-9 deg.
             Self::InputAngle => Range::closed(-1e7, 1e7, "deg"),
             Self::AllowableStress => Range::closed(1e-3, 1e6, "MPa"),
             Self::Samples => Range::closed(1.0, MAX_SAMPLES as f64, ""),

@@ -207,3 +207,53 @@ fn without_a_server_a_batch_answers_the_same_lines() {
     });
     assert_eq!(offline, online);
 }
+
+/// Documents of very different length, so that slices end anywhere.
+fn uneven(count: u64) -> Vec<String> {
+    (0..count)
+        .map(|index| with(&variant(index), "/sweep", json!({ "samples": 1 + 97 * index % 2000 })).to_string())
+        .collect()
+}
+
+/// Lines of an answer as it goes over the wire, between the lengths of its pieces.
+fn answered(answer: &Answer) -> usize {
+    answer.text().lines().filter(|line| line.starts_with('{')).count()
+}
+
+#[test]
+fn many_batches_at_once_all_come_to_their_end() {
+    let service = Listening::within(Limits { max_concurrent_solves: 2, max_concurrent_batches: 8, ..LIMITS });
+    let address = service.address;
+    let asked = |_| std::thread::spawn(move || ask_at(address, &question("?peaks_only=true", uneven(300).join("\n"))));
+    let clients: Vec<_> = (0..8).map(asked).collect();
+    for client in clients {
+        assert_eq!(answered(&client.join().unwrap()), 300);
+    }
+}
+
+#[tokio::test]
+async fn batches_that_nobody_reads_hold_up_neither_single_requests_nor_other_batches() {
+    let service = Service::within(Limits { max_concurrent_solves: 2, max_concurrent_batches: 8, ..LIMITS });
+    let mut unread = Vec::new();
+    for _ in 0..6 {
+        let request = Request::post("/v1/batch")
+            .header("content-type", "application/x-ndjson")
+            .body(Body::from(uneven(300).join("\n")))
+            .unwrap();
+        let mut body = service.response(request).await.into_body().into_data_stream();
+        assert!(body.next().await.is_some());
+        unread.push(body);
+    }
+    for index in 0..4 {
+        service.post("/v1/sweep", &variant(100 + index)).await.found();
+    }
+    assert_eq!(lines(&batch(&service, "?peaks_only=true", &uneven(200)).await).len(), 200);
+    assert_eq!(service.app.pool.batches(), unread.len());
+}
+
+#[test]
+fn a_whole_batch_may_be_sent_before_its_answers_are_read() {
+    let service = Listening::within(Limits { max_concurrent_solves: 2, ..LIMITS });
+    let answer = ask_at(service.address, &question("", vec![variant(0).to_string(); 6_000].join("\n")));
+    assert_eq!(answered(&answer), 6_000);
+}

@@ -139,3 +139,16 @@ fn a_solve_that_outlasts_the_shutdown_is_told_so() {
     asker.join().unwrap().refused(503, "shutting_down");
     assert_eq!(process.ended().code(), Some(0));
 }
+
+#[test]
+fn a_fault_in_the_settings_is_none_of_another_command() {
+    let command = |arguments: &[&str]| {
+        Command::new(env!("CARGO_BIN_EXE_toothwave"))
+            .args(arguments)
+            .env("TOOTHWAVE_KEYS_FILE", "/no/such/file")
+            .output()
+            .unwrap()
+    };
+    assert!(command(&["openapi"]).status.success());
+    assert_eq!(command(&[]).status.code(), Some(2));
+}

@@ -22,6 +22,7 @@ use futures_util::{Stream, StreamExt as _, stream};
 use metrics::{counter, histogram};
 use serde::{Deserialize, Serialize};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
+use tokio_util::task::AbortOnDropHandle;
 use utoipa::ToSchema;
 
 use super::coincidence_degree::CoincidenceDegree;
@@ -46,6 +47,9 @@ const SLICE_BYTES: usize = 1 << 20;
 
 /// Bytes of lines that are read ahead of their answers, so that a client may send a whole batch before it reads.
 const AHEAD_BYTES: usize = 8 << 20;
+
+/// What a line takes beside its bytes.
+const LINE_OVERHEAD_BYTES: usize = 256;
 
 /// The media type of a batch and of its answers.
 const NDJSON: &str = "application/x-ndjson";
@@ -251,15 +255,15 @@ impl Lines {
 }
 
 /// Reads lines ahead of their answers, as far as [`AHEAD_BYTES`] go, until the body ends or nobody wants answers any more.
-async fn read_ahead(mut lines: Lines, to: mpsc::Sender<Line>) {
+async fn read_ahead(mut lines: Lines, to: mpsc::UnboundedSender<Line>) {
     let ahead = Arc::new(Semaphore::new(AHEAD_BYTES));
     let mut index = 0;
     while let Some(document) = lines.next().await {
-        let bytes = document.as_ref().map_or(0, Bytes::len).clamp(1, AHEAD_BYTES);
+        let bytes = (document.as_ref().map_or(0, Bytes::len) + LINE_OVERHEAD_BYTES).min(AHEAD_BYTES);
         let Ok(permits) = Arc::clone(&ahead).acquire_many_owned(u32::try_from(bytes).unwrap_or(u32::MAX)).await else {
             return;
         };
-        if to.send(Line { index, document, _ahead: permits }).await.is_err() {
+        if to.send(Line { index, document, _ahead: permits }).is_err() {
             return;
         }
         index += 1;
@@ -284,6 +288,19 @@ struct Slice {
 }
 
 impl Chunk {
+    /// One slice further, in a task that ends with this future.
+    async fn advance_apart(self) -> Self {
+        let Self { pool, query, limits, .. } = &self;
+        let rest =
+            Self { pool: pool.clone(), query: *query, limits: *limits, waiting: VecDeque::new(), answers: Vec::new() };
+        let task = AbortOnDropHandle::new(tokio::spawn(self.advance()));
+        // Solves that panic are caught one by one; should the task itself, the batch ends early and the log says why.
+        task.await.unwrap_or_else(|panic| {
+            tracing::error!(%panic, "a batch broke off");
+            rest
+        })
+    }
+
     /// One slice further: at least one line is answered.
     async fn advance(mut self) -> Self {
         let slice = Arc::new(Mutex::new(Slice { waiting: std::mem::take(&mut self.waiting), ..Slice::default() }));
@@ -341,22 +358,29 @@ fn lock(slice: &Mutex<Slice>) -> std::sync::MutexGuard<'_, Slice> {
 }
 
 /// The answers as they become ready, in the order of the lines.
-fn answers(pool: Pool, query: BatchQuery, limits: Limits, from: mpsc::Receiver<Line>) -> impl Stream<Item = Bytes> {
+fn answers(
+    pool: Pool,
+    query: BatchQuery,
+    limits: Limits,
+    from: mpsc::UnboundedReceiver<Line>,
+) -> impl Stream<Item = Bytes> {
     let side_by_side = limits.max_concurrent_solves;
     let chunks = stream::unfold(from, |mut from| async move {
         let mut waiting = Vec::with_capacity(CHUNK_LINES);
         let received = from.recv_many(&mut waiting, CHUNK_LINES).await;
         (received > 0).then_some((VecDeque::from(waiting), from))
     });
-    let started =
-        chunks.map(move |waiting| Chunk { pool: pool.clone(), query, limits, waiting, answers: Vec::new() }.advance());
+    // A task of its own for each slice: a future that waits for a permit must be polled when it gets one, or the permit is lost to
+    // everybody while this stream gives out another chunk.
+    let started = chunks
+        .map(move |waiting| Chunk { pool: pool.clone(), query, limits, waiting, answers: Vec::new() }.advance_apart());
     started.buffered(side_by_side).flat_map(|chunk| {
         stream::unfold(chunk, |mut chunk| async move {
             if chunk.answers.is_empty() {
                 if chunk.waiting.is_empty() {
                     return None;
                 }
-                chunk = chunk.advance().await;
+                chunk = chunk.advance_apart().await;
             }
             Some((Bytes::from(std::mem::take(&mut chunk.answers)), chunk))
         })
@@ -401,7 +425,8 @@ fn begin(app: &App, query: Result<Query<BatchQuery>, QueryRejection>, request: R
         is_skipping: false,
         is_over: false,
     };
-    let (to, from) = mpsc::channel(CHUNK_LINES * app.limits.max_concurrent_solves);
+    // Bounded by bytes.
+    let (to, from) = mpsc::unbounded_channel();
     tokio::spawn(read_ahead(lines, to));
     let answers = answers(app.pool.clone(), query, app.limits, from).map(move |bytes| {
         // The place is held until the last answer is sent or the client has left.

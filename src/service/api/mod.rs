@@ -181,7 +181,7 @@ async fn walk<E: Endpoint>(endpoint: E, app: App, request: Request) -> Result<Re
         }
     };
     let etag = key.etag();
-    if negotiation::is_not_modified(&headers, &etag) || negotiation::matches_any(&headers) {
+    if negotiation::is_not_modified(&headers, &etag) {
         return Ok(not_modified(&etag, served));
     }
     Ok(found(stored, served, representation, &etag))

@@ -96,7 +96,7 @@ fn serve(asset: &Asset, headers: &HeaderMap) -> Response {
     // On 304 too: browsers take its headers over those that they kept.
     let policy = (header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY);
     let common = [cache_control, policy];
-    if negotiation::is_not_modified(headers, etag) || negotiation::matches_any(headers) {
+    if negotiation::is_not_modified(headers, etag) {
         return (StatusCode::NOT_MODIFIED, common, [tag]).into_response();
     }
     let content_type = (header::CONTENT_TYPE, HeaderValue::from_static(asset.content_type));
