@@ -78,7 +78,7 @@ impl Pool {
         self.closed.cancel();
     }
 
-    /// Runs `job` and hands it the signal that stops it: at the deadline, when the pool is closed, or when nobody waits for it.
+    /// Runs `job` and hands it the signal that stops it: at the deadline, when the pool is closed, or when this future is dropped.
     ///
     /// # Errors
     /// `queue_full` at once where no place is free, `deadline_exceeded` when the time is over, `shutting_down` when the pool is
