@@ -1169,3 +1169,49 @@ test('headers: a strict policy, and files that are asked for anew', async () => 
   const license = await (await fetch(`${server.origin}/page/vendor/uplot.LICENSE`)).text();
   assert.match(license, /MIT License/);
 });
+
+test('the browser draws every part’s SVG to scale', async () => {
+  const design = { ...(await server.example('paper-5.2')), parts: { wave_generator: { bore_radius_mm: 20 } } };
+  const { semi_major_mm: a, semi_minor_mm: b } = design.drive.wave_generator;
+  const { radius_mm: r } = design.drive.teeth;
+  const rim = 1.2 * (a + 2 * r);
+  page = await open(browser, server);
+  const drawn = async (part) => {
+    const response = await fetch(`${server.origin}/v1/drawings/${part}`, {
+      method: 'POST',
+      headers: { 'content-type': 'application/json', accept: 'image/svg+xml' },
+      body: JSON.stringify(design),
+    });
+    return page.evaluate((text) => {
+      const svg = new DOMParser().parseFromString(text, 'image/svg+xml').documentElement;
+      if (svg.querySelector('parsererror')) throw new Error(svg.textContent);
+      document.body.append(svg);
+      const paths = [...svg.querySelectorAll('path')];
+      const [path] = paths;
+      const { width, height } = path.getBBox();
+      const has = (x, y) => path.isPointInFill(new DOMPoint(x, y));
+      // By the shoelace formula along the outline, where there is one.
+      const length = path.getTotalLength();
+      const points = [...Array(4000).keys()].map((index) => path.getPointAtLength((length * index) / 4000));
+      const area = points.reduce((sum, { x, y }, index) => sum + x * points[(index + 1) % 4000].y - points[(index + 1) % 4000].x * y, 0) / 2;
+      const result = { count: paths.length, width, height, area, unit: svg.getAttribute('width'), box: svg.viewBox.baseVal.width, atAxis: has(0, 0), atRim: has(0.98 * width / 2, 0) };
+      svg.remove();
+      return result;
+    }, await response.text());
+  };
+  const near = (found, expected, what) => assert.ok(Math.abs(found / expected - 1) < 2e-3, `${what}: ${found} is not ${expected}`);
+  const ring = await drawn('ring');
+  near(ring.width, 2 * rim, 'ring');
+  assert.deepEqual([ring.count, ring.atAxis, ring.atRim], [1, false, true]);
+  assert.match(ring.unit, /mm$/);
+  near(Number.parseFloat(ring.unit), ring.box, 'a unit is a millimetre');
+  const cam = await drawn('wave-generator');
+  near(cam.width, 2 * a, 'cam');
+  near(cam.height, 2 * b, 'cam');
+  assert.deepEqual([cam.atAxis, cam.atRim], [false, true]);
+  const tooth = await drawn('tooth');
+  near(tooth.area, Math.PI * r * r, 'tooth');
+  const carrier = await drawn('carrier');
+  assert.equal(carrier.count, design.drive.teeth.installed);
+  assert.equal((await drawn('assembly')).count, 2 + 2 * design.drive.teeth.installed);
+});
