@@ -3,8 +3,8 @@
 use std::future::Future;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
+use axum::http::HeaderValue;
 use bytes::Bytes;
 use serde::Serialize;
 use tracing::Instrument;
@@ -47,8 +47,8 @@ impl std::fmt::Display for Key {
 pub struct Stored {
     /// The body, encoded as its representation says.
     pub body: Bytes,
-    /// How long the solve took.
-    pub solve: Duration,
+    /// How long the solve took, as the header says it.
+    pub server_timing: HeaderValue,
 }
 
 /// How an answer came about.

@@ -187,7 +187,9 @@ fn arguments() -> Vec<OsString> {
 fn run_service(settings: &Settings) -> Result<(), Failure> {
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
     tracing_subscriber::fmt().json().with_span_list(false).with_env_filter(filter).with_writer(io::stderr).init();
-    let runtime = tokio::runtime::Runtime::new()?;
+    // As many threads for solves as there are permits: with more of them each solve would wake another, whose memory is cold.
+    let solves = settings.limits().max_concurrent_solves;
+    let runtime = tokio::runtime::Builder::new_multi_thread().max_blocking_threads(solves).enable_all().build()?;
     let result = runtime.block_on(serve::serve(settings));
     // A solve beyond its bound must not hold up the exit.
     runtime.shutdown_background();

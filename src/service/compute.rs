@@ -1,5 +1,6 @@
 //! The only place that leaves the async executor: permits, a bounded queue, the deadline, cancellation.
 
+use std::panic::{self, AssertUnwindSafe};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -28,6 +29,16 @@ pub struct Pool {
     /// Cancelled when the service stops and has no time left.
     closed: CancellationToken,
     limits: Limits,
+}
+
+/// Where a solve runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Thread {
+    /// On a thread of its own, for as long as the deadline lets it.
+    Blocking,
+    /// Where the request is answered: for what takes no longer, some 0.1 ms, than an executor may be kept from its other tasks. To hand
+    /// over to another thread and back would cost a quarter of that again.
+    Executor,
 }
 
 /// Sets the stop signal of a job that nobody waits for any more.
@@ -86,6 +97,7 @@ impl Pool {
     pub async fn run<T: Send + 'static>(
         &self,
         deadline: Instant,
+        on: Thread,
         job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
         let Ok(place) = Arc::clone(&self.places).try_acquire_owned() else {
@@ -98,7 +110,7 @@ impl Pool {
             histogram!("toothwave_solve_duration_seconds").record(started.elapsed());
             result
         };
-        self.run_holding(place, deadline, timed).await
+        self.run_holding(place, deadline, on, timed).await
     }
 
     /// A place for a batch, to be held while it runs.
@@ -133,13 +145,14 @@ impl Pool {
             turn = Arc::clone(&self.turns).acquire_owned() => turn,
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
-        self.run_holding(turn, self.deadline(), job).await
+        self.run_holding(turn, self.deadline(), Thread::Blocking, job).await
     }
 
     async fn run_holding<T: Send + 'static>(
         &self,
         place: impl Send + 'static,
         deadline: Instant,
+        on: Thread,
         job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
         let waited = tokio::select! {
@@ -147,6 +160,11 @@ impl Pool {
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
         let Ok(permit) = waited else { return Err(self.deadline_exceeded()) };
+        if on == Thread::Executor {
+            let _held = (place, permit);
+            let finished = panic::catch_unwind(AssertUnwindSafe(|| job(&AtomicBool::new(false))));
+            return finished.unwrap_or_else(|_| Err(Problem::internal(&"a solve panicked")));
+        }
         let mut stop = StopOnDrop { signal: Arc::default(), is_over: false };
         let signal = Arc::clone(&stop.signal);
         // spawn_blocking loses the span, and cannot be aborted: span, permit and place go along.

@@ -6,6 +6,7 @@
 pub mod api;
 pub mod cache;
 pub mod cli;
+pub mod columns;
 pub mod compute;
 pub mod config;
 pub mod design;

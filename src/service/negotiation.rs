@@ -1,5 +1,6 @@
 //! What the client sends and accepts: media types and codings.
 
+use std::borrow::Cow;
 use std::iter;
 use std::str::FromStr;
 
@@ -73,16 +74,16 @@ impl Representation {
     /// # Errors
     /// `not_acceptable` where the client accepts none of them.
     pub fn negotiate(headers: &HeaderMap, others: impl Iterator<Item = Format>) -> Result<Self, Problem> {
+        let gzip = accepts_gzip(headers);
         let accepted = joined(headers, &header::ACCEPT);
+        if accepted.trim().is_empty() {
+            return Ok(Self { format: Format::Json, gzip });
+        }
         let formats: Vec<_> = iter::once(Format::Json).chain(others).collect();
-        let format = if accepted.trim().is_empty() {
-            Some(Format::Json)
-        } else {
-            let media_types: Vec<_> = formats.iter().map(|format| format.media_type()).collect();
-            // A header that cannot be read accepts nothing.
-            let best = Accept::from_str(&accepted).ok().and_then(|accept| accept.negotiate(&media_types).cloned());
-            formats.iter().copied().find(|format| best.as_ref() == Some(&format.media_type()))
-        };
+        let media_types: Vec<_> = formats.iter().map(|format| format.media_type()).collect();
+        // A header that cannot be read accepts nothing.
+        let best = Accept::from_str(&accepted).ok().and_then(|accept| accept.negotiate(&media_types).cloned());
+        let format = formats.iter().copied().find(|format| best.as_ref() == Some(&format.media_type()));
         let format = format.ok_or_else(|| {
             let offered: Vec<_> = formats.iter().map(|format| format.media_type().to_string()).collect();
             Problem::new(
@@ -90,7 +91,7 @@ impl Representation {
                 format!("this path answers with {}, and the request accepts none of it", offered.join(" or ")),
             )
         })?;
-        Ok(Self { format, gzip: accepts_gzip(headers) })
+        Ok(Self { format, gzip })
     }
 }
 
@@ -153,9 +154,10 @@ fn accepts_gzip(headers: &HeaderMap) -> bool {
 }
 
 /// All lines of a header as one list; a value that is no text counts as absent.
-fn joined(headers: &HeaderMap, name: &HeaderName) -> String {
-    let values: Vec<_> = headers.get_all(name).iter().filter_map(|value| value.to_str().ok()).collect();
-    values.join(",")
+fn joined<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Cow<'a, str> {
+    let mut values = headers.get_all(name).iter().filter_map(|value| value.to_str().ok());
+    let first = values.next().unwrap_or_default();
+    values.fold(first.into(), |list, value| format!("{list},{value}").into())
 }
 
 /// Whether `If-None-Match` names this entity tag, compared weakly as the header wants it, or `*`, which stands for any (RFC 9110).

@@ -1,12 +1,17 @@
-//! One log line and one set of metrics for each request.
+//! What every request gets: an id, a log line, metrics, and the headers of every answer.
 
-use std::sync::OnceLock;
-use std::time::Instant;
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::hash::{BuildHasher, RandomState};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{LazyLock, OnceLock};
+use std::time::{Duration, Instant};
 
 use axum::extract::{MatchedPath, Request};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, header};
 use axum::middleware::Next;
 use axum::response::Response;
-use metrics::{counter, gauge, histogram};
+use metrics::{Counter, Histogram, counter, gauge, histogram};
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use tracing::Instrument;
 
@@ -45,30 +50,109 @@ pub async fn render(app: &App) -> String {
     handle.map(PrometheusHandle::render).unwrap_or_default()
 }
 
-/// The middleware: a span with the request's id, then one line and the metrics when the answer's head is ready.
+/// Folds what was recorded into the histograms' buckets; until then the recorder keeps every single value.
+pub async fn keep_up() {
+    /// A busy service records some hundred kilobytes in this time.
+    const PAUSE: Duration = Duration::from_secs(5);
+    loop {
+        tokio::time::sleep(PAUSE).await;
+        if let Some(handle) = RECORDER.get().and_then(Option::as_ref) {
+            handle.run_upkeep();
+        }
+    }
+}
+
+/// What requests of one route, method, status and cache status count in.
+struct Series {
+    requests: Counter,
+    duration: Histogram,
+    from_cache: Option<Counter>,
+}
+
+/// What tells the series of one route apart: method, status and cache status.
+type Labels = (&'static str, u16, Option<&'static str>);
+
+thread_local! {
+    /// The series by route and labels: the recorder takes longer to find one than all the rest of a cache hit.
+    static SERIES: RefCell<HashMap<String, HashMap<Labels, Series>>> = RefCell::default();
+}
+
+/// Counts a request; routes, methods and statuses are few, so that there are few series.
+fn count(route: &str, labels: Labels, elapsed: Duration) {
+    // What is found before there is a recorder would lead nowhere for ever.
+    if RECORDER.get().is_none() {
+        return;
+    }
+    SERIES.with_borrow_mut(|series| {
+        if !series.contains_key(route) {
+            series.insert(route.to_owned(), HashMap::new());
+        }
+        let Some(of_route) = series.get_mut(route) else { return };
+        let Series { requests, duration, from_cache } = of_route.entry(labels).or_insert_with(|| {
+            let (method, status, cache) = labels;
+            let route = route.to_owned();
+            Series {
+                requests: counter!("toothwave_http_requests_total", "route" => route.clone(), "method" => method, "status" => status.to_string()),
+                duration: histogram!("toothwave_http_request_duration_seconds", "route" => route),
+                from_cache: cache.map(|cache| counter!("toothwave_cache_requests_total", "status" => cache)),
+            }
+        });
+        requests.increment(1);
+        duration.record(elapsed);
+        if let Some(counter) = from_cache {
+            counter.increment(1);
+        }
+    });
+}
+
+const X_REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+
+/// An id that no other request of this process has, and none of another process by all odds.
+fn new_id() -> HeaderValue {
+    static PROCESS: LazyLock<u64> = LazyLock::new(|| RandomState::new().hash_one(std::process::id()));
+    static REQUESTS: AtomicU64 = AtomicU64::new(0);
+    let id = format!("{:016x}-{:x}", *PROCESS, REQUESTS.fetch_add(1, Ordering::Relaxed));
+    HeaderValue::try_from(id).unwrap_or(HeaderValue::from_static("none"))
+}
+
+/// The middleware: a request's id and a span with it, then, when the answer's head is ready, one line, the metrics, and the headers
+/// that every answer has.
 pub async fn observe(request: Request, next: Next) -> Response {
     let started = Instant::now();
     // The route and not the path: labels must stay few.
-    let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str).to_owned();
-    let method = match request.method().as_str() {
-        known @ ("GET" | "HEAD" | "POST" | "PUT" | "PATCH" | "DELETE" | "OPTIONS") => known.to_owned(),
+    let route = request.extensions().get::<MatchedPath>().cloned();
+    let route = route.as_ref().map_or("none", MatchedPath::as_str);
+    let method = match *request.method() {
+        Method::GET => "GET",
+        Method::HEAD => "HEAD",
+        Method::POST => "POST",
+        Method::PUT => "PUT",
+        Method::PATCH => "PATCH",
+        Method::DELETE => "DELETE",
+        Method::OPTIONS => "OPTIONS",
         // Clients can invent methods without end, and each would be a series of its own.
-        _ => "other".to_owned(),
+        _ => "other",
     };
-    let id = request.headers().get("x-request-id").and_then(|value| value.to_str().ok()).unwrap_or_default();
-    let span = tracing::info_span!("request", id, design = tracing::field::Empty);
-    let response = next.run(request).instrument(span.clone()).await;
+    let id = request.headers().get(X_REQUEST_ID).cloned().unwrap_or_else(new_id);
+    let span = tracing::info_span!("request", id = id.to_str().unwrap_or_default(), design = tracing::field::Empty);
+    let mut response = next.run(request).instrument(span.clone()).await;
     let elapsed = started.elapsed();
     let status = response.status().as_u16();
     let cache = response.extensions().get::<Served>().map(|served| served.label());
-
-    counter!("toothwave_http_requests_total", "route" => route.clone(), "method" => method.clone(), "status" => status.to_string())
-        .increment(1);
-    histogram!("toothwave_http_request_duration_seconds", "route" => route.clone()).record(elapsed);
-    if let Some(cache) = cache {
-        counter!("toothwave_cache_requests_total", "status" => cache).increment(1);
-    }
+    count(route, (method, status, cache), elapsed);
     let elapsed_ms = 1e3 * elapsed.as_secs_f64();
     span.in_scope(|| tracing::info!(method, route, status, cache, elapsed_ms, "request"));
+    complete(response.headers_mut(), id);
     response
+}
+
+/// The headers of every answer.
+fn complete(headers: &mut HeaderMap, id: HeaderValue) {
+    headers.insert(X_REQUEST_ID, id);
+    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    headers.entry(header::REFERRER_POLICY).or_insert(HeaderValue::from_static("no-referrer"));
+    // The page and the documentation have policies of their own; nothing else is a document.
+    headers
+        .entry(header::CONTENT_SECURITY_POLICY)
+        .or_insert(HeaderValue::from_static("default-src 'none'; frame-ancestors 'none'"));
 }

@@ -1,5 +1,7 @@
 //! Every path on one screen, and the layers around them in order.
 
+use std::sync::Arc;
+
 use axum::Router;
 use axum::extract::Request;
 use axum::http::{HeaderValue, StatusCode, header};
@@ -10,8 +12,6 @@ use tower::ServiceBuilder;
 use tower::util::option_layer;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::cors::{AllowHeaders, AllowOrigin, Any, CorsLayer};
-use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
-use tower_http::set_header::SetResponseHeaderLayer;
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
@@ -36,7 +36,7 @@ use crate::problem::{Problem, ProblemCode};
 )]
 struct Document;
 
-fn api() -> OpenApiRouter<App> {
+fn api() -> OpenApiRouter<Arc<App>> {
     OpenApiRouter::with_openapi(Document::openapi())
         .routes(routes!(geometry::geometry))
         .routes(routes!(coincidence_degree::coincidence_degree))
@@ -60,11 +60,11 @@ pub fn openapi_json() -> String {
 }
 
 /// The whole service.
-pub fn router(app: App, cors_origins: &[String], keys: Option<Keys>) -> Router {
+pub fn router(app: Arc<App>, cors_origins: &[String], keys: Option<Keys>) -> Router {
     let openapi = openapi_json();
     // The bundled page alone: without "none" it would ask a validator elsewhere.
     let config = Config::new(["/openapi.json"]).validator_url("none");
-    let docs: Router<App> = SwaggerUi::new("/docs").config(config).into();
+    let docs: Router<Arc<App>> = SwaggerUi::new("/docs").config(config).into();
     let docs = docs.layer(middleware::map_response(as_documentation));
     let (paths, _) = api().split_for_parts();
     paths
@@ -78,21 +78,6 @@ pub fn router(app: App, cors_origins: &[String], keys: Option<Keys>) -> Router {
             // From the outside in; one stack, because every layer of a router boxes all its routes once more. A panic becomes a problem
             // before it is counted, logged and given its headers.
             ServiceBuilder::new()
-                .layer(SetResponseHeaderLayer::overriding(
-                    header::X_CONTENT_TYPE_OPTIONS,
-                    HeaderValue::from_static("nosniff"),
-                ))
-                .layer(SetResponseHeaderLayer::if_not_present(
-                    header::REFERRER_POLICY,
-                    HeaderValue::from_static("no-referrer"),
-                ))
-                // The page and the documentation have policies of their own; nothing else is a document.
-                .layer(SetResponseHeaderLayer::if_not_present(
-                    header::CONTENT_SECURITY_POLICY,
-                    HeaderValue::from_static("default-src 'none'; frame-ancestors 'none'"),
-                ))
-                .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid))
-                .layer(PropagateRequestIdLayer::x_request_id())
                 .layer(middleware::from_fn(observe::observe))
                 .layer(option_layer((!cors_origins.is_empty()).then(|| cors(cors_origins))))
                 .layer(middleware::from_fn_with_state(keys, keys::require))

@@ -57,7 +57,7 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
         tracing::warn!(%address, "anyone who reaches this address may use the service: no keys file is set");
     }
     let app = App::new(settings.limits());
-    let router = router(app.clone(), &settings.cors_origins, keys);
+    let router = router(Arc::clone(&app), &settings.cors_origins, keys);
     greet(address);
     let server = Server::new(router, app.limits);
     let signalled = async {
@@ -72,6 +72,7 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
     tokio::select! {
         () = signalled => {}
         () = server.accept(&listener) => {}
+        () = observe::keep_up() => {}
     }
     drop(listener);
     server.closing.cancel();

@@ -2,6 +2,7 @@
 
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
+use std::sync::Arc;
 use std::sync::mpsc;
 use std::time::Duration;
 
@@ -14,7 +15,7 @@ use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::task::JoinHandle;
 use toothwave::api::App;
-use toothwave::compute::Pool;
+use toothwave::compute::{Pool, Thread};
 use toothwave::config::Limits;
 use toothwave::keys::Keys;
 use toothwave::router::router;
@@ -184,7 +185,7 @@ fn cache_status(header: &str) -> Vec<&str> {
 /// The service without a connection before it.
 #[derive(Debug, Clone)]
 pub(crate) struct Service {
-    pub(crate) app: App,
+    pub(crate) app: Arc<App>,
     router: Router,
 }
 
@@ -204,13 +205,13 @@ impl Service {
     pub(crate) fn within_for_origins(limits: Limits, origins: &[&str]) -> Self {
         let app = App::new(limits);
         let origins: Vec<_> = origins.iter().map(|&origin| origin.into()).collect();
-        Self { router: router(app.clone(), &origins, None), app }
+        Self { router: router(Arc::clone(&app), &origins, None), app }
     }
 
     /// Behind a keys file of this text.
     pub(crate) fn behind(keys: &str) -> Self {
         let app = App::new(LIMITS);
-        Self { router: router(app.clone(), &[], Some(Keys::parse(keys).unwrap())), app }
+        Self { router: router(Arc::clone(&app), &[], Some(Keys::parse(keys).unwrap())), app }
     }
 
     pub(crate) async fn ask(&self, question: &Question) -> Answer {
@@ -247,7 +248,7 @@ impl Service {
 /// The service behind a real socket, on threads of its own.
 #[derive(Debug)]
 pub(crate) struct Listening {
-    pub(crate) app: App,
+    pub(crate) app: Arc<App>,
     pub(crate) address: SocketAddr,
     runtime: Option<Runtime>,
 }
@@ -256,7 +257,7 @@ impl Listening {
     pub(crate) fn within(limits: Limits) -> Self {
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(4).enable_all().build().unwrap();
         let app = App::new(limits);
-        let router = router(app.clone(), &[], None);
+        let router = router(Arc::clone(&app), &[], None);
         let listener = runtime.block_on(TcpListener::bind(("127.0.0.1", 0))).unwrap();
         let address = listener.local_addr().unwrap();
         runtime.spawn(async move { axum::serve(listener, router).await });
@@ -327,7 +328,7 @@ impl Occupied {
         let before = pool.running();
         let own = pool.clone();
         let solve = tokio::spawn(async move {
-            own.run(own.deadline(), move |_| {
+            own.run(own.deadline(), Thread::Blocking, move |_| {
                 // Dropped or told so: both mean that it is over.
                 let _ = released.recv();
                 Ok(())

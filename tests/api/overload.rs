@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Barrier, mpsc};
 
 use serde_json::json;
-use toothwave::compute::Pool;
+use toothwave::compute::{Pool, Thread};
 use toothwave::config::Limits;
 
 use crate::asking::{Answer, LIMITS, Listening, Occupied, Question, Service, ask_at, until};
@@ -179,7 +179,7 @@ async fn the_deadline_tells_a_computation_to_stop() {
         ends.fetch_add(1, Ordering::SeqCst);
         Ok(())
     };
-    let problem = pool.run(pool.deadline(), endless).await.unwrap_err();
+    let problem = pool.run(pool.deadline(), Thread::Blocking, endless).await.unwrap_err();
     assert_eq!(problem.status, 503);
     until("it has stopped", || ended.load(Ordering::SeqCst) == 1 && is_idle(pool)).await;
 }

@@ -4,6 +4,7 @@ use axum::body::Body;
 use axum::http::Request;
 use bytes_of::pending_forever;
 use serde_json::json;
+use toothwave::compute::Thread;
 use toothwave::config::Limits;
 
 use crate::asking::{Answer, ENDPOINTS, LIMITS, Occupied, Question, Service};
@@ -396,8 +397,10 @@ async fn refusals_are_not_for_keeping() {
 async fn a_panic_is_an_internal_error_that_tells_nothing_of_itself() {
     let service = Service::new();
     let pool = &service.app.pool;
-    let problem = pool.run::<()>(pool.deadline(), |_| panic!("the flux capacitor")).await.unwrap_err();
-    assert_eq!(problem.status, 500);
-    assert!(!serde_json::to_string(&problem).unwrap().contains("flux"), "{problem}");
-    assert_eq!((pool.running(), pool.admitted()), (0, 0), "and its permit is back");
+    for thread in [Thread::Blocking, Thread::Executor] {
+        let problem = pool.run::<()>(pool.deadline(), thread, |_| panic!("the flux capacitor")).await.unwrap_err();
+        assert_eq!(problem.status, 500);
+        assert!(!serde_json::to_string(&problem).unwrap().contains("flux"), "{problem}");
+        assert_eq!((pool.running(), pool.admitted()), (0, 0), "and its permit is back");
+    }
 }

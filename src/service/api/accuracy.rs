@@ -1,6 +1,7 @@
 //! `POST /v1/accuracy`: how wrong and how slow each way of computing a design is.
 
 use std::io::{self, Write};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
@@ -369,6 +370,6 @@ impl WayAnswer {
     responses((status = 200, description = "The ways, each with its error and its time.",
         content((AccuracyAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"))), Problems)
 )]
-pub async fn accuracy(State(app): State<App>, request: Request) -> Response {
+pub async fn accuracy(State(app): State<Arc<App>>, request: Request) -> Response {
     respond_afresh(Accuracy, app, request).await
 }

@@ -29,6 +29,7 @@ use super::coincidence_degree::CoincidenceDegree;
 use super::geometry::Geometry;
 use super::sweep::Sweep;
 use super::{App, Endpoint};
+use crate::columns;
 use crate::compute::Pool;
 use crate::config::Limits;
 use crate::design::Design;
@@ -180,7 +181,7 @@ fn append<A: Serialize>(out: &mut Vec<u8>, index: u64, answer: Result<&A, &Probl
     counter!("toothwave_batch_documents_total", "status" => status.to_string()).increment(1);
     let line = BatchLine { index, status, answer: answer.ok(), problem: answer.err().cloned() };
     // Numbers and words alone, into memory: this does not fail.
-    if serde_json::to_writer(&mut *out, &line).is_ok() {
+    if columns::write(&line, out).is_ok() {
         out.push(b'\n');
     }
 }
@@ -402,7 +403,7 @@ fn answers(
     )
 )]
 pub async fn batch(
-    State(app): State<App>,
+    State(app): State<Arc<App>>,
     query: Result<Query<BatchQuery>, QueryRejection>,
     request: Request,
 ) -> Response {

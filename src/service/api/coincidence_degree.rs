@@ -1,6 +1,7 @@
 //! `POST /v1/coincidence-degree`: how many teeth share the load.
 
 use std::io::{self, Write};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use axum::extract::{Request, State};
@@ -139,6 +140,6 @@ impl CoincidenceDegreeAnswer {
         Problems
     )
 )]
-pub async fn coincidence_degree(State(app): State<App>, request: Request) -> Response {
+pub async fn coincidence_degree(State(app): State<Arc<App>>, request: Request) -> Response {
     respond(CoincidenceDegree, app, request).await
 }

@@ -1,5 +1,6 @@
 //! `POST /v1/drawings/{part}`: each mating part, or all of them in place, as outlines for CAD, workshops and eyes.
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use axum::extract::rejection::PathRejection;
@@ -355,7 +356,7 @@ impl Forms for DrawingAnswer {
     )
 )]
 pub async fn drawing(
-    State(app): State<App>,
+    State(app): State<Arc<App>>,
     part: Result<Path<DrawnPart>, PathRejection>,
     request: Request,
 ) -> Response {

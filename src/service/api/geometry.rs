@@ -1,6 +1,7 @@
 //! `POST /v1/geometry`: the mating parts' profiles and what a designer decides by.
 
 use std::io::{self, Write};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use axum::extract::{Request, State};
@@ -317,6 +318,6 @@ pub(super) fn write_findings(findings: &[FindingAnswer], writer: &mut dyn Write)
         Problems
     )
 )]
-pub async fn geometry(State(app): State<App>, request: Request) -> Response {
+pub async fn geometry(State(app): State<Arc<App>>, request: Request) -> Response {
     respond(Geometry, app, request).await
 }

@@ -4,7 +4,7 @@
 use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use axum::body::Body;
 use axum::extract::Request;
@@ -19,7 +19,8 @@ use toothwave_solver::{Drive, LoadCase, SolveError, Violation};
 use utoipa::IntoResponses;
 
 use crate::cache::{Cache, Key, Served, Spelling, Stored};
-use crate::compute::Pool;
+use crate::columns;
+use crate::compute::{Pool, Thread};
 use crate::config::Limits;
 use crate::design::Design;
 use crate::json;
@@ -36,7 +37,7 @@ pub mod side;
 pub mod sweep;
 
 /// What handlers share.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct App {
     /// Limits of the service.
     pub limits: Limits,
@@ -45,18 +46,18 @@ pub struct App {
     /// Finished answers.
     pub cache: Cache,
     /// Whether the service wants requests: false while it drains.
-    pub ready: Arc<AtomicBool>,
+    pub ready: AtomicBool,
 }
 
 impl App {
     /// An idle service within these limits.
-    pub fn new(limits: Limits) -> Self {
-        Self {
+    pub fn new(limits: Limits) -> Arc<Self> {
+        Arc::new(Self {
             limits,
             pool: Pool::new(limits),
             cache: Cache::new(limits.cache_max_bytes),
-            ready: Arc::new(AtomicBool::new(true)),
-        }
+            ready: AtomicBool::new(true),
+        })
     }
 }
 
@@ -78,6 +79,11 @@ pub trait Endpoint: Send + 'static {
     /// # Errors
     /// A problem that names the fields at fault.
     fn question(&self, design: &Design, limits: &Limits) -> Result<Self::Question, Problem>;
+
+    /// Where solving runs, and writing the answer as uncompressed JSON.
+    fn thread(_question: &Self::Question) -> Thread {
+        Thread::Blocking
+    }
 
     /// Solves.
     ///
@@ -106,7 +112,7 @@ pub trait Forms: Serialize + Sized + 'static {
     fn write(&self, format: Format, writer: &mut impl Write) -> io::Result<()> {
         match Self::FORMS.iter().find(|(known, _)| *known == format) {
             Some((_, form)) => form(self, writer),
-            None => Ok(serde_json::to_writer(writer, self)?),
+            None => columns::write(self, writer),
         }
     }
 }
@@ -141,14 +147,14 @@ pub enum Problems {
 }
 
 /// The walk of a request: document → question → key → cache → solver → bytes.
-pub async fn respond<E: Endpoint>(endpoint: E, app: App, request: Request) -> Response {
+pub async fn respond<E: Endpoint>(endpoint: E, app: Arc<App>, request: Request) -> Response {
     match walk(endpoint, app, request).await {
         Ok(response) => response,
         Err(problem) => problem.into_response(),
     }
 }
 
-async fn walk<E: Endpoint>(endpoint: E, app: App, request: Request) -> Result<Response, Problem> {
+async fn walk<E: Endpoint>(endpoint: E, app: Arc<App>, request: Request) -> Result<Response, Problem> {
     let Asked { headers, body, representation, deadline } = Asked::read::<E>(&app, request).await?;
     let spelling = Spelling::new(endpoint.name(), representation, &body);
     let known = match app.cache.key(spelling) {
@@ -170,8 +176,12 @@ async fn walk<E: Endpoint>(endpoint: E, app: App, request: Request) -> Result<Re
                 None => {
                     let question = endpoint.question(&design, &app.limits)?;
                     let pool = app.pool.clone();
+                    let thread = match representation {
+                        Representation::JSON => E::thread(&question),
+                        _ => Thread::Blocking,
+                    };
                     let solve = async move {
-                        pool.run(deadline, move |stop| solve::<E>(&question, representation, stop)).await
+                        pool.run(deadline, thread, move |stop| solve::<E>(&question, representation, stop)).await
                     };
                     app.cache.solve_once(key, solve).await?
                 }
@@ -212,12 +222,13 @@ impl Asked {
 }
 
 /// The same walk for an answer that is measured there and then: never cached.
-async fn respond_afresh<E: Endpoint>(endpoint: E, app: App, request: Request) -> Response {
+async fn respond_afresh<E: Endpoint>(endpoint: E, app: Arc<App>, request: Request) -> Response {
     let walk = async {
         let Asked { body, representation, deadline, .. } = Asked::read::<E>(&app, request).await?;
         let design = json::read::<Design>(&body)?.normalised();
         let question = endpoint.question(&design, &app.limits)?;
-        let stored = app.pool.run(deadline, move |stop| solve::<E>(&question, representation, stop)).await?;
+        let stored =
+            app.pool.run(deadline, Thread::Blocking, move |stop| solve::<E>(&question, representation, stop)).await?;
         Ok::<_, Problem>(with_body(stored, representation))
     };
     let mut response = walk.await.unwrap_or_else(IntoResponse::into_response);
@@ -272,10 +283,16 @@ fn solve<E: Endpoint>(
     };
     match written {
         // To its size: the cache keeps it, and weighs its length.
-        Ok(writer) => Ok(Stored { body: writer.inner.into_boxed_slice().into(), solve }),
+        Ok(writer) => Ok(Stored { body: writer.inner.into_boxed_slice().into(), server_timing: server_timing(solve)? }),
         Err(_) if stop.load(Ordering::Relaxed) => Err(SolveError::Stopped.into()),
         Err(error) => Err(Problem::internal(&error)),
     }
+}
+
+/// The time of a solve as `Server-Timing` has it, made once for all who get the answer.
+fn server_timing(solve: Duration) -> Result<HeaderValue, Problem> {
+    HeaderValue::try_from(format!("solve;dur={:.3}", 1e3 * solve.as_secs_f64()))
+        .map_err(|error| Problem::internal(&error))
 }
 
 /// How much of a large answer is written between two looks at the stop signal.
@@ -324,10 +341,7 @@ fn with_body(stored: Stored, representation: Representation) -> Response {
     if representation.gzip {
         headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
     }
-    let timing = format!("solve;dur={:.3}", 1e3 * stored.solve.as_secs_f64());
-    if let Ok(timing) = HeaderValue::from_str(&timing) {
-        headers.insert("server-timing", timing);
-    }
+    headers.insert("server-timing", stored.server_timing);
     response
 }
 

@@ -1,5 +1,6 @@
 //! Beside the drive: limits, examples, health, metrics, the API document.
 
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use axum::Json;
@@ -19,7 +20,7 @@ use crate::problem::{Problem, ProblemCode};
 
 /// The limits of this service.
 #[utoipa::path(get, path = "/v1/limits", tag = "service", responses((status = 200, description = "The limits.", body = Limits)))]
-pub async fn limits(State(app): State<App>) -> Json<Limits> {
+pub async fn limits(State(app): State<Arc<App>>) -> Json<Limits> {
     Json(app.limits)
 }
 
@@ -92,7 +93,7 @@ pub async fn live() -> &'static str {
         (status = 503, description = "It is shutting down.", body = String, content_type = "text/plain")
     )
 )]
-pub async fn ready(State(app): State<App>) -> (StatusCode, &'static str) {
+pub async fn ready(State(app): State<Arc<App>>) -> (StatusCode, &'static str) {
     if app.ready.load(Ordering::Relaxed) {
         (StatusCode::OK, "ready\n")
     } else {
@@ -102,7 +103,7 @@ pub async fn ready(State(app): State<App>) -> (StatusCode, &'static str) {
 
 /// Metrics in Prometheus' text format.
 #[utoipa::path(get, path = "/metrics", tag = "service", responses((status = 200, description = "The metrics.", body = String, content_type = "text/plain")))]
-pub async fn metrics(State(app): State<App>) -> Response {
+pub async fn metrics(State(app): State<Arc<App>>) -> Response {
     let content_type = [(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")];
     (content_type, observe::render(&app).await).into_response()
 }
