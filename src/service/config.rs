@@ -57,6 +57,10 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_CACHE_MAX_BYTES", value_name = "BYTES", default_value_t = 268_435_456)]
     pub cache_max_bytes: u64,
 
+    /// Most bytes of answers on their way to clients, those up to 64 KiB not counted
+    #[arg(long, env = "TOOTHWAVE_MAX_UNREAD_BYTES", value_name = "BYTES", default_value_t = 536_870_912)]
+    pub max_unread_bytes: u64,
+
     /// Connections that may be open at once
     #[arg(long, env = "TOOTHWAVE_MAX_CONNECTIONS", value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=MOST_SOLVES))]
     pub max_connections: u32,
@@ -101,6 +105,8 @@ pub struct Limits {
     pub deadline_ms: u64,
     /// Most bytes of answers that the cache keeps.
     pub cache_max_bytes: u64,
+    /// Most bytes of answers on their way to clients, those up to 64 KiB not counted.
+    pub max_unread_bytes: u64,
     /// Connections that may be open at once.
     pub max_connections: usize,
     /// Bytes of a request's line and headers together.
@@ -123,6 +129,7 @@ impl Settings {
             max_concurrent_batches: self.max_concurrent_batches as usize,
             deadline_ms: self.deadline_ms,
             cache_max_bytes: self.cache_max_bytes,
+            max_unread_bytes: self.max_unread_bytes,
             max_connections: self.max_connections as usize,
             max_header_bytes: MAX_HEADER_BYTES,
             header_timeout_ms: self.header_timeout_ms,

@@ -19,6 +19,7 @@ pub mod negotiation;
 pub mod observe;
 pub mod plots;
 pub mod problem;
+pub mod room;
 pub mod router;
 pub mod serve;
 pub mod step;

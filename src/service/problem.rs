@@ -98,6 +98,8 @@ pub enum ProblemCode {
     ShuttingDown,
     /// 503: as many connections are open as the service admits.
     TooManyConnections,
+    /// 503: so many bytes of answers are on their way to clients that there is no room for another.
+    TooManyUnreadBytes,
     /// 500: a fault of the service itself.
     InternalError,
 }
@@ -178,9 +180,11 @@ impl ProblemCode {
             | Self::ComplianceNotPositive
             | Self::TooManyStates
             | Self::TooManyPoints => StatusCode::UNPROCESSABLE_ENTITY,
-            Self::QueueFull | Self::DeadlineExceeded | Self::ShuttingDown | Self::TooManyConnections => {
-                StatusCode::SERVICE_UNAVAILABLE
-            }
+            Self::QueueFull
+            | Self::DeadlineExceeded
+            | Self::ShuttingDown
+            | Self::TooManyConnections
+            | Self::TooManyUnreadBytes => StatusCode::SERVICE_UNAVAILABLE,
             Self::InternalError => StatusCode::INTERNAL_SERVER_ERROR,
         }
     }
@@ -206,6 +210,7 @@ impl ProblemCode {
             Self::DeadlineExceeded => "The deadline stopped the computation",
             Self::ShuttingDown => "The service is stopping",
             Self::TooManyConnections => "Too many connections are open",
+            Self::TooManyUnreadBytes => "Clients have too many bytes of answers to read",
             Self::InternalError => "The service failed",
         }
     }

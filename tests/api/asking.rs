@@ -34,6 +34,7 @@ pub(crate) const LIMITS: Limits = Limits {
     max_queued_solves: 32,
     deadline_ms: 600_000,
     cache_max_bytes: 268_435_456,
+    max_unread_bytes: 268_435_456,
     max_connections: 64,
     max_header_bytes: 16_384,
     max_concurrent_batches: 4,
@@ -70,7 +71,7 @@ impl Question {
         self
     }
 
-    fn request(&self) -> Request<Body> {
+    pub(crate) fn request(&self) -> Request<Body> {
         let mut request = Request::builder().method(self.method).uri(&self.path);
         for (name, value) in &self.headers {
             request = request.header(name, value);

@@ -36,7 +36,8 @@ pub(crate) fn problem_codes() -> Vec<ProblemCode> {
         QueueFull => DeadlineExceeded,
         DeadlineExceeded => ShuttingDown,
         ShuttingDown => TooManyConnections,
-        TooManyConnections => InternalError;
+        TooManyConnections => TooManyUnreadBytes,
+        TooManyUnreadBytes => InternalError;
         InternalError)
 }
 
@@ -121,7 +122,8 @@ fn every_kind_of_problem_has_its_status_and_a_type_of_its_own() {
         ProblemCode::QueueFull
         | ProblemCode::DeadlineExceeded
         | ProblemCode::ShuttingDown
-        | ProblemCode::TooManyConnections => 503,
+        | ProblemCode::TooManyConnections
+        | ProblemCode::TooManyUnreadBytes => 503,
         ProblemCode::InternalError => 500,
     };
     let mut types: Vec<_> = problem_codes()

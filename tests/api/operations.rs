@@ -37,6 +37,7 @@ async fn the_limits_can_be_read() {
         max_concurrent_batches: 10,
         header_timeout_ms: 9,
         cache_max_bytes: 7,
+        max_unread_bytes: 11,
     };
     let expected = json!({
         "max_states": 1,
@@ -46,6 +47,7 @@ async fn the_limits_can_be_read() {
         "max_queued_solves": 5,
         "deadline_ms": 6,
         "cache_max_bytes": 7,
+        "max_unread_bytes": 11,
         "max_connections": 8,
         "max_header_bytes": 16384,
         "max_concurrent_batches": 10,

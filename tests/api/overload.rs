@@ -192,10 +192,33 @@ async fn the_largest_numbers_for_limits_mean_no_limit() {
         max_body_bytes: usize::MAX,
         deadline_ms: u64::MAX,
         cache_max_bytes: u64::MAX,
+        max_unread_bytes: u64::MAX,
         ..LIMITS
     };
     let service = Service::within(limits);
     for path in crate::asking::ENDPOINTS {
         service.post(path, &spelled_out()).await.found();
     }
+}
+
+#[tokio::test]
+async fn answers_that_nobody_reads_leave_no_room_for_another_until_they_are_read() {
+    let service = Service::within(Limits { cache_max_bytes: 0, max_unread_bytes: 100_000, ..LIMITS });
+    // Some 70 kB each.
+    let unread = service.response(large(50, 1).request()).await;
+    assert_eq!(unread.status(), 200);
+    let answer = service.ask(&large(50, 2)).await;
+    answer.refused(503, "too_many_unread_bytes");
+    assert!(answer.header("retry-after").parse::<u32>().unwrap() >= 1);
+    // Small ones still fit.
+    service.post("/v1/coincidence-degree", &spelled_out()).await.found();
+    drop(unread);
+    service.ask(&large(50, 2)).await.found();
+}
+
+#[tokio::test]
+async fn an_answer_larger_than_all_that_may_be_unread_is_given_when_it_is_alone() {
+    let service = Service::within(Limits { cache_max_bytes: 0, max_unread_bytes: 10_000, ..LIMITS });
+    service.ask(&large(50, 1)).await.found();
+    service.ask(&large(50, 2)).await.found();
 }

@@ -28,6 +28,7 @@ const LIMITS: Limits = Limits {
     max_queued_solves: 0,
     deadline_ms: 10_000,
     cache_max_bytes: 0,
+    max_unread_bytes: u64::MAX,
     max_connections: 64,
     max_header_bytes: 16_384,
     max_concurrent_batches: 4,

@@ -4,7 +4,7 @@
 use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use axum::body::Body;
 use axum::extract::Request;
@@ -26,6 +26,7 @@ use crate::design::Design;
 use crate::json;
 use crate::negotiation::{self, Format, Representation};
 use crate::problem::{Problem, ProblemCode};
+use crate::room::Room;
 
 pub mod accuracy;
 pub mod batch;
@@ -45,6 +46,8 @@ pub struct App {
     pub pool: Pool,
     /// Finished answers.
     pub cache: Cache,
+    /// For answers on their way to clients.
+    pub room: Room,
     /// Whether the service wants requests: false while it drains.
     pub ready: AtomicBool,
 }
@@ -56,6 +59,7 @@ impl App {
             limits,
             pool: Pool::new(limits),
             cache: Cache::new(limits.cache_max_bytes),
+            room: Room::new(limits.max_unread_bytes),
             ready: AtomicBool::new(true),
         })
     }
@@ -194,7 +198,7 @@ async fn walk<E: Endpoint>(endpoint: E, app: Arc<App>, request: Request) -> Resu
     if negotiation::is_not_modified(&headers, &etag) {
         return Ok(not_modified(&etag, served));
     }
-    Ok(found(stored, served, representation, &etag))
+    Ok(caching(with_body(&app.room, stored, representation)?, served, &etag))
 }
 
 /// The design's hash, for the request's log line.
@@ -227,9 +231,8 @@ async fn respond_afresh<E: Endpoint>(endpoint: E, app: Arc<App>, request: Reques
         let Asked { body, representation, deadline, .. } = Asked::read::<E>(&app, request).await?;
         let design = json::read::<Design>(&body)?.normalised();
         let question = endpoint.question(&design, &app.limits)?;
-        let stored =
-            app.pool.run(deadline, Thread::Blocking, move |stop| solve::<E>(&question, representation, stop)).await?;
-        Ok::<_, Problem>(with_body(stored, representation))
+        let job = move |stop: &AtomicBool| solve::<E>(&question, representation, stop);
+        with_body(&app.room, app.pool.run(deadline, Thread::Blocking, job).await?, representation)
     };
     let mut response = walk.await.unwrap_or_else(IntoResponse::into_response);
     response.headers_mut().insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
@@ -282,17 +285,15 @@ fn solve<E: Endpoint>(
         answer.write(representation.format, &mut writer).map(|()| writer)
     };
     match written {
-        // To its size: the cache keeps it, and weighs its length.
-        Ok(writer) => Ok(Stored { body: writer.inner.into_boxed_slice().into(), server_timing: server_timing(solve)? }),
+        Ok(writer) => {
+            let server_timing = format!("solve;dur={:.3}", 1e3 * solve.as_secs_f64());
+            let server_timing = HeaderValue::try_from(server_timing).map_err(|error| Problem::internal(&error))?;
+            // To its size: the cache keeps it, and weighs its length.
+            Ok(Stored { body: writer.inner.into_boxed_slice().into(), server_timing })
+        }
         Err(_) if stop.load(Ordering::Relaxed) => Err(SolveError::Stopped.into()),
         Err(error) => Err(Problem::internal(&error)),
     }
-}
-
-/// The time of a solve as `Server-Timing` has it, made once for all who get the answer.
-fn server_timing(solve: Duration) -> Result<HeaderValue, Problem> {
-    HeaderValue::try_from(format!("solve;dur={:.3}", 1e3 * solve.as_secs_f64()))
-        .map_err(|error| Problem::internal(&error))
 }
 
 /// How much of a large answer is written between two looks at the stop signal.
@@ -328,12 +329,8 @@ impl Write for Stoppable<'_> {
     }
 }
 
-fn found(stored: Stored, served: Served, representation: Representation, etag: &str) -> Response {
-    caching(with_body(stored, representation), served, etag)
-}
-
-fn with_body(stored: Stored, representation: Representation) -> Response {
-    let mut response = (StatusCode::OK, stored.body).into_response();
+fn with_body(room: &Room, stored: Stored, representation: Representation) -> Result<Response, Problem> {
+    let mut response = (StatusCode::OK, room.take(stored.body)?).into_response();
     let headers = response.headers_mut();
     // Those here and those of the layers around.
     headers.reserve(12);
@@ -342,7 +339,7 @@ fn with_body(stored: Stored, representation: Representation) -> Response {
         headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
     }
     headers.insert("server-timing", stored.server_timing);
-    response
+    Ok(response)
 }
 
 fn not_modified(etag: &str, served: Served) -> Response {
