@@ -93,7 +93,7 @@ enum Command {
 struct Offline {
     /// A design document, or `-` for standard input
     file: PathBuf,
-    /// Form of the answer
+    /// Form of the answer, if it has this one; `table` means `text`
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
 }

@@ -188,7 +188,7 @@ impl Pool {
     fn queue_full(&self) -> Problem {
         let Limits { max_concurrent_solves, max_queued_solves, .. } = self.limits;
         let detail = format!(
-            "{max_concurrent_solves} solves run and {max_queued_solves} wait, as many as the service admits; try again in a moment"
+            "solves that run: {max_concurrent_solves}; that wait: {max_queued_solves}: as many as the service admits; try again in a moment"
         );
         Problem::new(ProblemCode::QueueFull, detail)
     }

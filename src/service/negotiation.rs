@@ -82,7 +82,9 @@ impl Representation {
         let formats: Vec<_> = iter::once(Format::Json).chain(others).collect();
         let media_types: Vec<_> = formats.iter().map(|format| format.media_type()).collect();
         // A header that cannot be read accepts nothing.
-        let best = Accept::from_str(&accepted).ok().and_then(|accept| accept.negotiate(&media_types).cloned());
+        let best = Accept::from_str(&without_parameters(&accepted))
+            .ok()
+            .and_then(|accept| accept.negotiate(&media_types).cloned());
         let format = formats.iter().copied().find(|format| best.as_ref() == Some(&format.media_type()));
         let format = format.ok_or_else(|| {
             let offered: Vec<_> = formats.iter().map(|format| format.media_type().to_string()).collect();
@@ -133,6 +135,17 @@ fn require_type(headers: &HeaderMap, wanted: &str, fits: impl Fn(&MediaType<'_>)
     } else {
         unsupported(format!("the body is sent as `{content_type}`"))
     }
+}
+
+/// Media ranges with nothing but their weights: who asks for `application/json; charset=utf-8` takes JSON as it is.
+fn without_parameters(accepted: &str) -> String {
+    let ranges = accepted.split(',').map(|range| {
+        let (media_type, parameters) = range.split_once(';').unwrap_or((range, ""));
+        let weight =
+            parameters.split(';').find(|parameter| parameter.trim_start().to_ascii_lowercase().starts_with("q="));
+        weight.map_or_else(|| media_type.to_owned(), |weight| format!("{media_type};{}", weight.trim()))
+    });
+    ranges.collect::<Vec<_>>().join(",")
 }
 
 /// Whether the request prefers gzip to no coding at all.

@@ -18,6 +18,20 @@ const RETRY_AFTER_S: u32 = 1;
 
 /// A problem as it goes over the wire (RFC 9457).
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[schema(example = json!({
+    "type": "urn:toothwave:problem:impossible_design",
+    "title": "Values that no design can have",
+    "status": 422,
+    "detail": "/drive/wave_generator/semi_major_mm: the semi-major axis (56.0 mm) must exceed the semi-minor axis (56.0 mm): a round cam moves no tooth",
+    "code": "impossible_design",
+    "errors": [{
+        "pointer": "/drive/wave_generator/semi_major_mm",
+        "code": "cam_not_elongated",
+        "detail": "the semi-major axis (56.0 mm) must exceed the semi-minor axis (56.0 mm): a round cam moves no tooth",
+        "value": 56.0,
+        "limit": 56.0
+    }]
+}))]
 pub struct Problem {
     /// `urn:toothwave:problem:` and the code.
     #[serde(rename = "type")]

@@ -12,7 +12,9 @@ use tower::ServiceBuilder;
 use tower::util::option_layer;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::cors::{AllowHeaders, AllowOrigin, Any, CorsLayer};
-use utoipa::OpenApi;
+use utoipa::openapi::security::{Http, HttpAuthScheme, SecurityRequirement, SecurityScheme};
+use utoipa::openapi::{self, Content, HeaderBuilder, Ref, ResponseBuilder};
+use utoipa::{OpenApi, PartialSchema};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
@@ -20,7 +22,7 @@ use utoipa_swagger_ui::{Config, SwaggerUi};
 use crate::api::{App, accuracy, batch, coincidence_degree, drawings, geometry, page, side, sweep};
 use crate::keys::{self, Keys};
 use crate::observe;
-use crate::problem::{Problem, ProblemCode};
+use crate::problem::{PROBLEM_JSON, Problem, ProblemCode};
 
 #[derive(OpenApi)]
 #[openapi(
@@ -54,9 +56,38 @@ fn api() -> OpenApiRouter<Arc<App>> {
 
 /// The API document as it is committed and served.
 pub fn openapi_json() -> String {
-    let mut text = api().into_openapi().to_pretty_json().unwrap_or_default();
+    let mut document = api().into_openapi();
+    describe_entry(&mut document);
+    let mut text = document.to_pretty_json().unwrap_or_default();
     text.push('\n');
     text
+}
+
+/// What stands before every path: keys, which a service may want, and connections, of which there may be too many.
+fn describe_entry(document: &mut openapi::OpenApi) {
+    const KEY: &str = "key";
+    let mut scheme = Http::new(HttpAuthScheme::Bearer);
+    scheme.description = Some("A key from the keys file, where the service has one; else none is wanted.".into());
+    document.components.get_or_insert_default().add_security_scheme(KEY, SecurityScheme::Http(scheme));
+    let problem = |description: &str| {
+        let content = Content::new(Some(Ref::from_schema_name("Problem")));
+        ResponseBuilder::new().description(description).content(PROBLEM_JSON, content)
+    };
+    let wanted = problem("A key is wanted, and the request has none or one that opens nothing.").build();
+    let seconds = HeaderBuilder::new().schema(Some(u32::schema())).description(Some("Seconds")).build();
+    let full = problem("As many connections are open as the service admits.").header("Retry-After", seconds).build();
+    for (path, item) in &mut document.paths.paths {
+        for operation in [&mut item.get, &mut item.post].into_iter().flatten() {
+            let responses = &mut operation.responses.responses;
+            if !path.starts_with("/health/") {
+                // Either a key or none.
+                operation.security =
+                    Some(vec![SecurityRequirement::default(), SecurityRequirement::new::<_, _, String>(KEY, [])]);
+                responses.insert("401".into(), wanted.clone().into());
+            }
+            responses.entry("503".into()).or_insert_with(|| full.clone().into());
+        }
+    }
 }
 
 /// The whole service.

@@ -90,6 +90,11 @@ fn every_path_and_every_status_that_it_can_have_is_described() {
         for status in statuses {
             assert!(responses.contains_key(*status), "{path} can answer {status}");
         }
+        assert!(responses.contains_key("503"), "{path} stands behind the bound on connections");
+        let wants_key = !path.starts_with("/health/");
+        assert_eq!(responses.contains_key("401"), wants_key, "{path}");
+        let security = &operations[method]["security"];
+        assert_eq!(*security, if wants_key { json!([{}, {"key": []}]) } else { Value::Null }, "{path}");
         assert!(operations[method]["summary"].is_string() && operations[method]["operationId"].is_string(), "{path}");
     }
 }

@@ -248,6 +248,9 @@ async fn head_gets_what_get_gets_without_the_body() {
 async fn the_best_format_that_the_client_accepts_is_chosen() {
     let service = Service::new();
     for (accept, expected) in [
+        ("application/json; charset=utf-8", "application/json"),
+        ("text/csv; charset=utf-8; header=present", "text/csv"),
+        ("text/csv;charset=utf-8;q=0.5, application/json;charset=utf-8;q=0.4", "text/csv"),
         ("*/*", "application/json"),
         ("application/*", "application/json"),
         ("text/*", "text/csv"),
