@@ -11,7 +11,7 @@ import time
 # What a client does when its connection is cut: it tries again, once, after this.
 RETRY_AFTER_S = 3.0
 PATIENCE_S = 45.0
-REFUSALS = ("queue_full", "deadline_exceeded")
+REFUSALS = ("queue_full", "deadline_exceeded", "too_many_unread_bytes")
 
 
 class Cut(Exception):
@@ -21,7 +21,8 @@ class Cut(Exception):
 class Tally:
     """What became of the requests of one load."""
 
-    def __init__(self):
+    def __init__(self, panics=False):
+        self.panics = panics  # Whether solves panic by order, and 500 is the proper answer then.
         self.sent = self.answered = self.served_by_retry = self.left = 0
         self.refused = collections.Counter()
         self.lost = collections.Counter()
@@ -172,22 +173,21 @@ def _refusal(status, headers, body, tally):
     except ValueError:
         problem = {}
     code = problem.get("code", "no problem")
-    proper = (
-        status == 503
-        and code in REFUSALS
-        and headers.get("content-type") == "application/problem+json"
-        and headers.get("retry-after", "0").isdigit()
-        and int(headers.get("retry-after", "0")) >= 1
-    )
+    if status == 500:
+        proper = tally.panics and code == "internal_error"
+    else:
+        retry_after = headers.get("retry-after", "0")
+        proper = status == 503 and code in REFUSALS and retry_after.isdigit() and int(retry_after) >= 1
+    proper = proper and headers.get("content-type") == "application/problem+json"
     if proper:
         tally.refused[code] += 1
     else:
         tally.lost[f"{status} {code}"] += 1
 
 
-async def send(host, port, works, rate, until, *, leaves=False):
+async def send(host, port, works, rate, until, *, leaves=False, panics=False):
     """Sends `rate` requests a second, the works in turn, until `until()`; returns what became of them when all have ended."""
-    tally, client, tasks = Tally(), Client(host, port), set()
+    tally, client, tasks = Tally(panics), Client(host, port), set()
     start = time.monotonic()
     for index, work in zip(itertools.count(), itertools.cycle(works)):
         due = start + index / rate

@@ -168,6 +168,8 @@ fn solved<E: Endpoint>(
     let started = Instant::now();
     // A fault at one document is no reason to leave the others without an answer.
     let answered = catch_unwind(AssertUnwindSafe(|| {
+        #[cfg(feature = "fault-injection")]
+        fail::fail_point!("solve");
         let design = json::read::<Design>(document)?.normalised();
         let question = endpoint.question(&design, limits)?;
         E::answer(&question, stop)

@@ -272,6 +272,8 @@ fn solve<E: Endpoint>(
     representation: Representation,
     stop: &AtomicBool,
 ) -> Result<Stored, Problem> {
+    #[cfg(feature = "fault-injection")]
+    fail::fail_point!("solve");
     let started = Instant::now();
     let answer = E::answer(question, stop)?;
     let solve = started.elapsed();
