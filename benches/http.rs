@@ -1,7 +1,7 @@
 //! The whole request: `cargo bench --bench http` writes docs/speed-http.md.
 //!
 //! The service runs as the released program on one core; this program asks it from another. Beside it, pinned alike, runs the least that
-//! axum can do: a handler that serialises the same answer, and one that returns the same bytes. With `-- --quick` rounds are short,
+//! axum can do: a handler that serialises the same answer, and handlers that return the same bytes. With `-- --quick` rounds are short,
 //! and the report stays beside the build.
 
 mod harness;
@@ -10,6 +10,7 @@ use std::cell::Cell;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::fs;
+use std::hint::black_box;
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
 use std::process::{Child, ChildStdout, Command, Stdio};
@@ -29,9 +30,11 @@ use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 use toothwave::api::Endpoint;
+use toothwave::api::batch::{BatchEndpoint, BatchQuery, answer_line};
 use toothwave::api::sweep::{Sweep, SweepAnswer};
-use toothwave::config::Settings;
+use toothwave::config::{Limits, Settings};
 use toothwave::design::Design;
+use toothwave::json;
 
 type Failure = Box<dyn Error>;
 
@@ -52,7 +55,8 @@ fn main() -> Result<(), Failure> {
     let machine = machine();
     let toothwave = {
         let mut command = Command::new(env!("CARGO_BIN_EXE_toothwave"));
-        command.args(["serve", "--listen", "127.0.0.1:0", "--log", "warn"]);
+        // On one core one solve runs at a time: those of all connections must be able to wait.
+        command.args(["serve", "--listen", "127.0.0.1:0", "--log", "warn", "--max-queued-solves", "64"]);
         Server::start(command, &cores)?
     };
     let bare = {
@@ -141,23 +145,35 @@ struct Defaults {
     settings: Settings,
 }
 
+/// Documents of a batch.
+const BATCH: usize = 50;
+
+/// What a batch is asked for: the peaks of sweeps.
+const PEAKS: BatchQuery = BatchQuery { endpoint: BatchEndpoint::Sweep, peaks_only: true };
+
 /// What the bare handlers answer with.
 #[derive(Debug)]
 struct Bare {
     answer: SweepAnswer,
     bytes: Bytes,
+    batch: Bytes,
 }
 
 fn serve_bare() -> Result<(), Failure> {
-    let limits = Defaults::parse_from(["defaults"]).settings.limits();
-    let design = toothwave::json::read::<Design>(DESIGN.as_bytes()).map_err(|error| format!("{error:?}"))?.normalised();
+    let limits = limits();
+    let design = json::read::<Design>(DESIGN.as_bytes()).map_err(|error| format!("{error:?}"))?.normalised();
     let question = Sweep.question(&design, &limits).map_err(|problem| problem.to_string())?;
     let answer = Sweep::answer(&question, &AtomicBool::new(false)).map_err(|problem| problem.to_string())?;
     let bytes = serde_json::to_vec(&answer)?.into();
+    let mut batch = Vec::new();
+    for index in 0..BATCH as u64 {
+        answer_line(PEAKS, index, DESIGN.as_bytes(), &limits, &AtomicBool::new(false), &mut batch);
+    }
     let router = Router::new()
         .route("/serialised", post(serialised))
         .route("/bytes", post(bytes_alone))
-        .with_state(Arc::new(Bare { answer, bytes }));
+        .route("/batch", post(batch_alone))
+        .with_state(Arc::new(Bare { answer, bytes, batch: batch.into() }));
     // The same kind of runtime as the service's.
     tokio::runtime::Runtime::new()?.block_on(async {
         let listener = TcpListener::bind("127.0.0.1:0").await?;
@@ -175,32 +191,62 @@ async fn bytes_alone(State(bare): State<Arc<Bare>>, _: Bytes) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], bare.bytes.clone()).into_response()
 }
 
+async fn batch_alone(State(bare): State<Arc<Bare>>, _: Bytes) -> Response {
+    ([(header::CONTENT_TYPE, "application/x-ndjson")], bare.batch.clone()).into_response()
+}
+
+fn limits() -> Limits {
+    Defaults::parse_from(["defaults"]).settings.limits()
+}
+
 /// A POST on a kept connection, whose torque may differ from request to request without changing its length.
 #[derive(Debug)]
 struct Requests {
+    head: String,
     before_torque: String,
     after_torque: String,
+    /// Documents in the body, each on a line of its own where there are several.
+    documents: usize,
     /// The billionths of the torque's next value; none where all requests are one.
     varied: Option<Cell<u64>>,
 }
 
 impl Requests {
     fn new(path: &str, varied: bool) -> Result<Self, Failure> {
+        Self::of_documents(path, "application/json", 1, varied)
+    }
+
+    fn batch(path: &str) -> Result<Self, Failure> {
+        Self::of_documents(path, "application/x-ndjson", BATCH, true)
+    }
+
+    fn of_documents(path: &str, content_type: &str, documents: usize, varied: bool) -> Result<Self, Failure> {
         let document = serde_json::from_str::<serde_json::Value>(DESIGN)?.to_string();
         let (before, after) = document.split_once("20.0").ok_or("the example has another torque")?;
-        let length = before.len() + "20.0000000000".len() + after.len();
+        let after = if documents > 1 { format!("{after}\n") } else { after.into() };
+        let length = documents * (before.len() + "20.0000000000".len() + after.len());
         let head = format!(
-            "POST {path} HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: {length}\r\n\r\n"
+            "POST {path} HTTP/1.1\r\nhost: localhost\r\ncontent-type: {content_type}\r\ncontent-length: {length}\r\n\r\n"
         );
-        Ok(Self { before_torque: head + before, after_torque: after.into(), varied: varied.then(|| Cell::new(1)) })
+        let varied = varied.then(|| Cell::new(1));
+        Ok(Self { head, before_torque: before.into(), after_torque: after, documents, varied })
     }
 
     fn write(&self, request: &mut Vec<u8>) {
-        let number = self.varied.as_ref().map_or(0, |next| next.replace(next.get() + 1));
         request.clear();
-        request.extend_from_slice(self.before_torque.as_bytes());
-        request.extend_from_slice(format!("20.{number:010}").as_bytes());
-        request.extend_from_slice(self.after_torque.as_bytes());
+        request.extend_from_slice(self.head.as_bytes());
+        for _ in 0..self.documents {
+            let number = self.varied.as_ref().map_or(0, |next| next.replace(next.get() + 1));
+            request.extend_from_slice(self.before_torque.as_bytes());
+            request.extend_from_slice(format!("20.{number:010}").as_bytes());
+            request.extend_from_slice(self.after_torque.as_bytes());
+        }
+    }
+
+    fn length(&self) -> usize {
+        let mut request = Vec::new();
+        self.write(&mut request);
+        request.len() - self.head.len()
     }
 }
 
@@ -224,40 +270,44 @@ impl Connection {
         requests.write(&mut self.request);
         self.stream.write_all(&self.request).await?;
         self.response.clear();
-        let mut end = None;
+        let mut head = None;
         loop {
             if self.stream.read_buf(&mut self.response).await? == 0 {
                 return Err("the server hung up".into());
             }
-            if end.is_none() {
-                end = end_of_answer(&self.response)?;
+            if head.is_none() {
+                head = head_of_answer(&self.response)?;
             }
-            if let Some((start, end)) = end
-                && self.response.len() >= end
-            {
-                return Ok(&self.response[start..end]);
+            match head {
+                Some((start, Some(length))) if self.response.len() >= start + length => {
+                    return Ok(&self.response[start..start + length]);
+                }
+                // In chunks, of which the last is empty.
+                Some((start, None)) if self.response.ends_with(b"\r\n0\r\n\r\n") => return Ok(&self.response[start..]),
+                _ => self.response.reserve(1 << 17),
             }
-            self.response.reserve(1 << 17);
         }
     }
 }
 
-/// Where the body starts and ends, once the head is there.
-fn end_of_answer(response: &[u8]) -> Result<Option<(usize, usize)>, Failure> {
+/// Where the body starts and how long it is, if the head says so, once that is there.
+fn head_of_answer(response: &[u8]) -> Result<Option<(usize, Option<usize>)>, Failure> {
     let Some(start) = response.windows(4).position(|bytes| bytes == b"\r\n\r\n") else { return Ok(None) };
     let head = std::str::from_utf8(&response[..start])?;
     if !head.starts_with("HTTP/1.1 200 ") {
         return Err(head.to_owned().into());
     }
-    let length = head.lines().find_map(|line| line.strip_prefix("content-length: ")).ok_or("no content-length")?;
-    Ok(Some((start + 4, start + 4 + length.parse::<usize>()?)))
+    let length = head.lines().find_map(|line| line.strip_prefix("content-length: "));
+    Ok(Some((start + 4, length.map(str::parse).transpose()?)))
 }
 
-/// Requests a second, and how long the server computed for one.
+/// Requests a second, how long the server computed for one, and how long the client waited: at the median, and at the 99th of a hundred.
 #[derive(Debug, Clone, Copy)]
 struct Throughput {
     per_second: f64,
     processor_s: f64,
+    median_s: f64,
+    slowest_s: f64,
 }
 
 /// So many connections, each of which asks again when it has its answer.
@@ -276,18 +326,21 @@ async fn closed_loop(
     let processor_before = server.processor_s()?;
     let started = Instant::now();
     let loops = opened.into_iter().map(|mut connection| async move {
-        let mut answered = 0_u32;
+        let mut waited_s = Vec::new();
         while started.elapsed() < duration {
+            let asked = Instant::now();
             connection.ask(requests).await?;
-            answered += 1;
+            waited_s.push(asked.elapsed().as_secs_f64());
         }
-        Ok::<_, Failure>(answered)
+        Ok::<_, Failure>(waited_s)
     });
-    let answered = futures_util::future::try_join_all(loops).await?;
+    let mut waited_s = futures_util::future::try_join_all(loops).await?.concat();
     let elapsed = started.elapsed().as_secs_f64();
-    let answered = f64::from(answered.into_iter().sum::<u32>());
+    waited_s.sort_by(f64::total_cmp);
+    let answered = waited_s.len() as f64;
     let processor_s = (server.processor_s()? - processor_before) / answered;
-    Ok(Throughput { per_second: answered / elapsed, processor_s })
+    let (median_s, slowest_s) = (waited_s[waited_s.len() / 2], waited_s[waited_s.len() * 99 / 100]);
+    Ok(Throughput { per_second: answered / elapsed, processor_s, median_s, slowest_s })
 }
 
 /// What is compared.
@@ -321,7 +374,7 @@ async fn measure(effort: Effort, machine: &str, toothwave: &Server, bare: &Serve
         }
         ours.len()
     };
-    let mut text = introduction(effort, machine, body_bytes, comparisons[1].toothwave.before_torque.len());
+    let mut text = introduction(effort, machine, body_bytes, comparisons[1].toothwave.length());
     let (rounds, duration) = effort.choose((9, Duration::from_secs(1)), (3, Duration::from_millis(200)));
     for Comparison { name, toothwave: ours, bare: theirs, goal_percent } in &comparisons {
         write!(text, "\n## A sweep {name}\n\n")?;
@@ -355,6 +408,105 @@ async fn measure(effort: Effort, machine: &str, toothwave: &Server, bare: &Serve
             )?;
         }
     }
+    text += &ladder(effort, toothwave, bare).await?;
+    text += &designs(effort, toothwave).await?;
+    Ok(text)
+}
+
+/// Cached sweeps, sweeps to be solved and batches at more and more connections, each against the bare handler of the same bytes.
+async fn ladder(effort: Effort, toothwave: &Server, bare: &Server) -> Result<String, Failure> {
+    let mut text = format!(
+        "\n## From 1 to 64 connections\n\n\
+         Each against the axum handler that returns the same bytes. A batch has {BATCH} documents, each with another torque, and asks for the peaks alone. \
+         Waiting times are the client's: at the median, and what 99 of 100 do not exceed.\n\n\
+         | | connections | toothwave, requests a second | bare axum, requests a second | share | toothwave, ms: median, 99 % | bare axum, ms: median, 99 % |\n\
+         |---|---|---|---|---|---|---|\n"
+    );
+    let kinds = [
+        ("hit", Requests::new("/v1/sweep", false)?, Requests::new("/bytes", false)?),
+        ("miss", Requests::new("/v1/sweep", true)?, Requests::new("/bytes", true)?),
+        ("batch", Requests::batch("/v1/batch?endpoint=sweep&peaks_only=true")?, Requests::batch("/batch")?),
+    ];
+    let (rounds, duration) = effort.choose((5, Duration::from_millis(600)), (1, Duration::from_millis(100)));
+    for (name, ours, theirs) in &kinds {
+        for connections in [1, 2, 4, 8, 16, 32, 64] {
+            let mut measured = Vec::new();
+            closed_loop(toothwave, ours, connections, duration / 2).await?;
+            for _ in 0..rounds {
+                let ours = closed_loop(toothwave, ours, connections, duration).await?;
+                measured.push((ours, closed_loop(bare, theirs, connections, duration).await?));
+            }
+            let median = |of: &dyn Fn(&(Throughput, Throughput)) -> f64| Spread::of(measured.iter().map(of)).median;
+            writeln!(
+                text,
+                "| {name} | {connections} | {} | {} | {} % | {}, {} | {}, {} |",
+                three_digits(median(&|(ours, _)| ours.per_second)),
+                three_digits(median(&|(_, theirs)| theirs.per_second)),
+                three_digits(median(&|(ours, theirs)| 100.0 * ours.per_second / theirs.per_second)),
+                three_digits(median(&|(ours, _)| 1e3 * ours.median_s)),
+                three_digits(median(&|(ours, _)| 1e3 * ours.slowest_s)),
+                three_digits(median(&|(_, theirs)| 1e3 * theirs.median_s)),
+                three_digits(median(&|(_, theirs)| 1e3 * theirs.slowest_s)),
+            )?;
+        }
+    }
+    Ok(text)
+}
+
+/// A step of answering a line.
+type Step<'a> = Box<dyn FnMut() + 'a>;
+
+/// How many designs a second a batch of peaks gives, and what each of its steps takes.
+async fn designs(effort: Effort, toothwave: &Server) -> Result<String, Failure> {
+    let (rounds, duration) = effort.choose((9, Duration::from_secs(1)), (1, Duration::from_millis(100)));
+    let requests = Requests::batch("/v1/batch?endpoint=sweep&peaks_only=true")?;
+    closed_loop(toothwave, &requests, 2, duration / 2).await?;
+    let mut per_second = Vec::new();
+    for _ in 0..rounds {
+        per_second.push(BATCH as f64 * closed_loop(toothwave, &requests, 2, duration).await?.per_second);
+    }
+
+    let (limits, never) = (limits(), AtomicBool::new(false));
+    let read = || json::read::<Design>(DESIGN.as_bytes()).map(Design::normalised).map_err(|error| format!("{error:?}"));
+    let design = read()?;
+    let question = Sweep.question(&design, &limits).map_err(|problem| problem.to_string())?;
+    let mut line = Vec::new();
+    let mut steps: [(&str, Step<'_>); 4] = [
+        ("reading the document", Box::new(|| drop(black_box(read())))),
+        ("checking it, and the drive's geometry", Box::new(|| drop(black_box(Sweep.question(&design, &limits))))),
+        ("the sweep, with peaks, checks and findings", Box::new(|| drop(black_box(Sweep::answer(&question, &never))))),
+        (
+            "all of a line, writing its answer included",
+            Box::new(|| {
+                line.clear();
+                answer_line(PEAKS, 0, DESIGN.as_bytes(), &limits, &never, &mut line);
+            }),
+        ),
+    ];
+    let mut text = format!(
+        "\n## Designs a second\n\n\
+         Batches of {BATCH} documents that ask for the peaks alone, on two connections: {} designs a second on the server's one core, the client on another one. \
+         A request has {} bytes; a line of its answer some {}. What a line takes by itself, on one thread of this program:\n\n\
+         | step | µs |\n|---|---|\n",
+        Spread::of(per_second).show(1.0),
+        requests.length(),
+        {
+            let mut line = Vec::new();
+            answer_line(PEAKS, 0, DESIGN.as_bytes(), &limits, &never, &mut line);
+            line.len()
+        },
+    );
+    for (name, step) in &mut steps {
+        let mut times = Vec::new();
+        for _ in 0..effort.choose(200, 5) {
+            let started = Instant::now();
+            for _ in 0..100 {
+                step();
+            }
+            times.push(started.elapsed().as_secs_f64() / 100.0);
+        }
+        writeln!(text, "| {name} | {} |", Spread::of(times).show(1e-6))?;
+    }
     Ok(text)
 }
 
@@ -364,8 +516,8 @@ fn introduction(effort: Effort, machine: &str, body_bytes: usize, request_bytes:
         "# Speed of the whole request\n\n\
          Written by `cargo bench --bench http`; run it again for your machine. The solver alone is measured in [speed-and-accuracy.md](speed-and-accuracy.md).\n\n\
          ## Method\n\n\
-         Case 5.1, 50 intervals, as JSON without compression: the answer's body has {body_bytes} bytes, the request about {request_bytes}. The service runs as the released program \
-         with its defaults but for the log filter `warn` (at `info` it writes a line for each request); a bare axum server runs beside it. Each is pinned to one and the same core \
+         Case 5.1, 50 intervals, as JSON without compression: the answer's body has {body_bytes} bytes, the request {request_bytes}. The service runs as the released program \
+         with its defaults but for the log filter `warn` (at `info` it writes a line for each request) and a queue for 64 solves; a bare axum server runs beside it. Each is pinned to one and the same core \
          and has one worker thread of tokio's usual runtime; the client is pinned to another core. Connections are kept, and each asks again \
          when it has its answer (closed loop). Torques differ by 1e-10 N·m where the cache must not know the answer. Rounds of {length} alternate between the two; a number is the median over the rounds, \
          with the quartiles in brackets, and a share is the median of the rounds' shares.\n\n\

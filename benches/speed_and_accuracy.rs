@@ -17,7 +17,6 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use alloc_counter::{AllocCounter, count_alloc};
 use baselines::paper::{Method, Paper};
 use baselines::{COLUMNS, Case, Columns, dense, newton};
 use harness::{Effort, Spread, machine, three_digits};
@@ -30,12 +29,12 @@ use toothwave_solver::mesh::Mesh;
 use toothwave_solver::sweep::{Points, Sweep, sweep, sweep_plain};
 use toothwave_solver::{Never, SolveError};
 
-/// The service's allocator, with a counter that costs every contestant a few nanoseconds for each allocation.
+/// The service's allocator.
 #[global_allocator]
-static ALLOCATOR: AllocCounter<MiMalloc> = AllocCounter(MiMalloc);
+static ALLOCATOR: MiMalloc = MiMalloc;
 
-/// A batch of runs takes at least so long, so that reading the clock does not count.
-const BATCH: Duration = Duration::from_millis(3);
+/// A batch of runs takes at least so long: what the one before left in caches and memory must not count.
+const BATCH: Duration = Duration::from_millis(50);
 
 /// As many states as a tolerance may take.
 const MAX_STATES: u64 = 10_000_000;
@@ -67,7 +66,6 @@ fn main() -> Result<(), Failure> {
         report += &against_baselines(&reference, paper.as_mut(), intervals, rounds)?;
     }
     drop(paper);
-    report += &allocations()?;
     report += &scaling(effort, &directory)?;
     report += &error_over_time(effort, &directory, &reference)?;
     let path = directory.join("speed-and-accuracy.md");
@@ -271,26 +269,6 @@ fn against_baselines(
     if paper.is_none() {
         text += "\n(iii) was not measured: there was no Python with NumPy.\n";
     }
-    Ok(text)
-}
-
-fn allocations() -> Result<String, Failure> {
-    let setup = Setup::PAPER_5_1;
-    let mut text =
-        String::from("\n## Allocations\n\n| intervals | states | allocations | growths |\n|---|---|---|---|\n");
-    let mut counts = Vec::new();
-    for intervals in [50, 5000] {
-        let ((allocations, growths, _), sweep) = count_alloc(|| from_cold(&setup, Points::Samples(intervals), sweep));
-        let states = sweep?.states.len();
-        counts.push((allocations + growths) as f64 / states as f64);
-        writeln!(text, "| {intervals} | {states} | {allocations} | {growths} |")?;
-    }
-    // Columns that grow are moved a number of times that rises with the logarithm of their length.
-    if counts[1] > 0.01 {
-        return Err(format!("{} allocations a state", counts[1]).into());
-    }
-    text += "\nNone a state: columns, and what grows with their number or the logarithm of their length.\n";
-    println!("{text}");
     Ok(text)
 }
 

@@ -1,10 +1,11 @@
 //! The fast path against the plain one, on any drive.
 
+use alloc_counter::count_alloc;
 use proptest::prelude::*;
 use toothwave_solver::sweep::{Points, Sweep, sweep, sweep_plain};
 use toothwave_solver::{Compatibility, LoadCase, Never};
 
-use crate::drives::{any_swept_drive, drive, load};
+use crate::drives::{PAPER_5_1, any_swept_drive, drive, load, swept};
 
 fn columns(sweep: &Sweep) -> Vec<(&Vec<f64>, f64)> {
     let states = &sweep.states;
@@ -42,4 +43,18 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn a_sweep_allocates_columns_and_nothing_a_state() {
+    let allocations = |samples| {
+        let load = load(20.0, Compatibility::Projection);
+        let ((allocations, growths, _), sweep) = count_alloc(|| swept(&PAPER_5_1, &load, samples));
+        (sweep.states.len(), allocations + growths)
+    };
+    let (few_states, of_few) = allocations(50);
+    let (many_states, of_many) = allocations(5000);
+    assert!(many_states > 90 * few_states, "{few_states}, {many_states}");
+    // Columns that grow are moved a number of times that rises with the logarithm of their length.
+    assert!(of_few <= of_many && of_many < of_few + 30, "{of_few}, {of_many}");
 }

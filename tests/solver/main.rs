@@ -10,3 +10,7 @@ mod paper;
 mod profiles;
 mod properties;
 mod reference;
+
+/// Counts, thread by thread, for the tests that ask what a sweep takes.
+#[global_allocator]
+static ALLOCATOR: alloc_counter::AllocCounterSystem = alloc_counter::AllocCounterSystem;
