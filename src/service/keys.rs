@@ -73,9 +73,8 @@ pub fn new_key(name: &str) -> Result<(String, String), getrandom::Error> {
     Ok((key, line))
 }
 
-/// The middleware: with keys, every path but health wants one.
-pub async fn require(State(keys): State<Option<Keys>>, request: Request, next: Next) -> Response {
-    let Some(keys) = keys else { return next.run(request).await };
+/// The middleware: every path but health wants a key.
+pub async fn require(State(keys): State<Keys>, request: Request, next: Next) -> Response {
     if matches!(request.uri().path(), "/health/live" | "/health/ready") {
         return next.run(request).await;
     }

@@ -98,20 +98,25 @@ pub fn router(app: Arc<App>, cors_origins: &[String], keys: Option<Keys>) -> Rou
     let docs: Router<Arc<App>> = SwaggerUi::new("/docs").config(config).into();
     let docs = docs.layer(middleware::map_response(as_documentation));
     let (paths, _) = api().split_for_parts();
-    paths
+    let paths = paths
         .route("/", get(page::index))
         .route("/page/{*name}", get(page::asset))
         .route("/openapi.json", get(move || openapi_document(openapi.clone())))
         .merge(docs)
         .fallback(not_found)
-        .method_not_allowed_fallback(method_not_allowed)
+        .method_not_allowed_fallback(method_not_allowed);
+    // Who is not let in by the keys still gets what the layers around give; where there are none, nothing is asked.
+    let paths = match keys {
+        Some(keys) => paths.layer(middleware::from_fn_with_state(keys, keys::require)),
+        None => paths,
+    };
+    paths
         .layer(
             // From the outside in; one stack, because every layer of a router boxes all its routes once more. A panic becomes a problem
             // before it is counted, logged and given its headers.
             ServiceBuilder::new()
                 .layer(middleware::from_fn(observe::observe))
                 .layer(option_layer((!cors_origins.is_empty()).then(|| cors(cors_origins))))
-                .layer(middleware::from_fn_with_state(keys, keys::require))
                 .layer(CatchPanicLayer::custom(panicked)),
         )
         .with_state(app)

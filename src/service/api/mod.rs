@@ -9,7 +9,7 @@ use std::time::Instant;
 use axum::body::Body;
 use axum::extract::Request;
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -331,6 +331,9 @@ impl Write for Stoppable<'_> {
     }
 }
 
+const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
+const CACHE_STATUS: HeaderName = HeaderName::from_static("cache-status");
+
 fn with_body(room: &Room, stored: Stored, representation: Representation) -> Result<Response, Problem> {
     let mut response = (StatusCode::OK, room.take(stored.body)?).into_response();
     let headers = response.headers_mut();
@@ -340,7 +343,7 @@ fn with_body(room: &Room, stored: Stored, representation: Representation) -> Res
     if representation.gzip {
         headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
     }
-    headers.insert("server-timing", stored.server_timing);
+    headers.insert(SERVER_TIMING, stored.server_timing);
     Ok(response)
 }
 
@@ -356,7 +359,7 @@ fn caching(mut response: Response, served: Served, etag: &str) -> Response {
         headers.insert(header::ETAG, etag);
     }
     headers.insert(header::VARY, HeaderValue::from_static("accept, accept-encoding"));
-    headers.insert("cache-status", HeaderValue::from_static(served.cache_status()));
+    headers.insert(CACHE_STATUS, HeaderValue::from_static(served.cache_status()));
     response
 }
 
