@@ -1,12 +1,14 @@
 //! Final bytes by the parameters that made them: key, single flight, weight.
 
+use std::collections::HashMap;
 use std::future::Future;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use axum::http::HeaderValue;
 use bytes::Bytes;
 use serde::Serialize;
+use tokio::sync::watch;
+use tokio_util::sync::{CancellationToken, DropGuard};
 use tracing::Instrument;
 
 use crate::negotiation::Representation;
@@ -96,11 +98,45 @@ impl Spelling {
     }
 }
 
-/// Answers by key, bounded by their bytes; and the keys of requests that were read before, so that the same bytes are not read again.
+/// Answers by key, bounded by their bytes; the solves under way; and the keys of requests that were read before, so that the same bytes
+/// are not read again.
 #[derive(Debug, Clone)]
 pub struct Cache {
-    answers: moka::future::Cache<Key, Stored>,
+    answers: moka::sync::Cache<Key, Stored>,
     keys: moka::sync::Cache<Spelling, Key>,
+    flights: Flights,
+}
+
+/// Solves under way, by the key of their answer.
+type Flights = Arc<Mutex<HashMap<Key, Weak<Flight>>>>;
+
+/// A solve for all who want its answer. It is theirs: with the last of them it ends.
+#[derive(Debug)]
+struct Flight {
+    outcome: watch::Receiver<Option<Result<Stored, Problem>>>,
+    _wanted: DropGuard,
+}
+
+/// Takes a solve off the list when it is over, however it ended.
+struct Landing {
+    flights: Flights,
+    key: Key,
+    flight: Weak<Flight>,
+}
+
+impl Drop for Landing {
+    fn drop(&mut self) {
+        let mut flights = lock(&self.flights);
+        // After one that nobody wanted any more another may have begun.
+        if flights.get(&self.key).is_some_and(|flight| flight.ptr_eq(&self.flight)) {
+            flights.remove(&self.key);
+        }
+    }
+}
+
+/// Nothing that panics runs under the lock.
+fn lock(flights: &Flights) -> MutexGuard<'_, HashMap<Key, Weak<Flight>>> {
+    flights.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Spellings that are remembered: some ten megabytes.
@@ -112,24 +148,24 @@ const ENTRY_OVERHEAD_BYTES: usize = 256;
 impl Cache {
     /// A cache of at most `max_bytes`.
     pub fn new(max_bytes: u64) -> Self {
-        let answers = moka::future::Cache::builder()
+        let answers = moka::sync::Cache::builder()
             .max_capacity(max_bytes)
             // A body beyond 4 GiB weighs as much as can be said, and is not kept.
             .weigher(|_, stored: &Stored| u32::try_from(stored.body.len() + ENTRY_OVERHEAD_BYTES).unwrap_or(u32::MAX))
             .build();
-        Self { answers, keys: moka::sync::Cache::new(MOST_SPELLINGS) }
+        Self { answers, keys: moka::sync::Cache::new(MOST_SPELLINGS), flights: Flights::default() }
     }
 
     /// Bytes and entries kept now.
-    pub async fn size(&self) -> CacheSize {
+    pub fn size(&self) -> CacheSize {
         // The cache counts lazily.
-        self.answers.run_pending_tasks().await;
+        self.answers.run_pending_tasks();
         CacheSize { bytes: self.answers.weighted_size(), entries: self.answers.entry_count() }
     }
 
     /// The answer under `key`, if it is kept.
-    pub async fn get(&self, key: Key) -> Option<Stored> {
-        self.answers.get(&key).await
+    pub fn get(&self, key: Key) -> Option<Stored> {
+        self.answers.get(&key)
     }
 
     /// The key of a request that was read and found possible before.
@@ -144,8 +180,8 @@ impl Cache {
 
     /// The answer under `key`, which `solve` makes once for all who ask meanwhile.
     ///
-    /// The flight runs in a task of its own: when the client that started it leaves, those who joined do not start over, and
-    /// the deadline bounds what is computed for nobody.
+    /// The solve runs in a task of its own: when the client that started it leaves, those who joined do not start over; when all
+    /// have left, it is dropped.
     ///
     /// # Errors
     /// What `solve` returns; failures are not kept.
@@ -154,20 +190,45 @@ impl Cache {
         key: Key,
         solve: impl Future<Output = Result<Stored, Problem>> + Send + 'static,
     ) -> Result<(Stored, Served), Problem> {
-        let is_own = Arc::new(AtomicBool::new(false));
-        let started = Arc::clone(&is_own);
-        let cache = self.answers.clone();
-        let flight = async move {
-            let solve = async {
-                started.store(true, Ordering::Relaxed);
-                solve.await
-            };
-            cache.try_get_with(key, solve).await
+        let (flight, served) = {
+            let mut flights = lock(&self.flights);
+            if let Some(stored) = self.answers.get(&key) {
+                return Ok((stored, Served::Hit));
+            }
+            match flights.get(&key).and_then(Weak::upgrade) {
+                Some(flight) => (flight, Served::Collapsed),
+                None => {
+                    let flight = self.start(key, solve);
+                    flights.insert(key, Arc::downgrade(&flight));
+                    (flight, Served::Miss)
+                }
+            }
         };
-        let joined = tokio::spawn(flight.in_current_span()).await;
-        let stored = joined.map_err(|panic| Problem::internal(&panic))?.map_err(Arc::unwrap_or_clone)?;
-        let served = if is_own.load(Ordering::Relaxed) { Served::Miss } else { Served::Collapsed };
+        let mut outcome = flight.outcome.clone();
+        let outcome = outcome.wait_for(Option::is_some).await;
+        // Without an outcome the task has panicked, and has said so in the log.
+        let outcome = outcome.ok().and_then(|outcome| outcome.clone());
+        let stored = outcome.unwrap_or_else(|| Err(Problem::internal(&"a solve had no outcome")))?;
         Ok((stored, served))
+    }
+
+    fn start(&self, key: Key, solve: impl Future<Output = Result<Stored, Problem>> + Send + 'static) -> Arc<Flight> {
+        let wanted = CancellationToken::new();
+        let (teller, outcome) = watch::channel(None);
+        let flight = Arc::new(Flight { outcome, _wanted: wanted.clone().drop_guard() });
+        let landing = Landing { flights: Arc::clone(&self.flights), key, flight: Arc::downgrade(&flight) };
+        let answers = self.answers.clone();
+        let task = async move {
+            let outcome = wanted.run_until_cancelled(solve).await;
+            if let Some(Ok(stored)) = &outcome {
+                answers.insert(key, stored.clone());
+            }
+            // Whoever finds no solve under way from here on finds the answer.
+            drop(landing);
+            teller.send_replace(outcome);
+        };
+        tokio::spawn(task.in_current_span());
+        flight
     }
 }
 

@@ -35,8 +35,8 @@ pub fn install_recorder() {
 }
 
 /// The metrics as text; levels are read at this moment.
-pub async fn render(app: &App) -> String {
-    let size = app.cache.size().await;
+pub fn render(app: &App) -> String {
+    let size = app.cache.size();
     let running = app.pool.running();
     #[expect(clippy::cast_precision_loss, reason = "a gauge")]
     {

@@ -312,6 +312,33 @@ async fn those_who_wait_get_their_answer_even_if_the_first_to_ask_leaves() {
 }
 
 #[tokio::test]
+async fn a_solve_whose_clients_have_all_left_is_stopped_and_the_next_to_ask_gets_an_answer() {
+    let service = Service::within(Limits { max_concurrent_solves: 1, ..LIMITS });
+    // Seconds of solving and compressing; if it were not stopped, it would leave an answer in the cache.
+    let endless = with(&spelled_out(), "/sweep/samples", json!(100_000)).to_string();
+    let endless = Question::post("/v1/sweep", endless).with("accept-encoding", "gzip");
+    let askers: Vec<_> = (0..3).map(|_| asked(&service, endless.clone())).collect();
+    until("it runs", || service.app.pool.running() == 1).await;
+    settle().await;
+    for asker in askers {
+        asker.abort();
+        assert!(asker.await.unwrap_err().is_cancelled());
+    }
+    until("it has stopped", || service.app.pool.running() == 0).await;
+    assert_eq!(service.app.cache.size().entries, 0);
+
+    let occupied = Occupied::by_one(&service.app.pool).await;
+    let first = asked(&service, question("/v1/sweep"));
+    until("the first is admitted", || service.app.pool.admitted() == 2).await;
+    first.abort();
+    let second = asked(&service, question("/v1/sweep"));
+    assert!(first.await.unwrap_err().is_cancelled());
+    settle().await;
+    occupied.end().await;
+    assert_eq!(second.await.unwrap().status, 200);
+}
+
+#[tokio::test]
 async fn those_who_wait_for_a_solve_that_fails_are_told_so() {
     let service = Service::within(Limits { max_concurrent_solves: 1, max_queued_solves: 1, ..LIMITS });
     let occupied = Occupied::by_one(&service.app.pool).await;

@@ -152,7 +152,7 @@ async fn a_computation_that_is_stopped_leaves_nothing_in_the_cache() {
         service.ask(&large(140_000, 1)).await.refused(503, "deadline_exceeded");
         until("the computation has stopped", || is_idle(&service.app.pool)).await;
     }
-    assert_eq!(service.app.cache.size().await.entries, 0);
+    assert_eq!(service.app.cache.size().entries, 0);
 }
 
 #[tokio::test]

@@ -161,10 +161,7 @@ pub async fn respond<E: Endpoint>(endpoint: E, app: Arc<App>, request: Request) 
 async fn walk<E: Endpoint>(endpoint: E, app: Arc<App>, request: Request) -> Result<Response, Problem> {
     let Asked { headers, body, representation, deadline } = Asked::read::<E>(&app, request).await?;
     let spelling = Spelling::new(endpoint.name(), representation, &body);
-    let known = match app.cache.key(spelling) {
-        Some(key) => app.cache.get(key).await.map(|stored| (key, stored)),
-        None => None,
-    };
+    let known = app.cache.key(spelling).and_then(|key| app.cache.get(key).map(|stored| (key, stored)));
     let (key, stored, served) = match known {
         Some((key, stored)) => {
             log_design(key);
@@ -174,7 +171,7 @@ async fn walk<E: Endpoint>(endpoint: E, app: Arc<App>, request: Request) -> Resu
             let design = json::read::<Design>(&body)?.normalised();
             let key = Key::new(endpoint.name(), &endpoint.reads(&design), representation)?;
             log_design(key);
-            let (stored, served) = match app.cache.get(key).await {
+            let (stored, served) = match app.cache.get(key) {
                 // What is kept was checked when it was solved.
                 Some(stored) => (stored, Served::Hit),
                 None => {

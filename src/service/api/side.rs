@@ -105,5 +105,5 @@ pub async fn ready(State(app): State<Arc<App>>) -> (StatusCode, &'static str) {
 #[utoipa::path(get, path = "/metrics", tag = "service", responses((status = 200, description = "The metrics.", body = String, content_type = "text/plain")))]
 pub async fn metrics(State(app): State<Arc<App>>) -> Response {
     let content_type = [(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")];
-    (content_type, observe::render(&app).await).into_response()
+    (content_type, observe::render(&app)).into_response()
 }
