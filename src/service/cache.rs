@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::future::Future;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::time::Duration;
 
 use axum::http::HeaderValue;
 use bytes::Bytes;
@@ -49,8 +50,19 @@ impl std::fmt::Display for Key {
 pub struct Stored {
     /// The body, encoded as its representation says.
     pub body: Bytes,
-    /// How long the solve took, as the header says it.
+    /// How long the solve took.
+    pub solve: Duration,
+    /// The same as the header says it, made once for all who get the answer.
     pub server_timing: HeaderValue,
+}
+
+/// Where an answer came from and what it had cost: an extension of the response, for log and metrics.
+#[derive(Debug, Clone, Copy)]
+pub struct Provenance {
+    /// How it came about.
+    pub served: Served,
+    /// How long its solve took, for whomever.
+    pub solve: Duration,
 }
 
 /// How an answer came about.

@@ -16,7 +16,7 @@ use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use tracing::Instrument;
 
 use crate::api::App;
-use crate::cache::Served;
+use crate::cache::Provenance;
 
 /// Upper bounds of the histograms' buckets in seconds: from a cache hit to the longest deadline.
 const BUCKETS_S: [f64; 12] = [1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 1e-2, 5e-2, 0.1, 0.5, 1.0, 10.0];
@@ -138,10 +138,12 @@ pub async fn observe(request: Request, next: Next) -> Response {
     let mut response = next.run(request).instrument(span.clone()).await;
     let elapsed = started.elapsed();
     let status = response.status().as_u16();
-    let cache = response.extensions().get::<Served>().map(|served| served.label());
+    let provenance = response.extensions().get::<Provenance>();
+    let cache = provenance.map(|provenance| provenance.served.label());
+    let solve_ms = provenance.map(|provenance| 1e3 * provenance.solve.as_secs_f64());
     count(route, (method, status, cache), elapsed);
     let elapsed_ms = 1e3 * elapsed.as_secs_f64();
-    span.in_scope(|| tracing::info!(method, route, status, cache, elapsed_ms, "request"));
+    span.in_scope(|| tracing::info!(method, route, status, cache, solve_ms, elapsed_ms, "request"));
     complete(response.headers_mut(), id);
     response
 }

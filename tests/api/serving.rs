@@ -5,7 +5,7 @@ use std::net::{SocketAddr, TcpListener};
 use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::asking::{LIMITS, Question, ask_at};
 use crate::designs::{shortest, with};
@@ -21,9 +21,14 @@ pub(crate) struct Process {
 impl Process {
     /// Started with these arguments on a port of the system's choice, which its greeting names.
     pub(crate) fn started(arguments: &[&str]) -> Self {
+        Self::logging(&[arguments, &["--log", "off"]].concat(), Stdio::null())
+    }
+
+    /// The same, with its log at the default level.
+    fn logging(arguments: &[&str], log: Stdio) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_toothwave"));
-        command.args(arguments).args(["--listen", "127.0.0.1:0", "--log", "off"]);
-        let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        command.args(arguments).args(["--listen", "127.0.0.1:0"]);
+        let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(log).spawn().unwrap();
         let mut greeting = BufReader::new(child.stdout.take().unwrap());
         let mut line = String::new();
         greeting.read_line(&mut line).unwrap();
@@ -122,6 +127,41 @@ fn an_origin_that_was_named_may_call_from_a_browser() {
     let process = Process::started(&["serve", "--cors-origin", "https://one.example,https://two.example"]);
     let answer = ask_at(process.address, &sweep(50).with("origin", "https://two.example"));
     assert_eq!(answer.header("access-control-allow-origin"), "https://two.example");
+}
+
+#[test]
+fn every_request_has_one_log_line_without_a_number_of_its_design() {
+    let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("log-{}", std::process::id()));
+    let process = Process::logging(&["serve"], std::fs::File::create(&path).unwrap().into());
+    // A torque that nothing else has anything of.
+    let design = with(&shortest(), "/load/input_torque_nm", json!(17.931)).to_string();
+    let question = Question::post("/v1/sweep", design).with("x-request-id", "drawing-4711");
+    for _ in 0..2 {
+        ask_at(process.address, &question).found();
+    }
+    ask_at(process.address, &Question::post("/v1/sweep", r#"{"drive": 17.931}"#)).problem();
+    process.signalled("-TERM");
+    assert_eq!(process.ended().code(), Some(0));
+    let log = std::fs::read_to_string(&path).unwrap();
+    std::fs::remove_file(&path).unwrap();
+    assert!(!log.contains("17.931") && !log.contains("17931"), "{log}");
+    let lines = log.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let requests: Vec<_> = lines.filter(|line| line["fields"]["message"] == "request").collect();
+    let [miss, hit, refused] = requests.as_slice() else { panic!("{log}") };
+    for (line, cache) in [(miss, "miss"), (hit, "hit")] {
+        let (fields, span) = (&line["fields"], &line["span"]);
+        assert_eq!((&fields["method"], &fields["route"]), (&json!("POST"), &json!("/v1/sweep")), "{line}");
+        assert_eq!((&fields["status"], &fields["cache"]), (&json!(200), &json!(cache)), "{line}");
+        assert!(fields["solve_ms"].is_f64() && fields["elapsed_ms"].is_f64(), "{line}");
+        assert_eq!(span["id"], "drawing-4711", "{line}");
+        assert_eq!(
+            (span["design"].as_str().map(str::len), &span["design"]),
+            (Some(32), &miss["span"]["design"]),
+            "{line}"
+        );
+    }
+    assert_eq!(hit["fields"]["solve_ms"], miss["fields"]["solve_ms"]);
+    assert_eq!((&refused["fields"]["status"], &refused["fields"]["cache"]), (&json!(422), &Value::Null), "{refused}");
 }
 
 #[test]

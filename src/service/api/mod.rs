@@ -18,7 +18,7 @@ use toothwave_solver::drive::DriveError;
 use toothwave_solver::{Drive, LoadCase, SolveError, Violation};
 use utoipa::IntoResponses;
 
-use crate::cache::{Cache, Key, Served, Spelling, Stored};
+use crate::cache::{Cache, Key, Provenance, Served, Spelling, Stored};
 use crate::columns;
 use crate::compute::{Pool, Thread};
 use crate::config::Limits;
@@ -192,10 +192,11 @@ async fn walk<E: Endpoint>(endpoint: E, app: Arc<App>, request: Request) -> Resu
         }
     };
     let etag = key.etag();
+    let provenance = Provenance { served, solve: stored.solve };
     if negotiation::is_not_modified(&headers, &etag) {
-        return Ok(not_modified(&etag, served));
+        return Ok(caching(StatusCode::NOT_MODIFIED.into_response(), provenance, &etag));
     }
-    Ok(caching(with_body(&app.room, stored, representation)?, served, &etag))
+    Ok(caching(with_body(&app.room, stored, representation)?, provenance, &etag))
 }
 
 /// The design's hash, for the request's log line.
@@ -288,7 +289,7 @@ fn solve<E: Endpoint>(
             let server_timing = format!("solve;dur={:.3}", 1e3 * solve.as_secs_f64());
             let server_timing = HeaderValue::try_from(server_timing).map_err(|error| Problem::internal(&error))?;
             // To its size: the cache keeps it, and weighs its length.
-            Ok(Stored { body: writer.inner.into_boxed_slice().into(), server_timing })
+            Ok(Stored { body: writer.inner.into_boxed_slice().into(), solve, server_timing })
         }
         Err(_) if stop.load(Ordering::Relaxed) => Err(SolveError::Stopped.into()),
         Err(error) => Err(Problem::internal(&error)),
@@ -344,19 +345,15 @@ fn with_body(room: &Room, stored: Stored, representation: Representation) -> Res
     Ok(response)
 }
 
-fn not_modified(etag: &str, served: Served) -> Response {
-    caching(StatusCode::NOT_MODIFIED.into_response(), served, etag)
-}
-
 /// The headers about caching that 200 and 304 share.
-fn caching(mut response: Response, served: Served, etag: &str) -> Response {
-    response.extensions_mut().insert(served);
+fn caching(mut response: Response, provenance: Provenance, etag: &str) -> Response {
+    response.extensions_mut().insert(provenance);
     let headers = response.headers_mut();
     if let Ok(etag) = HeaderValue::from_str(etag) {
         headers.insert(header::ETAG, etag);
     }
     headers.insert(header::VARY, HeaderValue::from_static("accept, accept-encoding"));
-    headers.insert(CACHE_STATUS, HeaderValue::from_static(served.cache_status()));
+    headers.insert(CACHE_STATUS, HeaderValue::from_static(provenance.served.cache_status()));
     response
 }
 
