@@ -470,7 +470,9 @@ impl<'de> Deserialize<'de> for StiffnessDocument {
         ];
         match fields.law {
             Law::Linear | Law::Palmgren => match stiffnesses.iter().find(|(_, stiffness)| stiffness.is_some()) {
-                Some((name, _)) => Err(D::Error::unknown_field(name, &["law"])),
+                Some((name, _)) => {
+                    Err(D::Error::unknown_field(name, &["law", "by default `linear`; stiffnesses belong to `fixed`"]))
+                }
                 None if matches!(fields.law, Law::Palmgren) => Ok(Self::Palmgren),
                 None => Ok(Self::Linear),
             },
