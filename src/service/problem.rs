@@ -248,15 +248,15 @@ impl Problem {
     }
 }
 
+/// For people: every error where there are several.
 impl std::fmt::Display for Problem {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: {}", self.title, self.detail)?;
-        if self.errors.len() > 1 {
-            for error in &self.errors {
-                write!(f, "\n  {}: {}", error.pointer, error.detail)?;
-            }
+        let Self { title, detail, errors, .. } = self;
+        if errors.len() < 2 {
+            return write!(f, "{title}: {detail}");
         }
-        Ok(())
+        write!(f, "{title}:")?;
+        errors.iter().try_for_each(|error| write!(f, "\n  {}: {}", error.pointer, error.detail))
     }
 }
 
@@ -311,7 +311,7 @@ impl From<SolveError> for Problem {
                 format!("{detail}. Choose `virtual_work`, or stiffnesses that differ less"),
             ),
             SolveError::TooManyPoints { points, limit } => {
-                let detail = format!("{detail} by `max_profile_points`");
+                let detail = format!("{detail} by `max_profile_points`; widen the chord tolerance");
                 let pointer = "/profile/chord_tolerance_mm";
                 too_many(ProblemCode::TooManyPoints, FieldCode::TooManyPoints, pointer, &detail, Some(points), limit)
             }

@@ -232,15 +232,13 @@ async fn read_body(
     deadline: tokio::time::Instant,
 ) -> Result<bytes::Bytes, Problem> {
     let limit = limits.max_body_bytes;
-    let too_large = |found: String| {
-        Problem::new(
-            ProblemCode::BodyTooLarge,
-            format!("the body has {found}, more than the {limit} bytes of `max_body_bytes`"),
-        )
+    let too_large = |length: &str| {
+        let detail = format!("the body has {length}more than the {limit} bytes of `max_body_bytes`");
+        Problem::new(ProblemCode::BodyTooLarge, detail)
     };
     let announced = headers.get(header::CONTENT_LENGTH).and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
     if let Some(length) = announced.filter(|&length| length > limit as u64) {
-        return Err(too_large(format!("{length} bytes")));
+        return Err(too_large(&format!("{length} bytes, ")));
     }
     let reading = axum::body::to_bytes(body, limit);
     let arrived = tokio::time::timeout_at(deadline, reading).await;
@@ -249,7 +247,7 @@ async fn read_body(
         Problem::new(ProblemCode::RequestTimeout, detail)
     })?;
     // What else can go wrong here is a client that left, which nobody is told of.
-    arrived.map_err(|_| too_large(format!("more than {limit} bytes")))
+    arrived.map_err(|_| too_large(""))
 }
 
 /// Solves and writes the final bytes, on a blocking thread.
