@@ -163,9 +163,12 @@ impl From<io::Error> for Failure {
 
 impl From<Problem> for Failure {
     fn from(problem: Problem) -> Self {
+        // A service's limits can be set, those of the command line are its own.
+        let limits = ["`max_states`", "`max_profile_points`"];
+        let text = limits.iter().fold(problem.to_string(), |text, limit| text.replace(limit, "the command line"));
         match problem.code {
-            ProblemCode::InternalError => Self::Io(io::Error::other(problem.to_string())),
-            _ => Self::BadInput(problem.to_string()),
+            ProblemCode::InternalError => Self::Io(io::Error::other(text)),
+            _ => Self::BadInput(text),
         }
     }
 }

@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use toothwave_solver::Contact;
 use toothwave_solver::drawing::DrawingParameters;
 use toothwave_solver::parts::PartsParameters;
@@ -13,8 +13,8 @@ use toothwave_solver::profile::{Extent, ProfileParameters};
 use toothwave_solver::sweep::Points;
 use toothwave_solver::violation::Range;
 use toothwave_solver::{
-    Compatibility, ContactLaw, DriveParameters, LoadCase, LoadParameters, Material, Materials, Parameter, PerContact,
-    Torque, Violation,
+    Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, Parameter, PerContact, Torque,
+    Violation,
 };
 use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, OneOfBuilder, Schema, Type};
@@ -89,7 +89,7 @@ pub struct WaveGeneratorDocument {
 }
 
 /// The discrete teeth.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct TeethDocument {
     /// Teeth in theory, Z_G: two more or two fewer than the ring's.
@@ -105,6 +105,14 @@ pub struct TeethDocument {
     /// Width L1 of a tooth along the axis.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub width_mm: f64,
+}
+
+/// With `installed` filled in. The document itself keeps whether it stands there, so that no fault is blamed on a field that does not.
+impl Serialize for TeethDocument {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self { count, installed, radius_mm, width_mm } = *self;
+        (count, installed.unwrap_or(count), radius_mm, width_mm).serialize(serializer)
+    }
 }
 
 /// The rigid internal wheel.
@@ -470,7 +478,9 @@ impl<'de> Deserialize<'de> for StiffnessDocument {
         ];
         match fields.law {
             Law::Linear | Law::Palmgren => match stiffnesses.iter().find(|(_, stiffness)| stiffness.is_some()) {
-                Some((name, _)) => Err(D::Error::unknown_field(name, &["law"])),
+                Some((name, _)) => {
+                    Err(D::Error::unknown_field(name, &["law", "by default `linear`; stiffnesses belong to `fixed`"]))
+                }
                 None if matches!(fields.law, Law::Palmgren) => Ok(Self::Palmgren),
                 None => Ok(Self::Linear),
             },
@@ -492,7 +502,6 @@ impl<'de> Deserialize<'de> for StiffnessDocument {
 impl Design {
     /// The document with what may be left out filled in and zeros of one sign, so that equal designs are equal bytes.
     pub fn normalised(mut self) -> Self {
-        self.drive.teeth.installed.get_or_insert(self.drive.teeth.count);
         if self.sweep.tolerance.is_none() {
             self.sweep.samples.get_or_insert(DEFAULT_SAMPLES);
         }
@@ -535,21 +544,28 @@ impl Design {
         }
     }
 
-    /// A violation with the number that stands in the document, where the solver's count could not hold it.
-    pub fn as_written(&self, violation: Violation) -> Violation {
-        let TeethDocument { count, installed, .. } = &self.drive.teeth;
-        match violation {
+    /// Violations with the numbers that stand in the document, where the solver's count could not hold them; without those of `installed`
+    /// where it does not stand there: they are faults of `count`, which has them too.
+    pub fn as_written(&self, violations: &[Violation]) -> Vec<Violation> {
+        let TeethDocument { count, installed, .. } = self.drive.teeth;
+        let as_written = |&violation: &Violation| match violation {
+            Violation::OutOfRange { parameter: Parameter::InstalledTeeth, .. } | Violation::InstalledOdd { .. }
+                if installed.is_none() =>
+            {
+                None
+            }
             Violation::OutOfRange { parameter, limit, value } => {
                 let value = match parameter {
                     Parameter::ToothCount => count.0,
-                    Parameter::InstalledTeeth => installed.unwrap_or(*count).0,
+                    Parameter::InstalledTeeth => installed.unwrap_or(count).0,
                     Parameter::RingTeeth => self.drive.ring.teeth.0,
                     _ => value,
                 };
-                Violation::OutOfRange { parameter, value, limit }
+                Some(Violation::OutOfRange { parameter, value, limit })
             }
-            other => other,
-        }
+            other => Some(other),
+        };
+        violations.iter().filter_map(as_written).collect()
     }
 
     /// The load's parameters.
@@ -609,14 +625,6 @@ impl Design {
             }),
             allowable_stress_mpa: load.allowable_stress_mpa,
         })
-    }
-
-    /// The checked load.
-    ///
-    /// # Errors
-    /// A fault as in [`Self::load_parameters`]; inside, every value out of its range.
-    pub fn load_case(&self) -> Result<Result<LoadCase, Vec<Violation>>, Fault> {
-        Ok(LoadCase::new(&self.load_parameters()?))
     }
 
     /// Where a sweep looks.

@@ -32,11 +32,15 @@ pub struct Fault {
     pub detail: String,
 }
 
+/// What some editors begin a UTF-8 text with; RFC 8259 lets a reader ignore it.
+const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+
 /// Reads a document.
 ///
 /// # Errors
 /// See [`ReadError`].
 pub fn read<'de, T: Deserialize<'de>>(text: &[u8]) -> Result<T, ReadError> {
+    let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
     if text.trim_ascii().is_empty() {
         return Err(ReadError::Malformed { detail: "nothing was sent; send a design document".into() });
     }
@@ -227,8 +231,10 @@ fn escaped(key: &str) -> String {
     key.replace('~', "~0").replace('/', "~1")
 }
 
+/// Names one after the other; what has a space in it is no name but a remark on them, which stands as it is.
 fn listed(names: &[&str]) -> String {
-    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+    let name = |name: &&str| if name.contains(' ') { (*name).to_owned() } else { format!("`{name}`") };
+    names.iter().map(name).collect::<Vec<_>>().join(", ")
 }
 
 impl de::Error for Fault {

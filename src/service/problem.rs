@@ -64,7 +64,7 @@ pub struct FieldError {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub value: Option<f64>,
-    /// The limit that the value is beyond.
+    /// The limit that the value is beyond, or, of a number of teeth, the nearest one that would do.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub limit: Option<f64>,
@@ -142,6 +142,8 @@ pub enum FieldCode {
     CamNotElongated,
     /// Carrier and ring do not differ by two teeth.
     ToothDifference,
+    /// An odd number of teeth, which no even number of installed ones divides.
+    CountOdd,
     /// An odd number of installed teeth.
     InstalledOdd,
     /// Installed teeth that do not divide the theoretical ones.
@@ -267,15 +269,15 @@ impl Problem {
     }
 }
 
+/// For people: every error where there are several.
 impl std::fmt::Display for Problem {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: {}", self.title, self.detail)?;
-        if self.errors.len() > 1 {
-            for error in &self.errors {
-                write!(f, "\n  {}: {}", error.pointer, error.detail)?;
-            }
+        let Self { title, detail, errors, .. } = self;
+        if errors.len() < 2 {
+            return write!(f, "{title}: {detail}");
         }
-        Ok(())
+        write!(f, "{title}:")?;
+        errors.iter().try_for_each(|error| write!(f, "\n  {}: {}", error.pointer, error.detail))
     }
 }
 
@@ -330,7 +332,7 @@ impl From<SolveError> for Problem {
                 format!("{detail}. Choose `virtual_work`, or stiffnesses that differ less"),
             ),
             SolveError::TooManyPoints { points, limit } => {
-                let detail = format!("{detail} by `max_profile_points`");
+                let detail = format!("{detail} by `max_profile_points`; widen the chord tolerance");
                 let pointer = "/profile/chord_tolerance_mm";
                 too_many(ProblemCode::TooManyPoints, FieldCode::TooManyPoints, pointer, &detail, Some(points), limit)
             }
@@ -369,24 +371,26 @@ pub fn too_many(
 
 /// A violation as the field that it is about.
 fn field_error(violation: &Violation) -> FieldError {
-    use Parameter::{InstalledTeeth, RingTeeth, SemiMajor, TipRadius, ToothRadius};
+    use Parameter::{InstalledTeeth, RingTeeth, SemiMajor, TipRadius, ToothCount, ToothRadius};
     let (code, parameter, value, limit) = match *violation {
         Violation::OutOfRange { parameter, value, limit } => (FieldCode::OutOfRange, parameter, value, limit),
         Violation::CamNotElongated { semi_major_mm, semi_minor_mm } => {
             (FieldCode::CamNotElongated, SemiMajor, semi_major_mm, semi_minor_mm)
         }
-        Violation::ToothDifference { teeth, ring_teeth } => {
-            let nearest = if ring_teeth > teeth { teeth + 2 } else { teeth - 2 };
-            (FieldCode::ToothDifference, RingTeeth, ring_teeth as f64, nearest as f64)
+        Violation::ToothDifference { ring_teeth, instead, .. } => {
+            (FieldCode::ToothDifference, RingTeeth, ring_teeth as f64, instead.nearest_to(ring_teeth) as f64)
         }
-        Violation::InstalledOdd { installed } => {
-            (FieldCode::InstalledOdd, InstalledTeeth, installed as f64, (installed + 1) as f64)
+        Violation::CountOdd { teeth, instead } => {
+            (FieldCode::CountOdd, ToothCount, teeth as f64, instead.nearest_to(teeth) as f64)
         }
-        Violation::InstalledNoDivisor { installed, teeth } => {
-            (FieldCode::InstalledNoDivisor, InstalledTeeth, installed as f64, teeth as f64)
+        Violation::InstalledOdd { installed, instead } => {
+            (FieldCode::InstalledOdd, InstalledTeeth, installed as f64, instead.nearest_to(installed) as f64)
         }
-        Violation::TeethTouch { tooth_diameter_mm, center_distance_mm } => {
-            (FieldCode::TeethTouch, ToothRadius, 0.5 * tooth_diameter_mm, 0.5 * center_distance_mm)
+        Violation::InstalledNoDivisor { installed, instead, .. } => {
+            (FieldCode::InstalledNoDivisor, InstalledTeeth, installed as f64, instead.nearest_to(installed) as f64)
+        }
+        Violation::TeethTouch { tooth_diameter_mm, touching_radius_mm, .. } => {
+            (FieldCode::TeethTouch, ToothRadius, 0.5 * tooth_diameter_mm, touching_radius_mm)
         }
         Violation::NoCarrierAnnulus { semi_major_mm, tip_radius_mm } => {
             (FieldCode::NoCarrierAnnulus, SemiMajor, semi_major_mm, tip_radius_mm)

@@ -6,10 +6,11 @@ use std::f64::consts::PI;
 use nalgebra::{Point2, Rotation2, Unit, Vector2};
 
 use crate::contact::Part;
-use crate::drive::{Drive, DriveError};
+use crate::drive::{Draft, Drive, DriveError};
 use crate::parts::{CarrierPart, PartsParameters, RingPart, ToothPart, WaveGeneratorPart};
 use crate::profile::{Polyline, SampledCurve, cam_quarter, flank_curve, mirrored};
 use crate::ring::FlankEnd;
+use crate::root::NotConverged;
 use crate::violation::{Parameter, Violation};
 use crate::{SolveError, Stop};
 
@@ -136,7 +137,7 @@ impl Subject {
 
 impl DrawingParameters {
     /// The values that are out of their ranges.
-    pub fn violations(&self, subject: Subject) -> Vec<Violation> {
+    fn violations(&self, subject: Subject) -> Vec<Violation> {
         let input_angle = match subject {
             Subject::Part(_) => None,
             Subject::Assembly => Parameter::InputAngle.check(self.input_angle_deg),
@@ -166,33 +167,34 @@ impl Drawing {
     /// Checks the parameters of what is drawn.
     ///
     /// # Errors
-    /// Every reason why it cannot be made.
+    /// Every reason why it cannot be made, those of the drive among them.
     pub fn new(
-        drive: &Drive,
+        draft: &Draft,
         subject: Subject,
         parts: &PartsParameters,
         parameters: &DrawingParameters,
     ) -> Result<Self, DriveError> {
-        let mut violations = parameters.violations(subject);
-        let mut made = Vec::new();
-        for &part in subject.parts() {
-            let result = match part {
-                Part::Ring => RingPart::new(drive, parts).map(MadePart::Ring),
-                Part::Carrier => CarrierPart::new(drive, parts).map(MadePart::Carrier),
-                Part::Teeth => ToothPart::new(drive, parts).map(MadePart::Teeth),
-                Part::WaveGenerator => WaveGeneratorPart::new(drive, parts).map(MadePart::WaveGenerator),
-            };
-            match result {
-                Ok(part) => made.push(part),
-                Err(DriveError::Impossible(found)) => violations.extend(found),
-                Err(error @ DriveError::NotConverged(_)) => return Err(error),
-            }
-        }
-        if violations.is_empty() {
-            Ok(Self { drive: *drive, parts: made, subject, parameters: *parameters })
-        } else {
-            Err(DriveError::Impossible(violations))
-        }
+        let mut violations = draft.violations().to_vec();
+        violations.extend(parameters.violations(subject));
+        violations.extend(subject.parts().iter().flat_map(|&part| parts.violations(part, draft)));
+        let Some(drive) = draft.drive().filter(|_| violations.is_empty()) else {
+            return Err(DriveError::Impossible(violations));
+        };
+        let made = |part: &Part| {
+            Ok(match part {
+                Part::Ring => MadePart::Ring(RingPart::new(&drive, parts)?),
+                Part::Carrier => MadePart::Carrier(CarrierPart::new(&drive, parts)),
+                Part::Teeth => MadePart::Teeth(ToothPart::new(&drive, parts)),
+                Part::WaveGenerator => MadePart::WaveGenerator(WaveGeneratorPart::new(parts)),
+            })
+        };
+        let parts = subject.parts().iter().map(made).collect::<Result<_, NotConverged>>()?;
+        Ok(Self { drive, parts, subject, parameters: *parameters })
+    }
+
+    /// The drive.
+    pub const fn drive(&self) -> &Drive {
+        &self.drive
     }
 
     /// Draws.

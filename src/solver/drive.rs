@@ -4,10 +4,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::cam::Cam;
 use crate::locus::{Locus, ToothCenter};
-use crate::position::Position;
 use crate::ring::{FlankLimit, RingFlank, RingTooth};
-use crate::root::NotConverged;
-use crate::violation::{Parameter, Violation};
+use crate::root::{NotConverged, bracketed};
+use crate::violation::{Alternatives, Parameter, Violation};
 
 /// Waves of the cam: an ellipse has two.
 pub const WAVES: f64 = 2.0;
@@ -55,31 +54,10 @@ impl Drive {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// Every reason why the drive cannot exist; those that need sound values (teeth that touch, no annulus, no flank)
-    /// are looked for when the values themselves are sound.
+    /// Every reason why the drive cannot exist.
     pub fn new(parameters: &DriveParameters) -> Result<Self, DriveError> {
-        let (mut violations, sound) = violations_of_values(parameters);
-        if !sound {
-            return Err(DriveError::Impossible(violations));
-        }
-        let p = *parameters;
-        let locus = Locus::new(Cam::new(p.semi_major_mm, p.semi_minor_mm), p.tooth_radius_mm);
-        let flank = RingFlank::new(locus, p.ring_teeth as f64 / WAVES);
-        let drive = Self { parameters: p, ring: RingTooth::new(flank, p.tip_radius_mm)? };
-        if drive.tip_radius_mm() <= p.semi_major_mm {
-            violations.push(Violation::NoCarrierAnnulus {
-                semi_major_mm: p.semi_major_mm,
-                tip_radius_mm: drive.tip_radius_mm(),
-            });
-        }
-        if !drive.neighbours_are_apart_everywhere() {
-            let center_distance_mm = drive.least_center_distance_mm()?;
-            let tooth_diameter_mm = 2.0 * p.tooth_radius_mm;
-            if center_distance_mm <= tooth_diameter_mm {
-                violations.push(Violation::TeethTouch { tooth_diameter_mm, center_distance_mm });
-            }
-        }
-        if violations.is_empty() { Ok(drive) } else { Err(DriveError::Impossible(violations)) }
+        let draft = Draft::new(parameters)?;
+        draft.drive().ok_or(DriveError::Impossible(draft.violations))
     }
 
     /// The parameters, as given.
@@ -143,37 +121,218 @@ impl Drive {
     /// # Errors
     /// [`NotConverged`] from the path.
     pub fn steepest_engaged(&self) -> Result<ToothCenter, NotConverged> {
-        let locus = self.ring.flank.locus();
-        let steepest = locus.steepest()?;
-        if steepest.position.from_minor_rad >= self.ring.limit.position.from_minor_rad {
-            Ok(steepest)
-        } else {
-            locus.at(self.ring.limit.position)
-        }
+        self.ring.steepest_engaged()
     }
 
-    /// Half the angle between neighbouring slots.
-    fn half_spacing_rad(&self) -> f64 {
-        PI / self.parameters.installed as f64
+    const fn neighbours(&self) -> Neighbours {
+        Neighbours { locus: *self.ring.flank.locus(), installed: self.parameters.installed }
     }
 
-    /// A bound that settles nearly every drive: no centre comes nearer to the axis than `b + r`.
-    fn neighbours_are_apart_everywhere(&self) -> bool {
-        let p = &self.parameters;
-        (p.semi_minor_mm + p.tooth_radius_mm) * self.half_spacing_rad().sin() > p.tooth_radius_mm
-    }
-
-    /// Least distance of two neighbouring centres on their path (docs/theory.md section 7): over the middle of the pair a scan,
-    /// then a golden-section search around its least value. The pair that straddles the minor axis is one of the scan.
+    /// Least distance of two neighbouring centres on their path.
     ///
     /// # Errors
     /// [`NotConverged`] from the path.
     pub fn least_center_distance_mm(&self) -> Result<f64, NotConverged> {
+        self.neighbours().least_center_distance_mm()
+    }
+
+    /// `d` at any angle from the major axis.
+    pub(crate) fn center_radius_at_mm(&self, angle_rad: f64) -> Result<f64, NotConverged> {
+        self.ring.flank.locus().center_radius_at_mm(angle_rad)
+    }
+
+    /// Thickness of the wall between two neighbouring slots where it is thinnest, at the carrier's inner edge on
+    /// the circle of radius `a`: `2 (√(a² - r²) sin(π/Z'_G) - r cos(π/Z'_G))`; not positive where the slots run into each other there.
+    pub fn slot_wall_mm(&self) -> f64 {
+        let p = &self.parameters;
+        let (a, r) = (p.semi_major_mm, p.tooth_radius_mm);
+        let (sin, cos) = self.neighbours().half_spacing_rad().sin_cos();
+        2.0 * (((a - r) * (a + r)).max(0.0).sqrt() * sin - r * cos)
+    }
+}
+
+/// Parameters of which some may be impossible. Whatever can be checked is checked as soon as the values that it itself needs are possible:
+/// one impossible value hides no other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Draft {
+    parameters: DriveParameters,
+    violations: Vec<Violation>,
+    pub(crate) semi_major_mm: Option<f64>,
+    pub(crate) semi_minor_mm: Option<f64>,
+    pub(crate) installed: Option<i64>,
+    pub(crate) tooth_radius_mm: Option<f64>,
+    pub(crate) cam: Option<Cam>,
+    /// `s`, where carrier and ring differ by two teeth.
+    pub(crate) sense: Option<f64>,
+    pub(crate) ring: Option<RingTooth>,
+}
+
+impl Draft {
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// [`NotConverged`] from the geometry.
+    pub fn new(parameters: &DriveParameters) -> Result<Self, NotConverged> {
+        let p = *parameters;
+        let mut violations = Vec::new();
+        let mut is_in_range = |parameter: Parameter, value: f64| {
+            let violation = parameter.check(value);
+            violations.extend(violation);
+            violation.is_none()
+        };
+        let semi_major_mm = is_in_range(Parameter::SemiMajor, p.semi_major_mm).then_some(p.semi_major_mm);
+        let semi_minor_mm = is_in_range(Parameter::SemiMinor, p.semi_minor_mm).then_some(p.semi_minor_mm);
+        let teeth = is_in_range(Parameter::ToothCount, p.teeth as f64).then_some(p.teeth);
+        let installed = is_in_range(Parameter::InstalledTeeth, p.installed as f64).then_some(p.installed);
+        let tooth_radius_mm = is_in_range(Parameter::ToothRadius, p.tooth_radius_mm).then_some(p.tooth_radius_mm);
+        is_in_range(Parameter::ToothWidth, p.tooth_width_mm);
+        let ring_teeth = is_in_range(Parameter::RingTeeth, p.ring_teeth as f64).then_some(p.ring_teeth);
+        let mut bore_is_possible = p.tip_radius_mm.is_none_or(|bore| is_in_range(Parameter::TipRadius, bore));
+
+        let mut cam = None;
+        if let Some((semi_major_mm, semi_minor_mm)) = semi_major_mm.zip(semi_minor_mm) {
+            if semi_major_mm > semi_minor_mm {
+                cam = Some(Cam::new(semi_major_mm, semi_minor_mm));
+            } else {
+                violations.push(Violation::CamNotElongated { semi_major_mm, semi_minor_mm });
+            }
+        }
+        let mut sense = None;
+        if let Some((teeth, ring_teeth)) = teeth.zip(ring_teeth) {
+            match teeth - ring_teeth {
+                2 => sense = Some(1.0),
+                -2 => sense = Some(-1.0),
+                _ => {
+                    let instead = Alternatives::to_ring_beside(teeth);
+                    violations.push(Violation::ToothDifference { teeth, ring_teeth, instead });
+                }
+            }
+        }
+        violations.extend(violations_of_counts(teeth, installed));
+        if let Some(((semi_major_mm, tooth_radius_mm), tip_radius_mm)) =
+            semi_major_mm.zip(tooth_radius_mm).zip(p.tip_radius_mm.filter(|_| bore_is_possible))
+        {
+            let root_radius_mm = semi_major_mm + 2.0 * tooth_radius_mm;
+            if tip_radius_mm >= root_radius_mm {
+                violations.push(Violation::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm });
+                bore_is_possible = false;
+            }
+        }
+
+        let locus = cam.zip(tooth_radius_mm).map(|(cam, tooth_radius_mm)| Locus::new(cam, tooth_radius_mm));
+        let ring = match locus.zip(ring_teeth).filter(|_| bore_is_possible) {
+            Some((locus, ring_teeth)) => {
+                Some(RingTooth::new(RingFlank::new(locus, ring_teeth as f64 / WAVES), p.tip_radius_mm)?)
+            }
+            None => None,
+        };
+        if let Some(RingTooth { tip_radius_mm, .. }) = ring
+            && tip_radius_mm <= p.semi_major_mm
+        {
+            violations.push(Violation::NoCarrierAnnulus { semi_major_mm: p.semi_major_mm, tip_radius_mm });
+        }
+        if let Some((locus, installed)) = locus.zip(installed) {
+            violations.extend(Neighbours { locus, installed }.violation()?);
+        }
+        Ok(Self {
+            parameters: p,
+            violations,
+            semi_major_mm,
+            semi_minor_mm,
+            installed,
+            tooth_radius_mm,
+            cam,
+            sense,
+            ring,
+        })
+    }
+
+    /// Every reason why the drive cannot exist.
+    pub fn violations(&self) -> &[Violation] {
+        &self.violations
+    }
+
+    /// The drive, where it can exist.
+    pub fn drive(&self) -> Option<Drive> {
+        let ring = self.ring.filter(|_| self.violations.is_empty())?;
+        Some(Drive { parameters: self.parameters, ring })
+    }
+}
+
+/// What makes a number of teeth, or of installed ones among them, impossible.
+fn violations_of_counts(teeth: Option<i64>, installed: Option<i64>) -> Vec<Violation> {
+    let mut violations = Vec::new();
+    let (even_teeth, odd_teeth) = (teeth.filter(|teeth| teeth % 2 == 0), teeth.filter(|teeth| teeth % 2 != 0));
+    violations.extend(odd_teeth.map(|teeth| Violation::CountOdd { teeth, instead: Alternatives::to_odd(teeth) }));
+    let Some(installed) = installed else { return violations };
+    let divisors = even_teeth.map(|teeth| Alternatives::to_installed(installed, teeth));
+    if installed % 2 != 0 {
+        let instead = divisors.unwrap_or(Alternatives::to_odd(installed));
+        violations.push(Violation::InstalledOdd { installed, instead });
+    }
+    if let Some((teeth, instead)) = even_teeth.zip(divisors).filter(|(teeth, _)| teeth % installed != 0) {
+        violations.push(Violation::InstalledNoDivisor { installed, teeth, instead });
+    }
+    violations
+}
+
+/// Neighbouring teeth on their path.
+#[derive(Debug, Clone, Copy)]
+struct Neighbours {
+    locus: Locus,
+    installed: i64,
+}
+
+impl Neighbours {
+    /// Half the angle between neighbouring slots.
+    fn half_spacing_rad(&self) -> f64 {
+        PI / self.installed as f64
+    }
+
+    /// The radius up to which teeth are apart, `b sin/(1 - sin)` of half the spacing, because no centre comes nearer to the axis than
+    /// `b + r`. This bound settles nearly every drive.
+    fn surely_free_radius_mm(&self) -> f64 {
+        let sin = self.half_spacing_rad().sin();
+        self.locus.cam().semi_minor_mm() * (sin / (1.0 - sin))
+    }
+
+    /// That they touch, where they do.
+    fn violation(&self) -> Result<Option<Violation>, NotConverged> {
+        let tooth_radius_mm = self.locus.tooth_radius_mm();
+        if tooth_radius_mm < self.surely_free_radius_mm() {
+            return Ok(None);
+        }
+        let center_distance_mm = self.least_center_distance_mm()?;
+        let tooth_diameter_mm = 2.0 * tooth_radius_mm;
+        if center_distance_mm > tooth_diameter_mm {
+            return Ok(None);
+        }
+        let touching_radius_mm = self.touching_radius_mm()?;
+        Ok(Some(Violation::TeethTouch { tooth_diameter_mm, center_distance_mm, touching_radius_mm }))
+    }
+
+    /// The radius, at most the one that the teeth have, at which they begin to touch: thicker teeth stand farther out, but by less than they
+    /// are thicker, so that the gap falls with the radius. Its logarithm is what is solved for, because radii range over twelve decades.
+    fn touching_radius_mm(&self) -> Result<f64, NotConverged> {
+        let free_mm = 0.5 * self.surely_free_radius_mm();
+        let at = |exponent: f64| Self { locus: Locus::new(*self.locus.cam(), free_mm * exponent.exp()), ..*self };
+        let gap_mm = |exponent: f64| {
+            let thinner = at(exponent);
+            Ok(thinner.least_center_distance_mm()? - 2.0 * thinner.locus.tooth_radius_mm())
+        };
+        let most = (self.locus.tooth_radius_mm() / free_mm).ln();
+        let exponent = bracketed("radius at which teeth touch", 0.0, gap_mm(0.0)?, most, gap_mm)?;
+        Ok(at(exponent).locus.tooth_radius_mm())
+    }
+
+    /// Least distance of two neighbouring centres on their path (docs/theory.md section 7): over the middle of the pair a scan,
+    /// then a golden-section search around its least value. The pair that straddles the minor axis is one of the scan.
+    fn least_center_distance_mm(&self) -> Result<f64, NotConverged> {
         const SCAN: u32 = 96;
         let half = self.half_spacing_rad();
         let distance = |middle_rad: f64| -> Result<f64, NotConverged> {
-            let before = self.center_radius_at_mm(middle_rad - half)?;
-            let after = self.center_radius_at_mm(middle_rad + half)?;
+            let before = self.locus.center_radius_at_mm(middle_rad - half)?;
+            let after = self.locus.center_radius_at_mm(middle_rad + half)?;
             Ok((before - after).hypot(2.0 * half.sin() * (before * after).sqrt()))
         };
         let step = FRAC_PI_2 / f64::from(SCAN);
@@ -196,61 +355,4 @@ impl Drive {
         }
         Ok(best.1)
     }
-
-    /// `d` at any angle from the major axis.
-    pub(crate) fn center_radius_at_mm(&self, angle_rad: f64) -> Result<f64, NotConverged> {
-        let folded = angle_rad.rem_euclid(PI);
-        let position = if folded > 0.5 * FRAC_PI_2 && folded < 1.5 * FRAC_PI_2 {
-            Position::from_minor((folded - FRAC_PI_2).abs())
-        } else {
-            Position::from_major(folded.min(PI - folded))
-        };
-        Ok(self.ring.flank.locus().at(position)?.center_radius_mm)
-    }
-
-    /// Thickness of the wall between two neighbouring slots where it is thinnest, at the carrier's inner edge on
-    /// the circle of radius `a`: `2 (√(a² - r²) sin(π/Z'_G) - r cos(π/Z'_G))`; not positive where the slots run into each other there.
-    pub fn slot_wall_mm(&self) -> f64 {
-        let p = &self.parameters;
-        let (a, r) = (p.semi_major_mm, p.tooth_radius_mm);
-        let (sin, cos) = self.half_spacing_rad().sin_cos();
-        2.0 * (((a - r) * (a + r)).max(0.0).sqrt() * sin - r * cos)
-    }
-}
-
-/// What can be said of the values before any geometry, and whether they are sound enough for it.
-fn violations_of_values(p: &DriveParameters) -> (Vec<Violation>, bool) {
-    let mut violations = Vec::new();
-    let mut check = |parameter: Parameter, value: f64| {
-        let violation = parameter.check(value);
-        violations.extend(violation);
-        violation.is_none()
-    };
-    let major = check(Parameter::SemiMajor, p.semi_major_mm);
-    let minor = check(Parameter::SemiMinor, p.semi_minor_mm);
-    let teeth = check(Parameter::ToothCount, p.teeth as f64);
-    let installed = check(Parameter::InstalledTeeth, p.installed as f64);
-    let radius = check(Parameter::ToothRadius, p.tooth_radius_mm);
-    let width = check(Parameter::ToothWidth, p.tooth_width_mm);
-    let ring = check(Parameter::RingTeeth, p.ring_teeth as f64);
-    let bore = p.tip_radius_mm.filter(|&bore| check(Parameter::TipRadius, bore));
-    if major && minor && p.semi_major_mm <= p.semi_minor_mm {
-        violations.push(Violation::CamNotElongated { semi_major_mm: p.semi_major_mm, semi_minor_mm: p.semi_minor_mm });
-    }
-    if teeth && ring && (p.teeth - p.ring_teeth).abs() != 2 {
-        violations.push(Violation::ToothDifference { teeth: p.teeth, ring_teeth: p.ring_teeth });
-    }
-    if installed && p.installed % 2 != 0 {
-        violations.push(Violation::InstalledOdd { installed: p.installed });
-    }
-    if installed && teeth && p.teeth % p.installed != 0 {
-        violations.push(Violation::InstalledNoDivisor { installed: p.installed, teeth: p.teeth });
-    }
-    let root_radius_mm = p.semi_major_mm + 2.0 * p.tooth_radius_mm;
-    if let Some(tip_radius_mm) = bore.filter(|&bore| major && radius && bore >= root_radius_mm) {
-        violations.push(Violation::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm });
-    }
-    // The width of the teeth is the one value that no geometry needs.
-    let sound = violations.len() == usize::from(!width);
-    (violations, sound)
 }

@@ -2,11 +2,11 @@
 
 use crate::SolveError;
 use crate::contact::{Approach, Contact, ContactLaw, HertzLine, Materials, PerContact};
-use crate::drive::{Drive, WAVES};
+use crate::drive::{Draft, Drive, WAVES};
 use crate::locus::ToothCenter;
 use crate::mesh::Mesh;
 use crate::position::Position;
-use crate::ring::FlankPoint;
+use crate::ring::{FlankPoint, RingFlank};
 use crate::root::{NotConverged, ValueAndSlope, newton_in_bracket};
 use crate::violation::{Parameter, Violation};
 
@@ -45,6 +45,31 @@ pub struct LoadParameters {
     pub allowable_stress_mpa: Option<f64>,
 }
 
+impl LoadParameters {
+    /// The gaps that this drive cannot have under `projection`: those that it weighs negatively somewhere on the engaged flank,
+    /// where more gap would mean more load. Virtual work weighs none so. Of a drive only `s` and the ring are needed, of the load
+    /// the gap itself.
+    ///
+    /// # Errors
+    /// [`NotConverged`] from the path.
+    pub fn clearance_violations(&self, draft: &Draft) -> Result<Vec<Violation>, NotConverged> {
+        let gaps = self.clearance_um.iter();
+        let gaps: Vec<_> =
+            gaps.filter(|&(contact, &gap)| gap > 0.0 && Parameter::Clearance(contact).check(gap).is_none()).collect();
+        let Some((sense, ring)) = draft.sense.zip(draft.ring) else { return Ok(Vec::new()) };
+        if self.compatibility == Compatibility::VirtualWork || gaps.is_empty() {
+            return Ok(Vec::new());
+        }
+        // Both weights fall with the pressure angle (or, for s = -1, one is negative throughout).
+        let weight = Weights::of(Compatibility::Projection, sense, &ring.flank, &ring.steepest_engaged()?).0;
+        Ok(gaps
+            .into_iter()
+            .filter(|&(contact, _)| *weight.get(contact) < 0.0)
+            .map(|(contact, &clearance_um)| Violation::ClearanceNotMonotone { contact, clearance_um })
+            .collect())
+    }
+}
+
 /// A load that was checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadCase(LoadParameters);
@@ -80,40 +105,21 @@ impl LoadCase {
     pub fn has_clearance(&self) -> bool {
         self.0.clearance_um.iter().any(|(_, &gap)| gap > 0.0)
     }
-
-    /// The gaps that this drive cannot have under `projection`: those that it weighs negatively somewhere on the engaged flank,
-    /// where more gap would mean more load. Virtual work weighs none so.
-    ///
-    /// # Errors
-    /// [`NotConverged`] from the path.
-    pub fn clearance_violations(&self, drive: &Drive) -> Result<Vec<Violation>, NotConverged> {
-        if self.0.compatibility == Compatibility::VirtualWork || !self.has_clearance() {
-            return Ok(Vec::new());
-        }
-        // Both weights fall with the pressure angle (or, for s = -1, one is negative throughout).
-        let weight = Weights::of(Compatibility::Projection, drive, &drive.steepest_engaged()?).0;
-        let gaps = self.0.clearance_um.iter();
-        Ok(gaps
-            .filter(|&(contact, &gap)| gap > 0.0 && *weight.get(contact) < 0.0)
-            .map(|(contact, &clearance_um)| Violation::ClearanceNotMonotone { contact, clearance_um })
-            .collect())
-    }
 }
 
 /// What an approach at each contact adds to the displacement ξ along `F_H`.
 struct Weights(PerContact<f64>);
 
 impl Weights {
-    fn of(compatibility: Compatibility, drive: &Drive, center: &ToothCenter) -> Self {
-        let force_ratio = force_ratio(drive, center);
+    fn of(compatibility: Compatibility, sense: f64, flank: &RingFlank, center: &ToothCenter) -> Self {
+        let force_ratio = force_ratio(sense, flank, center);
         match compatibility {
             Compatibility::VirtualWork => Self(force_ratio),
             // The paper's cos(γ + sβ) and s sin γ. With tan β = k tan γ the first, times F_K/F_H = cos γ/cos β, is 1 - (1 + sk) sin²γ.
             Compatibility::Projection => {
                 let t = center.tan_pressure_angle;
                 let sin_squared = t * t / (1.0 + t * t);
-                let sense = drive.sense();
-                let along_ring = 1.0 - (1.0 + sense * drive.flank().teeth_per_wave()) * sin_squared;
+                let along_ring = 1.0 - (1.0 + sense * flank.teeth_per_wave()) * sin_squared;
                 Self(PerContact {
                     wave_generator: 1.0,
                     ring: along_ring / force_ratio.ring,
@@ -124,15 +130,15 @@ impl Weights {
     }
 }
 
-/// Forces over `F_H`: 1, `F_K/F_H = cos γ/cos β`, `F_S/F_H = sin γ Z_G/U` \[1\].
-fn force_ratio(drive: &Drive, center: &ToothCenter) -> PerContact<f64> {
+/// Forces over `F_H`: 1, `F_K/F_H = cos γ/cos β`, `F_S/F_H = sin γ Z_G/U` \[1\], where `Z_G/U = k + s`.
+fn force_ratio(sense: f64, flank: &RingFlank, center: &ToothCenter) -> PerContact<f64> {
     let t = center.tan_pressure_angle;
-    let tan_ring = drive.flank().teeth_per_wave() * t;
+    let tan_ring = flank.teeth_per_wave() * t;
     let cos_cam = 1.0 / (1.0 + t * t).sqrt();
     PerContact {
         wave_generator: 1.0,
         ring: (1.0 + tan_ring * tan_ring).sqrt() * cos_cam,
-        carrier: t * cos_cam * drive.teeth_per_wave(),
+        carrier: t * cos_cam * (flank.teeth_per_wave() + sense),
     }
 }
 
@@ -269,8 +275,8 @@ impl<'a> LoadedDrive<'a> {
         let flank_curve = self.drive.flank();
         let flank = flank_curve.at(&center);
         let r = self.drive.parameters().tooth_radius_mm;
-        let force_ratio = force_ratio(self.drive, &center);
-        let weights = Weights::of(self.compatibility, self.drive, &center).0;
+        let force_ratio = force_ratio(self.drive.sense(), flank_curve, &center);
+        let weights = Weights::of(self.compatibility, self.drive.sense(), flank_curve, &center).0;
         let cam = flank_curve.locus().cam();
         let curvature_per_mm = PerContact {
             wave_generator: 1.0 / r + 1.0 / cam.curvature_radius_mm(&center.cam_contact),

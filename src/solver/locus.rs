@@ -1,5 +1,7 @@
 //! A tooth's centre over its position ψ (docs/theory.md section 2).
 
+use std::f64::consts::{FRAC_PI_2, PI};
+
 use crate::cam::{Cam, CamContact};
 use crate::position::Position;
 use crate::root::{NotConverged, ValueAndSlope, bracketed, newton_in_bracket};
@@ -64,6 +66,17 @@ impl Locus {
         let normal_sin = sin * (a * a + r * support_mm);
         let length = normal_cos.hypot(normal_sin);
         Ok(self.center(position, normal_cos / length, normal_sin / length))
+    }
+
+    /// `d` at any angle from the major axis.
+    pub(crate) fn center_radius_at_mm(&self, angle_rad: f64) -> Result<f64, NotConverged> {
+        let folded = angle_rad.rem_euclid(PI);
+        let position = if folded > 0.5 * FRAC_PI_2 && folded < 1.5 * FRAC_PI_2 {
+            Position::from_minor((folded - FRAC_PI_2).abs())
+        } else {
+            Position::from_major(folded.min(PI - folded))
+        };
+        Ok(self.at(position)?.center_radius_mm)
     }
 
     fn center(&self, position: Position, normal_cos: f64, normal_sin: f64) -> ToothCenter {

@@ -6,9 +6,11 @@
 
 use std::f64::consts::PI;
 
+use crate::cam::Cam;
 use crate::contact::Part;
-use crate::drive::{Drive, DriveError};
+use crate::drive::{Draft, Drive};
 use crate::ring::RingTooth;
+use crate::root::NotConverged;
 use crate::violation::{Misfit, Parameter, Violation};
 
 /// What the mechanics leave free. A radius that is `None` takes its default.
@@ -41,24 +43,99 @@ pub const CARRIER_PLAY: f64 = 0.1;
 const MM_PER_UM: f64 = 1e-3;
 
 impl PartsParameters {
-    /// The values of a part that are out of their ranges.
-    pub fn violations(&self, part: Part) -> Vec<Violation> {
-        let (clearance_um, radii) = match part {
-            Part::WaveGenerator => {
-                (self.wave_generator_clearance_um, vec![(Parameter::BoreRadius, self.bore_radius_mm)])
-            }
-            Part::Teeth => (self.teeth_clearance_um, vec![]),
-            Part::Ring => (self.ring_clearance_um, vec![(Parameter::RingOuterRadius, self.ring_outer_radius_mm)]),
-            Part::Carrier => (
-                self.carrier_clearance_um,
-                vec![
-                    (Parameter::CarrierInnerRadius, self.carrier_inner_radius_mm),
-                    (Parameter::CarrierOuterRadius, self.carrier_outer_radius_mm),
-                ],
-            ),
-        };
-        let radii = radii.into_iter().filter_map(|(parameter, radius_mm)| parameter.check(radius_mm?));
-        Parameter::PartClearance(part).check(clearance_um).into_iter().chain(radii).collect()
+    /// Every reason why a part cannot be made: values out of their ranges, and whatever does not fit among those of part and drive
+    /// that are possible.
+    pub fn violations(&self, part: Part, draft: &Draft) -> Vec<Violation> {
+        let mut checks = Checks(Vec::new());
+        match part {
+            Part::Ring => self.check_ring(draft, &mut checks),
+            Part::Carrier => self.check_carrier(draft, &mut checks),
+            Part::Teeth => self.check_teeth(draft, &mut checks),
+            Part::WaveGenerator => self.check_wave_generator(draft, &mut checks),
+        }
+        checks.0
+    }
+
+    fn check_ring(&self, draft: &Draft, checks: &mut Checks) {
+        let clearance_mm = checks.clearance_mm(Part::Ring, self.ring_clearance_um);
+        let outer_mm = checks.radius_mm(Parameter::RingOuterRadius, self.ring_outer_radius_mm, None);
+        if let (Some(outer_mm), Some(clearance_mm)) = (outer_mm, clearance_mm)
+            && let (Some(a), Some(r)) = (draft.semi_major_mm, draft.tooth_radius_mm)
+        {
+            checks.above(Misfit::RingWithoutRim, outer_mm, a + (r + (r + clearance_mm)));
+        }
+    }
+
+    fn check_wave_generator(&self, draft: &Draft, checks: &mut Checks) {
+        let clearance_mm = checks.clearance_mm(Part::WaveGenerator, self.wave_generator_clearance_um);
+        let bore_mm = checks.radius_mm(Parameter::BoreRadius, self.bore_radius_mm, None);
+        let Some(clearance_mm) = clearance_mm else { return };
+        if let Some(cam) = draft.cam {
+            // Set back by its least radius of curvature, at the major axis, the cam would get a cusp there.
+            let (a, b) = (cam.semi_major_mm(), cam.semi_minor_mm());
+            checks.below(Misfit::ClearanceTakesCam, self.wave_generator_clearance_um, b * (b / a) / MM_PER_UM);
+        }
+        // Where the clearance takes all of the cam, no bore is small enough.
+        let cam_mm = draft.semi_minor_mm.map(|b| b - clearance_mm).filter(|&cam_mm| cam_mm > 0.0);
+        if let (Some(bore_mm), Some(cam_mm)) = (bore_mm, cam_mm) {
+            checks.below(Misfit::BoreTakesCam, bore_mm, cam_mm);
+        }
+    }
+
+    fn check_carrier(&self, draft: &Draft, checks: &mut Checks) {
+        let annulus = draft.ring.and_then(|ring| Annulus::between(ring.flank.locus().cam(), ring.tip_radius_mm));
+        let clearance_mm = checks.clearance_mm(Part::Carrier, self.carrier_clearance_um);
+        let inner_mm = annulus.map(|annulus| annulus.carrier_inner_mm());
+        let inner_mm = checks.radius_mm(Parameter::CarrierInnerRadius, self.carrier_inner_radius_mm, inner_mm);
+        let outer_mm = annulus.map(|annulus| annulus.carrier_outer_mm());
+        let outer_mm = checks.radius_mm(Parameter::CarrierOuterRadius, self.carrier_outer_radius_mm, outer_mm);
+        if let (Some(inner_mm), Some(a)) = (inner_mm, draft.semi_major_mm) {
+            checks.above(Misfit::CarrierMeetsCam, inner_mm, a);
+        }
+        let Some(outer_mm) = outer_mm else { return };
+        if let Some(annulus) = annulus {
+            checks.below(Misfit::CarrierMeetsRing, outer_mm, annulus.outer_mm);
+        }
+        if let Some(inner_mm) = inner_mm {
+            checks.above(Misfit::CarrierWithoutWall, outer_mm, inner_mm);
+        }
+        if let (Some(clearance_mm), Some(r), Some(installed)) = (clearance_mm, draft.tooth_radius_mm, draft.installed) {
+            checks.above(Misfit::SlotsTakeCarrier, outer_mm, (r + clearance_mm) / (PI / installed as f64).sin());
+        }
+    }
+
+    fn check_teeth(&self, draft: &Draft, checks: &mut Checks) {
+        let clearance_mm = checks.clearance_mm(Part::Teeth, self.teeth_clearance_um);
+        if let (Some(_), Some(r)) = (clearance_mm, draft.tooth_radius_mm) {
+            checks.below(Misfit::ClearanceTakesTooth, self.teeth_clearance_um, r / MM_PER_UM);
+        }
+    }
+}
+
+/// What is left for the carrier between cam and ring tips.
+#[derive(Debug, Clone, Copy)]
+struct Annulus {
+    inner_mm: f64,
+    outer_mm: f64,
+}
+
+impl Annulus {
+    /// The annulus, where there is one.
+    fn between(cam: &Cam, tip_radius_mm: f64) -> Option<Self> {
+        let annulus = Self { inner_mm: cam.semi_major_mm(), outer_mm: tip_radius_mm };
+        (annulus.inner_mm < annulus.outer_mm).then_some(annulus)
+    }
+
+    fn play_mm(&self) -> f64 {
+        CARRIER_PLAY * (self.outer_mm - self.inner_mm)
+    }
+
+    fn carrier_inner_mm(&self) -> f64 {
+        self.inner_mm + self.play_mm()
+    }
+
+    fn carrier_outer_mm(&self) -> f64 {
+        self.outer_mm - self.play_mm()
     }
 }
 
@@ -90,91 +167,61 @@ pub struct ToothPart {
     pub(crate) radius_mm: f64,
 }
 
+// The parts of [`PartsParameters`] that have no violation for the drive.
+
 impl RingPart {
-    /// Checks the ring's parameters.
-    ///
-    /// # Errors
-    /// Every reason why it cannot be made.
-    pub fn new(drive: &Drive, parameters: &PartsParameters) -> Result<Self, DriveError> {
-        let mut checks = Checks::new(parameters, Part::Ring)?;
-        let clearance_mm = MM_PER_UM * parameters.ring_clearance_um;
-        let flank = drive.flank().set_back_by(clearance_mm);
-        let root_radius_mm = flank.root_radius_mm();
-        let outer_radius_mm = parameters.ring_outer_radius_mm.unwrap_or(RIM * root_radius_mm);
-        checks.above(Misfit::RingWithoutRim, outer_radius_mm, root_radius_mm);
-        checks.finish()?;
-        let tooth = RingTooth::new(flank, drive.parameters().tip_radius_mm)?;
-        Ok(Self { tooth, outer_radius_mm })
+    pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Result<Self, NotConverged> {
+        let flank = drive.flank().set_back_by(MM_PER_UM * parameters.ring_clearance_um);
+        let outer_radius_mm = parameters.ring_outer_radius_mm.unwrap_or(RIM * flank.root_radius_mm());
+        Ok(Self { tooth: RingTooth::new(flank, drive.parameters().tip_radius_mm)?, outer_radius_mm })
     }
 }
 
 impl WaveGeneratorPart {
-    /// Checks the wave generator's parameters.
-    ///
-    /// # Errors
-    /// Every reason why it cannot be made.
-    pub fn new(drive: &Drive, parameters: &PartsParameters) -> Result<Self, DriveError> {
-        let mut checks = Checks::new(parameters, Part::WaveGenerator)?;
+    pub(crate) fn new(parameters: &PartsParameters) -> Self {
         let clearance_mm = MM_PER_UM * parameters.wave_generator_clearance_um;
-        let (a, b) = (drive.parameters().semi_major_mm, drive.parameters().semi_minor_mm);
-        // Set back by its least radius of curvature, at the major axis, the cam would get a cusp there.
-        checks.below(Misfit::ClearanceTakesCam, parameters.wave_generator_clearance_um, b * (b / a) / MM_PER_UM);
-        if let Some(bore_radius_mm) = parameters.bore_radius_mm {
-            checks.below(Misfit::BoreTakesCam, bore_radius_mm, b - clearance_mm);
-        }
-        checks.finish()?;
-        Ok(Self { clearance_mm, bore_radius_mm: parameters.bore_radius_mm })
+        Self { clearance_mm, bore_radius_mm: parameters.bore_radius_mm }
     }
 }
 
 impl CarrierPart {
-    /// Checks the carrier's parameters.
-    ///
-    /// # Errors
-    /// Every reason why it cannot be made.
-    pub fn new(drive: &Drive, parameters: &PartsParameters) -> Result<Self, DriveError> {
+    pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Self {
         let p = drive.parameters();
-        let mut checks = Checks::new(parameters, Part::Carrier)?;
-        let clearance_mm = MM_PER_UM * parameters.carrier_clearance_um;
-        let tip_radius_mm = drive.tip_radius_mm();
-        let play_mm = CARRIER_PLAY * (tip_radius_mm - p.semi_major_mm);
-        let inner_radius_mm = parameters.carrier_inner_radius_mm.unwrap_or(p.semi_major_mm + play_mm);
-        let outer_radius_mm = parameters.carrier_outer_radius_mm.unwrap_or(tip_radius_mm - play_mm);
-        checks.above(Misfit::CarrierMeetsCam, inner_radius_mm, p.semi_major_mm);
-        checks.below(Misfit::CarrierMeetsRing, outer_radius_mm, tip_radius_mm);
-        checks.above(Misfit::CarrierWithoutWall, outer_radius_mm, inner_radius_mm);
-        let slot_half_width_mm = p.tooth_radius_mm + clearance_mm;
-        let slots_meet_mm = slot_half_width_mm / (PI / p.installed as f64).sin();
-        checks.above(Misfit::SlotsTakeCarrier, outer_radius_mm, slots_meet_mm);
-        checks.finish()?;
-        Ok(Self { inner_radius_mm, outer_radius_mm, slot_half_width_mm })
+        let annulus = Annulus { inner_mm: p.semi_major_mm, outer_mm: drive.tip_radius_mm() };
+        Self {
+            inner_radius_mm: parameters.carrier_inner_radius_mm.unwrap_or(annulus.carrier_inner_mm()),
+            outer_radius_mm: parameters.carrier_outer_radius_mm.unwrap_or(annulus.carrier_outer_mm()),
+            slot_half_width_mm: p.tooth_radius_mm + MM_PER_UM * parameters.carrier_clearance_um,
+        }
     }
 }
 
 impl ToothPart {
-    /// Checks the tooth's clearance.
-    ///
-    /// # Errors
-    /// Why it cannot be made.
-    pub fn new(drive: &Drive, parameters: &PartsParameters) -> Result<Self, DriveError> {
-        let radius_mm = drive.parameters().tooth_radius_mm;
-        let mut checks = Checks::new(parameters, Part::Teeth)?;
-        let clearance_mm = MM_PER_UM * parameters.teeth_clearance_um;
-        checks.below(Misfit::ClearanceTakesTooth, parameters.teeth_clearance_um, radius_mm / MM_PER_UM);
-        checks.finish()?;
-        Ok(Self { radius_mm: radius_mm - clearance_mm })
+    pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Self {
+        Self { radius_mm: drive.parameters().tooth_radius_mm - MM_PER_UM * parameters.teeth_clearance_um }
     }
 }
 
-/// What does not fit, as it is found, once the values themselves are in their ranges.
-#[derive(Debug)]
+/// What is wrong, as it is found.
 struct Checks(Vec<Violation>);
 
 impl Checks {
-    fn new(parameters: &PartsParameters, part: Part) -> Result<Self, DriveError> {
-        let mut checks = Self(parameters.violations(part));
-        checks.finish()?;
-        Ok(checks)
+    /// The value, where it is in its range.
+    fn in_range(&mut self, parameter: Parameter, value: f64) -> Option<f64> {
+        let violation = parameter.check(value);
+        self.0.extend(violation);
+        violation.is_none().then_some(value)
+    }
+
+    fn clearance_mm(&mut self, part: Part, clearance_um: f64) -> Option<f64> {
+        Some(MM_PER_UM * self.in_range(Parameter::PartClearance(part), clearance_um)?)
+    }
+
+    fn radius_mm(&mut self, parameter: Parameter, given_mm: Option<f64>, default_mm: Option<f64>) -> Option<f64> {
+        match given_mm {
+            Some(given_mm) => self.in_range(parameter, given_mm),
+            None => default_mm,
+        }
     }
 
     fn above(&mut self, misfit: Misfit, value: f64, limit: f64) {
@@ -189,9 +236,5 @@ impl Checks {
         if !holds {
             self.0.push(Violation::PartDoesNotFit { misfit, value, limit });
         }
-    }
-
-    fn finish(&mut self) -> Result<(), DriveError> {
-        if self.0.is_empty() { Ok(()) } else { Err(DriveError::Impossible(std::mem::take(&mut self.0))) }
     }
 }

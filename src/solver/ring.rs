@@ -85,6 +85,18 @@ impl RingTooth {
         };
         Ok(Self { limit, tip_radius_mm, ..unbored })
     }
+
+    /// The engaged tooth with the largest pressure angles: at the steepest place of the path, or where the flank ends
+    /// before it.
+    pub(crate) fn steepest_engaged(&self) -> Result<ToothCenter, NotConverged> {
+        let locus = self.flank.locus();
+        let steepest = locus.steepest()?;
+        if steepest.position.from_minor_rad >= self.limit.position.from_minor_rad {
+            Ok(steepest)
+        } else {
+            locus.at(self.limit.position)
+        }
+    }
 }
 
 impl RingFlank {

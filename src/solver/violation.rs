@@ -126,6 +126,50 @@ impl Parameter {
     }
 }
 
+/// The possible numbers of teeth on either side of one that is impossible.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Alternatives {
+    /// The largest below.
+    pub below: Option<i64>,
+    /// The least above.
+    pub above: Option<i64>,
+}
+
+impl Alternatives {
+    /// To an odd number of teeth.
+    pub(crate) const fn to_odd(count: i64) -> Self {
+        // A range of counts begins and ends with an even number.
+        Self { below: Some(count - 1), above: Some(count + 1) }
+    }
+
+    /// To a number of installed teeth that does not divide `teeth` or is odd: even divisors. `teeth` are even.
+    pub(crate) fn to_installed(installed: i64, teeth: i64) -> Self {
+        let is_even_divisor = |other: &i64| other % 2 == 0 && teeth % other == 0;
+        Self { below: (2..installed).rev().find(is_even_divisor), above: (installed + 1..=teeth).find(is_even_divisor) }
+    }
+
+    /// To a ring that does not differ from `teeth` by two.
+    pub(crate) fn to_ring_beside(teeth: i64) -> Self {
+        let in_range = |ring: i64| Parameter::RingTeeth.check(ring as f64).is_none().then_some(ring);
+        Self { below: in_range(teeth - 2), above: in_range(teeth + 2) }
+    }
+
+    /// The nearer one, of two as near the lower. There is always one.
+    pub fn nearest_to(&self, count: i64) -> i64 {
+        let nearest = [self.below, self.above].into_iter().flatten().min_by_key(|other| (other - count).abs());
+        nearest.unwrap_or(count)
+    }
+}
+
+impl std::fmt::Display for Alternatives {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match (self.below, self.above) {
+            (Some(below), Some(above)) => write!(f, "{below} or {above}"),
+            (below, above) => below.or(above).map_or(Ok(()), |only| write!(f, "{only}")),
+        }
+    }
+}
+
 /// A reason why a drive, a load or a request cannot exist. Its text says what to change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Violation {
@@ -151,11 +195,22 @@ pub enum Violation {
         teeth: i64,
         /// `Z_K`.
         ring_teeth: i64,
+        /// What `Z_K` could be.
+        instead: Alternatives,
+    },
+    /// `Z_G` odd, so that no even `Z'_G` divides it.
+    CountOdd {
+        /// `Z_G`.
+        teeth: i64,
+        /// What it could be.
+        instead: Alternatives,
     },
     /// `Z'_G` odd.
     InstalledOdd {
         /// `Z'_G`.
         installed: i64,
+        /// What it could be.
+        instead: Alternatives,
     },
     /// `Z'_G` no divisor of `Z_G`.
     InstalledNoDivisor {
@@ -163,6 +218,8 @@ pub enum Violation {
         installed: i64,
         /// `Z_G`.
         teeth: i64,
+        /// What `Z'_G` could be.
+        instead: Alternatives,
     },
     /// Neighbouring installed teeth touch somewhere on their path.
     TeethTouch {
@@ -170,6 +227,8 @@ pub enum Violation {
         tooth_diameter_mm: f64,
         /// Least distance of two neighbouring centres.
         center_distance_mm: f64,
+        /// The radius at which teeth begin to touch: that of thinner ones, whose path lies farther in.
+        touching_radius_mm: f64,
     },
     /// The ring's tips reach in to the wave generator: no annulus is left for the carrier.
     NoCarrierAnnulus {
@@ -258,23 +317,25 @@ impl std::fmt::Display for Violation {
                 f,
                 "the semi-major axis ({semi_major_mm:?} mm) must exceed the semi-minor axis ({semi_minor_mm:?} mm): a round cam moves no tooth"
             ),
-            Self::ToothDifference { teeth, ring_teeth } => write!(
+            Self::ToothDifference { teeth, ring_teeth, instead } => write!(
                 f,
-                "carrier and ring must differ by 2 teeth, one for each lobe of the ellipse: with {teeth} teeth the ring has {} or {}, not {ring_teeth}",
-                teeth - 2,
-                teeth + 2
+                "carrier and ring must differ by 2 teeth, one for each lobe of the ellipse: with {teeth} teeth the ring has {instead}, not {ring_teeth}"
             ),
-            Self::InstalledOdd { installed } => write!(
+            Self::CountOdd { teeth, instead } => write!(
                 f,
-                "{installed} installed teeth are odd: the two meshing zones are alike only for an even number"
+                "{teeth} teeth are odd: the two meshing zones are alike only for an even number of installed teeth, and none divides {teeth}; choose {instead}"
             ),
-            Self::InstalledNoDivisor { installed, teeth } => write!(
+            Self::InstalledOdd { installed, instead } => write!(
                 f,
-                "{installed} installed teeth do not divide {teeth}: teeth are removed evenly, every m-th slot keeps its tooth"
+                "{installed} installed teeth are odd: the two meshing zones are alike only for an even number; choose {instead}"
             ),
-            Self::TeethTouch { tooth_diameter_mm, center_distance_mm } => write!(
+            Self::InstalledNoDivisor { installed, teeth, instead } => write!(
                 f,
-                "neighbouring teeth of {tooth_diameter_mm:?} mm diameter come as near as {center_distance_mm:?} mm from centre to centre: make the teeth thinner, install fewer, or enlarge the wave generator"
+                "{installed} installed teeth do not divide {teeth}: teeth are removed evenly, every m-th slot keeps its tooth; choose {instead}"
+            ),
+            Self::TeethTouch { tooth_diameter_mm, center_distance_mm, touching_radius_mm } => write!(
+                f,
+                "neighbouring teeth of {tooth_diameter_mm:?} mm diameter come as near as {center_distance_mm:?} mm from centre to centre: choose a radius below {touching_radius_mm:?} mm, install fewer, or enlarge the wave generator"
             ),
             Self::NoCarrierAnnulus { semi_major_mm, tip_radius_mm } => write!(
                 f,

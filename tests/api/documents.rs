@@ -211,8 +211,9 @@ async fn a_typo_is_never_a_silent_default() {
 async fn stiffnesses_are_unknown_to_the_linear_law() {
     for law in [json!({ "law": "linear", "ring_n_per_mm": 5e5 }), json!({ "ring_n_per_mm": 5e5 })] {
         let document = with(&spelled_out(), "/model/stiffness", law);
-        let (at, code, _) = Service::new().post("/v1/sweep", &document).await.faulty_field();
+        let (at, code, detail) = Service::new().post("/v1/sweep", &document).await.faulty_field();
         assert_eq!((at.as_str(), code.as_str()), ("/model/stiffness/ring_n_per_mm", "unknown_field"));
+        assert!(detail.ends_with("it knows `law`, by default `linear`; stiffnesses belong to `fixed`"), "{detail}");
     }
 }
 
@@ -466,6 +467,17 @@ async fn a_body_that_is_no_json_is_refused_as_such() {
             let problem = service.post_text(path, text.clone()).await.refused(400, "malformed_json");
             assert!(problem.get("errors").is_none(), "{problem}");
         }
+    }
+}
+
+#[tokio::test]
+async fn a_byte_order_mark_before_the_document_is_ignored() {
+    let (service, document) = (Service::new(), spelled_out().to_string());
+    let plain = service.post_text("/v1/sweep", document.clone()).await;
+    let marked = service.post_text("/v1/sweep", format!("\u{feff}{document}")).await;
+    assert!(marked.status == 200 && marked.text() == plain.text());
+    for nothing in ["\u{feff}", "\u{feff}\u{feff}{}"] {
+        service.post_text("/v1/sweep", nothing).await.refused(400, "malformed_json");
     }
 }
 

@@ -315,7 +315,7 @@ async fn a_body_that_is_too_large_is_refused_even_where_nobody_announced_it() {
     };
     assert_eq!(service.send(request(1_000)).await.status, 200);
     let problem = service.send(request(1_001)).await.refused(413, "body_too_large");
-    assert!(problem["detail"].as_str().unwrap().contains("1000"), "{problem}");
+    assert_eq!(problem["detail"], "the body has more than the 1000 bytes of `max_body_bytes`");
 }
 
 #[tokio::test]

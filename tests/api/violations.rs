@@ -8,7 +8,11 @@ use crate::codes::{codes_of, field_codes, words};
 use crate::designs::{every_number, fixed, spelled_out, undercut, with, with_twice, without};
 
 async fn errors_at(path: &str, document: &Value) -> Vec<Value> {
-    let problem = Service::new().post(path, document).await.refused(422, "impossible_design");
+    errors_of(&Service::new(), path, document).await
+}
+
+async fn errors_of(service: &Service, path: &str, document: &Value) -> Vec<Value> {
+    let problem = service.post(path, document).await.refused(422, "impossible_design");
     problem["errors"].as_array().unwrap().clone()
 }
 
@@ -58,39 +62,72 @@ async fn ring_and_carrier_differ_by_two_teeth() {
 }
 
 #[tokio::test]
-async fn installed_teeth_are_even() {
-    assert_impossible(&[(INSTALLED, json!(7))], "installed_odd", INSTALLED, 7.0, 8.0).await;
+async fn a_ring_beside_the_least_and_the_most_teeth_has_the_number_that_is_in_range() {
+    for (count, ring, nearest) in [(2, 2, 4.0), (10_000, 10_000, 9_998.0)] {
+        let changes = [(COUNT, json!(count)), (INSTALLED, json!(2)), (RING_TEETH, json!(ring)), (RADIUS, json!(4.9))];
+        let value = f64::from(ring);
+        assert_impossible(&changes, "tooth_difference", RING_TEETH, value, nearest).await;
+    }
 }
 
 #[tokio::test]
-async fn an_odd_count_that_is_installed_in_full_is_refused_as_installed_odd() {
-    assert_impossible(
-        &[(COUNT, json!(27)), (INSTALLED, json!(27)), (RING_TEETH, json!(25))],
-        "installed_odd",
-        INSTALLED,
-        27.0,
-        28.0,
-    )
-    .await;
+async fn installed_teeth_are_even_and_the_nearest_divisor_of_their_count_is_told() {
+    assert_impossible(&[(INSTALLED, json!(7))], "installed_odd", INSTALLED, 7.0, 4.0).await;
+    let document = with(&spelled_out(), INSTALLED, json!(7));
+    let errors = errors_at("/v1/sweep", &document).await;
+    assert!(errors[0]["detail"].as_str().unwrap().ends_with("choose 4 or 14"), "{errors:?}");
+}
+
+#[tokio::test]
+async fn a_count_of_teeth_is_even() {
+    let odd = with(&with(&spelled_out(), COUNT, json!(27)), RING_TEETH, json!(25));
+    for path in ENDPOINTS {
+        // Both numbers are impossible where both stand there.
+        let errors = errors_at(path, &with(&odd, INSTALLED, json!(27))).await;
+        assert_eq!(codes_of(&errors), ["count_odd", "installed_odd"]);
+        let errors = errors_at(path, &without(&odd, INSTALLED)).await;
+        let [error] = errors.as_slice() else { panic!("{errors:?}") };
+        assert_eq!((&error["code"], &error["pointer"]), (&json!("count_odd"), &json!(COUNT)));
+        assert_eq!((&error["value"], &error["limit"]), (&json!(27.0), &json!(26.0)));
+        assert!(error["detail"].as_str().unwrap().ends_with("choose 26 or 28"), "{error}");
+    }
+}
+
+#[tokio::test]
+async fn no_fault_is_reported_at_a_field_that_is_left_out() {
+    for (count, ring) in [(27, 25), (20_000, 19_998), (1, 3), (-4, -2)] {
+        let document = with(&with(&spelled_out(), COUNT, json!(count)), RING_TEETH, json!(ring));
+        for path in ENDPOINTS {
+            let errors = errors_at(path, &without(&document, INSTALLED)).await;
+            assert!(errors.iter().any(|error| error["pointer"] == COUNT), "{errors:?}");
+            assert!(!errors.iter().any(|error| error["pointer"] == INSTALLED), "{errors:?}");
+        }
+    }
 }
 
 #[tokio::test]
 async fn installed_teeth_divide_the_theoretical_ones() {
-    assert_impossible(&[(INSTALLED, json!(8))], "installed_no_divisor", INSTALLED, 8.0, 28.0).await;
-    assert_impossible(&[(INSTALLED, json!(56))], "installed_no_divisor", INSTALLED, 56.0, 28.0).await;
+    for (installed, nearest) in [(8, 4.0), (10, 14.0), (56, 28.0)] {
+        let value = f64::from(installed);
+        let changes = [(INSTALLED, json!(installed)), (RADIUS, json!(3.0))];
+        assert_impossible(&changes, "installed_no_divisor", INSTALLED, value, nearest).await;
+    }
+    let errors = errors_at("/v1/sweep", &with(&spelled_out(), INSTALLED, json!(8))).await;
+    assert!(errors[0]["detail"].as_str().unwrap().ends_with("choose 4 or 14"), "{errors:?}");
 }
 
 #[tokio::test]
 async fn neighbouring_teeth_do_not_touch() {
-    // b + r = 63 mm at the minor axis: the pair there is 14.1 mm apart, and nowhere nearer.
-    let nearest = 2.0 * 63.2 * (std::f64::consts::PI / 28.0).sin();
+    // The cam is next to round: teeth touch where (56 mm + r) sin(π/28) = r.
+    let sin = (std::f64::consts::PI / 28.0).sin();
+    let largest = 56.0 * sin / (1.0 - sin);
     let document = with(&with(&spelled_out(), RADIUS, json!(7.2)), SEMI_MAJOR, json!(56.000_001));
     let errors = errors_at("/v1/coincidence-degree", &document).await;
     assert_eq!(errors.len(), 1, "{errors:?}");
     assert_eq!((&errors[0]["code"], &errors[0]["pointer"]), (&json!("teeth_touch"), &json!(RADIUS)));
     assert_eq!(errors[0]["value"], 7.2);
-    assert!((errors[0]["limit"].as_f64().unwrap() - 0.5 * nearest).abs() < 1e-5, "{errors:?}");
-    let thinner = with(&document, RADIUS, json!(7.0));
+    assert!((errors[0]["limit"].as_f64().unwrap() - largest).abs() < 1e-6, "{errors:?}");
+    let thinner = with(&document, RADIUS, json!(errors[0]["limit"].as_f64().unwrap() * (1.0 - 1e-12)));
     assert_eq!(Service::new().post("/v1/coincidence-degree", &thinner).await.status, 200);
 }
 
@@ -181,6 +218,161 @@ async fn values_that_do_not_fit_each_other_are_reported_at_once_and_beside_value
     ];
     assert_eq!(codes_of(&errors), expected);
     assert_eq!(errors.len(), 9, "{errors:?}");
+}
+
+/// A fault of case 5.1: the changes that make it, what it is reported as, and what else it follows from.
+struct SingleFault {
+    changes: &'static [(&'static str, f64)],
+    code: &'static str,
+    pointer: &'static str,
+    needs: &'static [&'static str],
+}
+
+const fn single(
+    changes: &'static [(&'static str, f64)],
+    code: &'static str,
+    pointer: &'static str,
+    needs: &'static [&'static str],
+) -> SingleFault {
+    SingleFault { changes, code, pointer, needs }
+}
+
+impl SingleFault {
+    fn reads(&self, field: &str) -> bool {
+        self.needs.contains(&field) || self.changes.iter().any(|(changed, _)| *changed == field)
+    }
+
+    fn is_disjoint_from(&self, other: &Self) -> bool {
+        !self.changes.iter().any(|(field, _)| other.reads(field)) && !self.needs.iter().any(|field| other.reads(field))
+    }
+
+    fn is_among(&self, errors: &[Value]) -> bool {
+        errors.iter().any(|error| error["code"] == self.code && error["pointer"] == self.pointer)
+    }
+}
+
+const GAP_AT_CARRIER: &str = "/model/clearance/carrier_um";
+const RING_OUTER: &str = "/parts/ring/outer_radius_mm";
+const RING_CLEARANCE: &str = "/parts/ring/clearance_um";
+const CARRIER_INNER: &str = "/parts/carrier/inner_radius_mm";
+const CARRIER_OUTER: &str = "/parts/carrier/outer_radius_mm";
+const CARRIER_CLEARANCE: &str = "/parts/carrier/clearance_um";
+const BORE: &str = "/parts/wave_generator/bore_radius_mm";
+const CAM_CLEARANCE: &str = "/parts/wave_generator/clearance_um";
+const TEETH_CLEARANCE: &str = "/parts/teeth/clearance_um";
+
+/// Every fault that the drive alone can have, by the least that it follows from.
+const FAULTS_OF_DRIVE: [SingleFault; 16] = [
+    single(&[(SEMI_MAJOR, 2e6)], "out_of_range", SEMI_MAJOR, &[]),
+    single(&[(SEMI_MINOR, -1.0)], "out_of_range", SEMI_MINOR, &[]),
+    single(&[(COUNT, 20_000.0)], "out_of_range", COUNT, &[]),
+    single(&[(INSTALLED, 0.0)], "out_of_range", INSTALLED, &[]),
+    single(&[(RADIUS, 0.0)], "out_of_range", RADIUS, &[]),
+    single(&[(WIDTH, 0.0)], "out_of_range", WIDTH, &[]),
+    single(&[(RING_TEETH, 1.0)], "out_of_range", RING_TEETH, &[]),
+    single(&[(TIP_RADIUS, -1.0)], "out_of_range", TIP_RADIUS, &[]),
+    single(&[(SEMI_MINOR, 58.0)], "cam_not_elongated", SEMI_MAJOR, &[SEMI_MAJOR]),
+    single(&[(RING_TEETH, 32.0)], "tooth_difference", RING_TEETH, &[COUNT]),
+    single(&[(COUNT, 27.0)], "count_odd", COUNT, &[]),
+    single(&[(INSTALLED, 7.0)], "installed_odd", INSTALLED, &[]),
+    single(&[(INSTALLED, 10.0)], "installed_no_divisor", INSTALLED, &[COUNT]),
+    single(&[(TIP_RADIUS, 200.0)], "bore_leaves_no_flank", TIP_RADIUS, &[SEMI_MAJOR, RADIUS]),
+    single(&[(RADIUS, 9.0)], "teeth_touch", RADIUS, &[SEMI_MAJOR, SEMI_MINOR, INSTALLED]),
+    single(&[(RADIUS, 0.5)], "no_carrier_annulus", SEMI_MAJOR, &[SEMI_MAJOR, SEMI_MINOR, RING_TEETH, TIP_RADIUS]),
+];
+
+const FAULTS_OF_SWEEP: [SingleFault; 10] = [
+    single(
+        &[(RING_TEETH, 30.0), (GAP_AT_CARRIER, 10.0)],
+        "clearance_not_monotone",
+        GAP_AT_CARRIER,
+        &[SEMI_MAJOR, SEMI_MINOR, RADIUS, COUNT, TIP_RADIUS],
+    ),
+    single(&[("/load/input_torque_nm", 0.0)], "out_of_range", "/load/input_torque_nm", &[]),
+    single(&[("/load/allowable_stress_mpa", 0.0)], "out_of_range", "/load/allowable_stress_mpa", &[]),
+    single(&[("/materials/ring/poissons_ratio", 3.0)], "out_of_range", "/materials/ring/poissons_ratio", &[]),
+    single(&[("/materials/teeth/youngs_modulus_gpa", 0.0)], "out_of_range", "/materials/teeth/youngs_modulus_gpa", &[]),
+    single(&[("/model/clearance/ring_um", -1.0)], "out_of_range", "/model/clearance/ring_um", &[]),
+    single(&[("/model/clearance/wave_generator_um", 2e6)], "out_of_range", "/model/clearance/wave_generator_um", &[]),
+    single(&[(GAP_AT_CARRIER, -1.0)], "out_of_range", GAP_AT_CARRIER, &[]),
+    single(&[("/model/stiffness/ring_n_per_mm", 0.0)], "out_of_range", "/model/stiffness/ring_n_per_mm", &[]),
+    single(&[("/sweep/samples", 0.0)], "out_of_range", "/sweep/samples", &[]),
+];
+
+const FAULTS_OF_DRAWING: [SingleFault; 18] = [
+    single(&[(RING_OUTER, 68.0)], "ring_without_rim", RING_OUTER, &[SEMI_MAJOR, RADIUS, RING_CLEARANCE]),
+    single(&[(CARRIER_INNER, 58.0)], "carrier_meets_cam", CARRIER_INNER, &[SEMI_MAJOR]),
+    single(
+        &[(CARRIER_OUTER, 67.0)],
+        "carrier_meets_ring",
+        CARRIER_OUTER,
+        &[SEMI_MAJOR, SEMI_MINOR, RADIUS, RING_TEETH, TIP_RADIUS],
+    ),
+    single(&[(CARRIER_INNER, 64.0), (CARRIER_OUTER, 63.0)], "carrier_without_wall", CARRIER_OUTER, &[]),
+    single(
+        &[(CARRIER_INNER, 66.0)],
+        "carrier_without_wall",
+        CARRIER_OUTER,
+        &[SEMI_MAJOR, SEMI_MINOR, RADIUS, RING_TEETH, TIP_RADIUS, CARRIER_OUTER],
+    ),
+    single(
+        &[(CARRIER_CLEARANCE, 2400.0), (CARRIER_OUTER, 65.0)],
+        "slots_take_carrier",
+        CARRIER_OUTER,
+        &[RADIUS, INSTALLED],
+    ),
+    single(&[(BORE, 56.0)], "bore_takes_cam", BORE, &[SEMI_MINOR, CAM_CLEARANCE]),
+    single(&[(CAM_CLEARANCE, 54_069.0)], "clearance_takes_cam", CAM_CLEARANCE, &[SEMI_MAJOR, SEMI_MINOR]),
+    single(&[(TEETH_CLEARANCE, 5000.0)], "clearance_takes_tooth", TEETH_CLEARANCE, &[RADIUS]),
+    single(&[(RING_OUTER, 0.0)], "out_of_range", RING_OUTER, &[]),
+    single(&[(RING_CLEARANCE, -1.0)], "out_of_range", RING_CLEARANCE, &[]),
+    single(&[(CARRIER_INNER, 0.0)], "out_of_range", CARRIER_INNER, &[]),
+    single(&[(CARRIER_OUTER, 2e6)], "out_of_range", CARRIER_OUTER, &[]),
+    single(&[(CARRIER_CLEARANCE, -1.0)], "out_of_range", CARRIER_CLEARANCE, &[]),
+    single(&[(BORE, 0.0)], "out_of_range", BORE, &[]),
+    single(&[(TEETH_CLEARANCE, -1.0)], "out_of_range", TEETH_CLEARANCE, &[]),
+    single(&[("/assembly/input_angle_deg", 1e8)], "out_of_range", "/assembly/input_angle_deg", &[]),
+    single(&[("/profile/chord_tolerance_mm", 0.0)], "out_of_range", "/profile/chord_tolerance_mm", &[]),
+];
+
+#[tokio::test]
+async fn no_fault_hides_another_that_follows_from_other_fields() {
+    let service = Service::new();
+    let base = with(&spelled_out(), "/model/stiffness", fixed(4e5, 5e5, 3e5));
+    let empty_parts = json!({ "ring": {}, "carrier": {}, "teeth": {}, "wave_generator": {} });
+    let base = [("/model/clearance", json!({})), ("/parts", empty_parts), ("/assembly", json!({}))]
+        .into_iter()
+        .fold(base, |document, (pointer, value)| with(&document, pointer, value));
+    let changed = |document: &Value, fault: &SingleFault| {
+        fault.changes.iter().fold(document.clone(), |document, (pointer, value)| with(&document, pointer, json!(value)))
+    };
+    for (path, faults) in [
+        ("/v1/sweep", FAULTS_OF_DRIVE.iter().chain(&FAULTS_OF_SWEEP).collect::<Vec<_>>()),
+        ("/v1/drawings/assembly", FAULTS_OF_DRIVE.iter().chain(&FAULTS_OF_DRAWING).collect()),
+    ] {
+        service.post(path, &base).await.found();
+        let mut pairs = 0;
+        for (index, one) in faults.iter().enumerate() {
+            let alone = errors_of(&service, path, &changed(&base, one)).await;
+            assert!(one.is_among(&alone), "no {} at {} in {alone:?}", one.code, one.pointer);
+            for other in faults[..index].iter().filter(|other| other.is_disjoint_from(one)) {
+                let errors = errors_of(&service, path, &changed(&changed(&base, one), other)).await;
+                for fault in [one, other] {
+                    let beside = if std::ptr::eq(fault, one) { other } else { one };
+                    assert!(
+                        fault.is_among(&errors),
+                        "{} at {} hides {} at {}: {errors:?}",
+                        beside.code,
+                        beside.pointer,
+                        fault.code,
+                        fault.pointer
+                    );
+                }
+                pairs += 1;
+            }
+        }
+        assert!(pairs > 200, "{pairs}");
+    }
 }
 
 #[tokio::test]
@@ -341,6 +533,7 @@ async fn profiles_larger_than_max_profile_points_are_refused_with_value_and_limi
             (Some(points as f64), Some((points - 1) as f64))
         );
         let detail = problem["detail"].as_str().unwrap();
+        assert!(detail.ends_with("widen the chord tolerance"), "{detail}");
         assert!(detail.contains(&points.to_string()) && detail.contains(&(points - 1).to_string()), "{detail}");
     }
 }
@@ -376,6 +569,7 @@ async fn every_kind_of_fault_of_a_field_can_be_met_over_http() {
         with(&document, RADIUS, json!(0.0)).to_string(),
         with(&document, SEMI_MINOR, json!(58.0)).to_string(),
         with(&document, RING_TEETH, json!(27)).to_string(),
+        with(&document, COUNT, json!(27)).to_string(),
         with(&document, INSTALLED, json!(7)).to_string(),
         with(&document, INSTALLED, json!(8)).to_string(),
         with(&document, RADIUS, json!(7.2)).to_string(),

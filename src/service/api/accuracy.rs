@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use axum::extract::{Request, State};
 use axum::response::Response;
 use serde::Serialize;
+use toothwave_solver::drive::Draft;
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::sweep::{ContactPeaks, Points, sweep};
 use toothwave_solver::{Compatibility, ContactLaw, Drive, LoadCase, LoadParameters, PerContact, SolveError};
@@ -143,9 +144,9 @@ impl Endpoint for Accuracy {
 
     fn question(&self, design: &Design, limits: &Limits) -> Result<AccuracyQuestion, Problem> {
         let mut violations = Vec::new();
-        let drive = checked_drive(design, &mut violations)?;
-        let load = checked_load(design, drive.as_ref(), &mut violations)?;
-        match (drive, load, design.requested_error()) {
+        let draft = checked_drive(design, &mut violations)?;
+        let load = checked_load(design, &draft, &mut violations)?;
+        match (draft.drive(), load, design.requested_error()) {
             (Some(drive), Some(load), Ok(requested_error)) if violations.is_empty() => {
                 Ok(AccuracyQuestion { drive, load, requested_error, max_states: limits.max_states })
             }
@@ -249,7 +250,7 @@ impl<'a> Model<'a> {
         stop: &AtomicBool,
     ) -> Result<Option<Self>, SolveError> {
         let Ok(load) = LoadCase::new(parameters) else { return Ok(None) };
-        if !load.clearance_violations(drive)?.is_empty() {
+        if !parameters.clearance_violations(&Draft::new(drive.parameters())?)?.is_empty() {
             return Ok(None);
         }
         let reference = converged(drive, &load, max_states, stop)?;

@@ -65,7 +65,7 @@ impl Endpoint for CoincidenceDegree {
 
     fn question(&self, design: &Design, _: &Limits) -> Result<Drive, Problem> {
         let mut violations = Vec::new();
-        checked_drive(design, &mut violations)?.ok_or_else(|| Problem::impossible(&violations))
+        checked_drive(design, &mut violations)?.drive().ok_or_else(|| Problem::impossible(&violations))
     }
 
     fn answer(drive: &Drive, _: &AtomicBool) -> Result<CoincidenceDegreeAnswer, Problem> {

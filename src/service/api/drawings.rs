@@ -9,11 +9,12 @@ use axum::response::{IntoResponse, Response};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use toothwave_solver::drawing::{self, Body, Edge, Outline, Placement, Subject};
-use toothwave_solver::{Drive, Part};
+use toothwave_solver::drive::{Draft, DriveError};
+use toothwave_solver::{Part, SolveError};
 use utoipa::ToSchema;
 
 use super::geometry::drive_findings;
-use super::{App, Endpoint, Form, Forms, Problems, checked_drive, respond};
+use super::{App, Endpoint, Form, Forms, Problems, respond};
 use crate::cache::Key;
 use crate::config::Limits;
 use crate::design::Design;
@@ -261,7 +262,6 @@ pub struct Drawing(pub DrawnPart);
 #[derive(Debug)]
 pub struct DrawingQuestion {
     drawing: drawing::Drawing,
-    drive: Drive,
     design_hash: String,
     subject: DrawnPart,
     chord_tolerance_mm: f64,
@@ -291,19 +291,14 @@ impl Endpoint for Drawing {
         let subject = self.0;
         let of_design = (&design.drive, &design.parts, design.profile.chord_tolerance_mm);
         let parameters = design.drawing_parameters(limits.max_profile_points);
-        let mut violations = Vec::new();
-        let drive = checked_drive(design, &mut violations)?;
-        let parts = design.parts_parameters();
-        let Some(drive) = drive else {
-            // The parts' own values can be judged without it.
-            violations.extend(parameters.violations(subject.subject()));
-            violations.extend(subject.subject().parts().iter().flat_map(|&part| parts.violations(part)));
-            return Err(Problem::impossible(&violations));
-        };
-        let drawing = drawing::Drawing::new(&drive, subject.subject(), &parts, &parameters)?;
+        let draft = Draft::new(&design.drive_parameters()).map_err(SolveError::from)?;
+        let drawing = drawing::Drawing::new(&draft, subject.subject(), &design.parts_parameters(), &parameters);
+        let drawing = drawing.map_err(|error| match error {
+            DriveError::Impossible(violations) => Problem::impossible(&design.as_written(&violations)),
+            error @ DriveError::NotConverged(_) => error.into(),
+        })?;
         Ok(DrawingQuestion {
             drawing,
-            drive,
             design_hash: Key::new("design", &of_design, Representation::JSON)?.to_string(),
             subject,
             chord_tolerance_mm: parameters.chord_tolerance_mm,
@@ -321,9 +316,9 @@ impl Endpoint for Drawing {
             input_angle_deg: question.input_angle_deg,
             bodies: bodies
                 .into_iter()
-                .map(|body| BodyAnswer::new(body, question.drive.parameters().tooth_width_mm))
+                .map(|body| BodyAnswer::new(body, question.drawing.drive().parameters().tooth_width_mm))
                 .collect(),
-            findings: drive_findings(&question.drive)?,
+            findings: drive_findings(question.drawing.drive())?,
         })
     }
 }

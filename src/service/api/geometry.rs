@@ -173,7 +173,7 @@ impl Endpoint for Geometry {
 
     fn question(&self, design: &Design, limits: &Limits) -> Result<Self::Question, Problem> {
         let mut violations = Vec::new();
-        let drive = checked_drive(design, &mut violations)?;
+        let drive = checked_drive(design, &mut violations)?.drive();
         let profile = design.profile_parameters(limits.max_profile_points);
         match (drive, profile) {
             (Some(drive), Ok(profile)) => Ok((drive, profile)),

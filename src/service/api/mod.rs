@@ -14,8 +14,8 @@ use axum::response::{IntoResponse, Response};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use serde::Serialize;
-use toothwave_solver::drive::DriveError;
-use toothwave_solver::{Drive, LoadCase, SolveError, Violation};
+use toothwave_solver::drive::Draft;
+use toothwave_solver::{LoadCase, SolveError, Violation};
 use utoipa::IntoResponses;
 
 use crate::cache::{Cache, Key, Provenance, Served, Spelling, Stored};
@@ -244,15 +244,13 @@ async fn read_body(
     deadline: tokio::time::Instant,
 ) -> Result<bytes::Bytes, Problem> {
     let limit = limits.max_body_bytes;
-    let too_large = |found: String| {
-        Problem::new(
-            ProblemCode::BodyTooLarge,
-            format!("the body has {found}, more than the {limit} bytes of `max_body_bytes`"),
-        )
+    let too_large = |length: &str| {
+        let detail = format!("the body has {length}more than the {limit} bytes of `max_body_bytes`");
+        Problem::new(ProblemCode::BodyTooLarge, detail)
     };
     let announced = headers.get(header::CONTENT_LENGTH).and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
     if let Some(length) = announced.filter(|&length| length > limit as u64) {
-        return Err(too_large(format!("{length} bytes")));
+        return Err(too_large(&format!("{length} bytes, ")));
     }
     let reading = axum::body::to_bytes(body, limit);
     let arrived = tokio::time::timeout_at(deadline, reading).await;
@@ -261,7 +259,7 @@ async fn read_body(
         Problem::new(ProblemCode::RequestTimeout, detail)
     })?;
     // What else can go wrong here is a client that left, which nobody is told of.
-    arrived.map_err(|_| too_large(format!("more than {limit} bytes")))
+    arrived.map_err(|_| too_large(""))
 }
 
 /// Solves and writes the final bytes, on a blocking thread.
@@ -382,40 +380,23 @@ fn require_finite<'a>(columns: impl IntoIterator<Item = &'a Vec<f64>>) -> Result
     }
 }
 
-/// The drive of a document; an impossible one adds its violations to the others.
+/// The drive of a document as far as it is possible; what is not adds its violations to the others.
 ///
 /// # Errors
 /// An internal problem where the geometry does not converge.
-fn checked_drive(design: &Design, violations: &mut Vec<Violation>) -> Result<Option<Drive>, Problem> {
-    match Drive::new(&design.drive_parameters()) {
-        Ok(drive) => Ok(Some(drive)),
-        Err(DriveError::Impossible(found)) => {
-            violations.extend(found.into_iter().map(|violation| design.as_written(violation)));
-            Ok(None)
-        }
-        Err(error @ DriveError::NotConverged(_)) => Err(error.into()),
-    }
+fn checked_drive(design: &Design, violations: &mut Vec<Violation>) -> Result<Draft, Problem> {
+    let draft = Draft::new(&design.drive_parameters()).map_err(SolveError::from)?;
+    violations.extend(design.as_written(draft.violations()));
+    Ok(draft)
 }
 
 /// The load of a document for a drive that was checked before; what is impossible adds its violations to the others.
 ///
 /// # Errors
 /// A problem where the document has no load or not exactly one torque, and an internal one where the geometry does not converge.
-fn checked_load(
-    design: &Design,
-    drive: Option<&Drive>,
-    violations: &mut Vec<Violation>,
-) -> Result<Option<LoadCase>, Problem> {
-    match design.load_case()? {
-        Ok(load) => {
-            if let Some(drive) = drive {
-                violations.extend(load.clearance_violations(drive).map_err(SolveError::from)?);
-            }
-            Ok(Some(load))
-        }
-        Err(found) => {
-            violations.extend(found);
-            Ok(None)
-        }
-    }
+fn checked_load(design: &Design, draft: &Draft, violations: &mut Vec<Violation>) -> Result<Option<LoadCase>, Problem> {
+    let parameters = design.load_parameters()?;
+    let load = LoadCase::new(&parameters).map_err(|found| violations.extend(found)).ok();
+    violations.extend(parameters.clearance_violations(draft).map_err(SolveError::from)?);
+    Ok(load)
 }

@@ -279,11 +279,11 @@ impl Endpoint for Sweep {
 
     fn question(&self, design: &Design, limits: &Limits) -> Result<SweepQuestion, Problem> {
         let mut violations = Vec::new();
-        let drive = checked_drive(design, &mut violations)?;
+        let draft = checked_drive(design, &mut violations)?;
         // In the document's order: of structural faults the first is told.
-        let load = checked_load(design, drive.as_ref(), &mut violations)?;
+        let load = checked_load(design, &draft, &mut violations)?;
         let points = design.sweep_points(limits.max_states)?;
-        let (drive, load, points) = match (drive, load, points) {
+        let (drive, load, points) = match (draft.drive(), load, points) {
             (Some(drive), Some(load), Ok(points)) if violations.is_empty() => (drive, load, points),
             (_, _, points) => {
                 violations.extend(points.err());
