@@ -14,6 +14,7 @@ use tracing::Instrument;
 
 use crate::negotiation::Representation;
 use crate::problem::Problem;
+use crate::room::Sent;
 
 /// A hash of everything that an answer's bytes depend on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -50,6 +51,8 @@ impl std::fmt::Display for Key {
 pub struct Stored {
     /// The body, encoded as its representation says.
     pub body: Bytes,
+    /// Whether it is on its way to clients.
+    pub sent: Sent,
     /// How long the solve took.
     pub solve: Duration,
     /// The same as the header says it, made once for all who get the answer.
@@ -146,7 +149,7 @@ impl Drop for Landing {
     }
 }
 
-/// Nothing that panics runs under the lock.
+/// Nothing that panics, nor anything that locks it too, runs under the lock.
 fn lock(flights: &Flights) -> MutexGuard<'_, HashMap<Key, Weak<Flight>>> {
     flights.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -210,8 +213,11 @@ impl Cache {
             match flights.get(&key).and_then(Weak::upgrade) {
                 Some(flight) => (flight, Served::Collapsed),
                 None => {
-                    let flight = self.start(key, solve);
+                    let (flight, task) = self.flight(key, solve);
                     flights.insert(key, Arc::downgrade(&flight));
+                    drop(flights);
+                    // A runtime that is shut down drops it at once, and with it its landing, which locks.
+                    tokio::spawn(task.in_current_span());
                     (flight, Served::Miss)
                 }
             }
@@ -224,7 +230,12 @@ impl Cache {
         Ok((stored, served))
     }
 
-    fn start(&self, key: Key, solve: impl Future<Output = Result<Stored, Problem>> + Send + 'static) -> Arc<Flight> {
+    /// A solve for whoever wants it, and the task that it runs in.
+    fn flight(
+        &self,
+        key: Key,
+        solve: impl Future<Output = Result<Stored, Problem>> + Send + 'static,
+    ) -> (Arc<Flight>, impl Future<Output = ()> + Send + 'static) {
         let wanted = CancellationToken::new();
         let (teller, outcome) = watch::channel(None);
         let flight = Arc::new(Flight { outcome, _wanted: wanted.clone().drop_guard() });
@@ -239,8 +250,7 @@ impl Cache {
             drop(landing);
             teller.send_replace(outcome);
         };
-        tokio::spawn(task.in_current_span());
-        flight
+        (flight, task)
     }
 }
 

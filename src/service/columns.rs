@@ -11,7 +11,7 @@ use serde::Serialize;
 use serde_json::Serializer;
 use serde_json::ser::Formatter;
 
-/// Writes a value as [`serde_json::to_writer`] does. Arrays hold either floats or none.
+/// Writes an object or an array as [`serde_json::to_writer`] does. Arrays hold either floats or none.
 ///
 /// # Errors
 /// Those of the writer.
@@ -66,6 +66,15 @@ impl Formatter for Columns {
         if self.count == KEPT { self.write_kept(writer) } else { Ok(()) }
     }
 
+    /// For a float that is no number.
+    fn write_null<W: ?Sized + Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        if self.count > 0 {
+            self.write_kept(writer)?;
+            writer.write_all(b",")?;
+        }
+        writer.write_all(b"null")
+    }
+
     fn begin_array_value<W: ?Sized + Write>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
         if first || self.count > 0 { Ok(()) } else { writer.write_all(b",") }
     }
@@ -112,6 +121,14 @@ mod tests {
             assert_eq!(text(&value), value.to_string());
             assert_eq!(text(&column), serde_json::to_string(&column).unwrap());
             assert_eq!(text(&points), serde_json::to_string(&points).unwrap());
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_is_null_wherever_it_stands() {
+        for values in [[f64::NAN, 1.5, 2.5], [1.5, f64::NAN, 2.5], [1.5, 2.5, f64::INFINITY]] {
+            assert_eq!(text(&values), serde_json::to_string(&values).unwrap());
+            assert_eq!(text(&[values; 9]), serde_json::to_string(&[values; 9]).unwrap());
         }
     }
 

@@ -1,4 +1,4 @@
-//! The only place that leaves the async executor: permits, a bounded queue, the deadline, cancellation.
+//! Where solves run: permits, a bounded queue, the deadline, cancellation; nothing else leaves the async executor.
 
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use tracing::Span;
 use crate::config::Limits;
 use crate::problem::{Problem, ProblemCode};
 
-/// Runs solves on blocking threads, a bounded number at once and a bounded number waiting.
+/// Runs solves, a bounded number at once and a bounded number waiting.
 #[derive(Debug, Clone)]
 pub struct Pool {
     /// One for each solve that runs.
@@ -36,8 +36,8 @@ pub struct Pool {
 pub enum Thread {
     /// On a thread of its own, for as long as the deadline lets it.
     Blocking,
-    /// Where the request is answered: for what takes no longer, some 0.1 ms, than an executor may be kept from its other tasks. To hand
-    /// over to another thread and back would cost a quarter of that again.
+    /// On the executor itself: for what keeps it from its other tasks no longer than some 0.1 ms. To hand that over to another thread
+    /// and back would cost a quarter of it again. Nothing stops it on its way.
     Executor,
 }
 
@@ -163,7 +163,7 @@ impl Pool {
         if on == Thread::Executor {
             let _held = (place, permit);
             let finished = panic::catch_unwind(AssertUnwindSafe(|| job(&AtomicBool::new(false))));
-            return finished.unwrap_or_else(|_| Err(Problem::internal(&"a solve panicked")));
+            return finished.unwrap_or_else(|panic| Err(Problem::panicked(panic.as_ref())));
         }
         let mut stop = StopOnDrop { signal: Arc::default(), is_over: false };
         let signal = Arc::clone(&stop.signal);
@@ -181,7 +181,10 @@ impl Pool {
         match finished {
             Ok(Ok(Err(Problem { code: ProblemCode::DeadlineExceeded, .. }))) | Err(_) => Err(self.deadline_exceeded()),
             Ok(Ok(result)) => result,
-            Ok(Err(panic)) => Err(Problem::internal(&panic)),
+            Ok(Err(error)) => Err(match error.try_into_panic() {
+                Ok(panic) => Problem::panicked(panic.as_ref()),
+                Err(error) => Problem::internal(&error),
+            }),
         }
     }
 

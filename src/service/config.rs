@@ -57,7 +57,7 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_CACHE_MAX_BYTES", value_name = "BYTES", default_value_t = 268_435_456)]
     pub cache_max_bytes: u64,
 
-    /// Most bytes of answers on their way to clients, those up to 64 KiB not counted
+    /// Most bytes of answers on their way to clients, those up to 256 KiB not counted
     #[arg(long, env = "TOOTHWAVE_MAX_UNREAD_BYTES", value_name = "BYTES", default_value_t = 536_870_912)]
     pub max_unread_bytes: u64,
 
@@ -105,7 +105,7 @@ pub struct Limits {
     pub deadline_ms: u64,
     /// Most bytes of answers that the cache keeps.
     pub cache_max_bytes: u64,
-    /// Most bytes of answers on their way to clients, those up to 64 KiB not counted.
+    /// Most bytes of answers on their way to clients, those up to 256 KiB not counted.
     pub max_unread_bytes: u64,
     /// Connections that may be open at once.
     pub max_connections: usize,

@@ -137,7 +137,8 @@ fn require_type(headers: &HeaderMap, wanted: &str, fits: impl Fn(&MediaType<'_>)
     }
 }
 
-/// Media ranges with nothing but their weights: who asks for `application/json; charset=utf-8` takes JSON as it is.
+/// Media ranges with nothing but their weights: who asks for `application/json; charset=utf-8` takes JSON as it is. No type that is
+/// offered has a parameter with a quoted `,` or `;`.
 fn without_parameters(accepted: &str) -> String {
     let ranges = accepted.split(',').map(|range| {
         let (media_type, parameters) = range.split_once(';').unwrap_or((range, ""));

@@ -1,5 +1,7 @@
 //! What bad input and trouble get: RFC 9457 problems, and the one map from the solver's errors to them.
 
+use std::any::Any;
+
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
@@ -260,6 +262,13 @@ impl Problem {
             several => format!("{} values are impossible; `errors` names each", several.len()),
         };
         Self::at_fields(ProblemCode::ImpossibleDesign, detail, errors)
+    }
+
+    /// A panic, logged with its text.
+    pub fn panicked(panic: &(dyn Any + Send)) -> Self {
+        let text = panic.downcast_ref::<String>().map(String::as_str);
+        let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a text");
+        Self::internal(&format_args!("a panic: {text}"))
     }
 
     /// An internal fault, logged here once; the client learns only that there was one.

@@ -1,6 +1,6 @@
-//! Room for answers that clients have not read yet: slow readers of large answers must not fill the memory.
+//! Room for large answers on their way to clients: those who read slowly must not fill the memory.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use bytes::Bytes;
 use metrics::counter;
@@ -8,8 +8,9 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::problem::{Problem, ProblemCode};
 
-/// Answers up to here need no room: the bound on connections bounds them too.
-const SMALL_BYTES: usize = 1 << 16;
+/// Answers up to here need no room, so that slow readers of large ones stop nobody's ordinary work; the bound on connections bounds
+/// them too.
+const SMALL_BYTES: usize = 1 << 18;
 
 /// Room for so many bytes.
 #[derive(Debug)]
@@ -19,17 +20,25 @@ pub struct Room {
     max_bytes: u64,
 }
 
-/// An answer on its way, which gives its room back when it is sent or its client has left.
+/// An answer on its way, which gives its room back when the last client has it or has left.
+#[derive(Debug)]
 struct OnItsWay {
     answer: Bytes,
     _room: OwnedSemaphorePermit,
 }
 
-impl AsRef<[u8]> for OnItsWay {
+/// What one of its clients holds.
+struct Share(Arc<OnItsWay>);
+
+impl AsRef<[u8]> for Share {
     fn as_ref(&self) -> &[u8] {
-        &self.answer
+        &self.0.answer
     }
 }
+
+/// Whether an answer is on its way to somebody already: it is in memory once, and takes room once.
+#[derive(Debug, Clone, Default)]
+pub struct Sent(Arc<Mutex<Weak<OnItsWay>>>);
 
 impl Room {
     /// Room for at most `max_bytes` at once.
@@ -41,12 +50,16 @@ impl Room {
     ///
     /// # Errors
     /// `too_many_unread_bytes` where there is not so much left.
-    pub fn take(&self, answer: Bytes) -> Result<Bytes, Problem> {
-        let size = answer.len();
-        if size <= SMALL_BYTES {
+    pub fn take(&self, answer: Bytes, sent: &Sent) -> Result<Bytes, Problem> {
+        if answer.len() <= SMALL_BYTES {
             return Ok(answer);
         }
-        let size = permits((size as u64).min(self.max_bytes));
+        // Nothing that panics runs under the lock.
+        let mut sent = sent.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(shared) = sent.upgrade() {
+            return Ok(Bytes::from_owner(Share(shared)));
+        }
+        let size = permits((answer.len() as u64).min(self.max_bytes));
         let room = Arc::clone(&self.free).try_acquire_many_owned(size).map_err(|_| {
             counter!("toothwave_refusals_total", "reason" => "too_many_unread_bytes").increment(1);
             let detail = format!(
@@ -56,12 +69,14 @@ impl Room {
             );
             Problem::new(ProblemCode::TooManyUnreadBytes, detail)
         })?;
-        Ok(Bytes::from_owner(OnItsWay { answer, _room: room }))
+        let shared = Arc::new(OnItsWay { answer, _room: room });
+        *sent = Arc::downgrade(&shared);
+        Ok(Bytes::from_owner(Share(shared)))
     }
 }
 
-/// Permits for so many bytes.
+/// Permits for so many bytes: at least one, so that without any room large answers go one at a time, and no more than a semaphore of
+/// any machine can count.
 fn permits(bytes: u64) -> u32 {
-    // As many as a semaphore of any machine can count.
-    u32::try_from(bytes.div_ceil(1024)).unwrap_or(u32::MAX).min(u32::MAX >> 3)
+    u32::try_from(bytes.div_ceil(1024)).unwrap_or(u32::MAX).clamp(1, u32::MAX >> 3)
 }

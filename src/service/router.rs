@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use axum::Router;
+use axum::body::Bytes;
 use axum::extract::Request;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::middleware;
@@ -92,7 +93,7 @@ fn describe_entry(document: &mut openapi::OpenApi) {
 
 /// The whole service.
 pub fn router(app: Arc<App>, cors_origins: &[String], keys: Option<Keys>) -> Router {
-    let openapi = openapi_json();
+    let openapi = Bytes::from(openapi_json());
     // The bundled page alone: without "none" it would ask a validator elsewhere.
     let config = Config::new(["/openapi.json"]).validator_url("none");
     let docs: Router<Arc<App>> = SwaggerUi::new("/docs").config(config).into();
@@ -122,7 +123,7 @@ pub fn router(app: Arc<App>, cors_origins: &[String], keys: Option<Keys>) -> Rou
         .with_state(app)
 }
 
-async fn openapi_document(document: String) -> Response {
+async fn openapi_document(document: Bytes) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], document).into_response()
 }
 
@@ -151,9 +152,7 @@ async fn method_not_allowed(request: Request) -> Problem {
 }
 
 fn panicked(panic: Box<dyn std::any::Any + Send>) -> Response {
-    let text = panic.downcast_ref::<String>().map(String::as_str);
-    let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("a panic without text");
-    Problem::internal(&text).into_response()
+    Problem::panicked(panic.as_ref()).into_response()
 }
 
 fn cors(origins: &[String]) -> CorsLayer {

@@ -60,6 +60,7 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
     let router = router(Arc::clone(&app), &settings.cors_origins, keys);
     greet(address);
     let server = Server::new(router, app.limits);
+    tokio::spawn(observe::keep_up());
     let signalled = async {
         tokio::select! {
             _ = terminate.recv() => {}
@@ -72,7 +73,6 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
     tokio::select! {
         () = signalled => {}
         () = server.accept(&listener) => {}
-        () = observe::keep_up() => {}
     }
     drop(listener);
     server.closing.cancel();

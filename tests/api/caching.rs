@@ -5,7 +5,9 @@ use std::sync::{Arc, Barrier};
 
 use flate2::read::GzDecoder;
 use serde_json::json;
+use toothwave::cache::{Cache, Key};
 use toothwave::config::Limits;
+use toothwave::negotiation::Representation;
 
 use crate::asking::{Answer, ENDPOINTS, LIMITS, Listening, Occupied, Question, Service, ask_at, until};
 use crate::designs::{bored, in_reverse, shortest, spelled_out, undercut, with};
@@ -325,6 +327,7 @@ async fn a_solve_whose_clients_have_all_left_is_stopped_and_the_next_to_ask_gets
         assert!(asker.await.unwrap_err().is_cancelled());
     }
     until("it has stopped", || service.app.pool.running() == 0).await;
+    settle().await;
     assert_eq!(service.app.cache.size().entries, 0);
 
     let occupied = Occupied::by_one(&service.app.pool).await;
@@ -336,6 +339,18 @@ async fn a_solve_whose_clients_have_all_left_is_stopped_and_the_next_to_ask_gets
     settle().await;
     occupied.end().await;
     assert_eq!(second.await.unwrap().status, 200);
+}
+
+#[tokio::test]
+async fn a_solve_that_no_thread_is_left_for_fails_instead_of_waiting() {
+    let ended = tokio::runtime::Builder::new_multi_thread().build().unwrap();
+    let handle = ended.handle().clone();
+    ended.shutdown_background();
+    let _there = handle.enter();
+    let cache = Cache::new(1 << 20);
+    let key = Key::new("sweep", &1, Representation::JSON).unwrap();
+    let problem = cache.solve_once(key, std::future::pending()).await.unwrap_err();
+    assert_eq!(problem.status, 500);
 }
 
 #[tokio::test]

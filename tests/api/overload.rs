@@ -203,22 +203,27 @@ async fn the_largest_numbers_for_limits_mean_no_limit() {
 
 #[tokio::test]
 async fn answers_that_nobody_reads_leave_no_room_for_another_until_they_are_read() {
-    let service = Service::within(Limits { cache_max_bytes: 0, max_unread_bytes: 100_000, ..LIMITS });
-    // Some 70 kB each.
-    let unread = service.response(large(50, 1).request()).await;
+    let service = Service::within(Limits { max_unread_bytes: 1_000_000, ..LIMITS });
+    // Some 700 kB each.
+    let unread = service.response(large(500, 1).request()).await;
     assert_eq!(unread.status(), 200);
-    let answer = service.ask(&large(50, 2)).await;
+    let answer = service.ask(&large(500, 2)).await;
     answer.refused(503, "too_many_unread_bytes");
     assert!(answer.header("retry-after").parse::<u32>().unwrap() >= 1);
-    // Small ones still fit.
-    service.post("/v1/coincidence-degree", &spelled_out()).await.found();
-    drop(unread);
+    // Ordinary ones are given all the same, and the same answer to whoever else wants it: it is in memory once.
     service.ask(&large(50, 2)).await.found();
+    service.ask(&large(500, 1)).await.found();
+    drop(unread);
+    service.ask(&large(500, 2)).await.found();
 }
 
 #[tokio::test]
 async fn an_answer_larger_than_all_that_may_be_unread_is_given_when_it_is_alone() {
-    let service = Service::within(Limits { cache_max_bytes: 0, max_unread_bytes: 10_000, ..LIMITS });
-    service.ask(&large(50, 1)).await.found();
-    service.ask(&large(50, 2)).await.found();
+    for max_unread_bytes in [0, 10_000] {
+        let service = Service::within(Limits { max_unread_bytes, ..LIMITS });
+        let unread = service.response(large(500, 1).request()).await;
+        service.ask(&large(500, 2)).await.refused(503, "too_many_unread_bytes");
+        drop(unread);
+        service.ask(&large(500, 2)).await.found();
+    }
 }

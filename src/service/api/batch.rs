@@ -175,7 +175,7 @@ fn solved<E: Endpoint>(
         E::answer(&question, stop)
     }));
     histogram!("toothwave_solve_duration_seconds").record(started.elapsed());
-    answered.unwrap_or_else(|_| Err(Problem::internal(&"a solve of a batch panicked")))
+    answered.unwrap_or_else(|panic| Err(Problem::panicked(panic.as_ref())))
 }
 
 fn append<A: Serialize>(out: &mut Vec<u8>, index: u64, answer: Result<&A, &Problem>) {

@@ -26,7 +26,7 @@ use crate::design::Design;
 use crate::json;
 use crate::negotiation::{self, Format, Representation};
 use crate::problem::{Problem, ProblemCode};
-use crate::room::Room;
+use crate::room::{Room, Sent};
 
 pub mod accuracy;
 pub mod batch;
@@ -262,7 +262,7 @@ async fn read_body(
     arrived.map_err(|_| too_large(""))
 }
 
-/// Solves and writes the final bytes, on a blocking thread.
+/// Solves and writes the final bytes.
 fn solve<E: Endpoint>(
     question: &E::Question,
     representation: Representation,
@@ -287,7 +287,7 @@ fn solve<E: Endpoint>(
             let server_timing = format!("solve;dur={:.3}", 1e3 * solve.as_secs_f64());
             let server_timing = HeaderValue::try_from(server_timing).map_err(|error| Problem::internal(&error))?;
             // To its size: the cache keeps it, and weighs its length.
-            Ok(Stored { body: writer.inner.into_boxed_slice().into(), solve, server_timing })
+            Ok(Stored { body: writer.inner.into_boxed_slice().into(), sent: Sent::default(), solve, server_timing })
         }
         Err(_) if stop.load(Ordering::Relaxed) => Err(SolveError::Stopped.into()),
         Err(error) => Err(Problem::internal(&error)),
@@ -331,7 +331,7 @@ const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
 const CACHE_STATUS: HeaderName = HeaderName::from_static("cache-status");
 
 fn with_body(room: &Room, stored: Stored, representation: Representation) -> Result<Response, Problem> {
-    let mut response = (StatusCode::OK, room.take(stored.body)?).into_response();
+    let mut response = (StatusCode::OK, room.take(stored.body, &stored.sent)?).into_response();
     let headers = response.headers_mut();
     // Those here and those of the layers around.
     headers.reserve(12);
