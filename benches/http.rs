@@ -56,7 +56,17 @@ fn main() -> Result<(), Failure> {
     let toothwave = {
         let mut command = Command::new(env!("CARGO_BIN_EXE_toothwave"));
         // On one core one solve runs at a time: those of all connections must be able to wait.
-        command.args(["serve", "--listen", "127.0.0.1:0", "--log", "warn", "--max-queued-solves", "64"]);
+        command.args([
+            "serve",
+            "--listen",
+            "127.0.0.1:0",
+            "--log",
+            "warn",
+            "--max-queued-solves",
+            "64",
+            "--max-concurrent-batches",
+            "64",
+        ]);
         Server::start(command, &cores)?
     };
     let bare = {
@@ -517,7 +527,7 @@ fn introduction(effort: Effort, machine: &str, body_bytes: usize, request_bytes:
          Written by `cargo bench --bench http`; run it again for your machine. The solver alone is measured in [speed-and-accuracy.md](speed-and-accuracy.md).\n\n\
          ## Method\n\n\
          Case 5.1, 50 intervals, as JSON without compression: the answer's body has {body_bytes} bytes, the request {request_bytes}. The service runs as the released program \
-         with its defaults but for the log filter `warn` (at `info` it writes a line for each request) and a queue for 64 solves; a bare axum server runs beside it. Each is pinned to one and the same core \
+         with its defaults but for the log filter `warn` (at `info` it writes a line for each request) and room for 64 waiting solves and 64 batches; a bare axum server runs beside it. Each is pinned to one and the same core \
          and has one worker thread of tokio's usual runtime; the client is pinned to another core. Connections are kept, and each asks again \
          when it has its answer (closed loop). Torques differ by 1e-10 N·m where the cache must not know the answer. Rounds of {length} alternate between the two; a number is the median over the rounds, \
          with the quartiles in brackets, and a share is the median of the rounds' shares.\n\n\
