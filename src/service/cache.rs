@@ -2,11 +2,12 @@
 
 use std::collections::HashMap;
 use std::future::Future;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use axum::http::HeaderValue;
 use bytes::Bytes;
+use parking_lot::Mutex;
 use serde::Serialize;
 use tokio::sync::watch;
 use tokio_util::sync::{CancellationToken, DropGuard};
@@ -122,7 +123,7 @@ pub struct Cache {
     flights: Flights,
 }
 
-/// Solves under way, by the key of their answer.
+/// Solves under way, by the key of their answer. What drops a [`Landing`] must not hold the lock, which that takes.
 type Flights = Arc<Mutex<HashMap<Key, Weak<Flight>>>>;
 
 /// A solve for all who want its answer. It is theirs: with the last of them it ends.
@@ -141,17 +142,12 @@ struct Landing {
 
 impl Drop for Landing {
     fn drop(&mut self) {
-        let mut flights = lock(&self.flights);
+        let mut flights = self.flights.lock();
         // After one that nobody wanted any more another may have begun.
         if flights.get(&self.key).is_some_and(|flight| flight.ptr_eq(&self.flight)) {
             flights.remove(&self.key);
         }
     }
-}
-
-/// Nothing that panics, nor anything that locks it too, runs under the lock.
-fn lock(flights: &Flights) -> MutexGuard<'_, HashMap<Key, Weak<Flight>>> {
-    flights.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Spellings that are remembered: some ten megabytes.
@@ -206,7 +202,7 @@ impl Cache {
         solve: impl Future<Output = Result<Stored, Problem>> + Send + 'static,
     ) -> Result<(Stored, Served), Problem> {
         let (flight, served) = {
-            let mut flights = lock(&self.flights);
+            let mut flights = self.flights.lock();
             if let Some(stored) = self.answers.get(&key) {
                 return Ok((stored, Served::Hit));
             }

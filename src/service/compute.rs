@@ -101,7 +101,6 @@ impl Pool {
         job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
         let Ok(place) = Arc::clone(&self.places).try_acquire_owned() else {
-            counter!("toothwave_refusals_total", "reason" => "queue_full").increment(1);
             return Err(self.queue_full());
         };
         let timed = move |stop: &AtomicBool| {
@@ -119,9 +118,8 @@ impl Pool {
     /// `queue_full` where as many run as the service admits.
     pub fn batch_place(&self) -> Result<OwnedSemaphorePermit, Problem> {
         Arc::clone(&self.batches).try_acquire_owned().map_err(|_| {
-            counter!("toothwave_refusals_total", "reason" => "queue_full").increment(1);
             let most = self.limits.max_concurrent_batches;
-            Problem::new(
+            Problem::refusal(
                 ProblemCode::QueueFull,
                 format!("{most} batches run, as many as the service admits; try again in a moment"),
             )
@@ -162,8 +160,7 @@ impl Pool {
         let Ok(permit) = waited else { return Err(self.deadline_exceeded()) };
         if on == Thread::Executor {
             let _held = (place, permit);
-            let finished = panic::catch_unwind(AssertUnwindSafe(|| job(&AtomicBool::new(false))));
-            return finished.unwrap_or_else(|panic| Err(Problem::panicked(panic.as_ref())));
+            return caught(|| job(&AtomicBool::new(false)));
         }
         let mut stop = StopOnDrop { signal: Arc::default(), is_over: false };
         let signal = Arc::clone(&stop.signal);
@@ -171,7 +168,7 @@ impl Pool {
         let span = Span::current();
         let running = tokio::task::spawn_blocking(move || {
             let _held = (place, permit);
-            span.in_scope(|| job(&signal))
+            span.in_scope(|| caught(|| job(&signal)))
         });
         let finished = tokio::select! {
             finished = tokio::time::timeout_at(deadline, running) => finished,
@@ -181,10 +178,7 @@ impl Pool {
         match finished {
             Ok(Ok(Err(Problem { code: ProblemCode::DeadlineExceeded, .. }))) | Err(_) => Err(self.deadline_exceeded()),
             Ok(Ok(result)) => result,
-            Ok(Err(error)) => Err(match error.try_into_panic() {
-                Ok(panic) => Problem::panicked(panic.as_ref()),
-                Err(error) => Problem::internal(&error),
-            }),
+            Ok(Err(error)) => Err(Problem::internal(&error)),
         }
     }
 
@@ -193,22 +187,28 @@ impl Pool {
         let detail = format!(
             "solves that run: {max_concurrent_solves}; that wait: {max_queued_solves}: as many as the service admits; try again in a moment"
         );
-        Problem::new(ProblemCode::QueueFull, detail)
+        Problem::refusal(ProblemCode::QueueFull, detail)
     }
 
     fn deadline_exceeded(&self) -> Problem {
-        counter!("toothwave_refusals_total", "reason" => "deadline_exceeded").increment(1);
         let detail = format!(
             "the computation did not finish within {} ms, waiting included; ask for less or try again in a moment",
             self.limits.deadline_ms
         );
-        Problem::new(ProblemCode::DeadlineExceeded, detail)
+        Problem::refusal(ProblemCode::DeadlineExceeded, detail)
     }
 }
 
+/// Makes a panic of a job the problem of those who asked for it.
+///
+/// # Errors
+/// `internal_error` where it panicked, and whatever it returns.
+pub fn caught<T>(job: impl FnOnce() -> Result<T, Problem>) -> Result<T, Problem> {
+    panic::catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|panic| Err(Problem::panicked(panic.as_ref())))
+}
+
 fn shutting_down() -> Problem {
-    counter!("toothwave_refusals_total", "reason" => "shutting_down").increment(1);
-    Problem::new(
+    Problem::refusal(
         ProblemCode::ShuttingDown,
         "the service is stopping, and had no time left for this computation; ask again",
     )

@@ -4,8 +4,8 @@
 //! the text becomes a tree first (no JSON: the first kind of fault), and the tree feeds serde through a deserializer whose error is a
 //! [`Fault`].
 
-use serde::Deserialize;
 use serde::de::{self, IntoDeserializer, MapAccess, Unexpected, Visitor};
+use serde::{Deserialize, Serialize};
 
 use crate::problem::FieldCode;
 
@@ -70,6 +70,11 @@ pub fn read<'de, T: Deserialize<'de>>(text: &[u8]) -> Result<T, ReadError> {
     })?;
     parser.end().map_err(|error| ReadError::Malformed { detail: error.to_string() })?;
     T::deserialize(&tree).map_err(ReadError::Fault)
+}
+
+/// A word of the API, as JSON spells it.
+pub fn word(value: &impl Serialize) -> String {
+    serde_json::to_value(value).ok().and_then(|value| Some(value.as_str()?.to_owned())).unwrap_or_default()
 }
 
 /// JSON as it stands in the text; of arrays, which no document has, only that they are there.

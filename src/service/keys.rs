@@ -10,7 +10,6 @@ use axum::extract::{Request, State};
 use axum::http::{HeaderValue, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
-use metrics::counter;
 
 use crate::problem::{Problem, ProblemCode};
 
@@ -86,12 +85,11 @@ pub async fn require(State(keys): State<Keys>, request: Request, next: Next) -> 
     if key.is_some_and(|key| keys.open_to(key)) {
         return next.run(request).await;
     }
-    counter!("toothwave_refusals_total", "reason" => "unauthorized").increment(1);
     let detail = match key {
         Some(_) => "this key opens nothing here",
         None => "send a key as `Authorization: Bearer …`",
     };
-    let mut response = Problem::new(ProblemCode::Unauthorized, detail).into_response();
+    let mut response = Problem::refusal(ProblemCode::Unauthorized, detail).into_response();
     response.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
     response
 }

@@ -73,7 +73,7 @@ struct Series {
 type Labels = (&'static str, u16, Option<&'static str>);
 
 thread_local! {
-    /// The series by route and labels: the recorder takes longer to find one than all the rest of a cache hit.
+    /// The series by route and labels: to have the recorder look one up takes longer than to count in it.
     static SERIES: RefCell<HashMap<String, HashMap<Labels, Series>>> = RefCell::default();
 }
 
@@ -105,7 +105,8 @@ fn count(route: &str, labels: Labels, elapsed: Duration) {
     });
 }
 
-const X_REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+/// The id of a request, the client's own or ours.
+pub const X_REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
 /// An id that no other request of this process has, and none of another process by all odds.
 fn new_id() -> HeaderValue {

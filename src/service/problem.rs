@@ -4,19 +4,20 @@ use std::any::Any;
 
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use metrics::counter;
 use serde::Serialize;
 use toothwave_solver::drive::DriveError;
 use toothwave_solver::violation::{Misfit, Violation};
 use toothwave_solver::{Contact, Parameter, Part, SolveError};
 use utoipa::ToSchema;
 
-use crate::json::{Fault, ReadError};
+use crate::json::{self, Fault, ReadError};
 
 /// The media type of problems.
 pub const PROBLEM_JSON: &str = "application/problem+json";
 
 /// Seconds after which a refused request may be worth trying again.
-const RETRY_AFTER_S: u32 = 1;
+pub const RETRY_AFTER_S: u32 = 1;
 
 /// A problem as it goes over the wire (RFC 9457).
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -242,10 +243,8 @@ impl Problem {
 
     /// A problem of these fields.
     pub fn at_fields(code: ProblemCode, detail: impl Into<String>, errors: Vec<FieldError>) -> Self {
-        // An enum of plain words always serialises.
-        let word = serde_json::to_value(code).unwrap_or_default();
         Self {
-            kind: format!("urn:toothwave:problem:{}", word.as_str().unwrap_or_default()),
+            kind: format!("urn:toothwave:problem:{}", json::word(&code)),
             title: code.title().into(),
             status: code.status().as_u16(),
             detail: detail.into(),
@@ -262,6 +261,12 @@ impl Problem {
             several => format!("{} values are impossible; `errors` names each", several.len()),
         };
         Self::at_fields(ProblemCode::ImpossibleDesign, detail, errors)
+    }
+
+    /// What the service could answer but does not take on now, or not for everybody; counted by its code.
+    pub fn refusal(code: ProblemCode, detail: impl Into<String>) -> Self {
+        counter!("toothwave_refusals_total", "reason" => json::word(&code)).increment(1);
+        Self::new(code, detail)
     }
 
     /// A panic, logged with its text.

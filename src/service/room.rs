@@ -1,9 +1,9 @@
 //! Room for large answers on their way to clients: those who read slowly must not fill the memory.
 
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::{Arc, Weak};
 
 use bytes::Bytes;
-use metrics::counter;
+use parking_lot::Mutex;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::problem::{Problem, ProblemCode};
@@ -54,20 +54,18 @@ impl Room {
         if answer.len() <= SMALL_BYTES {
             return Ok(answer);
         }
-        // Nothing that panics runs under the lock.
-        let mut sent = sent.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut sent = sent.0.lock();
         if let Some(shared) = sent.upgrade() {
             return Ok(Bytes::from_owner(Share(shared)));
         }
         let size = permits((answer.len() as u64).min(self.max_bytes));
         let room = Arc::clone(&self.free).try_acquire_many_owned(size).map_err(|_| {
-            counter!("toothwave_refusals_total", "reason" => "too_many_unread_bytes").increment(1);
             let detail = format!(
                 "the answer has {} bytes: with the others on their way to clients more than the {} of `max_unread_bytes`; try again in a moment",
                 answer.len(),
                 self.max_bytes
             );
-            Problem::new(ProblemCode::TooManyUnreadBytes, detail)
+            Problem::refusal(ProblemCode::TooManyUnreadBytes, detail)
         })?;
         let shared = Arc::new(OnItsWay { answer, _room: room });
         *sent = Arc::downgrade(&shared);

@@ -20,7 +20,9 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
-use crate::api::{App, accuracy, batch, coincidence_degree, drawings, geometry, page, side, sweep};
+use crate::api::{
+    App, CACHE_STATUS, SERVER_TIMING, accuracy, batch, coincidence_degree, drawings, geometry, page, side, sweep,
+};
 use crate::keys::{self, Keys};
 use crate::observe;
 use crate::problem::{PROBLEM_JSON, Problem, ProblemCode};
@@ -166,11 +168,5 @@ fn cors(origins: &[String]) -> CorsLayer {
         .allow_origin(allowed)
         .allow_methods(Any)
         .allow_headers(AllowHeaders::mirror_request())
-        .expose_headers([
-            header::ETAG,
-            header::RETRY_AFTER,
-            header::HeaderName::from_static("cache-status"),
-            header::HeaderName::from_static("server-timing"),
-            header::HeaderName::from_static("x-request-id"),
-        ])
+        .expose_headers([header::ETAG, header::RETRY_AFTER, CACHE_STATUS, SERVER_TIMING, observe::X_REQUEST_ID])
 }

@@ -13,7 +13,6 @@ use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
-use metrics::counter;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::signal::unix::{SignalKind, signal};
@@ -25,7 +24,7 @@ use tower::util::MapRequest;
 use crate::api::App;
 use crate::config::{Limits, MAX_HEADER_BYTES, Settings};
 use crate::observe;
-use crate::problem::{PROBLEM_JSON, Problem, ProblemCode};
+use crate::problem::{PROBLEM_JSON, Problem, ProblemCode, RETRY_AFTER_S};
 use crate::router::router;
 
 /// How long the service still listens after it has said that it is not ready, so that whoever asks can learn it.
@@ -128,7 +127,6 @@ impl Server {
                 Ok((stream, _)) => match Arc::clone(&self.connections).try_acquire_owned() {
                     Ok(permit) => self.serve(stream, permit),
                     Err(_) => {
-                        counter!("toothwave_refusals_total", "reason" => "too_many_connections").increment(1);
                         tokio::spawn(refuse(stream, self.max_connections));
                     }
                 },
@@ -181,10 +179,10 @@ impl Server {
 async fn refuse(mut stream: TcpStream, max_connections: usize) {
     let detail =
         format!("{max_connections} connections are open, as many as the service admits; try again in a moment");
-    let problem = Problem::new(ProblemCode::TooManyConnections, detail);
+    let problem = Problem::refusal(ProblemCode::TooManyConnections, detail);
     let body = serde_json::to_string(&problem).unwrap_or_default();
     let head = format!(
-        "HTTP/1.1 503 Service Unavailable\r\ncontent-type: {PROBLEM_JSON}\r\nretry-after: 1\r\nconnection: close\r\ncontent-length: {}\r\n\r\n",
+        "HTTP/1.1 503 Service Unavailable\r\ncontent-type: {PROBLEM_JSON}\r\nretry-after: {RETRY_AFTER_S}\r\nconnection: close\r\ncontent-length: {}\r\n\r\n",
         body.len()
     );
     let answer = async {

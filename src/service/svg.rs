@@ -48,7 +48,7 @@ pub fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> 
 /// What stands in a drawing about itself.
 pub fn title(drawing: &DrawingAnswer) -> String {
     let DrawingAnswer { solver_version, design_hash, .. } = drawing;
-    format!("toothwave {solver_version}, {}, design {design_hash}", crate::api::word(&drawing.subject))
+    format!("toothwave {solver_version}, {}, design {design_hash}", crate::json::word(&drawing.subject))
 }
 
 /// The farthest that a drawing reaches from its origin.

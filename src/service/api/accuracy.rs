@@ -14,9 +14,10 @@ use toothwave_solver::sweep::{ContactPeaks, Points, sweep};
 use toothwave_solver::{Compatibility, ContactLaw, Drive, LoadCase, LoadParameters, PerContact, SolveError};
 use utoipa::ToSchema;
 
-use super::{App, Endpoint, Form, Forms, Problems, checked_drive, checked_load, csv_error, respond_afresh, word};
+use super::{App, Endpoint, Form, Forms, Problems, checked_drive, checked_load, csv_error, respond_afresh};
 use crate::config::Limits;
 use crate::design::{CompatibilityDocument, Design};
+use crate::json::word;
 use crate::negotiation::Format;
 use crate::problem::{Problem, ProblemCode};
 

@@ -6,9 +6,8 @@
 
 use std::collections::VecDeque;
 use std::io;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use axum::body::{Body, BodyDataStream};
@@ -20,6 +19,7 @@ use bytes::{Bytes, BytesMut};
 use clap::ValueEnum;
 use futures_util::{Stream, StreamExt as _, stream};
 use metrics::{counter, histogram};
+use parking_lot::Mutex;
 use serde::{Deserialize, Serialize};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 use tokio_util::task::AbortOnDropHandle;
@@ -30,7 +30,7 @@ use super::geometry::Geometry;
 use super::sweep::Sweep;
 use super::{App, Endpoint};
 use crate::columns;
-use crate::compute::Pool;
+use crate::compute::{self, Pool};
 use crate::config::Limits;
 use crate::design::Design;
 use crate::findings::FindingAnswer;
@@ -167,15 +167,15 @@ fn solved<E: Endpoint>(
 ) -> Result<E::Answer, Problem> {
     let started = Instant::now();
     // A fault at one document is no reason to leave the others without an answer.
-    let answered = catch_unwind(AssertUnwindSafe(|| {
+    let answered = compute::caught(|| {
         #[cfg(feature = "fault-injection")]
         fail::fail_point!("solve");
         let design = json::read::<Design>(document)?.normalised();
         let question = endpoint.question(&design, limits)?;
         E::answer(&question, stop)
-    }));
+    });
     histogram!("toothwave_solve_duration_seconds").record(started.elapsed());
-    answered.unwrap_or_else(|panic| Err(Problem::panicked(panic.as_ref())))
+    answered
 }
 
 fn append<A: Serialize>(out: &mut Vec<u8>, index: u64, answer: Result<&A, &Problem>) {
@@ -313,7 +313,7 @@ impl Chunk {
             Ok(())
         });
         let result = result.await;
-        let mut slice = lock(&slice);
+        let mut slice = slice.lock();
         self.waiting = std::mem::take(&mut slice.waiting);
         self.answers.append(&mut slice.answers);
         if let Err(problem) = result {
@@ -332,7 +332,7 @@ fn work(slice: &Mutex<Slice>, query: BatchQuery, limits: &Limits, stop: &AtomicB
     let started = Instant::now();
     loop {
         let line = {
-            let mut slice = lock(slice);
+            let mut slice = slice.lock();
             let line = slice.waiting.pop_front();
             slice.current = line.as_ref().map(|line| line.index);
             line
@@ -343,7 +343,7 @@ fn work(slice: &Mutex<Slice>, query: BatchQuery, limits: &Limits, stop: &AtomicB
             Ok(document) => answer_line(query, index, &document, limits, stop, &mut answer),
             Err(problem) => append::<()>(&mut answer, index, Err(&problem)),
         }
-        let mut slice = lock(slice);
+        let mut slice = slice.lock();
         if slice.current.take() != Some(index) {
             // The deadline came first, and the line has its problem.
             return;
@@ -353,11 +353,6 @@ fn work(slice: &Mutex<Slice>, query: BatchQuery, limits: &Limits, stop: &AtomicB
             return;
         }
     }
-}
-
-/// A panic between lock and unlock would leave nothing half done.
-fn lock(slice: &Mutex<Slice>) -> std::sync::MutexGuard<'_, Slice> {
-    slice.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The answers as they become ready, in the order of the lines.

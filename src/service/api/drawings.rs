@@ -21,7 +21,7 @@ use crate::design::Design;
 use crate::findings::FindingAnswer;
 use crate::negotiation::{Format, Representation};
 use crate::problem::{Problem, ProblemCode};
-use crate::{dxf, step, svg};
+use crate::{dxf, json, step, svg};
 
 /// What can be drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ValueEnum, ToSchema)]
@@ -358,7 +358,7 @@ pub async fn drawing(
     match part {
         Ok(Path(part)) => respond(Drawing(part), app, request).await,
         Err(_) => {
-            let known: Vec<_> = DrawnPart::value_variants().iter().map(super::word).collect();
+            let known: Vec<_> = DrawnPart::value_variants().iter().map(json::word).collect();
             let detail = format!("drawings there are of {}", known.join(", "));
             Problem::new(ProblemCode::NotFound, detail).into_response()
         }

@@ -327,8 +327,10 @@ impl Write for Stoppable<'_> {
     }
 }
 
-const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
-const CACHE_STATUS: HeaderName = HeaderName::from_static("cache-status");
+/// How long a solve took.
+pub const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
+/// Where an answer came from (RFC 9211).
+pub const CACHE_STATUS: HeaderName = HeaderName::from_static("cache-status");
 
 fn with_body(room: &Room, stored: Stored, representation: Representation) -> Result<Response, Problem> {
     let mut response = (StatusCode::OK, room.take(stored.body, &stored.sent)?).into_response();
@@ -353,11 +355,6 @@ fn caching(mut response: Response, provenance: Provenance, etag: &str) -> Respon
     headers.insert(header::VARY, HeaderValue::from_static("accept, accept-encoding"));
     headers.insert(CACHE_STATUS, HeaderValue::from_static(provenance.served.cache_status()));
     response
-}
-
-/// A word of the API, as JSON spells it.
-pub fn word(value: &impl Serialize) -> String {
-    serde_json::to_value(value).ok().and_then(|value| Some(value.as_str()?.to_owned())).unwrap_or_default()
 }
 
 /// A CSV error as what it is: one of the writer, whose kind tells a closed pipe from a full disk.

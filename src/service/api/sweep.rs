@@ -15,13 +15,12 @@ use toothwave_solver::{Contact, Drive, LoadCase, PerContact, findings};
 use utoipa::ToSchema;
 
 use super::geometry::{drive_findings, write_findings};
-use super::{
-    App, Endpoint, Form, Forms, Problems, checked_drive, checked_load, csv_error, require_finite, respond, word,
-};
+use super::{App, Endpoint, Form, Forms, Problems, checked_drive, checked_load, csv_error, require_finite, respond};
 use crate::compute::Thread;
 use crate::config::Limits;
 use crate::design::Design;
 use crate::findings::FindingAnswer;
+use crate::json::word;
 use crate::negotiation::Format;
 use crate::plots;
 use crate::problem::{FieldCode, Problem, ProblemCode, too_many};
