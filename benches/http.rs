@@ -29,12 +29,12 @@ use harness::{Effort, Spread, machine, three_digits};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
-use toothwave::api::Endpoint;
 use toothwave::api::batch::{BatchEndpoint, BatchQuery, answer_line};
-use toothwave::api::sweep::{Sweep, SweepAnswer};
-use toothwave::config::{Limits, Settings};
-use toothwave::design::Design;
-use toothwave::json;
+use toothwave::config::Settings;
+use toothwave_calculation::design::Design;
+use toothwave_calculation::question::{Limits, Question};
+use toothwave_calculation::sweep::Sweep;
+use toothwave_calculation::sweep::answer::SweepAnswer;
 
 type Failure = Box<dyn Error>;
 
@@ -171,9 +171,7 @@ struct Bare {
 
 fn serve_bare() -> Result<(), Failure> {
     let limits = limits();
-    let design = json::read::<Design>(DESIGN.as_bytes()).map_err(|error| format!("{error:?}"))?.normalised();
-    let question = Sweep.question(&design, &limits).map_err(|problem| problem.to_string())?;
-    let answer = Sweep::answer(&question, &AtomicBool::new(false)).map_err(|problem| problem.to_string())?;
+    let answer = Sweep.ask(DESIGN.as_bytes(), &limits, &AtomicBool::new(false))?;
     let bytes = serde_json::to_vec(&answer)?.into();
     let mut batch = Vec::new();
     for index in 0..BATCH as u64 {
@@ -206,7 +204,7 @@ async fn batch_alone(State(bare): State<Arc<Bare>>, _: Bytes) -> Response {
 }
 
 fn limits() -> Limits {
-    Defaults::parse_from(["defaults"]).settings.limits()
+    Defaults::parse_from(["defaults"]).settings.limits().of_calculation()
 }
 
 /// A POST on a kept connection, whose torque may differ from request to request without changing its length.
@@ -477,14 +475,14 @@ async fn designs(effort: Effort, toothwave: &Server) -> Result<String, Failure> 
     }
 
     let (limits, never) = (limits(), AtomicBool::new(false));
-    let read = || json::read::<Design>(DESIGN.as_bytes()).map(Design::normalised).map_err(|error| format!("{error:?}"));
+    let read = || Design::read(DESIGN.as_bytes());
     let design = read()?;
-    let question = Sweep.question(&design, &limits).map_err(|problem| problem.to_string())?;
+    let checked = Sweep.check(&design, &limits)?;
     let mut line = Vec::new();
     let mut steps: [(&str, Step<'_>); 4] = [
         ("reading the document", Box::new(|| drop(black_box(read())))),
-        ("checking it, and the drive's geometry", Box::new(|| drop(black_box(Sweep.question(&design, &limits))))),
-        ("the sweep, with peaks, checks and findings", Box::new(|| drop(black_box(Sweep::answer(&question, &never))))),
+        ("checking it, and the drive's geometry", Box::new(|| drop(black_box(Sweep.check(&design, &limits))))),
+        ("the sweep, with peaks, checks and findings", Box::new(|| drop(black_box(Sweep::answer(&checked, &never))))),
         (
             "all of a line, writing its answer included",
             Box::new(|| {

@@ -1,4 +1,4 @@
-//! Final bytes by the parameters that made them: key, single flight, weight.
+//! Final bytes by the parameters that made them: single flight, weight.
 
 use std::collections::HashMap;
 use std::future::Future;
@@ -8,43 +8,18 @@ use std::time::Duration;
 use axum::http::HeaderValue;
 use bytes::Bytes;
 use parking_lot::Mutex;
-use serde::Serialize;
 use tokio::sync::watch;
 use tokio_util::sync::{CancellationToken, DropGuard};
+use toothwave_calculation::key::Key;
 use tracing::Instrument;
 
 use crate::negotiation::Representation;
 use crate::problem::Problem;
 use crate::room::Sent;
 
-/// A hash of everything that an answer's bytes depend on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Key([u8; 32]);
-
-impl Key {
-    /// The key of an endpoint's answer to `parameters`, which are normalised, in one representation.
-    ///
-    /// # Errors
-    /// An internal problem if the parameters do not serialise.
-    pub fn new(endpoint: &str, parameters: &impl Serialize, representation: Representation) -> Result<Self, Problem> {
-        let parts = (toothwave_solver::VERSION, endpoint, parameters, representation);
-        let bytes = postcard::to_stdvec(&parts).map_err(|error| Problem::internal(&error))?;
-        Ok(Self(blake3::hash(&bytes).into()))
-    }
-
-    /// The strong entity tag of the representation: the answer's bytes follow from the key alone.
-    pub fn etag(&self) -> String {
-        format!("\"{self}\"")
-    }
-}
-
-impl std::fmt::Display for Key {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        // Half of the hash is enough to tell every design ever asked for apart.
-        let mut half = [0; 16];
-        half.copy_from_slice(&self.0[..16]);
-        write!(f, "{:032x}", u128::from_be_bytes(half))
-    }
+/// The strong entity tag of a representation: its bytes follow from the key alone.
+pub fn etag(key: Key) -> String {
+    format!("\"{key}\"")
 }
 
 /// A finished answer.

@@ -10,24 +10,24 @@ use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
-
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
+use toothwave_calculation::accuracy::Accuracy;
+use toothwave_calculation::coincidence_degree::CoincidenceDegree;
+use toothwave_calculation::drawing::Drawing;
+use toothwave_calculation::drawing::answer::DrawnPart;
+use toothwave_calculation::forms::{Format, Forms};
+use toothwave_calculation::geometry::Geometry;
+use toothwave_calculation::question::{Limits, Question};
+use toothwave_calculation::sweep::Sweep;
 use tracing_subscriber::EnvFilter;
 
-use crate::api::accuracy::Accuracy;
 use crate::api::batch::{BatchEndpoint, BatchQuery, answer_line};
-use crate::api::coincidence_degree::CoincidenceDegree;
-use crate::api::drawings::{Drawing, DrawnPart};
-use crate::api::geometry::Geometry;
-use crate::api::sweep::Sweep;
-use crate::api::{Endpoint, Forms};
-use crate::config::{Limits, Settings};
-use crate::design::Design;
-use crate::negotiation::Format;
-use crate::problem::{Problem, ProblemCode};
-use crate::{json, keys, router, serve};
+use crate::config::Settings;
+use crate::problem::Problem;
+use crate::{keys, observe, router, serve};
 
 /// Bad input, as most tools have it.
 const EXIT_BAD_INPUT: u8 = 2;
@@ -55,12 +55,12 @@ enum Command {
     /// A part, or all of them, as DXF, STEP or SVG
     Draw {
         /// Which part
-        #[arg(value_enum)]
+        #[arg(value_parser = one_of(&PARTS))]
         part: DrawnPart,
         /// A design document, or `-` for standard input
         file: PathBuf,
         /// Form of the answer
-        #[arg(long, value_enum, default_value_t = Format::Dxf)]
+        #[arg(long, value_parser = one_of(&FORMATS), default_value = "dxf")]
         format: Format,
     },
     /// Many designs, one a line, on all cores; answers come as NDJSON in their order
@@ -94,8 +94,46 @@ struct Offline {
     /// A design document, or `-` for standard input
     file: PathBuf,
     /// Form of the answer, if it has this one; `table` means `text`
-    #[arg(long, value_enum, default_value_t = Format::Text)]
+    #[arg(long, value_parser = one_of(&FORMATS), default_value = "text")]
     format: Format,
+}
+
+/// A choice on the command line: its word, another word for it, and what it means.
+struct Choice<T> {
+    value: T,
+    word: &'static str,
+    alias: Option<&'static str>,
+    help: &'static str,
+}
+
+const fn choice<T>(value: T, word: &'static str, help: &'static str) -> Choice<T> {
+    Choice { value, word, alias: None, help }
+}
+
+const FORMATS: [Choice<Format>; 6] = [
+    choice(Format::Json, "json", "As programs read it"),
+    choice(Format::Csv, "csv", "Columns"),
+    Choice { value: Format::Text, word: "text", alias: Some("table"), help: "For a terminal" },
+    choice(Format::Svg, "svg", "A picture"),
+    choice(Format::Dxf, "dxf", "Outlines for CAD and workshops"),
+    choice(Format::Step, "step", "Solids for CAD"),
+];
+
+const PARTS: [Choice<DrawnPart>; 5] = [
+    choice(DrawnPart::Ring, "ring", "The ring, x along the middle of a tooth space"),
+    choice(DrawnPart::WaveGenerator, "wave-generator", "The wave generator, x along its major axis"),
+    choice(DrawnPart::Carrier, "carrier", "The carrier, x along a slot"),
+    choice(DrawnPart::Tooth, "tooth", "A tooth"),
+    choice(DrawnPart::Assembly, "assembly", "All parts in the ring's frame, at the document's input angle"),
+];
+
+/// Reads one of these words.
+fn one_of<T: Copy + Send + Sync + 'static>(choices: &'static [Choice<T>]) -> impl TypedValueParser<Value = T> {
+    let values = choices.iter().map(|choice| PossibleValue::new(choice.word).aliases(choice.alias).help(choice.help));
+    PossibleValuesParser::new(values).try_map(|word| {
+        let chosen = choices.iter().find(|choice| choice.word == word || choice.alias == Some(&*word));
+        chosen.map(|choice| choice.value).ok_or("none of the choices")
+    })
 }
 
 /// Runs the command that the process was started with.
@@ -163,12 +201,13 @@ impl From<io::Error> for Failure {
 
 impl From<Problem> for Failure {
     fn from(problem: Problem) -> Self {
+        observe::problem_is_told(&problem);
         // A service's limits can be set, those of the command line are its own.
         let limits = ["`max_states`", "`max_profile_points`"];
         let text = limits.iter().fold(problem.to_string(), |text, limit| text.replace(limit, "the command line"));
-        match problem.code {
-            ProblemCode::InternalError => Self::Io(io::Error::other(text)),
-            _ => Self::BadInput(text),
+        match problem.cause {
+            Some(_) => Self::Io(io::Error::other(text)),
+            None => Self::BadInput(text),
         }
     }
 }
@@ -200,25 +239,12 @@ fn run_service(settings: &Settings) -> Result<(), Failure> {
 }
 
 /// Without a server only memory limits what is computed: some two gigabytes of it.
-const OFFLINE: Limits = Limits {
-    max_states: 20_000_000,
-    max_profile_points: 20_000_000,
-    max_body_bytes: usize::MAX,
-    max_concurrent_solves: 1,
-    max_queued_solves: 0,
-    deadline_ms: u64::MAX,
-    cache_max_bytes: 0,
-    max_unread_bytes: u64::MAX,
-    max_connections: 64,
-    max_header_bytes: 16_384,
-    max_concurrent_batches: 4,
-    header_timeout_ms: 600_000,
-};
+const OFFLINE: Limits = Limits { max_states: 20_000_000, max_profile_points: 20_000_000 };
 
-fn answer<E: Endpoint>(endpoint: E, file: &Path, format: Format) -> Result<(), Failure> {
+fn answer<Q: Question>(question: Q, file: &Path, format: Format) -> Result<(), Failure> {
     // What fails inside says why in the log.
     tracing_subscriber::fmt().with_max_level(tracing::Level::ERROR).with_writer(io::stderr).init();
-    require_form::<E::Answer>(format)?;
+    require_form::<Q::Answer>(format)?;
     let mut text = Vec::new();
     if file.as_os_str() == "-" {
         io::stdin().read_to_end(&mut text)?;
@@ -227,9 +253,7 @@ fn answer<E: Endpoint>(endpoint: E, file: &Path, format: Format) -> Result<(), F
             .and_then(|mut file| file.read_to_end(&mut text))
             .map_err(|error| Failure::BadInput(format!("{}: {error}", file.display())))?;
     }
-    let design = json::read::<Design>(&text).map_err(Problem::from)?.normalised();
-    let question = endpoint.question(&design, &OFFLINE)?;
-    let answer = E::answer(&question, &AtomicBool::new(false))?;
+    let answer = question.ask(&text, &OFFLINE, &AtomicBool::new(false)).map_err(Problem::from)?;
     print(|writer| {
         answer.write(format, writer)?;
         // The other formats end their last line themselves.
@@ -291,9 +315,9 @@ fn require_form<A: Forms>(format: Format) -> Result<(), Failure> {
     if known.contains(&format) {
         return Ok(());
     }
-    let name = |format: &Format| format.to_possible_value().map_or_else(String::new, |value| value.get_name().into());
-    let (name, known) = (name(&format), known.iter().map(name).collect::<Vec<_>>());
-    Err(Failure::BadInput(format!("this answer has no form `{name}`; choose one of {}", known.join(", "))))
+    let name = |format: &Format| FORMATS.iter().find(|choice| choice.value == *format).map_or("", |choice| choice.word);
+    let names: Vec<_> = known.iter().map(name).collect();
+    Err(Failure::BadInput(format!("this answer has no form `{}`; choose one of {}", name(&format), names.join(", "))))
 }
 
 /// Writes to standard output; a reader that has seen enough is no failure.

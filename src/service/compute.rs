@@ -119,7 +119,7 @@ impl Pool {
     pub fn batch_place(&self) -> Result<OwnedSemaphorePermit, Problem> {
         Arc::clone(&self.batches).try_acquire_owned().map_err(|_| {
             let most = self.limits.max_concurrent_batches;
-            Problem::refusal(
+            Problem::new(
                 ProblemCode::QueueFull,
                 format!("{most} batches run, as many as the service admits; try again in a moment"),
             )
@@ -187,7 +187,7 @@ impl Pool {
         let detail = format!(
             "solves that run: {max_concurrent_solves}; that wait: {max_queued_solves}: as many as the service admits; try again in a moment"
         );
-        Problem::refusal(ProblemCode::QueueFull, detail)
+        Problem::new(ProblemCode::QueueFull, detail)
     }
 
     fn deadline_exceeded(&self) -> Problem {
@@ -195,7 +195,7 @@ impl Pool {
             "the computation did not finish within {} ms, waiting included; ask for less or try again in a moment",
             self.limits.deadline_ms
         );
-        Problem::refusal(ProblemCode::DeadlineExceeded, detail)
+        Problem::new(ProblemCode::DeadlineExceeded, detail)
     }
 }
 
@@ -208,7 +208,7 @@ pub fn caught<T>(job: impl FnOnce() -> Result<T, Problem>) -> Result<T, Problem>
 }
 
 fn shutting_down() -> Problem {
-    Problem::refusal(
+    Problem::new(
         ProblemCode::ShuttingDown,
         "the service is stopping, and had no time left for this computation; ask again",
     )

@@ -7,6 +7,7 @@ use std::time::Duration;
 use axum::http::Uri;
 use clap::Args;
 use serde::Serialize;
+use toothwave_calculation::question;
 use tracing_subscriber::EnvFilter;
 use utoipa::ToSchema;
 
@@ -113,6 +114,13 @@ pub struct Limits {
     pub max_header_bytes: usize,
     /// Milliseconds in which a request's line and headers have to arrive, and after which a silent connection is closed.
     pub header_timeout_ms: u64,
+}
+
+impl Limits {
+    /// Those that the calculation keeps.
+    pub const fn of_calculation(&self) -> question::Limits {
+        question::Limits { max_states: self.max_states, max_profile_points: self.max_profile_points }
+    }
 }
 
 impl Settings {

@@ -89,7 +89,7 @@ pub async fn require(State(keys): State<Keys>, request: Request, next: Next) -> 
         Some(_) => "this key opens nothing here",
         None => "send a key as `Authorization: Bearer …`",
     };
-    let mut response = Problem::refusal(ProblemCode::Unauthorized, detail).into_response();
+    let mut response = Problem::new(ProblemCode::Unauthorized, detail).into_response();
     response.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
     response
 }

@@ -5,64 +5,51 @@ use std::iter;
 use std::str::FromStr;
 
 use axum::http::{HeaderMap, HeaderName, header};
-use clap::ValueEnum;
 use headers_accept::Accept;
 use mediatype::{MediaType, Name, names};
-use serde::Serialize;
+use toothwave_calculation::forms::Format;
+use toothwave_calculation::key::{Encode, Encoder};
 
 use crate::problem::{Problem, ProblemCode};
 
-/// A format of answers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
-pub enum Format {
-    /// As programs read it
-    Json,
-    /// Columns
-    Csv,
-    /// For a terminal
-    #[value(alias = "table")]
-    Text,
-    /// A picture
-    Svg,
-    /// Outlines for CAD and workshops
-    Dxf,
-    /// Solids for CAD
-    Step,
+/// The media type of a format.
+const fn media_type(format: Format) -> MediaType<'static> {
+    match format {
+        Format::Json => MediaType::new(names::APPLICATION, names::JSON),
+        Format::Csv => MediaType::new(names::TEXT, Name::new_unchecked("csv")),
+        Format::Text => MediaType::new(names::TEXT, names::PLAIN),
+        Format::Svg => MediaType::from_parts(names::IMAGE, names::SVG, Some(names::XML), &[]),
+        Format::Dxf => MediaType::new(names::IMAGE, Name::new_unchecked("vnd.dxf")),
+        Format::Step => MediaType::new(names::MODEL, Name::new_unchecked("step")),
+    }
 }
 
-impl Format {
-    /// Its media type.
-    pub const fn media_type(self) -> MediaType<'static> {
-        match self {
-            Self::Json => MediaType::new(names::APPLICATION, names::JSON),
-            Self::Csv => MediaType::new(names::TEXT, Name::new_unchecked("csv")),
-            Self::Text => MediaType::new(names::TEXT, names::PLAIN),
-            Self::Svg => MediaType::from_parts(names::IMAGE, names::SVG, Some(names::XML), &[]),
-            Self::Dxf => MediaType::new(names::IMAGE, Name::new_unchecked("vnd.dxf")),
-            Self::Step => MediaType::new(names::MODEL, Name::new_unchecked("step")),
-        }
-    }
-
-    /// The `Content-Type` of an answer.
-    pub const fn content_type(self) -> &'static str {
-        match self {
-            Self::Json => "application/json",
-            Self::Csv => "text/csv; charset=utf-8; header=present",
-            Self::Text => "text/plain; charset=utf-8",
-            Self::Svg => "image/svg+xml",
-            Self::Dxf => "image/vnd.dxf",
-            Self::Step => "model/step",
-        }
+/// The `Content-Type` of an answer in a format.
+pub const fn content_type(format: Format) -> &'static str {
+    match format {
+        Format::Json => "application/json",
+        Format::Csv => "text/csv; charset=utf-8; header=present",
+        Format::Text => "text/plain; charset=utf-8",
+        Format::Svg => "image/svg+xml",
+        Format::Dxf => "image/vnd.dxf",
+        Format::Step => "model/step",
     }
 }
 
 /// A format with its coding: what an entity tag stands for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Representation {
     /// The format.
     pub format: Format,
     /// Whether it is compressed.
     pub gzip: bool,
+}
+
+impl Encode for Representation {
+    fn encode(&self, encoder: &mut Encoder) {
+        let Self { format, gzip } = self;
+        (format, gzip).encode(encoder);
+    }
 }
 
 impl Representation {
@@ -80,14 +67,14 @@ impl Representation {
             return Ok(Self { format: Format::Json, gzip });
         }
         let formats: Vec<_> = iter::once(Format::Json).chain(others).collect();
-        let media_types: Vec<_> = formats.iter().map(|format| format.media_type()).collect();
+        let media_types: Vec<_> = formats.iter().copied().map(media_type).collect();
         // A header that cannot be read accepts nothing.
         let best = Accept::from_str(&without_parameters(&accepted))
             .ok()
             .and_then(|accept| accept.negotiate(&media_types).cloned());
-        let format = formats.iter().copied().find(|format| best.as_ref() == Some(&format.media_type()));
+        let format = formats.iter().copied().find(|format| best.as_ref() == Some(&media_type(*format)));
         let format = format.ok_or_else(|| {
-            let offered: Vec<_> = formats.iter().map(|format| format.media_type().to_string()).collect();
+            let offered: Vec<_> = media_types.iter().map(ToString::to_string).collect();
             Problem::new(
                 ProblemCode::NotAcceptable,
                 format!("this path answers with {}, and the request accepts none of it", offered.join(" or ")),

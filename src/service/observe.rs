@@ -13,10 +13,12 @@ use axum::middleware::Next;
 use axum::response::Response;
 use metrics::{Counter, Histogram, counter, gauge, histogram};
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
+use toothwave_calculation::json::word;
 use tracing::Instrument;
 
 use crate::api::App;
 use crate::cache::Provenance;
+use crate::problem::Problem;
 
 /// Upper bounds of the histograms' buckets in seconds: from a cache hit to the longest deadline.
 const BUCKETS_S: [f64; 12] = [1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 1e-2, 5e-2, 0.1, 0.5, 1.0, 10.0];
@@ -138,6 +140,9 @@ pub async fn observe(request: Request, next: Next) -> Response {
     let span = tracing::info_span!("request", id = id.to_str().unwrap_or_default(), design = tracing::field::Empty);
     let mut response = next.run(request).instrument(span.clone()).await;
     let elapsed = started.elapsed();
+    if let Some(problem) = response.extensions().get() {
+        span.in_scope(|| problem_is_told(problem));
+    }
     let status = response.status().as_u16();
     let provenance = response.extensions().get::<Provenance>();
     let cache = provenance.map(|provenance| provenance.served.label());
@@ -147,6 +152,16 @@ pub async fn observe(request: Request, next: Next) -> Response {
     span.in_scope(|| tracing::info!(method, route, status, cache, solve_ms, elapsed_ms, "request"));
     complete(response.headers_mut(), id);
     response
+}
+
+/// Logs why an internal error happened, and counts refusals by their code: here alone, where a problem is about to be told.
+pub fn problem_is_told(problem: &Problem) {
+    if let Some(cause) = &problem.cause {
+        tracing::error!(cause, "internal error");
+    }
+    if problem.code.is_refusal() {
+        counter!("toothwave_refusals_total", "reason" => word(&problem.code)).increment(1);
+    }
 }
 
 /// The headers of every answer.

@@ -1,17 +1,16 @@
-//! What bad input and trouble get: RFC 9457 problems, and the one map from the solver's errors to them.
+//! What bad input and trouble get: RFC 9457 problems, and the one map to them from the reasons why the calculation has no answer.
+//!
+//! Making a problem neither counts nor logs it: it goes along with the response that tells it, and [`crate::observe`] does both there.
 
 use std::any::Any;
 
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use metrics::counter;
 use serde::Serialize;
-use toothwave_solver::drive::DriveError;
-use toothwave_solver::violation::{Misfit, Violation};
-use toothwave_solver::{Contact, Parameter, Part, SolveError};
+use toothwave_calculation::field::FieldError;
+use toothwave_calculation::json;
+use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use utoipa::ToSchema;
-
-use crate::json::{self, Fault, ReadError};
 
 /// The media type of problems.
 pub const PROBLEM_JSON: &str = "application/problem+json";
@@ -40,7 +39,7 @@ pub struct Problem {
     #[serde(rename = "type")]
     pub kind: String,
     /// The kind of problem in words.
-    pub title: String,
+    pub title: &'static str,
     /// HTTP status.
     #[schema(minimum = 400, maximum = 599)]
     pub status: u16,
@@ -52,25 +51,9 @@ pub struct Problem {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schema(required = false)]
     pub errors: Vec<FieldError>,
-}
-
-/// A field at fault.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct FieldError {
-    /// JSON pointer (RFC 6901) to the field.
-    pub pointer: String,
-    /// The kind of fault, a stable word.
-    pub code: FieldCode,
-    /// What is wrong and what would be right.
-    pub detail: String,
-    /// The field's value, where it is a number.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
-    pub value: Option<f64>,
-    /// The limit that the value is beyond, or, of a number of teeth, the nearest one that would do.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
-    pub limit: Option<f64>,
+    /// Of an internal error, why: for the log alone.
+    #[serde(skip)]
+    pub cause: Option<String>,
 }
 
 /// Kinds of problem.
@@ -119,66 +102,6 @@ pub enum ProblemCode {
     TooManyUnreadBytes,
     /// 500: a fault of the service itself.
     InternalError,
-}
-
-/// Kinds of fault of a field.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum FieldCode {
-    /// A field that the document does not know.
-    UnknownField,
-    /// A required field that is not there.
-    MissingField,
-    /// The same field twice.
-    DuplicateField,
-    /// A value of another type.
-    WrongType,
-    /// A word that is not one of the choices.
-    UnknownChoice,
-    /// A number that no double can hold.
-    NumberTooLarge,
-    /// Two fields of which only one may be there.
-    ConflictingFields,
-    /// A value outside its range.
-    OutOfRange,
-    /// The semi-major axis does not exceed the semi-minor one.
-    CamNotElongated,
-    /// Carrier and ring do not differ by two teeth.
-    ToothDifference,
-    /// An odd number of teeth, which no even number of installed ones divides.
-    CountOdd,
-    /// An odd number of installed teeth.
-    InstalledOdd,
-    /// Installed teeth that do not divide the theoretical ones.
-    InstalledNoDivisor,
-    /// Neighbouring teeth touch somewhere on their path.
-    TeethTouch,
-    /// The ring's tips reach in to the wave generator.
-    NoCarrierAnnulus,
-    /// The bore takes the whole flank away.
-    BoreLeavesNoFlank,
-    /// A clearance under `projection` that would load a tooth instead of freeing it.
-    ClearanceNotMonotone,
-    /// The ring's outer radius does not exceed its root radius.
-    RingWithoutRim,
-    /// The carrier's inner radius does not exceed the semi-major axis.
-    CarrierMeetsCam,
-    /// The carrier's outer radius reaches the ring's tips.
-    CarrierMeetsRing,
-    /// The carrier's outer radius does not exceed its inner one.
-    CarrierWithoutWall,
-    /// The slots run into each other all the way to the carrier's outer radius.
-    SlotsTakeCarrier,
-    /// The wave generator's bore cuts it open.
-    BoreTakesCam,
-    /// The wave generator's clearance gives it a cusp.
-    ClearanceTakesCam,
-    /// The teeth's clearance reaches their radius.
-    ClearanceTakesTooth,
-    /// More states than `max_states`.
-    TooManyStates,
-    /// More profile points than `max_profile_points`.
-    TooManyPoints,
 }
 
 impl ProblemCode {
@@ -233,6 +156,44 @@ impl ProblemCode {
             Self::InternalError => "The service failed",
         }
     }
+
+    /// Whether the service could answer but does not take it on now, or not for everybody.
+    pub const fn is_refusal(self) -> bool {
+        matches!(
+            self,
+            Self::Unauthorized
+                | Self::QueueFull
+                | Self::DeadlineExceeded
+                | Self::ShuttingDown
+                | Self::TooManyConnections
+                | Self::TooManyUnreadBytes
+        )
+    }
+}
+
+impl From<NoAnswerCode> for ProblemCode {
+    fn from(code: NoAnswerCode) -> Self {
+        match code {
+            NoAnswerCode::MalformedJson => Self::MalformedJson,
+            NoAnswerCode::InvalidDocument => Self::InvalidDocument,
+            NoAnswerCode::ImpossibleDesign => Self::ImpossibleDesign,
+            NoAnswerCode::NoToothInMesh => Self::NoToothInMesh,
+            NoAnswerCode::ComplianceNotPositive => Self::ComplianceNotPositive,
+            NoAnswerCode::TooManyStates => Self::TooManyStates,
+            NoAnswerCode::TooManyPoints => Self::TooManyPoints,
+            NoAnswerCode::Stopped => Self::DeadlineExceeded,
+            NoAnswerCode::InternalError => Self::InternalError,
+        }
+    }
+}
+
+impl From<NoAnswer> for Problem {
+    fn from(NoAnswer { code, detail, errors }: NoAnswer) -> Self {
+        match code {
+            NoAnswerCode::InternalError => Self::internal(&detail),
+            _ => Self::at_fields(code.into(), detail, errors),
+        }
+    }
 }
 
 impl Problem {
@@ -242,44 +203,29 @@ impl Problem {
     }
 
     /// A problem of these fields.
-    pub fn at_fields(code: ProblemCode, detail: impl Into<String>, errors: Vec<FieldError>) -> Self {
+    fn at_fields(code: ProblemCode, detail: impl Into<String>, errors: Vec<FieldError>) -> Self {
         Self {
             kind: format!("urn:toothwave:problem:{}", json::word(&code)),
-            title: code.title().into(),
+            title: code.title(),
             status: code.status().as_u16(),
             detail: detail.into(),
             code,
             errors,
+            cause: None,
         }
     }
 
-    /// All violations of a design.
-    pub fn impossible(violations: &[Violation]) -> Self {
-        let errors: Vec<_> = violations.iter().map(field_error).collect();
-        let detail = match errors.as_slice() {
-            [only] => format!("{}: {}", only.pointer, only.detail),
-            several => format!("{} values are impossible; `errors` names each", several.len()),
-        };
-        Self::at_fields(ProblemCode::ImpossibleDesign, detail, errors)
-    }
-
-    /// What the service could answer but does not take on now, or not for everybody; counted by its code.
-    pub fn refusal(code: ProblemCode, detail: impl Into<String>) -> Self {
-        counter!("toothwave_refusals_total", "reason" => json::word(&code)).increment(1);
-        Self::new(code, detail)
-    }
-
-    /// A panic, logged with its text.
+    /// A panic, with its text for the log.
     pub fn panicked(panic: &(dyn Any + Send)) -> Self {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a text");
         Self::internal(&format_args!("a panic: {text}"))
     }
 
-    /// An internal fault, logged here once; the client learns only that there was one.
+    /// An internal fault: the client learns only that there was one.
     pub fn internal(cause: &dyn std::fmt::Display) -> Self {
-        tracing::error!(%cause, "internal error");
-        Self::new(ProblemCode::InternalError, "the service failed at this request; its log says why")
+        let detail = "the service failed at this request; its log says why";
+        Self { cause: Some(cause.to_string()), ..Self::new(ProblemCode::InternalError, detail) }
     }
 }
 
@@ -303,187 +249,7 @@ impl IntoResponse for Problem {
         if status == StatusCode::SERVICE_UNAVAILABLE {
             response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from(RETRY_AFTER_S));
         }
+        response.extensions_mut().insert(self);
         response
-    }
-}
-
-impl From<ReadError> for Problem {
-    fn from(error: ReadError) -> Self {
-        match error {
-            ReadError::Malformed { detail } => Self::new(ProblemCode::MalformedJson, detail),
-            ReadError::Fault(fault) => fault.into(),
-        }
-    }
-}
-
-impl From<Fault> for Problem {
-    fn from(Fault { pointer, code, detail }: Fault) -> Self {
-        let text = if pointer.is_empty() { detail.clone() } else { format!("{pointer}: {detail}") };
-        let error = FieldError { pointer, code, detail, value: None, limit: None };
-        Self::at_fields(ProblemCode::InvalidDocument, text, vec![error])
-    }
-}
-
-impl From<DriveError> for Problem {
-    fn from(error: DriveError) -> Self {
-        match error {
-            DriveError::Impossible(violations) => Self::impossible(&violations),
-            DriveError::NotConverged(error) => Self::internal(&error),
-        }
-    }
-}
-
-impl From<SolveError> for Problem {
-    fn from(error: SolveError) -> Self {
-        let detail = error.to_string();
-        match error {
-            SolveError::NoToothInMesh { .. } => Self::new(
-                ProblemCode::NoToothInMesh,
-                format!("{detail}. Install more teeth, or lengthen the flank: less undercut, a smaller bore"),
-            ),
-            SolveError::ComplianceNotPositive { .. } => Self::new(
-                ProblemCode::ComplianceNotPositive,
-                format!("{detail}. Choose `virtual_work`, or stiffnesses that differ less"),
-            ),
-            SolveError::TooManyPoints { points, limit } => {
-                let detail = format!("{detail} by `max_profile_points`; widen the chord tolerance");
-                let pointer = "/profile/chord_tolerance_mm";
-                too_many(ProblemCode::TooManyPoints, FieldCode::TooManyPoints, pointer, &detail, Some(points), limit)
-            }
-            SolveError::TooManyStates { limit } => {
-                let detail = format!("{detail} by `max_states`; widen the tolerance");
-                let pointer = "/sweep/tolerance";
-                too_many(ProblemCode::TooManyStates, FieldCode::TooManyStates, pointer, &detail, None, limit)
-            }
-            SolveError::Stopped => {
-                Self::new(ProblemCode::DeadlineExceeded, "the computation took longer than the service allows")
-            }
-            SolveError::NotConverged(error) => Self::internal(&error),
-        }
-    }
-}
-
-/// The problem of a request that is larger than a limit, which it names with its own value, where that is known.
-#[expect(clippy::cast_precision_loss, reason = "counts far below 2^53")]
-pub fn too_many(
-    code: ProblemCode,
-    field_code: FieldCode,
-    pointer: &str,
-    detail: &str,
-    value: Option<u64>,
-    limit: u64,
-) -> Problem {
-    let error = FieldError {
-        pointer: pointer.into(),
-        code: field_code,
-        detail: detail.into(),
-        value: value.map(|value| value as f64),
-        limit: Some(limit as f64),
-    };
-    Problem::at_fields(code, detail, vec![error])
-}
-
-/// A violation as the field that it is about.
-fn field_error(violation: &Violation) -> FieldError {
-    use Parameter::{InstalledTeeth, RingTeeth, SemiMajor, TipRadius, ToothCount, ToothRadius};
-    let (code, parameter, value, limit) = match *violation {
-        Violation::OutOfRange { parameter, value, limit } => (FieldCode::OutOfRange, parameter, value, limit),
-        Violation::CamNotElongated { semi_major_mm, semi_minor_mm } => {
-            (FieldCode::CamNotElongated, SemiMajor, semi_major_mm, semi_minor_mm)
-        }
-        Violation::ToothDifference { ring_teeth, instead, .. } => {
-            (FieldCode::ToothDifference, RingTeeth, ring_teeth as f64, instead.nearest_to(ring_teeth) as f64)
-        }
-        Violation::CountOdd { teeth, instead } => {
-            (FieldCode::CountOdd, ToothCount, teeth as f64, instead.nearest_to(teeth) as f64)
-        }
-        Violation::InstalledOdd { installed, instead } => {
-            (FieldCode::InstalledOdd, InstalledTeeth, installed as f64, instead.nearest_to(installed) as f64)
-        }
-        Violation::InstalledNoDivisor { installed, instead, .. } => {
-            (FieldCode::InstalledNoDivisor, InstalledTeeth, installed as f64, instead.nearest_to(installed) as f64)
-        }
-        Violation::TeethTouch { tooth_diameter_mm, touching_radius_mm, .. } => {
-            (FieldCode::TeethTouch, ToothRadius, 0.5 * tooth_diameter_mm, touching_radius_mm)
-        }
-        Violation::NoCarrierAnnulus { semi_major_mm, tip_radius_mm } => {
-            (FieldCode::NoCarrierAnnulus, SemiMajor, semi_major_mm, tip_radius_mm)
-        }
-        Violation::ClearanceNotMonotone { contact, clearance_um } => {
-            (FieldCode::ClearanceNotMonotone, Parameter::Clearance(contact), clearance_um, 0.0)
-        }
-        Violation::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => {
-            (FieldCode::BoreLeavesNoFlank, TipRadius, tip_radius_mm, root_radius_mm)
-        }
-        Violation::PartDoesNotFit { misfit, value, limit } => {
-            let code = match misfit {
-                Misfit::RingWithoutRim => FieldCode::RingWithoutRim,
-                Misfit::CarrierMeetsCam => FieldCode::CarrierMeetsCam,
-                Misfit::CarrierMeetsRing => FieldCode::CarrierMeetsRing,
-                Misfit::CarrierWithoutWall => FieldCode::CarrierWithoutWall,
-                Misfit::SlotsTakeCarrier => FieldCode::SlotsTakeCarrier,
-                Misfit::BoreTakesCam => FieldCode::BoreTakesCam,
-                Misfit::ClearanceTakesCam => FieldCode::ClearanceTakesCam,
-                Misfit::ClearanceTakesTooth => FieldCode::ClearanceTakesTooth,
-            };
-            (code, misfit.parameter(), value, limit)
-        }
-    };
-    FieldError {
-        pointer: pointer(parameter),
-        code,
-        detail: violation.to_string(),
-        value: Some(value),
-        limit: Some(limit),
-    }
-}
-
-/// Where a parameter stands in the design document.
-pub fn pointer(parameter: Parameter) -> String {
-    match parameter {
-        Parameter::SemiMajor => "/drive/wave_generator/semi_major_mm".into(),
-        Parameter::SemiMinor => "/drive/wave_generator/semi_minor_mm".into(),
-        Parameter::ToothCount => "/drive/teeth/count".into(),
-        Parameter::InstalledTeeth => "/drive/teeth/installed".into(),
-        Parameter::ToothRadius => "/drive/teeth/radius_mm".into(),
-        Parameter::ToothWidth => "/drive/teeth/width_mm".into(),
-        Parameter::RingTeeth => "/drive/ring/teeth".into(),
-        Parameter::TipRadius => "/drive/ring/tip_radius_mm".into(),
-        Parameter::YoungsModulus(part) => format!("/materials/{}/youngs_modulus_gpa", part_name(part)),
-        Parameter::PoissonsRatio(part) => format!("/materials/{}/poissons_ratio", part_name(part)),
-        Parameter::InputTorque => "/load/input_torque_nm".into(),
-        Parameter::OutputTorque => "/load/output_torque_nm".into(),
-        Parameter::Stiffness(contact) => format!("/model/stiffness/{}_n_per_mm", contact_name(contact)),
-        Parameter::Clearance(contact) => format!("/model/clearance/{}_um", contact_name(contact)),
-        Parameter::AllowableStress => "/load/allowable_stress_mpa".into(),
-        Parameter::Samples => "/sweep/samples".into(),
-        Parameter::RequestedError => "/accuracy/requested_error".into(),
-        Parameter::SweepTolerance => "/sweep/tolerance".into(),
-        Parameter::ChordTolerance => "/profile/chord_tolerance_mm".into(),
-        Parameter::RingOuterRadius => "/parts/ring/outer_radius_mm".into(),
-        Parameter::CarrierInnerRadius => "/parts/carrier/inner_radius_mm".into(),
-        Parameter::CarrierOuterRadius => "/parts/carrier/outer_radius_mm".into(),
-        Parameter::BoreRadius => "/parts/wave_generator/bore_radius_mm".into(),
-        Parameter::PartClearance(part) => format!("/parts/{}/clearance_um", part_name(part)),
-        Parameter::InputAngle => "/assembly/input_angle_deg".into(),
-    }
-}
-
-/// A part as documents spell it.
-pub const fn part_name(part: Part) -> &'static str {
-    match part {
-        Part::WaveGenerator => "wave_generator",
-        Part::Teeth => "teeth",
-        Part::Ring => "ring",
-        Part::Carrier => "carrier",
-    }
-}
-
-/// A contact as documents spell it.
-pub const fn contact_name(contact: Contact) -> &'static str {
-    match contact {
-        Contact::WaveGenerator => "wave_generator",
-        Contact::Ring => "ring",
-        Contact::Carrier => "carrier",
     }
 }

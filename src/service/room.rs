@@ -65,7 +65,7 @@ impl Room {
                 answer.len(),
                 self.max_bytes
             );
-            Problem::refusal(ProblemCode::TooManyUnreadBytes, detail)
+            Problem::new(ProblemCode::TooManyUnreadBytes, detail)
         })?;
         let shared = Arc::new(OnItsWay { answer, _room: room });
         *sent = Arc::downgrade(&shared);

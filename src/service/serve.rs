@@ -179,7 +179,8 @@ impl Server {
 async fn refuse(mut stream: TcpStream, max_connections: usize) {
     let detail =
         format!("{max_connections} connections are open, as many as the service admits; try again in a moment");
-    let problem = Problem::refusal(ProblemCode::TooManyConnections, detail);
+    let problem = Problem::new(ProblemCode::TooManyConnections, detail);
+    observe::problem_is_told(&problem);
     let body = serde_json::to_string(&problem).unwrap_or_default();
     let head = format!(
         "HTTP/1.1 503 Service Unavailable\r\ncontent-type: {PROBLEM_JSON}\r\nretry-after: {RETRY_AFTER_S}\r\nconnection: close\r\ncontent-length: {}\r\n\r\n",

@@ -5,9 +5,10 @@ use std::sync::{Arc, Barrier};
 
 use flate2::read::GzDecoder;
 use serde_json::json;
-use toothwave::cache::{Cache, Key};
+use toothwave::cache::Cache;
 use toothwave::config::Limits;
 use toothwave::negotiation::Representation;
+use toothwave_calculation::key::Key;
 
 use crate::asking::{Answer, ENDPOINTS, LIMITS, Listening, Occupied, Question, Service, ask_at, until};
 use crate::designs::{bored, in_reverse, shortest, spelled_out, undercut, with};
@@ -348,7 +349,7 @@ async fn a_solve_that_no_thread_is_left_for_fails_instead_of_waiting() {
     ended.shutdown_background();
     let _there = handle.enter();
     let cache = Cache::new(1 << 20);
-    let key = Key::new("sweep", &1, Representation::JSON).unwrap();
+    let key = Key::new("sweep", &1.0, &Representation::JSON);
     let problem = cache.solve_once(key, std::future::pending()).await.unwrap_err();
     assert_eq!(problem.status, 500);
 }

@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 use serde_json::Value;
-use toothwave::findings::FindingCode;
-use toothwave::problem::{FieldCode, ProblemCode};
+use toothwave::problem::ProblemCode;
+use toothwave_calculation::field::FieldCode;
+use toothwave_calculation::findings::FindingCode;
 
 /// Steps through an enum from its first value to its last.
 macro_rules! all {

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use serde_json::{Value, json};
 use toothwave::config::Limits;
-use toothwave::problem::pointer;
+use toothwave_calculation::field::pointer;
 use toothwave_solver::{Contact, Parameter, Part};
 
 use crate::asking::{Answer, ENDPOINTS, LIMITS, Occupied, Question, Service};

@@ -1,47 +1,31 @@
 //! Whatever the document, there is an answer in numbers or a reason: no panic, no number that is none, no endless loop.
 //!
-//! `cargo test` replays the committed corpus and tries some more at random beside it; `cargo bolero test NAME -p toothwave`
+//! `cargo test` replays the committed corpus and tries some more at random beside it; `cargo bolero test NAME -p toothwave-calculation`
 //! hands the same targets to a coverage-guided fuzzer.
 #![allow(clippy::unwrap_used, reason = "a fuzz target fails by panicking")]
 
-use std::sync::atomic::AtomicBool;
-
 use serde_json::{Value, json};
-use toothwave::api::accuracy::Accuracy;
-use toothwave::api::coincidence_degree::CoincidenceDegree;
-use toothwave::api::drawings::{Drawing, DrawnPart};
-use toothwave::api::geometry::Geometry;
-use toothwave::api::sweep::Sweep;
-use toothwave::api::{Endpoint, Forms};
-use toothwave::config::Limits;
-use toothwave::design::Design;
-use toothwave::json;
-use toothwave::negotiation::Format;
-use toothwave::problem::{Problem, ProblemCode};
+use toothwave_calculation::accuracy::Accuracy;
+use toothwave_calculation::coincidence_degree::CoincidenceDegree;
+use toothwave_calculation::design::Design;
+use toothwave_calculation::drawing::Drawing;
+use toothwave_calculation::drawing::answer::DrawnPart;
+use toothwave_calculation::forms::{Format, Forms};
+use toothwave_calculation::geometry::Geometry;
+use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
+use toothwave_calculation::question::{Limits, Question};
+use toothwave_calculation::sweep::Sweep;
+use toothwave_solver::Never;
 
 /// Small enough for thousands of answers.
-const LIMITS: Limits = Limits {
-    max_states: 2_000,
-    max_profile_points: 20_000,
-    max_body_bytes: 65_536,
-    max_concurrent_solves: 1,
-    max_queued_solves: 0,
-    deadline_ms: 10_000,
-    cache_max_bytes: 0,
-    max_unread_bytes: u64::MAX,
-    max_connections: 64,
-    max_header_bytes: 16_384,
-    max_concurrent_batches: 4,
-    header_timeout_ms: 600_000,
-};
+const LIMITS: Limits = Limits { max_states: 2_000, max_profile_points: 20_000 };
 
-fn assert_answered<E: Endpoint>(endpoint: E, design: &Design) {
-    let answered =
-        endpoint.question(design, &LIMITS).and_then(|question| E::answer(&question, &AtomicBool::new(false)));
+fn assert_answered<Q: Question>(question: Q, design: &Design) {
+    let answered = question.check(design, &LIMITS).and_then(|checked| Q::answer(&checked, &Never));
     match answered {
         // serde_json writes null where a number is none.
         Ok(answer) => {
-            for format in E::Answer::FORMS.iter().map(|(format, _)| *format).chain([Format::Json]) {
+            for format in Q::Answer::FORMS.iter().map(|(format, _)| *format).chain([Format::Json]) {
                 let mut written = Vec::new();
                 answer.write(format, &mut written).unwrap();
                 let text = String::from_utf8(written).unwrap();
@@ -56,25 +40,24 @@ fn assert_answered<E: Endpoint>(endpoint: E, design: &Design) {
                 assert!(!is_none, "{format:?}: {design:?}");
             }
         }
-        Err(problem) => assert_refused_for_a_reason(&problem),
+        Err(reason) => assert_refused_for_a_reason(&reason),
     }
 }
 
-fn assert_refused_for_a_reason(problem: &Problem) {
-    assert_ne!(problem.code, ProblemCode::InternalError, "{problem}");
-    assert!(!problem.detail.is_empty());
+fn assert_refused_for_a_reason(reason: &NoAnswer) {
+    assert_ne!(reason.code, NoAnswerCode::InternalError, "{reason}");
+    assert!(!reason.detail.is_empty());
 }
 
 fn assert_text_is_answered(text: &[u8]) {
-    match json::read::<Design>(text) {
+    match Design::read(text) {
         Ok(design) => {
-            let design = design.normalised();
             assert_answered(Geometry, &design);
             assert_answered(CoincidenceDegree, &design);
             assert_answered(Sweep, &design);
             assert_answered(Drawing(DrawnPart::Assembly), &design);
         }
-        Err(error) => assert_refused_for_a_reason(&error.into()),
+        Err(reason) => assert_refused_for_a_reason(&reason),
     }
 }
 
@@ -168,6 +151,6 @@ fn any_drive() {
 fn any_accuracy() {
     bolero::check!().with_type::<[u8; 20]>().with_iterations(8).for_each(|bytes| {
         let text = document(bytes).to_string();
-        assert_answered(Accuracy, &json::read::<Design>(text.as_bytes()).unwrap().normalised());
+        assert_answered(Accuracy, &Design::read(text.as_bytes()).unwrap());
     });
 }

@@ -23,19 +23,20 @@ use parking_lot::Mutex;
 use serde::{Deserialize, Serialize};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 use tokio_util::task::AbortOnDropHandle;
+use toothwave_calculation::coincidence_degree::CoincidenceDegree;
+use toothwave_calculation::columns;
+use toothwave_calculation::findings::FindingAnswer;
+use toothwave_calculation::geometry::Geometry;
+use toothwave_calculation::question::{self, Question};
+use toothwave_calculation::sweep::Sweep;
+use toothwave_calculation::sweep::answer::{ChecksAnswer, PeaksAnswer, SweepAnswer, TorqueCapacityAnswer};
 use utoipa::ToSchema;
 
-use super::coincidence_degree::CoincidenceDegree;
-use super::geometry::Geometry;
-use super::sweep::Sweep;
-use super::{App, Endpoint};
-use crate::columns;
+use super::App;
 use crate::compute::{self, Pool};
 use crate::config::Limits;
-use crate::design::Design;
-use crate::findings::FindingAnswer;
 use crate::problem::{Problem, ProblemCode};
-use crate::{json, negotiation};
+use crate::{negotiation, observe};
 
 /// Lines of a chunk at most.
 const CHUNK_LINES: usize = 64;
@@ -118,10 +119,10 @@ struct PeaksOnly<'a> {
     solver_version: &'static str,
     coincidence_degree: f64,
     period_deg: f64,
-    peaks: &'a super::sweep::PeaksAnswer,
+    peaks: &'a PeaksAnswer,
     #[serde(skip_serializing_if = "Option::is_none")]
-    torque_capacity: &'a Option<super::sweep::TorqueCapacityAnswer>,
-    checks: &'a super::sweep::ChecksAnswer,
+    torque_capacity: &'a Option<TorqueCapacityAnswer>,
+    checks: &'a ChecksAnswer,
     findings: &'a [FindingAnswer],
 }
 
@@ -130,7 +131,7 @@ pub fn answer_line(
     query: BatchQuery,
     index: u64,
     document: &[u8],
-    limits: &Limits,
+    limits: &question::Limits,
     stop: &AtomicBool,
     out: &mut Vec<u8>,
 ) {
@@ -159,20 +160,18 @@ pub fn answer_line(
     }
 }
 
-fn solved<E: Endpoint>(
-    endpoint: &E,
+fn solved<Q: Question>(
+    question: &Q,
     document: &[u8],
-    limits: &Limits,
+    limits: &question::Limits,
     stop: &AtomicBool,
-) -> Result<E::Answer, Problem> {
+) -> Result<Q::Answer, Problem> {
     let started = Instant::now();
     // A fault at one document is no reason to leave the others without an answer.
     let answered = compute::caught(|| {
         #[cfg(feature = "fault-injection")]
         fail::fail_point!("solve");
-        let design = json::read::<Design>(document)?.normalised();
-        let question = endpoint.question(&design, limits)?;
-        E::answer(&question, stop)
+        Ok(question.ask(document, limits, stop)?)
     });
     histogram!("toothwave_solve_duration_seconds").record(started.elapsed());
     answered
@@ -181,6 +180,9 @@ fn solved<E: Endpoint>(
 fn append<A: Serialize>(out: &mut Vec<u8>, index: u64, answer: Result<&A, &Problem>) {
     let status = answer.map_or_else(|problem| problem.status, |_| StatusCode::OK.as_u16());
     counter!("toothwave_batch_documents_total", "status" => status.to_string()).increment(1);
+    if let Err(problem) = answer {
+        observe::problem_is_told(problem);
+    }
     let line = BatchLine { index, status, answer: answer.ok(), problem: answer.err().cloned() };
     // Numbers and words alone, into memory: this does not fail.
     if columns::write(&line, out).is_ok() {
@@ -340,7 +342,7 @@ fn work(slice: &Mutex<Slice>, query: BatchQuery, limits: &Limits, stop: &AtomicB
         let Some(Line { index, document, _ahead }) = line else { return };
         let mut answer = Vec::new();
         match document {
-            Ok(document) => answer_line(query, index, &document, limits, stop, &mut answer),
+            Ok(document) => answer_line(query, index, &document, &limits.of_calculation(), stop, &mut answer),
             Err(problem) => append::<()>(&mut answer, index, Err(&problem)),
         }
         let mut slice = slice.lock();
@@ -393,7 +395,7 @@ fn answers(
     params(BatchQuery),
     request_body(content = String, content_type = "application/x-ndjson", description = "A design document a line. Lines are answered while others are still sent: read answers while you send, or send no more than 8 MiB ahead of them."),
     responses(
-        (status = 200, description = "A line a document, in their order, each `{\"index\", \"status\", \"answer\"}` or `{\"index\", \"status\", \"problem\"}`.", body = BatchLine<super::sweep::SweepAnswer>, content_type = "application/x-ndjson"),
+        (status = 200, description = "A line a document, in their order, each `{\"index\", \"status\", \"answer\"}` or `{\"index\", \"status\", \"problem\"}`.", body = BatchLine<SweepAnswer>, content_type = "application/x-ndjson"),
         (status = 400, description = "A query that the batch does not know.", body = Problem, content_type = "application/problem+json"),
         (status = 415, description = "The body is not sent as NDJSON.", body = Problem, content_type = "application/problem+json"),
         (status = 503, description = "As many batches run as the service admits; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))

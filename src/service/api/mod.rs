@@ -1,5 +1,5 @@
-//! The endpoints: one file each, with its answer's type and its handler. What they share, the walk from document to bytes,
-//! stands here.
+//! The endpoints: one file each, with its handler and what the API document says of it. What they share, the walk of a request from
+//! document to bytes, stands here.
 
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -13,18 +13,17 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use serde::Serialize;
-use toothwave_solver::drive::Draft;
-use toothwave_solver::{LoadCase, SolveError, Violation};
+use toothwave_calculation::design::Design;
+use toothwave_calculation::forms::Forms;
+use toothwave_calculation::key::Key;
+use toothwave_calculation::no_answer::NoAnswer;
+use toothwave_calculation::question::Question;
 use utoipa::IntoResponses;
 
-use crate::cache::{Cache, Key, Provenance, Served, Spelling, Stored};
-use crate::columns;
+use crate::cache::{Cache, Provenance, Served, Spelling, Stored, etag};
 use crate::compute::{Pool, Thread};
 use crate::config::Limits;
-use crate::design::Design;
-use crate::json;
-use crate::negotiation::{self, Format, Representation};
+use crate::negotiation::{self, Representation};
 use crate::problem::{Problem, ProblemCode};
 use crate::room::{Room, Sent};
 
@@ -65,62 +64,6 @@ impl App {
     }
 }
 
-/// A question that a design document can be put to.
-pub trait Endpoint: Send + 'static {
-    /// The checked parameters that the answer follows from.
-    type Question: Send + 'static;
-    /// The answer; its serialisation is the JSON that goes over the wire.
-    type Answer: Forms;
-
-    /// Its name, in the cache's key.
-    fn name(&self) -> &'static str;
-
-    /// The parts of a normalised document that the answer depends on.
-    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a;
-
-    /// Checks those parts, reporting every impossible value.
-    ///
-    /// # Errors
-    /// A problem that names the fields at fault.
-    fn question(&self, design: &Design, limits: &Limits) -> Result<Self::Question, Problem>;
-
-    /// Where solving runs, and writing the answer as uncompressed JSON.
-    fn thread(_question: &Self::Question) -> Thread {
-        Thread::Blocking
-    }
-
-    /// Solves.
-    ///
-    /// # Errors
-    /// A problem where there is no answer, or where `stop` was set.
-    fn answer(question: &Self::Question, stop: &AtomicBool) -> Result<Self::Answer, Problem>;
-}
-
-/// Writes an answer in one form.
-pub type Form<A> = fn(&A, &mut dyn Write) -> io::Result<()>;
-
-/// What an answer can be written as.
-pub trait Forms: Serialize + Sized + 'static {
-    /// The formats beside JSON, in the service's order, each with what writes it.
-    const FORMS: &'static [(Format, Form<Self>)];
-
-    /// About how many bytes the JSON takes, so that its buffer need not grow.
-    fn expected_bytes(&self) -> usize {
-        4096
-    }
-
-    /// Writes the answer in one of its formats, or in JSON.
-    ///
-    /// # Errors
-    /// Those of the writer.
-    fn write(&self, format: Format, writer: &mut impl Write) -> io::Result<()> {
-        match Self::FORMS.iter().find(|(known, _)| *known == format) {
-            Some((_, form)) => form(self, writer),
-            None => columns::write(self, writer),
-        }
-    }
-}
-
 /// The statuses that every solving endpoint can answer with beside 200 and 304.
 #[derive(IntoResponses)]
 pub enum Problems {
@@ -150,17 +93,17 @@ pub enum Problems {
     Unavailable(#[to_schema] Problem),
 }
 
-/// The walk of a request: document → question → key → cache → solver → bytes.
-pub async fn respond<E: Endpoint>(endpoint: E, app: Arc<App>, request: Request) -> Response {
-    match walk(endpoint, app, request).await {
+/// The walk of a request: document → key → cache → checked parameters → answer → bytes.
+pub async fn respond<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Response {
+    match walk(question, app, request).await {
         Ok(response) => response,
         Err(problem) => problem.into_response(),
     }
 }
 
-async fn walk<E: Endpoint>(endpoint: E, app: Arc<App>, request: Request) -> Result<Response, Problem> {
-    let Asked { headers, body, representation, deadline } = Asked::read::<E>(&app, request).await?;
-    let spelling = Spelling::new(endpoint.name(), representation, &body);
+async fn walk<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Result<Response, Problem> {
+    let Asked { headers, body, representation, deadline } = Asked::read::<Q>(&app, request).await?;
+    let spelling = Spelling::new(question.name(), representation, &body);
     let known = app.cache.key(spelling).and_then(|key| app.cache.get(key).map(|stored| (key, stored)));
     let (key, stored, served) = match known {
         Some((key, stored)) => {
@@ -168,21 +111,21 @@ async fn walk<E: Endpoint>(endpoint: E, app: Arc<App>, request: Request) -> Resu
             (key, stored, Served::Hit)
         }
         None => {
-            let design = json::read::<Design>(&body)?.normalised();
-            let key = Key::new(endpoint.name(), &endpoint.reads(&design), representation)?;
+            let design = Design::read(&body)?;
+            let key = question.key(&design, &representation);
             log_design(key);
             let (stored, served) = match app.cache.get(key) {
                 // What is kept was checked when it was solved.
                 Some(stored) => (stored, Served::Hit),
                 None => {
-                    let question = endpoint.question(&design, &app.limits)?;
+                    let checked = question.check(&design, &app.limits.of_calculation())?;
                     let pool = app.pool.clone();
                     let thread = match representation {
-                        Representation::JSON => E::thread(&question),
+                        Representation::JSON if Q::is_short(&checked) => Thread::Executor,
                         _ => Thread::Blocking,
                     };
                     let solve = async move {
-                        pool.run(deadline, thread, move |stop| solve::<E>(&question, representation, stop)).await
+                        pool.run(deadline, thread, move |stop| solve::<Q>(&checked, representation, stop)).await
                     };
                     app.cache.solve_once(key, solve).await?
                 }
@@ -191,7 +134,7 @@ async fn walk<E: Endpoint>(endpoint: E, app: Arc<App>, request: Request) -> Resu
             (key, stored, served)
         }
     };
-    let etag = key.etag();
+    let etag = etag(key);
     let provenance = Provenance { served, solve: stored.solve };
     if negotiation::is_not_modified(&headers, &etag) {
         return Ok(caching(StatusCode::NOT_MODIFIED.into_response(), provenance, &etag));
@@ -213,23 +156,22 @@ struct Asked {
 }
 
 impl Asked {
-    async fn read<E: Endpoint>(app: &App, request: Request) -> Result<Self, Problem> {
+    async fn read<Q: Question>(app: &App, request: Request) -> Result<Self, Problem> {
         let deadline = app.pool.deadline();
         let (Parts { headers, .. }, body) = request.into_parts();
         negotiation::require_json(&headers)?;
-        let representation = Representation::negotiate(&headers, E::Answer::FORMS.iter().map(|(format, _)| *format))?;
+        let representation = Representation::negotiate(&headers, Q::Answer::FORMS.iter().map(|(format, _)| *format))?;
         let body = read_body(&headers, body, &app.limits, deadline).await?;
         Ok(Self { headers, body, representation, deadline })
     }
 }
 
 /// The same walk for an answer that is measured there and then: never cached.
-async fn respond_afresh<E: Endpoint>(endpoint: E, app: Arc<App>, request: Request) -> Response {
+async fn respond_afresh<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Response {
     let walk = async {
-        let Asked { body, representation, deadline, .. } = Asked::read::<E>(&app, request).await?;
-        let design = json::read::<Design>(&body)?.normalised();
-        let question = endpoint.question(&design, &app.limits)?;
-        let job = move |stop: &AtomicBool| solve::<E>(&question, representation, stop);
+        let Asked { body, representation, deadline, .. } = Asked::read::<Q>(&app, request).await?;
+        let checked = question.check(&Design::read(&body)?, &app.limits.of_calculation())?;
+        let job = move |stop: &AtomicBool| solve::<Q>(&checked, representation, stop);
         with_body(&app.room, app.pool.run(deadline, Thread::Blocking, job).await?, representation)
     };
     let mut response = walk.await.unwrap_or_else(IntoResponse::into_response);
@@ -263,15 +205,15 @@ async fn read_body(
 }
 
 /// Solves and writes the final bytes.
-fn solve<E: Endpoint>(
-    question: &E::Question,
+fn solve<Q: Question>(
+    checked: &Q::Checked,
     representation: Representation,
     stop: &AtomicBool,
 ) -> Result<Stored, Problem> {
     #[cfg(feature = "fault-injection")]
     fail::fail_point!("solve");
     let started = Instant::now();
-    let answer = E::answer(question, stop)?;
+    let answer = Q::answer(checked, stop)?;
     let solve = started.elapsed();
     let expected_bytes = if representation.gzip { 0 } else { answer.expected_bytes() };
     let writer = Stoppable { inner: Vec::with_capacity(expected_bytes), next_look: LOOK_EVERY_BYTES, stop };
@@ -289,7 +231,7 @@ fn solve<E: Endpoint>(
             // To its size: the cache keeps it, and weighs its length.
             Ok(Stored { body: writer.inner.into_boxed_slice().into(), sent: Sent::default(), solve, server_timing })
         }
-        Err(_) if stop.load(Ordering::Relaxed) => Err(SolveError::Stopped.into()),
+        Err(_) if stop.load(Ordering::Relaxed) => Err(NoAnswer::stopped().into()),
         Err(error) => Err(Problem::internal(&error)),
     }
 }
@@ -337,7 +279,7 @@ fn with_body(room: &Room, stored: Stored, representation: Representation) -> Res
     let headers = response.headers_mut();
     // Those here and those of the layers around.
     headers.reserve(12);
-    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(representation.format.content_type()));
+    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(negotiation::content_type(representation.format)));
     if representation.gzip {
         headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
     }
@@ -355,45 +297,4 @@ fn caching(mut response: Response, provenance: Provenance, etag: &str) -> Respon
     headers.insert(header::VARY, HeaderValue::from_static("accept, accept-encoding"));
     headers.insert(CACHE_STATUS, HeaderValue::from_static(provenance.served.cache_status()));
     response
-}
-
-/// A CSV error as what it is: one of the writer, whose kind tells a closed pipe from a full disk.
-fn csv_error(error: csv::Error) -> io::Error {
-    match error.into_kind() {
-        csv::ErrorKind::Io(error) => error,
-        other => io::Error::other(format!("{other:?}")),
-    }
-}
-
-/// Guards the promise that no answer holds anything but numbers: serde_json would write `null` and say nothing.
-///
-/// # Errors
-/// An internal problem.
-fn require_finite<'a>(columns: impl IntoIterator<Item = &'a Vec<f64>>) -> Result<(), Problem> {
-    if columns.into_iter().all(|column| column.iter().all(|value| value.is_finite())) {
-        Ok(())
-    } else {
-        Err(Problem::internal(&"a result is not finite"))
-    }
-}
-
-/// The drive of a document as far as it is possible; what is not adds its violations to the others.
-///
-/// # Errors
-/// An internal problem where the geometry does not converge.
-fn checked_drive(design: &Design, violations: &mut Vec<Violation>) -> Result<Draft, Problem> {
-    let draft = Draft::new(&design.drive_parameters()).map_err(SolveError::from)?;
-    violations.extend(design.as_written(draft.violations()));
-    Ok(draft)
-}
-
-/// The load of a document for a drive that was checked before; what is impossible adds its violations to the others.
-///
-/// # Errors
-/// A problem where the document has no load or not exactly one torque, and an internal one where the geometry does not converge.
-fn checked_load(design: &Design, draft: &Draft, violations: &mut Vec<Violation>) -> Result<Option<LoadCase>, Problem> {
-    let parameters = design.load_parameters()?;
-    let load = LoadCase::new(&parameters).map_err(|found| violations.extend(found)).ok();
-    violations.extend(parameters.clearance_violations(draft).map_err(SolveError::from)?);
-    Ok(load)
 }

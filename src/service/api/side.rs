@@ -9,11 +9,11 @@ use axum::extract::{Path, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
+use toothwave_calculation::design::Design;
 use utoipa::ToSchema;
 
 use super::App;
 use crate::config::Limits;
-use crate::design::Design;
 use crate::examples::{self, EXAMPLES};
 use crate::observe;
 use crate::problem::{Problem, ProblemCode};

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use crate::api::drawings::{BodyAnswer, BodyPart, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
+use super::answer::{BodyAnswer, BodyPart, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
 
 /// Share of the picture that is left free around the drawing.
 const MARGIN: f64 = 0.03;
@@ -11,7 +11,7 @@ const MARGIN: f64 = 0.03;
 ///
 /// # Errors
 /// Those of the writer.
-pub fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
+pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let reach_mm = reach_mm(&drawing.bodies) * (1.0 + MARGIN);
     let size_mm = 2.0 * reach_mm;
     writeln!(
@@ -46,13 +46,13 @@ pub fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> 
 }
 
 /// What stands in a drawing about itself.
-pub fn title(drawing: &DrawingAnswer) -> String {
+pub(super) fn title(drawing: &DrawingAnswer) -> String {
     let DrawingAnswer { solver_version, design_hash, .. } = drawing;
     format!("toothwave {solver_version}, {}, design {design_hash}", crate::json::word(&drawing.subject))
 }
 
 /// The farthest that a drawing reaches from its origin.
-pub fn reach_mm(bodies: &[BodyAnswer]) -> f64 {
+pub(super) fn reach_mm(bodies: &[BodyAnswer]) -> f64 {
     let of_edge = |edge: &EdgeAnswer| match edge {
         EdgeAnswer::Line { x_mm, y_mm } => farthest(x_mm, y_mm),
         EdgeAnswer::Arc { radius_mm, .. } => *radius_mm,

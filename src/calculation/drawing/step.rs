@@ -6,14 +6,14 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use crate::api::drawings::{BodyAnswer, BodyPart, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
-use crate::svg;
+use super::answer::{BodyAnswer, BodyPart, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
+use super::svg;
 
 /// Writes a drawing.
 ///
 /// # Errors
 /// Those of the writer.
-pub fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
+pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let mut step = Step { writer, last: 0 };
     step.head(drawing)?;
     let frame = step.frame()?;

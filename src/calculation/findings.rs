@@ -1,11 +1,14 @@
 //! Findings as they go over the wire, with what each means and what to change.
 
+use std::io::{self, Write};
+
 use serde::Serialize;
-use toothwave_solver::Finding;
-use toothwave_solver::findings::{Edge, FATIGUE_LIMIT_STRESS_MPA, STEEP_FLANK_DEG};
+use toothwave_solver::findings::{self, Edge, FATIGUE_LIMIT_STRESS_MPA, STEEP_FLANK_DEG};
+use toothwave_solver::{Drive, Finding, SolveError};
 use utoipa::ToSchema;
 
-use crate::problem::contact_name;
+use crate::field::contact_name;
+use crate::no_answer::NoAnswer;
 
 /// What a designer should be told about a drive that can exist; docs/findings.md has the formula behind each code.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -211,4 +214,19 @@ impl From<&Finding> for FindingAnswer {
             ),
         }
     }
+}
+
+/// The findings about a drive, as they go over the wire.
+pub(crate) fn drive_findings(drive: &Drive) -> Result<Vec<FindingAnswer>, NoAnswer> {
+    let findings = findings::of_drive(drive).map_err(SolveError::from)?;
+    Ok(findings.iter().map(FindingAnswer::from).collect())
+}
+
+/// The findings, a paragraph each.
+pub(crate) fn write_findings(findings: &[FindingAnswer], writer: &mut dyn Write) -> io::Result<()> {
+    for finding in findings {
+        let FindingAnswer { severity, detail, value, limit, unit, advice, .. } = finding;
+        writeln!(writer, "\n{severity:?}: {detail} ({value:.6} against {limit:.6} {unit}); {advice}")?;
+    }
+    Ok(())
 }

@@ -5,8 +5,8 @@
 
 use std::io::{self, Write};
 
-use crate::api::drawings::{BodyPart, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
-use crate::svg;
+use super::answer::{BodyPart, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
+use super::svg;
 
 /// The application under whose name every outline carries what it belongs to, as extended data.
 const APPLICATION: &str = "TOOTHWAVE";
@@ -34,7 +34,7 @@ const fn layer_of(part: BodyPart) -> Layer {
 ///
 /// # Errors
 /// Those of the writer.
-pub fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
+pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let mut dxf = Dxf { writer, next_handle: FIRST_FREE };
     let title = svg::title(drawing);
     dxf.text(999, &title)?;

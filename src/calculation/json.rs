@@ -7,7 +7,7 @@
 use serde::de::{self, IntoDeserializer, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
 
-use crate::problem::FieldCode;
+use crate::field::FieldCode;
 
 /// Why a text is no document of the wanted form.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,7 +8,7 @@ use kuva::render::figure::Figure;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 
-use crate::api::sweep::{PeakAnswer, StatesAnswer, SweepAnswer};
+use super::answer::{PeakAnswer, StatesAnswer, SweepAnswer};
 
 /// Apart for readers who do not tell red from green (Okabe and Ito): force, stress.
 const COLORS: [&str; 2] = ["#0072b2", "#d55e00"];
@@ -31,7 +31,7 @@ struct Panel<'a> {
 ///
 /// # Errors
 /// Those of the writer.
-pub fn write(sweep: &SweepAnswer, writer: &mut dyn Write) -> io::Result<()> {
+pub(super) fn write(sweep: &SweepAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let states = &sweep.states;
     let pieces = pass(states, sweep.enters_under_load);
     let (mut plots, mut layouts) = (Vec::new(), Vec::new());

@@ -1,7 +1,6 @@
 //! The design document: wire types, and their one conversion into the solver's.
 //!
-//! They are serialised for the cache's key alone, in a form without field names: every field is written always, because one that
-//! may be left out would let two designs share a key.
+//! A document that is written as JSON reads back as itself.
 
 use std::borrow::Cow;
 
@@ -20,8 +19,10 @@ use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, OneOfBuilder, Schema, Type};
 use utoipa::{PartialSchema, ToSchema};
 
-use crate::json::Fault;
-use crate::problem::FieldCode;
+use crate::field::FieldCode;
+use crate::json::{self, Fault};
+use crate::key::{Encode, Encoder, encoded};
+use crate::no_answer::NoAnswer;
 
 /// One document for every endpoint: each reads only what it needs. Lengths in mm, torques in N·m, moduli in GPa, stiffnesses in N/mm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -41,7 +42,7 @@ pub struct Design {
     #[serde(default)]
     pub materials: MaterialsDocument,
     /// The load; only a sweep needs it.
-    #[serde(default, deserialize_with = "given")]
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub load: Option<LoadDocument>,
     /// The model of load sharing.
@@ -89,14 +90,14 @@ pub struct WaveGeneratorDocument {
 }
 
 /// The discrete teeth.
-#[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct TeethDocument {
     /// Teeth in theory, Z_G: two more or two fewer than the ring's.
     #[schema(value_type = i64, minimum = 2, maximum = 10000)]
     pub count: Whole,
     /// Installed teeth Z'_G, an even divisor of `count`; only they have a slot. Left out: `count`.
-    #[serde(default, deserialize_with = "given")]
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, minimum = 2, maximum = 10000, required = false)]
     pub installed: Option<Whole>,
     /// Radius r of a tooth.
@@ -105,14 +106,6 @@ pub struct TeethDocument {
     /// Width L1 of a tooth along the axis.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub width_mm: f64,
-}
-
-/// With `installed` filled in. The document itself keeps whether it stands there, so that no fault is blamed on a field that does not.
-impl Serialize for TeethDocument {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let Self { count, installed, radius_mm, width_mm } = *self;
-        (count, installed.unwrap_or(count), radius_mm, width_mm).serialize(serializer)
-    }
 }
 
 /// The rigid internal wheel.
@@ -166,15 +159,15 @@ impl Default for MaterialDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct LoadDocument {
     /// Torque M0 at the wave generator.
-    #[serde(default, deserialize_with = "given")]
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
     pub input_torque_nm: Option<f64>,
     /// Torque at the carrier, losses neglected.
-    #[serde(default, deserialize_with = "given")]
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
     pub output_torque_nm: Option<f64>,
     /// The contact stress that the torque capacity is asked for.
-    #[serde(default, deserialize_with = "given")]
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-3, maximum = 1e6, nullable = false)]
     pub allowable_stress_mpa: Option<f64>,
 }
@@ -190,7 +183,7 @@ pub struct ModelDocument {
     #[serde(default)]
     pub stiffness: StiffnessDocument,
     /// Gaps at the contacts; left out, there are none.
-    #[serde(default, deserialize_with = "given")]
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub clearance: Option<ClearanceDocument>,
 }
@@ -276,12 +269,12 @@ impl ToSchema for StiffnessDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct SweepDocument {
     /// Equal intervals of one period; both ends are included. 50 where neither this nor `tolerance` is given.
-    #[serde(default, deserialize_with = "given")]
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, minimum = 1, maximum = 10000000, default = 50, required = false)]
     pub samples: Option<Whole>,
     /// Instead of `samples`: the true extremes of every force and stress to this relative tolerance, input angles placed where they are
     /// needed, and the instant at which a tooth enters twice, without it and with it.
-    #[serde(default, deserialize_with = "given")]
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-12, maximum = 0.1, nullable = false)]
     pub tolerance: Option<f64>,
     /// Whether wind-up and torsional stiffness are wanted too.
@@ -368,7 +361,7 @@ pub struct ToothPartDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct RingPartDocument {
     /// Outer radius; left out, 1.2 times the root radius.
-    #[serde(default, deserialize_with = "given")]
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
     pub outer_radius_mm: Option<f64>,
     /// How far the flank is set back outward; a bored tip stays where it is.
@@ -382,11 +375,11 @@ pub struct RingPartDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct CarrierPartDocument {
     /// Inner radius; left out, a tenth of the annulus between cam and ring tips is left free inside.
-    #[serde(default, deserialize_with = "given")]
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
     pub inner_radius_mm: Option<f64>,
     /// Outer radius; left out, a tenth of that annulus is left free outside.
-    #[serde(default, deserialize_with = "given")]
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
     pub outer_radius_mm: Option<f64>,
     /// How far each wall of a slot is set back.
@@ -416,8 +409,16 @@ pub enum ExtentDocument {
 }
 
 /// A whole number of any size, spelled `28`, `28.0` or `2.8e1`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Whole(f64);
+
+/// Without a point, as far as every reader can tell whole numbers apart.
+impl Serialize for Whole {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        const MOST: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
+        if self.0.abs() <= MOST { serializer.serialize_i64(self.count()) } else { serializer.serialize_f64(self.0) }
+    }
+}
 
 impl Whole {
     /// As the solver counts; what lies beyond that lies beyond every range too.
@@ -499,7 +500,63 @@ impl<'de> Deserialize<'de> for StiffnessDocument {
     }
 }
 
+encoded! {
+    struct DriveDocument { wave_generator, teeth, ring }
+    struct WaveGeneratorDocument { semi_major_mm, semi_minor_mm }
+    struct RingDocument { teeth, tip_radius_mm }
+    struct MaterialsDocument { wave_generator, teeth, ring, carrier }
+    struct MaterialDocument { youngs_modulus_gpa, poissons_ratio }
+    struct LoadDocument { input_torque_nm, output_torque_nm, allowable_stress_mpa }
+    struct ModelDocument { compatibility, stiffness, clearance }
+    struct ClearanceDocument { wave_generator_um, ring_um, carrier_um }
+    struct SweepDocument { samples, tolerance, wind_up }
+    struct ProfileDocument { chord_tolerance_mm, extent }
+    struct AccuracyDocument { requested_error }
+    struct PartsDocument { wave_generator, teeth, ring, carrier }
+    struct WaveGeneratorPartDocument { bore_radius_mm, clearance_um }
+    struct ToothPartDocument { clearance_um }
+    struct RingPartDocument { outer_radius_mm, clearance_um }
+    struct CarrierPartDocument { inner_radius_mm, outer_radius_mm, clearance_um }
+    struct AssemblyDocument { input_angle_deg }
+}
+
+encoded!(enum CompatibilityDocument enum ExtentDocument);
+
+impl Encode for Whole {
+    fn encode(&self, encoder: &mut Encoder) {
+        self.0.encode(encoder);
+    }
+}
+
+/// With `installed` filled in. The document itself keeps whether it stands there, so that no fault is blamed on a field that does not.
+impl Encode for TeethDocument {
+    fn encode(&self, encoder: &mut Encoder) {
+        let Self { count, installed, radius_mm, width_mm } = self;
+        (count, installed.unwrap_or(*count), radius_mm, width_mm).encode(encoder);
+    }
+}
+
+impl Encode for StiffnessDocument {
+    fn encode(&self, encoder: &mut Encoder) {
+        match self {
+            Self::Linear => "linear".encode(encoder),
+            Self::Fixed { wave_generator_n_per_mm, ring_n_per_mm, carrier_n_per_mm } => {
+                ("fixed", wave_generator_n_per_mm, ring_n_per_mm, carrier_n_per_mm).encode(encoder);
+            }
+            Self::Palmgren => "palmgren".encode(encoder),
+        }
+    }
+}
+
 impl Design {
+    /// The document that a text holds, normalised.
+    ///
+    /// # Errors
+    /// Where it holds none: the first structural fault.
+    pub fn read(text: &[u8]) -> Result<Self, NoAnswer> {
+        Ok(json::read::<Self>(text)?.normalised())
+    }
+
     /// The document with what may be left out filled in and zeros of one sign, so that equal designs are equal bytes.
     pub fn normalised(mut self) -> Self {
         if self.sweep.tolerance.is_none() {

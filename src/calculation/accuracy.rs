@@ -1,0 +1,360 @@
+//! How wrong and how slow each way of computing a design is.
+
+use std::io::{self, Write};
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+use toothwave_solver::drive::Draft;
+use toothwave_solver::mesh::Mesh;
+use toothwave_solver::sweep::{ContactPeaks, Points, sweep};
+use toothwave_solver::{Compatibility, ContactLaw, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop};
+use utoipa::ToSchema;
+
+use crate::design::{CompatibilityDocument, Design};
+use crate::forms::{Form, Format, Forms, csv_error};
+use crate::json::word;
+use crate::key::Encode;
+use crate::no_answer::{NoAnswer, NoAnswerCode};
+use crate::question::{Limits, Question, checked_drive, checked_load};
+
+/// The sample counts that are tried.
+const SAMPLES: [u64; 9] = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
+
+/// The tolerances that are tried.
+const TOLERANCES: [f64; 5] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10];
+
+/// The tolerance of the converged reference: the finest that a sweep takes.
+const REFERENCE_TOLERANCE: f64 = 1e-12;
+
+/// Runs of which the median time is taken, at most, and the time after which no further one is begun.
+const MOST_RUNS: usize = 15;
+const ENOUGH: Duration = Duration::from_millis(2);
+
+/// How wrong and how slow each way of computing a design is, measured for this answer.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct AccuracyAnswer {
+    /// Version of the solver.
+    pub solver_version: &'static str,
+    /// The relative error that was asked for.
+    pub requested_error: f64,
+    /// The fastest way of the design's own model that meets it; left out where none does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub cheapest: Option<WayAnswer>,
+    /// Every way, by model and then from coarse to fine.
+    pub ways: Vec<WayAnswer>,
+    /// Models that have no answer for this design.
+    pub unavailable: Vec<UnavailableAnswer>,
+}
+
+/// A way of computing the design.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct WayAnswer {
+    /// The form of compatibility.
+    pub compatibility: CompatibilityDocument,
+    /// The contact law.
+    pub law: LawName,
+    /// Equal intervals of the period; left out where there is a tolerance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub samples: Option<u64>,
+    /// Relative tolerance; left out where there are samples.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub tolerance: Option<f64>,
+    /// Largest relative error of the six peaks against those of the same model, converged.
+    pub error: f64,
+    /// Largest relative difference of the model's converged peaks from those of the design's own model.
+    pub model_difference: f64,
+    /// Median time of the solve.
+    pub solve_us: f64,
+    /// States of the sweep.
+    pub states: usize,
+}
+
+/// A model without an answer.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct UnavailableAnswer {
+    /// The form of compatibility.
+    pub compatibility: CompatibilityDocument,
+    /// The contact law.
+    pub law: LawName,
+    /// Why.
+    pub code: NoAnswerCode,
+}
+
+/// A contact law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LawName {
+    /// `k = π L1 E*/2`.
+    Linear,
+    /// Given stiffnesses.
+    Fixed,
+    /// Palmgren's.
+    Palmgren,
+}
+
+impl From<ContactLaw> for LawName {
+    fn from(law: ContactLaw) -> Self {
+        match law {
+            ContactLaw::Linear => Self::Linear,
+            ContactLaw::Fixed(_) => Self::Fixed,
+            ContactLaw::Palmgren => Self::Palmgren,
+        }
+    }
+}
+
+impl From<Compatibility> for CompatibilityDocument {
+    fn from(compatibility: Compatibility) -> Self {
+        match compatibility {
+            Compatibility::Projection => Self::Projection,
+            Compatibility::VirtualWork => Self::VirtualWork,
+        }
+    }
+}
+
+/// The checked parameters of the question.
+#[derive(Debug)]
+pub struct CheckedAccuracy {
+    drive: Drive,
+    load: LoadCase,
+    requested_error: f64,
+    max_states: u64,
+}
+
+/// What is asked.
+#[derive(Debug)]
+pub struct Accuracy;
+
+impl Question for Accuracy {
+    type Checked = CheckedAccuracy;
+    type Answer = AccuracyAnswer;
+
+    fn name(&self) -> &'static str {
+        "accuracy"
+    }
+
+    fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
+        (&design.drive, &design.materials, &design.load, &design.model, &design.accuracy)
+    }
+
+    fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedAccuracy, NoAnswer> {
+        let mut violations = Vec::new();
+        let draft = checked_drive(design, &mut violations)?;
+        let load = checked_load(design, &draft, &mut violations)?;
+        match (draft.drive(), load, design.requested_error()) {
+            (Some(drive), Some(load), Ok(requested_error)) if violations.is_empty() => {
+                Ok(CheckedAccuracy { drive, load, requested_error, max_states: limits.max_states })
+            }
+            (_, _, requested_error) => {
+                violations.extend(requested_error.err());
+                Err(NoAnswer::impossible(&violations))
+            }
+        }
+    }
+
+    fn answer(checked: &CheckedAccuracy, stop: &impl Stop) -> Result<AccuracyAnswer, NoAnswer> {
+        let CheckedAccuracy { drive, load, requested_error, max_states } = checked;
+        let own = *load.parameters();
+        let own_peaks = converged(drive, load, *max_states, stop).map_err(|error| match error {
+            // There is no field to blame: the reference's tolerance is ours.
+            SolveError::TooManyStates { limit } => NoAnswer::new(
+                NoAnswerCode::TooManyStates,
+                format!("a converged reference for this drive takes more states than the {limit} of `max_states`"),
+            ),
+            error => error.into(),
+        })?;
+        let (mut ways, mut unavailable) = (Vec::new(), Vec::new());
+        for model in models(&own) {
+            let (compatibility, law) = (model.compatibility.into(), model.law.into());
+            match Model::new(drive, &model, &own_peaks, *max_states, stop) {
+                Ok(Some(model)) => model.measure(&mut ways, stop)?,
+                // A gap that this form of compatibility would turn into load.
+                Ok(None) => {
+                    unavailable.push(UnavailableAnswer { compatibility, law, code: NoAnswerCode::ImpossibleDesign });
+                }
+                Err(SolveError::Stopped) => return Err(SolveError::Stopped.into()),
+                Err(error) => {
+                    let code = NoAnswer::from(error).code;
+                    unavailable.push(UnavailableAnswer { compatibility, law, code });
+                }
+            }
+        }
+        let is_own = |way: &&WayAnswer| {
+            way.compatibility == own.compatibility.into() && way.law == own.law.into() && way.error <= *requested_error
+        };
+        let cheapest = ways.iter().filter(is_own).min_by(|one, other| one.solve_us.total_cmp(&other.solve_us)).cloned();
+        Ok(AccuracyAnswer {
+            solver_version: toothwave_solver::VERSION,
+            requested_error: *requested_error,
+            cheapest,
+            ways,
+            unavailable,
+        })
+    }
+}
+
+/// The design's own model first, then every other form of compatibility and law that needs no further numbers.
+fn models(own: &LoadParameters) -> Vec<LoadParameters> {
+    let mut models = vec![*own];
+    for compatibility in [Compatibility::Projection, Compatibility::VirtualWork] {
+        for law in [own.law, ContactLaw::Linear, ContactLaw::Palmgren] {
+            let model = LoadParameters { compatibility, law, ..*own };
+            if !models.contains(&model) {
+                models.push(model);
+            }
+        }
+    }
+    models
+}
+
+fn converged(
+    drive: &Drive,
+    load: &LoadCase,
+    max_states: u64,
+    stop: &impl Stop,
+) -> Result<PerContact<ContactPeaks>, SolveError> {
+    let points = Points::Tolerance { tolerance: REFERENCE_TOLERANCE, max_states };
+    Ok(sweep(drive, load, points, stop)?.peaks)
+}
+
+/// The largest relative difference of six peaks from their reference.
+fn difference(peaks: &PerContact<ContactPeaks>, reference: &PerContact<ContactPeaks>) -> f64 {
+    let pairs = peaks.iter().flat_map(|(contact, peaks)| {
+        let reference = reference.get(contact);
+        [(peaks.force_n, reference.force_n), (peaks.stress_mpa, reference.stress_mpa)]
+    });
+    pairs.map(|(peak, reference)| (peak.value - reference.value).abs() / reference.value).fold(0.0, f64::max)
+}
+
+/// A model of the design with its converged peaks.
+struct Model<'a> {
+    drive: &'a Drive,
+    load: LoadCase,
+    reference: PerContact<ContactPeaks>,
+    difference: f64,
+    max_states: u64,
+}
+
+impl<'a> Model<'a> {
+    /// The model, or nothing where its clearances make no sense.
+    fn new(
+        drive: &'a Drive,
+        parameters: &LoadParameters,
+        own_peaks: &PerContact<ContactPeaks>,
+        max_states: u64,
+        stop: &impl Stop,
+    ) -> Result<Option<Self>, SolveError> {
+        let Ok(load) = LoadCase::new(parameters) else { return Ok(None) };
+        if !parameters.clearance_violations(&Draft::new(drive.parameters())?)?.is_empty() {
+            return Ok(None);
+        }
+        let reference = converged(drive, &load, max_states, stop)?;
+        let difference = difference(&reference, own_peaks);
+        Ok(Some(Self { drive, load, reference, difference, max_states }))
+    }
+
+    /// Tries every number of samples and every tolerance that the limit on states admits.
+    fn measure(&self, ways: &mut Vec<WayAnswer>, stop: &impl Stop) -> Result<(), SolveError> {
+        let mesh = Mesh::new(self.drive);
+        for samples in SAMPLES.into_iter().filter(|&samples| mesh.state_count(samples) <= self.max_states) {
+            ways.push(self.way(Points::Samples(samples), stop)?);
+        }
+        for tolerance in TOLERANCES {
+            ways.push(self.way(Points::Tolerance { tolerance, max_states: self.max_states }, stop)?);
+        }
+        Ok(())
+    }
+
+    fn way(&self, points: Points, stop: &impl Stop) -> Result<WayAnswer, SolveError> {
+        let begun = Instant::now();
+        let mut times_us = Vec::with_capacity(MOST_RUNS);
+        let found = loop {
+            let started = Instant::now();
+            let found = sweep(self.drive, &self.load, points, stop)?;
+            times_us.push(1e6 * started.elapsed().as_secs_f64());
+            if times_us.len() == MOST_RUNS || begun.elapsed() > ENOUGH {
+                break found;
+            }
+        };
+        times_us.sort_by(f64::total_cmp);
+        let (samples, tolerance) = match points {
+            Points::Samples(samples) => (Some(samples), None),
+            Points::Tolerance { tolerance, .. } => (None, Some(tolerance)),
+        };
+        let p = self.load.parameters();
+        Ok(WayAnswer {
+            compatibility: p.compatibility.into(),
+            law: p.law.into(),
+            samples,
+            tolerance,
+            error: difference(&found.peaks, &self.reference),
+            model_difference: self.difference,
+            solve_us: times_us[times_us.len() / 2],
+            states: found.states.len(),
+        })
+    }
+}
+
+impl Forms for AccuracyAnswer {
+    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Csv, Self::write_csv), (Format::Text, Self::write_text)];
+}
+
+impl AccuracyAnswer {
+    fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
+        let mut csv = csv::Writer::from_writer(writer);
+        let names = ["compatibility", "law", "samples", "tolerance", "error", "model_difference", "solve_us", "states"];
+        csv.write_record(names).map_err(csv_error)?;
+        for way in &self.ways {
+            csv.serialize((
+                way.compatibility,
+                way.law,
+                way.samples,
+                way.tolerance,
+                way.error,
+                way.model_difference,
+                way.solve_us,
+                way.states,
+            ))
+            .map_err(csv_error)?;
+        }
+        csv.flush()
+    }
+
+    fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
+        writeln!(writer, "compatibility  law       points            error   from own model      solve    states")?;
+        for way in &self.ways {
+            way.write_line(writer)?;
+        }
+        for UnavailableAnswer { compatibility, law, code } in &self.unavailable {
+            writeln!(writer, "{:<14} {:<9} no answer: {}", word(compatibility), word(law), word(code))?;
+        }
+        match &self.cheapest {
+            Some(way) => {
+                writeln!(writer, "\nfastest of the design's own model within {:e}:", self.requested_error)?;
+                way.write_line(writer)
+            }
+            None => writeln!(writer, "\nno way of the design's own model is within {:e}", self.requested_error),
+        }
+    }
+}
+
+impl WayAnswer {
+    fn write_line(&self, writer: &mut dyn Write) -> io::Result<()> {
+        let points = match (self.samples, self.tolerance) {
+            (Some(samples), _) => format!("{samples} samples"),
+            (None, tolerance) => format!("to {:e}", tolerance.unwrap_or_default()),
+        };
+        writeln!(
+            writer,
+            "{:<14} {:<9} {points:<14} {:>8.1e}         {:>8.1e} {:>7.1} us {:>9}",
+            word(&self.compatibility),
+            word(&self.law),
+            self.error,
+            self.model_difference,
+            self.solve_us,
+            self.states
+        )
+    }
+}

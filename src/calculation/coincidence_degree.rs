@@ -1,0 +1,119 @@
+//! How many teeth share the load.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+use toothwave_solver::mesh::{Mesh, TeethInMesh};
+use toothwave_solver::{Drive, Stop};
+use utoipa::ToSchema;
+
+use crate::design::Design;
+use crate::findings::{FindingAnswer, drive_findings, write_findings};
+use crate::forms::{Form, Format, Forms, csv_error};
+use crate::geometry::{EngagementAnswer, UndercutAnswer};
+use crate::key::Encode;
+use crate::no_answer::NoAnswer;
+use crate::question::{Limits, Question, checked_drive};
+
+/// The coincidence degree of a drive, and what it follows from.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct CoincidenceDegreeAnswer {
+    /// Version of the solver.
+    pub solver_version: &'static str,
+    /// Contact ratio ε, counted over both meshing zones.
+    pub coincidence_degree: f64,
+    /// Where a tooth touches the ring's flank.
+    pub engagement: EngagementAnswer,
+    /// How many teeth of a zone mesh, over the input angle.
+    pub teeth_in_mesh_per_zone: TeethInMeshAnswer,
+    /// Whether the ring's tips are cut away.
+    pub undercut: UndercutAnswer,
+    /// The input angle after which the load pattern repeats.
+    pub period_deg: f64,
+    /// What a designer should be told.
+    pub findings: Vec<FindingAnswer>,
+}
+
+/// How many teeth of a zone mesh, over the input angle.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct TeethInMeshAnswer {
+    /// At least.
+    pub min: u64,
+    /// At most.
+    pub max: u64,
+}
+
+/// What is asked.
+#[derive(Debug)]
+pub struct CoincidenceDegree;
+
+impl Question for CoincidenceDegree {
+    type Checked = Drive;
+    type Answer = CoincidenceDegreeAnswer;
+
+    fn name(&self) -> &'static str {
+        "coincidence-degree"
+    }
+
+    fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
+        &design.drive
+    }
+
+    fn check(&self, design: &Design, _: &Limits) -> Result<Drive, NoAnswer> {
+        let mut violations = Vec::new();
+        checked_drive(design, &mut violations)?.drive().ok_or_else(|| NoAnswer::impossible(&violations))
+    }
+
+    fn answer(drive: &Drive, _: &impl Stop) -> Result<CoincidenceDegreeAnswer, NoAnswer> {
+        let mesh = Mesh::new(drive);
+        let TeethInMesh { min, max } = mesh.teeth_in_mesh();
+        Ok(CoincidenceDegreeAnswer {
+            solver_version: toothwave_solver::VERSION,
+            coincidence_degree: mesh.coincidence_degree(),
+            engagement: drive.into(),
+            teeth_in_mesh_per_zone: TeethInMeshAnswer { min, max },
+            undercut: drive.into(),
+            period_deg: mesh.period_deg(),
+            findings: drive_findings(drive)?,
+        })
+    }
+}
+
+impl Forms for CoincidenceDegreeAnswer {
+    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Csv, Self::write_csv), (Format::Text, Self::write_text)];
+}
+
+impl CoincidenceDegreeAnswer {
+    fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
+        let mut csv = csv::Writer::from_writer(writer);
+        csv.write_record([
+            "coincidence_degree",
+            "engagement_start_deg",
+            "engagement_end_deg",
+            "teeth_in_mesh_per_zone_min",
+            "teeth_in_mesh_per_zone_max",
+            "period_deg",
+        ])
+        .map_err(csv_error)?;
+        csv.serialize((
+            self.coincidence_degree,
+            self.engagement.start_deg,
+            self.engagement.end_deg,
+            self.teeth_in_mesh_per_zone.min,
+            self.teeth_in_mesh_per_zone.max,
+            self.period_deg,
+        ))
+        .map_err(csv_error)?;
+        csv.flush()
+    }
+
+    fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
+        let TeethInMeshAnswer { min, max } = self.teeth_in_mesh_per_zone;
+        writeln!(writer, "coincidence degree                  {:.12}", self.coincidence_degree)?;
+        writeln!(writer, "teeth in mesh, each zone            {min} to {max}")?;
+        writeln!(writer, "period of the input angle           {:.6} deg", self.period_deg)?;
+        self.engagement.write_text(writer)?;
+        self.undercut.write_text(writer)?;
+        write_findings(&self.findings, writer)
+    }
+}

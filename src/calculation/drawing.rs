@@ -1,0 +1,92 @@
+//! Each mating part, or all of them in place, as outlines for CAD, workshops and eyes.
+
+use toothwave_solver::drawing as solver;
+use toothwave_solver::drive::{Draft, DriveError};
+use toothwave_solver::{SolveError, Stop};
+
+use crate::design::Design;
+use crate::drawing::answer::{BodyAnswer, DrawingAnswer, DrawnPart};
+use crate::findings::drive_findings;
+use crate::forms::{Form, Format, Forms};
+use crate::key::{Encode, Key};
+use crate::no_answer::NoAnswer;
+use crate::question::{Limits, Question};
+
+pub mod answer;
+mod dxf;
+mod step;
+mod svg;
+
+/// What is asked.
+#[derive(Debug)]
+pub struct Drawing(pub DrawnPart);
+
+/// A drawing that can be made.
+#[derive(Debug)]
+pub struct CheckedDrawing {
+    drawing: solver::Drawing,
+    design_hash: String,
+    subject: DrawnPart,
+    chord_tolerance_mm: f64,
+    input_angle_deg: Option<f64>,
+}
+
+impl Question for Drawing {
+    type Checked = CheckedDrawing;
+    type Answer = DrawingAnswer;
+
+    fn name(&self) -> &'static str {
+        match self.0 {
+            DrawnPart::Ring => "drawings/ring",
+            DrawnPart::WaveGenerator => "drawings/wave-generator",
+            DrawnPart::Carrier => "drawings/carrier",
+            DrawnPart::Tooth => "drawings/tooth",
+            DrawnPart::Assembly => "drawings/assembly",
+        }
+    }
+
+    fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
+        let assembly = (self.0 == DrawnPart::Assembly).then_some(&design.assembly);
+        (&design.drive, &design.parts, design.profile.chord_tolerance_mm, assembly)
+    }
+
+    fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedDrawing, NoAnswer> {
+        let subject = self.0;
+        let of_design = (&design.drive, &design.parts, design.profile.chord_tolerance_mm);
+        let parameters = design.drawing_parameters(limits.max_profile_points);
+        let draft = Draft::new(&design.drive_parameters()).map_err(SolveError::from)?;
+        let drawing = solver::Drawing::new(&draft, subject.subject(), &design.parts_parameters(), &parameters);
+        let drawing = drawing.map_err(|error| match error {
+            DriveError::Impossible(violations) => NoAnswer::impossible(&design.as_written(&violations)),
+            error @ DriveError::NotConverged(_) => error.into(),
+        })?;
+        Ok(CheckedDrawing {
+            drawing,
+            design_hash: Key::new("design", &of_design, &(Format::Json, false)).to_string(),
+            subject,
+            chord_tolerance_mm: parameters.chord_tolerance_mm,
+            input_angle_deg: (subject == DrawnPart::Assembly).then_some(parameters.input_angle_deg),
+        })
+    }
+
+    fn answer(checked: &CheckedDrawing, stop: &impl Stop) -> Result<DrawingAnswer, NoAnswer> {
+        let bodies = checked.drawing.bodies(stop)?;
+        Ok(DrawingAnswer {
+            solver_version: toothwave_solver::VERSION,
+            design_hash: checked.design_hash.clone(),
+            subject: checked.subject,
+            chord_tolerance_mm: checked.chord_tolerance_mm,
+            input_angle_deg: checked.input_angle_deg,
+            bodies: bodies
+                .into_iter()
+                .map(|body| BodyAnswer::new(body, checked.drawing.drive().parameters().tooth_width_mm))
+                .collect(),
+            findings: drive_findings(checked.drawing.drive())?,
+        })
+    }
+}
+
+impl Forms for DrawingAnswer {
+    const FORMS: &'static [(Format, Form<Self>)] =
+        &[(Format::Svg, svg::write), (Format::Dxf, dxf::write), (Format::Step, step::write)];
+}

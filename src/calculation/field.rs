@@ -1,0 +1,192 @@
+//! Fields of the design document: where each stands, and what can be wrong with it.
+
+use serde::Serialize;
+use toothwave_solver::violation::{Misfit, Violation};
+use toothwave_solver::{Contact, Parameter, Part};
+use utoipa::ToSchema;
+
+/// A field at fault.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct FieldError {
+    /// JSON pointer (RFC 6901) to the field.
+    pub pointer: String,
+    /// The kind of fault, a stable word.
+    pub code: FieldCode,
+    /// What is wrong and what would be right.
+    pub detail: String,
+    /// The field's value, where it is a number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub value: Option<f64>,
+    /// The limit that the value is beyond, or, of a number of teeth, the nearest one that would do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub limit: Option<f64>,
+}
+
+/// Kinds of fault of a field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FieldCode {
+    /// A field that the document does not know.
+    UnknownField,
+    /// A required field that is not there.
+    MissingField,
+    /// The same field twice.
+    DuplicateField,
+    /// A value of another type.
+    WrongType,
+    /// A word that is not one of the choices.
+    UnknownChoice,
+    /// A number that no double can hold.
+    NumberTooLarge,
+    /// Two fields of which only one may be there.
+    ConflictingFields,
+    /// A value outside its range.
+    OutOfRange,
+    /// The semi-major axis does not exceed the semi-minor one.
+    CamNotElongated,
+    /// Carrier and ring do not differ by two teeth.
+    ToothDifference,
+    /// An odd number of teeth, which no even number of installed ones divides.
+    CountOdd,
+    /// An odd number of installed teeth.
+    InstalledOdd,
+    /// Installed teeth that do not divide the theoretical ones.
+    InstalledNoDivisor,
+    /// Neighbouring teeth touch somewhere on their path.
+    TeethTouch,
+    /// The ring's tips reach in to the wave generator.
+    NoCarrierAnnulus,
+    /// The bore takes the whole flank away.
+    BoreLeavesNoFlank,
+    /// A clearance under `projection` that would load a tooth instead of freeing it.
+    ClearanceNotMonotone,
+    /// The ring's outer radius does not exceed its root radius.
+    RingWithoutRim,
+    /// The carrier's inner radius does not exceed the semi-major axis.
+    CarrierMeetsCam,
+    /// The carrier's outer radius reaches the ring's tips.
+    CarrierMeetsRing,
+    /// The carrier's outer radius does not exceed its inner one.
+    CarrierWithoutWall,
+    /// The slots run into each other all the way to the carrier's outer radius.
+    SlotsTakeCarrier,
+    /// The wave generator's bore cuts it open.
+    BoreTakesCam,
+    /// The wave generator's clearance gives it a cusp.
+    ClearanceTakesCam,
+    /// The teeth's clearance reaches their radius.
+    ClearanceTakesTooth,
+    /// More states than `max_states`.
+    TooManyStates,
+    /// More profile points than `max_profile_points`.
+    TooManyPoints,
+}
+
+/// A violation as the field that it is about.
+impl From<&Violation> for FieldError {
+    fn from(violation: &Violation) -> Self {
+        use Parameter::{InstalledTeeth, RingTeeth, SemiMajor, TipRadius, ToothCount, ToothRadius};
+        let (code, parameter, value, limit) = match *violation {
+            Violation::OutOfRange { parameter, value, limit } => (FieldCode::OutOfRange, parameter, value, limit),
+            Violation::CamNotElongated { semi_major_mm, semi_minor_mm } => {
+                (FieldCode::CamNotElongated, SemiMajor, semi_major_mm, semi_minor_mm)
+            }
+            Violation::ToothDifference { ring_teeth, instead, .. } => {
+                (FieldCode::ToothDifference, RingTeeth, ring_teeth as f64, instead.nearest_to(ring_teeth) as f64)
+            }
+            Violation::CountOdd { teeth, instead } => {
+                (FieldCode::CountOdd, ToothCount, teeth as f64, instead.nearest_to(teeth) as f64)
+            }
+            Violation::InstalledOdd { installed, instead } => {
+                (FieldCode::InstalledOdd, InstalledTeeth, installed as f64, instead.nearest_to(installed) as f64)
+            }
+            Violation::InstalledNoDivisor { installed, instead, .. } => {
+                (FieldCode::InstalledNoDivisor, InstalledTeeth, installed as f64, instead.nearest_to(installed) as f64)
+            }
+            Violation::TeethTouch { tooth_diameter_mm, touching_radius_mm, .. } => {
+                (FieldCode::TeethTouch, ToothRadius, 0.5 * tooth_diameter_mm, touching_radius_mm)
+            }
+            Violation::NoCarrierAnnulus { semi_major_mm, tip_radius_mm } => {
+                (FieldCode::NoCarrierAnnulus, SemiMajor, semi_major_mm, tip_radius_mm)
+            }
+            Violation::ClearanceNotMonotone { contact, clearance_um } => {
+                (FieldCode::ClearanceNotMonotone, Parameter::Clearance(contact), clearance_um, 0.0)
+            }
+            Violation::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => {
+                (FieldCode::BoreLeavesNoFlank, TipRadius, tip_radius_mm, root_radius_mm)
+            }
+            Violation::PartDoesNotFit { misfit, value, limit } => {
+                let code = match misfit {
+                    Misfit::RingWithoutRim => FieldCode::RingWithoutRim,
+                    Misfit::CarrierMeetsCam => FieldCode::CarrierMeetsCam,
+                    Misfit::CarrierMeetsRing => FieldCode::CarrierMeetsRing,
+                    Misfit::CarrierWithoutWall => FieldCode::CarrierWithoutWall,
+                    Misfit::SlotsTakeCarrier => FieldCode::SlotsTakeCarrier,
+                    Misfit::BoreTakesCam => FieldCode::BoreTakesCam,
+                    Misfit::ClearanceTakesCam => FieldCode::ClearanceTakesCam,
+                    Misfit::ClearanceTakesTooth => FieldCode::ClearanceTakesTooth,
+                };
+                (code, misfit.parameter(), value, limit)
+            }
+        };
+        FieldError {
+            pointer: pointer(parameter),
+            code,
+            detail: violation.to_string(),
+            value: Some(value),
+            limit: Some(limit),
+        }
+    }
+}
+
+/// Where a parameter stands in the design document.
+pub fn pointer(parameter: Parameter) -> String {
+    match parameter {
+        Parameter::SemiMajor => "/drive/wave_generator/semi_major_mm".into(),
+        Parameter::SemiMinor => "/drive/wave_generator/semi_minor_mm".into(),
+        Parameter::ToothCount => "/drive/teeth/count".into(),
+        Parameter::InstalledTeeth => "/drive/teeth/installed".into(),
+        Parameter::ToothRadius => "/drive/teeth/radius_mm".into(),
+        Parameter::ToothWidth => "/drive/teeth/width_mm".into(),
+        Parameter::RingTeeth => "/drive/ring/teeth".into(),
+        Parameter::TipRadius => "/drive/ring/tip_radius_mm".into(),
+        Parameter::YoungsModulus(part) => format!("/materials/{}/youngs_modulus_gpa", part_name(part)),
+        Parameter::PoissonsRatio(part) => format!("/materials/{}/poissons_ratio", part_name(part)),
+        Parameter::InputTorque => "/load/input_torque_nm".into(),
+        Parameter::OutputTorque => "/load/output_torque_nm".into(),
+        Parameter::Stiffness(contact) => format!("/model/stiffness/{}_n_per_mm", contact_name(contact)),
+        Parameter::Clearance(contact) => format!("/model/clearance/{}_um", contact_name(contact)),
+        Parameter::AllowableStress => "/load/allowable_stress_mpa".into(),
+        Parameter::Samples => "/sweep/samples".into(),
+        Parameter::RequestedError => "/accuracy/requested_error".into(),
+        Parameter::SweepTolerance => "/sweep/tolerance".into(),
+        Parameter::ChordTolerance => "/profile/chord_tolerance_mm".into(),
+        Parameter::RingOuterRadius => "/parts/ring/outer_radius_mm".into(),
+        Parameter::CarrierInnerRadius => "/parts/carrier/inner_radius_mm".into(),
+        Parameter::CarrierOuterRadius => "/parts/carrier/outer_radius_mm".into(),
+        Parameter::BoreRadius => "/parts/wave_generator/bore_radius_mm".into(),
+        Parameter::PartClearance(part) => format!("/parts/{}/clearance_um", part_name(part)),
+        Parameter::InputAngle => "/assembly/input_angle_deg".into(),
+    }
+}
+
+/// A part as documents spell it.
+pub const fn part_name(part: Part) -> &'static str {
+    match part {
+        Part::WaveGenerator => "wave_generator",
+        Part::Teeth => "teeth",
+        Part::Ring => "ring",
+        Part::Carrier => "carrier",
+    }
+}
+
+/// A contact as documents spell it.
+pub const fn contact_name(contact: Contact) -> &'static str {
+    match contact {
+        Contact::WaveGenerator => "wave_generator",
+        Contact::Ring => "ring",
+        Contact::Carrier => "carrier",
+    }
+}

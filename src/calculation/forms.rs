@@ -1,0 +1,57 @@
+//! The forms that answers are written in.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+
+use crate::columns;
+
+/// A format of answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// As programs read it.
+    Json,
+    /// Columns.
+    Csv,
+    /// For a terminal.
+    Text,
+    /// A picture.
+    Svg,
+    /// Outlines for CAD and workshops.
+    Dxf,
+    /// Solids for CAD.
+    Step,
+}
+
+/// Writes an answer in one form.
+pub type Form<A> = fn(&A, &mut dyn Write) -> io::Result<()>;
+
+/// What an answer can be written as.
+pub trait Forms: Serialize + Sized + 'static {
+    /// The formats beside JSON, the preferred first, each with what writes it.
+    const FORMS: &'static [(Format, Form<Self>)];
+
+    /// About how many bytes the JSON takes, so that its buffer need not grow.
+    fn expected_bytes(&self) -> usize {
+        4096
+    }
+
+    /// Writes the answer in one of its formats, or in JSON.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    fn write(&self, format: Format, writer: &mut impl Write) -> io::Result<()> {
+        match Self::FORMS.iter().find(|(known, _)| *known == format) {
+            Some((_, form)) => form(self, writer),
+            None => columns::write(self, writer),
+        }
+    }
+}
+
+/// A CSV error as what it is: one of the writer, whose kind tells a closed pipe from a full disk.
+pub(crate) fn csv_error(error: csv::Error) -> io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        other => io::Error::other(format!("{other:?}")),
+    }
+}

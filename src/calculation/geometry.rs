@@ -1,0 +1,282 @@
+//! The mating parts' profiles and what a designer decides by.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+use toothwave_solver::mesh::Mesh;
+use toothwave_solver::profile::{self, Polyline, ProfileParameters};
+use toothwave_solver::{Drive, SolveError, Stop};
+use utoipa::ToSchema;
+
+use crate::design::Design;
+use crate::findings::{FindingAnswer, drive_findings, write_findings};
+use crate::forms::{Form, Format, Forms, csv_error};
+use crate::key::Encode;
+use crate::no_answer::NoAnswer;
+use crate::question::{Limits, Question, checked_drive, require_finite};
+
+/// The geometry of a drive. Ring and path stand in the ring's frame, x along the middle of a tooth space; the wave generator
+/// in its own, x along the major axis.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct GeometryAnswer {
+    /// Version of the solver.
+    pub solver_version: &'static str,
+    /// `i_HG = Z_G/(Z_G - Z_K)`: input speed over carrier speed, ring fixed.
+    pub transmission_ratio: f64,
+    /// `i_HK = -Z_K/(Z_G - Z_K)`: input speed over ring speed, carrier fixed.
+    pub transmission_ratio_carrier_fixed: f64,
+    /// The input angle after which the load pattern repeats.
+    pub period_deg: f64,
+    /// Whether the ring's tips are cut away.
+    pub undercut: UndercutAnswer,
+    /// Where a tooth touches the ring's flank.
+    pub engagement: EngagementAnswer,
+    /// The ring.
+    pub ring: RingAnswer,
+    /// The wave generator.
+    pub wave_generator: WaveGeneratorAnswer,
+    /// The carrier, an annulus between wave generator and ring tips.
+    pub carrier: CarrierAnswer,
+    /// The teeth among each other.
+    pub teeth: TeethAnswer,
+    /// Path of a tooth's centre in the ring's frame.
+    pub tooth_center_path: ProfileAnswer,
+    /// What a designer should be told.
+    pub findings: Vec<FindingAnswer>,
+}
+
+/// Whether the ring's tips are cut away by their own envelope.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct UndercutAnswer {
+    /// Whether they are, before any bore.
+    pub occurs: bool,
+    /// The least tooth radius that undercuts; left out where none does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub critical_tooth_radius_mm: Option<f64>,
+}
+
+/// The tooth's polar angle from the major axis where it starts and stops to touch the ring's flank.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct EngagementAnswer {
+    /// Where it starts, towards the tip.
+    #[schema(minimum = 0, maximum = 90)]
+    pub start_deg: f64,
+    /// Where it stops, at the root.
+    pub end_deg: f64,
+}
+
+/// The ring.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct RingAnswer {
+    /// Radius at the middle of a tooth space.
+    pub root_radius_mm: f64,
+    /// Radius of the tips: natural, trimmed by undercut, or bored.
+    pub tip_radius_mm: f64,
+    /// Root radius less tip radius.
+    pub tooth_height_mm: f64,
+    /// Largest pressure angle β of the engaged flank (its normal against the radius).
+    pub pressure_angle_max_deg: f64,
+    /// Its profile.
+    pub profile: ProfileAnswer,
+}
+
+/// The wave generator.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct WaveGeneratorAnswer {
+    /// Largest pressure angle γ of an engaged tooth (the cam's normal against the radius).
+    pub pressure_angle_max_deg: f64,
+    /// Its closed profile.
+    pub profile: ProfileAnswer,
+}
+
+/// The room that the mechanics leave the carrier, and its thinnest wall.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct CarrierAnswer {
+    /// Its inner radius is above this: the wave generator's semi-major axis.
+    pub inner_radius_limit_mm: f64,
+    /// Its outer radius is below this: the ring's tip radius.
+    pub outer_radius_limit_mm: f64,
+    /// The difference of the two, shared by the carrier and its radial clearances.
+    pub radial_space_mm: f64,
+    /// The wall between two slots at the inner limit, where it is thinnest; not positive where the slots run into each other.
+    pub slot_wall_mm: f64,
+    /// How far the centre of an engaged tooth stays outside the inner limit at least; negative where it leaves the annulus.
+    pub tooth_center_clearance_inner_mm: f64,
+    /// How far the centre of an engaged tooth stays inside the outer limit at least; negative where it leaves the annulus.
+    pub tooth_center_clearance_outer_mm: f64,
+}
+
+/// The teeth among each other.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct TeethAnswer {
+    /// The least gap between neighbouring installed teeth anywhere on their path.
+    pub gap_min_mm: f64,
+}
+
+/// A curve as points of equal index.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct ProfileAnswer {
+    /// x coordinates.
+    pub x_mm: Vec<f64>,
+    /// y coordinates.
+    pub y_mm: Vec<f64>,
+}
+
+impl From<&Polyline> for ProfileAnswer {
+    fn from(polyline: &Polyline) -> Self {
+        Self {
+            x_mm: polyline.iter().map(|point| point.x).collect(),
+            y_mm: polyline.iter().map(|point| point.y).collect(),
+        }
+    }
+}
+
+impl From<&Drive> for UndercutAnswer {
+    fn from(drive: &Drive) -> Self {
+        let flank = drive.flank();
+        Self { occurs: flank.is_undercut(), critical_tooth_radius_mm: flank.critical_tooth_radius_mm() }
+    }
+}
+
+impl From<&Drive> for EngagementAnswer {
+    fn from(drive: &Drive) -> Self {
+        Self { start_deg: drive.flank_limit().position.from_major_deg(), end_deg: 0.0 }
+    }
+}
+
+/// What is asked.
+#[derive(Debug)]
+pub struct Geometry;
+
+impl Question for Geometry {
+    type Checked = (Drive, ProfileParameters);
+    type Answer = GeometryAnswer;
+
+    fn name(&self) -> &'static str {
+        "geometry"
+    }
+
+    fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
+        (&design.drive, &design.profile)
+    }
+
+    fn check(&self, design: &Design, limits: &Limits) -> Result<Self::Checked, NoAnswer> {
+        let mut violations = Vec::new();
+        let drive = checked_drive(design, &mut violations)?.drive();
+        let profile = design.profile_parameters(limits.max_profile_points);
+        match (drive, profile) {
+            (Some(drive), Ok(profile)) => Ok((drive, profile)),
+            (_, profile) => {
+                violations.extend(profile.err());
+                Err(NoAnswer::impossible(&violations))
+            }
+        }
+    }
+
+    fn answer((drive, profile): &Self::Checked, stop: &impl Stop) -> Result<GeometryAnswer, NoAnswer> {
+        let profiles = profile::profiles(drive, profile, stop)?;
+        let p = drive.parameters();
+        let flank = drive.flank();
+        let steepest = drive.steepest_engaged().map_err(SolveError::from)?;
+        let innermost = flank.locus().at(drive.flank_limit().position).map_err(SolveError::from)?;
+        let center_distance_mm = drive.least_center_distance_mm().map_err(SolveError::from)?;
+        let tip_radius_mm = drive.tip_radius_mm();
+        let answer = GeometryAnswer {
+            solver_version: toothwave_solver::VERSION,
+            transmission_ratio: drive.transmission_ratio(),
+            transmission_ratio_carrier_fixed: drive.transmission_ratio_carrier_fixed(),
+            period_deg: Mesh::new(drive).period_deg(),
+            undercut: drive.into(),
+            engagement: drive.into(),
+            ring: RingAnswer {
+                root_radius_mm: drive.root_radius_mm(),
+                tip_radius_mm,
+                tooth_height_mm: drive.root_radius_mm() - tip_radius_mm,
+                pressure_angle_max_deg: flank.at(&steepest).tan_pressure_angle.atan().to_degrees(),
+                profile: (&profiles.ring).into(),
+            },
+            wave_generator: WaveGeneratorAnswer {
+                pressure_angle_max_deg: steepest.tan_pressure_angle.atan().to_degrees(),
+                profile: (&profiles.wave_generator).into(),
+            },
+            carrier: CarrierAnswer {
+                inner_radius_limit_mm: p.semi_major_mm,
+                outer_radius_limit_mm: tip_radius_mm,
+                radial_space_mm: tip_radius_mm - p.semi_major_mm,
+                slot_wall_mm: drive.slot_wall_mm(),
+                tooth_center_clearance_inner_mm: innermost.center_radius_mm - p.semi_major_mm,
+                tooth_center_clearance_outer_mm: tip_radius_mm - (p.semi_major_mm + p.tooth_radius_mm),
+            },
+            teeth: TeethAnswer { gap_min_mm: center_distance_mm - 2.0 * p.tooth_radius_mm },
+            tooth_center_path: (&profiles.tooth_center_path).into(),
+            findings: drive_findings(drive)?,
+        };
+        let profiles = [&answer.ring.profile, &answer.wave_generator.profile, &answer.tooth_center_path];
+        require_finite(profiles.into_iter().flat_map(|profile| [&profile.x_mm, &profile.y_mm]))?;
+        Ok(answer)
+    }
+}
+
+impl Forms for GeometryAnswer {
+    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Csv, Self::write_csv), (Format::Text, Self::write_text)];
+}
+
+impl GeometryAnswer {
+    fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
+        let mut csv = csv::Writer::from_writer(writer);
+        csv.write_record(["profile", "x_mm", "y_mm"]).map_err(csv_error)?;
+        let profiles = [
+            ("ring", &self.ring.profile),
+            ("wave_generator", &self.wave_generator.profile),
+            ("tooth_center_path", &self.tooth_center_path),
+        ];
+        for (name, profile) in profiles {
+            for point in profile.x_mm.iter().zip(&profile.y_mm) {
+                csv.serialize((name, point.0, point.1)).map_err(csv_error)?;
+            }
+        }
+        csv.flush()
+    }
+
+    fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
+        let (ring, carrier) = (&self.ring, &self.carrier);
+        writeln!(writer, "transmission ratio, ring fixed      {}", self.transmission_ratio)?;
+        writeln!(writer, "transmission ratio, carrier fixed   {}", self.transmission_ratio_carrier_fixed)?;
+        writeln!(writer, "period of the input angle           {:.6} deg", self.period_deg)?;
+        self.undercut.write_text(writer)?;
+        self.engagement.write_text(writer)?;
+        writeln!(writer, "ring root radius                    {:.6} mm", ring.root_radius_mm)?;
+        writeln!(writer, "ring tip radius                     {:.6} mm", ring.tip_radius_mm)?;
+        writeln!(writer, "ring tooth height                   {:.6} mm", ring.tooth_height_mm)?;
+        writeln!(writer, "largest pressure angle, ring        {:.4} deg", ring.pressure_angle_max_deg)?;
+        writeln!(writer, "largest pressure angle, cam         {:.4} deg", self.wave_generator.pressure_angle_max_deg)?;
+        writeln!(writer, "radial space for the carrier        {:.6} mm", carrier.radial_space_mm)?;
+        writeln!(writer, "thinnest wall between slots         {:.6} mm", carrier.slot_wall_mm)?;
+        writeln!(writer, "least gap between teeth             {:.6} mm", self.teeth.gap_min_mm)?;
+        writeln!(
+            writer,
+            "points: ring, wave generator, path  {}, {}, {}",
+            ring.profile.x_mm.len(),
+            self.wave_generator.profile.x_mm.len(),
+            self.tooth_center_path.x_mm.len()
+        )?;
+        write_findings(&self.findings, writer)
+    }
+}
+
+impl UndercutAnswer {
+    pub(crate) fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
+        writeln!(writer, "undercut                            {}", if self.occurs { "yes" } else { "no" })?;
+        match self.critical_tooth_radius_mm {
+            Some(radius) => writeln!(writer, "critical tooth radius               {radius:.6} mm"),
+            None => writeln!(writer, "critical tooth radius               none"),
+        }
+    }
+}
+
+impl EngagementAnswer {
+    pub(crate) fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
+        writeln!(writer, "engagement from the major axis      {:.6} to {} deg", self.start_deg, self.end_deg)
+    }
+}

@@ -1,0 +1,20 @@
+//! One design document in, one answer out.
+//!
+//! The way is bytes → [`Design`](design::Design) → checked parameters → answer → bytes, and [`Question`](question::Question) is that way. What stands
+//! in its middle is `toothwave_solver`'s; here are the document, the answers, and the forms that they are written in. The crate knows no
+//! network: whoever calls it decides where it runs, what is kept, and what a client is told.
+
+pub mod accuracy;
+pub mod coincidence_degree;
+pub mod columns;
+pub mod design;
+pub mod drawing;
+pub mod field;
+pub mod findings;
+pub mod forms;
+pub mod geometry;
+pub mod json;
+pub mod key;
+pub mod no_answer;
+pub mod question;
+pub mod sweep;

@@ -1,0 +1,99 @@
+//! The walk from a document to an answer, which all questions share.
+
+use toothwave_solver::drive::Draft;
+use toothwave_solver::{LoadCase, SolveError, Stop, Violation};
+
+use crate::design::Design;
+use crate::forms::Forms;
+use crate::key::{Encode, Key};
+use crate::no_answer::NoAnswer;
+
+/// What is computed at most.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Most states of a sweep.
+    pub max_states: u64,
+    /// Most points of all profiles of a geometry.
+    pub max_profile_points: u64,
+}
+
+/// What a design document can be asked.
+pub trait Question: Send + 'static {
+    /// The checked parameters that the answer follows from.
+    type Checked: Send + 'static;
+    /// The answer; its serialisation is its JSON.
+    type Answer: Forms;
+
+    /// Its name, in the key.
+    fn name(&self) -> &'static str;
+
+    /// The parts of a normalised document that the answer depends on.
+    fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a;
+
+    /// Checks those parts, reporting every impossible value.
+    ///
+    /// # Errors
+    /// Names the fields at fault.
+    fn check(&self, design: &Design, limits: &Limits) -> Result<Self::Checked, NoAnswer>;
+
+    /// Whether solving, and writing the answer as JSON, is certain to take no longer than some 0.1 ms.
+    fn is_short(_checked: &Self::Checked) -> bool {
+        false
+    }
+
+    /// Solves.
+    ///
+    /// # Errors
+    /// Why there is no answer; also where `stop` was set.
+    fn answer(checked: &Self::Checked, stop: &impl Stop) -> Result<Self::Answer, NoAnswer>;
+
+    /// The key of the answer in a form that `form` stands for: equal keys are equal bytes, from the same version of the solver.
+    fn key(&self, design: &Design, form: &impl Encode) -> Key {
+        Key::new(self.name(), &self.reads(design), form)
+    }
+
+    /// The whole walk.
+    ///
+    /// # Errors
+    /// Why there is no answer.
+    fn ask(&self, document: &[u8], limits: &Limits, stop: &impl Stop) -> Result<Self::Answer, NoAnswer> {
+        Self::answer(&self.check(&Design::read(document)?, limits)?, stop)
+    }
+}
+
+/// Guards the promise that no answer holds anything but numbers: serde_json would write `null` and say nothing.
+///
+/// # Errors
+/// A fault of the calculation.
+pub(crate) fn require_finite<'a>(columns: impl IntoIterator<Item = &'a Vec<f64>>) -> Result<(), NoAnswer> {
+    if columns.into_iter().all(|column| column.iter().all(|value| value.is_finite())) {
+        Ok(())
+    } else {
+        Err(NoAnswer::internal("a result is not finite"))
+    }
+}
+
+/// The drive of a document as far as it is possible; what is not adds its violations to the others.
+///
+/// # Errors
+/// Where the geometry does not converge.
+pub(crate) fn checked_drive(design: &Design, violations: &mut Vec<Violation>) -> Result<Draft, NoAnswer> {
+    let draft = Draft::new(&design.drive_parameters()).map_err(SolveError::from)?;
+    violations.extend(design.as_written(draft.violations()));
+    Ok(draft)
+}
+
+/// The load of a document for a drive that was checked before; what is impossible adds its violations to the others.
+///
+/// # Errors
+/// Where the document has no load or not exactly one torque, and where the geometry does not converge.
+pub(crate) fn checked_load(
+    design: &Design,
+    draft: &Draft,
+    violations: &mut Vec<Violation>,
+) -> Result<Option<LoadCase>, NoAnswer> {
+    let parameters = design.load_parameters()?;
+    let load = LoadCase::new(&parameters).map_err(|found| violations.extend(found)).ok();
+    violations.extend(parameters.clearance_violations(draft).map_err(SolveError::from)?);
+    Ok(load)
+}

@@ -1,0 +1,234 @@
+//! A sweep as it goes over the wire.
+
+use serde::Serialize;
+use toothwave_solver::contact::{SHEAR_DEPTH, SHEAR_SHARE};
+use toothwave_solver::sweep::{self as solver, ContactPeaks, InputAngles, Peak, States, TorqueCapacity};
+use toothwave_solver::{Contact, Drive, PerContact};
+use utoipa::ToSchema;
+
+use crate::findings::FindingAnswer;
+
+/// Forces and contact stresses of one meshing zone over one period; the other zone is its point reflection.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SweepAnswer {
+    /// Version of the solver.
+    pub solver_version: &'static str,
+    /// Contact ratio ε, counted over both meshing zones.
+    pub coincidence_degree: f64,
+    /// The input angle after which the load pattern repeats.
+    pub period_deg: f64,
+    /// The largest force and stress of each contact, over the states.
+    pub peaks: PeaksAnswer,
+    /// The states.
+    pub states: StatesAnswer,
+    /// Wind-up and torsional stiffness, given `sweep.wind_up`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub wind_up: Option<WindUpAnswer>,
+    /// The torque capacity, given `load.allowable_stress_mpa`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub torque_capacity: Option<TorqueCapacityAnswer>,
+    /// How well the results fulfil what must hold.
+    pub checks: ChecksAnswer,
+    /// What a designer should be told.
+    pub findings: Vec<FindingAnswer>,
+    /// Whether a tooth takes load the moment it enters; the plots break there.
+    #[serde(skip)]
+    pub enters_under_load: bool,
+}
+
+/// The peaks of each contact.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct PeaksAnswer {
+    /// Between tooth and wave generator.
+    pub wave_generator: ContactPeaksAnswer,
+    /// Between tooth and ring.
+    pub ring: ContactPeaksAnswer,
+    /// Between tooth and carrier.
+    pub carrier: ContactPeaksAnswer,
+}
+
+/// The peaks of a contact.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct ContactPeaksAnswer {
+    /// Of its normal force, in N.
+    pub force_n: PeakAnswer,
+    /// Of its Hertz stress, in MPa.
+    pub stress_mpa: PeakAnswer,
+    /// Half the width of the contact where the stress has its peak.
+    pub half_width_mm: f64,
+    /// The largest shear stress below the surface there, in the plane of the section.
+    pub shear_stress_mpa: f64,
+    /// How deep it stands.
+    pub shear_depth_mm: f64,
+}
+
+/// A largest value and where it stands.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct PeakAnswer {
+    /// The value, in the unit of the field that holds the peak.
+    pub value: f64,
+    /// Input angle.
+    pub input_angle_deg: f64,
+    /// Position of the tooth, from the major axis.
+    pub position_deg: f64,
+}
+
+/// Columns of equal length: one entry for each input angle and tooth in mesh, by input angle, then tooth number.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct StatesAnswer {
+    /// Input angle j.
+    pub input_angle_deg: Vec<f64>,
+    /// Tooth number; tooth 0 stands on the major axis at j = 0.
+    pub tooth: Vec<u32>,
+    /// Position ψ of the tooth, from the major axis.
+    pub position_deg: Vec<f64>,
+    /// Distance of the tooth's centre from the axis.
+    pub center_radius_mm: Vec<f64>,
+    /// φ_H: contact on the wave generator, from its minor axis.
+    pub wave_generator_angle_deg: Vec<f64>,
+    /// φ_K: contact on the ring, from the ring's tooth tip.
+    pub ring_angle_deg: Vec<f64>,
+    /// Force F_H between tooth and wave generator.
+    pub force_wave_generator_n: Vec<f64>,
+    /// Force F_K between tooth and ring.
+    pub force_ring_n: Vec<f64>,
+    /// Force F_S between tooth and carrier.
+    pub force_carrier_n: Vec<f64>,
+    /// Hertz stress σ_H between tooth and wave generator.
+    pub stress_wave_generator_mpa: Vec<f64>,
+    /// Hertz stress σ_K between tooth and ring.
+    pub stress_ring_mpa: Vec<f64>,
+    /// Hertz stress σ_S between tooth and carrier.
+    pub stress_carrier_mpa: Vec<f64>,
+    /// Whether the tooth carries load, given `model.clearance`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub loaded: Option<Vec<bool>>,
+}
+
+/// What holds for all teeth at an input angle, in columns of equal length: one entry an input angle.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct WindUpAnswer {
+    /// Range of the wind-up over the period, at the output.
+    pub transmission_error_peak_to_peak_deg: f64,
+    /// Input angle j.
+    pub input_angle_deg: Vec<f64>,
+    /// How far the wave generator turns under the load, carrier held, clearances included.
+    pub wind_up_deg: Vec<f64>,
+    /// Output torque over output rotation at the load, wave generator held.
+    pub torsional_stiffness_nm_per_rad: Vec<f64>,
+    /// Teeth of one zone that carry load.
+    pub loaded_teeth: Vec<u32>,
+}
+
+/// The largest torque under which no contact exceeds the allowable stress, over the input angles of the sweep.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct TorqueCapacityAnswer {
+    /// At the wave generator.
+    pub input_torque_nm: f64,
+    /// At the carrier.
+    pub output_torque_nm: f64,
+    /// The contact that limits it.
+    pub limited_by: ContactName,
+    /// The input angle where it does.
+    pub input_angle_deg: f64,
+}
+
+/// A contact of a tooth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ContactName {
+    /// With the wave generator.
+    WaveGenerator,
+    /// With the ring.
+    Ring,
+    /// With the carrier.
+    Carrier,
+}
+
+impl From<Contact> for ContactName {
+    fn from(contact: Contact) -> Self {
+        match contact {
+            Contact::WaveGenerator => Self::WaveGenerator,
+            Contact::Ring => Self::Ring,
+            Contact::Carrier => Self::Carrier,
+        }
+    }
+}
+
+impl WindUpAnswer {
+    pub(super) fn new(drive: &Drive, sweep: &solver::Sweep) -> Self {
+        let InputAngles { input_angle_deg, wind_up_deg, torsional_stiffness_nm_per_rad, loaded_teeth } =
+            sweep.input_angles.clone();
+        Self {
+            transmission_error_peak_to_peak_deg: sweep.transmission_error_peak_to_peak_deg(drive),
+            input_angle_deg,
+            wind_up_deg,
+            torsional_stiffness_nm_per_rad,
+            loaded_teeth,
+        }
+    }
+}
+
+impl From<TorqueCapacity> for TorqueCapacityAnswer {
+    fn from(capacity: TorqueCapacity) -> Self {
+        let TorqueCapacity { input_torque_nm, output_torque_nm, contact, input_angle_deg } = capacity;
+        Self { input_torque_nm, output_torque_nm, limited_by: contact.into(), input_angle_deg }
+    }
+}
+
+/// How well the results fulfil what must hold.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct ChecksAnswer {
+    /// Largest relative deviation of the input, ring and carrier torques, over the input angles.
+    pub torque_balance_residual: f64,
+    /// Largest difference between the last input angle and the first, teeth renumbered, over the column's peak.
+    pub period_closure_residual: f64,
+}
+
+impl StatesAnswer {
+    pub(super) fn new(states: States, with_clearance: bool) -> Self {
+        let forces = &states.force_n.wave_generator;
+        Self {
+            loaded: with_clearance.then(|| forces.iter().map(|force| *force > 0.0).collect()),
+            input_angle_deg: states.input_angle_deg,
+            tooth: states.tooth,
+            position_deg: states.position_deg,
+            center_radius_mm: states.center_radius_mm,
+            wave_generator_angle_deg: states.wave_generator_angle_deg,
+            ring_angle_deg: states.ring_angle_deg,
+            force_wave_generator_n: states.force_n.wave_generator,
+            force_ring_n: states.force_n.ring,
+            force_carrier_n: states.force_n.carrier,
+            stress_wave_generator_mpa: states.stress_mpa.wave_generator,
+            stress_ring_mpa: states.stress_mpa.ring,
+            stress_carrier_mpa: states.stress_mpa.carrier,
+        }
+    }
+}
+
+impl From<Peak> for PeakAnswer {
+    fn from(Peak { value, input_angle_deg, position_deg }: Peak) -> Self {
+        Self { value, input_angle_deg, position_deg }
+    }
+}
+
+impl From<ContactPeaks> for ContactPeaksAnswer {
+    fn from(ContactPeaks { force_n, stress_mpa, half_width_mm }: ContactPeaks) -> Self {
+        Self {
+            shear_stress_mpa: SHEAR_SHARE * stress_mpa.value,
+            shear_depth_mm: SHEAR_DEPTH * half_width_mm,
+            half_width_mm,
+            force_n: force_n.into(),
+            stress_mpa: stress_mpa.into(),
+        }
+    }
+}
+
+impl From<PerContact<ContactPeaks>> for PeaksAnswer {
+    fn from(peaks: PerContact<ContactPeaks>) -> Self {
+        Self { wave_generator: peaks.wave_generator.into(), ring: peaks.ring.into(), carrier: peaks.carrier.into() }
+    }
+}

@@ -1,0 +1,4 @@
+//! What is true of documents and of what tells them apart.
+#![allow(clippy::unwrap_used, reason = "tests fail by panicking")]
+
+mod documents;
