@@ -358,6 +358,7 @@ impl From<SolveError> for Problem {
             SolveError::Stopped => {
                 Self::new(ProblemCode::DeadlineExceeded, "the computation took longer than the service allows")
             }
+            SolveError::Inconsistent { .. } => Self::internal(&detail),
             SolveError::NotConverged(error) => Self::internal(&error),
         }
     }
