@@ -205,7 +205,7 @@ fn against_baselines(
     rounds: usize,
 ) -> Result<String, Failure> {
     let setup = reference.setup("5.1 projection")?;
-    let samples = Points::Samples(intervals.unsigned_abs());
+    let samples = Points::samples(intervals.unsigned_abs()).map_err(|violation| violation.to_string())?;
     let case =
         Case { drive: setup.drive, material: setup.load.materials.teeth, input_torque_nm: setup.input_torque_nm };
     let case = black_box(&case);
@@ -278,6 +278,7 @@ const CHILD_FLAG: &str = "--one-size";
 /// Sweeps one size in a process of its own, whose peak memory is then that of this size, and prints states, seconds and bytes.
 fn scaling_child(intervals: u64) -> Result<(), Failure> {
     let setup = Setup::PAPER_5_1;
+    let points = Points::samples(intervals).map_err(|violation| violation.to_string())?;
     let before = memory_bytes("VmRSS")?;
     let mut seconds = Vec::new();
     let mut states = 0;
@@ -285,7 +286,7 @@ fn scaling_child(intervals: u64) -> Result<(), Failure> {
     // A second for those that are over at once, three runs for those that are not.
     while seconds.len() < 3 || started.elapsed() < Duration::from_millis(200) {
         let run = Instant::now();
-        let sweep = from_cold(&setup, Points::Samples(intervals), sweep)?;
+        let sweep = from_cold(&setup, points, sweep)?;
         seconds.push(run.elapsed().as_secs_f64());
         states = black_box(sweep).states.len();
     }
@@ -382,16 +383,14 @@ fn error_over_time(effort: Effort, directory: &Path, reference: &Reference) -> R
         "\n## Error over time\n\nWays to ask for the six peaks (three forces, three stresses): so many equal intervals, or a tolerance. Error is the largest relative one \
          of the six, against the same sweep with the tolerance 1e-12; time is from a cold drive. In the plots an error below 1e-16 stands at 1e-16.\n",
     );
-    let ladder = SAMPLES.map(|samples| (format!("{samples} intervals"), Points::Samples(samples))).into_iter().chain(
-        TOLERANCES.map(|tolerance| {
-            (format!("tolerance {tolerance:.0e}"), Points::Tolerance { tolerance, max_states: MAX_STATES })
-        }),
-    );
-    let ladder: Vec<_> = ladder.collect();
+    let by_samples = SAMPLES.map(|samples| (format!("{samples} intervals"), Points::samples(samples)));
+    let to_tolerance = TOLERANCES.map(|value| (format!("tolerance {value:.0e}"), Points::tolerance(value, MAX_STATES)));
+    let ladder = by_samples.into_iter().chain(to_tolerance);
+    let ladder: Result<Vec<_>, _> = ladder.map(|(name, points)| points.map(|points| (name, points))).collect();
+    let ladder = ladder.map_err(|violation| violation.to_string())?;
     for (title, file, name) in CASES_OVER_TIME {
         let setup = reference.setup(name)?;
-        let converged =
-            six_peaks(&from_cold(&setup, Points::Tolerance { tolerance: 1e-12, max_states: MAX_STATES }, sweep)?);
+        let converged = six_peaks(&from_cold(&setup, Points::finest(MAX_STATES), sweep)?);
         let mut contestants: Vec<_> =
             ladder.iter().map(|(name, points)| Contestant::of(name, || from_cold(&setup, *points, sweep))).collect();
         take_turns(&mut contestants, effort.choose(15, 1))?;
@@ -414,7 +413,7 @@ fn error_over_time(effort: Effort, directory: &Path, reference: &Reference) -> R
             let drawn = (time.median, error.max(LEAST_DRAWN_ERROR));
             match points {
                 Points::Samples(_) => by_samples.push(drawn),
-                Points::Tolerance { .. } => by_tolerance.push(drawn),
+                Points::Tolerance(_) => by_tolerance.push(drawn),
             }
         }
         Plot {

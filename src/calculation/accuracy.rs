@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use toothwave_solver::drive::Draft;
-use toothwave_solver::mesh::Mesh;
-use toothwave_solver::sweep::{ContactPeaks, Points, sweep};
+use toothwave_solver::mesh::{Mesh, Samples};
+use toothwave_solver::sweep::{ContactPeaks, Points, Tolerance, sweep};
 use toothwave_solver::{Compatibility, ContactLaw, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop};
 use utoipa::ToSchema;
 
@@ -22,9 +22,6 @@ const SAMPLES: [u64; 9] = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
 
 /// The tolerances that are tried.
 const TOLERANCES: [f64; 5] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10];
-
-/// The tolerance of the converged reference: the finest that a sweep takes.
-const REFERENCE_TOLERANCE: f64 = 1e-12;
 
 /// Runs of which the median time is taken, at most, and the time after which no further one is begun.
 const MOST_RUNS: usize = 15;
@@ -215,8 +212,7 @@ fn converged(
     max_states: u64,
     stop: &impl Stop,
 ) -> Result<PerContact<ContactPeaks>, SolveError> {
-    let points = Points::Tolerance { tolerance: REFERENCE_TOLERANCE, max_states };
-    Ok(sweep(drive, load, points, stop)?.peaks)
+    Ok(sweep(drive, load, Points::finest(max_states), stop)?.peaks)
 }
 
 /// The largest relative difference of six peaks from their reference.
@@ -258,11 +254,13 @@ impl<'a> Model<'a> {
     /// Tries every number of samples and every tolerance that the limit on states admits.
     fn measure(&self, ways: &mut Vec<WayAnswer>, stop: &impl Stop) -> Result<(), SolveError> {
         let mesh = Mesh::new(self.drive);
-        for samples in SAMPLES.into_iter().filter(|&samples| mesh.state_count(samples) <= self.max_states) {
+        // All of them lie within the ranges.
+        let samples = SAMPLES.into_iter().filter_map(|samples| Samples::new(samples).ok());
+        for samples in samples.filter(|&samples| mesh.state_count(samples) <= self.max_states) {
             ways.push(self.way(Points::Samples(samples), stop)?);
         }
-        for tolerance in TOLERANCES {
-            ways.push(self.way(Points::Tolerance { tolerance, max_states: self.max_states }, stop)?);
+        for tolerance in TOLERANCES.into_iter().filter_map(|value| Tolerance::new(value, self.max_states).ok()) {
+            ways.push(self.way(Points::Tolerance(tolerance), stop)?);
         }
         Ok(())
     }
@@ -280,8 +278,8 @@ impl<'a> Model<'a> {
         };
         times_us.sort_by(f64::total_cmp);
         let (samples, tolerance) = match points {
-            Points::Samples(samples) => (Some(samples), None),
-            Points::Tolerance { tolerance, .. } => (None, Some(tolerance)),
+            Points::Samples(samples) => (Some(samples.count()), None),
+            Points::Tolerance(tolerance) => (None, Some(tolerance.relative())),
         };
         let p = self.load.parameters();
         Ok(WayAnswer {

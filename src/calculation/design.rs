@@ -695,14 +695,11 @@ impl Design {
                 let detail = "at most one of `samples` and `tolerance` is wanted here";
                 Err(Fault::of_field(FieldCode::ConflictingFields, "sweep", detail.into()))
             }
-            (None, Some(tolerance)) => {
-                let violation = Parameter::SweepTolerance.check(tolerance);
-                Ok(violation.map_or(Ok(Points::Tolerance { tolerance, max_states }), Err))
-            }
+            (None, Some(tolerance)) => Ok(Points::tolerance(tolerance, max_states)),
             (samples, None) => {
                 let samples = samples.unwrap_or(DEFAULT_SAMPLES);
                 let violation = Parameter::Samples.check(samples.0);
-                Ok(violation.map_or(Ok(Points::Samples(samples.count().unsigned_abs())), Err))
+                Ok(violation.map_or_else(|| Points::samples(samples.count().unsigned_abs()), Err))
             }
         }
     }

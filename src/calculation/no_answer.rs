@@ -136,6 +136,7 @@ impl From<SolveError> for NoAnswer {
                 too_many(NoAnswerCode::TooManyStates, FieldCode::TooManyStates, pointer, &detail, None, limit)
             }
             SolveError::Stopped => Self::stopped(),
+            SolveError::Inconsistent { .. } => Self::internal(detail),
             SolveError::NotConverged(error) => Self::internal(error),
         }
     }

@@ -4,10 +4,10 @@
 //! clearance: continuous). Each smooth piece is halved until straight lines between its input angles are true to a
 //! resolution, so that no peak hides between them; then every peak that may be the largest of its kind is closed in on.
 
-use crate::load_sharing::LoadedDrive;
+use crate::load_sharing::{LoadCase, LoadedDrive};
 use crate::mesh::Mesh;
 use crate::ring::FlankEnd;
-use crate::sweep::PlacedTooth;
+use crate::sweep::{PlacedTooth, Tolerance};
 use crate::{SolveError, Stop};
 
 /// Intervals that a smooth piece starts with.
@@ -51,14 +51,27 @@ impl Moment {
     }
 }
 
-/// Forces and stresses of a tooth: three of each.
-type Loads = [f64; 6];
+/// Quantities of a tooth that have peaks: three forces, three stresses.
+const LOADS: usize = 6;
 
-/// A moment with the loads of its teeth, the first of which has the number `moment.first`.
+/// Quantities of all teeth together: wind-up and torsional stiffness with their reciprocals, because their least values are wanted too, and the
+/// reciprocal of the torque that the allowable stress admits, or nothing where there is none.
+const TOTALS: usize = 5;
+
+const QUANTITIES: usize = LOADS + TOTALS;
+
+/// The totals that are continuous between two entries. With clearance the stiffness jumps where a tooth begins or ceases to carry.
+const CONTINUOUS_TOTALS: [usize; 3] = [0, 1, 4];
+
+/// Loads of a tooth.
+type Loads = [f64; LOADS];
+
+/// A moment with what is known of it. Its first tooth has the number `moment.first`.
 #[derive(Debug, Clone)]
 struct Seen {
     moment: Moment,
     loads: Vec<Loads>,
+    totals: [f64; TOTALS],
 }
 
 impl Seen {
@@ -67,44 +80,123 @@ impl Seen {
         let index = number.checked_sub(self.moment.first).and_then(|index| usize::try_from(index).ok());
         index.and_then(|index| self.loads.get(index)).copied().unwrap_or_default()
     }
+
+    /// How many teeth carry here or there, but not at both.
+    fn teeth_changed(&self, other: &Self) -> usize {
+        let numbers = self.moment.first.min(other.moment.first)..=self.moment.last.max(other.moment.last);
+        numbers.filter(|&number| (self.of(number)[0] > 0.0) != (other.of(number)[0] > 0.0)).count()
+    }
+}
+
+/// The largest values of a moment.
+fn peaks_of(seen: &Seen) -> [f64; QUANTITIES] {
+    let mut peaks = [0.0; QUANTITIES];
+    for loads in &seen.loads {
+        raise(&mut peaks[..LOADS], loads);
+    }
+    peaks[LOADS..].copy_from_slice(&seen.totals);
+    peaks
+}
+
+fn raise(peaks: &mut [f64], values: &[f64]) {
+    for (peak, value) in peaks.iter_mut().zip(values) {
+        *peak = peak.max(*value);
+    }
+}
+
+/// A moment on the long track: tooth i past the end of the period is tooth i - 1 from its start, so that one period of all teeth is one pass
+/// of a single tooth, without a seam. The track runs from one entry, `entry - 1`, to the next, `entry`; on it a tooth keeps its number.
+#[derive(Debug, Clone, Copy)]
+struct Link<'a> {
+    /// Fraction of the period, below 0 for what stands in the answer a period later.
+    at: f64,
+    /// What a tooth's number there exceeds its number on the track by.
+    shift: u64,
+    seen: &'a Seen,
+}
+
+impl Link<'_> {
+    fn value(&self, Sought { quantity, number }: Sought) -> f64 {
+        match quantity.checked_sub(LOADS) {
+            None => self.seen.of(number + self.shift)[quantity],
+            Some(total) => self.seen.totals[total],
+        }
+    }
+
+    /// The same moment a period earlier.
+    fn before(self) -> Self {
+        Self { at: self.at - 1.0, shift: self.shift + 1, ..self }
+    }
+}
+
+/// A quantity whose largest value is looked for; of a load, the tooth by its number on the track.
+#[derive(Debug, Clone, Copy)]
+struct Sought {
+    quantity: usize,
+    number: u64,
+}
+
+/// A moment that stands above those beside it, and what the quantity may rise to between them.
+#[derive(Debug, Clone, Copy)]
+struct Candidate<'a> {
+    sought: Sought,
+    before: Link<'a>,
+    top: Link<'a>,
+    after: Link<'a>,
+    bound: f64,
 }
 
 struct Search<'a, S> {
     loaded: &'a LoadedDrive<'a>,
     mesh: Mesh,
+    allowable_stress_mpa: Option<f64>,
+    /// Whether teeth begin and cease to carry between their entry and their exit.
+    has_clearance: bool,
+    /// Whether loads are smooth between two entries.
+    is_smooth: bool,
+    tolerance: Tolerance,
     stop: &'a S,
-    max_states: u64,
     states: u64,
-    /// The largest loads seen.
-    peaks: Loads,
+    /// The largest values seen.
+    peaks: [f64; QUANTITIES],
 }
 
 /// The input angles of a sweep to a tolerance, in order; where loads jump the same angle stands twice, first without the tooth that
 /// enters and then with it.
 pub(crate) fn moments(
     loaded: &LoadedDrive<'_>,
-    tolerance: f64,
-    max_states: u64,
+    load: &LoadCase,
+    tolerance: Tolerance,
     stop: &impl Stop,
 ) -> Result<Vec<Moment>, SolveError> {
     let mesh = Mesh::new(loaded.drive());
-    let mut search = Search { loaded, mesh, stop, max_states, states: 0, peaks: Loads::default() };
-    let mut moments = Vec::new();
-    for piece in smooth_pieces(&mesh) {
-        let seen = search.resolve(piece, tolerance.clamp(FINEST_RESOLUTION, COARSEST_RESOLUTION))?;
-        moments.push(seen);
+    let mut search = Search {
+        loaded,
+        mesh,
+        allowable_stress_mpa: load.parameters().allowable_stress_mpa,
+        has_clearance: load.has_clearance(),
+        is_smooth: loaded.linear_compliance_mm_per_n().is_some(),
+        tolerance,
+        stop,
+        states: 0,
+        peaks: [0.0; QUANTITIES],
+    };
+    let (to_entry, from_entry) = pieces(&mesh);
+    let to_entry = search.resolve(to_entry)?;
+    let from_entry = from_entry.map(|piece| search.resolve(piece)).transpose()?.unwrap_or_default();
+    // What follows the entry stands before the period's start on the track. Both hold that start.
+    let followers = from_entry.iter().take(from_entry.len().saturating_sub(1));
+    let followers = followers.map(|seen| Link { at: seen.moment.fraction - 1.0, shift: 1, seen });
+    let leaders = to_entry.iter().map(|seen| Link { at: seen.moment.fraction, shift: 0, seen });
+    let track: Vec<_> = followers.chain(leaders).collect();
+    let extremes = search.extremes(&track)?;
+
+    let seen = to_entry.iter().chain(&from_entry).chain(&extremes);
+    let mut moments: Vec<_> = seen.map(|seen| seen.moment).collect();
+    if mesh.spacings_are_whole() && search.loads_jump() {
+        moments.push(search.at_end_with_entering());
     }
-    for seen in &mut moments {
-        let mut extremes = Vec::new();
-        for [before, middle, after] in neighbours(seen) {
-            search.extremes_around(before, middle, after, tolerance, &mut extremes)?;
-        }
-        seen.extend(extremes);
-        seen.sort_by(|one, other| one.moment.fraction.total_cmp(&other.moment.fraction));
-        seen.dedup_by(|one, other| one.moment == other.moment);
-    }
-    let mut moments: Vec<_> = moments.into_iter().flatten().map(|seen| seen.moment).collect();
-    // Two pieces share the instant between them where nothing jumps.
+    moments.sort_by(|one, other| one.fraction.total_cmp(&other.fraction).then(one.last.cmp(&other.last)));
     moments.dedup();
     Ok(moments)
 }
@@ -116,84 +208,100 @@ struct Piece {
     end: Moment,
 }
 
-fn smooth_pieces(mesh: &Mesh) -> Vec<Piece> {
-    let spacings = mesh.engaged_spacings();
-    let whole = mesh.last_step(1);
+/// The period up to the entry of a tooth, and what is left of it then.
+fn pieces(mesh: &Mesh) -> (Piece, Option<Piece>) {
+    let (whole, entry) = (mesh.whole_spacings(), mesh.entry_fraction());
     let at = |fraction, first, last, entering| Moment { fraction, first, last, entering };
-    // When the next tooth enters. Rounding may put it a hair outside the period: then it enters at its end.
-    let entry = (whole as f64 + 1.0 - spacings).clamp(0.0, 1.0);
-    let loads_jump = mesh.flank_limit().end != FlankEnd::RegularTip;
-    if entry > 0.0 && entry < 1.0 {
-        let before = Piece { start: at(0.0, 1, whole, None), end: at(entry, 1, whole, None) };
-        let after = Piece { start: at(entry, 1, whole + 1, Some(whole + 1)), end: at(1.0, 2, whole + 1, None) };
-        if loads_jump {
-            return vec![before, after];
-        }
-        // At a regular tip the entering tooth carries nothing: the instant belongs to both pieces and is wanted once.
-        return vec![Piece { start: before.start, end: after.start }, Piece { start: after.start, end: after.end }];
+    if mesh.spacings_are_whole() {
+        let loads_jump = mesh.flank_limit().end != FlankEnd::RegularTip;
+        let end = if loads_jump { at(1.0, 2, whole, None) } else { at(1.0, 2, whole + 1, Some(whole + 1)) };
+        return (Piece { start: at(0.0, 1, whole, Some(whole)), end }, None);
     }
-    let start = at(0.0, 1, whole, Some(whole));
-    let end = at(1.0, 2, whole + 1, Some(whole + 1));
-    if loads_jump {
-        vec![Piece { start, end: at(1.0, 2, whole, None) }, Piece { start: end, end }]
-    } else {
-        vec![Piece { start, end }]
-    }
-}
-
-/// Each moment of a piece between its neighbours; those at the ends are their own, so that an extreme beside an end is seen too.
-fn neighbours(seen: &[Seen]) -> impl Iterator<Item = [&Seen; 3]> {
-    let last = seen.len() - 1;
-    (0..seen.len()).map(move |index| [&seen[index.saturating_sub(1)], &seen[index], &seen[(index + 1).min(last)]])
+    let to_entry = Piece { start: at(0.0, 1, whole, None), end: at(entry, 1, whole, None) };
+    let from_entry = Piece { start: at(entry, 1, whole + 1, Some(whole + 1)), end: at(1.0, 2, whole + 1, None) };
+    (to_entry, Some(from_entry))
 }
 
 impl<S: Stop> Search<'_, S> {
+    fn loads_jump(&self) -> bool {
+        self.mesh.flank_limit().end != FlankEnd::RegularTip
+    }
+
+    /// The end of a period at which a tooth enters, with that tooth.
+    fn at_end_with_entering(&self) -> Moment {
+        let last = self.mesh.whole_spacings() + 1;
+        Moment { fraction: 1.0, first: 2, last, entering: Some(last) }
+    }
+
     fn see(&mut self, moment: Moment) -> Result<Seen, SolveError> {
         if self.stop.stopped() {
             return Err(SolveError::Stopped);
         }
         self.states += moment.last + 1 - moment.first;
-        if self.states > self.max_states {
-            return Err(SolveError::TooManyStates { limit: self.max_states });
+        let limit = self.tolerance.max_states();
+        if self.states > limit {
+            return Err(SolveError::TooManyStates { limit });
         }
         let teeth: Result<Vec<_>, _> =
             moment.teeth(&self.mesh).map(|placed| self.loaded.tooth(placed.position)).collect();
         let teeth = teeth?;
         let wind_up = self.loaded.wind_up(&teeth)?;
-        let loads: Vec<_> = teeth.iter().map(|tooth| self.loaded.loads(tooth, &wind_up)).collect();
-        for loads in &loads {
-            for (peak, load) in self.peaks.iter_mut().zip(loads) {
-                *peak = peak.max(*load);
-            }
-        }
-        Ok(Seen { moment, loads })
+        let loads = teeth.iter().map(|tooth| self.loaded.loads(tooth, &wind_up)).collect();
+        let (rotation_rad, stiffness) = (wind_up.rotation_rad(), wind_up.stiffness_nmm_per_rad);
+        let per_capacity = self
+            .allowable_stress_mpa
+            .map_or(0.0, |allowable_mpa| 1.0 / self.loaded.torque_limit(&teeth, allowable_mpa).input_torque_nmm);
+        let totals = [rotation_rad, 1.0 / rotation_rad, stiffness, 1.0 / stiffness, per_capacity];
+        let seen = Seen { moment, loads, totals };
+        raise(&mut self.peaks, &peaks_of(&seen));
+        Ok(seen)
     }
 
     /// A moment inside a piece.
-    fn see_at(&mut self, fraction: f64, from: &Moment, to: &Moment) -> Result<Seen, SolveError> {
+    fn see_inside(&mut self, fraction: f64, Piece { start, end }: &Piece) -> Result<Seen, SolveError> {
         // Inside a piece mesh all teeth that mesh at either end.
-        let (first, last) = (from.first.min(to.first), from.last.min(to.last));
+        let (first, last) = (start.first.min(end.first), start.last.min(end.last));
         self.see(Moment { fraction, first, last, entering: None })
     }
 
-    /// The moments of a piece, halved until straight lines between them are true to `resolution`.
-    fn resolve(&mut self, Piece { start, end }: Piece, resolution: f64) -> Result<Vec<Seen>, SolveError> {
-        let mut seen = vec![self.see(start)?];
-        if start == end {
-            return Ok(seen);
+    /// A moment of the track: how often a period was added to it, and what is seen there.
+    fn see_on_track(&mut self, at: f64) -> Result<(u64, Seen), SolveError> {
+        let (mut fraction, mut shift) = (at, 0);
+        while fraction < 0.0 {
+            (fraction, shift) = (fraction + 1.0, shift + 1);
         }
+        let entry = self.mesh.entry_fraction();
+        let has_entered = fraction > entry || shift > 0 && fraction >= entry;
+        let last = self.mesh.whole_spacings() + u64::from(has_entered);
+        let first = if fraction < 1.0 { 1 } else { 2 };
+        // Only at the track's start does a tooth stand at the very end of the flank.
+        let is_start = at.total_cmp(&(entry - 1.0)).is_eq();
+        let entering = is_start.then_some(last);
+        Ok((shift, self.see(Moment { fraction, first, last, entering })?))
+    }
+
+    /// The moments of a piece, halved until straight lines between them are true to the resolution, and until no more than one tooth begins or
+    /// ceases to carry from one to the next.
+    fn resolve(&mut self, piece: Piece) -> Result<Vec<Seen>, SolveError> {
+        let Piece { start, end } = piece;
+        let resolution = self.tolerance.relative().clamp(FINEST_RESOLUTION, COARSEST_RESOLUTION);
+        let mut seen = vec![self.see(start)?];
         // The last to be looked at stands first, so that the piece is walked from its start.
         let mut pending = vec![(self.see(end)?, 0)];
         for interval in (1..FIRST_INTERVALS).rev() {
             let share = f64::from(interval) / f64::from(FIRST_INTERVALS);
             let fraction = start.fraction + share * (end.fraction - start.fraction);
-            pending.push((self.see_at(fraction, &start, &end)?, 0));
+            pending.push((self.see_inside(fraction, &piece)?, 0));
         }
         let mut from = seen[0].clone();
         while let Some((to, depth)) = pending.pop() {
             let fraction = 0.5 * (from.moment.fraction + to.moment.fraction);
-            let middle = self.see_at(fraction, &start, &end)?;
-            if depth < MAX_DEPTH && self.bend(&from, &middle, &to) > resolution {
+            let middle = self.see_inside(fraction, &piece)?;
+            let width = to.moment.fraction - from.moment.fraction;
+            let is_told_apart = !self.has_clearance
+                || width < 0.1 * self.tolerance.relative()
+                || from.teeth_changed(&middle) + middle.teeth_changed(&to) < 2;
+            if depth < MAX_DEPTH && (self.bend(&from, &middle, &to) > resolution || !is_told_apart) {
                 pending.push((to, depth + 1));
                 pending.push((middle, depth + 1));
             } else {
@@ -208,62 +316,129 @@ impl<S: Stop> Search<'_, S> {
     /// How far a middle moment is off the straight line between its neighbours, over the peaks.
     fn bend(&self, from: &Seen, middle: &Seen, to: &Seen) -> f64 {
         let mut bend = 0.0_f64;
+        let mut see = |quantity: usize, [from, middle, to]: [f64; 3]| {
+            bend = bend.max((middle - 0.5 * (from + to)).abs() / self.peaks[quantity]);
+        };
         for number in middle.moment.first..=middle.moment.last {
             let (from, middle, to) = (from.of(number), middle.of(number), to.of(number));
-            for (kind, peak) in self.peaks.iter().enumerate() {
-                bend = bend.max((middle[kind] - 0.5 * (from[kind] + to[kind])).abs() / peak);
+            for quantity in 0..LOADS {
+                see(quantity, [from[quantity], middle[quantity], to[quantity]]);
             }
+        }
+        for total in CONTINUOUS_TOTALS {
+            // Without an allowable stress there is no capacity, and 0/0 is no bend.
+            see(LOADS + total, [from.totals[total], middle.totals[total], to.totals[total]]);
         }
         bend
     }
 
-    /// Closes in on every extreme around the middle one of three moments that may be the largest of its kind.
-    fn extremes_around(
-        &mut self,
-        before: &Seen,
-        middle: &Seen,
-        after: &Seen,
-        tolerance: f64,
-        extremes: &mut Vec<Seen>,
-    ) -> Result<(), SolveError> {
-        for number in middle.moment.first..=middle.moment.last {
-            let (low, top, high) = (before.of(number), middle.of(number), after.of(number));
-            for kind in 0..top.len() {
-                // A straight line is at most a resolution off, so a lower peak than this stays below the largest.
-                let may_be_largest = top[kind] >= (1.0 - 2.0 * COARSEST_RESOLUTION) * self.peaks[kind];
-                if may_be_largest && top[kind] > 0.0 && top[kind] >= low[kind] && top[kind] >= high[kind] {
-                    extremes.push(self.close_in(before, middle, after, number, kind, tolerance)?);
+    /// Closes in on every extreme that may be the largest of its kind by more than the tolerance, the most promising first.
+    fn extremes(&mut self, track: &[Link<'_>]) -> Result<Vec<Seen>, SolveError> {
+        let mut kept = [0.0; QUANTITIES];
+        for link in track {
+            raise(&mut kept, &peaks_of(link.seen));
+        }
+        let mut candidates = self.candidates(track, &kept);
+        candidates.sort_by(|one, other| other.bound.total_cmp(&one.bound));
+        let mut extremes = Vec::new();
+        for candidate in candidates {
+            let quantity = candidate.sought.quantity;
+            if candidate.bound > kept[quantity] * (1.0 + 0.25 * self.tolerance.relative()) {
+                let extreme = self.close_in(&candidate)?;
+                raise(&mut kept, &peaks_of(&extreme));
+                extremes.push(extreme);
+            }
+        }
+        Ok(extremes)
+    }
+
+    fn candidates<'t>(&self, track: &[Link<'t>], peaks: &[f64; QUANTITIES]) -> Vec<Candidate<'t>> {
+        let mut candidates = Vec::new();
+        // The end of a closed track is its start.
+        let own = if self.loads_jump() { track } else { &track[..track.len() - 1] };
+        for (index, top) in own.iter().enumerate() {
+            let Some([before, after]) = self.beside(track, index) else { continue };
+            let numbers = top.seen.moment.first.saturating_sub(top.shift)..=top.seen.moment.last - top.shift;
+            let of_teeth = numbers.flat_map(|number| (0..LOADS).map(move |quantity| Sought { quantity, number }));
+            let of_all = (LOADS..QUANTITIES).map(|quantity| Sought { quantity, number: 0 });
+            for sought in of_teeth.chain(of_all) {
+                let bound = match Self::at_open_end(track, index) {
+                    Some(inwards) if self.loads_jump() => self.bound_at_end(sought, inwards),
+                    _ => self.bound(sought, [&before, top, &after]),
+                };
+                if let Some(bound) = bound
+                    && bound > peaks[sought.quantity]
+                {
+                    candidates.push(Candidate { sought, before, top: *top, after, bound });
                 }
             }
         }
-        Ok(())
+        candidates
     }
 
-    /// The moment of a load's largest value between two moments, to a relative tolerance of the value: parabolas where they are
+    /// The moments beside one of the track, which is closed where no load jumps. At an open end they are that one itself and the next.
+    fn beside<'t>(&self, track: &[Link<'t>], index: usize) -> Option<[Link<'t>; 2]> {
+        let last = track.len().checked_sub(1)?;
+        let before = match index {
+            0 if self.loads_jump() => track[0],
+            0 => track[last.checked_sub(1)?].before(),
+            _ => track[index - 1],
+        };
+        Some([before, track[last.min(index + 1)]])
+    }
+
+    /// What a quantity may rise to beside a moment that stands above its neighbours: as far as the slope on one side leads on the other. That
+    /// holds wherever it is concave; a corner may stand above it, and is allowed for by as much again.
+    fn bound(&self, sought: Sought, links: [&Link<'_>; 3]) -> Option<f64> {
+        let [low, value, high] = links.map(|link| link.value(sought));
+        let [before, at, after] = links.map(|link| link.at);
+        let (left, right) = (at - before, after - at);
+        let (rise_left, rise_right) = (value - low, value - high);
+        if value <= 0.0 || rise_left < 0.0 || rise_right < 0.0 {
+            return None;
+        }
+        let excess = (rise_left * (right / left)).max(rise_right * (left / right));
+        Some(value + if self.is_smooth { excess } else { 2.0 * excess.max(rise_left).max(rise_right) })
+    }
+
+    /// The three moments at an end of the track, from that end inwards.
+    fn at_open_end<'s, 't>(track: &'s [Link<'t>], index: usize) -> Option<[&'s Link<'t>; 3]> {
+        match (track, index) {
+            ([end, next, third, ..], 0) => Some([end, next, third]),
+            ([.., third, next, end], index) if index + 1 == track.len() => Some([end, next, third]),
+            _ => None,
+        }
+    }
+
+    /// The same at an end of a track that loads jump at, where the other side is empty: as far as the slope there leads inwards.
+    fn bound_at_end(&self, sought: Sought, links: [&Link<'_>; 3]) -> Option<f64> {
+        let [value, next, third] = links.map(|link| link.value(sought));
+        let [to_next, to_third] = [1, 2].map(|index| (links[index].at - links[0].at).abs());
+        if value <= 0.0 || next > value {
+            return None;
+        }
+        let (slope, slope_beyond) = ((next - value) / to_next, (third - next) / (to_third - to_next));
+        let excess = to_next * (slope - to_next * (slope_beyond - slope) / to_third);
+        let excess = if self.is_smooth { excess } else { 2.0 * excess.max(value - next) };
+        (excess > 0.0).then_some(value + excess)
+    }
+
+    /// The moment of a quantity's largest value between two moments, to a relative tolerance of the value: parabolas where they are
     /// safe, golden sections elsewhere (Brent 1973).
-    fn close_in(
-        &mut self,
-        before: &Seen,
-        middle: &Seen,
-        after: &Seen,
-        number: u64,
-        kind: usize,
-        tolerance: f64,
-    ) -> Result<Seen, SolveError> {
+    fn close_in(&mut self, candidate: &Candidate<'_>) -> Result<Seen, SolveError> {
+        let Candidate { sought, before, top, after, .. } = *candidate;
         let golden = 0.5 * (3.0 - 5.0_f64.sqrt());
-        let (start, end) = (before.moment, after.moment);
-        let (mut low, mut high) = (start.fraction, end.fraction);
-        let mut best = middle.clone();
-        let (mut second, mut third) = (best.moment.fraction, best.moment.fraction);
-        let (mut at_second, mut at_third) = (best.of(number)[kind], best.of(number)[kind]);
+        let (mut low, mut high) = (before.at, after.at);
+        let (mut x, mut value) = (top.at, top.value(sought));
+        let mut best = top.seen.clone();
+        let (mut second, mut third, mut at_second, mut at_third) = (x, x, value, value);
         let (mut step, mut last_step) = (0.0_f64, 0.0_f64);
         // Around a smooth peak the value is off by the square of this, times what it varies by over the bracket; with clearance a peak
-        // may be a kink, where another tooth begins to carry, and the value is off by as much as the place.
-        let share = if self.loaded.linear_compliance_mm_per_n().is_some() { tolerance.sqrt() } else { tolerance };
+        // may be a corner, where another tooth begins to carry, and the value is off by as much as the place.
+        let tolerance = self.tolerance.relative();
+        let share = if self.is_smooth { tolerance.sqrt() } else { tolerance };
         let nearest = (0.1 * share * (high - low)).max(f64::EPSILON);
         for _ in 0..MAX_STEPS {
-            let x = best.moment.fraction;
-            let value = best.of(number)[kind];
             let center = 0.5 * (low + high);
             if (x - center).abs() + 0.5 * (high - low) <= 2.0 * nearest {
                 break;
@@ -282,8 +457,9 @@ impl<S: Stop> Search<'_, S> {
                 step = golden * last_step;
             }
             let moved = if step.abs() < nearest { nearest.copysign(step) } else { step };
-            let seen = self.see_at((x + moved).clamp(low, high), &start, &end)?;
-            let (u, at_u) = (seen.moment.fraction, seen.of(number)[kind]);
+            let u = (x + moved).clamp(low, high);
+            let (shift, seen) = self.see_on_track(u)?;
+            let at_u = Link { at: u, shift, seen: &seen }.value(sought);
             if at_u >= value {
                 if u < x {
                     high = x
@@ -291,7 +467,7 @@ impl<S: Stop> Search<'_, S> {
                     low = x
                 }
                 (third, at_third, second, at_second) = (second, at_second, x, value);
-                best = seen;
+                (x, value, best) = (u, at_u, seen);
             } else {
                 if u < x {
                     low = u

@@ -22,9 +22,9 @@ use std::ops::Range;
 use crate::contact::PerContact;
 use crate::drive::WAVES;
 use crate::load_sharing::{Compatibility, LoadedDrive};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, Samples};
 use crate::position::Position;
-use crate::sweep::{InputAngles, PeakAt, States};
+use crate::sweep::{InputAngles, PeakAt, States, TorqueBalance, worse};
 use crate::{SolveError, Stop};
 
 /// States worked on in one stretch of straight code; a multiple of every vector's width.
@@ -45,7 +45,7 @@ const LAST_STEP: f64 = 5e-6;
 /// Terms of the arctangent's series at most. A drive that needs more goes the plain way.
 const MAX_TERMS: usize = 24;
 
-/// What the plain path and this one both add to a sweep.
+/// What the plain path and this one both make of a sweep.
 pub(crate) struct BatchSweep {
     pub(crate) states: States,
     pub(crate) input_angles: InputAngles,
@@ -59,7 +59,7 @@ pub(crate) struct BatchSweep {
 /// [`SolveError::Stopped`] when `stop` says so.
 pub(crate) fn sweep(
     loaded: &LoadedDrive<'_>,
-    samples: u64,
+    samples: Samples,
     stop: &impl Stop,
 ) -> Result<Option<BatchSweep>, SolveError> {
     let Some(kernel) = Kernel::new(loaded) else { return Ok(None) };
@@ -71,7 +71,7 @@ pub(crate) fn sweep(
 struct Vectorised<'a, S> {
     kernel: &'a Kernel,
     loaded: &'a LoadedDrive<'a>,
-    samples: u64,
+    samples: Samples,
     stop: &'a S,
 }
 
@@ -182,14 +182,14 @@ impl Kernel {
     fn sweep(
         &self,
         loaded: &LoadedDrive<'_>,
-        samples: u64,
+        samples: Samples,
         stop: &impl Stop,
     ) -> Result<Option<BatchSweep>, SolveError> {
         let drive = loaded.drive();
         let mesh = Mesh::new(drive);
         let mut sweep = BatchSweep {
             states: States::with_capacity(whole(mesh.state_count(samples))),
-            input_angles: InputAngles::with_capacity(whole(samples + 1)),
+            input_angles: InputAngles::with_capacity(whole(samples.count() + 1)),
             peaks: PerContact::default(),
             torque_balance_residual: 0.0,
         };
@@ -198,7 +198,7 @@ impl Kernel {
         let mut arena = vec![0.0; size.doubles()];
         let mut tile = Tile::new(&mut arena, &size, 2.0 * PI / mesh.steps(samples) as f64);
         let mut first = 0;
-        while first < samples {
+        while first < samples.count() {
             let run = Run::from(first, samples, &mesh);
             run.lay_pattern(&mut tile);
             for start in run.samples.clone().step_by(run.rows) {
@@ -226,7 +226,7 @@ impl Kernel {
             }
         });
         // The last input angle repeats the first, every tooth one further.
-        let end_deg = mesh.input_angle_deg(samples, samples);
+        let end_deg = mesh.input_angle_deg(samples.count(), samples);
         sweep.states.repeat_first(mesh.teeth_at(0, samples).count(), end_deg);
         sweep.input_angles.repeat_first(end_deg);
         Ok(Some(sweep))
@@ -373,8 +373,7 @@ impl Kernel {
     ) {
         let rows = tile.sum_torques(run.teeth);
         let input_nmm = loaded.input_torque_nmm();
-        let [ring_ratio, carrier_ratio] =
-            [self.ring_teeth_per_wave, self.teeth_per_wave].map(|ratio| 1.0 / (input_nmm * ratio));
+        let balance = TorqueBalance::new(loaded.drive(), input_nmm);
         let PerContact { wave_generator: cam, ring, carrier } = &mut tile.row_torque;
         let (cam, ring, carrier) = (&cam[..rows], &ring[..rows], &carrier[..rows]);
         let (rotation_rad, rotation_root) = (&mut tile.row_rotation_rad[..rows], &mut tile.row_rotation_root[..rows]);
@@ -384,13 +383,11 @@ impl Kernel {
             rotation_rad[row] = rotation;
             rotation_root[row] = rotation.sqrt();
             let zones = WAVES * rotation;
-            let off_cam = (zones * cam[row] * (1.0 / input_nmm) - 1.0).abs();
-            let off_ring = (zones * ring[row] * ring_ratio - 1.0).abs();
-            let off_carrier = (zones * carrier[row] * carrier_ratio - 1.0).abs();
-            let most = if off_ring > off_carrier { off_ring } else { off_carrier };
-            residual[row] = if off_cam > most { off_cam } else { most };
+            let [wave_generator, ring, carrier] = [cam[row], ring[row], carrier[row]].map(|torque| zones * torque);
+            residual[row] = balance.residual(&PerContact { wave_generator, ring, carrier });
         }
-        sweep.torque_balance_residual = sweep.torque_balance_residual.max(largest(residual));
+        sweep.torque_balance_residual =
+            residual.iter().fold(sweep.torque_balance_residual, |worst, &residual| worse(residual, worst));
         for (angle_deg, sample) in zip(&mut tile.row_input_angle_deg[..rows], samples) {
             *angle_deg = mesh.input_angle_deg(sample, run.of);
         }
@@ -512,7 +509,7 @@ impl SineTable {
 struct Run {
     samples: Range<u64>,
     /// Samples of the period.
-    of: u64,
+    of: Samples,
     teeth: usize,
     /// Samples of a tile: equally many, but for the last.
     rows: usize,
@@ -523,7 +520,7 @@ struct Run {
 }
 
 impl Run {
-    fn from(first: u64, of: u64, mesh: &Mesh) -> Self {
+    fn from(first: u64, of: Samples, mesh: &Mesh) -> Self {
         let samples = first..mesh.same_teeth_until(first, of);
         let steps = mesh.steps(of) as f64;
         let teeth = whole(*mesh.teeth_at(first, of).end());
@@ -538,7 +535,7 @@ impl Run {
         let Self { teeth, rows, .. } = *self;
         let (base_sin, base_cos) = (&mut tile.base_sin[..teeth], &mut tile.base_cos[..teeth]);
         for (tooth, base) in zip(1.., zip(&mut *base_sin, &mut *base_cos)) {
-            let Position { sin, cos, .. } = self.mesh.position(tooth, self.samples.start, self.of);
+            let Position { sin, cos, .. } = self.mesh.position_in_mesh(tooth, self.samples.start, self.of);
             (*base.0, *base.1) = (sin, cos);
         }
         tile.tooth.clear();
@@ -552,7 +549,7 @@ impl Run {
                 sin[i] = base_sin[i] * row_cos - base_cos[i] * row_sin;
                 cos[i] = base_cos[i] * row_cos + base_sin[i] * row_sin;
                 // Whole numbers below 2^53: exact.
-                step[i] = (i + 1) as f64 * self.of as f64 - row as f64;
+                step[i] = (i + 1) as f64 * self.of.count() as f64 - row as f64;
             }
             tile.tooth.extend(1..=last_tooth);
         }
@@ -579,7 +576,7 @@ impl Run {
             from_minor_rad[i] = (steps - 4.0 * step) * quarter_step_rad;
         }
         // The first tooth again, from where it will stand at the last sample.
-        let end = self.mesh.position(1, samples.end - 1, self.of);
+        let end = self.mesh.position_in_mesh(1, samples.end - 1, self.of);
         for (row, to_end) in (0..rows).rev().enumerate() {
             let (row_sin, row_cos) = (tile.row_sines.sin[to_end], tile.row_sines.cos[to_end]);
             sin[row * self.teeth] = end.sin * row_cos + end.cos * row_sin;
@@ -599,11 +596,11 @@ struct TileSize {
 }
 
 impl TileSize {
-    fn of(mesh: &Mesh, samples: u64) -> Self {
+    fn of(mesh: &Mesh, samples: Samples) -> Self {
         let teeth_at = |sample| whole(*mesh.teeth_at(sample, samples).end());
-        let (least, most) = (teeth_at(0).max(1), teeth_at(samples - 1));
+        let (least, most) = (teeth_at(0).max(1), teeth_at(samples.count() - 1));
         let states = TILE.min(whole(mesh.state_count(samples))).max(most);
-        let rows = whole(samples).min(TILE.div_ceil(least));
+        let rows = whole(samples.count()).min(TILE.div_ceil(least));
         Self { len: states.next_multiple_of(LANES) + VECTOR, rows, teeth: most }
     }
 

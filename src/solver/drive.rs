@@ -1,9 +1,10 @@
 //! A drive whose parameters were checked once, so that nothing below doubts its input.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::{PI, SQRT_2};
 
 use crate::cam::Cam;
 use crate::locus::{Locus, ToothCenter};
+use crate::position::Position;
 use crate::ring::{FlankLimit, RingFlank, RingTooth};
 use crate::root::{NotConverged, bracketed};
 use crate::violation::{Alternatives, Parameter, Violation};
@@ -311,48 +312,41 @@ impl Neighbours {
         Ok(Some(Violation::TeethTouch { tooth_diameter_mm, center_distance_mm, touching_radius_mm }))
     }
 
-    /// The radius, at most the one that the teeth have, at which they begin to touch: thicker teeth stand farther out, but by less than they
-    /// are thicker, so that the gap falls with the radius. Its logarithm is what is solved for, because radii range over twelve decades.
-    fn touching_radius_mm(&self) -> Result<f64, NotConverged> {
-        let free_mm = 0.5 * self.surely_free_radius_mm();
-        let at = |exponent: f64| Self { locus: Locus::new(*self.locus.cam(), free_mm * exponent.exp()), ..*self };
-        let gap_mm = |exponent: f64| {
-            let thinner = at(exponent);
-            Ok(thinner.least_center_distance_mm()? - 2.0 * thinner.locus.tooth_radius_mm())
-        };
-        let most = (self.locus.tooth_radius_mm() / free_mm).ln();
-        let exponent = bracketed("radius at which teeth touch", 0.0, gap_mm(0.0)?, most, gap_mm)?;
-        Ok(at(exponent).locus.tooth_radius_mm())
+    /// Distance of the nearest two centres on their path (docs/theory.md section 7): those either side of the minor axis, and of two teeth
+    /// alone those on it.
+    fn least_center_distance_mm(&self) -> Result<f64, NotConverged> {
+        if self.installed == 2 {
+            return Ok(2.0 * self.locus.at(Position::TIP)?.center_radius_mm);
+        }
+        let half_rad = self.half_spacing_rad();
+        Ok(2.0 * half_rad.sin() * self.locus.at(Position::from_minor(half_rad))?.center_radius_mm)
     }
 
-    /// Least distance of two neighbouring centres on their path (docs/theory.md section 7): over the middle of the pair a scan,
-    /// then a golden-section search around its least value. The pair that straddles the minor axis is one of the scan.
-    fn least_center_distance_mm(&self) -> Result<f64, NotConverged> {
-        const SCAN: u32 = 96;
-        let half = self.half_spacing_rad();
-        let distance = |middle_rad: f64| -> Result<f64, NotConverged> {
-            let before = self.locus.center_radius_at_mm(middle_rad - half)?;
-            let after = self.locus.center_radius_at_mm(middle_rad + half)?;
-            Ok((before - after).hypot(2.0 * half.sin() * (before * after).sqrt()))
+    /// The radius at which the two teeth either side of the minor axis touch it, and so each other. There are four teeth or more.
+    ///
+    /// Their centres then stand at `(r, r cot μ)`, μ half the spacing, and on the path of section 2.2: with `a² cos φ/h = r (1 - cos φ)` and
+    /// `b² sin φ/h = r (cot μ - sin φ)` the normal's angle is the one root of `a² cos φ (cot μ - sin φ) = b² sin φ (1 - cos φ)`, beyond 45°.
+    fn touching_radius_mm(&self) -> Result<f64, NotConverged> {
+        let (a, b) = (self.locus.cam().semi_major_mm(), self.locus.cam().semi_minor_mm());
+        let half_rad = self.half_spacing_rad();
+        // cot μ - 1 and, below, 1 - sin φ and 1 - cos φ, without a difference of near values.
+        let beyond_one =
+            SQRT_2 * (PI * (self.installed - 4) as f64 / (4 * self.installed) as f64).sin() / half_rad.sin();
+        let flattening_squared = (b / a) * (b / a);
+        // In the logarithm of tan φ, which reaches from 1 to some (a/b)² cot μ.
+        let direction = |logarithm: f64| {
+            let tan = logarithm.exp();
+            let cos = 1.0 / tan.hypot(1.0);
+            (cos, tan * cos)
         };
-        let step = FRAC_PI_2 / f64::from(SCAN);
-        let mut best = (FRAC_PI_2, distance(FRAC_PI_2)?);
-        for i in 0..SCAN {
-            let middle = f64::from(i) * step;
-            let value = distance(middle)?;
-            if value < best.1 {
-                best = (middle, value);
-            }
-        }
-        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-        let (mut low, mut high) = (best.0 - step, best.0 + step);
-        // Forty steps shrink the bracket by 4e-9: a minimum is then known to all digits.
-        for _ in 0..40 {
-            let (left, right) = (high - golden * (high - low), low + golden * (high - low));
-            let (at_left, at_right) = (distance(left)?, distance(right)?);
-            best.1 = best.1.min(at_left).min(at_right);
-            if at_left < at_right { high = right } else { low = left }
-        }
-        Ok(best.1)
+        let condition = |logarithm: f64| {
+            let (cos, sin) = direction(logarithm);
+            let off_axis = beyond_one + cos * cos / (1.0 + sin);
+            Ok(cos * off_axis * (1.0 + cos) - flattening_squared * sin * sin * sin)
+        };
+        let most = (2.0 * (beyond_one + 1.0) / flattening_squared).ln() + 1.0;
+        let logarithm = bracketed("radius at which teeth touch", -1.0, condition(-1.0)?, most, condition)?;
+        let (cos, sin) = direction(logarithm);
+        Ok(a * (a / (a * cos).hypot(b * sin)) * cos * (1.0 + cos) / (sin * sin))
     }
 }

@@ -51,7 +51,6 @@ pub use contact::{Contact, ContactLaw, Material, Materials, Part, PerContact};
 pub use drive::{Drive, DriveParameters};
 pub use findings::Finding;
 pub use load_sharing::{Compatibility, LoadCase, LoadParameters, Torque};
-
 pub use position::Position;
 pub use violation::{Parameter, Violation};
 
@@ -96,6 +95,14 @@ pub enum SolveError {
     TooManyStates {
         /// The limit that was given.
         limit: u64,
+    },
+    /// The answer's own checks say that it is wrong: a fault of this crate.
+    #[error("the {check} of the sweep is off by {residual:e}")]
+    Inconsistent {
+        /// Which check.
+        check: &'static str,
+        /// What it came to.
+        residual: f64,
     },
     /// The caller's stop signal was seen.
     #[error("the computation was stopped")]

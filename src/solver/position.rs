@@ -35,9 +35,14 @@ impl Position {
         Self { from_major_rad: FRAC_PI_2 - from_minor_rad, from_minor_rad, cos, sin }
     }
 
-    /// At the whole fraction `numerator / denominator` of a turn, at most a quarter; exact towards both axes.
-    pub fn of_turn(numerator: u64, denominator: u64) -> Self {
-        debug_assert!(4 * u128::from(numerator) <= u128::from(denominator));
+    /// At the whole fraction `numerator / denominator` of a turn; exact towards both axes. None beyond a quarter.
+    pub fn of_turn(numerator: u64, denominator: u64) -> Option<Self> {
+        let is_in_quarter = denominator > 0 && 4 * u128::from(numerator) <= u128::from(denominator);
+        is_in_quarter.then(|| Self::of_quarter(numerator, denominator))
+    }
+
+    /// The same of a fraction that is known to be at most a quarter.
+    pub(crate) fn of_quarter(numerator: u64, denominator: u64) -> Self {
         // Below 2^53 for every sweep (samples × installed teeth), so that the conversions are exact.
         let whole = denominator as f64;
         let from_major_rad = 2.0 * PI * (numerator as f64 / whole);

@@ -212,7 +212,8 @@ fn sampled(
 /// An upper bound of the distance between an arc and its chord.
 ///
 /// A convex arc lies in the triangle of its chord and its end tangents, whose height is
-/// `c sin α sin β / sin(α + β)`; an arc with one inflection lies within `c max(sin α, sin β)`.
+/// `c sin α sin β / sin(α + β)`; an arc with one inflection stays below the tangent at one end and above that at the other, within
+/// `c max(tan α, tan β)`.
 fn chord_deviation_mm(from: &CurvePoint, to: &CurvePoint) -> f64 {
     let chord = to.point - from.point;
     let length = chord.norm();
@@ -229,7 +230,7 @@ fn chord_deviation_mm(from: &CurvePoint, to: &CurvePoint) -> f64 {
     if sin_from * sin_to > 0.0 {
         length * (sin_from * sin_to / sin_sum).abs()
     } else {
-        length * sin_from.abs().max(sin_to.abs())
+        length * (sin_from / cos_from).abs().max((sin_to / cos_to).abs())
     }
 }
 

@@ -5,22 +5,112 @@ use crate::batch::{self, BatchSweep};
 use crate::contact::{Contact, PerContact, half_width_mm};
 use crate::drive::{Drive, WAVES};
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState, WindUp};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, Samples, TeethInMesh};
 use crate::position::Position;
+use crate::violation::{Parameter, Violation};
 use crate::{SolveError, Stop};
 
 /// Where a sweep looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Points {
-    /// So many equal intervals of one period, both ends included; at least 1.
-    Samples(u64),
-    /// Wherever it takes to find the true extremes of every force and stress to a relative tolerance, both sides of every jump included.
-    Tolerance {
-        /// The relative tolerance.
-        tolerance: f64,
-        /// Most states.
-        max_states: u64,
-    },
+    /// So many equal intervals of one period, both ends included.
+    Samples(Samples),
+    /// Wherever it takes to find the true extremes to a tolerance.
+    Tolerance(Tolerance),
+}
+
+impl Points {
+    /// So many equal intervals of one period.
+    ///
+    /// # Errors
+    /// As [`Samples::new`].
+    pub fn samples(count: u64) -> Result<Self, Violation> {
+        Samples::new(count).map(Self::Samples)
+    }
+
+    /// Wherever it takes to find the true extremes to a tolerance, with so many states worked out on the way at most.
+    ///
+    /// # Errors
+    /// As [`Tolerance::new`].
+    pub fn tolerance(relative: f64, max_states: u64) -> Result<Self, Violation> {
+        Tolerance::new(relative, max_states).map(Self::Tolerance)
+    }
+
+    /// The same to the finest tolerance that there is.
+    pub const fn finest(max_states: u64) -> Self {
+        Self::Tolerance(Tolerance { relative: Parameter::SweepTolerance.range().low, max_states })
+    }
+}
+
+/// How true the extremes of a sweep are to be.
+///
+/// The relative tolerance holds for the largest value of every force and stress, for the least and the largest of wind-up and torsional
+/// stiffness and for the torque capacity; its root for the places where they stand and for half-widths; of the transmission error the
+/// tolerance times the wind-up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tolerance {
+    relative: f64,
+    max_states: u64,
+}
+
+impl Tolerance {
+    /// Checks the tolerance.
+    ///
+    /// # Errors
+    /// A tolerance out of its range.
+    pub fn new(relative: f64, max_states: u64) -> Result<Self, Violation> {
+        Parameter::SweepTolerance.check(relative).map_or(Ok(Self { relative, max_states }), Err)
+    }
+
+    /// The relative tolerance.
+    pub const fn relative(&self) -> f64 {
+        self.relative
+    }
+
+    /// Most states that may be worked out.
+    pub const fn max_states(&self) -> u64 {
+        self.max_states
+    }
+}
+
+/// Forces that miss a torque by more than this share of it, or a period that fails to close by more than this share of a peak, are wrong: some
+/// ten thousand times what rounding does to the worst design that is known.
+const MOST_RESIDUAL: f64 = 1e-9;
+
+/// The torques that must come out: `M0` at the wave generator, `M0 Z_K/U` at the ring, `M0 Z_G/U` at the carrier.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TorqueBalance {
+    per_nmm: PerContact<f64>,
+}
+
+impl TorqueBalance {
+    /// Of a drive under an input torque.
+    pub fn new(drive: &Drive, input_torque_nmm: f64) -> Self {
+        let per_nmm = PerContact {
+            wave_generator: 1.0 / input_torque_nmm,
+            ring: 1.0 / (input_torque_nmm * drive.flank().teeth_per_wave()),
+            carrier: 1.0 / (input_torque_nmm * drive.teeth_per_wave()),
+        };
+        Self { per_nmm }
+    }
+
+    /// The largest relative deviation of the torques that did come out; not a number where one of them is none.
+    #[inline(always)]
+    pub fn residual(&self, torque_nmm: &PerContact<f64>) -> f64 {
+        let off_cam = (torque_nmm.wave_generator * self.per_nmm.wave_generator - 1.0).abs();
+        let off_ring = (torque_nmm.ring * self.per_nmm.ring - 1.0).abs();
+        let off_carrier = (torque_nmm.carrier * self.per_nmm.carrier - 1.0).abs();
+        let most = if off_ring > off_carrier { off_ring } else { off_carrier };
+        let most = if off_cam > most { off_cam } else { most };
+        let all = off_cam + off_ring + off_carrier;
+        if all.is_nan() { all } else { most }
+    }
+}
+
+/// The larger of a residual and those before; what is not a number is the worst of all.
+#[inline(always)]
+pub(crate) fn worse(residual: f64, before: f64) -> f64 {
+    if residual.is_nan() || residual > before { residual } else { before }
 }
 
 /// The states of a sweep, by input angle and then tooth number: columns of equal length, one entry a state.
@@ -105,8 +195,7 @@ pub struct Sweep {
     pub torque_capacity: Option<TorqueCapacity>,
     /// Largest relative deviation of the input, ring and carrier torques from `M0`, `M0 Z_K/U`, `M0 Z_G/U`.
     pub torque_balance_residual: f64,
-    /// Largest difference of a force or stress between the last input angle and the first, teeth renumbered, over
-    /// the column's peak.
+    /// Largest difference of a force or stress at the last input angle from that angle worked out anew, over the column's peak.
     pub period_closure_residual: f64,
 }
 
@@ -116,6 +205,12 @@ impl Sweep {
         let wind_up_deg = self.input_angles.wind_up_deg.iter().copied();
         let most = wind_up_deg.clone().fold(f64::NEG_INFINITY, f64::max);
         (most - wind_up_deg.fold(f64::INFINITY, f64::min)) / drive.teeth_per_wave()
+    }
+
+    /// Least and most teeth of a zone that carry load: of those in mesh, those whose gaps are closed.
+    pub fn loaded_teeth(&self) -> TeethInMesh {
+        let teeth = self.input_angles.loaded_teeth.iter().map(|&teeth| u64::from(teeth));
+        TeethInMesh { min: teeth.clone().min().unwrap_or(0), max: teeth.max().unwrap_or(0) }
     }
 }
 
@@ -210,6 +305,7 @@ impl InputAngles {
 /// # Errors
 /// [`SolveError::NoToothInMesh`] and [`SolveError::ComplianceNotPositive`] where no finite forces exist,
 /// [`SolveError::TooManyStates`] at a tolerance that takes more of them than allowed,
+/// [`SolveError::Inconsistent`] where the answer's own checks say that it is wrong,
 /// [`SolveError::Stopped`] when `stop` says so.
 pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -> Result<Sweep, SolveError> {
     let loaded = LoadedDrive::new(drive, load)?;
@@ -217,10 +313,7 @@ pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -
     if let (Points::Samples(samples), None) = (points, load.parameters().allowable_stress_mpa)
         && let Some(batch) = batch::sweep(&loaded, samples, stop)?
     {
-        let mesh = Mesh::new(drive);
-        let teeth_at_ends = (mesh.teeth_at(0, samples).count(), mesh.teeth_at(samples, samples).count());
-        let BatchSweep { states, input_angles, peaks, torque_balance_residual } = batch;
-        return Ok(finished(drive, states, input_angles, &peaks, None, torque_balance_residual, teeth_at_ends));
+        return finished(&loaded, points, batch, None);
     }
     plain(&loaded, load, points, stop)
 }
@@ -239,25 +332,25 @@ fn plain(loaded: &LoadedDrive<'_>, load: &LoadCase, points: Points, stop: &impl 
     match points {
         Points::Samples(samples) => {
             columns.reserve(mesh.state_count(samples));
-            for sample in 0..=samples {
+            for sample in 0..=samples.count() {
                 if stop.stopped() {
                     return Err(SolveError::Stopped);
                 }
                 let teeth = mesh.teeth_at(sample, samples).map(|number| PlacedTooth {
                     number,
-                    position: mesh.position(number, sample, samples),
+                    position: mesh.position_in_mesh(number, sample, samples),
                     position_deg: mesh.position_deg(number, sample, samples),
                 });
                 columns.add(mesh.input_angle_deg(sample, samples), teeth)?;
             }
         }
-        Points::Tolerance { tolerance, max_states } => {
-            for moment in adaptive::moments(loaded, tolerance, max_states, stop)? {
+        Points::Tolerance(tolerance) => {
+            for moment in adaptive::moments(loaded, load, tolerance, stop)? {
                 columns.add(moment.fraction * mesh.period_deg(), moment.teeth(&mesh))?;
             }
         }
     }
-    Ok(columns.finish())
+    columns.finish(points)
 }
 
 /// A tooth in mesh at an input angle.
@@ -275,9 +368,8 @@ struct Columns<'a> {
     states: States,
     input_angles: InputAngles,
     torque_capacity: Option<TorqueCapacity>,
+    balance: TorqueBalance,
     torque_balance_residual: f64,
-    /// Teeth at the first and at the last input angle.
-    teeth_at_ends: (usize, usize),
     teeth: Vec<ToothState>,
 }
 
@@ -289,8 +381,8 @@ impl<'a> Columns<'a> {
             states: States::default(),
             input_angles: InputAngles::default(),
             torque_capacity: None,
+            balance: TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm()),
             torque_balance_residual: 0.0,
-            teeth_at_ends: (0, 0),
             teeth: Vec::new(),
         }
     }
@@ -312,10 +404,6 @@ impl<'a> Columns<'a> {
         let wind_up = self.loaded.wind_up(&self.teeth)?;
         let loaded_teeth = self.share_load(&wind_up);
         self.input_angles.push(self.loaded.drive(), input_angle_deg, &wind_up, loaded_teeth);
-        if self.input_angles.input_angle_deg.len() == 1 {
-            self.teeth_at_ends.0 = self.teeth.len();
-        }
-        self.teeth_at_ends.1 = self.teeth.len();
         if let Some(allowable_stress_mpa) = self.allowable_stress_mpa {
             let limit = self.loaded.torque_limit(&self.teeth, allowable_stress_mpa);
             let input_torque_nm = 1e-3 * limit.input_torque_nmm;
@@ -331,8 +419,7 @@ impl<'a> Columns<'a> {
 
     /// Appends geometry, forces and stresses of the teeth, and returns how many carry load.
     fn share_load(&mut self, wind_up: &WindUp) -> usize {
-        let drive = self.loaded.drive();
-        let flank = drive.flank();
+        let flank = self.loaded.drive().flank();
         let states = &mut self.states;
         let mut loaded_teeth = 0;
         let mut torque_nmm = PerContact::<f64>::default();
@@ -354,38 +441,31 @@ impl<'a> Columns<'a> {
             torque_nmm.ring += WAVES * force_n.ring * sin_ring * center.center_radius_mm;
             torque_nmm.carrier += WAVES * force_n.carrier * center.center_radius_mm;
         }
-        let input_nmm = self.loaded.input_torque_nmm();
-        let balanced = PerContact {
-            wave_generator: torque_nmm.wave_generator / input_nmm,
-            ring: torque_nmm.ring / (input_nmm * flank.teeth_per_wave()),
-            carrier: torque_nmm.carrier / (input_nmm * drive.teeth_per_wave()),
-        };
-        let residual = balanced.iter().map(|(_, ratio)| (ratio - 1.0).abs()).fold(0.0, f64::max);
-        self.torque_balance_residual = self.torque_balance_residual.max(residual);
+        let residual = self.balance.residual(&torque_nmm);
+        self.torque_balance_residual = worse(residual, self.torque_balance_residual);
         loaded_teeth
     }
 
-    fn finish(self) -> Sweep {
-        let Self { loaded, states, input_angles, torque_capacity, torque_balance_residual, teeth_at_ends, .. } = self;
+    fn finish(self, points: Points) -> Result<Sweep, SolveError> {
+        let Self { loaded, states, input_angles, torque_capacity, torque_balance_residual, .. } = self;
         let peaks = PerContact::of(|contact| PeakAt {
             force: peak_at(states.force_n.get(contact)),
             stress: peak_at(states.stress_mpa.get(contact)),
         });
-        finished(loaded.drive(), states, input_angles, &peaks, torque_capacity, torque_balance_residual, teeth_at_ends)
+        let columns = BatchSweep { states, input_angles, peaks, torque_balance_residual };
+        finished(loaded, points, columns, torque_capacity)
     }
 }
 
-/// A sweep with what follows from its states: peaks and closure.
+/// A sweep with what follows from its states: peaks and closure, if its checks say nothing against it.
 fn finished(
-    drive: &Drive,
-    states: States,
-    input_angles: InputAngles,
-    peaks: &PerContact<PeakAt>,
+    loaded: &LoadedDrive<'_>,
+    points: Points,
+    columns: BatchSweep,
     torque_capacity: Option<TorqueCapacity>,
-    torque_balance_residual: f64,
-    teeth_at_ends: (usize, usize),
-) -> Sweep {
-    let tooth_width_mm = drive.parameters().tooth_width_mm;
+) -> Result<Sweep, SolveError> {
+    let BatchSweep { states, input_angles, peaks, torque_balance_residual } = columns;
+    let tooth_width_mm = loaded.drive().parameters().tooth_width_mm;
     let peaks = PerContact::of(|contact| {
         let (force, at) = (states.force_n.get(contact), peaks.get(contact));
         let stress_mpa = states.peak(states.stress_mpa.get(contact), at.stress);
@@ -395,27 +475,51 @@ fn finished(
             half_width_mm: half_width_mm(force[at.stress], stress_mpa.value, tooth_width_mm),
         }
     });
-    let period_closure_residual = period_closure(&states, &peaks, teeth_at_ends);
-    Sweep { states, input_angles, peaks, torque_capacity, torque_balance_residual, period_closure_residual }
+    let period_closure_residual = period_closure(loaded, points, &states, &peaks)?;
+    for (check, residual) in [("torque balance", torque_balance_residual), ("period closure", period_closure_residual)]
+    {
+        // The negated comparison also catches what is not a number.
+        if !(residual <= MOST_RESIDUAL) {
+            return Err(SolveError::Inconsistent { check, residual });
+        }
+    }
+    Ok(Sweep { states, input_angles, peaks, torque_capacity, torque_balance_residual, period_closure_residual })
 }
 
+/// The largest difference of a load at the last input angle from that angle worked out anew, one state at a time and from positions found
+/// another way: by angles where the sweep goes by whole numbers, and the other way about.
 fn period_closure(
+    loaded: &LoadedDrive<'_>,
+    points: Points,
     states: &States,
     peaks: &PerContact<ContactPeaks>,
-    (teeth_at_start, teeth_at_end): (usize, usize),
-) -> f64 {
-    let last = states.len() - teeth_at_end;
-    let residual = |column: &[f64], peak: f64| {
-        let pairs = column[last..].iter().zip(&column[..teeth_at_start]);
-        pairs.map(|(end, start)| (end - start).abs()).fold(0.0, f64::max) / peak
+) -> Result<f64, SolveError> {
+    let mesh = Mesh::new(loaded.drive());
+    let numbers = 2..=mesh.whole_spacings() + 1;
+    let position = |number| match points {
+        Points::Samples(_) => mesh.position_between(number, 1.0),
+        Points::Tolerance(_) => mesh.position_after_period(number),
     };
-    peaks
-        .iter()
-        .map(|(contact, ContactPeaks { force_n, stress_mpa, .. })| {
-            let force = residual(states.force_n.get(contact), force_n.value);
-            force.max(residual(states.stress_mpa.get(contact), stress_mpa.value))
-        })
-        .fold(0.0, f64::max)
+    let teeth = numbers.clone().map(|number| loaded.tooth(position(number))).collect::<Result<Vec<_>, _>>()?;
+    let wind_up = loaded.wind_up(&teeth)?;
+    let last_angle_deg = states.input_angle_deg.last();
+    let first = states.len().checked_sub(teeth.len());
+    let Some(first) = first.filter(|&first| states.input_angle_deg.get(first) == last_angle_deg) else {
+        return Ok(f64::INFINITY);
+    };
+    let mut residual = 0.0;
+    for ((state, number), tooth) in (first..).zip(numbers).zip(&teeth) {
+        if u64::from(states.tooth[state]) != number {
+            return Ok(f64::INFINITY);
+        }
+        let loads = loaded.loads(tooth, &wind_up);
+        for ((contact, peaks), (force_n, stress_mpa)) in peaks.iter().zip(loads[..3].iter().zip(&loads[3..])) {
+            let off_force = (states.force_n.get(contact)[state] - force_n).abs() / peaks.force_n.value;
+            let off_stress = (states.stress_mpa.get(contact)[state] - stress_mpa).abs() / peaks.stress_mpa.value;
+            residual = worse(off_stress, worse(off_force, residual));
+        }
+    }
+    Ok(residual)
 }
 
 impl PerContact<Vec<f64>> {

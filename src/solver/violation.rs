@@ -225,7 +225,7 @@ pub enum Violation {
     TeethTouch {
         /// `2r`.
         tooth_diameter_mm: f64,
-        /// Least distance of two neighbouring centres.
+        /// Distance of two neighbouring centres, those either side of the minor axis.
         center_distance_mm: f64,
         /// The radius at which teeth begin to touch: that of thinner ones, whose path lies farther in.
         touching_radius_mm: f64,

@@ -58,7 +58,7 @@ pub(crate) fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParamete
 
 pub(crate) fn swept(parameters: &DriveParameters, load: &LoadParameters, samples: u64) -> Sweep {
     let load = LoadCase::new(load).expect("a possible load");
-    sweep::sweep(&drive(parameters), &load, Points::Samples(samples), &Never).expect("a solvable sweep")
+    sweep::sweep(&drive(parameters), &load, Points::samples(samples).unwrap(), &Never).expect("a solvable sweep")
 }
 
 /// Possible drives of many shapes, swept ones (`always_carries`) among them.

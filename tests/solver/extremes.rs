@@ -19,7 +19,8 @@ fn a_sweep_to_a_tolerance_finds_the_true_extremes() {
     let mut worst = Worst::default();
     for case in cases("extremes") {
         let (name, sweep) = (case.name(), case.sweep().unwrap());
-        let Points::Tolerance { tolerance, .. } = case.points() else { panic!("{name}") };
+        let Points::Tolerance(tolerance) = case.points() else { panic!("{name}") };
+        let tolerance = tolerance.relative();
         let (expected, condition) = (&case.0["expected"], &case.0["condition"]);
         for (contact, word) in CONTACTS {
             let peaks = PerContact::get(&sweep.peaks, contact);

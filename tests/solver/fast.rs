@@ -33,8 +33,8 @@ proptest! {
     ) {
         let compatibility = if by_virtual_work { Compatibility::VirtualWork } else { Compatibility::Projection };
         let (drive, load) = (drive(&parameters), LoadCase::new(&load(7.0, compatibility)).unwrap());
-        let fast = sweep(&drive, &load, Points::Samples(samples), &Never).unwrap();
-        let plain = sweep_plain(&drive, &load, Points::Samples(samples), &Never).unwrap();
+        let fast = sweep(&drive, &load, Points::samples(samples).unwrap(), &Never).unwrap();
+        let plain = sweep_plain(&drive, &load, Points::samples(samples).unwrap(), &Never).unwrap();
         prop_assert_eq!(&fast.states.tooth, &plain.states.tooth);
         prop_assert_eq!(&fast.input_angles.loaded_teeth, &plain.input_angles.loaded_teeth);
         for ((fast, peak), (plain, _)) in columns(&fast).into_iter().zip(columns(&plain)) {

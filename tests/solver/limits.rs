@@ -2,8 +2,9 @@
 
 use toothwave_solver::drive::DriveError;
 use toothwave_solver::{
-    Compatibility, ContactLaw, Drive, DriveParameters, Finding, LoadCase, Never, Parameter, PerContact, SolveError,
-    Torque, Violation, findings,
+    Compatibility, ContactLaw, Drive, DriveParameters, Finding, LoadCase, Never, Parameter, PerContact, Position,
+    SolveError, Torque, Violation, findings,
+    mesh::{Mesh, Samples},
     sweep::{self, Points},
 };
 
@@ -52,7 +53,7 @@ fn neighbouring_teeth_may_not_touch() {
     let p = DriveParameters { tooth_radius_mm: 7.0, ..PAPER_5_1 };
     let fitting = drive(&p);
     let half = std::f64::consts::PI / 28.0;
-    let at = |psi: f64| fitting.flank().locus().at(toothwave_solver::Position::from_minor(psi)).unwrap();
+    let at = |psi: f64| fitting.flank().locus().at(Position::from_minor(psi)).unwrap();
     let straddling = 2.0 * at(half).center_radius_mm * half.sin();
     assert!((fitting.least_center_distance_mm().unwrap() - straddling).abs() < 1e-12 * straddling);
     assert!(straddling > 14.0);
@@ -231,7 +232,7 @@ fn four_teeth_have_a_geometry_but_no_sweep() {
         ..PAPER_5_1
     };
     let load = LoadCase::new(&load(1.0, Compatibility::Projection)).unwrap();
-    let refused = sweep::sweep(&drive(&p), &load, Points::Samples(10), &Never).unwrap_err();
+    let refused = sweep::sweep(&drive(&p), &load, Points::samples(10).unwrap(), &Never).unwrap_err();
     assert!(matches!(refused, SolveError::NoToothInMesh { .. }));
 }
 
@@ -240,8 +241,8 @@ fn stiffnesses_that_differ_much_make_projection_meaningless_and_virtual_work_doe
     let mut soft_ring = load(20.0, Compatibility::Projection);
     soft_ring.law = ContactLaw::Fixed(PerContact { wave_generator: 1e9, ring: 1e9, carrier: 1e3 });
     let p = DriveParameters { ring_teeth: 30, tooth_radius_mm: 4.0, ..PAPER_5_1 };
-    let refused =
-        sweep::sweep(&drive(&p), &LoadCase::new(&soft_ring).unwrap(), Points::Samples(10), &Never).unwrap_err();
+    let refused = sweep::sweep(&drive(&p), &LoadCase::new(&soft_ring).unwrap(), Points::samples(10).unwrap(), &Never)
+        .unwrap_err();
     assert!(
         matches!(refused, SolveError::ComplianceNotPositive { compliance_mm_per_n, .. } if compliance_mm_per_n <= 0.0)
     );
@@ -294,10 +295,37 @@ fn a_bore_inside_the_natural_tip_changes_nothing_but_is_a_finding() {
 }
 
 #[test]
+fn a_sweep_cannot_be_asked_for_no_points_for_too_many_or_for_a_tolerance_that_is_none() {
+    for count in [0, 10_000_001, u64::MAX] {
+        assert!(matches!(Points::samples(count), Err(Violation::OutOfRange { parameter: Parameter::Samples, .. })));
+    }
+    for tolerance in [f64::NAN, 0.0, -1e-3, f64::INFINITY] {
+        let refused = Points::tolerance(tolerance, 1000);
+        assert!(matches!(refused, Err(Violation::OutOfRange { parameter: Parameter::SweepTolerance, .. })));
+    }
+    assert!(Points::samples(1).is_ok() && Points::tolerance(1e-12, 1).is_ok());
+    assert_eq!(Points::finest(7), Points::tolerance(1e-12, 7).unwrap());
+}
+
+#[test]
+fn a_position_lies_in_the_quarter_turn_from_the_major_to_the_minor_axis() {
+    assert_eq!(Position::of_turn(1, 4), Some(Position::TIP));
+    assert_eq!(Position::of_turn(0, 4), Some(Position::ROOT));
+    for (numerator, denominator) in [(1, 2), (1, 0), (0, 0), (u64::MAX, u64::MAX), (26, 100)] {
+        assert_eq!(Position::of_turn(numerator, denominator), None);
+    }
+    let (mesh, samples) = (Mesh::new(&drive(&PAPER_5_1)), Samples::new(50).unwrap());
+    assert!(mesh.position(7, 0, samples).is_some());
+    assert_eq!(mesh.position(0, 1, samples), None, "beyond the major axis");
+    assert_eq!(mesh.position(8, 0, samples), None, "beyond the minor axis");
+    assert_eq!(mesh.position(u64::MAX, 0, samples), None);
+}
+
+#[test]
 fn a_sweep_stops_when_it_is_told_to() {
     let stop = std::sync::atomic::AtomicBool::new(true);
     let load = LoadCase::new(&load(20.0, Compatibility::Projection)).unwrap();
-    assert_eq!(sweep::sweep(&drive(&PAPER_5_1), &load, Points::Samples(50), &stop), Err(SolveError::Stopped));
+    assert_eq!(sweep::sweep(&drive(&PAPER_5_1), &load, Points::samples(50).unwrap(), &stop), Err(SolveError::Stopped));
 }
 
 #[test]

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Vector2};
 use proptest::prelude::*;
 use toothwave_solver::Compatibility::{self, Projection, VirtualWork};
 use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
-use toothwave_solver::mesh::Mesh;
+use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::{ContactLaw, Drive, DriveParameters, LoadCase, PerContact, Position};
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, any_swept_drive, drive, load};
@@ -131,17 +131,17 @@ fn forces_by_springs(
 
 /// The largest difference between the closed form and a dense solve over a few input angles, over the largest force.
 fn worst_difference(parameters: &DriveParameters, compatibility: Compatibility, stiffness: PerContact<f64>) -> f64 {
-    const SAMPLES: u64 = 7;
+    let samples = Samples::new(7).unwrap();
     let drive = drive(parameters);
     let mut load = load(20.0, compatibility);
     load.law = ContactLaw::Fixed(stiffness);
     let loaded = LoadedDrive::new(&drive, &LoadCase::new(&load).unwrap()).unwrap();
     let mesh = Mesh::new(&drive);
     let mut worst = 0.0_f64;
-    for sample in 0..=SAMPLES {
+    for sample in 0..=samples.count() {
         let teeth: Vec<_> = mesh
-            .teeth_at(sample, SAMPLES)
-            .map(|tooth| loaded.tooth(mesh.position(tooth, sample, SAMPLES)).unwrap())
+            .teeth_at(sample, samples)
+            .map(|tooth| loaded.tooth(mesh.position(tooth, sample, samples).unwrap()).unwrap())
             .filter(|tooth| tooth.center.tan_pressure_angle > 0.0)
             .collect();
         let wind_up = loaded.wind_up(&teeth).unwrap();

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use serde_json::Value;
-use toothwave_solver::mesh::Mesh;
+use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::sweep::{self, Points, States, Sweep};
 use toothwave_solver::{
     Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Never,
@@ -103,13 +103,13 @@ impl Case {
         .unwrap()
     }
 
-    fn samples(&self) -> u64 {
-        self.0["document"]["sweep"]["samples"].as_u64().unwrap()
+    fn samples(&self) -> Samples {
+        Samples::new(self.0["document"]["sweep"]["samples"].as_u64().unwrap()).unwrap()
     }
 
     pub(crate) fn points(&self) -> Points {
         match self.0["document"]["sweep"]["tolerance"].as_f64() {
-            Some(tolerance) => Points::Tolerance { tolerance, max_states: 10_000_000 },
+            Some(tolerance) => Points::tolerance(tolerance, 10_000_000).unwrap(),
             None => Points::Samples(self.samples()),
         }
     }
@@ -202,7 +202,7 @@ fn geometry_and_mesh_agree_with_60_digits() {
 }
 
 /// Where a recorded row stands among the states.
-fn index_of(mesh: &Mesh, samples: u64, rows: &Value, row: usize) -> usize {
+fn index_of(mesh: &Mesh, samples: Samples, rows: &Value, row: usize) -> usize {
     let (tooth, sample) = (rows["tooth"][row].as_u64().unwrap(), rows["input_index"][row].as_u64().unwrap());
     let before: usize = (0..sample).map(|sample| mesh.teeth_at(sample, samples).count()).sum();
     before + usize::try_from(tooth - mesh.teeth_at(sample, samples).start()).unwrap()

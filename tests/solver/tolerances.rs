@@ -1,0 +1,317 @@
+//! Sweeps to a tolerance: what they promise, where teeth enter, and what they cost.
+
+use proptest::prelude::*;
+use toothwave_solver::Compatibility::{Projection, VirtualWork};
+use toothwave_solver::mesh::Mesh;
+use toothwave_solver::ring::FlankEnd;
+use toothwave_solver::sweep::{Peak, Points, Sweep, sweep};
+use toothwave_solver::{
+    ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, PerContact, Position, SolveError,
+};
+
+use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, drive, load, swept};
+
+/// More than any of these sweeps takes.
+const MAX_STATES: u64 = 10_000_000;
+
+fn swept_to(parameters: &DriveParameters, load: &LoadParameters, tolerance: f64) -> Sweep {
+    let load = LoadCase::new(load).unwrap();
+    let points = Points::tolerance(tolerance, MAX_STATES).unwrap();
+    sweep(&drive(parameters), &load, points, &Never).unwrap_or_else(|error| panic!("{error} of {parameters:?}"))
+}
+
+fn six_peaks(sweep: &Sweep) -> Vec<Peak> {
+    sweep.peaks.iter().flat_map(|(_, peaks)| [peaks.force_n, peaks.stress_mpa]).collect()
+}
+
+// --- Where a tooth enters
+
+/// The bore that ends the flank of a drive at so many spacings from the major axis, but for rounding.
+fn bore_at(unbored: &Drive, spacings: u64) -> Option<f64> {
+    let flank = unbored.flank();
+    let position = Position::of_turn(spacings, unbored.parameters().installed.unsigned_abs())?;
+    let center = flank.locus().at(position).unwrap();
+    Some(flank.radius_mm(&center, &flank.at(&center)))
+}
+
+/// The values up to four units in the last place around one.
+fn around(value: f64) -> impl Iterator<Item = f64> {
+    (value.to_bits() - 4..=value.to_bits() + 4).map(f64::from_bits)
+}
+
+/// That both ways to sweep a drive agree about its teeth and its loads.
+fn assert_entry_is_decided_once(parameters: &DriveParameters) -> bool {
+    let Ok(possible) = Drive::new(parameters) else { return false };
+    let mesh = Mesh::new(&possible);
+    if !mesh.always_carries() {
+        return false;
+    }
+    let load = load(20.0, Projection);
+    let (by_samples, to_tolerance) = (swept(parameters, &load, 5), swept_to(parameters, &load, 1e-2));
+    let teeth = mesh.teeth_in_mesh();
+    for sweep in [&by_samples, &to_tolerance] {
+        assert!(sweep.torque_balance_residual < 1e-12, "{:e} of {parameters:?}", sweep.torque_balance_residual);
+        assert!(sweep.period_closure_residual < 1e-12, "{:e} of {parameters:?}", sweep.period_closure_residual);
+        let (states, angles) = (sweep.states.len() as u64, sweep.input_angles.input_angle_deg.len() as u64);
+        // One fewer where a tooth leaves, and carries nothing, at the very instant before another enters.
+        assert!((angles * teeth.min - 1..=angles * teeth.max).contains(&states), "{parameters:?}");
+    }
+    for (by_samples, to_tolerance) in six_peaks(&by_samples).iter().zip(six_peaks(&to_tolerance)) {
+        assert!(to_tolerance.value >= (1.0 - 1e-2) * by_samples.value, "{parameters:?}");
+    }
+    for (contact, peaks) in to_tolerance.peaks.iter() {
+        // A force between five samples may be larger, but not by orders of magnitude.
+        assert!(peaks.force_n.value <= 100.0 * by_samples.peaks.get(contact).force_n.value, "{parameters:?}");
+    }
+    true
+}
+
+#[test]
+fn a_bore_that_ends_the_flank_whole_spacings_from_the_major_axis_is_swept_alike_by_samples_and_to_a_tolerance() {
+    // Found in answers of 0.1: the wrong tooth stood at the end of the flank, and F_K was 3.6e18 N.
+    let known = DriveParameters {
+        semi_major_mm: 504.4784470731704,
+        semi_minor_mm: 498.60993196702196,
+        teeth: 24,
+        installed: 12,
+        tooth_radius_mm: 163.34276420022084,
+        tooth_width_mm: 10.0,
+        ring_teeth: 22,
+        tip_radius_mm: Some(826.2920076590049),
+    };
+    assert!(assert_entry_is_decided_once(&known));
+    let peak = swept_to(&known, &load(20.0, Projection), 1e-6).peaks.ring.force_n.value;
+    let by_samples = swept(&known, &load(20.0, Projection), 2000).peaks.ring.force_n.value;
+    assert!((peak / by_samples - 1.0).abs() < 1e-3, "{peak} {by_samples}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 192, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn bores_a_few_roundings_around_whole_spacings_are_swept_alike(parameters in any_drive(), share in 0.0_f64..1.0) {
+        let unbored = DriveParameters { tip_radius_mm: None, ..parameters };
+        let Ok(possible) = Drive::new(&unbored) else { return Ok(()) };
+        let most = Mesh::new(&possible).teeth_in_mesh().min;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number of teeth")]
+        let spacings = 2 + (share * most.saturating_sub(2) as f64) as u64;
+        let Some(bore_mm) = bore_at(&possible, spacings).filter(|_| spacings <= most) else { return Ok(()) };
+        for tip_radius_mm in around(bore_mm) {
+            assert_entry_is_decided_once(&DriveParameters { tip_radius_mm: Some(tip_radius_mm), ..unbored });
+        }
+    }
+}
+
+#[test]
+fn undercut_flanks_and_tips_a_few_roundings_around_whole_spacings_are_swept_alike() {
+    let mut tried = 0;
+    for teeth in [12_i64, 16, 20, 22, 28, 40] {
+        for flattening in [0.01, 0.02, 0.034, 0.05] {
+            let base = DriveParameters {
+                semi_minor_mm: 58.0 * (1.0 - flattening),
+                teeth,
+                installed: teeth,
+                ring_teeth: teeth - 2,
+                tooth_radius_mm: 1.0,
+                tip_radius_mm: Some(58.5),
+                ..PAPER_5_1
+            };
+            let of_radius = |tooth_radius_mm| DriveParameters { tooth_radius_mm, tip_radius_mm: None, ..base };
+            let Some(critical) = Drive::new(&base).ok().and_then(|drive| drive.flank().critical_tooth_radius_mm())
+            else {
+                continue;
+            };
+            for tooth_radius_mm in around(critical) {
+                tried += u32::from(assert_entry_is_decided_once(&of_radius(tooth_radius_mm)));
+            }
+            // Thicker teeth end the flank earlier: halve for the radius at which it ends whole spacings from the major axis.
+            let spacings =
+                |radius: f64| Drive::new(&of_radius(radius)).map(|drive| Mesh::new(&drive).engaged_spacings());
+            let (mut thin, mut thick) = (critical * 1.001, critical * 1.5);
+            let (Ok(most), Ok(least)) = (spacings(thin), spacings(thick)) else { continue };
+            let wanted = most.floor();
+            if wanted <= least {
+                continue;
+            }
+            for _ in 0..60 {
+                let middle = 0.5 * (thin + thick);
+                if spacings(middle).unwrap() > wanted { thin = middle } else { thick = middle }
+            }
+            for tooth_radius_mm in around(thick) {
+                tried += u32::from(assert_entry_is_decided_once(&of_radius(tooth_radius_mm)));
+            }
+        }
+    }
+    assert!(tried > 100, "{tried}");
+}
+
+// --- What a tolerance promises
+
+struct Extremes {
+    peaks: Vec<Peak>,
+    half_widths_mm: Vec<f64>,
+    /// Wind-up and stiffness.
+    most: [f64; 2],
+    least: [f64; 2],
+    transmission_error_deg: f64,
+    capacity_nm: f64,
+}
+
+impl Extremes {
+    fn of(parameters: &DriveParameters, sweep: &Sweep) -> Self {
+        let columns = [&sweep.input_angles.wind_up_deg, &sweep.input_angles.torsional_stiffness_nm_per_rad];
+        Self {
+            peaks: six_peaks(sweep),
+            half_widths_mm: sweep.peaks.iter().map(|(_, peaks)| peaks.half_width_mm).collect(),
+            most: columns.map(|column| column.iter().copied().fold(0.0, f64::max)),
+            least: columns.map(|column| column.iter().copied().fold(f64::INFINITY, f64::min)),
+            transmission_error_deg: sweep.transmission_error_peak_to_peak_deg(&drive(parameters)),
+            capacity_nm: sweep.torque_capacity.unwrap().input_torque_nm,
+        }
+    }
+}
+
+/// Designs whose extremes stand at summits, at entries, at corners and at jumps of the stiffness.
+fn designs() -> Vec<(DriveParameters, LoadParameters)> {
+    let mut designs = Vec::new();
+    let elliptic = DriveParameters {
+        semi_major_mm: 58.0,
+        semi_minor_mm: 40.0,
+        teeth: 12,
+        installed: 12,
+        ring_teeth: 14,
+        tooth_radius_mm: 10.0,
+        ..PAPER_5_1
+    };
+    for parameters in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, elliptic] {
+        for (law, compatibility) in
+            [(ContactLaw::Linear, VirtualWork), (ContactLaw::Palmgren, VirtualWork), (ContactLaw::Linear, Projection)]
+        {
+            for (ring, carrier) in [(0.0, 0.0), (10.0, 0.0), (3.0, 25.0)] {
+                if carrier > 0.0 && (compatibility == Projection || parameters.semi_minor_mm == 40.0) {
+                    continue;
+                }
+                for torque_nm in [1.0, 40.0] {
+                    let mut load = load(torque_nm, compatibility);
+                    load.law = law;
+                    load.clearance_um = PerContact { wave_generator: 0.0, ring, carrier };
+                    load.allowable_stress_mpa = Some(1500.0);
+                    designs.push((parameters, load));
+                }
+            }
+        }
+    }
+    designs
+}
+
+#[test]
+fn a_tolerance_holds_for_peaks_wind_up_stiffness_and_capacity_and_its_root_for_half_widths() {
+    let mut worst = [0.0_f64; 5];
+    for (parameters, load) in designs() {
+        let dense = Extremes::of(&parameters, &swept(&parameters, &load, 20_000));
+        for tolerance in [1e-1, 1e-2, 1e-4, 1e-6, 1e-9] {
+            let found = Extremes::of(&parameters, &swept_to(&parameters, &load, tolerance));
+            let context = format!("{tolerance:e}, {:?} {:?} of {parameters:?}", load.law, load.clearance_um);
+            let mut see = |kind: usize, missing: f64, allowed: f64| {
+                assert!(missing <= allowed, "{kind}: {missing:e} of {allowed:e} at {context}");
+                worst[kind] = worst[kind].max(missing / allowed);
+            };
+            // Whatever a sweep finds is a value that is taken on: it can miss an extreme, but not exceed it.
+            for (found, dense) in found.peaks.iter().zip(&dense.peaks) {
+                see(0, 1.0 - found.value / dense.value, tolerance);
+            }
+            for quantity in 0..2 {
+                see(1, 1.0 - found.most[quantity] / dense.most[quantity], tolerance);
+                see(1, found.least[quantity] / dense.least[quantity] - 1.0, tolerance);
+            }
+            let error_missed = dense.transmission_error_deg - found.transmission_error_deg;
+            see(2, error_missed * drive(&parameters).teeth_per_wave(), tolerance * dense.most[0]);
+            see(3, found.capacity_nm / dense.capacity_nm - 1.0, tolerance);
+            for (found, dense) in found.half_widths_mm.iter().zip(&dense.half_widths_mm) {
+                // The dense sweep itself knows the place to a 20 000th of the period.
+                see(4, (found / dense - 1.0).abs(), tolerance.sqrt() + 1e-3);
+            }
+        }
+    }
+    println!("peaks, wind-up and stiffness, transmission error, capacity, half-widths: {worst:.3?} of what is allowed");
+}
+
+#[test]
+fn the_capacity_is_that_of_the_angle_where_it_is_least_and_not_of_those_where_loads_peak() {
+    let mut load = load(1.0, VirtualWork);
+    load.clearance_um.ring = 10.0;
+    load.allowable_stress_mpa = Some(1500.0);
+    let found = swept_to(&PAPER_5_1, &load, 1e-4).torque_capacity.unwrap().input_torque_nm;
+    let dense = swept(&PAPER_5_1, &load, 100_000).torque_capacity.unwrap().input_torque_nm;
+    assert!((found / dense - 1.0).abs() < 1e-4, "{found} {dense}");
+    assert!((found - 37.018).abs() < 0.01, "{found}");
+}
+
+#[test]
+fn without_gaps_the_capacity_is_the_torque_by_the_rule_of_three_for_every_single_exponent() {
+    for law in [ContactLaw::Linear, ContactLaw::Palmgren] {
+        for parameters in [PAPER_5_1, PAPER_5_2] {
+            let mut load = load(7.0, VirtualWork);
+            (load.law, load.allowable_stress_mpa) = (law, Some(1500.0));
+            let sweep = swept(&parameters, &load, 400);
+            let stress = sweep.peaks.iter().map(|(_, peaks)| peaks.stress_mpa.value).fold(0.0, f64::max);
+            let expected = 7.0 * (1500.0 / stress).powi(2);
+            let found = sweep.torque_capacity.unwrap().input_torque_nm;
+            assert!((found / expected - 1.0).abs() < 1e-12, "{found} is not {expected}");
+        }
+    }
+}
+
+// --- What it costs
+
+/// A drive of so many teeth, its radius this many times the critical one.
+fn of_many_teeth(teeth: i64, of_critical: f64) -> DriveParameters {
+    let sin = (std::f64::consts::PI / teeth as f64).sin();
+    let (a, ring) = (58.0, (teeth - 2) as f64 / 2.0);
+    let tooth_radius_mm = 0.8 * a * sin / (1.0 - sin);
+    // k² (a² - b²) r_c = a²b, but for small terms.
+    let stroke_mm = a * a / (2.0 * ring * ring * (tooth_radius_mm / of_critical));
+    DriveParameters {
+        semi_major_mm: a,
+        semi_minor_mm: a - stroke_mm,
+        teeth,
+        installed: teeth,
+        ring_teeth: teeth - 2,
+        tooth_radius_mm,
+        ..PAPER_5_1
+    }
+}
+
+/// The fewest states with which a sweep is content.
+fn states_worked_out(parameters: &DriveParameters, tolerance: f64) -> u64 {
+    let (drive, load) = (drive(parameters), LoadCase::new(&load(20.0, Projection)).unwrap());
+    let is_enough = |max_states| match sweep(&drive, &load, Points::tolerance(tolerance, max_states).unwrap(), &Never) {
+        Ok(_) => true,
+        Err(SolveError::TooManyStates { .. }) => false,
+        Err(error) => panic!("{error}"),
+    };
+    let (mut few, mut enough) = (1, MAX_STATES);
+    while enough - few > few / 50 + 1 {
+        let middle = few.midpoint(enough);
+        if is_enough(middle) { enough = middle } else { few = middle }
+    }
+    enough
+}
+
+#[test]
+fn a_sweep_to_a_tolerance_works_out_a_number_of_states_that_grows_with_the_teeth_and_not_with_their_square() {
+    for teeth in [28, 200, 1000, 1800, 10_000] {
+        for of_critical in [0.7, 1.5] {
+            let parameters = of_many_teeth(teeth, of_critical);
+            let end = drive(&parameters).flank_limit().end;
+            assert_eq!(end == FlankEnd::Undercut, of_critical > 1.0);
+            let in_mesh = Mesh::new(&drive(&parameters)).teeth_in_mesh().max;
+            let states = states_worked_out(&parameters, 1e-4);
+            println!(
+                "{teeth} teeth, {end:?}: {states} states worked out, {} times the teeth in mesh",
+                states / in_mesh
+            );
+            assert!(states < 400 * in_mesh, "{states} for {in_mesh} teeth in mesh");
+        }
+    }
+}
