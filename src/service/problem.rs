@@ -345,6 +345,8 @@ impl From<SolveError> for Problem {
                 ProblemCode::ComplianceNotPositive,
                 format!("{detail}. Choose `virtual_work`, or stiffnesses that differ less"),
             ),
+            SolveError::Impossible(violations) => Self::impossible(&violations),
+            SolveError::NoLeverArm => Self::new(ProblemCode::NoToothInMesh, detail),
             SolveError::TooManyPoints { points, limit } => {
                 let detail = format!("{detail} by `max_profile_points`; widen the chord tolerance");
                 let pointer = "/profile/chord_tolerance_mm";

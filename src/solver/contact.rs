@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use crate::approach::Approach as ToothApproach;
 use crate::violation::Parameter;
 
 /// A part with a material of its own.
@@ -172,9 +173,13 @@ impl Approach {
         if self.exponent < 1.0 { force.powf(self.exponent) } else { force }
     }
 
-    /// The inverse of [`Self::power`].
-    pub fn root(&self, power: f64) -> f64 {
-        if self.exponent < 1.0 { power.powf(1.0 / self.exponent) } else { power }
+    /// The approach of a tooth whose contacts, each with its weight and force, sum to `coefficient`.
+    pub(crate) fn of_tooth(&self, coefficient: f64) -> ToothApproach {
+        if self.exponent < 1.0 {
+            ToothApproach::Power { exponent: self.exponent, coefficient, compliance_mm_per_n: 0.0 }
+        } else {
+            ToothApproach::Linear { compliance_mm_per_n: coefficient }
+        }
     }
 }
 

@@ -30,6 +30,7 @@
 //! its geometry and its mesh; with a [`LoadCase`] it answers a [`sweep()`](sweep::sweep) over one period.
 
 mod adaptive;
+pub mod approach;
 mod batch;
 pub mod cam;
 pub mod contact;
@@ -44,6 +45,7 @@ pub mod position;
 pub mod profile;
 pub mod ring;
 pub mod root;
+pub mod springs;
 pub mod sweep;
 pub mod violation;
 
@@ -81,6 +83,12 @@ pub enum SolveError {
         /// The least compliance.
         compliance_mm_per_n: f64,
     },
+    /// A load that this drive cannot have.
+    #[error("the load is impossible for this drive")]
+    Impossible(Vec<Violation>),
+    /// None of the teeth at an input angle has a lever arm.
+    #[error("none of the teeth in mesh has a lever arm, so no finite force carries the torque")]
+    NoLeverArm,
     /// More points than asked for at most.
     #[error("the profiles need {points} points at this chord tolerance, more than the {limit} allowed")]
     TooManyPoints {

@@ -10,6 +10,7 @@ mod paper;
 mod profiles;
 mod properties;
 mod reference;
+mod springs;
 
 /// Counts, thread by thread, for the tests that ask what a sweep takes.
 #[global_allocator]
