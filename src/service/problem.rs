@@ -346,6 +346,9 @@ impl From<SolveError> for Problem {
                 format!("{detail}. Choose `virtual_work`, or stiffnesses that differ less"),
             ),
             SolveError::Impossible(violations) => Self::impossible(&violations),
+            SolveError::JohnsonBeyondHalfWidth { .. } | SolveError::FlatOffCarrier { .. } => {
+                Self::new(ProblemCode::ImpossibleDesign, detail)
+            }
             SolveError::NoLeverArm => Self::new(ProblemCode::NoToothInMesh, detail),
             SolveError::TooManyPoints { points, limit } => {
                 let detail = format!("{detail} by `max_profile_points`; widen the chord tolerance");
@@ -385,6 +388,17 @@ pub fn too_many(
     Problem::at_fields(code, detail, vec![error])
 }
 
+/// A violation that is about a choice, which has no number.
+fn conflict(violation: &Violation, parameter: Parameter) -> FieldError {
+    FieldError {
+        pointer: pointer(parameter),
+        code: FieldCode::ConflictingFields,
+        detail: violation.to_string(),
+        value: None,
+        limit: None,
+    }
+}
+
 /// A violation as the field that it is about.
 fn field_error(violation: &Violation) -> FieldError {
     use Parameter::{InstalledTeeth, RingTeeth, SemiMajor, TipRadius, ToothCount, ToothRadius};
@@ -414,6 +428,8 @@ fn field_error(violation: &Violation) -> FieldError {
         Violation::ClearanceNotMonotone { contact, clearance_um } => {
             (FieldCode::ClearanceNotMonotone, Parameter::Clearance(contact), clearance_um, 0.0)
         }
+        Violation::NeedsVirtualWork { parameter } => return conflict(violation, parameter),
+        Violation::LawOfOtherTeeth => return conflict(violation, Parameter::Law),
         Violation::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => {
             (FieldCode::BoreLeavesNoFlank, TipRadius, tip_radius_mm, root_radius_mm)
         }
@@ -456,6 +472,11 @@ pub fn pointer(parameter: Parameter) -> String {
         Parameter::InputTorque => "/load/input_torque_nm".into(),
         Parameter::OutputTorque => "/load/output_torque_nm".into(),
         Parameter::Stiffness(contact) => format!("/model/stiffness/{}_n_per_mm", contact_name(contact)),
+        Parameter::Law => "/model/stiffness/law".into(),
+        Parameter::Depth(contact) => format!("/model/stiffness/depth_mm/{}", contact_name(contact)),
+        Parameter::SeriesCompliance(contact) => {
+            format!("/model/series_compliance_mm_per_n/{}", contact_name(contact))
+        }
         Parameter::Clearance(contact) => format!("/model/clearance/{}_um", contact_name(contact)),
         Parameter::AllowableStress => "/load/allowable_stress_mpa".into(),
         Parameter::Samples => "/sweep/samples".into(),

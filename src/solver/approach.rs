@@ -54,7 +54,7 @@ impl Logarithmic {
     pub const LIMIT: f64 = 0.25;
 
     /// `A`, `B` and `F_r`, for which `A + B (ln 4 - 1) > 0`: the slope stays positive up to the limit.
-    pub(crate) fn new(compliance_mm_per_n: f64, growth_mm_per_n: f64, reference_n: f64) -> Self {
+    pub fn new(compliance_mm_per_n: f64, growth_mm_per_n: f64, reference_n: f64) -> Self {
         let limit_n = Self::LIMIT * reference_n;
         let limit_mm = limit_n * (compliance_mm_per_n + growth_mm_per_n * -Self::LIMIT.ln());
         Self { compliance_mm_per_n, growth_mm_per_n, reference_n, limit_n, limit_mm }
@@ -151,11 +151,11 @@ impl Approach {
         }
     }
 
-    /// The force at which the law ends; without end for most.
-    pub const fn limit_n(&self) -> f64 {
+    /// The approach at which the law ends; without end for most.
+    pub const fn limit_mm(&self) -> f64 {
         match self {
             Self::Linear { .. } | Self::Power { .. } => f64::INFINITY,
-            Self::Logarithmic(law) => law.limit_n,
+            Self::Logarithmic(law) => law.limit_mm,
         }
     }
 

@@ -4,6 +4,7 @@
 mod drives;
 mod extremes;
 mod fast;
+mod laws;
 mod limits;
 mod oracles;
 mod paper;
