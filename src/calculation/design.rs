@@ -675,6 +675,7 @@ impl Design {
             torque,
             compatibility,
             law,
+            series_compliance_mm_per_n: PerContact::default(),
             clearance_um: self.model.clearance.as_ref().map_or_else(PerContact::default, |clearance| PerContact {
                 wave_generator: clearance.wave_generator_um,
                 ring: clearance.ring_um,

@@ -84,6 +84,17 @@ pub enum FieldCode {
     TooManyPoints,
 }
 
+/// A violation that is about a choice, which has no number.
+fn conflict(violation: &Violation, parameter: Parameter) -> FieldError {
+    FieldError {
+        pointer: pointer(parameter),
+        code: FieldCode::ConflictingFields,
+        detail: violation.to_string(),
+        value: None,
+        limit: None,
+    }
+}
+
 /// A violation as the field that it is about.
 impl From<&Violation> for FieldError {
     fn from(violation: &Violation) -> Self {
@@ -114,6 +125,8 @@ impl From<&Violation> for FieldError {
             Violation::ClearanceNotMonotone { contact, clearance_um } => {
                 (FieldCode::ClearanceNotMonotone, Parameter::Clearance(contact), clearance_um, 0.0)
             }
+            Violation::NeedsVirtualWork { parameter } => return conflict(violation, parameter),
+            Violation::LawOfOtherTeeth => return conflict(violation, Parameter::Law),
             Violation::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => {
                 (FieldCode::BoreLeavesNoFlank, TipRadius, tip_radius_mm, root_radius_mm)
             }
@@ -157,6 +170,11 @@ pub fn pointer(parameter: Parameter) -> String {
         Parameter::InputTorque => "/load/input_torque_nm".into(),
         Parameter::OutputTorque => "/load/output_torque_nm".into(),
         Parameter::Stiffness(contact) => format!("/model/stiffness/{}_n_per_mm", contact_name(contact)),
+        Parameter::Law => "/model/stiffness/law".into(),
+        Parameter::Depth(contact) => format!("/model/stiffness/depth_mm/{}", contact_name(contact)),
+        Parameter::SeriesCompliance(contact) => {
+            format!("/model/series_compliance_mm_per_n/{}", contact_name(contact))
+        }
         Parameter::Clearance(contact) => format!("/model/clearance/{}_um", contact_name(contact)),
         Parameter::AllowableStress => "/load/allowable_stress_mpa".into(),
         Parameter::Samples => "/sweep/samples".into(),

@@ -246,13 +246,14 @@ impl<S: Stop> Search<'_, S> {
             moment.teeth(&self.mesh).map(|placed| self.loaded.tooth(placed.position)).collect();
         let teeth = teeth?;
         let wind_up = self.loaded.wind_up(&teeth)?;
-        let loads = teeth.iter().map(|tooth| self.loaded.loads(tooth, &wind_up)).collect();
+        let loads: Result<Vec<_>, _> = teeth.iter().map(|tooth| self.loaded.loads(tooth, &wind_up)).collect();
         let (rotation_rad, stiffness) = (wind_up.rotation_rad(), wind_up.stiffness_nmm_per_rad);
-        let per_capacity = self
-            .allowable_stress_mpa
-            .map_or(0.0, |allowable_mpa| 1.0 / self.loaded.torque_limit(&teeth, allowable_mpa).input_torque_nmm);
+        let per_capacity = match self.allowable_stress_mpa {
+            Some(allowable_mpa) => 1.0 / self.loaded.torque_limit(&teeth, allowable_mpa)?.input_torque_nmm,
+            None => 0.0,
+        };
         let totals = [rotation_rad, 1.0 / rotation_rad, stiffness, 1.0 / stiffness, per_capacity];
-        let seen = Seen { moment, loads, totals };
+        let seen = Seen { moment, loads: loads?, totals };
         raise(&mut self.peaks, &peaks_of(&seen));
         Ok(seen)
     }

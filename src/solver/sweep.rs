@@ -4,9 +4,11 @@ use crate::adaptive;
 use crate::batch::{self, BatchSweep};
 use crate::contact::{Contact, PerContact, half_width_mm};
 use crate::drive::{Drive, WAVES};
-use crate::load_sharing::{LoadCase, LoadedDrive, ToothState, WindUp};
+use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
 use crate::mesh::{Mesh, Samples, TeethInMesh};
 use crate::position::Position;
+use crate::root::NotConverged;
+use crate::springs::WindUp;
 use crate::violation::{Parameter, Violation};
 use crate::{SolveError, Stop};
 
@@ -402,10 +404,10 @@ impl<'a> Columns<'a> {
             self.states.position_deg.push(position_deg);
         }
         let wind_up = self.loaded.wind_up(&self.teeth)?;
-        let loaded_teeth = self.share_load(&wind_up);
+        let loaded_teeth = self.share_load(&wind_up)?;
         self.input_angles.push(self.loaded.drive(), input_angle_deg, &wind_up, loaded_teeth);
         if let Some(allowable_stress_mpa) = self.allowable_stress_mpa {
-            let limit = self.loaded.torque_limit(&self.teeth, allowable_stress_mpa);
+            let limit = self.loaded.torque_limit(&self.teeth, allowable_stress_mpa)?;
             let input_torque_nm = 1e-3 * limit.input_torque_nmm;
             if self.torque_capacity.is_none_or(|capacity| input_torque_nm < capacity.input_torque_nm) {
                 let output_torque_nm = input_torque_nm * self.loaded.drive().teeth_per_wave();
@@ -418,7 +420,7 @@ impl<'a> Columns<'a> {
     }
 
     /// Appends geometry, forces and stresses of the teeth, and returns how many carry load.
-    fn share_load(&mut self, wind_up: &WindUp) -> usize {
+    fn share_load(&mut self, wind_up: &WindUp) -> Result<usize, NotConverged> {
         let flank = self.loaded.drive().flank();
         let states = &mut self.states;
         let mut loaded_teeth = 0;
@@ -430,7 +432,7 @@ impl<'a> Columns<'a> {
             states.wave_generator_angle_deg.push(cam_angle_rad.to_degrees());
             states.ring_angle_deg.push(flank.angle_from_tip_rad(center, point).to_degrees());
 
-            let force_n = self.loaded.forces_n(tooth, wind_up);
+            let force_n = self.loaded.forces_n(tooth, wind_up)?;
             loaded_teeth += usize::from(force_n.wave_generator > 0.0);
             let stress_mpa = self.loaded.stress_mpa(tooth, &force_n);
             states.force_n.push(force_n);
@@ -443,7 +445,7 @@ impl<'a> Columns<'a> {
         }
         let residual = self.balance.residual(&torque_nmm);
         self.torque_balance_residual = worse(residual, self.torque_balance_residual);
-        loaded_teeth
+        Ok(loaded_teeth)
     }
 
     fn finish(self, points: Points) -> Result<Sweep, SolveError> {
@@ -512,7 +514,7 @@ fn period_closure(
         if u64::from(states.tooth[state]) != number {
             return Ok(f64::INFINITY);
         }
-        let loads = loaded.loads(tooth, &wind_up);
+        let loads = loaded.loads(tooth, &wind_up)?;
         for ((contact, peaks), (force_n, stress_mpa)) in peaks.iter().zip(loads[..3].iter().zip(&loads[3..])) {
             let off_force = (states.force_n.get(contact)[state] - force_n).abs() / peaks.force_n.value;
             let off_stress = (states.stress_mpa.get(contact)[state] - stress_mpa).abs() / peaks.stress_mpa.value;

@@ -31,6 +31,12 @@ pub enum Parameter {
     OutputTorque,
     /// Fixed stiffness, N/mm.
     Stiffness(Contact),
+    /// The contact law.
+    Law,
+    /// Depth of the body at a contact, mm.
+    Depth(Contact),
+    /// Compliance of what stands behind a contact, mm/N.
+    SeriesCompliance(Contact),
     /// Gap along a contact's normal, µm.
     Clearance(Contact),
     /// Allowable contact stress, MPa.
@@ -102,12 +108,17 @@ impl Parameter {
             | Self::CarrierInnerRadius
             | Self::CarrierOuterRadius
             | Self::BoreRadius
+            | Self::Depth(_)
             | Self::ChordTolerance => Range::closed(1e-6, 1e6, "mm"),
             Self::ToothCount | Self::InstalledTeeth | Self::RingTeeth => Range::closed(2.0, MAX_TEETH as f64, ""),
             Self::YoungsModulus(_) => Range::closed(1e-3, 1e5, "GPa"),
             Self::PoissonsRatio(_) => Range { low: -1.0, high: 0.5, closed: false, unit: "" },
             Self::InputTorque | Self::OutputTorque => Range::closed(1e-12, 1e15, "N·m"),
             Self::Stiffness(_) => Range::closed(1e-3, 1e15, "N/mm"),
+            // As soft as the least stiffness, and nothing.
+            Self::SeriesCompliance(_) => Range::closed(0.0, 1e3, "mm/N"),
+            // A choice, which has no number.
+            Self::Law => Range::closed(f64::NEG_INFINITY, f64::INFINITY, ""),
             Self::Clearance(_) | Self::PartClearance(_) => Range::closed(0.0, 1e6, "µm"),
             // At its ends the rounding of the angle is 2e-9 deg.
             Self::InputAngle => Range::closed(-1e7, 1e7, "deg"),
@@ -244,6 +255,13 @@ pub enum Violation {
         /// The clearance.
         clearance_um: f64,
     },
+    /// What `projection` does not take.
+    NeedsVirtualWork {
+        /// Which.
+        parameter: Parameter,
+    },
+    /// A contact law that teeth of this shape do not have.
+    LawOfOtherTeeth,
     /// The bore takes the whole flank away.
     BoreLeavesNoFlank {
         /// The bore.
@@ -344,6 +362,13 @@ impl std::fmt::Display for Violation {
             Self::ClearanceNotMonotone { clearance_um, .. } => write!(
                 f,
                 "`projection` weighs this gap of {clearance_um:?} µm negatively at some position, so that it would load a tooth instead of freeing it: choose `virtual_work` or no gap here"
+            ),
+            Self::NeedsVirtualWork { .. } => {
+                write!(f, "`projection` does not take this: choose `virtual_work`, or leave it out")
+            }
+            Self::LawOfOtherTeeth => write!(
+                f,
+                "balls take `hertz` or `fixed`, and `hertz` is nowhere else: choose a law that teeth of this shape have"
             ),
             Self::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => write!(
                 f,

@@ -83,7 +83,8 @@ pub(crate) fn finding_codes() -> Vec<FindingCode> {
         ToothBeyondCarrier => SteepRingFlank,
         SteepRingFlank => LinearLawTooStiff,
         LinearLawTooStiff => PalmgrenBeyondSteel,
-        PalmgrenBeyondSteel => StressAboveFatigueLimit;
+        PalmgrenBeyondSteel => JohnsonBeyondHalfWidth,
+        JohnsonBeyondHalfWidth => StressAboveFatigueLimit;
         StressAboveFatigueLimit)
 }
 

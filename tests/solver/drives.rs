@@ -51,6 +51,7 @@ pub(crate) fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParamete
         torque: Torque::Input(torque_nm),
         compatibility,
         law: ContactLaw::Linear,
+        series_compliance_mm_per_n: PerContact::default(),
         clearance_um: PerContact::default(),
         allowable_stress_mpa: None,
     }

@@ -4,12 +4,14 @@
 mod drives;
 mod extremes;
 mod fast;
+mod laws;
 mod limits;
 mod oracles;
 mod paper;
 mod profiles;
 mod properties;
 mod reference;
+mod springs;
 mod tolerances;
 
 /// Counts, thread by thread, for the tests that ask what a sweep takes.
