@@ -149,6 +149,19 @@ fn of(list: &[f64], index: u64) -> f64 {
 }
 
 impl Modification {
+    /// As conjugate parts are.
+    pub const NONE: Self = Self {
+        ring_equidistant_um: 0.0,
+        ring_path_shift_um: 0.0,
+        ring_profile_shift_um: 0.0,
+        ring_rotation_arcsec: 0.0,
+        wave_generator_equidistant_um: 0.0,
+        slot_wall_um: 0.0,
+        carrier_rotation_arcsec: 0.0,
+        tooth_radius_um: 0.0,
+        ring_tip_relief: None,
+    };
+
     /// Its numbers.
     pub(crate) fn parameters(&self) -> Vec<(Modified, f64)> {
         let mut parameters = vec![
