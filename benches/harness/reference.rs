@@ -4,7 +4,7 @@ use std::error::Error;
 
 use serde_json::Value;
 use toothwave_solver::{
-    Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, PerContact, Torque,
+    Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, Modification, PerContact, Torque,
 };
 
 use crate::baselines::{COLUMNS, Columns};
@@ -46,6 +46,7 @@ impl Setup {
             law: ContactLaw::Linear,
             series_compliance_mm_per_n: PerContact { wave_generator: 0.0, ring: 0.0, carrier: 0.0 },
             clearance_um: PerContact { wave_generator: 0.0, ring: 0.0, carrier: 0.0 },
+            modification: Modification::NONE,
             allowable_stress_mpa: None,
         },
         input_torque_nm: 20.0,
@@ -108,6 +109,7 @@ impl Reference {
                 law: ContactLaw::Linear,
                 series_compliance_mm_per_n: PerContact::default(),
                 clearance_um: PerContact::default(),
+                modification: Modification::NONE,
                 allowable_stress_mpa: None,
             },
             input_torque_nm,

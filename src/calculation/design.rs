@@ -12,8 +12,8 @@ use toothwave_solver::profile::{Extent, ProfileParameters};
 use toothwave_solver::sweep::Points;
 use toothwave_solver::violation::Range;
 use toothwave_solver::{
-    Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, Parameter, PerContact, Torque,
-    Violation,
+    Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, Modification, Parameter,
+    PerContact, Torque, Violation,
 };
 use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, OneOfBuilder, Schema, Type};
@@ -681,6 +681,7 @@ impl Design {
                 ring: clearance.ring_um,
                 carrier: clearance.carrier_um,
             }),
+            modification: Modification::default(),
             allowable_stress_mpa: load.allowable_stress_mpa,
         })
     }

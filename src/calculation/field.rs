@@ -1,7 +1,7 @@
 //! Fields of the design document: where each stands, and what can be wrong with it.
 
 use serde::Serialize;
-use toothwave_solver::violation::{Misfit, Violation};
+use toothwave_solver::violation::{Misfit, Modified, Violation};
 use toothwave_solver::{Contact, Parameter, Part};
 use utoipa::ToSchema;
 
@@ -126,6 +126,16 @@ impl From<&Violation> for FieldError {
                 (FieldCode::ClearanceNotMonotone, Parameter::Clearance(contact), clearance_um, 0.0)
             }
             Violation::NeedsVirtualWork { parameter } => return conflict(violation, parameter),
+            Violation::TipReliefBeyondFlank { start_deg, engagement_start_deg } => (
+                FieldCode::OutOfRange,
+                Parameter::Modification(Modified::TipReliefStart),
+                start_deg,
+                engagement_start_deg,
+            ),
+            Violation::DeviationCount { count, items } => {
+                (FieldCode::OutOfRange, Parameter::Deviations, count as f64, items as f64)
+            }
+            Violation::DeviationNotFinite => return conflict(violation, Parameter::Deviations),
             Violation::LawOfOtherTeeth => return conflict(violation, Parameter::Law),
             Violation::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => {
                 (FieldCode::BoreLeavesNoFlank, TipRadius, tip_radius_mm, root_radius_mm)
@@ -176,6 +186,8 @@ pub fn pointer(parameter: Parameter) -> String {
             format!("/model/series_compliance_mm_per_n/{}", contact_name(contact))
         }
         Parameter::Clearance(contact) => format!("/model/clearance/{}_um", contact_name(contact)),
+        Parameter::Modification(modified) => format!("/modification/{}", modified_name(modified)),
+        Parameter::Deviations => "/deviations".into(),
         Parameter::AllowableStress => "/load/allowable_stress_mpa".into(),
         Parameter::Samples => "/sweep/samples".into(),
         Parameter::RequestedError => "/accuracy/requested_error".into(),
@@ -187,6 +199,23 @@ pub fn pointer(parameter: Parameter) -> String {
         Parameter::BoreRadius => "/parts/wave_generator/bore_radius_mm".into(),
         Parameter::PartClearance(part) => format!("/parts/{}/clearance_um", part_name(part)),
         Parameter::InputAngle => "/assembly/input_angle_deg".into(),
+    }
+}
+
+/// A number of the modification as documents spell it.
+const fn modified_name(modified: Modified) -> &'static str {
+    match modified {
+        Modified::RingEquidistant => "ring_equidistant_um",
+        Modified::RingPathShift => "ring_path_shift_um",
+        Modified::RingProfileShift => "ring_profile_shift_um",
+        Modified::RingRotation => "ring_rotation_arcsec",
+        Modified::WaveGeneratorEquidistant => "wave_generator_equidistant_um",
+        Modified::SlotWall => "slot_wall_um",
+        Modified::CarrierRotation => "carrier_rotation_arcsec",
+        Modified::ToothRadius => "tooth_radius_um",
+        Modified::TipReliefAmount => "ring_tip_relief/amount_um",
+        Modified::TipReliefStart => "ring_tip_relief/start_deg",
+        Modified::TipReliefPower => "ring_tip_relief/power",
     }
 }
 

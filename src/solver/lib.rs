@@ -37,6 +37,7 @@ pub mod contact;
 pub mod drawing;
 pub mod drive;
 pub mod findings;
+pub mod gaps;
 pub mod load_sharing;
 pub mod locus;
 pub mod mesh;
@@ -53,6 +54,7 @@ pub mod violation;
 pub use contact::{Contact, ContactLaw, Material, Materials, Part, PerContact};
 pub use drive::{Drive, DriveParameters};
 pub use findings::Finding;
+pub use gaps::Modification;
 pub use load_sharing::{Compatibility, LoadCase, LoadParameters, Torque};
 pub use position::Position;
 pub use violation::{Parameter, Violation};
@@ -102,6 +104,18 @@ pub enum SolveError {
         half_width_limit_mm: f64,
         /// The input torque at which it does so, at the input angle looked at.
         input_torque_limit_nm: f64,
+    },
+    /// A part that is too full: before any load a tooth would be pressed already.
+    #[error(
+        "interference: the tooth in slot {slot}, {position_deg} deg from the major axis, has a total gap of {gap_um} µm along the wave generator's force; make the clearance larger than the deviations"
+    )]
+    Interference {
+        /// The tooth's slot.
+        slot: u64,
+        /// Where it stands.
+        position_deg: f64,
+        /// Its total gap along `F_H`, below zero.
+        gap_um: f64,
     },
     /// A flat-sided tooth that is nowhere borne by the carrier.
     #[error(

@@ -1,8 +1,8 @@
 //! Equilibrium of a tooth and compatibility of all of them at one input angle (docs/theory.md section 4).
 
-use crate::SolveError;
 use crate::contact::{Contact, ContactLaw, HertzLine, Materials, PerContact, half_width_mm};
 use crate::drive::{Draft, Drive, DriveParameters, WAVES};
+use crate::gaps::{Deviations, Gaps, Modification, Place};
 use crate::locus::ToothCenter;
 use crate::mesh::Mesh;
 use crate::position::Position;
@@ -10,8 +10,9 @@ use crate::ring::{FlankPoint, RingFlank, RingTooth};
 use crate::root::NotConverged;
 use crate::springs::{Rotation, Spring, Springs, WindUp};
 use crate::tooth::line::{WIDEST_SHARE, least_length_mm};
-use crate::tooth::{Contacts, Place, Pressure, ToothContact, ToothSize};
+use crate::tooth::{Contacts, Pressure, ToothContact, ToothSize};
 use crate::violation::{Parameter, Violation};
+use crate::{SolveError, tooth};
 
 /// How the three approaches of a tooth add up to the rotation of the wave generator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,6 +47,8 @@ pub struct LoadParameters {
     pub series_compliance_mm_per_n: PerContact<f64>,
     /// Gap along the normal of each contact, in µm.
     pub clearance_um: PerContact<f64>,
+    /// Parts made otherwise than conjugate, with `VirtualWork` alone.
+    pub modification: Modification,
     /// The contact stress that the torque capacity is asked for.
     pub allowable_stress_mpa: Option<f64>,
 }
@@ -66,7 +69,8 @@ impl LoadParameters {
     fn what_needs_virtual_work(&self) -> impl Iterator<Item = Parameter> {
         let law = (!self.law.is_of_projection()).then_some(Parameter::Law);
         let series = self.series_compliance_mm_per_n.iter().filter(|&(_, &compliance)| compliance > 0.0);
-        law.into_iter().chain(series.map(|(contact, _)| Parameter::SeriesCompliance(contact)))
+        let series = series.map(|(contact, _)| Parameter::SeriesCompliance(contact));
+        law.into_iter().chain(series).chain(self.modification.first())
     }
 
     fn clearance_violations_in(&self, sense: f64, ring: &RingTooth) -> Result<Vec<Violation>, NotConverged> {
@@ -105,6 +109,8 @@ impl LoadCase {
         values.extend(parameters.law.parameters());
         let series = parameters.series_compliance_mm_per_n.iter();
         values.extend(series.map(|(contact, &value)| (Parameter::SeriesCompliance(contact), value)));
+        let modification = parameters.modification.parameters();
+        values.extend(modification.into_iter().map(|(modified, value)| (Parameter::Modification(modified), value)));
         let gaps = parameters.clearance_um.iter();
         values.extend(gaps.map(|(contact, &value)| (Parameter::Clearance(contact), value)));
         values.extend(parameters.allowable_stress_mpa.map(|value| (Parameter::AllowableStress, value)));
@@ -195,7 +201,7 @@ pub struct LoadedDrive<'a> {
     input_torque_nmm: f64,
     law: ContactLaw,
     contacts: Contacts,
-    clearance_mm: PerContact<f64>,
+    gaps: Gaps<'a>,
 }
 
 /// A stress that limits the torque at one input angle.
@@ -222,6 +228,20 @@ impl<'a> LoadedDrive<'a> {
     /// # Errors
     /// As [`Self::new`], and [`SolveError::Impossible`] under a law that such teeth do not have.
     pub fn with_teeth(drive: &'a Drive, load: &LoadCase, shape: &ToothContact) -> Result<Self, SolveError> {
+        Self::with_deviations(drive, load, shape, None)
+    }
+
+    /// The drive under the load, with teeth of another shape and parts that deviate. Then zones are not alike: [`Self::wind_up`] wants the teeth
+    /// of all zones, made by [`Self::tooth_at`].
+    ///
+    /// # Errors
+    /// As [`Self::with_teeth`], and [`SolveError::Impossible`] where a list does not fit or `projection` is to take deviations.
+    pub fn with_deviations(
+        drive: &'a Drive,
+        load: &LoadCase,
+        shape: &ToothContact,
+        deviations: Option<&'a Deviations>,
+    ) -> Result<Self, SolveError> {
         let p = load.parameters();
         let DriveParameters { tooth_radius_mm: radius_mm, tooth_width_mm: width_mm, .. } = *drive.parameters();
         let size = ToothSize { radius_mm, width_mm };
@@ -237,9 +257,16 @@ impl<'a> LoadedDrive<'a> {
             input_torque_nmm: 1e3 * input_torque_nm,
             law: p.law,
             contacts,
-            clearance_mm: PerContact::of(|contact| 1e-3 * p.clearance_um.get(contact)),
+            gaps: Gaps::new(drive, &p.clearance_um, p.modification, deviations),
         };
-        let violations = p.clearance_violations_in(drive.sense(), drive.ring_tooth())?;
+        let mut violations = p.clearance_violations_in(drive.sense(), drive.ring_tooth())?;
+        violations.extend(p.modification.violation_in(drive));
+        if let Some(deviations) = deviations {
+            violations.extend(deviations.violations(drive));
+            if loaded.gaps.tell_zones_apart() && p.compatibility == Compatibility::Projection {
+                violations.push(Violation::NeedsVirtualWork { parameter: Parameter::Deviations });
+            }
+        }
         if !violations.is_empty() {
             return Err(SolveError::Impossible(violations));
         }
@@ -253,7 +280,7 @@ impl<'a> LoadedDrive<'a> {
         // Only `projection` can fall to zero, and only with unlike stiffnesses. It is then linear in sin²γ and positive at the root, so its
         // least value stands there or where γ is largest.
         if p.compatibility == Compatibility::Projection {
-            let ToothState { center, spring, .. } = loaded.state(drive.steepest_engaged()?)?;
+            let ToothState { center, spring, .. } = loaded.state(&Place::default(), drive.steepest_engaged()?)?;
             let compliance_mm_per_n = spring.approach.approach_mm(1.0);
             if compliance_mm_per_n <= 0.0 {
                 let position_deg = center.position.from_major_deg();
@@ -275,8 +302,7 @@ impl<'a> LoadedDrive<'a> {
 
     /// `1/k` of each contact, where the law is linear and no contact has a gap: where unit loads only have to be scaled.
     pub(crate) fn linear_compliance_mm_per_n(&self) -> Option<PerContact<f64>> {
-        let is_gapless = self.clearance_mm.iter().all(|(_, &gap)| gap == 0.0);
-        self.contacts.linear_compliance_mm_per_n().filter(|_| is_gapless)
+        self.contacts.linear_compliance_mm_per_n().filter(|_| self.gaps.is_nil())
     }
 
     /// Hertz stress of a contact.
@@ -294,11 +320,19 @@ impl<'a> LoadedDrive<'a> {
     /// # Errors
     /// [`NotConverged`] from the path, [`SolveError::FlatOffCarrier`] where a flat-sided tooth has left its slot.
     pub fn tooth(&self, position: Position) -> Result<ToothState, SolveError> {
-        let locus = self.drive.flank().locus();
-        self.state(locus.at(position)?)
+        self.tooth_at(&Place::default(), position)
     }
 
-    fn state(&self, center: ToothCenter) -> Result<ToothState, SolveError> {
+    /// The tooth at a position, in its place among the items that may deviate.
+    ///
+    /// # Errors
+    /// As [`Self::tooth`], and [`SolveError::Interference`] where a part is too full.
+    pub fn tooth_at(&self, place: &Place, position: Position) -> Result<ToothState, SolveError> {
+        let locus = self.drive.flank().locus();
+        self.state(place, locus.at(position)?)
+    }
+
+    fn state(&self, place: &Place, center: ToothCenter) -> Result<ToothState, SolveError> {
         let flank_curve = self.drive.flank();
         let flank = flank_curve.at(&center);
         let r = self.drive.parameters().tooth_radius_mm;
@@ -317,14 +351,24 @@ impl<'a> LoadedDrive<'a> {
                 let position_deg = center.position.from_major_deg();
                 SolveError::FlatOffCarrier { position_deg, center_radius_mm }
             })?;
-            Ok::<_, SolveError>(Place {
+            Ok::<_, SolveError>(tooth::Place {
                 force_ratio: *force_ratio.get(contact),
                 weight: *weights.get(contact),
                 pressure,
             })
         })?;
-        let gap_mm = weights.iter().fold(0.0, |sum, (contact, weight)| sum + weight * self.clearance_mm.get(contact));
-        let gap_mm = self.clearance_mm.iter().any(|(_, &gap)| gap > 0.0).then_some(gap_mm);
+        let gap_mm = if self.gaps.is_nil() {
+            None
+        } else {
+            let gaps_mm = self.gaps.at(place, &center, &flank);
+            let gap_mm = weights.iter().fold(0.0, |sum, (contact, weight)| sum + weight * gaps_mm.get(contact));
+            // The weights of clearances under `projection` were looked at before: what is left of them is rounding.
+            if gap_mm < 0.0 && self.compatibility == Compatibility::VirtualWork {
+                let position_deg = center.position.from_major_deg();
+                return Err(SolveError::Interference { slot: place.slot, position_deg, gap_um: 1e3 * gap_mm });
+            }
+            Some(gap_mm)
+        };
         let approach = self.contacts.approach(&places);
         // Without friction the way that the wave generator makes and the torque that it takes have one arm.
         let arm_mm = center.cam_contact.lever_arm_mm;
@@ -361,12 +405,17 @@ impl<'a> LoadedDrive<'a> {
         PerContact::of(|contact| tooth.pressure.get(contact).stress_mpa(*force_n.get(contact)))
     }
 
-    /// The `Δφ` that balances the input torque over these teeth of one zone.
+    /// The teeth of one zone, which stands for all; of all of them where zones are unlike.
+    fn springs<'s>(&self, teeth: &'s [ToothState]) -> Springs<'s, ToothState> {
+        Springs::new(teeth, if self.gaps.tell_zones_apart() { 1.0 } else { WAVES })
+    }
+
+    /// The `Δφ` that balances the input torque over these teeth of one zone, or of all where zones are unlike.
     ///
     /// # Errors
     /// [`SolveError::NoLeverArm`] where none of them can carry, [`SolveError::JohnsonBeyondHalfWidth`] where that law ends before.
     pub fn wind_up(&self, teeth: &[ToothState]) -> Result<WindUp, SolveError> {
-        let wind_up = Springs::new(teeth, WAVES).wind_up(self.input_torque_nmm)?.ok_or(SolveError::NoLeverArm)?;
+        let wind_up = self.springs(teeth).wind_up(self.input_torque_nmm)?.ok_or(SolveError::NoLeverArm)?;
         self.check_law(teeth, &wind_up.rotation)?;
         Ok(wind_up)
     }
@@ -383,7 +432,7 @@ impl<'a> LoadedDrive<'a> {
         });
         let FirstLimit { rotation, contact, .. } = limit.ok_or(SolveError::NoLeverArm)?;
         self.check_law(teeth, &rotation)?;
-        let input_torque_nmm = Springs::new(teeth, WAVES).torque_nmm(&rotation)?.value;
+        let input_torque_nmm = self.springs(teeth).torque_nmm(&rotation)?.value;
         Ok(TorqueLimit { input_torque_nmm, contact })
     }
 
@@ -428,7 +477,7 @@ impl<'a> LoadedDrive<'a> {
             contact,
             position_deg: tooth.center.position.from_major_deg(),
             half_width_limit_mm: limit_mm(contact),
-            input_torque_limit_nm: 1e-3 * Springs::new(teeth, WAVES).torque_nmm(&rotation)?.value,
+            input_torque_limit_nm: 1e-3 * self.springs(teeth).torque_nmm(&rotation)?.value,
         })
     }
 }

@@ -39,6 +39,10 @@ pub enum Parameter {
     SeriesCompliance(Contact),
     /// Gap along a contact's normal, µm.
     Clearance(Contact),
+    /// A number of the modification.
+    Modification(Modified),
+    /// A list of the deviations that has neither no entry nor one for each item.
+    Deviations,
     /// Allowable contact stress, MPa.
     AllowableStress,
     /// Intervals of a sweep.
@@ -61,6 +65,33 @@ pub enum Parameter {
     PartClearance(Part),
     /// Input angle of an assembly, deg.
     InputAngle,
+}
+
+/// What a modification says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Modified {
+    /// The ring set back along its normals, µm.
+    RingEquidistant,
+    /// The ring's generating path shifted, µm.
+    RingPathShift,
+    /// The ring's profile shifted, µm.
+    RingProfileShift,
+    /// The ring turned, arcsec.
+    RingRotation,
+    /// The wave generator set back, µm.
+    WaveGeneratorEquidistant,
+    /// The slots' walls set back, µm.
+    SlotWall,
+    /// The carrier turned, arcsec.
+    CarrierRotation,
+    /// Teeth thinner in radius, µm.
+    ToothRadius,
+    /// Tip relief at the flank's end, µm.
+    TipReliefAmount,
+    /// Where it starts, deg.
+    TipReliefStart,
+    /// Its power.
+    TipReliefPower,
 }
 
 /// The range of a parameter and its unit.
@@ -117,9 +148,21 @@ impl Parameter {
             Self::Stiffness(_) => Range::closed(1e-3, 1e15, "N/mm"),
             // As soft as the least stiffness, and nothing.
             Self::SeriesCompliance(_) => Range::closed(0.0, 1e3, "mm/N"),
-            // A choice, which has no number.
-            Self::Law => Range::closed(f64::NEG_INFINITY, f64::INFINITY, ""),
+            // A choice and lists, which have no number.
+            Self::Law | Self::Deviations => Range::closed(f64::NEG_INFINITY, f64::INFINITY, ""),
             Self::Clearance(_) | Self::PartClearance(_) => Range::closed(0.0, 1e6, "µm"),
+            Self::Modification(modified) => match modified {
+                Modified::RingRotation | Modified::CarrierRotation => Range::closed(-1e5, 1e5, "arcsec"),
+                Modified::TipReliefStart => Range::closed(0.0, 90.0, "deg"),
+                Modified::TipReliefPower => Range::closed(0.1, 100.0, ""),
+                Modified::RingEquidistant
+                | Modified::RingPathShift
+                | Modified::RingProfileShift
+                | Modified::WaveGeneratorEquidistant
+                | Modified::SlotWall
+                | Modified::ToothRadius
+                | Modified::TipReliefAmount => Range::closed(-1e6, 1e6, "µm"),
+            },
             // At its ends the rounding of the angle is 2e-9 deg.
             Self::InputAngle => Range::closed(-1e7, 1e7, "deg"),
             Self::AllowableStress => Range::closed(1e-3, 1e6, "MPa"),
@@ -260,6 +303,22 @@ pub enum Violation {
         /// Which.
         parameter: Parameter,
     },
+    /// A tip relief that starts at the end of the flank or beyond it.
+    TipReliefBeyondFlank {
+        /// Where it starts.
+        start_deg: f64,
+        /// Where the flank ends.
+        engagement_start_deg: f64,
+    },
+    /// A list of deviations that has neither no entry nor one for each item.
+    DeviationCount {
+        /// Entries.
+        count: usize,
+        /// Items.
+        items: usize,
+    },
+    /// A deviation that is no finite number.
+    DeviationNotFinite,
     /// A contact law that teeth of this shape do not have.
     LawOfOtherTeeth,
     /// The bore takes the whole flank away.
@@ -366,6 +425,14 @@ impl std::fmt::Display for Violation {
             Self::NeedsVirtualWork { .. } => {
                 write!(f, "`projection` does not take this: choose `virtual_work`, or leave it out")
             }
+            Self::TipReliefBeyondFlank { start_deg, engagement_start_deg } => write!(
+                f,
+                "a tip relief from {start_deg:?} deg on relieves nothing: the flank ends at {engagement_start_deg:?} deg"
+            ),
+            Self::DeviationCount { count, items } => {
+                write!(f, "{count} entries for {items} items: give one for each, or none")
+            }
+            Self::DeviationNotFinite => write!(f, "a deviation is no finite number"),
             Self::LawOfOtherTeeth => write!(
                 f,
                 "balls take `hertz` or `fixed`, and `hertz` is nowhere else: choose a law that teeth of this shape have"

@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::{
-    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Never,
-    PerContact, Torque,
+    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Modification,
+    Never, PerContact, Torque,
     sweep::{self, Points, Sweep},
 };
 
@@ -53,6 +53,7 @@ pub(crate) fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParamete
         law: ContactLaw::Linear,
         series_compliance_mm_per_n: PerContact::default(),
         clearance_um: PerContact::default(),
+        modification: Modification::default(),
         allowable_stress_mpa: None,
     }
 }

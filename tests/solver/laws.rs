@@ -350,6 +350,61 @@ fn a_contact_wider_than_a_tenth_of_the_tooth_is_a_finding() {
     assert!(matches!(found(&shallow)[..], [Finding::JohnsonBeyondHalfWidth { contact: Contact::Carrier, .. }]));
 }
 
+/// Laws without a closed form, with gaps.
+fn laws_of_searches() -> [LoadParameters; 3] {
+    let gapped = |load: LoadParameters| LoadParameters {
+        clearance_um: PerContact { wave_generator: 0.0, ring: 10.0, carrier: 2.0 },
+        ..load
+    };
+    let springy = LoadParameters {
+        law: ContactLaw::Palmgren,
+        series_compliance_mm_per_n: PerContact { wave_generator: 0.0, ring: 2e-6, carrier: 5e-6 },
+        ..load(20.0, VirtualWork)
+    };
+    [johnson(20.0), gapped(mixed(20.0)), gapped(springy)]
+}
+
+#[test]
+fn stiffness_is_the_slope_of_torque_over_wind_up_and_capacity_the_torque_at_which_the_stress_is_reached() {
+    for load in laws_of_searches() {
+        let at = |torque_nm: f64| {
+            let load = LoadParameters { torque: toothwave_solver::Torque::Input(torque_nm), ..load };
+            swept(&PAPER_5_1, &load, 6)
+        };
+        let (less, middle, more) = (at(20.0 * (1.0 - 1e-5)), at(20.0), at(20.0 * (1.0 + 1e-5)));
+        for (sample, stiffness) in middle.input_angles.torsional_stiffness_nm_per_rad.iter().enumerate() {
+            let turned = |sweep: &sweep::Sweep| sweep.input_angles.wind_up_deg[sample].to_radians();
+            let slope = 20.0 * 2e-5 * 14.0 * 14.0 / (turned(&more) - turned(&less));
+            assert!((stiffness / slope - 1.0).abs() < 1e-7, "{stiffness} {slope}");
+        }
+        let limited = LoadParameters { allowable_stress_mpa: Some(1500.0), ..load };
+        let capacity = swept(&PAPER_5_1, &limited, 6).torque_capacity.unwrap();
+        let reached = at(capacity.input_torque_nm);
+        let largest = reached.peaks.iter().map(|(_, peaks)| peaks.stress_mpa.value).fold(0.0, f64::max);
+        assert!((largest / 1500.0 - 1.0).abs() < 1e-12, "{largest}");
+        assert_eq!(reached.peaks.get(capacity.contact).stress_mpa.value, largest);
+    }
+}
+
+#[test]
+fn a_sweep_to_a_tolerance_finds_the_peaks_of_these_laws_too() {
+    for load in laws_of_searches() {
+        let case = LoadCase::new(&load).unwrap();
+        let points = Points::Tolerance { tolerance: 1e-6, max_states: 1_000_000 };
+        let found = sweep::sweep(&drive(&PAPER_5_1), &case, points, &Never).unwrap();
+        let sampled = swept(&PAPER_5_1, &load, 4000);
+        for (contact, peaks) in found.peaks.iter() {
+            let sampled = sampled.peaks.get(contact);
+            for (found, sampled) in
+                [(peaks.force_n.value, sampled.force_n.value), (peaks.stress_mpa.value, sampled.stress_mpa.value)]
+            {
+                // Samples miss a kink by as much as they are apart.
+                assert!(found >= sampled * (1.0 - 1e-6) && found <= sampled * (1.0 + 2e-4), "{found} {sampled}");
+            }
+        }
+    }
+}
+
 #[test]
 fn projection_takes_neither_johnsons_law_nor_a_series_compliance() {
     let refused = |parameters: LoadParameters| LoadCase::new(&parameters).unwrap_err();

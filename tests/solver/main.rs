@@ -4,6 +4,7 @@
 mod drives;
 mod extremes;
 mod fast;
+mod gaps;
 mod laws;
 mod limits;
 mod oracles;

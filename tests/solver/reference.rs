@@ -11,8 +11,8 @@ use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::sweep::{self, Points, States, Sweep};
 use toothwave_solver::tooth::ToothContact;
 use toothwave_solver::{
-    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Never,
-    PerContact, SolveError, Torque,
+    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Modification,
+    Never, PerContact, SolveError, Torque,
 };
 
 /// What is allowed beside the condition, relative to the value or the column's peak.
@@ -112,6 +112,7 @@ impl Case {
                 ring: gap("ring_um"),
                 carrier: gap("carrier_um"),
             },
+            modification: Modification::default(),
             allowable_stress_mpa: load["allowable_stress_mpa"].as_f64(),
         })
         .unwrap()
