@@ -316,7 +316,7 @@ impl Endpoint for Drawing {
             input_angle_deg: question.input_angle_deg,
             bodies: bodies
                 .into_iter()
-                .map(|body| BodyAnswer::new(body, question.drawing.drive().parameters().tooth_width_mm))
+                .map(|body| BodyAnswer::new(body, question.drawing.drive().tooth_width_mm()))
                 .collect(),
             findings: drive_findings(question.drawing.drive())?,
         })
