@@ -5,9 +5,9 @@
 //! resolution, so that no peak hides between them; then every peak that may be the largest of its kind is closed in on.
 
 use crate::load_sharing::LoadedDrive;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, PlacedTooth};
+use crate::position::Position;
 use crate::ring::FlankEnd;
-use crate::sweep::PlacedTooth;
 use crate::{SolveError, Stop};
 
 /// Intervals that a smooth piece starts with.
@@ -28,7 +28,7 @@ const MAX_STEPS: u32 = 100;
 /// An input angle, and which teeth mesh there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Moment {
-    /// Share of the period that has passed.
+    /// Share of the lap that has passed.
     pub(crate) fraction: f64,
     first: u64,
     last: u64,
@@ -37,17 +37,23 @@ pub(crate) struct Moment {
 }
 
 impl Moment {
-    /// The teeth in mesh.
-    pub(crate) fn teeth(self, mesh: &Mesh) -> impl Iterator<Item = PlacedTooth> {
+    /// The teeth that are listed when so many laps have passed before.
+    pub(crate) fn placed(self, mesh: &Mesh, lap: u64) -> impl Iterator<Item = PlacedTooth> {
         let mesh = *mesh;
-        (self.first..=self.last).map(move |number| {
-            let position = if self.entering == Some(number) {
-                mesh.flank_limit().position
-            } else {
-                mesh.position_between(number, self.fraction)
-            };
-            PlacedTooth { number, position, position_deg: position.from_major_deg() }
-        })
+        mesh.placed_between(self.first..=self.last, lap, move |place| self.position(&mesh, place))
+    }
+
+    /// Places where teeth mesh.
+    pub(crate) const fn places(&self) -> u64 {
+        self.last + 1 - self.first
+    }
+
+    fn position(&self, mesh: &Mesh, place: u64) -> Position {
+        if self.entering == Some(place) {
+            mesh.flank_limit().position
+        } else {
+            mesh.position_between(place, self.fraction)
+        }
     }
 }
 
@@ -70,7 +76,8 @@ impl Seen {
 }
 
 struct Search<'a, S> {
-    loaded: &'a LoadedDrive<'a>,
+    /// With one tooth at each place of the mesh, which stands for all that carry alike.
+    loaded: LoadedDrive<'a>,
     mesh: Mesh,
     stop: &'a S,
     max_states: u64,
@@ -88,6 +95,7 @@ pub(crate) fn moments(
     stop: &impl Stop,
 ) -> Result<Vec<Moment>, SolveError> {
     let mesh = Mesh::new(loaded.drive());
+    let loaded = loaded.with_zones(mesh.teeth_at_each_place());
     let mut search = Search { loaded, mesh, stop, max_states, states: 0, peaks: Loads::default() };
     let mut moments = Vec::new();
     for piece in smooth_pieces(&mesh) {
@@ -152,12 +160,13 @@ impl<S: Stop> Search<'_, S> {
         if self.stop.stopped() {
             return Err(SolveError::Stopped);
         }
-        self.states += moment.last + 1 - moment.first;
+        self.states += moment.places();
         if self.states > self.max_states {
             return Err(SolveError::TooManyStates { limit: self.max_states });
         }
+        let places = moment.first..=moment.last;
         let teeth: Result<Vec<_>, _> =
-            moment.teeth(&self.mesh).map(|placed| self.loaded.tooth(placed.position)).collect();
+            places.map(|place| self.loaded.tooth(moment.position(&self.mesh, place))).collect();
         let teeth = teeth?;
         let wind_up = self.loaded.wind_up(&teeth)?;
         let loads: Vec<_> = teeth.iter().map(|tooth| self.loaded.loads(tooth, &wind_up)).collect();

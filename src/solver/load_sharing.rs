@@ -2,7 +2,7 @@
 
 use crate::SolveError;
 use crate::contact::{Approach, Contact, ContactLaw, HertzLine, Materials, PerContact};
-use crate::drive::{Draft, Drive, WAVES};
+use crate::drive::{Draft, Drive};
 use crate::locus::ToothCenter;
 use crate::mesh::Mesh;
 use crate::position::Position;
@@ -164,6 +164,8 @@ pub struct ToothState {
 pub struct LoadedDrive<'a> {
     drive: &'a Drive,
     compatibility: Compatibility,
+    /// What a sum over the teeth that are listed is multiplied by, to be that over all.
+    zones: f64,
     input_torque_nmm: f64,
     approach: Approach,
     clearance_mm: PerContact<f64>,
@@ -204,23 +206,24 @@ impl<'a> LoadedDrive<'a> {
     /// [`SolveError::NoToothInMesh`] and [`SolveError::ComplianceNotPositive`] where no finite forces exist.
     pub fn new(drive: &'a Drive, load: &LoadCase) -> Result<Self, SolveError> {
         let p = load.parameters();
-        let width_mm = drive.parameters().tooth_width_mm;
+        let width_mm = drive.tooth_width_mm();
         let input_torque_nm = match p.torque {
             Torque::Input(torque) => torque,
             Torque::Output(torque) => torque / drive.teeth_per_wave(),
         };
+        let mesh = Mesh::new(drive);
         let loaded = Self {
             drive,
             compatibility: p.compatibility,
+            zones: mesh.zones_in_torque(),
             input_torque_nmm: 1e3 * input_torque_nm,
             approach: p.law.approach(&p.materials, width_mm),
             clearance_mm: PerContact::of(|contact| 1e-3 * p.clearance_um.get(contact)),
             hertz: PerContact::of(|contact| HertzLine::new(&p.materials, contact, width_mm)),
         };
-        let mesh = Mesh::new(drive);
         if !mesh.always_carries() {
             return Err(SolveError::NoToothInMesh {
-                engagement_start_deg: drive.flank_limit().position.from_major_deg(),
+                engagement_start_deg: drive.flank_limit().position.from_lobe_deg(),
                 spacing_deg: mesh.spacing_deg(),
             });
         }
@@ -229,11 +232,21 @@ impl<'a> LoadedDrive<'a> {
         if p.compatibility == Compatibility::Projection {
             let ToothState { center, compliance, .. } = loaded.state(drive.steepest_engaged()?);
             if compliance <= 0.0 {
-                let position_deg = center.position.from_major_deg();
+                let position_deg = center.position.from_lobe_deg();
                 return Err(SolveError::ComplianceNotPositive { position_deg, compliance_mm_per_n: compliance });
             }
         }
         Ok(loaded)
+    }
+
+    /// The same for lists in which each tooth stands for so many.
+    pub(crate) const fn with_zones(self, zones: f64) -> Self {
+        Self { zones, ..self }
+    }
+
+    /// What a sum over the teeth that are listed is multiplied by, to be that over all.
+    pub(crate) const fn zones(&self) -> f64 {
+        self.zones
     }
 
     /// The drive.
@@ -277,9 +290,8 @@ impl<'a> LoadedDrive<'a> {
         let r = self.drive.parameters().tooth_radius_mm;
         let force_ratio = force_ratio(self.drive.sense(), flank_curve, &center);
         let weights = Weights::of(self.compatibility, self.drive.sense(), flank_curve, &center).0;
-        let cam = flank_curve.locus().cam();
         let curvature_per_mm = PerContact {
-            wave_generator: 1.0 / r + 1.0 / cam.curvature_radius_mm(&center.cam_contact),
+            wave_generator: 1.0 / r + center.cam_contact.curvature_per_mm,
             ring: 1.0 / (r * flank.regularity),
             carrier: 1.0 / r,
         };
@@ -325,14 +337,14 @@ impl<'a> LoadedDrive<'a> {
         })
     }
 
-    /// The torque `U Σ F_H |h'|` \[2\] of these teeth of one zone, and its derivative by `Δφ`.
+    /// The torque `U Σ F_H |h'|` \[2\] of the teeth that are listed, and its derivative by `Δφ`.
     fn torque(&self, teeth: &[ToothState], closing_rad: f64, excess_rad: f64) -> ValueAndSlope {
         let mut torque = ValueAndSlope { value: 0.0, slope: 0.0 };
         for tooth in teeth {
             let displacement_mm = tooth.displacement_mm(closing_rad, excess_rad);
             if displacement_mm > 0.0 {
                 let lever_arm_mm = tooth.center.cam_contact.lever_arm_mm;
-                let torque_nmm = WAVES * self.cam_force_n(tooth, displacement_mm) * lever_arm_mm;
+                let torque_nmm = self.zones * self.cam_force_n(tooth, displacement_mm) * lever_arm_mm;
                 torque.value += torque_nmm;
                 // dF/dΔφ = n F |h'|/(Δφ |h'| - g)
                 torque.slope += torque_nmm * (lever_arm_mm / displacement_mm) / self.approach.exponent;
@@ -341,7 +353,7 @@ impl<'a> LoadedDrive<'a> {
         torque
     }
 
-    /// The `Δφ` that balances the input torque over these teeth of one zone.
+    /// The `Δφ` that balances the input torque over the teeth that are listed.
     ///
     /// Without clearance all teeth carry, and `Δφ = (M0/(U Σ |h'| (|h'|/c)^n))^(1/n)`. With clearance a tooth carries from `Δφ = g/|h'|` on;
     /// in that order the teeth are taken in until the torque is reached: for a linear law the sum over those that carry is closed
@@ -368,7 +380,7 @@ impl<'a> LoadedDrive<'a> {
                 lever_arm_mm * self.approach.root(lever_arm_mm / tooth.compliance)
             })
             .sum();
-        self.approach.power(self.input_torque_nmm / (WAVES * torque_of_unit))
+        self.approach.power(self.input_torque_nmm / (self.zones * torque_of_unit))
     }
 
     /// What is turned beyond the first closing angle, by an exact active set.
@@ -401,7 +413,7 @@ impl<'a> LoadedDrive<'a> {
                 stiffness += share;
                 torque_of_gaps += share * (tooth.closing_rad - closing_rad);
             }
-            Ok((self.input_torque_nmm / WAVES + torque_of_gaps) / stiffness)
+            Ok((self.input_torque_nmm / self.zones + torque_of_gaps) / stiffness)
         }
     }
 

@@ -3,10 +3,9 @@
 use crate::adaptive;
 use crate::batch::{self, BatchSweep};
 use crate::contact::{Contact, PerContact, half_width_mm};
-use crate::drive::{Drive, WAVES};
+use crate::drive::Drive;
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState, WindUp};
-use crate::mesh::Mesh;
-use crate::position::Position;
+use crate::mesh::{Mesh, PlacedTooth};
 use crate::{SolveError, Stop};
 
 /// Where a sweep looks.
@@ -23,18 +22,21 @@ pub enum Points {
     },
 }
 
-/// The states of a sweep, by input angle and then tooth number: columns of equal length, one entry a state.
+/// The states of a sweep, by input angle and then tooth number: columns of equal length, one entry a state. Where the zones are alike the
+/// teeth of one stand for all, elsewhere the teeth of all zones are listed ([`Mesh`]).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct States {
     /// Input angle j.
     pub input_angle_deg: Vec<f64>,
-    /// Tooth number, 0 being the tooth on the major axis at j = 0.
+    /// Tooth number, 0 being the tooth in the middle of a lobe at j = 0.
     pub tooth: Vec<u32>,
-    /// Position ψ, from the major axis.
+    /// The lobe that the tooth is on; empty where the zones are alike.
+    pub lobe: Vec<u32>,
+    /// Position ψ, from the middle of the lobe.
     pub position_deg: Vec<f64>,
     /// Distance `d` of the tooth's centre from the axis.
     pub center_radius_mm: Vec<f64>,
-    /// φ_H: contact point on the cam, from the minor axis.
+    /// φ_H: contact point on the cam, from the valley.
     pub wave_generator_angle_deg: Vec<f64>,
     /// φ_K: contact point on the ring, from the ring's tooth tip.
     pub ring_angle_deg: Vec<f64>,
@@ -53,7 +55,7 @@ pub struct InputAngles {
     pub wind_up_deg: Vec<f64>,
     /// `(Z_G/U)² dM0/dΔφ`: output torque over output rotation, input held, at the load.
     pub torsional_stiffness_nm_per_rad: Vec<f64>,
-    /// Teeth of one zone that carry load.
+    /// Of the teeth that are listed, those that carry load.
     pub loaded_teeth: Vec<u32>,
 }
 
@@ -125,6 +127,7 @@ impl States {
         Self {
             input_angle_deg: column(),
             tooth: Vec::with_capacity(count),
+            lobe: Vec::new(),
             position_deg: column(),
             center_radius_mm: column(),
             wave_generator_angle_deg: column(),
@@ -243,29 +246,30 @@ fn plain(loaded: &LoadedDrive<'_>, load: &LoadCase, points: Points, stop: &impl 
                 if stop.stopped() {
                     return Err(SolveError::Stopped);
                 }
-                let teeth = mesh.teeth_at(sample, samples).map(|number| PlacedTooth {
-                    number,
-                    position: mesh.position(number, sample, samples),
-                    position_deg: mesh.position_deg(number, sample, samples),
-                });
-                columns.add(mesh.input_angle_deg(sample, samples), teeth)?;
+                columns.add(mesh.input_angle_deg(sample, samples), mesh.placed_at(sample, samples))?;
             }
         }
         Points::Tolerance { tolerance, max_states } => {
-            for moment in adaptive::moments(loaded, tolerance, max_states, stop)? {
-                columns.add(moment.fraction * mesh.period_deg(), moment.teeth(&mesh))?;
+            let moments = adaptive::moments(loaded, tolerance, max_states, stop)?;
+            // Each place was counted once; listed it may stand for several teeth, and in every lap.
+            let listed =
+                moments.iter().map(|moment| moment.places()).sum::<u64>() * mesh.laps() * mesh.listed_at_each_place();
+            if listed > max_states {
+                return Err(SolveError::TooManyStates { limit: max_states });
+            }
+            let lap_deg = mesh.period_deg() / mesh.laps() as f64;
+            for lap in 0..mesh.laps() {
+                // A lap begins where the one before has ended.
+                for moment in &moments[usize::from(lap > 0)..] {
+                    if stop.stopped() {
+                        return Err(SolveError::Stopped);
+                    }
+                    columns.add((lap as f64 + moment.fraction) * lap_deg, moment.placed(&mesh, lap))?;
+                }
             }
         }
     }
     Ok(columns.finish())
-}
-
-/// A tooth in mesh at an input angle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PlacedTooth {
-    pub(crate) number: u64,
-    pub(crate) position: Position,
-    pub(crate) position_deg: f64,
 }
 
 /// A sweep as it grows by input angles.
@@ -276,6 +280,7 @@ struct Columns<'a> {
     input_angles: InputAngles,
     torque_capacity: Option<TorqueCapacity>,
     torque_balance_residual: f64,
+    lists_lobes: bool,
     /// Teeth at the first and at the last input angle.
     teeth_at_ends: (usize, usize),
     teeth: Vec<ToothState>,
@@ -290,6 +295,7 @@ impl<'a> Columns<'a> {
             input_angles: InputAngles::default(),
             torque_capacity: None,
             torque_balance_residual: 0.0,
+            lists_lobes: !Mesh::new(loaded.drive()).zones_are_alike(),
             teeth_at_ends: (0, 0),
             teeth: Vec::new(),
         }
@@ -303,10 +309,13 @@ impl<'a> Columns<'a> {
     /// Appends the states of the teeth in mesh at one input angle.
     fn add(&mut self, input_angle_deg: f64, placed: impl Iterator<Item = PlacedTooth>) -> Result<(), SolveError> {
         self.teeth.clear();
-        for PlacedTooth { number, position, position_deg } in placed {
+        for PlacedTooth { number, lobe, position, position_deg } in placed {
             self.teeth.push(self.loaded.tooth(position)?);
             self.states.input_angle_deg.push(input_angle_deg);
             self.states.tooth.push(u32::try_from(number).unwrap_or(u32::MAX));
+            if self.lists_lobes {
+                self.states.lobe.push(lobe);
+            }
             self.states.position_deg.push(position_deg);
         }
         let wind_up = self.loaded.wind_up(&self.teeth)?;
@@ -335,11 +344,12 @@ impl<'a> Columns<'a> {
         let flank = drive.flank();
         let states = &mut self.states;
         let mut loaded_teeth = 0;
+        let zones = self.loaded.zones();
         let mut torque_nmm = PerContact::<f64>::default();
         for tooth in &self.teeth {
             let ToothState { center, flank: point, .. } = tooth;
             states.center_radius_mm.push(center.center_radius_mm);
-            let cam_angle_rad = flank.locus().cam().contact_angle_from_minor_rad(&center.cam_contact);
+            let cam_angle_rad = flank.locus().contact_angle_from_valley_rad(center);
             states.wave_generator_angle_deg.push(cam_angle_rad.to_degrees());
             states.ring_angle_deg.push(flank.angle_from_tip_rad(center, point).to_degrees());
 
@@ -350,9 +360,9 @@ impl<'a> Columns<'a> {
             states.stress_mpa.push(stress_mpa);
 
             let sin_ring = point.tan_pressure_angle * point.cos_pressure_angle;
-            torque_nmm.wave_generator += WAVES * force_n.wave_generator * center.cam_contact.lever_arm_mm;
-            torque_nmm.ring += WAVES * force_n.ring * sin_ring * center.center_radius_mm;
-            torque_nmm.carrier += WAVES * force_n.carrier * center.center_radius_mm;
+            torque_nmm.wave_generator += zones * force_n.wave_generator * center.cam_contact.lever_arm_mm;
+            torque_nmm.ring += zones * force_n.ring * sin_ring * center.center_radius_mm;
+            torque_nmm.carrier += zones * force_n.carrier * center.center_radius_mm;
         }
         let input_nmm = self.loaded.input_torque_nmm();
         let balanced = PerContact {
@@ -385,7 +395,7 @@ fn finished(
     torque_balance_residual: f64,
     teeth_at_ends: (usize, usize),
 ) -> Sweep {
-    let tooth_width_mm = drive.parameters().tooth_width_mm;
+    let tooth_width_mm = drive.tooth_width_mm();
     let peaks = PerContact::of(|contact| {
         let (force, at) = (states.force_n.get(contact), peaks.get(contact));
         let stress_mpa = states.peak(states.stress_mpa.get(contact), at.stress);
@@ -405,8 +415,11 @@ fn period_closure(
     (teeth_at_start, teeth_at_end): (usize, usize),
 ) -> f64 {
     let last = states.len() - teeth_at_end;
+    // Each tooth stands where the one before stood; where all slots are listed, the first one where the last did.
+    let wrapped = usize::from(states.tooth.get(last) == Some(&0));
     let residual = |column: &[f64], peak: f64| {
-        let pairs = column[last..].iter().zip(&column[..teeth_at_start]);
+        let ends = column[last + wrapped..].iter().chain(&column[last..last + wrapped]);
+        let pairs = ends.zip(&column[..teeth_at_start]);
         pairs.map(|(end, start)| (end - start).abs()).fold(0.0, f64::max) / peak
     };
     peaks

@@ -52,11 +52,12 @@ pub(crate) fn field_codes() -> Vec<FieldCode> {
         NumberTooLarge => ConflictingFields,
         ConflictingFields => OutOfRange,
         OutOfRange => CamNotElongated,
-        CamNotElongated => ToothDifference,
-        ToothDifference => CountOdd,
-        CountOdd => InstalledOdd,
-        InstalledOdd => InstalledNoDivisor,
-        InstalledNoDivisor => TeethTouch,
+        CamNotElongated => CamTooSmall,
+        CamTooSmall => ToothDifference,
+        ToothDifference => InstalledNoDivisor,
+        InstalledNoDivisor => GrooveTooTight,
+        GrooveTooTight => FlatTooLong,
+        FlatTooLong => TeethTouch,
         TeethTouch => NoCarrierAnnulus,
         NoCarrierAnnulus => BoreLeavesNoFlank,
         BoreLeavesNoFlank => ClearanceNotMonotone,
@@ -82,7 +83,9 @@ pub(crate) fn finding_codes() -> Vec<FindingCode> {
         ThinSlotWall => ToothBeyondCarrier,
         ToothBeyondCarrier => SteepRingFlank,
         SteepRingFlank => LinearLawTooStiff,
-        LinearLawTooStiff => PalmgrenBeyondSteel,
+        LinearLawTooStiff => HollowWaveGenerator,
+        HollowWaveGenerator => FlatCutsTheContact,
+        FlatCutsTheContact => PalmgrenBeyondSteel,
         PalmgrenBeyondSteel => StressAboveFatigueLimit;
         StressAboveFatigueLimit)
 }
