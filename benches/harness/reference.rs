@@ -4,7 +4,8 @@ use std::error::Error;
 
 use serde_json::Value;
 use toothwave_solver::{
-    Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, Modification, PerContact, Torque,
+    Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, Modification, PerContact, ToothShape,
+    Torque, WaveGenerator,
 };
 
 use crate::baselines::{COLUMNS, Columns};
@@ -25,12 +26,11 @@ impl Setup {
     /// The paper's case 5.1, projection: for measurements of memory, which reading the file would disturb.
     pub(crate) const PAPER_5_1: Self = Self {
         drive: DriveParameters {
-            semi_major_mm: 58.0,
-            semi_minor_mm: 56.0,
+            wave_generator: WaveGenerator::Ellipse { semi_major_mm: 58.0, semi_minor_mm: 56.0 },
             teeth: 28,
             installed: 28,
             tooth_radius_mm: 5.0,
-            tooth_width_mm: 15.0,
+            tooth: ToothShape::Cylinder { width_mm: 15.0 },
             ring_teeth: 26,
             tip_radius_mm: None,
         },
@@ -88,12 +88,14 @@ impl Reference {
         let input_torque_nm = number("/load/input_torque_nm")?;
         Ok(Setup {
             drive: DriveParameters {
-                semi_major_mm: number("/drive/wave_generator/semi_major_mm")?,
-                semi_minor_mm: number("/drive/wave_generator/semi_minor_mm")?,
+                wave_generator: WaveGenerator::Ellipse {
+                    semi_major_mm: number("/drive/wave_generator/semi_major_mm")?,
+                    semi_minor_mm: number("/drive/wave_generator/semi_minor_mm")?,
+                },
                 teeth: count("/drive/teeth/count")?,
                 installed: count("/drive/teeth/installed")?,
                 tooth_radius_mm: number("/drive/teeth/radius_mm")?,
-                tooth_width_mm: number("/drive/teeth/width_mm")?,
+                tooth: ToothShape::Cylinder { width_mm: number("/drive/teeth/width_mm")? },
                 ring_teeth: count("/drive/ring/teeth")?,
                 tip_radius_mm: number("/drive/ring/tip_radius_mm").ok(),
             },

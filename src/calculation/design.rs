@@ -13,7 +13,7 @@ use toothwave_solver::sweep::Points;
 use toothwave_solver::violation::Range;
 use toothwave_solver::{
     Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, Modification, Parameter,
-    PerContact, Torque, Violation,
+    PerContact, ToothShape, Torque, Violation, WaveGenerator,
 };
 use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, OneOfBuilder, Schema, Type};
@@ -590,12 +590,14 @@ impl Design {
     pub fn drive_parameters(&self) -> DriveParameters {
         let DriveDocument { wave_generator, teeth, ring } = &self.drive;
         DriveParameters {
-            semi_major_mm: wave_generator.semi_major_mm,
-            semi_minor_mm: wave_generator.semi_minor_mm,
+            wave_generator: WaveGenerator::Ellipse {
+                semi_major_mm: wave_generator.semi_major_mm,
+                semi_minor_mm: wave_generator.semi_minor_mm,
+            },
             teeth: teeth.count.count(),
             installed: teeth.installed.unwrap_or(teeth.count).count(),
             tooth_radius_mm: teeth.radius_mm,
-            tooth_width_mm: teeth.width_mm,
+            tooth: ToothShape::Cylinder { width_mm: teeth.width_mm },
             ring_teeth: ring.teeth.count(),
             tip_radius_mm: ring.tip_radius_mm,
         }
@@ -606,11 +608,7 @@ impl Design {
     pub fn as_written(&self, violations: &[Violation]) -> Vec<Violation> {
         let TeethDocument { count, installed, .. } = self.drive.teeth;
         let as_written = |&violation: &Violation| match violation {
-            Violation::OutOfRange { parameter: Parameter::InstalledTeeth, .. } | Violation::InstalledOdd { .. }
-                if installed.is_none() =>
-            {
-                None
-            }
+            Violation::OutOfRange { parameter: Parameter::InstalledTeeth, .. } if installed.is_none() => None,
             Violation::OutOfRange { parameter, limit, value } => {
                 let value = match parameter {
                     Parameter::ToothCount => count.0,

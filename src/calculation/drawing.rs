@@ -79,7 +79,7 @@ impl Question for Drawing {
             input_angle_deg: checked.input_angle_deg,
             bodies: bodies
                 .into_iter()
-                .map(|body| BodyAnswer::new(body, checked.drawing.drive().parameters().tooth_width_mm))
+                .map(|body| BodyAnswer::new(body, checked.drawing.drive().tooth_width_mm()))
                 .collect(),
             findings: drive_findings(checked.drawing.drive())?,
         })

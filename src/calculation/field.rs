@@ -46,14 +46,16 @@ pub enum FieldCode {
     OutOfRange,
     /// The semi-major axis does not exceed the semi-minor one.
     CamNotElongated,
-    /// Carrier and ring do not differ by two teeth.
+    /// The wave generator is too small for its stroke.
+    CamTooSmall,
+    /// Carrier and ring do not differ by a tooth for each lobe.
     ToothDifference,
-    /// An odd number of teeth, which no even number of installed ones divides.
-    CountOdd,
-    /// An odd number of installed teeth.
-    InstalledOdd,
     /// Installed teeth that do not divide the theoretical ones.
     InstalledNoDivisor,
+    /// A groove that is no wider than the ball in it.
+    GrooveTooTight,
+    /// A flat as long as the tooth is thick.
+    FlatTooLong,
     /// Neighbouring teeth touch somewhere on their path.
     TeethTouch,
     /// The ring's tips reach in to the wave generator.
@@ -98,20 +100,23 @@ fn conflict(violation: &Violation, parameter: Parameter) -> FieldError {
 /// A violation as the field that it is about.
 impl From<&Violation> for FieldError {
     fn from(violation: &Violation) -> Self {
-        use Parameter::{InstalledTeeth, RingTeeth, SemiMajor, TipRadius, ToothCount, ToothRadius};
+        use Parameter::{InstalledTeeth, RingTeeth, SemiMajor, TipRadius, ToothRadius};
         let (code, parameter, value, limit) = match *violation {
             Violation::OutOfRange { parameter, value, limit } => (FieldCode::OutOfRange, parameter, value, limit),
             Violation::CamNotElongated { semi_major_mm, semi_minor_mm } => {
                 (FieldCode::CamNotElongated, SemiMajor, semi_major_mm, semi_minor_mm)
             }
+            Violation::CamTooSmall { parameter, radius_mm, least_mm } => {
+                (FieldCode::CamTooSmall, parameter, radius_mm, least_mm)
+            }
+            Violation::GrooveTooTight { contact, groove_radius_mm, tooth_radius_mm } => {
+                (FieldCode::GrooveTooTight, Parameter::GrooveRadius(contact), groove_radius_mm, tooth_radius_mm)
+            }
+            Violation::FlatTooLong { flat_length_mm, tooth_diameter_mm } => {
+                (FieldCode::FlatTooLong, Parameter::FlatLength, flat_length_mm, tooth_diameter_mm)
+            }
             Violation::ToothDifference { ring_teeth, instead, .. } => {
                 (FieldCode::ToothDifference, RingTeeth, ring_teeth as f64, instead.nearest_to(ring_teeth) as f64)
-            }
-            Violation::CountOdd { teeth, instead } => {
-                (FieldCode::CountOdd, ToothCount, teeth as f64, instead.nearest_to(teeth) as f64)
-            }
-            Violation::InstalledOdd { installed, instead } => {
-                (FieldCode::InstalledOdd, InstalledTeeth, installed as f64, instead.nearest_to(installed) as f64)
             }
             Violation::InstalledNoDivisor { installed, instead, .. } => {
                 (FieldCode::InstalledNoDivisor, InstalledTeeth, installed as f64, instead.nearest_to(installed) as f64)
@@ -119,8 +124,8 @@ impl From<&Violation> for FieldError {
             Violation::TeethTouch { tooth_diameter_mm, touching_radius_mm, .. } => {
                 (FieldCode::TeethTouch, ToothRadius, 0.5 * tooth_diameter_mm, touching_radius_mm)
             }
-            Violation::NoCarrierAnnulus { semi_major_mm, tip_radius_mm } => {
-                (FieldCode::NoCarrierAnnulus, SemiMajor, semi_major_mm, tip_radius_mm)
+            Violation::NoCarrierAnnulus { parameter, value_mm, limit_mm, .. } => {
+                (FieldCode::NoCarrierAnnulus, parameter, value_mm, limit_mm)
             }
             Violation::ClearanceNotMonotone { contact, clearance_um } => {
                 (FieldCode::ClearanceNotMonotone, Parameter::Clearance(contact), clearance_um, 0.0)
@@ -169,10 +174,18 @@ pub fn pointer(parameter: Parameter) -> String {
     match parameter {
         Parameter::SemiMajor => "/drive/wave_generator/semi_major_mm".into(),
         Parameter::SemiMinor => "/drive/wave_generator/semi_minor_mm".into(),
+        Parameter::EccentricRadius => "/drive/wave_generator/radius_mm".into(),
+        Parameter::Eccentricity => "/drive/wave_generator/eccentricity_mm".into(),
+        Parameter::Lobes => "/drive/wave_generator/lobes".into(),
+        Parameter::MeanRadius => "/drive/wave_generator/mean_radius_mm".into(),
+        Parameter::MeanPathRadius => "/drive/wave_generator/mean_path_radius_mm".into(),
+        Parameter::Amplitude => "/drive/wave_generator/amplitude_mm".into(),
         Parameter::ToothCount => "/drive/teeth/count".into(),
         Parameter::InstalledTeeth => "/drive/teeth/installed".into(),
         Parameter::ToothRadius => "/drive/teeth/radius_mm".into(),
         Parameter::ToothWidth => "/drive/teeth/width_mm".into(),
+        Parameter::GrooveRadius(contact) => format!("/drive/teeth/groove_radius_mm/{}", contact_name(contact)),
+        Parameter::FlatLength => "/drive/teeth/flat_length_mm".into(),
         Parameter::RingTeeth => "/drive/ring/teeth".into(),
         Parameter::TipRadius => "/drive/ring/tip_radius_mm".into(),
         Parameter::YoungsModulus(part) => format!("/materials/{}/youngs_modulus_gpa", part_name(part)),

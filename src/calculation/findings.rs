@@ -61,6 +61,10 @@ pub enum FindingCode {
     SteepRingFlank,
     /// The linear law where wind-up or clearance was asked for: it is several times too stiff.
     LinearLawTooStiff,
+    /// A cam with hollow valleys, which no bearing's ring could follow.
+    HollowWaveGenerator,
+    /// The teeth's flats end their arcs before the steepest contact.
+    FlatCutsTheContact,
     /// Palmgren's law for a contact that is not steel on steel.
     PalmgrenBeyondSteel,
     /// Johnson's law for a contact that is wide beside the tooth's radius or the depth.
@@ -177,6 +181,26 @@ impl From<&Finding> for FindingAnswer {
                 "deg",
                 "the ring's flank stands steep to the radius: its force is several times the wave generator's, and friction, which the model leaves out, may keep the drive from turning".into(),
                 "make the ellipse rounder, or take fewer teeth",
+            ),
+            Finding::HollowWaveGenerator { amplitude_mm, limit_mm } => new(
+                Code::HollowWaveGenerator,
+                Info,
+                &["/drive/wave_generator/amplitude_mm"],
+                amplitude_mm,
+                limit_mm,
+                "mm",
+                "the wave generator is hollow between its lobes: a solid one turns, but the ring of a bearing could not follow it".into(),
+                "for a bearing choose a smaller amplitude or a larger path",
+            ),
+            Finding::FlatCutsTheContact { flat_length_mm, limit_mm } => new(
+                Code::FlatCutsTheContact,
+                Warning,
+                &["/drive/teeth/flat_length_mm", RADIUS],
+                flat_length_mm,
+                limit_mm,
+                "mm",
+                "the flats end a tooth's arcs before its steepest contact with the ring: there it would ride on an edge".into(),
+                "make the flats shorter",
             ),
             Finding::LinearLawTooStiff { linear_um, palmgren_um } => new(
                 Code::LinearLawTooStiff,

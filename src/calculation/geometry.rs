@@ -141,7 +141,7 @@ impl From<&Drive> for UndercutAnswer {
 
 impl From<&Drive> for EngagementAnswer {
     fn from(drive: &Drive) -> Self {
-        Self { start_deg: drive.flank_limit().position.from_major_deg(), end_deg: 0.0 }
+        Self { start_deg: drive.flank_limit().position.from_lobe_deg(), end_deg: 0.0 }
     }
 }
 
@@ -176,7 +176,7 @@ impl Question for Geometry {
 
     fn answer((drive, profile): &Self::Checked, stop: &impl Stop) -> Result<GeometryAnswer, NoAnswer> {
         let profiles = profile::profiles(drive, profile, stop)?;
-        let p = drive.parameters();
+        let (p, cam_outer_mm) = (drive.parameters(), drive.cam_outer_radius_mm());
         let flank = drive.flank();
         let steepest = drive.steepest_engaged().map_err(SolveError::from)?;
         let innermost = flank.locus().at(drive.flank_limit().position).map_err(SolveError::from)?;
@@ -201,12 +201,12 @@ impl Question for Geometry {
                 profile: (&profiles.wave_generator).into(),
             },
             carrier: CarrierAnswer {
-                inner_radius_limit_mm: p.semi_major_mm,
+                inner_radius_limit_mm: cam_outer_mm,
                 outer_radius_limit_mm: tip_radius_mm,
-                radial_space_mm: tip_radius_mm - p.semi_major_mm,
+                radial_space_mm: tip_radius_mm - cam_outer_mm,
                 slot_wall_mm: drive.slot_wall_mm(),
-                tooth_center_clearance_inner_mm: innermost.center_radius_mm - p.semi_major_mm,
-                tooth_center_clearance_outer_mm: tip_radius_mm - (p.semi_major_mm + p.tooth_radius_mm),
+                tooth_center_clearance_inner_mm: innermost.center_radius_mm - cam_outer_mm,
+                tooth_center_clearance_outer_mm: tip_radius_mm - (cam_outer_mm + p.tooth_radius_mm),
             },
             teeth: TeethAnswer { gap_min_mm: center_distance_mm - 2.0 * p.tooth_radius_mm },
             tooth_center_path: (&profiles.tooth_center_path).into(),

@@ -5,9 +5,10 @@
 //! resolution, so that no peak hides between them; then every peak that may be the largest of its kind is closed in on.
 
 use crate::load_sharing::{LoadCase, LoadedDrive};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, PlacedTooth};
+use crate::position::Position;
 use crate::ring::FlankEnd;
-use crate::sweep::{PlacedTooth, Tolerance};
+use crate::sweep::Tolerance;
 use crate::{SolveError, Stop};
 
 /// Intervals that a smooth piece starts with.
@@ -28,26 +29,32 @@ const MAX_STEPS: u32 = 100;
 /// An input angle, and which teeth mesh there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Moment {
-    /// Share of the period that has passed.
+    /// Share of the lap that has passed.
     pub(crate) fraction: f64,
     first: u64,
     last: u64,
-    /// The tooth that stands exactly where the flank ends.
+    /// The place that stands exactly where the flank ends.
     entering: Option<u64>,
 }
 
 impl Moment {
-    /// The teeth in mesh.
-    pub(crate) fn teeth(self, mesh: &Mesh) -> impl Iterator<Item = PlacedTooth> {
+    /// The teeth that are listed when so many laps have passed before.
+    pub(crate) fn placed(self, mesh: &Mesh, lap: u64) -> impl Iterator<Item = PlacedTooth> {
         let mesh = *mesh;
-        (self.first..=self.last).map(move |number| {
-            let position = if self.entering == Some(number) {
-                mesh.flank_limit().position
-            } else {
-                mesh.position_between(number, self.fraction)
-            };
-            PlacedTooth { number, position, position_deg: position.from_major_deg() }
-        })
+        mesh.placed_between(self.first..=self.last, lap, move |place| self.position(&mesh, place))
+    }
+
+    /// Places where teeth mesh.
+    pub(crate) const fn places(&self) -> u64 {
+        self.last + 1 - self.first
+    }
+
+    fn position(&self, mesh: &Mesh, place: u64) -> Position {
+        if self.entering == Some(place) {
+            mesh.flank_limit().position
+        } else {
+            mesh.position_between(place, self.fraction)
+        }
     }
 }
 
@@ -108,7 +115,7 @@ fn raise(peaks: &mut [f64], values: &[f64]) {
 /// of a single tooth, without a seam. The track runs from one entry, `entry - 1`, to the next, `entry`; on it a tooth keeps its number.
 #[derive(Debug, Clone, Copy)]
 struct Link<'a> {
-    /// Fraction of the period, below 0 for what stands in the answer a period later.
+    /// Fraction of the lap, below 0 for what stands in the answer a lap later.
     at: f64,
     /// What a tooth's number there exceeds its number on the track by.
     shift: u64,
@@ -147,7 +154,8 @@ struct Candidate<'a> {
 }
 
 struct Search<'a, S> {
-    loaded: &'a LoadedDrive<'a>,
+    /// With one tooth at each place of the mesh, which stands for all that carry alike.
+    loaded: LoadedDrive<'a>,
     mesh: Mesh,
     allowable_stress_mpa: Option<f64>,
     /// Whether teeth begin and cease to carry between their entry and their exit.
@@ -171,7 +179,7 @@ pub(crate) fn moments(
 ) -> Result<Vec<Moment>, SolveError> {
     let mesh = Mesh::new(loaded.drive());
     let mut search = Search {
-        loaded,
+        loaded: loaded.with_zones(mesh.teeth_at_each_place()),
         mesh,
         allowable_stress_mpa: load.parameters().allowable_stress_mpa,
         has_clearance: load.has_clearance(),
@@ -237,13 +245,14 @@ impl<S: Stop> Search<'_, S> {
         if self.stop.stopped() {
             return Err(SolveError::Stopped);
         }
-        self.states += moment.last + 1 - moment.first;
+        self.states += moment.places();
         let limit = self.tolerance.max_states();
         if self.states > limit {
             return Err(SolveError::TooManyStates { limit });
         }
+        let places = moment.first..=moment.last;
         let teeth: Result<Vec<_>, _> =
-            moment.teeth(&self.mesh).map(|placed| self.loaded.tooth(placed.position)).collect();
+            places.map(|place| self.loaded.tooth(moment.position(&self.mesh, place))).collect();
         let teeth = teeth?;
         let wind_up = self.loaded.wind_up(&teeth)?;
         let loads: Result<Vec<_>, _> = teeth.iter().map(|tooth| self.loaded.loads(tooth, &wind_up)).collect();

@@ -19,8 +19,8 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
 use std::iter::zip;
 use std::ops::Range;
 
+use crate::cam::Cam;
 use crate::contact::PerContact;
-use crate::drive::WAVES;
 use crate::load_sharing::{Compatibility, LoadedDrive};
 use crate::mesh::{Mesh, Samples};
 use crate::position::Position;
@@ -157,9 +157,13 @@ impl Kernel {
     fn new(loaded: &LoadedDrive<'_>) -> Option<Self> {
         let contact = loaded.linear_compliance_mm_per_n()?;
         let drive = loaded.drive();
-        let p = drive.parameters();
-        let (a, b, r) = (p.semi_major_mm, p.semi_minor_mm, p.tooth_radius_mm);
-        let difference_of_squares = drive.flank().locus().cam().difference_of_squares_mm2();
+        // The formulas are those of an ellipse, and one zone stands for both.
+        let Cam::Ellipse(cam) = drive.flank().locus().cam() else { return None };
+        if !Mesh::new(drive).zones_are_alike() {
+            return None;
+        }
+        let (a, b, r) = (cam.semi_major_mm(), cam.semi_minor_mm(), drive.parameters().tooth_radius_mm);
+        let difference_of_squares = cam.difference_of_squares_mm2();
         // Bounds of the two ratios over all positions: the first by the inequality of the means, the second by sin β ≤ 1.
         let cam_ratio = difference_of_squares * r * a / (2.0 * a * b * ((b * b + r * b) * (a * a + r * b)).sqrt());
         let ring_ratio = r / (b + r);
@@ -379,10 +383,10 @@ impl Kernel {
         let (rotation_rad, rotation_root) = (&mut tile.row_rotation_rad[..rows], &mut tile.row_rotation_root[..rows]);
         let residual = &mut tile.row_residual[..rows];
         for row in 0..rows {
-            let rotation = input_nmm / (WAVES * cam[row]);
+            let rotation = input_nmm / (loaded.zones() * cam[row]);
             rotation_rad[row] = rotation;
             rotation_root[row] = rotation.sqrt();
-            let zones = WAVES * rotation;
+            let zones = loaded.zones() * rotation;
             let [wave_generator, ring, carrier] = [cam[row], ring[row], carrier[row]].map(|torque| zones * torque);
             residual[row] = balance.residual(&PerContact { wave_generator, ring, carrier });
         }
@@ -391,7 +395,7 @@ impl Kernel {
         for (angle_deg, sample) in zip(&mut tile.row_input_angle_deg[..rows], samples) {
             *angle_deg = mesh.input_angle_deg(sample, run.of);
         }
-        let stiffness_nmm_per_rad = cam.iter().map(|cam| WAVES * cam);
+        let stiffness_nmm_per_rad = cam.iter().map(|cam| loaded.zones() * cam);
         // Only a tooth on the minor axis, the last one, has no lever arm and no load.
         let lasts = tile.force.wave_generator[..tile.count].iter().skip(run.teeth - 1).step_by(run.teeth);
         let loaded_teeth = lasts.map(|last| run.teeth - usize::from(*last <= 0.0));
@@ -535,7 +539,8 @@ impl Run {
         let Self { teeth, rows, .. } = *self;
         let (base_sin, base_cos) = (&mut tile.base_sin[..teeth], &mut tile.base_cos[..teeth]);
         for (tooth, base) in zip(1.., zip(&mut *base_sin, &mut *base_cos)) {
-            let Position { sin, cos, .. } = self.mesh.position_in_mesh(tooth, self.samples.start, self.of);
+            let Position { phase_sin: sin, phase_cos: cos, .. } =
+                self.mesh.position_in_mesh(tooth, self.samples.start, self.of);
             (*base.0, *base.1) = (sin, cos);
         }
         tile.tooth.clear();
@@ -579,8 +584,8 @@ impl Run {
         let end = self.mesh.position_in_mesh(1, samples.end - 1, self.of);
         for (row, to_end) in (0..rows).rev().enumerate() {
             let (row_sin, row_cos) = (tile.row_sines.sin[to_end], tile.row_sines.cos[to_end]);
-            sin[row * self.teeth] = end.sin * row_cos + end.cos * row_sin;
-            cos[row * self.teeth] = end.cos * row_cos - end.sin * row_sin;
+            sin[row * self.teeth] = end.phase_sin * row_cos + end.phase_cos * row_sin;
+            cos[row * self.teeth] = end.phase_cos * row_cos - end.phase_sin * row_sin;
         }
     }
 }

@@ -8,7 +8,7 @@ use nalgebra::{Point2, Rotation2, Unit, Vector2};
 use crate::contact::Part;
 use crate::drive::{Draft, Drive, DriveError};
 use crate::parts::{CarrierPart, PartsParameters, RingPart, ToothPart, WaveGeneratorPart};
-use crate::profile::{Polyline, SampledCurve, cam_quarter, flank_curve, mirrored};
+use crate::profile::{Polyline, SampledCurve, cam_half_lobe, cam_outline, direction, flank_curve};
 use crate::ring::FlankEnd;
 use crate::root::NotConverged;
 use crate::violation::{Parameter, Violation};
@@ -210,9 +210,7 @@ impl Drawing {
             MadePart::Ring(ring) => (Part::Ring, self.ring_section(ring, stop)?),
             MadePart::WaveGenerator(cam) => (Part::WaveGenerator, self.cam_section(cam, stop)?),
             MadePart::Carrier(carrier) => (Part::Carrier, self.carrier_section(carrier)),
-            MadePart::Teeth(ToothPart { radius_mm }) => {
-                (Part::Teeth, Section { outer: Outline::Circle { radius_mm: *radius_mm }, holes: Vec::new() })
-            }
+            MadePart::Teeth(tooth) => (Part::Teeth, tooth_section(tooth)),
         };
         Ok(Body { part, section, placements: self.placements(part)? })
     }
@@ -258,20 +256,23 @@ impl Drawing {
         Ok(Section { outer: Outline::Circle { radius_mm: ring.outer_radius_mm }, holes: vec![Outline::Edges(edges)] })
     }
 
-    /// The wave generator: a curve a quarter.
+    /// The wave generator: a curve from each lobe to each valley and on.
     fn cam_section(&self, cam: &WaveGeneratorPart, stop: &impl Stop) -> Result<Section, SolveError> {
+        let (locus, lobes) = (self.drive.flank().locus(), self.drive.lobes());
         let SampledCurve { points, .. } =
-            cam_quarter(self.drive.flank().locus().cam(), cam.clearance_mm, self.parameters.chord_tolerance_mm, stop)?;
-        self.require_points(4 * (points.len() as u64 - 1))?;
-        let half = mirrored(&points, Vector2::new(-1.0, 1.0));
-        let whole = mirrored(&half, Vector2::new(1.0, -1.0));
-        let quarter = points.len() - 1;
-        let axes = [Vector2::x_axis(), Vector2::y_axis()];
-        let directions = [axes[1], -axes[0], -axes[1], axes[0]];
-        let edges = (0..4).map(|index| Edge::Curve {
-            points: whole[index * quarter..=(index + 1) * quarter].to_vec(),
-            start_tangent: directions[index],
-            end_tangent: directions[(index + 1) % 4],
+            cam_half_lobe(locus, cam.clearance_mm, self.parameters.chord_tolerance_mm, stop)?;
+        let half = points.len() - 1;
+        self.require_points(u64::from(2 * lobes) * half as u64)?;
+        let whole = cam_outline(&points, lobes);
+        // Where a lobe or a valley lies the tangent stands across the radius.
+        let across = |end: u32| {
+            let radial = direction(end, 2 * lobes);
+            Unit::new_unchecked(Vector2::new(0.0 - radial.y, radial.x))
+        };
+        let edges = (0..2 * lobes).zip((0..).step_by(half)).map(|(index, start)| Edge::Curve {
+            points: whole[start..=start + half].to_vec(),
+            start_tangent: across(index),
+            end_tangent: across((index + 1) % (2 * lobes)),
         });
         Ok(Section {
             outer: Outline::Edges(edges.collect()),
@@ -319,7 +320,7 @@ impl Drawing {
 
     /// Where the prisms of a part stand: in the ring's frame for an assembly, in its own otherwise.
     ///
-    /// The carrier turns by `j (Z_G - Z_K)/Z_G` and tooth i stands in slot i, at `ψ_i = i 2π/Z'_G - j Z_K/Z_G` from the major axis
+    /// The carrier turns by `j (Z_G - Z_K)/Z_G` and tooth i stands in slot i, at `ψ_i = i 2π/Z'_G - j Z_K/Z_G` from the first lobe
     /// (docs/theory.md section 3).
     fn placements(&self, part: Part) -> Result<Vec<Placement>, SolveError> {
         let p = self.drive.parameters();
@@ -336,11 +337,11 @@ impl Drawing {
             (Part::WaveGenerator, _) => vec![turned(input_turns)],
             (Part::Carrier, _) => slots.map(|slot| turned(slot + carrier_turns)).collect(),
             (Part::Teeth, Subject::Assembly) => {
-                let from_major = input_turns * (p.ring_teeth as f64 / p.teeth as f64);
+                let from_lobe = input_turns * (p.ring_teeth as f64 / p.teeth as f64);
                 let placed = slots.map(|slot| {
                     let placement = turned(slot + carrier_turns);
                     let (sin, cos) = placement.rotation_rad.sin_cos();
-                    let position_rad = 2.0 * PI * (slot - from_major).rem_euclid(1.0);
+                    let position_rad = 2.0 * PI * (slot - from_lobe).rem_euclid(1.0);
                     let center_radius_mm = self.drive.center_radius_at_mm(position_rad)?;
                     let origin_mm = Point2::from(center_radius_mm * Vector2::new(cos, sin));
                     Ok(Placement { origin_mm, ..placement })
@@ -354,4 +355,25 @@ impl Drawing {
         let limit = self.parameters.max_points;
         if points > limit { Err(SolveError::TooManyPoints { points, limit }) } else { Ok(()) }
     }
+}
+
+/// A tooth: a circle, or, with flats on the walls of its slot, which runs along x, two arcs joined by lines.
+fn tooth_section(tooth: &ToothPart) -> Section {
+    let ToothPart { radius_mm, half_width_mm } = *tooth;
+    let outer = if half_width_mm < radius_mm {
+        let half_length_mm = ((radius_mm - half_width_mm) * (radius_mm + half_width_mm)).sqrt();
+        let corner = |x: f64, y: f64| Point2::new(x * half_length_mm, y * half_width_mm);
+        let arc =
+            |start, end| Edge::Arc { start, end, radius_mm, sweep_rad: 2.0 * half_width_mm.atan2(half_length_mm) };
+        let (right, left) = ([corner(1.0, -1.0), corner(1.0, 1.0)], [corner(-1.0, 1.0), corner(-1.0, -1.0)]);
+        Outline::Edges(vec![
+            arc(right[0], right[1]),
+            Edge::Line { start: right[1], end: left[0] },
+            arc(left[0], left[1]),
+            Edge::Line { start: left[1], end: right[0] },
+        ])
+    } else {
+        Outline::Circle { radius_mm }
+    };
+    Section { outer, holes: Vec::new() }
 }

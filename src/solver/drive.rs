@@ -2,35 +2,104 @@
 
 use std::f64::consts::{PI, SQRT_2};
 
-use crate::cam::Cam;
+use crate::cam::{Cam, Ellipse, WaveGenerator};
+use crate::contact::PerContact;
 use crate::locus::{Locus, ToothCenter};
-use crate::position::Position;
+use crate::position::{Position, half_lobe_rad};
 use crate::ring::{FlankLimit, RingFlank, RingTooth};
 use crate::root::{NotConverged, bracketed};
 use crate::violation::{Alternatives, Parameter, Violation};
 
-/// Waves of the cam: an ellipse has two.
-pub const WAVES: f64 = 2.0;
-
 /// What describes a drive (docs/theory.md section 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriveParameters {
-    /// `a`: semi-major axis of the wave generator.
-    pub semi_major_mm: f64,
-    /// `b`: semi-minor axis of the wave generator.
-    pub semi_minor_mm: f64,
+    /// What pushes the teeth outward.
+    pub wave_generator: WaveGenerator,
     /// `Z_G`: teeth in theory.
     pub teeth: i64,
     /// `Z'_G`: installed teeth; only they have a slot.
     pub installed: i64,
     /// `r`: radius of a tooth.
     pub tooth_radius_mm: f64,
-    /// `L1`: width of a tooth along the axis.
-    pub tooth_width_mm: f64,
+    /// What a tooth is besides its radius.
+    pub tooth: ToothShape,
     /// `Z_K`: teeth of the ring.
     pub ring_teeth: i64,
     /// Radius of a bore that truncates the ring's teeth.
     pub tip_radius_mm: Option<f64>,
+}
+
+/// The shape of a tooth of the radius `r` (docs/theory.md section 2.10).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ToothShape {
+    /// A cylinder along the axis.
+    Cylinder {
+        /// `L1`: width along the axis.
+        width_mm: f64,
+    },
+    /// A ball, in grooves where their radii are given.
+    Ball {
+        /// Radius of the groove in each part.
+        groove_radius_mm: PerContact<Option<f64>>,
+    },
+    /// A cylinder with two flats, which lie on the walls of its slot.
+    FlatSided {
+        /// `L1`: width along the axis.
+        width_mm: f64,
+        /// `l`: length of a flat along the slot.
+        flat_length_mm: f64,
+    },
+}
+
+impl ToothShape {
+    /// What is given, each with the range that it has to lie in.
+    pub(crate) fn parameters(&self) -> Vec<(Parameter, f64)> {
+        match self {
+            Self::Cylinder { width_mm } => vec![(Parameter::ToothWidth, *width_mm)],
+            Self::Ball { groove_radius_mm } => groove_radius_mm
+                .iter()
+                .filter_map(|(contact, radius)| Some((Parameter::GrooveRadius(contact), (*radius)?)))
+                .collect(),
+            Self::FlatSided { width_mm, flat_length_mm } => {
+                vec![(Parameter::ToothWidth, *width_mm), (Parameter::FlatLength, *flat_length_mm)]
+            }
+        }
+    }
+
+    /// Why no tooth of this radius has the shape, its parameters being in their ranges.
+    fn violations(&self, tooth_radius_mm: f64) -> Vec<Violation> {
+        match self {
+            Self::Cylinder { .. } => Vec::new(),
+            Self::Ball { groove_radius_mm } => groove_radius_mm
+                .iter()
+                .filter_map(|(contact, radius)| Some((contact, (*radius)?)))
+                .filter(|&(_, groove_radius_mm)| groove_radius_mm <= tooth_radius_mm)
+                .map(|(contact, groove_radius_mm)| Violation::GrooveTooTight {
+                    contact,
+                    groove_radius_mm,
+                    tooth_radius_mm,
+                })
+                .collect(),
+            Self::FlatSided { flat_length_mm, .. } if *flat_length_mm >= 2.0 * tooth_radius_mm => {
+                vec![Violation::FlatTooLong {
+                    flat_length_mm: *flat_length_mm,
+                    tooth_diameter_mm: 2.0 * tooth_radius_mm,
+                }]
+            }
+            Self::FlatSided { .. } => Vec::new(),
+        }
+    }
+
+    /// Half the width across the slot: `r`, between flats `√(r² - l²/4)`.
+    pub fn half_width_in_slot_mm(&self, tooth_radius_mm: f64) -> f64 {
+        match self {
+            Self::Cylinder { .. } | Self::Ball { .. } => tooth_radius_mm,
+            Self::FlatSided { flat_length_mm, .. } => {
+                let half_mm = 0.5 * flat_length_mm;
+                ((tooth_radius_mm - half_mm) * (tooth_radius_mm + half_mm)).sqrt()
+            }
+        }
+    }
 }
 
 /// A drive that can exist.
@@ -66,6 +135,29 @@ impl Drive {
         &self.parameters
     }
 
+    /// `U`: lobes of the wave generator.
+    pub fn lobes(&self) -> u32 {
+        self.ring.flank.locus().lobes()
+    }
+
+    /// Extent of a tooth along the axis: `L1`, a ball's diameter.
+    pub fn tooth_width_mm(&self) -> f64 {
+        match self.parameters.tooth {
+            ToothShape::Cylinder { width_mm } | ToothShape::FlatSided { width_mm, .. } => width_mm,
+            ToothShape::Ball { .. } => 2.0 * self.parameters.tooth_radius_mm,
+        }
+    }
+
+    /// Half the width of a slot without clearance.
+    pub fn slot_half_width_mm(&self) -> f64 {
+        self.parameters.tooth.half_width_in_slot_mm(self.parameters.tooth_radius_mm)
+    }
+
+    /// The cam's largest distance from the axis, from where on the carrier can begin.
+    pub fn cam_outer_radius_mm(&self) -> f64 {
+        self.ring.flank.locus().cam_outer_radius_mm()
+    }
+
     /// The ring's flank; through it the path of the teeth and the wave generator.
     pub const fn flank(&self) -> &RingFlank {
         &self.ring.flank
@@ -88,7 +180,7 @@ impl Drive {
 
     /// `Z_G / U`: carrier torque over input torque.
     pub fn teeth_per_wave(&self) -> f64 {
-        self.parameters.teeth as f64 / WAVES
+        self.parameters.teeth as f64 / f64::from(self.lobes())
     }
 
     /// `i_HG = Z_G/(Z_G - Z_K)`: input speed over carrier speed, ring fixed.
@@ -101,7 +193,7 @@ impl Drive {
         -self.sense() * self.ring.flank.teeth_per_wave()
     }
 
-    /// Radius of the ring at the middle of its tooth space, `a + 2r`.
+    /// Radius of the ring at the middle of its tooth space, `d_l + r`.
     pub fn root_radius_mm(&self) -> f64 {
         self.ring.flank.root_radius_mm()
     }
@@ -137,16 +229,15 @@ impl Drive {
         self.neighbours().least_center_distance_mm()
     }
 
-    /// `d` at any angle from the major axis.
+    /// `d` at any angle from a lobe.
     pub(crate) fn center_radius_at_mm(&self, angle_rad: f64) -> Result<f64, NotConverged> {
         self.ring.flank.locus().center_radius_at_mm(angle_rad)
     }
 
     /// Thickness of the wall between two neighbouring slots where it is thinnest, at the carrier's inner edge on
-    /// the circle of radius `a`: `2 (√(a² - r²) sin(π/Z'_G) - r cos(π/Z'_G))`; not positive where the slots run into each other there.
+    /// the circle of the cam's outer radius `a`: `2 (√(a² - w²) sin(π/Z'_G) - w cos(π/Z'_G))`, w half the slot's width; not positive where the slots run into each other there.
     pub fn slot_wall_mm(&self) -> f64 {
-        let p = &self.parameters;
-        let (a, r) = (p.semi_major_mm, p.tooth_radius_mm);
+        let (a, r) = (self.cam_outer_radius_mm(), self.slot_half_width_mm());
         let (sin, cos) = self.neighbours().half_spacing_rad().sin_cos();
         2.0 * (((a - r) * (a + r)).max(0.0).sqrt() * sin - r * cos)
     }
@@ -158,12 +249,16 @@ impl Drive {
 pub struct Draft {
     parameters: DriveParameters,
     violations: Vec<Violation>,
-    pub(crate) semi_major_mm: Option<f64>,
-    pub(crate) semi_minor_mm: Option<f64>,
+    /// The cam's largest and least distance from the axis.
+    pub(crate) cam_outer_mm: Option<f64>,
+    pub(crate) cam_inner_mm: Option<f64>,
+    /// How far the cam can be set back.
+    pub(crate) greatest_set_back_mm: Option<f64>,
     pub(crate) installed: Option<i64>,
     pub(crate) tooth_radius_mm: Option<f64>,
-    pub(crate) cam: Option<Cam>,
-    /// `s`, where carrier and ring differ by two teeth.
+    /// Half the width of a slot.
+    pub(crate) slot_half_width_mm: Option<f64>,
+    /// `s`, where carrier and ring differ by a tooth for each lobe.
     pub(crate) sense: Option<f64>,
     pub(crate) ring: Option<RingTooth>,
 }
@@ -181,56 +276,95 @@ impl Draft {
             violations.extend(violation);
             violation.is_none()
         };
-        let semi_major_mm = is_in_range(Parameter::SemiMajor, p.semi_major_mm).then_some(p.semi_major_mm);
-        let semi_minor_mm = is_in_range(Parameter::SemiMinor, p.semi_minor_mm).then_some(p.semi_minor_mm);
-        let teeth = is_in_range(Parameter::ToothCount, p.teeth as f64).then_some(p.teeth);
-        let installed = is_in_range(Parameter::InstalledTeeth, p.installed as f64).then_some(p.installed);
-        let tooth_radius_mm = is_in_range(Parameter::ToothRadius, p.tooth_radius_mm).then_some(p.tooth_radius_mm);
-        is_in_range(Parameter::ToothWidth, p.tooth_width_mm);
-        let ring_teeth = is_in_range(Parameter::RingTeeth, p.ring_teeth as f64).then_some(p.ring_teeth);
+        let mut are_in_range = |parameters: Vec<(Parameter, f64)>| {
+            parameters.into_iter().fold(true, |all, (parameter, value)| is_in_range(parameter, value) && all)
+        };
+        let wave_generator = are_in_range(p.wave_generator.parameters()).then_some(p.wave_generator);
+        let teeth = are_in_range(vec![(Parameter::ToothCount, p.teeth as f64)]).then_some(p.teeth);
+        let installed = are_in_range(vec![(Parameter::InstalledTeeth, p.installed as f64)]).then_some(p.installed);
+        let tooth_radius_mm =
+            are_in_range(vec![(Parameter::ToothRadius, p.tooth_radius_mm)]).then_some(p.tooth_radius_mm);
+        let tooth = are_in_range(p.tooth.parameters()).then_some(p.tooth);
+        let ring_teeth = are_in_range(vec![(Parameter::RingTeeth, p.ring_teeth as f64)]).then_some(p.ring_teeth);
         let mut bore_is_possible = p.tip_radius_mm.is_none_or(|bore| is_in_range(Parameter::TipRadius, bore));
 
+        // A cam of which the path is given follows from the teeth; every other one is what it is without them.
+        let cam_tooth_radius_mm = tooth_radius_mm.or((!p.wave_generator.follows_from_teeth()).then_some(0.0));
         let mut cam = None;
-        if let Some((semi_major_mm, semi_minor_mm)) = semi_major_mm.zip(semi_minor_mm) {
-            if semi_major_mm > semi_minor_mm {
-                cam = Some(Cam::new(semi_major_mm, semi_minor_mm));
-            } else {
-                violations.push(Violation::CamNotElongated { semi_major_mm, semi_minor_mm });
+        if let Some((wave_generator, radius_mm)) = wave_generator.zip(cam_tooth_radius_mm) {
+            match wave_generator.cam(radius_mm) {
+                Ok(possible) => cam = Some(Locus::new(possible, radius_mm)),
+                Err(violation) => violations.push(violation),
             }
         }
+        let (cam_outer_mm, cam_inner_mm) = match p.wave_generator {
+            // Of an ellipse each is known by itself.
+            WaveGenerator::Ellipse { semi_major_mm, semi_minor_mm } => {
+                let in_range = |parameter: Parameter, value| parameter.check(value).is_none().then_some(value);
+                (in_range(Parameter::SemiMajor, semi_major_mm), in_range(Parameter::SemiMinor, semi_minor_mm))
+            }
+            _ => (cam.map(|cam| cam.cam_outer_radius_mm()), cam.map(|cam| cam.cam_inner_radius_mm())),
+        };
+        let lobes = wave_generator.map(|wave_generator| wave_generator.lobes()).or_else(|| {
+            let lobes = p.wave_generator.lobes();
+            Parameter::Lobes.check(lobes as f64).is_none().then_some(lobes)
+        });
         let mut sense = None;
-        if let Some((teeth, ring_teeth)) = teeth.zip(ring_teeth) {
-            match teeth - ring_teeth {
-                2 => sense = Some(1.0),
-                -2 => sense = Some(-1.0),
-                _ => {
-                    let instead = Alternatives::to_ring_beside(teeth);
-                    violations.push(Violation::ToothDifference { teeth, ring_teeth, instead });
-                }
+        if let Some(((teeth, ring_teeth), lobes)) = teeth.zip(ring_teeth).zip(lobes) {
+            let instead = Alternatives::to_ring_beside(teeth, lobes);
+            if instead.contains(ring_teeth) {
+                sense = Some(if teeth > ring_teeth { 1.0 } else { -1.0 });
+            } else {
+                violations.push(Violation::ToothDifference { teeth, ring_teeth, lobes, instead });
             }
         }
-        violations.extend(violations_of_counts(teeth, installed));
-        if let Some(((semi_major_mm, tooth_radius_mm), tip_radius_mm)) =
-            semi_major_mm.zip(tooth_radius_mm).zip(p.tip_radius_mm.filter(|_| bore_is_possible))
+        if let Some((installed, teeth)) = installed.zip(teeth).filter(|(installed, teeth)| teeth % installed != 0) {
+            let instead = Alternatives::to_installed(installed, teeth);
+            violations.push(Violation::InstalledNoDivisor { installed, teeth, instead });
+        }
+        let mut slot_half_width_mm = None;
+        if let Some((tooth, tooth_radius_mm)) = tooth.zip(tooth_radius_mm) {
+            let impossible = tooth.violations(tooth_radius_mm);
+            if impossible.is_empty() {
+                slot_half_width_mm = Some(tooth.half_width_in_slot_mm(tooth_radius_mm));
+            }
+            violations.extend(impossible);
+        }
+        if let Some(((cam_outer_mm, tooth_radius_mm), tip_radius_mm)) =
+            cam_outer_mm.zip(tooth_radius_mm).zip(p.tip_radius_mm.filter(|_| bore_is_possible))
         {
-            let root_radius_mm = semi_major_mm + 2.0 * tooth_radius_mm;
+            let root_radius_mm = cam_outer_mm + 2.0 * tooth_radius_mm;
             if tip_radius_mm >= root_radius_mm {
                 violations.push(Violation::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm });
                 bore_is_possible = false;
             }
         }
 
-        let locus = cam.zip(tooth_radius_mm).map(|(cam, tooth_radius_mm)| Locus::new(cam, tooth_radius_mm));
+        let locus = cam.zip(tooth_radius_mm).map(|(cam, tooth_radius_mm)| Locus::new(*cam.cam(), tooth_radius_mm));
         let ring = match locus.zip(ring_teeth).filter(|_| bore_is_possible) {
             Some((locus, ring_teeth)) => {
-                Some(RingTooth::new(RingFlank::new(locus, ring_teeth as f64 / WAVES), p.tip_radius_mm)?)
+                let flank = RingFlank::new(locus, ring_teeth as f64 / f64::from(locus.lobes()));
+                Some(RingTooth::new(flank, p.tip_radius_mm)?)
             }
             None => None,
         };
-        if let Some(RingTooth { tip_radius_mm, .. }) = ring
-            && tip_radius_mm <= p.semi_major_mm
-        {
-            violations.push(Violation::NoCarrierAnnulus { semi_major_mm: p.semi_major_mm, tip_radius_mm });
+        if let Some(RingTooth { flank, tip_radius_mm, .. }) = ring {
+            let cam_outer_mm = flank.locus().cam_outer_radius_mm();
+            if tip_radius_mm <= cam_outer_mm {
+                let (parameter, value_mm) = p.wave_generator.stroke();
+                let limit_mm = match p.wave_generator {
+                    WaveGenerator::Ellipse { .. } => tip_radius_mm,
+                    // At a regular tip, where it lies farthest in, the ring leaves room where e < r.
+                    _ => p.tooth_radius_mm,
+                };
+                violations.push(Violation::NoCarrierAnnulus {
+                    parameter,
+                    value_mm,
+                    limit_mm,
+                    cam_outer_mm,
+                    tip_radius_mm,
+                });
+            }
         }
         if let Some((locus, installed)) = locus.zip(installed) {
             violations.extend(Neighbours { locus, installed }.violation()?);
@@ -238,11 +372,12 @@ impl Draft {
         Ok(Self {
             parameters: p,
             violations,
-            semi_major_mm,
-            semi_minor_mm,
+            cam_outer_mm,
+            cam_inner_mm,
+            greatest_set_back_mm: cam.map(|cam| cam.greatest_set_back_mm()),
             installed,
             tooth_radius_mm,
-            cam,
+            slot_half_width_mm,
             sense,
             ring,
         })
@@ -260,23 +395,6 @@ impl Draft {
     }
 }
 
-/// What makes a number of teeth, or of installed ones among them, impossible.
-fn violations_of_counts(teeth: Option<i64>, installed: Option<i64>) -> Vec<Violation> {
-    let mut violations = Vec::new();
-    let (even_teeth, odd_teeth) = (teeth.filter(|teeth| teeth % 2 == 0), teeth.filter(|teeth| teeth % 2 != 0));
-    violations.extend(odd_teeth.map(|teeth| Violation::CountOdd { teeth, instead: Alternatives::to_odd(teeth) }));
-    let Some(installed) = installed else { return violations };
-    let divisors = even_teeth.map(|teeth| Alternatives::to_installed(installed, teeth));
-    if installed % 2 != 0 {
-        let instead = divisors.unwrap_or(Alternatives::to_odd(installed));
-        violations.push(Violation::InstalledOdd { installed, instead });
-    }
-    if let Some((teeth, instead)) = even_teeth.zip(divisors).filter(|(teeth, _)| teeth % installed != 0) {
-        violations.push(Violation::InstalledNoDivisor { installed, teeth, instead });
-    }
-    violations
-}
-
 /// Neighbouring teeth on their path.
 #[derive(Debug, Clone, Copy)]
 struct Neighbours {
@@ -290,11 +408,10 @@ impl Neighbours {
         PI / self.installed as f64
     }
 
-    /// The radius up to which teeth are apart, `b sin/(1 - sin)` of half the spacing, because no centre comes nearer to the axis than
-    /// `b + r`. This bound settles nearly every drive.
+    /// The radius up to which teeth are apart, because no centre comes nearer to the axis than in the valley. This bound settles nearly
+    /// every drive.
     fn surely_free_radius_mm(&self) -> f64 {
-        let sin = self.half_spacing_rad().sin();
-        self.locus.cam().semi_minor_mm() * (sin / (1.0 - sin))
+        self.locus.cam().kind().surely_free_radius_mm(self.half_spacing_rad().sin())
     }
 
     /// That they touch, where they do.
@@ -312,22 +429,75 @@ impl Neighbours {
         Ok(Some(Violation::TeethTouch { tooth_diameter_mm, center_distance_mm, touching_radius_mm }))
     }
 
-    /// Distance of the nearest two centres on their path (docs/theory.md section 7): those either side of the minor axis, and of two teeth
-    /// alone those on it.
+    /// Least distance of two neighbouring centres on their path (docs/theory.md section 7): around an ellipse of those either side of the
+    /// minor axis, and of two teeth alone those on it.
     fn least_center_distance_mm(&self) -> Result<f64, NotConverged> {
+        if !matches!(self.locus.cam(), Cam::Ellipse(_)) {
+            return self.least_scanned_distance_mm();
+        }
+        let lobes = self.locus.lobes();
         if self.installed == 2 {
-            return Ok(2.0 * self.locus.at(Position::TIP)?.center_radius_mm);
+            return Ok(2.0 * self.locus.at(Position::valley(lobes))?.center_radius_mm);
         }
         let half_rad = self.half_spacing_rad();
-        Ok(2.0 * half_rad.sin() * self.locus.at(Position::from_minor(half_rad))?.center_radius_mm)
+        Ok(2.0 * half_rad.sin() * self.locus.at(Position::from_valley(half_rad, lobes))?.center_radius_mm)
     }
 
-    /// The radius at which the two teeth either side of the minor axis touch it, and so each other. There are four teeth or more.
+    /// The same around any cam: over the middle of the pair a scan,
+    /// then a golden-section search around its least value. The pair that straddles the valley is one of the scan.
+    fn least_scanned_distance_mm(&self) -> Result<f64, NotConverged> {
+        const SCAN: u32 = 96;
+        let half = self.half_spacing_rad();
+        let distance = |middle_rad: f64| -> Result<f64, NotConverged> {
+            let before = self.locus.center_radius_at_mm(middle_rad - half)?;
+            let after = self.locus.center_radius_at_mm(middle_rad + half)?;
+            Ok((before - after).hypot(2.0 * half.sin() * (before * after).sqrt()))
+        };
+        let valley_rad = half_lobe_rad(self.locus.lobes());
+        let step = valley_rad / f64::from(SCAN);
+        let mut best = (valley_rad, distance(valley_rad)?);
+        for i in 0..SCAN {
+            let middle = f64::from(i) * step;
+            let value = distance(middle)?;
+            if value < best.1 {
+                best = (middle, value);
+            }
+        }
+        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+        let (mut low, mut high) = (best.0 - step, best.0 + step);
+        // Forty steps shrink the bracket by 4e-9: a minimum is then known to all digits.
+        for _ in 0..40 {
+            let (left, right) = (high - golden * (high - low), low + golden * (high - low));
+            let (at_left, at_right) = (distance(left)?, distance(right)?);
+            best.1 = best.1.min(at_left).min(at_right);
+            if at_left < at_right { high = right } else { low = left }
+        }
+        Ok(best.1)
+    }
+
+    /// The radius, at most the one that the teeth have, at which they begin to touch: thicker teeth stand farther out, but by less than they
+    /// are thicker, so that the gap falls with the radius. Its logarithm is what is solved for, because radii range over twelve decades.
+    fn touching_radius_mm(&self) -> Result<f64, NotConverged> {
+        if let Cam::Ellipse(cam) = self.locus.cam() {
+            return self.touching_radius_of_ellipse_mm(cam);
+        }
+        let free_mm = 0.5 * self.surely_free_radius_mm();
+        let at = |exponent: f64| Self { locus: Locus::new(*self.locus.cam(), free_mm * exponent.exp()), ..*self };
+        let gap_mm = |exponent: f64| {
+            let thinner = at(exponent);
+            Ok(thinner.least_center_distance_mm()? - 2.0 * thinner.locus.tooth_radius_mm())
+        };
+        let most = (self.locus.tooth_radius_mm() / free_mm).ln();
+        let exponent = bracketed("radius at which teeth touch", 0.0, gap_mm(0.0)?, most, gap_mm)?;
+        Ok(at(exponent).locus.tooth_radius_mm())
+    }
+
+    /// Of an ellipse the radius at which the two teeth either side of the minor axis touch it, and so each other. There are four teeth or more.
     ///
     /// Their centres then stand at `(r, r cot μ)`, μ half the spacing, and on the path of section 2.2: with `a² cos φ/h = r (1 - cos φ)` and
     /// `b² sin φ/h = r (cot μ - sin φ)` the normal's angle is the one root of `a² cos φ (cot μ - sin φ) = b² sin φ (1 - cos φ)`, beyond 45°.
-    fn touching_radius_mm(&self) -> Result<f64, NotConverged> {
-        let (a, b) = (self.locus.cam().semi_major_mm(), self.locus.cam().semi_minor_mm());
+    fn touching_radius_of_ellipse_mm(&self, cam: &Ellipse) -> Result<f64, NotConverged> {
+        let (a, b) = (cam.semi_major_mm(), cam.semi_minor_mm());
         let half_rad = self.half_spacing_rad();
         // cot μ - 1 and, below, 1 - sin φ and 1 - cos φ, without a difference of near values.
         let beyond_one =

@@ -1,7 +1,8 @@
 //! What a designer should be told about a drive that can exist (docs/findings.md).
 
+use crate::cam::Cam;
 use crate::contact::{Contact, ContactLaw, Material, Materials, PerContact, half_width_mm};
-use crate::drive::{Drive, DriveParameters};
+use crate::drive::{Drive, ToothShape};
 use crate::load_sharing::LoadCase;
 use crate::mesh::Mesh;
 use crate::ring::FlankEnd;
@@ -90,6 +91,20 @@ pub enum Finding {
         /// Largest pressure angle β on the engaged flank.
         pressure_angle_deg: f64,
     },
+    /// The cam is hollow in its valleys: a solid one turns, but the ring of a bearing could not follow it.
+    HollowWaveGenerator {
+        /// `e`.
+        amplitude_mm: f64,
+        /// The largest that leaves the cam convex, `R/(U² + 1)`.
+        limit_mm: f64,
+    },
+    /// The flats of the teeth end their arcs before the steepest contact with the ring.
+    FlatCutsTheContact {
+        /// `l`.
+        flat_length_mm: f64,
+        /// The longest flat that leaves the contact whole, `2r cos β`.
+        limit_mm: f64,
+    },
     /// The linear law where approaches matter: it is several times too stiff.
     LinearLawTooStiff {
         /// The approach at the wave generator under the peak force by the linear law.
@@ -133,7 +148,7 @@ pub fn of_drive(drive: &Drive) -> Result<Vec<Finding>, NotConverged> {
     let p = drive.parameters();
     let flank = drive.flank();
     let limit = drive.flank_limit();
-    let engagement_start_deg = limit.position.from_major_deg();
+    let engagement_start_deg = limit.position.from_lobe_deg();
     let natural_tip_radius_mm = drive.natural_tip_radius_mm();
     if flank.is_undercut()
         && let Some(critical_tooth_radius_mm) = flank.critical_tooth_radius_mm()
@@ -159,19 +174,20 @@ pub fn of_drive(drive: &Drive) -> Result<Vec<Finding>, NotConverged> {
         findings.push(Finding::FewTeethInMesh { min });
     }
     let slot_wall_mm = drive.slot_wall_mm();
-    let limit_mm = THIN_WALL_SHARE_OF_SLOT * 2.0 * p.tooth_radius_mm;
+    let limit_mm = THIN_WALL_SHARE_OF_SLOT * 2.0 * drive.slot_half_width_mm();
     if slot_wall_mm < limit_mm {
         findings.push(Finding::ThinSlotWall { slot_wall_mm, limit_mm });
     }
     let innermost_mm = flank.locus().at(limit.position)?.center_radius_mm;
-    if innermost_mm < p.semi_major_mm {
+    let cam_outer_mm = drive.cam_outer_radius_mm();
+    if innermost_mm < cam_outer_mm {
         findings.push(Finding::ToothBeyondCarrier {
             edge: Edge::Inner,
             center_radius_mm: innermost_mm,
-            limit_mm: p.semi_major_mm,
+            limit_mm: cam_outer_mm,
         });
     }
-    let outermost_mm = p.semi_major_mm + p.tooth_radius_mm;
+    let outermost_mm = cam_outer_mm + p.tooth_radius_mm;
     if outermost_mm > drive.tip_radius_mm() {
         findings.push(Finding::ToothBeyondCarrier {
             edge: Edge::Outer,
@@ -179,10 +195,23 @@ pub fn of_drive(drive: &Drive) -> Result<Vec<Finding>, NotConverged> {
             limit_mm: drive.tip_radius_mm(),
         });
     }
-    let pressure_angle_deg = drive.steepest_engaged()?.tan_pressure_angle * flank.teeth_per_wave();
-    let pressure_angle_deg = pressure_angle_deg.atan().to_degrees();
+    let tan_pressure_angle = drive.steepest_engaged()?.tan_pressure_angle * flank.teeth_per_wave();
+    let pressure_angle_deg = tan_pressure_angle.atan().to_degrees();
     if pressure_angle_deg > STEEP_FLANK_DEG {
         findings.push(Finding::SteepRingFlank { pressure_angle_deg });
+    }
+    if let Cam::HarmonicPath(cam) = flank.locus().cam()
+        && cam.amplitude_mm() > cam.greatest_convex_amplitude_mm()
+    {
+        let limit_mm = cam.greatest_convex_amplitude_mm();
+        findings.push(Finding::HollowWaveGenerator { amplitude_mm: cam.amplitude_mm(), limit_mm });
+    }
+    if let ToothShape::FlatSided { flat_length_mm, .. } = p.tooth {
+        // The arcs that the flats leave reach as far as the contact with the ring: w/2 ≥ r sin β, that is, l ≤ 2r cos β.
+        let limit_mm = 2.0 * p.tooth_radius_mm / tan_pressure_angle.hypot(1.0);
+        if flat_length_mm > limit_mm {
+            findings.push(Finding::FlatCutsTheContact { flat_length_mm, limit_mm });
+        }
     }
     Ok(findings)
 }
@@ -195,7 +224,7 @@ pub fn of_contacts(
     approaches_matter: bool,
 ) -> Vec<Finding> {
     let p = load.parameters();
-    let width_mm = drive.parameters().tooth_width_mm;
+    let width_mm = drive.tooth_width_mm();
     let mut findings = Vec::new();
     let force_n = peaks.wave_generator.force_n.value;
     let approach_mm = |law: ContactLaw| plain_approach_mm(&law, &p.materials, width_mm, force_n);
@@ -230,7 +259,7 @@ pub fn of_contacts(
 /// The contacts that are too wide for Johnson's law, over all states: the widest is not the one with the largest stress.
 pub fn of_half_widths(drive: &Drive, load: &LoadCase, states: &States) -> Vec<Finding> {
     let ContactLaw::Johnson { depth_mm } = &load.parameters().law else { return Vec::new() };
-    let DriveParameters { tooth_radius_mm, tooth_width_mm, .. } = *drive.parameters();
+    let (tooth_radius_mm, tooth_width_mm) = (drive.parameters().tooth_radius_mm, drive.tooth_width_mm());
     let widest = states.force_n.iter().map(|(contact, forces_n)| {
         let loaded = forces_n.iter().zip(states.stress_mpa.get(contact)).filter(|&(&force_n, _)| force_n > 0.0);
         let half_widths = loaded.map(|(&force_n, &stress_mpa)| half_width_mm(force_n, stress_mpa, tooth_width_mm));

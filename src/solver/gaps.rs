@@ -4,14 +4,12 @@
 use std::f64::consts::PI;
 
 use crate::contact::PerContact;
-use crate::drive::{Drive, WAVES};
+use crate::drive::Drive;
 use crate::locus::ToothCenter;
 use crate::ring::FlankPoint;
 use crate::violation::{Modified, Parameter, Violation};
 
 const MM_PER_UM: f64 = 1e-3;
-/// Lobes of an ellipse.
-const LOBES: usize = 2;
 
 const RAD_PER_ARCSEC: f64 = PI / 648_000.0;
 
@@ -118,7 +116,7 @@ impl Deviations {
             (&self.slot_wall_um, slots),
             (&self.ring_space_um, spaces),
             (&self.ring_space_angle_arcsec, spaces),
-            (&self.wave_generator_lobe_um, LOBES),
+            (&self.wave_generator_lobe_um, usize::try_from(drive.lobes()).unwrap_or(0)),
         ];
         let runouts = self.runout.iter().flat_map(|(_, runout)| [runout.amount_um, runout.angle_deg]);
         let values = lists.iter().flat_map(|(list, _)| list.iter().copied()).chain(runouts);
@@ -187,7 +185,7 @@ impl Modification {
     /// That its tip relief starts where a drive has no flank.
     pub(crate) fn violation_in(&self, drive: &Drive) -> Option<Violation> {
         let start_deg = self.ring_tip_relief?.start_deg;
-        let engagement_start_deg = drive.flank_limit().position.from_major_deg();
+        let engagement_start_deg = drive.flank_limit().position.from_lobe_deg();
         (start_deg >= engagement_start_deg)
             .then_some(Violation::TipReliefBeyondFlank { start_deg, engagement_start_deg })
     }
@@ -271,8 +269,8 @@ impl<'a> Gaps<'a> {
     fn tip_relief_um(&self, center: &ToothCenter) -> f64 {
         let Some(TipRelief { amount_um, start_deg, power }) = self.modification.ring_tip_relief else { return 0.0 };
         let start_rad = start_deg.to_radians();
-        let end_rad = self.drive.flank_limit().position.from_major_rad;
-        let beyond_rad = center.position.from_major_rad - start_rad;
+        let end_rad = self.drive.flank_limit().position.from_lobe_rad;
+        let beyond_rad = center.position.from_lobe_rad - start_rad;
         if beyond_rad > 0.0 { amount_um * (beyond_rad / (end_rad - start_rad)).powf(power) } else { 0.0 }
     }
 
@@ -290,10 +288,10 @@ impl<'a> Gaps<'a> {
         let sin = flank.tan_pressure_angle * flank.cos_pressure_angle;
         let thinner_mm = MM_PER_UM * of(&deviations.tooth_radius_um, slot);
         // Directions, each in its own part: of the cam's normal, of the ring's outward normal, and in which a slot's wall is pressed.
-        let normal_rad = center.cam_contact.normal_sin.atan2(center.cam_contact.normal_cos);
-        let cam_rad = normal_rad + 2.0 * PI * lobe as f64 / WAVES;
+        let normal_rad = center.position.from_lobe_rad + center.tan_pressure_angle.atan();
+        let cam_rad = normal_rad + 2.0 * PI * lobe as f64 / f64::from(self.drive.lobes());
         let beta_rad = flank.tan_pressure_angle.atan();
-        let in_space_rad = center.position.from_major_rad / self.drive.flank().teeth_per_wave() + beta_rad;
+        let in_space_rad = center.position.from_lobe_rad / self.drive.flank().teeth_per_wave() + beta_rad;
         let ring_rad = 2.0 * PI * ring_space as f64 / p.ring_teeth as f64 - s * in_space_rad;
         let wall_rad = 2.0 * PI * slot as f64 / p.installed as f64 + s * 0.5 * PI;
         let along_mm = |runout: &Runout, direction_rad: f64| {

@@ -6,18 +6,20 @@
 //!
 //! # Parts
 //!
-//! An elliptic *wave generator* (input) pushes cylindrical *teeth* outward in the radial slots of a *carrier*
+//! A *wave generator* of U lobes (input) pushes *teeth* outward in the radial slots of a *carrier*
 //! (output). A fixed *ring*, whose profile is the envelope of the moving teeth, deflects them sideways.
 //!
 //! # Frames and signs
 //!
-//! - Wave generator's frame: x along the major axis. A tooth's *position* ψ is the polar angle of its centre there,
-//!   0 on the major axis (root of the ring's tooth space), π/2 on the minor axis (tip of the ring's tooth).
-//! - Ring's frame: x along the middle of a tooth space; the tooth's centre stands at the angle `-s ψ/k`, `k = Z_K / 2`,
+//! - Wave generator's frame: x along the middle of a lobe, the major axis of an ellipse. A tooth's *position* ψ is the polar angle of its
+//!   centre from the lobe that it is on: 0 in the middle of the lobe (root of the ring's tooth space), π/U in the valley (tip of the
+//!   ring's tooth).
+//! - Ring's frame: x along the middle of a tooth space; the tooth's centre stands at the angle `-s ψ/k`, `k = Z_K / U`,
 //!   `s = sign(Z_G - Z_K)`. The profile is symmetric, and is drawn with ψ/k.
-//! - Near the tip everything is worked from `x = π/2 - ψ`, which a [`Position`] carries beside ψ, because cos(π/2)
+//! - Near the tip everything is worked from `x = π/U - ψ`, which a [`Position`] carries beside ψ, because cos(π/2)
 //!   is 6e-17 in doubles and would enter stresses through a square root.
-//! - The two meshing zones are point reflections of each other; sums are over one zone, torques over both.
+//! - Where U divides the number of installed teeth the meshing zones are alike: sums are over one of them, torques over all. Elsewhere
+//!   the teeth of all zones are listed.
 //!
 //! # Units
 //!
@@ -44,6 +46,7 @@ pub mod mesh;
 pub mod parts;
 pub mod position;
 pub mod profile;
+pub mod radial_force;
 pub mod ring;
 pub mod root;
 pub mod springs;
@@ -51,8 +54,9 @@ pub mod sweep;
 pub mod tooth;
 pub mod violation;
 
+pub use cam::WaveGenerator;
 pub use contact::{Contact, ContactLaw, Material, Materials, Part, PerContact};
-pub use drive::{Drive, DriveParameters};
+pub use drive::{Drive, DriveParameters, ToothShape};
 pub use findings::Finding;
 pub use gaps::Modification;
 pub use load_sharing::{Compatibility, LoadCase, LoadParameters, Torque};
@@ -65,9 +69,9 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Why a drive that can exist has no answer to a question.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SolveError {
-    /// At some input angle no tooth has a lever arm: ψ_e is at most the spacing of the installed teeth.
+    /// At some input angle no tooth has a lever arm: ψ_e is at most the spacing of the places where teeth stand.
     #[error(
-        "the ring's flank ends at {engagement_start_deg} deg from the major axis, within one spacing of the installed teeth ({spacing_deg} deg): at some input angle no tooth has a lever arm, so no finite force carries the torque"
+        "the ring's flank ends at {engagement_start_deg} deg from the middle of a lobe, within one spacing of the teeth ({spacing_deg} deg): at some input angle no tooth has a lever arm, so no finite force carries the torque"
     )]
     NoToothInMesh {
         /// Where the flank ends, ψ_e.

@@ -1,7 +1,7 @@
 //! Equilibrium of a tooth and compatibility of all of them at one input angle (docs/theory.md section 4).
 
 use crate::contact::{Contact, ContactLaw, HertzLine, Materials, PerContact, half_width_mm};
-use crate::drive::{Draft, Drive, DriveParameters, WAVES};
+use crate::drive::{Draft, Drive};
 use crate::gaps::{Deviations, Gaps, Modification, Place};
 use crate::locus::ToothCenter;
 use crate::mesh::Mesh;
@@ -198,6 +198,8 @@ impl AsRef<Spring> for ToothState {
 pub struct LoadedDrive<'a> {
     drive: &'a Drive,
     compatibility: Compatibility,
+    /// What a sum over the teeth that are listed is multiplied by, to be that over all.
+    zones: f64,
     input_torque_nmm: f64,
     law: ContactLaw,
     contacts: Contacts,
@@ -220,7 +222,7 @@ impl<'a> LoadedDrive<'a> {
     /// [`SolveError::NoToothInMesh`] and [`SolveError::ComplianceNotPositive`] where no finite forces exist, [`SolveError::Impossible`] where the
     /// drive cannot have the load's clearances.
     pub fn new(drive: &'a Drive, load: &LoadCase) -> Result<Self, SolveError> {
-        Self::with_teeth(drive, load, &ToothContact::Cylinder)
+        Self::with_teeth(drive, load, &ToothContact::of(drive))
     }
 
     /// The drive under the load, with teeth of another shape.
@@ -243,17 +245,18 @@ impl<'a> LoadedDrive<'a> {
         deviations: Option<&'a Deviations>,
     ) -> Result<Self, SolveError> {
         let p = load.parameters();
-        let DriveParameters { tooth_radius_mm: radius_mm, tooth_width_mm: width_mm, .. } = *drive.parameters();
-        let size = ToothSize { radius_mm, width_mm };
+        let size = ToothSize { radius_mm: drive.parameters().tooth_radius_mm, width_mm: drive.tooth_width_mm() };
         let contacts = Contacts::new(shape, &p.law, &p.materials, size, &p.series_compliance_mm_per_n)
             .ok_or_else(|| SolveError::Impossible(vec![Violation::LawOfOtherTeeth]))?;
         let input_torque_nm = match p.torque {
             Torque::Input(torque) => torque,
             Torque::Output(torque) => torque / drive.teeth_per_wave(),
         };
+        let mesh = Mesh::new(drive);
         let loaded = Self {
             drive,
             compatibility: p.compatibility,
+            zones: mesh.zones_in_torque(),
             input_torque_nmm: 1e3 * input_torque_nm,
             law: p.law,
             contacts,
@@ -270,10 +273,9 @@ impl<'a> LoadedDrive<'a> {
         if !violations.is_empty() {
             return Err(SolveError::Impossible(violations));
         }
-        let mesh = Mesh::new(drive);
         if !mesh.always_carries() {
             return Err(SolveError::NoToothInMesh {
-                engagement_start_deg: drive.flank_limit().position.from_major_deg(),
+                engagement_start_deg: drive.flank_limit().position.from_lobe_deg(),
                 spacing_deg: mesh.spacing_deg(),
             });
         }
@@ -283,11 +285,21 @@ impl<'a> LoadedDrive<'a> {
             let ToothState { center, spring, .. } = loaded.state(&Place::default(), drive.steepest_engaged()?)?;
             let compliance_mm_per_n = spring.approach.approach_mm(1.0);
             if compliance_mm_per_n <= 0.0 {
-                let position_deg = center.position.from_major_deg();
+                let position_deg = center.position.from_lobe_deg();
                 return Err(SolveError::ComplianceNotPositive { position_deg, compliance_mm_per_n });
             }
         }
         Ok(loaded)
+    }
+
+    /// The same for lists in which each tooth stands for so many.
+    pub(crate) const fn with_zones(self, zones: f64) -> Self {
+        Self { zones, ..self }
+    }
+
+    /// What a sum over the teeth that are listed is multiplied by, to be that over all.
+    pub(crate) const fn zones(&self) -> f64 {
+        self.zones
     }
 
     /// The drive.
@@ -338,9 +350,8 @@ impl<'a> LoadedDrive<'a> {
         let r = self.drive.parameters().tooth_radius_mm;
         let force_ratio = force_ratio(self.drive.sense(), flank_curve, &center);
         let weights = Weights::of(self.compatibility, self.drive.sense(), flank_curve, &center).0;
-        let cam = flank_curve.locus().cam();
         let curvature_per_mm = PerContact {
-            wave_generator: 1.0 / r + 1.0 / cam.curvature_radius_mm(&center.cam_contact),
+            wave_generator: 1.0 / r + center.cam_contact.curvature_per_mm,
             ring: 1.0 / (r * flank.regularity),
             carrier: 1.0 / r,
         };
@@ -348,7 +359,7 @@ impl<'a> LoadedDrive<'a> {
             let center_radius_mm = center.center_radius_mm;
             let pressure = self.contacts.pressure(contact, *curvature_per_mm.get(contact), center_radius_mm)?;
             let pressure = pressure.ok_or_else(|| {
-                let position_deg = center.position.from_major_deg();
+                let position_deg = center.position.from_lobe_deg();
                 SolveError::FlatOffCarrier { position_deg, center_radius_mm }
             })?;
             Ok::<_, SolveError>(tooth::Place {
@@ -364,7 +375,7 @@ impl<'a> LoadedDrive<'a> {
             let gap_mm = weights.iter().fold(0.0, |sum, (contact, weight)| sum + weight * gaps_mm.get(contact));
             // The weights of clearances under `projection` were looked at before: what is left of them is rounding.
             if gap_mm < 0.0 && self.compatibility == Compatibility::VirtualWork {
-                let position_deg = center.position.from_major_deg();
+                let position_deg = center.position.from_lobe_deg();
                 return Err(SolveError::Interference { slot: place.slot, position_deg, gap_um: 1e3 * gap_mm });
             }
             Some(gap_mm)
@@ -407,7 +418,7 @@ impl<'a> LoadedDrive<'a> {
 
     /// The teeth of one zone, which stands for all; of all of them where zones are unlike.
     fn springs<'s>(&self, teeth: &'s [ToothState]) -> Springs<'s, ToothState> {
-        Springs::new(teeth, if self.gaps.tell_zones_apart() { 1.0 } else { WAVES })
+        Springs::new(teeth, if self.gaps.tell_zones_apart() { 1.0 } else { self.zones })
     }
 
     /// The `Δφ` that balances the input torque over these teeth of one zone, or of all where zones are unlike.
@@ -463,7 +474,7 @@ impl<'a> LoadedDrive<'a> {
         if !teeth.iter().any(is_beyond) {
             return Ok(());
         }
-        let DriveParameters { tooth_radius_mm, tooth_width_mm, .. } = *self.drive.parameters();
+        let (tooth_radius_mm, tooth_width_mm) = (self.drive.parameters().tooth_radius_mm, self.drive.tooth_width_mm());
         let limit_mm = |contact| WIDEST_SHARE * least_length_mm(depth_mm, contact, tooth_radius_mm);
         let limit = Self::first_to_reach(teeth, |tooth, contact| {
             // Under `F_r` the half-width is the whole length, and its square goes as the force.
@@ -475,7 +486,7 @@ impl<'a> LoadedDrive<'a> {
         let FirstLimit { tooth, contact, rotation } = limit.ok_or(SolveError::NoLeverArm)?;
         Err(SolveError::JohnsonBeyondHalfWidth {
             contact,
-            position_deg: tooth.center.position.from_major_deg(),
+            position_deg: tooth.center.position.from_lobe_deg(),
             half_width_limit_mm: limit_mm(contact),
             input_torque_limit_nm: 1e-3 * self.springs(teeth).torque_nmm(&rotation)?.value,
         })

@@ -1,6 +1,7 @@
 //! Which teeth carry load at an input angle (docs/theory.md section 3).
 
 use std::f64::consts::PI;
+use std::ops::RangeInclusive;
 
 use crate::drive::Drive;
 use crate::position::Position;
@@ -26,27 +27,53 @@ impl Samples {
     }
 }
 
-/// The mesh of one zone over the input angle.
+/// The mesh over the input angle.
 ///
-/// In the wave generator's frame tooth i stands at `ψ_i(j) = 2π i/Z'_G - j Z_K/Z_G`. At the sample `n` of `N` over one
-/// period that is the whole fraction `(iN - n)/(N Z'_G)` of a turn: which teeth mesh is decided in whole numbers.
+/// In the wave generator's frame tooth i stands at `ψ_i(j) = 2π i/Z'_G - j Z_K/Z_G`, less the lobe that it is on. At the sample `n` of `N`
+/// over one period that is the whole fraction `q/(U N Z'_G)` of a turn, `q = U (iN - n) - u N Z'_G` for the lobe u: which teeth mesh is
+/// decided in whole numbers.
+///
+/// Where `U` divides `Z'_G` the zones are alike and one of them stands for all; its teeth are numbered on, past the last slot. Elsewhere
+/// the teeth of all zones are listed, by slot. With `g = gcd(U, Z'_G)` they stand at places `2π g/(U Z'_G)` apart, g at each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mesh {
     installed: u64,
     removal: u64,
     ring_teeth: u64,
+    lobes: u32,
     limit: FlankLimit,
-    /// `ψ_e Z'_G/2π`, rounded once: whoever asks when a tooth enters asks this number, and takes it as exact.
+    /// `ε/g`, rounded once: whoever asks when a tooth enters asks this number, and takes it as exact.
     engaged_spacings: f64,
 }
 
-/// How many teeth of a zone mesh, over the input angle.
+/// How many teeth mesh, over the input angle: of a zone where all are alike, of all zones elsewhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TeethInMesh {
     /// At least.
     pub min: u64,
     /// At most.
     pub max: u64,
+}
+
+/// A tooth in mesh at an input angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlacedTooth {
+    /// Its slot; where zones are alike, the slots of a zone counted on.
+    pub number: u64,
+    /// The lobe that it is on, counted from the one where tooth 0 stands at the start.
+    pub lobe: u32,
+    /// Where it stands on it.
+    pub position: Position,
+    /// The same in degrees, rounded once where it is a whole fraction of a turn.
+    pub position_deg: f64,
+}
+
+const fn greatest_common_divisor(one: u64, other: u64) -> u64 {
+    let (mut a, mut b) = (one, other);
+    while b > 0 {
+        (a, b) = (b, a % b);
+    }
+    a
 }
 
 impl Mesh {
@@ -56,12 +83,15 @@ impl Mesh {
         // Counts of a checked drive are positive and small.
         let whole = |count: i64| count.unsigned_abs();
         let (installed, limit) = (whole(p.installed), *drive.flank_limit());
+        let alike = greatest_common_divisor(u64::from(drive.lobes()), installed);
+        let places = u64::from(drive.lobes()) / alike * installed;
         Self {
             installed,
             removal: whole(p.teeth / p.installed),
             ring_teeth: whole(p.ring_teeth),
+            lobes: drive.lobes(),
             limit,
-            engaged_spacings: engaged_spacings(&limit, installed),
+            engaged_spacings: engaged_spacings(&limit, 0.5 * installed as f64 / alike as f64, places),
         }
     }
 
@@ -70,9 +100,39 @@ impl Mesh {
         &self.limit
     }
 
-    /// `ε = ψ_e Z'_G/π`, counted over both zones.
-    pub const fn coincidence_degree(&self) -> f64 {
-        2.0 * self.engaged_spacings
+    /// `U`.
+    fn lobes(&self) -> u64 {
+        u64::from(self.lobes)
+    }
+
+    /// `g = gcd(U, Z'_G)`: for every tooth so many stand alike, each on a lobe of its own.
+    pub fn lobes_loaded_alike(&self) -> u64 {
+        greatest_common_divisor(self.lobes(), self.installed)
+    }
+
+    /// Whether each zone looks like every other: `U` divides `Z'_G`.
+    pub fn zones_are_alike(&self) -> bool {
+        self.installed.is_multiple_of(self.lobes())
+    }
+
+    /// What the sum over the teeth listed has to be multiplied by to be that over all teeth.
+    pub fn zones_in_torque(&self) -> f64 {
+        if self.zones_are_alike() { f64::from(self.lobes) } else { 1.0 }
+    }
+
+    /// How many of the teeth that are listed stand at each place.
+    pub(crate) fn listed_at_each_place(&self) -> u64 {
+        if self.zones_are_alike() { 1 } else { self.lobes_loaded_alike() }
+    }
+
+    /// How many teeth carry alike: what a sum over one tooth at each place has to be multiplied by.
+    pub(crate) fn teeth_at_each_place(&self) -> f64 {
+        self.lobes_loaded_alike() as f64
+    }
+
+    /// `ε = U ψ_e Z'_G/2π`, counted over all zones.
+    pub fn coincidence_degree(&self) -> f64 {
+        self.teeth_at_each_place() * self.engaged_spacings
     }
 
     /// The input angle after which the load pattern repeats, teeth renumbered: `2π m/Z_K`, m = Z_G/Z'_G.
@@ -80,23 +140,30 @@ impl Mesh {
         360.0 * self.removal as f64 / self.ring_teeth as f64
     }
 
-    /// Angle between neighbouring installed teeth.
+    /// Places of a whole turn: `U Z'_G/g`.
+    fn places(&self) -> u64 {
+        self.lobes() / self.lobes_loaded_alike() * self.installed
+    }
+
+    /// Angle between neighbouring places: that between installed teeth where zones are alike.
     pub fn spacing_deg(&self) -> f64 {
-        360.0 / self.installed as f64
+        360.0 / self.places() as f64
     }
 
-    /// How many teeth of a zone mesh: always as many as the engagement spans whole spacings, or at times one more.
+    /// How many teeth mesh: always as many as the engagement spans whole spacings, or at times one more at each place.
     pub fn teeth_in_mesh(&self) -> TeethInMesh {
+        let at_each_place = self.listed_at_each_place();
         let min = self.whole_spacings();
-        TeethInMesh { min, max: min + u64::from(!self.spacings_are_whole()) }
+        let max = min + u64::from(!self.spacings_are_whole());
+        TeethInMesh { min: at_each_place * min, max: at_each_place * max }
     }
 
-    /// Whether at every input angle a tooth has a lever arm: `ψ_e > 2π/Z'_G`.
+    /// Whether at every input angle a tooth has a lever arm: `ψ_e > 2π g/(U Z'_G)`.
     pub fn always_carries(&self) -> bool {
         self.engaged_spacings > 1.0
     }
 
-    /// Whole spacings within the engagement: the teeth in mesh at j = 0.
+    /// Whole spacings within the engagement: the places in mesh at j = 0.
     pub(crate) fn whole_spacings(&self) -> u64 {
         floor_of_product(self.engaged_spacings, 1)
     }
@@ -106,25 +173,57 @@ impl Mesh {
         self.engaged_spacings.fract() == 0.0
     }
 
-    /// The fraction of the period that has passed when a tooth enters, above 0; 1 where that is at its end. Exact.
+    /// The fraction of a lap that has passed when a tooth enters, above 0; 1 where that is at its end. Exact.
     pub(crate) fn entry_fraction(&self) -> f64 {
         1.0 - self.engaged_spacings.fract()
     }
 
-    /// The largest whole p with `2π p/(N Z'_G) ≤ ψ_e`.
+    /// The largest whole p with `2π p/(N places) ≤ ψ_e`.
     pub fn last_step(&self, samples: Samples) -> u64 {
         floor_of_product(self.engaged_spacings, samples.0)
     }
 
-    /// States of a sweep: one for each of its input angles and tooth in mesh.
+    /// States of a sweep: one for each of its input angles and teeth that are listed there.
     pub fn state_count(&self, samples: Samples) -> u64 {
-        let last_step = self.last_step(samples);
-        // Every step from 1 on belongs to one sample below N; the sample N repeats the sample 0.
-        last_step + last_step / samples.0
+        if self.zones_are_alike() {
+            let last_step = self.last_step(samples);
+            // Every step from 1 on belongs to one sample below N; the sample N repeats the sample 0.
+            return last_step + last_step / samples.0;
+        }
+        // The steps that occur, `U p` modulo `N Z'_G`, are the multiples of their greatest common divisor, each as many times.
+        let last_step = self.last_listed_step(samples);
+        let alike = greatest_common_divisor(self.lobes(), self.steps(samples));
+        alike * (last_step / alike) + self.lobes_loaded_alike() * (last_step / (self.lobes_loaded_alike() * samples.0))
     }
 
-    /// The teeth in mesh at sample `sample`, at most the last, by number.
-    pub fn teeth_at(&self, sample: u64, samples: Samples) -> std::ops::RangeInclusive<u64> {
+    /// The largest q in mesh.
+    fn last_listed_step(&self, samples: Samples) -> u64 {
+        floor_of_product(self.engaged_spacings, self.lobes_loaded_alike() * samples.0)
+    }
+
+    /// The teeth that are listed at sample `sample`, at most the last.
+    pub fn placed_at(self, sample: u64, samples: Samples) -> impl Iterator<Item = PlacedTooth> {
+        let sample = sample.min(samples.0);
+        let is_one_zone = self.zones_are_alike();
+        let numbers = if is_one_zone { self.teeth_at(sample, samples) } else { 0..=self.installed - 1 };
+        let last_step = self.last_listed_step(samples);
+        let (lobes, steps) = (self.lobes(), self.steps(samples));
+        numbers.filter_map(move |number| {
+            // A turn ahead, so that nothing falls below zero: the tooth in slot 0 soon stands behind the lobe where it began.
+            let ahead = lobes * (number * samples.0 + steps - sample);
+            let lobe = (ahead - 1) / steps;
+            let step = ahead - lobe * steps;
+            (is_one_zone || step <= last_step).then(|| PlacedTooth {
+                number,
+                lobe: u32::try_from(lobe % lobes).unwrap_or_default(),
+                position: Position::of_lobe(step, steps, self.lobes),
+                position_deg: (360 * step) as f64 / (lobes * steps) as f64,
+            })
+        })
+    }
+
+    /// The teeth in mesh at sample `sample`, at most the last, by number, where zones are alike.
+    pub fn teeth_at(&self, sample: u64, samples: Samples) -> RangeInclusive<u64> {
         let sample = sample.min(samples.0);
         let first = if sample < samples.0 { 1 } else { 2 };
         first..=(self.last_step(samples) + sample) / samples.0
@@ -141,42 +240,71 @@ impl Mesh {
         samples.0 * self.installed
     }
 
-    /// The position of a tooth at a sample, where it stands in the quarter turn from the major to the minor axis.
+    /// The position of a tooth at a sample, where it stands between the lobe and the valley behind it; where zones are alike.
     pub fn position(&self, tooth: u64, sample: u64, samples: Samples) -> Option<Position> {
-        Position::of_turn(tooth.checked_mul(samples.0)?.checked_sub(sample)?, self.steps(samples))
+        let steps = tooth.checked_mul(samples.0)?.checked_sub(sample)?;
+        Position::of_turn(steps, self.steps(samples), self.lobes)
     }
 
-    /// The position of a tooth in mesh at a sample.
+    /// The position of a tooth in mesh at a sample, where zones are alike.
     pub(crate) fn position_in_mesh(&self, tooth: u64, sample: u64, samples: Samples) -> Position {
-        Position::of_quarter(tooth * samples.0 - sample, self.steps(samples))
+        Position::of_lobe(self.lobes() * (tooth * samples.0 - sample), self.steps(samples), self.lobes)
     }
 
-    /// The same position in degrees, rounded once.
-    pub(crate) fn position_deg(&self, tooth: u64, sample: u64, samples: Samples) -> f64 {
-        (360 * (tooth * samples.0 - sample)) as f64 / self.steps(samples) as f64
+    /// How many times the pattern of places repeats in a period: `U/g`, once where zones are alike.
+    pub(crate) fn laps(&self) -> u64 {
+        self.lobes() / self.lobes_loaded_alike()
     }
 
-    /// How many spacings of the installed teeth the engagement spans, `ψ_e Z'_G/2π`.
+    /// How many spacings the engagement spans, `ε/g`.
     pub const fn engaged_spacings(&self) -> f64 {
         self.engaged_spacings
     }
 
-    /// The position of a tooth when a fraction of the period has passed: `tooth - fraction` spacings from the major axis. Both are
-    /// exact, so the distance to the minor axis keeps its digits too.
-    pub(crate) fn position_between(&self, tooth: u64, fraction: f64) -> Position {
-        let spacing_rad = 2.0 * PI / self.installed as f64;
-        let from_major_rad = (tooth as f64 - fraction) * spacing_rad;
-        let from_minor_rad = ((0.25 * self.installed as f64 - tooth as f64) + fraction) * spacing_rad;
-        if from_major_rad < from_minor_rad {
-            Position::from_major(from_major_rad)
+    /// The position at a place when a fraction of a lap has passed: `place - fraction` spacings from the lobe. Both are exact, so the
+    /// distance to the valley keeps its digits too.
+    pub fn position_between(&self, place: u64, fraction: f64) -> Position {
+        let spacing_rad = 2.0 * PI / self.places() as f64;
+        let from_lobe_rad = (place as f64 - fraction) * spacing_rad;
+        let to_valley = 0.5 * self.installed as f64 / self.teeth_at_each_place();
+        let from_valley_rad = ((to_valley - place as f64) + fraction) * spacing_rad;
+        if from_lobe_rad < from_valley_rad {
+            Position::from_lobe(from_lobe_rad, self.lobes)
         } else {
-            Position::from_minor(from_minor_rad.max(0.0))
+            Position::from_valley(from_valley_rad.max(0.0), self.lobes)
         }
     }
 
-    /// The position of a tooth at the end of the period, where the one before it stood at its start.
-    pub(crate) fn position_after_period(&self, tooth: u64) -> Position {
-        Position::of_quarter(tooth - 1, self.installed)
+    /// The position at a place at the end of a lap, where the one before it stood at its start.
+    pub(crate) fn position_after_lap(&self, place: u64) -> Position {
+        Position::of_lobe(self.lobes() * (place - 1), self.places(), self.lobes)
+    }
+
+    /// The teeth at these places during a lap, in the order of [`Self::placed_at`].
+    pub(crate) fn placed_between(
+        self,
+        places: RangeInclusive<u64>,
+        lap: u64,
+        position: impl Fn(u64) -> Position,
+    ) -> impl Iterator<Item = PlacedTooth> {
+        let is_one_zone = self.zones_are_alike();
+        let numbers = if is_one_zone { places.clone() } else { 0..=self.installed - 1 };
+        let (lobes, alike, turn) = (self.lobes(), self.lobes_loaded_alike(), self.installed);
+        numbers.filter_map(move |number| {
+            let (place, lobe) = if is_one_zone {
+                (number, 0)
+            } else {
+                // `U i - g lap = g place + u Z'_G`, a turn ahead.
+                let ahead = lobes * (number + turn) - alike * lap;
+                let lobe = (ahead - 1) / turn;
+                ((ahead - lobe * turn) / alike, lobe % lobes)
+            };
+            places.contains(&place).then(|| {
+                let position = position(place);
+                let lobe = u32::try_from(lobe).unwrap_or_default();
+                PlacedTooth { number, lobe, position, position_deg: position.from_lobe_deg() }
+            })
+        })
     }
 
     /// The input angle of a sample, rounded once.
@@ -185,16 +313,16 @@ impl Mesh {
     }
 }
 
-/// `ψ_e Z'_G/2π`, from whichever axis is nearer; never beyond the minor axis.
-fn engaged_spacings(limit: &FlankLimit, installed: u64) -> f64 {
-    let (quarter, position) = (0.25 * installed as f64, &limit.position);
-    let spacings = |angle_rad: f64| angle_rad * installed as f64 / (2.0 * PI);
+/// ψ_e in spacings, of which a whole turn has `places` and half a lobe `to_valley`; from whichever end of it is nearer, never beyond the valley.
+fn engaged_spacings(limit: &FlankLimit, to_valley: f64, places: u64) -> f64 {
+    let position = &limit.position;
+    let spacings = |angle_rad: f64| angle_rad * places as f64 / (2.0 * PI);
     match limit.end {
-        FlankEnd::RegularTip => quarter,
-        FlankEnd::Undercut | FlankEnd::Bore if position.from_minor_rad < position.from_major_rad => {
-            quarter - spacings(position.from_minor_rad)
+        FlankEnd::RegularTip => to_valley,
+        FlankEnd::Undercut | FlankEnd::Bore if position.from_valley_rad < position.from_lobe_rad => {
+            to_valley - spacings(position.from_valley_rad)
         }
-        FlankEnd::Undercut | FlankEnd::Bore => spacings(position.from_major_rad),
+        FlankEnd::Undercut | FlankEnd::Bore => spacings(position.from_lobe_rad),
     }
 }
 

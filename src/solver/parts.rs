@@ -6,7 +6,6 @@
 
 use std::f64::consts::PI;
 
-use crate::cam::Cam;
 use crate::contact::Part;
 use crate::drive::{Draft, Drive};
 use crate::ring::RingTooth;
@@ -18,7 +17,7 @@ use crate::violation::{Misfit, Parameter, Violation};
 pub struct PartsParameters {
     /// Outer radius of the ring; by default [`RIM`] times its root radius.
     pub ring_outer_radius_mm: Option<f64>,
-    /// Radius of the carrier's bore, inside which the cam turns; by default [`CARRIER_PLAY`] outside `a`.
+    /// Radius of the carrier's bore, inside which the cam turns; by default [`CARRIER_PLAY`] outside the cam.
     pub carrier_inner_radius_mm: Option<f64>,
     /// Outer radius of the carrier; by default [`CARRIER_PLAY`] inside the ring's tips.
     pub carrier_outer_radius_mm: Option<f64>,
@@ -26,7 +25,7 @@ pub struct PartsParameters {
     pub bore_radius_mm: Option<f64>,
     /// How far the cam is set back along its normal.
     pub wave_generator_clearance_um: f64,
-    /// How much smaller than `r` the teeth's radius is.
+    /// How far a tooth's surface is set back: how much smaller than `r` its radius is.
     pub teeth_clearance_um: f64,
     /// How far the ring's flank is set back along its normal.
     pub ring_clearance_um: f64,
@@ -60,7 +59,7 @@ impl PartsParameters {
         let clearance_mm = checks.clearance_mm(Part::Ring, self.ring_clearance_um);
         let outer_mm = checks.radius_mm(Parameter::RingOuterRadius, self.ring_outer_radius_mm, None);
         if let (Some(outer_mm), Some(clearance_mm)) = (outer_mm, clearance_mm)
-            && let (Some(a), Some(r)) = (draft.semi_major_mm, draft.tooth_radius_mm)
+            && let (Some(a), Some(r)) = (draft.cam_outer_mm, draft.tooth_radius_mm)
         {
             checks.above(Misfit::RingWithoutRim, outer_mm, a + (r + (r + clearance_mm)));
         }
@@ -70,26 +69,25 @@ impl PartsParameters {
         let clearance_mm = checks.clearance_mm(Part::WaveGenerator, self.wave_generator_clearance_um);
         let bore_mm = checks.radius_mm(Parameter::BoreRadius, self.bore_radius_mm, None);
         let Some(clearance_mm) = clearance_mm else { return };
-        if let Some(cam) = draft.cam {
-            // Set back by its least radius of curvature, at the major axis, the cam would get a cusp there.
-            let (a, b) = (cam.semi_major_mm(), cam.semi_minor_mm());
-            checks.below(Misfit::ClearanceTakesCam, self.wave_generator_clearance_um, b * (b / a) / MM_PER_UM);
+        if let Some(greatest_mm) = draft.greatest_set_back_mm {
+            checks.below(Misfit::ClearanceTakesCam, self.wave_generator_clearance_um, greatest_mm / MM_PER_UM);
         }
         // Where the clearance takes all of the cam, no bore is small enough.
-        let cam_mm = draft.semi_minor_mm.map(|b| b - clearance_mm).filter(|&cam_mm| cam_mm > 0.0);
+        let cam_mm = draft.cam_inner_mm.map(|inner_mm| inner_mm - clearance_mm).filter(|&cam_mm| cam_mm > 0.0);
         if let (Some(bore_mm), Some(cam_mm)) = (bore_mm, cam_mm) {
             checks.below(Misfit::BoreTakesCam, bore_mm, cam_mm);
         }
     }
 
     fn check_carrier(&self, draft: &Draft, checks: &mut Checks) {
-        let annulus = draft.ring.and_then(|ring| Annulus::between(ring.flank.locus().cam(), ring.tip_radius_mm));
+        let annulus =
+            draft.ring.and_then(|ring| Annulus::between(ring.flank.locus().cam_outer_radius_mm(), ring.tip_radius_mm));
         let clearance_mm = checks.clearance_mm(Part::Carrier, self.carrier_clearance_um);
         let inner_mm = annulus.map(|annulus| annulus.carrier_inner_mm());
         let inner_mm = checks.radius_mm(Parameter::CarrierInnerRadius, self.carrier_inner_radius_mm, inner_mm);
         let outer_mm = annulus.map(|annulus| annulus.carrier_outer_mm());
         let outer_mm = checks.radius_mm(Parameter::CarrierOuterRadius, self.carrier_outer_radius_mm, outer_mm);
-        if let (Some(inner_mm), Some(a)) = (inner_mm, draft.semi_major_mm) {
+        if let (Some(inner_mm), Some(a)) = (inner_mm, draft.cam_outer_mm) {
             checks.above(Misfit::CarrierMeetsCam, inner_mm, a);
         }
         let Some(outer_mm) = outer_mm else { return };
@@ -99,15 +97,19 @@ impl PartsParameters {
         if let Some(inner_mm) = inner_mm {
             checks.above(Misfit::CarrierWithoutWall, outer_mm, inner_mm);
         }
-        if let (Some(clearance_mm), Some(r), Some(installed)) = (clearance_mm, draft.tooth_radius_mm, draft.installed) {
-            checks.above(Misfit::SlotsTakeCarrier, outer_mm, (r + clearance_mm) / (PI / installed as f64).sin());
+        if let (Some(clearance_mm), Some(wall_mm), Some(installed)) =
+            (clearance_mm, draft.slot_half_width_mm, draft.installed)
+        {
+            let half_spacing_rad = PI / installed as f64;
+            checks.above(Misfit::SlotsTakeCarrier, outer_mm, (wall_mm + clearance_mm) / half_spacing_rad.sin());
         }
     }
 
     fn check_teeth(&self, draft: &Draft, checks: &mut Checks) {
         let clearance_mm = checks.clearance_mm(Part::Teeth, self.teeth_clearance_um);
-        if let (Some(_), Some(r)) = (clearance_mm, draft.tooth_radius_mm) {
-            checks.below(Misfit::ClearanceTakesTooth, self.teeth_clearance_um, r / MM_PER_UM);
+        // Between flats a tooth is thinnest.
+        if let (Some(_), Some(half_width_mm)) = (clearance_mm, draft.slot_half_width_mm) {
+            checks.below(Misfit::ClearanceTakesTooth, self.teeth_clearance_um, half_width_mm / MM_PER_UM);
         }
     }
 }
@@ -121,8 +123,8 @@ struct Annulus {
 
 impl Annulus {
     /// The annulus, where there is one.
-    fn between(cam: &Cam, tip_radius_mm: f64) -> Option<Self> {
-        let annulus = Self { inner_mm: cam.semi_major_mm(), outer_mm: tip_radius_mm };
+    fn between(inner_mm: f64, outer_mm: f64) -> Option<Self> {
+        let annulus = Self { inner_mm, outer_mm };
         (annulus.inner_mm < annulus.outer_mm).then_some(annulus)
     }
 
@@ -165,6 +167,8 @@ pub struct CarrierPart {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToothPart {
     pub(crate) radius_mm: f64,
+    /// Half its width across the slot, less than the radius between flats.
+    pub(crate) half_width_mm: f64,
 }
 
 // The parts of [`PartsParameters`] that have no violation for the drive.
@@ -186,19 +190,22 @@ impl WaveGeneratorPart {
 
 impl CarrierPart {
     pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Self {
-        let p = drive.parameters();
-        let annulus = Annulus { inner_mm: p.semi_major_mm, outer_mm: drive.tip_radius_mm() };
+        let annulus = Annulus { inner_mm: drive.cam_outer_radius_mm(), outer_mm: drive.tip_radius_mm() };
         Self {
             inner_radius_mm: parameters.carrier_inner_radius_mm.unwrap_or(annulus.carrier_inner_mm()),
             outer_radius_mm: parameters.carrier_outer_radius_mm.unwrap_or(annulus.carrier_outer_mm()),
-            slot_half_width_mm: p.tooth_radius_mm + MM_PER_UM * parameters.carrier_clearance_um,
+            slot_half_width_mm: drive.slot_half_width_mm() + MM_PER_UM * parameters.carrier_clearance_um,
         }
     }
 }
 
 impl ToothPart {
     pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Self {
-        Self { radius_mm: drive.parameters().tooth_radius_mm - MM_PER_UM * parameters.teeth_clearance_um }
+        let clearance_mm = MM_PER_UM * parameters.teeth_clearance_um;
+        Self {
+            radius_mm: drive.parameters().tooth_radius_mm - clearance_mm,
+            half_width_mm: drive.slot_half_width_mm() - clearance_mm,
+        }
     }
 }
 

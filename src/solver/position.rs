@@ -1,67 +1,92 @@
-//! A tooth's position ψ from the major axis, kept exact at both ends of the quarter turn.
+//! A tooth's position ψ from the lobe it is on, kept exact at both ends of half a lobe (docs/theory.md section 3).
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
 
-/// A position ψ in `[0, π/2]`, with its distance to either axis and its sine and cosine, each to full relative
-/// precision: near the major axis ψ itself is small, near the minor axis `π/2 - ψ` is.
+/// A position ψ in `[0, π/U]`, from the middle of a lobe to the valley beside it. Its distance to either, and its phase, which runs
+/// through a quarter turn for any number of lobes, have full relative precision: near the lobe ψ itself is small, near the valley
+/// `π/U - ψ` is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Position {
-    /// ψ, from the major axis.
-    pub from_major_rad: f64,
-    /// `x = π/2 - ψ`, from the minor axis.
-    pub from_minor_rad: f64,
-    /// cos ψ.
-    pub cos: f64,
-    /// sin ψ.
-    pub sin: f64,
+    /// ψ, from the middle of the lobe.
+    pub from_lobe_rad: f64,
+    /// `x = π/U - ψ`, from the valley.
+    pub from_valley_rad: f64,
+    /// cos of the phase `Uψ/2`; of an ellipse, cos ψ.
+    pub phase_cos: f64,
+    /// sin of the phase.
+    pub phase_sin: f64,
+    /// `U`: lobes of the wave generator.
+    pub lobes: u32,
+}
+
+/// Half the angle of a lobe, `π/U`.
+pub fn half_lobe_rad(lobes: u32) -> f64 {
+    PI / f64::from(lobes)
 }
 
 impl Position {
-    /// On the major axis: the root of the ring's tooth space.
-    pub const ROOT: Self = Self { from_major_rad: 0.0, from_minor_rad: FRAC_PI_2, cos: 1.0, sin: 0.0 };
-
-    /// On the minor axis: the tip of the ring's tooth.
-    pub const TIP: Self = Self { from_major_rad: FRAC_PI_2, from_minor_rad: 0.0, cos: 0.0, sin: 1.0 };
-
-    /// At `ψ` in `[0, π/2]`; exact towards the major axis.
-    pub fn from_major(from_major_rad: f64) -> Self {
-        let (sin, cos) = from_major_rad.sin_cos();
-        Self { from_major_rad, from_minor_rad: FRAC_PI_2 - from_major_rad, cos, sin }
+    /// In the middle of the lobe: the root of the ring's tooth space.
+    pub fn lobe(lobes: u32) -> Self {
+        Self { from_lobe_rad: 0.0, from_valley_rad: half_lobe_rad(lobes), phase_cos: 1.0, phase_sin: 0.0, lobes }
     }
 
-    /// At `x = π/2 - ψ` in `[0, π/2]`; exact towards the minor axis.
-    pub fn from_minor(from_minor_rad: f64) -> Self {
-        let (cos, sin) = from_minor_rad.sin_cos();
-        Self { from_major_rad: FRAC_PI_2 - from_minor_rad, from_minor_rad, cos, sin }
+    /// In the valley: the tip of the ring's tooth.
+    pub fn valley(lobes: u32) -> Self {
+        Self { from_lobe_rad: half_lobe_rad(lobes), from_valley_rad: 0.0, phase_cos: 0.0, phase_sin: 1.0, lobes }
     }
 
-    /// At the whole fraction `numerator / denominator` of a turn; exact towards both axes. None beyond a quarter.
-    pub fn of_turn(numerator: u64, denominator: u64) -> Option<Self> {
-        let is_in_quarter = denominator > 0 && 4 * u128::from(numerator) <= u128::from(denominator);
-        is_in_quarter.then(|| Self::of_quarter(numerator, denominator))
+    /// At `ψ` in `[0, π/U]`; exact towards the lobe.
+    pub fn from_lobe(from_lobe_rad: f64, lobes: u32) -> Self {
+        let (phase_sin, phase_cos) = (0.5 * f64::from(lobes) * from_lobe_rad).sin_cos();
+        Self { from_lobe_rad, from_valley_rad: half_lobe_rad(lobes) - from_lobe_rad, phase_cos, phase_sin, lobes }
     }
 
-    /// The same of a fraction that is known to be at most a quarter.
-    pub(crate) fn of_quarter(numerator: u64, denominator: u64) -> Self {
-        // Below 2^53 for every sweep (samples × installed teeth), so that the conversions are exact.
-        let whole = denominator as f64;
-        let from_major_rad = 2.0 * PI * (numerator as f64 / whole);
-        let from_minor_rad = FRAC_PI_2 * ((denominator - 4 * numerator) as f64 / whole);
-        let (sin, cos) = if from_major_rad < from_minor_rad {
-            from_major_rad.sin_cos()
+    /// At `x = π/U - ψ` in `[0, π/U]`; exact towards the valley.
+    pub fn from_valley(from_valley_rad: f64, lobes: u32) -> Self {
+        let (phase_cos, phase_sin) = (0.5 * f64::from(lobes) * from_valley_rad).sin_cos();
+        Self { from_lobe_rad: half_lobe_rad(lobes) - from_valley_rad, from_valley_rad, phase_cos, phase_sin, lobes }
+    }
+
+    /// At two distances that add up to `π/U`, each exact.
+    pub(crate) fn between(from_lobe_rad: f64, from_valley_rad: f64, lobes: u32) -> Self {
+        let phase = |rad: f64| (0.5 * f64::from(lobes) * rad).sin_cos();
+        let (phase_sin, phase_cos) = if from_lobe_rad < from_valley_rad {
+            phase(from_lobe_rad)
         } else {
-            let (cos, sin) = from_minor_rad.sin_cos();
+            let (cos, sin) = phase(from_valley_rad);
             (sin, cos)
         };
-        Self { from_major_rad, from_minor_rad, cos, sin }
+        Self { from_lobe_rad, from_valley_rad, phase_cos, phase_sin, lobes }
+    }
+
+    /// At the whole fraction `numerator / denominator` of a turn from the lobe; exact towards both ends. None beyond the valley.
+    pub fn of_turn(numerator: u64, denominator: u64, lobes: u32) -> Option<Self> {
+        let of_lobe = numerator.checked_mul(u64::from(lobes))?;
+        let is_to_valley = denominator > 0 && 2 * u128::from(of_lobe) <= u128::from(denominator);
+        is_to_valley.then(|| Self::of_lobe(of_lobe, denominator, lobes))
+    }
+
+    /// At the whole fraction `numerator / denominator` of a lobe, at most half of it; exact towards both ends.
+    pub(crate) fn of_lobe(numerator: u64, denominator: u64, lobes: u32) -> Self {
+        debug_assert!(2 * u128::from(numerator) <= u128::from(denominator));
+        // Below 2^53 for every sweep (lobes × samples × installed teeth), so that the conversions are exact.
+        let whole = denominator as f64;
+        let from_lobe_rad = 2.0 * PI * (numerator as f64 / (f64::from(lobes) * whole));
+        let from_valley_rad = half_lobe_rad(lobes) * ((denominator - 2 * numerator) as f64 / whole);
+        Self::between(from_lobe_rad, from_valley_rad, lobes)
+    }
+
+    /// `π/U`.
+    pub fn half_lobe_rad(&self) -> f64 {
+        half_lobe_rad(self.lobes)
     }
 
     /// ψ in degrees.
-    pub fn from_major_deg(&self) -> f64 {
-        if self.from_minor_rad < self.from_major_rad {
-            90.0 - self.from_minor_rad.to_degrees()
+    pub fn from_lobe_deg(&self) -> f64 {
+        if self.from_valley_rad < self.from_lobe_rad {
+            180.0 / f64::from(self.lobes) - self.from_valley_rad.to_degrees()
         } else {
-            self.from_major_rad.to_degrees()
+            self.from_lobe_rad.to_degrees()
         }
     }
 }

@@ -1,12 +1,13 @@
 //! The mating parts' profiles, sampled to a chord tolerance.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
 
 use nalgebra::{Point2, Rotation2, Unit, Vector2};
 
-use crate::cam::Cam;
+use crate::cam::CamPoint;
 use crate::drive::Drive;
-use crate::position::Position;
+use crate::locus::Locus;
+use crate::position::{Position, half_lobe_rad};
 use crate::ring::{FlankEnd, FlankLimit, RingFlank};
 use crate::root::NotConverged;
 use crate::{SolveError, Stop};
@@ -58,7 +59,7 @@ pub(crate) struct SampledCurve {
     pub(crate) end_tangent: Unit<Vector2<f64>>,
 }
 
-/// Pieces that a quarter wave starts with, so that no piece can hide more than one inflection.
+/// Pieces that half a lobe starts with, so that no piece can hide more than one inflection.
 const PIECES: u32 = 16;
 
 /// Halvings of a piece at most: 2^40 chords of a piece are beyond every tolerance that the ranges allow.
@@ -72,23 +73,21 @@ pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &impl Stop)
     let ring_teeth = drive.parameters().ring_teeth.unsigned_abs();
     let flank = ring_half_tooth(drive, parameters.chord_tolerance_mm, stop)?;
     let path = path_half_tooth(drive, parameters.chord_tolerance_mm, stop)?;
-    let cam = drive.flank().locus().cam();
-    let quarter = cam_quarter(cam, 0.0, parameters.chord_tolerance_mm, stop)?.points;
+    let half_lobe = cam_half_lobe(drive.flank().locus(), 0.0, parameters.chord_tolerance_mm, stop)?.points;
 
     let copies = match parameters.extent {
         Extent::Tooth => 1,
         Extent::Full => ring_teeth,
     };
     let spans = |half: &Polyline| 2 * (half.len() as u64 - 1);
-    let points = copies * (spans(&flank) + spans(&path)) + 2 * spans(&quarter) + 3;
+    let points = copies * (spans(&flank) + spans(&path)) + u64::from(drive.lobes()) * spans(&half_lobe) + 3;
     if points > parameters.max_points {
         return Err(SolveError::TooManyPoints { points, limit: parameters.max_points });
     }
-    let cam_half = mirrored(&quarter, Vector2::new(-1.0, 1.0));
     Ok(Profiles {
         ring: repeated(&from_tip_to_tip(&flank), ring_teeth, parameters.extent),
         tooth_center_path: repeated(&from_tip_to_tip(&path), ring_teeth, parameters.extent),
-        wave_generator: closed(&mirrored(&cam_half, Vector2::new(1.0, -1.0))),
+        wave_generator: closed(&cam_outline(&half_lobe, drive.lobes())),
     })
 }
 
@@ -125,7 +124,8 @@ pub(crate) fn flank_curve(
     tolerance_mm: f64,
     stop: &impl Stop,
 ) -> Result<SampledCurve, SolveError> {
-    sampled(limit.position, tolerance_mm, stop, |position| {
+    let lobes = flank.locus().lobes();
+    sampled(limit.position, lobes, tolerance_mm, stop, |position| {
         let tooth = flank.locus().at(position)?;
         let point = flank.at(&tooth);
         Ok(CurvePoint { point: flank.point(&tooth, &point), tangent: flank.tangent(&tooth, &point) })
@@ -135,32 +135,77 @@ pub(crate) fn flank_curve(
 /// The path of a tooth's centre from the middle of the tooth space to the symmetry line of the ring's tooth.
 fn path_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &impl Stop) -> Result<Polyline, SolveError> {
     let flank = drive.flank();
-    let mut points = sampled(Position::TIP, tolerance_mm, stop, |position| {
+    let lobes = drive.lobes();
+    let mut points = sampled(Position::valley(lobes), lobes, tolerance_mm, stop, |position| {
         let tooth = flank.locus().at(position)?;
         let point = flank.at(&tooth);
-        let angle_rad = position.from_major_rad / flank.teeth_per_wave();
+        let angle_rad = position.from_lobe_rad / flank.teeth_per_wave();
         Ok(CurvePoint { point: on_circle(tooth.center_radius_mm, angle_rad), tangent: flank.tangent(&tooth, &point) })
     })?
     .points;
     points.pop();
     let p = drive.parameters();
-    points.push(on_circle(p.semi_minor_mm + p.tooth_radius_mm, PI / p.ring_teeth as f64));
+    let valley_mm = flank.locus().cam_inner_radius_mm() + p.tooth_radius_mm;
+    points.push(on_circle(valley_mm, PI / p.ring_teeth as f64));
     Ok(points)
 }
 
-/// The wave generator from its major to its minor axis, set back along its normal by less than its least radius of curvature.
-pub(crate) fn cam_quarter(
-    cam: &Cam,
+/// The wave generator from the middle of a lobe to the valley beside it, set back along its normal by less than its least radius of curvature.
+pub(crate) fn cam_half_lobe(
+    locus: &Locus,
     clearance_mm: f64,
     tolerance_mm: f64,
     stop: &impl Stop,
 ) -> Result<SampledCurve, SolveError> {
-    // Here a position is taken as the angle φ of the normal.
-    sampled(Position::TIP, tolerance_mm, stop, |normal| {
-        let contact = cam.contact(normal.cos, normal.sin);
-        let point = cam.point(&contact) - clearance_mm * Vector2::new(normal.cos, normal.sin);
-        Ok(CurvePoint { point, tangent: cam.tangent(&contact) })
-    })
+    let lobes = locus.lobes();
+    let mut curve = sampled(Position::valley(lobes), lobes, tolerance_mm, stop, |place| {
+        let CamPoint { point, tangent } = locus.cam_outline(clearance_mm, place)?;
+        Ok(CurvePoint { point, tangent })
+    })?;
+    // The last point stands on the valley's line.
+    if let Some(last) = curve.points.last_mut() {
+        *last = Point2::from(last.coords.norm() * direction(1, 2 * lobes));
+    }
+    Ok(curve)
+}
+
+/// The closed wave generator from half a lobe of it: mirrored at the valley, then turned from lobe to lobe.
+pub(crate) fn cam_outline(half_lobe: &Polyline, lobes: u32) -> Polyline {
+    let pitch = direction(1, lobes);
+    // Adding zero turns -0.0 into 0.0.
+    let mirrored = half_lobe
+        .iter()
+        .rev()
+        .skip(1)
+        .map(|p| Point2::new(pitch.x * p.x + pitch.y * p.y + 0.0, pitch.y * p.x - pitch.x * p.y + 0.0));
+    let lobe: Polyline = half_lobe.iter().copied().chain(mirrored).collect();
+    let mut outline = lobe.clone();
+    for turned in 1..lobes {
+        let at = direction(turned, lobes);
+        let next =
+            lobe.iter().skip(1).map(|p| Point2::new(at.x * p.x - at.y * p.y + 0.0, at.y * p.x + at.x * p.y + 0.0));
+        outline.extend(next);
+    }
+    if let Some(last) = outline.last_mut() {
+        *last = half_lobe[0];
+    }
+    outline
+}
+
+/// The direction at a fraction of a turn, exact on the axes.
+pub(crate) fn direction(numerator: u32, denominator: u32) -> Vector2<f64> {
+    let quarters = 4 * u64::from(numerator);
+    let whole = u64::from(denominator);
+    if quarters.is_multiple_of(whole) {
+        return match quarters / whole % 4 {
+            0 => Vector2::new(1.0, 0.0),
+            1 => Vector2::new(0.0, 1.0),
+            2 => Vector2::new(-1.0, 0.0),
+            _ => Vector2::new(0.0, -1.0),
+        };
+    }
+    let (sin, cos) = (2.0 * PI * (f64::from(numerator) / f64::from(denominator))).sin_cos();
+    Vector2::new(cos, sin)
 }
 
 fn on_circle(radius_mm: f64, angle_rad: f64) -> Point2<f64> {
@@ -171,26 +216,28 @@ fn on_circle(radius_mm: f64, angle_rad: f64) -> Point2<f64> {
 /// The curve over positions from the root to `end`, both included, by halving pieces until each chord is true.
 fn sampled(
     end: Position,
+    lobes: u32,
     tolerance_mm: f64,
     stop: &impl Stop,
     curve: impl Fn(Position) -> Result<CurvePoint, NotConverged>,
 ) -> Result<SampledCurve, SolveError> {
-    // Measured from the minor axis, where cusps are; beyond 45° a `Position` is as good from the other side.
+    // Measured from the valley, where cusps are; beyond the middle a `Position` is as good from the other side.
+    let half_rad = half_lobe_rad(lobes);
     let at = |x: f64| {
-        if x <= end.from_minor_rad {
+        if x <= end.from_valley_rad {
             curve(end)
-        } else if x < 0.5 * FRAC_PI_2 {
-            curve(Position::from_minor(x))
+        } else if x < 0.5 * half_rad {
+            curve(Position::from_valley(x, lobes))
         } else {
-            curve(Position::from_major(FRAC_PI_2 - x))
+            curve(Position::from_lobe(half_rad - x, lobes))
         }
     };
-    let span = FRAC_PI_2 - end.from_minor_rad;
-    let mut from = (FRAC_PI_2, curve(Position::ROOT)?);
+    let span = half_rad - end.from_valley_rad;
+    let mut from = (half_rad, curve(Position::lobe(lobes))?);
     let mut points = vec![from.1.point];
     for piece in 1..=PIECES {
-        let x = FRAC_PI_2 - span * (f64::from(piece) / f64::from(PIECES));
-        let mut pending = vec![(x.max(end.from_minor_rad), at(x)?, 0)];
+        let x = half_rad - span * (f64::from(piece) / f64::from(PIECES));
+        let mut pending = vec![(x.max(end.from_valley_rad), at(x)?, 0)];
         while let Some(to) = pending.pop() {
             let (x, to_point, depth) = to;
             if chord_deviation_mm(&from.1, &to_point) <= tolerance_mm || depth == MAX_DEPTH {
@@ -232,13 +279,6 @@ fn chord_deviation_mm(from: &CurvePoint, to: &CurvePoint) -> f64 {
     } else {
         length * (sin_from / cos_from).abs().max((sin_to / cos_to).abs())
     }
-}
-
-/// The curve followed by its mirror image, the shared point once; a factor of -1 mirrors its coordinate.
-pub(crate) fn mirrored(half: &Polyline, factors: Vector2<f64>) -> Polyline {
-    // Adding zero turns -0.0 into 0.0.
-    let image = half.iter().rev().skip(1).map(|p| Point2::new(p.x * factors.x + 0.0, p.y * factors.y + 0.0));
-    half.iter().copied().chain(image).collect()
 }
 
 /// From a half that starts in the middle of the tooth space: from tip to tip, counter-clockwise.

@@ -1,12 +1,10 @@
 //! The ring's flank: the outer parallel curve of the centres' path at the tooth radius (docs/theory.md section 2), or, in a ring
 //! made with clearance, a little farther out.
 
-use std::f64::consts::FRAC_PI_4;
-
 use nalgebra::{Point2, Unit, Vector2};
 
 use crate::locus::{Locus, ToothCenter};
-use crate::position::Position;
+use crate::position::{Position, half_lobe_rad};
 use crate::root::{NotConverged, bracketed};
 
 /// The flank of the ring's teeth.
@@ -31,7 +29,7 @@ pub struct FlankPoint {
 /// What ends the flank towards the tip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FlankEnd {
-    /// The minor axis: a regular tip.
+    /// The valley: a regular tip.
     RegularTip,
     /// Undercut: both flanks of the ring's tooth cross on its symmetry line.
     Undercut,
@@ -78,7 +76,7 @@ impl RingTooth {
         };
         let position = flank.position_at_radius(tip_radius_mm)?;
         // Beside an undercut tip rounding could otherwise move the end outward.
-        let limit = if position.from_minor_rad > natural.position.from_minor_rad {
+        let limit = if position.from_valley_rad > natural.position.from_valley_rad {
             FlankLimit { position, end: FlankEnd::Bore }
         } else {
             natural
@@ -91,7 +89,7 @@ impl RingTooth {
     pub(crate) fn steepest_engaged(&self) -> Result<ToothCenter, NotConverged> {
         let locus = self.flank.locus();
         let steepest = locus.steepest()?;
-        if steepest.position.from_minor_rad >= self.limit.position.from_minor_rad {
+        if steepest.position.from_valley_rad >= self.limit.position.from_valley_rad {
             Ok(steepest)
         } else {
             locus.at(self.limit.position)
@@ -109,14 +107,14 @@ impl RingFlank {
         Self { distance_mm: self.distance_mm + clearance_mm, ..self }
     }
 
-    /// Radius of the ring at the middle of its tooth space, `a + 2r` without clearance.
+    /// Radius of the ring at the middle of its tooth space, `d_l + r` without clearance.
     pub fn root_radius_mm(&self) -> f64 {
-        self.locus.cam().semi_major_mm() + self.height_over_cam_mm()
+        self.locus.cam_outer_radius_mm() + self.height_over_cam_mm()
     }
 
-    /// Radius of a regular tip, `b + 2r` without clearance.
+    /// Radius of a regular tip, `d_v + r` without clearance.
     fn regular_tip_radius_mm(&self) -> f64 {
-        self.locus.cam().semi_minor_mm() + self.height_over_cam_mm()
+        self.locus.cam_inner_radius_mm() + self.height_over_cam_mm()
     }
 
     /// Distance of cam and flank along a common normal, `2r` without clearance.
@@ -140,7 +138,7 @@ impl RingFlank {
         let tan_pressure_angle = k * tooth.tan_pressure_angle;
         let secant_squared = 1.0 + tan_pressure_angle * tan_pressure_angle;
         let cos_pressure_angle = 1.0 / secant_squared.sqrt();
-        let turning = 1.0 + k * k * self.locus.tan_pressure_angle_derivative(tooth) / secant_squared;
+        let turning = 1.0 + k * k * tooth.tan_pressure_angle_derivative / secant_squared;
         let regularity = 1.0 + self.distance_mm * (cos_pressure_angle / tooth.center_radius_mm) * turning;
         // Positive wherever a tooth meshes; nearer to zero than its own rounding it is not known, and a curvature of
         // 1/0 or below would be neither.
@@ -156,12 +154,12 @@ impl RingFlank {
 
     /// Angle of the contact point from the middle of the tooth space.
     pub fn angle_from_space_rad(&self, tooth: &ToothCenter, point: &FlankPoint) -> f64 {
-        tooth.position.from_major_rad / self.teeth_per_wave + self.lead_rad(tooth, point)
+        tooth.position.from_lobe_rad / self.teeth_per_wave + self.lead_rad(tooth, point)
     }
 
     /// Angle φ_K of the contact point from the symmetry line of the ring's tooth.
     pub fn angle_from_tip_rad(&self, tooth: &ToothCenter, point: &FlankPoint) -> f64 {
-        tooth.position.from_minor_rad / self.teeth_per_wave - self.lead_rad(tooth, point)
+        tooth.position.from_valley_rad / self.teeth_per_wave - self.lead_rad(tooth, point)
     }
 
     /// Distance `R` of the contact point from the axis.
@@ -178,21 +176,14 @@ impl RingFlank {
 
     /// The tangent of flank and path alike, towards the tip, in the ring's frame.
     pub fn tangent(&self, tooth: &ToothCenter, point: &FlankPoint) -> Unit<Vector2<f64>> {
-        let normal_rad = tooth.position.from_major_rad / self.teeth_per_wave + point.tan_pressure_angle.atan();
+        let normal_rad = tooth.position.from_lobe_rad / self.teeth_per_wave + point.tan_pressure_angle.atan();
         Unit::new_unchecked(Vector2::new(-normal_rad.sin(), normal_rad.cos()))
     }
 
-    /// `(b + r)(1 + rκ)` at the tip: `b + 2r - r k² (a² - b²)/(a² + br)`, the last but one r being the flank's distance.
+    /// `d_v (1 + rκ)` at the tip, r being the flank's distance.
     fn tip_regularity_mm(&self) -> f64 {
-        let (a, b, r) = self.lengths();
-        let k = self.teeth_per_wave;
-        let narrowing = k * k * self.locus.cam().difference_of_squares_mm2() / (a * a + b * r);
-        self.regular_tip_radius_mm() - self.distance_mm * narrowing
-    }
-
-    fn lengths(&self) -> (f64, f64, f64) {
-        let cam = self.locus.cam();
-        (cam.semi_major_mm(), cam.semi_minor_mm(), self.locus.tooth_radius_mm())
+        let bend = self.locus.cam().kind().tip_bend(self.locus.tooth_radius_mm(), self.teeth_per_wave);
+        self.regular_tip_radius_mm() - self.distance_mm * bend
     }
 
     /// Whether the ring's tips are cut away by their own envelope: whether the parallel curve is irregular at the tip.
@@ -200,43 +191,35 @@ impl RingFlank {
         self.tip_regularity_mm() < 0.0
     }
 
-    /// The least tooth radius that undercuts: the lower root of
-    /// `2b r² + (b² + 2a² - k²(a² - b²)) r + a²b = 0`; none where the roots are not real.
+    /// The least tooth radius that undercuts; none where no radius does.
     pub fn critical_tooth_radius_mm(&self) -> Option<f64> {
-        let (a, b, _) = self.lengths();
-        let k = self.teeth_per_wave;
-        let linear = k * k * self.locus.cam().difference_of_squares_mm2() - b * b - 2.0 * a * a;
-        let least = 2.0 * std::f64::consts::SQRT_2 * a * b;
-        if linear < least {
-            return None;
-        }
-        // The stable form of the lower root: no difference of near values.
-        let root = ((linear - least) * (linear + least)).sqrt();
-        Some(2.0 * a * (a * b / (linear + root)))
+        self.locus.cam().kind().critical_tooth_radius_mm(self.teeth_per_wave)
     }
 
     /// Where the flank ends if nothing is bored away.
     ///
-    /// The flank crosses the symmetry line of the ring's tooth where `tan(x/k)(d + r cos β) = r sin β`, `x = π/2 - ψ`.
-    /// Divided by `cos β sin x / k` the trivial root `x = 0` is gone, and at the threshold of undercut the
+    /// The flank crosses the symmetry line of the ring's tooth where `tan(x/k)(d + r cos β) = r sin β`, `x = π/U - ψ`.
+    /// Divided by `cos β sin(Ux/2) / k` the trivial root `x = 0` is gone, and at the threshold of undercut the
     /// other one leaves from there like a square root.
     ///
     /// # Errors
     /// [`NotConverged`] if the crossing is not found.
     pub fn natural_limit(&self) -> Result<FlankLimit, NotConverged> {
         if !self.is_undercut() {
-            return Ok(FlankLimit { position: Position::TIP, end: FlankEnd::RegularTip });
+            return Ok(FlankLimit { position: Position::valley(self.locus.lobes()), end: FlankEnd::RegularTip });
         }
+        let lobes = self.locus.lobes();
         let k = self.teeth_per_wave;
         let gap = |position: Position| -> Result<f64, NotConverged> {
             let tooth = self.locus.at(position)?;
             let point = self.at(&tooth);
             let r = self.distance_mm;
-            let widening = k * (position.from_minor_rad / k).tan() / position.cos;
+            let widening = k * (position.from_valley_rad / k).tan() / position.phase_cos;
             Ok(widening * (tooth.center_radius_mm / point.cos_pressure_angle + r)
-                - r * k * k * (tooth.tan_pressure_angle / position.cos))
+                - r * k * k * (tooth.tan_pressure_angle / position.phase_cos))
         };
-        let position = self.crossing("end of the undercut flank", self.tip_regularity_mm(), gap)?;
+        let at_tip = 2.0 / f64::from(lobes) * self.tip_regularity_mm();
+        let position = self.crossing("end of the undercut flank", at_tip, gap)?;
         Ok(FlankLimit { position, end: FlankEnd::Undercut })
     }
 
@@ -245,7 +228,7 @@ impl RingFlank {
     /// # Errors
     /// [`NotConverged`] if the crossing is not found.
     pub fn position_at_radius(&self, bore_mm: f64) -> Result<Position, NotConverged> {
-        let (a, b, _) = self.lengths();
+        let (a, b) = (self.locus.cam_outer_radius_mm(), self.locus.cam_inner_radius_mm());
         let height_mm = self.height_over_cam_mm();
         // Differences first: a bore may be as near to tip or root as its digits can say.
         let above_tip_mm = bore_mm - b - height_mm;
@@ -254,7 +237,7 @@ impl RingFlank {
         let below_root_mm2 = below_root_mm * (bore_mm + a + height_mm);
         let excess = |position: Position| -> Result<f64, NotConverged> {
             let tooth = self.locus.at(position)?;
-            Ok(if position.from_minor_rad < position.from_major_rad {
+            Ok(if position.from_valley_rad < position.from_lobe_rad {
                 self.rise_above_tip_mm2(&tooth) - above_tip_mm2
             } else {
                 below_root_mm2 - self.drop_below_root_mm2(&tooth)
@@ -264,45 +247,39 @@ impl RingFlank {
     }
 
     /// The position between tip and root where `function`, of negative value `at_tip` at the tip, changes its sign;
-    /// solved in the angle from whichever axis is nearer.
+    /// solved in the angle from whichever of valley and lobe is nearer.
     fn crossing(
         &self,
         what: &'static str,
         at_tip: f64,
         function: impl Fn(Position) -> Result<f64, NotConverged>,
     ) -> Result<Position, NotConverged> {
-        let middle = function(Position::from_minor(FRAC_PI_4))?;
+        let lobes = self.locus.lobes();
+        let quarter_rad = 0.5 * half_lobe_rad(lobes);
+        let middle = function(Position::from_valley(quarter_rad, lobes))?;
         Ok(if middle > 0.0 {
-            Position::from_minor(bracketed(what, 0.0, at_tip, FRAC_PI_4, |x| function(Position::from_minor(x)))?)
+            let from_valley = |x| Position::from_valley(x, lobes);
+            from_valley(bracketed(what, 0.0, at_tip, quarter_rad, |x| function(from_valley(x)))?)
         } else {
-            Position::from_major(bracketed(what, FRAC_PI_4, middle, 0.0, |x| function(Position::from_major(x)))?)
+            let from_lobe = |psi| Position::from_lobe(psi, lobes);
+            from_lobe(bracketed(what, quarter_rad, middle, 0.0, |psi| function(from_lobe(psi)))?)
         })
     }
 
-    /// `R² - (b + 2r)²`, without clearance, free of cancellation but for that of the flank itself near the threshold of undercut.
+    /// `R² - (d_v + r)²`, without clearance, free of cancellation but for that of the flank itself near the threshold of undercut.
     fn rise_above_tip_mm2(&self, tooth: &ToothCenter) -> f64 {
-        let (a, b, r) = self.lengths();
-        let contact = &tooth.cam_contact;
-        let h = contact.support_mm;
-        let cos_squared = contact.normal_cos * contact.normal_cos;
-        // d² - (b + r)², with h² - b² = (a² - b²) cos²φ and h'² = (h² - b²)(a² - h²)/h².
-        let center_rise_mm2 =
-            self.locus.cam().difference_of_squares_mm2() * cos_squared * (2.0 * r / (h + b) + (a / h) * (a / h));
+        let (b, r) = (self.locus.cam_inner_radius_mm(), self.locus.tooth_radius_mm());
+        let center_rise_mm2 = self.locus.cam().kind().center_rise_mm2(r, tooth);
         let center_rise_mm = center_rise_mm2 / (tooth.center_radius_mm + b + r);
         let point = self.at(tooth);
         center_rise_mm2
             + 2.0 * self.distance_mm * (center_rise_mm * point.cos_pressure_angle - (b + r) * versine(&point))
     }
 
-    /// `(a + 2r)² - R²`, without clearance, a sum of positive terms.
+    /// `(d_l + r)² - R²`, without clearance, a sum of positive terms.
     fn drop_below_root_mm2(&self, tooth: &ToothCenter) -> f64 {
-        let (a, b, r) = self.lengths();
-        let contact = &tooth.cam_contact;
-        let h = contact.support_mm;
-        let sin_squared = contact.normal_sin * contact.normal_sin;
-        // (a + r)² - d², with a² - h² = (a² - b²) sin²φ.
-        let center_drop_mm2 =
-            self.locus.cam().difference_of_squares_mm2() * sin_squared * (2.0 * r / (a + h) + (b / h) * (b / h));
+        let (a, r) = (self.locus.cam_outer_radius_mm(), self.locus.tooth_radius_mm());
+        let center_drop_mm2 = self.locus.cam().kind().center_drop_mm2(r, tooth);
         let center_drop_mm = center_drop_mm2 / (a + r + tooth.center_radius_mm);
         let point = self.at(tooth);
         center_drop_mm2 + 2.0 * self.distance_mm * (center_drop_mm + tooth.center_radius_mm * versine(&point))

@@ -3,10 +3,9 @@
 use crate::adaptive;
 use crate::batch::{self, BatchSweep};
 use crate::contact::{Contact, PerContact, half_width_mm};
-use crate::drive::{Drive, WAVES};
+use crate::drive::Drive;
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
-use crate::mesh::{Mesh, Samples, TeethInMesh};
-use crate::position::Position;
+use crate::mesh::{Mesh, PlacedTooth, Samples, TeethInMesh};
 use crate::root::NotConverged;
 use crate::springs::WindUp;
 use crate::violation::{Parameter, Violation};
@@ -115,18 +114,21 @@ pub(crate) fn worse(residual: f64, before: f64) -> f64 {
     if residual.is_nan() || residual > before { residual } else { before }
 }
 
-/// The states of a sweep, by input angle and then tooth number: columns of equal length, one entry a state.
+/// The states of a sweep, by input angle and then tooth number: columns of equal length, one entry a state. Where the zones are alike the
+/// teeth of one stand for all, elsewhere the teeth of all zones are listed ([`Mesh`]).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct States {
     /// Input angle j.
     pub input_angle_deg: Vec<f64>,
-    /// Tooth number, 0 being the tooth on the major axis at j = 0.
+    /// Tooth number, 0 being the tooth in the middle of a lobe at j = 0.
     pub tooth: Vec<u32>,
-    /// Position ψ, from the major axis.
+    /// The lobe that the tooth is on; empty where the zones are alike.
+    pub lobe: Vec<u32>,
+    /// Position ψ, from the middle of the lobe.
     pub position_deg: Vec<f64>,
     /// Distance `d` of the tooth's centre from the axis.
     pub center_radius_mm: Vec<f64>,
-    /// φ_H: contact point on the cam, from the minor axis.
+    /// φ_H: contact point on the cam, from the valley.
     pub wave_generator_angle_deg: Vec<f64>,
     /// φ_K: contact point on the ring, from the ring's tooth tip.
     pub ring_angle_deg: Vec<f64>,
@@ -145,7 +147,7 @@ pub struct InputAngles {
     pub wind_up_deg: Vec<f64>,
     /// `(Z_G/U)² dM0/dΔφ`: output torque over output rotation, input held, at the load.
     pub torsional_stiffness_nm_per_rad: Vec<f64>,
-    /// Teeth of one zone that carry load.
+    /// Of the teeth that are listed, those that carry load.
     pub loaded_teeth: Vec<u32>,
 }
 
@@ -222,6 +224,7 @@ impl States {
         Self {
             input_angle_deg: column(),
             tooth: Vec::with_capacity(count),
+            lobe: Vec::new(),
             position_deg: column(),
             center_radius_mm: column(),
             wave_generator_angle_deg: column(),
@@ -338,29 +341,31 @@ fn plain(loaded: &LoadedDrive<'_>, load: &LoadCase, points: Points, stop: &impl 
                 if stop.stopped() {
                     return Err(SolveError::Stopped);
                 }
-                let teeth = mesh.teeth_at(sample, samples).map(|number| PlacedTooth {
-                    number,
-                    position: mesh.position_in_mesh(number, sample, samples),
-                    position_deg: mesh.position_deg(number, sample, samples),
-                });
-                columns.add(mesh.input_angle_deg(sample, samples), teeth)?;
+                columns.add(mesh.input_angle_deg(sample, samples), mesh.placed_at(sample, samples))?;
             }
         }
         Points::Tolerance(tolerance) => {
-            for moment in adaptive::moments(loaded, load, tolerance, stop)? {
-                columns.add(moment.fraction * mesh.period_deg(), moment.teeth(&mesh))?;
+            let moments = adaptive::moments(loaded, load, tolerance, stop)?;
+            // Each place was counted once; listed it may stand for several teeth, and in every lap.
+            let listed =
+                moments.iter().map(|moment| moment.places()).sum::<u64>() * mesh.laps() * mesh.listed_at_each_place();
+            let limit = tolerance.max_states();
+            if listed > limit {
+                return Err(SolveError::TooManyStates { limit });
+            }
+            let lap_deg = mesh.period_deg() / mesh.laps() as f64;
+            for lap in 0..mesh.laps() {
+                // A lap begins where the one before has ended.
+                for moment in &moments[usize::from(lap > 0)..] {
+                    if stop.stopped() {
+                        return Err(SolveError::Stopped);
+                    }
+                    columns.add((lap as f64 + moment.fraction) * lap_deg, moment.placed(&mesh, lap))?;
+                }
             }
         }
     }
     columns.finish(points)
-}
-
-/// A tooth in mesh at an input angle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PlacedTooth {
-    pub(crate) number: u64,
-    pub(crate) position: Position,
-    pub(crate) position_deg: f64,
 }
 
 /// A sweep as it grows by input angles.
@@ -372,6 +377,7 @@ struct Columns<'a> {
     torque_capacity: Option<TorqueCapacity>,
     balance: TorqueBalance,
     torque_balance_residual: f64,
+    lists_lobes: bool,
     teeth: Vec<ToothState>,
 }
 
@@ -385,6 +391,7 @@ impl<'a> Columns<'a> {
             torque_capacity: None,
             balance: TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm()),
             torque_balance_residual: 0.0,
+            lists_lobes: !Mesh::new(loaded.drive()).zones_are_alike(),
             teeth: Vec::new(),
         }
     }
@@ -397,10 +404,13 @@ impl<'a> Columns<'a> {
     /// Appends the states of the teeth in mesh at one input angle.
     fn add(&mut self, input_angle_deg: f64, placed: impl Iterator<Item = PlacedTooth>) -> Result<(), SolveError> {
         self.teeth.clear();
-        for PlacedTooth { number, position, position_deg } in placed {
+        for PlacedTooth { number, lobe, position, position_deg } in placed {
             self.teeth.push(self.loaded.tooth(position)?);
             self.states.input_angle_deg.push(input_angle_deg);
             self.states.tooth.push(u32::try_from(number).unwrap_or(u32::MAX));
+            if self.lists_lobes {
+                self.states.lobe.push(lobe);
+            }
             self.states.position_deg.push(position_deg);
         }
         let wind_up = self.loaded.wind_up(&self.teeth)?;
@@ -424,11 +434,12 @@ impl<'a> Columns<'a> {
         let flank = self.loaded.drive().flank();
         let states = &mut self.states;
         let mut loaded_teeth = 0;
+        let zones = self.loaded.zones();
         let mut torque_nmm = PerContact::<f64>::default();
         for tooth in &self.teeth {
             let ToothState { center, flank: point, .. } = tooth;
             states.center_radius_mm.push(center.center_radius_mm);
-            let cam_angle_rad = flank.locus().cam().contact_angle_from_minor_rad(&center.cam_contact);
+            let cam_angle_rad = flank.locus().contact_angle_from_valley_rad(center);
             states.wave_generator_angle_deg.push(cam_angle_rad.to_degrees());
             states.ring_angle_deg.push(flank.angle_from_tip_rad(center, point).to_degrees());
 
@@ -439,9 +450,9 @@ impl<'a> Columns<'a> {
             states.stress_mpa.push(stress_mpa);
 
             let sin_ring = point.tan_pressure_angle * point.cos_pressure_angle;
-            torque_nmm.wave_generator += WAVES * force_n.wave_generator * center.cam_contact.lever_arm_mm;
-            torque_nmm.ring += WAVES * force_n.ring * sin_ring * center.center_radius_mm;
-            torque_nmm.carrier += WAVES * force_n.carrier * center.center_radius_mm;
+            torque_nmm.wave_generator += zones * force_n.wave_generator * center.cam_contact.lever_arm_mm;
+            torque_nmm.ring += zones * force_n.ring * sin_ring * center.center_radius_mm;
+            torque_nmm.carrier += zones * force_n.carrier * center.center_radius_mm;
         }
         let residual = self.balance.residual(&torque_nmm);
         self.torque_balance_residual = worse(residual, self.torque_balance_residual);
@@ -467,7 +478,7 @@ fn finished(
     torque_capacity: Option<TorqueCapacity>,
 ) -> Result<Sweep, SolveError> {
     let BatchSweep { states, input_angles, peaks, torque_balance_residual } = columns;
-    let tooth_width_mm = loaded.drive().parameters().tooth_width_mm;
+    let tooth_width_mm = loaded.drive().tooth_width_mm();
     let peaks = PerContact::of(|contact| {
         let (force, at) = (states.force_n.get(contact), peaks.get(contact));
         let stress_mpa = states.peak(states.stress_mpa.get(contact), at.stress);
@@ -497,12 +508,12 @@ fn period_closure(
     peaks: &PerContact<ContactPeaks>,
 ) -> Result<f64, SolveError> {
     let mesh = Mesh::new(loaded.drive());
-    let numbers = 2..=mesh.whole_spacings() + 1;
-    let position = |number| match points {
-        Points::Samples(_) => mesh.position_between(number, 1.0),
-        Points::Tolerance(_) => mesh.position_after_period(number),
+    let position = |place| match points {
+        Points::Samples(_) => mesh.position_between(place, 1.0),
+        Points::Tolerance(_) => mesh.position_after_lap(place),
     };
-    let teeth = numbers.clone().map(|number| loaded.tooth(position(number))).collect::<Result<Vec<_>, _>>()?;
+    let placed: Vec<_> = mesh.placed_between(2..=mesh.whole_spacings() + 1, mesh.laps() - 1, position).collect();
+    let teeth = placed.iter().map(|placed| loaded.tooth(placed.position)).collect::<Result<Vec<_>, _>>()?;
     let wind_up = loaded.wind_up(&teeth)?;
     let last_angle_deg = states.input_angle_deg.last();
     let first = states.len().checked_sub(teeth.len());
@@ -510,8 +521,8 @@ fn period_closure(
         return Ok(f64::INFINITY);
     };
     let mut residual = 0.0;
-    for ((state, number), tooth) in (first..).zip(numbers).zip(&teeth) {
-        if u64::from(states.tooth[state]) != number {
+    for ((state, placed), tooth) in (first..).zip(&placed).zip(&teeth) {
+        if u64::from(states.tooth[state]) != placed.number {
             return Ok(f64::INFINITY);
         }
         let loads = loaded.loads(tooth, &wind_up)?;

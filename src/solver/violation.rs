@@ -9,6 +9,18 @@ pub enum Parameter {
     SemiMajor,
     /// `b`, mm.
     SemiMinor,
+    /// Radius of an eccentric circle, mm.
+    EccentricRadius,
+    /// Its distance from the axis, mm.
+    Eccentricity,
+    /// `U`.
+    Lobes,
+    /// `R0` of a harmonic support function, mm.
+    MeanRadius,
+    /// `R` of a harmonic path, mm.
+    MeanPathRadius,
+    /// `e` of either, mm.
+    Amplitude,
     /// `Z_G`.
     ToothCount,
     /// `Z'_G`.
@@ -17,6 +29,10 @@ pub enum Parameter {
     ToothRadius,
     /// `L1`, mm.
     ToothWidth,
+    /// Radius of a ball's groove, mm.
+    GrooveRadius(Contact),
+    /// `l`: length of a tooth's flat, mm.
+    FlatLength,
     /// `Z_K`.
     RingTeeth,
     /// Tip-circle radius, mm.
@@ -123,6 +139,9 @@ impl Range {
 /// Most teeth of carrier and ring.
 pub const MAX_TEETH: i64 = 10_000;
 
+/// Most lobes of a wave generator; more than any has, and so few that some number of ring teeth is possible beside any of teeth.
+pub const MAX_LOBES: i64 = 1_000;
+
 /// Most intervals of a sweep.
 pub const MAX_SAMPLES: i64 = 10_000_000;
 
@@ -132,8 +151,15 @@ impl Parameter {
         match self {
             Self::SemiMajor
             | Self::SemiMinor
+            | Self::EccentricRadius
+            | Self::Eccentricity
+            | Self::MeanRadius
+            | Self::MeanPathRadius
+            | Self::Amplitude
             | Self::ToothRadius
             | Self::ToothWidth
+            | Self::GrooveRadius(_)
+            | Self::FlatLength
             | Self::TipRadius
             | Self::RingOuterRadius
             | Self::CarrierInnerRadius
@@ -141,6 +167,7 @@ impl Parameter {
             | Self::BoreRadius
             | Self::Depth(_)
             | Self::ChordTolerance => Range::closed(1e-6, 1e6, "mm"),
+            Self::Lobes => Range::closed(1.0, MAX_LOBES as f64, ""),
             Self::ToothCount | Self::InstalledTeeth | Self::RingTeeth => Range::closed(2.0, MAX_TEETH as f64, ""),
             Self::YoungsModulus(_) => Range::closed(1e-3, 1e5, "GPa"),
             Self::PoissonsRatio(_) => Range { low: -1.0, high: 0.5, closed: false, unit: "" },
@@ -190,22 +217,24 @@ pub struct Alternatives {
 }
 
 impl Alternatives {
-    /// To an odd number of teeth.
-    pub(crate) const fn to_odd(count: i64) -> Self {
-        // A range of counts begins and ends with an even number.
-        Self { below: Some(count - 1), above: Some(count + 1) }
-    }
-
-    /// To a number of installed teeth that does not divide `teeth` or is odd: even divisors. `teeth` are even.
+    /// To a number of installed teeth that does not divide `teeth`: divisors.
     pub(crate) fn to_installed(installed: i64, teeth: i64) -> Self {
-        let is_even_divisor = |other: &i64| other % 2 == 0 && teeth % other == 0;
-        Self { below: (2..installed).rev().find(is_even_divisor), above: (installed + 1..=teeth).find(is_even_divisor) }
+        let is_divisor = |other: &i64| teeth % other == 0;
+        Self { below: (2..installed).rev().find(is_divisor), above: (installed + 1..=teeth).find(is_divisor) }
     }
 
-    /// To a ring that does not differ from `teeth` by two.
-    pub(crate) fn to_ring_beside(teeth: i64) -> Self {
-        let in_range = |ring: i64| Parameter::RingTeeth.check(ring as f64).is_none().then_some(ring);
-        Self { below: in_range(teeth - 2), above: in_range(teeth + 2) }
+    /// To a ring that does not differ from `teeth` by the lobes, or has fewer teeth than there are lobes.
+    pub(crate) fn to_ring_beside(teeth: i64, lobes: i64) -> Self {
+        let possible = |ring: i64| {
+            let is_in_range = Parameter::RingTeeth.check(ring as f64).is_none();
+            (is_in_range && ring >= lobes).then_some(ring)
+        };
+        Self { below: possible(teeth - lobes), above: possible(teeth + lobes) }
+    }
+
+    /// Whether the count is one of the two.
+    pub(crate) fn contains(&self, count: i64) -> bool {
+        self.below == Some(count) || self.above == Some(count)
     }
 
     /// The nearer one, of two as near the lower. There is always one.
@@ -243,28 +272,41 @@ pub enum Violation {
         /// `b`.
         semi_minor_mm: f64,
     },
-    /// `|Z_G - Z_K| ≠ 2`.
+    /// A cam that is too small for its stroke: its lobes would have cusps, or the axis would lie outside.
+    CamTooSmall {
+        /// The radius that says how large it is.
+        parameter: Parameter,
+        /// Its value.
+        radius_mm: f64,
+        /// What it has to exceed.
+        least_mm: f64,
+    },
+    /// `|Z_G - Z_K| ≠ U`, or `Z_K < U`.
     ToothDifference {
         /// `Z_G`.
         teeth: i64,
         /// `Z_K`.
         ring_teeth: i64,
+        /// `U`.
+        lobes: i64,
         /// What `Z_K` could be.
         instead: Alternatives,
     },
-    /// `Z_G` odd, so that no even `Z'_G` divides it.
-    CountOdd {
-        /// `Z_G`.
-        teeth: i64,
-        /// What it could be.
-        instead: Alternatives,
+    /// A groove that is no wider than the ball in it.
+    GrooveTooTight {
+        /// At which contact.
+        contact: Contact,
+        /// The groove's radius.
+        groove_radius_mm: f64,
+        /// `r`.
+        tooth_radius_mm: f64,
     },
-    /// `Z'_G` odd.
-    InstalledOdd {
-        /// `Z'_G`.
-        installed: i64,
-        /// What it could be.
-        instead: Alternatives,
+    /// A flat that leaves nothing of the tooth.
+    FlatTooLong {
+        /// `l`.
+        flat_length_mm: f64,
+        /// `2r`.
+        tooth_diameter_mm: f64,
     },
     /// `Z'_G` no divisor of `Z_G`.
     InstalledNoDivisor {
@@ -286,8 +328,14 @@ pub enum Violation {
     },
     /// The ring's tips reach in to the wave generator: no annulus is left for the carrier.
     NoCarrierAnnulus {
-        /// `a`.
-        semi_major_mm: f64,
+        /// What makes the wave generator reach so far out.
+        parameter: Parameter,
+        /// Its value.
+        value_mm: f64,
+        /// What it has to stay below.
+        limit_mm: f64,
+        /// The wave generator's largest distance from the axis, `a` of an ellipse.
+        cam_outer_mm: f64,
         /// The ring's actual tip radius.
         tip_radius_mm: f64,
     },
@@ -325,7 +373,7 @@ pub enum Violation {
     BoreLeavesNoFlank {
         /// The bore.
         tip_radius_mm: f64,
-        /// `a + 2r`.
+        /// `d_l + r`.
         root_radius_mm: f64,
     },
     /// A part whose dimension or clearance leaves no room for it or for another.
@@ -344,7 +392,7 @@ pub enum Violation {
 pub enum Misfit {
     /// The ring's outer radius does not exceed its root radius.
     RingWithoutRim,
-    /// The carrier's inner radius does not exceed the cam's semi-major axis.
+    /// The carrier's inner radius does not exceed that of the cam.
     CarrierMeetsCam,
     /// The carrier's outer radius reaches the ring's tips.
     CarrierMeetsRing,
@@ -394,17 +442,24 @@ impl std::fmt::Display for Violation {
                 f,
                 "the semi-major axis ({semi_major_mm:?} mm) must exceed the semi-minor axis ({semi_minor_mm:?} mm): a round cam moves no tooth"
             ),
-            Self::ToothDifference { teeth, ring_teeth, instead } => write!(
+            Self::CamTooSmall { radius_mm, least_mm, .. } => write!(
                 f,
-                "carrier and ring must differ by 2 teeth, one for each lobe of the ellipse: with {teeth} teeth the ring has {instead}, not {ring_teeth}"
+                "a wave generator of {radius_mm:?} mm is too small for its stroke, its lobes would have cusps or its axis would lie outside: choose more than {least_mm:?} mm, or a smaller stroke"
             ),
-            Self::CountOdd { teeth, instead } => write!(
+            Self::ToothDifference { teeth, ring_teeth, lobes, instead } => {
+                let joint = if lobes == 1 { "1 tooth".to_owned() } else { format!("{lobes} teeth") };
+                write!(
+                    f,
+                    "carrier and ring must differ by {joint}, one for each lobe of the wave generator: with {teeth} teeth the ring has {instead}, not {ring_teeth}"
+                )
+            }
+            Self::GrooveTooTight { groove_radius_mm, tooth_radius_mm, .. } => write!(
                 f,
-                "{teeth} teeth are odd: the two meshing zones are alike only for an even number of installed teeth, and none divides {teeth}; choose {instead}"
+                "a groove of {groove_radius_mm:?} mm radius is no wider than the balls in it: choose more than their radius of {tooth_radius_mm:?} mm"
             ),
-            Self::InstalledOdd { installed, instead } => write!(
+            Self::FlatTooLong { flat_length_mm, tooth_diameter_mm } => write!(
                 f,
-                "{installed} installed teeth are odd: the two meshing zones are alike only for an even number; choose {instead}"
+                "flats of {flat_length_mm:?} mm length leave nothing of a tooth: choose less than its diameter of {tooth_diameter_mm:?} mm"
             ),
             Self::InstalledNoDivisor { installed, teeth, instead } => write!(
                 f,
@@ -414,9 +469,9 @@ impl std::fmt::Display for Violation {
                 f,
                 "neighbouring teeth of {tooth_diameter_mm:?} mm diameter come as near as {center_distance_mm:?} mm from centre to centre: choose a radius below {touching_radius_mm:?} mm, install fewer, or enlarge the wave generator"
             ),
-            Self::NoCarrierAnnulus { semi_major_mm, tip_radius_mm } => write!(
+            Self::NoCarrierAnnulus { cam_outer_mm, tip_radius_mm, .. } => write!(
                 f,
-                "the ring's tips ({tip_radius_mm:?} mm) must stay outside the wave generator ({semi_major_mm:?} mm), or no annulus is left for the carrier: make the teeth thicker or the ellipse rounder, or bore the ring"
+                "the ring's tips ({tip_radius_mm:?} mm) must stay outside the wave generator ({cam_outer_mm:?} mm), or no annulus is left for the carrier: make the teeth thicker or the wave generator rounder, or bore the ring"
             ),
             Self::ClearanceNotMonotone { clearance_um, .. } => write!(
                 f,
@@ -448,7 +503,7 @@ impl std::fmt::Display for Violation {
                 ),
                 Misfit::CarrierMeetsCam => write!(
                     f,
-                    "a carrier of {value:?} mm inner radius meets the wave generator: choose more than its semi-major axis of {limit:?} mm"
+                    "a carrier of {value:?} mm inner radius meets the wave generator: choose more than its largest radius of {limit:?} mm"
                 ),
                 Misfit::CarrierMeetsRing => write!(
                     f,

@@ -4,30 +4,40 @@ use proptest::prelude::*;
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::{
     Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Modification,
-    Never, PerContact, Torque,
+    Never, PerContact, ToothShape, Torque, WaveGenerator,
     sweep::{self, Points, Sweep},
 };
 
+pub(crate) const fn ellipse(semi_major_mm: f64, semi_minor_mm: f64) -> WaveGenerator {
+    WaveGenerator::Ellipse { semi_major_mm, semi_minor_mm }
+}
+
+/// The semi-axes of an elliptic drive.
+pub(crate) fn semi_axes_mm(parameters: &DriveParameters) -> (f64, f64) {
+    match parameters.wave_generator {
+        WaveGenerator::Ellipse { semi_major_mm, semi_minor_mm } => (semi_major_mm, semi_minor_mm),
+        other => panic!("{other:?} is no ellipse"),
+    }
+}
+
 /// The paper's case 5.1: no undercut.
 pub(crate) const PAPER_5_1: DriveParameters = DriveParameters {
-    semi_major_mm: 58.0,
-    semi_minor_mm: 56.0,
+    wave_generator: ellipse(58.0, 56.0),
     teeth: 28,
     installed: 28,
     tooth_radius_mm: 5.0,
-    tooth_width_mm: 15.0,
+    tooth: ToothShape::Cylinder { width_mm: 15.0 },
     ring_teeth: 26,
     tip_radius_mm: None,
 };
 
 /// The paper's case 5.2: undercut, every second slot filled.
 pub(crate) const PAPER_5_2: DriveParameters = DriveParameters {
-    semi_major_mm: 50.7,
-    semi_minor_mm: 49.3,
+    wave_generator: ellipse(50.7, 49.3),
     teeth: 80,
     installed: 40,
     tooth_radius_mm: 1.5,
-    tooth_width_mm: 15.0,
+    tooth: ToothShape::Cylinder { width_mm: 15.0 },
     ring_teeth: 78,
     tip_radius_mm: None,
 };
@@ -82,12 +92,11 @@ pub(crate) fn any_drive() -> impl Strategy<Value = DriveParameters> {
             let sin = (std::f64::consts::PI / installed as f64).sin();
             let tooth_radius_mm = thickness * semi_minor_mm * sin / (1.0 - sin);
             let parameters = DriveParameters {
-                semi_major_mm: a,
-                semi_minor_mm,
+                wave_generator: ellipse(a, semi_minor_mm),
                 teeth,
                 installed,
                 tooth_radius_mm,
-                tooth_width_mm: 10.0,
+                tooth: ToothShape::Cylinder { width_mm: 10.0 },
                 ring_teeth: if more { teeth + 2 } else { teeth - 2 },
                 tip_radius_mm: bore
                     .map(|share| semi_minor_mm + 2.0 * tooth_radius_mm + share * 0.9 * (a - semi_minor_mm)),

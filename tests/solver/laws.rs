@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Vector2};
 use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
-use toothwave_solver::mesh::Mesh;
+use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::sweep::{self, Points};
 use toothwave_solver::tooth::ToothContact;
 use toothwave_solver::tooth::flat::FlatContact;
@@ -163,7 +163,7 @@ fn free_tooth(
 
 /// The largest difference of the solver's forces from those of free teeth at its wind-up, over the peak, and of the torque they make.
 fn worst_against_free_teeth(parameters: &DriveParameters, load: &LoadParameters) -> f64 {
-    const SAMPLES: u64 = 3;
+    let samples = Samples::new(3).unwrap();
     let drive = drive(parameters);
     let loaded = LoadCase::new(load).unwrap();
     let loaded = LoadedDrive::new(&drive, &loaded).unwrap();
@@ -180,10 +180,10 @@ fn worst_against_free_teeth(parameters: &DriveParameters, load: &LoadParameters)
     let gap_mm = PerContact::of(|contact| 1e-3 * load.clearance_um.get(contact));
     let mesh = Mesh::new(&drive);
     let mut worst = 0.0_f64;
-    for sample in 0..SAMPLES {
+    for sample in 0..samples.count() {
         let teeth: Vec<_> = mesh
-            .teeth_at(sample, SAMPLES)
-            .map(|tooth| loaded.tooth(mesh.position(tooth, sample, SAMPLES)).unwrap())
+            .placed_at(sample, samples)
+            .map(|placed| loaded.tooth(placed.position).unwrap())
             .filter(|tooth| tooth.center.tan_pressure_angle > 0.0)
             .collect();
         let wind_up = loaded.wind_up(&teeth).unwrap();
@@ -295,7 +295,7 @@ fn under_johnsons_law_too_any_torque_up_to_its_end_and_any_gap_is_balanced() {
 fn johnsons_law_ends_where_a_contact_is_half_as_wide_as_the_tooth_and_says_at_which_torque() {
     let heavy = LoadCase::new(&johnson(1e6)).unwrap();
     let drive = drive(&PAPER_5_1);
-    let refused = sweep::sweep(&drive, &heavy, Points::Samples(4), &Never).unwrap_err();
+    let refused = sweep::sweep(&drive, &heavy, Points::samples(4).unwrap(), &Never).unwrap_err();
     let SolveError::JohnsonBeyondHalfWidth { contact, half_width_limit_mm, input_torque_limit_nm, .. } = refused else {
         panic!("{refused:?}")
     };
@@ -306,7 +306,7 @@ fn johnsons_law_ends_where_a_contact_is_half_as_wide_as_the_tooth_and_says_at_wh
         let loaded = LoadedDrive::new(&drive, &case).unwrap();
         let mesh = Mesh::new(&drive);
         let teeth: Vec<_> =
-            mesh.teeth_at(0, 4).map(|tooth| loaded.tooth(mesh.position(tooth, 0, 4)).unwrap()).collect();
+            mesh.placed_at(0, Samples::new(4).unwrap()).map(|placed| loaded.tooth(placed.position).unwrap()).collect();
         let wind_up = loaded.wind_up(&teeth)?;
         let widths = teeth.iter().map(|tooth| {
             let force_n = *loaded.forces_n(tooth, &wind_up).unwrap().get(contact);
@@ -319,7 +319,7 @@ fn johnsons_law_ends_where_a_contact_is_half_as_wide_as_the_tooth_and_says_at_wh
     assert!(loaded(input_torque_limit_nm * (1.0 + 1e-9)).is_err());
     // A capacity beyond is none.
     let parameters = LoadParameters { allowable_stress_mpa: Some(1e6), ..johnson(20.0) };
-    let refused = sweep::sweep(&drive, &LoadCase::new(&parameters).unwrap(), Points::Samples(4), &Never);
+    let refused = sweep::sweep(&drive, &LoadCase::new(&parameters).unwrap(), Points::samples(4).unwrap(), &Never);
     assert!(matches!(refused, Err(SolveError::JohnsonBeyondHalfWidth { .. })), "{refused:?}");
 }
 
@@ -570,7 +570,7 @@ fn flat_sided_teeth_share_the_load_with_any_law_of_cylinders() {
         let loaded = LoadedDrive::with_teeth(&drive, &case, &shape(65.5)).unwrap();
         let mesh = Mesh::new(&drive);
         let teeth: Vec<_> =
-            mesh.teeth_at(1, 3).map(|tooth| loaded.tooth(mesh.position(tooth, 1, 3)).unwrap()).collect();
+            mesh.placed_at(1, Samples::new(3).unwrap()).map(|placed| loaded.tooth(placed.position).unwrap()).collect();
         let wind_up = loaded.wind_up(&teeth).unwrap();
         let mut torque = 0.0;
         for tooth in &teeth {

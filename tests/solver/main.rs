@@ -3,6 +3,7 @@
 
 mod drives;
 mod extremes;
+mod family;
 mod fast;
 mod gaps;
 mod laws;

@@ -9,9 +9,7 @@ use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
 use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::{ContactLaw, Drive, DriveParameters, LoadCase, PerContact, Position};
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, any_swept_drive, drive, load};
-
-const WAVES: f64 = 2.0;
+use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, any_swept_drive, drive, load, semi_axes_mm};
 
 /// The directions of the three forces on a tooth, in its slot's frame: x outward, y in the sense of the input.
 ///
@@ -57,7 +55,7 @@ fn forces_by_projection(
             matrix[(2 * i + axis, 3 * i + 1)] = direction.ring[axis];
             matrix[(2 * i + axis, 3 * i + 2)] = direction.carrier[axis];
         }
-        matrix[(2 * n, 3 * i)] = WAVES * lever_mm(tooth);
+        matrix[(2 * n, 3 * i)] = Mesh::new(drive).zones_in_torque() * lever_mm(tooth);
         if let Some(next) = teeth.get(i + 1) {
             for contact in 0..3 {
                 matrix[(2 * n + 1 + i, 3 * i + contact)] = displacement(tooth)[contact] * lever_mm(next);
@@ -111,7 +109,7 @@ fn forces_by_springs(
         }
         matrix[(2 * n, 2 * n)] += push * lever_mm(tooth);
     }
-    right[2 * n] = torque_nmm / WAVES;
+    right[2 * n] = torque_nmm / Mesh::new(drive).zones_in_torque();
     let solution = matrix.lu().solve(&right).unwrap();
     teeth
         .iter()
@@ -130,7 +128,11 @@ fn forces_by_springs(
 }
 
 /// The largest difference between the closed form and a dense solve over a few input angles, over the largest force.
-fn worst_difference(parameters: &DriveParameters, compatibility: Compatibility, stiffness: PerContact<f64>) -> f64 {
+pub(crate) fn worst_difference(
+    parameters: &DriveParameters,
+    compatibility: Compatibility,
+    stiffness: PerContact<f64>,
+) -> f64 {
     let samples = Samples::new(7).unwrap();
     let drive = drive(parameters);
     let mut load = load(20.0, compatibility);
@@ -140,8 +142,8 @@ fn worst_difference(parameters: &DriveParameters, compatibility: Compatibility, 
     let mut worst = 0.0_f64;
     for sample in 0..=samples.count() {
         let teeth: Vec<_> = mesh
-            .teeth_at(sample, samples)
-            .map(|tooth| loaded.tooth(mesh.position(tooth, sample, samples).unwrap()).unwrap())
+            .placed_at(sample, samples)
+            .map(|placed| loaded.tooth(placed.position).unwrap())
             .filter(|tooth| tooth.center.tan_pressure_angle > 0.0)
             .collect();
         let wind_up = loaded.wind_up(&teeth).unwrap();
@@ -160,8 +162,8 @@ fn worst_difference(parameters: &DriveParameters, compatibility: Compatibility, 
     worst
 }
 
-const EQUAL: PerContact<f64> = PerContact { wave_generator: 1e6, ring: 1e6, carrier: 1e6 };
-const UNEQUAL: PerContact<f64> = PerContact { wave_generator: 1.3e6, ring: 0.7e6, carrier: 0.9e6 };
+pub(crate) const EQUAL: PerContact<f64> = PerContact { wave_generator: 1e6, ring: 1e6, carrier: 1e6 };
+pub(crate) const UNEQUAL: PerContact<f64> = PerContact { wave_generator: 1.3e6, ring: 0.7e6, carrier: 0.9e6 };
 
 #[test]
 fn projection_is_the_papers_3n_equations() {
@@ -197,8 +199,8 @@ proptest! {
     fn the_ring_is_the_boundary_of_the_circles_swept_along_the_path(parameters in any_drive(), share in 0.02_f64..0.98) {
         let drive = drive(&parameters);
         let flank = drive.flank();
-        let end_rad = drive.flank_limit().position.from_major_rad;
-        let tooth = flank.locus().at(Position::from_major(share * end_rad)).unwrap();
+        let end_rad = drive.flank_limit().position.from_lobe_rad;
+        let tooth = flank.locus().at(Position::from_lobe(share * end_rad, 2)).unwrap();
         let point = flank.at(&tooth);
         let flank_mm = flank.radius_mm(&tooth, &point);
         let angle_rad = flank.angle_from_space_rad(&tooth, &point);
@@ -212,8 +214,8 @@ proptest! {
 fn farthest_swept_mm(drive: &Drive, angle_rad: f64) -> f64 {
     const SCAN: u32 = 4000;
     let p = drive.parameters();
-    let (a, b, r) = (p.semi_major_mm, p.semi_minor_mm, p.tooth_radius_mm);
-    let k = p.ring_teeth as f64 / WAVES;
+    let ((a, b), r) = (semi_axes_mm(p), p.tooth_radius_mm);
+    let k = p.ring_teeth as f64 / 2.0;
     // The path by the normal's angle φ on the ellipse, without the solver.
     let reach = |phi: f64| {
         let (sin, cos) = phi.sin_cos();

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use toothwave_solver::profile::{Extent, Polyline, ProfileParameters, Profiles, profiles};
 use toothwave_solver::{DriveParameters, Never, SolveError};
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, drive};
+use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, drive, semi_axes_mm};
 
 fn sampled(parameters: &DriveParameters, chord_tolerance_mm: f64, extent: Extent) -> Profiles {
     let request = ProfileParameters { chord_tolerance_mm, extent, max_points: 10_000_000 };
@@ -58,7 +58,7 @@ proptest! {
         prop_assert!((first.y.atan2(first.x) + tip_rad).abs() < 1e-15);
         prop_assert!((last.y.atan2(last.x) - tip_rad).abs() < 1e-15);
         let turned = Rotation2::new(2.0 * tip_rad) * first;
-        prop_assert!((turned - last).norm() < 1e-12 * p.semi_major_mm);
+        prop_assert!((turned - last).norm() < 1e-12 * semi_axes_mm(p).0);
         let full = sampled(p, 1e-3 * p.tooth_radius_mm, Extent::Full);
         for curve in [&full.ring, &full.tooth_center_path, &full.wave_generator] {
             prop_assert_eq!(curve.first(), curve.last());

@@ -4,20 +4,22 @@ use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::Sweep;
-use toothwave_solver::{Compatibility, DriveParameters, Torque};
+use toothwave_solver::{Compatibility, DriveParameters, ToothShape, Torque};
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_swept_drive, drive, load, swept};
+use crate::drives::{
+    PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_swept_drive, drive, ellipse, load, semi_axes_mm, swept,
+};
 
 fn any_compatibility() -> impl Strategy<Value = Compatibility> {
     prop::sample::select(vec![Projection, VirtualWork])
 }
 
 fn scaled(p: &DriveParameters, factor: f64) -> DriveParameters {
+    let (a, b) = semi_axes_mm(p);
     DriveParameters {
-        semi_major_mm: factor * p.semi_major_mm,
-        semi_minor_mm: factor * p.semi_minor_mm,
+        wave_generator: ellipse(factor * a, factor * b),
         tooth_radius_mm: factor * p.tooth_radius_mm,
-        tooth_width_mm: factor * p.tooth_width_mm,
+        tooth: ToothShape::Cylinder { width_mm: factor * 10.0 },
         tip_radius_mm: p.tip_radius_mm.map(|radius| factor * radius),
         ..*p
     }
@@ -163,7 +165,7 @@ fn just_above_the_critical_radius_the_flank_ends_just_before_the_minor_axis() {
     let critical = drive(&PAPER_5_1).flank().critical_tooth_radius_mm().unwrap();
     let at = |factor: f64| drive(&DriveParameters { tooth_radius_mm: critical * factor, ..PAPER_5_1 });
     assert_eq!(at(1.0 - 1e-9).flank_limit().end, FlankEnd::RegularTip);
-    let short = |relative: f64| at(1.0 + relative).flank_limit().position.from_minor_rad;
+    let short = |relative: f64| at(1.0 + relative).flank_limit().position.from_valley_rad;
     // Like a square root: a hundredth of the distance, a tenth of the angle.
     assert!((short(1e-6) / short(1e-8) - 10.0).abs() < 1e-2);
 }

@@ -12,8 +12,10 @@ use toothwave_solver::sweep::{self, Points, States, Sweep};
 use toothwave_solver::tooth::ToothContact;
 use toothwave_solver::{
     Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Modification,
-    Never, PerContact, SolveError, Torque,
+    Never, PerContact, SolveError, ToothShape, Torque,
 };
+
+use crate::drives::ellipse;
 
 /// What is allowed beside the condition, relative to the value or the column's peak.
 const TOLERANCE: f64 = 1e-14;
@@ -52,12 +54,11 @@ impl Case {
         let drive = &self.0["document"]["drive"];
         let (cam, teeth, ring) = (&drive["wave_generator"], &drive["teeth"], &drive["ring"]);
         Drive::new(&DriveParameters {
-            semi_major_mm: cam["semi_major_mm"].as_f64().unwrap(),
-            semi_minor_mm: cam["semi_minor_mm"].as_f64().unwrap(),
+            wave_generator: ellipse(cam["semi_major_mm"].as_f64().unwrap(), cam["semi_minor_mm"].as_f64().unwrap()),
             teeth: teeth["count"].as_i64().unwrap(),
             installed: teeth["installed"].as_i64().unwrap(),
             tooth_radius_mm: teeth["radius_mm"].as_f64().unwrap(),
-            tooth_width_mm: teeth["width_mm"].as_f64().unwrap(),
+            tooth: ToothShape::Cylinder { width_mm: teeth["width_mm"].as_f64().unwrap() },
             ring_teeth: ring["teeth"].as_i64().unwrap(),
             tip_radius_mm: ring["tip_radius_mm"].as_f64(),
         })
@@ -212,7 +213,7 @@ fn geometry_and_mesh_agree_with_60_digits() {
         assert_eq!(critical.is_some(), !expected["critical_tooth_radius_mm"].is_null(), "{name}");
         let found = [
             ("critical_tooth_radius_mm", critical.unwrap_or_default()),
-            ("engagement_start_deg", drive.flank_limit().position.from_major_deg()),
+            ("engagement_start_deg", drive.flank_limit().position.from_lobe_deg()),
             ("coincidence_degree", mesh.coincidence_degree()),
             ("period_deg", mesh.period_deg()),
             ("transmission_ratio", drive.transmission_ratio()),

@@ -29,7 +29,7 @@ fn six_peaks(sweep: &Sweep) -> Vec<Peak> {
 /// The bore that ends the flank of a drive at so many spacings from the major axis, but for rounding.
 fn bore_at(unbored: &Drive, spacings: u64) -> Option<f64> {
     let flank = unbored.flank();
-    let position = Position::of_turn(spacings, unbored.parameters().installed.unsigned_abs())?;
+    let position = Position::of_turn(spacings, unbored.parameters().installed.unsigned_abs(), 2)?;
     let center = flank.locus().at(position).unwrap();
     Some(flank.radius_mm(&center, &flank.at(&center)))
 }

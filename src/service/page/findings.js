@@ -50,6 +50,18 @@ const KINDS = {
     tests: 'The largest pressure angle on the engaged flank of the ring.',
     basis: RULE_OF_THUMB,
   },
+  hollow_wave_generator: {
+    title: 'Hollow wave generator',
+    tests: 'The amplitude of the path against the largest that leaves the wave generator convex.',
+    basis: ['exact', 'The limit is geometry.'],
+    why: 'A solid wave generator turns as calculated; the ring of a bearing could not follow it.',
+  },
+  flat_cuts_the_contact: {
+    title: 'Flats cut the contact',
+    tests: 'The length of a tooth’s flats against the longest that leaves its steepest contact with the ring on the arc.',
+    basis: ['exact', 'The limit is geometry, without the width of the contact itself.'],
+    why: 'Beyond that place a tooth would touch the ring with the edge of its flat.',
+  },
   stress_above_fatigue_limit: {
     title: 'Stress above the fatigue limit',
     tests: 'The peak contact stress over a period against the fatigue limit of bearing steel.',

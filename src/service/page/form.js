@@ -6,7 +6,7 @@ import { explanation, sentence, titleOf } from './findings.js';
 import { number } from './format.js';
 
 /** Faults whose limit is itself a value that would do. */
-const LIMIT_WOULD_DO = new Set(['tooth_difference', 'count_odd', 'installed_odd', 'installed_no_divisor', 'out_of_range', 'clearance_not_monotone']);
+const LIMIT_WOULD_DO = new Set(['tooth_difference', 'installed_no_divisor', 'out_of_range', 'clearance_not_monotone']);
 
 const SLIDER_STEPS = 250;
 

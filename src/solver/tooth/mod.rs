@@ -6,6 +6,7 @@ pub mod point;
 
 use crate::approach::{Approach, Logarithmic};
 use crate::contact::{Contact, ContactLaw, HertzLine, Materials, PerContact};
+use crate::drive::{Drive, ToothShape};
 use crate::root::NotConverged;
 use crate::violation::Parameter;
 use flat::FlatContact;
@@ -31,6 +32,21 @@ pub enum ToothContact {
         /// Its outer radius, where they end.
         carrier_outer_radius_mm: f64,
     },
+}
+
+impl ToothContact {
+    /// Of a drive's own teeth; a flat's carrier fills the room between wave generator and ring.
+    pub fn of(drive: &Drive) -> Self {
+        match drive.parameters().tooth {
+            ToothShape::Cylinder { .. } => Self::Cylinder,
+            ToothShape::Ball { groove_radius_mm } => Self::Ball { groove_radius_mm },
+            ToothShape::FlatSided { flat_length_mm, .. } => Self::FlatSided {
+                flat_length_mm,
+                carrier_inner_radius_mm: drive.cam_outer_radius_mm(),
+                carrier_outer_radius_mm: drive.tip_radius_mm(),
+            },
+        }
+    }
 }
 
 /// How force and approach of one contact go together, wherever it stands.

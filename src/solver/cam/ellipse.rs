@@ -1,0 +1,204 @@
+//! The ellipse, described by its support function over the angle φ of its outward normal (docs/theory.md sections 2.1 to 2.3).
+
+use nalgebra::{Point2, Unit, Vector2};
+
+use crate::cam::{CamContact, CamPoint, Kind};
+use crate::locus::ToothCenter;
+use crate::position::Position;
+use crate::root::{NotConverged, ValueAndSlope, bracketed, newton_in_bracket};
+
+/// An ellipse about the axis, `a > b`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ellipse {
+    semi_major_mm: f64,
+    semi_minor_mm: f64,
+}
+
+/// The direction of a normal, the angle φ from the major axis.
+#[derive(Clone, Copy)]
+struct Normal {
+    cos: f64,
+    sin: f64,
+}
+
+impl Ellipse {
+    pub(super) const fn new(semi_major_mm: f64, semi_minor_mm: f64) -> Self {
+        Self { semi_major_mm, semi_minor_mm }
+    }
+
+    /// `a`.
+    pub const fn semi_major_mm(&self) -> f64 {
+        self.semi_major_mm
+    }
+
+    /// `b`.
+    pub const fn semi_minor_mm(&self) -> f64 {
+        self.semi_minor_mm
+    }
+
+    /// `a² - b²`, as a product so that a nearly round cam keeps all its digits.
+    pub(crate) fn difference_of_squares_mm2(&self) -> f64 {
+        (self.semi_major_mm - self.semi_minor_mm) * (self.semi_major_mm + self.semi_minor_mm)
+    }
+
+    fn support_mm(&self, normal: Normal) -> f64 {
+        (self.semi_major_mm * normal.cos).hypot(self.semi_minor_mm * normal.sin)
+    }
+
+    /// Radius of curvature `ρ_H = h + h'' = a²b²/h³`: for an ellipse the sum has this closed form without cancellation.
+    fn curvature_radius_mm(&self, support_mm: f64) -> f64 {
+        let a_over_h = self.semi_major_mm / support_mm;
+        let b_over_h = self.semi_minor_mm / support_mm;
+        a_over_h * a_over_h * b_over_h * b_over_h * support_mm
+    }
+
+    /// `h'' = ρ_H - h`, written as a product of differences that keeps its digits for a nearly round cam:
+    /// `(a - b)(b sin²φ - a cos²φ)(ab + h²)/h³`.
+    fn support_second_derivative_mm(&self, normal: Normal, support_mm: f64) -> f64 {
+        let (a, b, h) = (self.semi_major_mm, self.semi_minor_mm, support_mm);
+        let (c, s) = (normal.cos, normal.sin);
+        (a - b) * ((b * s * s - a * c * c) / h) * ((a / h) * (b / h) + 1.0)
+    }
+
+    /// The normal at the tooth: `tan φ = tan ψ (a² + rh)/(b² + rh)`, sums and products of positive terms alone.
+    fn normal(&self, tooth_radius_mm: f64, position: Position, support_mm: f64) -> Normal {
+        let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
+        let cos = position.phase_cos * (b * b + r * support_mm);
+        let sin = position.phase_sin * (a * a + r * support_mm);
+        let length = cos.hypot(sin);
+        Normal { cos: cos / length, sin: sin / length }
+    }
+
+    fn normal_at(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> Normal {
+        self.normal(tooth_radius_mm, tooth.position, tooth.cam_contact.support_mm)
+    }
+
+    fn center(&self, tooth_radius_mm: f64, position: Position, normal: Normal) -> ToothCenter {
+        let support_mm = self.support_mm(normal);
+        let lever_arm_mm = self.difference_of_squares_mm2() * (normal.sin * normal.cos / support_mm);
+        let curvature_radius_mm = self.curvature_radius_mm(support_mm);
+        ToothCenter::by_support(
+            position,
+            tooth_radius_mm,
+            CamContact { support_mm, lever_arm_mm, curvature_per_mm: 1.0 / curvature_radius_mm },
+            curvature_radius_mm,
+            self.support_second_derivative_mm(normal, support_mm),
+        )
+    }
+}
+
+impl Kind for Ellipse {
+    fn lobes(&self) -> u32 {
+        2
+    }
+
+    /// The centre is `((a²/h + r) cos φ, (b²/h + r) sin φ)`, so that φ follows from ψ once the support `h = h(φ)` is known. `h` is the one
+    /// root in `[b, a]` of `sin²ψ (a² + rh)² (h² - b²) - cos²ψ (b² + rh)² (a² - h²)`.
+    fn tooth(&self, tooth_radius_mm: f64, position: Position) -> Result<ToothCenter, NotConverged> {
+        let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
+        let Position { phase_cos: cos, phase_sin: sin, .. } = position;
+        let guess = (a * cos).hypot(b * sin);
+        let support_mm = newton_in_bracket("support of the cam at a tooth", b, a, guess, |h| {
+            let major = sin * (a * a + r * h);
+            let minor = cos * (b * b + r * h);
+            let (above_b, below_a) = ((h - b) * (h + b), (a - h) * (a + h));
+            ValueAndSlope {
+                value: major * major * above_b - minor * minor * below_a,
+                slope: 2.0 * (major * (r * sin * above_b + major * h) + minor * (minor * h - r * cos * below_a)),
+            }
+        })?;
+        Ok(self.center(r, position, self.normal(r, position, support_mm)))
+    }
+
+    /// There `h''(h + r) = h'²`; in `u = cos²φ` and divided by `a - b` this reads
+    /// `(b - (a + b) u)(ab + h²)(h + r) = h (a + b)(a² - b²) u (1 - u)`, with `h² = b² + (a² - b²) u`.
+    fn steepest(&self, tooth_radius_mm: f64) -> Result<ToothCenter, NotConverged> {
+        let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
+        let difference = self.difference_of_squares_mm2();
+        let condition = |u: f64| {
+            let support_squared = b * b + difference * u;
+            let h = support_squared.sqrt();
+            Ok((b - (a + b) * u) * (a * b + support_squared) * (h + r) - h * (a + b) * difference * u * (1.0 - u))
+        };
+        let cos_squared = bracketed("largest pressure angle", 0.0, b * (a * b + b * b) * (b + r), 1.0, condition)?;
+        let normal = Normal { cos: cos_squared.sqrt(), sin: (1.0 - cos_squared).sqrt() };
+        let support_mm = (b * b + difference * cos_squared).sqrt();
+        let major = normal.cos * (a * a / support_mm + r);
+        let minor = normal.sin * (b * b / support_mm + r);
+        let position = if minor < major {
+            Position::from_lobe(minor.atan2(major), 2)
+        } else {
+            Position::from_valley(major.atan2(minor), 2)
+        };
+        Ok(self.center(r, position, normal))
+    }
+
+    fn outer_radius_mm(&self, _: f64) -> f64 {
+        self.semi_major_mm
+    }
+
+    fn inner_radius_mm(&self, _: f64) -> f64 {
+        self.semi_minor_mm
+    }
+
+    /// `b²/a`, on the major axis.
+    fn least_curvature_radius_mm(&self, _: f64) -> f64 {
+        self.semi_minor_mm * (self.semi_minor_mm / self.semi_major_mm)
+    }
+
+    /// With `h² - b² = (a² - b²) cos²φ` and `h'² = (h² - b²)(a² - h²)/h²`.
+    fn center_rise_mm2(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64 {
+        let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
+        let h = tooth.cam_contact.support_mm;
+        let cos = self.normal_at(r, tooth).cos;
+        let cos_squared = cos * cos;
+        self.difference_of_squares_mm2() * cos_squared * (2.0 * r / (h + b) + (a / h) * (a / h))
+    }
+
+    /// With `a² - h² = (a² - b²) sin²φ`.
+    fn center_drop_mm2(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64 {
+        let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
+        let h = tooth.cam_contact.support_mm;
+        let sin = self.normal_at(r, tooth).sin;
+        let sin_squared = sin * sin;
+        self.difference_of_squares_mm2() * sin_squared * (2.0 * r / (a + h) + (b / h) * (b / h))
+    }
+
+    /// `k² (a² - b²)/(a² + br)`.
+    fn tip_bend(&self, tooth_radius_mm: f64, ring_teeth_per_lobe: f64) -> f64 {
+        let (a, b, k) = (self.semi_major_mm, self.semi_minor_mm, ring_teeth_per_lobe);
+        k * k * self.difference_of_squares_mm2() / (a * a + b * tooth_radius_mm)
+    }
+
+    /// The lower root of `2b r² + (b² + 2a² - k²(a² - b²)) r + a²b = 0`; none where the roots are not real.
+    fn critical_tooth_radius_mm(&self, ring_teeth_per_lobe: f64) -> Option<f64> {
+        let (a, b, k) = (self.semi_major_mm, self.semi_minor_mm, ring_teeth_per_lobe);
+        let linear = k * k * self.difference_of_squares_mm2() - b * b - 2.0 * a * a;
+        let least = 2.0 * std::f64::consts::SQRT_2 * a * b;
+        if linear < least {
+            return None;
+        }
+        // The stable form of the lower root: no difference of near values.
+        let root = ((linear - least) * (linear + least)).sqrt();
+        Some(2.0 * a * (a * b / (linear + root)))
+    }
+
+    /// The point is `(a² cos φ, b² sin φ)/h`.
+    fn contact_angle_from_valley_rad(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64 {
+        let (a, b) = (self.semi_major_mm, self.semi_minor_mm);
+        let normal = self.normal_at(tooth_radius_mm, tooth);
+        (a * (a * normal.cos)).atan2(b * (b * normal.sin))
+    }
+
+    /// By the angle φ of the normal, for which no tooth has to be found.
+    fn outline(&self, _: f64, set_back_mm: f64, place: Position) -> Result<CamPoint, NotConverged> {
+        let (a, b) = (self.semi_major_mm, self.semi_minor_mm);
+        let normal = Normal { cos: place.phase_cos, sin: place.phase_sin };
+        let h = self.support_mm(normal);
+        let point = Point2::new(a * (a / h) * normal.cos, b * (b / h) * normal.sin);
+        Ok(CamPoint {
+            point: point - set_back_mm * Vector2::new(normal.cos, normal.sin),
+            tangent: Unit::new_unchecked(Vector2::new(-normal.sin, normal.cos)),
+        })
+    }
+}

@@ -1,0 +1,150 @@
+//! The cam that moves the centres along `d = R + e cos Uψ`: explicit in the position, and hollow in its valleys where the stroke is large
+//! (docs/theory.md section 2.9).
+
+use crate::cam::{CamContact, Kind};
+use crate::locus::ToothCenter;
+use crate::position::Position;
+use crate::root::NotConverged;
+
+/// A cam with a harmonic path of the centres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HarmonicPath {
+    lobes: u32,
+    mean_radius_mm: f64,
+    amplitude_mm: f64,
+}
+
+impl HarmonicPath {
+    pub(super) const fn new(lobes: u32, mean_radius_mm: f64, amplitude_mm: f64) -> Self {
+        Self { lobes, mean_radius_mm, amplitude_mm }
+    }
+
+    /// What R has to exceed: `r + e`, for the valley to lie outside the axis; and with two lobes or more the larger root of
+    /// `r(R + e + eU²) = (R + e)²`, for the lobe to be round. With one lobe `r < √(R² - e²)` at its sharpest place follows from the first.
+    pub(super) fn least_mean_radius_mm(lobes: u32, amplitude_mm: f64, tooth_radius_mm: f64) -> f64 {
+        let (e, r) = (amplitude_mm, tooth_radius_mm);
+        let of_valley_mm = r + e;
+        if lobes < 2 {
+            return of_valley_mm;
+        }
+        let u = f64::from(lobes);
+        let of_lobe_mm = 0.5 * (r + (r * (r + 4.0 * e * u * u)).sqrt()) - e;
+        of_valley_mm.max(of_lobe_mm)
+    }
+
+    /// `e`.
+    pub const fn amplitude_mm(&self) -> f64 {
+        self.amplitude_mm
+    }
+
+    /// `R/(U² + 1)`: beyond it the cam is hollow in its valleys.
+    pub fn greatest_convex_amplitude_mm(&self) -> f64 {
+        let u = self.lobe_count();
+        self.mean_radius_mm / (u * u + 1.0)
+    }
+
+    fn lobe_count(&self) -> f64 {
+        f64::from(self.lobes)
+    }
+
+    /// `d_v = R - e`.
+    fn valley_mm(&self) -> f64 {
+        self.mean_radius_mm - self.amplitude_mm
+    }
+}
+
+impl Kind for HarmonicPath {
+    fn lobes(&self) -> u32 {
+        self.lobes
+    }
+
+    /// `T = eU sin(Uψ)/d`, `T_ψ = eU² cos(Uψ)/d + T²`, the path's curvature `κ_C = (cos γ/d)(1 + T_ψ/(1 + T²))`, and
+    /// `1/ρ_H = κ_C/(1 - rκ_C)`, which has no pole where the cam is straight.
+    fn tooth(&self, tooth_radius_mm: f64, position: Position) -> Result<ToothCenter, NotConverged> {
+        let (u, e) = (self.lobe_count(), self.amplitude_mm);
+        let (cos, sin) = (position.phase_cos, position.phase_sin);
+        let cos_of_lobe = cos * cos - sin * sin;
+        let center_radius_mm = self.mean_radius_mm + e * cos_of_lobe;
+        let t = 2.0 * e * u * (sin * cos) / center_radius_mm;
+        let derivative = e * u * u * cos_of_lobe / center_radius_mm + t * t;
+        let cos_gamma = 1.0 / (1.0 + t * t).sqrt();
+        let path_curvature_per_mm = cos_gamma / center_radius_mm * (1.0 + derivative / (1.0 + t * t));
+        let cam_contact = CamContact {
+            support_mm: center_radius_mm * cos_gamma - tooth_radius_mm,
+            lever_arm_mm: center_radius_mm * (t * cos_gamma),
+            curvature_per_mm: path_curvature_per_mm / (1.0 - tooth_radius_mm * path_curvature_per_mm),
+        };
+        Ok(ToothCenter {
+            position,
+            cam_contact,
+            center_radius_mm,
+            tan_pressure_angle: t,
+            tan_pressure_angle_derivative: derivative,
+        })
+    }
+
+    /// `cos Uψ = -e/R`.
+    fn steepest(&self, tooth_radius_mm: f64) -> Result<ToothCenter, NotConverged> {
+        let share = self.amplitude_mm / self.mean_radius_mm;
+        let (cos, sin) = ((0.5 * (1.0 - share)).sqrt(), (0.5 * (1.0 + share)).sqrt());
+        let position = Position {
+            from_lobe_rad: 2.0 / self.lobe_count() * sin.atan2(cos),
+            from_valley_rad: 2.0 / self.lobe_count() * cos.atan2(sin),
+            phase_cos: cos,
+            phase_sin: sin,
+            ..Position::lobe(self.lobes)
+        };
+        self.tooth(tooth_radius_mm, position)
+    }
+
+    fn outer_radius_mm(&self, tooth_radius_mm: f64) -> f64 {
+        self.mean_radius_mm + self.amplitude_mm - tooth_radius_mm
+    }
+
+    fn inner_radius_mm(&self, tooth_radius_mm: f64) -> f64 {
+        self.valley_mm() - tooth_radius_mm
+    }
+
+    /// In the middle of a lobe; with one lobe where `cos ψ = -e/R`, the path's radius of curvature being `√(R² - e²)` there.
+    fn least_curvature_radius_mm(&self, tooth_radius_mm: f64) -> f64 {
+        let (e, u) = (self.amplitude_mm, self.lobe_count());
+        let lobe_mm = self.mean_radius_mm + e;
+        let path_mm = if self.lobes < 2 {
+            (self.valley_mm() * lobe_mm).sqrt()
+        } else {
+            lobe_mm * (lobe_mm / (lobe_mm + e * u * u))
+        };
+        path_mm - tooth_radius_mm
+    }
+
+    /// With `d - d_v = e(1 + cos Uψ)`.
+    fn center_rise_mm2(&self, _: f64, tooth: &ToothCenter) -> f64 {
+        let cos = tooth.position.phase_cos;
+        2.0 * self.amplitude_mm * cos * cos * (tooth.center_radius_mm + self.valley_mm())
+    }
+
+    /// With `d_l - d = e(1 - cos Uψ)`.
+    fn center_drop_mm2(&self, _: f64, tooth: &ToothCenter) -> f64 {
+        let sin = tooth.position.phase_sin;
+        2.0 * self.amplitude_mm * sin * sin * (tooth.center_radius_mm + (self.mean_radius_mm + self.amplitude_mm))
+    }
+
+    /// `eZ_K²/(R - e)`.
+    fn tip_bend(&self, _: f64, ring_teeth_per_lobe: f64) -> f64 {
+        let ring_teeth = ring_teeth_per_lobe * self.lobe_count();
+        self.amplitude_mm * ring_teeth * ring_teeth / self.valley_mm()
+    }
+
+    /// `(R - e)²/(eZ_K² - (R - e))`, the path held as it is.
+    fn critical_tooth_radius_mm(&self, ring_teeth_per_lobe: f64) -> Option<f64> {
+        let ring_teeth = ring_teeth_per_lobe * self.lobe_count();
+        let valley_mm = self.valley_mm();
+        let bend_mm = self.amplitude_mm * ring_teeth * ring_teeth - valley_mm;
+        (bend_mm > 0.0).then(|| valley_mm * (valley_mm / bend_mm))
+    }
+
+    /// The path stays as it is where teeth get thicker.
+    fn surely_free_radius_mm(&self, sin: f64) -> f64 {
+        self.valley_mm() * sin
+    }
+}

@@ -1,0 +1,256 @@
+//! Wave generators, one file a kind (docs/theory.md section 2).
+//!
+//! A further kind is a file that implements [`Kind`], a line of [`Cam`] with its arm in [`Cam::kind`], and a line of [`WaveGenerator`]
+//! that says what a designer gives for it.
+
+mod ellipse;
+mod harmonic;
+mod harmonic_path;
+
+use nalgebra::{Point2, Unit, Vector2};
+
+use crate::locus::ToothCenter;
+use crate::position::Position;
+use crate::root::NotConverged;
+use crate::violation::{Parameter, Violation};
+
+pub use ellipse::Ellipse;
+pub use harmonic::Harmonic;
+pub use harmonic_path::HarmonicPath;
+
+/// What describes a wave generator, not yet checked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum WaveGenerator {
+    /// An ellipse: two lobes.
+    Ellipse {
+        /// `a`.
+        semi_major_mm: f64,
+        /// `b`.
+        semi_minor_mm: f64,
+    },
+    /// A circle that turns about a point beside its centre: one lobe.
+    Eccentric {
+        /// `R0`: the circle's radius.
+        radius_mm: f64,
+        /// `e`: distance of its centre from the axis.
+        eccentricity_mm: f64,
+    },
+    /// The support function `R0 + e cos Uφ`.
+    Harmonic {
+        /// `U`.
+        lobes: i64,
+        /// `R0`.
+        mean_radius_mm: f64,
+        /// `e`.
+        amplitude_mm: f64,
+    },
+    /// The cam that moves the teeth's centres along `R + e cos Uψ`.
+    HarmonicPath {
+        /// `U`.
+        lobes: i64,
+        /// `R`.
+        mean_path_radius_mm: f64,
+        /// `e`.
+        amplitude_mm: f64,
+    },
+}
+
+/// The cam where a tooth touches it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CamContact {
+    /// Support function `h(φ)`: distance of the tangent from the axis.
+    pub support_mm: f64,
+    /// `|h'(φ)|`: the lever arm of a force along the normal about the axis.
+    pub lever_arm_mm: f64,
+    /// `1/ρ_H`: negative where the cam is hollow.
+    pub curvature_per_mm: f64,
+}
+
+/// A point of the cam's outline, in its own frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct CamPoint {
+    pub(crate) point: Point2<f64>,
+    /// Counter-clockwise.
+    pub(crate) tangent: Unit<Vector2<f64>>,
+}
+
+/// What a kind of wave generator answers, for teeth of the radius `r`.
+///
+/// Mesh and load follow from [`Kind::tooth`] alone. The rest are closed forms: of lengths, because differences of them decide what fits,
+/// and of what happens in the valley, where a flank may be irregular by less than rounding.
+pub(crate) trait Kind {
+    /// `U`.
+    fn lobes(&self) -> u32;
+
+    /// The tooth whose centre stands at `position`.
+    fn tooth(&self, tooth_radius_mm: f64, position: Position) -> Result<ToothCenter, NotConverged>;
+
+    /// The tooth with the largest pressure angle, where `dT/dψ = 0`.
+    fn steepest(&self, tooth_radius_mm: f64) -> Result<ToothCenter, NotConverged>;
+
+    /// The cam's largest distance from the axis, in the middle of a lobe: `d_l - r`.
+    fn outer_radius_mm(&self, tooth_radius_mm: f64) -> f64;
+
+    /// The cam's least distance from the axis, in a valley: `d_v - r`.
+    fn inner_radius_mm(&self, tooth_radius_mm: f64) -> f64;
+
+    /// The least radius of curvature of the cam where it is convex.
+    fn least_curvature_radius_mm(&self, tooth_radius_mm: f64) -> f64;
+
+    /// `d² - d_v²`, free of cancellation towards the valley.
+    fn center_rise_mm2(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64;
+
+    /// `d_l² - d²`, free of cancellation towards the lobe.
+    fn center_drop_mm2(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64;
+
+    /// `-k² T_ψ` in the valley, which is what bends the ring's tip: `d_v κ = 1 - this`.
+    fn tip_bend(&self, tooth_radius_mm: f64, ring_teeth_per_lobe: f64) -> f64;
+
+    /// The least tooth radius that undercuts the ring; none where no radius does.
+    fn critical_tooth_radius_mm(&self, ring_teeth_per_lobe: f64) -> Option<f64>;
+
+    /// The radius up to which neighbouring teeth are apart for sure, `sin` being that of half the angle between them: no centre comes
+    /// nearer to the axis than `d_v`, and `d_v sin > r` is enough.
+    fn surely_free_radius_mm(&self, sin: f64) -> f64 {
+        // The cam stays as it is where teeth get thicker, so that d_v grows with r.
+        self.inner_radius_mm(0.0) * (sin / (1.0 - sin))
+    }
+
+    /// Angle φ_H of the contact point from the valley, about the axis of rotation.
+    fn contact_angle_from_valley_rad(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64 {
+        let normal_mm = tooth_radius_mm * tooth.cos_pressure_angle();
+        let behind_rad = (normal_mm * tooth.tan_pressure_angle).atan2(tooth.center_radius_mm - normal_mm);
+        tooth.position.from_valley_rad + behind_rad
+    }
+
+    /// The outline where the tooth at `place` touches it, set back along its normal. A kind that knows its outline by the normal's
+    /// angle may take `place` as that.
+    fn outline(&self, tooth_radius_mm: f64, set_back_mm: f64, place: Position) -> Result<CamPoint, NotConverged> {
+        let tooth = self.tooth(tooth_radius_mm, place)?;
+        let (sin, cos) = tooth.normal_rad().sin_cos();
+        let inside_mm = tooth_radius_mm + set_back_mm;
+        let (center_sin, center_cos) = place.from_lobe_rad.sin_cos();
+        let center = tooth.center_radius_mm * Vector2::new(center_cos, center_sin);
+        Ok(CamPoint {
+            point: Point2::from(center - inside_mm * Vector2::new(cos, sin)),
+            tangent: Unit::new_unchecked(Vector2::new(-sin, cos)),
+        })
+    }
+}
+
+/// A wave generator that exists.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Cam {
+    /// An ellipse.
+    Ellipse(Ellipse),
+    /// A harmonic support function; with one lobe an eccentric circle.
+    Harmonic(Harmonic),
+    /// A harmonic path of the centres.
+    HarmonicPath(HarmonicPath),
+}
+
+impl Cam {
+    /// What it is made of.
+    pub(crate) const fn kind(&self) -> &dyn Kind {
+        match self {
+            Self::Ellipse(cam) => cam,
+            Self::Harmonic(cam) => cam,
+            Self::HarmonicPath(cam) => cam,
+        }
+    }
+}
+
+impl WaveGenerator {
+    /// `U`, as given.
+    pub const fn lobes(&self) -> i64 {
+        match *self {
+            Self::Eccentric { .. } => 1,
+            Self::Ellipse { .. } => 2,
+            Self::Harmonic { lobes, .. } | Self::HarmonicPath { lobes, .. } => lobes,
+        }
+    }
+
+    /// What is given, each with the range that it has to lie in.
+    pub fn parameters(&self) -> Vec<(Parameter, f64)> {
+        match *self {
+            Self::Ellipse { semi_major_mm, semi_minor_mm } => {
+                vec![(Parameter::SemiMajor, semi_major_mm), (Parameter::SemiMinor, semi_minor_mm)]
+            }
+            Self::Eccentric { radius_mm, eccentricity_mm } => {
+                vec![(Parameter::EccentricRadius, radius_mm), (Parameter::Eccentricity, eccentricity_mm)]
+            }
+            Self::Harmonic { lobes, mean_radius_mm, amplitude_mm } => vec![
+                (Parameter::Lobes, lobes as f64),
+                (Parameter::MeanRadius, mean_radius_mm),
+                (Parameter::Amplitude, amplitude_mm),
+            ],
+            Self::HarmonicPath { lobes, mean_path_radius_mm, amplitude_mm } => vec![
+                (Parameter::Lobes, lobes as f64),
+                (Parameter::MeanPathRadius, mean_path_radius_mm),
+                (Parameter::Amplitude, amplitude_mm),
+            ],
+        }
+    }
+
+    /// Whether the cam is another one under teeth of another radius, because it is their path that is given.
+    pub(crate) const fn follows_from_teeth(&self) -> bool {
+        matches!(self, Self::HarmonicPath { .. })
+    }
+
+    /// The parameter that says how large the cam is.
+    const fn size_parameter(&self) -> Parameter {
+        match self {
+            Self::Ellipse { .. } => Parameter::SemiMajor,
+            Self::Eccentric { .. } => Parameter::EccentricRadius,
+            Self::Harmonic { .. } => Parameter::MeanRadius,
+            Self::HarmonicPath { .. } => Parameter::MeanPathRadius,
+        }
+    }
+
+    /// What says how far the teeth are moved: of an ellipse, whose other axis is held, the semi-major axis.
+    pub(crate) const fn stroke(&self) -> (Parameter, f64) {
+        match *self {
+            Self::Ellipse { semi_major_mm, .. } => (Parameter::SemiMajor, semi_major_mm),
+            Self::Eccentric { eccentricity_mm, .. } => (Parameter::Eccentricity, eccentricity_mm),
+            Self::Harmonic { amplitude_mm, .. } | Self::HarmonicPath { amplitude_mm, .. } => {
+                (Parameter::Amplitude, amplitude_mm)
+            }
+        }
+    }
+
+    /// The cam under teeth of this radius, every parameter being in its range.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub(crate) fn cam(&self, tooth_radius_mm: f64) -> Result<Cam, Violation> {
+        // In range, so at most MAX_LOBES.
+        let lobes = u32::try_from(self.lobes()).unwrap_or(u32::MAX);
+        match *self {
+            Self::Ellipse { semi_major_mm, semi_minor_mm } => {
+                if semi_major_mm > semi_minor_mm {
+                    Ok(Cam::Ellipse(Ellipse::new(semi_major_mm, semi_minor_mm)))
+                } else {
+                    Err(Violation::CamNotElongated { semi_major_mm, semi_minor_mm })
+                }
+            }
+            Self::Eccentric { radius_mm: radius, eccentricity_mm: stroke }
+            | Self::Harmonic { mean_radius_mm: radius, amplitude_mm: stroke, .. } => {
+                self.wide_enough(radius, Harmonic::least_mean_radius_mm(lobes, stroke))?;
+                Ok(Cam::Harmonic(Harmonic::new(lobes, radius, stroke)))
+            }
+            Self::HarmonicPath { mean_path_radius_mm, amplitude_mm, .. } => {
+                let least_mm = HarmonicPath::least_mean_radius_mm(lobes, amplitude_mm, tooth_radius_mm);
+                self.wide_enough(mean_path_radius_mm, least_mm)?;
+                Ok(Cam::HarmonicPath(HarmonicPath::new(lobes, mean_path_radius_mm, amplitude_mm)))
+            }
+        }
+    }
+
+    fn wide_enough(&self, radius_mm: f64, least_mm: f64) -> Result<(), Violation> {
+        if radius_mm > least_mm {
+            Ok(())
+        } else {
+            Err(Violation::CamTooSmall { parameter: self.size_parameter(), radius_mm, least_mm })
+        }
+    }
+}
