@@ -1721,7 +1721,7 @@ def laws_johnson():
     yield "5.1, four materials", johnson(
         materials={"wave_generator": CERAMIC, "teeth": TITANIUM, "ring": CAST_IRON, "carrier": BRONZE})
     yield "5.1, soft ring, near the widest", johnson(
-        torque=180.0, materials={"ring": POLYMER, "carrier": {"youngs_modulus_gpa": 8.0, "poissons_ratio": -0.4}})
+        torque=40.0, materials={"ring": POLYMER, "carrier": {"youngs_modulus_gpa": 8.0, "poissons_ratio": -0.4}})
     yield "5.1, light", johnson(torque=1e-9, samples=4)
     yield "5.1, ring 10 um", johnson(clearance=(0.0, 10.0, 0.0))
     yield "5.1, all three gaps", johnson(clearance=(3.0, 4.5, 6.0), series=(1e-6, 0.0, 3e-6))
