@@ -82,7 +82,8 @@ pub(crate) fn finding_codes() -> Vec<FindingCode> {
         ToothBeyondCarrier => SteepRingFlank,
         SteepRingFlank => LinearLawTooStiff,
         LinearLawTooStiff => PalmgrenBeyondSteel,
-        PalmgrenBeyondSteel => StressAboveFatigueLimit;
+        PalmgrenBeyondSteel => WindUpBeyondModel,
+        WindUpBeyondModel => StressAboveFatigueLimit;
         StressAboveFatigueLimit)
 }
 

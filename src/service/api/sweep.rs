@@ -14,6 +14,7 @@ use toothwave_solver::sweep::{self as solver, ContactPeaks, InputAngles, Peak, P
 use toothwave_solver::{Contact, Drive, LoadCase, PerContact, findings};
 use utoipa::ToSchema;
 
+use super::coincidence_degree::TeethInMeshAnswer;
 use super::geometry::{drive_findings, write_findings};
 use super::{App, Endpoint, Form, Forms, Problems, checked_drive, checked_load, csv_error, require_finite, respond};
 use crate::compute::Thread;
@@ -36,6 +37,10 @@ pub struct SweepAnswer {
     pub period_deg: f64,
     /// The largest force and stress of each contact, over the states.
     pub peaks: PeaksAnswer,
+    /// How many teeth of a zone mesh, over the input angle.
+    pub teeth_in_mesh_per_zone: TeethInMeshAnswer,
+    /// How many of them carry load, over the input angles of the sweep: with clearance fewer.
+    pub loaded_teeth_per_zone: TeethInMeshAnswer,
     /// The states.
     pub states: StatesAnswer,
     /// Wind-up and torsional stiffness, given `sweep.wind_up`.
@@ -201,7 +206,7 @@ impl From<TorqueCapacity> for TorqueCapacityAnswer {
 pub struct ChecksAnswer {
     /// Largest relative deviation of the input, ring and carrier torques, over the input angles.
     pub torque_balance_residual: f64,
-    /// Largest difference between the last input angle and the first, teeth renumbered, over the column's peak.
+    /// Largest difference of a load at the last input angle from that angle worked out anew, over the column's peak.
     pub period_closure_residual: f64,
 }
 
@@ -322,12 +327,15 @@ impl Endpoint for Sweep {
         let mut findings = drive_findings(drive)?;
         let approaches_matter = *with_wind_up || load.has_clearance();
         let of_contacts = findings::of_contacts(drive, load, &sweep.peaks, approaches_matter);
-        findings.extend(of_contacts.iter().map(FindingAnswer::from));
+        let of_wind_up = findings::of_wind_up(drive, &sweep);
+        findings.extend(of_wind_up.iter().chain(&of_contacts).map(FindingAnswer::from));
         let answer = SweepAnswer {
             solver_version: toothwave_solver::VERSION,
             coincidence_degree: mesh.coincidence_degree(),
             period_deg: mesh.period_deg(),
             peaks: sweep.peaks.into(),
+            teeth_in_mesh_per_zone: mesh.teeth_in_mesh().into(),
+            loaded_teeth_per_zone: sweep.loaded_teeth().into(),
             wind_up: with_wind_up.then(|| WindUpAnswer::new(drive, &sweep)),
             torque_capacity: sweep.torque_capacity.map(Into::into),
             checks: ChecksAnswer {
@@ -416,6 +424,8 @@ impl SweepAnswer {
     fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
         writeln!(writer, "coincidence degree                  {:.12}", self.coincidence_degree)?;
         writeln!(writer, "period of the input angle           {:.6} deg", self.period_deg)?;
+        writeln!(writer, "teeth in mesh per zone              {}", self.teeth_in_mesh_per_zone)?;
+        writeln!(writer, "teeth that carry per zone           {}", self.loaded_teeth_per_zone)?;
         writeln!(writer, "states                              {}", self.states.tooth.len())?;
         writeln!(writer, "torque balance residual             {:.1e}", self.checks.torque_balance_residual)?;
         writeln!(writer, "period closure residual             {:.1e}", self.checks.period_closure_residual)?;

@@ -50,6 +50,13 @@ const KINDS = {
     tests: 'The largest pressure angle on the engaged flank of the ring.',
     basis: RULE_OF_THUMB,
   },
+  wind_up_beyond_model: {
+    title: 'Wind-up beyond the model',
+    tests: 'The largest wind-up of the wave generator under the load against a tenth of the period.',
+    basis: RULE_OF_THUMB,
+    why: 'Lever arms and directions are those of the drive without load; a wind-up of one period moves every tooth on by a whole spacing.',
+    change: 'A torque that suits the drive, or clearances that do.',
+  },
   stress_above_fatigue_limit: {
     title: 'Stress above the fatigue limit',
     tests: 'The peak contact stress over a period against the fatigue limit of bearing steel.',
