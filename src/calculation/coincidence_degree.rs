@@ -43,6 +43,19 @@ pub struct TeethInMeshAnswer {
     pub max: u64,
 }
 
+impl From<TeethInMesh> for TeethInMeshAnswer {
+    fn from(TeethInMesh { min, max }: TeethInMesh) -> Self {
+        Self { min, max }
+    }
+}
+
+impl std::fmt::Display for TeethInMeshAnswer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { min, max } = self;
+        if min == max { write!(f, "{min}") } else { write!(f, "{min} to {max}") }
+    }
+}
+
 /// What is asked.
 #[derive(Debug)]
 pub struct CoincidenceDegree;
@@ -66,12 +79,11 @@ impl Question for CoincidenceDegree {
 
     fn answer(drive: &Drive, _: &impl Stop) -> Result<CoincidenceDegreeAnswer, NoAnswer> {
         let mesh = Mesh::new(drive);
-        let TeethInMesh { min, max } = mesh.teeth_in_mesh();
         Ok(CoincidenceDegreeAnswer {
             solver_version: toothwave_solver::VERSION,
             coincidence_degree: mesh.coincidence_degree(),
             engagement: drive.into(),
-            teeth_in_mesh_per_zone: TeethInMeshAnswer { min, max },
+            teeth_in_mesh_per_zone: mesh.teeth_in_mesh().into(),
             undercut: drive.into(),
             period_deg: mesh.period_deg(),
             findings: drive_findings(drive)?,

@@ -272,8 +272,9 @@ pub struct SweepDocument {
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, minimum = 1, maximum = 10000000, default = 50, required = false)]
     pub samples: Option<Whole>,
-    /// Instead of `samples`: the true extremes of every force and stress to this relative tolerance, input angles placed where they are
-    /// needed, and the instant at which a tooth enters twice, without it and with it.
+    /// Instead of `samples`: the true extremes to this relative tolerance, of every force and stress, of wind-up, torsional stiffness and torque
+    /// capacity. Places and half-widths are known to its root, the transmission error to the tolerance times the wind-up. Input angles are
+    /// placed where they are needed, and the instant at which a tooth enters twice, without it and with it.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-12, maximum = 0.1, nullable = false)]
     pub tolerance: Option<f64>,

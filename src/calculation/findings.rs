@@ -69,6 +69,8 @@ pub enum FindingCode {
     PalmgrenBeyondSteel,
     /// Johnson's law for a contact that is wide beside the tooth's radius or the depth.
     JohnsonBeyondHalfWidth,
+    /// A wind-up so large that the teeth no longer stand where the model has them.
+    WindUpBeyondModel,
     /// A stress above the fatigue limit of bearing steel.
     StressAboveFatigueLimit,
 }
@@ -237,6 +239,16 @@ impl From<&Finding> for FindingAnswer {
                     contact_name(contact).replace('_', " ")
                 ),
                 "lower the torque, widen the teeth, or take a stiffer material",
+            ),
+            Finding::WindUpBeyondModel { wind_up_deg, limit_deg } => new(
+                Code::WindUpBeyondModel,
+                Warning,
+                &[LOAD, "/model"],
+                wind_up_deg,
+                limit_deg,
+                "deg",
+                "under the load the wave generator turns by more than a tenth of the period: the teeth then stand elsewhere than the model, which takes lever arms and directions from the drive without load, has them".into(),
+                "lower the torque, choose stiffer contacts, or close the clearances",
             ),
             Finding::StressAboveFatigueLimit { contact, stress_mpa } => new(
                 Code::StressAboveFatigueLimit,

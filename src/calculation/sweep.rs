@@ -90,12 +90,16 @@ impl Question for Sweep {
         let mut findings = drive_findings(drive)?;
         let approaches_matter = *with_wind_up || load.has_clearance();
         let of_contacts = findings::of_contacts(drive, load, &sweep.peaks, approaches_matter);
-        findings.extend(of_contacts.iter().map(FindingAnswer::from));
+        let of_half_widths = findings::of_half_widths(drive, load, &sweep.states);
+        let of_wind_up = findings::of_wind_up(drive, &sweep);
+        findings.extend(of_wind_up.iter().chain(&of_half_widths).chain(&of_contacts).map(FindingAnswer::from));
         let answer = SweepAnswer {
             solver_version: toothwave_solver::VERSION,
             coincidence_degree: mesh.coincidence_degree(),
             period_deg: mesh.period_deg(),
             peaks: sweep.peaks.into(),
+            teeth_in_mesh_per_zone: mesh.teeth_in_mesh().into(),
+            loaded_teeth_per_zone: sweep.loaded_teeth().into(),
             wind_up: with_wind_up.then(|| WindUpAnswer::new(drive, &sweep)),
             torque_capacity: sweep.torque_capacity.map(Into::into),
             checks: ChecksAnswer {
@@ -184,6 +188,8 @@ impl SweepAnswer {
     fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
         writeln!(writer, "coincidence degree                  {:.12}", self.coincidence_degree)?;
         writeln!(writer, "period of the input angle           {:.6} deg", self.period_deg)?;
+        writeln!(writer, "teeth in mesh per zone              {}", self.teeth_in_mesh_per_zone)?;
+        writeln!(writer, "teeth that carry per zone           {}", self.loaded_teeth_per_zone)?;
         writeln!(writer, "states                              {}", self.states.tooth.len())?;
         writeln!(writer, "torque balance residual             {:.1e}", self.checks.torque_balance_residual)?;
         writeln!(writer, "period closure residual             {:.1e}", self.checks.period_closure_residual)?;

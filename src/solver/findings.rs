@@ -7,7 +7,7 @@ use crate::load_sharing::LoadCase;
 use crate::mesh::Mesh;
 use crate::ring::FlankEnd;
 use crate::root::NotConverged;
-use crate::sweep::{ContactPeaks, States};
+use crate::sweep::{ContactPeaks, States, Sweep};
 use crate::tooth::line::{WIDE_SHARE, least_length_mm};
 use crate::tooth::plain_approach_mm;
 
@@ -23,6 +23,10 @@ pub const STEEP_FLANK_DEG: f64 = 70.0;
 
 /// How far a contact modulus may be from that of steel on steel for Palmgren's constant to hold without a word: steels differ by less.
 pub const STEEL_TOLERANCE: f64 = 0.1;
+
+/// A wind-up beyond this share of the period is reported. Lever arms and directions are those of the positions without load, and a wind-up of
+/// one period moves every tooth on by one spacing: a tenth of it by a tenth of a spacing, which begins to be a matter of per cent.
+pub const WIND_UP_SHARE_OF_PERIOD: f64 = 0.1;
 
 const STEEL: Material = Material::STEEL;
 
@@ -130,6 +134,13 @@ pub enum Finding {
         /// What it should stay below.
         limit_mm: f64,
     },
+    /// A wind-up so large that the teeth no longer stand where the model has them.
+    WindUpBeyondModel {
+        /// The largest wind-up of the input.
+        wind_up_deg: f64,
+        /// What it is measured against.
+        limit_deg: f64,
+    },
     /// A stress above the fatigue limit of bearing steel.
     StressAboveFatigueLimit {
         /// Where.
@@ -214,6 +225,13 @@ pub fn of_drive(drive: &Drive) -> Result<Vec<Finding>, NotConverged> {
         }
     }
     Ok(findings)
+}
+
+/// That the wind-up of a sweep goes beyond what the model holds for.
+pub fn of_wind_up(drive: &Drive, sweep: &Sweep) -> Option<Finding> {
+    let wind_up_deg = sweep.input_angles.wind_up_deg.iter().copied().fold(0.0, f64::max);
+    let limit_deg = WIND_UP_SHARE_OF_PERIOD * Mesh::new(drive).period_deg();
+    (wind_up_deg > limit_deg).then_some(Finding::WindUpBeyondModel { wind_up_deg, limit_deg })
 }
 
 /// The findings about a drive's contacts under a load. `approaches_matter` where wind-up or clearance was asked for.

@@ -87,7 +87,8 @@ pub(crate) fn finding_codes() -> Vec<FindingCode> {
         HollowWaveGenerator => FlatCutsTheContact,
         FlatCutsTheContact => PalmgrenBeyondSteel,
         PalmgrenBeyondSteel => JohnsonBeyondHalfWidth,
-        JohnsonBeyondHalfWidth => StressAboveFatigueLimit;
+        JohnsonBeyondHalfWidth => WindUpBeyondModel,
+        WindUpBeyondModel => StressAboveFatigueLimit;
         StressAboveFatigueLimit)
 }
 

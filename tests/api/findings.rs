@@ -173,6 +173,45 @@ async fn a_stress_above_the_fatigue_limit_is_a_warning_for_each_contact() {
     }
 }
 
+/// Case 5.1 with gaps of a millimetre at the carrier.
+fn loose() -> Value {
+    let document = with(&shortest(), "/model", json!({ "compatibility": "virtual_work" }));
+    with(&document, "/model/clearance", json!({ "carrier_um": 1000.0 }))
+}
+
+#[tokio::test]
+async fn a_wind_up_of_more_than_a_tenth_of_the_period_is_a_warning() {
+    let document = with(&loose(), "/sweep", json!({ "wind_up": true }));
+    let found = Service::new().post("/v1/sweep", &document).await.found();
+    let wind_up = found["wind_up"]["wind_up_deg"].as_array().unwrap();
+    let most = wind_up.iter().map(|value| value.as_f64().unwrap()).fold(0.0, f64::max);
+    let finding = finding(&loose(), "wind_up_beyond_model").await;
+    assert_numbers(&finding, most, 36.0 / 26.0, "deg");
+    assert!(most > 36.0 / 26.0 && finding["severity"] == "warning");
+    let tight = with(&loose(), "/model/clearance", json!({ "carrier_um": 10.0 }));
+    assert!(!codes_of(&findings(&tight).await).contains(&"wind_up_beyond_model".to_owned()));
+}
+
+#[tokio::test]
+async fn a_sweep_tells_how_many_teeth_mesh_and_how_many_of_them_carry() {
+    let found = Service::new().post("/v1/sweep", &loose()).await.found();
+    assert_eq!(found["teeth_in_mesh_per_zone"], json!({ "min": 7, "max": 7 }));
+    let loaded = found["states"]["loaded"].as_array().unwrap();
+    let angles = found["states"]["input_angle_deg"].as_array().unwrap();
+    let mut carrying: Vec<(f64, u64)> = Vec::new();
+    for (angle, loaded) in angles.iter().zip(loaded) {
+        let (angle, loaded) = (angle.as_f64().unwrap(), u64::from(loaded.as_bool().unwrap()));
+        match carrying.last_mut() {
+            Some((last, teeth)) if *last == angle => *teeth += loaded,
+            _ => carrying.push((angle, loaded)),
+        }
+    }
+    let teeth = carrying.iter().map(|(_, teeth)| *teeth);
+    let expected = json!({ "min": teeth.clone().min(), "max": teeth.max() });
+    assert_eq!(found["loaded_teeth_per_zone"], expected);
+    assert!(expected["max"].as_u64() < Some(7));
+}
+
 #[tokio::test]
 async fn stresses_are_no_finding_where_no_load_is_read() {
     for path in ["/v1/geometry", "/v1/coincidence-degree"] {
@@ -204,7 +243,7 @@ async fn every_kind_of_finding_can_be_met_over_http() {
     for document in [undercut(), bored(), bore_without_effect, sparse(), thick(), thin(1.9), steep(), overloaded()] {
         all.extend(findings(&document).await);
     }
-    for document in [linear, brass] {
+    for document in [linear, brass, loose()] {
         all.extend(findings(&document).await);
     }
     assert_eq!(codes_of(&all), words(&finding_codes()));

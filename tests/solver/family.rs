@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::drive::DriveError;
 use toothwave_solver::load_sharing::LoadedDrive;
-use toothwave_solver::mesh::{Mesh, TeethInMesh};
+use toothwave_solver::mesh::{Mesh, Samples, TeethInMesh};
 use toothwave_solver::profile::{Extent, ProfileParameters, profiles};
 use toothwave_solver::radial_force::{CamLoad, radial_force_n};
 use toothwave_solver::ring::FlankEnd;
@@ -371,7 +371,7 @@ fn as_the_stroke_goes_to_nothing_every_kind_becomes_a_circle() {
             assert!((tooth.tan_pressure_angle - t).abs() < 1e-5 * t, "{wave_generator:?}");
             assert!((drive.flank().at(&tooth).tan_pressure_angle / tooth.tan_pressure_angle - k).abs() < 1e-12 * k);
         }
-        let sweep = sweep::sweep(&drive, &case(VirtualWork), Points::Samples(10), &Never).unwrap();
+        let sweep = sweep::sweep(&drive, &case(VirtualWork), Points::samples(10).unwrap(), &Never).unwrap();
         assert!(sweep.torque_balance_residual < 1e-13, "{:e} of {wave_generator:?}", sweep.torque_balance_residual);
     }
 }
@@ -418,19 +418,20 @@ fn teeth_in_mesh_are_those_that_fractions_of_a_turn_find() {
         let mesh = Mesh::new(&drive(&p));
         assert_eq!(mesh.flank_limit().end, FlankEnd::RegularTip);
         let listed_lobes = if mesh.zones_are_alike() { 1 } else { lobes };
-        for samples in [1, 2, 5, 12, 13] {
+        for count in [1, 2, 5, 12, 13] {
+            let samples = Samples::new(count).unwrap();
             let mut states = 0;
             let mut counts = Vec::new();
-            for sample in 0..=samples {
+            for sample in 0..=count {
                 let placed: Vec<_> = mesh.placed_at(sample, samples).collect();
-                let (n, of) = (i64::try_from(sample).unwrap(), i64::try_from(samples).unwrap());
+                let (n, of) = (i64::try_from(sample).unwrap(), i64::try_from(count).unwrap());
                 let mut expected = in_mesh_by_fractions(installed, lobes, n, of, (1, 2 * lobes));
                 expected.retain(|&(_, lobe)| i64::from(lobe) < listed_lobes);
                 let found: Vec<_> =
                     placed.iter().map(|placed| (placed.number % installed.unsigned_abs(), placed.lobe)).collect();
-                assert_eq!(found, expected, "{sample} of {samples}, {p:?}");
+                assert_eq!(found, expected, "{sample} of {count}, {p:?}");
                 for placed in &placed {
-                    let turns = (placed.number as f64 - sample as f64 / samples as f64) / installed as f64
+                    let turns = (placed.number as f64 - sample as f64 / count as f64) / installed as f64
                         - f64::from(placed.lobe) / lobes as f64;
                     // The valley is half a lobe ahead, not behind.
                     let psi = 2.0 * PI * (turns - (turns - 1e-12).round());
@@ -440,10 +441,10 @@ fn teeth_in_mesh_are_those_that_fractions_of_a_turn_find() {
                 states += placed.len() as u64;
                 counts.push(placed.len() as u64);
             }
-            assert_eq!(states, mesh.state_count(samples), "{samples} of {p:?}");
+            assert_eq!(states, mesh.state_count(samples), "{count} of {p:?}");
             let TeethInMesh { min, max } = mesh.teeth_in_mesh();
             assert!(counts.iter().all(|count| (min..=max).contains(count)), "{counts:?} {min} {max} of {p:?}");
-            if samples == 12 {
+            if count == 12 {
                 assert!(counts.contains(&min) && counts.contains(&max), "{counts:?} {min} {max} of {p:?}");
             }
         }
@@ -462,7 +463,7 @@ fn a_cut_short_flank_takes_the_teeth_that_stand_on_it() {
         let engaged = drive.flank_limit().position.from_lobe_rad / (2.0 * PI);
         let mut states = 0;
         for sample in 0..=7 {
-            let found = mesh.placed_at(sample, 7).count();
+            let found = mesh.placed_at(sample, Samples::new(7).unwrap()).count();
             let listed_lobes = if mesh.zones_are_alike() { 1 } else { lobes };
             let expected = (0..installed)
                 .flat_map(|slot| (0..listed_lobes).map(move |lobe| (slot, lobe)))
@@ -475,7 +476,7 @@ fn a_cut_short_flank_takes_the_teeth_that_stand_on_it() {
             assert_eq!(found, expected, "{sample} of {p:?}");
             states += found as u64;
         }
-        assert_eq!(states, mesh.state_count(7));
+        assert_eq!(states, mesh.state_count(Samples::new(7).unwrap()));
         let degree = lobes as f64 * engaged * installed as f64;
         assert!((mesh.coincidence_degree() - degree).abs() < 1e-12 * degree);
     }
@@ -530,9 +531,9 @@ proptest! {
     #[test]
     fn a_sweep_to_a_tolerance_sees_what_many_samples_see(parameters in any_of_the_family()) {
         let drive = drive(&parameters);
-        let to_tolerance = Points::Tolerance { tolerance: 1e-4, max_states: 1_000_000 };
+        let to_tolerance = Points::tolerance(1e-4, 1_000_000).unwrap();
         let adaptive = sweep::sweep(&drive, &case(VirtualWork), to_tolerance, &Never).unwrap();
-        let dense = sweep::sweep(&drive, &case(VirtualWork), Points::Samples(600), &Never).unwrap();
+        let dense = sweep::sweep(&drive, &case(VirtualWork), Points::samples(600).unwrap(), &Never).unwrap();
         prop_assert!(adaptive.torque_balance_residual < 1e-11, "{:e}", adaptive.torque_balance_residual);
         prop_assert!(adaptive.period_closure_residual < 1e-9, "{:e}", adaptive.period_closure_residual);
         for (contact, peaks) in adaptive.peaks.iter() {
@@ -580,10 +581,10 @@ fn forces(p: &DriveParameters, sample: u64, samples: u64) -> (Vector2<f64>, f64,
     let load = case(VirtualWork);
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
     let mesh = Mesh::new(&drive);
-    let placed: Vec<_> = mesh.placed_at(sample, samples).collect();
+    let placed: Vec<_> = mesh.placed_at(sample, Samples::new(samples).unwrap()).collect();
     let teeth: Vec<_> = placed.iter().map(|placed| loaded.tooth(placed.position).unwrap()).collect();
     let wind_up = loaded.wind_up(&teeth).unwrap();
-    let force_n: Vec<_> = teeth.iter().map(|tooth| loaded.forces_n(tooth, &wind_up).wave_generator).collect();
+    let force_n: Vec<_> = teeth.iter().map(|tooth| loaded.forces_n(tooth, &wind_up).unwrap().wave_generator).collect();
     let loads = placed.iter().zip(&teeth).zip(&force_n);
     let loads = loads.map(|((placed, tooth), &force_n)| CamLoad { lobe: placed.lobe, center: &tooth.center, force_n });
     (radial_force_n(&mesh, loads), force_n.iter().sum(), loaded.input_torque_nmm())
@@ -624,7 +625,7 @@ fn lobes_that_are_loaded_alike_push_the_wave_generator_nowhere_and_others_do() {
     let p = of(harmonic(4, 60.0, 1.2), 36, 18, 40, 4.0);
     let drive = drive(&p);
     let mesh = Mesh::new(&drive);
-    let by_lobe = mesh.placed_at(2, 5).fold([0_usize; 4], |mut count, placed| {
+    let by_lobe = mesh.placed_at(2, Samples::new(5).unwrap()).fold([0_usize; 4], |mut count, placed| {
         count[placed.lobe as usize] += 1;
         count
     });

@@ -1,6 +1,7 @@
 //! What is true of drives: against closed forms, independent constructions and a 60-digit calculation.
 #![allow(clippy::float_cmp, clippy::unwrap_used, reason = "tests compare exactly where values are exact")]
 
+mod contacts;
 mod drives;
 mod extremes;
 mod family;
@@ -10,6 +11,7 @@ mod laws;
 mod limits;
 mod oracles;
 mod paper;
+mod parts;
 mod profiles;
 mod properties;
 mod reference;

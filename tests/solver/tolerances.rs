@@ -86,7 +86,7 @@ fn a_bore_that_ends_the_flank_whole_spacings_from_the_major_axis_is_swept_alike_
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 192, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn bores_a_few_roundings_around_whole_spacings_are_swept_alike(parameters in any_drive(), share in 0.0_f64..1.0) {
@@ -106,7 +106,7 @@ proptest! {
 fn undercut_flanks_and_tips_a_few_roundings_around_whole_spacings_are_swept_alike() {
     let mut tried = 0;
     for teeth in [12_i64, 16, 20, 22, 28, 40] {
-        for flattening in [0.01, 0.02, 0.034, 0.05] {
+        for flattening in [0.005, 0.01, 0.015, 0.02, 0.027, 0.034, 0.05, 0.07] {
             let base = DriveParameters {
                 semi_minor_mm: 58.0 * (1.0 - flattening),
                 teeth,
@@ -208,7 +208,7 @@ fn designs() -> Vec<(DriveParameters, LoadParameters)> {
 fn a_tolerance_holds_for_peaks_wind_up_stiffness_and_capacity_and_its_root_for_half_widths() {
     let mut worst = [0.0_f64; 5];
     for (parameters, load) in designs() {
-        let dense = Extremes::of(&parameters, &swept(&parameters, &load, 20_000));
+        let dense = Extremes::of(&parameters, &swept(&parameters, &load, 6_000));
         for tolerance in [1e-1, 1e-2, 1e-4, 1e-6, 1e-9] {
             let found = Extremes::of(&parameters, &swept_to(&parameters, &load, tolerance));
             let context = format!("{tolerance:e}, {:?} {:?} of {parameters:?}", load.law, load.clearance_um);
@@ -228,7 +228,7 @@ fn a_tolerance_holds_for_peaks_wind_up_stiffness_and_capacity_and_its_root_for_h
             see(2, error_missed * drive(&parameters).teeth_per_wave(), tolerance * dense.most[0]);
             see(3, found.capacity_nm / dense.capacity_nm - 1.0, tolerance);
             for (found, dense) in found.half_widths_mm.iter().zip(&dense.half_widths_mm) {
-                // The dense sweep itself knows the place to a 20 000th of the period.
+                // The dense sweep itself knows the place to a 6000th of the period.
                 see(4, (found / dense - 1.0).abs(), tolerance.sqrt() + 1e-3);
             }
         }

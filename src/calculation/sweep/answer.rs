@@ -6,6 +6,7 @@ use toothwave_solver::sweep::{self as solver, ContactPeaks, InputAngles, Peak, S
 use toothwave_solver::{Contact, Drive, PerContact};
 use utoipa::ToSchema;
 
+use crate::coincidence_degree::TeethInMeshAnswer;
 use crate::findings::FindingAnswer;
 
 /// Forces and contact stresses of one meshing zone over one period; the other zone is its point reflection.
@@ -19,6 +20,10 @@ pub struct SweepAnswer {
     pub period_deg: f64,
     /// The largest force and stress of each contact, over the states.
     pub peaks: PeaksAnswer,
+    /// How many teeth of a zone mesh, over the input angle.
+    pub teeth_in_mesh_per_zone: TeethInMeshAnswer,
+    /// How many of them carry load, over the input angles of the sweep: with clearance fewer.
+    pub loaded_teeth_per_zone: TeethInMeshAnswer,
     /// The states.
     pub states: StatesAnswer,
     /// Wind-up and torsional stiffness, given `sweep.wind_up`.
@@ -184,7 +189,7 @@ impl From<TorqueCapacity> for TorqueCapacityAnswer {
 pub struct ChecksAnswer {
     /// Largest relative deviation of the input, ring and carrier torques, over the input angles.
     pub torque_balance_residual: f64,
-    /// Largest difference between the last input angle and the first, teeth renumbered, over the column's peak.
+    /// Largest difference of a load at the last input angle from that angle worked out anew, over the column's peak.
     pub period_closure_residual: f64,
 }
 

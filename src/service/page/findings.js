@@ -62,6 +62,19 @@ const KINDS = {
     basis: ['exact', 'The limit is geometry, without the width of the contact itself.'],
     why: 'Beyond that place a tooth would touch the ring with the edge of its flat.',
   },
+  johnson_beyond_half_width: {
+    title: 'Contact wide for Johnson’s law',
+    tests: 'Half the width of a contact against a tenth of the tooth’s radius or of the depth, whichever is less.',
+    basis: RULE_OF_THUMB,
+    why: 'The law is that of a narrow strip: the wider the contact, the more its approach comes out too small.',
+  },
+  wind_up_beyond_model: {
+    title: 'Wind-up beyond the model',
+    tests: 'The largest wind-up of the wave generator under the load against a tenth of the period.',
+    basis: RULE_OF_THUMB,
+    why: 'Lever arms and directions are those of the drive without load; a wind-up of one period moves every tooth on by a whole spacing.',
+    change: 'A torque that suits the drive, or clearances that do.',
+  },
   stress_above_fatigue_limit: {
     title: 'Stress above the fatigue limit',
     tests: 'The peak contact stress over a period against the fatigue limit of bearing steel.',

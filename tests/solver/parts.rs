@@ -1,0 +1,134 @@
+//! Parts as they are made, and the room that they leave each other.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Point2, Rotation2};
+use toothwave_solver::drawing::{Drawing, DrawingParameters, Edge, Outline, Subject};
+use toothwave_solver::drive::Draft;
+use toothwave_solver::findings::{self, Edge as CarrierEdge};
+use toothwave_solver::parts::PartsParameters;
+use toothwave_solver::ring::FlankEnd;
+use toothwave_solver::{Drive, DriveParameters, Finding, Never, Part};
+
+use crate::drives::{PAPER_5_1, PAPER_5_2, drive};
+
+/// The first closed path of a part's section.
+fn edges(parameters: &DriveParameters, part: Part, parts: &PartsParameters) -> Vec<Edge> {
+    let drawing = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 1_000_000, input_angle_deg: 0.0 };
+    let draft = Draft::new(parameters).unwrap();
+    let drawing = Drawing::new(&draft, Subject::Part(part), parts, &drawing).unwrap();
+    let section = drawing.bodies(&Never).unwrap().remove(0).section;
+    let outlines = std::iter::once(section.outer).chain(section.holes);
+    outlines
+        .into_iter()
+        .find_map(|outline| match outline {
+            Outline::Edges(edges) => Some(edges),
+            Outline::Circle { .. } => None,
+        })
+        .unwrap()
+}
+
+/// Where a wall of slot 0 cuts a circle, and its mirror image in the line between the slots 0 and 1.
+fn on_both_walls(radius_mm: f64, wall_mm: f64, installed: i64) -> [Point2<f64>; 2] {
+    let near = Point2::new((radius_mm * radius_mm - wall_mm * wall_mm).sqrt(), wall_mm);
+    let to_next = Rotation2::new(2.0 * PI / installed as f64);
+    [near, to_next * Point2::new(near.x, -near.y)]
+}
+
+#[test]
+fn the_wall_between_two_slots_is_as_thick_as_the_points_where_they_cut_the_inner_circle_are_apart() {
+    for (tooth_radius_mm, is_wall) in [(5.0, true), (2.0, true), (7.0, false)] {
+        let p = DriveParameters { tooth_radius_mm, ..PAPER_5_1 };
+        let [near, next] = on_both_walls(p.semi_major_mm, tooth_radius_mm, p.installed);
+        // Beyond the line between the slots the wall is less than nothing.
+        let between = Rotation2::new(PI / 28.0).inverse() * near;
+        let wall = (near - next).norm().copysign(-between.y);
+        let found = drive(&p).slot_wall_mm();
+        assert!((found - wall).abs() < 1e-12 * p.semi_major_mm, "{found} is not {wall}");
+        assert_eq!(found > 0.0, is_wall);
+    }
+}
+
+#[test]
+fn a_carrier_without_radii_leaves_a_tenth_of_the_annulus_free_on_either_side() {
+    let radii: Vec<_> = edges(&PAPER_5_1, Part::Carrier, &PartsParameters::default())
+        .into_iter()
+        .filter_map(|edge| match edge {
+            Edge::Arc { radius_mm, .. } => Some(radius_mm),
+            Edge::Line { .. } | Edge::Curve { .. } => None,
+        })
+        .collect();
+    // From a = 58 to b + 2r = 66.
+    let [outer, inner] = radii[..] else { panic!("{radii:?}") };
+    assert!((outer - 65.2).abs() < 1e-12 && (inner - 58.8).abs() < 1e-12, "{radii:?}");
+}
+
+#[test]
+fn a_tooth_presses_on_an_edge_of_the_carrier_where_its_centre_leaves_the_annulus() {
+    let edges = |tooth_radius_mm| -> Vec<_> {
+        let found = findings::of_drive(&drive(&DriveParameters { tooth_radius_mm, ..PAPER_5_1 })).unwrap();
+        let edge = |finding: &Finding| match *finding {
+            Finding::ToothBeyondCarrier { edge, center_radius_mm, limit_mm } => {
+                Some((edge, center_radius_mm, limit_mm))
+            }
+            _ => None,
+        };
+        found.iter().filter_map(edge).collect()
+    };
+    // Centres run from 56 + r to 58 + r, the annulus from 58 to 56 + 2r.
+    assert_eq!(edges(2.1), []);
+    assert_eq!(edges(1.5), [(CarrierEdge::Inner, 57.5, 58.0), (CarrierEdge::Outer, 59.5, 59.0)]);
+}
+
+#[test]
+fn a_pointed_finger_ends_where_the_walls_of_its_two_slots_meet() {
+    let p = DriveParameters { tooth_radius_mm: 7.0, ..PAPER_5_1 };
+    let finger = edges(&p, Part::Carrier, &PartsParameters::default());
+    let [Edge::Line { start: apex, end: outer }, Edge::Arc { .. }, Edge::Line { end: closed, .. }] = &finger[..] else {
+        panic!("{finger:?}")
+    };
+    assert_eq!(apex, closed);
+    // On the wall of slot 0, and as far from the middle of slot 1.
+    assert!((apex.y - 7.0).abs() < 1e-12 && (outer.y - 7.0).abs() < 1e-12);
+    let from_next = Rotation2::new(-2.0 * PI / 28.0) * apex;
+    assert!((from_next.y + 7.0).abs() < 1e-12, "{from_next}");
+    assert!((apex.y.atan2(apex.x) - PI / 28.0).abs() < 1e-14);
+}
+
+#[test]
+fn a_ring_made_with_clearance_is_undercut_by_its_own_distance_from_the_path() {
+    let critical = drive(&PAPER_5_1).flank().critical_tooth_radius_mm().unwrap();
+    let p = DriveParameters { tooth_radius_mm: 0.999 * critical, ..PAPER_5_1 };
+    assert_eq!(drive(&p).flank_limit().end, FlankEnd::RegularTip);
+    let (a, b, r, k) = (p.semi_major_mm, p.semi_minor_mm, p.tooth_radius_mm, 13.0);
+    // (b + r)(1 + (r + c)κ) = b + 2r + c - (r + c) k² (a² - b²)/(a² + br) at the tip.
+    let narrowing = k * k * (a * a - b * b) / (a * a + b * r);
+    let most_um = 1e3 * (b + 2.0 * r - r * narrowing) / (narrowing - 1.0);
+    let tip_mm = |clearance_um| {
+        let parts = PartsParameters { ring_clearance_um: clearance_um, ..PartsParameters::default() };
+        let ring = edges(&p, Part::Ring, &parts);
+        let Edge::Curve { points, .. } = &ring[0] else { panic!("{ring:?}") };
+        points[0].coords.norm() - (b + 2.0 * r + 1e-3 * clearance_um)
+    };
+    // A regular tip stands at b + 2r + c; the flanks of an undercut one meet farther out.
+    assert!(tip_mm(0.5 * most_um).abs() < 1e-10);
+    assert!(tip_mm(20.0 * most_um) > 1e-6, "{}", tip_mm(20.0 * most_um));
+}
+
+#[test]
+fn a_bore_that_just_meets_an_undercut_tip_does_not_move_the_end_of_the_flank_outward() {
+    let mut tried = 0;
+    for tenth_um in 1..400_u32 {
+        let unbored = DriveParameters { tooth_radius_mm: 0.7 + 1e-3 * f64::from(tenth_um), ..PAPER_5_2 };
+        let Ok(natural) = Drive::new(&unbored) else { continue };
+        assert_eq!(natural.flank_limit().end, FlankEnd::Undercut);
+        let tip = natural.natural_tip_radius_mm().to_bits();
+        for tip_radius_mm in (tip..tip + 4).map(f64::from_bits) {
+            let bored = drive(&DriveParameters { tip_radius_mm: Some(tip_radius_mm), ..unbored });
+            let (found, end) = (bored.flank_limit().position, natural.flank_limit().position);
+            assert!(found.from_minor_rad >= end.from_minor_rad, "{tip_radius_mm} on {unbored:?}");
+            tried += 1;
+        }
+    }
+    assert!(tried > 1000, "{tried}");
+}
