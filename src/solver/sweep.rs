@@ -491,8 +491,7 @@ fn finished(
     let period_closure_residual = period_closure(loaded, points, &states, &peaks)?;
     for (check, residual) in [("torque balance", torque_balance_residual), ("period closure", period_closure_residual)]
     {
-        // The negated comparison also catches what is not a number.
-        if !(residual <= MOST_RESIDUAL) {
+        if residual.is_nan() || residual > MOST_RESIDUAL {
             return Err(SolveError::Inconsistent { check, residual });
         }
     }

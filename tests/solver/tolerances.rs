@@ -9,7 +9,7 @@ use toothwave_solver::{
     ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, PerContact, Position, SolveError,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, drive, load, swept};
+use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, any_swept_drive, drive, load, swept};
 
 /// More than any of these sweeps takes.
 const MAX_STATES: u64 = 10_000_000;
@@ -234,6 +234,56 @@ fn a_tolerance_holds_for_peaks_wind_up_stiffness_and_capacity_and_its_root_for_h
         }
     }
     println!("peaks, wind-up and stiffness, transmission error, capacity, half-widths: {worst:.3?} of what is allowed");
+}
+
+#[test]
+fn a_finer_tolerance_moves_nothing_by_more_than_the_coarser_one_allows_at_corners_and_jumps_too() {
+    for (parameters, load) in designs() {
+        let finest = Extremes::of(&parameters, &swept_to(&parameters, &load, 1e-12));
+        for tolerance in [1e-3, 1e-5, 1e-8] {
+            let found = Extremes::of(&parameters, &swept_to(&parameters, &load, tolerance));
+            let near = |found: f64, finest: f64| {
+                let off = (found / finest - 1.0).abs();
+                assert!(off <= tolerance, "{off:e} at {tolerance:e}, {:?} {load:?} of {parameters:?}", load.law);
+            };
+            for (found, finest) in found.peaks.iter().zip(&finest.peaks) {
+                near(found.value, finest.value);
+            }
+            for quantity in 0..2 {
+                near(found.most[quantity], finest.most[quantity]);
+                near(found.least[quantity], finest.least[quantity]);
+            }
+            near(found.capacity_nm, finest.capacity_nm);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_tolerance_holds_on_any_drive_with_any_gap(
+        parameters in any_swept_drive(),
+        exponents in prop::array::uniform3(-1.0_f64..2.0),
+        is_linear in any::<bool>(),
+        tolerance in prop::sample::select(vec![1e-1, 1e-2, 1e-4]),
+    ) {
+        let mut load = load(20.0, VirtualWork);
+        load.law = if is_linear { ContactLaw::Linear } else { ContactLaw::Palmgren };
+        let [wave_generator, ring, carrier] = exponents.map(|exponent| 10.0_f64.powf(exponent));
+        load.clearance_um = PerContact { wave_generator, ring, carrier };
+        load.allowable_stress_mpa = Some(1500.0);
+        let dense = Extremes::of(&parameters, &swept(&parameters, &load, 1500));
+        let found = Extremes::of(&parameters, &swept_to(&parameters, &load, tolerance));
+        for (found, dense) in found.peaks.iter().zip(&dense.peaks) {
+            prop_assert!(found.value >= (1.0 - tolerance) * dense.value, "{} {}", found.value, dense.value);
+        }
+        for quantity in 0..2 {
+            prop_assert!(found.most[quantity] >= (1.0 - tolerance) * dense.most[quantity], "most {}", quantity);
+            prop_assert!(found.least[quantity] <= (1.0 + tolerance) * dense.least[quantity], "least {}", quantity);
+        }
+        prop_assert!(found.capacity_nm <= (1.0 + tolerance) * dense.capacity_nm);
+    }
 }
 
 #[test]
