@@ -593,7 +593,7 @@ fn forces(p: &DriveParameters, sample: u64, samples: u64) -> (Vector2<f64>, f64,
 /// The sum of the forces at the cam, along the lines from the circle's centre to the teeth's centres.
 fn along_normals_n(p: &DriveParameters, sample: u64, samples: u64, circle: Vector2<f64>) -> Vector2<f64> {
     let states = swept(p, &load(7.0, VirtualWork), samples).states;
-    let angle_deg = Mesh::new(&drive(p)).input_angle_deg(sample, samples);
+    let angle_deg = Mesh::new(&drive(p)).input_angle_deg(sample, Samples::new(samples).unwrap());
     (0..states.len()).filter(|&i| states.input_angle_deg[i] == angle_deg).fold(Vector2::zeros(), |sum, i| {
         let psi = states.position_deg[i].to_radians();
         let center = center_radius_mm(p, psi) * Vector2::new(psi.cos(), psi.sin());

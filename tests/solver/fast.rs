@@ -68,14 +68,14 @@ fn columns(sweep: &Sweep) -> Vec<(&'static str, &Vec<f64>)> {
 /// How much a relative error of the flank's terms becomes in the stress at the ring: `1 + rκ` may be a small difference.
 fn amplification(drive: &Drive, position_deg: f64) -> f64 {
     let position = if position_deg < 45.0 {
-        Position::from_major(position_deg.to_radians())
+        Position::from_lobe(position_deg.to_radians(), 2)
     } else {
-        Position::from_minor((90.0 - position_deg).to_radians())
+        Position::from_valley((90.0 - position_deg).to_radians(), 2)
     };
     let center = drive.flank().locus().at(position).unwrap();
     let point = drive.flank().at(&center);
     let k = drive.flank().teeth_per_wave();
-    let slope = drive.flank().locus().tan_pressure_angle_derivative(&center);
+    let slope = center.tan_pressure_angle_derivative;
     let bending = k * k * slope.abs() * point.cos_pressure_angle.powi(2);
     let r_over_d = drive.parameters().tooth_radius_mm / center.center_radius_mm;
     1.0 + (1.0 + r_over_d * (1.0 + bending)) / point.regularity

@@ -6,7 +6,7 @@ use nalgebra::{Rotation2, Vector2};
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::gaps::{Deviations, Gaps, Place, Runout, TipRelief};
 use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
-use toothwave_solver::mesh::Mesh;
+use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::tooth::ToothContact;
 use toothwave_solver::violation::Modified;
 use toothwave_solver::{
@@ -14,7 +14,7 @@ use toothwave_solver::{
     Violation,
 };
 
-use crate::drives::{PAPER_5_1, drive, load};
+use crate::drives::{PAPER_5_1, drive, ellipse, load, semi_axes_mm};
 
 /// Small enough for first order, large enough for its digits.
 const SMALL_UM: f64 = 1e-3;
@@ -32,7 +32,7 @@ fn unit(angle_rad: f64) -> Vector2<f64> {
 
 /// The path of the teeth's centres around the cam, by the angle of the cam's normal, all the way around: no formula of the solver's.
 fn path_at_normal(p: &DriveParameters, normal_rad: f64) -> Vector2<f64> {
-    let (a, b, r) = (p.semi_major_mm, p.semi_minor_mm, p.tooth_radius_mm);
+    let ((a, b), r) = (semi_axes_mm(p), p.tooth_radius_mm);
     let n = unit(normal_rad);
     let h = (a * n.x).hypot(b * n.y);
     Vector2::new(a * a / h * n.x, b * b / h * n.y) + n * r
@@ -96,7 +96,7 @@ fn gaps_of(
 
 fn tooth_of(drive: &Drive, degrees: f64) -> ToothState {
     let case = LoadCase::new(&load(20.0, VirtualWork)).unwrap();
-    LoadedDrive::new(drive, &case).unwrap().tooth(Position::from_major(degrees.to_radians())).unwrap()
+    LoadedDrive::new(drive, &case).unwrap().tooth(Position::from_lobe(degrees.to_radians(), 2)).unwrap()
 }
 
 const DEGREES: [f64; 5] = [3.0, 25.0, 45.0, 68.0, 86.0];
@@ -275,7 +275,7 @@ fn a_turned_ring_or_carrier_is_lost_motion_alone() {
         let loaded = LoadedDrive::new(&drive, &case).unwrap();
         let mesh = Mesh::new(&drive);
         let teeth: Vec<_> =
-            mesh.teeth_at(2, 5).map(|tooth| loaded.tooth(mesh.position(tooth, 2, 5)).unwrap()).collect();
+            mesh.placed_at(2, Samples::new(5).unwrap()).map(|placed| loaded.tooth(placed.position).unwrap()).collect();
         let wind_up = loaded.wind_up(&teeth).unwrap();
         let forces: Vec<_> = teeth.iter().map(|tooth| loaded.forces_n(tooth, &wind_up).unwrap().ring).collect();
         (wind_up.rotation_rad(), forces)
@@ -306,10 +306,10 @@ fn with_deviations_the_teeth_of_both_zones_share_the_load() {
         let loaded = LoadedDrive::with_deviations(&drive, &case, &ToothContact::Cylinder, deviations)?;
         let mut teeth = Vec::new();
         for lobe in 0..zones {
-            for number in mesh.teeth_at(1, 4) {
+            for placed in mesh.placed_at(1, Samples::new(4).unwrap()) {
                 // Half a turn on stand the teeth of the second lobe.
-                let place = Place::new(&drive, number + 14 * lobe, lobe);
-                teeth.push(loaded.tooth_at(&place, mesh.position(number, 1, 4))?);
+                let place = Place::new(&drive, placed.number + 14 * lobe, lobe);
+                teeth.push(loaded.tooth_at(&place, placed.position)?);
             }
         }
         let wind_up = loaded.wind_up(&teeth)?;
@@ -352,8 +352,7 @@ fn the_space_of_a_tooth_follows_from_its_slot_and_lobe() {
             installed: 40,
             ring_teeth: 78,
             tooth_radius_mm: 1.5,
-            semi_major_mm: 50.7,
-            semi_minor_mm: 49.3,
+            wave_generator: ellipse(50.7, 49.3),
             ..PAPER_5_1
         },
     ] {

@@ -167,9 +167,9 @@ fn worst_against_free_teeth(parameters: &DriveParameters, load: &LoadParameters)
     let drive = drive(parameters);
     let loaded = LoadCase::new(load).unwrap();
     let loaded = LoadedDrive::new(&drive, &loaded).unwrap();
-    let (r, width_mm) = (parameters.tooth_radius_mm, parameters.tooth_width_mm);
+    let (r, width_mm) = (parameters.tooth_radius_mm, drive.tooth_width_mm());
     let law = |contact: Contact, tooth: &ToothState, force_n: f64| {
-        let cam = drive.flank().locus().cam().curvature_radius_mm(&tooth.center.cam_contact);
+        let cam = 1.0 / tooth.center.cam_contact.curvature_per_mm;
         let curvature = match contact {
             Contact::WaveGenerator => 1.0 / r + 1.0 / cam,
             Contact::Ring => 1.0 / (r * tooth.flank.regularity),
@@ -231,7 +231,7 @@ fn a_tooth_gives_way_by_johnsons_printed_formula_at_each_contact() {
     let case = LoadCase::new(&load).unwrap();
     let loaded = LoadedDrive::new(&drive, &case).unwrap();
     for degrees in [0.0_f64, 1e-6, 10.0, 45.0, 80.0] {
-        let tooth = loaded.tooth(Position::from_major(degrees.to_radians())).unwrap();
+        let tooth = loaded.tooth(Position::from_lobe(degrees.to_radians(), 2)).unwrap();
         for force_n in [1e-9, 1.0, 1e3, 1e4] {
             let printed: f64 = CONTACTS
                 .iter()
@@ -390,7 +390,7 @@ fn stiffness_is_the_slope_of_torque_over_wind_up_and_capacity_the_torque_at_whic
 fn a_sweep_to_a_tolerance_finds_the_peaks_of_these_laws_too() {
     for load in laws_of_searches() {
         let case = LoadCase::new(&load).unwrap();
-        let points = Points::Tolerance { tolerance: 1e-6, max_states: 1_000_000 };
+        let points = Points::tolerance(1e-6, 1_000_000).unwrap();
         let found = sweep::sweep(&drive(&PAPER_5_1), &case, points, &Never).unwrap();
         let sampled = swept(&PAPER_5_1, &load, 4000);
         for (contact, peaks) in found.peaks.iter() {
@@ -585,7 +585,7 @@ fn flat_sided_teeth_share_the_load_with_any_law_of_cylinders() {
     }
     let case = LoadCase::new(&load(20.0, VirtualWork)).unwrap();
     let loaded = LoadedDrive::with_teeth(&drive, &case, &shape(60.0)).unwrap();
-    let left = loaded.tooth(Position::from_major(0.1));
+    let left = loaded.tooth(Position::from_lobe(0.1, 2));
     assert!(matches!(left, Err(SolveError::FlatOffCarrier { .. })), "{left:?}");
 }
 

@@ -300,10 +300,12 @@ fn see_states(case: &Case, worst: &mut Worst) {
         let allowed = (TOLERANCE + CONDITION_MULTIPLE * condition.as_f64().unwrap_or(0.0)) * scale;
         worst.see(kind, &name, (found - number(value).unwrap()).abs(), allowed);
     };
-    for sample in 0..=samples {
+    for sample in 0..=samples.count() {
         let numbers = mesh.teeth_at(sample, samples);
-        let teeth: Vec<_> =
-            numbers.clone().map(|tooth| loaded.tooth(mesh.position(tooth, sample, samples)).unwrap()).collect();
+        let teeth: Vec<_> = numbers
+            .clone()
+            .map(|tooth| loaded.tooth(mesh.position(tooth, sample, samples).unwrap()).unwrap())
+            .collect();
         let wind_up = loaded.wind_up(&teeth).unwrap();
         let most = expected["wind_up_deg"].as_array().unwrap().iter().filter_map(number).fold(0.0, f64::max);
         let at = usize::try_from(sample).unwrap();

@@ -34,7 +34,7 @@ fn under_any_torque_and_any_gap_the_forces_balance_it_to_1e_12() {
                         let parameters =
                             toothwave_solver::LoadParameters { torque, law, clearance_um, ..load(1.0, VirtualWork) };
                         let case = LoadCase::new(&parameters).unwrap();
-                        let sweep = sweep::sweep(&drive, &case, Points::Samples(2), &Never).unwrap();
+                        let sweep = sweep::sweep(&drive, &case, Points::samples(2).unwrap(), &Never).unwrap();
                         let residual = sweep.torque_balance_residual;
                         if residual > worst.0 || residual.is_nan() {
                             worst = (residual, format!("{law:?}, {torque:?}, {gap_um} um at {contact:?}"));
@@ -55,8 +55,8 @@ fn a_tooth_on_the_minor_axis_never_closes_the_gap_of_its_slot() {
     parameters.clearance_um.carrier = 1000.0;
     let case = LoadCase::new(&parameters).unwrap();
     let loaded = LoadedDrive::new(&drive, &case).unwrap();
-    assert_eq!(loaded.tooth(Position::TIP).unwrap().spring.closing_rad, f64::INFINITY);
-    let sweep = sweep::sweep(&drive, &case, Points::Samples(2), &Never).unwrap();
+    assert_eq!(loaded.tooth(Position::valley(2)).unwrap().spring.closing_rad, f64::INFINITY);
+    let sweep = sweep::sweep(&drive, &case, Points::samples(2).unwrap(), &Never).unwrap();
     assert!(sweep.torque_balance_residual < 1e-14, "{:e}", sweep.torque_balance_residual);
 }
 
@@ -69,7 +69,7 @@ fn a_tooth_without_a_lever_arm_alone_carries_nothing_and_says_so() {
         parameters.allowable_stress_mpa = Some(1500.0);
         let loaded = LoadCase::new(&parameters).unwrap();
         let loaded = LoadedDrive::new(&drive, &loaded).unwrap();
-        let tip = [loaded.tooth(Position::TIP).unwrap()];
+        let tip = [loaded.tooth(Position::valley(2)).unwrap()];
         assert_eq!(loaded.wind_up(&tip), Err(SolveError::NoLeverArm));
         assert_eq!(loaded.torque_limit(&tip, 1500.0).map(|_| ()), Err(SolveError::NoLeverArm));
         assert_eq!(loaded.wind_up(&[]), Err(SolveError::NoLeverArm));
@@ -82,7 +82,7 @@ fn a_gap_that_projection_would_turn_into_load_is_refused_by_the_crate_too() {
     let mut parameters = load(20.0, Projection);
     parameters.clearance_um.carrier = 500.0;
     let case = LoadCase::new(&parameters).unwrap();
-    let refused = sweep::sweep(&larger, &case, Points::Samples(10), &Never);
+    let refused = sweep::sweep(&larger, &case, Points::samples(10).unwrap(), &Never);
     let violation = Violation::ClearanceNotMonotone { contact: Contact::Carrier, clearance_um: 500.0 };
     assert_eq!(refused, Err(SolveError::Impossible(vec![violation])));
 }

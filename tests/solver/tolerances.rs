@@ -6,10 +6,12 @@ use toothwave_solver::mesh::Mesh;
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{Peak, Points, Sweep, sweep};
 use toothwave_solver::{
-    ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, PerContact, Position, SolveError,
+    ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, PerContact, Position, SolveError, ToothShape,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, any_swept_drive, drive, load, swept};
+use crate::drives::{
+    PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, any_swept_drive, drive, ellipse, load, semi_axes_mm, swept,
+};
 
 /// More than any of these sweeps takes.
 const MAX_STATES: u64 = 10_000_000;
@@ -70,12 +72,11 @@ fn assert_entry_is_decided_once(parameters: &DriveParameters) -> bool {
 fn a_bore_that_ends_the_flank_whole_spacings_from_the_major_axis_is_swept_alike_by_samples_and_to_a_tolerance() {
     // Found in answers of 0.1: the wrong tooth stood at the end of the flank, and F_K was 3.6e18 N.
     let known = DriveParameters {
-        semi_major_mm: 504.4784470731704,
-        semi_minor_mm: 498.60993196702196,
+        wave_generator: ellipse(504.4784470731704, 498.60993196702196),
         teeth: 24,
         installed: 12,
         tooth_radius_mm: 163.34276420022084,
-        tooth_width_mm: 10.0,
+        tooth: ToothShape::Cylinder { width_mm: 10.0 },
         ring_teeth: 22,
         tip_radius_mm: Some(826.2920076590049),
     };
@@ -108,7 +109,7 @@ fn undercut_flanks_and_tips_a_few_roundings_around_whole_spacings_are_swept_alik
     for teeth in [12_i64, 16, 20, 22, 28, 40] {
         for flattening in [0.005, 0.01, 0.015, 0.02, 0.027, 0.034, 0.05, 0.07] {
             let base = DriveParameters {
-                semi_minor_mm: 58.0 * (1.0 - flattening),
+                wave_generator: ellipse(58.0, 58.0 * (1.0 - flattening)),
                 teeth,
                 installed: teeth,
                 ring_teeth: teeth - 2,
@@ -175,8 +176,7 @@ impl Extremes {
 fn designs() -> Vec<(DriveParameters, LoadParameters)> {
     let mut designs = Vec::new();
     let elliptic = DriveParameters {
-        semi_major_mm: 58.0,
-        semi_minor_mm: 40.0,
+        wave_generator: ellipse(58.0, 40.0),
         teeth: 12,
         installed: 12,
         ring_teeth: 14,
@@ -188,7 +188,7 @@ fn designs() -> Vec<(DriveParameters, LoadParameters)> {
             [(ContactLaw::Linear, VirtualWork), (ContactLaw::Palmgren, VirtualWork), (ContactLaw::Linear, Projection)]
         {
             for (ring, carrier) in [(0.0, 0.0), (10.0, 0.0), (3.0, 25.0)] {
-                if carrier > 0.0 && (compatibility == Projection || parameters.semi_minor_mm == 40.0) {
+                if carrier > 0.0 && (compatibility == Projection || semi_axes_mm(&parameters).1 == 40.0) {
                     continue;
                 }
                 for torque_nm in [1.0, 40.0] {
@@ -322,8 +322,7 @@ fn of_many_teeth(teeth: i64, of_critical: f64) -> DriveParameters {
     // k² (a² - b²) r_c = a²b, but for small terms.
     let stroke_mm = a * a / (2.0 * ring * ring * (tooth_radius_mm / of_critical));
     DriveParameters {
-        semi_major_mm: a,
-        semi_minor_mm: a - stroke_mm,
+        wave_generator: ellipse(a, a - stroke_mm),
         teeth,
         installed: teeth,
         ring_teeth: teeth - 2,
