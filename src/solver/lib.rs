@@ -38,6 +38,7 @@ pub mod drive;
 pub mod findings;
 pub mod load_sharing;
 pub mod locus;
+pub mod losses;
 pub mod mesh;
 pub mod parts;
 pub mod position;

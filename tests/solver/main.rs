@@ -5,6 +5,7 @@ mod drives;
 mod extremes;
 mod fast;
 mod limits;
+mod losses;
 mod oracles;
 mod paper;
 mod profiles;
