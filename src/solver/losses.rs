@@ -393,20 +393,19 @@ impl Friction {
         self.bearing().map_or(0.0, |bearing| bearing.drag_n(load_n) * race_mm_per_rad.abs())
     }
 
-    /// How far an efficiency at the loss ℓ may be from that of an exact equilibrium with Coulomb friction: `(C μ + C_p μ_p) ℓ`, μ the
-    /// largest coefficient of a contact, `μ_p` what friction there can be along the wave generator as a whole: on a race no more than its
-    /// bearing has. Both C and the ranges were measured (docs/theory.md section 10.6, `tests/reference/friction.py ranges`).
+    /// How far an efficiency at the loss ℓ may be from that of an exact equilibrium with Coulomb friction: `(C μ + 10 μ_p) ℓ`, μ the
+    /// largest coefficient, `μ_p` what friction there can be along the wave generator as a whole: on a race no more than its bearing
+    /// has. C and the ranges were measured (docs/theory.md section 10.6, `tests/reference/friction.py ranges`).
     pub fn first_order_error(&self, mechanism: &Mechanism, loss_share: f64) -> FirstOrderError {
+        let of_bearing =
+            self.bearing().map_or(0.0, |bearing| bearing.coefficient * bearing.radius_mm / bearing.race_radius_mm);
         let coefficient = self.coefficient();
-        let largest = coefficient.iter().map(|(_, &coefficient)| coefficient).fold(0.0, f64::max);
-        let on_race = |of_spinning| if mechanism.tooth_spins { of_spinning } else { ERROR_WITHOUT_SPIN };
+        let largest = coefficient.iter().map(|(_, &coefficient)| coefficient).fold(of_bearing, f64::max);
+        let on_race = if mechanism.tooth_spins { ERROR_ON_RACE } else { ERROR_ON_RACE_WITHOUT_SPIN };
         let (share, along) = match self.0.wave_generator {
             WaveGeneratorFriction::Plain { .. } => (0.0, largest),
-            WaveGeneratorFriction::Race { coefficient, bearing } => {
-                let of_bearing = bearing.coefficient * bearing.radius_mm / bearing.race_radius_mm;
-                (on_race(ERROR_ON_RACE), coefficient.min(of_bearing))
-            }
-            WaveGeneratorFriction::Rolling { .. } => (on_race(ERROR_ROLLING), 0.0),
+            WaveGeneratorFriction::Race { coefficient, .. } => (on_race, coefficient.min(of_bearing)),
+            WaveGeneratorFriction::Rolling { .. } => (on_race, 0.0),
         };
         FirstOrderError {
             efficiency: (share * largest + ERROR_ALONG_CAM * along) * loss_share,
@@ -415,15 +414,13 @@ impl Friction {
     }
 }
 
-/// Error of an efficiency over μℓ, by friction along the cam as a whole.
+/// Error of an efficiency over μℓ by friction along the cam as a whole.
 const ERROR_ALONG_CAM: f64 = 10.0;
-/// The same by friction of each tooth in itself: on a race.
+/// The same by friction of each tooth in itself, which shows where the cam does not drag: on a race.
 const ERROR_ON_RACE: f64 = 2.5;
-/// On a race that does not rub.
-const ERROR_ROLLING: f64 = 1.5;
-/// On either, by teeth that cannot spin.
-const ERROR_WITHOUT_SPIN: f64 = 9.5;
-/// The largest coefficient of a contact for which these hold.
+/// The same of teeth that cannot spin.
+const ERROR_ON_RACE_WITHOUT_SPIN: f64 = 9.5;
+/// The largest coefficient for which these hold.
 const MEASURED_TO: f64 = 0.1;
 /// The same along the cam.
 const MEASURED_TO_ALONG_CAM: f64 = 0.05;
