@@ -150,8 +150,8 @@ pub struct ToothSlip {
 pub struct Turning {
     /// How each tooth slips.
     pub teeth: Vec<ToothSlip>,
-    /// `v_R`: speed of the race along the cam; 0 without one. Over `R_race` it is the bearing's turning over that of wave generator
-    /// against carrier.
+    /// `v_R`: speed of the race along the cam, against the cam's own turning; 0 without one. Over `R_race` it is the bearing's turning
+    /// over that of wave generator against carrier: near 1, since the race nearly stands still with the carrier.
     pub race_mm_per_rad: f64,
     /// What friction takes at each contact, of all teeth of all zones.
     pub work_nmm_per_rad: PerContact<f64>,

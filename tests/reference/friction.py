@@ -4,8 +4,8 @@
 Writes friction.json beside itself: what src/solver/losses.rs is held against (docs/theory.md, section 10).
 
     usage: python3 friction.py               friction.json
-           python3 friction.py ranges 40     how far first order is from the exact equilibrium, over the drives of that file
-                                             and as many drawn at random
+           python3 friction.py ranges 40     how far first order is from the exact equilibrium, over the drives below
+                                             and 40 drawn at random
 
 Nothing here knows the formulas of section 10. A tooth is a body in a plane. Its contacts are points; their velocities
 are differences of the velocities of the two bodies there, taken as vectors, with the tooth's centre, the ring's curve
@@ -116,7 +116,7 @@ class Drive:
         return point, normal, (point[0] + self.radius * normal[0], point[1] + self.radius * normal[1])
 
     def parameter(self, psi):
-        """The parameter of the tooth whose centre stands at psi: bisection in doubles' place, then the secant method."""
+        """The parameter of the tooth whose centre stands at psi: some bisection, then the secant method."""
         if self.cam == HARMONIC_PATH:
             return psi
         cos, sin = mp.cos_sin(psi)
@@ -263,9 +263,8 @@ def tooth_at(drive, psi, lobe):
     path_along = dot(difference(path_after, path_before), left_of(ring_normal))
     return SimpleNamespace(
         psi=psi, lobe=lobe, r=r, distance=distance, points=points, pushes=pushes, tangents=tangents, slips=slips,
-        turning=turning, ratios=ratios, lever=abs(lever), tan_gamma=tan_gamma, advance=advance,
-        cam_curvature=turned / along, regularity=1 + r * flank_turned / path_along,
-        is_other_wall=False)
+        ratios=ratios, lever=abs(lever), tan_gamma=tan_gamma, advance=advance,
+        cam_curvature=turned / along, regularity=1 + r * flank_turned / path_along)
 
 
 def on_other_wall(tooth):
@@ -276,7 +275,6 @@ def on_other_wall(tooth):
     opposite.pushes[S] = tuple(-value for value in tooth.pushes[S])
     opposite.tangents[S] = tuple(-value for value in tooth.tangents[S])
     opposite.slips = tooth.slips[:2] + [-tooth.slips[S]]
-    opposite.is_other_wall = True
     return opposite
 
 
@@ -306,14 +304,16 @@ def solve3(columns, right):
 
 
 def equilibria(tooth, coefficients, spins, direction, race):
-    """Every equilibrium of a tooth, against either wall of its slot."""
-    found = one_wall(tooth, coefficients, spins, direction, race)
-    return found if found else one_wall(on_other_wall(tooth), coefficients, spins, direction, race)
+    """The equilibrium of a tooth, against either wall of its slot, if there is one."""
+    found = (one_wall(tooth, coefficients, spins, direction, race)
+             or one_wall(on_other_wall(tooth), coefficients, spins, direction, race))
+    assert len(found) <= 1, "more than one equilibrium"
+    return found
 
 
 def one_wall(tooth, coefficients, spins, direction, race):
-    """Every equilibrium of a tooth against one wall: normal forces, friction (along the counter-clockwise tangents), slips and the contact
-    that sticks. The motion has the sense `direction`; `race` is the speed of the cam's surface that a race adds."""
+    """Every equilibrium of a tooth against one wall: normal forces, friction (along the counter-clockwise tangents) and the
+    contact that sticks. The motion has the sense `direction`; `race` is the speed that a race adds to the cam's surface."""
     speeds = [direction * tooth.slips[H] - race, direction * tooth.slips[K], direction * tooth.slips[S]]
     force = tooth.force
     given = [force * tooth.pushes[H][0], force * tooth.pushes[H][1]]
@@ -339,7 +339,7 @@ def one_wall(tooth, coefficients, spins, direction, race):
     for regime in product((-1, 0, 1), repeat=3):
         sticking = [contact for contact in (H, K, S) if regime[contact] == 0]
         if len(sticking) != 1:
-            # All three slipping: three equations for two unknown forces. Two sticking: their speeds would have to be alike.
+            # All three slipping: three equations for two unknown forces. Two sticking: their speeds would be alike.
             continue
         stick = sticking[0]
         slips = [speed - speeds[stick] for speed in speeds]                # the spin stops the sticking one
@@ -376,25 +376,22 @@ def weighted(states, weight):
 
 
 def balanced(drive, teeth, friction, direction):
-    """All teeth in equilibrium, and the bearing's couple on the wave generator and race speed; None where the drive jams."""
+    """All teeth in equilibrium, the race's speed, the bearing's couple on the wave generator and its power; None where the
+    drive jams."""
     _, kind, spins, coefficients, bearing = friction
     bearing_radius = drive.bearing_radius
     load = sum(tooth.force for tooth in teeth)
 
     def all_at(race, cam_slides=True):
         used = coefficients if cam_slides else (0 * coefficients[H], *coefficients[1:])
-        states = [equilibria(tooth, used, spins, direction, race) for tooth in teeth]
-        found = None if any(len(found) == 0 for found in states) else weighted([found[0] for found in states], 1)
-        return found, max(len(found) for found in states)
+        found = [equilibria(tooth, used, spins, direction, race) for tooth in teeth]
+        return weighted([states[0] for states in found], 1) if all(found) else None
 
-    if kind == "plain":
-        states, several = all_at(0)
-        return states and SimpleNamespace(states=states, race=0, couple=0, bearing_power=0, several=several)
-    if kind == "rolling":
-        states, several = all_at(direction * drive.race, cam_slides=False)
-        couple = bearing * bearing_radius * load
-        return states and SimpleNamespace(states=states, race=direction * drive.race, couple=couple,
-                                          bearing_power=couple, several=several)
+    if kind != "race":
+        race = direction * drive.race if kind == "rolling" else 0
+        states = all_at(race, cam_slides=kind == "plain")
+        couple = bearing * bearing_radius * load if kind == "rolling" else 0
+        return states and SimpleNamespace(states=states, race=race, couple=couple, bearing_power=couple)
     # A free race: friction of the teeth along it and of the bearing balance. Between the speeds at which some tooth has
     # two alike no regime changes, so the sum along the race is constant there.
     drag = bearing * bearing_radius / drive.race * load
@@ -408,12 +405,9 @@ def balanced(drive, teeth, friction, direction):
     # The teeth drag the race along the clockwise tangent by minus their friction.
     sums = []
     for middle in middles:
-        states, several = all_at(middle)
-        if states is None:
-            sums.append(None)
-            continue
-        pull = -sum(state.frictions[H] for state in states)
-        sums.append((pull - (drag if middle > 0 else -drag), states, several))
+        states = all_at(middle)
+        pull = states and -sum(state.frictions[H] for state in states)
+        sums.append(states and (pull - (drag if middle > 0 else -drag), states))
     for place, before, after in zip(places, sums, sums[1:]):
         if before is None or after is None:
             continue
@@ -424,13 +418,12 @@ def balanced(drive, teeth, friction, direction):
             states = weighted(before[1], 1 - share) + weighted(after[1], share)
             pull = -sum(state.weight * state.frictions[H] for state in states)
             assert abs(pull) <= drag * (1 + 1e-12) + 1e-12 * load
-            return SimpleNamespace(states=states, race=place, couple=0, bearing_power=pull * place,
-                                   several=max(before[2], after[2]))
+            return SimpleNamespace(states=states, race=place, couple=0, bearing_power=pull * place)
     return None
 
 
 def turn(drive, teeth, friction, direction):
-    """The efficiencies in one sense of rotation at |omega_HS| = 1, with what friction takes; None where the drive jams."""
+    """The efficiencies in one sense of rotation at |omega_HS| = 1 and what friction takes; None where the drive jams."""
     result = balanced(drive, teeth, friction, direction)
     if not result:
         return None
