@@ -245,6 +245,29 @@ fn efficiencies_err_by_no_more_than_is_told() {
 }
 
 #[test]
+fn the_error_that_is_told_holds_up_to_a_coefficient_and_less_where_the_cam_drags() {
+    let spinning = mechanism(&PAPER_5_1);
+    let flat_sided = Mechanism { tooth_spins: false, ..spinning };
+    let race = |on_balls| WaveGeneratorFriction::Race { coefficient: 0.08, bearing: bearing_of_5_1(on_balls) };
+    let rolling = WaveGeneratorFriction::Rolling { bearing: bearing_of_5_1(0.0) };
+    let told = |mechanism: &Mechanism, friction: &Friction| {
+        let error = friction.first_order_error(mechanism, 0.25);
+        (error.efficiency, error.is_within_measured_range)
+    };
+    assert_eq!(told(&spinning, &plain(0.05, 0.04)), (10.0 * 0.05 * 0.25, true));
+    assert!(!told(&spinning, &plain(0.04, 0.051)).1);
+    assert_eq!(told(&spinning, &with(rolling, 0.1)), (2.5 * 0.1 * 0.25, true));
+    assert_eq!(told(&flat_sided, &with(rolling, 0.1)), (9.5 * 0.1 * 0.25, true));
+    assert!(!told(&spinning, &with(rolling, 0.101)).1);
+    // 57/52 of these stand for the race's radius over the bearing's.
+    let (light, _) = told(&spinning, &with(race(0.01 * 57.0 / 52.0), 0.05));
+    assert_near(light, (2.5 * 0.08 + 10.0 * 0.01) * 0.25, 1e-15, "light bearing");
+    let (stiff, is_within) = told(&spinning, &with(race(0.09 * 57.0 / 52.0), 0.05));
+    assert_near(stiff, (2.5 * 0.09 + 10.0 * 0.08) * 0.25, 1e-15, "stiff bearing");
+    assert!(!is_within);
+}
+
+#[test]
 fn the_point_of_contact_moves_over_each_part_as_its_curve_says() {
     for case in Case::all() {
         let placed = case.0["placed"].as_array().unwrap();
