@@ -42,6 +42,7 @@ pub mod findings;
 pub mod gaps;
 pub mod load_sharing;
 pub mod locus;
+pub mod losses;
 pub mod mesh;
 pub mod parts;
 pub mod position;

@@ -9,6 +9,7 @@ mod fast;
 mod gaps;
 mod laws;
 mod limits;
+mod losses;
 mod oracles;
 mod paper;
 mod parts;

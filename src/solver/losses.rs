@@ -1,0 +1,506 @@
+//! What a turn costs: slip, friction's power, efficiency (docs/theory.md section 10); wear, the bearing's load and life, and duty in
+//! the modules below.
+//!
+//! Friction is taken to first order in its coefficients: normal forces are those without friction, and what is lost is what they lose
+//! at the slip of the kinematics. How far that is from an exact equilibrium was measured, see [`Friction::first_order_error`].
+//!
+//! Everything is per radian of the wave generator *against the carrier*, whichever member is fixed. Which one that is comes in with
+//! [`Mechanism::loss_share`] and [`Mechanism::turning_rad_per_s`].
+
+pub mod bearing;
+pub mod duty;
+pub mod wear;
+
+use std::f64::consts::PI;
+
+use crate::contact::{Contact, PerContact};
+use crate::violation::Range;
+
+/// What losses need to know of a drive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mechanism {
+    /// `U`: lobes of the wave generator.
+    pub lobes: u32,
+    /// `Z_G`: teeth in theory.
+    pub teeth: u32,
+    /// `Z'_G`: installed teeth.
+    pub installed: u32,
+    /// `Z_K`: teeth of the ring.
+    pub ring_teeth: u32,
+    /// `r`.
+    pub tooth_radius_mm: f64,
+    /// Whether a tooth is free to spin about its own axis; a flat-sided one is not.
+    pub tooth_spins: bool,
+}
+
+/// A tooth in mesh and what it bears.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoadedTooth {
+    /// ψ, from the middle of its lobe.
+    pub position_rad: f64,
+    /// The lobe, counted from 0 in the sense of ψ.
+    pub lobe: u32,
+    /// `d`: distance of its centre from the axis.
+    pub center_radius_mm: f64,
+    /// `tan γ`, γ the pressure angle at the wave generator.
+    pub tan_pressure_angle: f64,
+    /// `1/ρ_H`: curvature of the cam, convex positive.
+    pub cam_curvature_per_mm: f64,
+    /// `1 + rκ` of the ring's flank.
+    pub regularity: f64,
+    /// `F_H`, `F_K`, `F_S` without friction.
+    pub force_n: PerContact<f64>,
+}
+
+/// Friction of a drive, as given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrictionParameters {
+    /// What the teeth run on.
+    pub wave_generator: WaveGeneratorFriction,
+    /// `μ_K`.
+    pub ring_coefficient: f64,
+    /// `μ_S`.
+    pub carrier_coefficient: f64,
+}
+
+/// What the teeth run on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum WaveGeneratorFriction {
+    /// The cam itself: teeth slide on it.
+    Plain {
+        /// `μ_H`.
+        coefficient: f64,
+    },
+    /// A race around the cam, free to turn: a thin bearing, or the bearing that is the eccentric.
+    Race {
+        /// `μ_H`, of teeth on the race.
+        coefficient: f64,
+        /// What the race runs on.
+        bearing: RaceBearing,
+    },
+    /// A race that stands still against the carrier and does not rub on the teeth: the limit of a light bearing.
+    Rolling {
+        /// What the race runs on.
+        bearing: RaceBearing,
+    },
+}
+
+/// The bearing between cam and race.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RaceBearing {
+    /// `μ_b`: its friction couple over load and radius.
+    pub coefficient: f64,
+    /// `R_b`: the radius that the coefficient belongs to.
+    pub radius_mm: f64,
+    /// `R_race`: race's speed along the cam over its turning: `R0` of a harmonic cam and an eccentric, `(a + b)/2` of an ellipse,
+    /// `R - r` of a harmonic path.
+    pub race_radius_mm: f64,
+}
+
+/// A number of [`FrictionParameters`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum FrictionParameter {
+    /// The coefficient of a contact.
+    Coefficient(Contact),
+    /// `μ_b`.
+    BearingCoefficient,
+    /// `R_b`, mm.
+    BearingRadius,
+    /// `R_race`, mm.
+    RaceRadius,
+}
+
+/// A value that friction cannot have.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("{parameter:?} is {value}, beyond {limit}")]
+pub struct FrictionOutOfRange {
+    /// Which.
+    pub parameter: FrictionParameter,
+    /// Its value.
+    pub value: f64,
+    /// The end of its range that it is beyond.
+    pub limit: f64,
+}
+
+impl FrictionParameter {
+    /// The range that it has to lie in.
+    pub const fn range(self) -> Range {
+        match self {
+            Self::Coefficient(_) | Self::BearingCoefficient => Range { low: 0.0, high: 1.0, closed: true, unit: "" },
+            Self::BearingRadius | Self::RaceRadius => Range { low: 1e-6, high: 1e6, closed: true, unit: "mm" },
+        }
+    }
+}
+
+/// Friction that was checked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Friction(FrictionParameters);
+
+/// How a tooth moves over the parts that it touches.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToothSlip {
+    /// `v_c`: slip of the tooth's surface against the part's, along the counter-clockwise tangent; exactly 0 where it rolls.
+    pub slip_mm_per_rad: PerContact<f64>,
+    /// The contact that rolls; none of a tooth that cannot spin or carries nothing.
+    pub rolls: Option<Contact>,
+}
+
+/// What friction does at one input angle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Turning {
+    /// How each tooth slips.
+    pub teeth: Vec<ToothSlip>,
+    /// `v_R`: speed of the race along the cam, against the cam's own turning; 0 without one. Over `R_race` it is the bearing's turning
+    /// over that of wave generator against carrier: near 1, since the race nearly stands still with the carrier.
+    pub race_mm_per_rad: f64,
+    /// What friction takes at each contact, of all teeth of all zones.
+    pub work_nmm_per_rad: PerContact<f64>,
+    /// What the bearing takes.
+    pub bearing_work_nmm_per_rad: f64,
+    /// `M0`: the wave generator's torque without friction.
+    pub input_torque_nmm: f64,
+}
+
+/// The member that stands still.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Fixed {
+    /// The wave generator drives the carrier.
+    Ring,
+    /// The wave generator drives the ring.
+    Carrier,
+    /// The ring drives the carrier.
+    WaveGenerator,
+}
+
+impl Fixed {
+    /// All three.
+    pub const ALL: [Self; 3] = [Self::Ring, Self::Carrier, Self::WaveGenerator];
+}
+
+/// The efficiency with one member fixed, the torque at the driven end given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Efficiency {
+    /// Power out over power in.
+    pub driven: f64,
+    /// The same when driven from behind; at or below 0 the drive locks itself, and a negative value says how much more than the load's
+    /// power has to be put in from the other end.
+    pub back_driven: f64,
+}
+
+impl Efficiency {
+    /// From the loss over the power at the driven end, `1/(1 + ℓ)` and `1 - ℓ`.
+    pub fn of_loss(loss_share: f64) -> Self {
+        Self { driven: 1.0 / (1.0 + loss_share), back_driven: 1.0 - loss_share }
+    }
+
+    /// Whether no torque at the output turns the drive.
+    pub fn is_self_locking(&self) -> bool {
+        self.back_driven <= 0.0
+    }
+}
+
+/// How far an efficiency may be from that of an exact equilibrium.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FirstOrderError {
+    /// The largest error that was measured at such a loss and such coefficients.
+    pub efficiency: f64,
+    /// Whether the coefficients lie where it was measured; beyond, the error is no bound.
+    pub is_within_measured_range: bool,
+}
+
+impl Mechanism {
+    /// `k = Z_K/U`.
+    pub fn ring_teeth_per_wave(&self) -> f64 {
+        f64::from(self.ring_teeth) / f64::from(self.lobes)
+    }
+
+    /// `s = sign(Z_G - Z_K)`.
+    pub const fn sense(&self) -> f64 {
+        if self.teeth > self.ring_teeth { 1.0 } else { -1.0 }
+    }
+
+    /// What the sum over the listed teeth is to be multiplied by: zones that are alike are listed once.
+    pub fn zones_in_torque(&self) -> f64 {
+        if self.installed.is_multiple_of(self.lobes) { f64::from(self.lobes) } else { 1.0 }
+    }
+
+    /// The loss over the power at the driven end, `ℓ`, from the loss ratio ν: `ν Z_K/Z_G`, `ν`, `ν U/Z_G`.
+    pub fn loss_share(&self, fixed: Fixed, loss_ratio: f64) -> f64 {
+        let turns = match fixed {
+            Fixed::Ring => self.ring_teeth,
+            Fixed::Carrier => self.teeth,
+            Fixed::WaveGenerator => self.lobes,
+        };
+        loss_ratio * (f64::from(turns) / f64::from(self.teeth))
+    }
+
+    /// The efficiency at a loss ratio ν; over a period, from its mean.
+    pub fn efficiency(&self, fixed: Fixed, loss_ratio: f64) -> Efficiency {
+        Efficiency::of_loss(self.loss_share(fixed, loss_ratio))
+    }
+
+    /// `|ω_HS|`, wave generator against carrier, with the ring fixed: `|ω_H| Z_K/Z_G`.
+    pub fn turning_rad_per_s(&self, input_speed_rpm: f64) -> f64 {
+        input_speed_rpm * (2.0 * PI / 60.0) * (f64::from(self.ring_teeth) / f64::from(self.teeth))
+    }
+
+    /// The slips of a tooth that does not spin: `a_H = d/cos γ - r`, `a_K = s(d/cos β + r)/k`, `a_S = -s d tan β/k`.
+    fn slip_without_spin_mm_per_rad(&self, tooth: &LoadedTooth) -> PerContact<f64> {
+        let (k, s, r) = (self.ring_teeth_per_wave(), self.sense(), self.tooth_radius_mm);
+        let (d, t) = (tooth.center_radius_mm, tooth.tan_pressure_angle);
+        PerContact {
+            wave_generator: d * secant(t) - r,
+            ring: s * (d * secant(k * t) + r) / k,
+            // tan β = k tan γ
+            carrier: -s * d * t,
+        }
+    }
+
+    /// What friction does to these teeth: all in mesh of one zone where zones are alike, of all zones otherwise; at least one carries,
+    /// away from both ends of its pass.
+    pub fn turning(&self, friction: &Friction, teeth: &[LoadedTooth]) -> Turning {
+        let slips: Vec<_> = teeth.iter().map(|tooth| self.slip_without_spin_mm_per_rad(tooth)).collect();
+        let race_mm_per_rad = self.race_mm_per_rad(friction, teeth, &slips);
+        let zones = self.zones_in_torque();
+        let (mut work, mut load_n, mut input_torque_nmm) = (PerContact::default(), 0.0, 0.0);
+        let mut slipping = Vec::with_capacity(teeth.len());
+        for (tooth, slip) in teeth.iter().zip(&slips) {
+            let on_race = PerContact { wave_generator: slip.wave_generator - race_mm_per_rad, ..*slip };
+            let limit_n = friction.limit_n(&tooth.force_n);
+            let slip = self.least_slip(&on_race, &limit_n);
+            let taken = |contact| zones * limit_n.get(contact) * slip.slip_mm_per_rad.get(contact).abs();
+            work = PerContact::of(|contact| work.get(contact) + taken(contact));
+            load_n += zones * tooth.force_n.wave_generator;
+            input_torque_nmm += zones * tooth.force_n.wave_generator * tooth.lever_arm_mm();
+            slipping.push(slip);
+        }
+        Turning {
+            teeth: slipping,
+            race_mm_per_rad,
+            work_nmm_per_rad: work,
+            bearing_work_nmm_per_rad: friction.bearing_work_nmm_per_rad(load_n, race_mm_per_rad),
+            input_torque_nmm,
+        }
+    }
+
+    /// The spin at which a tooth loses least: there its moments balance. `-rω` is the median of the slips, weighted by `μ_c F_c`, so the
+    /// contact of the median rolls.
+    fn least_slip(&self, slip: &PerContact<f64>, limit_n: &PerContact<f64>) -> ToothSlip {
+        let rolls = if self.tooth_spins {
+            let weighted = |of| Weighted { place: *slip.get(of), weight: *limit_n.get(of), of };
+            let mut places = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier].map(weighted);
+            weighted_median(&mut places).map(|median| median.of)
+        } else {
+            None
+        };
+        let spin_mm_per_rad = rolls.map_or(0.0, |contact| *slip.get(contact));
+        ToothSlip { slip_mm_per_rad: PerContact::of(|contact| slip.get(contact) - spin_mm_per_rad), rolls }
+    }
+
+    /// `v_R`: the speed of the race at which least is lost, `Σ min_ω Σ μ_c F_c |v_c| + D |v_R|`. Each tooth's part is convex and piecewise
+    /// linear; its slope changes where its contact with the race would roll together with another one, at `a_H - a_K` and `a_H - a_S`.
+    /// The whole is therefore a weighted median of these places and of 0.
+    fn race_mm_per_rad(&self, friction: &Friction, teeth: &[LoadedTooth], slips: &[PerContact<f64>]) -> f64 {
+        let bearing = match friction.0.wave_generator {
+            WaveGeneratorFriction::Plain { .. } => return 0.0,
+            WaveGeneratorFriction::Rolling { bearing } => return bearing.race_radius_mm,
+            WaveGeneratorFriction::Race { bearing, .. } => bearing,
+        };
+        let load_n: f64 = teeth.iter().map(|tooth| tooth.force_n.wave_generator).sum();
+        let drag = Weighted { place: 0.0, weight: bearing.drag_n(load_n), of: () };
+        let of_teeth = teeth.iter().zip(slips).flat_map(|(tooth, slip)| {
+            let limit_n = friction.limit_n(&tooth.force_n);
+            let with = |other: f64, weight: f64| Weighted { place: slip.wave_generator - other, weight, of: () };
+            if !self.tooth_spins {
+                return [with(0.0, limit_n.wave_generator), with(0.0, 0.0)];
+            }
+            // Where race and ring roll together the slope of the other two contacts' least loss changes by 2 μ_K F_K, and likewise at the
+            // slot; the race takes no steeper one than μ_H F_H of either sign.
+            let most = limit_n.wave_generator.min(limit_n.ring + limit_n.carrier);
+            let between = (limit_n.ring - limit_n.carrier).clamp(-most, most);
+            [with(slip.ring, 0.5 * (most + between)), with(slip.carrier, 0.5 * (most - between))]
+        });
+        let mut places: Vec<_> = of_teeth.chain(std::iter::once(drag)).collect();
+        weighted_median(&mut places).map_or(0.0, |median| median.place)
+    }
+}
+
+impl LoadedTooth {
+    /// `|h'| = d sin γ`: lever arm of `F_H`.
+    pub fn lever_arm_mm(&self) -> f64 {
+        self.center_radius_mm * self.tan_pressure_angle / secant(self.tan_pressure_angle)
+    }
+}
+
+impl Friction {
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// Every value that is out of its range.
+    pub fn new(parameters: &FrictionParameters) -> Result<Self, Vec<FrictionOutOfRange>> {
+        let friction = Self(*parameters);
+        let coefficient = friction.coefficient();
+        let contacts = coefficient.iter().map(|(contact, &value)| (FrictionParameter::Coefficient(contact), value));
+        let of_bearing = friction.bearing().into_iter().flat_map(|bearing| {
+            [
+                (FrictionParameter::BearingCoefficient, bearing.coefficient),
+                (FrictionParameter::BearingRadius, bearing.radius_mm),
+                (FrictionParameter::RaceRadius, bearing.race_radius_mm),
+            ]
+        });
+        let out_of_range: Vec<_> = contacts
+            .chain(of_bearing)
+            .filter_map(|(parameter, value)| {
+                let limit = parameter.range().limit_exceeded_by(value)?;
+                Some(FrictionOutOfRange { parameter, value, limit })
+            })
+            .collect();
+        if out_of_range.is_empty() { Ok(friction) } else { Err(out_of_range) }
+    }
+
+    /// The parameters, as given.
+    pub const fn parameters(&self) -> &FrictionParameters {
+        &self.0
+    }
+
+    /// `μ_c`; none where the race does not rub on the teeth.
+    fn coefficient(&self) -> PerContact<f64> {
+        let wave_generator = match self.0.wave_generator {
+            WaveGeneratorFriction::Plain { coefficient } | WaveGeneratorFriction::Race { coefficient, .. } => {
+                coefficient
+            }
+            WaveGeneratorFriction::Rolling { .. } => 0.0,
+        };
+        PerContact { wave_generator, ring: self.0.ring_coefficient, carrier: self.0.carrier_coefficient }
+    }
+
+    /// The bearing between cam and race, where there is one.
+    pub const fn bearing(&self) -> Option<RaceBearing> {
+        match self.0.wave_generator {
+            WaveGeneratorFriction::Plain { .. } => None,
+            WaveGeneratorFriction::Race { bearing, .. } | WaveGeneratorFriction::Rolling { bearing } => Some(bearing),
+        }
+    }
+
+    /// `μ_c F_c`.
+    fn limit_n(&self, force_n: &PerContact<f64>) -> PerContact<f64> {
+        let coefficient = self.coefficient();
+        PerContact::of(|contact| coefficient.get(contact) * force_n.get(contact))
+    }
+
+    /// `D |v_R|`: what the bearing takes under the forces of all teeth.
+    fn bearing_work_nmm_per_rad(&self, load_n: f64, race_mm_per_rad: f64) -> f64 {
+        self.bearing().map_or(0.0, |bearing| bearing.drag_n(load_n) * race_mm_per_rad.abs())
+    }
+
+    /// How far an efficiency at the loss ℓ may be from that of an exact equilibrium with Coulomb friction: `(C μ + 10 μ_p) ℓ`, μ the
+    /// largest coefficient, `μ_p` what friction there can be along the wave generator as a whole: on a race no more than its bearing
+    /// has. C and the ranges were measured (docs/theory.md section 10.6, `tests/reference/friction.py ranges`).
+    pub fn first_order_error(&self, mechanism: &Mechanism, loss_share: f64) -> FirstOrderError {
+        let of_bearing =
+            self.bearing().map_or(0.0, |bearing| bearing.coefficient * bearing.radius_mm / bearing.race_radius_mm);
+        let coefficient = self.coefficient();
+        let largest = coefficient.iter().map(|(_, &coefficient)| coefficient).fold(of_bearing, f64::max);
+        let on_race = if mechanism.tooth_spins { ERROR_ON_RACE } else { ERROR_ON_RACE_WITHOUT_SPIN };
+        let (share, along) = match self.0.wave_generator {
+            WaveGeneratorFriction::Plain { .. } => (0.0, largest),
+            WaveGeneratorFriction::Race { coefficient, .. } => (on_race, coefficient.min(of_bearing)),
+            WaveGeneratorFriction::Rolling { .. } => (on_race, 0.0),
+        };
+        FirstOrderError {
+            efficiency: (share * largest + ERROR_ALONG_CAM * along) * loss_share,
+            is_within_measured_range: largest <= MEASURED_TO && along <= MEASURED_TO_ALONG_CAM,
+        }
+    }
+}
+
+/// Error of an efficiency over μℓ by friction along the cam as a whole.
+const ERROR_ALONG_CAM: f64 = 10.0;
+/// The same by friction of each tooth in itself, which shows where the cam does not drag: on a race.
+const ERROR_ON_RACE: f64 = 2.5;
+/// The same of teeth that cannot spin.
+const ERROR_ON_RACE_WITHOUT_SPIN: f64 = 9.5;
+/// The largest coefficient for which these hold.
+const MEASURED_TO: f64 = 0.1;
+/// The same along the cam.
+const MEASURED_TO_ALONG_CAM: f64 = 0.05;
+
+impl RaceBearing {
+    /// `D = μ_b R_b ΣF_H/R_race`: friction of the bearing along the race.
+    fn drag_n(&self, load_n: f64) -> f64 {
+        self.coefficient * self.radius_mm * load_n / self.race_radius_mm
+    }
+}
+
+impl Turning {
+    /// What is lost altogether.
+    pub fn lost_nmm_per_rad(&self) -> f64 {
+        self.work_nmm_per_rad.iter().map(|(_, &work)| work).sum::<f64>() + self.bearing_work_nmm_per_rad
+    }
+
+    /// `ν = P/(M0 ω_HS)`.
+    pub fn loss_ratio(&self) -> f64 {
+        self.lost_nmm_per_rad() / self.input_torque_nmm
+    }
+}
+
+/// `p·v = σ |v_c|` at each contact of a tooth, σ the largest Hertz pressure. Handbook limits are on the load over the projected area, which
+/// is far less: the two are never compared.
+pub fn pressure_velocity_mpa_m_per_s(
+    stress_mpa: &PerContact<f64>,
+    slip: &ToothSlip,
+    turning_rad_per_s: f64,
+) -> PerContact<f64> {
+    PerContact::of(|contact| {
+        1e-3 * turning_rad_per_s * stress_mpa.get(contact) * slip.slip_mm_per_rad.get(contact).abs()
+    })
+}
+
+/// Power in W of what is done per radian at a speed.
+pub fn power_w(work_nmm_per_rad: f64, turning_rad_per_s: f64) -> f64 {
+    1e-3 * work_nmm_per_rad * turning_rad_per_s
+}
+
+/// A quantity at an input angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AtInputAngle {
+    /// The input angle, in any unit.
+    pub input_angle: f64,
+    /// The quantity.
+    pub value: f64,
+}
+
+/// The mean over a period, by trapezes: over equal intervals with both ends, and over places of any distance where a jump stands twice.
+pub fn mean_over_period(column: &[AtInputAngle]) -> f64 {
+    let (mut area, mut length) = (0.0, 0.0);
+    for pair in column.windows(2) {
+        let step = pair[1].input_angle - pair[0].input_angle;
+        area += 0.5 * step * (pair[0].value + pair[1].value);
+        length += step;
+    }
+    area / length
+}
+
+/// `1/cos` of the angle with this tangent.
+fn secant(tan: f64) -> f64 {
+    (1.0 + tan * tan).sqrt()
+}
+
+/// A place with a weight.
+#[derive(Debug, Clone, Copy)]
+struct Weighted<T> {
+    place: f64,
+    weight: f64,
+    of: T,
+}
+
+/// The weighted median, where `Σ weight |x - place|` is least; the lowest place if there are several, none where nothing weighs.
+fn weighted_median<T>(places: &mut [Weighted<T>]) -> Option<&Weighted<T>> {
+    places.sort_unstable_by(|one, other| one.place.total_cmp(&other.place));
+    let half = 0.5 * places.iter().map(|place| place.weight).sum::<f64>();
+    let mut below = 0.0;
+    places.iter().find(|place| {
+        below += place.weight;
+        place.weight > 0.0 && below >= half
+    })
+}

@@ -1,0 +1,719 @@
+//! Friction against exact equilibria (tests/reference/friction.py), closed forms and brute force.
+
+use std::f64::consts::PI;
+
+use proptest::prelude::*;
+use serde_json::Value;
+use toothwave_solver::load_sharing::LoadedDrive;
+use toothwave_solver::losses::bearing::{LoadForRevolutions, RollingElement};
+use toothwave_solver::losses::duty::{
+    BearingLoadForTime, ColumnForTime, DutyPoint, bearing_life_h, mean_at_each_place,
+};
+use toothwave_solver::losses::wear::WearParameters;
+use toothwave_solver::losses::{
+    AtInputAngle, Efficiency, Fixed, Friction, FrictionParameter, FrictionParameters, LoadedTooth, Mechanism,
+    RaceBearing, Turning, WaveGeneratorFriction, mean_over_period, power_w, pressure_velocity_mpa_m_per_s,
+};
+use toothwave_solver::mesh::Mesh;
+use toothwave_solver::{Compatibility, Contact, Drive, DriveParameters, LoadCase, PerContact};
+
+use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, load};
+use crate::reference::number;
+
+const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
+
+/// One input angle of a drive in friction.json.
+struct Case(Value);
+
+impl Case {
+    fn all() -> Vec<Self> {
+        let file: Value = serde_json::from_str(include_str!("../reference/friction.json")).unwrap();
+        file["cases"].as_array().unwrap().iter().cloned().map(Self).collect()
+    }
+
+    fn name(&self) -> &str {
+        self.0["name"].as_str().unwrap()
+    }
+
+    fn float(&self, name: &str) -> f64 {
+        self.0[name].as_f64().unwrap()
+    }
+
+    fn mechanism(&self, tooth_spins: bool) -> Mechanism {
+        let whole = |name: &str| u32::try_from(self.0[name].as_u64().unwrap()).unwrap();
+        Mechanism {
+            lobes: whole("lobes"),
+            teeth: whole("teeth"),
+            installed: whole("installed"),
+            ring_teeth: whole("ring_teeth"),
+            tooth_radius_mm: self.float("tooth_radius_mm"),
+            tooth_spins,
+        }
+    }
+
+    fn teeth(&self) -> Vec<LoadedTooth> {
+        let placed = self.0["placed"].as_array().unwrap().iter();
+        placed
+            .map(|tooth| LoadedTooth {
+                position_rad: tooth["position_rad"].as_f64().unwrap(),
+                lobe: u32::try_from(tooth["lobe"].as_u64().unwrap()).unwrap(),
+                center_radius_mm: tooth["center_radius_mm"].as_f64().unwrap(),
+                tan_pressure_angle: tooth["tan_pressure_angle"].as_f64().unwrap(),
+                cam_curvature_per_mm: tooth["cam_curvature_per_mm"].as_f64().unwrap(),
+                regularity: tooth["regularity"].as_f64().unwrap(),
+                force_n: per_contact(&tooth["force_n"]),
+            })
+            .collect()
+    }
+
+    /// Friction of an entry, its coefficients times a factor, with the mechanism that its teeth make.
+    fn friction(&self, entry: &Value, factor: f64) -> (Mechanism, Friction) {
+        let coefficient = per_contact(&entry["coefficient"]);
+        let bearing = RaceBearing {
+            coefficient: factor * entry["bearing_coefficient"].as_f64().unwrap(),
+            radius_mm: self.float("bearing_radius_mm"),
+            race_radius_mm: self.float("race_radius_mm"),
+        };
+        let on_cam = factor * coefficient.wave_generator;
+        let wave_generator = match entry["wave_generator"].as_str().unwrap() {
+            "plain" => WaveGeneratorFriction::Plain { coefficient: on_cam },
+            "race" => WaveGeneratorFriction::Race { coefficient: on_cam, bearing },
+            _ => WaveGeneratorFriction::Rolling { bearing },
+        };
+        let parameters = FrictionParameters {
+            wave_generator,
+            ring_coefficient: factor * coefficient.ring,
+            carrier_coefficient: factor * coefficient.carrier,
+        };
+        (self.mechanism(entry["spins"].as_bool().unwrap()), Friction::new(&parameters).unwrap())
+    }
+
+    fn frictions(&self) -> impl Iterator<Item = &Value> {
+        self.0["frictions"].as_array().unwrap().iter()
+    }
+}
+
+/// Three numbers in the order of the contacts.
+fn per_contact(values: &Value) -> PerContact<f64> {
+    PerContact {
+        wave_generator: number(&values[0]).unwrap(),
+        ring: number(&values[1]).unwrap(),
+        carrier: number(&values[2]).unwrap(),
+    }
+}
+
+fn assert_near(found: f64, expected: f64, allowed: f64, what: &str) {
+    assert!((found - expected).abs() <= allowed, "{what}: {found} instead of {expected}, allowed {allowed:e}");
+}
+
+#[test]
+fn slip_rolling_and_losses_are_those_of_an_exact_equilibrium_with_vanishing_friction() {
+    let mut compared = 0;
+    for case in Case::all() {
+        let teeth = case.teeth();
+        for entry in case.frictions() {
+            let name = format!("{} / {}", case.name(), entry["name"].as_str().unwrap());
+            let (mechanism, friction) = case.friction(entry, 1.0);
+            let turning = mechanism.turning(&friction, &teeth);
+            let limit = &entry["limit"];
+            let way = case.float("race_radius_mm");
+            assert_near(
+                turning.race_mm_per_rad,
+                number(&limit["race_mm_per_rad"]).unwrap(),
+                1e-13 * way,
+                &format!("{name}: race"),
+            );
+            for (index, slip) in turning.teeth.iter().enumerate() {
+                let expected = per_contact(&limit["slip_mm_per_rad"][index]);
+                let rolls = limit["rolls"][index].as_str();
+                // Where the race's speed lets two contacts roll at once either may be named.
+                let is_named = |contact: Contact| {
+                    rolls == Some(code(contact)) || expected.get(contact).abs() < 1e-10 * way && rolls.is_some()
+                };
+                assert!(slip.rolls.map_or(rolls.is_none(), is_named), "{name}: {:?} rolls, not {rolls:?}", slip.rolls);
+                for contact in CONTACTS {
+                    let what = format!("{name}: slip of tooth {index} at {contact:?}");
+                    assert_near(*slip.slip_mm_per_rad.get(contact), *expected.get(contact), 1e-13 * way, &what);
+                    compared += 1;
+                }
+                if let Some(contact) = slip.rolls {
+                    assert_eq!(*slip.slip_mm_per_rad.get(contact), 0.0, "{name}");
+                }
+            }
+            let zones = mechanism.zones_in_torque();
+            let lost = turning.lost_nmm_per_rad();
+            for contact in CONTACTS {
+                let expected = zones * number(&limit["work_nmm_per_rad"][code(contact)]).unwrap();
+                let what = format!("{name}: work at {contact:?}");
+                assert_near(*turning.work_nmm_per_rad.get(contact), expected, 1e-12 * lost, &what);
+                compared += 1;
+            }
+            let expected = zones * number(&limit["bearing_nmm_per_rad"]).unwrap();
+            assert_near(turning.bearing_work_nmm_per_rad, expected, 1e-12 * lost, &format!("{name}: bearing"));
+        }
+    }
+    assert!(compared > 4000, "{compared}");
+}
+
+const fn code(contact: Contact) -> &'static str {
+    match contact {
+        Contact::WaveGenerator => "wave_generator",
+        Contact::Ring => "ring",
+        Contact::Carrier => "carrier",
+    }
+}
+
+/// First-order efficiencies with the names that friction.json has for them.
+fn efficiencies(mechanism: &Mechanism, loss_ratio: f64) -> [(&'static str, Fixed, f64); 6] {
+    let of = |fixed| mechanism.efficiency(fixed, loss_ratio);
+    [
+        ("ring_fixed", Fixed::Ring, of(Fixed::Ring).driven),
+        ("carrier_fixed", Fixed::Carrier, of(Fixed::Carrier).driven),
+        ("wave_generator_fixed", Fixed::WaveGenerator, of(Fixed::WaveGenerator).driven),
+        ("ring_fixed_back_driven", Fixed::Ring, of(Fixed::Ring).back_driven),
+        ("carrier_fixed_back_driven", Fixed::Carrier, of(Fixed::Carrier).back_driven),
+        ("wave_generator_fixed_back_driven", Fixed::WaveGenerator, of(Fixed::WaveGenerator).back_driven),
+    ]
+}
+
+/// The loss over the power at the driven end that makes an efficiency.
+fn loss_share_of(name: &str, efficiency: f64) -> f64 {
+    if name.ends_with("back_driven") { 1.0 - efficiency } else { 1.0 / efficiency - 1.0 }
+}
+
+#[test]
+fn losses_err_by_the_square_of_the_coefficients() {
+    let (mut compared, mut least, mut most) = (0, f64::INFINITY, 0.0_f64);
+    for case in Case::all() {
+        let teeth = case.teeth();
+        for entry in case.frictions() {
+            // Over the loss itself, so that one order is left.
+            let errors: Vec<_> = entry["exact"].as_array().unwrap()[1..]
+                .iter()
+                .map(|exact| {
+                    let (mechanism, friction) = case.friction(entry, exact["factor"].as_f64().unwrap());
+                    let loss_ratio = mechanism.turning(&friction, &teeth).loss_ratio();
+                    efficiencies(&mechanism, loss_ratio).map(|(name, fixed, _)| {
+                        let exact = loss_share_of(name, exact[name].as_f64().unwrap());
+                        exact / mechanism.loss_share(fixed, loss_ratio) - 1.0
+                    })
+                })
+                .collect();
+            for (coarse, fine) in errors[0].iter().zip(errors[1]) {
+                let name = format!("{} / {}: from {coarse:e} to {fine:e}", case.name(), entry["name"]);
+                // A quarter of the coefficients. Where orders cancel each other the first of them shows later.
+                assert!(fine.abs() < 0.34 * coarse.abs() + 1.5e-3, "{name}");
+                if coarse.abs() > 0.01 {
+                    (least, most) = (least.min(fine / coarse), most.max(fine / coarse));
+                    compared += 1;
+                }
+            }
+        }
+    }
+    println!(
+        "{compared} relative errors at a quarter of the coefficients are {least:.3} to {most:.3} of what they were"
+    );
+    assert!(compared > 500, "{compared}");
+}
+
+#[test]
+fn efficiencies_err_by_no_more_than_is_told() {
+    let mut nearest = 0.0_f64;
+    let mut beyond = 0;
+    for case in Case::all() {
+        let teeth = case.teeth();
+        for entry in case.frictions() {
+            for exact in entry["exact"].as_array().unwrap() {
+                let (mechanism, friction) = case.friction(entry, exact["factor"].as_f64().unwrap());
+                let loss_ratio = mechanism.turning(&friction, &teeth).loss_ratio();
+                for (name, fixed, efficiency) in efficiencies(&mechanism, loss_ratio) {
+                    let told = friction.first_order_error(&mechanism, mechanism.loss_share(fixed, loss_ratio));
+                    if !told.is_within_measured_range {
+                        beyond += 1;
+                        continue;
+                    }
+                    let exact = exact[name].as_f64().unwrap_or_else(|| panic!("{} {name} jams", case.name()));
+                    let share = (efficiency - exact).abs() / told.efficiency;
+                    nearest = nearest.max(share);
+                    assert!(share <= 1.0, "{} / {} {name}: {share} of what is told", case.name(), entry["name"]);
+                }
+            }
+        }
+    }
+    println!("at most {nearest:.3} of what is told; {beyond} beyond the measured range");
+    assert!(nearest > 0.5, "what is told is far too much: {nearest}");
+}
+
+#[test]
+fn the_error_that_is_told_holds_up_to_a_coefficient_and_less_where_the_cam_drags() {
+    let spinning = mechanism(&PAPER_5_1);
+    let flat_sided = Mechanism { tooth_spins: false, ..spinning };
+    let race = |on_balls| WaveGeneratorFriction::Race { coefficient: 0.08, bearing: bearing_of_5_1(on_balls) };
+    let rolling = WaveGeneratorFriction::Rolling { bearing: bearing_of_5_1(0.0) };
+    let told = |mechanism: &Mechanism, friction: &Friction| {
+        let error = friction.first_order_error(mechanism, 0.25);
+        (error.efficiency, error.is_within_measured_range)
+    };
+    assert_eq!(told(&spinning, &plain(0.05, 0.04)), (10.0 * 0.05 * 0.25, true));
+    assert!(!told(&spinning, &plain(0.04, 0.051)).1);
+    assert_eq!(told(&spinning, &with(rolling, 0.1)), (2.5 * 0.1 * 0.25, true));
+    assert_eq!(told(&flat_sided, &with(rolling, 0.1)), (9.5 * 0.1 * 0.25, true));
+    assert!(!told(&spinning, &with(rolling, 0.101)).1);
+    // 57/52 of these stand for the race's radius over the bearing's.
+    let (light, _) = told(&spinning, &with(race(0.01 * 57.0 / 52.0), 0.05));
+    assert_near(light, (2.5 * 0.08 + 10.0 * 0.01) * 0.25, 1e-15, "light bearing");
+    let (stiff, is_within) = told(&spinning, &with(race(0.09 * 57.0 / 52.0), 0.05));
+    assert_near(stiff, (2.5 * 0.09 + 10.0 * 0.08) * 0.25, 1e-15, "stiff bearing");
+    assert!(!is_within);
+}
+
+#[test]
+fn the_point_of_contact_moves_over_each_part_as_its_curve_says() {
+    for case in Case::all() {
+        let placed = case.0["placed"].as_array().unwrap();
+        for (tooth, row) in case.teeth().iter().zip(placed) {
+            let found = case.mechanism(true).advance_mm_per_rad(tooth);
+            let expected = per_contact(&row["advance_mm_per_rad"]);
+            for contact in CONTACTS {
+                let expected = *expected.get(contact);
+                let what = format!("{} at {contact:?}", case.name());
+                // 1 + rκ itself is given to half a unit in its last place.
+                assert_near(*found.get(contact), expected, 1e-13 * expected, &what);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_radial_load_is_the_sum_of_the_teeths_forces() {
+    for case in Case::all() {
+        let (mechanism, teeth) = (case.mechanism(true), case.teeth());
+        let total: f64 = teeth.iter().map(|tooth| tooth.force_n.wave_generator).sum();
+        let load = mechanism.radial_load_n(&teeth);
+        for axis in 0..2 {
+            let expected = number(&case.0["radial_load_n"][axis]).unwrap();
+            assert_near(load[axis], expected, 1e-13 * total, case.name());
+        }
+        if mechanism.lobes == 1 {
+            // All normals of an eccentric circle meet in its centre: the load across the eccentricity makes the torque.
+            let eccentricity_mm = if mechanism.ring_teeth == 10 { 3.0 } else { 1.2 };
+            assert_near(load[1].abs() * eccentricity_mm, 20e3, 1e-12 * 20e3, case.name());
+        }
+    }
+}
+
+/// The teeth in mesh of one zone, as the load sharing makes them.
+fn teeth_at(drive: &Drive, loaded: &LoadedDrive<'_>, sample: u64, samples: u64) -> Vec<LoadedTooth> {
+    let mesh = Mesh::new(drive);
+    let states: Vec<_> = mesh
+        .teeth_at(sample, samples)
+        .map(|number| loaded.tooth(mesh.position(number, sample, samples)).unwrap())
+        .collect();
+    let wind_up = loaded.wind_up(&states).unwrap();
+    states
+        .iter()
+        .map(|state| LoadedTooth {
+            position_rad: state.center.position.from_major_rad,
+            lobe: 0,
+            center_radius_mm: state.center.center_radius_mm,
+            tan_pressure_angle: state.center.tan_pressure_angle,
+            cam_curvature_per_mm: 1.0 / drive.flank().locus().cam().curvature_radius_mm(&state.center.cam_contact),
+            regularity: state.flank.regularity,
+            force_n: loaded.forces_n(state, &wind_up),
+        })
+        .collect()
+}
+
+fn mechanism(parameters: &DriveParameters) -> Mechanism {
+    let whole = |count: i64| u32::try_from(count).unwrap();
+    Mechanism {
+        lobes: 2,
+        teeth: whole(parameters.teeth),
+        installed: whole(parameters.installed),
+        ring_teeth: whole(parameters.ring_teeth),
+        tooth_radius_mm: parameters.tooth_radius_mm,
+        tooth_spins: true,
+    }
+}
+
+fn plain(on_cam: f64, elsewhere: f64) -> Friction {
+    with(WaveGeneratorFriction::Plain { coefficient: on_cam }, elsewhere)
+}
+
+fn with(wave_generator: WaveGeneratorFriction, elsewhere: f64) -> Friction {
+    let parameters = FrictionParameters { wave_generator, ring_coefficient: elsewhere, carrier_coefficient: elsewhere };
+    Friction::new(&parameters).unwrap()
+}
+
+fn bearing_of_5_1(coefficient: f64) -> RaceBearing {
+    RaceBearing { coefficient, radius_mm: 52.0, race_radius_mm: 57.0 }
+}
+
+/// The mean of ν over 40 intervals of a period, `virtual_work`, 20 N·m.
+fn mean_loss_ratio(parameters: &DriveParameters, mechanism: &Mechanism, friction: &Friction) -> f64 {
+    let drive = drive(parameters);
+    let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
+    let loaded = LoadedDrive::new(&drive, &load).unwrap();
+    let column: Vec<_> = (0..=40_u32)
+        .map(|sample| {
+            let teeth = teeth_at(&drive, &loaded, sample.into(), 40);
+            let turning = mechanism.turning(friction, &teeth);
+            assert_near(turning.input_torque_nmm, 20e3, 1e-8, "torque of the listed teeth");
+            AtInputAngle { input_angle: f64::from(sample), value: turning.loss_ratio() }
+        })
+        .collect();
+    mean_over_period(&column)
+}
+
+#[test]
+fn case_5_1_loses_half_of_its_power_on_a_plain_cam_and_an_eighth_on_a_bearing() {
+    let mechanism = mechanism(&PAPER_5_1);
+    let efficiency = |friction: Friction| {
+        let loss_ratio = mean_loss_ratio(&PAPER_5_1, &mechanism, &friction);
+        mechanism.efficiency(Fixed::Ring, loss_ratio)
+    };
+    let on_cam = efficiency(plain(0.03, 0.05));
+    let on_bearing =
+        efficiency(with(WaveGeneratorFriction::Race { coefficient: 0.05, bearing: bearing_of_5_1(0.002) }, 0.05));
+    println!("plain {on_cam:?}, on a bearing {on_bearing:?}");
+    assert!((on_cam.driven - 0.5).abs() < 0.02, "{on_cam:?}");
+    assert!((1.0 - on_bearing.driven - 0.125).abs() < 0.02, "{on_bearing:?}");
+    assert!(!on_bearing.is_self_locking());
+    assert!(efficiency(plain(0.05, 0.05)).is_self_locking());
+}
+
+#[test]
+fn power_in_is_power_out_and_what_is_lost() {
+    let mechanism = mechanism(&PAPER_5_2);
+    for friction in [plain(0.01, 0.02), plain(0.08, 0.1)] {
+        let drive = drive(&PAPER_5_2);
+        let load = LoadCase::new(&load(3.0, Compatibility::VirtualWork)).unwrap();
+        let loaded = LoadedDrive::new(&drive, &load).unwrap();
+        let turning = mechanism.turning(&friction, &teeth_at(&drive, &loaded, 3, 20));
+        let turning_rad_per_s = mechanism.turning_rad_per_s(1500.0);
+        let lost_w = power_w(turning.lost_nmm_per_rad(), turning_rad_per_s);
+        // Speeds of wave generator, ring and carrier against the member that stands still, at this speed of the first against the last.
+        let k = mechanism.ring_teeth_per_wave();
+        let (cam, ring) = (turning_rad_per_s, -mechanism.sense() / k * turning_rad_per_s);
+        for fixed in Fixed::ALL {
+            let still = match fixed {
+                Fixed::Ring => ring,
+                Fixed::Carrier => 0.0,
+                Fixed::WaveGenerator => cam,
+            };
+            // The torques without friction, of the teeth on the three; each driven end keeps its own.
+            let torque_nm = [-3.0, 3.0 * k * -mechanism.sense(), 3.0 * (k + mechanism.sense()) * mechanism.sense()];
+            let powers_w = [torque_nm[0] * (cam - still), torque_nm[1] * (ring - still), torque_nm[2] * -still];
+            assert!(powers_w.iter().sum::<f64>().abs() < 1e-10);
+            let out_w = powers_w.iter().copied().fold(0.0, f64::max);
+            let Efficiency { driven, back_driven } = mechanism.efficiency(fixed, turning.loss_ratio());
+            assert_near(out_w / driven, out_w + lost_w, 1e-12 * out_w, "driven");
+            assert_near(out_w * back_driven, out_w - lost_w, 1e-12 * out_w, "driven from behind");
+        }
+    }
+}
+
+/// What a turn takes at a given speed of the race, each tooth's spin found among all three that let a contact roll.
+fn lost_at(mechanism: &Mechanism, friction: &FrictionParameters, teeth: &[LoadedTooth], race_mm_per_rad: f64) -> f64 {
+    let (WaveGeneratorFriction::Race { coefficient, .. } | WaveGeneratorFriction::Plain { coefficient }) =
+        friction.wave_generator
+    else {
+        unreachable!("not asked for")
+    };
+    let still = WaveGeneratorFriction::Plain { coefficient: 0.0 };
+    let unspun = with(still, 0.0);
+    let bearing = Friction::new(friction).unwrap().bearing().unwrap();
+    let rigid = Mechanism { tooth_spins: false, ..*mechanism };
+    let slips = rigid.turning(&unspun, teeth);
+    let mut lost = 0.0;
+    for (tooth, slip) in teeth.iter().zip(&slips.teeth) {
+        let v = &slip.slip_mm_per_rad;
+        let v = [v.wave_generator - race_mm_per_rad, v.ring, v.carrier];
+        let limit = [
+            coefficient * tooth.force_n.wave_generator,
+            friction.ring_coefficient * tooth.force_n.ring,
+            friction.carrier_coefficient * tooth.force_n.carrier,
+        ];
+        let at = |spin: f64| (0..3).map(|contact| limit[contact] * (v[contact] - spin).abs()).sum::<f64>();
+        lost +=
+            if mechanism.tooth_spins { v.iter().map(|&spin| at(spin)).fold(f64::INFINITY, f64::min) } else { at(0.0) };
+        lost += bearing.coefficient * bearing.radius_mm / bearing.race_radius_mm
+            * tooth.force_n.wave_generator
+            * race_mm_per_rad.abs();
+    }
+    lost * mechanism.zones_in_torque()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn the_race_turns_as_fast_as_loses_least(
+        parameters in any_swept_drive(),
+        on_race in 0.0_f64..0.2, ring in 0.0_f64..0.2, carrier in 0.0_f64..0.2, on_balls in 0.0_f64..0.1,
+        tooth_spins in any::<bool>(), sample in 0_u64..7, other in -2.0_f64..2.0,
+    ) {
+        let drive = drive(&parameters);
+        let load = LoadCase::new(&load(5.0, Compatibility::VirtualWork)).unwrap();
+        let loaded = LoadedDrive::new(&drive, &load).unwrap();
+        let mechanism = Mechanism { tooth_spins, ..mechanism(&parameters) };
+        let race_radius_mm = 0.5 * (parameters.semi_major_mm + parameters.semi_minor_mm);
+        let bearing = RaceBearing { coefficient: on_balls, radius_mm: 0.9 * race_radius_mm, race_radius_mm };
+        let friction = FrictionParameters {
+            wave_generator: WaveGeneratorFriction::Race { coefficient: on_race, bearing },
+            ring_coefficient: ring,
+            carrier_coefficient: carrier,
+        };
+        let teeth = teeth_at(&drive, &loaded, sample, 7);
+        let turning = mechanism.turning(&Friction::new(&friction).unwrap(), &teeth);
+        let lost = turning.lost_nmm_per_rad();
+        let here = lost_at(&mechanism, &friction, &teeth, turning.race_mm_per_rad);
+        prop_assert!((lost - here).abs() <= 1e-12 * here.max(1e-3), "{lost} {here}");
+        for race in [0.0, other * race_radius_mm, turning.race_mm_per_rad + 1e-3 * other * race_radius_mm] {
+            let elsewhere = lost_at(&mechanism, &friction, &teeth, race);
+            prop_assert!(lost <= elsewhere * (1.0 + 1e-12), "{lost} at {}, {elsewhere} at {race}", turning.race_mm_per_rad);
+        }
+    }
+
+    #[test]
+    fn a_tooth_that_cannot_spin_loses_no_less_and_a_stuck_race_is_a_cam(
+        parameters in any_swept_drive(), on_cam in 0.001_f64..0.2, elsewhere in 0.001_f64..0.2, sample in 0_u64..7,
+    ) {
+        let drive = drive(&parameters);
+        let load = LoadCase::new(&load(5.0, Compatibility::VirtualWork)).unwrap();
+        let loaded = LoadedDrive::new(&drive, &load).unwrap();
+        let spinning = mechanism(&parameters);
+        let flat = Mechanism { tooth_spins: false, ..spinning };
+        let teeth = teeth_at(&drive, &loaded, sample, 7);
+        let friction = plain(on_cam, elsewhere);
+        let lost = |mechanism: &Mechanism, friction: &Friction| mechanism.turning(friction, &teeth).lost_nmm_per_rad();
+        prop_assert!(lost(&spinning, &friction) <= lost(&flat, &friction) * (1.0 + 1e-14));
+        let race_radius_mm = parameters.semi_major_mm;
+        let bearing = |coefficient| RaceBearing { coefficient, radius_mm: race_radius_mm, race_radius_mm };
+        let race = |on_balls| WaveGeneratorFriction::Race { coefficient: on_cam, bearing: bearing(on_balls) };
+        // A bearing rougher than the teeth never turns.
+        let stuck = spinning.turning(&with(race(2.0 * on_cam), elsewhere), &teeth);
+        prop_assert_eq!(stuck.race_mm_per_rad, 0.0);
+        prop_assert_eq!(stuck.lost_nmm_per_rad(), lost(&spinning, &friction));
+        // A race that is free loses less than the cam, and no less than one that does not rub on the teeth at all.
+        let free = lost(&spinning, &with(race(0.0), elsewhere));
+        let rolling = lost(&spinning, &with(WaveGeneratorFriction::Rolling { bearing: bearing(0.0) }, elsewhere));
+        prop_assert!(free <= lost(&spinning, &friction) * (1.0 + 1e-14));
+        prop_assert!(rolling <= free * (1.0 + 1e-14), "{rolling} {free}");
+    }
+}
+
+#[test]
+fn a_tooth_without_load_loses_nothing_and_rolls_on_nothing() {
+    let drive = drive(&PAPER_5_1);
+    let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
+    let loaded = LoadedDrive::new(&drive, &load).unwrap();
+    let mechanism = mechanism(&PAPER_5_1);
+    let mut teeth = teeth_at(&drive, &loaded, 0, 50);
+    let friction = plain(0.03, 0.05);
+    let all = mechanism.turning(&friction, &teeth);
+    let idle = LoadedTooth { force_n: PerContact::default(), ..teeth[3] };
+    teeth.push(idle);
+    let more = mechanism.turning(&friction, &teeth);
+    assert_eq!(more.teeth.last().unwrap().rolls, None);
+    assert_eq!(more.lost_nmm_per_rad(), all.lost_nmm_per_rad());
+    assert_eq!(more.loss_ratio(), all.loss_ratio());
+}
+
+/// The worn section of each part by two ways: depth over its flanks, and what the teeth take off. Teeth that cannot spin slip everywhere.
+#[test]
+fn what_a_part_loses_is_what_the_teeth_take_off_it() {
+    let drive = drive(&PAPER_5_2);
+    let load = LoadCase::new(&load(3.0, Compatibility::VirtualWork)).unwrap();
+    let loaded = LoadedDrive::new(&drive, &load).unwrap();
+    let mechanism = Mechanism { tooth_spins: false, ..mechanism(&PAPER_5_2) };
+    let friction = plain(0.03, 0.05);
+    let (rate, turning_rad_per_s, width_mm) = (1e-6, mechanism.turning_rad_per_s(1000.0), 15.0);
+    let wear = WearParameters {
+        rate_mm3_per_nm: PerContact { wave_generator: rate, ring: rate, carrier: rate },
+        turning_rad_per_s,
+    };
+    let samples = 400;
+    let mut worn = PerContact::<f64>::default();
+    let mut taken = PerContact::<f64>::default();
+    let step_rad = 2.0 * PI / (40.0 * samples as f64);
+    for sample in 0..samples {
+        let teeth = teeth_at(&drive, &loaded, sample, samples);
+        let turning = mechanism.turning(&friction, &teeth);
+        for (tooth, slip) in teeth.iter().zip(&turning.teeth) {
+            let line_load = PerContact::of(|contact| tooth.force_n.get(contact) / width_mm);
+            let depth = mechanism.wear_mm_per_hour(&friction, &wear, tooth, slip, &line_load);
+            let advance = mechanism.advance_mm_per_rad(tooth);
+            worn = PerContact::of(|contact| worn.get(contact) + depth.get(contact) * advance.get(contact) * step_rad);
+            // Friction's work without its coefficient, in N·m an hour, over all teeth of both zones.
+            taken = PerContact::of(|contact| {
+                let sliding_nm = 1e-3 * tooth.force_n.get(contact) * slip.slip_mm_per_rad.get(contact).abs();
+                taken.get(contact) + 2.0 / samples as f64 * rate / width_mm * sliding_nm * turning_rad_per_s * 3600.0
+            });
+        }
+    }
+    // Loaded flanks: of the cam one a lobe, of the ring one a space, of the carrier one a slot.
+    for (contact, flanks) in [(Contact::WaveGenerator, 2.0), (Contact::Ring, 78.0), (Contact::Carrier, 40.0)] {
+        let (worn_mm2, taken_mm2) = (flanks * worn.get(contact), *taken.get(contact));
+        assert!(taken_mm2 > 0.0, "{contact:?}");
+        assert_near(worn_mm2, taken_mm2, 1e-12 * taken_mm2, &format!("{contact:?}"));
+    }
+}
+
+#[test]
+fn a_race_wears_all_round() {
+    let drive = drive(&PAPER_5_1);
+    let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
+    let loaded = LoadedDrive::new(&drive, &load).unwrap();
+    let mechanism = mechanism(&PAPER_5_1);
+    let friction = with(WaveGeneratorFriction::Race { coefficient: 0.05, bearing: bearing_of_5_1(0.0015) }, 0.05);
+    let teeth = teeth_at(&drive, &loaded, 7, 50);
+    let turning = mechanism.turning(&friction, &teeth);
+    let wear = WearParameters {
+        rate_mm3_per_nm: PerContact { wave_generator: 2e-6, ring: 0.0, carrier: 0.0 },
+        turning_rad_per_s: mechanism.turning_rad_per_s(1000.0),
+    };
+    let depth_mm: f64 = teeth
+        .iter()
+        .zip(&turning.teeth)
+        .map(|(tooth, slip)| {
+            let line_load = PerContact::of(|contact| tooth.force_n.get(contact) / 15.0);
+            mechanism.wear_mm_per_hour(&friction, &wear, tooth, slip, &line_load).wave_generator
+        })
+        .sum();
+    // Volume over surface: friction's work over its coefficient is force times way.
+    let way_nm_per_h = 1e-3 * turning.work_nmm_per_rad.wave_generator / 0.05 * wear.turning_rad_per_s * 3600.0;
+    assert_near(depth_mm, 2e-6 * way_nm_per_h / (2.0 * PI * 57.0 * 15.0), 1e-12 * depth_mm, "depth");
+}
+
+#[test]
+fn a_tooth_that_cannot_spin_wears_its_slot_by_its_line_load_a_pass() {
+    let drive = drive(&PAPER_5_1);
+    let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
+    let loaded = LoadedDrive::new(&drive, &load).unwrap();
+    let mechanism = Mechanism { tooth_spins: false, ..mechanism(&PAPER_5_1) };
+    let teeth = teeth_at(&drive, &loaded, 7, 50);
+    let turning = mechanism.turning(&plain(0.03, 0.05), &teeth);
+    let wear = WearParameters {
+        rate_mm3_per_nm: PerContact { wave_generator: 0.0, ring: 0.0, carrier: 1e-6 },
+        turning_rad_per_s: 2.0 * PI / 60.0,
+    };
+    for (tooth, slip) in teeth.iter().zip(&turning.teeth) {
+        let line_load = PerContact::of(|contact| tooth.force_n.get(contact) / 15.0);
+        let depth = mechanism.wear_mm_per_hour(&plain(0.03, 0.05), &wear, tooth, slip, &line_load).carrier;
+        // Two passes a turn, 60 turns an hour.
+        let expected = 120.0 * 1e-3 * 1e-6 * line_load.carrier;
+        assert_near(depth, expected, 1e-13 * expected, "depth");
+    }
+}
+
+#[test]
+fn pressure_times_velocity_is_the_hertz_pressure_at_the_slip() {
+    let case = &Case::all()[0];
+    let turning = case.mechanism(true).turning(&plain(0.03, 0.05), &case.teeth());
+    let stress_mpa = PerContact { wave_generator: 800.0, ring: 900.0, carrier: 500.0 };
+    let found = pressure_velocity_mpa_m_per_s(&stress_mpa, &turning.teeth[2], 100.0);
+    let slip = &turning.teeth[2].slip_mm_per_rad;
+    assert_eq!(turning.teeth[2].rolls, Some(Contact::Ring));
+    assert_eq!(found.ring, 0.0);
+    // 800 MPa at some 55 mm/rad and 100 rad/s.
+    assert_near(found.wave_generator, 800.0 * slip.wave_generator.abs() / 10.0, 1e-9, "cam");
+    assert!(found.wave_generator > 800.0 * 5.0 && found.wave_generator < 800.0 * 7.0);
+}
+
+#[test]
+fn a_bearing_lasts_as_iso_281_says() {
+    assert_near(RollingElement::Ball.life_h(10_000.0, 1_000.0, 1_000.0), 1e9 / 60e3, 1e-8, "ball");
+    let roller = RollingElement::Roller.life_h(10_000.0, 1_000.0, 1_000.0);
+    assert_near(roller, 1e6 * 10.0_f64.powf(10.0 / 3.0) / 60e3, 1e-7, "roller");
+    assert_eq!(RollingElement::Ball.life_h(10_000.0, 0.0, 1_000.0), f64::INFINITY);
+    // Half of the turns without load: the other half decides, and P falls by the cube root of two.
+    let loads = [(2_000.0, 1.0), (0.0, 1.0)].map(|(load_n, revolutions)| LoadForRevolutions { load_n, revolutions });
+    assert_near(RollingElement::Ball.mean_load_n(&loads), 2_000.0 / 2.0_f64.cbrt(), 1e-9, "mean load");
+    assert_eq!(RollingElement::Ball.mean_load_n(&loads[1..]), 0.0);
+}
+
+#[test]
+fn a_duty_uses_up_a_bearings_life_point_by_point() {
+    let points = [(0.5, 1500.0, 800.0), (0.3, 300.0, 3000.0), (0.2, 3000.0, 100.0)]
+        .map(|(share_of_time, speed_rpm, mean_load_n)| BearingLoadForTime { share_of_time, speed_rpm, mean_load_n });
+    for element in [RollingElement::Ball, RollingElement::Roller] {
+        // Palmgren and Miner: each hour takes its share of the life that it would have alone.
+        let used: f64 = points
+            .iter()
+            .map(|point| point.share_of_time / element.life_h(9e3, point.mean_load_n, point.speed_rpm))
+            .sum();
+        assert_near(bearing_life_h(element, 9e3, &points) * used, 1.0, 1e-13, "life");
+    }
+}
+
+#[test]
+fn a_duty_adds_energies_and_depths_where_they_are() {
+    let mechanism = mechanism(&PAPER_5_1);
+    let points = [(0.5, 1500.0, 20.0, 0.08), (0.25, 300.0, 60.0, 0.2), (0.25, 3000.0, 5.0, 0.05)].map(
+        |(share_of_time, input_speed_rpm, input_torque_nm, loss_ratio)| DutyPoint {
+            share_of_time,
+            input_speed_rpm,
+            input_torque_nm,
+            loss_ratio,
+        },
+    );
+    let duty = mechanism.duty(&points);
+    let (mut given_w, mut taken_w, mut lost_w, mut speed_rpm) = (0.0, 0.0, 0.0, 0.0);
+    for point in &points {
+        let out_w = point.input_torque_nm * point.input_speed_rpm * PI / 30.0;
+        let efficiency = mechanism.efficiency(Fixed::Ring, point.loss_ratio).driven;
+        taken_w += point.share_of_time * out_w;
+        given_w += point.share_of_time * out_w / efficiency;
+        lost_w += point.share_of_time * out_w * (1.0 / efficiency - 1.0);
+        speed_rpm += point.share_of_time * point.input_speed_rpm;
+    }
+    assert_near(mechanism.efficiency(Fixed::Ring, duty.loss_ratio).driven, taken_w / given_w, 1e-14, "efficiency");
+    assert_near(duty.power_loss_w, lost_w, 1e-12 * lost_w, "power");
+    assert_near(duty.input_speed_rpm, speed_rpm, 1e-12 * speed_rpm, "speed");
+    // Shares need not be of one.
+    let doubled = points.map(|point| DutyPoint { share_of_time: 2.0 * point.share_of_time, ..point });
+    assert_eq!(mechanism.duty(&doubled), duty);
+
+    let early = ColumnForTime { share_of_time: 3.0, column: &[4.0, 0.0, 1.0] };
+    let late = ColumnForTime { share_of_time: 1.0, column: &[0.0, 8.0, 1.0] };
+    // The greatest depth is 3, not the 5 that the mean of the greatest would be.
+    assert_eq!(mean_at_each_place(&[early, late]), [3.0, 2.0, 1.0]);
+}
+
+#[test]
+fn a_mean_over_a_period_counts_its_ends_half_and_a_jump_twice() {
+    let column = |points: &[(f64, f64)]| -> Vec<AtInputAngle> {
+        points.iter().map(|&(input_angle, value)| AtInputAngle { input_angle, value }).collect()
+    };
+    assert_eq!(mean_over_period(&column(&[(0.0, 1.0), (1.0, 3.0), (2.0, 1.0)])), 2.0);
+    assert_eq!(mean_over_period(&column(&[(0.0, 1.0), (1.0, 1.0), (1.0, 5.0), (4.0, 5.0)])), 4.0);
+}
+
+#[test]
+fn impossible_friction_is_refused_with_every_value() {
+    let bearing = RaceBearing { coefficient: 2.0, radius_mm: 0.0, race_radius_mm: 57.0 };
+    let parameters = FrictionParameters {
+        wave_generator: WaveGeneratorFriction::Race { coefficient: -0.1, bearing },
+        ring_coefficient: f64::NAN,
+        carrier_coefficient: 0.05,
+    };
+    let refused: Vec<_> =
+        Friction::new(&parameters).unwrap_err().iter().map(|fault| (fault.parameter, fault.limit)).collect();
+    let expected = [
+        (FrictionParameter::Coefficient(Contact::WaveGenerator), 0.0),
+        (FrictionParameter::Coefficient(Contact::Ring), 0.0),
+        (FrictionParameter::BearingCoefficient, 1.0),
+        (FrictionParameter::BearingRadius, 1e-6),
+    ];
+    assert_eq!(refused, expected);
+}
+
+#[test]
+fn friction_of_nothing_takes_nothing() {
+    let case = &Case::all()[0];
+    let Turning { teeth, work_nmm_per_rad, .. } = case.mechanism(true).turning(&plain(0.0, 0.0), &case.teeth());
+    assert!(teeth.iter().all(|slip| slip.rolls.is_none()));
+    assert_eq!(work_nmm_per_rad, PerContact::default());
+    assert_eq!(case.mechanism(true).efficiency(Fixed::Ring, 0.0), Efficiency { driven: 1.0, back_driven: 1.0 });
+}
