@@ -14,10 +14,10 @@ use toothwave_solver::losses::{
     AtInputAngle, Efficiency, Fixed, Friction, FrictionParameter, FrictionParameters, LoadedTooth, Mechanism,
     RaceBearing, Turning, WaveGeneratorFriction, mean_over_period, power_w, pressure_velocity_mpa_m_per_s,
 };
-use toothwave_solver::mesh::Mesh;
-use toothwave_solver::{Compatibility, Contact, Drive, DriveParameters, LoadCase, PerContact};
+use toothwave_solver::mesh::{Mesh, Samples};
+use toothwave_solver::{Compatibility, Contact, DriveParameters, LoadCase, PerContact};
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, load};
+use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, load, semi_axes_mm};
 use crate::reference::number;
 
 const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
@@ -303,23 +303,23 @@ fn the_radial_load_is_the_sum_of_the_teeths_forces() {
 }
 
 /// The teeth in mesh of one zone, as the load sharing makes them.
-fn teeth_at(drive: &Drive, loaded: &LoadedDrive<'_>, sample: u64, samples: u64) -> Vec<LoadedTooth> {
-    let mesh = Mesh::new(drive);
+fn teeth_at(loaded: &LoadedDrive<'_>, sample: u64, samples: u64) -> Vec<LoadedTooth> {
+    let mesh = Mesh::new(loaded.drive());
     let states: Vec<_> = mesh
-        .teeth_at(sample, samples)
-        .map(|number| loaded.tooth(mesh.position(number, sample, samples)).unwrap())
+        .placed_at(sample, Samples::new(samples).unwrap())
+        .map(|placed| loaded.tooth(placed.position).unwrap())
         .collect();
     let wind_up = loaded.wind_up(&states).unwrap();
     states
         .iter()
         .map(|state| LoadedTooth {
-            position_rad: state.center.position.from_major_rad,
+            position_rad: state.center.position.from_lobe_rad,
             lobe: 0,
             center_radius_mm: state.center.center_radius_mm,
             tan_pressure_angle: state.center.tan_pressure_angle,
-            cam_curvature_per_mm: 1.0 / drive.flank().locus().cam().curvature_radius_mm(&state.center.cam_contact),
+            cam_curvature_per_mm: state.center.cam_contact.curvature_per_mm,
             regularity: state.flank.regularity,
-            force_n: loaded.forces_n(state, &wind_up),
+            force_n: loaded.forces_n(state, &wind_up).unwrap(),
         })
         .collect()
 }
@@ -356,7 +356,7 @@ fn mean_loss_ratio(parameters: &DriveParameters, mechanism: &Mechanism, friction
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
     let column: Vec<_> = (0..=40_u32)
         .map(|sample| {
-            let teeth = teeth_at(&drive, &loaded, sample.into(), 40);
+            let teeth = teeth_at(&loaded, sample.into(), 40);
             let turning = mechanism.turning(friction, &teeth);
             assert_near(turning.input_torque_nmm, 20e3, 1e-8, "torque of the listed teeth");
             AtInputAngle { input_angle: f64::from(sample), value: turning.loss_ratio() }
@@ -389,7 +389,7 @@ fn power_in_is_power_out_and_what_is_lost() {
         let drive = drive(&PAPER_5_2);
         let load = LoadCase::new(&load(3.0, Compatibility::VirtualWork)).unwrap();
         let loaded = LoadedDrive::new(&drive, &load).unwrap();
-        let turning = mechanism.turning(&friction, &teeth_at(&drive, &loaded, 3, 20));
+        let turning = mechanism.turning(&friction, &teeth_at(&loaded, 3, 20));
         let turning_rad_per_s = mechanism.turning_rad_per_s(1500.0);
         let lost_w = power_w(turning.lost_nmm_per_rad(), turning_rad_per_s);
         // Speeds of wave generator, ring and carrier against the member that stands still, at this speed of the first against the last.
@@ -457,14 +457,15 @@ proptest! {
         let load = LoadCase::new(&load(5.0, Compatibility::VirtualWork)).unwrap();
         let loaded = LoadedDrive::new(&drive, &load).unwrap();
         let mechanism = Mechanism { tooth_spins, ..mechanism(&parameters) };
-        let race_radius_mm = 0.5 * (parameters.semi_major_mm + parameters.semi_minor_mm);
+        let (semi_major_mm, semi_minor_mm) = semi_axes_mm(&parameters);
+        let race_radius_mm = 0.5 * (semi_major_mm + semi_minor_mm);
         let bearing = RaceBearing { coefficient: on_balls, radius_mm: 0.9 * race_radius_mm, race_radius_mm };
         let friction = FrictionParameters {
             wave_generator: WaveGeneratorFriction::Race { coefficient: on_race, bearing },
             ring_coefficient: ring,
             carrier_coefficient: carrier,
         };
-        let teeth = teeth_at(&drive, &loaded, sample, 7);
+        let teeth = teeth_at(&loaded, sample, 7);
         let turning = mechanism.turning(&Friction::new(&friction).unwrap(), &teeth);
         let lost = turning.lost_nmm_per_rad();
         let here = lost_at(&mechanism, &friction, &teeth, turning.race_mm_per_rad);
@@ -484,11 +485,11 @@ proptest! {
         let loaded = LoadedDrive::new(&drive, &load).unwrap();
         let spinning = mechanism(&parameters);
         let flat = Mechanism { tooth_spins: false, ..spinning };
-        let teeth = teeth_at(&drive, &loaded, sample, 7);
+        let teeth = teeth_at(&loaded, sample, 7);
         let friction = plain(on_cam, elsewhere);
         let lost = |mechanism: &Mechanism, friction: &Friction| mechanism.turning(friction, &teeth).lost_nmm_per_rad();
         prop_assert!(lost(&spinning, &friction) <= lost(&flat, &friction) * (1.0 + 1e-14));
-        let race_radius_mm = parameters.semi_major_mm;
+        let race_radius_mm = semi_axes_mm(&parameters).0;
         let bearing = |coefficient| RaceBearing { coefficient, radius_mm: race_radius_mm, race_radius_mm };
         let race = |on_balls| WaveGeneratorFriction::Race { coefficient: on_cam, bearing: bearing(on_balls) };
         // A bearing rougher than the teeth never turns.
@@ -509,7 +510,7 @@ fn a_tooth_without_load_loses_nothing_and_rolls_on_nothing() {
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
     let mechanism = mechanism(&PAPER_5_1);
-    let mut teeth = teeth_at(&drive, &loaded, 0, 50);
+    let mut teeth = teeth_at(&loaded, 0, 50);
     let friction = plain(0.03, 0.05);
     let all = mechanism.turning(&friction, &teeth);
     let idle = LoadedTooth { force_n: PerContact::default(), ..teeth[3] };
@@ -538,7 +539,7 @@ fn what_a_part_loses_is_what_the_teeth_take_off_it() {
     let mut taken = PerContact::<f64>::default();
     let step_rad = 2.0 * PI / (40.0 * samples as f64);
     for sample in 0..samples {
-        let teeth = teeth_at(&drive, &loaded, sample, samples);
+        let teeth = teeth_at(&loaded, sample, samples);
         let turning = mechanism.turning(&friction, &teeth);
         for (tooth, slip) in teeth.iter().zip(&turning.teeth) {
             let line_load = PerContact::of(|contact| tooth.force_n.get(contact) / width_mm);
@@ -567,7 +568,7 @@ fn a_race_wears_all_round() {
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
     let mechanism = mechanism(&PAPER_5_1);
     let friction = with(WaveGeneratorFriction::Race { coefficient: 0.05, bearing: bearing_of_5_1(0.0015) }, 0.05);
-    let teeth = teeth_at(&drive, &loaded, 7, 50);
+    let teeth = teeth_at(&loaded, 7, 50);
     let turning = mechanism.turning(&friction, &teeth);
     let wear = WearParameters {
         rate_mm3_per_nm: PerContact { wave_generator: 2e-6, ring: 0.0, carrier: 0.0 },
@@ -592,7 +593,7 @@ fn a_tooth_that_cannot_spin_wears_its_slot_by_its_line_load_a_pass() {
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
     let mechanism = Mechanism { tooth_spins: false, ..mechanism(&PAPER_5_1) };
-    let teeth = teeth_at(&drive, &loaded, 7, 50);
+    let teeth = teeth_at(&loaded, 7, 50);
     let turning = mechanism.turning(&plain(0.03, 0.05), &teeth);
     let wear = WearParameters {
         rate_mm3_per_nm: PerContact { wave_generator: 0.0, ring: 0.0, carrier: 1e-6 },
