@@ -101,6 +101,22 @@ impl LoadCase {
         &self.0
     }
 
+    /// The torque at the wave generator. Losses neglected, it is the carrier's over the absolute ratio, ring fixed.
+    pub fn input_torque_nm(&self, drive: &Drive) -> f64 {
+        match self.0.torque {
+            Torque::Input(torque) => torque,
+            Torque::Output(torque) => torque / drive.teeth_per_wave(),
+        }
+    }
+
+    /// The torque at the carrier.
+    pub fn output_torque_nm(&self, drive: &Drive) -> f64 {
+        match self.0.torque {
+            Torque::Input(torque) => torque * drive.teeth_per_wave(),
+            Torque::Output(torque) => torque,
+        }
+    }
+
     /// Whether any contact has a gap.
     pub fn has_clearance(&self) -> bool {
         self.0.clearance_um.iter().any(|(_, &gap)| gap > 0.0)
@@ -205,14 +221,10 @@ impl<'a> LoadedDrive<'a> {
     pub fn new(drive: &'a Drive, load: &LoadCase) -> Result<Self, SolveError> {
         let p = load.parameters();
         let width_mm = drive.parameters().tooth_width_mm;
-        let input_torque_nm = match p.torque {
-            Torque::Input(torque) => torque,
-            Torque::Output(torque) => torque / drive.teeth_per_wave(),
-        };
         let loaded = Self {
             drive,
             compatibility: p.compatibility,
-            input_torque_nmm: 1e3 * input_torque_nm,
+            input_torque_nmm: 1e3 * load.input_torque_nm(drive),
             approach: p.law.approach(&p.materials, width_mm),
             clearance_mm: PerContact::of(|contact| 1e-3 * p.clearance_um.get(contact)),
             hertz: PerContact::of(|contact| HertzLine::new(&p.materials, contact, width_mm)),

@@ -196,6 +196,18 @@ impl CarrierPart {
     }
 }
 
+impl CarrierPart {
+    /// The carrier without clearance or play, where the mechanics leave room for one.
+    pub(crate) fn widest(drive: &Drive) -> Option<Self> {
+        let p = drive.parameters();
+        let Annulus { inner_mm, outer_mm } = Annulus::between(drive.flank().locus().cam(), drive.tip_radius_mm())?;
+        let slots_meet_mm = p.tooth_radius_mm / (PI / p.installed as f64).sin();
+        let carrier =
+            Self { inner_radius_mm: inner_mm, outer_radius_mm: outer_mm, slot_half_width_mm: p.tooth_radius_mm };
+        (slots_meet_mm < outer_mm).then_some(carrier)
+    }
+}
+
 impl ToothPart {
     pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Self {
         Self { radius_mm: drive.parameters().tooth_radius_mm - MM_PER_UM * parameters.teeth_clearance_um }

@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 use axum::extract::{Request, State};
 use axum::response::Response;
 use serde::Serialize;
+use toothwave_solver::drawing::{self, Edge};
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::profile::{self, Polyline, ProfileParameters};
 use toothwave_solver::{Drive, SolveError, findings};
@@ -109,6 +110,30 @@ pub struct CarrierAnswer {
     pub tooth_center_clearance_inner_mm: f64,
     /// How far the centre of an engaged tooth stays inside the outer limit at least; negative where it leaves the annulus.
     pub tooth_center_clearance_outer_mm: f64,
+    /// The wall of its slot that a loaded tooth leans on.
+    pub loaded_wall: SlotWall,
+    /// The finger between slots 0 and 1 of a carrier that fills the annulus; left out where nothing stays between the slots.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub finger: Option<FingerAnswer>,
+}
+
+/// A wall of a slot, in the sense in which the wave generator turns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SlotWall {
+    /// Ahead of the tooth.
+    Leading,
+    /// Behind the tooth.
+    Trailing,
+}
+
+/// What stands between two neighbouring slots of a carrier without clearance or play, in the carrier's frame, slot 0 along x.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct FingerAnswer {
+    /// Its corners, counter-clockwise from the inner end of slot 0's wall: four, or three where the slots run into each other. The
+    /// second and third are joined by an arc of the outer limit, the fourth and first by one of the inner limit, others straight.
+    pub corners: ProfileAnswer,
 }
 
 /// The teeth among each other.
@@ -146,6 +171,20 @@ impl From<&Drive> for UndercutAnswer {
 impl From<&Drive> for EngagementAnswer {
     fn from(drive: &Drive) -> Self {
         Self { start_deg: drive.flank_limit().position.from_major_deg(), end_deg: 0.0 }
+    }
+}
+
+impl SlotWall {
+    /// The ring pushes a tooth along for s = +1, against the input's sense for s = -1 (docs/theory.md section 5).
+    fn loaded(drive: &Drive) -> Self {
+        if drive.sense() > 0.0 { Self::Leading } else { Self::Trailing }
+    }
+}
+
+impl FingerAnswer {
+    fn new(drive: &Drive) -> Option<Self> {
+        let corners: Vec<_> = drawing::widest_finger(drive)?.iter().map(Edge::start).collect();
+        Some(Self { corners: (&corners).into() })
     }
 }
 
@@ -217,6 +256,8 @@ impl Endpoint for Geometry {
                 slot_wall_mm: drive.slot_wall_mm(),
                 tooth_center_clearance_inner_mm: innermost.center_radius_mm - p.semi_major_mm,
                 tooth_center_clearance_outer_mm: tip_radius_mm - (p.semi_major_mm + p.tooth_radius_mm),
+                loaded_wall: SlotWall::loaded(drive),
+                finger: FingerAnswer::new(drive),
             },
             teeth: TeethAnswer { gap_min_mm: center_distance_mm - 2.0 * p.tooth_radius_mm },
             tooth_center_path: (&profiles.tooth_center_path).into(),

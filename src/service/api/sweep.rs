@@ -34,6 +34,11 @@ pub struct SweepAnswer {
     pub coincidence_degree: f64,
     /// The input angle after which the load pattern repeats.
     pub period_deg: f64,
+    /// The load at both shafts.
+    pub load: LoadAnswer,
+    /// Whether a tooth takes load the moment it enters, because its flank ends before the place where its lever arm is zero: the
+    /// others' loads then jump.
+    pub enters_under_load: bool,
     /// The largest force and stress of each contact, over the states.
     pub peaks: PeaksAnswer,
     /// The states.
@@ -50,9 +55,15 @@ pub struct SweepAnswer {
     pub checks: ChecksAnswer,
     /// What a designer should be told.
     pub findings: Vec<FindingAnswer>,
-    /// Whether a tooth takes load the moment it enters; the plots break there.
-    #[serde(skip)]
-    pub enters_under_load: bool,
+}
+
+/// The load as it is seen from either shaft, ring fixed, losses neglected.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct LoadAnswer {
+    /// At the wave generator.
+    pub input_torque_nm: f64,
+    /// At the carrier.
+    pub output_torque_nm: f64,
 }
 
 /// The peaks of each contact.
@@ -327,6 +338,11 @@ impl Endpoint for Sweep {
             solver_version: toothwave_solver::VERSION,
             coincidence_degree: mesh.coincidence_degree(),
             period_deg: mesh.period_deg(),
+            load: LoadAnswer {
+                input_torque_nm: load.input_torque_nm(drive),
+                output_torque_nm: load.output_torque_nm(drive),
+            },
+            enters_under_load: drive.flank_limit().end != FlankEnd::RegularTip,
             peaks: sweep.peaks.into(),
             wind_up: with_wind_up.then(|| WindUpAnswer::new(drive, &sweep)),
             torque_capacity: sweep.torque_capacity.map(Into::into),
@@ -335,7 +351,6 @@ impl Endpoint for Sweep {
                 period_closure_residual: sweep.period_closure_residual,
             },
             states: StatesAnswer::new(sweep.states, *with_clearance),
-            enters_under_load: drive.flank_limit().end != FlankEnd::RegularTip,
             findings,
         };
         let states = &answer.states;
