@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 import { readFile } from 'node:fs/promises';
 import { after, afterEach, before, test } from 'node:test';
-import { Server, choose, designOf, enter, field, launch, notes, open, resultOf, settled } from './harness.js';
+import { Server, choose, designOf, enter, field, launch, notes, open, resultOf, setDocument as putDocument, settled } from './harness.js';
 
 const AXE = createRequire(import.meta.url).resolve('axe-core/axe.min.js');
 const RADIUS = '/drive/teeth/radius_mm';
@@ -289,12 +289,7 @@ test('switching the torque’s shaft keeps the load; fixed stiffnesses come with
   await assertShows(design);
 });
 
-async function setDocument(design) {
-  await page.click('#open-document');
-  await page.fill('#document-text', JSON.stringify(design));
-  await page.click('#document-apply');
-  await settled(page);
-}
+const setDocument = (design) => putDocument(page, design);
 
 /** The columns of a sweep's states by instant: `[{ angle, teeth: Map(tooth → index) }]`. */
 function instants({ states }) {

@@ -211,7 +211,6 @@ export class Form {
   #take(entry) {
     const { field, input } = entry;
     const { value, fault } = typed(input.value);
-    entry.isEdited = false;
     entry.fault = fault ?? (value === undefined ? undefined : field.refuses?.(value));
     if (entry.fault !== undefined) this.#renderNotes();
     else if (field.derived) {
@@ -226,6 +225,7 @@ export class Form {
     const step = field.step ?? entry.step ?? (field.whole ? 1 : niceStep(Math.max(Math.abs(value), SPANNED.least) / 100));
     const next = field.next?.(value, sense) ?? rounded(value + sense * step, step);
     input.value = String(next);
+    entry.isEdited = true;
     this.#take(entry);
   }
 
@@ -322,7 +322,10 @@ export class Form {
     for (const entry of this.#fields.values()) {
       const { field } = entry;
       if (field.optional) entry.input.placeholder = field.optional(this.#design, answers);
-      if (field.derived) this.#showValue(entry, false);
+      if (field.derived) {
+        entry.isEdited &&= entry.fault !== undefined;
+        this.#showValue(entry, false);
+      }
       if (field.mark) this.#showMark(entry, field.mark(answers));
     }
     this.#renderNotes();

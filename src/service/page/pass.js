@@ -4,7 +4,7 @@
 import { CONTACTS, between, enteringBetween, framesOf } from './motion.js';
 
 export const ABSCISSAE = [
-  { key: 'input', label: 'Input angle', axis: 'input angle since the tooth passed the minor axis, Δj, deg', unit: 'deg', symbol: 'Δj' },
+  { key: 'input', label: 'Input angle', axis: 'input angle since the minor axis, Δj, deg', unit: 'deg', symbol: 'Δj' },
   { key: 'ring', label: 'Ring flank', axis: 'φ_K on the ring, from the tooth tip, deg', unit: 'deg', symbol: 'φ_K' },
   { key: 'cam', label: 'Cam', axis: 'φ_H on the cam, from the minor axis, deg', unit: 'deg', symbol: 'φ_H' },
   { key: 'slot', label: 'Slot', axis: 'distance of the tooth’s centre from the axis, mm', unit: 'mm', symbol: 'ρ' },

@@ -36,13 +36,19 @@ const definition = html('div', { id: 'definition', class: 'definition', popover:
 export function term(...keys) {
   const names = keys.map((key) => TERMS[key].title).join(', ');
   const button = html('button', { type: 'button', class: 'term', 'aria-label': `What is meant: ${names}` }, '?');
+  // A press outside closes it before the click is heard, which would then open it anew.
+  let wasOpen = false;
+  const isOpen = () => definition.matches(':popover-open') && definition.previousSibling === button;
+  button.addEventListener('pointerdown', () => {
+    wasOpen = isOpen();
+  });
   button.addEventListener('click', (event) => {
     // A mark may stand inside what has a click of its own.
     event.preventDefault();
-    const wasOpen = definition.matches(':popover-open') && definition.owner === button;
+    const closes = wasOpen || isOpen();
+    wasOpen = false;
     if (definition.matches(':popover-open')) definition.hidePopover();
-    if (wasOpen) return;
-    definition.owner = button;
+    if (closes) return;
     definition.replaceChildren(html('dl', {}, keys.map((key) => [html('dt', {}, TERMS[key].title), html('dd', {}, TERMS[key].text)]).flat()));
     // Beside its mark in the document too, so that the next press of Tab and a screen reader find it there; in a dialog nothing else
     // can be reached.
