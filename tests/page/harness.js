@@ -134,7 +134,7 @@ export async function open(browser, server, { address = '', ...options } = {}) {
 
 /** Waits until the page shows the answers about the design that stands in its form. */
 export async function settled(page) {
-  await page.waitForFunction(() => document.querySelector('#key-figures').getAttribute('aria-busy') === 'false', undefined, { timeout: 10_000 });
+  await page.waitForFunction(() => document.querySelector('#key-figures').getAttribute('aria-busy') === 'false', undefined, { timeout: 60_000 });
   // One frame more, for what is drawn once a frame.
   await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
 }

@@ -251,20 +251,22 @@ function showComparison() {
   mechanism.setReference(reference);
   if (shown) results.update(shown.answers, reference?.answers, form.isHeld);
   byId('comparing').hidden = !reference;
-  if (!reference) {
-    byId('inputs').replaceChildren();
-    return;
-  }
+  const differences = shown && reference ? inputDifferences(shown.design, reference.design) : [];
+  showInputs(differences);
+  if (!reference) return;
   setText(byId('reference-name'), reference.name);
-  const differences = shown ? inputDifferences(shown.design, reference.design) : [];
   const text = differences.map(({ label, value, reference: other }) => `${label} ${other} → ${value}`).join(', ');
   setText(byId('differing'), differences.length > 0 ? `Inputs that differ: ${text}.` : 'All inputs are the same.');
-  showInputs(differences);
 }
 
-/** Above the table of results: what the differences in it come from. */
+let shownInputs = '[]';
+
+/** Above the table of results: what the differences in it come from. It stands as long as it is the same: a press that begins on one
+ *  of its buttons must end on it. */
 function showInputs(differences) {
-  if (form.isHeld) return;
+  const text = JSON.stringify(differences);
+  if (form.isHeld || text === shownInputs) return;
+  shownInputs = text;
   const head = ['Input', 'This design', 'Reference'].map((text, index) => html('th', { scope: 'col', class: index > 0 && 'numeric' }, text));
   const rows = differences.map(({ pointer, label, value, reference }) =>
     html(
