@@ -112,6 +112,8 @@ export async function open(browser, server, { address = '', ...options } = {}) {
     ...options,
   });
   const page = await context.newPage();
+  // A machine that has much else to do is slow, not wrong.
+  context.setDefaultTimeout(120_000);
   page.faults = [];
   page.expectsOutage = false;
   page.on('pageerror', (error) => page.faults.push(`error: ${error.stack}`));
