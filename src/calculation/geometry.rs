@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 
 use serde::Serialize;
+use toothwave_solver::drawing::{self, Edge};
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::profile::{self, Polyline, ProfileParameters};
 use toothwave_solver::{Drive, SolveError, Stop};
@@ -105,6 +106,30 @@ pub struct CarrierAnswer {
     pub tooth_center_clearance_inner_mm: f64,
     /// How far the centre of an engaged tooth stays inside the outer limit at least; negative where it leaves the annulus.
     pub tooth_center_clearance_outer_mm: f64,
+    /// The wall of its slot that a loaded tooth leans on.
+    pub loaded_wall: SlotWall,
+    /// The finger between slots 0 and 1 of a carrier that fills the annulus; left out where nothing stays between the slots.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub finger: Option<FingerAnswer>,
+}
+
+/// A wall of a slot, in the sense in which the wave generator turns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SlotWall {
+    /// Ahead of the tooth.
+    Leading,
+    /// Behind the tooth.
+    Trailing,
+}
+
+/// What stands between two neighbouring slots of a carrier without clearance or play, in the carrier's frame, slot 0 along x.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct FingerAnswer {
+    /// Its corners, counter-clockwise from the inner end of slot 0's wall: four, or three where the slots run into each other. The
+    /// second and third are joined by an arc of the outer limit, the fourth and first by one of the inner limit, others straight.
+    pub corners: ProfileAnswer,
 }
 
 /// The teeth among each other.
@@ -136,6 +161,20 @@ impl From<&Drive> for UndercutAnswer {
     fn from(drive: &Drive) -> Self {
         let flank = drive.flank();
         Self { occurs: flank.is_undercut(), critical_tooth_radius_mm: flank.critical_tooth_radius_mm() }
+    }
+}
+
+impl SlotWall {
+    /// The ring pushes a tooth along for s = +1, against the input's sense for s = -1 (docs/theory.md section 5).
+    fn loaded(drive: &Drive) -> Self {
+        if drive.sense() > 0.0 { Self::Leading } else { Self::Trailing }
+    }
+}
+
+impl FingerAnswer {
+    fn new(drive: &Drive) -> Option<Self> {
+        let corners: Vec<_> = drawing::widest_finger(drive)?.iter().map(Edge::start).collect();
+        Some(Self { corners: (&corners).into() })
     }
 }
 
@@ -207,6 +246,8 @@ impl Question for Geometry {
                 slot_wall_mm: drive.slot_wall_mm(),
                 tooth_center_clearance_inner_mm: innermost.center_radius_mm - cam_outer_mm,
                 tooth_center_clearance_outer_mm: tip_radius_mm - (cam_outer_mm + p.tooth_radius_mm),
+                loaded_wall: SlotWall::loaded(drive),
+                finger: FingerAnswer::new(drive),
             },
             teeth: TeethAnswer { gap_min_mm: center_distance_mm - 2.0 * p.tooth_radius_mm },
             tooth_center_path: (&profiles.tooth_center_path).into(),

@@ -15,7 +15,7 @@ use crate::json::word;
 use crate::key::Encode;
 use crate::no_answer::{NoAnswer, NoAnswerCode, too_many};
 use crate::question::{Limits, Question, checked_drive, checked_load, require_finite};
-use crate::sweep::answer::{ChecksAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
+use crate::sweep::answer::{ChecksAnswer, LoadAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
 
 pub mod answer;
 mod plots;
@@ -97,6 +97,11 @@ impl Question for Sweep {
             solver_version: toothwave_solver::VERSION,
             coincidence_degree: mesh.coincidence_degree(),
             period_deg: mesh.period_deg(),
+            load: LoadAnswer {
+                input_torque_nm: load.input_torque_nm(drive),
+                output_torque_nm: load.output_torque_nm(drive),
+            },
+            enters_under_load: drive.flank_limit().end != FlankEnd::RegularTip,
             peaks: sweep.peaks.into(),
             teeth_in_mesh_per_zone: mesh.teeth_in_mesh().into(),
             loaded_teeth_per_zone: sweep.loaded_teeth().into(),
@@ -107,7 +112,6 @@ impl Question for Sweep {
                 period_closure_residual: sweep.period_closure_residual,
             },
             states: StatesAnswer::new(sweep.states, *with_clearance),
-            enters_under_load: drive.flank_limit().end != FlankEnd::RegularTip,
             findings,
         };
         let states = &answer.states;

@@ -70,7 +70,7 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_HEADER_TIMEOUT_MS", value_name = "MS", default_value_t = 30_000, value_parser = clap::value_parser!(u64).range(1..))]
     pub header_timeout_ms: u64,
 
-    /// File of key hashes (see `toothwave new-key`): with it every path but health wants a bearer token
+    /// File of key hashes (see `toothwave new-key`): with it every path but health and the page wants a bearer token
     #[arg(long, env = "TOOTHWAVE_KEYS_FILE", value_name = "FILE", value_parser = Keys::read)]
     pub keys_file: Option<Keys>,
 

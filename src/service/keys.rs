@@ -72,9 +72,15 @@ pub fn new_key(name: &str) -> Result<(String, String), getrandom::Error> {
     Ok((key, line))
 }
 
-/// The middleware: every path but health wants a key.
+/// Whether a path wants a key: health is asked by who has none, and the page, which holds nothing secret, has to be there to ask for
+/// one.
+fn wants_key(path: &str) -> bool {
+    !(matches!(path, "/health/live" | "/health/ready" | "/") || path.starts_with("/page/"))
+}
+
+/// The middleware: every path but health and the page wants a key.
 pub async fn require(State(keys): State<Keys>, request: Request, next: Next) -> Response {
-    if matches!(request.uri().path(), "/health/live" | "/health/ready") {
+    if !wants_key(request.uri().path()) {
         return next.run(request).await;
     }
     let given = request.headers().get(header::AUTHORIZATION).and_then(|value| value.to_str().ok());

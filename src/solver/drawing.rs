@@ -283,39 +283,7 @@ impl Drawing {
     /// One finger of the carrier: what stands between slot 0, along x, and slot 1. Where the slots run into each other
     /// beyond the inner radius it is pointed.
     fn carrier_section(&self, carrier: &CarrierPart) -> Section {
-        let CarrierPart { inner_radius_mm, outer_radius_mm, slot_half_width_mm: wall } = *carrier;
-        let half_spacing_rad = PI / self.drive.parameters().installed as f64;
-        let to_next = Rotation2::new(2.0 * half_spacing_rad);
-        // On the wall of slot 0 at a radius, and its mirror image on the near wall of slot 1.
-        let on_wall = |radius_mm: f64| Point2::new(((radius_mm - wall) * (radius_mm + wall)).sqrt(), wall);
-        let on_next = |point: Point2<f64>| to_next * Point2::new(point.x, -point.y);
-        let sweep_rad = |radius_mm: f64| 2.0 * (half_spacing_rad - (wall / radius_mm).asin());
-        let outer = on_wall(outer_radius_mm);
-        let rim = Edge::Arc {
-            start: outer,
-            end: on_next(outer),
-            radius_mm: outer_radius_mm,
-            sweep_rad: sweep_rad(outer_radius_mm),
-        };
-        let meet_radius_mm = wall / half_spacing_rad.sin();
-        let edges = if meet_radius_mm < inner_radius_mm {
-            let inner = on_wall(inner_radius_mm);
-            vec![
-                Edge::Line { start: inner, end: outer },
-                rim,
-                Edge::Line { start: on_next(outer), end: on_next(inner) },
-                Edge::Arc {
-                    start: on_next(inner),
-                    end: inner,
-                    radius_mm: inner_radius_mm,
-                    sweep_rad: -sweep_rad(inner_radius_mm),
-                },
-            ]
-        } else {
-            let point = Point2::new(meet_radius_mm * half_spacing_rad.cos(), wall);
-            vec![Edge::Line { start: point, end: outer }, rim, Edge::Line { start: on_next(outer), end: point }]
-        };
-        Section { outer: Outline::Edges(edges), holes: Vec::new() }
+        Section { outer: Outline::Edges(finger(&self.drive, carrier)), holes: Vec::new() }
     }
 
     /// Where the prisms of a part stand: in the ring's frame for an assembly, in its own otherwise.
@@ -376,4 +344,46 @@ fn tooth_section(tooth: &ToothPart) -> Section {
         Outline::Circle { radius_mm }
     };
     Section { outer, holes: Vec::new() }
+}
+
+/// The finger between slots 0 and 1 of the carrier that fills the annulus which the mechanics leave it: from the cam's major axis to
+/// the ring's tips, with slots as wide as a tooth (docs/theory.md sections 7 and 8). None where nothing is left.
+pub fn widest_finger(drive: &Drive) -> Option<Vec<Edge>> {
+    CarrierPart::widest(drive).map(|carrier| finger(drive, &carrier))
+}
+
+/// A finger of the carrier, between the walls of slots 0 and 1.
+fn finger(drive: &Drive, carrier: &CarrierPart) -> Vec<Edge> {
+    let CarrierPart { inner_radius_mm, outer_radius_mm, slot_half_width_mm: wall } = *carrier;
+    let half_spacing_rad = PI / drive.parameters().installed as f64;
+    let to_next = Rotation2::new(2.0 * half_spacing_rad);
+    // On the wall of slot 0 at a radius, and its mirror image on the near wall of slot 1.
+    let on_wall = |radius_mm: f64| Point2::new(((radius_mm - wall) * (radius_mm + wall)).sqrt(), wall);
+    let on_next = |point: Point2<f64>| to_next * Point2::new(point.x, -point.y);
+    let sweep_rad = |radius_mm: f64| 2.0 * (half_spacing_rad - (wall / radius_mm).asin());
+    let outer = on_wall(outer_radius_mm);
+    let rim = Edge::Arc {
+        start: outer,
+        end: on_next(outer),
+        radius_mm: outer_radius_mm,
+        sweep_rad: sweep_rad(outer_radius_mm),
+    };
+    let meet_radius_mm = wall / half_spacing_rad.sin();
+    if meet_radius_mm < inner_radius_mm {
+        let inner = on_wall(inner_radius_mm);
+        vec![
+            Edge::Line { start: inner, end: outer },
+            rim,
+            Edge::Line { start: on_next(outer), end: on_next(inner) },
+            Edge::Arc {
+                start: on_next(inner),
+                end: inner,
+                radius_mm: inner_radius_mm,
+                sweep_rad: -sweep_rad(inner_radius_mm),
+            },
+        ]
+    } else {
+        let point = Point2::new(meet_radius_mm * half_spacing_rad.cos(), wall);
+        vec![Edge::Line { start: point, end: outer }, rim, Edge::Line { start: on_next(outer), end: point }]
+    }
 }

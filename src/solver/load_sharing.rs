@@ -129,6 +129,22 @@ impl LoadCase {
         &self.0
     }
 
+    /// The torque at the wave generator. Losses neglected, it is the carrier's over the absolute ratio, ring fixed.
+    pub fn input_torque_nm(&self, drive: &Drive) -> f64 {
+        match self.0.torque {
+            Torque::Input(torque) => torque,
+            Torque::Output(torque) => torque / drive.teeth_per_wave(),
+        }
+    }
+
+    /// The torque at the carrier.
+    pub fn output_torque_nm(&self, drive: &Drive) -> f64 {
+        match self.0.torque {
+            Torque::Input(torque) => torque * drive.teeth_per_wave(),
+            Torque::Output(torque) => torque,
+        }
+    }
+
     /// Whether any contact has a gap.
     pub fn has_clearance(&self) -> bool {
         self.0.clearance_um.iter().any(|(_, &gap)| gap > 0.0)
@@ -248,16 +264,12 @@ impl<'a> LoadedDrive<'a> {
         let size = ToothSize { radius_mm: drive.parameters().tooth_radius_mm, width_mm: drive.tooth_width_mm() };
         let contacts = Contacts::new(shape, &p.law, &p.materials, size, &p.series_compliance_mm_per_n)
             .ok_or_else(|| SolveError::Impossible(vec![Violation::LawOfOtherTeeth]))?;
-        let input_torque_nm = match p.torque {
-            Torque::Input(torque) => torque,
-            Torque::Output(torque) => torque / drive.teeth_per_wave(),
-        };
         let mesh = Mesh::new(drive);
         let loaded = Self {
             drive,
             compatibility: p.compatibility,
             zones: mesh.zones_in_torque(),
-            input_torque_nmm: 1e3 * input_torque_nm,
+            input_torque_nmm: 1e3 * load.input_torque_nm(drive),
             law: p.law,
             contacts,
             gaps: Gaps::new(drive, &p.clearance_um, p.modification, deviations),

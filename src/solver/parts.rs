@@ -199,6 +199,17 @@ impl CarrierPart {
     }
 }
 
+impl CarrierPart {
+    /// The carrier without clearance or play, where the mechanics leave room for one.
+    pub(crate) fn widest(drive: &Drive) -> Option<Self> {
+        let Annulus { inner_mm, outer_mm } = Annulus::between(drive.cam_outer_radius_mm(), drive.tip_radius_mm())?;
+        let slot_half_width_mm = drive.slot_half_width_mm();
+        let slots_meet_mm = slot_half_width_mm / (PI / drive.parameters().installed as f64).sin();
+        let carrier = Self { inner_radius_mm: inner_mm, outer_radius_mm: outer_mm, slot_half_width_mm };
+        (slots_meet_mm < outer_mm).then_some(carrier)
+    }
+}
+
 impl ToothPart {
     pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Self {
         let clearance_mm = MM_PER_UM * parameters.teeth_clearance_um;

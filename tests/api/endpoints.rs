@@ -131,3 +131,37 @@ async fn endpoints_do_not_answer_for_each_other() {
     tags.dedup();
     assert_eq!(tags.len(), 3);
 }
+
+#[tokio::test]
+async fn a_sweep_says_the_load_at_both_shafts_and_whether_teeth_enter_under_it() {
+    let service = Service::new();
+    for (example, enters_under_load) in [("paper-5.1", false), ("paper-5.2", true), ("paper-5.2-bored", true)] {
+        let design = service.get(&format!("/v1/examples/{example}")).await.json();
+        let ratio = service.post("/v1/geometry", &design).await.json()["transmission_ratio"].as_f64().unwrap();
+        let sweep = service.post("/v1/sweep", &design).await.json();
+        let input_nm = design["load"]["input_torque_nm"].as_f64().unwrap();
+        assert_eq!(sweep["load"], json!({ "input_torque_nm": input_nm, "output_torque_nm": input_nm * ratio }));
+        assert_eq!(sweep["enters_under_load"], enters_under_load, "{example}");
+        // Given at the other shaft it is the same load.
+        let turned = with(&design, "/load", json!({ "output_torque_nm": input_nm * ratio }));
+        assert_eq!(service.post("/v1/sweep", &turned).await.json()["load"], sweep["load"]);
+    }
+}
+
+#[tokio::test]
+async fn the_geometry_says_which_wall_holds_a_tooth_and_what_stands_between_two_slots() {
+    let service = Service::new();
+    let design = spelled_out();
+    let carrier = |answer: &Value| answer["carrier"].clone();
+    let forward = carrier(&service.post("/v1/geometry", &design).await.json());
+    let against = with(&design, "/drive/ring/teeth", json!(30));
+    let backward = carrier(&service.post("/v1/geometry", &without(&against, "/drive/ring/tip_radius_mm")).await.json());
+    assert_eq!((&forward["loaded_wall"], &backward["loaded_wall"]), (&json!("leading"), &json!("trailing")));
+    assert_eq!(forward["finger"]["corners"]["x_mm"].as_array().unwrap().len(), 4);
+    // Slots that run into each other leave a pointed finger, wider ones none.
+    let of_radius = |radius_mm: f64| {
+        with(&without(&design, "/drive/ring/tip_radius_mm"), "/drive/teeth/radius_mm", json!(radius_mm))
+    };
+    let pointed = service.post("/v1/geometry", &of_radius(6.6)).await.json();
+    assert_eq!(pointed["carrier"]["finger"]["corners"]["x_mm"].as_array().unwrap().len(), 3, "{}", pointed["carrier"]);
+}

@@ -1,11 +1,12 @@
 // The real binary and a real Chromium.
 
+import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { once } from 'node:events';
 import { createServer } from 'node:net';
 import { chromium } from 'playwright-core';
 
-const BINARY = process.env.TOOTHWAVE_BIN ?? '../../target/debug/toothwave';
+export const BINARY = process.env.TOOTHWAVE_BIN ?? '../../target/debug/toothwave';
 const CHROMIUM = process.env.CHROMIUM ?? '/usr/bin/chromium';
 
 async function freePort() {
@@ -17,11 +18,11 @@ async function freePort() {
 }
 
 export class Server {
-  static async start(port) {
+  static async start(port, settings = []) {
     const server = new Server();
     server.port = port ?? (await freePort());
     server.origin = `http://127.0.0.1:${server.port}`;
-    server.process = spawn(BINARY, ['serve', '--listen', `127.0.0.1:${server.port}`, '--log', 'warn'], { stdio: 'ignore' });
+    server.process = spawn(BINARY, ['serve', '--listen', `127.0.0.1:${server.port}`, '--log', 'warn', ...settings], { stdio: 'ignore' });
     for (let attempt = 0; ; attempt += 1) {
       try {
         await fetch(`${server.origin}/health/ready`);
@@ -76,6 +77,32 @@ export const launch = () =>
     args: ['--no-sandbox', '--disable-gpu', '--disable-quic', '--disable-background-networking', '--no-first-run', '--disable-component-update', '--disable-sync'],
   });
 
+/** One server and one browser for the tests of a file, and a page for each: `bed.page` is set by the test with `bed.open(…)`, and must
+ *  have had no fault at its end. */
+export function testBed({ before, after, afterEach }) {
+  const bed = {
+    async open(options) {
+      bed.page = await open(bed.browser, bed.server, options);
+      return bed.page;
+    },
+  };
+  before(async () => {
+    bed.server = await Server.start();
+    bed.browser = await launch();
+  });
+  after(async () => {
+    await bed.browser?.close();
+    await bed.server?.stop();
+  });
+  afterEach(async () => {
+    const faults = bed.page?.faults ?? [];
+    await bed.page?.context().close();
+    bed.page = undefined;
+    assert.deepEqual(faults, [], 'no console error, no violation of the policy, no request to elsewhere');
+  });
+  return bed;
+}
+
 /** A page that remembers what must not happen: errors, violations of its policy, requests to elsewhere. */
 export async function open(browser, server, { address = '', ...options } = {}) {
   const context = await browser.newContext({
@@ -85,6 +112,8 @@ export async function open(browser, server, { address = '', ...options } = {}) {
     ...options,
   });
   const page = await context.newPage();
+  // A machine that has much else to do is slow, not wrong.
+  context.setDefaultTimeout(120_000);
   page.faults = [];
   page.expectsOutage = false;
   page.on('pageerror', (error) => page.faults.push(`error: ${error.stack}`));
@@ -107,7 +136,7 @@ export async function open(browser, server, { address = '', ...options } = {}) {
 
 /** Waits until the page shows the answers about the design that stands in its form. */
 export async function settled(page) {
-  await page.waitForFunction(() => document.querySelector('#results').getAttribute('aria-busy') === 'false', undefined, { timeout: 10_000 });
+  await page.waitForFunction(() => document.querySelector('#key-figures').getAttribute('aria-busy') === 'false', undefined, { timeout: 60_000 });
   // One frame more, for what is drawn once a frame.
   await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
 }
@@ -124,6 +153,14 @@ export async function enter(page, pointer, value) {
 
 export const field = (pointer) => `#field${pointer.replaceAll('/', '-')}`;
 export const notes = (pointer) => `#notes${pointer.replaceAll('/', '-')}`;
+
+/** Puts a document into the page as JSON. */
+export async function setDocument(page, design) {
+  await page.click('#open-document');
+  await page.fill('#document-text', JSON.stringify(design));
+  await page.click('#document-apply');
+  await settled(page);
+}
 
 /** The design in the page, as its JSON. */
 export async function designOf(page) {

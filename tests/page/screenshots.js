@@ -35,7 +35,7 @@ for (const example of ['paper-5.1', 'paper-5.2']) {
   await take(`${example}-dark`, { ...WIDE, colorScheme: 'dark' }, prepare);
   await take(`${example}-narrow`, NARROW, async (page) => {
     await prepare(page);
-    await page.evaluate(() => document.querySelector('#results').scrollIntoView());
+    await page.evaluate(() => document.querySelector('main').scrollIntoView());
   });
 }
 

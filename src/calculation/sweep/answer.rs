@@ -18,6 +18,11 @@ pub struct SweepAnswer {
     pub coincidence_degree: f64,
     /// The input angle after which the load pattern repeats.
     pub period_deg: f64,
+    /// The load at both shafts.
+    pub load: LoadAnswer,
+    /// Whether a tooth takes load the moment it enters, because its flank ends before the place where its lever arm is zero: the
+    /// others' loads then jump.
+    pub enters_under_load: bool,
     /// The largest force and stress of each contact, over the states.
     pub peaks: PeaksAnswer,
     /// How many teeth of a zone mesh, over the input angle.
@@ -38,9 +43,15 @@ pub struct SweepAnswer {
     pub checks: ChecksAnswer,
     /// What a designer should be told.
     pub findings: Vec<FindingAnswer>,
-    /// Whether a tooth takes load the moment it enters; the plots break there.
-    #[serde(skip)]
-    pub enters_under_load: bool,
+}
+
+/// The load as it is seen from either shaft, ring fixed, losses neglected.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct LoadAnswer {
+    /// At the wave generator.
+    pub input_torque_nm: f64,
+    /// At the carrier.
+    pub output_torque_nm: f64,
 }
 
 /// The peaks of each contact.

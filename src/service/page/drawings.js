@@ -7,9 +7,9 @@ import { reasonsOf } from './findings.js';
 import { ask } from './service.js';
 import { save } from './share.js';
 
-const MEDIA_TYPES = { dxf: 'image/vnd.dxf', svg: 'image/svg+xml' };
+const MEDIA_TYPES = { dxf: 'image/vnd.dxf', step: 'model/step', svg: 'image/svg+xml', csv: 'text/csv' };
 
-const drawing = (part, name) => ({ part, name, path: `v1/drawings/${part}`, formats: ['dxf', 'svg'] });
+const drawing = (part, name) => ({ part, name, path: `v1/drawings/${part}`, formats: ['dxf', 'step', 'svg'] });
 
 const FILES = [
   drawing('assembly', 'Assembly'),
@@ -18,6 +18,8 @@ const FILES = [
   drawing('carrier', 'Carrier'),
   drawing('tooth', 'Tooth'),
   { part: 'plots', name: 'Force and stress plots', path: 'v1/sweep', formats: ['svg'] },
+  { part: 'states', name: 'Forces and stresses of all states', path: 'v1/sweep', formats: ['csv'] },
+  { part: 'profiles', name: 'Profiles as points', path: 'v1/geometry', formats: ['csv'] },
 ];
 
 export class Drawings {

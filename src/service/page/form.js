@@ -1,14 +1,18 @@
 // The form, built from the field table in design.js, with problems and findings at the fields that they point at.
 
-import { GROUPS, at, changed, fieldsOf, fullLabel, isSame } from './design.js';
+import { GROUPS, at, changed, fieldsOf, fullLabel, isSame, keptBy, kindOf } from './design.js';
 import { html, setChildren, setText, symbol } from './dom.js';
 import { explanation, sentence, titleOf } from './findings.js';
-import { number } from './format.js';
+import { number, typed } from './format.js';
+import { term } from './terms.js';
 
 /** Faults whose limit is itself a value that would do. */
 const LIMIT_WOULD_DO = new Set(['tooth_difference', 'installed_no_divisor', 'out_of_range', 'clearance_not_monotone']);
 
 const SLIDER_STEPS = 250;
+
+/** Sizes that a slider can span; beyond them no design is possible. */
+const SPANNED = { least: 1e-12, most: 1e15 };
 
 const idOf = (pointer, what) => `${what}${pointer.replaceAll('/', '-')}`;
 
@@ -19,7 +23,7 @@ function niceStep(size) {
 }
 
 const rounded = (value, step) => {
-  const places = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  const places = Math.min(100, Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
   return Number((step * Math.round(value / step)).toFixed(places));
 };
 
@@ -28,20 +32,37 @@ export class Form {
   #notes = new Map();
   #groups = [];
   #built = new Map();
+  /** The field whose slider is held: as long as it is, nothing moves under the pointer. */
+  #held;
   #onEdit;
   #onEnd;
   #design = {};
   #answers = {};
+  #isOwn = false;
   #findings = [];
 
   /** `onEdit(design, gesture)` at each change; changes of one gesture are one step to undo; `onEnd()` ends it. */
-  constructor(container, { onEdit, onEnd }) {
+  constructor(container, { onEdit, onEnd }, groups = GROUPS) {
     this.container = container;
+    this.groups = groups;
     this.#onEdit = onEdit;
     this.#onEnd = onEnd;
     const general = this.#notesFor('', container);
     general.classList.add('general');
-    for (const group of GROUPS) container.append(this.#buildGroup(group));
+    for (const group of groups) container.append(this.#buildGroup(group));
+    // Wherever the pointer is let go.
+    for (const end of ['pointerup', 'pointercancel']) addEventListener(end, () => this.#release());
+  }
+
+  get isHeld() {
+    return this.#held !== undefined;
+  }
+
+  #release() {
+    if (!this.#held) return;
+    this.#held = undefined;
+    this.#renderNotes();
+    this.#onEnd();
   }
 
   #notesFor(pointer, parent) {
@@ -80,8 +101,12 @@ export class Form {
   }
 
   #edit(pointer, value) {
-    this.#design = changed(this.#design, pointer, value);
-    this.#onEdit(this.#design, pointer);
+    this.#replace(changed(this.#design, pointer, value), pointer);
+  }
+
+  #replace(design, gesture) {
+    this.#design = design;
+    this.#onEdit(design, gesture);
   }
 
   #buildChoice(field, choose) {
@@ -95,21 +120,20 @@ export class Form {
       choose(select.value);
       this.#onEnd();
     });
-    const element = html('div', { class: 'field choice' }, html('label', { for: id }, field.label), select);
+    const label = html('div', { class: 'choice-label' }, html('label', { for: id }, field.label), field.terms && term(...field.terms));
+    const element = html('div', { class: 'field choice' }, label, select);
+    // Where there is nothing to choose, nothing is asked.
+    if (field.options.length === 1) for (const part of [label, select]) part.hidden = true;
     this.#notesFor(field.pointer, element);
     this.#fields.set(field.pointer, { field, element, input: select });
     return element;
   }
 
-  /** A tagged object: its tag is chosen, the fields of the chosen kind follow. */
+  /** A tagged object: its kind is chosen, the fields of that kind follow. Kinds may share fields. */
   #buildVariant(field) {
-    const element = this.#buildChoice(field, (tag) => {
-      const option = field.options.find(({ value }) => value === tag);
-      const presets = option.fields.map(({ pointer, preset }) => [pointer.split('/').at(-1), preset]);
-      this.#edit(field.pointer, { [field.tag]: tag, ...Object.fromEntries(presets) });
-    });
-    for (const option of field.options) {
-      for (const inner of option.fields) element.append(this.#buildNumber(inner));
+    const element = this.#buildChoice(field, (kind) => this.#edit(field.pointer, keptBy(field, kind, this.#design)));
+    for (const inner of new Map(field.options.flatMap(({ fields }) => fields).map((each) => [each.pointer, each])).values()) {
+      element.append(this.#buildField(inner));
     }
     return element;
   }
@@ -133,9 +157,12 @@ export class Form {
     const element = this.#buildChoice(field, (key) => {
       const given = field.options.find((option) => at(this.#design, option.field.pointer) !== undefined);
       const option = field.options.find((candidate) => candidate.key === key);
-      const value = given && field.convert?.(at(this.#design, given.field.pointer), key, this.#answers);
+      // What has no answer cannot be seen from the other side; it is asked for again rather than made up.
+      const value = given && field.convert ? field.convert(given.key, at(this.#design, given.field.pointer), key, this.#answers) : option.preset;
+      this.#fields.get(field.pointer).chosen = key;
       const others = Object.entries(at(this.#design, field.pointer) ?? {}).filter(([name]) => !field.options.some((candidate) => candidate.key === name));
-      this.#edit(field.pointer, { [key]: Number.isFinite(value) ? Number(value.toPrecision(12)) : option.preset, ...Object.fromEntries(others) });
+      const kept = value === undefined ? [] : [[key, Number(value.toPrecision(12))]];
+      this.#edit(field.pointer, Object.fromEntries([...kept, ...others]));
     });
     for (const option of field.options) element.append(this.#buildNumber(option.field));
     return element;
@@ -143,28 +170,63 @@ export class Form {
 
   #buildNumber(field) {
     const id = idOf(field.pointer, 'field');
+    // A text, not a number: browsers read those each in their own way, and lose what they do not understand.
     const input = html('input', {
       id,
-      type: 'number',
-      inputmode: field.whole ? 'numeric' : 'decimal',
-      step: field.step ?? (field.whole ? 1 : 'any'),
+      type: 'text',
+      class: 'number',
+      inputmode: 'decimal',
       autocomplete: 'off',
+      spellcheck: 'false',
       'aria-describedby': `${field.unit ? `${idOf(field.pointer, 'unit')} ` : ''}${idOf(field.pointer, 'notes')}`,
     });
     const label = html('label', { for: id }, field.of && html('span', { class: 'hidden' }, `${field.of}: `), field.label, field.symbol && [' ', symbol(field.symbol)]);
+    const name = field.terms ? html('span', { class: 'named' }, label, term(...field.terms)) : label;
     const unit = html('span', { class: 'unit', id: idOf(field.pointer, 'unit') }, field.unit ?? '');
-    const element = html('div', { class: 'field number-field' }, label, html('span', { class: 'entry' }, input, unit));
+    const element = html('div', { class: 'field number-field' }, name, html('span', { class: 'entry' }, input, unit));
     const entry = { field, element, input };
     if (field.slider) this.#addSlider(entry);
     this.#notesFor(field.pointer, element);
     this.#fields.set(field.pointer, entry);
     input.addEventListener('input', () => {
-      entry.isNoNumber = input.validity.badInput;
-      if (entry.isNoNumber) this.#renderNotes();
-      else this.#edit(field.pointer, input.value === '' ? undefined : Number(input.value));
+      // What others follow from waits until it is whole: the first digit of a ratio is another one.
+      entry.isEdited = true;
+      if (!field.derived) this.#take(entry);
     });
-    input.addEventListener('change', () => this.#onEnd());
+    input.addEventListener('change', () => {
+      if (field.derived) this.#take(entry);
+      this.#onEnd();
+      if (entry.fault === undefined) this.#showValue(entry);
+    });
+    input.addEventListener('keydown', (event) => {
+      const sense = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+      if (!sense || event.altKey || event.ctrlKey || event.metaKey) return;
+      event.preventDefault();
+      this.#stepBy(entry, sense);
+    });
     return element;
+  }
+
+  /** Takes what was typed into the document, or says at the field why not. */
+  #take(entry) {
+    const { field, input } = entry;
+    const { value, fault } = typed(input.value);
+    entry.fault = fault ?? (value === undefined ? undefined : field.refuses?.(value));
+    if (entry.fault !== undefined) this.#renderNotes();
+    else if (field.derived) {
+      if (value !== undefined) this.#replace(field.derived.write(this.#design, value), field.pointer);
+    } else this.#edit(field.pointer, value);
+  }
+
+  #stepBy(entry, sense) {
+    const { field, input } = entry;
+    const { value } = typed(input.value);
+    if (value === undefined) return;
+    const step = field.step ?? entry.step ?? (field.whole ? 1 : niceStep(Math.max(Math.abs(value), SPANNED.least) / 100));
+    const next = field.next?.(value, sense) ?? rounded(value + sense * step, step);
+    input.value = String(next);
+    entry.isEdited = true;
+    this.#take(entry);
   }
 
   #addSlider(entry) {
@@ -176,8 +238,11 @@ export class Form {
     entry.slider.addEventListener('input', () => {
       const value = rounded(Number(entry.slider.value), entry.step);
       entry.input.value = String(value);
-      entry.isNoNumber = false;
+      entry.fault = undefined;
       this.#edit(field.pointer, value);
+    });
+    entry.slider.addEventListener('pointerdown', () => {
+      this.#held = entry;
     });
     entry.slider.addEventListener('change', () => {
       // At the end of its way the slider makes room beyond.
@@ -196,7 +261,6 @@ export class Form {
     entry.slider.max = high;
     entry.slider.step = entry.step;
     entry.slider.value = value;
-    entry.input.step = entry.step;
   }
 
   /** Shows a document; sliders span anew around its values where `respan` says that it is another one. */
@@ -210,19 +274,17 @@ export class Form {
     const { field, input } = entry;
     const design = this.#design;
     if (field.kind === 'variant') {
-      const tag = at(design, field.pointer)?.[field.tag] ?? field.options[0].value;
-      input.value = tag;
-      for (const option of field.options) {
-        for (const inner of option.fields) this.#fields.get(inner.pointer).element.hidden = option.value !== tag;
-      }
+      const kind = kindOf(field, design);
+      input.value = kind ?? '';
+      const wanted = new Set(field.options.find(({ value }) => value === kind)?.fields.map(({ pointer }) => pointer));
+      for (const { pointer } of field.options.flatMap(({ fields }) => fields)) this.#fields.get(pointer).element.hidden = !wanted.has(pointer);
       return;
     }
     if (field.kind === 'oneOf') {
       const given = field.options.filter((option) => at(design, option.field.pointer) !== undefined);
-      input.value = (given[0] ?? field.options[0]).key;
-      for (const option of field.options) {
-        this.#fields.get(option.field.pointer).element.hidden = given.length ? !given.includes(option) : option !== field.options[0];
-      }
+      const shown = given.length > 0 ? given : [field.options.find(({ key }) => key === entry.chosen) ?? field.options[0]];
+      input.value = shown[0].key;
+      for (const option of field.options) this.#fields.get(option.field.pointer).element.hidden = !shown.includes(option);
       return;
     }
     if (field.kind === 'flag') {
@@ -233,16 +295,15 @@ export class Form {
       input.value = at(design, field.pointer) ?? field.options[0].value;
       return;
     }
-    const value = at(design, field.pointer) ?? field.preset;
-    const isShown = input.value !== '' && Number(input.value) === value;
-    if (value === undefined || value === null) {
-      if (!input.validity.badInput || document.activeElement !== input) input.value = '';
-    } else if (!isShown) {
-      input.value = typeof value === 'number' ? String(value) : '';
-    }
-    if (field.optional) input.placeholder = field.optional(design, this.#answers);
+    const value = field.derived ? field.derived.read(this.#isOwn ? this.#answers : {}) : (at(design, field.pointer) ?? field.preset);
+    const isTyping = document.activeElement === input;
+    if (!isTyping) entry.fault = undefined;
+    // What is being typed stays as it is spelled, as long as it means the value.
+    const isShown = isTyping && (field.derived ? entry.isEdited : typed(input.value).value === (at(design, field.pointer) ?? undefined));
+    if (!isShown && entry.fault === undefined) input.value = typeof value === 'number' ? String(value) : '';
+    input.placeholder = field.optional?.(design, this.#answers) ?? field.preset ?? (field.derived ? '' : 'wanted');
     if (entry.slider) {
-      const isGiven = typeof value === 'number' && value > 0;
+      const isGiven = typeof value === 'number' && value >= SPANNED.least && value <= SPANNED.most;
       entry.slider.parentElement.hidden = !isGiven;
       if (!isGiven) return;
       const { min, max } = entry.slider;
@@ -252,14 +313,19 @@ export class Form {
     }
   }
 
-  /** Shows what the service says about the document. */
-  setResult(answers, reasons, findings) {
+  /** Shows what the service says: the last answers that there are, whether they are the document's own, why there are none, findings. */
+  setResult(answers, isOwn, reasons, findings) {
     this.#answers = answers;
+    this.#isOwn = isOwn;
     this.reasons = reasons;
     this.#findings = findings;
     for (const entry of this.#fields.values()) {
       const { field } = entry;
       if (field.optional) entry.input.placeholder = field.optional(this.#design, answers);
+      if (field.derived) {
+        entry.isEdited &&= entry.fault !== undefined;
+        this.#showValue(entry, false);
+      }
       if (field.mark) this.#showMark(entry, field.mark(answers));
     }
     this.#renderNotes();
@@ -281,6 +347,14 @@ export class Form {
     return place;
   }
 
+  /** What a field without a value wants, where it has to have one. */
+  #wantOf({ field, element, input }) {
+    const isWanted = !field.kind || field.kind === 'number';
+    if (!isWanted || field.optional || field.derived || field.preset !== undefined || element.hidden || input.value !== '') return undefined;
+    const what = field.label[0].toLowerCase() + field.label.slice(1);
+    return `Wanted here: the ${what}, ${field.whole ? 'a whole number' : `a number in ${field.unit}`}${field.likely === undefined ? '' : `, such as ${field.likely}`}.`;
+  }
+
   #renderNotes() {
     const contents = new Map([...this.#notes.keys()].map((pointer) => [pointer, []]));
     const worst = new Map();
@@ -293,12 +367,16 @@ export class Form {
       contents.get(pointer).push(note);
       if (!worst.has(pointer)) worst.set(pointer, severity);
     };
+    const say = (pointer, text) => add(pointer, 'problem', text, () => ({ element: html('p', { class: 'note problem' }, text) }));
+    for (const [pointer, entry] of this.#fields) {
+      const text = entry.fault ?? this.#wantOf(entry);
+      if (text) say(pointer, text);
+    }
     for (const reason of this.reasons ?? []) {
       const place = this.#placeOf(reason.pointer);
+      // An empty field has said so itself.
+      if (reason.code === 'missing_field' && place === reason.pointer && contents.get(place).length > 0) continue;
       add(place, 'problem', JSON.stringify(reason), () => ({ element: this.#problemNote(reason, place) }));
-    }
-    for (const [pointer, { isNoNumber }] of this.#fields) {
-      if (isNoNumber) add(pointer, 'problem', 'no number', () => ({ element: html('p', { class: 'note problem' }, 'This is no number; the last one stands.') }));
     }
     for (const finding of this.#findings) {
       for (const place of new Set(finding.pointers.map((pointer) => this.#placeOf(pointer)))) {
@@ -306,20 +384,32 @@ export class Form {
         built.get(`${place} ${finding.key}`).show(finding);
       }
     }
+    for (const [pointer, entry] of this.#fields) {
+      entry.element.dataset.state = worst.get(pointer) ?? '';
+      if (worst.get(pointer) === 'problem') entry.input.setAttribute('aria-invalid', 'true');
+      else entry.input.removeAttribute('aria-invalid');
+    }
+    // Colours follow at once; words, which take room, wait until the slider is let go.
+    if (this.#held) return;
     this.#built = built;
-    for (const [pointer, notes] of contents) {
-      setChildren(this.#notes.get(pointer), notes.map((note) => note.element));
-      const entry = this.#fields.get(pointer);
-      if (entry) {
-        entry.element.dataset.state = worst.get(pointer) ?? '';
-        if (worst.get(pointer) === 'problem') entry.input.setAttribute('aria-invalid', 'true');
-        else entry.input.removeAttribute('aria-invalid');
+    this.#inPlace(() => {
+      for (const [pointer, notes] of contents) setChildren(this.#notes.get(pointer), notes.map((note) => note.element));
+      for (const { group, details } of this.#groups) {
+        const pointers = [group.pointer, ...[...fieldsOf(group)].map((field) => field.pointer)];
+        if (pointers.some((pointer) => worst.get(pointer) === 'problem')) details.open = true;
       }
-    }
-    for (const { group, details } of this.#groups) {
-      const pointers = [group.pointer, ...[...fieldsOf(group)].map((field) => field.pointer)];
-      if (pointers.some((pointer) => worst.get(pointer) === 'problem')) details.open = true;
-    }
+    });
+  }
+
+  /** Keeps the field that has the focus where it is on the screen while others around it grow or shrink. */
+  #inPlace(change) {
+    const anchor = this.container.contains(document.activeElement) ? document.activeElement : undefined;
+    const before = anchor?.getBoundingClientRect().top;
+    change();
+    if (!anchor?.isConnected) return;
+    const moved = anchor.getBoundingClientRect().top - before;
+    const scrolls = this.container.scrollHeight > this.container.clientHeight ? this.container : document.scrollingElement;
+    if (moved !== 0) scrolls.scrollTop += moved;
   }
 
   #problemNote(reason, place) {
@@ -380,14 +470,14 @@ export class Form {
   labelOf(pointer) {
     const place = this.#placeOf(pointer);
     const { field } = this.#fields.get(place) ?? {};
-    const group = GROUPS.find((candidate) => candidate.pointer === place);
+    const group = this.groups.find((candidate) => candidate.pointer === place);
     return field?.name ?? (field && fullLabel(field)) ?? group?.title ?? pointer;
   }
 
   /** Leads to a field: opens its group, moves the focus there. */
   goTo(pointer) {
     const place = this.#placeOf(pointer);
-    const visible = [...this.#fields.entries()].find(([key, { element }]) => key.startsWith(place) && key.split('/').length > 2 && !element.hidden);
+    const visible = [...this.#fields.entries()].find(([key, { element, input }]) => key.startsWith(place) && key.split('/').length > 2 && !element.hidden && !input.hidden);
     const { element, input } = this.#fields.get(place)?.field.kind === 'number' ? this.#fields.get(place) : (visible?.[1] ?? {});
     if (!element) return;
     element.closest('details').open = true;

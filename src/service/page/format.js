@@ -42,3 +42,19 @@ export function difference(value, reference, significant = 3) {
 }
 
 export const withUnit = (text, unit) => (unit && text !== DASH ? `${text}${THIN_SPACE}${unit}` : text);
+
+const PLAIN = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
+const WITH_COMMA = /^([+-]?\d*),(\d*(?:e[+-]?\d+)?)$/i;
+const THOUSANDS = /^[+-]?[1-9]\d{0,2},\d{3}$/;
+
+/** What a person typed as a number: `{ value }`, undefined where nothing stands there, or `{ fault }` in words. A comma is a decimal
+ *  sign, as a point is; where it could part thousands as well, it is asked back. Spaces between digits are passed over. */
+export function typed(text) {
+  const compact = text.trim().replace(/(?<=\d)[\s\u00a0\u2009\u202f](?=\d)/g, '').replace(MINUS, '-');
+  if (compact === '') return { value: undefined };
+  if (THOUSANDS.test(compact)) return { fault: `“${compact}” can mean ${compact.replace(',', '.')} or ${compact.replace(',', '')}: write which. The last number stands.` };
+  const plain = compact.replace(WITH_COMMA, '$1.$2');
+  if (!PLAIN.test(plain)) return { fault: 'This is no number; the last one stands.' };
+  const value = Number(plain);
+  return Number.isFinite(value) ? { value } : { fault: 'This is more than a number can hold; the last one stands.' };
+}

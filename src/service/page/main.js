@@ -1,6 +1,7 @@
 // What the page shows: one design, its answers, an input angle, a selected tooth and perhaps a reference. Everything on the page
 // follows from these; each part of it is asked to show them, none keeps a second copy.
 
+import * as access from './access.js';
 import { Accuracy } from './accuracy.js';
 import { isSame } from './design.js';
 import { html, oncePerFrame, setChildren, setText } from './dom.js';
@@ -13,10 +14,12 @@ import { Mechanism, stressColor } from './mechanism.js';
 import { CONTACTS, Motion } from './motion.js';
 import { passOf } from './pass.js';
 import { Plots } from './plots.js';
-import { findingsTable, reportOf } from './report.js';
+import { findingsTable, inputDifferences, reportOf } from './report.js';
 import { Results } from './results.js';
 import { Service, evaluate, getJson } from './service.js';
 import * as share from './share.js';
+import { glossary, term } from './terms.js';
+import { Toolbar } from './toolbar.js';
 
 const FIRST_EXAMPLE = 'paper-5.1';
 /** Degrees of the input angle per second while it plays: a turn takes 20 seconds. */
@@ -35,7 +38,8 @@ const state = {
   reasons: [],
   findings: [],
   examples: [],
-  origin: '',
+  /** Where the design comes from: `{ title, design }` of an example or a file, null of a design of its own. */
+  origin: null,
   inputDeg: 0,
   selected: 3,
   from: 'ring',
@@ -46,7 +50,7 @@ let pass;
 let gesture;
 
 const history = new History();
-const service = new Service({ onResult, onAway, onBusy: (isBusy) => byId('results').setAttribute('aria-busy', String(isBusy)) });
+const service = new Service({ onResult, onAway, onBusy: (isBusy) => byId('key-figures').setAttribute('aria-busy', String(isBusy)), onSlow });
 
 const form = new Form(byId('form'), {
   onEdit(design, pointer) {
@@ -54,6 +58,9 @@ const form = new Form(byId('form'), {
   },
   onEnd() {
     gesture = undefined;
+    // What had to wait because it takes room.
+    showFindings();
+    showComparison();
   },
 });
 
@@ -90,14 +97,14 @@ const drawings = new Drawings(
 
 // ---- the design
 
-function setDesign(design, { gesture: newGesture, origin = state.origin, fromForm = false, respan = false } = {}) {
+function setDesign(design, { gesture: newGesture, origin = state.origin, fromForm = false, respan = false, keepsAddress = false } = {}) {
   if (state.design && isSame(design, state.design)) return;
   if (state.design && !(newGesture && newGesture === gesture)) history.record(current());
   gesture = newGesture;
-  replaceDesign(design, { origin, fromForm, respan });
+  replaceDesign(design, { origin, fromForm, respan, keepsAddress });
 }
 
-function replaceDesign(design, { origin, fromForm = false, respan = false }) {
+function replaceDesign(design, { origin, fromForm = false, respan = false, keepsAddress = false }) {
   state.design = design;
   state.origin = origin;
   form.setDesign(design, { respan: respan && !fromForm });
@@ -107,7 +114,7 @@ function replaceDesign(design, { origin, fromForm = false, respan = false }) {
   byId('undo').disabled = !history.canUndo;
   byId('redo').disabled = !history.canRedo;
   showName();
-  addressLater();
+  if (!keepsAddress) addressLater();
 }
 
 const current = () => ({ design: state.design, origin: state.origin });
@@ -124,7 +131,8 @@ const redo = () => step(history.redo(current()));
 function nameOf(design, origin = state.origin) {
   const example = state.examples.find((candidate) => isSame(candidate.design, design));
   if (example) return example.title;
-  return origin ? `${origin} (changed)` : 'A design of your own';
+  if (!origin) return 'A design of your own';
+  return isSame(design, origin.design) ? origin.title : `${origin.title} (changed)`;
 }
 
 function showName() {
@@ -154,12 +162,13 @@ function onResult({ design, answers, problems, solveMs }) {
   if (isDrawn) {
     state.shown = { design, answers };
     motion = new Motion(design, answers.geometry, answers.sweep);
-    pass = answers.sweep && passOf(design, answers.geometry, answers.sweep);
+    pass = answers.sweep && passOf(design, answers.sweep);
     if (state.selected >= motion.installed) state.selected = 0;
     mechanism.setMotion(motion);
     setText(byId('solved'), `Solver ${answers.geometry.solver_version}, solved in ${number(solveMs, 2)} ms`);
   }
   state.findings = isDrawn ? findingsOf(answers) : [];
+  document.body.classList.toggle('stale', !isDrawn);
   showNotes();
   showFindings();
   showReasons(isDrawn);
@@ -171,20 +180,40 @@ function onResult({ design, answers, problems, solveMs }) {
 /** At the fields: what keeps the drive from existing, and what a drawing was refused for. */
 function showNotes() {
   // Hints beside the fields stand on the last drive that could exist.
-  form.setResult(state.shown?.answers ?? {}, reasonsOf([...state.problems, ...drawings.problems]), state.findings);
+  form.setResult(state.shown?.answers ?? {}, !document.body.classList.contains('stale'), reasonsOf([...state.problems, ...drawings.problems]), state.findings);
 }
 
+/** In the line under the key figures, which is always there: what takes room of its own would push the page about. */
 function showReasons(isDrawn) {
   const banner = byId('impossible');
   banner.hidden = state.reasons.length === 0;
-  document.body.classList.toggle('stale', !isDrawn);
+  showStatus();
   if (banner.hidden) return;
   const [{ title }] = state.reasons;
   const kept = isDrawn ? 'Geometry is shown; forces are not.' : 'The last possible design stays in the picture.';
-  const reasons = state.reasons.map(({ pointer, detail }) =>
-    html('li', {}, pointer ? html('button', { type: 'button', class: 'link', onclick: () => form.goTo(pointer) }, `${form.labelOf(pointer)}: ${detail}`) : detail),
+  const parts = state.reasons.map(({ pointer, detail }) => ({ pointer, text: pointer ? `${form.labelOf(pointer)}: ${detail}` : detail }));
+  setText(byId('impossible-title'), `${title}.`);
+  setText(byId('impossible-first'), parts.length > 1 ? `${parts[0].text}, and ${parts.length - 1} more` : parts[0].text);
+  byId('impossible-all').replaceChildren(
+    html('p', {}, state.shown ? kept : ''),
+    html('ul', {}, parts.map(({ pointer, text }) => html('li', {}, pointer ? html('button', { type: 'button', class: 'link', onclick: () => form.goTo(pointer) }, text) : text))),
   );
-  banner.replaceChildren(html('strong', {}, `${title}.`), ` ${state.shown ? kept : ''}`, html('ul', {}, reasons));
+}
+
+/** What is told where there is nothing wrong. */
+function showStatus() {
+  const { findings, reasons } = state;
+  const line = byId('status-findings');
+  line.hidden = reasons.length > 0;
+  const count = findings.length === 1 ? '1 finding' : `${findings.length} findings`;
+  setText(line, findings.length === 0 ? 'No findings' : `${count}: ${findings.map(titleOf).join(', ')}`);
+  line.className = findings.some(({ severity }) => severity === 'warning') ? 'warning' : '';
+}
+
+function onSlow(seconds) {
+  const line = byId('slow');
+  line.hidden = seconds === undefined;
+  if (seconds !== undefined) setText(line, `Calculating for ${fixed(seconds, 0)} s; numbers are the last design’s.`);
 }
 
 const findingNotes = new Map();
@@ -210,6 +239,8 @@ const noFindings = html('p', { class: 'none' });
 
 function showFindings() {
   const { findings } = state;
+  // A list that grows under a held slider would push the table away; the line at the top says the same.
+  if (form.isHeld) return;
   setText(noFindings, state.reasons.length > 0 ? 'The reasons why the design cannot exist come first.' : 'Nothing to report about this design.');
   setChildren(byId('findings'), findings.length > 0 ? findings.map(findingNote) : [noFindings]);
 }
@@ -218,9 +249,36 @@ function showComparison() {
   const { reference, shown } = state;
   plots.setPasses(pass, reference?.pass);
   mechanism.setReference(reference);
-  if (shown) results.update(shown.answers, reference?.answers);
+  if (shown) results.update(shown.answers, reference?.answers, form.isHeld);
   byId('comparing').hidden = !reference;
-  if (reference) setText(byId('reference-name'), reference.name);
+  const differences = shown && reference ? inputDifferences(shown.design, reference.design) : [];
+  showInputs(differences);
+  if (!reference) return;
+  setText(byId('reference-name'), reference.name);
+  const text = differences.map(({ label, value, reference: other }) => `${label} ${other} → ${value}`).join(', ');
+  setText(byId('differing'), differences.length > 0 ? `Inputs that differ: ${text}.` : 'All inputs are the same.');
+}
+
+let shownInputs = '[]';
+
+/** Above the table of results: what the differences in it come from. It stands as long as it is the same: a press that begins on one
+ *  of its buttons must end on it. */
+function showInputs(differences) {
+  const text = JSON.stringify(differences);
+  if (form.isHeld || text === shownInputs) return;
+  shownInputs = text;
+  const head = ['Input', 'This design', 'Reference'].map((text, index) => html('th', { scope: 'col', class: index > 0 && 'numeric' }, text));
+  const rows = differences.map(({ pointer, label, value, reference }) =>
+    html(
+      'tr',
+      {},
+      html('th', { scope: 'row' }, html('button', { type: 'button', class: 'link', onclick: () => form.goTo(pointer) }, label)),
+      html('td', { class: 'numeric number' }, value),
+      html('td', { class: 'numeric number' }, reference),
+    ),
+  );
+  const table = [html('caption', {}, 'Inputs that differ from the reference'), html('thead', {}, html('tr', {}, head)), html('tbody', {}, rows)];
+  byId('inputs').replaceChildren(...(differences.length > 0 ? table : []));
 }
 
 let announceTimer;
@@ -247,17 +305,17 @@ function onAway(away, detail) {
 
 // ---- the reference
 
-async function keepReference({ design, origin }, answers) {
+async function keepReference({ design, origin }, answers, { keepsAddress = false } = {}) {
   const name = nameOf(design, origin);
   const known = answers ?? (await evaluate(design).catch(() => ({ answers: {} }))).answers;
   if (!known.geometry) {
     setText(byId('announcer'), 'The reference could not be calculated.');
     return;
   }
-  state.reference = { design, origin, name, answers: known, geometry: known.geometry, pass: known.sweep && passOf(design, known.geometry, known.sweep) };
+  state.reference = { design, origin, name, answers: known, geometry: known.geometry, pass: known.sweep && passOf(design, known.sweep) };
   showComparison();
   render();
-  addressLater();
+  if (!keepsAddress) addressLater();
 }
 
 function keepShown() {
@@ -382,23 +440,68 @@ async function copy(text, button) {
   setTimeout(() => setText(button, label), 1500);
 }
 
-function applyText(text, origin) {
+/** Takes the document in a text, from a file of the name or, without one, as it was edited here. */
+function applyText(text, fileName) {
   const error = byId('document-error');
   try {
     const design = share.fromText(text);
-    setDesign(design, { origin, respan: true });
+    setDesign(design, { origin: fileName === undefined ? state.origin : { title: share.titleOfFile(fileName), design }, respan: true });
     error.hidden = true;
     byId('document').close();
   } catch (failure) {
+    // The text is there to be mended.
+    if (!byId('document').open) showDocument(text);
     error.hidden = false;
     setText(error, failure.message);
   }
 }
 
-/** Named after the design: its title without what a file cannot be called. */
+function showDocument(text) {
+  byId('document-text').value = text;
+  byId('document-error').hidden = true;
+  byId('document').showModal();
+}
+
+const notify = (text) => {
+  byId('notice').hidden = false;
+  setText(byId('notice-text'), text);
+};
+
+function showIntro(isShown, isRemembered) {
+  byId('intro').hidden = !isShown;
+  if (!isRemembered) return;
+  try {
+    if (isShown) localStorage.removeItem('intro');
+    else localStorage.setItem('intro', 'hidden');
+  } catch {
+    // Storage may be forbidden; the page is then introduced each time.
+  }
+}
+
+function isIntroWanted() {
+  try {
+    return localStorage.getItem('intro') !== 'hidden';
+  } catch {
+    return true;
+  }
+}
+
+function askForKey(detail, isWrong) {
+  const login = byId('login');
+  login.hidden = false;
+  setText(byId('login-detail'), isWrong ? 'This key opens nothing here.' : 'This service wants a key.');
+  byId('login-key').focus();
+  byId('login-key').select();
+  setText(byId('announcer'), detail ?? '');
+}
+
+/** Named after the design: its title without what a file cannot be called, and, but for a ready one, what tells it from others of that
+ *  title. */
 function fileName(ending) {
-  const title = document.title.replace(/ – toothwave$/, '').replace(/\.json\b|[’']/g, '');
-  return `${title.replace(/[^\w.]+/g, '-').replace(/^-|-$/g, '').toLowerCase()}${ending}`;
+  const title = document.title.replace(/ – toothwave$/, '').replace(/[’']/g, '');
+  const isReady = state.examples.some(({ design }) => isSame(design, state.design));
+  const own = isReady ? '' : `-${share.fingerprint(state.design)}`;
+  return `${title.replace(/[^\w.]+/g, '-').replace(/^-|-$/g, '').toLowerCase()}${own}${ending}`;
 }
 
 function nextTheme() {
@@ -443,16 +546,41 @@ function listen() {
   };
   click('zoom-in', () => zoomBy(Math.SQRT2));
   click('zoom-out', () => zoomBy(Math.SQRT1_2));
-  click('open-document', () => {
-    byId('document-text').value = share.toText(state.design);
-    byId('document-error').hidden = true;
-    byId('document').showModal();
+  click('open-document', () => showDocument(share.toText(state.design)));
+  click('help', () => byId('help-dialog').showModal());
+  click('help-close', () => byId('help-dialog').close());
+  click('help-intro', () => {
+    byId('help-dialog').close();
+    showIntro(true, true);
+    byId('intro').scrollIntoView({ block: 'start' });
   });
+  click('intro-hide', () => showIntro(false, true));
+  click('notice-hide', () => {
+    byId('notice').hidden = true;
+  });
+  click('status-findings', () => byId('findings-title').scrollIntoView({ block: 'center' }));
+  byId('login').addEventListener('submit', (event) => {
+    event.preventDefault();
+    byId('login').hidden = true;
+    access.open(byId('login-key').value.trim());
+    byId('login-key').value = '';
+  });
+  access.listen(askForKey);
+  // Their places are no part of the address, which is the design's.
+  for (const link of document.querySelectorAll('.skip')) {
+    link.addEventListener('click', (event) => {
+      event.preventDefault();
+      const target = document.querySelector(link.hash);
+      target.focus({ preventScroll: true });
+      target.scrollIntoView({ block: 'start' });
+    });
+  }
+  new Toolbar(byId('tools'));
   click('document-close', () => byId('document').close());
-  click('document-apply', () => applyText(byId('document-text').value, state.origin));
+  click('document-apply', () => applyText(byId('document-text').value));
   click('document-copy', ({ currentTarget }) => copy(byId('document-text').value, currentTarget));
-  click('document-save', () => share.save(share.toFile(state.design), fileName('.json')));
-  click('document-load', () => byId('document-file').click());
+  click('save', () => share.save(share.toFile(state.design), fileName('.json')));
+  click('load', () => byId('document-file').click());
   byId('document-file').addEventListener('change', async ({ currentTarget: input }) => {
     const [file] = input.files;
     if (file) applyText(await file.text(), file.name);
@@ -470,18 +598,18 @@ function listen() {
   });
   byId('teeth-table').addEventListener('toggle', render);
   addEventListener('keydown', (event) => {
-    if (!(event.ctrlKey || event.metaKey) || event.altKey || byId('document').open) return;
+    if (!(event.ctrlKey || event.metaKey) || event.altKey || document.querySelector('dialog[open]')) return;
     const key = event.key.toLowerCase();
     if (key === 'z' && !event.shiftKey) undo();
     else if (key === 'y' || key === 'z') redo();
     else return;
     event.preventDefault();
   });
-  addEventListener('hashchange', fromAddress);
+  addEventListener('hashchange', () => fromAddress());
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => plots.restyle());
   addEventListener('beforeprint', () => {
     byId('findings-table').replaceChildren(...findingsTable(state.findings));
-    byId('report').replaceChildren(...reportOf(nameOf(state.design), state, location.href));
+    byId('report').replaceChildren(...reportOf(...reported(), location.href));
     document.documentElement.classList.add('printing');
     plots.restyle(true);
   });
@@ -491,16 +619,29 @@ function listen() {
   });
 }
 
-function fromAddress() {
-  try {
-    const { design, reference } = share.fromAddress(location.hash);
-    if (reference && !isSame(reference, state.reference?.design)) keepReference({ design: reference, origin: '' });
-    if (design) setDesign(design, { origin: '', respan: true });
-    return design !== undefined;
-  } catch {
-    setText(byId('announcer'), 'The address holds no design that can be read.');
+/** What is printed: the design that the numbers are about, or, where there are none, the one at hand and why. */
+function reported() {
+  const isStale = document.body.classList.contains('stale') || !state.shown;
+  const design = isStale ? state.design : state.shown.design;
+  const reasons = state.reasons.map(({ title, detail, pointer }) => ({ title, detail, label: pointer && form.labelOf(pointer) }));
+  const version = isStale ? undefined : state.shown.answers.geometry.solver_version;
+  return [nameOf(design), { design, version, reference: state.reference, reasons }];
+}
+
+/** Takes what the address holds; what cannot be read is told, and the address is left as it is, to be looked at. */
+function fromAddress({ atStart = false } = {}) {
+  // A place in the page is no design.
+  if (location.hash && document.getElementById(location.hash.slice(1))) return false;
+  const { design, reference, broken } = share.fromAddress(location.hash);
+  if (broken.includes('design')) {
+    const instead = atStart ? 'A ready design is shown instead' : 'Your design is kept';
+    notify(`This link is damaged or was cut short: no design can be read from it. ${instead}; the address stays until you change something.`);
     return false;
   }
+  if (broken.includes('reference')) notify('This link is damaged or was cut short: its design is shown, but the reference cannot be read from it.');
+  if (reference && !isSame(reference, state.reference?.design)) keepReference({ design: reference, origin: null }, undefined, { keepsAddress: true });
+  if (design) setDesign(design, { origin: null, respan: true, keepsAddress: broken.length > 0 });
+  return design !== undefined;
 }
 
 async function loadExamples() {
@@ -514,28 +655,33 @@ function showExamples() {
     example.button = html('button', { type: 'button', title: example.title, 'data-example': example.name }, label[0].toUpperCase() + label.slice(1));
     example.button.addEventListener('click', () => {
       gesture = undefined;
-      setDesign(example.design, { origin: example.title.split(':')[0], respan: true });
+      setDesign(example.design, { origin: originOf(example), respan: true });
     });
     byId('examples').append(example.button);
   }
 }
 
+const originOf = ({ title, design }) => ({ title: title.split(':')[0], design });
+
 async function start() {
   showTheme();
+  showIntro(isIntroWanted(), false);
+  byId('glossary').append(glossary());
+  byId('position-term').append(term('position'));
   listen();
   while (state.examples.length === 0) {
     try {
       state.examples = await loadExamples();
     } catch {
-      if (byId('away').hidden) onAway(true, 'The calculation service does not answer.');
+      if (byId('away').hidden && !access.isAsking()) onAway(true, 'The calculation service does not answer.');
       await new Promise((resolve) => setTimeout(resolve, 1000));
     }
   }
   byId('away').hidden = true;
   showExamples();
-  if (!fromAddress()) {
+  if (!fromAddress({ atStart: true })) {
     const first = state.examples.find(({ name }) => name === FIRST_EXAMPLE) ?? state.examples[0];
-    setDesign(first.design, { origin: first.title.split(':')[0], respan: true });
+    setDesign(first.design, { origin: originOf(first), respan: true, keepsAddress: location.hash !== '' });
   }
   byId('legend').querySelector('.ramp').style.background = `linear-gradient(to right, ${[0, 0.25, 0.5, 0.75, 1].map(stressColor).join(', ')})`;
   if (!matchMedia('(prefers-reduced-motion: reduce)').matches) play(true);

@@ -48,30 +48,24 @@ function flanks(geometry, teeth, first, count, spacing) {
   return all;
 }
 
-/** The carrier: the annulus that the mechanics leave it, cut by radial slots as wide as a tooth; `count` pieces of it, each as long
- *  as `stride` teeth are apart. */
-function carrierOutline({ geometry, installed, toothRadius }, first, count, stride = 1) {
-  const half = Math.PI / installed;
-  const outer = geometry.carrier.outer_radius_limit_mm;
-  // Where slots run into each other, the walls begin further out.
-  const inner = Math.max(geometry.carrier.inner_radius_limit_mm, toothRadius / Math.sin(half));
-  if (outer <= inner) return '';
-  const deg = 180 / Math.PI;
-  const wallAt = (radius) => Math.asin(Math.min(1, toothRadius / radius)) * deg;
-  const parts = [];
+/** The carrier: `count` of the fingers between its slots, as the service outlines the first. Of very many teeth one finger stands for
+ *  as many as `stride` teeth are apart. */
+function carrierOutline({ geometry, installed }, first, count, stride = 1) {
+  const { finger, inner_radius_limit_mm: inner, outer_radius_limit_mm: outer } = geometry.carrier;
+  if (!finger) return '';
+  const corners = points(finger.corners);
+  const turned = ({ x, y }, slots) => {
+    const angle = (2 * Math.PI * slots) / installed;
+    return xy({ x: x * Math.cos(angle) - y * Math.sin(angle), y: x * Math.sin(angle) + y * Math.cos(angle) });
+  };
+  const fingers = [];
   for (let index = first; index < first + count; index += 1) {
-    const [from, to] = [index, index + 1].map((slot) => (Math.min(slot * stride, first + installed) * 360) / installed);
-    const corners = [
-      polar(inner, from + wallAt(inner)),
-      polar(outer, from + wallAt(outer)),
-      polar(outer, to - wallAt(outer)),
-      polar(inner, to - wallAt(inner)),
-    ].map(xy);
-    parts.push(
-      `M${corners[0]}L${corners[1]}A${outer} ${outer} 0 0 1 ${corners[2]}L${corners[3]}A${inner} ${inner} 0 0 0 ${corners[0]}Z`,
-    );
+    const from = index * stride;
+    const to = Math.min(from + stride, first + installed) - 1;
+    const [start, rise, fall, back] = [turned(corners[0], from), turned(corners[1], from), turned(corners[2], to), corners[3] && turned(corners[3], to)];
+    fingers.push(`M${start}L${rise}A${outer} ${outer} 0 0 1 ${fall}${back ? `L${back}A${inner} ${inner} 0 0 0 ${start}` : ''}Z`);
   }
-  return parts.join('');
+  return fingers.join('');
 }
 
 function arc(radius, fromDeg, toDeg) {

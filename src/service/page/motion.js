@@ -7,15 +7,14 @@
 const RAD = Math.PI / 180;
 
 export const CONTACTS = [
-  { key: 'wave_generator', name: 'Wave generator', short: 'cam', index: 'H' },
-  { key: 'ring', name: 'Ring', short: 'ring', index: 'K' },
-  { key: 'carrier', name: 'Carrier', short: 'slot', index: 'S' },
+  { key: 'wave_generator', name: 'Wave generator', index: 'H' },
+  { key: 'ring', name: 'Ring', index: 'K' },
+  { key: 'carrier', name: 'Carrier', index: 'S' },
 ];
 
 /** The columns of a sweep's states, apart from angle and tooth number. */
-const COLUMNS = ['position_deg', 'wave_generator_angle_deg', 'ring_angle_deg'].concat(
-  ...CONTACTS.map(({ key }) => [`force_${key}_n`, `stress_${key}_mpa`]),
-);
+const LOADS = CONTACTS.flatMap(({ key }) => [`force_${key}_n`, `stress_${key}_mpa`]);
+const COLUMNS = ['position_deg', 'wave_generator_angle_deg', 'ring_angle_deg', ...LOADS];
 
 export const polar = (radius, deg) => ({ x: radius * Math.cos(deg * RAD), y: radius * Math.sin(deg * RAD) });
 
@@ -42,12 +41,16 @@ export function framesOf(states) {
   return frames;
 }
 
-/** Whether a tooth can take load at once when it enters: its flank ends before the place where the lever arm is zero. */
-export const entersUnderLoad = (geometry) => geometry.engagement.start_deg < 90 - 1e-9;
+/** The tooth that makes every force jump between two frames of a sweep, by entering under load. */
+export const enteringBetween = (sweep, before, after) =>
+  sweep.enters_under_load ? [...after.rows.values()].find((row) => !before.rows.has(row.tooth) && row.loaded) : undefined;
 
-/** The tooth that makes every force jump between two frames, by entering under load. */
-export const enteringBetween = (geometry, before, after) =>
-  entersUnderLoad(geometry) ? [...after.rows.values()].find((row) => !before.rows.has(row.tooth) && row.loaded) : undefined;
+/** A column's value at a share of the way from one to another. Stress goes by the root of the force, so it is its square that is
+ *  nearly straight between two states, and up to where both end together. */
+export const between = (column, one, other, share) => {
+  if (!column.startsWith('stress_')) return one + share * (other - one);
+  return Math.sqrt(Math.max(0, one * one + share * (other * other - one * one)));
+};
 
 export class Motion {
   constructor(design, geometry, sweep) {
@@ -151,11 +154,11 @@ export class Motion {
     const start = this.geometry.engagement.start_deg;
     const blend = (one, other, t) => {
       const row = { tooth: one.tooth, loaded: (one.loaded && t < 1) || (other.loaded && t > 0) };
-      for (const column of COLUMNS) row[column] = one[column] + t * (other[column] - one[column]);
+      for (const column of COLUMNS) row[column] = between(column, one[column], other[column], t);
       return row;
     };
     // A tooth that enters under load makes every force jump there, so nothing is interpolated across its entry.
-    const entering = enteringBetween(this.geometry, this.frames[index], this.frames[index + 1]);
+    const entering = enteringBetween(this.sweep, this.frames[index], this.frames[index + 1]);
     const rate = (this.ringTeeth / this.theoretical) * (this.frames[index + 1].angle - this.frames[index].angle);
     const hasEntered = entering && entering.position_deg + (1 - share) * rate <= start;
     for (const row of before.values()) {
@@ -165,7 +168,7 @@ export class Motion {
         if (entering) {
           const held = hasEntered ? next : row;
           blended.loaded = held.loaded;
-          for (const column of COLUMNS) if (!column.endsWith('_deg')) blended[column] = held[column];
+          for (const column of LOADS) blended[column] = held[column];
         }
         yield blended;
       } else {
@@ -174,7 +177,7 @@ export class Motion {
         if (positionDeg <= 0) continue;
         const left = positionDeg / row.position_deg;
         const faded = { ...row, position_deg: positionDeg };
-        for (const column of COLUMNS) if (!column.endsWith('_deg')) faded[column] *= left;
+        for (const column of LOADS) faded[column] = between(column, 0, row[column], left);
         faded.wave_generator_angle_deg = 90 - left * (90 - row.wave_generator_angle_deg);
         faded.ring_angle_deg = 180 / this.ringTeeth - left * (180 / this.ringTeeth - row.ring_angle_deg);
         yield faded;
@@ -182,8 +185,14 @@ export class Motion {
     }
     for (const row of after.values()) {
       if (before.has(row.tooth)) continue;
-      if (entering ? hasEntered : row.position_deg + (1 - share) * rate <= start) {
-        yield { ...row, position_deg: row.position_deg + (1 - share) * rate };
+      const positionDeg = row.position_deg + (1 - share) * rate;
+      if (entering) {
+        if (hasEntered) yield { ...row, position_deg: positionDeg };
+      } else if (positionDeg < start) {
+        // It enters where its lever arm is zero, and takes load from there on.
+        const came = { ...row, position_deg: positionDeg };
+        for (const column of LOADS) came[column] = between(column, 0, row[column], (start - positionDeg) / (start - row.position_deg));
+        yield came;
       }
     }
   }
@@ -206,7 +215,7 @@ export class Motion {
       force[key] = row[`force_${key}_n`];
       stress[key] = row[`stress_${key}_mpa`];
     }
-    contacts.carrier = this.#slotContact(center, contacts, force);
+    contacts.carrier = this.#slotContact(center);
     return { tooth, zone, positionDeg: row.position_deg, center, force, stress, contacts };
   }
 
@@ -217,15 +226,9 @@ export class Motion {
     return polar(radius * Math.cos(off) + side * reach, deg);
   }
 
-  /** The slot's wall pushes across the slot, on the side that the other two forces press the tooth to. */
-  #slotContact(center, contacts, force) {
-    const along = { x: -Math.sin(center.deg * RAD), y: Math.cos(center.deg * RAD) };
-    let push = 0;
-    for (const key of ['wave_generator', 'ring']) {
-      const contact = contacts[key];
-      push += (force[key] * ((center.x - contact.x) * along.x + (center.y - contact.y) * along.y)) / this.toothRadius;
-    }
-    const side = Math.sign(push) || 1;
-    return { x: center.x + side * this.toothRadius * along.x, y: center.y + side * this.toothRadius * along.y };
+  /** The slot's wall, on the side that the service says. */
+  #slotContact({ x, y, deg }) {
+    const reach = this.geometry.carrier.loaded_wall === 'leading' ? this.toothRadius : -this.toothRadius;
+    return { x: x - reach * Math.sin(deg * RAD), y: y + reach * Math.cos(deg * RAD) };
   }
 }

@@ -1,10 +1,10 @@
 // One tooth's pass through the meshing zone, from where it enters to the root, put together from the samples of one period
 // as the paper does it (its figures 8 to 10): each loaded tooth stands for a part of the pass.
 
-import { CONTACTS, enteringBetween, entersUnderLoad, framesOf } from './motion.js';
+import { CONTACTS, between, enteringBetween, framesOf } from './motion.js';
 
 export const ABSCISSAE = [
-  { key: 'input', label: 'Input angle', axis: 'input angle since the minor axis, deg', unit: 'deg', symbol: 'j' },
+  { key: 'input', label: 'Input angle', axis: 'input angle since the minor axis, Δj, deg', unit: 'deg', symbol: 'Δj' },
   { key: 'ring', label: 'Ring flank', axis: 'φ_K on the ring, from the tooth tip, deg', unit: 'deg', symbol: 'φ_K' },
   { key: 'cam', label: 'Cam', axis: 'φ_H on the cam, from the minor axis, deg', unit: 'deg', symbol: 'φ_H' },
   { key: 'slot', label: 'Slot', axis: 'distance of the tooth’s centre from the axis, mm', unit: 'mm', symbol: 'ρ' },
@@ -15,14 +15,14 @@ const SAME_DEG = 1e-9;
 
 /** `{ x: { abscissa: [] }, force: { contact: [] }, stress: { contact: [] }, position: [], breaks: Set of indices }`; a break at an
  *  index stands between that point and the one before it. */
-export function passOf(design, geometry, sweep) {
+export function passOf(design, sweep) {
   const frames = framesOf(sweep.states);
   const rate = design.drive.teeth.count / design.drive.ring.teeth;
   const points = [];
   // The last sample repeats the first, teeth renumbered.
   for (let index = 0; index < frames.length - 1; index += 1) {
     const { rows } = frames[index];
-    const breaksAfter = enteringBetween(geometry, frames[index], frames[index + 1]) !== undefined;
+    const breaksAfter = enteringBetween(sweep, frames[index], frames[index + 1]) !== undefined;
     for (const row of rows.values()) points.push({ row, breaksAfter });
   }
   // Where an angle stands twice, what was before the jump comes first.
@@ -44,7 +44,7 @@ export function passOf(design, geometry, sweep) {
     },
     force: {},
     stress: {},
-    entersUnderLoad: entersUnderLoad(geometry),
+    entersUnderLoad: sweep.enters_under_load,
     breaks: new Set(),
     peaks: sweep.peaks,
   };
@@ -100,7 +100,8 @@ export function readAt(pass, abscissa, x) {
   const reading = { position: value(pass.position), force: {}, stress: {} };
   for (const { key } of CONTACTS) {
     reading.force[key] = value(pass.force[key]);
-    reading.stress[key] = value(pass.stress[key]);
+    const stress = pass.stress[key];
+    reading.stress[key] = between(`stress_${key}_mpa`, stress[place.low], stress[place.high], share);
   }
   return reading;
 }

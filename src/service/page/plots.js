@@ -99,9 +99,11 @@ class Plot {
   data() {
     const { owner, quantity } = this;
     const keys = CONTACTS.map(({ key }) => key);
-    const empty = [[], ...keys.map(() => [])];
-    const of = (pass) => (pass ? plotted(pass, owner.abscissa, quantity.key, keys) : empty);
-    return uPlot.join([of(owner.pass), of(owner.reference)]);
+    const of = (pass) => (pass ? plotted(pass, owner.abscissa, quantity.key, keys) : [[], ...keys.map(() => [])]);
+    const own = of(owner.pass);
+    if (owner.reference) return uPlot.join([own, of(owner.reference)]);
+    const nothing = own[0].map(() => null);
+    return [...own, ...keys.map(() => nothing)];
   }
 
   update() {

@@ -1,26 +1,45 @@
 // What only paper shows: the design as a table, with its name, date and address, and the findings as another. The rest of the
 // report is the page itself.
 
-import { GROUPS, at, fieldsOf } from './design.js';
+import { GROUPS, at, fieldsOf, fullLabel, kindOf } from './design.js';
 import { html } from './dom.js';
-import { basisOf, contactOf, kindOf, meaningOf, readable, sentence } from './findings.js';
-import { number, withUnit } from './format.js';
+import { basisOf, contactOf, kindOf as kindOfFinding, meaningOf, readable, sentence } from './findings.js';
+import { DASH, number, withUnit } from './format.js';
 
 function shownValue(field, design) {
   const value = at(design, field.pointer);
-  if (field.kind === 'variant') return field.options.find((option) => option.value === (value?.[field.tag] ?? field.options[0].value))?.label;
-  if (field.kind === 'choice') return field.options.find((option) => option.value === (value ?? field.options[0].value))?.label;
-  if (field.kind === 'oneOf') return undefined;
+  const labelled = (wanted) => field.options.find((option) => option.value === wanted)?.label;
+  // What has one kind alone is not told apart by it.
+  if (field.kind === 'variant') return field.options.length > 1 ? labelled(kindOf(field, design)) : undefined;
+  if (field.kind === 'choice') return labelled(value ?? field.options[0].value);
+  if (field.kind === 'flag') return value === true ? 'yes' : undefined;
+  if (field.kind === 'oneOf' || field.derived) return undefined;
   const shown = value ?? field.preset;
   return typeof shown === 'number' ? withUnit(String(shown), field.unit) : undefined;
 }
 
-export function reportOf(name, { design, shown, reference }, address) {
+/** Of fields of kinds and alternatives, only what a document gives: their presets are for when they are chosen. */
+const optional = (group) => new Set((group.parts ?? [group]).flatMap(({ fields }) => fields).flatMap((field) => field.options ?? []).flatMap((option) => option.fields ?? option.field ?? []));
+
+/** The inputs in which two designs differ: `[{ pointer, label, value, reference }]`, in words; what is left out is `–`. */
+export function inputDifferences(design, reference) {
+  const found = [];
+  for (const group of GROUPS) {
+    const onlyGiven = optional(group);
+    for (const field of fieldsOf(group)) {
+      const [value, other] = [design, reference].map((each) => (onlyGiven.has(field) && at(each, field.pointer) === undefined ? undefined : shownValue(field, each)));
+      if (value !== other) found.push({ pointer: field.pointer, label: fullLabel(field), value: value ?? DASH, reference: other ?? DASH });
+    }
+  }
+  return found;
+}
+
+/** The report on a design; of one that cannot exist, `reasons` why, `{ title, detail, label }`, in place of its numbers. */
+export function reportOf(name, { design, version, reference, reasons }, address) {
   const groups = GROUPS.filter((group) => !group.parts).map((group) => {
-    // Of several options only the given one has a value of its own; the others have presets for when they are chosen.
-    const options = new Set((group.fields ?? []).flatMap((field) => field.options ?? []).flatMap((option) => option.fields ?? option.field ?? []));
-    const rows = [...fieldsOf(group)]
-      .filter((field) => !options.has(field) || at(design, field.pointer) !== undefined)
+    const onlyGiven = optional(group);
+    const rows = fieldsOf(group)
+      .filter((field) => !onlyGiven.has(field) || at(design, field.pointer) !== undefined)
       .map((field) => [field.label, shownValue(field, design)])
       .filter(([, value]) => value !== undefined)
       .map(([label, value]) => html('tr', {}, html('th', {}, label), html('td', {}, value)));
@@ -41,14 +60,15 @@ export function reportOf(name, { design, shown, reference }, address) {
     html(
       'p',
       { class: 'imprint' },
-      `Calculated ${new Date().toISOString().slice(0, 10)} by toothwave ${shown?.answers.geometry.solver_version ?? ''}`,
-      reference ? `; compared with the reference ${reference.name}` : '',
+      `${version ? 'Calculated' : 'Printed'} ${new Date().toISOString().slice(0, 10)} by toothwave ${version ?? ''}`,
+      reference && version ? `; compared with the reference ${reference.name}` : '',
       ' · ',
       html('a', { href: address }, 'this design on line'),
     ),
+    reasons.length > 0 && html('div', { class: 'report-reasons' }, html('h2', {}, `${reasons[0].title}.`), html('ul', {}, reasons.map(({ label, detail }) => html('li', {}, label ? `${label}: ${detail}` : detail)))),
     html('div', { class: 'report-design' }, groups.filter(Boolean), html('table', {}, html('caption', {}, materials.title), html('tbody', {}, parts))),
     given.length > 0 ? html('p', { class: 'report-parts' }, html('b', {}, `${made.title}. `), `${given.join('. ')}.`) : '',
-  ];
+  ].filter(Boolean);
 }
 
 /** Findings of one kind share a title and an advice, and each has its line; what they mean stands below where few have to share
@@ -65,7 +85,7 @@ export function findingsTable(findings) {
       return html(
         'tr',
         {},
-        finding === first && html('th', { scope: 'rowgroup', rowspan: kind.length }, kindOf(first)),
+        finding === first && html('th', { scope: 'rowgroup', rowspan: kind.length }, kindOfFinding(first)),
         html('td', {}, where && `${where} `, html('b', { class: 'number' }, withUnit(number(value, 5), unit))),
         html('td', {}, html('span', { class: 'number' }, withUnit(number(limit, 5), unit)), finding === first && html('span', { class: 'basis' }, basisOf(first))),
         finding === first && html('td', { rowspan: kind.length }, sentence(readable(first.advice))),

@@ -2,7 +2,8 @@
 
 import { html, setText, symbol } from './dom.js';
 import { DASH, difference, number } from './format.js';
-import { CONTACTS, framesOf } from './motion.js';
+import { CONTACTS } from './motion.js';
+import { term } from './terms.js';
 
 const row = (label, sign, unit, get, more) => ({ label, symbol: sign, unit, get, ...more });
 
@@ -21,14 +22,6 @@ const contactRows = (field, name, sign, unit) =>
 
 const least = (column) => column?.reduce((most, value) => Math.min(most, value));
 const greatest = (column) => column?.reduce((most, value) => Math.max(most, value));
-
-/** Teeth of a zone that carry, by input angle, where the service tells them from those that only mesh. */
-const carrying = new WeakMap();
-function carryingTeeth({ sweep }) {
-  if (!sweep?.states.loaded) return undefined;
-  if (!carrying.has(sweep)) carrying.set(sweep, framesOf(sweep.states).map(({ rows }) => [...rows.values()].filter(({ loaded }) => loaded).length));
-  return carrying.get(sweep);
-}
 
 /** The contact that carries the largest of a quantity. */
 function largest(field, { sweep }) {
@@ -50,6 +43,7 @@ const KEY_ROWS = [
   row('Ratio, ring fixed', '', '', ({ geometry }) => geometry?.transmission_ratio),
   row('Coincidence degree', '', '', ({ coincidence }) => coincidence?.coincidence_degree, {
     note: ({ coincidence }) => `from ψ ${number(coincidence.engagement.start_deg, 4)}°`,
+    terms: ['coincidence', 'position'],
   }),
   row('Teeth in mesh, a zone', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, {
     text: ({ coincidence: { teeth_in_mesh_per_zone: { min, max } } }) => (min === max ? `${min}` : `${min} to ${max}`),
@@ -72,12 +66,12 @@ export const GROUPS = [
       row('Ratio, ring fixed', 'i_HG', '', ({ geometry }) => geometry?.transmission_ratio),
       row('Ratio, carrier fixed', 'i_HK', '', ({ geometry }) => geometry?.transmission_ratio_carrier_fixed),
       row('Period of the load pattern', '', 'deg', ({ geometry }) => geometry?.period_deg),
-      row('Coincidence degree, both zones', 'ε', '', ({ coincidence }) => coincidence?.coincidence_degree, { significant: 7 }),
+      row('Coincidence degree, both zones', 'ε', '', ({ coincidence }) => coincidence?.coincidence_degree, { significant: 7, terms: ['coincidence'] }),
       row('Fewest teeth in mesh, each zone', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.min),
       row('Most teeth in mesh, each zone', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max),
-      row('Fewest teeth that carry, each zone', '', '', (answers) => least(carryingTeeth(answers))),
-      row('Most teeth that carry, each zone', '', '', (answers) => greatest(carryingTeeth(answers))),
-      row('Engagement begins, from the major axis', 'ψ_e', 'deg', ({ geometry }) => geometry?.engagement.start_deg),
+      row('Fewest teeth that carry, each zone', '', '', ({ sweep }) => sweep?.carrying_teeth?.min),
+      row('Most teeth that carry, each zone', '', '', ({ sweep }) => sweep?.carrying_teeth?.max),
+      row('Engagement begins, from the major axis', 'ψ_e', 'deg', ({ geometry }) => geometry?.engagement.start_deg, { terms: ['position'] }),
       row('Undercut', '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
         text: ({ geometry }) => (geometry.undercut.occurs ? 'yes' : 'no'),
       }),
@@ -165,7 +159,7 @@ export class Results {
       const value = html('data', { class: 'value number' });
       const unit = entry.unit && !entry.text ? html('span', { class: 'unit' }, entry.unit) : undefined;
       const note = html('span', { class: 'tile-note number' });
-      const tile = html('div', { class: 'tile' }, html('dt', {}, entry.label), html('dd', {}, value, unit && [' ', unit], note));
+      const tile = html('div', { class: 'tile' }, html('dt', {}, html('span', {}, entry.label), entry.terms && term(...entry.terms)), html('dd', {}, value, unit && [' ', unit], note));
       this.#tiles.push({ entry, tile, value, note });
       keyFigures.append(tile);
     }
@@ -191,7 +185,7 @@ export class Results {
         const line = html(
           'tr',
           {},
-          html('th', { scope: 'row' }, entry.label, entry.symbol && [' ', symbol(entry.symbol)]),
+          html('th', { scope: 'row' }, entry.label, entry.symbol && [' ', symbol(entry.symbol)], entry.terms && [' ', term(...entry.terms)]),
           html('td', { class: 'numeric' }, value, unit),
           html('td', { class: 'numeric compared' }, reference, referenceUnit),
           [delta, html('td', { class: 'place' }, place)],
@@ -209,8 +203,9 @@ export class Results {
     return difference === 'differs' ? `reference: ${entry.text(reference)}` : difference;
   }
 
-  /** Shows answers, and beside them those of a reference. What has no answer keeps its place but no number. */
-  update(answers, reference) {
+  /** Shows answers, and beside them those of a reference. What has no answer keeps its place but no number; `isHeld` says that no row may
+   *  go, because a slider is held. */
+  update(answers, reference, isHeld) {
     this.table.classList.toggle('comparing', Boolean(reference));
     for (const { group, offer, heading } of this.#offers) {
       const isAnswered = (given) => given && group.rows[0].get(given) !== undefined;
@@ -229,7 +224,7 @@ export class Results {
       const { entry, line, value, unit, reference: other, referenceUnit, delta, place } = cell;
       const shown = show(entry, answers);
       const otherShown = reference && show(entry, reference);
-      line.hidden = !shown && !otherShown;
+      line.hidden = !shown && !otherShown && (line.hidden || !isHeld);
       setText(value, shown?.text ?? DASH);
       if (shown) value.value = shown.value;
       setText(other, otherShown?.text ?? DASH);

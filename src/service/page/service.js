@@ -1,6 +1,9 @@
 // The client of the calculation service: the newest design wins, stale requests are aborted, and a service that went away is
 // asked again until it answers.
 
+import { isAsking, request } from './access.js';
+import { answerOf } from './answers.js';
+
 /** A running evaluation is left to finish although a newer design waits, unless it takes much longer than the last one took:
  *  a dragged slider then shows every answer that it can get, instead of aborting each one just before it arrives. */
 const GRACE = 2;
@@ -9,6 +12,21 @@ const MOST_GRACE_MS = 1000;
 const FIRST_RETRY_MS = 500;
 const LONGEST_RETRY_MS = 5000;
 const HEARTBEAT_MS = 5000;
+
+/** A calculation that takes longer than this is told of; after the second time the service is asked whether it lives, and gets the
+ *  third to say so. */
+const SLOW_MS = 1000;
+const SUSPICIOUS_MS = 3000;
+const ALIVE_MS = 2000;
+
+const SILENT = 'The calculation service does not answer.';
+
+/** Whether the process answers at all, within its time. */
+const isAlive = () =>
+  fetch('health/live', { cache: 'no-store', signal: AbortSignal.timeout(ALIVE_MS) }).then(
+    () => true,
+    () => false,
+  );
 
 const ENDPOINTS = { geometry: 'v1/geometry', coincidence: 'v1/coincidence-degree', sweep: 'v1/sweep' };
 
@@ -22,21 +40,21 @@ class Unavailable extends Error {
 
 const JSON_TYPE = 'application/json';
 
-/** One answer, or the problem in its place; anything but JSON is answered as a `Blob`. */
-export async function ask(path, design, { signal, accept = JSON_TYPE } = {}) {
+/** One answer, or the problem in its place; anything but JSON is answered as a `Blob`. `kind` says how an answer is read. */
+export async function ask(path, design, { signal, accept = JSON_TYPE, kind } = {}) {
   let response;
   let body;
   try {
-    response = await fetch(path, {
+    response = await request(path, {
       method: 'POST',
       headers: { 'content-type': JSON_TYPE, accept },
       body: JSON.stringify(design),
       signal,
     });
-    body = await (response.ok && accept !== JSON_TYPE ? response.blob() : response.json());
+    body = await (response.ok && accept !== JSON_TYPE ? response.blob() : answerOf(response, response.ok ? kind : undefined, signal));
   } catch (error) {
     if (signal?.aborted) throw error;
-    throw new Unavailable('The calculation service does not answer.');
+    throw new Unavailable(SILENT);
   }
   if (response.status === 503) {
     throw new Unavailable(body.detail, 1000 * Number(response.headers.get('retry-after') ?? 1));
@@ -52,7 +70,7 @@ export async function evaluate(design, signal) {
   const drawn = { ...design, profile: { ...design.profile, extent: 'tooth' } };
   const names = Object.keys(ENDPOINTS);
   const replies = await Promise.all(
-    names.map((name) => ask(ENDPOINTS[name], name === 'geometry' ? drawn : design, { signal })),
+    names.map((name) => ask(ENDPOINTS[name], name === 'geometry' ? drawn : design, { signal, kind: name })),
   );
   const result = { design, answers: {}, problems: [], solveMs: 0 };
   names.forEach((name, index) => {
@@ -65,12 +83,13 @@ export async function evaluate(design, signal) {
 }
 
 export const getJson = async (path) => {
-  const response = await fetch(path);
+  const response = await request(path, { timeoutMs: SUSPICIOUS_MS });
   if (!response.ok) throw new Error(`${path}: ${response.status}`);
   return response.json();
 };
 
 export class Service {
+  #watch;
   #last;
   #lastMs = 0;
   #waiting;
@@ -80,12 +99,15 @@ export class Service {
   #onResult;
   #onAway;
   #onBusy;
+  #onSlow;
 
-  /** `onResult(result)` for each evaluation that is finished; `onAway(isAway, detail)` and `onBusy(isBusy)` when that changes. */
-  constructor({ onResult, onAway, onBusy }) {
+  /** `onResult(result)` for each evaluation that is finished; `onAway(isAway, detail)` and `onBusy(isBusy)` when that changes;
+   *  `onSlow(seconds)` each second that an evaluation takes longer, undefined when it does no more. */
+  constructor({ onResult, onAway, onBusy, onSlow }) {
     this.#onResult = onResult;
     this.#onAway = onAway;
     this.#onBusy = onBusy;
+    this.#onSlow = onSlow;
     setInterval(() => this.#beat(), HEARTBEAT_MS);
   }
 
@@ -110,6 +132,7 @@ export class Service {
     const running = { controller, since: performance.now() };
     this.#running = running;
     this.#onBusy(true);
+    this.#watchOver(running);
     try {
       const result = await evaluate(design, controller.signal);
       this.#lastMs = performance.now() - running.since;
@@ -128,20 +151,36 @@ export class Service {
     } finally {
       clearTimeout(running.abortTimer);
       this.#running = undefined;
+      clearInterval(this.#watch);
       if (this.#waiting) this.#run();
-      else this.#onBusy(false);
+      else {
+        this.#onSlow(undefined);
+        this.#onBusy(false);
+      }
     }
+  }
+
+  /** Tells of an evaluation that takes long, and of a service that is silent. */
+  #watchOver(running) {
+    clearInterval(this.#watch);
+    let isProbed = false;
+    this.#watch = setInterval(async () => {
+      if (isAsking()) return;
+      const age = performance.now() - running.since;
+      this.#onSlow(age / 1000);
+      if (age < SUSPICIOUS_MS || isProbed) return;
+      isProbed = true;
+      if (!(await isAlive()) && this.#running === running) this.#setAway(true, SILENT);
+      isProbed = false;
+    }, SLOW_MS);
   }
 
   /** An idle page notices too that the service went away. */
   async #beat() {
     if (document.hidden || this.#running) return;
-    try {
-      await fetch('health/live', { cache: 'no-store' });
-    } catch {
-      this.#setAway(true, 'The calculation service does not answer.');
-      if (this.#last && !this.#running) this.request(this.#last);
-    }
+    if (await isAlive()) return;
+    this.#setAway(true, SILENT);
+    if (this.#last && !this.#running) this.request(this.#last);
   }
 
   #setAway(away, detail) {

@@ -13,17 +13,24 @@ function decode(text) {
 
 const isObject = (value) => typeof value === 'object' && value !== null && !Array.isArray(value);
 
-/** What the address holds: `{ design, reference }`, each undefined where there is none. Throws where it cannot be read. */
+/** What the address holds: `{ design, reference, broken }`, each of the first two undefined where there is none or none that can be
+ *  read; `broken` names those. An address that holds something else, as a link that was cut short, is a broken design. */
 export function fromAddress(hash) {
-  const parameters = new URLSearchParams(hash.replace(/^#/, ''));
-  const read = (name) => {
-    const text = parameters.get(name);
-    if (!text) return undefined;
-    const design = decode(text);
-    if (!isObject(design)) throw new Error('no design document');
-    return design;
-  };
-  return { design: read('design'), reference: read('reference') };
+  const text = hash.replace(/^#/, '');
+  const parameters = new URLSearchParams(text);
+  const found = { broken: [] };
+  for (const name of ['design', 'reference']) {
+    if (!parameters.has(name)) continue;
+    try {
+      const design = decode(parameters.get(name));
+      if (!isObject(design)) throw new Error('no design document');
+      found[name] = design;
+    } catch {
+      found.broken.push(name);
+    }
+  }
+  if (text && !found.design && !found.broken.includes('design')) found.broken.push('design');
+  return found;
 }
 
 export function toAddress(design, reference) {
@@ -45,6 +52,19 @@ export function fromText(text) {
 }
 
 export const toFile = (design) => new Blob([toText(design)], { type: 'application/json' });
+
+const inOrder = (value) =>
+  isObject(value) ? Object.fromEntries(Object.keys(value).sort().map((key) => [key, inOrder(value[key])])) : Array.isArray(value) ? value.map(inOrder) : value;
+
+/** Six digits that tell designs apart by their names: 24 bits of FNV-1a over the document with its fields in order. */
+export function fingerprint(design) {
+  let hash = 0x811c9dc5;
+  for (const byte of new TextEncoder().encode(JSON.stringify(inOrder(design)))) hash = Math.imul(hash ^ byte, 0x01000193) >>> 0;
+  return ((hash >>> 24) ^ (hash & 0xffffff)).toString(16).padStart(6, '0');
+}
+
+/** What a design is called that comes from a file: its name without the endings that this page itself gave it. */
+export const titleOfFile = (name) => name.replace(/\.json$/i, '').replace(/(-changed)*(-[0-9a-f]{6})?$/, '') || name;
 
 /** Hands a blob to the browser as a file to keep. */
 export function save(blob, name) {

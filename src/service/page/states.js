@@ -1,0 +1,54 @@
+// A sweep as it is drawn: of very many input angles those that can be told apart on a screen, and what the others leave behind.
+
+import { enteringBetween, framesOf } from './motion.js';
+
+/** Most states that are drawn as they are: two plots with some thousands of points each. */
+const MOST_STATES = 6000;
+
+/** Of each frame, how many teeth carry: `{ min, max }`, where the service tells them from those that only mesh. */
+function carrying({ loaded }, starts) {
+  if (!loaded) return undefined;
+  let [min, max] = [Infinity, 0];
+  starts.forEach((start, index) => {
+    let count = 0;
+    for (let row = start; row < (starts[index + 1] ?? loaded.length); row += 1) count += loaded[row] ? 1 : 0;
+    min = Math.min(min, count);
+    max = Math.max(max, count);
+  });
+  return { min, max };
+}
+
+/** Where each frame begins, as `framesOf` parts them. */
+function startsOf({ input_angle_deg: angles, tooth }) {
+  const starts = [];
+  for (let row = 0; row < tooth.length; row += 1) {
+    if (row === 0 || angles[row] !== angles[row - 1] || tooth[row] <= tooth[row - 1]) starts.push(row);
+  }
+  return starts;
+}
+
+const part = (states, from, to) => Object.fromEntries(Object.entries(states).map(([name, column]) => [name, column.slice(from, to)]));
+
+/** The sweep with `carrying_teeth`, and with so few states that they can be drawn: every so many input angles, both sides of each jump,
+ *  and the angles of the peaks. What the table shows stays that of all states. */
+export function drawable(sweep) {
+  const { states, peaks } = sweep;
+  const starts = startsOf(states);
+  const whole = { ...sweep, carrying_teeth: carrying(states, starts) };
+  const stride = Math.ceil(states.tooth.length / MOST_STATES);
+  if (stride <= 1) return whole;
+  const last = starts.length - 1;
+  const peakAngles = new Set(Object.values(peaks).flatMap(({ force_n: force, stress_mpa: stress }) => [force.input_angle_deg, stress.input_angle_deg]));
+  const kept = new Set([0, last]);
+  const end = (frame) => starts[frame + 1] ?? states.tooth.length;
+  const frame = (index) => framesOf(part(states, starts[index], end(index)))[0];
+  for (let index = 0; index < last; index += 1) {
+    if (index % stride === 0 || peakAngles.has(states.input_angle_deg[starts[index]])) kept.add(index);
+    // Only where a tooth number appears that was not there can loads jump.
+    const isNewest = states.tooth[end(index + 1) - 1] > states.tooth[end(index) - 1];
+    if (isNewest && enteringBetween(sweep, frame(index), frame(index + 1))) kept.add(index).add(index + 1);
+  }
+  const rows = [...kept].sort((one, other) => one - other).flatMap((index) => Array.from({ length: end(index) - starts[index] }, (_, row) => starts[index] + row));
+  const thinned = Object.fromEntries(Object.entries(states).map(([name, column]) => [name, rows.map((row) => column[row])]));
+  return { ...whole, states: thinned };
+}

@@ -1,0 +1,66 @@
+// What the words mean, where they stand: a mark beside a word opens its definition, and the help lists all of them.
+
+import { html } from './dom.js';
+
+const PAPER =
+  'Wang Su, Bai Xin, Chen Shixian, Wang Chunyan: Research on analysis of force and contacting stress for the discrete teeth harmonic drives. ' +
+  'Journal of Chongqing University 36(1), 2013, 35–42 (in Chinese).';
+
+export const TERMS = {
+  coincidence: {
+    title: 'Coincidence degree ε',
+    text: 'The contact ratio: how many teeth touch the ring’s flanks at once, on average over a turn and in both meshing zones together. More teeth share the load.',
+  },
+  position: {
+    title: 'Position ψ',
+    text: 'Where a tooth stands, as the angle from the wave generator’s major axis. At ψ = 0° it is pushed out farthest, into the root of the ring; it enters the ring’s flank at ψ_e, 90° at most.',
+  },
+  slots: {
+    title: 'Slots in theory Z_G',
+    text: 'How many slots the carrier has room for: the count that sets the ratio, two more or two fewer than the ring’s teeth. Of these slots all, or every second, third and so on, are made and hold a tooth.',
+  },
+  projection: {
+    title: 'Projection',
+    text: 'How the paper adds up what the contacts of a tooth yield: each approach is projected on the direction of the wave generator’s force. It makes the answers those of the paper.',
+  },
+  virtual_work: {
+    title: 'Virtual work',
+    text: 'The frictionless solution for a tooth that is free to find its place: each contact’s approach counts with the force that it takes. It is the one that follows from mechanics alone.',
+  },
+  paper: { title: 'The paper', text: PAPER },
+};
+
+const definition = html('div', { id: 'definition', class: 'definition', popover: 'auto', role: 'note' });
+
+/** A mark that opens definitions beside it. */
+export function term(...keys) {
+  const names = keys.map((key) => TERMS[key].title).join(', ');
+  const button = html('button', { type: 'button', class: 'term', 'aria-label': `What is meant: ${names}` }, '?');
+  // A press outside closes it before the click is heard, which would then open it anew.
+  let wasOpen = false;
+  const isOpen = () => definition.matches(':popover-open') && definition.previousSibling === button;
+  button.addEventListener('pointerdown', () => {
+    wasOpen = isOpen();
+  });
+  button.addEventListener('click', (event) => {
+    // A mark may stand inside what has a click of its own.
+    event.preventDefault();
+    const closes = wasOpen || isOpen();
+    wasOpen = false;
+    if (definition.matches(':popover-open')) definition.hidePopover();
+    if (closes) return;
+    definition.replaceChildren(html('dl', {}, keys.map((key) => [html('dt', {}, TERMS[key].title), html('dd', {}, TERMS[key].text)]).flat()));
+    // Beside its mark in the document too, so that the next press of Tab and a screen reader find it there; in a dialog nothing else
+    // can be reached.
+    button.after(definition);
+    definition.showPopover();
+    const { left, bottom, top } = button.getBoundingClientRect();
+    const { offsetWidth: width, offsetHeight: height } = definition;
+    const below = bottom + 6 + height <= innerHeight;
+    definition.style.left = `${Math.max(8, Math.min(left, document.documentElement.clientWidth - width - 8))}px`;
+    definition.style.top = `${below ? bottom + 6 : Math.max(8, top - 6 - height)}px`;
+  });
+  return button;
+}
+
+export const glossary = () => html('dl', { class: 'glossary' }, Object.values(TERMS).map(({ title, text }) => [html('dt', {}, title), html('dd', {}, text)]).flat());

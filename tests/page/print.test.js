@@ -1,0 +1,68 @@
+// What comes out on paper.
+
+import assert from 'node:assert/strict';
+import { after, afterEach, before, test } from 'node:test';
+import { getDocument } from 'pdfjs-dist/legacy/build/pdf.mjs';
+import { enter, setDocument, testBed } from './harness.js';
+
+const bed = testBed({ before, after, afterEach });
+
+/** The lines of each page from top to bottom; ligatures stand alone in a PDF. */
+async function printed(page) {
+  const data = new Uint8Array(await page.pdf({ preferCSSPageSize: true, printBackground: true }));
+  const pdf = await getDocument({ data, verbosity: 0 }).promise;
+  const pages = [];
+  for (let number = 1; number <= pdf.numPages; number += 1) {
+    const { items } = await (await pdf.getPage(number)).getTextContent();
+    const lines = new Map();
+    for (const { str, transform } of items) {
+      if (!str.trim()) continue;
+      const y = Math.round(transform[5] / 3);
+      lines.set(y, [...(lines.get(y) ?? []), { x: transform[4], str }]);
+    }
+    pages.push([...lines].sort(([one], [other]) => other - one).map(([, parts]) => parts.sort((one, other) => one.x - other.x).map(({ str }) => str).join(' ').replace(/ ?(ff|fi|fl) ?/g, '$1')));
+  }
+  return pages;
+}
+
+test('an impossible design prints its inputs and why it is impossible, and no number of another', async () => {
+  const page = await bed.open();
+  await enter(page, '/drive/wave_generator/semi_minor_mm', 60);
+  const pages = await printed(page);
+  assert.equal(pages.length, 1);
+  const text = pages[0].join('\n');
+  assert.match(text, /Values that no design can have/);
+  assert.match(text, /Semi-major axis: .*must exceed/);
+  assert.match(text, /Semi-minor axis\s+60/);
+  assert.doesNotMatch(text, /1549|Largest stress|980/);
+  // Possible again, it prints all.
+  await enter(page, '/drive/wave_generator/semi_minor_mm', 56);
+  assert.match((await printed(page)).flat().join('\n'), /1549/);
+});
+
+test('no head stands alone at the foot of a page', async () => {
+  const page = await bed.open();
+  const heads = await page.evaluate(() => [...document.querySelectorAll('h2, h3, .group th')].map((element) => element.childNodes[0]?.textContent.trim()).filter(Boolean));
+  assert.ok(heads.includes('Results') && heads.includes('Parts and room'));
+  const base = await bed.server.example('paper-5.2');
+  for (const design of [
+    await bed.server.example('paper-5.1'),
+    base,
+    { ...base, sweep: { wind_up: true } },
+    { ...base, sweep: { wind_up: true }, load: { ...base.load, allowable_stress_mpa: 1500 }, model: { compatibility: 'virtual_work', clearance: { ring_um: 2 } } },
+  ]) {
+    await setDocument(page, design);
+    const pages = await printed(page);
+    assert.ok(pages.length <= 2, `${pages.length} pages`);
+    for (const lines of pages) assert.ok(!heads.includes(lines.at(-1)?.trim()), `${lines.at(-1)} stands alone`);
+  }
+});
+
+test('a comparison prints the inputs that differ', async () => {
+  const page = await bed.open();
+  await page.click('#keep');
+  await enter(page, '/load/input_torque_nm', 3);
+  const text = (await printed(page)).flat().join('\n');
+  assert.match(text, /Inputs that differ ?from the reference/);
+  assert.match(text, /Input torque\s+3.N·m\s+20.N·m/);
+});

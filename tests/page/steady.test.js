@@ -1,0 +1,128 @@
+// Nothing moves under the hand, everything can be reached and hit.
+
+import assert from 'node:assert/strict';
+import { after, afterEach, before, test } from 'node:test';
+import { choose, enter, field, notes, settled, setDocument, testBed } from './harness.js';
+
+const RADIUS = '/drive/teeth/radius_mm';
+const SEMI_MINOR = '/drive/wave_generator/semi_minor_mm';
+const bed = testBed({ before, after, afterEach });
+
+/** Where things stand that a hand or an eye is on. */
+const places = (page) =>
+  page.evaluate(() =>
+    Object.fromEntries(
+      ['#mechanism-title', '#whole', '#plots-title', '#table-title', '#accuracy-title', '.field:has(> .entry #field-drive-teeth-radius_mm)', '.field:has(> .entry #field-drive-teeth-width_mm)', '#field-load-input_torque_nm'].map((selector) => [selector, document.querySelector(selector).getBoundingClientRect().top]),
+    ),
+  );
+
+/** Drags a slider from its middle to shares of its length, and gives the places at each. */
+async function dragged(page, pointer, shares) {
+  const slider = page.locator(`.field:has(> .entry ${field(pointer)}) input[type=range]`);
+  const box = await slider.boundingBox();
+  const y = box.y + box.height / 2;
+  await page.mouse.move(box.x + box.width / 2, y);
+  const all = [await places(page)];
+  await page.mouse.down();
+  for (const share of shares) {
+    const before = await page.inputValue(field(pointer));
+    await page.mouse.move(box.x + box.width * share, y);
+    // A browser hands pointer events on by the frame.
+    await page.waitForFunction(([selector, old]) => document.querySelector(selector).value !== old, [field(pointer), before]);
+    await settled(page);
+    all.push(await places(page));
+  }
+  return all;
+}
+
+for (const [name, viewport] of Object.entries({ wide: { width: 1366, height: 900 }, tablet: { width: 820, height: 1180 } })) {
+  test(`nothing moves while a held slider passes limits: ${name}`, async () => {
+    const page = await bed.open({ viewport });
+    // Past the undercut, and past the smallest semi-minor axis that a cam can have.
+    const all = await dragged(page, RADIUS, [0.75, 0.95, 0.5]);
+    for (const each of all) assert.deepEqual(each, all[0]);
+    await page.mouse.move(1, 1);
+    await page.mouse.up();
+    await page.click('#undo');
+    await settled(page);
+    const passed = await dragged(page, SEMI_MINOR, [0.8, 0.99, 0.5]);
+    for (const each of passed) assert.deepEqual(each, passed[0]);
+    await page.mouse.up();
+  });
+}
+
+test('what a held slider passes is told at once in the line at the top, and at the field when it is let go', async () => {
+  const page = await bed.open();
+  await dragged(page, RADIUS, [0.75]);
+  assert.match(await page.textContent('#status-findings'), /Undercut ring tips/);
+  assert.equal(await page.locator(`${notes(RADIUS)} .finding`).count(), 0);
+  await page.mouse.up();
+  await settled(page);
+  assert.match(await page.textContent(notes(RADIUS)), /Undercut ring tips/);
+  assert.match(await page.textContent('#findings'), /Undercut ring tips/);
+});
+
+test('an impossible design is told in a line of its own height, with all reasons under it on demand', async () => {
+  const page = await bed.open();
+  const before = await places(page);
+  await enter(page, SEMI_MINOR, 60);
+  const after = await places(page);
+  for (const place of ['#mechanism-title', '#whole', '#plots-title']) assert.equal(after[place], before[place], place);
+  await page.click('#impossible summary');
+  await page.click('#impossible-all button:has-text("Semi-major axis")');
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'field-drive-wave_generator-semi_major_mm');
+});
+
+test('a field that has the focus stays where it is while others above it are told of', async () => {
+  const page = await bed.open();
+  await page.focus(field('/drive/ring/teeth'));
+  const top = () => page.$eval(field('/drive/ring/teeth'), (input) => input.getBoundingClientRect().top);
+  const before = await top();
+  await page.keyboard.press('Control+a');
+  await page.keyboard.type('2');
+  await settled(page);
+  assert.ok(Math.abs((await top()) - before) <= 1, `${await top()} is not ${before}`);
+});
+
+test('Play is reached within a dozen tab stops', async () => {
+  const page = await bed.open();
+  let stops = 0;
+  for (; stops < 30; stops += 1) {
+    if (await page.evaluate(() => document.activeElement.id === 'play')) break;
+    await page.keyboard.press('Tab');
+  }
+  assert.ok(stops <= 12, `${stops} stops`);
+});
+
+test('the tools are one stop, and arrows move among them', async () => {
+  const page = await bed.open();
+  await page.focus('#save');
+  await page.keyboard.press('ArrowRight');
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'load');
+  await page.keyboard.press('End');
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'theme');
+  await page.keyboard.press('ArrowRight');
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'keep', 'undo and redo have nothing to do yet');
+  assert.equal(await page.locator('#tools [tabindex="0"]').count(), 1);
+});
+
+test('at 320 px nothing is wider than the screen, and every target is 24 px', async () => {
+  const page = await bed.open({ viewport: { width: 320, height: 640 } });
+  await page.click('#keep');
+  await setDocument(page, { ...(await bed.server.example('paper-5.2')), sweep: { wind_up: true }, model: { compatibility: 'virtual_work', stiffness: { law: 'fixed', wave_generator_n_per_mm: 5e5, ring_n_per_mm: 5e5, carrier_n_per_mm: 5e5 }, clearance: { ring_um: 1 } }, load: { input_torque_nm: 3, allowable_stress_mpa: 1500 } });
+  for (const details of await page.$$('main details:not([open]) > summary')) if (await details.isVisible()) await details.click();
+  const seen = () =>
+    page.evaluate(() => ({
+      overflow: document.documentElement.scrollWidth - document.documentElement.clientWidth,
+      small: [...document.querySelectorAll('input[type=range], button, summary, select, .button')]
+        .filter((element) => element.checkVisibility() && !element.closest('p, .hidden'))
+        .map((element) => [element.id || element.className || element.textContent, element.getBoundingClientRect()])
+        .filter(([, { width, height }]) => height < 24 || width < 24)
+        .map(([name, { width, height }]) => `${name}: ${width} × ${height}`),
+    }));
+  assert.deepEqual(await seen(), { overflow: 0, small: [] });
+  await enter(page, SEMI_MINOR, 70);
+  assert.equal((await seen()).overflow, 0);
+  await page.click('#help');
+  assert.equal((await seen()).overflow, 0);
+});
