@@ -34,7 +34,7 @@ const ENDLESS: [&str; 5] = ["serve", "--deadline-ms", "600000", "--max-states", 
 
 /// Until a solve runs.
 fn until_running(address: SocketAddr, solves: f64) {
-    while metric(address, "toothwave_solves_running") != solves {}
+    assert!((0..100_000).any(|_| metric(address, "toothwave_solves_running") == solves), "never {solves} solves");
 }
 
 /// A file of its own for a test.
