@@ -31,6 +31,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 use toothwave::api::batch::{BatchEndpoint, BatchQuery, answer_line};
 use toothwave::config::Settings;
+use toothwave::room::Room;
 use toothwave_calculation::design::Design;
 use toothwave_calculation::question::{Limits, Question};
 use toothwave_calculation::sweep::Sweep;
@@ -173,9 +174,9 @@ fn serve_bare() -> Result<(), Failure> {
     let limits = limits();
     let answer = Sweep.ask(DESIGN.as_bytes(), &limits, &AtomicBool::new(false))?;
     let bytes = serde_json::to_vec(&answer)?.into();
-    let mut batch = Vec::new();
+    let (mut batch, room) = (Vec::new(), Room::new(u64::MAX));
     for index in 0..BATCH as u64 {
-        answer_line(PEAKS, index, DESIGN.as_bytes(), &limits, &AtomicBool::new(false), &mut batch);
+        batch.extend(answer_line(PEAKS, index, DESIGN.as_bytes(), &limits, &room, &AtomicBool::new(false)).text);
     }
     let router = Router::new()
         .route("/serialised", post(serialised))
@@ -478,7 +479,7 @@ async fn designs(effort: Effort, toothwave: &Server) -> Result<String, Failure> 
     let read = || Design::read(DESIGN.as_bytes());
     let design = read()?;
     let checked = Sweep.check(&design, &limits)?;
-    let mut line = Vec::new();
+    let room = Room::new(u64::MAX);
     let mut steps: [(&str, Step<'_>); 4] = [
         ("reading the document", Box::new(|| drop(black_box(read())))),
         ("checking it, and the drive's geometry", Box::new(|| drop(black_box(Sweep.check(&design, &limits))))),
@@ -486,8 +487,7 @@ async fn designs(effort: Effort, toothwave: &Server) -> Result<String, Failure> 
         (
             "all of a line, writing its answer included",
             Box::new(|| {
-                line.clear();
-                answer_line(PEAKS, 0, DESIGN.as_bytes(), &limits, &never, &mut line);
+                black_box(answer_line(PEAKS, 0, DESIGN.as_bytes(), &limits, &room, &never));
             }),
         ),
     ];
@@ -498,11 +498,7 @@ async fn designs(effort: Effort, toothwave: &Server) -> Result<String, Failure> 
          | step | µs |\n|---|---|\n",
         Spread::of(per_second).show(1.0),
         requests.length(),
-        {
-            let mut line = Vec::new();
-            answer_line(PEAKS, 0, DESIGN.as_bytes(), &limits, &never, &mut line);
-            line.len()
-        },
+        answer_line(PEAKS, 0, DESIGN.as_bytes(), &limits, &room, &never).text.len(),
     );
     for (name, step) in &mut steps {
         let mut times = Vec::new();

@@ -32,6 +32,8 @@ const ENOUGH: Duration = Duration::from_millis(2);
 pub struct AccuracyAnswer {
     /// Version of the solver.
     pub solver_version: &'static str,
+    /// The build that computed it: equal builds on equal processors give equal bytes.
+    pub build: &'static str,
     /// The relative error that was asked for.
     pub requested_error: f64,
     /// The fastest way of the design's own model that meets it; left out where none does.
@@ -190,6 +192,7 @@ impl Question for Accuracy {
         let cheapest = ways.iter().filter(is_own).min_by(|one, other| one.solve_us.total_cmp(&other.solve_us)).cloned();
         Ok(AccuracyAnswer {
             solver_version: toothwave_solver::VERSION,
+            build: crate::BUILD,
             requested_error: *requested_error,
             cheapest,
             ways,

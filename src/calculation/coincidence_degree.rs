@@ -20,6 +20,8 @@ use crate::question::{Limits, Question, checked_drive};
 pub struct CoincidenceDegreeAnswer {
     /// Version of the solver.
     pub solver_version: &'static str,
+    /// The build that computed it: equal builds on equal processors give equal bytes.
+    pub build: &'static str,
     /// Contact ratio ε, counted over both meshing zones.
     pub coincidence_degree: f64,
     /// Where a tooth touches the ring's flank.
@@ -81,6 +83,7 @@ impl Question for CoincidenceDegree {
         let mesh = Mesh::new(drive);
         Ok(CoincidenceDegreeAnswer {
             solver_version: toothwave_solver::VERSION,
+            build: crate::BUILD,
             coincidence_degree: mesh.coincidence_degree(),
             engagement: drive.into(),
             teeth_in_mesh_per_zone: mesh.teeth_in_mesh().into(),

@@ -73,6 +73,7 @@ impl Question for Drawing {
         let bodies = checked.drawing.bodies(stop)?;
         Ok(DrawingAnswer {
             solver_version: toothwave_solver::VERSION,
+            build: crate::BUILD,
             design_hash: checked.design_hash.clone(),
             subject: checked.subject,
             chord_tolerance_mm: checked.chord_tolerance_mm,

@@ -22,6 +22,8 @@ use crate::question::{Limits, Question, checked_drive, require_finite};
 pub struct GeometryAnswer {
     /// Version of the solver.
     pub solver_version: &'static str,
+    /// The build that computed it: equal builds on equal processors give equal bytes.
+    pub build: &'static str,
     /// `i_HG = Z_G/(Z_G - Z_K)`: input speed over carrier speed, ring fixed.
     pub transmission_ratio: f64,
     /// `i_HK = -Z_K/(Z_G - Z_K)`: input speed over ring speed, carrier fixed.
@@ -223,6 +225,7 @@ impl Question for Geometry {
         let tip_radius_mm = drive.tip_radius_mm();
         let answer = GeometryAnswer {
             solver_version: toothwave_solver::VERSION,
+            build: crate::BUILD,
             transmission_ratio: drive.transmission_ratio(),
             transmission_ratio_carrier_fixed: drive.transmission_ratio_carrier_fixed(),
             period_deg: Mesh::new(drive).period_deg(),

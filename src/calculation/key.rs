@@ -3,6 +3,8 @@
 //! Every field is written always, in the order of the document and without its name, so that no two designs share their bytes. A structure
 //! is encoded by [`encoded!`], which names all its fields: one that was forgotten does not compile.
 
+use crate::BUILD;
+use crate::arithmetic::arithmetic;
 use crate::forms::Format;
 
 /// Bytes to be hashed.
@@ -109,10 +111,11 @@ encoded!(enum Format);
 pub struct Key([u8; 32]);
 
 impl Key {
-    /// The key of what is asked for, read from a normalised document, in a form.
+    /// The key of what is asked for, read from a normalised document, in a form: from this build, on a processor like this one.
     pub fn new(asked: &str, read: &impl Encode, form: &impl Encode) -> Self {
         let mut encoder = Encoder::default();
-        (toothwave_solver::VERSION, asked, read, form).encode(&mut encoder);
+        encoder.0.extend_from_slice(&arithmetic());
+        (BUILD, asked, read, form).encode(&mut encoder);
         Self(blake3::hash(&encoder.0).into())
     }
 }

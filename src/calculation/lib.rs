@@ -4,7 +4,11 @@
 //! in its middle is `toothwave_solver`'s; here are the document, the answers, and the forms that they are written in. The crate knows no
 //! network: whoever calls it decides where it runs, what is kept, and what a client is told.
 
+/// The id of this build, beside [`toothwave_solver::VERSION`] in every answer: a hash of its sources, its dependencies and its target.
+pub const BUILD: &str = env!("TOOTHWAVE_BUILD");
+
 pub mod accuracy;
+mod arithmetic;
 pub mod coincidence_degree;
 pub mod columns;
 pub mod design;

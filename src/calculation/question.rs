@@ -36,6 +36,11 @@ pub trait Question: Send + 'static {
     /// Names the fields at fault.
     fn check(&self, design: &Design, limits: &Limits) -> Result<Self::Checked, NoAnswer>;
 
+    /// Bytes that the answer's columns of numbers take, as far as that is known before it is there.
+    fn columns_bytes(_checked: &Self::Checked) -> u64 {
+        0
+    }
+
     /// Whether solving, and writing the answer as JSON, is certain to take no longer than some 0.1 ms.
     fn is_short(_checked: &Self::Checked) -> bool {
         false
@@ -47,7 +52,7 @@ pub trait Question: Send + 'static {
     /// Why there is no answer; also where `stop` was set.
     fn answer(checked: &Self::Checked, stop: &impl Stop) -> Result<Self::Answer, NoAnswer>;
 
-    /// The key of the answer in a form that `form` stands for: equal keys are equal bytes, from the same version of the solver.
+    /// The key of the answer in a form that `form` stands for: equal keys are equal bytes, whatever process they come from.
     fn key(&self, design: &Design, form: &impl Encode) -> Key {
         Key::new(self.name(), &self.reads(design), form)
     }

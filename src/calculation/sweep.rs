@@ -73,6 +73,15 @@ impl Question for Sweep {
         Ok(CheckedSweep { drive, load, points, with_clearance, with_wind_up })
     }
 
+    fn columns_bytes(checked: &CheckedSweep) -> u64 {
+        // Eleven columns of doubles and one of teeth; of a sweep to a tolerance nobody knows how long they will be.
+        const STATE_BYTES: u64 = 11 * 8 + 4;
+        match checked.points {
+            Points::Samples(samples) => STATE_BYTES * Mesh::new(&checked.drive).state_count(samples),
+            Points::Tolerance { .. } => 0,
+        }
+    }
+
     fn is_short(checked: &CheckedSweep) -> bool {
         /// They are solved and written in about 0.1 ms; with Palmgren's law and all that can be asked for in a quarter of a millisecond.
         const FEW_STATES: u64 = 400;
@@ -95,6 +104,7 @@ impl Question for Sweep {
         findings.extend(of_wind_up.iter().chain(&of_half_widths).chain(&of_contacts).map(FindingAnswer::from));
         let answer = SweepAnswer {
             solver_version: toothwave_solver::VERSION,
+            build: crate::BUILD,
             coincidence_degree: mesh.coincidence_degree(),
             period_deg: mesh.period_deg(),
             load: LoadAnswer {

@@ -29,6 +29,8 @@ pub struct Stored {
     pub body: Bytes,
     /// Whether it is on its way to clients.
     pub sent: Sent,
+    /// Of an answer that was just made: its room, until all who asked have taken it.
+    pub held: Option<Bytes>,
     /// How long the solve took.
     pub solve: Duration,
     /// The same as the header says it, made once for all who get the answer.
@@ -166,20 +168,23 @@ impl Cache {
 
     /// The answer under `key`, which `solve` makes once for all who ask meanwhile.
     ///
-    /// The solve runs in a task of its own: when the client that started it leaves, those who joined do not start over; when all
-    /// have left, it is dropped.
+    /// The solve runs in a task of its own: when the client that started it leaves, or its time is over, those who joined do not start
+    /// over; when all have left, it is dropped.
+    ///
+    /// Nothing where there is none until the time of this one who asks is over; each has its own.
     ///
     /// # Errors
     /// What `solve` returns; failures are not kept.
     pub async fn solve_once(
         &self,
         key: Key,
+        time_is_over: impl Future<Output = ()>,
         solve: impl Future<Output = Result<Stored, Problem>> + Send + 'static,
-    ) -> Result<(Stored, Served), Problem> {
+    ) -> Result<Option<(Stored, Served)>, Problem> {
         let (flight, served) = {
             let mut flights = self.flights.lock();
             if let Some(stored) = self.answers.get(&key) {
-                return Ok((stored, Served::Hit));
+                return Ok(Some((stored, Served::Hit)));
             }
             match flights.get(&key).and_then(Weak::upgrade) {
                 Some(flight) => (flight, Served::Collapsed),
@@ -194,11 +199,22 @@ impl Cache {
             }
         };
         let mut outcome = flight.outcome.clone();
-        let outcome = outcome.wait_for(Option::is_some).await;
+        let is_told = tokio::select! {
+            biased;
+            _ = outcome.wait_for(Option::is_some) => true,
+            () = time_is_over => false,
+        };
+        if !is_told {
+            if Arc::into_inner(flight).is_some() {
+                // It was the last one, so the solve ends: whoever is told so finds its place free.
+                let _ = outcome.wait_for(Option::is_some).await;
+            }
+            return Ok(None);
+        }
         // Without an outcome the task has panicked, and has said so in the log.
-        let outcome = outcome.ok().and_then(|outcome| outcome.clone());
+        let outcome = outcome.borrow().clone();
         let stored = outcome.unwrap_or_else(|| Err(Problem::internal(&"a solve had no outcome")))?;
-        Ok((stored, served))
+        Ok(Some((stored, served)))
     }
 
     /// A solve for whoever wants it, and the task that it runs in.
@@ -215,7 +231,7 @@ impl Cache {
         let task = async move {
             let outcome = wanted.run_until_cancelled(solve).await;
             if let Some(Ok(stored)) = &outcome {
-                answers.insert(key, stored.clone());
+                answers.insert(key, Stored { held: None, ..stored.clone() });
             }
             // Whoever finds no solve under way from here on finds the answer.
             drop(landing);

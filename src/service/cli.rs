@@ -24,10 +24,11 @@ use toothwave_calculation::question::{Limits, Question};
 use toothwave_calculation::sweep::Sweep;
 use tracing_subscriber::EnvFilter;
 
-use crate::api::batch::{BatchEndpoint, BatchQuery, answer_line};
+use crate::api::batch::{BatchEnd, BatchEndpoint, BatchQuery, answer_line};
 use crate::config::Settings;
 use crate::problem::Problem;
-use crate::{keys, observe, router, serve};
+use crate::room::Room;
+use crate::{keys, log, observe, router, serve};
 
 /// Bad input, as most tools have it.
 const EXIT_BAD_INPUT: u8 = 2;
@@ -156,15 +157,15 @@ pub fn run() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(Failure::BadInput(text)) => {
-            eprintln!("toothwave: {text}");
-            ExitCode::from(EXIT_BAD_INPUT)
-        }
-        Err(Failure::Io(error)) => {
-            eprintln!("toothwave: {error}");
-            ExitCode::FAILURE
-        }
+        Err(Failure::BadInput(text)) => complain(&text, ExitCode::from(EXIT_BAD_INPUT)),
+        Err(Failure::Io(error)) => complain(&error, ExitCode::FAILURE),
     }
+}
+
+/// Says what went wrong, where anybody listens: standard error may be full or closed.
+fn complain(what: &dyn std::fmt::Display, status: ExitCode) -> ExitCode {
+    let _ = writeln!(io::stderr(), "toothwave: {what}");
+    status
 }
 
 /// Says what is wrong with the command line. It names the first fault alone; of the settings in the environment, by which containers are
@@ -228,13 +229,14 @@ fn arguments() -> Vec<OsString> {
 
 fn run_service(settings: &Settings) -> Result<(), Failure> {
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
-    tracing_subscriber::fmt().json().with_span_list(false).with_env_filter(filter).with_writer(io::stderr).init();
+    log::start(filter)?;
     // As many threads for solves as there are permits: with more of them each solve would wake another, whose memory is cold.
     let solves = settings.limits().max_concurrent_solves;
     let runtime = tokio::runtime::Builder::new_multi_thread().max_blocking_threads(solves).enable_all().build()?;
     let result = runtime.block_on(serve::serve(settings));
     // A solve beyond its bound must not hold up the exit.
     runtime.shutdown_background();
+    log::flush();
     result.map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", settings.listen)).into())
 }
 
@@ -285,22 +287,22 @@ fn batch(file: &Path, query: BatchQuery) -> Result<(), Failure> {
     progress.set_length(bytes.unwrap_or(0));
     let mut lines = input.split(b'\n');
     let mut index = 0;
+    let room = Room::new(u64::MAX);
     print(|writer| {
         loop {
             let chunk: Vec<_> =
                 lines.by_ref().take(lines_at_once(query, rayon::current_num_threads())).collect::<io::Result<_>>()?;
             if chunk.is_empty() {
                 progress.finish_and_clear();
-                return Ok(());
+                let end = BatchEnd { asked: index, answered: index, problem: None };
+                return writer.write_all(&end.line());
             }
             progress.inc(chunk.iter().map(|line| line.len() as u64 + 1).sum());
             let documents: Vec<_> = chunk.iter().filter(|line| !line.trim_ascii().is_empty()).zip(index..).collect();
             let answers: Vec<_> = documents
                 .par_iter()
                 .map(|&(document, index)| {
-                    let mut answer = Vec::new();
-                    answer_line(query, index, document, &OFFLINE, &AtomicBool::new(false), &mut answer);
-                    answer
+                    answer_line(query, index, document, &OFFLINE, &room, &AtomicBool::new(false)).text
                 })
                 .collect();
             index += documents.len() as u64;

@@ -89,14 +89,38 @@ impl Pool {
         self.closed.cancel();
     }
 
-    /// Runs `job` and hands it the signal that stops it: at the deadline, when the pool is closed, or when this future is dropped.
+    /// What comes of `future` until the deadline, at which it is dropped.
     ///
     /// # Errors
-    /// `queue_full` at once where no place is free, `deadline_exceeded` when the time is over, `shutting_down` when the pool is
-    /// closed, `internal_error` where the job panicked, and whatever the job returns.
+    /// `deadline_exceeded`, and whatever it comes to.
+    async fn within<T>(
+        &self,
+        deadline: Instant,
+        future: impl Future<Output = Result<T, Problem>>,
+    ) -> Result<T, Problem> {
+        tokio::time::timeout_at(deadline, future).await.unwrap_or_else(|_| Err(self.deadline_exceeded()))
+    }
+
+    /// Runs `job` as [`Self::run_while_wanted`] does, until the deadline.
+    ///
+    /// # Errors
+    /// As there, and `deadline_exceeded` when the time is over.
     pub async fn run<T: Send + 'static>(
         &self,
         deadline: Instant,
+        on: Thread,
+        job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        self.within(deadline, self.run_while_wanted(on, job)).await
+    }
+
+    /// Runs `job` and hands it the signal that stops it: when the pool is closed, or when this future is dropped.
+    ///
+    /// # Errors
+    /// `queue_full` at once where no place is free, `shutting_down` when the pool is closed, `internal_error` where the job panicked,
+    /// and whatever the job returns.
+    pub async fn run_while_wanted<T: Send + 'static>(
+        &self,
         on: Thread,
         job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
@@ -109,7 +133,7 @@ impl Pool {
             histogram!("toothwave_solve_duration_seconds").record(started.elapsed());
             result
         };
-        self.run_holding(place, deadline, on, timed).await
+        self.run_holding(place, on, timed).await
     }
 
     /// A place for a batch, to be held while it runs.
@@ -143,21 +167,19 @@ impl Pool {
             turn = Arc::clone(&self.turns).acquire_owned() => turn,
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
-        self.run_holding(turn, self.deadline(), Thread::Blocking, job).await
+        self.within(self.deadline(), self.run_holding(turn, Thread::Blocking, job)).await
     }
 
     async fn run_holding<T: Send + 'static>(
         &self,
         place: impl Send + 'static,
-        deadline: Instant,
         on: Thread,
         job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
-        let waited = tokio::select! {
-            waited = tokio::time::timeout_at(deadline, Arc::clone(&self.permits).acquire_owned()) => waited,
+        let permit = tokio::select! {
+            permit = Arc::clone(&self.permits).acquire_owned() => permit,
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
-        let Ok(permit) = waited else { return Err(self.deadline_exceeded()) };
         if on == Thread::Executor {
             let _held = (place, permit);
             return caught(|| job(&AtomicBool::new(false)));
@@ -171,15 +193,11 @@ impl Pool {
             span.in_scope(|| caught(|| job(&signal)))
         });
         let finished = tokio::select! {
-            finished = tokio::time::timeout_at(deadline, running) => finished,
+            finished = running => finished,
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
-        stop.is_over = finished.is_ok();
-        match finished {
-            Ok(Ok(Err(Problem { code: ProblemCode::DeadlineExceeded, .. }))) | Err(_) => Err(self.deadline_exceeded()),
-            Ok(Ok(result)) => result,
-            Ok(Err(error)) => Err(Problem::internal(&error)),
-        }
+        stop.is_over = true;
+        finished.unwrap_or_else(|error| Err(Problem::internal(&error)))
     }
 
     fn queue_full(&self) -> Problem {
@@ -190,7 +208,8 @@ impl Pool {
         Problem::new(ProblemCode::QueueFull, detail)
     }
 
-    fn deadline_exceeded(&self) -> Problem {
+    /// The problem of what took too long.
+    pub fn deadline_exceeded(&self) -> Problem {
         let detail = format!(
             "the computation did not finish within {} ms, waiting included; ask for less or try again in a moment",
             self.limits.deadline_ms

@@ -12,9 +12,28 @@ use tracing_subscriber::EnvFilter;
 use utoipa::ToSchema;
 
 use crate::keys::Keys;
+use crate::machine;
 
 /// Solves that may be allowed to run or to wait: more than any machine can, fewer than a semaphore can count.
 const MOST_SOLVES: i64 = 1_000_000;
+
+/// Where the machine does not tell.
+const UNKNOWN_MEMORY_BYTES: u64 = 2 << 30;
+
+/// By default, for each solve that runs at once: room for one of a million states that is made, and for another one on its way.
+const MOST_UNREAD_BYTES_PER_SOLVE: u64 = 512 << 20;
+
+/// By default.
+const MOST_CACHE_BYTES: u64 = 256 << 20;
+
+/// States or points, by default.
+const MOST_OF_AN_ANSWER: u64 = 1_000_000;
+
+/// What a state takes while its answer is made: its columns and their text.
+const STATE_BYTES: u64 = 320;
+
+/// What a point takes in the longest form, STEP.
+const POINT_BYTES: u64 = 800;
 
 /// Bytes of a request's line and headers together, at most.
 pub const MAX_HEADER_BYTES: usize = 40_960;
@@ -30,13 +49,13 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_MAX_BODY_BYTES", value_name = "BYTES", default_value_t = 65_536)]
     pub max_body_bytes: usize,
 
-    /// Most states of a sweep
-    #[arg(long, env = "TOOTHWAVE_MAX_STATES", value_name = "N", default_value_t = 1_000_000)]
-    pub max_states: u64,
+    /// Most states of a sweep [default: 1000000, or as many as have room in max-unread-bytes]
+    #[arg(long, env = "TOOTHWAVE_MAX_STATES", value_name = "N")]
+    pub max_states: Option<u64>,
 
-    /// Most points of all profiles of a geometry
-    #[arg(long, env = "TOOTHWAVE_MAX_PROFILE_POINTS", value_name = "N", default_value_t = 1_000_000)]
-    pub max_profile_points: u64,
+    /// Most points of all profiles of a geometry [default: 1000000, or as many as have room in max-unread-bytes]
+    #[arg(long, env = "TOOTHWAVE_MAX_PROFILE_POINTS", value_name = "N")]
+    pub max_profile_points: Option<u64>,
 
     /// Solves that run at once [default: the cores that the process may use]
     #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_SOLVES", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_SOLVES))]
@@ -54,13 +73,14 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_DEADLINE_MS", value_name = "MS", default_value_t = 10_000)]
     pub deadline_ms: u64,
 
-    /// Most bytes of answers that the cache keeps
-    #[arg(long, env = "TOOTHWAVE_CACHE_MAX_BYTES", value_name = "BYTES", default_value_t = 268_435_456)]
-    pub cache_max_bytes: u64,
+    /// Most bytes of answers that the cache keeps [default: 256 MiB, or an eighth of the memory]
+    #[arg(long, env = "TOOTHWAVE_CACHE_MAX_BYTES", value_name = "BYTES")]
+    pub cache_max_bytes: Option<u64>,
 
-    /// Most bytes of answers on their way to clients, those up to 256 KiB not counted
-    #[arg(long, env = "TOOTHWAVE_MAX_UNREAD_BYTES", value_name = "BYTES", default_value_t = 536_870_912)]
-    pub max_unread_bytes: u64,
+    /// Most bytes of answers that nobody has read yet: being made, in batches, on their way; those up to 256 KiB not counted
+    /// [default: 512 MiB for each solve that runs at once, or half of the memory]
+    #[arg(long, env = "TOOTHWAVE_MAX_UNREAD_BYTES", value_name = "BYTES")]
+    pub max_unread_bytes: Option<u64>,
 
     /// Connections that may be open at once
     #[arg(long, env = "TOOTHWAVE_MAX_CONNECTIONS", value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=MOST_SOLVES))]
@@ -77,6 +97,11 @@ pub struct Settings {
     /// Origin that browsers may call from, or `*`; may be given several times, in the variable separated by commas
     #[arg(long = "cors-origin", env = "TOOTHWAVE_CORS_ORIGINS", value_name = "ORIGIN", value_delimiter = ',', value_parser = origin)]
     pub cors_origins: Vec<String>,
+
+    /// Milliseconds after a signal to stop in which the service still takes what comes, not ready any more and closing each connection
+    /// after its answer, so that whoever spreads requests can turn to others
+    #[arg(long, env = "TOOTHWAVE_LAME_DUCK_MS", value_name = "MS", default_value_t = 0)]
+    pub lame_duck_ms: u64,
 
     /// Milliseconds that running requests get to finish after a signal to stop; below the ten seconds that container engines wait
     #[arg(long, env = "TOOTHWAVE_SHUTDOWN_MS", value_name = "MS", default_value_t = 8_000)]
@@ -106,7 +131,7 @@ pub struct Limits {
     pub deadline_ms: u64,
     /// Most bytes of answers that the cache keeps.
     pub cache_max_bytes: u64,
-    /// Most bytes of answers on their way to clients, those up to 256 KiB not counted.
+    /// Most bytes of answers that nobody has read yet: being made, in batches, on their way; those up to 256 KiB not counted.
     pub max_unread_bytes: u64,
     /// Connections that may be open at once.
     pub max_connections: usize,
@@ -128,20 +153,30 @@ impl Settings {
     pub fn limits(&self) -> Limits {
         let cores = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
         let max_concurrent_solves = self.max_concurrent_solves.map_or_else(cores, |solves| solves as usize);
+        let memory_bytes = machine::memory_bytes().unwrap_or(UNKNOWN_MEMORY_BYTES);
+        let max_unread_bytes = self
+            .max_unread_bytes
+            .unwrap_or_else(|| (memory_bytes / 2).min(max_concurrent_solves as u64 * MOST_UNREAD_BYTES_PER_SOLVE));
+        let with_room_for = |each_bytes: u64| MOST_OF_AN_ANSWER.min(max_unread_bytes / each_bytes).max(1);
         Limits {
-            max_states: self.max_states,
-            max_profile_points: self.max_profile_points,
+            max_states: self.max_states.unwrap_or_else(|| with_room_for(STATE_BYTES)),
+            max_profile_points: self.max_profile_points.unwrap_or_else(|| with_room_for(POINT_BYTES)),
             max_body_bytes: self.max_body_bytes,
             max_concurrent_solves,
             max_queued_solves: self.max_queued_solves as usize,
             max_concurrent_batches: self.max_concurrent_batches as usize,
             deadline_ms: self.deadline_ms,
-            cache_max_bytes: self.cache_max_bytes,
-            max_unread_bytes: self.max_unread_bytes,
+            cache_max_bytes: self.cache_max_bytes.unwrap_or_else(|| MOST_CACHE_BYTES.min(memory_bytes / 8)),
+            max_unread_bytes,
             max_connections: self.max_connections as usize,
             max_header_bytes: MAX_HEADER_BYTES,
             header_timeout_ms: self.header_timeout_ms,
         }
+    }
+
+    /// The time in which the service still takes what comes, though it is told to stop.
+    pub const fn lame_duck(&self) -> Duration {
+        Duration::from_millis(self.lame_duck_ms)
     }
 
     /// The bound on a shutdown.

@@ -4,21 +4,33 @@
 //! empty ones are passed over. Keys are random and long (`toothwave new-key`), so that a fast hash cannot be searched.
 
 use std::fmt::Write as _;
+use std::os::unix::fs::PermissionsExt as _;
 use std::sync::Arc;
 
 use axum::extract::{Request, State};
 use axum::http::{HeaderValue, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use parking_lot::RwLock;
 
 use crate::problem::{Problem, ProblemCode};
 
 /// Random bytes of a new key.
 const KEY_BYTES: usize = 32;
 
-/// The hashes of the keys that open the service.
+/// The keys that open the service, as long as their file is not read anew.
 #[derive(Debug, Clone)]
-pub struct Keys(Arc<[blake3::Hash]>);
+pub struct Keys {
+    path: Arc<str>,
+    known: Arc<RwLock<Vec<Known>>>,
+}
+
+/// A line of the file.
+#[derive(Debug, Clone)]
+struct Known {
+    hash: blake3::Hash,
+    name: String,
+}
 
 impl Keys {
     /// Reads a keys file.
@@ -26,8 +38,28 @@ impl Keys {
     /// # Errors
     /// What is wrong with it.
     pub fn read(path: &str) -> Result<Self, String> {
-        let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
-        Self::parse(&text)
+        let known = Arc::new(RwLock::new(known_in(path)?));
+        Ok(Self { path: path.into(), known })
+    }
+
+    /// Reads the file again. One that is wrong leaves the keys as they were, and the log says so.
+    pub fn reload(&self) {
+        match known_in(&self.path) {
+            Ok(known) => {
+                tracing::info!(keys = known.len(), "the keys file was read again");
+                *self.known.write() = known;
+            }
+            Err(error) => tracing::error!(path = %self.path, error, "the keys stay as they were"),
+        }
+        self.warn_of_readers();
+    }
+
+    /// Whoever reads the file learns the names, and which hash to look for.
+    pub fn warn_of_readers(&self) {
+        let mode = std::fs::metadata(&*self.path).map_or(0, |file| file.permissions().mode());
+        if mode & 0o004 != 0 {
+            tracing::warn!(path = %self.path, mode = format!("{:o}", mode & 0o777), "anyone on this machine may read the keys file");
+        }
     }
 
     /// Reads the text of a keys file.
@@ -35,25 +67,35 @@ impl Keys {
     /// # Errors
     /// What is wrong with it.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let mut keys = Vec::new();
-        for (number, line) in (1..).zip(text.lines()) {
-            let Some(hash) = line.split_whitespace().next().filter(|word| !word.starts_with('#')) else { continue };
-            let hash = blake3::Hash::from_hex(hash)
-                .map_err(|_| format!("line {number} does not begin with a hash of 64 hexadecimal digits"))?;
-            keys.push(hash);
-        }
-        if keys.is_empty() {
-            Err("there is no key in it, so that nobody could come in".into())
-        } else {
-            Ok(Self(keys.into()))
-        }
+        Ok(Self { path: "".into(), known: Arc::new(RwLock::new(parse(text)?)) })
     }
 
-    /// Whether a key is one of them. Every hash is compared, each in constant time.
-    fn open_to(&self, key: &str) -> bool {
+    /// The name of a key that is one of them. Every hash is compared, each in constant time.
+    fn name_of(&self, key: &str) -> Option<String> {
         let hash = blake3::hash(key.as_bytes());
-        self.0.iter().fold(false, |found, known| found | (*known == hash))
+        let known = self.known.read();
+        let found = known.iter().fold(None, |found, known| if known.hash == hash { Some(known) } else { found });
+        found.map(|known| known.name.clone())
     }
+}
+
+fn known_in(path: &str) -> Result<Vec<Known>, String> {
+    parse(&std::fs::read_to_string(path).map_err(|error| error.to_string())?)
+}
+
+fn parse(text: &str) -> Result<Vec<Known>, String> {
+    let mut keys = Vec::new();
+    for (number, line) in (1..).zip(text.lines()) {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let (hash, name) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        let hash = blake3::Hash::from_hex(hash)
+            .map_err(|_| format!("line {number} does not begin with a hash of 64 hexadecimal digits"))?;
+        keys.push(Known { hash, name: name.trim().into() });
+    }
+    if keys.is_empty() { Err("there is no key in it, so that nobody could come in".into()) } else { Ok(keys) }
 }
 
 /// A new key, and its line of a keys file.
@@ -88,7 +130,8 @@ pub async fn require(State(keys): State<Keys>, request: Request, next: Next) -> 
         let (scheme, key) = value.split_once(' ')?;
         scheme.eq_ignore_ascii_case("bearer").then(|| key.trim())
     });
-    if key.is_some_and(|key| keys.open_to(key)) {
+    if let Some(name) = key.and_then(|key| keys.name_of(key)) {
+        tracing::Span::current().record("key", name);
         return next.run(request).await;
     }
     let detail = match key {

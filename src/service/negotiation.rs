@@ -161,8 +161,9 @@ fn joined<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Cow<'a, str> {
     values.fold(first.into(), |list, value| format!("{list},{value}").into())
 }
 
-/// Whether `If-None-Match` names this entity tag, compared weakly as the header wants it, or `*`, which stands for any (RFC 9110).
+/// Whether `If-None-Match` names this entity tag, compared weakly as the header wants it. `*`, which stands for any, is ignored: it is for
+/// what a client would overwrite, and one that has no answer would get none.
 pub fn is_not_modified(headers: &HeaderMap, etag: &str) -> bool {
     let listed = joined(headers, &header::IF_NONE_MATCH);
-    listed.split(',').map(str::trim).any(|tag| tag.strip_prefix("W/").unwrap_or(tag) == etag) || listed.trim() == "*"
+    listed.split(',').map(str::trim).any(|tag| tag.strip_prefix("W/").unwrap_or(tag) == etag)
 }

@@ -3,22 +3,29 @@
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::hash::{BuildHasher, RandomState};
+use std::pin::Pin;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{LazyLock, OnceLock};
+use std::sync::{Arc, LazyLock, OnceLock};
+use std::task::{Context, Poll, ready};
 use std::time::{Duration, Instant};
 
-use axum::extract::{MatchedPath, Request};
+use axum::body::{Body, Bytes, HttpBody};
+use axum::extract::{MatchedPath, Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, header};
 use axum::middleware::Next;
 use axum::response::Response;
-use metrics::{Counter, Histogram, counter, gauge, histogram};
+use http_body::{Frame, SizeHint};
+use metrics::{Counter, Histogram, counter, describe_counter, describe_gauge, describe_histogram, gauge, histogram};
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
+use metrics_process::Collector;
+use toothwave_calculation::BUILD;
 use toothwave_calculation::json::word;
-use tracing::Instrument;
+use tracing::{Instrument, Span};
 
 use crate::api::App;
 use crate::cache::Provenance;
-use crate::problem::Problem;
+use crate::problem::{Problem, ProblemCode};
+use crate::{log, socket};
 
 /// Upper bounds of the histograms' buckets in seconds: from a cache hit to the longest deadline.
 const BUCKETS_S: [f64; 12] = [1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 1e-2, 5e-2, 0.1, 0.5, 1.0, 10.0];
@@ -31,9 +38,36 @@ pub fn install_recorder() {
         PrometheusBuilder::new()
             .set_buckets_for_metric(Matcher::Suffix("_seconds".into()), &BUCKETS_S)
             .and_then(PrometheusBuilder::install_recorder)
+            .inspect(|_| describe())
             .inspect_err(|error| tracing::error!(%error, "no metrics"))
             .ok()
     });
+}
+
+/// What each series says, for whoever reads the metrics themselves.
+fn describe() {
+    Collector::default().describe();
+    describe_counter!("toothwave_http_requests_total", "Requests answered.");
+    describe_histogram!("toothwave_http_request_duration_seconds", "Time to an answer's head.");
+    describe_histogram!(
+        "toothwave_http_request_completion_seconds",
+        "Time until an answer was handed to the network, or broken off."
+    );
+    describe_counter!("toothwave_cache_requests_total", "Answers that may be kept, by where they came from.");
+    describe_gauge!("toothwave_cache_bytes", "Bytes that the cache holds.");
+    describe_gauge!("toothwave_cache_entries", "Answers that the cache holds.");
+    describe_histogram!("toothwave_solve_duration_seconds", "Time of each solve, without waiting.");
+    describe_gauge!("toothwave_solves_running", "Solves that run.");
+    describe_gauge!("toothwave_solves_queued", "Single solves that wait.");
+    describe_gauge!("toothwave_batches_running", "Batches that run.");
+    describe_counter!("toothwave_batch_documents_total", "Documents of batches answered.");
+    describe_counter!("toothwave_refusals_total", "Requests that were not taken on, by the reason.");
+    describe_counter!("toothwave_cancellations_total", "Computations that were stopped.");
+    describe_gauge!("toothwave_connections", "Connections that are open.");
+    describe_gauge!("toothwave_unread_bytes", "Bytes taken of max_unread_bytes.");
+    describe_counter!("toothwave_sent_bytes_total", "Bytes handed to the network.");
+    describe_counter!("toothwave_log_lines_lost_total", "Lines of the log that nobody will read.");
+    describe_gauge!("toothwave_build_info", "1; its labels say what runs.");
 }
 
 /// The metrics as text; levels are read at this moment.
@@ -47,7 +81,13 @@ pub fn render(app: &App) -> String {
         gauge!("toothwave_batches_running").set(app.pool.batches() as f64);
         gauge!("toothwave_solves_running").set(running as f64);
         gauge!("toothwave_solves_queued").set(app.pool.admitted().saturating_sub(running) as f64);
+        gauge!("toothwave_connections").set(socket::open() as f64);
+        gauge!("toothwave_unread_bytes").set(app.room.taken_bytes() as f64);
     }
+    gauge!("toothwave_build_info", "version" => env!("CARGO_PKG_VERSION"), "build" => BUILD).set(1.0);
+    counter!("toothwave_sent_bytes_total").absolute(socket::sent_bytes());
+    counter!("toothwave_log_lines_lost_total").absolute(log::lost_lines());
+    Collector::default().collect();
     let handle = RECORDER.get().and_then(Option::as_ref);
     handle.map(PrometheusHandle::render).unwrap_or_default()
 }
@@ -68,6 +108,7 @@ pub async fn keep_up() {
 struct Series {
     requests: Counter,
     duration: Histogram,
+    completion: Histogram,
     from_cache: Option<Counter>,
 }
 
@@ -79,23 +120,24 @@ thread_local! {
     static SERIES: RefCell<HashMap<String, HashMap<Labels, Series>>> = RefCell::default();
 }
 
-/// Counts a request; routes, methods and statuses are few, so that there are few series.
-fn count(route: &str, labels: Labels, elapsed: Duration) {
+/// Counts a request; routes, methods and statuses are few, so that there are few series. Returns where its completion counts.
+fn count(route: &str, labels: Labels, elapsed: Duration) -> Histogram {
     // What is found before there is a recorder would lead nowhere for ever.
     if RECORDER.get().is_none() {
-        return;
+        return Histogram::noop();
     }
     SERIES.with_borrow_mut(|series| {
         if !series.contains_key(route) {
             series.insert(route.to_owned(), HashMap::new());
         }
-        let Some(of_route) = series.get_mut(route) else { return };
-        let Series { requests, duration, from_cache } = of_route.entry(labels).or_insert_with(|| {
+        let Some(of_route) = series.get_mut(route) else { return Histogram::noop() };
+        let Series { requests, duration, completion, from_cache } = of_route.entry(labels).or_insert_with(|| {
             let (method, status, cache) = labels;
             let route = route.to_owned();
             Series {
                 requests: counter!("toothwave_http_requests_total", "route" => route.clone(), "method" => method, "status" => status.to_string()),
-                duration: histogram!("toothwave_http_request_duration_seconds", "route" => route),
+                duration: histogram!("toothwave_http_request_duration_seconds", "route" => route.clone()),
+                completion: histogram!("toothwave_http_request_completion_seconds", "route" => route),
                 from_cache: cache.map(|cache| counter!("toothwave_cache_requests_total", "status" => cache)),
             }
         });
@@ -104,7 +146,8 @@ fn count(route: &str, labels: Labels, elapsed: Duration) {
         if let Some(counter) = from_cache {
             counter.increment(1);
         }
-    });
+        completion.clone()
+    })
 }
 
 /// The id of a request, the client's own or ours.
@@ -118,13 +161,33 @@ fn new_id() -> HeaderValue {
     HeaderValue::try_from(id).unwrap_or(HeaderValue::from_static("none"))
 }
 
-/// The middleware: a request's id and a span with it, then, when the answer's head is ready, one line, the metrics, and the headers
-/// that every answer has.
-pub async fn observe(request: Request, next: Next) -> Response {
+/// Characters of an id at most: what others than ourselves wrote stands in the log and in the answer.
+const LONGEST_ID: usize = 128;
+
+/// The client's id, where it is one.
+fn given_id(headers: &HeaderMap) -> Option<HeaderValue> {
+    let id = headers.get(X_REQUEST_ID)?;
+    let is_id = (1..=LONGEST_ID).contains(&id.len()) && id.as_bytes().iter().all(u8::is_ascii_graphic);
+    is_id.then(|| id.clone())
+}
+
+/// What W3C Trace Context calls the caller: version, trace, parent and flags in hexadecimal.
+const TRACEPARENT: HeaderName = HeaderName::from_static("traceparent");
+
+fn traceparent(headers: &HeaderMap) -> Option<&str> {
+    let value = headers.get(TRACEPARENT)?.to_str().ok()?;
+    let is_hexadecimal = |part: &str| part.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
+    let parts: Vec<_> = value.split('-').collect();
+    let lengths: Vec<_> = parts.iter().map(|part| part.len()).collect();
+    (lengths == [2, 32, 16, 2] && parts.iter().all(|part| is_hexadecimal(part))).then_some(value)
+}
+
+/// The middleware: a request's id and a span with it; when the answer's head is ready, the metrics and the headers that every answer
+/// has; and one line when its body is on its way or broken off.
+pub async fn observe(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let started = Instant::now();
     // The route and not the path: labels must stay few.
     let route = request.extensions().get::<MatchedPath>().cloned();
-    let route = route.as_ref().map_or("none", MatchedPath::as_str);
     let method = match *request.method() {
         Method::GET => "GET",
         Method::HEAD => "HEAD",
@@ -136,22 +199,144 @@ pub async fn observe(request: Request, next: Next) -> Response {
         // Clients can invent methods without end, and each would be a series of its own.
         _ => "other",
     };
-    let id = request.headers().get(X_REQUEST_ID).cloned().unwrap_or_else(new_id);
-    let span = tracing::info_span!("request", id = id.to_str().unwrap_or_default(), design = tracing::field::Empty);
+    let id = given_id(request.headers()).unwrap_or_else(new_id);
+    let span = tracing::info_span!(
+        "request",
+        id = id.to_str().unwrap_or_default(),
+        design = tracing::field::Empty,
+        key = tracing::field::Empty,
+        traceparent = traceparent(request.headers())
+    );
     let mut response = next.run(request).instrument(span.clone()).await;
     let elapsed = started.elapsed();
-    if let Some(problem) = response.extensions().get() {
+    let problem = response.extensions().get::<Problem>().map(|problem| {
         span.in_scope(|| problem_is_told(problem));
-    }
+        problem.code
+    });
     let status = response.status().as_u16();
     let provenance = response.extensions().get::<Provenance>();
     let cache = provenance.map(|provenance| provenance.served.label());
     let solve_ms = provenance.map(|provenance| 1e3 * provenance.solve.as_secs_f64());
-    count(route, (method, status, cache), elapsed);
-    let elapsed_ms = 1e3 * elapsed.as_secs_f64();
-    span.in_scope(|| tracing::info!(method, route, status, cache, solve_ms, elapsed_ms, "request"));
+    let histogram = count(route.as_ref().map_or("none", MatchedPath::as_str), (method, status, cache), elapsed);
     complete(response.headers_mut(), id);
-    response
+    if !app.ready.load(Ordering::Relaxed) {
+        response.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
+    }
+    let elapsed_ms = 1e3 * elapsed.as_secs_f64();
+    response.map(|body| {
+        let is_whole = body.is_end_stream();
+        let sent_bytes = 0;
+        let completion = Completion {
+            span,
+            method,
+            route,
+            status,
+            cache,
+            problem,
+            solve_ms,
+            started,
+            elapsed_ms,
+            sent_bytes,
+            is_whole,
+            histogram,
+        };
+        Body::new(Observed { body, rest: Bytes::new(), completion })
+    })
+}
+
+/// What is known of a request when the last of its answer is handed over, or will never be.
+struct Completion {
+    span: Span,
+    method: &'static str,
+    route: Option<MatchedPath>,
+    status: u16,
+    cache: Option<&'static str>,
+    problem: Option<ProblemCode>,
+    solve_ms: Option<f64>,
+    started: Instant,
+    elapsed_ms: f64,
+    sent_bytes: u64,
+    is_whole: bool,
+    histogram: Histogram,
+}
+
+impl Drop for Completion {
+    fn drop(&mut self) {
+        let Self { method, status, cache, solve_ms, elapsed_ms, sent_bytes, is_whole, .. } = *self;
+        let completed = self.started.elapsed();
+        self.histogram.record(completed);
+        let completed_ms = 1e3 * completed.as_secs_f64();
+        let route = self.route.as_ref().map_or("none", MatchedPath::as_str);
+        let problem = self.problem.map(|code| word(&code));
+        self.span.in_scope(|| {
+            tracing::info!(
+                method,
+                route,
+                status,
+                problem,
+                cache,
+                solve_ms,
+                elapsed_ms,
+                completed_ms,
+                sent_bytes,
+                is_whole,
+                "request"
+            );
+        });
+    }
+}
+
+/// So much of a body is handed over at once: what is left of a large one is known to be on its way only when it is asked for.
+const PART_BYTES: usize = 1 << 18;
+
+/// A body, in parts, that tells what became of it.
+struct Observed {
+    body: Body,
+    /// Of what the body gave last.
+    rest: Bytes,
+    completion: Completion,
+}
+
+impl HttpBody for Observed {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        let this = &mut *self;
+        if this.rest.is_empty() {
+            match ready!(Pin::new(&mut this.body).poll_frame(context)) {
+                Some(Ok(frame)) => match frame.into_data() {
+                    Ok(bytes) => this.rest = bytes,
+                    Err(trailers) => return Poll::Ready(Some(Ok(trailers))),
+                },
+                Some(Err(error)) => return Poll::Ready(Some(Err(error))),
+                None => {
+                    this.completion.is_whole = true;
+                    return Poll::Ready(None);
+                }
+            }
+        }
+        let part = this.rest.split_to(this.rest.len().min(PART_BYTES));
+        this.completion.sent_bytes += part.len() as u64;
+        this.completion.is_whole = this.is_end_stream();
+        Poll::Ready(Some(Ok(Frame::data(part))))
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.rest.is_empty() && self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        let (mut hint, rest) = (self.body.size_hint(), self.rest.len() as u64);
+        if let Some(upper) = hint.upper() {
+            hint.set_upper(upper + rest);
+        }
+        hint.set_lower(hint.lower() + rest);
+        hint
+    }
 }
 
 /// Logs why an internal error happened, and counts refusals by their code: here alone, where a problem is about to be told.

@@ -62,6 +62,8 @@ pub struct Problem {
 pub enum ProblemCode {
     /// 400: the body is no JSON.
     MalformedJson,
+    /// 400: the body broke off, or is not coded as its head says.
+    BrokenBody,
     /// 400: a query that the path does not know.
     InvalidQuery,
     /// 401: no key, or one that opens nothing.
@@ -78,6 +80,8 @@ pub enum ProblemCode {
     BodyTooLarge,
     /// 415: the body is not sent as plain JSON.
     UnsupportedMediaType,
+    /// 421: a service that listens on this machine alone was asked under another name.
+    MisdirectedRequest,
     /// 422: JSON of another form than the design document's.
     InvalidDocument,
     /// 422: values that no drive, load or request can have.
@@ -108,7 +112,7 @@ impl ProblemCode {
     /// Its HTTP status.
     pub const fn status(self) -> StatusCode {
         match self {
-            Self::MalformedJson | Self::InvalidQuery => StatusCode::BAD_REQUEST,
+            Self::MalformedJson | Self::BrokenBody | Self::InvalidQuery => StatusCode::BAD_REQUEST,
             Self::Unauthorized => StatusCode::UNAUTHORIZED,
             Self::NotFound => StatusCode::NOT_FOUND,
             Self::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
@@ -116,6 +120,7 @@ impl ProblemCode {
             Self::RequestTimeout => StatusCode::REQUEST_TIMEOUT,
             Self::BodyTooLarge => StatusCode::PAYLOAD_TOO_LARGE,
             Self::UnsupportedMediaType => StatusCode::UNSUPPORTED_MEDIA_TYPE,
+            Self::MisdirectedRequest => StatusCode::MISDIRECTED_REQUEST,
             Self::InvalidDocument
             | Self::ImpossibleDesign
             | Self::NoToothInMesh
@@ -134,6 +139,7 @@ impl ProblemCode {
     const fn title(self) -> &'static str {
         match self {
             Self::MalformedJson => "The body is no JSON",
+            Self::BrokenBody => "The body broke off",
             Self::InvalidQuery => "The query is not one of this path",
             Self::Unauthorized => "A key is wanted",
             Self::NotFound => "Nothing stands at this path",
@@ -142,6 +148,7 @@ impl ProblemCode {
             Self::RequestTimeout => "The body did not arrive in time",
             Self::BodyTooLarge => "The body is too large",
             Self::UnsupportedMediaType => "The body is not sent as plain JSON",
+            Self::MisdirectedRequest => "Nobody is called so here",
             Self::InvalidDocument => "The document is no design document",
             Self::ImpossibleDesign => "Values that no design can have",
             Self::NoToothInMesh => "At some input angle no tooth carries load",
@@ -167,6 +174,7 @@ impl ProblemCode {
                 | Self::ShuttingDown
                 | Self::TooManyConnections
                 | Self::TooManyUnreadBytes
+                | Self::MisdirectedRequest
         )
     }
 }

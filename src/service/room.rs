@@ -1,4 +1,5 @@
-//! Room for large answers on their way to clients: those who read slowly must not fill the memory.
+//! Room for large answers that nobody has read yet: while they are made, while they wait in a batch, while they are on their way. However
+//! many are asked for, and however slowly they are read, they must not fill the memory.
 
 use std::sync::{Arc, Weak};
 
@@ -10,21 +11,44 @@ use crate::problem::{Problem, ProblemCode};
 
 /// Answers up to here need no room, so that slow readers of large ones stop nobody's ordinary work; the bound on connections bounds
 /// them too.
-const SMALL_BYTES: usize = 1 << 18;
+const SMALL_BYTES: u64 = 1 << 18;
 
 /// Room for so many bytes.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Room {
     /// One permit for each KiB.
     free: Arc<Semaphore>,
     max_bytes: u64,
 }
 
+/// A part of the room, for one answer.
+#[derive(Debug)]
+pub struct Reserved {
+    room: Room,
+    held: Option<OwnedSemaphorePermit>,
+}
+
+/// There is not so much left.
+#[derive(Debug, Clone, Copy, thiserror::Error)]
+#[error(
+    "the answer takes {bytes} bytes: with the others that nobody has read yet more than the {max_bytes} of `max_unread_bytes`; try again in a moment"
+)]
+pub struct NoRoom {
+    bytes: u64,
+    max_bytes: u64,
+}
+
+impl From<NoRoom> for Problem {
+    fn from(error: NoRoom) -> Self {
+        Self::new(ProblemCode::TooManyUnreadBytes, error.to_string())
+    }
+}
+
 /// An answer on its way, which gives its room back when the last client has it or has left.
 #[derive(Debug)]
 struct OnItsWay {
     answer: Bytes,
-    _room: OwnedSemaphorePermit,
+    _room: Reserved,
 }
 
 /// What one of its clients holds.
@@ -46,30 +70,88 @@ impl Room {
         Self { free: Arc::new(Semaphore::new(permits(max_bytes) as usize)), max_bytes }
     }
 
-    /// The answer, taking room until it is dropped. One larger than all the room takes all of it.
+    /// The same room for one who holds so many bytes of it already: all of it is what is left.
+    pub fn beside(&self, held_bytes: u64) -> Self {
+        Self { free: Arc::clone(&self.free), max_bytes: self.max_bytes.saturating_sub(held_bytes) }
+    }
+
+    /// Bytes that are taken now.
+    pub fn taken_bytes(&self) -> u64 {
+        let taken = permits(self.max_bytes) as usize - self.free.available_permits();
+        (taken as u64 * 1024).min(self.max_bytes)
+    }
+
+    /// Room for an answer that takes so many bytes. One larger than all the room takes all of it.
     ///
     /// # Errors
-    /// `too_many_unread_bytes` where there is not so much left.
-    pub fn take(&self, answer: Bytes, sent: &Sent) -> Result<Bytes, Problem> {
-        if answer.len() <= SMALL_BYTES {
+    /// Where there is not so much left.
+    pub fn reserve(&self, bytes: u64) -> Result<Reserved, NoRoom> {
+        let mut reserved = Reserved { room: self.clone(), held: None };
+        reserved.hold_at_least(bytes)?;
+        Ok(reserved)
+    }
+
+    /// An answer that is kept, taking room until it is dropped.
+    ///
+    /// # Errors
+    /// Where there is not so much left.
+    pub fn take(&self, answer: Bytes, sent: &Sent) -> Result<Bytes, NoRoom> {
+        let bytes = answer.len() as u64;
+        if bytes <= SMALL_BYTES {
             return Ok(answer);
         }
-        let mut sent = sent.0.lock();
-        if let Some(shared) = sent.upgrade() {
+        if let Some(shared) = sent.0.lock().upgrade() {
             return Ok(Bytes::from_owner(Share(shared)));
         }
-        let size = permits((answer.len() as u64).min(self.max_bytes));
-        let room = Arc::clone(&self.free).try_acquire_many_owned(size).map_err(|_| {
-            let detail = format!(
-                "the answer has {} bytes: with the others on their way to clients more than the {} of `max_unread_bytes`; try again in a moment",
-                answer.len(),
-                self.max_bytes
-            );
-            Problem::new(ProblemCode::TooManyUnreadBytes, detail)
-        })?;
-        let shared = Arc::new(OnItsWay { answer, _room: room });
-        *sent = Arc::downgrade(&shared);
-        Ok(Bytes::from_owner(Share(shared)))
+        Ok(self.reserve(bytes)?.send(answer, sent))
+    }
+
+    fn permits_for(&self, bytes: u64) -> u32 {
+        if bytes <= SMALL_BYTES { 0 } else { permits(bytes.min(self.max_bytes)) }
+    }
+}
+
+impl Reserved {
+    fn permits(&self) -> u32 {
+        self.held.as_ref().map_or(0, |held| u32::try_from(held.num_permits()).unwrap_or(u32::MAX))
+    }
+
+    /// More, where it is less.
+    ///
+    /// # Errors
+    /// Where there is not so much left.
+    pub fn hold_at_least(&mut self, bytes: u64) -> Result<(), NoRoom> {
+        let lacking = self.room.permits_for(bytes).saturating_sub(self.permits());
+        if lacking == 0 {
+            return Ok(());
+        }
+        let no_room = |_| NoRoom { bytes, max_bytes: self.room.max_bytes };
+        let more = Arc::clone(&self.room.free).try_acquire_many_owned(lacking).map_err(no_room)?;
+        match &mut self.held {
+            Some(held) => held.merge(more),
+            None => self.held = Some(more),
+        }
+        Ok(())
+    }
+
+    /// Less, where it is more.
+    pub fn hold_at_most(&mut self, bytes: u64) {
+        let most = self.room.permits_for(bytes);
+        if let Some(held) = &mut self.held {
+            drop(held.split(held.num_permits().saturating_sub(most as usize)));
+        }
+    }
+
+    /// The finished answer, holding its room until its last client has it.
+    pub fn send(mut self, answer: Bytes, sent: &Sent) -> Bytes {
+        let bytes = answer.len() as u64;
+        if bytes <= SMALL_BYTES {
+            return answer;
+        }
+        self.hold_at_most(bytes);
+        let shared = Arc::new(OnItsWay { answer, _room: self });
+        *sent.0.lock() = Arc::downgrade(&shared);
+        Bytes::from_owner(Share(shared))
     }
 }
 

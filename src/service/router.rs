@@ -1,12 +1,14 @@
 //! Every path on one screen, and the layers around them in order.
 
+use std::net::IpAddr;
 use std::sync::Arc;
 
 use axum::Router;
 use axum::body::Bytes;
 use axum::extract::Request;
-use axum::http::{HeaderValue, StatusCode, header};
-use axum::middleware;
+use axum::http::uri::Authority;
+use axum::http::{HeaderValue, StatusCode, Uri, header};
+use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use tower::ServiceBuilder;
@@ -42,6 +44,13 @@ use crate::problem::{PROBLEM_JSON, Problem, ProblemCode};
 struct Document;
 
 fn api() -> OpenApiRouter<Arc<App>> {
+    let side = OpenApiRouter::new()
+        .routes(routes!(side::limits))
+        .routes(routes!(side::examples))
+        .routes(routes!(side::example))
+        .routes(routes!(side::live))
+        .routes(routes!(side::ready))
+        .routes(routes!(side::metrics));
     OpenApiRouter::with_openapi(Document::openapi())
         .routes(routes!(geometry::geometry))
         .routes(routes!(coincidence_degree::coincidence_degree))
@@ -49,12 +58,19 @@ fn api() -> OpenApiRouter<Arc<App>> {
         .routes(routes!(accuracy::accuracy))
         .routes(routes!(drawings::drawing))
         .routes(routes!(batch::batch))
-        .routes(routes!(side::limits))
-        .routes(routes!(side::examples))
-        .routes(routes!(side::example))
-        .routes(routes!(side::live))
-        .routes(routes!(side::ready))
-        .routes(routes!(side::metrics))
+        // What reads a document refuses a query itself.
+        .merge(side.layer(middleware::from_fn(without_query)))
+}
+
+/// Who may ask.
+#[derive(Debug, Clone, Default)]
+pub struct Entry {
+    /// Origins that browsers may call from.
+    pub cors_origins: Vec<String>,
+    /// Keys, one of which is wanted where there are any.
+    pub keys: Option<Keys>,
+    /// Whether the service may be called by names of this machine alone.
+    pub checks_host: bool,
 }
 
 /// The API document as it is committed and served.
@@ -76,6 +92,8 @@ fn describe_entry(document: &mut openapi::OpenApi) {
         let content = Content::new(Some(Ref::from_schema_name("Problem")));
         ResponseBuilder::new().description(description).content(PROBLEM_JSON, content)
     };
+    let query = problem("A query that the path does not know.").build();
+    let host = problem("The service listens on this machine alone, and the host is another name.").build();
     let wanted = problem("A key is wanted, and the request has none or one that opens nothing.").build();
     let seconds = HeaderBuilder::new().schema(Some(u32::schema())).description(Some("Seconds")).build();
     let full = problem("As many connections are open as the service admits.").header("Retry-After", seconds).build();
@@ -88,13 +106,15 @@ fn describe_entry(document: &mut openapi::OpenApi) {
                     Some(vec![SecurityRequirement::default(), SecurityRequirement::new::<_, _, String>(KEY, [])]);
                 responses.insert("401".into(), wanted.clone().into());
             }
+            responses.entry("400".into()).or_insert_with(|| query.clone().into());
+            responses.insert("421".into(), host.clone().into());
             responses.entry("503".into()).or_insert_with(|| full.clone().into());
         }
     }
 }
 
 /// The whole service.
-pub fn router(app: Arc<App>, cors_origins: &[String], keys: Option<Keys>) -> Router {
+pub fn router(app: Arc<App>, entry: &Entry) -> Router {
     let openapi = Bytes::from(openapi_json());
     // The bundled page alone: without "none" it would ask a validator elsewhere.
     let config = Config::new(["/openapi.json"]).validator_url("none");
@@ -108,21 +128,82 @@ pub fn router(app: Arc<App>, cors_origins: &[String], keys: Option<Keys>) -> Rou
         .merge(docs)
         .fallback(not_found)
         .method_not_allowed_fallback(method_not_allowed);
+    with_layers(paths, app, entry)
+}
+
+/// What stands beyond the last connection: what has to answer all the same, and a refusal.
+pub fn beyond_connections(app: Arc<App>, entry: &Entry) -> Router {
+    let max_connections = app.limits.max_connections;
+    let paths = Router::new()
+        .route("/health/live", get(side::live))
+        .route("/health/ready", get(side::ready))
+        .route("/metrics", get(side::metrics))
+        .fallback(async move || {
+            let detail =
+                format!("{max_connections} connections are open, as many as the service admits; try again in a moment");
+            Problem::new(ProblemCode::TooManyConnections, detail)
+        });
+    with_layers(paths, app, entry)
+}
+
+fn with_layers(paths: Router<Arc<App>>, app: Arc<App>, Entry { cors_origins, keys, checks_host }: &Entry) -> Router {
     // Who is not let in by the keys still gets what the layers around give; where there are none, nothing is asked.
     let paths = match keys {
-        Some(keys) => paths.layer(middleware::from_fn_with_state(keys, keys::require)),
+        Some(keys) => paths.layer(middleware::from_fn_with_state(keys.clone(), keys::require)),
         None => paths,
     };
+    let paths = if *checks_host { paths.layer(middleware::from_fn(require_host_of_this_machine)) } else { paths };
     paths
         .layer(
             // From the outside in; one stack, because every layer of a router boxes all its routes once more. A panic becomes a problem
-            // before it is counted, logged and given its headers.
+            // before it is counted, logged and given its headers; one of the counting itself is caught too.
             ServiceBuilder::new()
-                .layer(middleware::from_fn(observe::observe))
+                .layer(CatchPanicLayer::custom(panicked))
+                .layer(middleware::from_fn_with_state(Arc::clone(&app), observe::observe))
                 .layer(option_layer((!cors_origins.is_empty()).then(|| cors(cors_origins))))
                 .layer(CatchPanicLayer::custom(panicked)),
         )
         .with_state(app)
+}
+
+/// A page of another site can have its own name resolve to this machine, and would then be of the same origin as the service. It cannot
+/// change the `Host` that the browser sends.
+async fn require_host_of_this_machine(request: Request, next: Next) -> Response {
+    let of_header = || request.headers().get(header::HOST)?.to_str().ok()?.parse::<Authority>().ok();
+    let host = request.uri().authority().cloned().or_else(of_header);
+    // Without any it is no browser.
+    let is_absent = host.is_none() && !request.headers().contains_key(header::HOST);
+    let is_of_this_machine = |host: Authority| {
+        let name = host.host().trim_start_matches('[').trim_end_matches(']');
+        name.eq_ignore_ascii_case("localhost") || name.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
+    };
+    if is_absent || host.is_some_and(is_of_this_machine) {
+        return next.run(request).await;
+    }
+    let detail = "the service listens on this machine alone: call it `localhost`, or by its address";
+    Problem::new(ProblemCode::MisdirectedRequest, detail).into_response()
+}
+
+/// The middleware of paths that know no query.
+async fn without_query(request: Request, next: Next) -> Response {
+    match require_no_query(request.uri()) {
+        Ok(()) => next.run(request).await,
+        Err(problem) => problem.into_response(),
+    }
+}
+
+/// Checks that there is no query, so that a typo is never a silent default.
+///
+/// # Errors
+/// `invalid_query`.
+pub fn require_no_query(uri: &Uri) -> Result<(), Problem> {
+    match uri.query() {
+        None | Some("") => Ok(()),
+        Some(query) => {
+            let detail = format!("`{}` knows no query, and the request has `{query}`", uri.path());
+            Err(Problem::new(ProblemCode::InvalidQuery, detail))
+        }
+    }
 }
 
 async fn openapi_document(document: Bytes) -> Response {

@@ -1,5 +1,6 @@
 //! The running service: listening, bounded connections, and stopping in order.
 
+use std::collections::VecDeque;
 use std::io::{self, Write};
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -8,41 +9,47 @@ use std::time::Duration;
 
 use axum::Router;
 use axum::body::Body;
+use futures_util::FutureExt as _;
 use hyper::body::Incoming;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
-use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use parking_lot::Mutex;
+use rustix::process::{Resource, getrlimit, setrlimit};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use tokio_io_timeout::TimeoutStream;
+use tokio::task::AbortHandle;
 use tokio_util::sync::CancellationToken;
 use tower::util::MapRequest;
 
 use crate::api::App;
 use crate::config::{Limits, MAX_HEADER_BYTES, Settings};
 use crate::observe;
-use crate::problem::{PROBLEM_JSON, Problem, ProblemCode, RETRY_AFTER_S};
-use crate::router::router;
+use crate::router::{self, Entry};
+use crate::socket::Socket;
 
-/// How long the service still listens after it has said that it is not ready, so that whoever asks can learn it.
+/// How long the service still listens at least after it has said that it is not ready, so that whoever asks can learn it.
 const NOTICE: Duration = Duration::from_millis(200);
 
 /// What running solves get at the end of the bound on a shutdown to be answered that it is over.
 const LAST_WORDS: Duration = Duration::from_millis(300);
 
-/// A connection that takes nothing of its answer for so long is closed.
-const WRITE_STALL: Duration = Duration::from_secs(30);
-
-/// What a client beyond the last connection gets to have sent its request before it is refused.
+/// What a client beyond the last connection gets for all of its request and answer.
 const REFUSAL: Duration = Duration::from_secs(1);
+
+/// Connections beyond the last one that are open at once: of more the oldest is closed, so that a probe, which asks at once, is answered
+/// however many others come and say nothing.
+const SIDE_CONNECTIONS: usize = 64;
+
+/// Files that are kept for all but admitted connections: those beyond the last one, the listener, what the runtime has, the keys file.
+const OTHER_FILES: u64 = SIDE_CONNECTIONS as u64 + 64;
 
 /// After an error of the listener itself, such as too many open files.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// Serves until a signal, then drains within the bound of the settings.
+/// Serves until a signal, then drains within the bound of the settings, or until a second signal.
 ///
 /// # Errors
 /// Where the address cannot be listened on, or the process gets no signals.
@@ -50,34 +57,80 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
     observe::install_recorder();
     let listener = TcpListener::bind(settings.listen).await?;
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
+    let mut hang_up = signal(SignalKind::hangup())?;
+    let mut told_to_stop = async || {
+        tokio::select! {
+            _ = terminate.recv() => {}
+            _ = interrupt.recv() => {}
+        }
+    };
     let address = listener.local_addr()?;
     let keys = settings.keys_file.clone();
     if keys.is_none() && !address.ip().is_loopback() {
         tracing::warn!(%address, "anyone who reaches this address may use the service: no keys file is set");
     }
-    let app = App::new(settings.limits());
-    let router = router(Arc::clone(&app), &settings.cors_origins, keys);
-    greet(address);
-    let server = Server::new(router, app.limits);
-    tokio::spawn(observe::keep_up());
-    let signalled = async {
-        tokio::select! {
-            _ = terminate.recv() => {}
-            _ = interrupt.recv() => {}
-        }
-        tracing::info!("stopping: no longer ready, draining");
-        app.ready.store(false, Ordering::Relaxed);
-        tokio::time::sleep(NOTICE).await;
-    };
-    tokio::select! {
-        () = signalled => {}
-        () = server.accept(&listener) => {}
+    if let Some(keys) = &keys {
+        keys.warn_of_readers();
     }
-    drop(listener);
-    server.closing.cancel();
-    drain(server.graceful, &app, settings.shutdown()).await;
+    let mut limits = settings.limits();
+    limits.max_connections = connections_that_fit(limits.max_connections);
+    let app = App::new(limits);
+    let entry = Entry {
+        cors_origins: settings.cors_origins.clone(),
+        // A page of another site that resolves its own name to this machine knows no key.
+        checks_host: keys.is_none() && address.ip().is_loopback(),
+        keys: keys.clone(),
+    };
+    let server = Server::new(&app, &entry);
+    // Whoever started the service may not read its output.
+    std::thread::spawn(move || greet(address));
+    tokio::spawn(observe::keep_up());
+    tokio::spawn(async move {
+        while hang_up.recv().await.is_some() {
+            if let Some(keys) = &keys {
+                keys.reload();
+            }
+        }
+    });
+    let notice = NOTICE.max(settings.lame_duck());
+    let stopping = async {
+        told_to_stop().await;
+        tracing::info!("stopping: no longer ready, still listening");
+        app.ready.store(false, Ordering::Relaxed);
+        tokio::select! {
+            () = tokio::time::sleep(notice) => false,
+            () = told_to_stop() => true,
+        }
+    };
+    let is_told_twice = tokio::select! {
+        twice = stopping => twice,
+        () = server.accept(&listener) => false,
+    };
+    if !is_told_twice {
+        server.accept_those_that_wait(&listener);
+        drop(listener);
+        server.closing.cancel();
+        tokio::select! {
+            () = drain(server.graceful, &app, settings.shutdown()) => {}
+            () = told_to_stop() => tracing::warn!("told to stop again: what still ran is given up"),
+        }
+    }
     tracing::info!("stopped");
     Ok(())
+}
+
+/// As many connections as are wanted, or as the process may open files for, whose number is raised as far as the process may do so itself.
+fn connections_that_fit(wanted: usize) -> usize {
+    let mut files = getrlimit(Resource::Nofile);
+    files.current = files.maximum;
+    // Where it is not allowed, the number stays what it was.
+    let _ = setrlimit(Resource::Nofile, files);
+    let Some(files) = getrlimit(Resource::Nofile).current else { return wanted };
+    let fit = usize::try_from(files.saturating_sub(OTHER_FILES)).unwrap_or(usize::MAX).max(1);
+    if fit < wanted {
+        tracing::warn!(files, wanted, fit, "fewer connections than wanted: the process may not open more files");
+    }
+    wanted.min(fit)
 }
 
 /// Waits until every request is answered, at most for `bound`; just before its end running solves are told to stop.
@@ -97,26 +150,39 @@ async fn drain(connections: GracefulShutdown, app: &App, bound: Duration) {
 struct Server {
     router: Router,
     http: http1::Builder,
+    /// What a connection beyond the last one gets.
+    side: Router,
+    side_http: http1::Builder,
+    /// The last of those, the oldest first.
+    side_connections: Mutex<VecDeque<AbortHandle>>,
     graceful: GracefulShutdown,
     /// Cancelled when the service stops.
     closing: CancellationToken,
     connections: Arc<Semaphore>,
-    max_connections: usize,
+    patience: Duration,
 }
 
 impl Server {
-    fn new(router: Router, limits: Limits) -> Self {
-        let mut http = http1::Builder::new();
-        http.timer(TokioTimer::new())
-            .header_read_timeout(Duration::from_millis(limits.header_timeout_ms))
-            .max_header_size(MAX_HEADER_BYTES);
+    fn new(app: &Arc<App>, entry: &Entry) -> Self {
+        let Limits { max_connections, header_timeout_ms, .. } = app.limits;
+        let patience = Duration::from_millis(header_timeout_ms);
+        let http = |patience| {
+            let mut http = http1::Builder::new();
+            http.timer(TokioTimer::new()).header_read_timeout(patience).max_header_size(MAX_HEADER_BYTES);
+            http
+        };
+        let mut side_http = http(REFUSAL);
+        side_http.keep_alive(false);
         Self {
-            router,
-            http,
+            router: router::router(Arc::clone(app), entry),
+            http: http(patience),
+            side: router::beyond_connections(Arc::clone(app), entry),
+            side_http,
+            side_connections: Mutex::default(),
             graceful: GracefulShutdown::new(),
             closing: CancellationToken::new(),
-            connections: Arc::new(Semaphore::new(limits.max_connections)),
-            max_connections: limits.max_connections,
+            connections: Arc::new(Semaphore::new(max_connections)),
+            patience,
         }
     }
 
@@ -124,12 +190,7 @@ impl Server {
     async fn accept(&self, listener: &TcpListener) {
         loop {
             match listener.accept().await {
-                Ok((stream, _)) => match Arc::clone(&self.connections).try_acquire_owned() {
-                    Ok(permit) => self.serve(stream, permit),
-                    Err(_) => {
-                        tokio::spawn(refuse(stream, self.max_connections));
-                    }
-                },
+                Ok((stream, _)) => self.take(stream),
                 Err(error) => {
                     // A client that gave up is none of the listener's faults; the others pass when something is closed.
                     if !matches!(error.kind(), io::ErrorKind::ConnectionAborted | io::ErrorKind::ConnectionReset) {
@@ -141,19 +202,30 @@ impl Server {
         }
     }
 
-    fn serve(&self, stream: TcpStream, permit: OwnedSemaphorePermit) {
-        // Without it small answers could wait for the client's acknowledgement of earlier ones.
-        let _ = stream.set_nodelay(true);
-        let mut stream = TimeoutStream::new(stream);
-        stream.set_write_timeout(Some(WRITE_STALL));
+    /// Accepts the connections that came before the listener is closed, which would cut them.
+    fn accept_those_that_wait(&self, listener: &TcpListener) {
+        while let Some(Ok((stream, _))) = listener.accept().now_or_never() {
+            self.take(stream);
+        }
+    }
+
+    fn take(&self, stream: TcpStream) {
+        let stream = Socket::new(stream, self.patience);
+        match Arc::clone(&self.connections).try_acquire_owned() {
+            Ok(permit) => self.serve(stream, permit),
+            Err(_) => self.serve_beside(stream),
+        }
+    }
+
+    fn serve(&self, stream: Socket, permit: OwnedSemaphorePermit) {
         let has_asked = Arc::new(AtomicBool::new(false));
         let asked = Arc::clone(&has_asked);
         let service = MapRequest::new(self.router.clone(), move |request: hyper::Request<Incoming>| {
             asked.store(true, Ordering::Relaxed);
             request.map(Body::new)
         });
-        let service = TowerToHyperService::new(service);
-        let connection = self.http.serve_connection(TokioIo::new(Box::pin(stream)), service);
+        let left = stream.left();
+        let connection = self.http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
         let connection = self.graceful.watch(connection);
         let closing = self.closing.clone();
         // A client that has not finished its first request's head holds up no shutdown.
@@ -169,31 +241,27 @@ impl Server {
             tokio::select! {
                 // What goes wrong on a connection is its client's to know; the request, if there was one, is logged by itself.
                 _ = connection => {}
+                () = left => {}
                 () = never_asked => {}
             }
         });
     }
-}
 
-/// Answers a connection beyond the last one, and closes it.
-async fn refuse(mut stream: TcpStream, max_connections: usize) {
-    let detail =
-        format!("{max_connections} connections are open, as many as the service admits; try again in a moment");
-    let problem = Problem::new(ProblemCode::TooManyConnections, detail);
-    observe::problem_is_told(&problem);
-    let body = serde_json::to_string(&problem).unwrap_or_default();
-    let head = format!(
-        "HTTP/1.1 503 Service Unavailable\r\ncontent-type: {PROBLEM_JSON}\r\nretry-after: {RETRY_AFTER_S}\r\nconnection: close\r\ncontent-length: {}\r\n\r\n",
-        body.len()
-    );
-    let answer = async {
-        // What is left unread when a connection is closed would reset it before the answer is read.
-        let mut request = [0; 4096];
-        let _ = stream.read(&mut request).await;
-        let _ = stream.write_all(format!("{head}{body}").as_bytes()).await;
-        let _ = stream.shutdown().await;
-    };
-    let _ = tokio::time::timeout(REFUSAL, answer).await;
+    /// Answers a connection beyond the last one: health and metrics as ever, all else with a refusal.
+    fn serve_beside(&self, stream: Socket) {
+        let service = MapRequest::new(self.side.clone(), |request: hyper::Request<Incoming>| request.map(Body::new));
+        let connection = self.side_http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
+        let answered = tokio::spawn(async move {
+            let _ = tokio::time::timeout(REFUSAL, connection).await;
+        });
+        let mut connections = self.side_connections.lock();
+        connections.push_back(answered.abort_handle());
+        if connections.len() > SIDE_CONNECTIONS
+            && let Some(oldest) = connections.pop_front()
+        {
+            oldest.abort();
+        }
+    }
 }
 
 /// Where the service is and what to try.

@@ -18,7 +18,7 @@ use toothwave::api::App;
 use toothwave::compute::{Pool, Thread};
 use toothwave::config::Limits;
 use toothwave::keys::Keys;
-use toothwave::router::router;
+use toothwave::router::{Entry, router};
 use tower::ServiceExt as _;
 
 /// Every path that a design document can be sent to.
@@ -80,7 +80,7 @@ impl Question {
     }
 
     fn wire(&self) -> Vec<u8> {
-        let mut head = format!("{} {} HTTP/1.1\r\nhost: toothwave\r\nconnection: close\r\n", self.method, self.path);
+        let mut head = format!("{} {} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n", self.method, self.path);
         for (name, value) in &self.headers {
             head += &format!("{name}: {value}\r\n");
         }
@@ -206,13 +206,15 @@ impl Service {
     pub(crate) fn within_for_origins(limits: Limits, origins: &[&str]) -> Self {
         let app = App::new(limits);
         let origins: Vec<_> = origins.iter().map(|&origin| origin.into()).collect();
-        Self { router: router(Arc::clone(&app), &origins, None), app }
+        let entry = Entry { cors_origins: origins, ..Entry::default() };
+        Self { router: router(Arc::clone(&app), &entry), app }
     }
 
     /// Behind a keys file of this text.
     pub(crate) fn behind(keys: &str) -> Self {
         let app = App::new(LIMITS);
-        Self { router: router(Arc::clone(&app), &[], Some(Keys::parse(keys).unwrap())), app }
+        let entry = Entry { keys: Some(Keys::parse(keys).unwrap()), ..Entry::default() };
+        Self { router: router(Arc::clone(&app), &entry), app }
     }
 
     pub(crate) async fn ask(&self, question: &Question) -> Answer {
@@ -258,7 +260,7 @@ impl Listening {
     pub(crate) fn within(limits: Limits) -> Self {
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(4).enable_all().build().unwrap();
         let app = App::new(limits);
-        let router = router(Arc::clone(&app), &[], None);
+        let router = router(Arc::clone(&app), &Entry::default());
         let listener = runtime.block_on(TcpListener::bind(("127.0.0.1", 0))).unwrap();
         let address = listener.local_addr().unwrap();
         runtime.spawn(async move { axum::serve(listener, router).await });

@@ -22,7 +22,10 @@ async fn batch(service: &Service, query: &str, lines: &[String]) -> Answer {
 
 fn lines(answer: &Answer) -> Vec<Value> {
     assert_eq!((answer.status, answer.header("content-type")), (200, "application/x-ndjson"), "{}", answer.text());
-    answer.text().lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    let mut lines: Vec<Value> = answer.text().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let count = lines.len() - 1;
+    assert_eq!(lines.pop(), Some(json!({ "asked": count, "answered": count })));
+    lines
 }
 
 /// Case 5.1 with another torque for each index, so that every answer tells whose it is.
@@ -105,8 +108,8 @@ async fn a_line_may_arrive_in_any_pieces() {
 }
 
 #[tokio::test]
-async fn an_empty_batch_has_an_empty_answer() {
-    assert_eq!(batch(&Service::new(), "", &[]).await.text(), "");
+async fn an_empty_batch_has_the_last_line_alone() {
+    assert!(lines(&batch(&Service::new(), "", &[]).await).is_empty());
 }
 
 #[tokio::test]
@@ -205,7 +208,8 @@ fn without_a_server_a_batch_answers_the_same_lines() {
                 .await,
         )
     });
-    assert_eq!(offline, online);
+    let (end, offline) = offline.split_last().unwrap();
+    assert_eq!((offline, end), (online.as_slice(), &json!({ "asked": 3, "answered": 3 })));
 }
 
 /// Documents of very different length, so that slices end anywhere.
@@ -217,7 +221,7 @@ fn uneven(count: u64) -> Vec<String> {
 
 /// Lines of an answer as it goes over the wire, between the lengths of its pieces.
 fn answered(answer: &Answer) -> usize {
-    answer.text().lines().filter(|line| line.starts_with('{')).count()
+    answer.text().lines().filter(|line| line.starts_with("{\"index\"")).count()
 }
 
 #[test]
@@ -256,4 +260,69 @@ fn a_whole_batch_may_be_sent_before_its_answers_are_read() {
     let service = Listening::within(Limits { max_concurrent_solves: 2, ..LIMITS });
     let answer = ask_at(service.address, &question("", vec![variant(0).to_string(); 6_000].join("\n")));
     assert_eq!(answered(&answer), 6_000);
+}
+
+/// A batch whose body is made of these pieces, the last of which may be a fault.
+async fn sent_in_pieces(service: &Service, pieces: Vec<Result<Bytes, std::io::Error>>) -> Vec<Value> {
+    let request = Request::post("/v1/batch?peaks_only=true")
+        .header("content-type", "application/x-ndjson")
+        .body(Body::from_stream(stream::iter(pieces)))
+        .unwrap();
+    service.send(request).await.text().lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+#[tokio::test]
+async fn a_batch_that_breaks_off_ends_with_a_line_that_says_so() {
+    let whole = Bytes::from(format!("{}\n{}\n{{\"dri", variant(0), variant(1)));
+    let found = sent_in_pieces(&Service::new(), vec![Ok(whole), Err(std::io::Error::other("reset"))]).await;
+    let [first, second, end] = found.as_slice() else { panic!("{found:?}") };
+    assert_eq!((&first["status"], &second["status"]), (&json!(200), &json!(200)));
+    assert_eq!((&end["asked"], &end["answered"]), (&json!(2), &json!(2)));
+    assert_eq!(end["problem"]["code"], "broken_body");
+}
+
+/// Each drip comes within the patience, all of them together bring too little.
+#[tokio::test(start_paused = true)]
+async fn a_batch_that_drips_is_ended() {
+    let service = Service::within(Limits { header_timeout_ms: 30_000, ..LIMITS });
+    let drips = stream::unfold((), |()| async {
+        tokio::time::sleep(std::time::Duration::from_secs(20)).await;
+        Some((Ok::<_, std::io::Error>(Bytes::from_static(b" ")), ()))
+    });
+    let request = Request::post("/v1/batch")
+        .header("content-type", "application/x-ndjson")
+        .body(Body::from_stream(stream::once(async { Ok(Bytes::from(format!("{}\n", variant(0)))) }).chain(drips)))
+        .unwrap();
+    let answer = service.send(request).await;
+    let end: Value = serde_json::from_str(answer.text().lines().last().unwrap()).unwrap();
+    assert_eq!((&end["asked"], &end["problem"]["code"]), (&json!(1), &json!("request_timeout")));
+    assert_eq!(service.app.pool.batches(), 0);
+}
+
+/// Slower than a machine, faster than nothing: a document each few seconds.
+#[tokio::test(start_paused = true)]
+async fn a_batch_that_is_sent_bit_by_bit_is_answered() {
+    let documents = stream::unfold(0, |index| async move {
+        tokio::time::sleep(std::time::Duration::from_secs(4)).await;
+        (index < 40).then(|| (Ok::<_, std::io::Error>(Bytes::from(format!("{}\n", variant(index)))), index + 1))
+    });
+    let request = Request::post("/v1/batch?peaks_only=true")
+        .header("content-type", "application/x-ndjson")
+        .body(Body::from_stream(documents))
+        .unwrap();
+    let service = Service::within(Limits { header_timeout_ms: 30_000, ..LIMITS });
+    assert_eq!(lines(&service.send(request).await).len(), 40);
+}
+
+#[tokio::test]
+async fn a_line_without_room_is_refused_in_its_place_and_the_others_are_answered() {
+    let service = Service::within(Limits { max_unread_bytes: 30_000_000, max_concurrent_solves: 1, ..LIMITS });
+    // Some 14 MB of answer, and half as much beside it while it is made.
+    let long = with(&variant(0), "/sweep", json!({ "samples": 10_000 })).to_string();
+    let found =
+        lines(&batch(&service, "", &[variant(1).to_string(), long.clone(), long, variant(2).to_string()]).await);
+    let codes: Vec<_> = found.iter().map(|line| line["problem"]["code"].as_str()).collect();
+    assert!(codes[0].is_none() && codes[3].is_none(), "{codes:?}");
+    assert!(codes[1..3].contains(&Some("too_many_unread_bytes")), "{codes:?}");
+    assert_eq!(service.app.room.taken_bytes(), 0);
 }

@@ -164,9 +164,7 @@ async fn a_client_that_has_the_representation_gets_304_without_a_body() {
     for path in ENDPOINTS {
         let first = service.ask(&question(path)).await;
         let tag = first.etag();
-        for condition in
-            [tag, &format!("W/{tag}"), &format!("\"other\", {tag}"), &format!("W/\"a\" ,W/{tag},\"b\""), "*"]
-        {
+        for condition in [tag, &format!("W/{tag}"), &format!("\"other\", {tag}"), &format!("W/\"a\" ,W/{tag},\"b\"")] {
             let answer = service.ask(&question(path).with("if-none-match", condition)).await;
             assert_eq!((answer.status, answer.body.len()), (304, 0), "{path}: {condition}");
             assert_eq!((answer.etag(), answer.header("vary")), (tag, first.header("vary")));
@@ -182,7 +180,7 @@ async fn a_client_that_has_something_else_gets_the_answer() {
     let service = Service::new();
     let json = service.ask(&question("/v1/sweep")).await;
     let other = service.post("/v1/sweep", &undercut()).await;
-    for condition in ["\"other\"", other.etag(), "", json.etag().trim_matches('"'), "\"*\""] {
+    for condition in ["\"other\"", other.etag(), "", json.etag().trim_matches('"'), "\"*\"", "*"] {
         let answer = service.ask(&question("/v1/sweep").with("if-none-match", condition)).await;
         assert_eq!((answer.status, &answer.body), (200, &json.body), "{condition}");
     }
@@ -350,7 +348,7 @@ async fn a_solve_that_no_thread_is_left_for_fails_instead_of_waiting() {
     let _there = handle.enter();
     let cache = Cache::new(1 << 20);
     let key = Key::new("sweep", &1.0, &Representation::JSON);
-    let problem = cache.solve_once(key, std::future::pending()).await.unwrap_err();
+    let problem = cache.solve_once(key, std::future::pending(), std::future::pending()).await.unwrap_err();
     assert_eq!(problem.status, 500);
 }
 

@@ -19,7 +19,8 @@ macro_rules! all {
 
 pub(crate) fn problem_codes() -> Vec<ProblemCode> {
     all!(ProblemCode: MalformedJson,
-        MalformedJson => InvalidQuery,
+        MalformedJson => BrokenBody,
+        BrokenBody => InvalidQuery,
         InvalidQuery => Unauthorized,
         Unauthorized => NotFound,
         NotFound => MethodNotAllowed,
@@ -27,7 +28,8 @@ pub(crate) fn problem_codes() -> Vec<ProblemCode> {
         NotAcceptable => RequestTimeout,
         RequestTimeout => BodyTooLarge,
         BodyTooLarge => UnsupportedMediaType,
-        UnsupportedMediaType => InvalidDocument,
+        UnsupportedMediaType => MisdirectedRequest,
+        MisdirectedRequest => InvalidDocument,
         InvalidDocument => ImpossibleDesign,
         ImpossibleDesign => NoToothInMesh,
         NoToothInMesh => ComplianceNotPositive,
@@ -112,7 +114,7 @@ pub(crate) fn codes_of<'a>(objects: impl IntoIterator<Item = &'a Value>) -> Vec<
 fn every_kind_of_problem_has_its_status_and_a_type_of_its_own() {
     use toothwave::problem::Problem;
     let expected = |code| match code {
-        ProblemCode::MalformedJson | ProblemCode::InvalidQuery => 400,
+        ProblemCode::MalformedJson | ProblemCode::BrokenBody | ProblemCode::InvalidQuery => 400,
         ProblemCode::Unauthorized => 401,
         ProblemCode::NotFound => 404,
         ProblemCode::MethodNotAllowed => 405,
@@ -120,6 +122,7 @@ fn every_kind_of_problem_has_its_status_and_a_type_of_its_own() {
         ProblemCode::RequestTimeout => 408,
         ProblemCode::BodyTooLarge => 413,
         ProblemCode::UnsupportedMediaType => 415,
+        ProblemCode::MisdirectedRequest => 421,
         ProblemCode::InvalidDocument
         | ProblemCode::ImpossibleDesign
         | ProblemCode::NoToothInMesh

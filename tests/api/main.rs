@@ -20,6 +20,7 @@ mod entry;
 mod examples;
 mod extremes;
 mod findings;
+mod fire;
 mod openapi;
 mod operations;
 mod overload;

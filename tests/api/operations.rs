@@ -82,9 +82,12 @@ async fn every_series_is_documented_and_every_documented_one_is_there() {
     let slow = with(&spelled_out(), "/sweep/samples", json!(5_000_000));
     service.post("/v1/sweep", &slow).await.refused(503, "deadline_exceeded");
     let text = service.get("/metrics").await.text().to_owned();
+    for series in series(&text) {
+        assert!(text.contains(&format!("# HELP {series} ")), "{series} says nothing of itself");
+    }
     let documented: BTreeSet<String> = include_str!("../../docs/operations.md")
         .split('`')
-        .filter(|word| word.starts_with("toothwave_"))
+        .filter(|word| word.starts_with("toothwave_") || word.starts_with("process_"))
         .map(|word| word.split('{').next().unwrap().to_owned())
         .collect();
     assert_eq!(series(&text), documented);

@@ -12,7 +12,7 @@ use crate::designs::{shortest, with};
 
 /// A running service that ends with the test.
 pub(crate) struct Process {
-    child: Child,
+    pub(crate) child: Child,
     pub(crate) address: SocketAddr,
     /// Kept open: a process that greets into a closed pipe would fail for that.
     _greeting: BufReader<ChildStdout>,
@@ -25,9 +25,13 @@ impl Process {
     }
 
     /// The same, with its log at the default level.
-    fn logging(arguments: &[&str], log: Stdio) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_toothwave"));
-        command.args(arguments).args(["--listen", "127.0.0.1:0"]);
+    pub(crate) fn logging(arguments: &[&str], log: Stdio) -> Self {
+        Self::of(Command::new(env!("CARGO_BIN_EXE_toothwave")).args(arguments), log)
+    }
+
+    /// The same, started by this command.
+    pub(crate) fn of(command: &mut Command, log: Stdio) -> Self {
+        command.args(["--listen", "127.0.0.1:0"]);
         let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(log).spawn().unwrap();
         let mut greeting = BufReader::new(child.stdout.take().unwrap());
         let mut line = String::new();

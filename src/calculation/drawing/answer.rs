@@ -43,6 +43,8 @@ impl DrawnPart {
 pub struct DrawingAnswer {
     /// Version of the solver.
     pub solver_version: &'static str,
+    /// The build that computed it: equal builds on equal processors give equal bytes.
+    pub build: &'static str,
     /// Hash of the solver's version and of the drive, the parts and the chord tolerance: alike on all drawings that belong together.
     pub design_hash: String,
     /// What is drawn.

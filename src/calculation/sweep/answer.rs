@@ -14,6 +14,8 @@ use crate::findings::FindingAnswer;
 pub struct SweepAnswer {
     /// Version of the solver.
     pub solver_version: &'static str,
+    /// The build that computed it: equal builds on equal processors give equal bytes.
+    pub build: &'static str,
     /// Contact ratio ε, counted over both meshing zones.
     pub coincidence_degree: f64,
     /// The input angle after which the load pattern repeats.

@@ -56,9 +56,26 @@ pub(super) fn write(sweep: &SweepAnswer, writer: &mut dyn Write) -> io::Result<(
         plots.push(drawn);
     }
     let figure = Figure::new(2, 3).with_plots(plots).with_layouts(layouts).with_cell_size(420.0, 300.0);
-    let mut text = SvgBackend.render_scene(&figure.render());
+    let mut text = own_ids(&SvgBackend.render_scene(&figure.render()));
     text.push('\n');
     writer.write_all(text.as_bytes())
+}
+
+/// What kuva numbers through the whole process, numbered anew: a picture's bytes follow from its content.
+fn own_ids(text: &str) -> String {
+    const ID: &str = "kuva-clip-";
+    let mut parts = text.split(ID);
+    let mut numbered = parts.next().unwrap_or_default().to_owned();
+    let mut seen: Vec<&str> = Vec::new();
+    for part in parts {
+        let (number, rest) = part.split_at(part.find(|letter: char| !letter.is_ascii_digit()).unwrap_or(part.len()));
+        let own = seen.iter().position(|known| *known == number).unwrap_or_else(|| {
+            seen.push(number);
+            seen.len() - 1
+        });
+        numbered.push_str(&format!("{ID}{own}{rest}"));
+    }
+    numbered
 }
 
 fn panels(sweep: &SweepAnswer) -> Vec<Panel<'_>> {

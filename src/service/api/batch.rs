@@ -5,7 +5,7 @@
 //! bounded however long a batch is, by lines that wait to be answered and by answers that wait to be sent.
 
 use std::collections::VecDeque;
-use std::io;
+use std::io::{self, Write as _};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -25,17 +25,20 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 use tokio_util::task::AbortOnDropHandle;
 use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::columns;
+use toothwave_calculation::design::Design;
 use toothwave_calculation::findings::FindingAnswer;
+use toothwave_calculation::forms::Forms as _;
 use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::question::{self, Question};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_calculation::sweep::answer::{ChecksAnswer, PeaksAnswer, SweepAnswer, TorqueCapacityAnswer};
 use utoipa::ToSchema;
 
-use super::App;
+use super::{App, Growing, broken_body, write_problem};
 use crate::compute::{self, Pool};
 use crate::config::Limits;
 use crate::problem::{Problem, ProblemCode};
+use crate::room::{Reserved, Room, Sent};
 use crate::{negotiation, observe};
 
 /// Lines of a chunk at most.
@@ -52,6 +55,12 @@ const AHEAD_BYTES: usize = 8 << 20;
 
 /// What a line takes beside its bytes.
 const LINE_OVERHEAD_BYTES: usize = 256;
+
+/// Lines from here on go out by themselves.
+const LONG_LINE_BYTES: usize = 1 << 16;
+
+/// What has to arrive of a batch on the average while it is waited for: a batch holds one of few places.
+const LEAST_ARRIVING_BYTES_PER_S: u64 = 32;
 
 /// The media type of a batch and of its answers.
 const NDJSON: &str = "application/x-ndjson";
@@ -117,6 +126,7 @@ pub struct BatchLine<A> {
 #[derive(Serialize)]
 struct PeaksOnly<'a> {
     solver_version: &'static str,
+    build: &'static str,
     coincidence_degree: f64,
     period_deg: f64,
     peaks: &'a PeaksAnswer,
@@ -126,67 +136,182 @@ struct PeaksOnly<'a> {
     findings: &'a [FindingAnswer],
 }
 
-/// Appends the line that answers one document.
+/// The last line: whoever finds it has all the others.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct BatchEnd {
+    /// Documents that arrived.
+    pub asked: u64,
+    /// Lines that answer them.
+    pub answered: u64,
+    /// Why no more arrived, where the batch broke off.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub problem: Option<Problem>,
+}
+
+impl BatchEnd {
+    /// The line.
+    pub fn line(&self) -> Vec<u8> {
+        let mut line = Vec::new();
+        // Numbers and words alone, into memory: this does not fail.
+        if columns::write(self, &mut line).is_ok() {
+            line.push(b'\n');
+        }
+        line
+    }
+}
+
+/// The line that answers one document, with the room that it takes.
+#[derive(Debug)]
+pub struct AnsweredLine {
+    /// The line.
+    pub text: Vec<u8>,
+    room: Option<Reserved>,
+}
+
+/// Answers one document.
 pub fn answer_line(
     query: BatchQuery,
     index: u64,
     document: &[u8],
     limits: &question::Limits,
+    room: &Room,
     stop: &AtomicBool,
-    out: &mut Vec<u8>,
-) {
-    match query.endpoint {
-        BatchEndpoint::Geometry => append(out, index, solved(&Geometry, document, limits, stop).as_ref()),
-        BatchEndpoint::CoincidenceDegree => {
-            append(out, index, solved(&CoincidenceDegree, document, limits, stop).as_ref())
-        }
-        BatchEndpoint::Sweep => {
-            let sweep = solved(&Sweep, document, limits, stop);
-            if query.peaks_only {
-                let peaks = sweep.as_ref().map(|sweep| PeaksOnly {
-                    solver_version: sweep.solver_version,
-                    coincidence_degree: sweep.coincidence_degree,
-                    period_deg: sweep.period_deg,
-                    peaks: &sweep.peaks,
-                    torque_capacity: &sweep.torque_capacity,
-                    checks: &sweep.checks,
-                    findings: &sweep.findings,
-                });
-                append(out, index, peaks.as_ref().map_err(|problem| *problem));
-            } else {
-                append(out, index, sweep.as_ref());
-            }
-        }
-    }
+) -> AnsweredLine {
+    let answered = match query.endpoint {
+        BatchEndpoint::Geometry => whole_line(&Geometry, index, document, limits, room, stop),
+        BatchEndpoint::CoincidenceDegree => whole_line(&CoincidenceDegree, index, document, limits, room, stop),
+        BatchEndpoint::Sweep if query.peaks_only => peaks_line(index, document, limits, room, stop),
+        BatchEndpoint::Sweep => whole_line(&Sweep, index, document, limits, room, stop),
+    };
+    answered.unwrap_or_else(|problem| problem_line(index, &problem))
+}
+
+fn whole_line<Q: Question>(
+    question: &Q,
+    index: u64,
+    document: &[u8],
+    limits: &question::Limits,
+    room: &Room,
+    stop: &AtomicBool,
+) -> Result<AnsweredLine, Problem> {
+    let Solved { answer, columns_bytes, reserved } = solved(question, document, limits, room, stop)?;
+    let buffer = Growing::new(reserved, columns_bytes, answer.expected_bytes())?;
+    line(index, &answer, buffer)
+}
+
+fn peaks_line(
+    index: u64,
+    document: &[u8],
+    limits: &question::Limits,
+    room: &Room,
+    stop: &AtomicBool,
+) -> Result<AnsweredLine, Problem> {
+    let Solved { answer: sweep, columns_bytes, reserved } = solved(&Sweep, document, limits, room, stop)?;
+    let peaks = PeaksOnly {
+        solver_version: sweep.solver_version,
+        build: sweep.build,
+        coincidence_degree: sweep.coincidence_degree,
+        period_deg: sweep.period_deg,
+        peaks: &sweep.peaks,
+        torque_capacity: &sweep.torque_capacity,
+        checks: &sweep.checks,
+        findings: &sweep.findings,
+    };
+    line(index, &peaks, Growing::new(reserved, columns_bytes, 0)?)
+}
+
+/// What a document comes to, and the memory that it takes.
+struct Solved<A> {
+    answer: A,
+    columns_bytes: u64,
+    reserved: Reserved,
 }
 
 fn solved<Q: Question>(
     question: &Q,
     document: &[u8],
     limits: &question::Limits,
+    room: &Room,
     stop: &AtomicBool,
-) -> Result<Q::Answer, Problem> {
+) -> Result<Solved<Q::Answer>, Problem> {
     let started = Instant::now();
     // A fault at one document is no reason to leave the others without an answer.
     let answered = compute::caught(|| {
         #[cfg(feature = "fault-injection")]
         fail::fail_point!("solve");
-        Ok(question.ask(document, limits, stop)?)
+        let checked = question.check(&Design::read(document)?, limits)?;
+        let columns_bytes = Q::columns_bytes(&checked);
+        let reserved = room.reserve(columns_bytes)?;
+        Ok(Solved { answer: Q::answer(&checked, stop)?, columns_bytes, reserved })
     });
     histogram!("toothwave_solve_duration_seconds").record(started.elapsed());
     answered
 }
 
-fn append<A: Serialize>(out: &mut Vec<u8>, index: u64, answer: Result<&A, &Problem>) {
-    let status = answer.map_or_else(|problem| problem.status, |_| StatusCode::OK.as_u16());
-    counter!("toothwave_batch_documents_total", "status" => status.to_string()).increment(1);
-    if let Err(problem) = answer {
-        observe::problem_is_told(problem);
-    }
-    let line = BatchLine { index, status, answer: answer.ok(), problem: answer.err().cloned() };
+fn line<A: Serialize>(index: u64, answer: &A, mut buffer: Growing) -> Result<AnsweredLine, Problem> {
+    let status = StatusCode::OK.as_u16();
+    let line = BatchLine { index, status, answer: Some(answer), problem: None };
+    columns::write(&line, &mut buffer).and_then(|()| buffer.write_all(b"\n")).map_err(write_problem)?;
+    count(status);
+    let Growing { bytes: text, mut reserved, .. } = buffer;
+    reserved.hold_at_most(text.capacity() as u64);
+    Ok(AnsweredLine { text, room: Some(reserved) })
+}
+
+fn problem_line(index: u64, problem: &Problem) -> AnsweredLine {
+    count(problem.status);
+    observe::problem_is_told(problem);
+    let line = BatchLine::<()> { index, status: problem.status, answer: None, problem: Some(problem.clone()) };
+    let mut text = Vec::new();
     // Numbers and words alone, into memory: this does not fail.
-    if columns::write(&line, out).is_ok() {
-        out.push(b'\n');
+    if columns::write(&line, &mut text).is_ok() {
+        text.push(b'\n');
+    }
+    AnsweredLine { text, room: None }
+}
+
+fn count(status: u16) {
+    counter!("toothwave_batch_documents_total", "status" => status.to_string()).increment(1);
+}
+
+/// Lines as they go out: short ones together, each long one by itself with its room, none of them copied again.
+#[derive(Debug, Default)]
+struct Answers {
+    parts: VecDeque<Bytes>,
+    tail: Vec<u8>,
+    bytes: usize,
+    lines: u64,
+}
+
+impl Answers {
+    fn push(&mut self, AnsweredLine { text, room }: AnsweredLine) {
+        self.lines += 1;
+        self.bytes += text.len();
+        if text.len() < LONG_LINE_BYTES {
+            self.tail.extend_from_slice(&text);
+            return;
+        }
+        self.end_part();
+        let text = Bytes::from(text);
+        self.parts.push_back(match room {
+            Some(room) => room.send(text, &Sent::default()),
+            None => text,
+        });
+    }
+
+    fn append(&mut self, mut other: Self) {
+        other.end_part();
+        self.end_part();
+        self.parts.append(&mut other.parts);
+        self.bytes += other.bytes;
+        self.lines += other.lines;
+    }
+
+    fn end_part(&mut self) {
+        if !self.tail.is_empty() {
+            self.parts.push_back(std::mem::take(&mut self.tail).into());
+        }
     }
 }
 
@@ -202,18 +327,42 @@ struct Line {
 struct Lines {
     body: BodyDataStream,
     buffer: BytesMut,
+    /// So much of it holds no end of a line.
+    searched_bytes: usize,
     max_line_bytes: usize,
     patience: Duration,
+    /// Of the patience, used up, and what arrived meanwhile.
+    waited: Duration,
+    arrived_bytes: u64,
+    /// Why the body has no end of its own.
+    broken: Option<Problem>,
     /// Whether the rest of a line that was too long is being passed over.
     is_skipping: bool,
     is_over: bool,
 }
 
 impl Lines {
+    fn new(body: Body, limits: &Limits) -> Self {
+        Self {
+            body: body.into_data_stream(),
+            buffer: BytesMut::new(),
+            searched_bytes: 0,
+            max_line_bytes: limits.max_body_bytes,
+            patience: Duration::from_millis(limits.header_timeout_ms),
+            waited: Duration::ZERO,
+            arrived_bytes: 0,
+            broken: None,
+            is_skipping: false,
+            is_over: false,
+        }
+    }
+
     /// The next line, or what was wrong with it; nothing at the end.
     async fn next(&mut self) -> Option<Result<Bytes, Problem>> {
         loop {
-            if let Some(end) = self.buffer.iter().position(|&byte| byte == b'\n') {
+            let unsearched = &self.buffer[self.searched_bytes..];
+            if let Some(end) = unsearched.iter().position(|&byte| byte == b'\n') {
+                let end = std::mem::take(&mut self.searched_bytes) + end;
                 let line = self.buffer.split_to(end + 1).freeze().slice(..end);
                 if std::mem::take(&mut self.is_skipping) {
                     continue;
@@ -224,33 +373,65 @@ impl Lines {
                 if !line.trim_ascii().is_empty() {
                     return Some(Ok(line));
                 }
-            } else if self.is_skipping {
-                self.buffer.clear();
+                continue;
+            }
+            self.searched_bytes = self.buffer.len();
+            if self.is_skipping {
+                self.forget();
             } else if self.buffer.len() > self.max_line_bytes {
-                self.buffer.clear();
+                self.forget();
                 self.is_skipping = true;
                 return Some(Err(self.too_long()));
             }
-            if self.buffer.contains(&b'\n') {
-                continue;
-            }
             if self.is_over {
+                self.searched_bytes = 0;
                 let rest = self.buffer.split().freeze();
-                return (!self.is_skipping && !rest.trim_ascii().is_empty()).then_some(Ok(rest));
+                return (!rest.trim_ascii().is_empty()).then_some(Ok(rest));
             }
-            match tokio::time::timeout(self.patience, self.body.next()).await {
-                Ok(Some(Ok(bytes))) => self.buffer.extend_from_slice(&bytes),
-                // A client that left, which nobody is told of.
-                Ok(Some(Err(_))) => return None,
-                Ok(None) => self.is_over = true,
-                Err(_) => {
-                    self.is_over = true;
-                    self.buffer.clear();
-                    let detail = format!("nothing more of the batch arrived within {} ms", self.patience.as_millis());
-                    return Some(Err(Problem::new(ProblemCode::RequestTimeout, detail)));
+            self.receive().await;
+        }
+    }
+
+    /// Takes what arrives next, or finds that nothing more will, or too little.
+    async fn receive(&mut self) {
+        let began = tokio::time::Instant::now();
+        let arrived = tokio::time::timeout(self.patience.saturating_sub(self.waited), self.body.next()).await;
+        self.waited += began.elapsed();
+        match arrived {
+            Ok(Some(Ok(bytes))) => {
+                self.buffer.extend_from_slice(&bytes);
+                self.arrived_bytes += bytes.len() as u64;
+                if u128::from(self.arrived_bytes) >= self.least_bytes() {
+                    (self.waited, self.arrived_bytes) = (Duration::ZERO, 0);
                 }
             }
+            Ok(Some(Err(error))) => self.break_off(broken_body(&error)),
+            Ok(None) => self.is_over = true,
+            Err(_) => {
+                let detail = format!(
+                    "within {} ms of waiting less than {} bytes of the batch arrived",
+                    self.patience.as_millis(),
+                    self.least_bytes()
+                );
+                self.break_off(Problem::new(ProblemCode::RequestTimeout, detail));
+            }
         }
+    }
+
+    fn least_bytes(&self) -> u128 {
+        (u128::from(LEAST_ARRIVING_BYTES_PER_S) * self.patience.as_millis()).div_ceil(1000)
+    }
+
+    /// The line that is not whole counts for nothing.
+    fn break_off(&mut self, problem: Problem) {
+        self.is_over = true;
+        self.broken = Some(problem);
+        self.forget();
+    }
+
+    fn forget(&mut self) {
+        self.buffer.clear();
+        self.searched_bytes = 0;
     }
 
     fn too_long(&self) -> Problem {
@@ -259,8 +440,11 @@ impl Lines {
     }
 }
 
+/// How the batch has ended.
+type End = Arc<Mutex<BatchEnd>>;
+
 /// Reads lines ahead of their answers, as far as [`AHEAD_BYTES`] go, until the body ends or nobody wants answers any more.
-async fn read_ahead(mut lines: Lines, to: mpsc::UnboundedSender<Line>) {
+async fn read_ahead(mut lines: Lines, to: mpsc::UnboundedSender<Line>, end: End) {
     let ahead = Arc::new(Semaphore::new(AHEAD_BYTES));
     let mut index = 0;
     while let Some(document) = lines.next().await {
@@ -272,16 +456,25 @@ async fn read_ahead(mut lines: Lines, to: mpsc::UnboundedSender<Line>) {
             return;
         }
         index += 1;
+        end.lock().asked = index;
     }
+    end.lock().problem = lines.broken;
 }
 
 /// Lines that are answered together, as far as they are.
 struct Chunk {
+    batch: Batch,
+    waiting: VecDeque<Line>,
+    answers: Answers,
+}
+
+/// What all chunks of a batch share.
+#[derive(Clone)]
+struct Batch {
     pool: Pool,
+    room: Room,
     query: BatchQuery,
     limits: Limits,
-    waiting: VecDeque<Line>,
-    answers: Vec<u8>,
 }
 
 /// What a slice works on; it outlives the slice where the deadline stops that.
@@ -289,15 +482,13 @@ struct Chunk {
 struct Slice {
     waiting: VecDeque<Line>,
     current: Option<u64>,
-    answers: Vec<u8>,
+    answers: Answers,
 }
 
 impl Chunk {
     /// One slice further, in a task that ends with this future.
     async fn advance_apart(self) -> Self {
-        let Self { pool, query, limits, .. } = &self;
-        let rest =
-            Self { pool: pool.clone(), query: *query, limits: *limits, waiting: VecDeque::new(), answers: Vec::new() };
+        let rest = Self { batch: self.batch.clone(), waiting: VecDeque::new(), answers: Answers::default() };
         let task = AbortOnDropHandle::new(tokio::spawn(self.advance()));
         // Solves that panic are caught one by one; should the task itself, the batch ends early and the log says why.
         task.await.unwrap_or_else(|panic| {
@@ -309,28 +500,29 @@ impl Chunk {
     /// One slice further: at least one line is answered.
     async fn advance(mut self) -> Self {
         let slice = Arc::new(Mutex::new(Slice { waiting: std::mem::take(&mut self.waiting), ..Slice::default() }));
-        let (shared, query, limits) = (Arc::clone(&slice), self.query, self.limits);
-        let result = self.pool.run_in_turn(move |stop| {
-            work(&shared, query, &limits, stop);
+        let (shared, batch) = (Arc::clone(&slice), self.batch.clone());
+        let result = self.batch.pool.run_in_turn(move |stop| {
+            work(&shared, &batch, stop);
             Ok(())
         });
         let result = result.await;
         let mut slice = slice.lock();
         self.waiting = std::mem::take(&mut slice.waiting);
-        self.answers.append(&mut slice.answers);
+        self.answers.append(std::mem::take(&mut slice.answers));
         if let Err(problem) = result {
             // Of the line that was being answered, or of the next one, so that there is an end.
             let index = slice.current.take().or_else(|| self.waiting.pop_front().map(|line| line.index));
             if let Some(index) = index {
-                append::<()>(&mut self.answers, index, Err(&problem));
+                self.answers.push(problem_line(index, &problem));
             }
         }
+        self.answers.end_part();
         self
     }
 }
 
 /// Answers lines until the slice's time or room is over.
-fn work(slice: &Mutex<Slice>, query: BatchQuery, limits: &Limits, stop: &AtomicBool) {
+fn work(slice: &Mutex<Slice>, batch: &Batch, stop: &AtomicBool) {
     let started = Instant::now();
     loop {
         let line = {
@@ -340,31 +532,27 @@ fn work(slice: &Mutex<Slice>, query: BatchQuery, limits: &Limits, stop: &AtomicB
             line
         };
         let Some(Line { index, document, _ahead }) = line else { return };
-        let mut answer = Vec::new();
-        match document {
-            Ok(document) => answer_line(query, index, &document, &limits.of_calculation(), stop, &mut answer),
-            Err(problem) => append::<()>(&mut answer, index, Err(&problem)),
-        }
+        let answer = match document {
+            Ok(document) => {
+                answer_line(batch.query, index, &document, &batch.limits.of_calculation(), &batch.room, stop)
+            }
+            Err(problem) => problem_line(index, &problem),
+        };
         let mut slice = slice.lock();
         if slice.current.take() != Some(index) {
             // The deadline came first, and the line has its problem.
             return;
         }
-        slice.answers.append(&mut answer);
-        if started.elapsed() >= SLICE || slice.answers.len() >= SLICE_BYTES {
+        slice.answers.push(answer);
+        if started.elapsed() >= SLICE || slice.answers.bytes >= SLICE_BYTES {
             return;
         }
     }
 }
 
-/// The answers as they become ready, in the order of the lines.
-fn answers(
-    pool: Pool,
-    query: BatchQuery,
-    limits: Limits,
-    from: mpsc::UnboundedReceiver<Line>,
-) -> impl Stream<Item = Bytes> {
-    let side_by_side = limits.max_concurrent_solves;
+/// The answers as they become ready, in the order of the lines, and the last line.
+fn answers(batch: Batch, from: mpsc::UnboundedReceiver<Line>, end: End) -> impl Stream<Item = Bytes> {
+    let side_by_side = batch.limits.max_concurrent_solves;
     let chunks = stream::unfold(from, |mut from| async move {
         let mut waiting = Vec::with_capacity(CHUNK_LINES);
         let received = from.recv_many(&mut waiting, CHUNK_LINES).await;
@@ -372,19 +560,25 @@ fn answers(
     });
     // A task of its own for each slice: a future that waits for a permit must be polled when it gets one, or the permit is lost to
     // everybody while this stream gives out another chunk.
-    let started = chunks
-        .map(move |waiting| Chunk { pool: pool.clone(), query, limits, waiting, answers: Vec::new() }.advance_apart());
-    started.buffered(side_by_side).flat_map(|chunk| {
-        stream::unfold(chunk, |mut chunk| async move {
-            if chunk.answers.is_empty() {
+    let started =
+        chunks.map(move |waiting| Chunk { batch: batch.clone(), waiting, answers: Answers::default() }.advance_apart());
+    let ending = Arc::clone(&end);
+    let answered = started.buffered(side_by_side).flat_map(move |chunk| {
+        let end = Arc::clone(&end);
+        stream::unfold((chunk, end), |(mut chunk, end)| async move {
+            if chunk.answers.parts.is_empty() {
                 if chunk.waiting.is_empty() {
                     return None;
                 }
                 chunk = chunk.advance_apart().await;
             }
-            Some((Bytes::from(std::mem::take(&mut chunk.answers)), chunk))
+            end.lock().answered += std::mem::take(&mut chunk.answers.lines);
+            let part = chunk.answers.parts.pop_front().unwrap_or_default();
+            Some((part, (chunk, end)))
         })
-    })
+    });
+    // Nothing stands after the last line, so it is made when all else has been given out.
+    answered.chain(stream::once(async move { ending.lock().line().into() }))
 }
 
 /// Many design documents, a line each, answered in their order.
@@ -395,7 +589,7 @@ fn answers(
     params(BatchQuery),
     request_body(content = String, content_type = "application/x-ndjson", description = "A design document a line. Lines are answered while others are still sent: read answers while you send, or send no more than 8 MiB ahead of them."),
     responses(
-        (status = 200, description = "A line a document, in their order, each `{\"index\", \"status\", \"answer\"}` or `{\"index\", \"status\", \"problem\"}`.", body = BatchLine<SweepAnswer>, content_type = "application/x-ndjson"),
+        (status = 200, description = "A line a document, in their order, each `{\"index\", \"status\", \"answer\"}` or `{\"index\", \"status\", \"problem\"}`; then a last one, `{\"asked\", \"answered\"}`, with a `problem` where the batch broke off.", body = BatchLine<SweepAnswer>, content_type = "application/x-ndjson"),
         (status = 400, description = "A query that the batch does not know.", body = Problem, content_type = "application/problem+json"),
         (status = 415, description = "The body is not sent as NDJSON.", body = Problem, content_type = "application/problem+json"),
         (status = 503, description = "As many batches run as the service admits; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
@@ -417,20 +611,19 @@ fn begin(app: &App, query: Result<Query<BatchQuery>, QueryRejection>, request: R
     query.require_possible()?;
     negotiation::require_ndjson(request.headers())?;
     let place = app.pool.batch_place()?;
-    let lines = Lines {
-        body: request.into_body().into_data_stream(),
-        buffer: BytesMut::new(),
-        max_line_bytes: app.limits.max_body_bytes,
-        patience: Duration::from_millis(app.limits.header_timeout_ms),
-        is_skipping: false,
-        is_over: false,
-    };
+    // Lines that wait, and of each chunk that is worked on its short answers; a long one has room of its own.
+    let held_bytes = AHEAD_BYTES + app.limits.max_concurrent_solves * SLICE_BYTES;
+    let room = app.room.reserve(held_bytes as u64)?;
+    let lines = Lines::new(request.into_body(), &app.limits);
     // Bounded by bytes.
     let (to, from) = mpsc::unbounded_channel();
-    tokio::spawn(read_ahead(lines, to));
-    let answers = answers(app.pool.clone(), query, app.limits, from).map(move |bytes| {
-        // The place is held until the last answer is sent or the client has left.
-        let _held = &place;
+    let end = End::new(Mutex::new(BatchEnd { asked: 0, answered: 0, problem: None }));
+    tokio::spawn(read_ahead(lines, to, Arc::clone(&end)));
+    let beside = app.room.beside(held_bytes as u64);
+    let batch = Batch { pool: app.pool.clone(), room: beside, query, limits: app.limits };
+    let answers = answers(batch, from, end).map(move |bytes| {
+        // Place and room are held until the last answer is sent or the client has left.
+        let _held = (&place, &room);
         Ok::<_, io::Error>(bytes)
     });
     let mut response = Body::from_stream(answers).into_response();

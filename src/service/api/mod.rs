@@ -1,6 +1,7 @@
 //! The endpoints: one file each, with its handler and what the API document says of it. What they share, the walk of a request from
 //! document to bytes, stands here.
 
+use std::error::Error as _;
 use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,8 +14,9 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use http_body_util::LengthLimitError;
 use toothwave_calculation::design::Design;
-use toothwave_calculation::forms::Forms;
+use toothwave_calculation::forms::{Format, Forms};
 use toothwave_calculation::key::Key;
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_calculation::question::Question;
@@ -25,7 +27,8 @@ use crate::compute::{Pool, Thread};
 use crate::config::Limits;
 use crate::negotiation::{self, Representation};
 use crate::problem::{Problem, ProblemCode};
-use crate::room::{Room, Sent};
+use crate::room::{NoRoom, Reserved, Room, Sent};
+use crate::router::require_no_query;
 
 pub mod accuracy;
 pub mod batch;
@@ -124,10 +127,13 @@ async fn walk<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Resu
                         Representation::JSON if Q::is_short(&checked) => Thread::Executor,
                         _ => Thread::Blocking,
                     };
+                    let room = app.room.clone();
                     let solve = async move {
-                        pool.run(deadline, thread, move |stop| solve::<Q>(&checked, representation, stop)).await
+                        let job = move |stop: &AtomicBool| solve::<Q>(&checked, representation, &room, stop);
+                        pool.run_while_wanted(thread, job).await
                     };
-                    app.cache.solve_once(key, solve).await?
+                    let solved = app.cache.solve_once(key, tokio::time::sleep_until(deadline), solve).await?;
+                    solved.ok_or_else(|| app.pool.deadline_exceeded())?
                 }
             };
             app.cache.remember(spelling, key);
@@ -158,7 +164,8 @@ struct Asked {
 impl Asked {
     async fn read<Q: Question>(app: &App, request: Request) -> Result<Self, Problem> {
         let deadline = app.pool.deadline();
-        let (Parts { headers, .. }, body) = request.into_parts();
+        let (Parts { headers, uri, .. }, body) = request.into_parts();
+        require_no_query(&uri)?;
         negotiation::require_json(&headers)?;
         let representation = Representation::negotiate(&headers, Q::Answer::FORMS.iter().map(|(format, _)| *format))?;
         let body = read_body(&headers, body, &app.limits, deadline).await?;
@@ -171,7 +178,8 @@ async fn respond_afresh<Q: Question>(question: Q, app: Arc<App>, request: Reques
     let walk = async {
         let Asked { body, representation, deadline, .. } = Asked::read::<Q>(&app, request).await?;
         let checked = question.check(&Design::read(&body)?, &app.limits.of_calculation())?;
-        let job = move |stop: &AtomicBool| solve::<Q>(&checked, representation, stop);
+        let room = app.room.clone();
+        let job = move |stop: &AtomicBool| solve::<Q>(&checked, representation, &room, stop);
         with_body(&app.room, app.pool.run(deadline, Thread::Blocking, job).await?, representation)
     };
     let mut response = walk.await.unwrap_or_else(IntoResponse::into_response);
@@ -200,53 +208,82 @@ async fn read_body(
         let detail = format!("the body did not arrive within {} ms", limits.deadline_ms);
         Problem::new(ProblemCode::RequestTimeout, detail)
     })?;
-    // What else can go wrong here is a client that left, which nobody is told of.
-    arrived.map_err(|_| too_large(""))
+    arrived.map_err(|error| match error.source() {
+        Some(cause) if cause.is::<LengthLimitError>() => too_large(""),
+        _ => broken_body(&error),
+    })
+}
+
+/// The problem of a body that does not end as it should.
+fn broken_body(error: &axum::Error) -> Problem {
+    Problem::new(ProblemCode::BrokenBody, format!("the body cannot be read to its end: {error}"))
 }
 
 /// Solves and writes the final bytes.
 fn solve<Q: Question>(
     checked: &Q::Checked,
     representation: Representation,
+    room: &Room,
     stop: &AtomicBool,
 ) -> Result<Stored, Problem> {
     #[cfg(feature = "fault-injection")]
     fail::fail_point!("solve");
     let started = Instant::now();
+    let columns_bytes = Q::columns_bytes(checked);
+    let Representation { format, gzip } = representation;
+    let is_long = matches!(format, Format::Json | Format::Csv);
+    let text_bytes = if is_long { columns_bytes * if gzip { 1 } else { 2 } } else { 0 };
+    let reserved = room.reserve(columns_bytes + text_bytes)?;
     let answer = Q::answer(checked, stop)?;
     let solve = started.elapsed();
-    let expected_bytes = if representation.gzip { 0 } else { answer.expected_bytes() };
-    let writer = Stoppable { inner: Vec::with_capacity(expected_bytes), next_look: LOOK_EVERY_BYTES, stop };
-    let written = if representation.gzip {
-        let mut encoder = GzEncoder::new(writer, Compression::fast());
-        answer.write(representation.format, &mut encoder).and_then(|()| encoder.finish())
+    let expected_bytes = if gzip || !is_long { 0 } else { answer.expected_bytes() };
+    let buffer = Growing::new(reserved, columns_bytes, expected_bytes)?;
+    let written = if gzip {
+        // Before the encoder: of what compresses well little comes out of it for long.
+        let mut writer = Stoppable::new(GzEncoder::new(buffer, Compression::fast()), stop);
+        answer.write(format, &mut writer).and_then(|()| writer.inner.finish())
     } else {
-        let mut writer = writer;
-        answer.write(representation.format, &mut writer).map(|()| writer)
+        let mut writer = Stoppable::new(buffer, stop);
+        answer.write(format, &mut writer).map(|()| writer.inner)
     };
+    drop(answer);
     match written {
-        Ok(writer) => {
+        Ok(Growing { bytes, reserved, .. }) => {
             let server_timing = format!("solve;dur={:.3}", 1e3 * solve.as_secs_f64());
             let server_timing = HeaderValue::try_from(server_timing).map_err(|error| Problem::internal(&error))?;
             // To its size: the cache keeps it, and weighs its length.
-            Ok(Stored { body: writer.inner.into_boxed_slice().into(), sent: Sent::default(), solve, server_timing })
+            let body: bytes::Bytes = bytes.into_boxed_slice().into();
+            let sent = Sent::default();
+            let held = Some(reserved.send(body.clone(), &sent));
+            Ok(Stored { body, sent, held, solve, server_timing })
         }
         Err(_) if stop.load(Ordering::Relaxed) => Err(NoAnswer::stopped().into()),
-        Err(error) => Err(Problem::internal(&error)),
+        Err(error) => Err(write_problem(error)),
     }
+}
+
+/// Why an answer could not be written into memory.
+fn write_problem(error: io::Error) -> Problem {
+    error.downcast::<NoRoom>().map_or_else(|error| Problem::internal(&error), Into::into)
 }
 
 /// How much of a large answer is written between two looks at the stop signal.
 const LOOK_EVERY_BYTES: usize = 1 << 16;
 
-/// A buffer that fails once the stop signal is set, so that writing a large answer stops too.
-struct Stoppable<'a> {
-    inner: Vec<u8>,
-    next_look: usize,
+/// A writer that fails once the stop signal is set, so that writing a large answer stops too.
+struct Stoppable<'a, W> {
+    inner: W,
+    until_look: usize,
     stop: &'a AtomicBool,
 }
 
-impl Write for Stoppable<'_> {
+impl<'a, W> Stoppable<'a, W> {
+    fn new(inner: W, stop: &'a AtomicBool) -> Self {
+        Self { inner, until_look: LOOK_EVERY_BYTES, stop }
+    }
+}
+
+impl<W: Write> Write for Stoppable<'_, W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.write_all(bytes).map(|()| bytes.len())
     }
@@ -254,13 +291,59 @@ impl Write for Stoppable<'_> {
     // Numbers come one by one: this is called for each.
     #[inline]
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.inner.extend_from_slice(bytes);
-        if self.inner.len() >= self.next_look {
-            self.next_look = self.inner.len() + LOOK_EVERY_BYTES;
-            if self.stop.load(Ordering::Relaxed) {
-                return Err(io::Error::other("stopped"));
+        match self.until_look.checked_sub(bytes.len()) {
+            Some(rest) => self.until_look = rest,
+            None => {
+                self.until_look = LOOK_EVERY_BYTES;
+                if self.stop.load(Ordering::Relaxed) {
+                    return Err(io::Error::other("stopped"));
+                }
             }
         }
+        self.inner.write_all(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.inner.flush()
+    }
+}
+
+/// A buffer that takes room before it takes memory.
+struct Growing {
+    bytes: Vec<u8>,
+    reserved: Reserved,
+    /// What the answer takes beside its bytes.
+    columns_bytes: u64,
+}
+
+impl Growing {
+    fn new(mut reserved: Reserved, columns_bytes: u64, expected_bytes: usize) -> Result<Self, NoRoom> {
+        // Where the question did not tell, the columns are about half of their text.
+        let columns_bytes = columns_bytes.max(expected_bytes as u64 / 2);
+        reserved.hold_at_least(columns_bytes + expected_bytes as u64)?;
+        Ok(Self { bytes: Vec::with_capacity(expected_bytes), reserved, columns_bytes })
+    }
+
+    #[cold]
+    fn grow(&mut self, bytes: usize) -> io::Result<()> {
+        let capacity = (2 * self.bytes.capacity()).max(self.bytes.len() + bytes);
+        self.reserved.hold_at_least(self.columns_bytes + capacity as u64).map_err(io::Error::other)?;
+        self.bytes.reserve_exact(capacity - self.bytes.len());
+        Ok(())
+    }
+}
+
+impl Write for Growing {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.write_all(bytes).map(|()| bytes.len())
+    }
+
+    #[inline]
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        if bytes.len() > self.bytes.capacity() - self.bytes.len() {
+            self.grow(bytes.len())?;
+        }
+        self.bytes.extend_from_slice(bytes);
         Ok(())
     }
 
@@ -297,4 +380,24 @@ fn caching(mut response: Response, provenance: Provenance, etag: &str) -> Respon
     headers.insert(header::VARY, HeaderValue::from_static("accept, accept-encoding"));
     headers.insert(CACHE_STATUS, HeaderValue::from_static(provenance.served.cache_status()));
     response
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+    use std::sync::atomic::AtomicBool;
+
+    use flate2::Compression;
+    use flate2::write::GzEncoder;
+
+    use super::{LOOK_EVERY_BYTES, Stoppable};
+
+    /// Of a megabyte of zeros a kilobyte comes out of the encoder.
+    #[test]
+    fn what_compresses_well_is_stopped_as_soon_as_anything_else() {
+        let stop = AtomicBool::new(true);
+        let mut writer = Stoppable::new(GzEncoder::new(Vec::new(), Compression::fast()), &stop);
+        let written = (0..LOOK_EVERY_BYTES).take_while(|_| writer.write_all(&[0; 1024]).is_ok()).count();
+        assert!(written * 1024 <= LOOK_EVERY_BYTES, "{written} KiB");
+    }
 }

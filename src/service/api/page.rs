@@ -3,6 +3,7 @@
 use std::sync::LazyLock;
 
 use axum::extract::Path;
+use axum::extract::rejection::PathRejection;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 
@@ -84,7 +85,9 @@ pub async fn index(headers: HeaderMap) -> Response {
 }
 
 /// The files that it loads.
-pub async fn asset(Path(name): Path<String>, uri: Uri, headers: HeaderMap) -> Response {
+pub async fn asset(name: Result<Path<String>, PathRejection>, uri: Uri, headers: HeaderMap) -> Response {
+    // A name that is no text is no file's either.
+    let name = name.map(|Path(name)| name).unwrap_or_default();
     match ASSETS.iter().find(|asset| asset.name == name) {
         Some(asset) => serve(asset, &headers),
         None => {

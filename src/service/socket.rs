@@ -1,0 +1,146 @@
+//! A client's connection as the service sees it: whether it takes what it gets, and whether it is still there.
+
+use std::io::{self, IoSlice};
+use std::pin::Pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::task::{Context, Poll, ready};
+use std::time::Duration;
+
+use tokio::io::{AsyncRead, AsyncWrite, Interest, ReadBuf};
+use tokio::net::TcpStream;
+use tokio::time::{Sleep, sleep};
+
+/// What a client that is written to has to take at least, on the average over its patience: below it, it is taken for one that does not read.
+const LEAST_TAKEN_BYTES_PER_S: u64 = 8 << 10;
+
+/// Pause between two looks whether a client has left behind bytes that nobody has read yet.
+const LOOK: Duration = Duration::from_millis(10);
+
+static OPEN: AtomicUsize = AtomicUsize::new(0);
+static SENT_BYTES: AtomicU64 = AtomicU64::new(0);
+
+/// Connections that are open now.
+pub fn open() -> usize {
+    OPEN.load(Ordering::Relaxed)
+}
+
+/// Bytes handed to the network since the process began.
+pub fn sent_bytes() -> u64 {
+    SENT_BYTES.load(Ordering::Relaxed)
+}
+
+/// A connection whose client has to take what it is sent.
+#[derive(Debug)]
+pub struct Socket {
+    stream: Arc<TcpStream>,
+    patience: Duration,
+    /// Runs while the client has something to take.
+    stalled: Option<Pin<Box<Sleep>>>,
+    taken_bytes: u64,
+}
+
+impl Socket {
+    /// Of a client that takes [`LEAST_TAKEN_BYTES_PER_S`] over each `patience`, or is left.
+    pub fn new(stream: TcpStream, patience: Duration) -> Self {
+        // Without it small answers could wait for the client's acknowledgement of earlier ones.
+        let _ = stream.set_nodelay(true);
+        OPEN.fetch_add(1, Ordering::Relaxed);
+        Self { stream: Arc::new(stream), patience, stalled: None, taken_bytes: 0 }
+    }
+
+    /// Waits until the client has closed its side, or the connection is broken.
+    ///
+    /// What reads the connection learns of that only when it has read all that came before; while a request is being answered, one byte
+    /// of another one hides it. Who has closed its side for writing alone is taken for gone, here as in hyper.
+    pub fn left(&self) -> impl Future<Output = ()> + Send + 'static {
+        let stream = Arc::clone(&self.stream);
+        async move {
+            while stream.ready(Interest::READABLE).await.is_ok_and(|ready| !ready.is_read_closed()) {
+                sleep(LOOK).await;
+            }
+            // What is nearly answered still goes out.
+            sleep(LOOK).await;
+        }
+    }
+
+    /// One try to write, within the client's patience.
+    fn poll_paced(
+        &mut self,
+        context: &mut Context<'_>,
+        write: impl Fn(&TcpStream) -> io::Result<usize>,
+    ) -> Poll<io::Result<usize>> {
+        loop {
+            let written = match self.stream.poll_write_ready(context) {
+                Poll::Ready(Ok(())) => write(&self.stream),
+                Poll::Ready(Err(error)) => Err(error),
+                Poll::Pending => {
+                    let stalled = self.stalled.get_or_insert_with(|| Box::pin(sleep(self.patience)));
+                    ready!(stalled.as_mut().poll(context));
+                    self.stalled = None;
+                    let least_bytes = u128::from(LEAST_TAKEN_BYTES_PER_S) * self.patience.as_millis() / 1000;
+                    if u128::from(std::mem::take(&mut self.taken_bytes)) < least_bytes {
+                        return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
+                    }
+                    continue;
+                }
+            };
+            match written {
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                Ok(bytes) => {
+                    self.taken_bytes += bytes as u64;
+                    SENT_BYTES.fetch_add(bytes as u64, Ordering::Relaxed);
+                    return Poll::Ready(Ok(bytes));
+                }
+                Err(error) => return Poll::Ready(Err(error)),
+            }
+        }
+    }
+}
+
+impl Drop for Socket {
+    fn drop(&mut self) {
+        OPEN.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+impl AsyncRead for Socket {
+    fn poll_read(self: Pin<&mut Self>, context: &mut Context<'_>, buffer: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
+        loop {
+            ready!(self.stream.poll_read_ready(context))?;
+            match self.stream.try_read(buffer.initialize_unfilled()) {
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                read => return Poll::Ready(read.map(|bytes| buffer.advance(bytes))),
+            }
+        }
+    }
+}
+
+impl AsyncWrite for Socket {
+    fn poll_write(self: Pin<&mut Self>, context: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
+        self.get_mut().poll_paced(context, |stream| stream.try_write(bytes))
+    }
+
+    fn poll_write_vectored(
+        self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        parts: &[IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        self.get_mut().poll_paced(context, |stream| stream.try_write_vectored(parts))
+    }
+
+    fn is_write_vectored(&self) -> bool {
+        true
+    }
+
+    /// Asked for when all that there was is written: the client's time begins anew with what comes next.
+    fn poll_flush(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<io::Result<()>> {
+        self.stalled = None;
+        self.taken_bytes = 0;
+        Poll::Ready(Ok(()))
+    }
+
+    fn poll_shutdown(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Poll::Ready(Ok(rustix::net::shutdown(&*self.stream, rustix::net::Shutdown::Write)?))
+    }
+}

@@ -1,0 +1,559 @@
+//! The service under fire: what it is given to wait for, it does not wait for.
+
+use std::fs::File;
+use std::io::{Read as _, Write as _};
+use std::net::{SocketAddr, TcpStream};
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Barrier};
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use toothwave::keys::new_key;
+
+use crate::asking::{Question, Service, ask_at};
+use crate::designs::{shortest, with};
+use crate::serving::Process;
+
+fn live() -> Question {
+    Question::of("GET", "/health/live")
+}
+
+fn metric(address: SocketAddr, series: &str) -> f64 {
+    let metrics = ask_at(address, &Question::of("GET", "/metrics"));
+    let line = metrics.text().lines().find(|line| line.starts_with(&format!("{series} ")));
+    line.unwrap_or_else(|| panic!("no {series} in {}", metrics.text())).rsplit_once(' ').unwrap().1.parse().unwrap()
+}
+
+/// A sweep that no test waits for.
+fn endless() -> String {
+    with(&shortest(), "/sweep", json!({ "samples": 10_000_000 })).to_string()
+}
+
+const ENDLESS: [&str; 5] = ["serve", "--deadline-ms", "600000", "--max-states", "100000000"];
+
+/// Until a solve runs.
+fn until_running(address: SocketAddr, solves: f64) {
+    assert!((0..100_000).any(|_| metric(address, "toothwave_solves_running") == solves), "never {solves} solves");
+}
+
+/// A file of its own for a test.
+fn scratch(name: &str) -> std::path::PathBuf {
+    std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{}", std::process::id()))
+}
+
+// --- The log
+
+#[test]
+fn a_log_on_a_full_device_stops_nothing_and_is_counted() {
+    let full = File::options().write(true).open("/dev/full").unwrap();
+    let process = Process::logging(&["serve"], full.into());
+    for _ in 0..3 {
+        assert_eq!(ask_at(process.address, &live()).status, 200);
+    }
+    assert!((0..10_000).any(|_| metric(process.address, "toothwave_log_lines_lost_total") >= 3.0));
+    process.signalled("-TERM");
+    assert_eq!(process.ended().code(), Some(0));
+}
+
+#[test]
+fn a_log_whose_reader_has_gone_stops_nothing_and_is_counted() {
+    let mut process = Process::logging(&["serve"], Stdio::piped());
+    drop(process.child.stderr.take());
+    for _ in 0..3 {
+        assert_eq!(ask_at(process.address, &live()).status, 200);
+    }
+    assert!((0..10_000).any(|_| metric(process.address, "toothwave_log_lines_lost_total") >= 3.0));
+    process.signalled("-TERM");
+    assert_eq!(process.ended().code(), Some(0));
+}
+
+/// A pipe holds 64 KiB, some 250 lines.
+#[test]
+fn a_log_whose_reader_is_stuck_stops_nothing_and_what_does_not_fit_is_counted() {
+    let process = Process::logging(&["serve"], Stdio::piped());
+    let mut stream = TcpStream::connect(process.address).unwrap();
+    let asked = b"GET /health/live HTTP/1.1\r\nhost: localhost\r\n\r\n".repeat(100);
+    let mut buffer = [0; 1 << 16];
+    let mut lost = 0.0;
+    for _ in 0..300 {
+        stream.write_all(&asked).unwrap();
+        let mut answers = 0;
+        while answers < 100 {
+            let read = stream.read(&mut buffer).unwrap();
+            assert!(read > 0, "the connection was closed");
+            answers += buffer[..read].windows(5).filter(|word| word == b"live\n").count();
+        }
+        lost = metric(process.address, "toothwave_log_lines_lost_total");
+        if lost > 0.0 {
+            break;
+        }
+    }
+    assert!(lost > 0.0);
+    process.signalled("-TERM");
+    assert_eq!(process.ended().code(), Some(0));
+}
+
+// --- Connections
+
+/// A connection that was served once and says nothing more.
+fn idle(address: SocketAddr) -> TcpStream {
+    let mut stream = TcpStream::connect(address).unwrap();
+    stream.write_all(b"GET /health/live HTTP/1.1\r\nhost: localhost\r\n\r\n").unwrap();
+    assert!(stream.read(&mut [0; 512]).unwrap() > 0);
+    stream
+}
+
+fn with_files(limit: &str, arguments: &[&str]) -> Process {
+    let mut command = Command::new("sh");
+    command.args(["-c", &format!("ulimit {limit}; exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_toothwave")]);
+    Process::of(command.args(arguments).args(["--log", "off"]), Stdio::null())
+}
+
+#[test]
+fn where_the_process_may_open_few_files_it_admits_fewer_connections_and_refuses_the_others_at_once() {
+    let process = with_files("-n 200", &["serve"]);
+    let limits = ask_at(process.address, &Question::of("GET", "/v1/limits")).found();
+    assert_eq!(limits["max_connections"], 200 - 128);
+    // More than there are files.
+    let silent: Vec<_> = (0..400).map(|_| TcpStream::connect(process.address).unwrap()).collect();
+    for _ in 0..5 {
+        assert_eq!(ask_at(process.address, &live()).status, 200);
+        ask_at(process.address, &Question::of("GET", "/v1/limits")).refused(503, "too_many_connections");
+    }
+    drop(silent);
+}
+
+#[test]
+fn a_limit_of_files_that_the_process_may_raise_itself_is_raised() {
+    let process = with_files("-S -n 100", &["serve"]);
+    let limits = ask_at(process.address, &Question::of("GET", "/v1/limits")).found();
+    assert_eq!(limits["max_connections"], 1024);
+}
+
+#[test]
+fn where_all_connections_are_taken_health_and_metrics_answer_however_many_others_come_and_say_nothing() {
+    let process = Process::started(&["serve", "--max-connections", "3"]);
+    let held: Vec<_> = (0..3).map(|_| idle(process.address)).collect();
+    let silent: Vec<_> = (0..300).map(|_| TcpStream::connect(process.address).unwrap()).collect();
+    for path in ["/health/live", "/health/ready", "/metrics"] {
+        assert_eq!(ask_at(process.address, &Question::of("GET", path)).status, 200, "{path}");
+    }
+    ask_at(process.address, &Question::of("GET", "/v1/limits")).refused(503, "too_many_connections");
+    drop((held, silent));
+}
+
+#[test]
+fn a_client_that_takes_less_than_the_least_of_its_answer_is_left() {
+    let process = Process::started(&["serve", "--header-timeout-ms", "200"]);
+    let document = with(&shortest(), "/sweep", json!({ "samples": 50_000 })).to_string();
+    let mut stream = TcpStream::connect(process.address).unwrap();
+    let head = format!(
+        "POST /v1/sweep HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: {}\r\n\r\n",
+        document.len()
+    );
+    stream.write_all(format!("{head}{document}").as_bytes()).unwrap();
+    let mut some = [0; 1];
+    stream.read_exact(&mut some).unwrap();
+    while metric(process.address, "toothwave_connections") > 1.0 {}
+    let mut rest = Vec::new();
+    // Cut in any way.
+    let _ = stream.read_to_end(&mut rest);
+    assert!(rest.len() < 70_000_000, "{}", rest.len());
+}
+
+// --- Leaving
+
+/// Asks for an endless sweep, with something behind the request, and leaves while it runs.
+fn leaves(encoding: &str, behind: &str) {
+    let process = Process::started(&ENDLESS);
+    let document = endless();
+    let mut stream = TcpStream::connect(process.address).unwrap();
+    let head = format!(
+        "POST /v1/sweep HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\naccept-encoding: {encoding}\r\ncontent-length: {}\r\n\r\n",
+        document.len()
+    );
+    stream.write_all(format!("{head}{document}{behind}").as_bytes()).unwrap();
+    until_running(process.address, 1.0);
+    drop(stream);
+    until_running(process.address, 0.0);
+    assert_eq!(metric(process.address, "toothwave_cancellations_total"), 1.0);
+}
+
+#[test]
+fn a_client_that_leaves_ends_its_solve() {
+    leaves("identity", "");
+}
+
+#[test]
+fn a_byte_of_another_request_does_not_hide_that_the_client_has_left() {
+    leaves("gzip", "G");
+    leaves("identity", &"GET /health/live HTTP/1.1\r\n".repeat(3000));
+}
+
+#[test]
+fn a_body_that_breaks_off_is_bad_and_not_large() {
+    let process = Process::started(&["serve"]);
+    let mut stream = TcpStream::connect(process.address).unwrap();
+    let head = "POST /v1/sweep HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ntransfer-encoding: chunked\r\n\r\n";
+    stream.write_all(format!("{head}5\r\n{{\"dri\r\nno length\r\n").as_bytes()).unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    assert!(answer.starts_with("HTTP/1.1 400") && answer.contains("\"broken_body\""), "{answer}");
+}
+
+// --- Stopping
+
+/// A client that asks again and again on a connection that it keeps, and makes another one only when it was told that this one ends. Returns how
+/// many requests were answered, or what became of one that was not.
+fn keeps_asking(address: SocketAddr, is_stopping: &AtomicBool) -> Result<usize, String> {
+    let mut answered = 0;
+    while let Ok(mut stream) = TcpStream::connect(address) {
+        loop {
+            stream
+                .write_all(b"GET /v1/limits HTTP/1.1\r\nhost: localhost\r\n\r\n")
+                .map_err(|error| error.to_string())?;
+            let mut answer = [0; 4096];
+            let read = stream.read(&mut answer).map_err(|error| error.to_string())?;
+            let answer = String::from_utf8_lossy(&answer[..read]);
+            if !answer.starts_with("HTTP/1.1 200") {
+                return Err(format!("after {answered} answers: {answer:?}, stopping: {is_stopping:?}"));
+            }
+            answered += 1;
+            if answer.contains("connection: close") {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        if is_stopping.load(Ordering::Relaxed) {
+            // There is another replica to go to.
+            break;
+        }
+    }
+    Ok(answered)
+}
+
+#[test]
+fn no_client_that_keeps_its_connection_loses_a_request_when_the_process_is_told_to_stop() {
+    let process = Process::started(&["serve", "--lame-duck-ms", "1000"]);
+    let (address, start) = (process.address, Arc::new(Barrier::new(21)));
+    let is_stopping = Arc::new(AtomicBool::new(false));
+    let clients: Vec<_> = (0..20)
+        .map(|_| {
+            let (start, is_stopping) = (Arc::clone(&start), Arc::clone(&is_stopping));
+            std::thread::spawn(move || {
+                start.wait();
+                keeps_asking(address, &is_stopping)
+            })
+        })
+        .collect();
+    start.wait();
+    process.signalled("-TERM");
+    is_stopping.store(true, Ordering::Relaxed);
+    for client in clients {
+        assert!(client.join().unwrap().unwrap() > 0);
+    }
+    assert_eq!(process.ended().code(), Some(0));
+}
+
+#[test]
+fn a_process_that_is_told_twice_to_stop_ends_at_once() {
+    for lame_duck_ms in ["0", "600000"] {
+        let arguments = [&ENDLESS[..], &["--shutdown-ms", "600000", "--lame-duck-ms", lame_duck_ms]].concat();
+        let process = Process::started(&arguments);
+        let address = process.address;
+        let asker = std::thread::spawn(move || {
+            let mut stream = TcpStream::connect(address).unwrap();
+            let document = endless();
+            let head = "POST /v1/sweep HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json";
+            stream
+                .write_all(format!("{head}\r\ncontent-length: {}\r\n\r\n{document}", document.len()).as_bytes())
+                .unwrap();
+            let _ = stream.read_to_end(&mut Vec::new());
+        });
+        until_running(address, 1.0);
+        process.signalled("-TERM");
+        // The first one is taken up before the second one comes.
+        while ask_at_any(address, "/health/ready") == Some(200) {}
+        process.signalled("-INT");
+        assert_eq!(process.ended().code(), Some(0));
+        asker.join().unwrap();
+    }
+}
+
+/// The status, if anybody listens.
+fn ask_at_any(address: SocketAddr, path: &str) -> Option<u16> {
+    let mut stream = TcpStream::connect(address).ok()?;
+    stream.write_all(format!("GET {path} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n").as_bytes()).ok()?;
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).ok()?;
+    answer.split(' ').nth(1)?.parse().ok()
+}
+
+// --- Entry
+
+#[test]
+fn what_listens_on_this_machine_alone_answers_to_its_names_alone() {
+    let process = Process::started(&["serve"]);
+    let status = |host: &str| {
+        let mut stream = TcpStream::connect(process.address).unwrap();
+        stream.write_all(format!("GET /v1/limits HTTP/1.1\r\n{host}connection: close\r\n\r\n").as_bytes()).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        (answer[9..12].to_owned(), answer)
+    };
+    for host in ["localhost", "LOCALHOST:8080", "127.0.0.1", "127.0.0.1:1", "[::1]", "[::1]:8080"] {
+        assert_eq!(status(&format!("host: {host}\r\n")).0, "200", "{host}");
+    }
+    for host in ["rebound.example", "localhost.example:8080", "10.0.0.1", "127.0.0.1.example", ""] {
+        let (status, answer) = status(&format!("host: {host}\r\n"));
+        assert!(status == "421" && answer.contains("\"misdirected_request\""), "{host}: {answer}");
+    }
+}
+
+#[tokio::test]
+async fn a_query_that_a_path_does_not_know_is_refused() {
+    let service = Service::new();
+    for path in ["/v1/limits", "/v1/examples", "/v1/examples/paper-5.1", "/metrics", "/health/live", "/health/ready"] {
+        service.get(&format!("{path}?pretty=1")).await.refused(400, "invalid_query");
+        assert_eq!(service.get(&format!("{path}?")).await.status, 200, "{path}");
+    }
+    for path in crate::asking::ENDPOINTS {
+        let question = Question::post(&format!("{path}?samples=7"), shortest().to_string());
+        service.ask(&question).await.refused(400, "invalid_query");
+    }
+}
+
+#[tokio::test]
+async fn a_file_of_the_page_whose_name_is_no_text_is_not_found() {
+    Service::new().get("/page/%FF").await.refused(404, "not_found");
+}
+
+#[tokio::test]
+async fn an_id_that_is_long_or_no_word_is_replaced() {
+    let service = Service::new();
+    for (id, is_kept) in
+        [("a-b.c:1", true), (&*"x".repeat(128), true), (&*"x".repeat(129), false), ("two words", false), ("", false)]
+    {
+        let answer = service.ask(&live().with("x-request-id", id)).await;
+        assert_eq!(answer.header("x-request-id") == id, is_kept, "{id}");
+        assert!(!answer.header("x-request-id").is_empty());
+    }
+}
+
+/// The lines that stand in a log once the process has ended.
+fn requests_in(path: &std::path::Path) -> Vec<Value> {
+    let log = std::fs::read_to_string(path).unwrap();
+    std::fs::remove_file(path).unwrap();
+    let lines = log.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    lines.filter(|line| line["fields"]["message"] == "request").collect()
+}
+
+#[test]
+fn a_requests_line_names_its_problem_its_key_its_caller_and_what_became_of_its_answer() {
+    let (log, file) = (scratch("completion"), scratch("named-keys"));
+    let (key, line) = new_key("drawing office").unwrap();
+    std::fs::write(&file, line).unwrap();
+    let process =
+        Process::logging(&["serve", "--keys-file", file.to_str().unwrap()], File::create(&log).unwrap().into());
+    let traceparent = "00-0af7651916cd43dd8448eb211c80319c-b7ad6b7169203331-01";
+    let asked = Question::post("/v1/sweep", "{").with("authorization", &format!("Bearer {key}"));
+    let refused = ask_at(process.address, &asked.clone().with("traceparent", traceparent));
+    refused.refused(400, "malformed_json");
+    ask_at(process.address, &asked.with("traceparent", "no trace"));
+    process.signalled("-TERM");
+    assert_eq!(process.ended().code(), Some(0));
+    std::fs::remove_file(&file).unwrap();
+    let requests = requests_in(&log);
+    let [first, second] = requests.as_slice() else { panic!("{requests:?}") };
+    assert_eq!(first["fields"]["problem"], "malformed_json");
+    assert_eq!(
+        (&first["fields"]["sent_bytes"], &first["fields"]["is_whole"]),
+        (&json!(refused.body.len()), &json!(true))
+    );
+    assert!(first["fields"]["completed_ms"].as_f64() >= first["fields"]["elapsed_ms"].as_f64());
+    assert_eq!((&first["span"]["key"], &first["span"]["traceparent"]), (&json!("drawing office"), &json!(traceparent)));
+    assert_eq!(second["span"]["traceparent"], Value::Null);
+}
+
+#[test]
+fn keys_are_read_again_when_the_process_is_told_so_and_a_file_that_is_wrong_changes_nothing() {
+    let file = scratch("keys");
+    let ((old, old_line), (new, new_line)) = (new_key("old").unwrap(), new_key("new").unwrap());
+    std::fs::write(&file, old_line).unwrap();
+    let process = Process::started(&["serve", "--keys-file", file.to_str().unwrap()]);
+    let status = |key: &str| {
+        let limits = Question::of("GET", "/v1/limits");
+        ask_at(process.address, &limits.with("authorization", &format!("Bearer {key}"))).status
+    };
+    assert_eq!((status(&old), status(&new)), (200, 401));
+    std::fs::write(&file, new_line).unwrap();
+    process.signalled("-HUP");
+    while status(&new) != 200 {}
+    assert_eq!(status(&old), 401);
+    std::fs::write(&file, "not a key").unwrap();
+    process.signalled("-HUP");
+    assert_eq!(status(&new), 200);
+    std::fs::remove_file(&file).unwrap();
+    process.signalled("-HUP");
+    assert_eq!(status(&new), 200);
+}
+
+#[test]
+fn a_keys_file_that_anyone_may_read_is_warned_of() {
+    use std::os::unix::fs::PermissionsExt as _;
+    for (mode, is_warned) in [(0o644, true), (0o640, false)] {
+        let (log, file) = (scratch("mode"), scratch("keys-of-mode"));
+        std::fs::write(&file, new_key("one").unwrap().1).unwrap();
+        std::fs::set_permissions(&file, std::fs::Permissions::from_mode(mode)).unwrap();
+        let process =
+            Process::logging(&["serve", "--keys-file", file.to_str().unwrap()], File::create(&log).unwrap().into());
+        process.signalled("-TERM");
+        process.ended();
+        let text = std::fs::read_to_string(&log).unwrap();
+        assert_eq!(text.contains("may read the keys file"), is_warned, "{text}");
+        std::fs::remove_file(&log).unwrap();
+        std::fs::remove_file(&file).unwrap();
+    }
+}
+
+// --- Answers that nobody reads
+
+fn most_resident_mib(process: &Process) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", process.child.id())).unwrap();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap();
+    line.split_whitespace().next().unwrap().parse::<u64>().unwrap() / 1024
+}
+
+/// Sent, and nothing of the answer read.
+fn sent(address: SocketAddr, path: &str, content_type: &str, body: &str) -> TcpStream {
+    let mut stream = TcpStream::connect(address).unwrap();
+    let length = body.len();
+    let head =
+        format!("POST {path} HTTP/1.1\r\nhost: localhost\r\ncontent-type: {content_type}\r\ncontent-length: {length}");
+    stream.write_all(format!("{head}\r\n\r\n{body}").as_bytes()).unwrap();
+    stream
+}
+
+/// Twelve answers of 80 MB each, 30 MB of columns beside them while they are made.
+#[test]
+fn however_many_large_answers_are_asked_for_they_keep_to_their_room() {
+    let arguments =
+        ["serve", "--max-unread-bytes", "250000000", "--max-concurrent-solves", "6", "--cache-max-bytes", "0"];
+    let process = Process::started(&arguments);
+    let document = |torque_nm: u32| {
+        let document = with(&shortest(), "/sweep", json!({ "samples": 50_000 }));
+        with(&document, "/load/input_torque_nm", json!(torque_nm)).to_string()
+    };
+    let mut unread: Vec<_> =
+        (1..=6).map(|torque_nm| sent(process.address, "/v1/sweep", "application/json", &document(torque_nm))).collect();
+    unread.extend((7..=9).map(|torque_nm| {
+        let lines = format!("{}\n{}\n", document(torque_nm), document(torque_nm + 10));
+        sent(process.address, "/v1/batch", "application/x-ndjson", &lines)
+    }));
+    // Each has the head of its answer, whatever that is, and no solve runs any more.
+    for stream in &mut unread {
+        stream.read_exact(&mut [0; 12]).unwrap();
+    }
+    until_running(process.address, 0.0);
+    assert!(metric(process.address, "toothwave_unread_bytes") <= 250e6);
+    let most = most_resident_mib(&process);
+    assert!(most < 450, "{most} MiB");
+}
+
+#[tokio::test]
+async fn an_answers_room_is_taken_while_it_is_made_and_given_back() {
+    let limits = toothwave::config::Limits { max_unread_bytes: 3_000_000, ..crate::asking::LIMITS };
+    let service = Service::within(limits);
+    let large = |samples: u32| {
+        Question::post("/v1/sweep", with(&shortest(), "/sweep", json!({ "samples": samples })).to_string())
+    };
+    // 0.8 MB of answer, and 0.3 MB beside it while it is made.
+    service.ask(&large(500)).await.found();
+    let unread = service.response(large(900).request()).await;
+    assert_eq!(unread.status(), 200);
+    assert!(service.app.room.taken_bytes() > 1_000_000);
+    service.ask(&large(901)).await.refused(503, "too_many_unread_bytes");
+    drop(unread);
+    assert_eq!(service.app.room.taken_bytes(), 0);
+    service.ask(&large(901)).await.found();
+}
+
+// --- Time and joining
+
+/// Whoever joins another's solve has a deadline of its own: it began later.
+#[tokio::test(start_paused = true)]
+async fn a_joiner_is_answered_though_the_time_of_the_first_is_over() {
+    let limits = toothwave::config::Limits { max_concurrent_solves: 1, deadline_ms: 1000, ..crate::asking::LIMITS };
+    let service = Service::within(limits);
+    let (release, released) = std::sync::mpsc::channel::<()>();
+    let pool = service.app.pool.clone();
+    let occupied = tokio::spawn(async move {
+        let job = move |_: &AtomicBool| {
+            let _ = released.recv();
+            Ok(())
+        };
+        pool.run_while_wanted(toothwave::compute::Thread::Blocking, job).await
+    });
+    let ask = || {
+        let service = service.clone();
+        tokio::spawn(async move { service.ask(&Question::post("/v1/sweep", shortest().to_string())).await })
+    };
+    crate::asking::until("the pool is occupied", || service.app.pool.running() == 1).await;
+    let first = ask();
+    crate::asking::until("the first waits", || service.app.pool.admitted() == 2).await;
+    tokio::time::advance(Duration::from_millis(600)).await;
+    let joiner = ask();
+    for _ in 0..1000 {
+        tokio::task::yield_now().await;
+    }
+    tokio::time::advance(Duration::from_millis(401)).await;
+    first.await.unwrap().refused(503, "deadline_exceeded");
+    release.send(()).unwrap();
+    occupied.await.unwrap().unwrap();
+    let answer = joiner.await.unwrap();
+    assert_eq!(answer.status, 200, "{}", answer.text());
+    assert!(answer.is_collapsed());
+}
+
+// --- Entity tags
+
+#[tokio::test]
+async fn a_picture_made_again_is_the_same_to_the_byte() {
+    let plots = Question::post("/v1/sweep", shortest().to_string()).with("accept", "image/svg+xml");
+    let (first, again) = (Service::new().ask(&plots).await, Service::new().ask(&plots).await);
+    assert!(first.is_miss() && again.is_miss());
+    assert_eq!(first.etag(), again.etag());
+    assert_eq!(first.text(), again.text());
+    let references = first.text().matches("url(#kuva-clip-").count();
+    let named: std::collections::BTreeSet<_> =
+        first.text().split("id=\"kuva-clip-").skip(1).map(|rest| rest.split('"').next().unwrap()).collect();
+    assert!(named.len() == 6 && references >= 6, "each of six plots is clipped by its own: {named:?}");
+}
+
+/// The mathematical library chooses its code by the processor: under one tag there is one text, whatever it chose.
+#[test]
+fn another_arithmetic_has_other_tags() {
+    let answer = |tunables: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_toothwave"));
+        let process =
+            Process::of(command.env("GLIBC_TUNABLES", tunables).args(["serve", "--log", "off"]), Stdio::null());
+        let design = with(&shortest(), "/model", json!({ "stiffness": { "law": "palmgren" } }));
+        let answer = ask_at(process.address, &Question::post("/v1/sweep", design.to_string()));
+        (answer.etag().to_owned(), answer.body)
+    };
+    let (usual, masked) = (answer(""), answer("glibc.cpu.hwcaps=-AVX2,-FMA,-AVX2_Usable,-FMA_Usable"));
+    assert!(usual.1 == masked.1 || usual.0 != masked.0, "{} for two texts", usual.0);
+}
+
+#[tokio::test]
+async fn metrics_say_what_was_built() {
+    toothwave::observe::install_recorder();
+    let metrics = Service::new().get("/metrics").await;
+    let info = metrics.text().lines().find(|line| line.starts_with("toothwave_build_info{")).unwrap().to_owned();
+    assert!(info.contains(&format!("build=\"{}\"", toothwave_calculation::BUILD)) && info.ends_with(" 1"), "{info}");
+    assert!(
+        toothwave_calculation::BUILD.len() == 16
+            && toothwave_calculation::BUILD.bytes().all(|byte| byte.is_ascii_hexdigit())
+    );
+}
