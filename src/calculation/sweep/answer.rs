@@ -80,8 +80,12 @@ pub struct PeakAnswer {
 pub struct StatesAnswer {
     /// Input angle j.
     pub input_angle_deg: Vec<f64>,
-    /// Tooth number; tooth 0 stands on the major axis at j = 0.
+    /// Tooth number, from the middle of a lobe on; where zones are unlike, the number of its slot, slot 0 standing in the middle of lobe 0 at j = 0.
     pub tooth: Vec<u32>,
+    /// The lobe that the tooth is on, where zones are unlike and all of them are listed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub lobe: Option<Vec<u32>>,
     /// Position ψ of the tooth, from the major axis.
     pub position_deg: Vec<f64>,
     /// Distance of the tooth's centre from the axis.
@@ -195,6 +199,7 @@ impl StatesAnswer {
             loaded: with_clearance.then(|| forces.iter().map(|force| *force > 0.0).collect()),
             input_angle_deg: states.input_angle_deg,
             tooth: states.tooth,
+            lobe: (!states.lobe.is_empty()).then_some(states.lobe),
             position_deg: states.position_deg,
             center_radius_mm: states.center_radius_mm,
             wave_generator_angle_deg: states.wave_generator_angle_deg,
