@@ -8,7 +8,7 @@ pub(crate) mod paper;
 
 use std::f64::consts::PI;
 
-use toothwave_solver::{DriveParameters, Material};
+use toothwave_solver::{DriveParameters, Material, ToothShape, WaveGenerator};
 
 /// The columns of a sweep in the order of the API: one entry a state, without the tooth number, which stands beside them.
 pub(crate) const COLUMNS: [&str; 11] = [
@@ -56,6 +56,22 @@ pub(crate) struct Case {
 }
 
 impl Case {
+    /// `a` and `b`.
+    fn semi_axes_mm(&self) -> [f64; 2] {
+        match self.drive.wave_generator {
+            WaveGenerator::Ellipse { semi_major_mm, semi_minor_mm } => [semi_major_mm, semi_minor_mm],
+            other => unreachable!("the baselines know ellipses alone, not {other:?}"),
+        }
+    }
+
+    /// `L1`.
+    fn tooth_width_mm(&self) -> f64 {
+        match self.drive.tooth {
+            ToothShape::Cylinder { width_mm } => width_mm,
+            other => unreachable!("the baselines know cylinders alone, not {other:?}"),
+        }
+    }
+
     /// `k = Z_K/U`.
     fn ring_teeth_per_wave(&self) -> f64 {
         self.drive.ring_teeth as f64 / 2.0
@@ -79,12 +95,12 @@ impl Case {
 
     /// `k = π L1 E*/2`, alike at the three contacts.
     fn stiffness_n_per_mm(&self) -> f64 {
-        0.5 * PI * self.drive.tooth_width_mm * self.contact_modulus_mpa()
+        0.5 * PI * self.tooth_width_mm() * self.contact_modulus_mpa()
     }
 
     /// Hertz [8].
     fn stress_mpa(&self, force_n: f64, curvature_per_mm: f64) -> f64 {
-        (force_n * curvature_per_mm * self.contact_modulus_mpa() / (PI * self.drive.tooth_width_mm)).sqrt()
+        (force_n * curvature_per_mm * self.contact_modulus_mpa() / (PI * self.tooth_width_mm())).sqrt()
     }
 
     /// The columns of one tooth from its geometry and its three forces.

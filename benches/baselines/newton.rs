@@ -59,7 +59,7 @@ fn normal_rad(a: f64, b: f64, r: f64, from_minor_rad: f64) -> f64 {
 impl Tooth {
     /// At the position x.
     pub(crate) fn at(case: &Case, from_minor_rad: f64) -> Self {
-        let (a, b, r) = (case.drive.semi_major_mm, case.drive.semi_minor_mm, case.drive.tooth_radius_mm);
+        let ([a, b], r) = (case.semi_axes_mm(), case.drive.tooth_radius_mm);
         let k = case.ring_teeth_per_wave();
         let chi = normal_rad(a, b, r, from_minor_rad);
         let Support { h, first, second } = support(a, b, chi);

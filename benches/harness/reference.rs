@@ -4,7 +4,8 @@ use std::error::Error;
 
 use serde_json::Value;
 use toothwave_solver::{
-    Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, PerContact, Torque,
+    Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, PerContact, ToothShape, Torque,
+    WaveGenerator,
 };
 
 use crate::baselines::{COLUMNS, Columns};
