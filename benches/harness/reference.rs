@@ -4,8 +4,8 @@ use std::error::Error;
 
 use serde_json::Value;
 use toothwave_solver::{
-    Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, PerContact, ToothShape, Torque,
-    WaveGenerator,
+    Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, Modification, PerContact,
+    ToothShape, Torque, WaveGenerator,
 };
 
 use crate::baselines::{COLUMNS, Columns};
@@ -44,7 +44,9 @@ impl Setup {
             torque: Torque::Input(20.0),
             compatibility: Compatibility::Projection,
             law: ContactLaw::Linear,
+            series_compliance_mm_per_n: PerContact { wave_generator: 0.0, ring: 0.0, carrier: 0.0 },
             clearance_um: PerContact { wave_generator: 0.0, ring: 0.0, carrier: 0.0 },
+            modification: Modification::NONE,
             allowable_stress_mpa: None,
         },
         input_torque_nm: 20.0,
@@ -107,7 +109,9 @@ impl Reference {
                 torque: Torque::Input(input_torque_nm),
                 compatibility: Compatibility::Projection,
                 law: ContactLaw::Linear,
+                series_compliance_mm_per_n: PerContact::default(),
                 clearance_um: PerContact::default(),
+                modification: Modification::NONE,
                 allowable_stress_mpa: None,
             },
             input_torque_nm,

@@ -93,6 +93,10 @@ pub enum LawName {
     Fixed,
     /// Palmgren's.
     Palmgren,
+    /// Johnson's.
+    Johnson,
+    /// Hertz's.
+    Hertz,
 }
 
 impl From<ContactLaw> for LawName {
@@ -101,6 +105,8 @@ impl From<ContactLaw> for LawName {
             ContactLaw::Linear => Self::Linear,
             ContactLaw::Fixed(_) => Self::Fixed,
             ContactLaw::Palmgren => Self::Palmgren,
+            ContactLaw::Johnson { .. } => Self::Johnson,
+            ContactLaw::Hertz => Self::Hertz,
         }
     }
 }

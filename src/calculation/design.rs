@@ -8,8 +8,8 @@ use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::profile::{Extent, ProfileParameters};
 use toothwave_solver::sweep::Points;
 use toothwave_solver::{
-    Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, Parameter, PerContact, Torque,
-    Violation,
+    Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, Modification, Parameter,
+    PerContact, Torque, Violation,
 };
 use utoipa::ToSchema;
 
@@ -85,7 +85,13 @@ impl Design {
         if self.sweep.tolerance.is_none() {
             self.sweep.samples.get_or_insert(DEFAULT_SAMPLES);
         }
-        self.model.stiffness.get_or_insert(StiffnessDocument::Linear(LinearDocument::default()));
+        let by_default = match &self.drive.teeth {
+            TeethDocument::Ball(_) => StiffnessDocument::Hertz(HertzDocument::default()),
+            TeethDocument::Cylinder(_) | TeethDocument::FlatSided(_) => {
+                StiffnessDocument::Linear(LinearDocument::default())
+            }
+        };
+        self.model.stiffness.get_or_insert(by_default);
         self
     }
 
@@ -164,6 +170,8 @@ impl Design {
             torque,
             compatibility,
             law: self.contact_law(),
+            series_compliance_mm_per_n: (&self.model.series_compliance_mm_per_n).into(),
+            modification: Modification::default(),
             clearance_um: self.model.clearance.as_ref().map_or_else(PerContact::default, |clearance| PerContact {
                 wave_generator: clearance.wave_generator_um,
                 ring: clearance.ring_um,

@@ -1,7 +1,7 @@
 //! Fields of the design document: where each stands, and what can be wrong with it.
 
 use serde::Serialize;
-use toothwave_solver::violation::{Misfit, Violation};
+use toothwave_solver::violation::{Misfit, Modified, Violation};
 use toothwave_solver::{Contact, Parameter, Part};
 use utoipa::ToSchema;
 
@@ -122,6 +122,16 @@ impl From<&Violation> for FieldError {
             Violation::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => {
                 (FieldCode::BoreLeavesNoFlank, TipRadius, tip_radius_mm, root_radius_mm)
             }
+            Violation::NeedsVirtualWork { parameter } => return Self::conflict(violation, parameter),
+            Violation::TipReliefBeyondFlank { start_deg, engagement_start_deg } => {
+                let parameter = Parameter::Modification(Modified::TipReliefStart);
+                (FieldCode::OutOfRange, parameter, start_deg, engagement_start_deg)
+            }
+            Violation::DeviationCount { count, items } => {
+                (FieldCode::OutOfRange, Parameter::Deviations, count as f64, items as f64)
+            }
+            Violation::DeviationNotFinite => return Self::conflict(violation, Parameter::Deviations),
+            Violation::LawOfOtherTeeth => return Self::conflict(violation, Parameter::Law),
             Violation::PartDoesNotFit { misfit, value, limit } => {
                 let code = match misfit {
                     Misfit::RingWithoutRim => FieldCode::RingWithoutRim,
@@ -142,6 +152,19 @@ impl From<&Violation> for FieldError {
             detail: violation.to_string(),
             value: Some(value),
             limit: Some(limit),
+        }
+    }
+}
+
+impl FieldError {
+    /// A violation that is about a choice, which has no number.
+    fn conflict(violation: &Violation, parameter: Parameter) -> Self {
+        Self {
+            pointer: pointer(parameter),
+            code: FieldCode::ConflictingFields,
+            detail: violation.to_string(),
+            value: None,
+            limit: None,
         }
     }
 }
@@ -171,6 +194,13 @@ pub fn pointer(parameter: Parameter) -> String {
         Parameter::OutputTorque => "/load/output_torque_nm".into(),
         Parameter::Stiffness(contact) => format!("/model/stiffness/{}_n_per_mm", contact_name(contact)),
         Parameter::Clearance(contact) => format!("/model/clearance/{}_um", contact_name(contact)),
+        Parameter::Law => "/model/stiffness/law".into(),
+        Parameter::Depth(contact) => format!("/model/stiffness/depth_mm/{}", contact_name(contact)),
+        Parameter::SeriesCompliance(contact) => {
+            format!("/model/series_compliance_mm_per_n/{}", contact_name(contact))
+        }
+        Parameter::Modification(modified) => format!("/modification/{}", modified_name(modified)),
+        Parameter::Deviations => "/deviations".into(),
         Parameter::AllowableStress => "/load/allowable_stress_mpa".into(),
         Parameter::Samples => "/sweep/samples".into(),
         Parameter::RequestedError => "/accuracy/requested_error".into(),
@@ -201,5 +231,22 @@ pub const fn contact_name(contact: Contact) -> &'static str {
         Contact::WaveGenerator => "wave_generator",
         Contact::Ring => "ring",
         Contact::Carrier => "carrier",
+    }
+}
+
+/// A number of the modification as documents spell it.
+const fn modified_name(modified: Modified) -> &'static str {
+    match modified {
+        Modified::RingEquidistant => "ring_equidistant_um",
+        Modified::RingPathShift => "ring_path_shift_um",
+        Modified::RingProfileShift => "ring_profile_shift_um",
+        Modified::RingRotation => "ring_rotation_arcsec",
+        Modified::WaveGeneratorEquidistant => "wave_generator_equidistant_um",
+        Modified::SlotWall => "slot_wall_um",
+        Modified::CarrierRotation => "carrier_rotation_arcsec",
+        Modified::ToothRadius => "tooth_radius_um",
+        Modified::TipReliefAmount => "ring_tip_relief/amount_um",
+        Modified::TipReliefStart => "ring_tip_relief/start_deg",
+        Modified::TipReliefPower => "ring_tip_relief/power",
     }
 }

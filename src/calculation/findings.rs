@@ -67,6 +67,8 @@ pub enum FindingCode {
     FlatCutsTheContact,
     /// Palmgren's law for a contact that is not steel on steel.
     PalmgrenBeyondSteel,
+    /// Johnson's law for a contact that is wide beside the tooth's radius or the depth.
+    JohnsonBeyondHalfWidth,
     /// A stress above the fatigue limit of bearing steel.
     StressAboveFatigueLimit,
 }
@@ -222,6 +224,19 @@ impl From<&Finding> for FindingAnswer {
                     contact_name(contact).replace('_', " ")
                 ),
                 "choose the law `fixed` with stiffnesses of your own",
+            ),
+            Finding::JohnsonBeyondHalfWidth { contact, half_width_mm, limit_mm } => new(
+                Code::JohnsonBeyondHalfWidth,
+                Warning,
+                &["/model/stiffness/law", LOAD, RADIUS],
+                half_width_mm,
+                limit_mm,
+                "mm",
+                format!(
+                    "half the contact's width at the {} exceeds a tenth of the tooth's radius or of the depth: Johnson's law, which takes contacts for narrow, begins to err",
+                    contact_name(contact).replace('_', " ")
+                ),
+                "lower the torque, widen the teeth, or take a stiffer material",
             ),
             Finding::StressAboveFatigueLimit { contact, stress_mpa } => new(
                 Code::StressAboveFatigueLimit,

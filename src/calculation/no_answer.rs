@@ -125,6 +125,11 @@ impl From<SolveError> for NoAnswer {
                 NoAnswerCode::ComplianceNotPositive,
                 format!("{detail}. Choose `virtual_work`, or stiffnesses that differ less"),
             ),
+            SolveError::Impossible(violations) => Self::impossible(&violations),
+            SolveError::JohnsonBeyondHalfWidth { .. }
+            | SolveError::Interference { .. }
+            | SolveError::FlatOffCarrier { .. } => Self::new(NoAnswerCode::ImpossibleDesign, detail),
+            SolveError::NoLeverArm => Self::new(NoAnswerCode::NoToothInMesh, detail),
             SolveError::TooManyPoints { points, limit } => {
                 let detail = format!("{detail} by `max_profile_points`; widen the chord tolerance");
                 let pointer = "/profile/chord_tolerance_mm";

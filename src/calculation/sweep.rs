@@ -90,7 +90,8 @@ impl Question for Sweep {
         let mut findings = drive_findings(drive)?;
         let approaches_matter = *with_wind_up || load.has_clearance();
         let of_contacts = findings::of_contacts(drive, load, &sweep.peaks, approaches_matter);
-        findings.extend(of_contacts.iter().map(FindingAnswer::from));
+        let of_half_widths = findings::of_half_widths(drive, load, &sweep.states);
+        findings.extend(of_contacts.iter().chain(&of_half_widths).map(FindingAnswer::from));
         let answer = SweepAnswer {
             solver_version: toothwave_solver::VERSION,
             coincidence_degree: mesh.coincidence_degree(),

@@ -169,7 +169,8 @@ impl<S: Stop> Search<'_, S> {
             places.map(|place| self.loaded.tooth(moment.position(&self.mesh, place))).collect();
         let teeth = teeth?;
         let wind_up = self.loaded.wind_up(&teeth)?;
-        let loads: Vec<_> = teeth.iter().map(|tooth| self.loaded.loads(tooth, &wind_up)).collect();
+        let loads: Result<Vec<_>, _> = teeth.iter().map(|tooth| self.loaded.loads(tooth, &wind_up)).collect();
+        let loads = loads?;
         for loads in &loads {
             for (peak, load) in self.peaks.iter_mut().zip(loads) {
                 *peak = peak.max(*load);

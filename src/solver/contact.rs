@@ -28,6 +28,17 @@ pub enum Contact {
     Carrier,
 }
 
+impl Contact {
+    /// In words.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::WaveGenerator => "the wave generator",
+            Self::Ring => "the ring",
+            Self::Carrier => "the carrier",
+        }
+    }
+}
+
 /// One value for each contact.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PerContact<T> {
@@ -46,6 +57,27 @@ impl<T> PerContact<T> {
             wave_generator: function(Contact::WaveGenerator),
             ring: function(Contact::Ring),
             carrier: function(Contact::Carrier),
+        }
+    }
+
+    /// The same fallible function of each contact.
+    ///
+    /// # Errors
+    /// The first one's.
+    pub fn try_of<E>(mut function: impl FnMut(Contact) -> Result<T, E>) -> Result<Self, E> {
+        Ok(Self {
+            wave_generator: function(Contact::WaveGenerator)?,
+            ring: function(Contact::Ring)?,
+            carrier: function(Contact::Carrier)?,
+        })
+    }
+
+    /// The value at one contact, to be changed.
+    pub const fn get_mut(&mut self, contact: Contact) -> &mut T {
+        match contact {
+            Contact::WaveGenerator => &mut self.wave_generator,
+            Contact::Ring => &mut self.ring,
+            Contact::Carrier => &mut self.carrier,
         }
     }
 
@@ -79,7 +111,7 @@ impl Material {
     pub const STEEL: Self = Self { youngs_modulus_gpa: 210.0, poissons_ratio: 0.3 };
 
     /// `(1 - ν²)/E`, in 1/MPa.
-    fn compliance_per_mpa(&self) -> f64 {
+    pub(crate) fn compliance_per_mpa(&self) -> f64 {
         (1.0 - self.poissons_ratio) * (1.0 + self.poissons_ratio) / (1e3 * self.youngs_modulus_gpa)
     }
 }
@@ -116,12 +148,16 @@ impl Materials {
 
     /// The contact modulus E* of a contact: `1/E* = (1 - ν1²)/E1 + (1 - ν2²)/E2`.
     pub fn contact_modulus_mpa(&self, contact: Contact) -> f64 {
-        let partner = match contact {
-            Contact::WaveGenerator => self.wave_generator,
-            Contact::Ring => self.ring,
-            Contact::Carrier => self.carrier,
-        };
-        1.0 / (self.teeth.compliance_per_mpa() + partner.compliance_per_mpa())
+        1.0 / (self.teeth.compliance_per_mpa() + self.partner(contact).compliance_per_mpa())
+    }
+
+    /// The material that a tooth touches at a contact.
+    pub(crate) const fn partner(&self, contact: Contact) -> &Material {
+        match contact {
+            Contact::WaveGenerator => &self.wave_generator,
+            Contact::Ring => &self.ring,
+            Contact::Carrier => &self.carrier,
+        }
     }
 }
 
@@ -134,48 +170,14 @@ pub enum ContactLaw {
     Fixed(PerContact<f64>),
     /// Palmgren's `δ = 3.84e-5 F^0.9/L^0.8` (steel on steel, N and mm).
     Palmgren,
-}
-
-/// The approach of a contact as a power of its force: `δ = coefficient F^exponent`, one exponent for all three.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Approach {
-    /// `1/n`: 1 for a linear law.
-    pub exponent: f64,
-    /// `K^(-1/n)` of each contact, in mm/N^exponent.
-    pub coefficient: PerContact<f64>,
-}
-
-impl ContactLaw {
-    /// The law of teeth of this width.
-    pub fn approach(&self, materials: &Materials, tooth_width_mm: f64) -> Approach {
-        match self {
-            Self::Linear => {
-                let stiffness = |contact| 0.5 * PI * tooth_width_mm * materials.contact_modulus_mpa(contact);
-                Approach { exponent: 1.0, coefficient: PerContact::of(|contact| 1.0 / stiffness(contact)) }
-            }
-            Self::Fixed(stiffness_n_per_mm) => {
-                let coefficient = PerContact::of(|contact| 1.0 / stiffness_n_per_mm.get(contact));
-                Approach { exponent: 1.0, coefficient }
-            }
-            Self::Palmgren => {
-                let coefficient = 3.84e-5 / tooth_width_mm.powf(0.8);
-                Approach { exponent: 0.9, coefficient: PerContact::of(|_| coefficient) }
-            }
-        }
-    }
-}
-
-impl Approach {
-    /// `F^exponent`.
-    pub fn power(&self, force: f64) -> f64 {
-        // The common law is linear, and a power costs as much as all the rest of a state.
-        if self.exponent < 1.0 { force.powf(self.exponent) } else { force }
-    }
-
-    /// The inverse of [`Self::power`].
-    pub fn root(&self, power: f64) -> f64 {
-        if self.exponent < 1.0 { power.powf(1.0 / self.exponent) } else { power }
-    }
+    /// The logarithmic approach of a cylinder between two bodies (K. L. Johnson, *Contact Mechanics*, 1985, section 5.6), each of which stands still
+    /// at a depth, by default the tooth's radius.
+    Johnson {
+        /// Depth of each body below its contact, in mm.
+        depth_mm: PerContact<Option<f64>>,
+    },
+    /// Hertz's `δ = q F^(2/3)` of a point contact: the law of balls.
+    Hertz,
 }
 
 /// Hertz stress of a line contact \[8\]: `σ = √(F/(π L1) · (1/ρ1 + 1/ρ2) · E*)`.

@@ -1,13 +1,15 @@
 //! What a designer should be told about a drive that can exist (docs/findings.md).
 
 use crate::cam::Cam;
-use crate::contact::{Contact, ContactLaw, Material, Materials, PerContact};
+use crate::contact::{Contact, ContactLaw, Material, Materials, PerContact, half_width_mm};
 use crate::drive::{Drive, ToothShape};
 use crate::load_sharing::LoadCase;
 use crate::mesh::Mesh;
 use crate::ring::FlankEnd;
 use crate::root::NotConverged;
-use crate::sweep::ContactPeaks;
+use crate::sweep::{ContactPeaks, States};
+use crate::tooth::line::{WIDE_SHARE, least_length_mm};
+use crate::tooth::plain_approach_mm;
 
 /// Contact stress at the fatigue limit of bearing steel (ISO 281:2007).
 pub const FATIGUE_LIMIT_STRESS_MPA: f64 = 1500.0;
@@ -119,6 +121,15 @@ pub enum Finding {
         /// That of steel on steel.
         steel_gpa: f64,
     },
+    /// Johnson's law for a contact that is wide beside the tooth's radius or the depth.
+    JohnsonBeyondHalfWidth {
+        /// Which.
+        contact: Contact,
+        /// Half of its largest width.
+        half_width_mm: f64,
+        /// What it should stay below.
+        limit_mm: f64,
+    },
     /// A stress above the fatigue limit of bearing steel.
     StressAboveFatigueLimit {
         /// Where.
@@ -215,16 +226,13 @@ pub fn of_contacts(
     let p = load.parameters();
     let width_mm = drive.tooth_width_mm();
     let mut findings = Vec::new();
-    if p.law == ContactLaw::Linear && approaches_matter {
-        let force_n = peaks.wave_generator.force_n.value;
-        let approach_um = |law: ContactLaw| {
-            let approach = law.approach(&p.materials, width_mm);
-            1e3 * approach.coefficient.wave_generator * approach.power(force_n)
-        };
-        findings.push(Finding::LinearLawTooStiff {
-            linear_um: approach_um(ContactLaw::Linear),
-            palmgren_um: approach_um(ContactLaw::Palmgren),
-        });
+    let force_n = peaks.wave_generator.force_n.value;
+    let approach_mm = |law: ContactLaw| plain_approach_mm(&law, &p.materials, width_mm, force_n);
+    if p.law == ContactLaw::Linear
+        && approaches_matter
+        && let Some((linear_mm, palmgren_mm)) = approach_mm(ContactLaw::Linear).zip(approach_mm(ContactLaw::Palmgren))
+    {
+        findings.push(Finding::LinearLawTooStiff { linear_um: 1e3 * linear_mm, palmgren_um: 1e3 * palmgren_mm });
     }
     if p.law == ContactLaw::Palmgren {
         let steel = Materials { wave_generator: STEEL, teeth: STEEL, ring: STEEL, carrier: STEEL };
@@ -246,4 +254,26 @@ pub fn of_contacts(
             .map(|(contact, peaks)| Finding::StressAboveFatigueLimit { contact, stress_mpa: peaks.stress_mpa.value }),
     );
     findings
+}
+
+/// The contacts that are too wide for Johnson's law, over all states: the widest is not the one with the largest stress.
+pub fn of_half_widths(drive: &Drive, load: &LoadCase, states: &States) -> Vec<Finding> {
+    let ContactLaw::Johnson { depth_mm } = &load.parameters().law else { return Vec::new() };
+    let (tooth_radius_mm, tooth_width_mm) = (drive.parameters().tooth_radius_mm, drive.tooth_width_mm());
+    let is_flat =
+        |contact| contact == Contact::Carrier && matches!(drive.parameters().tooth, ToothShape::FlatSided { .. });
+    let widest = states.force_n.iter().filter(|&(contact, _)| !is_flat(contact)).map(|(contact, forces_n)| {
+        let loaded = forces_n.iter().zip(states.stress_mpa.get(contact)).filter(|&(&force_n, _)| force_n > 0.0);
+        let half_widths = loaded.map(|(&force_n, &stress_mpa)| half_width_mm(force_n, stress_mpa, tooth_width_mm));
+        (contact, half_widths.fold(0.0, f64::max))
+    });
+    widest
+        .map(|(contact, half_width_mm)| {
+            let limit_mm = WIDE_SHARE * least_length_mm(depth_mm, contact, tooth_radius_mm);
+            Finding::JohnsonBeyondHalfWidth { contact, half_width_mm, limit_mm }
+        })
+        .filter(|finding| {
+            matches!(finding, Finding::JohnsonBeyondHalfWidth { half_width_mm, limit_mm, .. } if half_width_mm > limit_mm)
+        })
+        .collect()
 }

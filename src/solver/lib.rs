@@ -32,12 +32,14 @@
 //! its geometry and its mesh; with a [`LoadCase`] it answers a [`sweep()`](sweep::sweep) over one period.
 
 mod adaptive;
+pub mod approach;
 mod batch;
 pub mod cam;
 pub mod contact;
 pub mod drawing;
 pub mod drive;
 pub mod findings;
+pub mod gaps;
 pub mod load_sharing;
 pub mod locus;
 pub mod mesh;
@@ -47,13 +49,16 @@ pub mod profile;
 pub mod radial_force;
 pub mod ring;
 pub mod root;
+pub mod springs;
 pub mod sweep;
+pub mod tooth;
 pub mod violation;
 
 pub use cam::WaveGenerator;
 pub use contact::{Contact, ContactLaw, Material, Materials, Part, PerContact};
 pub use drive::{Drive, DriveParameters, ToothShape};
 pub use findings::Finding;
+pub use gaps::Modification;
 pub use load_sharing::{Compatibility, LoadCase, LoadParameters, Torque};
 
 pub use position::Position;
@@ -84,6 +89,48 @@ pub enum SolveError {
         position_deg: f64,
         /// The least compliance.
         compliance_mm_per_n: f64,
+    },
+    /// A load that this drive cannot have.
+    #[error("the load is impossible for this drive")]
+    Impossible(Vec<Violation>),
+    /// None of the teeth at an input angle has a lever arm.
+    #[error("none of the teeth in mesh has a lever arm, so no finite force carries the torque")]
+    NoLeverArm,
+    /// Johnson's law where a contact is half as wide as the tooth's radius or the depth, or wider.
+    #[error(
+        "half the contact's width at {} reaches {half_width_limit_mm} mm, half of the tooth's radius or of the depth, where Johnson's approach ends: at this input angle with an input torque of {input_torque_limit_nm} N·m, first on the tooth at {position_deg} deg", .contact.name()
+    )]
+    JohnsonBeyondHalfWidth {
+        /// The contact that is first.
+        contact: Contact,
+        /// Where its tooth stands.
+        position_deg: f64,
+        /// The half-width at which the law ends.
+        half_width_limit_mm: f64,
+        /// The input torque at which it does so, at the input angle looked at.
+        input_torque_limit_nm: f64,
+    },
+    /// A part that is too full: before any load a tooth would be pressed already.
+    #[error(
+        "interference: the tooth in slot {slot}, {position_deg} deg from the major axis, has a total gap of {gap_um} µm along the wave generator's force; make the clearance larger than the deviations"
+    )]
+    Interference {
+        /// The tooth's slot.
+        slot: u64,
+        /// Where it stands.
+        position_deg: f64,
+        /// Its total gap along `F_H`, below zero.
+        gap_um: f64,
+    },
+    /// A flat-sided tooth that is nowhere borne by the carrier.
+    #[error(
+        "the flat of the tooth at {position_deg} deg, its centre {center_radius_mm} mm from the axis, lies outside the carrier"
+    )]
+    FlatOffCarrier {
+        /// Where it stands.
+        position_deg: f64,
+        /// Distance of its centre from the axis.
+        center_radius_mm: f64,
     },
     /// More points than asked for at most.
     #[error("the profiles need {points} points at this chord tolerance, more than the {limit} allowed")]

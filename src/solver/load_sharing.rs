@@ -1,14 +1,18 @@
 //! Equilibrium of a tooth and compatibility of all of them at one input angle (docs/theory.md section 4).
 
-use crate::SolveError;
-use crate::contact::{Approach, Contact, ContactLaw, HertzLine, Materials, PerContact};
+use crate::contact::{Contact, ContactLaw, HertzLine, Materials, PerContact, half_width_mm};
 use crate::drive::{Draft, Drive};
+use crate::gaps::{Deviations, Gaps, Modification, Place};
 use crate::locus::ToothCenter;
 use crate::mesh::Mesh;
 use crate::position::Position;
-use crate::ring::{FlankPoint, RingFlank};
-use crate::root::{NotConverged, ValueAndSlope, newton_in_bracket};
+use crate::ring::{FlankPoint, RingFlank, RingTooth};
+use crate::root::NotConverged;
+use crate::springs::{Rotation, Spring, Springs, WindUp};
+use crate::tooth::line::{WIDEST_SHARE, least_length_mm};
+use crate::tooth::{Contacts, Pressure, ToothContact, ToothSize};
 use crate::violation::{Parameter, Violation};
+use crate::{SolveError, tooth};
 
 /// How the three approaches of a tooth add up to the rotation of the wave generator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,8 +43,12 @@ pub struct LoadParameters {
     pub compatibility: Compatibility,
     /// The contact law.
     pub law: ContactLaw,
+    /// What stands behind each contact and gives way too, under any law, with `VirtualWork` alone.
+    pub series_compliance_mm_per_n: PerContact<f64>,
     /// Gap along the normal of each contact, in µm.
     pub clearance_um: PerContact<f64>,
+    /// Parts made otherwise than conjugate, with `VirtualWork` alone.
+    pub modification: Modification,
     /// The contact stress that the torque capacity is asked for.
     pub allowable_stress_mpa: Option<f64>,
 }
@@ -53,10 +61,22 @@ impl LoadParameters {
     /// # Errors
     /// [`NotConverged`] from the path.
     pub fn clearance_violations(&self, draft: &Draft) -> Result<Vec<Violation>, NotConverged> {
+        let Some((sense, ring)) = draft.sense.zip(draft.ring) else { return Ok(Vec::new()) };
+        self.clearance_violations_in(sense, &ring)
+    }
+
+    /// What `projection` does not take: its weights are not those of the work done, and may be negative.
+    fn what_needs_virtual_work(&self) -> impl Iterator<Item = Parameter> {
+        let law = (!self.law.is_of_projection()).then_some(Parameter::Law);
+        let series = self.series_compliance_mm_per_n.iter().filter(|&(_, &compliance)| compliance > 0.0);
+        let series = series.map(|(contact, _)| Parameter::SeriesCompliance(contact));
+        law.into_iter().chain(series).chain(self.modification.first())
+    }
+
+    fn clearance_violations_in(&self, sense: f64, ring: &RingTooth) -> Result<Vec<Violation>, NotConverged> {
         let gaps = self.clearance_um.iter();
         let gaps: Vec<_> =
             gaps.filter(|&(contact, &gap)| gap > 0.0 && Parameter::Clearance(contact).check(gap).is_none()).collect();
-        let Some((sense, ring)) = draft.sense.zip(draft.ring) else { return Ok(Vec::new()) };
         if self.compatibility == Compatibility::VirtualWork || gaps.is_empty() {
             return Ok(Vec::new());
         }
@@ -86,13 +106,21 @@ impl LoadCase {
         };
         let mut values: Vec<_> = parameters.materials.parameters().collect();
         values.push(torque);
-        if let ContactLaw::Fixed(stiffness) = &parameters.law {
-            values.extend(stiffness.iter().map(|(contact, &value)| (Parameter::Stiffness(contact), value)));
-        }
+        values.extend(parameters.law.parameters());
+        let series = parameters.series_compliance_mm_per_n.iter();
+        values.extend(series.map(|(contact, &value)| (Parameter::SeriesCompliance(contact), value)));
+        let modification = parameters.modification.parameters();
+        values.extend(modification.into_iter().map(|(modified, value)| (Parameter::Modification(modified), value)));
         let gaps = parameters.clearance_um.iter();
         values.extend(gaps.map(|(contact, &value)| (Parameter::Clearance(contact), value)));
         values.extend(parameters.allowable_stress_mpa.map(|value| (Parameter::AllowableStress, value)));
-        let violations: Vec<_> = values.into_iter().filter_map(|(parameter, value)| parameter.check(value)).collect();
+        let mut violations: Vec<_> =
+            values.into_iter().filter_map(|(parameter, value)| parameter.check(value)).collect();
+        if parameters.compatibility == Compatibility::Projection {
+            violations.extend(
+                parameters.what_needs_virtual_work().map(|parameter| Violation::NeedsVirtualWork { parameter }),
+            );
+        }
         if violations.is_empty() { Ok(Self(*parameters)) } else { Err(violations) }
     }
 
@@ -151,12 +179,18 @@ pub struct ToothState {
     pub flank: FlankPoint,
     /// Forces over `F_H`.
     pub force_ratio: PerContact<f64>,
-    /// Relative curvature of each contact, in 1/mm.
+    /// Relative curvature of each contact in the plane of motion, in 1/mm.
     pub curvature_per_mm: PerContact<f64>,
-    /// `c` in `ξ = c F_H^(1/n)`: displacement along `F_H`, in mm/N^(1/n).
-    pub compliance: f64,
-    /// `g/|h'|`: how far the wave generator turns before the clearances at this tooth are closed; infinite where it has no lever arm.
-    pub closing_rad: f64,
+    /// What the pressure at each contact follows from.
+    pub pressure: PerContact<Pressure>,
+    /// What it is to the sharing of the load.
+    pub spring: Spring,
+}
+
+impl AsRef<Spring> for ToothState {
+    fn as_ref(&self) -> &Spring {
+        &self.spring
+    }
 }
 
 /// A drive under a load: everything that does not depend on the position, worked out once.
@@ -167,27 +201,9 @@ pub struct LoadedDrive<'a> {
     /// What a sum over the teeth that are listed is multiplied by, to be that over all.
     zones: f64,
     input_torque_nmm: f64,
-    approach: Approach,
-    clearance_mm: PerContact<f64>,
-    hertz: PerContact<HertzLine>,
-}
-
-/// How far the wave generator turns under the load at one input angle, and how stiffly.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WindUp {
-    /// Where the first tooth's clearances are closed.
-    pub closing_rad: f64,
-    /// What is turned beyond that. Kept apart, because it may be small against the clearances and alone makes the forces.
-    pub excess_rad: f64,
-    /// `dM0/dΔφ` at the load.
-    pub stiffness_nmm_per_rad: f64,
-}
-
-impl WindUp {
-    /// `Δφ`.
-    pub const fn rotation_rad(&self) -> f64 {
-        self.closing_rad + self.excess_rad
-    }
+    law: ContactLaw,
+    contacts: Contacts,
+    gaps: Gaps<'a>,
 }
 
 /// A stress that limits the torque at one input angle.
@@ -203,10 +219,35 @@ impl<'a> LoadedDrive<'a> {
     /// The drive under the load.
     ///
     /// # Errors
-    /// [`SolveError::NoToothInMesh`] and [`SolveError::ComplianceNotPositive`] where no finite forces exist.
+    /// [`SolveError::NoToothInMesh`] and [`SolveError::ComplianceNotPositive`] where no finite forces exist, [`SolveError::Impossible`] where the
+    /// drive cannot have the load's clearances.
     pub fn new(drive: &'a Drive, load: &LoadCase) -> Result<Self, SolveError> {
+        Self::with_deviations(drive, load, &ToothContact::of(drive), None)
+    }
+
+    /// The drive under the load, with teeth of another shape.
+    ///
+    /// # Errors
+    /// As [`Self::new`], and [`SolveError::Impossible`] under a law that such teeth do not have.
+    pub fn with_teeth(drive: &'a Drive, load: &LoadCase, shape: &ToothContact) -> Result<Self, SolveError> {
+        Self::with_deviations(drive, load, shape, None)
+    }
+
+    /// The drive under the load, with teeth of another shape and parts that deviate. Then zones are not alike: [`Self::wind_up`] wants the teeth
+    /// of all zones, made by [`Self::tooth_at`].
+    ///
+    /// # Errors
+    /// As [`Self::with_teeth`], and [`SolveError::Impossible`] where a list does not fit or `projection` is to take deviations.
+    pub fn with_deviations(
+        drive: &'a Drive,
+        load: &LoadCase,
+        shape: &ToothContact,
+        deviations: Option<&'a Deviations>,
+    ) -> Result<Self, SolveError> {
         let p = load.parameters();
-        let width_mm = drive.tooth_width_mm();
+        let size = ToothSize { radius_mm: drive.parameters().tooth_radius_mm, width_mm: drive.tooth_width_mm() };
+        let contacts = Contacts::new(shape, &p.law, &p.materials, size, &p.series_compliance_mm_per_n)
+            .ok_or_else(|| SolveError::Impossible(vec![Violation::LawOfOtherTeeth]))?;
         let input_torque_nm = match p.torque {
             Torque::Input(torque) => torque,
             Torque::Output(torque) => torque / drive.teeth_per_wave(),
@@ -217,10 +258,21 @@ impl<'a> LoadedDrive<'a> {
             compatibility: p.compatibility,
             zones: mesh.zones_in_torque(),
             input_torque_nmm: 1e3 * input_torque_nm,
-            approach: p.law.approach(&p.materials, width_mm),
-            clearance_mm: PerContact::of(|contact| 1e-3 * p.clearance_um.get(contact)),
-            hertz: PerContact::of(|contact| HertzLine::new(&p.materials, contact, width_mm)),
+            law: p.law,
+            contacts,
+            gaps: Gaps::new(drive, &p.clearance_um, p.modification, deviations),
         };
+        let mut violations = p.clearance_violations_in(drive.sense(), drive.ring_tooth())?;
+        violations.extend(p.modification.violation_in(drive));
+        if let Some(deviations) = deviations {
+            violations.extend(deviations.violations(drive));
+            if loaded.gaps.tell_zones_apart() && p.compatibility == Compatibility::Projection {
+                violations.push(Violation::NeedsVirtualWork { parameter: Parameter::Deviations });
+            }
+        }
+        if !violations.is_empty() {
+            return Err(SolveError::Impossible(violations));
+        }
         if !mesh.always_carries() {
             return Err(SolveError::NoToothInMesh {
                 engagement_start_deg: drive.flank_limit().position.from_lobe_deg(),
@@ -230,10 +282,11 @@ impl<'a> LoadedDrive<'a> {
         // Only `projection` can fall to zero, and only with unlike stiffnesses. It is then linear in sin²γ and positive at the root, so its
         // least value stands there or where γ is largest.
         if p.compatibility == Compatibility::Projection {
-            let ToothState { center, compliance, .. } = loaded.state(drive.steepest_engaged()?);
-            if compliance <= 0.0 {
+            let ToothState { center, spring, .. } = loaded.state(&Place::default(), drive.steepest_engaged()?)?;
+            let compliance_mm_per_n = spring.approach.approach_mm(1.0);
+            if compliance_mm_per_n <= 0.0 {
                 let position_deg = center.position.from_lobe_deg();
-                return Err(SolveError::ComplianceNotPositive { position_deg, compliance_mm_per_n: compliance });
+                return Err(SolveError::ComplianceNotPositive { position_deg, compliance_mm_per_n });
             }
         }
         Ok(loaded)
@@ -261,13 +314,12 @@ impl<'a> LoadedDrive<'a> {
 
     /// `1/k` of each contact, where the law is linear and no contact has a gap: where unit loads only have to be scaled.
     pub(crate) fn linear_compliance_mm_per_n(&self) -> Option<PerContact<f64>> {
-        let is_gapless = self.clearance_mm.iter().all(|(_, &gap)| gap == 0.0);
-        (is_gapless && self.approach.exponent >= 1.0).then_some(self.approach.coefficient)
+        self.contacts.linear_compliance_mm_per_n().filter(|_| self.gaps.is_nil())
     }
 
     /// Hertz stress of a contact.
     pub(crate) const fn hertz(&self, contact: Contact) -> &HertzLine {
-        self.hertz.get(contact)
+        self.contacts.hertz(contact)
     }
 
     /// `M0` in N·mm.
@@ -278,13 +330,21 @@ impl<'a> LoadedDrive<'a> {
     /// The tooth at a position.
     ///
     /// # Errors
-    /// [`NotConverged`] from the path.
-    pub fn tooth(&self, position: Position) -> Result<ToothState, NotConverged> {
-        let locus = self.drive.flank().locus();
-        Ok(self.state(locus.at(position)?))
+    /// [`NotConverged`] from the path, [`SolveError::FlatOffCarrier`] where a flat-sided tooth has left its slot.
+    pub fn tooth(&self, position: Position) -> Result<ToothState, SolveError> {
+        self.tooth_at(&Place::default(), position)
     }
 
-    fn state(&self, center: ToothCenter) -> ToothState {
+    /// The tooth at a position, in its place among the items that may deviate.
+    ///
+    /// # Errors
+    /// As [`Self::tooth`], and [`SolveError::Interference`] where a part is too full.
+    pub fn tooth_at(&self, place: &Place, position: Position) -> Result<ToothState, SolveError> {
+        let locus = self.drive.flank().locus();
+        self.state(place, locus.at(position)?)
+    }
+
+    fn state(&self, place: &Place, center: ToothCenter) -> Result<ToothState, SolveError> {
         let flank_curve = self.drive.flank();
         let flank = flank_curve.at(&center);
         let r = self.drive.parameters().tooth_radius_mm;
@@ -295,156 +355,148 @@ impl<'a> LoadedDrive<'a> {
             ring: 1.0 / (r * flank.regularity),
             carrier: 1.0 / r,
         };
-        let (mut compliance, mut gap_mm) = (0.0, 0.0);
-        for (contact, weight) in weights.iter() {
-            let approach = self.approach.coefficient.get(contact) * self.approach.power(*force_ratio.get(contact));
-            compliance += weight * approach;
-            gap_mm += weight * self.clearance_mm.get(contact);
-        }
-        let closing_rad = if gap_mm > 0.0 { gap_mm / center.cam_contact.lever_arm_mm } else { 0.0 };
-        ToothState { center, flank, force_ratio, curvature_per_mm, compliance, closing_rad }
+        let places = PerContact::try_of(|contact| {
+            let center_radius_mm = center.center_radius_mm;
+            let pressure = self.contacts.pressure(contact, *curvature_per_mm.get(contact), center_radius_mm)?;
+            let pressure = pressure.ok_or_else(|| {
+                let position_deg = center.position.from_lobe_deg();
+                SolveError::FlatOffCarrier { position_deg, center_radius_mm }
+            })?;
+            Ok::<_, SolveError>(tooth::Place {
+                force_ratio: *force_ratio.get(contact),
+                weight: *weights.get(contact),
+                pressure,
+            })
+        })?;
+        let gap_mm = if self.gaps.is_nil() {
+            None
+        } else {
+            let gaps_mm = self.gaps.at(place, &center, &flank);
+            let gap_mm = weights.iter().fold(0.0, |sum, (contact, weight)| sum + weight * gaps_mm.get(contact));
+            // The weights of clearances under `projection` were looked at before: what is left of them is rounding.
+            if gap_mm < 0.0 && self.compatibility == Compatibility::VirtualWork {
+                let position_deg = center.position.from_lobe_deg();
+                return Err(SolveError::Interference { slot: place.slot, position_deg, gap_um: 1e3 * gap_mm });
+            }
+            Some(gap_mm)
+        };
+        let approach = self.contacts.approach(&places);
+        // Without friction the way that the wave generator makes and the torque that it takes have one arm.
+        let arm_mm = center.cam_contact.lever_arm_mm;
+        let spring = Spring::new(arm_mm, arm_mm, gap_mm, approach);
+        let pressure = PerContact::of(|contact| places.get(contact).pressure);
+        Ok(ToothState { center, flank, force_ratio, curvature_per_mm, pressure, spring })
     }
 
-    /// The forces on a tooth when the wave generator has turned by `Δφ`, from `F_H = ((Δφ |h'| - g)/c)^n`; none where a gap is
-    /// still open.
-    pub fn forces_n(&self, tooth: &ToothState, wind_up: &WindUp) -> PerContact<f64> {
-        let cam_force_n = self.cam_force_n(tooth, tooth.displacement_mm(wind_up.closing_rad, wind_up.excess_rad));
-        PerContact::of(|contact| cam_force_n * tooth.force_ratio.get(contact))
-    }
-
-    fn cam_force_n(&self, tooth: &ToothState, displacement_mm: f64) -> f64 {
-        self.approach.root(displacement_mm / tooth.compliance)
+    /// The forces on a tooth when the wave generator has turned by `Δφ`; none where a gap is still open.
+    ///
+    /// # Errors
+    /// [`NotConverged`] from the law's inverse.
+    pub fn forces_n(&self, tooth: &ToothState, wind_up: &WindUp) -> Result<PerContact<f64>, NotConverged> {
+        let cam_force_n = tooth.spring.force_n(&wind_up.rotation)?;
+        Ok(PerContact::of(|contact| cam_force_n * tooth.force_ratio.get(contact)))
     }
 
     /// The three forces and the three stresses on a tooth when the wave generator has turned by `Δφ`.
-    pub(crate) fn loads(&self, tooth: &ToothState, wind_up: &WindUp) -> [f64; 6] {
-        let force_n = self.forces_n(tooth, wind_up);
+    pub(crate) fn loads(&self, tooth: &ToothState, wind_up: &WindUp) -> Result<[f64; 6], NotConverged> {
+        let force_n = self.forces_n(tooth, wind_up)?;
         let stress_mpa = self.stress_mpa(tooth, &force_n);
-        [
+        Ok([
             force_n.wave_generator,
             force_n.ring,
             force_n.carrier,
             stress_mpa.wave_generator,
             stress_mpa.ring,
             stress_mpa.carrier,
-        ]
+        ])
     }
 
     /// The Hertz stresses under the forces on a tooth.
     pub fn stress_mpa(&self, tooth: &ToothState, force_n: &PerContact<f64>) -> PerContact<f64> {
-        PerContact::of(|contact| {
-            self.hertz.get(contact).stress_mpa(*force_n.get(contact), *tooth.curvature_per_mm.get(contact))
-        })
+        PerContact::of(|contact| tooth.pressure.get(contact).stress_mpa(*force_n.get(contact)))
     }
 
-    /// The torque `U Σ F_H |h'|` \[2\] of the teeth that are listed, and its derivative by `Δφ`.
-    fn torque(&self, teeth: &[ToothState], closing_rad: f64, excess_rad: f64) -> ValueAndSlope {
-        let mut torque = ValueAndSlope { value: 0.0, slope: 0.0 };
-        for tooth in teeth {
-            let displacement_mm = tooth.displacement_mm(closing_rad, excess_rad);
-            if displacement_mm > 0.0 {
-                let lever_arm_mm = tooth.center.cam_contact.lever_arm_mm;
-                let torque_nmm = self.zones * self.cam_force_n(tooth, displacement_mm) * lever_arm_mm;
-                torque.value += torque_nmm;
-                // dF/dΔφ = n F |h'|/(Δφ |h'| - g)
-                torque.slope += torque_nmm * (lever_arm_mm / displacement_mm) / self.approach.exponent;
-            }
-        }
-        torque
+    /// The teeth of one zone, which stands for all; of all of them where zones are unlike.
+    fn springs<'s>(&self, teeth: &'s [ToothState]) -> Springs<'s, ToothState> {
+        Springs::new(teeth, if self.gaps.tell_zones_apart() { 1.0 } else { self.zones })
     }
 
-    /// The `Δφ` that balances the input torque over the teeth that are listed.
-    ///
-    /// Without clearance all teeth carry, and `Δφ = (M0/(U Σ |h'| (|h'|/c)^n))^(1/n)`. With clearance a tooth carries from `Δφ = g/|h'|` on;
-    /// in that order the teeth are taken in until the torque is reached: for a linear law the sum over those that carry is closed
-    /// again, for a power law one increasing equation is left.
+    /// The `Δφ` that balances the input torque over these teeth of one zone, or of all where zones are unlike.
     ///
     /// # Errors
-    /// [`NotConverged`] where that equation is not solved.
-    pub fn wind_up(&self, teeth: &[ToothState]) -> Result<WindUp, NotConverged> {
-        let closing_rad = teeth.iter().map(|tooth| tooth.closing_rad).fold(f64::INFINITY, f64::min);
-        let excess_rad = if teeth.iter().all(|tooth| tooth.closing_rad == 0.0) {
-            self.gapless_rotation_rad(teeth)
-        } else {
-            self.excess_rad(teeth, closing_rad)?
-        };
-        let stiffness_nmm_per_rad = self.torque(teeth, closing_rad, excess_rad).slope;
-        Ok(WindUp { closing_rad, excess_rad, stiffness_nmm_per_rad })
-    }
-
-    fn gapless_rotation_rad(&self, teeth: &[ToothState]) -> f64 {
-        let torque_of_unit: f64 = teeth
-            .iter()
-            .map(|tooth| {
-                let lever_arm_mm = tooth.center.cam_contact.lever_arm_mm;
-                lever_arm_mm * self.approach.root(lever_arm_mm / tooth.compliance)
-            })
-            .sum();
-        self.approach.power(self.input_torque_nmm / (self.zones * torque_of_unit))
-    }
-
-    /// What is turned beyond the first closing angle, by an exact active set.
-    fn excess_rad(&self, teeth: &[ToothState], closing_rad: f64) -> Result<f64, NotConverged> {
-        let mut order: Vec<ToothState> = teeth.iter().filter(|tooth| tooth.closing_rad.is_finite()).copied().collect();
-        order.sort_by(|one, other| one.closing_rad.total_cmp(&other.closing_rad));
-        // The next tooth is taken in if those before make less than the torque when it begins to carry.
-        let mut carrying = 1;
-        while let Some(next) = order.get(carrying)
-            && self.torque(&order[..carrying], closing_rad, next.closing_rad - closing_rad).value
-                < self.input_torque_nmm
-        {
-            carrying += 1;
-        }
-        let order = &order[..carrying];
-        if self.approach.exponent < 1.0 {
-            // With all gaps closed from the start these teeth would need less, and from the last closing angle on they need no more.
-            let gapless_rad = self.gapless_rotation_rad(order);
-            let last_rad = order[carrying - 1].closing_rad - closing_rad;
-            let (low, high) = (last_rad.max(gapless_rad), last_rad + gapless_rad);
-            newton_in_bracket("rotation that closes the gaps", low, high, high, |excess_rad| {
-                let torque = self.torque(order, closing_rad, excess_rad);
-                ValueAndSlope { value: torque.value - self.input_torque_nmm, slope: torque.slope }
-            })
-        } else {
-            let (mut stiffness, mut torque_of_gaps) = (0.0, 0.0);
-            for tooth in order {
-                let lever_arm_mm = tooth.center.cam_contact.lever_arm_mm;
-                let share = lever_arm_mm * (lever_arm_mm / tooth.compliance);
-                stiffness += share;
-                torque_of_gaps += share * (tooth.closing_rad - closing_rad);
-            }
-            Ok((self.input_torque_nmm / self.zones + torque_of_gaps) / stiffness)
-        }
+    /// [`SolveError::NoLeverArm`] where none of them can carry, [`SolveError::JohnsonBeyondHalfWidth`] where that law ends before.
+    pub fn wind_up(&self, teeth: &[ToothState]) -> Result<WindUp, SolveError> {
+        let wind_up = self.springs(teeth).wind_up(self.input_torque_nmm)?.ok_or(SolveError::NoLeverArm)?;
+        self.check_law(teeth, &wind_up.rotation)?;
+        Ok(wind_up)
     }
 
     /// The largest input torque under which no contact of these teeth exceeds a stress, and the contact that reaches it.
     ///
     /// Loads grow with `Δφ` and `Δφ` with the torque, so the first contact to reach the stress sets `Δφ`, and that the torque.
-    pub fn torque_limit(&self, teeth: &[ToothState], allowable_stress_mpa: f64) -> TorqueLimit {
-        let closing_rad = teeth.iter().map(|tooth| tooth.closing_rad).fold(f64::INFINITY, f64::min);
-        let mut limit = (f64::INFINITY, Contact::WaveGenerator);
+    ///
+    /// # Errors
+    /// As [`Self::wind_up`].
+    pub fn torque_limit(&self, teeth: &[ToothState], allowable_stress_mpa: f64) -> Result<TorqueLimit, SolveError> {
+        let limit = Self::first_to_reach(teeth, |tooth, contact| {
+            tooth.pressure.get(contact).force_n(allowable_stress_mpa) / tooth.force_ratio.get(contact)
+        });
+        let FirstLimit { rotation, contact, .. } = limit.ok_or(SolveError::NoLeverArm)?;
+        self.check_law(teeth, &rotation)?;
+        let input_torque_nmm = self.springs(teeth).torque_nmm(&rotation)?.value;
+        Ok(TorqueLimit { input_torque_nmm, contact })
+    }
+
+    /// Of all teeth and contacts the one for which the rotation is least at which the tooth bears a certain `F_H`.
+    fn first_to_reach(teeth: &[ToothState], limit_n: impl Fn(&ToothState, Contact) -> f64) -> Option<FirstLimit<'_>> {
+        let first_rad = teeth.iter().map(|tooth| tooth.spring.closing_rad).fold(f64::INFINITY, f64::min);
+        let mut least: Option<(f64, FirstLimit<'_>)> = None;
         for tooth in teeth {
-            let lever_arm_mm = tooth.center.cam_contact.lever_arm_mm;
-            for (contact, hertz) in self.hertz.iter() {
-                let ratio = *tooth.force_ratio.get(contact);
-                if ratio > 0.0 && lever_arm_mm > 0.0 {
-                    let allowed_n = hertz.force_n(allowable_stress_mpa, *tooth.curvature_per_mm.get(contact));
-                    let displacement_mm = tooth.compliance * self.approach.power(allowed_n / ratio);
-                    let excess_rad = displacement_mm / lever_arm_mm + (tooth.closing_rad - closing_rad);
-                    if excess_rad < limit.0 {
-                        limit = (excess_rad, contact);
+            let Spring { travel_arm_mm, closing_rad, ref approach, .. } = tooth.spring;
+            for (contact, &ratio) in tooth.force_ratio.iter() {
+                if ratio > 0.0 && travel_arm_mm > 0.0 && closing_rad.is_finite() {
+                    let excess_rad = approach.approach_mm(limit_n(tooth, contact)) / travel_arm_mm;
+                    let from_first_rad = excess_rad + (closing_rad - first_rad);
+                    if least.as_ref().is_none_or(|(least_rad, _)| from_first_rad < *least_rad) {
+                        let rotation = Rotation { closing_rad, excess_rad };
+                        least = Some((from_first_rad, FirstLimit { tooth, contact, rotation }));
                     }
                 }
             }
         }
-        TorqueLimit { input_torque_nmm: self.torque(teeth, closing_rad, limit.0).value, contact: limit.1 }
+        least.map(|(_, limit)| limit)
+    }
+
+    /// That no contact is wider than Johnson's law allows.
+    fn check_law(&self, teeth: &[ToothState], rotation: &Rotation) -> Result<(), SolveError> {
+        let ContactLaw::Johnson { depth_mm } = &self.law else { return Ok(()) };
+        let is_beyond = |tooth: &ToothState| tooth.spring.displacement_mm(rotation) >= tooth.spring.approach.limit_mm();
+        if !teeth.iter().any(is_beyond) {
+            return Ok(());
+        }
+        let tooth_radius_mm = self.drive.parameters().tooth_radius_mm;
+        let tooth_width_mm = self.drive.tooth_width_mm();
+        let limit_mm = |contact| WIDEST_SHARE * least_length_mm(depth_mm, contact, tooth_radius_mm);
+        let limit = Self::first_to_reach(teeth, |tooth, contact| {
+            // Under `F_r` the half-width is the whole length, and its square goes as the force.
+            let pressure = tooth.pressure.get(contact);
+            let stress_mpa = pressure.stress_mpa(1.0);
+            let share = limit_mm(contact) / half_width_mm(1.0, stress_mpa, tooth_width_mm);
+            share * share / tooth.force_ratio.get(contact)
+        });
+        let FirstLimit { tooth, contact, rotation } = limit.ok_or(SolveError::NoLeverArm)?;
+        Err(SolveError::JohnsonBeyondHalfWidth {
+            contact,
+            position_deg: tooth.center.position.from_lobe_deg(),
+            half_width_limit_mm: limit_mm(contact),
+            input_torque_limit_nm: 1e-3 * self.springs(teeth).torque_nmm(&rotation)?.value,
+        })
     }
 }
 
-impl ToothState {
-    /// `Δφ |h'| - g`, or nothing while the gap is open, for a rotation of `excess_rad` beyond `closing_rad`.
-    fn displacement_mm(&self, closing_rad: f64, excess_rad: f64) -> f64 {
-        let closed_rad = excess_rad - (self.closing_rad - closing_rad);
-        if closed_rad > 0.0 { closed_rad * self.center.cam_contact.lever_arm_mm } else { 0.0 }
-    }
+/// The first of many contacts to reach what it may bear.
+struct FirstLimit<'a> {
+    tooth: &'a ToothState,
+    contact: Contact,
+    rotation: Rotation,
 }

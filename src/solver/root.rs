@@ -70,6 +70,51 @@ pub fn newton_in_bracket(
     Err(NotConverged { what, iterations: MAX_ITERATIONS, bracket_width: high - low })
 }
 
+/// The root of an increasing function that is straight or bent upwards, from a place at or above it: Newton's method, which then comes down
+/// to the root without passing it, needs no bracket. Places are not negative; where rounding carries a step below zero, zero is the root.
+///
+/// # Errors
+/// [`NotConverged`] after 200 iterations, or from `function` itself.
+pub fn newton_from_above(
+    what: &'static str,
+    start: f64,
+    function: impl Fn(f64) -> Result<ValueAndSlope, NotConverged>,
+) -> Result<f64, NotConverged> {
+    let mut x = start;
+    for _ in 0..MAX_ITERATIONS {
+        let ValueAndSlope { value, slope } = function(x)?;
+        // Below the root only rounding leads, or a start that rounding has put there: the step upwards is then its correction.
+        let next = (x - value / slope).max(0.0);
+        if value <= 0.0 || x - next <= f64::EPSILON * x {
+            return Ok(if next.is_finite() { next } else { x });
+        }
+        x = next;
+    }
+    Err(NotConverged { what, iterations: MAX_ITERATIONS, bracket_width: x })
+}
+
+/// The root of an increasing function that is straight or bent downwards, from a positive place at or below it: as [`newton_from_above`], the other
+/// way round.
+///
+/// # Errors
+/// [`NotConverged`] after 200 iterations.
+pub fn newton_from_below(
+    what: &'static str,
+    start: f64,
+    function: impl Fn(f64) -> ValueAndSlope,
+) -> Result<f64, NotConverged> {
+    let mut x = start;
+    for _ in 0..MAX_ITERATIONS {
+        let ValueAndSlope { value, slope } = function(x);
+        let next = x - value / slope;
+        if value >= 0.0 || next - x <= f64::EPSILON * x {
+            return Ok(next);
+        }
+        x = next;
+    }
+    Err(NotConverged { what, iterations: MAX_ITERATIONS, bracket_width: x })
+}
+
 /// The root between `start`, where the function's value is known, and `end`, where it has the other sign:
 /// inverse quadratic interpolation where it is safe, bisection elsewhere (Chandrupatla 1997).
 ///

@@ -47,8 +47,18 @@ pub enum Parameter {
     OutputTorque,
     /// Fixed stiffness, N/mm.
     Stiffness(Contact),
+    /// The contact law.
+    Law,
+    /// Depth of the body at a contact, mm.
+    Depth(Contact),
+    /// Compliance of what stands behind a contact, mm/N.
+    SeriesCompliance(Contact),
     /// Gap along a contact's normal, µm.
     Clearance(Contact),
+    /// A number of the modification.
+    Modification(Modified),
+    /// A list of the deviations that has neither no entry nor one for each item.
+    Deviations,
     /// Allowable contact stress, MPa.
     AllowableStress,
     /// Intervals of a sweep.
@@ -71,6 +81,33 @@ pub enum Parameter {
     PartClearance(Part),
     /// Input angle of an assembly, deg.
     InputAngle,
+}
+
+/// What a modification says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Modified {
+    /// The ring set back along its normals, µm.
+    RingEquidistant,
+    /// The ring's generating path shifted, µm.
+    RingPathShift,
+    /// The ring's profile shifted, µm.
+    RingProfileShift,
+    /// The ring turned, arcsec.
+    RingRotation,
+    /// The wave generator set back, µm.
+    WaveGeneratorEquidistant,
+    /// The slots' walls set back, µm.
+    SlotWall,
+    /// The carrier turned, arcsec.
+    CarrierRotation,
+    /// Teeth thinner in radius, µm.
+    ToothRadius,
+    /// Tip relief at the flank's end, µm.
+    TipReliefAmount,
+    /// Where it starts, deg.
+    TipReliefStart,
+    /// Its power.
+    TipReliefPower,
 }
 
 /// The range of a parameter and its unit.
@@ -128,6 +165,7 @@ impl Parameter {
             | Self::CarrierInnerRadius
             | Self::CarrierOuterRadius
             | Self::BoreRadius
+            | Self::Depth(_)
             | Self::ChordTolerance => Range::closed(1e-6, 1e6, "mm"),
             Self::Lobes => Range::closed(1.0, MAX_LOBES as f64, ""),
             Self::ToothCount | Self::InstalledTeeth | Self::RingTeeth => Range::closed(2.0, MAX_TEETH as f64, ""),
@@ -135,7 +173,23 @@ impl Parameter {
             Self::PoissonsRatio(_) => Range { low: -1.0, high: 0.5, closed: false, unit: "" },
             Self::InputTorque | Self::OutputTorque => Range::closed(1e-12, 1e15, "N·m"),
             Self::Stiffness(_) => Range::closed(1e-3, 1e15, "N/mm"),
+            // As soft as the least stiffness, and nothing.
+            Self::SeriesCompliance(_) => Range::closed(0.0, 1e3, "mm/N"),
+            // A choice and lists, which have no number.
+            Self::Law | Self::Deviations => Range::closed(f64::NEG_INFINITY, f64::INFINITY, ""),
             Self::Clearance(_) | Self::PartClearance(_) => Range::closed(0.0, 1e6, "µm"),
+            Self::Modification(modified) => match modified {
+                Modified::RingRotation | Modified::CarrierRotation => Range::closed(-1e5, 1e5, "arcsec"),
+                Modified::TipReliefStart => Range::closed(0.0, 90.0, "deg"),
+                Modified::TipReliefPower => Range::closed(0.1, 100.0, ""),
+                Modified::RingEquidistant
+                | Modified::RingPathShift
+                | Modified::RingProfileShift
+                | Modified::WaveGeneratorEquidistant
+                | Modified::SlotWall
+                | Modified::ToothRadius
+                | Modified::TipReliefAmount => Range::closed(-1e6, 1e6, "µm"),
+            },
             // At its ends the rounding of the angle is 2e-9 deg.
             Self::InputAngle => Range::closed(-1e7, 1e7, "deg"),
             Self::AllowableStress => Range::closed(1e-3, 1e6, "MPa"),
@@ -292,6 +346,29 @@ pub enum Violation {
         /// The clearance.
         clearance_um: f64,
     },
+    /// What `projection` does not take.
+    NeedsVirtualWork {
+        /// Which.
+        parameter: Parameter,
+    },
+    /// A tip relief that starts at the end of the flank or beyond it.
+    TipReliefBeyondFlank {
+        /// Where it starts.
+        start_deg: f64,
+        /// Where the flank ends.
+        engagement_start_deg: f64,
+    },
+    /// A list of deviations that has neither no entry nor one for each item.
+    DeviationCount {
+        /// Entries.
+        count: usize,
+        /// Items.
+        items: usize,
+    },
+    /// A deviation that is no finite number.
+    DeviationNotFinite,
+    /// A contact law that teeth of this shape do not have.
+    LawOfOtherTeeth,
     /// The bore takes the whole flank away.
     BoreLeavesNoFlank {
         /// The bore.
@@ -399,6 +476,21 @@ impl std::fmt::Display for Violation {
             Self::ClearanceNotMonotone { clearance_um, .. } => write!(
                 f,
                 "`projection` weighs this gap of {clearance_um:?} µm negatively at some position, so that it would load a tooth instead of freeing it: choose `virtual_work` or no gap here"
+            ),
+            Self::NeedsVirtualWork { .. } => {
+                write!(f, "`projection` does not take this: choose `virtual_work`, or leave it out")
+            }
+            Self::TipReliefBeyondFlank { start_deg, engagement_start_deg } => write!(
+                f,
+                "a tip relief from {start_deg:?} deg on relieves nothing: the flank ends at {engagement_start_deg:?} deg"
+            ),
+            Self::DeviationCount { count, items } => {
+                write!(f, "{count} entries for {items} items: give one for each, or none")
+            }
+            Self::DeviationNotFinite => write!(f, "a deviation is no finite number"),
+            Self::LawOfOtherTeeth => write!(
+                f,
+                "balls take `hertz` or `fixed`, and `hertz` is nowhere else: choose a law that teeth of this shape have"
             ),
             Self::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => write!(
                 f,

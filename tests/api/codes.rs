@@ -86,7 +86,8 @@ pub(crate) fn finding_codes() -> Vec<FindingCode> {
         LinearLawTooStiff => HollowWaveGenerator,
         HollowWaveGenerator => FlatCutsTheContact,
         FlatCutsTheContact => PalmgrenBeyondSteel,
-        PalmgrenBeyondSteel => StressAboveFatigueLimit;
+        PalmgrenBeyondSteel => JohnsonBeyondHalfWidth,
+        JohnsonBeyondHalfWidth => StressAboveFatigueLimit;
         StressAboveFatigueLimit)
 }
 

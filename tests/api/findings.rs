@@ -213,7 +213,9 @@ async fn every_kind_of_finding_can_be_met_over_http() {
     for document in [undercut(), bored(), bore_without_effect, sparse(), thick(), thin(1.9), steep(), overloaded()] {
         all.extend(findings(&document).await);
     }
-    for document in [linear, brass] {
+    let johnson = json!({ "compatibility": "virtual_work", "stiffness": { "law": "johnson" } });
+    let wide = with(&with(&shortest(), "/model", johnson), "/load/input_torque_nm", json!(2000.0));
+    for document in [linear, brass, wide] {
         all.extend(findings(&document).await);
     }
     assert_eq!(codes_of(&all), words(&finding_codes()));

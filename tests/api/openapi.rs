@@ -155,6 +155,8 @@ fn parameters() -> Vec<Parameter> {
     parameters.extend(parts.map(Parameter::YoungsModulus));
     parameters.extend(parts.map(Parameter::PoissonsRatio));
     parameters.extend(contacts.map(Parameter::GrooveRadius));
+    parameters.extend(contacts.map(Parameter::Depth));
+    parameters.extend(contacts.map(Parameter::SeriesCompliance));
     parameters.extend(contacts.map(Parameter::Stiffness));
     parameters.extend(contacts.map(Parameter::Clearance));
     parameters.extend(parts.map(Parameter::PartClearance));
@@ -464,6 +466,12 @@ fn kinds() -> Vec<Value> {
     kinds.extend(wave_generators.map(|other| with(&shortest(), "/drive/wave_generator", other)));
     kinds.extend(teeth.map(|other| with(&shortest(), "/drive/teeth", other)));
     kinds.extend(laws.map(|other| with(&shortest(), "/model", json!({ "stiffness": other }))));
+    let balls = json!({ "shape": "ball", "count": 28, "radius_mm": 3.0, "groove_radius_mm": { "ring": 3.2 } });
+    let virtual_work = |other: Value| json!({ "compatibility": "virtual_work", "stiffness": other });
+    kinds.push(with(&with(&shortest(), "/drive/teeth", balls), "/model", virtual_work(json!({ "law": "hertz" }))));
+    let johnson = json!({ "law": "johnson", "depth_mm": { "ring": 4.0 } });
+    let model = with(&virtual_work(johnson), "/series_compliance_mm_per_n", json!({ "carrier": 1e-6 }));
+    kinds.push(with(&shortest(), "/model", model));
     kinds
 }
 

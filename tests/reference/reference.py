@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """High-precision reference values for discrete-tooth harmonic drives.
 
-Writes three files beside itself, each a list of design documents with what the model of docs/theory.md
+Writes four files beside itself, each a list of design documents with what the model of docs/theory.md
 makes of them, to 40 digits:
 
     cases.json           geometry, mesh, forces and stresses under linear contact stiffness
     cases_contact.json   the same under Palmgren's law and with clearances
+    cases_laws.json      the same under Johnson's law, with series compliance, with balls, and clearances under projection
     extremes.json        the extremes over every input angle, not only sampled ones; and torque capacity
 
     usage: python3 reference.py [group or file ...]      (nothing: everything, and all files are written;
@@ -111,9 +112,12 @@ def read_document(document):
     for contact in CONTACTS:
         reals[f"stiffness_{contact}"] = model["stiffness"].get(f"{contact}_n_per_mm")
         reals[f"clearance_{contact}"] = model.get("clearance", {}).get(f"{contact}_um", 0.0)
+        reals[f"depth_{contact}"] = model["stiffness"].get("depth_mm", {}).get(contact)
+        reals[f"series_{contact}"] = model.get("series_compliance_mm_per_n", {}).get(contact, 0.0)
+        reals[f"groove_{contact}"] = teeth.get("groove_radius_mm", {}).get(contact)
     return SimpleNamespace(
         teeth=teeth["count"], installed=teeth.get("installed", teeth["count"]), ring_teeth=ring["teeth"],
-        compatibility=model["compatibility"], law=model["stiffness"]["law"],
+        compatibility=model["compatibility"], law=model["stiffness"]["law"], is_ball=teeth.get("shape") == "ball",
         samples=document["sweep"].get("samples", 1),      # a sweep to a tolerance has none of its own
         reals={name: mpf(value) for name, value in reals.items() if value is not None})
 
@@ -420,6 +424,8 @@ def contact_laws(drive):
     """For each contact the deflection under 1 N; and the power q of delta = deflection F^q as tenths."""
     if drive.law == "palmgren":
         return [PALMGREN_MM / drive.reals["width"] ** (mpf(8) / 10)] * 3, 9
+    if drive.law in ("johnson", "hertz"):
+        return None, None
     if drive.law == "fixed":
         return [1 / drive.reals[f"stiffness_{contact}"] for contact in CONTACTS], 10
     return [2 * pair_compliance(drive, contact) / (mp.pi * drive.reals["width"]) for contact in CONTACTS], 10
@@ -450,8 +456,90 @@ def tenths_power(value, tenths):
     return value if tenths == 10 else value / mp.root(value, 10)
 
 
+def is_single_power(drive):
+    """Whether all approaches are one power of the force, with a constant coefficient."""
+    return drive.law in ("linear", "fixed", "palmgren") and not any(drive.reals[f"series_{c}"] for c in CONTACTS)
+
+
+def curvatures(drive, tooth):
+    """Relative curvatures of the three contacts in the plane of motion."""
+    r = drive.reals["tooth_radius"]
+    return (1 / r + 1 / tooth.cam_radius, 1 / r - tooth.kappa / (1 + r * tooth.kappa), 1 / r)
+
+
+@lru_cache(maxsize=None)
+def ratio_of_half_axes(curvature_ratio):
+    """Short over long half-axis of the contact of these relative curvatures, large over small, with its integrals K and E."""
+    if abs(curvature_ratio - 1) < mpf(10) ** -60:
+        return mpf(1), mp.pi / 2, mp.pi / 2
+    with mp.workdps(90):
+        def off(t):
+            k = mp.exp(-t)
+            K, E = mp.ellipk(1 - k * k), mp.ellipe(1 - k * k)
+            return mp.log((E / k ** 2 - K) / (K - E)) - mp.log(curvature_ratio)
+        # The logarithm of the ratio is between a half and a whole of that of the curvatures.
+        t = bracketed_root(off, mp.log(curvature_ratio) / 2, mp.log(curvature_ratio))
+        k = mp.exp(-t)
+        return k, mp.ellipk(1 - k * k), mp.ellipe(1 - k * k)
+
+
+def contact_ellipse(drive, tooth, contact):
+    """Hertz's ellipse of a ball's contact under 1 N: half-axes in the plane of motion and along the axis, and K of its eccentricity.
+    The ratio of the half-axes is the one for which the ratio of the curvatures is right."""
+    r = drive.reals["tooth_radius"]
+    in_plane = curvatures(drive, tooth)[CONTACTS.index(contact)]
+    groove = drive.reals.get(f"groove_{contact}")
+    axial = 1 / r - (1 / groove if groove else 0)
+    large, small = max(in_plane, axial), min(in_plane, axial)
+    compliance = pair_compliance(drive, contact)
+    k, K, E = ratio_of_half_axes(large / small)
+    long = mp.root(3 * E * compliance / (mp.pi * k ** 2 * (large + small)), 3)
+    return (k * long, long, K) if in_plane >= axial else (long, k * long, K)
+
+
+def approach(drive, tooth, contact, force):
+    """What a contact and all behind it give way by, and the force times its slope."""
+    reals = drive.reals
+    series = reals[f"series_{contact}"] * force
+    if drive.law == "johnson":
+        index = CONTACTS.index(contact)
+        r, width, nu = reals["tooth_radius"], reals["width"], reals[f"poissons_ratio_{contact}"]
+        depth = reals.get(f"depth_{contact}", r)
+        both = pair_compliance(drive, contact)
+        of_mate = (1 - nu ** 2) / (1000 * reals[f"youngs_modulus_{contact}"])
+        half = mp.sqrt(4 * force * both / (mp.pi * width * curvatures(drive, tooth)[index]))
+        assert half < min(r, depth) / 2, "too wide for Johnson's law"
+        of_tooth = (both - of_mate) * (2 * mp.log(4 * r / half) - 1)
+        of_mate *= 2 * mp.log(2 * depth / half) - nu / (1 - nu)
+        here = force * (of_tooth + of_mate) / (mp.pi * width)
+        return here + series, here - force * both / (mp.pi * width) + series
+    if drive.law == "hertz":
+        in_plane, axial, K = tooth.ellipses[contact]
+        here = 3 * pair_compliance(drive, contact) * K / (2 * mp.pi * max(in_plane, axial)) * mp.root(force, 3) ** 2
+        return here + series, 2 * here / 3 + series
+    deflections, tenths = contact_laws(drive)
+    here = deflections[CONTACTS.index(contact)] * tenths_power(force, tenths)
+    return here + series, here * tenths / 10 + series
+
+
+def any_cam_force(drive, tooth, weights, ratios, stretch, last):
+    """The F_H that makes the weighted approaches of a tooth a stretch, by Newton's method in the logarithms of both, from the
+    `last` one found."""
+    log_force = mp.log(last[0] * stretch)
+    for _ in range(60):
+        force = mp.exp(log_force)
+        pairs = [(w, approach(drive, tooth, contact, force * f)) for w, f, contact in zip(weights, ratios, CONTACTS) if f]
+        total, slope = (sum(w * pair[i] for w, pair in pairs) for i in (0, 1))
+        step = mp.log(stretch / total) * total / slope
+        log_force += step
+        if abs(step) < mpf(10) ** -35:
+            last[0] = mp.exp(log_force) / stretch
+            return last[0] * stretch
+    raise ArithmeticError("no force found")
+
+
 def tooth_in_load_sharing(drive, tooth, laws):
-    """A tooth as F_H = (max(0, rotation lever - gap)/compliance)^(1/q), with its force ratios."""
+    """A tooth as F_H = (max(0, rotation lever - gap)/compliance)^(1/q), or as what else gives F_H, with its force ratios."""
     deflections, tenths = laws
     vectors = directions(drive, tooth)
     ratios = force_ratios(vectors)
@@ -459,20 +547,41 @@ def tooth_in_load_sharing(drive, tooth, laws):
         weights = ratios
     else:
         weights = tuple(dot(u, vectors[0]) for u in vectors)
+    gap = sum(w * drive.reals[f"clearance_{contact}"] / 1000 for w, contact in zip(weights, CONTACTS))
+    assert gap >= 0
+    if not is_single_power(drive):
+        if drive.is_ball:
+            tooth.ellipses = {contact: contact_ellipse(drive, tooth, contact) for contact in CONTACTS}
+        return SimpleNamespace(
+            lever=tooth.lever, gap=gap, ratios=ratios,
+            force=lambda stretch, last=[mpf(10) ** 5]: any_cam_force(drive, tooth, weights, ratios, stretch, last),
+            reach=lambda force: sum(w * approach(drive, tooth, c, force * f)[0]
+                                    for w, f, c in zip(weights, ratios, CONTACTS) if f))
     compliance = sum(w * deflection * tenths_power(f, tenths) if f else 0
                      for w, deflection, f in zip(weights, deflections, ratios))
     assert compliance > 0, "compliance not positive"
-    gap = sum(f * drive.reals[f"clearance_{contact}"] / 1000 for f, contact in zip(ratios, CONTACTS))
-    assert gap == 0 or drive.compatibility == "virtual_work"
-    return SimpleNamespace(lever=tooth.lever, gap=gap, compliance=compliance, ratios=ratios)
+    return SimpleNamespace(
+        lever=tooth.lever, gap=gap, compliance=compliance, ratios=ratios, force=None,
+        reach=lambda force: tenths_power(force, tenths) * compliance)
 
 
 def cam_force(tooth, rotation, tenths):
     stretch = rotation * tooth.lever - tooth.gap
     if stretch <= 0:
         return mpf(0)
+    if tooth.force:
+        return tooth.force(stretch)
     force = stretch / tooth.compliance
     return force if tenths == 10 else force * mp.root(force, 9)
+
+
+def general_high(sharing, torque):
+    """A rotation that surely makes the torque: each of the teeth with the longer arms bears its part, even without a law that holds for
+    the whole."""
+    longest = max(t.lever for t in sharing)
+    chosen = [t for t in sharing if t.lever > longest / 2]
+    squares = sum(t.lever ** 2 for t in chosen)
+    return 1.01 * max((t.reach(torque * t.lever / (WAVES * squares)) + t.gap) / t.lever for t in chosen)
 
 
 def share_load(drive, teeth):
@@ -496,9 +605,12 @@ def share_load(drive, teeth):
     else:
         lone = [(torque / (WAVES * t.lever), t) for t in sharing if t.lever > 0]
         # A tooth alone would need this rotation for the whole torque: at twice that the bracket is safe.
-        high = 2 * min((tenths_power(f, tenths) * t.compliance + t.gap) / t.lever for f, t in lone)
-    rotation = bracketed_root(excess, low, high)
-    return rotation, [cam_force(t, rotation, tenths) for t in sharing], [t.ratios for t in sharing]
+        high = 2 * min((t.reach(f) + t.gap) / t.lever for f, t in lone) if sharing[0].force is None \
+            else general_high(sharing, torque)
+    # Where each force is a search of its own, digits beyond those that are written and checked cost too much.
+    with mp.workdps(mp.dps if is_single_power(drive) else 66):
+        rotation = bracketed_root(excess, low, high)
+        return rotation, [cam_force(t, rotation, tenths) for t in sharing], [t.ratios for t in sharing]
 
 
 def hertz_stress(drive, part, force, curvature):
@@ -507,9 +619,11 @@ def hertz_stress(drive, part, force, curvature):
 
 
 def stresses(drive, tooth, forces):
-    r = drive.reals["tooth_radius"]
-    curvatures = (1 / r + 1 / tooth.cam_radius, 1 / r - tooth.kappa / (1 + r * tooth.kappa), 1 / r)
-    return [hertz_stress(drive, part, force, c) for part, force, c in zip(CONTACTS, forces, curvatures)]
+    if drive.is_ball:
+        halves = [contact_ellipse(drive, tooth, contact)[:2] for contact in CONTACTS]
+        return [3 * mp.root(force, 3) / (2 * mp.pi * one * other) for (one, other), force in zip(halves, forces)]
+    return [hertz_stress(drive, part, force, c)
+            for part, force, c in zip(CONTACTS, forces, curvatures(drive, tooth))]
 
 
 def check_load_sharing_by_matrix(drive, teeth, rotation, cam_forces, ratios):
@@ -568,13 +682,13 @@ def check_balance(drive, teeth, rotation, cam_forces, ratios):
     assert abs(on_ring / (torque * drive.ring_teeth / WAVES) - 1) < mpf(10) ** -40
     if drive.compatibility != "virtual_work":
         return
-    deflections, tenths = contact_laws(drive)
     gaps = [drive.reals[f"clearance_{contact}"] / 1000 for contact in CONTACTS]
     for force, ratio, tooth in zip(cam_forces, ratios, teeth):
         if force == 0:
             continue
         u_h, u_k, u_s = directions(drive, tooth)
-        reach = [gap + c * tenths_power(force * f, tenths) for gap, c, f in zip(gaps, deflections, ratio)]
+        reach = [gap + (approach(drive, tooth, contact, force * f)[0] if f else 0)
+                 for gap, contact, f in zip(gaps, CONTACTS, ratio)]
         forward = s * reach[2]
         radial = (reach[1] - u_k[1] * forward) / u_k[0]
         assert abs(rotation * tooth.lever - dot(u_h, (radial, forward)) - reach[0]) \
@@ -637,7 +751,7 @@ def rough(value):
 def sweep(drive, scalars, with_matrix):
     """All states of one period as {(input index, tooth): columns}, and the wind-up at each input angle."""
     states, wind_up, loaded_teeth = {}, [], 0
-    linear = drive.law != "palmgren" and all(drive.reals[f"clearance_{c}"] == 0 for c in CONTACTS)
+    linear = drive.law in ("linear", "fixed") and is_single_power(drive) and all(drive.reals[f"clearance_{c}"] == 0 for c in CONTACTS)
     path = path_of(drive)
     for index in range(drive.samples + 1):
         found, rotation, solution = states_at(drive, index, scalars.span)
@@ -708,7 +822,7 @@ def condition_of(drive, scalars, rows, states, wind_up, peaks):
 
 def solve_case(case):
     """A case with what is expected of it."""
-    for function in (tooth_at, tip_regularity, critical_tooth_radius, natural_engagement_start, engagement):
+    for function in (tooth_at, ratio_of_half_axes, tip_regularity, critical_tooth_radius, natural_engagement_start, engagement):
         function.cache_clear()
     drive = read_document(case["document"])
     scalars = geometry(drive)
@@ -722,7 +836,7 @@ def solve_case(case):
     expected.update({name: getattr(scalars, name) for name in DISCRETE[1:3]})
     expected["state_count"] = None
     rows, states, wind_up, peaks = [], {}, [], {}
-    in_contact_file = case["group"].startswith("contact")
+    in_contact_file = case["group"].startswith(("contact", "laws"))
     if swept:
         states, wind_up, loaded_mean = sweep(drive, scalars, with_matrix=True)
         rows = choose_rows(drive, states)
@@ -1251,7 +1365,7 @@ def solve_torque_capacity(drive):
 
 def solve_extreme_case(case):
     """A case of extremes.json with what is expected of it."""
-    for function in (tooth_at, tip_regularity, critical_tooth_radius, natural_engagement_start, engagement):
+    for function in (tooth_at, ratio_of_half_axes, tip_regularity, critical_tooth_radius, natural_engagement_start, engagement):
         function.cache_clear()
     drive = read_document(case["document"])
     check_possible(drive, geometry(drive))
@@ -1335,7 +1449,8 @@ def check_possible(drive, scalars):
 # ---------------------------------------------------------------------------------------------------------
 
 def design(a, b, r, teeth, ring_teeth, *, installed=None, width=15.0, bore=None, torque=20.0, output_torque=None,
-           compatibility="projection", stiffness=None, law="linear", clearance=None, materials=None, samples=10):
+           compatibility="projection", stiffness=None, law="linear", clearance=None, materials=None, samples=10,
+           depth=None, series=None, groove=None, ball=False):
     """A complete design document, as docs/theory.md's case 5.1 and 5.2 would be written."""
     ring = {"teeth": ring_teeth}
     if bore is not None:
@@ -1343,14 +1458,19 @@ def design(a, b, r, teeth, ring_teeth, *, installed=None, width=15.0, bore=None,
     stiffness_fields = {"law": law}
     if stiffness is not None:
         stiffness_fields = {"law": "fixed", **{f"{c}_n_per_mm": k for c, k in zip(CONTACTS, stiffness)}}
+    if depth is not None:
+        stiffness_fields["depth_mm"] = depth
     model = {"compatibility": compatibility, "stiffness": stiffness_fields}
+    if series is not None:
+        model["series_compliance_mm_per_n"] = dict(zip(CONTACTS, series))
     if clearance is not None:
         model["clearance"] = {f"{contact}_um": gap for contact, gap in zip(CONTACTS, clearance)}
     steel = {"youngs_modulus_gpa": 210.0, "poissons_ratio": 0.3}
+    shape = {} if not ball else {"shape": "ball", "groove_radius_mm": groove or {}}
     return {
         "drive": {
             "wave_generator": {"semi_major_mm": a, "semi_minor_mm": b},
-            "teeth": {"count": teeth, "installed": installed or teeth, "radius_mm": r, "width_mm": width},
+            "teeth": {"count": teeth, "installed": installed or teeth, "radius_mm": r, "width_mm": width, **shape},
             "ring": ring},
         "materials": {part: (materials or {}).get(part, steel) for part in PARTS},
         "load": {"input_torque_nm": torque} if output_torque is None else {"output_torque_nm": output_torque},
@@ -1589,6 +1709,86 @@ def contact_clearance():
     yield "5.1 fixed, all gaps zero", gapped((0.0, 0.0, 0.0), stiffness=stiff, samples=5)
 
 
+def laws_johnson():
+    def johnson(build=drive_51, samples=3, **changes):
+        return build(**{**dict(compatibility="virtual_work", law="johnson", samples=samples), **changes})
+
+    yield "5.1", johnson()
+    yield "5.2", johnson(drive_52)
+    yield "5.1, ring larger", johnson(ring_teeth=30, r=4.5)
+    yield "5.1, depths", johnson(depth={"wave_generator": 10.0, "ring": 4.0, "carrier": 2.5})
+    yield "5.1, series compliance", johnson(series=(0.0, 2e-6, 7.5e-6))
+    yield "5.1, four materials", johnson(
+        materials={"wave_generator": CERAMIC, "teeth": TITANIUM, "ring": CAST_IRON, "carrier": BRONZE})
+    yield "5.1, soft ring, near the widest", johnson(
+        torque=40.0, materials={"ring": POLYMER, "carrier": {"youngs_modulus_gpa": 8.0, "poissons_ratio": -0.4}})
+    yield "5.1, light", johnson(torque=1e-9, samples=4)
+    yield "5.1, ring 10 um", johnson(clearance=(0.0, 10.0, 0.0))
+    yield "5.1, all three gaps", johnson(clearance=(3.0, 4.5, 6.0), series=(1e-6, 0.0, 3e-6))
+    yield "5.1, light, wide gap at the carrier", johnson(clearance=(0.0, 0.0, 1000.0), torque=1e-9, samples=2)
+    yield "5.2, ring 10 um, series compliance", johnson(drive_52, clearance=(0.0, 10.0, 0.0), series=(0.0, 0.0, 4e-6))
+    yield "5.2 bored", johnson(drive_52, bore=52.8227)
+    yield "5.2 bored, ring 2 um", johnson(drive_52, bore=52.8227, clearance=(0.0, 2.0, 0.0))
+
+
+def laws_series():
+    for law in ("linear", "palmgren"):
+        yield f"5.1 {law}", drive_51(
+            compatibility="virtual_work", law=law, series=(1e-6, 0.0, 5e-6), samples=8)
+        yield f"5.1 {law}, all three gaps", drive_51(
+            compatibility="virtual_work", law=law, series=(1e-6, 3e-7, 5e-6), clearance=(3.0, 4.5, 6.0), samples=8)
+
+
+def laws_projection_clearance():
+    stiff = (4.1e5, 6.3e5, 2.2e5)
+    for name, gaps in (("wave generator", (8.0, 0.0, 0.0)), ("ring", (0.0, 8.0, 0.0)), ("carrier", (0.0, 0.0, 8.0)),
+                       ("all three", (2.0, 3.0, 4.0))):
+        yield f"5.1 linear, {name}", drive_51(clearance=gaps)
+        yield f"5.1 fixed, {name}", drive_51(clearance=gaps, stiffness=stiff)
+        yield f"5.1 palmgren, {name}", drive_51(clearance=gaps, law="palmgren")
+    yield "5.1 ring larger, wave generator and ring", drive_51(clearance=(3.0, 5.0, 0.0), ring_teeth=30, r=4.5)
+    yield "5.2 linear, all three", drive_52(clearance=(0.2, 0.3, 0.4), samples=8)
+    yield "5.2 palmgren, all three", drive_52(clearance=(1.0, 1.5, 2.0), law="palmgren", samples=8)
+
+
+def laws_bored_clearance():
+    for law in ("linear", "palmgren"):
+        for compatibility in COMPATIBILITIES:
+            yield f"5.2 bored {law} {compatibility}", drive_52(
+                bore=52.8227, law=law, compatibility=compatibility, clearance=(0.5, 0.75, 1.0), samples=8)
+    yield "5.1 bored palmgren", drive_51(
+        bore=67.0, law="palmgren", compatibility="virtual_work", clearance=(0.0, 6.0, 2.0))
+
+
+def laws_elliptic():
+    def very(b, teeth, ring_teeth, r, **changes):
+        return design(**{**dict(a=50.0, b=b, r=r, teeth=teeth, ring_teeth=ring_teeth, compatibility="virtual_work",
+                                samples=3), **changes})
+
+    for name, shape in (("a = 1.1 b", (50 / 1.1, 16, 14, 7.0)), ("a = 1.25 b", (40.0, 12, 10, 8.0)),
+                        ("a = 1.5 b", (50 / 1.5, 10, 8, 10.0)), ("a = 1.5 b, ring larger", (50 / 1.5, 10, 12, 9.0))):
+        yield f"{name}, palmgren", very(*shape, law="palmgren")
+        yield f"{name}, palmgren, gaps", very(*shape, law="palmgren", clearance=(5.0, 10.0, 15.0))
+        yield f"{name}, johnson", very(*shape, law="johnson")
+        yield f"{name}, johnson, gaps", very(*shape, law="johnson", clearance=(5.0, 10.0, 15.0))
+
+
+def laws_ball():
+    def ball(build=drive_51, **changes):
+        return build(**{**dict(compatibility="virtual_work", law="hertz", ball=True, samples=2), **changes})
+
+    grooves = {"wave_generator": 5.2, "ring": 5.2, "carrier": 5.15}
+    yield "5.1, plain", ball()
+    yield "5.1, grooves", ball(groove=grooves)
+    yield "5.1, groove at the ring, ring larger", ball(groove={"ring": 4.8}, ring_teeth=30, r=4.5)
+    yield "5.1, grooves, gaps", ball(groove=grooves, clearance=(3.0, 4.5, 6.0))
+    yield "5.1, grooves, gaps, series compliance", ball(groove=grooves, clearance=(3.0, 4.5, 6.0), series=(0.0, 2e-6, 5e-6))
+    yield "5.1, grooves, four materials", ball(groove=grooves, materials={
+        "wave_generator": CERAMIC, "teeth": TITANIUM, "ring": CAST_IRON, "carrier": BRONZE})
+    yield "5.1, nearly the ball's own radius", ball(groove={c: 5.0001 for c in CONTACTS})
+    yield "5.2, plain", ball(drive_52)
+
+
 STIFF_52 = (1.5e5, 1e5, 3e5)
 RING_LARGER = dict(a=40.6, b=39.4, r=3.0, teeth=30, ring_teeth=32, width=12.0, compatibility="virtual_work")
 COMPATIBILITIES = ("projection", "virtual_work")
@@ -1663,6 +1863,7 @@ FILES = {
     "cases.json": [paper, plain, undercut_threshold, nearly_round, very_elliptic, range_ends, tooth_count,
                    single_tooth, entry_exit, bore_limits, stiffness_ratio, both_senses],
     "cases_contact.json": [contact_palmgren, contact_palmgren_clearance, contact_clearance],
+    "cases_laws.json": [laws_johnson, laws_series, laws_projection_clearance, laws_bored_clearance, laws_elliptic, laws_ball],
     "extremes.json": [extremes, torque_capacity]}
 
 

@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::{
-    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Never,
-    PerContact, ToothShape, Torque, WaveGenerator,
+    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Modification,
+    Never, PerContact, ToothShape, Torque, WaveGenerator,
     sweep::{self, Points, Sweep},
 };
 
@@ -61,7 +61,9 @@ pub(crate) fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParamete
         torque: Torque::Input(torque_nm),
         compatibility,
         law: ContactLaw::Linear,
+        series_compliance_mm_per_n: PerContact::default(),
         clearance_um: PerContact::default(),
+        modification: Modification::default(),
         allowable_stress_mpa: None,
     }
 }

@@ -583,7 +583,7 @@ fn forces(p: &DriveParameters, sample: u64, samples: u64) -> (Vector2<f64>, f64,
     let placed: Vec<_> = mesh.placed_at(sample, samples).collect();
     let teeth: Vec<_> = placed.iter().map(|placed| loaded.tooth(placed.position).unwrap()).collect();
     let wind_up = loaded.wind_up(&teeth).unwrap();
-    let force_n: Vec<_> = teeth.iter().map(|tooth| loaded.forces_n(tooth, &wind_up).wave_generator).collect();
+    let force_n: Vec<_> = teeth.iter().map(|tooth| loaded.forces_n(tooth, &wind_up).unwrap().wave_generator).collect();
     let loads = placed.iter().zip(&teeth).zip(&force_n);
     let loads = loads.map(|((placed, tooth), &force_n)| CamLoad { lobe: placed.lobe, center: &tooth.center, force_n });
     (radial_force_n(&mesh, loads), force_n.iter().sum(), loaded.input_torque_nmm())

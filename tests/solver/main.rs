@@ -5,12 +5,15 @@ mod drives;
 mod extremes;
 mod family;
 mod fast;
+mod gaps;
+mod laws;
 mod limits;
 mod oracles;
 mod paper;
 mod profiles;
 mod properties;
 mod reference;
+mod springs;
 
 /// Counts, thread by thread, for the tests that ask what a sweep takes.
 #[global_allocator]

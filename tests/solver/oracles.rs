@@ -151,7 +151,7 @@ pub(crate) fn worst_difference(
             Projection => forces_by_projection(&drive, &teeth, &stiffness, loaded.input_torque_nmm()),
             VirtualWork => forces_by_springs(&drive, &teeth, &stiffness, loaded.input_torque_nmm()),
         };
-        let closed: Vec<_> = teeth.iter().map(|tooth| loaded.forces_n(tooth, &wind_up)).collect();
+        let closed: Vec<_> = teeth.iter().map(|tooth| loaded.forces_n(tooth, &wind_up).unwrap()).collect();
         let peak = closed.iter().map(|force| force.wave_generator).fold(0.0, f64::max);
         for (closed, dense) in closed.iter().zip(&dense) {
             for (contact, force) in closed.iter() {

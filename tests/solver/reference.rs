@@ -6,11 +6,13 @@
 use std::collections::BTreeMap;
 
 use serde_json::Value;
+use toothwave_solver::load_sharing::LoadedDrive;
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::sweep::{self, Points, States, Sweep};
+use toothwave_solver::tooth::ToothContact;
 use toothwave_solver::{
-    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Never,
-    PerContact, SolveError, ToothShape, Torque,
+    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Modification,
+    Never, PerContact, SolveError, ToothShape, Torque,
 };
 
 use crate::drives::ellipse;
@@ -31,6 +33,11 @@ impl Case {
     /// Palmgren's law and clearances.
     fn all_of_contact() -> Vec<Self> {
         Self::of(include_str!("../reference/cases_contact.json"))
+    }
+
+    /// Johnson's law, series compliance, balls; clearances with `projection`, bores and very elliptic cams.
+    fn all_of_laws() -> Vec<Self> {
+        Self::of(include_str!("../reference/cases_laws.json"))
     }
 
     /// The cases of a file.
@@ -88,20 +95,38 @@ impl Case {
             law: match stiffness["law"].as_str().unwrap() {
                 "linear" => ContactLaw::Linear,
                 "palmgren" => ContactLaw::Palmgren,
+                "hertz" => ContactLaw::Hertz,
+                "johnson" => {
+                    ContactLaw::Johnson { depth_mm: per_contact(|contact| stiffness["depth_mm"][contact].as_f64()) }
+                }
                 _ => ContactLaw::Fixed(PerContact {
                     wave_generator: fixed("wave_generator_n_per_mm"),
                     ring: fixed("ring_n_per_mm"),
                     carrier: fixed("carrier_n_per_mm"),
                 }),
             },
+            series_compliance_mm_per_n: per_contact(|contact| {
+                document["model"]["series_compliance_mm_per_n"][contact].as_f64().unwrap_or(0.0)
+            }),
             clearance_um: PerContact {
                 wave_generator: gap("wave_generator_um"),
                 ring: gap("ring_um"),
                 carrier: gap("carrier_um"),
             },
+            modification: Modification::default(),
             allowable_stress_mpa: load["allowable_stress_mpa"].as_f64(),
         })
         .unwrap()
+    }
+
+    fn shape(&self) -> ToothContact {
+        let teeth = &self.0["document"]["drive"]["teeth"];
+        if teeth["shape"] == "ball" {
+            let groove_radius_mm = per_contact(|contact| teeth["groove_radius_mm"][contact].as_f64());
+            ToothContact::Ball { groove_radius_mm }
+        } else {
+            ToothContact::Cylinder
+        }
     }
 
     fn samples(&self) -> u64 {
@@ -124,6 +149,10 @@ impl Case {
         let value = number(&self.0["expected"][name])?;
         Some((value, self.0["condition"][name].as_f64().unwrap_or(0.0)))
     }
+}
+
+fn per_contact<T>(of: impl Fn(&str) -> T) -> PerContact<T> {
+    PerContact { wave_generator: of("wave_generator"), ring: of("ring"), carrier: of("carrier") }
 }
 
 pub(crate) fn number(value: &Value) -> Option<f64> {
@@ -255,6 +284,57 @@ fn palmgrens_law_and_clearances_agree_with_60_digits() {
     let mut worst = Worst::default();
     for case in Case::all_of_contact() {
         see_sweep(&case, &mut worst);
+    }
+    worst.assert_all_within();
+}
+
+/// Forces and stresses at the recorded rows, and the wind-up at every input angle, worked out angle by angle: teeth of any shape.
+fn see_states(case: &Case, worst: &mut Worst) {
+    let (name, samples) = (case.name(), case.samples());
+    let (drive, load) = (case.drive(), case.load());
+    let loaded = LoadedDrive::with_teeth(&drive, &load, &case.shape()).unwrap();
+    let mesh = Mesh::new(&drive);
+    let expected = &case.0["expected"];
+    let (rows, condition) = (&expected["rows"], &case.0["condition"]);
+    let mut see = |kind: &str, found: f64, value: &Value, scale: f64, condition: &Value| {
+        let allowed = (TOLERANCE + CONDITION_MULTIPLE * condition.as_f64().unwrap_or(0.0)) * scale;
+        worst.see(kind, &name, (found - number(value).unwrap()).abs(), allowed);
+    };
+    for sample in 0..=samples {
+        let numbers = mesh.teeth_at(sample, samples);
+        let teeth: Vec<_> =
+            numbers.clone().map(|tooth| loaded.tooth(mesh.position(tooth, sample, samples)).unwrap()).collect();
+        let wind_up = loaded.wind_up(&teeth).unwrap();
+        let most = expected["wind_up_deg"].as_array().unwrap().iter().filter_map(number).fold(0.0, f64::max);
+        let at = usize::try_from(sample).unwrap();
+        let wind_up_deg = wind_up.rotation_rad().to_degrees();
+        see("wind_up_deg", wind_up_deg, &expected["wind_up_deg"][at], most, &condition["wind_up_deg"]);
+        for (number_of_tooth, tooth) in numbers.zip(&teeth) {
+            let is_row = |row: &usize| rows["input_index"][*row] == sample && rows["tooth"][*row] == number_of_tooth;
+            let Some(row) = (0..rows["tooth"].as_array().unwrap().len()).find(is_row) else { continue };
+            let force_n = loaded.forces_n(tooth, &wind_up).unwrap();
+            let stress_mpa = loaded.stress_mpa(tooth, &force_n);
+            assert_eq!(Some(force_n.wave_generator > 0.0), rows["loaded"][row].as_bool(), "{name}");
+            let per = |what: &str, unit: &str, found: &PerContact<f64>| {
+                [("wave_generator", found.wave_generator), ("ring", found.ring), ("carrier", found.carrier)]
+                    .map(|(contact, found)| (format!("{what}_{contact}_{unit}"), found))
+            };
+            for (kind, found) in per("force", "n", &force_n).into_iter().chain(per("stress", "mpa", &stress_mpa)) {
+                let peak = number(&expected["column_peak"][&kind]).unwrap();
+                see(&kind, found, &rows[&kind][row], peak, &condition["columns"][&kind]);
+            }
+        }
+    }
+}
+
+#[test]
+fn johnsons_law_balls_series_compliance_and_gaps_under_projection_agree_with_40_digits() {
+    let mut worst = Worst::default();
+    for case in Case::all_of_laws() {
+        see_states(&case, &mut worst);
+        if case.shape() == ToothContact::Cylinder {
+            see_sweep(&case, &mut worst);
+        }
     }
     worst.assert_all_within();
 }

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use toothwave_solver::{ContactLaw, Material, PerContact};
 use utoipa::ToSchema;
 
+use super::drive::LengthsByContactDocument;
 use super::number::given;
 use crate::key::encoded;
 use crate::union::union;
@@ -66,10 +67,13 @@ pub struct ModelDocument {
     /// How the approaches at a tooth's contacts add up.
     #[serde(default)]
     pub compatibility: CompatibilityDocument,
-    /// The contact law; left out, `linear`.
+    /// The contact law; left out, `hertz` of balls, `linear` of other teeth.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub stiffness: Option<StiffnessDocument>,
+    /// What stands behind each contact and gives way too, with `virtual_work` alone.
+    #[serde(default)]
+    pub series_compliance_mm_per_n: CompliancesDocument,
     /// Gaps at the contacts; left out, there are none.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
@@ -102,6 +106,21 @@ pub enum CompatibilityDocument {
     VirtualWork,
 }
 
+/// A compliance for each contact, in mm/N.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
+pub struct CompliancesDocument {
+    /// At the wave generator.
+    #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
+    pub wave_generator: f64,
+    /// At the ring.
+    #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
+    pub ring: f64,
+    /// At the carrier.
+    #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
+    pub carrier: f64,
+}
+
 union! {
     /// The contact law.
     pub enum StiffnessDocument as "Stiffness" by "law" read "by:law" {
@@ -111,6 +130,10 @@ union! {
         Fixed(FixedDocument) = "fixed",
         /// Palmgren's law.
         Palmgren(PalmgrenDocument) = "palmgren",
+        /// Johnson's law.
+        Johnson(JohnsonDocument) = "johnson",
+        /// Hertz's law.
+        Hertz(HertzDocument) = "hertz",
     }
 }
 
@@ -139,6 +162,20 @@ pub struct FixedDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct PalmgrenDocument {}
 
+/// The logarithmic approach of a cylinder between two bodies (Johnson, Contact Mechanics, section 5.6).
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct JohnsonDocument {
+    /// How deep below each contact the body stands still; left out, the tooth's radius.
+    #[serde(default)]
+    pub depth_mm: LengthsByContactDocument,
+}
+
+/// Hertz's law of point contacts, δ = q F^(2/3): that of balls.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct HertzDocument {}
+
 impl From<&StiffnessDocument> for ContactLaw {
     fn from(document: &StiffnessDocument) -> Self {
         match document {
@@ -149,7 +186,18 @@ impl From<&StiffnessDocument> for ContactLaw {
                 ring: stiffness.ring_n_per_mm,
                 carrier: stiffness.carrier_n_per_mm,
             }),
+            StiffnessDocument::Johnson(JohnsonDocument { depth_mm }) => {
+                Self::Johnson { depth_mm: depth_mm.by_contact() }
+            }
+            StiffnessDocument::Hertz(_) => Self::Hertz,
         }
+    }
+}
+
+impl From<&CompliancesDocument> for PerContact<f64> {
+    fn from(document: &CompliancesDocument) -> Self {
+        let CompliancesDocument { wave_generator, ring, carrier } = *document;
+        Self { wave_generator, ring, carrier }
     }
 }
 
@@ -157,11 +205,14 @@ encoded! {
     struct MaterialsDocument { wave_generator, teeth, ring, carrier }
     struct MaterialDocument { youngs_modulus_gpa, poissons_ratio }
     struct LoadDocument { input_torque_nm, output_torque_nm, allowable_stress_mpa }
-    struct ModelDocument { compatibility, stiffness, clearance }
+    struct ModelDocument { compatibility, stiffness, series_compliance_mm_per_n, clearance }
     struct ClearanceDocument { wave_generator_um, ring_um, carrier_um }
+    struct CompliancesDocument { wave_generator, ring, carrier }
     struct LinearDocument {}
     struct FixedDocument { wave_generator_n_per_mm, ring_n_per_mm, carrier_n_per_mm }
     struct PalmgrenDocument {}
+    struct JohnsonDocument { depth_mm }
+    struct HertzDocument {}
 }
 
 encoded!(enum CompatibilityDocument);

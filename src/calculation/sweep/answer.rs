@@ -1,7 +1,6 @@
 //! A sweep as it goes over the wire.
 
 use serde::Serialize;
-use toothwave_solver::contact::{SHEAR_DEPTH, SHEAR_SHARE};
 use toothwave_solver::sweep::{self as solver, ContactPeaks, InputAngles, Peak, States, TorqueCapacity};
 use toothwave_solver::{Contact, Drive, PerContact};
 use utoipa::ToSchema;
@@ -56,12 +55,20 @@ pub struct ContactPeaksAnswer {
     pub force_n: PeakAnswer,
     /// Of its Hertz stress, in MPa.
     pub stress_mpa: PeakAnswer,
-    /// Half the width of the contact where the stress has its peak.
+    /// Half the width of the contact, in the plane of motion, where the stress has its peak.
     pub half_width_mm: f64,
-    /// The largest shear stress below the surface there, in the plane of the section.
-    pub shear_stress_mpa: f64,
+    /// Half its length along the axis there, of a ball.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub half_length_mm: Option<f64>,
+    /// The largest shear stress below the surface there; left out under a flat, whose edges are not modelled.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub shear_stress_mpa: Option<f64>,
     /// How deep it stands.
-    pub shear_depth_mm: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub shear_depth_mm: Option<f64>,
 }
 
 /// A largest value and where it stands.
@@ -221,11 +228,12 @@ impl From<Peak> for PeakAnswer {
 }
 
 impl From<ContactPeaks> for ContactPeaksAnswer {
-    fn from(ContactPeaks { force_n, stress_mpa, half_width_mm }: ContactPeaks) -> Self {
+    fn from(ContactPeaks { force_n, stress_mpa, half_width_mm, half_length_mm, shear }: ContactPeaks) -> Self {
         Self {
-            shear_stress_mpa: SHEAR_SHARE * stress_mpa.value,
-            shear_depth_mm: SHEAR_DEPTH * half_width_mm,
             half_width_mm,
+            half_length_mm,
+            shear_stress_mpa: shear.map(|shear| shear.stress_mpa),
+            shear_depth_mm: shear.map(|shear| shear.depth_mm),
             force_n: force_n.into(),
             stress_mpa: stress_mpa.into(),
         }

@@ -1,0 +1,170 @@
+//! The approach of a tooth along `F_H` as a function of that force (docs/theory.md sections 4.3 to 4.5).
+
+use crate::root::{NotConverged, ValueAndSlope, newton_from_below};
+
+/// The sum of a tooth's three approaches, each with its weight, over `F_H`: nothing at no force, increasing, and straight or bent downwards,
+/// so that the force grows with the approach ever faster. Every search above relies on these three.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Approach {
+    /// `ξ = c F`.
+    Linear {
+        /// `c`.
+        compliance_mm_per_n: f64,
+    },
+    /// `ξ = c F^p + l F` with `p < 1`; the linear part is that of contacts or series compliances of another law.
+    Power {
+        /// `p`.
+        exponent: f64,
+        /// `c`, in mm/N^p.
+        coefficient: f64,
+        /// `l`.
+        compliance_mm_per_n: f64,
+    },
+    /// `ξ = F (A + B ln(F_r/F))`.
+    Logarithmic(Logarithmic),
+}
+
+/// `ξ = F (A + B ln(F_r/F))` up to the force at which the law ends. Beyond, it goes on along its tangent: no answer stands there, but
+/// a search may pass through.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Logarithmic {
+    /// `A`.
+    compliance_mm_per_n: f64,
+    /// `B`.
+    growth_mm_per_n: f64,
+    /// `F_r`.
+    reference_n: f64,
+    /// Where the law ends, `F_r` times [`Logarithmic::LIMIT`].
+    limit_n: f64,
+    /// The approach there.
+    limit_mm: f64,
+}
+
+/// A force, and how the approach goes by its power there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ForceAndExponent {
+    /// The force.
+    pub force_n: f64,
+    /// `d ln ξ/d ln F`.
+    pub exponent: f64,
+}
+
+impl Logarithmic {
+    /// The part of the reference force at which the law ends: half the width that the reference stands for.
+    pub const LIMIT: f64 = 0.25;
+
+    /// `A`, `B` and `F_r`, for which `A + B (ln 4 - 1) > 0`: the slope stays positive up to the limit.
+    pub fn new(compliance_mm_per_n: f64, growth_mm_per_n: f64, reference_n: f64) -> Self {
+        let limit_n = Self::LIMIT * reference_n;
+        let limit_mm = limit_n * (compliance_mm_per_n + growth_mm_per_n * -Self::LIMIT.ln());
+        Self { compliance_mm_per_n, growth_mm_per_n, reference_n, limit_n, limit_mm }
+    }
+
+    /// `dξ/dF` at the limit and beyond.
+    fn limit_slope_mm_per_n(&self) -> f64 {
+        self.compliance_mm_per_n + self.growth_mm_per_n * (-Self::LIMIT.ln() - 1.0)
+    }
+
+    fn approach_mm(&self, force_n: f64) -> f64 {
+        if force_n > self.limit_n {
+            return self.limit_mm + (force_n - self.limit_n) * self.limit_slope_mm_per_n();
+        }
+        if force_n > 0.0 {
+            force_n * (self.compliance_mm_per_n + self.growth_mm_per_n * (self.reference_n / force_n).ln())
+        } else {
+            0.0
+        }
+    }
+
+    /// With `w = A/B + ln(F_r/F)` the law reads `ξ = B F w`, that is `w - ln w = A/B + ln(B F_r/ξ)`: the lower branch of Lambert's function,
+    /// for `w > 1` increasing and bent upwards, so that Newton's method comes down to its root after one step. The force `ξ/(B w)` keeps the
+    /// relative digits of w.
+    fn force(&self, approach_mm: f64) -> Result<ForceAndExponent, NotConverged> {
+        const CAP: u32 = 50;
+        if approach_mm >= self.limit_mm {
+            let slope = self.limit_slope_mm_per_n();
+            let force_n = self.limit_n + (approach_mm - self.limit_mm) / slope;
+            return Ok(ForceAndExponent { force_n, exponent: force_n * slope / approach_mm });
+        }
+        let right = self.compliance_mm_per_n / self.growth_mm_per_n
+            + (self.growth_mm_per_n * (self.reference_n / approach_mm)).ln();
+        let ln = right.ln();
+        let mut w = right + ln + ln / right;
+        for _ in 0..CAP {
+            let step = (w - w.ln() - right) * w / (w - 1.0);
+            w -= step;
+            // Quadratic: the next step would be the square of this one over w.
+            if step.abs() <= 1e-9 * w {
+                return Ok(ForceAndExponent {
+                    force_n: approach_mm / (self.growth_mm_per_n * w),
+                    exponent: (w - 1.0) / w,
+                });
+            }
+        }
+        Err(NotConverged { what: "force of a logarithmic approach", iterations: CAP, bracket_width: w })
+    }
+}
+
+impl Approach {
+    /// `ξ` under a force.
+    pub fn approach_mm(&self, force_n: f64) -> f64 {
+        match self {
+            Self::Linear { compliance_mm_per_n } => compliance_mm_per_n * force_n,
+            Self::Power { exponent, coefficient, compliance_mm_per_n } => {
+                coefficient * force_n.powf(*exponent) + compliance_mm_per_n * force_n
+            }
+            Self::Logarithmic(law) => law.approach_mm(force_n),
+        }
+    }
+
+    /// The force that makes an approach: the inverse of [`Self::approach_mm`].
+    ///
+    /// # Errors
+    /// [`NotConverged`], where there is no closed form.
+    pub fn force(&self, approach_mm: f64) -> Result<ForceAndExponent, NotConverged> {
+        match self {
+            Self::Linear { compliance_mm_per_n } => {
+                Ok(ForceAndExponent { force_n: approach_mm / compliance_mm_per_n, exponent: 1.0 })
+            }
+            &Self::Power { exponent, coefficient, compliance_mm_per_n } => {
+                let alone_n = (approach_mm / coefficient).powf(1.0 / exponent);
+                // Where the linear part is nothing beside the other, so is its share in the force.
+                if compliance_mm_per_n * alone_n <= 0.0 {
+                    return Ok(ForceAndExponent { force_n: alone_n, exponent });
+                }
+                // With half of the approach for either part the force is too small for both together.
+                let half_n = alone_n * 0.5_f64.powf(1.0 / exponent);
+                let start_n = half_n.min(0.5 * approach_mm / compliance_mm_per_n);
+                let force_n = newton_from_below("force of a power and a linear approach", start_n, |force_n| {
+                    let power_mm = coefficient * force_n.powf(exponent);
+                    ValueAndSlope {
+                        value: (power_mm - approach_mm) + compliance_mm_per_n * force_n,
+                        slope: exponent * power_mm / force_n + compliance_mm_per_n,
+                    }
+                })?;
+                let linear_mm = compliance_mm_per_n * force_n;
+                let power_mm = coefficient * force_n.powf(exponent);
+                let exponent = (exponent * power_mm + linear_mm) / (power_mm + linear_mm);
+                Ok(ForceAndExponent { force_n, exponent })
+            }
+            Self::Logarithmic(law) => law.force(approach_mm),
+        }
+    }
+
+    /// The approach at which the law ends; without end for most.
+    pub const fn limit_mm(&self) -> f64 {
+        match self {
+            Self::Linear { .. } | Self::Power { .. } => f64::INFINITY,
+            Self::Logarithmic(law) => law.limit_mm,
+        }
+    }
+
+    /// The exponent of a law that is a single power.
+    pub(crate) fn single_exponent(&self) -> Option<f64> {
+        match *self {
+            Self::Linear { .. } => Some(1.0),
+            Self::Power { exponent, compliance_mm_per_n, .. } => (compliance_mm_per_n <= 0.0).then_some(exponent),
+            Self::Logarithmic(_) => None,
+        }
+    }
+}

@@ -1,0 +1,312 @@
+//! Gaps at a tooth's three contacts: what parts that were modified, or came out a little off, leave free (docs/theory.md section 4.8). Each opens a gap where
+//! it is positive; all are exact to first order in their size, and add up.
+
+use std::f64::consts::PI;
+
+use crate::contact::PerContact;
+use crate::drive::Drive;
+use crate::locus::ToothCenter;
+use crate::ring::FlankPoint;
+use crate::violation::{Modified, Parameter, Violation};
+
+const MM_PER_UM: f64 = 1e-3;
+const RAD_PER_ARCSEC: f64 = PI / 648_000.0;
+
+/// Parts made otherwise than conjugate on purpose, all teeth alike. Angles are turned away from the flank under load.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Modification {
+    /// The ring's profile set back along its normals.
+    pub ring_equidistant_um: f64,
+    /// The path that generates the ring shifted outward along its radii.
+    pub ring_path_shift_um: f64,
+    /// The ring's profile moved outward along its own radii.
+    pub ring_profile_shift_um: f64,
+    /// The ring's flanks turned about the axis.
+    pub ring_rotation_arcsec: f64,
+    /// The wave generator set back along its normals.
+    pub wave_generator_equidistant_um: f64,
+    /// The slots' walls set back.
+    pub slot_wall_um: f64,
+    /// The carrier turned about the axis.
+    pub carrier_rotation_arcsec: f64,
+    /// The teeth thinner in their radius.
+    pub tooth_radius_um: f64,
+    /// The ring's flank set back towards its tip.
+    pub ring_tip_relief: Option<TipRelief>,
+}
+
+/// `C ((ψ - ψ_t)/(ψ_e - ψ_t))^n` beyond ψ_t.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TipRelief {
+    /// `C`, at the flank's end.
+    pub amount_um: f64,
+    /// `ψ_t`, where it starts.
+    pub start_deg: f64,
+    /// `n`.
+    pub power: f64,
+}
+
+/// What a drive that was measured, or drawn by lot, has at each of its items; an empty list is one of zeros.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Deviations {
+    /// Teeth thinner in their radius, by slot.
+    pub tooth_radius_um: Vec<f64>,
+    /// Slots turned away, by slot.
+    pub slot_angle_arcsec: Vec<f64>,
+    /// Walls set back, by slot.
+    pub slot_wall_um: Vec<f64>,
+    /// Profiles set back along their normals, by ring space.
+    pub ring_space_um: Vec<f64>,
+    /// Spaces turned away, by ring space.
+    pub ring_space_angle_arcsec: Vec<f64>,
+    /// The wave generator set back, by lobe.
+    pub wave_generator_lobe_um: Vec<f64>,
+    /// How far and in which direction, seen in itself, each part stands off the axis.
+    pub runout: PerContact<Runout>,
+}
+
+/// A part off its axis.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Runout {
+    /// How far.
+    pub amount_um: f64,
+    /// In which direction, fixed in the part: from the major axis of lobe 0, the middle of ring space 0, or slot 0.
+    pub angle_deg: f64,
+}
+
+/// Where a tooth is among the items of the parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Place {
+    /// Its slot.
+    pub slot: u64,
+    /// The ring's space that it stands in.
+    pub ring_space: u64,
+    /// The lobe of the wave generator that pushes it.
+    pub lobe: u64,
+}
+
+impl Place {
+    /// Of the tooth that started `slot` slots from lobe 0 and is pushed by a lobe: `l = m i - s u`, modulo the ring's teeth.
+    pub fn new(drive: &Drive, slot: u64, lobe: u64) -> Self {
+        let p = drive.parameters();
+        // Counts of a checked drive are positive and small.
+        let spaces = i128::from(p.ring_teeth);
+        let turned = if p.teeth > p.ring_teeth { i128::from(lobe) } else { -i128::from(lobe) };
+        let ring_space = (i128::from(p.teeth / p.installed) * i128::from(slot) - turned).rem_euclid(spaces);
+        Self {
+            slot: slot % p.installed.unsigned_abs(),
+            // Between 0 and the count of spaces.
+            ring_space: u64::try_from(ring_space).unwrap_or(0),
+            lobe,
+        }
+    }
+}
+
+impl Deviations {
+    /// What of them cannot be for a drive.
+    pub(crate) fn violations(&self, drive: &Drive) -> Vec<Violation> {
+        let p = drive.parameters();
+        // Counts of a checked drive are positive and small.
+        let whole = |count: i64| usize::try_from(count).unwrap_or(0);
+        let (slots, spaces) = (whole(p.installed), whole(p.ring_teeth));
+        let lists = [
+            (&self.tooth_radius_um, slots),
+            (&self.slot_angle_arcsec, slots),
+            (&self.slot_wall_um, slots),
+            (&self.ring_space_um, spaces),
+            (&self.ring_space_angle_arcsec, spaces),
+            (&self.wave_generator_lobe_um, drive.lobes() as usize),
+        ];
+        let runouts = self.runout.iter().flat_map(|(_, runout)| [runout.amount_um, runout.angle_deg]);
+        let values = lists.iter().flat_map(|(list, _)| list.iter().copied()).chain(runouts);
+        let not_finite = values.into_iter().any(|value| !value.is_finite()).then_some(Violation::DeviationNotFinite);
+        let miscounted = lists.iter().filter(|(list, items)| !list.is_empty() && list.len() != *items);
+        let counts = miscounted.map(|(list, items)| Violation::DeviationCount { count: list.len(), items: *items });
+        counts.chain(not_finite).collect()
+    }
+
+    /// Whether there are none: then zones are alike, and places do not matter.
+    pub fn is_nil(&self) -> bool {
+        let lists = [
+            &self.tooth_radius_um,
+            &self.slot_angle_arcsec,
+            &self.slot_wall_um,
+            &self.ring_space_um,
+            &self.ring_space_angle_arcsec,
+            &self.wave_generator_lobe_um,
+        ];
+        lists.into_iter().flatten().all(|&value| value == 0.0)
+            && self.runout.iter().all(|(_, runout)| runout.amount_um == 0.0)
+    }
+}
+
+/// The entry of a list; zero beyond it.
+fn of(list: &[f64], index: u64) -> f64 {
+    usize::try_from(index).ok().and_then(|index| list.get(index)).copied().unwrap_or_default()
+}
+
+impl Modification {
+    /// As conjugate parts are.
+    pub const NONE: Self = Self {
+        ring_equidistant_um: 0.0,
+        ring_path_shift_um: 0.0,
+        ring_profile_shift_um: 0.0,
+        ring_rotation_arcsec: 0.0,
+        wave_generator_equidistant_um: 0.0,
+        slot_wall_um: 0.0,
+        carrier_rotation_arcsec: 0.0,
+        tooth_radius_um: 0.0,
+        ring_tip_relief: None,
+    };
+
+    /// Its numbers.
+    pub(crate) fn parameters(&self) -> Vec<(Modified, f64)> {
+        let mut parameters = vec![
+            (Modified::RingEquidistant, self.ring_equidistant_um),
+            (Modified::RingPathShift, self.ring_path_shift_um),
+            (Modified::RingProfileShift, self.ring_profile_shift_um),
+            (Modified::RingRotation, self.ring_rotation_arcsec),
+            (Modified::WaveGeneratorEquidistant, self.wave_generator_equidistant_um),
+            (Modified::SlotWall, self.slot_wall_um),
+            (Modified::CarrierRotation, self.carrier_rotation_arcsec),
+            (Modified::ToothRadius, self.tooth_radius_um),
+        ];
+        if let Some(TipRelief { amount_um, start_deg, power }) = self.ring_tip_relief {
+            parameters.extend([
+                (Modified::TipReliefAmount, amount_um),
+                (Modified::TipReliefStart, start_deg),
+                (Modified::TipReliefPower, power),
+            ]);
+        }
+        parameters
+    }
+
+    /// That its tip relief starts where a drive has no flank.
+    pub(crate) fn violation_in(&self, drive: &Drive) -> Option<Violation> {
+        let start_deg = self.ring_tip_relief?.start_deg;
+        let engagement_start_deg = drive.flank_limit().position.from_lobe_deg();
+        (start_deg >= engagement_start_deg)
+            .then_some(Violation::TipReliefBeyondFlank { start_deg, engagement_start_deg })
+    }
+
+    /// The first of its numbers that opens or closes a gap.
+    pub(crate) fn first(&self) -> Option<Parameter> {
+        let opens = |modified: &Modified| !matches!(modified, Modified::TipReliefStart | Modified::TipReliefPower);
+        let parameters = self.parameters().into_iter();
+        let mut set = parameters.filter(|(modified, value)| *value != 0.0 && opens(modified));
+        set.next().map(|(modified, _)| Parameter::Modification(modified))
+    }
+}
+
+/// The gaps of a drive.
+#[derive(Debug, Clone, Copy)]
+pub struct Gaps<'a> {
+    drive: &'a Drive,
+    clearance_mm: PerContact<f64>,
+    modification: Modification,
+    deviations: Option<&'a Deviations>,
+}
+
+impl<'a> Gaps<'a> {
+    /// From clearances, which are the same at every tooth, modifications, which depend on its position, and deviations, which depend on its place.
+    pub fn new(
+        drive: &'a Drive,
+        clearance_um: &PerContact<f64>,
+        modification: Modification,
+        deviations: Option<&'a Deviations>,
+    ) -> Self {
+        Self {
+            drive,
+            clearance_mm: PerContact::of(|contact| MM_PER_UM * clearance_um.get(contact)),
+            modification,
+            deviations: deviations.filter(|deviations| !deviations.is_nil()),
+        }
+    }
+
+    /// Whether there is no gap anywhere.
+    pub fn is_nil(&self) -> bool {
+        self.deviations.is_none()
+            && self.modification.first().is_none()
+            && self.clearance_mm.iter().all(|(_, &gap_mm)| gap_mm == 0.0)
+    }
+
+    /// Whether zones are unlike, so that all teeth of all zones share the load together.
+    pub const fn tell_zones_apart(&self) -> bool {
+        self.deviations.is_some()
+    }
+
+    /// The gap at each contact of a tooth, along its normal; negative where a part is too full.
+    pub fn at(&self, place: &Place, center: &ToothCenter, flank: &FlankPoint) -> PerContact<f64> {
+        let mut gap_mm = self.clearance_mm;
+        self.add_modification(center, flank, &mut gap_mm);
+        if let Some(deviations) = self.deviations {
+            self.add_deviations(deviations, place, center, flank, &mut gap_mm);
+        }
+        gap_mm
+    }
+
+    fn add_modification(&self, center: &ToothCenter, flank: &FlankPoint, gap_mm: &mut PerContact<f64>) {
+        let m = &self.modification;
+        let d = center.center_radius_mm;
+        let (cos, sin) = (flank.cos_pressure_angle, flank.tan_pressure_angle * flank.cos_pressure_angle);
+        // The angle δ of the contact on the ring against the tooth's centre line, as seen from the axis.
+        let r = self.drive.parameters().tooth_radius_mm;
+        let (along, across) = (d + r * cos, r * sin);
+        let cos_to_profile = (along * cos + across * sin) / along.hypot(across);
+        let thinner_mm = MM_PER_UM * m.tooth_radius_um;
+        gap_mm.wave_generator += MM_PER_UM * m.wave_generator_equidistant_um + thinner_mm;
+        gap_mm.ring += MM_PER_UM
+            * (m.ring_equidistant_um
+                + m.ring_path_shift_um * cos
+                + m.ring_profile_shift_um * cos_to_profile
+                + self.tip_relief_um(center))
+            + RAD_PER_ARCSEC * m.ring_rotation_arcsec * d * sin
+            + thinner_mm;
+        gap_mm.carrier += MM_PER_UM * m.slot_wall_um + RAD_PER_ARCSEC * m.carrier_rotation_arcsec * d + thinner_mm;
+    }
+
+    fn tip_relief_um(&self, center: &ToothCenter) -> f64 {
+        let Some(TipRelief { amount_um, start_deg, power }) = self.modification.ring_tip_relief else { return 0.0 };
+        let start_rad = start_deg.to_radians();
+        let end_rad = self.drive.flank_limit().position.from_lobe_rad;
+        let beyond_rad = center.position.from_lobe_rad - start_rad;
+        if beyond_rad > 0.0 { amount_um * (beyond_rad / (end_rad - start_rad)).powf(power) } else { 0.0 }
+    }
+
+    fn add_deviations(
+        &self,
+        deviations: &Deviations,
+        &Place { slot, ring_space, lobe }: &Place,
+        center: &ToothCenter,
+        flank: &FlankPoint,
+        gap_mm: &mut PerContact<f64>,
+    ) {
+        let p = self.drive.parameters();
+        let s = self.drive.sense();
+        let d = center.center_radius_mm;
+        let sin = flank.tan_pressure_angle * flank.cos_pressure_angle;
+        let thinner_mm = MM_PER_UM * of(&deviations.tooth_radius_um, slot);
+        // Directions, each in its own part: of the cam's normal, of the ring's outward normal, and in which a slot's wall is pressed.
+        let normal_rad = center.normal_rad();
+        let cam_rad = normal_rad + 2.0 * PI * lobe as f64 / f64::from(self.drive.lobes());
+        let beta_rad = flank.tan_pressure_angle.atan();
+        let in_space_rad = center.position.from_lobe_rad / self.drive.flank().teeth_per_wave() + beta_rad;
+        let ring_rad = 2.0 * PI * ring_space as f64 / p.ring_teeth as f64 - s * in_space_rad;
+        let wall_rad = 2.0 * PI * slot as f64 / p.installed as f64 + s * 0.5 * PI;
+        let along_mm = |runout: &Runout, direction_rad: f64| {
+            MM_PER_UM * runout.amount_um * (direction_rad - runout.angle_deg.to_radians()).cos()
+        };
+        let runout = &deviations.runout;
+        gap_mm.wave_generator += MM_PER_UM * of(&deviations.wave_generator_lobe_um, lobe)
+            - along_mm(&runout.wave_generator, cam_rad)
+            + thinner_mm;
+        gap_mm.ring += MM_PER_UM * of(&deviations.ring_space_um, ring_space)
+            + RAD_PER_ARCSEC * of(&deviations.ring_space_angle_arcsec, ring_space) * d * sin
+            + along_mm(&runout.ring, ring_rad)
+            + thinner_mm;
+        gap_mm.carrier += MM_PER_UM * of(&deviations.slot_wall_um, slot)
+            + RAD_PER_ARCSEC * of(&deviations.slot_angle_arcsec, slot) * d
+            + along_mm(&runout.carrier, wall_rad)
+            + thinner_mm;
+    }
+}

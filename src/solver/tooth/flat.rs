@@ -1,0 +1,47 @@
+//! The flat of a flat-sided tooth on the wall of its slot (docs/theory.md sections 4.3 and 5).
+
+use std::f64::consts::PI;
+
+/// The rectangle over which a flat is borne.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FlatContact {
+    length_mm: f64,
+    width_mm: f64,
+}
+
+impl FlatContact {
+    /// Of a length along the slot and a width along the axis, both positive.
+    pub const fn new(length_mm: f64, width_mm: f64) -> Self {
+        Self { length_mm, width_mm }
+    }
+
+    /// Its length along the slot.
+    pub const fn length_mm(&self) -> f64 {
+        self.length_mm
+    }
+
+    /// The mean pressure under a force. Its edges, where the pressure is higher, are not modelled.
+    pub fn stress_mpa(&self, force_n: f64) -> f64 {
+        force_n / (self.length_mm * self.width_mm)
+    }
+
+    /// The force that makes the mean pressure `stress_mpa`.
+    pub fn force_n(&self, stress_mpa: f64) -> f64 {
+        stress_mpa * (self.length_mm * self.width_mm)
+    }
+
+    /// The mean approach of the rectangle, evenly pressed, on half-spaces under 1 N: `I/(π E* (l L)²)` with
+    /// `I = (2/3)(3l²L asinh(L/l) + 3lL² asinh(l/L) + l³ + L³ - (l² + L²)^(3/2))`.
+    pub fn compliance_mm_per_n(&self, modulus_mpa: f64) -> f64 {
+        let (long, short) = (self.length_mm.max(self.width_mm), self.length_mm.min(self.width_mm));
+        // Over the cube of the long side, with t = short/long: 1 + t³ - (1 + t²)^(3/2) without the difference of near numbers.
+        let t = short / long;
+        let squared = t * t;
+        let root = (1.0 + squared).sqrt();
+        // (1 + t²)^(3/2) - 1 = t² (root² + root + 1)/(root + 1)
+        let corners = squared * (t - (squared + 1.0 + root + 1.0) / (root + 1.0));
+        let integral = (2.0 / 3.0) * (3.0 * t * t.recip().asinh() * t + 3.0 * t * t.asinh() + corners);
+        // long³ · integral/(l L)², and l L = t long².
+        integral / (PI * modulus_mpa * squared * long)
+    }
+}

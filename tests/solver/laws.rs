@@ -1,0 +1,625 @@
+//! Johnson's law, series compliance, balls and flats, against formulas and constructions of their own.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Matrix2, Vector2};
+use proptest::prelude::*;
+use toothwave_solver::Compatibility::{Projection, VirtualWork};
+use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
+use toothwave_solver::mesh::Mesh;
+use toothwave_solver::sweep::{self, Points};
+use toothwave_solver::tooth::ToothContact;
+use toothwave_solver::tooth::flat::FlatContact;
+use toothwave_solver::tooth::point::EllipticContact;
+use toothwave_solver::{
+    Contact, ContactLaw, Drive, DriveParameters, Finding, LoadCase, LoadParameters, Material, Materials, Never,
+    Parameter, PerContact, Position, SolveError, Violation, findings,
+};
+
+use crate::drives::{PAPER_5_1, PAPER_5_2, drive, load, swept};
+
+const R_DEEP: ContactLaw =
+    ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
+
+fn johnson(torque_nm: f64) -> LoadParameters {
+    LoadParameters { law: R_DEEP, ..load(torque_nm, VirtualWork) }
+}
+
+/// Titanium teeth between ceramic, cast iron and bronze, at depths of their own.
+fn mixed(torque_nm: f64) -> LoadParameters {
+    let material = |youngs_modulus_gpa, poissons_ratio| Material { youngs_modulus_gpa, poissons_ratio };
+    LoadParameters {
+        materials: Materials {
+            wave_generator: material(310.0, 0.27),
+            teeth: material(114.0, 0.31),
+            ring: material(120.0, 0.26),
+            carrier: material(110.0, 0.34),
+        },
+        law: ContactLaw::Johnson {
+            depth_mm: PerContact { wave_generator: Some(12.0), ring: None, carrier: Some(3.0) },
+        },
+        ..load(torque_nm, VirtualWork)
+    }
+}
+
+/// Johnson's approach as it is printed, with its half-width.
+fn printed_approach_mm(
+    load: &LoadParameters,
+    r: f64,
+    width_mm: f64,
+    contact: Contact,
+    curvature: f64,
+    force_n: f64,
+) -> f64 {
+    let ContactLaw::Johnson { depth_mm } = &load.law else { panic!("another law") };
+    let mate = match contact {
+        Contact::WaveGenerator => load.materials.wave_generator,
+        Contact::Ring => load.materials.ring,
+        Contact::Carrier => load.materials.carrier,
+    };
+    let soft = |m: Material| (1.0 - m.poissons_ratio * m.poissons_ratio) / (1e3 * m.youngs_modulus_gpa);
+    let (tooth, nu) = (soft(load.materials.teeth), mate.poissons_ratio);
+    let b = (4.0 * force_n * (tooth + soft(mate)) / (PI * width_mm * curvature)).sqrt();
+    let d = depth_mm.get(contact).unwrap_or(r);
+    force_n / (PI * width_mm)
+        * (tooth * (2.0 * (4.0 * r / b).ln() - 1.0) + soft(mate) * (2.0 * (2.0 * d / b).ln() - nu / (1.0 - nu)))
+        + load.series_compliance_mm_per_n.get(contact) * force_n
+}
+
+fn directions(drive: &Drive, tooth: &ToothState) -> [Vector2<f64>; 3] {
+    let (cam, ring) = (tooth.center.tan_pressure_angle.atan(), tooth.flank.tan_pressure_angle.atan());
+    [
+        Vector2::new(cam.cos(), cam.sin()),
+        Vector2::new(-ring.cos(), drive.sense() * ring.sin()),
+        Vector2::new(0.0, -drive.sense()),
+    ]
+}
+
+const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
+
+/// The force under which a contact gives way so far, by bisection in its logarithm.
+fn force_of(approach_mm: f64, law: impl Fn(f64) -> f64) -> f64 {
+    if approach_mm <= 0.0 {
+        return 0.0;
+    }
+    let (mut low, mut high) = (1e-12_f64, 1e7_f64);
+    for _ in 0..120 {
+        let middle = (low * high).sqrt();
+        if law(middle) < approach_mm { low = middle } else { high = middle }
+    }
+    (low * high).sqrt()
+}
+
+/// The three forces on a tooth whose centre is free: moved by Newton's method until its contacts, which press only, balance.
+fn free_tooth(
+    drive: &Drive,
+    tooth: &ToothState,
+    law: &dyn Fn(Contact, &ToothState, f64) -> f64,
+    gap_mm: &PerContact<f64>,
+    rotation_rad: f64,
+) -> [f64; 3] {
+    let along = directions(drive, tooth);
+    let d = tooth.center.center_radius_mm;
+    let pushed_mm = rotation_rad * d * tooth.center.tan_pressure_angle.atan().sin();
+    // How far each contact is pressed when the centre moves by v: the cam comes nearer by what it has turned.
+    let pressed = |v: Vector2<f64>| {
+        [
+            pushed_mm - v.dot(&along[0]) - gap_mm.wave_generator,
+            -v.dot(&along[1]) - gap_mm.ring,
+            -v.dot(&along[2]) - gap_mm.carrier,
+        ]
+    };
+    let forces = |v: Vector2<f64>| {
+        let pressed = pressed(v);
+        [0, 1, 2].map(|i| force_of(pressed[i], |force_n| law(CONTACTS[i], tooth, force_n)))
+    };
+    let stiffness = |i: usize, force_n: f64| {
+        let step = 1e-5 * force_n;
+        2.0 * step / (law(CONTACTS[i], tooth, force_n + step) - law(CONTACTS[i], tooth, force_n - step))
+    };
+    // Each contact at first takes the part that statics gives it, so that all three press.
+    let mut v = {
+        let reach = |ratio: f64, i: usize, f: f64| law(CONTACTS[i], tooth, f * ratio);
+        let ratio = tooth.force_ratio;
+        let (mut low, mut high) = (1e-12_f64, 1e7_f64);
+        for _ in 0..200 {
+            let f = (low * high).sqrt();
+            let all = reach(1.0, 0, f)
+                + gap_mm.wave_generator
+                + ratio.ring * (reach(ratio.ring, 1, f) + gap_mm.ring)
+                + ratio.carrier * (reach(ratio.carrier, 2, f) + gap_mm.carrier);
+            if all < pushed_mm { low = f } else { high = f }
+        }
+        if low < 1e-11 {
+            return [0.0; 3];
+        }
+        let f = low;
+        let ring = -(reach(ratio.ring, 1, f) + gap_mm.ring);
+        let carrier = -(reach(ratio.carrier, 2, f) + gap_mm.carrier);
+        Matrix2::from_rows(&[along[1].transpose(), along[2].transpose()])
+            .lu()
+            .solve(&Vector2::new(ring, carrier))
+            .unwrap()
+            // Somewhere beside the answer, or Newton's method would have nothing to do.
+            * 1.001
+    };
+    for _ in 0..60 {
+        let f = forces(v);
+        let unbalanced: Vector2<f64> = (0..3).map(|i| along[i] * f[i]).sum();
+        let mut slope = Matrix2::zeros();
+        for i in 0..3 {
+            if f[i] > 0.0 {
+                slope -= along[i] * along[i].transpose() * stiffness(i, f[i]);
+            }
+        }
+        let Some(step) = slope.lu().solve(&-unbalanced) else { break };
+        v += step;
+        if step.norm() < 1e-16 {
+            break;
+        }
+    }
+    forces(v)
+}
+
+/// The largest difference of the solver's forces from those of free teeth at its wind-up, over the peak, and of the torque they make.
+fn worst_against_free_teeth(parameters: &DriveParameters, load: &LoadParameters) -> f64 {
+    const SAMPLES: u64 = 3;
+    let drive = drive(parameters);
+    let loaded = LoadCase::new(load).unwrap();
+    let loaded = LoadedDrive::new(&drive, &loaded).unwrap();
+    let (r, width_mm) = (parameters.tooth_radius_mm, drive.tooth_width_mm());
+    let law = |contact: Contact, tooth: &ToothState, force_n: f64| {
+        let cam = 1.0 / tooth.center.cam_contact.curvature_per_mm;
+        let curvature = match contact {
+            Contact::WaveGenerator => 1.0 / r + 1.0 / cam,
+            Contact::Ring => 1.0 / (r * tooth.flank.regularity),
+            Contact::Carrier => 1.0 / r,
+        };
+        printed_approach_mm(load, r, width_mm, contact, curvature, force_n)
+    };
+    let gap_mm = PerContact::of(|contact| 1e-3 * load.clearance_um.get(contact));
+    let mesh = Mesh::new(&drive);
+    let mut worst = 0.0_f64;
+    for sample in 0..SAMPLES {
+        let teeth: Vec<_> = mesh
+            .teeth_at(sample, SAMPLES)
+            .map(|tooth| loaded.tooth(mesh.position(tooth, sample, SAMPLES)).unwrap())
+            .filter(|tooth| tooth.center.tan_pressure_angle > 0.0)
+            .collect();
+        let wind_up = loaded.wind_up(&teeth).unwrap();
+        let found: Vec<_> = teeth.iter().map(|tooth| loaded.forces_n(tooth, &wind_up).unwrap()).collect();
+        let peak = found.iter().map(|force| force.wave_generator).fold(0.0, f64::max);
+        let mut torque = 0.0;
+        for (tooth, found) in teeth.iter().zip(&found) {
+            let free = free_tooth(&drive, tooth, &law, &gap_mm, wind_up.rotation_rad());
+            torque += 2.0 * free[0] * tooth.center.cam_contact.lever_arm_mm;
+            for (free, (_, found)) in free.iter().zip(found.iter()) {
+                worst = worst.max((free - found).abs() / peak);
+            }
+        }
+        worst = worst.max((torque / loaded.input_torque_nmm() - 1.0).abs());
+    }
+    worst
+}
+
+#[test]
+fn johnsons_law_by_virtual_work_is_a_tooth_free_to_move_between_three_lines() {
+    let with_gaps = |load: LoadParameters| LoadParameters {
+        clearance_um: PerContact { wave_generator: 3.0, ring: 4.5, carrier: 6.0 },
+        series_compliance_mm_per_n: PerContact { wave_generator: 0.0, ring: 1e-6, carrier: 7e-6 },
+        ..load
+    };
+    let larger = DriveParameters { ring_teeth: 30, tooth_radius_mm: 4.5, ..PAPER_5_1 };
+    for (parameters, load) in [
+        (PAPER_5_1, johnson(20.0)),
+        (PAPER_5_2, johnson(3.0)),
+        (PAPER_5_1, mixed(20.0)),
+        (larger, mixed(20.0)),
+        (PAPER_5_1, with_gaps(johnson(20.0))),
+        (larger, with_gaps(mixed(20.0))),
+        (PAPER_5_2, with_gaps(mixed(3.0))),
+    ] {
+        let worst = worst_against_free_teeth(&parameters, &load);
+        assert!(worst < 1e-10, "{worst:e} at {load:?}");
+    }
+}
+
+#[test]
+fn a_tooth_gives_way_by_johnsons_printed_formula_at_each_contact() {
+    let load = mixed(20.0);
+    let drive = drive(&PAPER_5_1);
+    let case = LoadCase::new(&load).unwrap();
+    let loaded = LoadedDrive::new(&drive, &case).unwrap();
+    for degrees in [0.0_f64, 1e-6, 10.0, 45.0, 80.0] {
+        let tooth = loaded.tooth(Position::from_lobe(degrees.to_radians(), 2)).unwrap();
+        for force_n in [1e-9, 1.0, 1e3, 1e4] {
+            let printed: f64 = CONTACTS
+                .iter()
+                .map(|&contact| {
+                    let (ratio, curvature) = (*tooth.force_ratio.get(contact), *tooth.curvature_per_mm.get(contact));
+                    if ratio > 0.0 {
+                        ratio * printed_approach_mm(&load, 5.0, 15.0, contact, curvature, ratio * force_n)
+                    } else {
+                        0.0
+                    }
+                })
+                .sum();
+            let found = tooth.spring.approach.approach_mm(force_n);
+            assert!((found / printed - 1.0).abs() < 4e-15, "{degrees}, {force_n}: {:e}", found / printed - 1.0);
+            let back = tooth.spring.approach.force(found).unwrap();
+            assert!((back.force_n / force_n - 1.0).abs() < 2e-15, "{:e}", back.force_n / force_n - 1.0);
+            let step = 1e-5;
+            let rise = (tooth.spring.approach.approach_mm(force_n * (1.0 + step))
+                / tooth.spring.approach.approach_mm(force_n * (1.0 - step)))
+            .ln()
+                / (2.0 * step);
+            assert!((back.exponent - rise).abs() < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn case_5_1_by_virtual_work_and_johnson_stands_between_linear_and_palmgren() {
+    let peak = |law| {
+        let load = LoadParameters { law, ..load(20.0, VirtualWork) };
+        let sweep = swept(&PAPER_5_1, &load, 50);
+        let most_deg = sweep.input_angles.wind_up_deg.iter().copied().fold(0.0, f64::max);
+        println!("5.1, {law:?}: peak F_H {:.3} N, wind-up {most_deg:.5} deg", sweep.peaks.wave_generator.force_n.value);
+        (sweep.peaks.wave_generator.force_n.value, most_deg)
+    };
+    let (linear, palmgren, johnson) = (peak(ContactLaw::Linear), peak(ContactLaw::Palmgren), peak(R_DEEP));
+    assert!(linear.0 < palmgren.0 && palmgren.0 < johnson.0 && johnson.0 < 1.01 * palmgren.0, "{johnson:?}");
+    assert!(linear.1 < johnson.1 && johnson.1 < palmgren.1, "{johnson:?}");
+}
+
+#[test]
+fn under_johnsons_law_too_any_torque_up_to_its_end_and_any_gap_is_balanced() {
+    let mut worst = 0.0_f64;
+    for parameters in [PAPER_5_1, PAPER_5_2] {
+        for exponent in [-12, -8, -4, 0, 1] {
+            for gap_um in [0.0, 1e-6, 1.0, 1e3, 1e6] {
+                for contact in CONTACTS {
+                    let load = LoadParameters {
+                        clearance_um: PerContact::of(|at| if at == contact { gap_um } else { 0.0 }),
+                        ..johnson(10.0_f64.powi(exponent))
+                    };
+                    worst = worst.max(swept(&parameters, &load, 2).torque_balance_residual);
+                }
+            }
+        }
+    }
+    assert!(worst <= 1e-13, "{worst:e}");
+}
+
+#[test]
+fn johnsons_law_ends_where_a_contact_is_half_as_wide_as_the_tooth_and_says_at_which_torque() {
+    let heavy = LoadCase::new(&johnson(1e6)).unwrap();
+    let drive = drive(&PAPER_5_1);
+    let refused = sweep::sweep(&drive, &heavy, Points::Samples(4), &Never).unwrap_err();
+    let SolveError::JohnsonBeyondHalfWidth { contact, half_width_limit_mm, input_torque_limit_nm, .. } = refused else {
+        panic!("{refused:?}")
+    };
+    assert_eq!(half_width_limit_mm, 2.5);
+    // Just below the torque that it names the first input angle has an answer, with that half-width; just above it has none.
+    let loaded = |torque_nm: f64| {
+        let case = LoadCase::new(&johnson(torque_nm)).unwrap();
+        let loaded = LoadedDrive::new(&drive, &case).unwrap();
+        let mesh = Mesh::new(&drive);
+        let teeth: Vec<_> =
+            mesh.teeth_at(0, 4).map(|tooth| loaded.tooth(mesh.position(tooth, 0, 4)).unwrap()).collect();
+        let wind_up = loaded.wind_up(&teeth)?;
+        let widths = teeth.iter().map(|tooth| {
+            let force_n = *loaded.forces_n(tooth, &wind_up).unwrap().get(contact);
+            let modulus_mpa = 210e3 / (2.0 * (1.0 - 0.09));
+            (4.0 * force_n / (PI * 15.0 * modulus_mpa * tooth.curvature_per_mm.get(contact))).sqrt()
+        });
+        Ok::<f64, SolveError>(widths.fold(0.0, f64::max))
+    };
+    assert!((loaded(input_torque_limit_nm * (1.0 - 1e-9)).unwrap() / 2.5 - 1.0).abs() < 1e-8);
+    assert!(loaded(input_torque_limit_nm * (1.0 + 1e-9)).is_err());
+    // A capacity beyond is none.
+    let parameters = LoadParameters { allowable_stress_mpa: Some(1e6), ..johnson(20.0) };
+    let refused = sweep::sweep(&drive, &LoadCase::new(&parameters).unwrap(), Points::Samples(4), &Never);
+    assert!(matches!(refused, Err(SolveError::JohnsonBeyondHalfWidth { .. })), "{refused:?}");
+}
+
+#[test]
+fn a_contact_wider_than_a_tenth_of_the_tooth_is_a_finding() {
+    let found = |load: &LoadParameters| {
+        let drive = drive(&PAPER_5_1);
+        let sweep = swept(&PAPER_5_1, load, 10);
+        findings::of_half_widths(&drive, &LoadCase::new(load).unwrap(), &sweep.states)
+    };
+    assert_eq!(found(&johnson(20.0)), []);
+    assert_eq!(found(&load(2e3, VirtualWork)), []);
+    let heavy = found(&johnson(2000.0));
+    let widths: Vec<_> = heavy
+        .iter()
+        .map(|finding| match finding {
+            Finding::JohnsonBeyondHalfWidth { contact, half_width_mm, limit_mm } if half_width_mm > limit_mm => {
+                (*contact, *limit_mm)
+            }
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    assert!(widths.contains(&(Contact::Ring, 0.5)), "{heavy:?}");
+    let shallow = LoadParameters {
+        law: ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: Some(0.3) } },
+        ..johnson(20.0)
+    };
+    assert!(matches!(found(&shallow)[..], [Finding::JohnsonBeyondHalfWidth { contact: Contact::Carrier, .. }]));
+}
+
+/// Laws without a closed form, with gaps.
+fn laws_of_searches() -> [LoadParameters; 3] {
+    let gapped = |load: LoadParameters| LoadParameters {
+        clearance_um: PerContact { wave_generator: 0.0, ring: 10.0, carrier: 2.0 },
+        ..load
+    };
+    let springy = LoadParameters {
+        law: ContactLaw::Palmgren,
+        series_compliance_mm_per_n: PerContact { wave_generator: 0.0, ring: 2e-6, carrier: 5e-6 },
+        ..load(20.0, VirtualWork)
+    };
+    [johnson(20.0), gapped(mixed(20.0)), gapped(springy)]
+}
+
+#[test]
+fn stiffness_is_the_slope_of_torque_over_wind_up_and_capacity_the_torque_at_which_the_stress_is_reached() {
+    for load in laws_of_searches() {
+        let at = |torque_nm: f64| {
+            let load = LoadParameters { torque: toothwave_solver::Torque::Input(torque_nm), ..load };
+            swept(&PAPER_5_1, &load, 6)
+        };
+        let (less, middle, more) = (at(20.0 * (1.0 - 1e-5)), at(20.0), at(20.0 * (1.0 + 1e-5)));
+        for (sample, stiffness) in middle.input_angles.torsional_stiffness_nm_per_rad.iter().enumerate() {
+            let turned = |sweep: &sweep::Sweep| sweep.input_angles.wind_up_deg[sample].to_radians();
+            let slope = 20.0 * 2e-5 * 14.0 * 14.0 / (turned(&more) - turned(&less));
+            assert!((stiffness / slope - 1.0).abs() < 1e-7, "{stiffness} {slope}");
+        }
+        let limited = LoadParameters { allowable_stress_mpa: Some(1500.0), ..load };
+        let capacity = swept(&PAPER_5_1, &limited, 6).torque_capacity.unwrap();
+        let reached = at(capacity.input_torque_nm);
+        let largest = reached.peaks.iter().map(|(_, peaks)| peaks.stress_mpa.value).fold(0.0, f64::max);
+        assert!((largest / 1500.0 - 1.0).abs() < 1e-12, "{largest}");
+        assert_eq!(reached.peaks.get(capacity.contact).stress_mpa.value, largest);
+    }
+}
+
+#[test]
+fn a_sweep_to_a_tolerance_finds_the_peaks_of_these_laws_too() {
+    for load in laws_of_searches() {
+        let case = LoadCase::new(&load).unwrap();
+        let points = Points::Tolerance { tolerance: 1e-6, max_states: 1_000_000 };
+        let found = sweep::sweep(&drive(&PAPER_5_1), &case, points, &Never).unwrap();
+        let sampled = swept(&PAPER_5_1, &load, 4000);
+        for (contact, peaks) in found.peaks.iter() {
+            let sampled = sampled.peaks.get(contact);
+            for (found, sampled) in
+                [(peaks.force_n.value, sampled.force_n.value), (peaks.stress_mpa.value, sampled.stress_mpa.value)]
+            {
+                // Samples miss a kink by as much as they are apart.
+                assert!(found >= sampled * (1.0 - 1e-6) && found <= sampled * (1.0 + 2e-4), "{found} {sampled}");
+            }
+        }
+    }
+}
+
+#[test]
+fn projection_takes_neither_johnsons_law_nor_a_series_compliance() {
+    let refused = |parameters: LoadParameters| LoadCase::new(&parameters).unwrap_err();
+    let projected = LoadParameters { law: R_DEEP, ..load(20.0, Projection) };
+    assert_eq!(refused(projected), [Violation::NeedsVirtualWork { parameter: Parameter::Law }]);
+    let mut springy = load(20.0, Projection);
+    springy.series_compliance_mm_per_n.carrier = 1e-6;
+    let parameter = Parameter::SeriesCompliance(Contact::Carrier);
+    assert_eq!(refused(springy), [Violation::NeedsVirtualWork { parameter }]);
+    let mut soft = johnson(20.0);
+    soft.series_compliance_mm_per_n.ring = -1e-9;
+    soft.law = ContactLaw::Johnson { depth_mm: PerContact { wave_generator: Some(0.0), ring: None, carrier: None } };
+    assert_eq!(refused(soft).len(), 2);
+}
+
+#[test]
+fn a_series_compliance_is_a_softer_stiffness_where_the_law_is_linear() {
+    let stiffness = PerContact { wave_generator: 4e5, ring: 6e5, carrier: 2e5 };
+    let series = PerContact { wave_generator: 1e-6, ring: 2e-6, carrier: 3e-6 };
+    let springy = LoadParameters {
+        law: ContactLaw::Fixed(stiffness),
+        series_compliance_mm_per_n: series,
+        ..load(20.0, VirtualWork)
+    };
+    let softer = PerContact::of(|contact| 1.0 / (1.0 / stiffness.get(contact) + series.get(contact)));
+    let soft = LoadParameters { law: ContactLaw::Fixed(softer), ..load(20.0, VirtualWork) };
+    let gapped = |load: LoadParameters| LoadParameters {
+        clearance_um: PerContact { wave_generator: 0.0, ring: 5.0, carrier: 2.0 },
+        ..load
+    };
+    for (springy, soft) in [(springy, soft), (gapped(springy), gapped(soft))] {
+        let (one, other) = (swept(&PAPER_5_1, &springy, 20), swept(&PAPER_5_1, &soft, 20));
+        for (contact, column) in one.states.force_n.iter() {
+            for (one_n, other_n) in column.iter().zip(other.states.force_n.get(contact)) {
+                assert!((one_n - other_n).abs() < 1e-12 * other.peaks.get(contact).force_n.value);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_ball_on_a_plane_approaches_as_the_closed_form_of_hertz_says() {
+    let (r, modulus) = (5.0_f64, 115e3_f64);
+    let circle = EllipticContact::new(1.0 / r, 1.0 / r, modulus).unwrap();
+    let sum = 2.0 / r;
+    assert!((circle.coefficient() / (9.0 * sum / (32.0 * modulus * modulus)).cbrt() - 1.0).abs() < 1e-15);
+    let half = (3.0 * 100.0 * r / (4.0 * modulus)).cbrt();
+    assert!(
+        (circle.half_width_mm(100.0) / half - 1.0).abs() < 1e-15
+            && (circle.half_length_mm(100.0) / half - 1.0).abs() < 1e-15
+    );
+    assert!((circle.stress_mpa(100.0) / (1.5 * 100.0 / (PI * half * half)) - 1.0).abs() < 1e-15);
+    // Largest shear below a circle, from the closed stresses on its axis.
+    let shear = |z: f64| {
+        let radial = -1.3 * (1.0 - z * (1.0 / z).atan()) + 0.5 / (1.0 + z * z);
+        0.5 * (radial + 1.0 / (1.0 + z * z))
+    };
+    let below = circle.shear_below(0.3);
+    assert!((below.share - shear(below.depth)).abs() < 1e-14);
+    assert!(shear(below.depth) >= shear(below.depth + 1e-4) && shear(below.depth) >= shear(below.depth - 1e-4));
+    assert!((below.share - 0.310).abs() < 5e-4 && (below.depth - 0.481).abs() < 1e-3, "{below:?}");
+}
+
+#[test]
+fn a_very_long_ellipse_is_sheared_like_a_line() {
+    let long = EllipticContact::new(1.0, 1e-20, 1e5).unwrap();
+    for nu in [0.0, 0.3, 0.45] {
+        let below = long.shear_below(nu);
+        assert!((below.share - toothwave_solver::contact::SHEAR_SHARE).abs() < 1e-9, "{below:?}");
+        assert!((below.depth - toothwave_solver::contact::SHEAR_DEPTH).abs() < 1e-6, "{below:?}");
+    }
+}
+
+/// The deflection of a half-space at `(x, y)` under Hertz's pressure of unit peak over an ellipse of half-axes `long`, `short`, times π E*: the sum of
+/// the pressure along all lines through the point. Over a chord from the point, at the angle t, the pressure is the root of a quadratic.
+fn half_space_deflection(long: f64, short: f64, x: f64, y: f64) -> f64 {
+    const STEPS: u32 = 20_000;
+    let mut sum = 0.0;
+    for i in 0..STEPS {
+        let t = PI * (f64::from(i) + 0.5) / f64::from(STEPS);
+        let (sin, cos) = t.sin_cos();
+        let a = (cos / long).powi(2) + (sin / short).powi(2);
+        let b = x * cos / (long * long) + y * sin / (short * short);
+        let c = 1.0 - (x / long).powi(2) - (y / short).powi(2);
+        // ∫ √(c - 2bs - as²) ds over the whole chord: half a disc's area.
+        sum += 0.5 * PI * (c + b * b / a) / a.sqrt();
+    }
+    sum * PI / f64::from(STEPS)
+}
+
+#[test]
+fn hertzs_pressure_over_the_ellipse_makes_the_two_bodies_touch_all_over_it() {
+    let modulus = 115e3;
+    for (in_plane, axial) in [(0.4, 0.4 - 1e-9), (0.4, 0.2), (0.3, 0.008), (0.02, 0.2), (5.0, 0.008)] {
+        let force_n = 730.0;
+        let contact = EllipticContact::new(in_plane, axial, modulus).unwrap();
+        let (wide, long) = (contact.half_width_mm(force_n), contact.half_length_mm(force_n));
+        let peak = contact.stress_mpa(force_n);
+        assert!((peak * 2.0 * PI * wide * long / 3.0 / force_n - 1.0).abs() < 1e-13);
+        assert!((contact.force_n(peak) / force_n - 1.0).abs() < 1e-13);
+        let approach = contact.coefficient() * force_n.powf(EllipticContact::EXPONENT);
+        for (x, y) in [(0.0, 0.0), (0.6, 0.0), (0.0, 0.7), (0.5, 0.5)] {
+            let (x, y) = (x * wide, y * long);
+            let deflection = peak / (PI * modulus) * half_space_deflection(wide, long, x, y);
+            let gone = approach - 0.5 * (in_plane * x * x + axial * y * y);
+            assert!((deflection / gone - 1.0).abs() < 1e-9, "{in_plane} {axial}: {:e}", deflection / gone - 1.0);
+        }
+    }
+}
+
+#[test]
+fn a_flat_gives_way_as_the_mean_of_an_evenly_pressed_rectangle() {
+    let modulus = 115e3;
+    for (length, width) in [(4.0_f64, 15.0_f64), (3.0, 3.0), (15.0, 4.0), (1e-4, 10.0)] {
+        let flat = FlatContact::new(length, width);
+        // Over the distances (u, v) of two points, each (l - u)(L - v) often: in the corner u = v = 0 by polar coordinates.
+        let steps = 400;
+        let nodes = |n: u32| (0..n).map(move |i| (f64::from(i) + 0.5) / f64::from(n));
+        let corner = (width / length).atan();
+        let mut sum = 0.0;
+        for (from, to) in [(0.0, corner), (corner, 0.5 * PI)] {
+            for share in nodes(steps) {
+                let t: f64 = from + (to - from) * share;
+                let (sin, cos) = t.sin_cos();
+                let reach = (length / cos).min(width / sin);
+                // ∫ (l - s cos)(L - s sin) ds
+                let along = length * width * reach - 0.5 * (length * sin + width * cos) * reach * reach
+                    + sin * cos * reach.powi(3) / 3.0;
+                sum += 4.0 * along * (to - from) / f64::from(steps);
+            }
+        }
+        let area = length * width;
+        let mean = sum / (PI * modulus * area * area);
+        let found = flat.compliance_mm_per_n(modulus);
+        assert!(
+            (found / mean - 1.0).abs() < 1e-4 * (width / length).max(1.0),
+            "{length} {width}: {:e}",
+            found / mean - 1.0
+        );
+        assert_eq!(flat.stress_mpa(flat.force_n(800.0)), 800.0);
+    }
+    // A square, from its closed form.
+    let square = FlatContact::new(3.0, 3.0).compliance_mm_per_n(modulus);
+    let closed = (4.0 * 1.0_f64.asinh() + (4.0 - 4.0 * 2.0_f64.sqrt()) / 3.0) / (PI * modulus * 3.0);
+    assert!((square / closed - 1.0).abs() < 1e-15);
+    // A narrow strip keeps its digits: to second order in t = l/L, I over L³ is 2t²(ln(2/t) + 1/2) + (2/3) t³.
+    let t = 1e-9_f64;
+    let strip = FlatContact::new(t, 1.0).compliance_mm_per_n(1.0) * PI * t * t;
+    let series = 2.0 * t * t * ((2.0 / t).ln() + 0.5) + 2.0 / 3.0 * t * t * t;
+    assert!((strip / series - 1.0).abs() < 1e-14, "{:e}", strip / series - 1.0);
+}
+
+#[test]
+fn flat_sided_teeth_share_the_load_with_any_law_of_cylinders() {
+    let drive = drive(&PAPER_5_1);
+    let shape = |outer_mm| ToothContact::FlatSided {
+        flat_length_mm: 4.0,
+        carrier_inner_radius_mm: 58.5,
+        carrier_outer_radius_mm: outer_mm,
+    };
+    for law in [ContactLaw::Linear, ContactLaw::Palmgren, R_DEEP] {
+        let case = LoadCase::new(&LoadParameters { law, ..load(20.0, VirtualWork) }).unwrap();
+        let loaded = LoadedDrive::with_teeth(&drive, &case, &shape(65.5)).unwrap();
+        let mesh = Mesh::new(&drive);
+        let teeth: Vec<_> =
+            mesh.teeth_at(1, 3).map(|tooth| loaded.tooth(mesh.position(tooth, 1, 3)).unwrap()).collect();
+        let wind_up = loaded.wind_up(&teeth).unwrap();
+        let mut torque = 0.0;
+        for tooth in &teeth {
+            let force_n = loaded.forces_n(tooth, &wind_up).unwrap();
+            torque += 2.0 * force_n.wave_generator * tooth.center.cam_contact.lever_arm_mm;
+            let d = tooth.center.center_radius_mm;
+            let borne = (d + 2.0).min(65.5) - (d - 2.0).max(58.5);
+            let pressure = loaded.stress_mpa(tooth, &force_n).carrier;
+            assert!((pressure * borne * 15.0 / force_n.carrier - 1.0).abs() < 1e-12);
+        }
+        assert!((torque / 20e3 - 1.0).abs() < 1e-14);
+    }
+    let case = LoadCase::new(&load(20.0, VirtualWork)).unwrap();
+    let loaded = LoadedDrive::with_teeth(&drive, &case, &shape(60.0)).unwrap();
+    let left = loaded.tooth(Position::from_lobe(0.1, 2));
+    assert!(matches!(left, Err(SolveError::FlatOffCarrier { .. })), "{left:?}");
+}
+
+#[test]
+fn balls_take_hertz_or_fixed_and_no_other_tooth_takes_hertz() {
+    let drive = drive(&PAPER_5_1);
+    let ball = ToothContact::Ball { groove_radius_mm: PerContact::default() };
+    let accepts = |law, shape: &ToothContact| {
+        let case = LoadCase::new(&LoadParameters { law, ..load(20.0, VirtualWork) }).unwrap();
+        match LoadedDrive::with_teeth(&drive, &case, shape) {
+            Ok(_) => true,
+            Err(error) => {
+                assert_eq!(error, SolveError::Impossible(vec![Violation::LawOfOtherTeeth]));
+                false
+            }
+        }
+    };
+    let fixed = ContactLaw::Fixed(PerContact { wave_generator: 1e5, ring: 1e5, carrier: 1e5 });
+    assert!(accepts(ContactLaw::Hertz, &ball) && accepts(fixed, &ball));
+    assert!(!accepts(ContactLaw::Linear, &ball) && !accepts(ContactLaw::Palmgren, &ball) && !accepts(R_DEEP, &ball));
+    assert!(!accepts(ContactLaw::Hertz, &ToothContact::Cylinder));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 512, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_stress_is_that_of_its_force_for_every_ellipse(one in -6.0_f64..3.0, other in -6.0_f64..3.0, power in -6.0_f64..6.0) {
+        let contact = EllipticContact::new(10.0_f64.powf(one), 10.0_f64.powf(other), 1.1e5).unwrap();
+        let force_n = 10.0_f64.powf(power);
+        prop_assert!((contact.force_n(contact.stress_mpa(force_n)) / force_n - 1.0).abs() < 1e-14);
+        // The larger curvature lies along the shorter half-axis.
+        prop_assert_eq!(one >= other, contact.half_width_mm(force_n) <= contact.half_length_mm(force_n));
+        let turned = EllipticContact::new(10.0_f64.powf(other), 10.0_f64.powf(one), 1.1e5).unwrap();
+        prop_assert!((turned.half_length_mm(force_n) / contact.half_width_mm(force_n) - 1.0).abs() < 1e-13);
+    }
+}

@@ -1,0 +1,188 @@
+//! The sharing of a load over springs, and light loads on wide gaps.
+
+use std::cell::Cell;
+
+use proptest::prelude::*;
+use toothwave_solver::Compatibility::{Projection, VirtualWork};
+use toothwave_solver::approach::Approach;
+use toothwave_solver::load_sharing::LoadedDrive;
+use toothwave_solver::springs::{Spring, Springs};
+use toothwave_solver::sweep::{self, Points};
+use toothwave_solver::{
+    Contact, ContactLaw, DriveParameters, LoadCase, Never, PerContact, Position, SolveError, Torque, Violation,
+};
+
+use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, load};
+
+const STIFFNESS: PerContact<f64> = PerContact { wave_generator: 4.1e5, ring: 6.3e5, carrier: 2.2e5 };
+
+fn laws() -> [ContactLaw; 3] {
+    [ContactLaw::Linear, ContactLaw::Fixed(STIFFNESS), ContactLaw::Palmgren]
+}
+
+#[test]
+fn under_any_torque_and_any_gap_the_forces_balance_it_to_1e_12() {
+    let mut worst = (0.0_f64, String::new());
+    for parameters in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED] {
+        let drive = drive(&parameters);
+        for law in laws() {
+            for exponent in [-12, -9, -6, -3, 0, 3, 6, 9, 12, 15] {
+                for gap_um in [0.0, 1e-6, 1e-3, 1.0, 1e3, 1e6] {
+                    for contact in [Contact::WaveGenerator, Contact::Ring, Contact::Carrier] {
+                        let clearance_um = PerContact::of(|at| if at == contact { gap_um } else { 0.0 });
+                        let torque = Torque::Input(10.0_f64.powi(exponent));
+                        let parameters =
+                            toothwave_solver::LoadParameters { torque, law, clearance_um, ..load(1.0, VirtualWork) };
+                        let case = LoadCase::new(&parameters).unwrap();
+                        let sweep = sweep::sweep(&drive, &case, Points::Samples(2), &Never).unwrap();
+                        let residual = sweep.torque_balance_residual;
+                        if residual > worst.0 || residual.is_nan() {
+                            worst = (residual, format!("{law:?}, {torque:?}, {gap_um} um at {contact:?}"));
+                        }
+                    }
+                }
+            }
+        }
+    }
+    assert!(worst.0 <= 1e-12, "{worst:?}");
+}
+
+#[test]
+fn a_tooth_on_the_minor_axis_never_closes_the_gap_of_its_slot() {
+    // Gap and lever arm vanish there together; once it counted as closed from the start and alone carried what it could not.
+    let drive = drive(&PAPER_5_1);
+    let mut parameters = load(1e-9, VirtualWork);
+    parameters.clearance_um.carrier = 1000.0;
+    let case = LoadCase::new(&parameters).unwrap();
+    let loaded = LoadedDrive::new(&drive, &case).unwrap();
+    assert_eq!(loaded.tooth(Position::valley(2)).unwrap().spring.closing_rad, f64::INFINITY);
+    let sweep = sweep::sweep(&drive, &case, Points::Samples(2), &Never).unwrap();
+    assert!(sweep.torque_balance_residual < 1e-14, "{:e}", sweep.torque_balance_residual);
+}
+
+#[test]
+fn a_tooth_without_a_lever_arm_alone_carries_nothing_and_says_so() {
+    let drive = drive(&PAPER_5_1);
+    for contact in [None, Some(Contact::WaveGenerator), Some(Contact::Carrier)] {
+        let mut parameters = load(20.0, VirtualWork);
+        parameters.clearance_um = PerContact::of(|at| if Some(at) == contact { 10.0 } else { 0.0 });
+        parameters.allowable_stress_mpa = Some(1500.0);
+        let loaded = LoadCase::new(&parameters).unwrap();
+        let loaded = LoadedDrive::new(&drive, &loaded).unwrap();
+        let tip = [loaded.tooth(Position::valley(2)).unwrap()];
+        assert_eq!(loaded.wind_up(&tip), Err(SolveError::NoLeverArm));
+        assert_eq!(loaded.torque_limit(&tip, 1500.0).map(|_| ()), Err(SolveError::NoLeverArm));
+        assert_eq!(loaded.wind_up(&[]), Err(SolveError::NoLeverArm));
+    }
+}
+
+#[test]
+fn a_gap_that_projection_would_turn_into_load_is_refused_by_the_crate_too() {
+    let larger = drive(&DriveParameters { ring_teeth: 30, tooth_radius_mm: 4.0, ..PAPER_5_1 });
+    let mut parameters = load(20.0, Projection);
+    parameters.clearance_um.carrier = 500.0;
+    let case = LoadCase::new(&parameters).unwrap();
+    let refused = sweep::sweep(&larger, &case, Points::Samples(10), &Never);
+    let violation = Violation::ClearanceNotMonotone { contact: Contact::Carrier, clearance_um: 500.0 };
+    assert_eq!(refused, Err(SolveError::Impossible(vec![violation])));
+}
+
+#[test]
+fn a_tooth_of_next_to_no_arm_that_closes_first_takes_no_digits_from_the_others() {
+    // It would have to turn by 1e9 rad to make the torque alone; beside it the next one is pressed by 1e-15 of what the first has turned.
+    let approach = Approach::Linear { compliance_mm_per_n: 1e-6 };
+    let spring =
+        |arm_mm: f64, closing_rad| Spring { travel_arm_mm: arm_mm, static_arm_mm: arm_mm, closing_rad, approach };
+    let springs = [spring(1e-12, 0.0), spring(1.7, 1.1), spring(1.9, 2.3)];
+    let wind_up = Springs::new(&springs, 2.0).wind_up(1e-9).unwrap().unwrap();
+    let torque: f64 =
+        springs.iter().map(|spring| 2.0 * spring.force_n(&wind_up.rotation).unwrap() * spring.static_arm_mm).sum();
+    assert!((torque / 1e-9 - 1.0).abs() < 1e-14, "{torque:e}");
+    assert_eq!(wind_up.rotation.closing_rad, 1.1);
+}
+
+/// Counts how often it is looked at.
+struct Counted(Spring, Cell<u64>);
+
+impl AsRef<Spring> for Counted {
+    fn as_ref(&self) -> &Spring {
+        self.1.set(self.1.get() + 1);
+        &self.0
+    }
+}
+
+#[test]
+fn which_of_ten_thousand_teeth_carry_is_found_in_a_few_passes_over_them() {
+    let looks = |count: u32, torque_nmm: f64| {
+        let spring = |i: u32| Spring {
+            travel_arm_mm: 1.0,
+            static_arm_mm: 1.0,
+            // In no order, and all unlike.
+            closing_rad: 1e-6 * f64::from(i * 7919 % count),
+            approach: Approach::Power { exponent: 0.9, coefficient: 1e-6, compliance_mm_per_n: 0.0 },
+        };
+        let springs: Vec<_> = (0..count).map(|i| Counted(spring(i), Cell::new(0))).collect();
+        Springs::new(&springs, 2.0).wind_up(torque_nmm).unwrap().unwrap();
+        springs.iter().map(|counted| counted.1.get()).sum::<u64>()
+    };
+    for torque_nmm in [1.0, 1e3, 1e6, 1e9] {
+        let looks = looks(10_000, torque_nmm);
+        assert!(looks < 10_000 * 100, "{looks} looks at 10 000 springs under {torque_nmm} N mm");
+    }
+}
+
+prop_compose! {
+    fn any_power()(p in prop::sample::select(vec![0.9, 2.0 / 3.0, 0.5]), c in -9.0_f64..-3.0, l in prop::option::of(-12.0_f64..-3.0)) -> Approach {
+        Approach::Power { exponent: p, coefficient: 10.0_f64.powf(c), compliance_mm_per_n: l.map_or(0.0, |l| 10.0_f64.powf(l)) }
+    }
+}
+
+prop_compose! {
+    fn any_linear()(c in -12.0_f64..-3.0) -> Approach {
+        Approach::Linear { compliance_mm_per_n: 10.0_f64.powf(c) }
+    }
+}
+
+fn any_approach() -> impl Strategy<Value = Approach> {
+    prop_oneof![any_linear(), any_power()]
+}
+
+prop_compose! {
+    fn any_spring()(approach in any_approach(), arm in -6.0_f64..2.0, ratio in 0.7_f64..1.4, closing in prop::option::of(-9.0_f64..1.0)) -> Spring {
+        let travel_arm_mm = 10.0_f64.powf(arm);
+        Spring { travel_arm_mm, static_arm_mm: ratio * travel_arm_mm, closing_rad: closing.map_or(0.0, |power| 10.0_f64.powf(power)), approach }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 4096, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn an_approach_is_undone_by_its_inverse(approach in any_approach(), power in -30.0_f64..18.0) {
+        let force_n = 10.0_f64.powf(power);
+        let approach_mm = approach.approach_mm(force_n);
+        let found = approach.force(approach_mm).unwrap();
+        prop_assert!((found.force_n / force_n - 1.0).abs() < 1e-14, "{approach:?}, {force_n:e}, {:e}", found.force_n / force_n - 1.0);
+        // The exponent is the slope of the logarithms.
+        let step = 1e-5_f64;
+        let rise = (approach.approach_mm(force_n * (1.0 + step)) / approach.approach_mm(force_n * (1.0 - step))).ln() / (2.0 * step);
+        prop_assert!((found.exponent - rise).abs() < 1e-8, "{} {rise}", found.exponent);
+    }
+
+    #[test]
+    fn springs_of_all_laws_share_any_torque_to_the_last_digits(springs in prop::collection::vec(any_spring(), 1..12), power in -12.0_f64..15.0) {
+        let torque_nmm = 1e3 * 10.0_f64.powf(power);
+        let wind_up = Springs::new(&springs, 2.0).wind_up(torque_nmm).unwrap().unwrap();
+        prop_assert!(wind_up.rotation.excess_rad >= 0.0);
+        let mut torque = 0.0;
+        for spring in &springs {
+            let force_n = spring.force_n(&wind_up.rotation).unwrap();
+            torque += 2.0 * force_n * spring.static_arm_mm;
+            // Each carries exactly where its gap is closed.
+            prop_assert!((force_n > 0.0) == (wind_up.rotation_rad() > spring.closing_rad) || (spring.closing_rad - wind_up.rotation_rad()).abs() < 1e-15 * spring.closing_rad);
+        }
+        prop_assert!((torque / torque_nmm - 1.0).abs() < 1e-13, "{:e}", torque / torque_nmm - 1.0);
+        let more = Springs::new(&springs, 2.0).wind_up(torque_nmm * (1.0 + 1e-6)).unwrap().unwrap();
+        prop_assert!(more.rotation_rad() >= wind_up.rotation_rad());
+    }
+}
