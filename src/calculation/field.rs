@@ -86,17 +86,6 @@ pub enum FieldCode {
     TooManyPoints,
 }
 
-/// A violation that is about a choice, which has no number.
-fn conflict(violation: &Violation, parameter: Parameter) -> FieldError {
-    FieldError {
-        pointer: pointer(parameter),
-        code: FieldCode::ConflictingFields,
-        detail: violation.to_string(),
-        value: None,
-        limit: None,
-    }
-}
-
 /// A violation as the field that it is about.
 impl From<&Violation> for FieldError {
     fn from(violation: &Violation) -> Self {
@@ -130,21 +119,19 @@ impl From<&Violation> for FieldError {
             Violation::ClearanceNotMonotone { contact, clearance_um } => {
                 (FieldCode::ClearanceNotMonotone, Parameter::Clearance(contact), clearance_um, 0.0)
             }
-            Violation::NeedsVirtualWork { parameter } => return conflict(violation, parameter),
-            Violation::TipReliefBeyondFlank { start_deg, engagement_start_deg } => (
-                FieldCode::OutOfRange,
-                Parameter::Modification(Modified::TipReliefStart),
-                start_deg,
-                engagement_start_deg,
-            ),
-            Violation::DeviationCount { count, items } => {
-                (FieldCode::OutOfRange, Parameter::Deviations, count as f64, items as f64)
-            }
-            Violation::DeviationNotFinite => return conflict(violation, Parameter::Deviations),
-            Violation::LawOfOtherTeeth => return conflict(violation, Parameter::Law),
             Violation::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => {
                 (FieldCode::BoreLeavesNoFlank, TipRadius, tip_radius_mm, root_radius_mm)
             }
+            Violation::NeedsVirtualWork { parameter } => return Self::conflict(violation, parameter),
+            Violation::TipReliefBeyondFlank { start_deg, engagement_start_deg } => {
+                let parameter = Parameter::Modification(Modified::TipReliefStart);
+                (FieldCode::OutOfRange, parameter, start_deg, engagement_start_deg)
+            }
+            Violation::DeviationCount { count, items } => {
+                (FieldCode::OutOfRange, Parameter::Deviations, count as f64, items as f64)
+            }
+            Violation::DeviationNotFinite => return Self::conflict(violation, Parameter::Deviations),
+            Violation::LawOfOtherTeeth => return Self::conflict(violation, Parameter::Law),
             Violation::PartDoesNotFit { misfit, value, limit } => {
                 let code = match misfit {
                     Misfit::RingWithoutRim => FieldCode::RingWithoutRim,
@@ -165,6 +152,19 @@ impl From<&Violation> for FieldError {
             detail: violation.to_string(),
             value: Some(value),
             limit: Some(limit),
+        }
+    }
+}
+
+impl FieldError {
+    /// A violation that is about a choice, which has no number.
+    fn conflict(violation: &Violation, parameter: Parameter) -> Self {
+        Self {
+            pointer: pointer(parameter),
+            code: FieldCode::ConflictingFields,
+            detail: violation.to_string(),
+            value: None,
+            limit: None,
         }
     }
 }

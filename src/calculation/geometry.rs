@@ -63,7 +63,7 @@ pub struct UndercutAnswer {
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct EngagementAnswer {
     /// Where it starts, towards the tip.
-    #[schema(minimum = 0, maximum = 90)]
+    #[schema(minimum = 0, maximum = 180)]
     pub start_deg: f64,
     /// Where it stops, at the root.
     pub end_deg: f64,

@@ -60,6 +60,7 @@ pub fn read<'de, T: Deserialize<'de>>(text: &[u8]) -> Result<T, ReadError> {
             (Some((code, detail)), Ok(_)) => {
                 let pointer = error.path().iter().filter_map(|segment| match segment {
                     serde_path_to_error::Segment::Map { key } => Some(format!("/{}", escaped(key))),
+                    serde_path_to_error::Segment::Seq { index } => Some(format!("/{index}")),
                     _ => None,
                 });
                 ReadError::Fault(Fault { pointer: pointer.collect(), code, detail: detail.into() })
@@ -77,14 +78,14 @@ pub fn word(value: &impl Serialize) -> String {
     serde_json::to_value(value).ok().and_then(|value| Some(value.as_str()?.to_owned())).unwrap_or_default()
 }
 
-/// JSON as it stands in the text; of arrays, which no document has, only that they are there.
+/// JSON as it stands in the text.
 #[derive(Debug)]
 enum Node {
     Null,
     Bool(bool),
     Number(f64),
     Text(String),
-    Array,
+    Array(Vec<Self>),
     Object(Vec<(String, Self)>),
 }
 
@@ -120,7 +121,8 @@ impl<'de> Visitor<'de> for NodeVisitor {
     }
 
     fn visit_f64<E>(self, value: f64) -> Result<Node, E> {
-        Ok(Node::Number(value))
+        // -0.0 means nothing else than 0.0, and must not be told from it.
+        Ok(Node::Number(value + 0.0))
     }
 
     fn visit_str<E>(self, value: &str) -> Result<Node, E> {
@@ -128,8 +130,11 @@ impl<'de> Visitor<'de> for NodeVisitor {
     }
 
     fn visit_seq<A: de::SeqAccess<'de>>(self, mut items: A) -> Result<Node, A::Error> {
-        while items.next_element::<Node>()?.is_some() {}
-        Ok(Node::Array)
+        let mut nodes = Vec::new();
+        while let Some(node) = items.next_element()? {
+            nodes.push(node);
+        }
+        Ok(Node::Array(nodes))
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Node, A::Error> {
@@ -148,7 +153,7 @@ impl Node {
             Self::Bool(value) => Unexpected::Bool(*value),
             Self::Number(value) => Unexpected::Float(*value),
             Self::Text(value) => Unexpected::Str(value),
-            Self::Array => Unexpected::Seq,
+            Self::Array(_) => Unexpected::Seq,
             Self::Object(_) => Unexpected::Map,
         }
     }
@@ -163,8 +168,9 @@ impl<'de> serde::Deserializer<'de> for &Node {
             Node::Bool(value) => visitor.visit_bool(*value),
             Node::Number(value) => visitor.visit_f64(*value),
             Node::Text(value) => visitor.visit_str(value),
-            Node::Object(fields) => visitor.visit_map(Fields { fields: fields.iter(), current: None }),
-            Node::Array => Err(de::Error::invalid_type(self.unexpected(), &visitor)),
+            Node::Object(fields) => visitor.visit_map(Fields::new(fields, None)),
+            // What is read field by field would take an array for its fields in order.
+            Node::Array(_) => Err(de::Error::invalid_type(self.unexpected(), &visitor)),
         }
     }
 
@@ -175,14 +181,28 @@ impl<'de> serde::Deserializer<'de> for &Node {
         }
     }
 
+    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        match self {
+            Node::Array(items) => visitor.visit_seq(Items { items: items.iter().enumerate() }),
+            _ => Err(de::Error::invalid_type(self.unexpected(), &"an array")),
+        }
+    }
+
+    /// A word, or one of several kinds of object, which a field tells apart: those are enums named `by:` and the field, and perhaps `=` and
+    /// the kind that is meant where the field is left out.
     fn deserialize_enum<V: Visitor<'de>>(
         self,
-        _: &'static str,
+        name: &'static str,
         _: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Fault> {
-        match self {
-            Node::Text(value) => visitor.visit_enum(value.as_str().into_deserializer()),
+        match (self, name.strip_prefix("by:")) {
+            (Node::Text(value), None) => visitor.visit_enum(value.as_str().into_deserializer()),
+            (Node::Object(fields), Some(tag)) => {
+                let (tag, by_default) = tag.split_once('=').map_or((tag, None), |(tag, kind)| (tag, Some(kind)));
+                visitor.visit_enum(Union { tag, by_default, fields })
+            }
+            (_, Some(_)) => Err(de::Error::invalid_type(self.unexpected(), &"an object")),
             _ => Err(de::Error::invalid_type(self.unexpected(), &"a word")),
         }
     }
@@ -192,21 +212,29 @@ impl<'de> serde::Deserializer<'de> for &Node {
     }
 
     serde::forward_to_deserialize_any! {
-        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct seq tuple
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct tuple
         tuple_struct map struct identifier ignored_any
     }
 }
 
 struct Fields<'a> {
     fields: std::slice::Iter<'a, (String, Node)>,
+    /// A field that was read already.
+    passed_over: Option<&'a str>,
     current: Option<&'a (String, Node)>,
+}
+
+impl<'a> Fields<'a> {
+    fn new(fields: &'a [(String, Node)], passed_over: Option<&'a str>) -> Self {
+        Self { fields: fields.iter(), passed_over, current: None }
+    }
 }
 
 impl<'de> MapAccess<'de> for Fields<'_> {
     type Error = Fault;
 
     fn next_key_seed<K: de::DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, Fault> {
-        self.current = self.fields.next();
+        self.current = self.fields.find(|(key, _)| Some(key.as_str()) != self.passed_over);
         self.current.map(|(key, _)| seed.deserialize(key.as_str().into_deserializer())).transpose()
     }
 
@@ -215,6 +243,70 @@ impl<'de> MapAccess<'de> for Fields<'_> {
             return Err(de::Error::custom("a value was asked for before its key"));
         };
         seed.deserialize(value).map_err(|fault| fault.within(key))
+    }
+}
+
+struct Items<'a> {
+    items: std::iter::Enumerate<std::slice::Iter<'a, Node>>,
+}
+
+impl<'de> de::SeqAccess<'de> for Items<'_> {
+    type Error = Fault;
+
+    fn next_element_seed<S: de::DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, Fault> {
+        let item = self.items.next();
+        item.map(|(index, node)| seed.deserialize(node).map_err(|fault| fault.within(&index.to_string()))).transpose()
+    }
+}
+
+/// An object of a kind that one of its fields names.
+#[derive(Clone, Copy)]
+struct Union<'a> {
+    tag: &'static str,
+    by_default: Option<&'static str>,
+    fields: &'a [(String, Node)],
+}
+
+impl<'de> de::EnumAccess<'de> for Union<'_> {
+    type Error = Fault;
+    type Variant = Self;
+
+    fn variant_seed<S: de::DeserializeSeed<'de>>(self, seed: S) -> Result<(S::Value, Self), Fault> {
+        let mut tags = self.fields.iter().filter(|(key, _)| key == self.tag).map(|(_, value)| value);
+        let kind = match (tags.next(), self.by_default) {
+            (Some(Node::Text(word)), _) => word.as_str(),
+            (Some(other), _) => {
+                let fault: Fault = de::Error::invalid_type(other.unexpected(), &"a word");
+                return Err(fault.within(self.tag));
+            }
+            (None, Some(by_default)) => by_default,
+            (None, None) => return Err(de::Error::missing_field(self.tag)),
+        };
+        if tags.next().is_some() {
+            return Err(de::Error::duplicate_field(self.tag));
+        }
+        let deserializer: de::value::StrDeserializer<'_, Fault> = kind.into_deserializer();
+        Ok((seed.deserialize(deserializer).map_err(|fault| fault.within(self.tag))?, self))
+    }
+}
+
+impl<'de> de::VariantAccess<'de> for Union<'_> {
+    type Error = Fault;
+
+    fn newtype_variant_seed<S: de::DeserializeSeed<'de>>(self, seed: S) -> Result<S::Value, Fault> {
+        seed.deserialize(de::value::MapAccessDeserializer::new(Fields::new(self.fields, Some(self.tag))))
+    }
+
+    fn unit_variant(self) -> Result<(), Fault> {
+        Err(de::Error::invalid_type(Unexpected::Map, &"a word"))
+    }
+
+    fn tuple_variant<V: Visitor<'de>>(self, _: usize, visitor: V) -> Result<V::Value, Fault> {
+        Err(de::Error::invalid_type(Unexpected::Map, &visitor))
+    }
+
+    fn struct_variant<V: Visitor<'de>>(self, _: &'static [&'static str], visitor: V) -> Result<V::Value, Fault> {
+        visitor.visit_map(Fields::new(self.fields, Some(self.tag)))
     }
 }
 
@@ -236,10 +328,9 @@ fn escaped(key: &str) -> String {
     key.replace('~', "~0").replace('/', "~1")
 }
 
-/// Names one after the other; what has a space in it is no name but a remark on them, which stands as it is.
+/// Names one after the other.
 fn listed(names: &[&str]) -> String {
-    let name = |name: &&str| if name.contains(' ') { (*name).to_owned() } else { format!("`{name}`") };
-    names.iter().map(name).collect::<Vec<_>>().join(", ")
+    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
 impl de::Error for Fault {
@@ -266,11 +357,9 @@ impl de::Error for Fault {
     }
 
     fn unknown_field(field: &str, known: &'static [&'static str]) -> Self {
-        Self::of_field(
-            FieldCode::UnknownField,
-            field,
-            format!("the document knows no field `{field}` here; it knows {}", listed(known)),
-        )
+        let known = if known.is_empty() { "no other".into() } else { listed(known) };
+        let detail = format!("the document knows no field `{field}` here; it knows {known}");
+        Self::of_field(FieldCode::UnknownField, field, detail)
     }
 
     fn missing_field(field: &'static str) -> Self {

@@ -86,11 +86,12 @@ encode_tuples!((A B)(A B C)(A B C D)(A B C D E));
 
 /// Encodes structures field by field, and enums of words by their order.
 macro_rules! encoded {
-    ($(struct $type:ident { $($field:ident),+ $(,)? })+) => {$(
+    ($(struct $type:ident { $($field:ident),* $(,)? })+) => {$(
         impl $crate::key::Encode for $type {
+            #[allow(unused_variables, reason = "an object may have no fields")]
             fn encode(&self, encoder: &mut $crate::key::Encoder) {
-                let Self { $($field),+ } = self;
-                $($crate::key::Encode::encode($field, encoder);)+
+                let Self { $($field),* } = self;
+                $($crate::key::Encode::encode($field, encoder);)*
             }
         }
     )+};

@@ -22,3 +22,4 @@ pub mod key;
 pub mod no_answer;
 pub mod question;
 pub mod sweep;
+mod union;

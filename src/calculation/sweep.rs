@@ -173,8 +173,8 @@ impl SweepAnswer {
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
         let states = &self.states;
         let mut csv = csv::Writer::from_writer(writer);
-        let names = STATE_COLUMNS.iter().chain(states.loaded.as_ref().map(|_| &"loaded"));
-        csv.write_record(names).map_err(csv_error)?;
+        let names = STATE_COLUMNS.iter().chain(states.lobe.as_ref().map(|_| &"lobe"));
+        csv.write_record(names.chain(states.loaded.as_ref().map(|_| &"loaded"))).map_err(csv_error)?;
         for i in 0..states.tooth.len() {
             let state = (
                 states.input_angle_deg[i],
@@ -190,9 +190,11 @@ impl SweepAnswer {
                 states.stress_ring_mpa[i],
                 states.stress_carrier_mpa[i],
             );
-            match &states.loaded {
-                Some(loaded) => csv.serialize((state, loaded[i])),
-                None => csv.serialize(state),
+            match (&states.lobe, &states.loaded) {
+                (None, None) => csv.serialize(state),
+                (Some(lobe), None) => csv.serialize((state, lobe[i])),
+                (None, Some(loaded)) => csv.serialize((state, loaded[i])),
+                (Some(lobe), Some(loaded)) => csv.serialize((state, lobe[i], loaded[i])),
             }
             .map_err(csv_error)?;
         }

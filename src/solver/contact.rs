@@ -72,6 +72,15 @@ impl<T> PerContact<T> {
         })
     }
 
+    /// The value at one contact, to be changed.
+    pub const fn get_mut(&mut self, contact: Contact) -> &mut T {
+        match contact {
+            Contact::WaveGenerator => &mut self.wave_generator,
+            Contact::Ring => &mut self.ring,
+            Contact::Carrier => &mut self.carrier,
+        }
+    }
+
     /// The value at one contact.
     pub const fn get(&self, contact: Contact) -> &T {
         match contact {

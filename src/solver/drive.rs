@@ -66,21 +66,27 @@ impl ToothShape {
         }
     }
 
-    /// Why no tooth of this radius has the shape, its parameters being in their ranges.
+    /// Why no tooth of this radius has the shape, as far as its parameters are in their ranges.
     fn violations(&self, tooth_radius_mm: f64) -> Vec<Violation> {
         match self {
             Self::Cylinder { .. } => Vec::new(),
             Self::Ball { groove_radius_mm } => groove_radius_mm
                 .iter()
                 .filter_map(|(contact, radius)| Some((contact, (*radius)?)))
-                .filter(|&(_, groove_radius_mm)| groove_radius_mm <= tooth_radius_mm)
+                .filter(|&(contact, groove_radius_mm)| {
+                    let is_in_range = Parameter::GrooveRadius(contact).check(groove_radius_mm).is_none();
+                    is_in_range && groove_radius_mm <= tooth_radius_mm
+                })
                 .map(|(contact, groove_radius_mm)| Violation::GrooveTooTight {
                     contact,
                     groove_radius_mm,
                     tooth_radius_mm,
                 })
                 .collect(),
-            Self::FlatSided { flat_length_mm, .. } if *flat_length_mm >= 2.0 * tooth_radius_mm => {
+            Self::FlatSided { flat_length_mm, .. }
+                if Parameter::FlatLength.check(*flat_length_mm).is_none()
+                    && *flat_length_mm >= 2.0 * tooth_radius_mm =>
+            {
                 vec![Violation::FlatTooLong {
                     flat_length_mm: *flat_length_mm,
                     tooth_diameter_mm: 2.0 * tooth_radius_mm,
@@ -284,7 +290,7 @@ impl Draft {
         let installed = are_in_range(vec![(Parameter::InstalledTeeth, p.installed as f64)]).then_some(p.installed);
         let tooth_radius_mm =
             are_in_range(vec![(Parameter::ToothRadius, p.tooth_radius_mm)]).then_some(p.tooth_radius_mm);
-        let tooth = are_in_range(p.tooth.parameters()).then_some(p.tooth);
+        are_in_range(p.tooth.parameters());
         let ring_teeth = are_in_range(vec![(Parameter::RingTeeth, p.ring_teeth as f64)]).then_some(p.ring_teeth);
         let mut bore_is_possible = p.tip_radius_mm.is_none_or(|bore| is_in_range(Parameter::TipRadius, bore));
 
@@ -323,12 +329,11 @@ impl Draft {
             violations.push(Violation::InstalledNoDivisor { installed, teeth, instead });
         }
         let mut slot_half_width_mm = None;
-        if let Some((tooth, tooth_radius_mm)) = tooth.zip(tooth_radius_mm) {
-            let impossible = tooth.violations(tooth_radius_mm);
-            if impossible.is_empty() {
-                slot_half_width_mm = Some(tooth.half_width_in_slot_mm(tooth_radius_mm));
-            }
-            violations.extend(impossible);
+        if let Some(tooth_radius_mm) = tooth_radius_mm {
+            violations.extend(p.tooth.violations(tooth_radius_mm));
+            // No number where the flats leave nothing of the tooth.
+            slot_half_width_mm =
+                Some(p.tooth.half_width_in_slot_mm(tooth_radius_mm)).filter(|&width_mm| width_mm > 0.0);
         }
         if let Some(((cam_outer_mm, tooth_radius_mm), tip_radius_mm)) =
             cam_outer_mm.zip(tooth_radius_mm).zip(p.tip_radius_mm.filter(|_| bore_is_possible))

@@ -278,7 +278,9 @@ pub fn of_contacts(
 pub fn of_half_widths(drive: &Drive, load: &LoadCase, states: &States) -> Vec<Finding> {
     let ContactLaw::Johnson { depth_mm } = &load.parameters().law else { return Vec::new() };
     let (tooth_radius_mm, tooth_width_mm) = (drive.parameters().tooth_radius_mm, drive.tooth_width_mm());
-    let widest = states.force_n.iter().map(|(contact, forces_n)| {
+    let is_flat =
+        |contact| contact == Contact::Carrier && matches!(drive.parameters().tooth, ToothShape::FlatSided { .. });
+    let widest = states.force_n.iter().filter(|&(contact, _)| !is_flat(contact)).map(|(contact, forces_n)| {
         let loaded = forces_n.iter().zip(states.stress_mpa.get(contact)).filter(|&(&force_n, _)| force_n > 0.0);
         let half_widths = loaded.map(|(&force_n, &stress_mpa)| half_width_mm(force_n, stress_mpa, tooth_width_mm));
         (contact, half_widths.fold(0.0, f64::max))

@@ -10,7 +10,6 @@ use crate::ring::FlankPoint;
 use crate::violation::{Modified, Parameter, Violation};
 
 const MM_PER_UM: f64 = 1e-3;
-
 const RAD_PER_ARCSEC: f64 = PI / 648_000.0;
 
 /// Parts made otherwise than conjugate on purpose, all teeth alike. Angles are turned away from the flank under load.
@@ -288,7 +287,7 @@ impl<'a> Gaps<'a> {
         let sin = flank.tan_pressure_angle * flank.cos_pressure_angle;
         let thinner_mm = MM_PER_UM * of(&deviations.tooth_radius_um, slot);
         // Directions, each in its own part: of the cam's normal, of the ring's outward normal, and in which a slot's wall is pressed.
-        let normal_rad = center.position.from_lobe_rad + center.tan_pressure_angle.atan();
+        let normal_rad = center.normal_rad();
         let cam_rad = normal_rad + 2.0 * PI * lobe as f64 / f64::from(self.drive.lobes());
         let beta_rad = flank.tan_pressure_angle.atan();
         let in_space_rad = center.position.from_lobe_rad / self.drive.flank().teeth_per_wave() + beta_rad;

@@ -238,7 +238,7 @@ impl<'a> LoadedDrive<'a> {
     /// [`SolveError::NoToothInMesh`] and [`SolveError::ComplianceNotPositive`] where no finite forces exist, [`SolveError::Impossible`] where the
     /// drive cannot have the load's clearances.
     pub fn new(drive: &'a Drive, load: &LoadCase) -> Result<Self, SolveError> {
-        Self::with_teeth(drive, load, &ToothContact::of(drive))
+        Self::with_deviations(drive, load, &ToothContact::of(drive), None)
     }
 
     /// The drive under the load, with teeth of another shape.
@@ -486,7 +486,8 @@ impl<'a> LoadedDrive<'a> {
         if !teeth.iter().any(is_beyond) {
             return Ok(());
         }
-        let (tooth_radius_mm, tooth_width_mm) = (self.drive.parameters().tooth_radius_mm, self.drive.tooth_width_mm());
+        let tooth_radius_mm = self.drive.parameters().tooth_radius_mm;
+        let tooth_width_mm = self.drive.tooth_width_mm();
         let limit_mm = |contact| WIDEST_SHARE * least_length_mm(depth_mm, contact, tooth_radius_mm);
         let limit = Self::first_to_reach(teeth, |tooth, contact| {
             // Under `F_r` the half-width is the whole length, and its square goes as the force.

@@ -2,12 +2,14 @@
 
 use crate::adaptive;
 use crate::batch::{self, BatchSweep};
-use crate::contact::{Contact, PerContact, half_width_mm};
+use crate::contact::{Contact, Materials, PerContact, SHEAR_DEPTH, SHEAR_SHARE, half_width_mm};
 use crate::drive::Drive;
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
 use crate::mesh::{Mesh, PlacedTooth, Samples, TeethInMesh};
 use crate::root::NotConverged;
 use crate::springs::WindUp;
+use crate::tooth::Pressure;
+use crate::tooth::point::ShearBelow;
 use crate::violation::{Parameter, Violation};
 use crate::{SolveError, Stop};
 
@@ -169,8 +171,29 @@ pub struct ContactPeaks {
     pub force_n: Peak,
     /// Of the stress, in MPa.
     pub stress_mpa: Peak,
-    /// Half the width of the contact where the stress has its peak.
+    /// Half the width of the contact, in the plane of motion, where the stress has its peak.
     pub half_width_mm: f64,
+    /// Half its length along the axis there, of an ellipse.
+    pub half_length_mm: Option<f64>,
+    /// The largest shear stress below the surface there, and how deep it stands; none under a flat, whose edges are not modelled.
+    pub shear: Option<PeakShear>,
+}
+
+/// The largest shear stress below a contact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PeakShear {
+    /// Its value.
+    pub stress_mpa: f64,
+    /// Its depth.
+    pub depth_mm: f64,
+}
+
+/// The pressure that has the largest stress of a contact so far.
+#[derive(Debug, Clone, Copy)]
+struct Hardest {
+    stress_mpa: f64,
+    force_n: f64,
+    pressure: Pressure,
 }
 
 /// What limits the torque.
@@ -365,7 +388,7 @@ fn plain(loaded: &LoadedDrive<'_>, load: &LoadCase, points: Points, stop: &impl 
             }
         }
     }
-    columns.finish(points)
+    columns.finish(points, &load.parameters().materials)
 }
 
 /// A sweep as it grows by input angles.
@@ -379,6 +402,32 @@ struct Columns<'a> {
     torque_balance_residual: f64,
     lists_lobes: bool,
     teeth: Vec<ToothState>,
+    hardest: PerContact<Option<Hardest>>,
+}
+
+impl Hardest {
+    /// The peaks of a line with what is another contact's own.
+    fn complete(&self, peaks: ContactPeaks, materials: &Materials, contact: Contact) -> ContactPeaks {
+        match &self.pressure {
+            Pressure::Line { .. } => peaks,
+            Pressure::Flat(flat) => ContactPeaks { half_width_mm: 0.5 * flat.length_mm(), shear: None, ..peaks },
+            Pressure::Ellipse(ellipse) => {
+                let half_width_mm = ellipse.half_width_mm(self.force_n);
+                let half_length_mm = ellipse.half_length_mm(self.force_n);
+                // Of the two bodies the one where it is larger.
+                let shears = [materials.teeth, *materials.partner(contact)].map(|material| {
+                    let ShearBelow { share, depth } = ellipse.shear_below(material.poissons_ratio);
+                    PeakShear {
+                        stress_mpa: share * self.stress_mpa,
+                        depth_mm: depth * half_width_mm.min(half_length_mm),
+                    }
+                });
+                let [one, other] = shears;
+                let shear = if other.stress_mpa > one.stress_mpa { other } else { one };
+                ContactPeaks { half_width_mm, half_length_mm: Some(half_length_mm), shear: Some(shear), ..peaks }
+            }
+        }
+    }
 }
 
 impl<'a> Columns<'a> {
@@ -393,6 +442,7 @@ impl<'a> Columns<'a> {
             torque_balance_residual: 0.0,
             lists_lobes: !Mesh::new(loaded.drive()).zones_are_alike(),
             teeth: Vec::new(),
+            hardest: PerContact::default(),
         }
     }
 
@@ -446,6 +496,14 @@ impl<'a> Columns<'a> {
             let force_n = self.loaded.forces_n(tooth, wind_up)?;
             loaded_teeth += usize::from(force_n.wave_generator > 0.0);
             let stress_mpa = self.loaded.stress_mpa(tooth, &force_n);
+            for (contact, &stress_mpa) in stress_mpa.iter() {
+                let hardest = self.hardest.get_mut(contact);
+                // The first of equal ones, as among the states.
+                if hardest.is_none_or(|before| stress_mpa > before.stress_mpa) {
+                    let (force_n, pressure) = (*force_n.get(contact), *tooth.pressure.get(contact));
+                    *hardest = Some(Hardest { stress_mpa, force_n, pressure });
+                }
+            }
             states.force_n.push(force_n);
             states.stress_mpa.push(stress_mpa);
 
@@ -459,14 +517,19 @@ impl<'a> Columns<'a> {
         Ok(loaded_teeth)
     }
 
-    fn finish(self, points: Points) -> Result<Sweep, SolveError> {
-        let Self { loaded, states, input_angles, torque_capacity, torque_balance_residual, .. } = self;
+    fn finish(self, points: Points, materials: &Materials) -> Result<Sweep, SolveError> {
+        let Self { loaded, states, input_angles, torque_capacity, torque_balance_residual, hardest, .. } = self;
         let peaks = PerContact::of(|contact| PeakAt {
             force: peak_at(states.force_n.get(contact)),
             stress: peak_at(states.stress_mpa.get(contact)),
         });
         let columns = BatchSweep { states, input_angles, peaks, torque_balance_residual };
-        finished(loaded, points, columns, torque_capacity)
+        let mut sweep = finished(loaded, points, columns, torque_capacity)?;
+        sweep.peaks = PerContact::of(|contact| match hardest.get(contact) {
+            Some(hardest) => hardest.complete(*sweep.peaks.get(contact), materials, contact),
+            None => *sweep.peaks.get(contact),
+        });
+        Ok(sweep)
     }
 }
 
@@ -482,10 +545,16 @@ fn finished(
     let peaks = PerContact::of(|contact| {
         let (force, at) = (states.force_n.get(contact), peaks.get(contact));
         let stress_mpa = states.peak(states.stress_mpa.get(contact), at.stress);
+        let half_width_mm = half_width_mm(force[at.stress], stress_mpa.value, tooth_width_mm);
         ContactPeaks {
             force_n: states.peak(force, at.force),
             stress_mpa,
-            half_width_mm: half_width_mm(force[at.stress], stress_mpa.value, tooth_width_mm),
+            half_width_mm,
+            half_length_mm: None,
+            shear: Some(PeakShear {
+                stress_mpa: SHEAR_SHARE * stress_mpa.value,
+                depth_mm: SHEAR_DEPTH * half_width_mm,
+            }),
         }
     });
     let period_closure_residual = period_closure(loaded, points, &states, &peaks)?;

@@ -65,6 +65,18 @@ pub(crate) fn bored() -> Value {
     with(&undercut(), "/drive/ring/tip_radius_mm", json!(52.8227))
 }
 
+/// A drive with an eccentric circle, one lobe.
+pub(crate) fn eccentric() -> Value {
+    json!({
+        "drive": {
+            "wave_generator": { "kind": "eccentric", "radius_mm": 30.8, "eccentricity_mm": 1.2 },
+            "teeth": { "count": 28, "radius_mm": 2.5, "width_mm": 10.0 },
+            "ring": { "teeth": 27 }
+        },
+        "load": { "input_torque_nm": 5.0 }
+    })
+}
+
 /// Everything spelled out, with fixed stiffnesses and a bore: each number that a document can hold at once.
 pub(crate) fn every_number() -> Value {
     let document = with(&spelled_out(), "/model/stiffness", fixed(4e5, 5e5, 3e5));

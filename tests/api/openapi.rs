@@ -10,7 +10,7 @@ use toothwave_solver::{Contact, Parameter, Part};
 
 use crate::asking::{Answer, ENDPOINTS, LIMITS, Occupied, Question, Service};
 use crate::codes::{field_codes, finding_codes, problem_codes, words};
-use crate::designs::{self, bored, every_number, shortest, spelled_out, undercut, with, without};
+use crate::designs::{self, bored, eccentric, every_number, fixed, shortest, spelled_out, undercut, with, without};
 
 /// The document as it is committed.
 pub(crate) const COMMITTED: &str = include_str!("../../openapi/openapi.json");
@@ -126,10 +126,17 @@ fn parameters() -> Vec<Parameter> {
     let mut parameters = vec![
         Parameter::SemiMajor,
         Parameter::SemiMinor,
+        Parameter::EccentricRadius,
+        Parameter::Eccentricity,
+        Parameter::Lobes,
+        Parameter::MeanRadius,
+        Parameter::MeanPathRadius,
+        Parameter::Amplitude,
         Parameter::ToothCount,
         Parameter::InstalledTeeth,
         Parameter::ToothRadius,
         Parameter::ToothWidth,
+        Parameter::FlatLength,
         Parameter::RingTeeth,
         Parameter::TipRadius,
         Parameter::InputTorque,
@@ -147,6 +154,9 @@ fn parameters() -> Vec<Parameter> {
     ];
     parameters.extend(parts.map(Parameter::YoungsModulus));
     parameters.extend(parts.map(Parameter::PoissonsRatio));
+    parameters.extend(contacts.map(Parameter::GrooveRadius));
+    parameters.extend(contacts.map(Parameter::Depth));
+    parameters.extend(contacts.map(Parameter::SeriesCompliance));
     parameters.extend(contacts.map(Parameter::Stiffness));
     parameters.extend(contacts.map(Parameter::Clearance));
     parameters.extend(parts.map(Parameter::PartClearance));
@@ -441,11 +451,62 @@ async fn what_the_service_takes_the_schema_takes_too() {
     }
 }
 
+/// Of each kind, shape and law one, with its word and, where it is the default, without.
+fn kinds() -> Vec<Value> {
+    let wave_generators = [
+        json!({ "kind": "ellipse", "semi_major_mm": 49.0, "semi_minor_mm": 47.0 }),
+        json!({ "kind": "harmonic", "lobes": 2, "mean_radius_mm": 48.0, "amplitude_mm": 1.0 }),
+        json!({ "kind": "harmonic_path", "lobes": 2, "mean_path_radius_mm": 51.0, "amplitude_mm": 1.0 }),
+    ];
+    let teeth = [
+        json!({ "shape": "cylinder", "count": 28, "radius_mm": 3.0, "width_mm": 15.0 }),
+        json!({ "shape": "flat_sided", "count": 28, "radius_mm": 3.0, "width_mm": 15.0, "flat_length_mm": 3.0 }),
+    ];
+    let laws = [json!({ "law": "linear" }), json!({ "law": "palmgren" }), fixed(4e5, 5e5, 3e5)];
+    let mut kinds = vec![eccentric()];
+    kinds.extend(wave_generators.map(|other| with(&shortest(), "/drive/wave_generator", other)));
+    kinds.extend(teeth.map(|other| with(&shortest(), "/drive/teeth", other)));
+    kinds.extend(laws.map(|other| with(&shortest(), "/model", json!({ "stiffness": other }))));
+    let balls = json!({ "shape": "ball", "count": 28, "radius_mm": 3.0, "groove_radius_mm": { "ring": 3.2 } });
+    let virtual_work = |other: Value| json!({ "compatibility": "virtual_work", "stiffness": other });
+    kinds.push(with(&with(&shortest(), "/drive/teeth", balls), "/model", virtual_work(json!({ "law": "hertz" }))));
+    let johnson = json!({ "law": "johnson", "depth_mm": { "ring": 4.0 } });
+    let model = with(&virtual_work(johnson), "/series_compliance_mm_per_n", json!({ "carrier": 1e-6 }));
+    kinds.push(with(&shortest(), "/model", model));
+    kinds
+}
+
 #[tokio::test]
-async fn a_stiffness_that_leaves_its_law_to_the_default_is_valid_by_the_schema_too() {
-    let document = with(&shortest(), "/model", json!({ "stiffness": {} }));
-    Service::new().post("/v1/sweep", &document).await.found();
-    assert_valid(&design_schema(), &document, &document.to_string());
+async fn every_kind_shape_and_law_is_answered_and_as_described() {
+    let service = Service::new();
+    for document in kinds() {
+        assert_valid(&design_schema(), &document, &document.to_string());
+        for path in ENDPOINTS {
+            let answer = service.post(path, &document).await;
+            assert_eq!(answer.status, 200, "{path}: {document}: {}", answer.text());
+            assert_described("post", path, &answer);
+        }
+    }
+}
+
+/// Generators of clients tell kinds apart by the discriminator: each schema that it leads to requires the word that leads there.
+#[test]
+fn every_discriminator_leads_to_schemas_that_require_its_word() {
+    let document = document();
+    let mut unions = 0;
+    for (name, schema) in document["components"]["schemas"].as_object().unwrap() {
+        let Some(discriminator) = schema.get("discriminator") else { continue };
+        let tag = discriminator["propertyName"].as_str().unwrap();
+        let alternatives: Vec<_> = schema["oneOf"].as_array().unwrap().iter().map(|one| &one["$ref"]).collect();
+        for (word, reference) in discriminator["mapping"].as_object().unwrap() {
+            assert!(alternatives.contains(&reference), "{name}: {reference}");
+            let kind = document.pointer(&reference.as_str().unwrap()[1..]).unwrap();
+            assert_eq!(kind["properties"][tag]["enum"], json!([word]), "{name}");
+            assert!(kind["required"].as_array().unwrap().contains(&json!(tag)), "{name}");
+        }
+        unions += 1;
+    }
+    assert_eq!(unions, 3);
 }
 
 #[tokio::test]

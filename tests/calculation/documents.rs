@@ -1,146 +1,171 @@
 //! A document as JSON, and as the key of its answers.
 
+use proptest::prelude::*;
 use serde_json::{Value, json};
 use toothwave_calculation::accuracy::Accuracy;
 use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::design::Design;
 use toothwave_calculation::drawing::Drawing;
 use toothwave_calculation::drawing::answer::DrawnPart;
+use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::forms::Format;
 use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::key::Key;
+use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::question::Question;
 use toothwave_calculation::sweep::Sweep;
 
-/// Every field of a document that can stand beside the others.
-fn whole() -> Value {
-    json!({
-        "drive": {
-            "wave_generator": { "semi_major_mm": 58.0, "semi_minor_mm": 56.0 },
-            "teeth": { "count": 28, "installed": 14, "radius_mm": 5.0, "width_mm": 15.0 },
-            "ring": { "teeth": 26, "tip_radius_mm": 66.5 }
-        },
-        "materials": {
-            "wave_generator": { "youngs_modulus_gpa": 201.0, "poissons_ratio": 0.31 },
-            "teeth": { "youngs_modulus_gpa": 202.0, "poissons_ratio": 0.32 },
-            "ring": { "youngs_modulus_gpa": 203.0, "poissons_ratio": 0.33 },
-            "carrier": { "youngs_modulus_gpa": 204.0, "poissons_ratio": 0.34 }
-        },
-        "load": { "output_torque_nm": 200.0, "allowable_stress_mpa": 1500.0 },
-        "model": {
-            "compatibility": "virtual_work",
-            "stiffness": { "law": "fixed", "wave_generator_n_per_mm": 1e5, "ring_n_per_mm": 2e5, "carrier_n_per_mm": 3e5 },
-            "clearance": { "wave_generator_um": 1.0, "ring_um": 2.0, "carrier_um": 3.0 }
-        },
-        "sweep": { "samples": 31, "wind_up": true },
-        "profile": { "chord_tolerance_mm": 0.002, "extent": "full" },
-        "accuracy": { "requested_error": 1e-5 },
-        "parts": {
-            "wave_generator": { "bore_radius_mm": 20.0, "clearance_um": 4.0 },
-            "teeth": { "clearance_um": 5.0 },
-            "ring": { "outer_radius_mm": 80.0, "clearance_um": 6.0 },
-            "carrier": { "inner_radius_mm": 58.5, "outer_radius_mm": 65.5, "clearance_um": 7.0 }
-        },
-        "assembly": { "input_angle_deg": 12.0 }
-    })
-}
+use crate::schema::{Chance, Schemas, leaves, objects};
 
-fn read(document: &Value) -> Design {
-    Design::read(document.to_string().as_bytes()).unwrap()
+fn read(document: &Value) -> Result<Design, NoAnswer> {
+    Design::read(document.to_string().as_bytes())
 }
 
 /// The keys of all questions, one after the other.
-fn keys(document: &Value) -> Vec<Key> {
-    let (design, form) = (read(document), Format::Json);
+fn keys(design: &Design) -> Vec<Key> {
+    let form = Format::Json;
     let mut keys = vec![
-        Geometry.key(&design, &form),
-        CoincidenceDegree.key(&design, &form),
-        Sweep.key(&design, &form),
-        Accuracy.key(&design, &form),
+        Geometry.key(design, &form),
+        CoincidenceDegree.key(design, &form),
+        Sweep.key(design, &form),
+        Accuracy.key(design, &form),
     ];
-    keys.extend(DrawnPart::ALL.map(|part| Drawing(part).key(&design, &form)));
+    keys.extend(DrawnPart::ALL.map(|part| Drawing(part).key(design, &form)));
     keys
 }
 
-/// Pointers to everything in a document that holds no further fields.
-fn leaves(value: &Value, at: &str) -> Vec<String> {
-    match value.as_object() {
-        Some(fields) => fields.iter().flat_map(|(name, value)| leaves(value, &format!("{at}/{name}"))).collect(),
-        None => vec![at.into()],
+fn with(document: &Value, pointer: &str, value: Value) -> Value {
+    let mut document = document.clone();
+    *document.pointer_mut(pointer).unwrap() = value;
+    document
+}
+
+/// Another value of the same type, where there is one that is read as another.
+fn other(value: &Value) -> Option<Value> {
+    match value {
+        Value::Number(number) => {
+            let number = number.as_f64().unwrap();
+            let other = if number.fract() == 0.0 { number + 1.0 } else { number * 0.75 };
+            // Beyond 2^53 a number is the next one too.
+            (other.total_cmp(&number).is_ne()).then(|| json!(other))
+        }
+        Value::Bool(value) => Some(json!(!value)),
+        _ => None,
     }
 }
 
-/// The document without a field, and with another value in it, as far as that can be read.
-fn changed(document: &Value, pointer: &str) -> Vec<Value> {
-    let (parent, name) = pointer.rsplit_once('/').unwrap();
-    let mut without = document.clone();
-    without.pointer_mut(parent).unwrap().as_object_mut().unwrap().remove(name);
-    let mut other = document.clone();
-    let value = other.pointer_mut(pointer).unwrap();
-    *value = match &*value {
-        Value::Number(number) if number.is_i64() => json!(number.as_i64().unwrap() + 1),
-        Value::Number(number) => json!(number.as_f64().unwrap() * 1.25),
-        Value::Bool(value) => json!(!value),
-        Value::String(word) => json!(match word.as_str() {
-            "virtual_work" => "projection",
-            "full" => "tooth",
-            // The other laws know none of its stiffnesses.
-            "fixed" => "fixed",
-            word => panic!("another word for `{word}` is wanted here"),
-        }),
-        other => panic!("{other} is no value of a document"),
-    };
-    [without, other]
-        .into_iter()
-        .filter(|one| one != document && Design::read(one.to_string().as_bytes()).is_ok())
-        .collect()
+/// That a document is refused for one fault, at this place.
+fn assert_fault(document: &Value, pointer: &str, code: FieldCode) {
+    let refused = read(document).unwrap_err();
+    assert_eq!(refused.code, NoAnswerCode::InvalidDocument, "{document}");
+    assert_eq!(refused.errors.len(), 1);
+    assert_eq!((refused.errors[0].pointer.as_str(), refused.errors[0].code), (pointer, code), "{document}: {refused}");
 }
 
-#[test]
-fn a_document_that_is_written_as_json_reads_back_as_itself() {
-    let whole = whole();
-    let mut documents = vec![whole.clone()];
-    documents.extend(leaves(&whole, "").iter().flat_map(|pointer| changed(&whole, pointer)));
-    for law in ["linear", "palmgren"] {
-        let mut other = whole.clone();
-        other["model"]["stiffness"] = json!({ "law": law });
-        documents.push(other);
-    }
-    let mut largest = whole;
-    largest["drive"]["ring"]["teeth"] = json!(1e300);
-    documents.push(largest);
-    for document in documents {
-        let design = read(&document);
+proptest! {
+    #[test]
+    fn a_document_that_is_written_as_json_reads_back_as_itself(seed: u64) {
+        let document = Schemas::new().document(&mut Chance::new(seed));
+        let design = read(&document).unwrap_or_else(|refused| panic!("{refused}: {document}"));
         let written = serde_json::to_string(&design).unwrap();
-        assert_eq!(Design::read(written.as_bytes()), Ok(design), "{written}");
+        prop_assert_eq!(Design::read(written.as_bytes()), Ok(design), "{}", written);
     }
-}
 
-#[test]
-fn whole_numbers_are_written_without_a_point() {
-    let written = serde_json::to_value(read(&whole())).unwrap();
-    assert_eq!(written["drive"]["teeth"]["count"].to_string(), "28");
-}
+    /// Questions ask for parts of a document; together they ask for all of it.
+    #[test]
+    fn each_number_that_is_changed_gives_some_question_another_key(seed: u64) {
+        let document = Schemas::new().document(&mut Chance::new(seed));
+        let before = keys(&read(&document).unwrap());
+        for pointer in leaves(&document, "") {
+            if let Some(other) = other(document.pointer(&pointer).unwrap()) {
+                let changed = with(&document, &pointer, other);
+                prop_assert_ne!(&keys(&read(&changed).unwrap()), &before, "{}: {}", pointer, changed);
+            }
+        }
+    }
 
-/// Questions ask for parts of a document; together they ask for all of it.
-#[test]
-fn each_field_that_is_changed_or_left_out_gives_some_question_another_key() {
-    let whole = whole();
-    let before = keys(&whole);
-    for pointer in leaves(&whole, "") {
-        for document in changed(&whole, &pointer) {
-            assert_ne!(keys(&document), before, "{pointer}: {document}");
+    #[test]
+    fn another_document_has_another_key(one: u64, other: u64) {
+        let document = |seed| read(&Schemas::new().document(&mut Chance::new(seed))).unwrap();
+        let (one, other) = (document(one), document(other));
+        prop_assert_eq!(one == other, keys(&one) == keys(&other));
+    }
+
+    #[test]
+    fn a_structural_fault_is_told_at_its_place_in_every_kind_of_object(seed: u64) {
+        let document = Schemas::new().document(&mut Chance::new(seed));
+        for pointer in leaves(&document, "") {
+            assert_fault(&with(&document, &pointer, json!([])), &pointer, FieldCode::WrongType);
+        }
+        for pointer in objects(&document, "") {
+            let mut unknown = document.clone();
+            unknown.pointer_mut(&pointer).unwrap()["colour"] = json!(1);
+            assert_fault(&unknown, &format!("{pointer}/colour"), FieldCode::UnknownField);
+            assert_fault(&with(&document, &pointer, json!("text")), &pointer, FieldCode::WrongType);
+            assert_fault(&with(&document, &pointer, json!([1])), &pointer, FieldCode::WrongType);
         }
     }
 }
 
-#[test]
-fn what_is_left_out_has_the_key_of_its_default() {
-    let short = json!({ "drive": {
+fn short() -> Value {
+    json!({ "drive": {
         "wave_generator": { "semi_major_mm": 58.0, "semi_minor_mm": 56.0 },
         "teeth": { "count": 28, "radius_mm": 5.0, "width_mm": 15.0 }, "ring": { "teeth": 26 }
-    }, "load": { "input_torque_nm": 20.0 } });
+    }, "load": { "input_torque_nm": 20.0 } })
+}
+
+#[test]
+fn the_word_of_a_kind_is_told_apart_from_the_fields_of_that_kind() {
+    let fault = |wave_generator: Value, pointer: &str, code| {
+        assert_fault(
+            &with(&short(), "/drive/wave_generator", wave_generator),
+            &format!("/drive/wave_generator{pointer}"),
+            code,
+        );
+    };
+    fault(json!({ "kind": "round", "semi_major_mm": 58.0 }), "/kind", FieldCode::UnknownChoice);
+    fault(json!({ "kind": 1 }), "/kind", FieldCode::WrongType);
+    fault(json!({ "kind": null, "semi_major_mm": 58.0 }), "/kind", FieldCode::WrongType);
+    fault(json!({ "kind": "eccentric", "radius_mm": 30.8 }), "/eccentricity_mm", FieldCode::MissingField);
+    fault(json!({ "kind": "eccentric", "semi_major_mm": 30.8 }), "/semi_major_mm", FieldCode::UnknownField);
+    fault(json!({ "radius_mm": 30.8 }), "/radius_mm", FieldCode::UnknownField);
+    fault(json!({ "kind": "harmonic", "lobes": 2.5 }), "/lobes", FieldCode::WrongType);
+    fault(json!("ellipse"), "", FieldCode::WrongType);
+    let twice =
+        short().to_string().replace(r#""semi_major_mm":"#, r#""kind":"ellipse","kind":"ellipse","semi_major_mm":"#);
+    let refused = Design::read(twice.as_bytes()).unwrap_err();
+    assert_eq!(refused.errors[0].code, FieldCode::DuplicateField);
+    assert_eq!(refused.errors[0].pointer, "/drive/wave_generator/kind");
+}
+
+#[test]
+fn the_word_of_a_kind_may_stand_behind_its_fields() {
+    let behind = short().to_string().replace(r#""semi_minor_mm":56.0"#, r#""semi_minor_mm":56.0,"kind":"ellipse""#);
+    assert_eq!(Design::read(behind.as_bytes()), read(&short()));
+}
+
+#[test]
+fn a_word_is_no_object() {
+    let mut document = short();
+    document["model"] = json!({ "compatibility": {} });
+    assert_fault(&document, "/model/compatibility", FieldCode::WrongType);
+}
+
+#[test]
+fn whole_numbers_are_written_without_a_point_as_far_as_they_are_told_apart() {
+    let written = |teeth: Value| {
+        let design = read(&with(&short(), "/drive/ring/teeth", teeth)).unwrap();
+        serde_json::to_value(design).unwrap()["drive"]["ring"]["teeth"].to_string()
+    };
+    assert_eq!((written(json!(26.0)), written(json!(1e300))), ("26".into(), "1e+300".into()));
+}
+
+#[test]
+fn what_is_left_out_has_the_key_of_its_default() {
+    let short = short();
     let mut long = short.clone();
+    long["drive"]["wave_generator"]["kind"] = json!("ellipse");
+    long["drive"]["teeth"]["shape"] = json!("cylinder");
     long["drive"]["teeth"]["installed"] = json!(28.0);
     long["drive"]["ring"]["tip_radius_mm"] = json!(null);
     long["materials"] = json!({ "teeth": { "poissons_ratio": 0.3 } });
@@ -148,5 +173,5 @@ fn what_is_left_out_has_the_key_of_its_default() {
     long["sweep"] = json!({ "samples": 50, "wind_up": false });
     long["parts"] = json!({ "ring": { "clearance_um": -0.0 } });
     long["assembly"] = json!({ "input_angle_deg": -0.0 });
-    assert_eq!(keys(&short), keys(&long));
+    assert_eq!(keys(&read(&short).unwrap()), keys(&read(&long).unwrap()));
 }

@@ -1,7 +1,6 @@
 //! A sweep as it goes over the wire.
 
 use serde::Serialize;
-use toothwave_solver::contact::{SHEAR_DEPTH, SHEAR_SHARE};
 use toothwave_solver::sweep::{self as solver, ContactPeaks, InputAngles, Peak, States, TorqueCapacity};
 use toothwave_solver::{Contact, Drive, PerContact};
 use utoipa::ToSchema;
@@ -74,12 +73,20 @@ pub struct ContactPeaksAnswer {
     pub force_n: PeakAnswer,
     /// Of its Hertz stress, in MPa.
     pub stress_mpa: PeakAnswer,
-    /// Half the width of the contact where the stress has its peak.
+    /// Half the width of the contact, in the plane of motion, where the stress has its peak.
     pub half_width_mm: f64,
-    /// The largest shear stress below the surface there, in the plane of the section.
-    pub shear_stress_mpa: f64,
+    /// Half its length along the axis there, of a ball.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub half_length_mm: Option<f64>,
+    /// The largest shear stress below the surface there; left out under a flat, whose edges are not modelled.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub shear_stress_mpa: Option<f64>,
     /// How deep it stands.
-    pub shear_depth_mm: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub shear_depth_mm: Option<f64>,
 }
 
 /// A largest value and where it stands.
@@ -98,8 +105,12 @@ pub struct PeakAnswer {
 pub struct StatesAnswer {
     /// Input angle j.
     pub input_angle_deg: Vec<f64>,
-    /// Tooth number; tooth 0 stands on the major axis at j = 0.
+    /// Tooth number, from the middle of a lobe on; where zones are unlike, the number of its slot, slot 0 standing in the middle of lobe 0 at j = 0.
     pub tooth: Vec<u32>,
+    /// The lobe that the tooth is on, where zones are unlike and all of them are listed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub lobe: Option<Vec<u32>>,
     /// Position ψ of the tooth, from the major axis.
     pub position_deg: Vec<f64>,
     /// Distance of the tooth's centre from the axis.
@@ -213,6 +224,7 @@ impl StatesAnswer {
             loaded: with_clearance.then(|| forces.iter().map(|force| *force > 0.0).collect()),
             input_angle_deg: states.input_angle_deg,
             tooth: states.tooth,
+            lobe: (!states.lobe.is_empty()).then_some(states.lobe),
             position_deg: states.position_deg,
             center_radius_mm: states.center_radius_mm,
             wave_generator_angle_deg: states.wave_generator_angle_deg,
@@ -234,11 +246,12 @@ impl From<Peak> for PeakAnswer {
 }
 
 impl From<ContactPeaks> for ContactPeaksAnswer {
-    fn from(ContactPeaks { force_n, stress_mpa, half_width_mm }: ContactPeaks) -> Self {
+    fn from(ContactPeaks { force_n, stress_mpa, half_width_mm, half_length_mm, shear }: ContactPeaks) -> Self {
         Self {
-            shear_stress_mpa: SHEAR_SHARE * stress_mpa.value,
-            shear_depth_mm: SHEAR_DEPTH * half_width_mm,
             half_width_mm,
+            half_length_mm,
+            shear_stress_mpa: shear.map(|shear| shear.stress_mpa),
+            shear_depth_mm: shear.map(|shear| shear.depth_mm),
             force_n: force_n.into(),
             stress_mpa: stress_mpa.into(),
         }

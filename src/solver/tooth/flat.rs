@@ -15,6 +15,11 @@ impl FlatContact {
         Self { length_mm, width_mm }
     }
 
+    /// Its length along the slot.
+    pub const fn length_mm(&self) -> f64 {
+        self.length_mm
+    }
+
     /// The mean pressure under a force. Its edges, where the pressure is higher, are not modelled.
     pub fn stress_mpa(&self, force_n: f64) -> f64 {
         force_n / (self.length_mm * self.width_mm)

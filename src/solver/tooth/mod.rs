@@ -7,6 +7,7 @@ pub mod point;
 use crate::approach::{Approach, Logarithmic};
 use crate::contact::{Contact, ContactLaw, HertzLine, Materials, PerContact};
 use crate::drive::{Drive, ToothShape};
+use crate::parts::CARRIER_PLAY;
 use crate::root::NotConverged;
 use crate::violation::Parameter;
 use flat::FlatContact;
@@ -35,16 +36,19 @@ pub enum ToothContact {
 }
 
 impl ToothContact {
-    /// Of a drive's own teeth; a flat's carrier fills the room between wave generator and ring.
+    /// Of a drive's teeth. Flats are borne by a carrier with the play of one whose radii are not given.
     pub fn of(drive: &Drive) -> Self {
         match drive.parameters().tooth {
             ToothShape::Cylinder { .. } => Self::Cylinder,
             ToothShape::Ball { groove_radius_mm } => Self::Ball { groove_radius_mm },
-            ToothShape::FlatSided { flat_length_mm, .. } => Self::FlatSided {
-                flat_length_mm,
-                carrier_inner_radius_mm: drive.cam_outer_radius_mm(),
-                carrier_outer_radius_mm: drive.tip_radius_mm(),
-            },
+            ToothShape::FlatSided { flat_length_mm, .. } => {
+                let play_mm = CARRIER_PLAY * (drive.tip_radius_mm() - drive.cam_outer_radius_mm());
+                Self::FlatSided {
+                    flat_length_mm,
+                    carrier_inner_radius_mm: drive.cam_outer_radius_mm() + play_mm,
+                    carrier_outer_radius_mm: drive.tip_radius_mm() - play_mm,
+                }
+            }
         }
     }
 }

@@ -1,0 +1,297 @@
+//! Wave generator, teeth and ring: each kind and shape an object of its own.
+
+use serde::{Deserialize, Serialize};
+use toothwave_solver::{PerContact, ToothShape, WaveGenerator};
+use utoipa::ToSchema;
+
+use super::number::{Whole, given};
+use crate::key::{Encode, Encoder, encoded};
+use crate::union::union;
+
+/// Wave generator, teeth and ring.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct DriveDocument {
+    /// What pushes the teeth outward.
+    pub wave_generator: WaveGeneratorDocument,
+    /// The discrete teeth.
+    pub teeth: TeethDocument,
+    /// The rigid internal wheel.
+    pub ring: RingDocument,
+}
+
+union! {
+    /// What pushes the teeth outward: a cam of one or more lobes; an ellipse where no kind is named.
+    pub enum WaveGeneratorDocument as "WaveGenerator" by "kind" read "by:kind=ellipse" default "ellipse" {
+        /// An ellipse.
+        Ellipse(EllipseDocument) = "ellipse",
+        /// A circle that turns about a point beside its centre.
+        Eccentric(EccentricDocument) = "eccentric",
+        /// A support function with one harmonic.
+        Harmonic(HarmonicDocument) = "harmonic",
+        /// A path of the teeth's centres with one harmonic.
+        HarmonicPath(HarmonicPathDocument) = "harmonic_path",
+    }
+}
+
+/// The elliptic cam, two lobes; `semi_major_mm` exceeds `semi_minor_mm`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct EllipseDocument {
+    /// Semi-major axis a.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub semi_major_mm: f64,
+    /// Semi-minor axis b.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub semi_minor_mm: f64,
+}
+
+/// A circle that turns about a point beside its centre, one lobe; `eccentricity_mm` is below `radius_mm`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct EccentricDocument {
+    /// Radius R0 of the circle.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub radius_mm: f64,
+    /// Distance e of its centre from the axis.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub eccentricity_mm: f64,
+}
+
+/// The cam of the support function R0 + e cos Uφ: of the distance of its tangents from the axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct HarmonicDocument {
+    /// Lobes U: teeth pass as many meshing zones in a turn.
+    #[schema(value_type = i64, minimum = 1, maximum = 1000)]
+    pub lobes: Whole,
+    /// Mean radius R0.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub mean_radius_mm: f64,
+    /// Amplitude e.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub amplitude_mm: f64,
+}
+
+/// The cam that moves the teeth's centres along R + e cos Uψ.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct HarmonicPathDocument {
+    /// Lobes U: teeth pass as many meshing zones in a turn.
+    #[schema(value_type = i64, minimum = 1, maximum = 1000)]
+    pub lobes: Whole,
+    /// Mean radius R of the path.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub mean_path_radius_mm: f64,
+    /// Amplitude e.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub amplitude_mm: f64,
+}
+
+union! {
+    /// The discrete teeth; cylinders where no shape is named.
+    pub enum TeethDocument as "Teeth" by "shape" read "by:shape=cylinder" default "cylinder" {
+        /// Cylinders along the axis.
+        Cylinder(CylinderDocument) = "cylinder",
+        /// Balls.
+        Ball(BallDocument) = "ball",
+        /// Cylinders with two flats.
+        FlatSided(FlatSidedDocument) = "flat_sided",
+    }
+}
+
+/// Cylinders along the axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct CylinderDocument {
+    /// Teeth in theory, Z_G: as many more or fewer than the ring's as the wave generator has lobes.
+    #[schema(value_type = i64, minimum = 2, maximum = 10000)]
+    pub count: Whole,
+    /// Installed teeth Z'_G, a divisor of `count`; only they have a slot. Left out: `count`.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = i64, minimum = 2, maximum = 10000, required = false)]
+    pub installed: Option<Whole>,
+    /// Radius r of a tooth.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub radius_mm: f64,
+    /// Width L1 of a tooth along the axis.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub width_mm: f64,
+}
+
+/// Balls, which may run in grooves along the path of the contact.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct BallDocument {
+    /// Teeth in theory, Z_G: as many more or fewer than the ring's as the wave generator has lobes.
+    #[schema(value_type = i64, minimum = 2, maximum = 10000)]
+    pub count: Whole,
+    /// Installed teeth Z'_G, a divisor of `count`; only they have a slot. Left out: `count`.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = i64, minimum = 2, maximum = 10000, required = false)]
+    pub installed: Option<Whole>,
+    /// Radius r of a ball.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub radius_mm: f64,
+    /// Radii of the grooves across the path, each above the ball's own; a part that has none is straight along the axis.
+    #[serde(default)]
+    pub groove_radius_mm: LengthsByContactDocument,
+}
+
+/// Cylinders with two flats, which lie on the walls of the slot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct FlatSidedDocument {
+    /// Teeth in theory, Z_G: as many more or fewer than the ring's as the wave generator has lobes.
+    #[schema(value_type = i64, minimum = 2, maximum = 10000)]
+    pub count: Whole,
+    /// Installed teeth Z'_G, a divisor of `count`; only they have a slot. Left out: `count`.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = i64, minimum = 2, maximum = 10000, required = false)]
+    pub installed: Option<Whole>,
+    /// Radius r of a tooth.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub radius_mm: f64,
+    /// Width L1 of a tooth along the axis.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub width_mm: f64,
+    /// Length l of a flat along the slot, below the tooth's diameter.
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub flat_length_mm: f64,
+}
+
+/// A length for each contact that has one.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct LengthsByContactDocument {
+    /// At the wave generator.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    pub wave_generator: Option<f64>,
+    /// At the ring.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    pub ring: Option<f64>,
+    /// At the carrier.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    pub carrier: Option<f64>,
+}
+
+/// What every tooth has, whatever its shape.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Counted {
+    pub(super) count: Whole,
+    /// As it stands in the document.
+    pub(super) installed: Option<Whole>,
+    pub(super) radius_mm: f64,
+}
+
+impl WaveGeneratorDocument {
+    /// Where they are given.
+    pub(super) const fn lobes(&self) -> Option<Whole> {
+        match *self {
+            Self::Ellipse(_) | Self::Eccentric(_) => None,
+            Self::Harmonic(HarmonicDocument { lobes, .. }) | Self::HarmonicPath(HarmonicPathDocument { lobes, .. }) => {
+                Some(lobes)
+            }
+        }
+    }
+}
+
+impl From<&WaveGeneratorDocument> for WaveGenerator {
+    fn from(document: &WaveGeneratorDocument) -> Self {
+        match *document {
+            WaveGeneratorDocument::Ellipse(EllipseDocument { semi_major_mm, semi_minor_mm }) => {
+                Self::Ellipse { semi_major_mm, semi_minor_mm }
+            }
+            WaveGeneratorDocument::Eccentric(EccentricDocument { radius_mm, eccentricity_mm }) => {
+                Self::Eccentric { radius_mm, eccentricity_mm }
+            }
+            WaveGeneratorDocument::Harmonic(HarmonicDocument { lobes, mean_radius_mm, amplitude_mm }) => {
+                Self::Harmonic { lobes: lobes.count(), mean_radius_mm, amplitude_mm }
+            }
+            WaveGeneratorDocument::HarmonicPath(HarmonicPathDocument { lobes, mean_path_radius_mm, amplitude_mm }) => {
+                Self::HarmonicPath { lobes: lobes.count(), mean_path_radius_mm, amplitude_mm }
+            }
+        }
+    }
+}
+
+impl From<&TeethDocument> for ToothShape {
+    fn from(document: &TeethDocument) -> Self {
+        match document {
+            TeethDocument::Cylinder(teeth) => Self::Cylinder { width_mm: teeth.width_mm },
+            TeethDocument::Ball(teeth) => Self::Ball { groove_radius_mm: teeth.groove_radius_mm.by_contact() },
+            TeethDocument::FlatSided(teeth) => {
+                Self::FlatSided { width_mm: teeth.width_mm, flat_length_mm: teeth.flat_length_mm }
+            }
+        }
+    }
+}
+
+impl LengthsByContactDocument {
+    pub(super) const fn by_contact(&self) -> PerContact<Option<f64>> {
+        let Self { wave_generator, ring, carrier } = *self;
+        PerContact { wave_generator, ring, carrier }
+    }
+}
+
+impl TeethDocument {
+    pub(super) const fn counted(&self) -> Counted {
+        match *self {
+            Self::Cylinder(CylinderDocument { count, installed, radius_mm, .. })
+            | Self::Ball(BallDocument { count, installed, radius_mm, .. })
+            | Self::FlatSided(FlatSidedDocument { count, installed, radius_mm, .. }) => {
+                Counted { count, installed, radius_mm }
+            }
+        }
+    }
+}
+
+/// The rigid internal wheel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct RingDocument {
+    /// Teeth Z_K: two fewer or two more than the carrier's.
+    #[schema(value_type = i64, minimum = 2, maximum = 10000)]
+    pub teeth: Whole,
+    /// Radius of a bore that truncates the teeth; null or left out, the ring keeps its natural tip.
+    #[serde(default)]
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub tip_radius_mm: Option<f64>,
+}
+
+encoded! {
+    struct DriveDocument { wave_generator, teeth, ring }
+    struct EllipseDocument { semi_major_mm, semi_minor_mm }
+    struct EccentricDocument { radius_mm, eccentricity_mm }
+    struct HarmonicDocument { lobes, mean_radius_mm, amplitude_mm }
+    struct HarmonicPathDocument { lobes, mean_path_radius_mm, amplitude_mm }
+    struct LengthsByContactDocument { wave_generator, ring, carrier }
+    struct RingDocument { teeth, tip_radius_mm }
+}
+
+/// With `installed` filled in. The document itself keeps whether it stands there, so that no fault is blamed on a field that does not.
+impl Encode for CylinderDocument {
+    fn encode(&self, encoder: &mut Encoder) {
+        let Self { count, installed, radius_mm, width_mm } = self;
+        (count, installed.unwrap_or(*count), radius_mm, width_mm).encode(encoder);
+    }
+}
+
+/// Likewise.
+impl Encode for BallDocument {
+    fn encode(&self, encoder: &mut Encoder) {
+        let Self { count, installed, radius_mm, groove_radius_mm } = self;
+        (count, installed.unwrap_or(*count), radius_mm, groove_radius_mm).encode(encoder);
+    }
+}
+
+/// Likewise.
+impl Encode for FlatSidedDocument {
+    fn encode(&self, encoder: &mut Encoder) {
+        let Self { count, installed, radius_mm, width_mm, flat_length_mm } = self;
+        (count, installed.unwrap_or(*count), radius_mm, width_mm, flat_length_mm).encode(encoder);
+    }
+}

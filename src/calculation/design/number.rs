@@ -1,0 +1,48 @@
+//! Numbers and absences, as documents have them.
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::key::{Encode, Encoder};
+
+/// A whole number of any size, spelled `28`, `28.0` or `2.8e1`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Whole(pub(super) f64);
+
+/// Without a point, as far as every reader can tell whole numbers apart.
+impl Serialize for Whole {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        const MOST: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
+        if self.0.abs() <= MOST { serializer.serialize_i64(self.count()) } else { serializer.serialize_f64(self.0) }
+    }
+}
+
+impl Whole {
+    /// As the solver counts; what lies beyond that lies beyond every range too.
+    #[expect(clippy::cast_possible_truncation, reason = "whole, and saturating")]
+    pub(super) const fn count(self) -> i64 {
+        self.0 as i64
+    }
+}
+
+impl<'de> Deserialize<'de> for Whole {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = f64::deserialize(deserializer)?;
+        if value.fract() == 0.0 {
+            Ok(Self(value))
+        } else {
+            let message = format_args!("a whole number is wanted here, not {value}").to_string();
+            Err(serde::de::Error::custom(message))
+        }
+    }
+}
+
+/// For fields that may be left out but not be null.
+pub(super) fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<Option<T>, D::Error> {
+    T::deserialize(deserializer).map(Some)
+}
+
+impl Encode for Whole {
+    fn encode(&self, encoder: &mut Encoder) {
+        self.0.encode(encoder);
+    }
+}

@@ -1,0 +1,155 @@
+//! Objects of several kinds, told apart by a word in one of their fields.
+
+use utoipa::ToSchema;
+use utoipa::openapi::schema::{Discriminator, ObjectBuilder, OneOfBuilder, Schema, Type};
+use utoipa::openapi::{Ref, RefOr};
+
+/// A kind of a union, as the API document has it.
+pub(crate) struct KindSchema {
+    /// The word that names the kind.
+    pub(crate) word: &'static str,
+    /// The name of its schema.
+    pub(crate) name: String,
+    /// Its fields but for the word.
+    pub(crate) fields: RefOr<Schema>,
+}
+
+impl KindSchema {
+    pub(crate) fn of<T: ToSchema>(union: &str, word: &'static str) -> Self {
+        let mut name = union.to_owned();
+        for part in word.split('_') {
+            let (first, rest) = part.split_at(1);
+            name.push_str(&first.to_uppercase());
+            name.push_str(rest);
+        }
+        Self { word, name, fields: T::schema() }
+    }
+
+    /// The fields with the word, which is required, so that readers can tell the kinds apart by it alone.
+    fn with_word(&self, tag: &str) -> RefOr<Schema> {
+        let mut schema = self.fields.clone();
+        if let RefOr::T(Schema::Object(object)) = &mut schema {
+            let word = ObjectBuilder::new().schema_type(Type::String).enum_values(Some([self.word]));
+            object.properties.insert(tag.into(), Schema::Object(word.build()).into());
+            object.required.insert(0, tag.into());
+        }
+        schema
+    }
+
+    fn reference(&self) -> Ref {
+        Ref::from_schema_name(&self.name)
+    }
+
+    /// The name of the kind that is meant where the word is left out.
+    fn name_by_default(&self) -> String {
+        format!("{}ByDefault", self.name)
+    }
+}
+
+/// One of these kinds.
+pub(crate) fn schema(description: &str, tag: &str, kinds: &[KindSchema], by_default: &[&str]) -> RefOr<Schema> {
+    let mapping = kinds.iter().map(|kind| (kind.word, kind.reference().ref_location));
+    let mut union = OneOfBuilder::new()
+        .description(Some(description.trim()))
+        .discriminator(Some(Discriminator::with_mapping(tag, mapping)));
+    for kind in kinds {
+        union = union.item(kind.reference());
+    }
+    for kind in kinds.iter().filter(|kind| by_default.contains(&kind.word)) {
+        union = union.item(Ref::from_schema_name(kind.name_by_default()));
+    }
+    union.into()
+}
+
+/// The schemas that [`schema`] refers to.
+pub(crate) fn schemas(
+    tag: &str,
+    kinds: &[KindSchema],
+    by_default: &[&str],
+    schemas: &mut Vec<(String, RefOr<Schema>)>,
+) {
+    for kind in kinds {
+        schemas.push((kind.name.clone(), kind.with_word(tag)));
+        if by_default.contains(&kind.word) {
+            schemas.push((kind.name_by_default(), kind.fields.clone()));
+        }
+    }
+}
+
+/// Makes an enum of kinds of object. It is written with its word always, read as [`crate::json`] reads unions, and in the API document it is a
+/// `oneOf` with a discriminator.
+macro_rules! union {
+    (
+        $(#[doc = $doc:literal])+
+        pub enum $union:ident as $name:literal by $tag:literal read $read:literal $(default $by_default:literal)? {
+            $($(#[doc = $kind_doc:literal])+ $kind:ident($fields:ty) = $word:literal),+ $(,)?
+        }
+    ) => {
+        $(#[doc = $doc])+
+        #[derive(Debug, Clone, PartialEq)]
+        pub enum $union {
+            $($(#[doc = $kind_doc])+ $kind($fields)),+
+        }
+
+        impl serde::Serialize for $union {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                #[derive(serde::Serialize)]
+                #[serde(tag = $tag)]
+                enum Written<'a> {
+                    $(#[serde(rename = $word)] $kind(&'a $fields)),+
+                }
+                match self {
+                    $(Self::$kind(fields) => Written::$kind(fields)),+
+                }
+                .serialize(serializer)
+            }
+        }
+
+        impl<'de> serde::Deserialize<'de> for $union {
+            fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                #[derive(serde::Deserialize)]
+                #[serde(rename = $read)]
+                enum Read {
+                    $(#[serde(rename = $word)] $kind($fields)),+
+                }
+                Ok(match Read::deserialize(deserializer)? {
+                    $(Read::$kind(fields) => Self::$kind(fields)),+
+                })
+            }
+        }
+
+        impl $crate::key::Encode for $union {
+            fn encode(&self, encoder: &mut $crate::key::Encoder) {
+                match self {
+                    $(Self::$kind(fields) => ($word, fields).encode(encoder)),+
+                }
+            }
+        }
+
+        impl $union {
+            const BY_DEFAULT: &[&str] = &[$($by_default)?];
+
+            fn kinds() -> Vec<$crate::union::KindSchema> {
+                vec![$($crate::union::KindSchema::of::<$fields>($name, $word)),+]
+            }
+        }
+
+        impl utoipa::PartialSchema for $union {
+            fn schema() -> utoipa::openapi::RefOr<utoipa::openapi::schema::Schema> {
+                $crate::union::schema(concat!($($doc, "\n"),+), $tag, &Self::kinds(), Self::BY_DEFAULT)
+            }
+        }
+
+        impl utoipa::ToSchema for $union {
+            fn name() -> std::borrow::Cow<'static, str> {
+                $name.into()
+            }
+
+            fn schemas(schemas: &mut Vec<(String, utoipa::openapi::RefOr<utoipa::openapi::schema::Schema>)>) {
+                $crate::union::schemas($tag, &Self::kinds(), Self::BY_DEFAULT, schemas);
+                $(<$fields as utoipa::ToSchema>::schemas(schemas);)+
+            }
+        }
+    };
+}
+pub(crate) use union;
