@@ -40,6 +40,10 @@ pub const RIM: f64 = 1.2;
 /// Share of the annulus between cam and ring tips that is left free on either side of a carrier that no radius is given for.
 pub const CARRIER_PLAY: f64 = 0.1;
 
+/// A ring's rim or a cam's wall thinner than this share of its radius is none: CAD kernels take points nearer than 1e-7 mm to each
+/// other as one, and a solid whose wall is that thin is invalid to them.
+pub const LEAST_WALL: f64 = 1e-7;
+
 const MM_PER_UM: f64 = 1e-3;
 
 impl PartsParameters {
@@ -62,7 +66,7 @@ impl PartsParameters {
         if let (Some(outer_mm), Some(clearance_mm)) = (outer_mm, clearance_mm)
             && let (Some(a), Some(r)) = (draft.semi_major_mm, draft.tooth_radius_mm)
         {
-            checks.above(Misfit::RingWithoutRim, outer_mm, a + (r + (r + clearance_mm)));
+            checks.above(Misfit::RingWithoutRim, outer_mm, (a + (r + (r + clearance_mm))) * (1.0 + LEAST_WALL));
         }
     }
 
@@ -78,7 +82,7 @@ impl PartsParameters {
         // Where the clearance takes all of the cam, no bore is small enough.
         let cam_mm = draft.semi_minor_mm.map(|b| b - clearance_mm).filter(|&cam_mm| cam_mm > 0.0);
         if let (Some(bore_mm), Some(cam_mm)) = (bore_mm, cam_mm) {
-            checks.below(Misfit::BoreTakesCam, bore_mm, cam_mm);
+            checks.below(Misfit::BoreTakesCam, bore_mm, cam_mm * (1.0 - LEAST_WALL));
         }
     }
 

@@ -119,6 +119,11 @@ impl RingFlank {
         self.locus.cam().semi_minor_mm() + self.height_over_cam_mm()
     }
 
+    /// Distance of the flank from the path of the teeth's centres, `r` without clearance.
+    pub(crate) const fn distance_mm(&self) -> f64 {
+        self.distance_mm
+    }
+
     /// Distance of cam and flank along a common normal, `2r` without clearance.
     fn height_over_cam_mm(&self) -> f64 {
         self.locus.tooth_radius_mm() + self.distance_mm
@@ -184,10 +189,14 @@ impl RingFlank {
 
     /// `(b + r)(1 + rκ)` at the tip: `b + 2r - r k² (a² - b²)/(a² + br)`, the last but one r being the flank's distance.
     fn tip_regularity_mm(&self) -> f64 {
+        self.regular_tip_radius_mm() - self.distance_mm * self.tip_narrowing()
+    }
+
+    /// `k² (a² - b²)/(a² + br)`.
+    fn tip_narrowing(&self) -> f64 {
         let (a, b, r) = self.lengths();
         let k = self.teeth_per_wave;
-        let narrowing = k * k * self.locus.cam().difference_of_squares_mm2() / (a * a + b * r);
-        self.regular_tip_radius_mm() - self.distance_mm * narrowing
+        k * k * self.locus.cam().difference_of_squares_mm2() / (a * a + b * r)
     }
 
     fn lengths(&self) -> (f64, f64, f64) {
@@ -213,6 +222,14 @@ impl RingFlank {
         // The stable form of the lower root: no difference of near values.
         let root = ((linear - least) * (linear + least)).sqrt();
         Some(2.0 * a * (a * b / (linear + root)))
+    }
+
+    /// The least distance from the path of the centres at which this flank is undercut, `(b + r)/(k² (a² - b²)/(a² + br) - 1)`:
+    /// that of the critical tooth radius where distance and radius are one. None where no distance undercuts.
+    pub(crate) fn critical_distance_mm(&self) -> Option<f64> {
+        let (_, b, r) = self.lengths();
+        let narrowing = self.tip_narrowing();
+        (narrowing > 1.0).then(|| (b + r) / (narrowing - 1.0))
     }
 
     /// Where the flank ends if nothing is bored away.

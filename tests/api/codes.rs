@@ -82,7 +82,10 @@ pub(crate) fn finding_codes() -> Vec<FindingCode> {
         ToothBeyondCarrier => SteepRingFlank,
         SteepRingFlank => LinearLawTooStiff,
         LinearLawTooStiff => PalmgrenBeyondSteel,
-        PalmgrenBeyondSteel => StressAboveFatigueLimit;
+        PalmgrenBeyondSteel => ToothLeavesSlot,
+        ToothLeavesSlot => ThinWallAsMade,
+        ThinWallAsMade => ClearanceUndercutsRing,
+        ClearanceUndercutsRing => StressAboveFatigueLimit;
         StressAboveFatigueLimit)
 }
 

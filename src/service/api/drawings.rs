@@ -68,7 +68,7 @@ pub struct DrawingAnswer {
     pub input_angle_deg: Option<f64>,
     /// The parts that are drawn.
     pub bodies: Vec<BodyAnswer>,
-    /// What a designer should be told about the drive.
+    /// What a designer should be told about the drive, and about the drawn parts as they are made.
     pub findings: Vec<FindingAnswer>,
 }
 
@@ -164,7 +164,7 @@ pub enum EdgeAnswer {
 }
 
 /// Where a section stands: turned about its origin, then moved.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ToSchema)]
 pub struct PlacementAnswer {
     /// x of its origin.
     pub x_mm: f64,
@@ -318,7 +318,12 @@ impl Endpoint for Drawing {
                 .into_iter()
                 .map(|body| BodyAnswer::new(body, question.drawing.drive().parameters().tooth_width_mm))
                 .collect(),
-            findings: drive_findings(question.drawing.drive())?,
+            findings: {
+                let of_parts = question.drawing.findings().map_err(SolveError::from)?;
+                let mut findings = drive_findings(question.drawing.drive())?;
+                findings.extend(of_parts.iter().map(FindingAnswer::from));
+                findings
+            },
         })
     }
 }
