@@ -17,6 +17,7 @@ pub mod json;
 pub mod keys;
 pub mod negotiation;
 pub mod observe;
+mod openapi;
 pub mod plots;
 pub mod problem;
 pub mod room;
