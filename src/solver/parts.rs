@@ -40,9 +40,9 @@ pub const RIM: f64 = 1.2;
 /// Share of the annulus between cam and ring tips that is left free on either side of a carrier that no radius is given for.
 pub const CARRIER_PLAY: f64 = 0.1;
 
-/// A ring's rim or a cam's wall thinner than this share of its radius is none: CAD kernels take points nearer than 1e-7 mm to each
-/// other as one, and a solid whose wall is that thin is invalid to them.
-pub const LEAST_WALL: f64 = 1e-7;
+/// A ring's rim or a cam's wall thinner than this share of its radius is none: by the default chord tolerance a solid's splines are
+/// within a hundredth of a micrometre of their curves, and one that they pass is invalid to CAD kernels.
+pub const LEAST_WALL: f64 = 1e-6;
 
 const MM_PER_UM: f64 = 1e-3;
 
