@@ -467,7 +467,7 @@ impl Spline {
             let mut next = vec![0];
             for (piece, ends) in kept.windows(2).enumerate() {
                 let (from, to) = (ends[0], ends[1]);
-                if points[from + 1..to].iter().any(|&point| !(spline.distance_mm(piece, point) <= tolerance_mm)) {
+                if points[from + 1..to].iter().any(|&point| spline.distance_mm(piece, point) > tolerance_mm) {
                     next.push(from.midpoint(to));
                 }
                 next.push(to);
