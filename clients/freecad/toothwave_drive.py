@@ -29,7 +29,16 @@ _services = {}
 
 def service_at(url):
     """One service for each address, so that all drives of a session share its answers."""
-    return _services.setdefault(url, toothwave_client.Service(url))
+    return _services.setdefault(url, toothwave_client.Service(url, wait=_wait))
+
+
+def _wait(call):
+    """Makes a call to a service; where there is a window, it goes on being drawn, and the call can be given up."""
+    if not FreeCAD.GuiUp:
+        return call()
+    import toothwave_panel
+
+    return toothwave_panel.patiently(call)
 
 
 class Stateless:
@@ -188,13 +197,13 @@ def set_document(obj, document):
         setattr(obj, name, value)
 
 
-def make_drive(design=None, url=DEFAULT_URL, document=None):
+def make_drive(design=None, url=None, document=None):
     """A drive with its parts and results in a FreeCAD document; recompute it then."""
     document = document or FreeCAD.ActiveDocument or FreeCAD.newDocument("HarmonicDrive")
     group = document.addObject("App::Part", "Assembly")
     drive = document.addObject("App::FeaturePython", "HarmonicDrive")
     HarmonicDrive(drive)
-    drive.ServiceUrl = url
+    drive.ServiceUrl = url or DEFAULT_URL
     if design is not None:
         set_document(drive, design)
     objects = [drive]

@@ -1,16 +1,21 @@
 """The dialog: the design's fields in FreeCAD's task panel, with what the service says of them beside the fields it names."""
 
+import concurrent.futures
 import os
+import threading
 
+import FreeCAD
 import FreeCADGui
 from PySide import QtCore, QtGui
 
+import toothwave_client
 import toothwave_design
 import toothwave_drive
 
 ICON = os.path.join(os.path.dirname(__file__), "toothwave.svg")
 AT_FAULT = "border: 1px solid #c0392b; border-radius: 2px;"
 PROBLEM, FINDING = "#c0392b", "#b9770e"
+AT_ONCE_S, SOON_MS, LOOK_MS = 0.05, 500, 20  # an answer from the cache; one that needs no word; how often to look for it
 
 
 class FieldEdit(QtGui.QWidget):
@@ -73,18 +78,19 @@ class FieldEdit(QtGui.QWidget):
 
 
 class Panel:
-    """FreeCAD's task panel for one drive. Apply recomputes; Cancel takes everything back."""
+    """FreeCAD's task panel for one drive. Apply recomputes; Cancel takes everything back, a new drive as a whole."""
 
     is_open = False
 
-    def __init__(self, drive):
+    def __init__(self, drive, is_new=False):
         self.drive = drive
         self.edits = {field.name: FieldEdit(field) for field in toothwave_design.FIELDS}
         groups = dict.fromkeys(field.group for field in toothwave_design.FIELDS)
         self.form = [self._service_box(), *map(self._group_box, groups)]
         self._show_properties()
         self._show_outcome()
-        drive.Document.openTransaction("Edit harmonic drive")
+        if not is_new:  # else the transaction that made it is still open, and opening another would close it
+            open_transaction("Edit harmonic drive")
         Panel.is_open = True
 
     # --- What it looks like
@@ -205,12 +211,13 @@ class Panel:
     def accept(self):
         if not self.apply():
             return False
-        self.drive.Document.commitTransaction()
+        FreeCAD.closeActiveTransaction()
         return self._close()
 
     def reject(self):
-        self.drive.Document.abortTransaction()
-        self.drive.Document.recompute()
+        document = self.drive.Document  # a new drive is no more after the next line
+        FreeCAD.closeActiveTransaction(True)
+        document.recompute()
         return self._close()
 
     def _close(self):
@@ -255,11 +262,53 @@ class NewDrive:
         return not FreeCADGui.Control.activeDialog()
 
     def Activated(self):
-        drive = toothwave_drive.make_drive()
-        drive.Document.recompute()
+        document = FreeCAD.ActiveDocument or FreeCAD.newDocument("HarmonicDrive")
+        open_transaction("New harmonic drive")
+        drive = toothwave_drive.make_drive(document=document)
+        document.recompute()
         FreeCADGui.activeDocument().activeView().viewIsometric()
         FreeCADGui.SendMsgToActiveView("ViewFit")
-        FreeCADGui.Control.showDialog(Panel(drive))
+        FreeCADGui.Control.showDialog(Panel(drive, is_new=True))
+
+
+def open_transaction(name):
+    """What is done from here on is one step, undone by one Undo or by Cancel. It outlives the command that opens it."""
+    FreeCAD.setActiveTransaction(name, True)
+
+
+def patiently(call):
+    """What a call gives. The window goes on being drawn; where the call takes long, a dialog offers to give it up."""
+    outcome = concurrent.futures.Future()
+
+    def run():
+        try:
+            outcome.set_result(call())
+        except BaseException as error:  # goes on in the thread that waits
+            outcome.set_exception(error)
+
+    threading.Thread(target=run, daemon=True).start()
+    concurrent.futures.wait([outcome], AT_ONCE_S)
+    if outcome.done():
+        return outcome.result()
+    loop = QtCore.QEventLoop()
+    look, soon = QtCore.QTimer(interval=LOOK_MS), QtCore.QTimer(interval=SOON_MS, singleShot=True)
+    look.timeout.connect(lambda: outcome.done() and loop.quit())
+    soon.timeout.connect(loop.quit)
+    look.start()
+    soon.start()
+    # Nothing can be clicked until the dialog is there, which then bars all else: the design must not change under way.
+    loop.exec_(QtCore.QEventLoop.ExcludeUserInputEvents)
+    if not outcome.done():
+        dialog = QtGui.QProgressDialog("Waiting for the toothwave service…", "Give up", 0, 0, FreeCADGui.getMainWindow())
+        dialog.setWindowModality(QtCore.Qt.ApplicationModal)
+        dialog.canceled.connect(loop.quit)
+        dialog.show()
+        loop.exec_()
+        dialog.hide()
+        dialog.deleteLater()
+    if not outcome.done():  # given up; the thread ends by itself, at its own time limit
+        raise toothwave_client.NoService("The toothwave service was not waited for")
+    return outcome.result()
 
 
 def dress(drive, parts):

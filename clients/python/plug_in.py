@@ -1,5 +1,7 @@
 """A drive in an assembly, as a plug-in gets it from a toothwave service: python3 plug_in.py URL DESIGN.json"""
 
+import email.utils
+import http.client
 import json
 import math
 import os
@@ -9,34 +11,87 @@ import urllib.error
 import urllib.request
 
 KEPT = 32  # as many tags as a request's headers have room for
+ATTEMPTS = 4
 
 answers = {}  # entity tag -> drawing: what this plug-in has already, the oldest first
 
 
-def drawing(url, design, attempts=4):
+def drawing(url, design):
     """All parts in place; asked for again only where the design has changed in what a drawing reads."""
-    request = urllib.request.Request(f"{url}/v1/drawings/assembly", json.dumps(design).encode())
-    request.add_header("Content-Type", "application/json")
-    if key := os.environ.get("TOOTHWAVE_KEY"):  # where the service wants one
-        request.add_header("Authorization", f"Bearer {key}")
-    if answers:
-        request.add_header("If-None-Match", ", ".join(answers))
+    tag, answer = asked(url, design, answers)
+    if answer is None and tag not in answers:  # a proxy mixed something up
+        tag, answer = asked(url, design, {})
+    if answer is None:
+        return answers[tag] if tag in answers else no_service(url, "nothing changed, it says, of what it never sent")
+    if not (isinstance(answer, dict) and "bodies" in answer):
+        no_service(url, "the answer is no drawing")
+    answers[tag] = answer
+    while len(answers) > KEPT:
+        del answers[next(iter(answers))]
+    return answer
+
+
+def asked(url, design, known):
+    """Entity tag and drawing; no drawing where the one with this tag still holds."""
+    for left in reversed(range(ATTEMPTS)):
+        pause_s = 1.0
+        try:
+            request = urllib.request.Request(f"{address_of(url)}/v1/drawings/assembly", json.dumps(design).encode())
+            request.add_header("Content-Type", "application/json")
+            if key := os.environ.get("TOOTHWAVE_KEY", "").strip():  # where the service wants one; nobody else gets it
+                request.add_unredirected_header("Authorization", f"Bearer {key}")
+            if known:
+                request.add_header("If-None-Match", ", ".join(filter(None, known)))
+            with urllib.request.urlopen(request, timeout=30) as response:
+                return response.headers["ETag"], json.load(response)
+        except urllib.error.HTTPError as error:
+            if error.code == 304:
+                return error.headers["ETag"], None
+            if error.code not in (502, 503, 504) or not left:
+                objection(url, error)
+            pause_s = pause_of(error.headers["Retry-After"])
+        except (ConnectionResetError, http.client.IncompleteRead) as error:  # a replica died; another one may be there
+            if not left:
+                no_service(url, error)
+        except (OSError, ValueError, OverflowError, http.client.HTTPException) as error:
+            no_service(url, getattr(error, "reason", error))
+        time.sleep(pause_s)
+
+
+def address_of(url):
+    """The address as it is typed, with or without `http://`."""
+    url = url.strip().rstrip("/")
+    url = url if "://" in url else f"http://{url}"
+    if not url.startswith(("http://", "https://")):
+        raise ValueError("http and https are spoken here")
+    return url
+
+
+def pause_of(retry_after):
+    """`Retry-After` in seconds, five at most: it may be a number or a date."""
     try:
-        with urllib.request.urlopen(request, timeout=30) as response:
-            tag = response.headers["ETag"]
-            answers[tag] = json.load(response)
-            while len(answers) > KEPT:
-                del answers[next(iter(answers))]
-    except urllib.error.HTTPError as error:
-        if error.code in (502, 503, 504) and attempts > 1:
-            time.sleep(float(error.headers.get("Retry-After", 1)))
-            return drawing(url, design, attempts - 1)
-        if error.code != 304:
-            problem = json.load(error)
-            faults = [f"{fault['pointer']}: {fault['detail']}" for fault in problem.get("errors", [])]
-            raise SystemExit("\n".join([problem["title"], *(faults or [problem["detail"]])])) from None
-        tag = error.headers["ETag"]
-    return answers[tag]
+        pause_s = float(retry_after)
+    except (TypeError, ValueError):
+        try:
+            pause_s = email.utils.parsedate_to_datetime(retry_after).timestamp() - time.time()
+        except (TypeError, ValueError, OverflowError):
+            pause_s = 1.0
+    return min(max(0.0, pause_s), 5.0)
+
+
+def objection(url, error):
+    """What the service objects to, in its own words."""
+    try:
+        problem = json.load(error)
+        faults = [f"{fault['pointer']}: {fault['detail']}" for fault in problem.get("errors", [])]
+        text = "\n".join([problem["title"], *(faults or [problem["detail"]])])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, http.client.HTTPException):
+        no_service(url, f"HTTP status {error.code}")
+    raise SystemExit(text)
+
+
+def no_service(url, reason):
+    raise SystemExit(f"No toothwave service answers at {url}: {reason or type(reason).__name__}")
 
 
 def placed(point, placement):

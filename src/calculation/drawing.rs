@@ -6,7 +6,7 @@ use toothwave_solver::{SolveError, Stop};
 
 use crate::design::Design;
 use crate::drawing::answer::{BodyAnswer, DrawingAnswer, DrawnPart};
-use crate::findings::drive_findings;
+use crate::findings::{FindingAnswer, drive_findings};
 use crate::forms::{Form, Format, Forms};
 use crate::key::{Encode, Key};
 use crate::no_answer::NoAnswer;
@@ -71,6 +71,9 @@ impl Question for Drawing {
 
     fn answer(checked: &CheckedDrawing, stop: &impl Stop) -> Result<DrawingAnswer, NoAnswer> {
         let bodies = checked.drawing.bodies(stop)?;
+        let of_parts = checked.drawing.findings().map_err(SolveError::from)?;
+        let mut findings = drive_findings(checked.drawing.drive())?;
+        findings.extend(of_parts.iter().map(FindingAnswer::from));
         Ok(DrawingAnswer {
             solver_version: toothwave_solver::VERSION,
             build: crate::BUILD,
@@ -82,7 +85,7 @@ impl Question for Drawing {
                 .into_iter()
                 .map(|body| BodyAnswer::new(body, checked.drawing.drive().tooth_width_mm()))
                 .collect(),
-            findings: drive_findings(checked.drawing.drive())?,
+            findings,
         })
     }
 }

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use serde::Serialize;
-use toothwave_solver::findings::{self, Edge, FATIGUE_LIMIT_STRESS_MPA, STEEP_FLANK_DEG};
+use toothwave_solver::findings::{self, Edge, FATIGUE_LIMIT_STRESS_MPA, STEEP_FLANK_DEG, Wall};
 use toothwave_solver::{Drive, Finding, SolveError};
 use utoipa::ToSchema;
 
@@ -71,6 +71,12 @@ pub enum FindingCode {
     JohnsonBeyondHalfWidth,
     /// A wind-up so large that the teeth no longer stand where the model has them.
     WindUpBeyondModel,
+    /// A tooth's centre passes the end of its slot's walls, as the carrier is made.
+    ToothLeavesSlot,
+    /// A wall of a part as it is made is thin.
+    ThinWallAsMade,
+    /// The ring's flank is undercut only because its clearance sets it back.
+    ClearanceUndercutsRing,
     /// A stress above the fatigue limit of bearing steel.
     StressAboveFatigueLimit,
 }
@@ -249,6 +255,68 @@ impl From<&Finding> for FindingAnswer {
                 "deg",
                 "under the load the wave generator turns by more than a tenth of the period: the teeth then stand elsewhere than the model, which takes lever arms and directions from the drive without load, has them".into(),
                 "lower the torque, choose stiffer contacts, or close the clearances",
+            ),
+            Finding::ToothLeavesSlot { edge, center_radius_mm, wall_end_mm, is_loaded } => new(
+                Code::ToothLeavesSlot,
+                if is_loaded { Warning } else { Info },
+                &[
+                    match edge {
+                        Edge::Inner => "/parts/carrier/inner_radius_mm",
+                        Edge::Outer => "/parts/carrier/outer_radius_mm",
+                    },
+                    "/parts/carrier/clearance_um",
+                ],
+                center_radius_mm,
+                wall_end_mm,
+                "mm",
+                format!(
+                    "the centre of a tooth {}: {}",
+                    match edge {
+                        Edge::Inner => "comes nearer to the axis than the walls of its slot begin",
+                        Edge::Outer => "goes further out than the walls of its slot reach",
+                    },
+                    if is_loaded {
+                        "under load it presses on the wall's edge, or on nothing"
+                    } else {
+                        "it is not loaded there, but nothing holds it upright in its slot"
+                    }
+                ),
+                match edge {
+                    Edge::Inner => "draw the carrier further in",
+                    Edge::Outer => "draw the carrier further out",
+                },
+            ),
+            Finding::ThinWallAsMade { wall, wall_mm, limit_mm } => new(
+                Code::ThinWallAsMade,
+                Warning,
+                &[match wall {
+                    Wall::RingRim => "/parts/ring/outer_radius_mm",
+                    Wall::Cam => "/parts/wave_generator/bore_radius_mm",
+                }],
+                wall_mm,
+                limit_mm,
+                "mm",
+                format!(
+                    "{} is thinner than a quarter of a slot's width: the model takes the part as rigid, and this one is not",
+                    match wall {
+                        Wall::RingRim => "the ring's rim beyond its tooth spaces",
+                        Wall::Cam => "the wave generator's wall between its minor axis and its bore",
+                    }
+                ),
+                match wall {
+                    Wall::RingRim => "draw the ring larger",
+                    Wall::Cam => "bore the wave generator less",
+                },
+            ),
+            Finding::ClearanceUndercutsRing { distance_mm, critical_distance_mm } => new(
+                Code::ClearanceUndercutsRing,
+                Warning,
+                &["/parts/ring/clearance_um", RADIUS],
+                distance_mm,
+                critical_distance_mm,
+                "mm",
+                "the ring's clearance alone cuts away its tooth tips: the flank as drawn ends before the one that is computed with, so teeth enter later than the results say".into(),
+                "make the clearance smaller, or take it from the teeth's radius instead",
             ),
             Finding::StressAboveFatigueLimit { contact, stress_mpa } => new(
                 Code::StressAboveFatigueLimit,

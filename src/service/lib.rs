@@ -14,6 +14,7 @@ pub mod log;
 pub mod machine;
 pub mod negotiation;
 pub mod observe;
+mod openapi;
 pub mod problem;
 pub mod room;
 pub mod router;

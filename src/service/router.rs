@@ -11,6 +11,7 @@ use axum::http::{HeaderValue, StatusCode, Uri, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+use serde_json::Value;
 use tower::ServiceBuilder;
 use tower::util::option_layer;
 use tower_http::catch_panic::CatchPanicLayer;
@@ -75,9 +76,24 @@ pub struct Entry {
 
 /// The API document as it is committed and served.
 pub fn openapi_json() -> String {
+    pretty(&document())
+}
+
+/// The same in OpenAPI 3.0.3.
+pub fn openapi_3_0_json() -> String {
+    pretty(&crate::openapi::as_3_0(&document()))
+}
+
+fn document() -> Value {
     let mut document = api().into_openapi();
     describe_entry(&mut document);
-    let mut text = document.to_pretty_json().unwrap_or_default();
+    let mut document = serde_json::to_value(document).unwrap_or_default();
+    crate::openapi::for_generators(&mut document);
+    document
+}
+
+fn pretty(document: &Value) -> String {
+    let mut text = serde_json::to_string_pretty(document).unwrap_or_default();
     text.push('\n');
     text
 }
@@ -115,7 +131,7 @@ fn describe_entry(document: &mut openapi::OpenApi) {
 
 /// The whole service.
 pub fn router(app: Arc<App>, entry: &Entry) -> Router {
-    let openapi = Bytes::from(openapi_json());
+    let [openapi, openapi_3_0] = [openapi_json(), openapi_3_0_json()].map(Bytes::from);
     // The bundled page alone: without "none" it would ask a validator elsewhere.
     let config = Config::new(["/openapi.json"]).validator_url("none");
     let docs: Router<Arc<App>> = SwaggerUi::new("/docs").config(config).into();
@@ -125,6 +141,7 @@ pub fn router(app: Arc<App>, entry: &Entry) -> Router {
         .route("/", get(page::index))
         .route("/page/{*name}", get(page::asset))
         .route("/openapi.json", get(move || openapi_document(openapi.clone())))
+        .route("/openapi-3.0.json", get(move || openapi_document(openapi_3_0.clone())))
         .merge(docs)
         .fallback(not_found)
         .method_not_allowed_fallback(method_not_allowed);

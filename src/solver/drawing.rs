@@ -7,6 +7,7 @@ use nalgebra::{Point2, Rotation2, Unit, Vector2};
 
 use crate::contact::Part;
 use crate::drive::{Draft, Drive, DriveError};
+use crate::findings::{self, Finding};
 use crate::parts::{CarrierPart, PartsParameters, RingPart, ToothPart, WaveGeneratorPart};
 use crate::profile::{Polyline, SampledCurve, cam_half_lobe, cam_outline, direction, flank_curve};
 use crate::ring::FlankEnd;
@@ -195,6 +196,21 @@ impl Drawing {
     /// The drive.
     pub const fn drive(&self) -> &Drive {
         &self.drive
+    }
+
+    /// What a designer should be told about the parts as they are made, those that are drawn.
+    ///
+    /// # Errors
+    /// [`NotConverged`] from the geometry.
+    pub fn findings(&self) -> Result<Vec<Finding>, NotConverged> {
+        let of_part = |part: &MadePart| match part {
+            MadePart::Ring(ring) => Ok(findings::of_ring(&self.drive, ring)),
+            MadePart::Carrier(carrier) => findings::of_carrier(&self.drive, carrier),
+            MadePart::Teeth(_) => Ok(Vec::new()),
+            MadePart::WaveGenerator(cam) => Ok(findings::of_wave_generator(&self.drive, cam)),
+        };
+        let findings: Vec<_> = self.parts.iter().map(of_part).collect::<Result<_, NotConverged>>()?;
+        Ok(findings.concat())
     }
 
     /// Draws.

@@ -1,10 +1,13 @@
 //! What a designer should be told about a drive that can exist (docs/findings.md).
 
+use std::f64::consts::PI;
+
 use crate::cam::Cam;
 use crate::contact::{Contact, ContactLaw, Material, Materials, PerContact, half_width_mm};
 use crate::drive::{Drive, ToothShape};
 use crate::load_sharing::LoadCase;
 use crate::mesh::Mesh;
+use crate::parts::{CarrierPart, RingPart, WaveGeneratorPart};
 use crate::ring::FlankEnd;
 use crate::root::NotConverged;
 use crate::sweep::{ContactPeaks, States, Sweep};
@@ -37,6 +40,15 @@ pub enum Edge {
     Inner,
     /// Towards the ring.
     Outer,
+}
+
+/// A wall that the parts as they are made leave.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wall {
+    /// Between the ring's tooth spaces and its outer circle.
+    RingRim,
+    /// Between the cam and its bore.
+    Cam,
 }
 
 /// Something questionable about a drive or its load.
@@ -141,6 +153,33 @@ pub enum Finding {
         /// What it is measured against.
         limit_deg: f64,
     },
+    /// A tooth's centre passes the end of its slot's walls, as the carrier is made.
+    ToothLeavesSlot {
+        /// Which end it passes.
+        edge: Edge,
+        /// How far its centre goes.
+        center_radius_mm: f64,
+        /// Where the slot's walls end, along the slot from the axis.
+        wall_end_mm: f64,
+        /// Whether it does so while it touches the ring's flank.
+        is_loaded: bool,
+    },
+    /// A wall of a part as it is made is thin.
+    ThinWallAsMade {
+        /// Which.
+        wall: Wall,
+        /// Its least thickness.
+        wall_mm: f64,
+        /// What it is measured against.
+        limit_mm: f64,
+    },
+    /// The ring's flank is undercut only because its clearance sets it back.
+    ClearanceUndercutsRing {
+        /// The flank's distance from the path of the teeth's centres, `r` and the clearance.
+        distance_mm: f64,
+        /// The least one that undercuts.
+        critical_distance_mm: f64,
+    },
     /// A stress above the fatigue limit of bearing steel.
     StressAboveFatigueLimit {
         /// Where.
@@ -232,6 +271,70 @@ pub fn of_wind_up(drive: &Drive, sweep: &Sweep) -> Option<Finding> {
     let wind_up_deg = sweep.input_angles.wind_up_deg.iter().copied().fold(0.0, f64::max);
     let limit_deg = WIND_UP_SHARE_OF_PERIOD * Mesh::new(drive).period_deg();
     (wind_up_deg > limit_deg).then_some(Finding::WindUpBeyondModel { wind_up_deg, limit_deg })
+}
+
+/// The findings about the ring as it is made (docs/theory.md section 8).
+pub(crate) fn of_ring(drive: &Drive, ring: &RingPart) -> Vec<Finding> {
+    let flank = &ring.tooth.flank;
+    let mut findings = thin_wall(drive, Wall::RingRim, ring.outer_radius_mm - flank.root_radius_mm());
+    if ring.tooth.limit.end == FlankEnd::Undercut
+        && !drive.flank().is_undercut()
+        && let Some(critical_distance_mm) = flank.critical_distance_mm()
+    {
+        findings.push(Finding::ClearanceUndercutsRing { distance_mm: flank.distance_mm(), critical_distance_mm });
+    }
+    findings
+}
+
+/// The findings about the wave generator as it is made; a solid cam has no wall.
+pub(crate) fn of_wave_generator(drive: &Drive, cam: &WaveGeneratorPart) -> Vec<Finding> {
+    let wall_mm = |bore_mm: f64| drive.flank().locus().cam_inner_radius_mm() - cam.clearance_mm - bore_mm;
+    cam.bore_radius_mm.map_or_else(Vec::new, |bore_mm| thin_wall(drive, Wall::Cam, wall_mm(bore_mm)))
+}
+
+/// The findings about the carrier as it is made: whether its walls reach as far as the teeth's centres go.
+///
+/// # Errors
+/// [`NotConverged`] from the geometry.
+pub(crate) fn of_carrier(drive: &Drive, carrier: &CarrierPart) -> Result<Vec<Finding>, NotConverged> {
+    let p = drive.parameters();
+    let w = carrier.slot_half_width_mm;
+    // A wall stands w beside the slot's middle, so its ends are nearer to the axis along the slot than their radii.
+    let along_slot_mm = |radius_mm: f64| ((radius_mm - w).max(0.0) * (radius_mm + w)).sqrt();
+    // Where slots run into each other the fingers are pointed, and their walls begin at the point.
+    let point_mm = w / (PI / p.installed as f64).tan();
+    let (inner_mm, outer_mm) =
+        (along_slot_mm(carrier.inner_radius_mm).max(point_mm), along_slot_mm(carrier.outer_radius_mm));
+    let locus = drive.flank().locus();
+    let innermost_mm = locus.cam_inner_radius_mm() + p.tooth_radius_mm;
+    let outermost_mm = locus.cam_outer_radius_mm() + p.tooth_radius_mm;
+    let innermost_loaded_mm = drive.flank().locus().at(drive.flank_limit().position)?.center_radius_mm;
+    let mut findings = Vec::new();
+    if innermost_mm < inner_mm {
+        let is_loaded = innermost_loaded_mm < inner_mm;
+        let center_radius_mm = if is_loaded { innermost_loaded_mm } else { innermost_mm };
+        findings.push(Finding::ToothLeavesSlot {
+            edge: Edge::Inner,
+            center_radius_mm,
+            wall_end_mm: inner_mm,
+            is_loaded,
+        });
+    }
+    if outermost_mm > outer_mm {
+        findings.push(Finding::ToothLeavesSlot {
+            edge: Edge::Outer,
+            center_radius_mm: outermost_mm,
+            wall_end_mm: outer_mm,
+            is_loaded: true,
+        });
+    }
+    Ok(findings)
+}
+
+/// The finding, where a wall is thinner than the share of a slot's width that a wall between slots should have too.
+fn thin_wall(drive: &Drive, wall: Wall, wall_mm: f64) -> Vec<Finding> {
+    let limit_mm = THIN_WALL_SHARE_OF_SLOT * 2.0 * drive.slot_half_width_mm();
+    if wall_mm < limit_mm { vec![Finding::ThinWallAsMade { wall, wall_mm, limit_mm }] } else { Vec::new() }
 }
 
 /// The findings about a drive's contacts under a load. `approaches_matter` where wind-up or clearance was asked for.

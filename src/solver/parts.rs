@@ -39,6 +39,10 @@ pub const RIM: f64 = 1.2;
 /// Share of the annulus between cam and ring tips that is left free on either side of a carrier that no radius is given for.
 pub const CARRIER_PLAY: f64 = 0.1;
 
+/// A ring's rim or a cam's wall thinner than this share of its radius is none: by the default chord tolerance a solid's splines are
+/// within a hundredth of a micrometre of their curves, and one that they pass is invalid to CAD kernels.
+pub const LEAST_WALL: f64 = 1e-6;
+
 const MM_PER_UM: f64 = 1e-3;
 
 impl PartsParameters {
@@ -61,7 +65,7 @@ impl PartsParameters {
         if let (Some(outer_mm), Some(clearance_mm)) = (outer_mm, clearance_mm)
             && let (Some(a), Some(r)) = (draft.cam_outer_mm, draft.tooth_radius_mm)
         {
-            checks.above(Misfit::RingWithoutRim, outer_mm, a + (r + (r + clearance_mm)));
+            checks.above(Misfit::RingWithoutRim, outer_mm, (a + (r + (r + clearance_mm))) * (1.0 + LEAST_WALL));
         }
     }
 
@@ -75,7 +79,7 @@ impl PartsParameters {
         // Where the clearance takes all of the cam, no bore is small enough.
         let cam_mm = draft.cam_inner_mm.map(|inner_mm| inner_mm - clearance_mm).filter(|&cam_mm| cam_mm > 0.0);
         if let (Some(bore_mm), Some(cam_mm)) = (bore_mm, cam_mm) {
-            checks.below(Misfit::BoreTakesCam, bore_mm, cam_mm);
+            checks.below(Misfit::BoreTakesCam, bore_mm, cam_mm * (1.0 - LEAST_WALL));
         }
     }
 

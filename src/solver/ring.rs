@@ -117,6 +117,11 @@ impl RingFlank {
         self.locus.cam_inner_radius_mm() + self.height_over_cam_mm()
     }
 
+    /// Distance of the flank from the path of the teeth's centres, `r` without clearance.
+    pub(crate) const fn distance_mm(&self) -> f64 {
+        self.distance_mm
+    }
+
     /// Distance of cam and flank along a common normal, `2r` without clearance.
     fn height_over_cam_mm(&self) -> f64 {
         self.locus.tooth_radius_mm() + self.distance_mm
@@ -194,6 +199,14 @@ impl RingFlank {
     /// The least tooth radius that undercuts; none where no radius does.
     pub fn critical_tooth_radius_mm(&self) -> Option<f64> {
         self.locus.cam().kind().critical_tooth_radius_mm(self.teeth_per_wave)
+    }
+
+    /// The least distance from the path of the centres at which this flank is undercut, of an ellipse `(b + r)/(k² (a² - b²)/(a² + br) - 1)`:
+    /// that of the critical tooth radius where distance and radius are one. None where no distance undercuts.
+    pub(crate) fn critical_distance_mm(&self) -> Option<f64> {
+        let r = self.locus.tooth_radius_mm();
+        let bend = self.locus.cam().kind().tip_bend(r, self.teeth_per_wave);
+        (bend > 1.0).then(|| (self.locus.cam_inner_radius_mm() + r) / (bend - 1.0))
     }
 
     /// Where the flank ends if nothing is bored away.

@@ -90,7 +90,10 @@ pub(crate) fn finding_codes() -> Vec<FindingCode> {
         FlatCutsTheContact => PalmgrenBeyondSteel,
         PalmgrenBeyondSteel => JohnsonBeyondHalfWidth,
         JohnsonBeyondHalfWidth => WindUpBeyondModel,
-        WindUpBeyondModel => StressAboveFatigueLimit;
+        WindUpBeyondModel => ToothLeavesSlot,
+        ToothLeavesSlot => ThinWallAsMade,
+        ThinWallAsMade => ClearanceUndercutsRing,
+        ClearanceUndercutsRing => StressAboveFatigueLimit;
         StressAboveFatigueLimit)
 }
 

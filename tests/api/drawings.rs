@@ -17,7 +17,7 @@ pub(crate) fn made(parts: &str) -> Value {
 
 /// Parts of case 5.1 that cannot be made: the code, the field, its value and the limit.
 pub(crate) const MISFITS: [(&str, &str, &str, f64, f64); 8] = [
-    (r#"{ "ring": { "outer_radius_mm": 68 } }"#, "ring_without_rim", "/parts/ring/outer_radius_mm", 68.0, 68.0),
+    (r#"{ "ring": { "outer_radius_mm": 68 } }"#, "ring_without_rim", "/parts/ring/outer_radius_mm", 68.0, 68.000_068),
     (r#"{ "carrier": { "inner_radius_mm": 58 } }"#, "carrier_meets_cam", "/parts/carrier/inner_radius_mm", 58.0, 58.0),
     (r#"{ "carrier": { "outer_radius_mm": 66 } }"#, "carrier_meets_ring", "/parts/carrier/outer_radius_mm", 66.0, 66.0),
     (
@@ -40,7 +40,7 @@ pub(crate) const MISFITS: [(&str, &str, &str, f64, f64); 8] = [
         "bore_takes_cam",
         "/parts/wave_generator/bore_radius_mm",
         55.5,
-        55.5,
+        55.499_944_5,
     ),
     (
         // 56 mm times 56/58, in µm.
@@ -106,6 +106,48 @@ async fn what_cannot_be_made_is_refused_with_value_and_limit() {
             assert!((found - expected).abs() <= 1e-8 * expected, "{name} of {error}");
         }
     }
+}
+
+#[tokio::test]
+async fn a_wall_that_is_none_to_cad_is_refused_and_the_limit_leads_to_one_that_is() {
+    for (group, field, none_mm, code) in [
+        ("wave_generator", "bore_radius_mm", 56.0 - 1e-7, "bore_takes_cam"),
+        ("ring", "outer_radius_mm", 68.0 + 1e-7, "ring_without_rim"),
+    ] {
+        let of = |radius_mm: f64| with(&shortest(), "/parts", json!({ group: { field: radius_mm } }));
+        let problem =
+            Service::new().post("/v1/drawings/assembly", &of(none_mm)).await.refused(422, "impossible_design");
+        assert_eq!(problem["errors"][0]["code"], code);
+        let limit_mm = problem["errors"][0]["limit"].as_f64().unwrap();
+        drawn("assembly", &of(limit_mm + 1e-9 * (limit_mm - none_mm).signum())).await;
+    }
+}
+
+#[tokio::test]
+async fn a_step_makes_a_part_once_names_it_by_the_design_colours_it_and_extrudes_its_flanks() {
+    let hash = drawn("assembly", &undercut()).await["design_hash"].as_str().unwrap()[..8].to_owned();
+    let text = written("assembly", &undercut(), "model/step").await;
+    let count = |what: &str| text.matches(what).count();
+    for name in ["ring", "carrier_finger", "tooth", "wave_generator", "assembly"] {
+        assert_eq!(count(&format!("=PRODUCT('{name} {hash}'")), 1, "{name}");
+    }
+    assert_eq!((count("=PRODUCT("), count("=MANIFOLD_SOLID_BREP("), count("=STYLED_ITEM(")), (5, 4, 4));
+    assert_eq!(count("=NEXT_ASSEMBLY_USAGE_OCCURRENCE("), 2 + 2 * 40);
+    // The cam's quarters and the ring's spaces.
+    assert_eq!((count("=SURFACE_OF_LINEAR_EXTRUSION("), count("=B_SPLINE_SURFACE_WITH_KNOTS(")), (4 + 78, 0));
+    assert_eq!(written("tooth", &undercut(), "model/step").await.matches("NEXT_ASSEMBLY_USAGE_OCCURRENCE").count(), 0);
+}
+
+/// A spline is held to its own error, so it has fewer points the finer it is, beside chords of the same tolerance.
+#[tokio::test]
+async fn a_step_leaves_out_the_points_that_its_splines_pass_without_them() {
+    let document = with(&undercut(), "/profile", json!({ "chord_tolerance_mm": 1e-5 }));
+    let drawing = drawn("ring", &document).await;
+    let edge = &drawing["bodies"][0]["holes"][0]["edges"][0];
+    let text = written("ring", &document, "model/step").await;
+    let spline = text.lines().find(|line| line.contains("B_SPLINE_CURVE_WITH_KNOTS")).unwrap();
+    let poles = spline.split("),.UNSPECIFIED.").next().unwrap().matches('#').count() - 1;
+    assert!(4 * poles < numbers(&edge["x_mm"]).len(), "{poles} of {}", numbers(&edge["x_mm"]).len());
 }
 
 #[tokio::test]

@@ -10,7 +10,12 @@ use crate::designs::{bored, shortest, spelled_out, undercut, with};
 async fn findings_at(path: &str, document: &Value) -> Vec<Value> {
     let found = Service::new().post(path, document).await.found();
     let findings = found["findings"].as_array().unwrap().clone();
-    let spelled_out = with(&spelled_out(), "/drive/ring/tip_radius_mm", json!(1.0));
+    let parts = json!({
+        "wave_generator": { "bore_radius_mm": 20 },
+        "ring": { "outer_radius_mm": 80, "clearance_um": 0 },
+        "carrier": { "inner_radius_mm": 59, "outer_radius_mm": 65, "clearance_um": 0 }
+    });
+    let spelled_out = with(&with(&spelled_out(), "/drive/ring/tip_radius_mm", json!(1.0)), "/parts", parts);
     for finding in &findings {
         for member in ["code", "severity", "detail", "advice"] {
             assert!(finding[member].as_str().is_some_and(|text| !text.is_empty()), "`{member}` of {finding}");
@@ -229,6 +234,86 @@ async fn all_endpoints_tell_the_same_of_the_drive_itself() {
     }
 }
 
+/// The findings of an assembly beyond those of its drive.
+async fn findings_of_parts(document: &Value) -> Vec<Value> {
+    let of_drive = findings_at("/v1/geometry", document).await.len();
+    findings_at("/v1/drawings/assembly", document).await.split_off(of_drive)
+}
+
+#[tokio::test]
+async fn a_carrier_as_drawn_that_does_not_hold_the_teeth_is_a_warning_for_each_edge() {
+    // Centres run from b + r to a + r; a wall stands r beside the slot's middle.
+    let along = |radius_mm: f64| (radius_mm * radius_mm - 25.0).sqrt();
+    for (radii, edge, expected) in [
+        (json!({ "inner_radius_mm": 58.1, "outer_radius_mm": 58.2 }), "outer", (63.0, along(58.2))),
+        (json!({ "inner_radius_mm": 62.0 }), "inner", (61.0, along(62.0))),
+    ] {
+        let document = with(&shortest(), "/parts", json!({ "carrier": radii }));
+        let [finding] = &findings_of_parts(&document).await[..] else { panic!("{radii}") };
+        assert_eq!((&finding["code"], &finding["severity"]), (&json!("tooth_leaves_slot"), &json!("warning")));
+        assert_eq!(finding["pointers"][0], json!(format!("/parts/carrier/{edge}_radius_mm")));
+        assert_numbers(finding, expected.0, expected.1, "mm");
+    }
+    let holds = json!({ "inner_radius_mm": 61.2, "outer_radius_mm": 63.3 });
+    assert!(findings_of_parts(&with(&shortest(), "/parts", json!({ "carrier": holds }))).await.is_empty());
+}
+
+#[tokio::test]
+async fn a_tooth_that_leaves_its_slot_without_load_is_information() {
+    // Case 5.2 as it is by default. Centres start at b + r = 50.8 mm, where the undercut flank is long past; the carrier starts a tenth
+    // of the annulus outside the cam.
+    let found = Service::new().post("/v1/geometry", &undercut()).await.found();
+    let inner_mm = 50.7 + 0.1 * (found["ring"]["tip_radius_mm"].as_f64().unwrap() - 50.7);
+    let findings = findings_of_parts(&undercut()).await;
+    let [finding] = &findings[..] else { panic!("{findings:?}") };
+    assert_eq!((&finding["code"], &finding["severity"]), (&json!("tooth_leaves_slot"), &json!("info")));
+    assert_numbers(finding, 50.8, (inner_mm * inner_mm - 2.25).sqrt(), "mm");
+}
+
+/// Case 5.1 with a rim and a cam's wall of a micrometre.
+fn thin_walls() -> Value {
+    let parts = json!({ "ring": { "outer_radius_mm": 68.001 }, "wave_generator": { "bore_radius_mm": 55.999 } });
+    with(&shortest(), "/parts", parts)
+}
+
+#[tokio::test]
+async fn rims_and_walls_of_a_micrometre_are_warnings() {
+    let findings = findings_of_parts(&thin_walls()).await;
+    let [rim, wall] = &findings[..] else { panic!("{findings:?}") };
+    for (finding, pointer) in [(rim, "/parts/ring/outer_radius_mm"), (wall, "/parts/wave_generator/bore_radius_mm")] {
+        assert_eq!((&finding["code"], &finding["pointers"]), (&json!("thin_wall_as_made"), &json!([pointer])));
+        assert_numbers(finding, 0.001, 2.5, "mm");
+    }
+    let thick = json!({ "ring": { "outer_radius_mm": 70.6 }, "wave_generator": { "bore_radius_mm": 53.4 } });
+    assert!(findings_of_parts(&with(&shortest(), "/parts", thick)).await.is_empty());
+}
+
+/// Case 5.1 with a ring whose clearance takes the flank beyond the critical distance.
+fn cleared(clearance_um: f64) -> Value {
+    let parts = json!({ "ring": { "clearance_um": clearance_um, "outer_radius_mm": 90 } });
+    with(&shortest(), "/parts", parts)
+}
+
+#[tokio::test]
+async fn a_clearance_that_itself_undercuts_the_ring_is_a_warning_with_the_distance_from_which_it_does() {
+    // The path of the centres has at its tip the curvature radius that the flank may be away from it.
+    let (a, b, r, k) = (58.0_f64, 56.0_f64, 5.0_f64, 13.0_f64);
+    let critical_mm = (b + r) / (k * k * (a * a - b * b) / (a * a + b * r) - 1.0);
+    let codes = async |clearance_um: f64| codes_of(&findings_of_parts(&cleared(clearance_um)).await);
+    assert!(codes(1e3 * (critical_mm - r) - 1.0).await.is_empty());
+    let findings = findings_of_parts(&cleared(1e3 * (critical_mm - r) + 1.0)).await;
+    let [finding] = &findings[..] else { panic!("{findings:?}") };
+    assert_eq!(finding["code"], "clearance_undercuts_ring");
+    assert_numbers(finding, critical_mm + 1e-3, critical_mm, "mm");
+    assert_eq!(findings_at("/v1/geometry", &cleared(9000.0)).await, findings_at("/v1/geometry", &shortest()).await);
+}
+
+#[tokio::test]
+async fn parts_that_are_not_drawn_are_not_judged() {
+    assert!(findings_at("/v1/drawings/tooth", &thin_walls()).await.is_empty());
+    assert_eq!(findings_at("/v1/drawings/ring", &thin_walls()).await.len(), 1);
+}
+
 #[tokio::test]
 async fn every_kind_of_finding_can_be_met_over_http() {
     let bore_without_effect = with(&shortest(), "/drive/ring/tip_radius_mm", json!(60.0));
@@ -256,6 +341,9 @@ async fn every_kind_of_finding_can_be_met_over_http() {
     let wide = with(&with(&shortest(), "/model", johnson), "/load/input_torque_nm", json!(2000.0));
     for document in [linear, brass, wide, loose()] {
         all.extend(findings(&document).await);
+    }
+    for document in [undercut(), thin_walls(), cleared(9000.0)] {
+        all.extend(findings_of_parts(&document).await);
     }
     assert_eq!(codes_of(&all), words(&finding_codes()));
 }

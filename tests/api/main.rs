@@ -15,6 +15,7 @@ mod contact;
 mod designs;
 mod documents;
 mod drawings;
+mod dxf;
 mod endpoints;
 mod entry;
 mod examples;

@@ -56,6 +56,89 @@ fn every_reference_leads_somewhere() {
     assert!(references > 20, "{references} references");
 }
 
+/// Every object of a document.
+fn objects(document: &Value) -> Vec<&serde_json::Map<String, Value>> {
+    let (mut found, mut pending) = (Vec::new(), vec![document]);
+    while let Some(value) = pending.pop() {
+        match value {
+            Value::Object(fields) => {
+                found.push(fields);
+                pending.extend(fields.values());
+            }
+            Value::Array(items) => pending.extend(items),
+            _ => {}
+        }
+    }
+    found
+}
+
+#[test]
+fn there_is_one_problem_and_every_refusal_refers_to_it() {
+    let problems: Vec<_> =
+        objects(document()).into_iter().filter_map(|object| object.get("application/problem+json")).collect();
+    assert!(problems.len() > 50, "{}", problems.len());
+    for problem in problems {
+        assert_eq!(*problem, json!({ "schema": { "$ref": "#/components/schemas/Problem" } }));
+    }
+}
+
+#[test]
+fn the_document_says_where_its_service_stands() {
+    assert_eq!(document()["servers"][0]["url"], "/");
+}
+
+#[test]
+fn every_variant_of_a_choice_has_a_name_and_the_word_that_leads_to_it() {
+    let schemas = document()["components"]["schemas"].as_object().unwrap();
+    for (name, words) in [
+        ("StiffnessDocument", vec!["linear", "fixed", "palmgren"]),
+        ("EdgeAnswer", vec!["line", "arc", "curve"]),
+        ("OutlineAnswer", vec!["circle", "path"]),
+    ] {
+        let (schema, mapping) = (&schemas[name], &schemas[name]["discriminator"]["mapping"]);
+        let tag = schema["discriminator"]["propertyName"].as_str().unwrap();
+        // A law that is left out has a variant of its own.
+        let by_default = usize::from(name == "StiffnessDocument");
+        assert_eq!(schema["oneOf"].as_array().unwrap().len(), words.len() + by_default);
+        for word in words {
+            let reference = mapping[word].as_str().unwrap();
+            assert!(schema["oneOf"].as_array().unwrap().contains(&json!({ "$ref": reference })), "{name} {word}");
+            let variant = &schemas[reference.rsplit('/').next().unwrap()];
+            assert_eq!(variant["properties"][tag]["enum"], json!([word]));
+        }
+    }
+}
+
+#[test]
+fn the_rendering_in_3_0_has_no_word_that_only_3_1_knows() {
+    let document: Value = serde_json::from_str(&toothwave::router::openapi_3_0_json()).unwrap();
+    assert_eq!(document["openapi"], "3.0.3");
+    assert_eq!(document["info"]["license"].get("identifier"), None);
+    for object in objects(&document) {
+        assert!(!object.get("type").is_some_and(Value::is_array), "{object:?}");
+        assert!(!object.get("exclusiveMinimum").is_some_and(Value::is_number), "{object:?}");
+        assert!(!object.get("exclusiveMaximum").is_some_and(Value::is_number), "{object:?}");
+        for word in ["const", "examples", "prefixItems", "propertyNames", "patternProperties"] {
+            // An object under this word is a field's schema.
+            assert!(object.get(word).is_none_or(Value::is_object), "{word} in {object:?}");
+        }
+        if let Some(reference) = object.get("$ref").and_then(Value::as_str) {
+            assert_eq!(object.len(), 1, "{object:?}");
+            assert!(document.pointer(reference.strip_prefix('#').unwrap()).is_some(), "{reference}");
+        }
+    }
+    let sweep = &document["paths"]["/v1/sweep"]["post"];
+    let answer = &sweep["responses"]["200"]["content"];
+    assert_eq!(*answer, json!({ "application/json": { "schema": { "$ref": "#/components/schemas/SweepAnswer" } } }));
+    assert!(document["paths"].get("/v1/batch").is_none(), "its lines are no JSON document");
+}
+
+#[tokio::test]
+async fn the_rendering_in_3_0_is_served_beside() {
+    let answer = Service::new().ask(&Question::of("GET", "/openapi-3.0.json")).await;
+    assert_eq!((answer.status, answer.text()), (200, toothwave::router::openapi_3_0_json().as_str()));
+}
+
 #[test]
 fn every_schema_is_used() {
     let text = document().to_string();

@@ -1,16 +1,20 @@
 """The calls: what is imported, what is sent again and what is not, what is said when there is no answer."""
 
 import ast
+import email.utils
 import json
+import os
 import sys
 import threading
+import time
 import unittest
 from http.server import BaseHTTPRequestHandler, HTTPServer
+from unittest import mock
 
 import toothwave_client
 import toothwave_design
 from cases import designs, example
-from service import ROOT, running_service
+from service import DIES_WITHIN, ROOT, answer, host, running_service
 
 CLIENT = ROOT / "clients/freecad"
 
@@ -116,8 +120,162 @@ class NoAnswer(unittest.TestCase):
             self.assertIn(said, str(caught.exception))
 
     def test_where_no_service_stands_the_address_is_named(self):
-        with self.assertRaisesRegex(toothwave_client.NoService, "http://127.0.0.1:1: .*refused"):
+        with self.assertRaisesRegex(toothwave_client.NoService, "http://127.0.0.1:1/: .*refused"):
             toothwave_client.Service("http://127.0.0.1:1/").sweep({})
+
+
+DRAWING = answer(200, b'{"bodies": []}', 'ETag: "x"')
+
+
+class NoPause:
+    """Pauses are noted, not made."""
+
+    def setUp(self):
+        self.pauses_s = []
+        self.enterContext(mock.patch("toothwave_client.time.sleep", self.pauses_s.append))
+
+
+class Addresses(NoPause, unittest.TestCase):
+    def test_what_can_be_no_address_is_no_service_and_says_why(self):
+        for text, why in {
+            "": "the address is empty",
+            "   ": "the address is empty",
+            "http://": "no host and port",
+            "http:///x": "no host and port",
+            "127.0.0.1 :8080": "no blanks",
+            "http://local host:8080": "no blanks",
+            "http://127.0.0.1:80\t80": "no blanks",
+            "http://127.0.0.1:port": "port",
+            "http://127.0.0.1:0": "no host and port",
+            "http://127.0.0.1:99999": "(?i)port out of range",
+            "http://[::1": "IPv6",
+            "http://a..b": "label",
+            "file:///etc/hostname": "file is not spoken",
+            "ftp://127.0.0.1": "ftp is not spoken",
+            "http://127.0.0.1:1/ä": "ascii",
+            "localhost:1": "refused",
+        }.items():
+            for call in ("examples", "sweep"):
+                with self.subTest(text, call=call), self.assertRaisesRegex(toothwave_client.NoService, why):
+                    getattr(toothwave_client.Service(text), call)(*(({},) if call == "sweep" else ()))
+
+    def test_scheme_blanks_around_and_a_slash_at_the_end_do_not_matter(self):
+        with host(DRAWING) as (address, _):
+            for text in (address, f" {address}/ ", f"http://{address}", f"http://{address}//\n"):
+                with self.subTest(text):
+                    self.assertEqual(toothwave_client.Service(text).drawing("ring", {}), {"bodies": []})
+
+
+class Replicas(NoPause, unittest.TestCase):
+    def test_one_that_dies_within_its_answer_is_no_answer_and_the_next_is_asked(self):
+        for lost in (DIES_WITHIN, b""):
+            with self.subTest(lost), host(lost, lost, DRAWING) as (address, heard):
+                self.assertEqual(toothwave_client.Service(address).drawing("ring", {}), {"bodies": []})
+                self.assertEqual((len(heard), self.pauses_s), (3, [1.0, 1.0]))
+                self.pauses_s.clear()
+
+    def test_where_all_of_them_die_that_is_said_and_not_for_ever_tried(self):
+        for lost in (DIES_WITHIN, b""):
+            with self.subTest(lost), host(lost) as (address, heard):
+                with self.assertRaisesRegex(toothwave_client.NoService, "IncompleteRead|without response"):
+                    toothwave_client.Service(address).drawing("ring", {})
+                self.assertEqual(len(heard), toothwave_client.ATTEMPTS)
+
+    def test_what_speaks_no_http_or_is_no_toothwave_is_no_service(self):
+        for said in (
+            b"SSH-2.0-OpenSSH_9.2\r\n",
+            b"HTTP/1.1 two hundred\r\n\r\n",
+            b"HTTP/1.1 200 OK\r\nContent-Le",
+            b"HTTP/9.9 200 OK\r\n\r\n",
+            b"HTTP/1.1 200 OK\r\n" + b"x: y\r\n" * 200 + b"\r\n",
+            answer(200, b"<html>"),
+            answer(200, b"null"),
+            answer(200, b"[]"),
+            answer(200, b"{}", 'ETag: "x"'),
+            answer(200, b"\xff"),
+            answer(404, b"<html>"),
+            answer(404, b"[]"),
+            answer(422, b'{"errors": [1]}'),
+            answer(422, b'{"errors": [{}]}'),
+            b"HTTP/1.1 500 .\r\nContent-Length: 9\r\n\r\n{",
+            answer(304),
+            answer(301, b"", "Location: file:///etc/hostname"),
+        ):
+            for call in (
+                lambda service: service.drawing("ring", {}),
+                lambda service: service.sweep({}),
+                lambda service: service.examples(),
+                lambda service: service.example("paper-5.1"),
+            ):
+                with self.subTest(said), host(said) as (address, _), self.assertRaises(toothwave_client.NoService) as caught:
+                    call(toothwave_client.Service(address))
+                self.assertIn(address, str(caught.exception))
+
+    def test_a_full_one_is_waited_for_as_long_as_it_says_within_reason(self):
+        in_a_minute, long_ago = (email.utils.formatdate(time.time() + s, usegmt=True) for s in (60, -1e6))
+        for header, pause_s in {
+            "0": 0.0,
+            "3": 3.0,
+            "86400": 5.0,
+            in_a_minute: 5.0,
+            long_ago: 0.0,
+            "soon": 1.0,
+            "-1": 1.0,
+            "nan": 1.0,
+            "²": 1.0,
+            "Mon, 99 Foo 2026": 1.0,
+        }.items():
+            with self.subTest(header):
+                self.assertEqual(toothwave_client.pause_of(header), pause_s)
+                full = answer(503, b"{}", f"Retry-After: {header}")
+                with host(full, DRAWING) as (address, _):
+                    self.assertEqual(toothwave_client.Service(address).drawing("ring", {}), {"bodies": []})
+                self.assertEqual(self.pauses_s, [pause_s])
+                self.pauses_s.clear()
+        self.assertEqual(toothwave_client.pause_of(None), 1.0)
+
+    def test_an_unknown_304_is_asked_again_without_tags(self):
+        first = answer(200, b'{"bodies": [1]}', 'ETag: "a"')
+        with host(first, answer(304, b"", 'ETag: "b"'), DRAWING) as (address, heard):
+            service = toothwave_client.Service(address)
+            service.drawing("ring", {})
+            self.assertEqual(service.drawing("ring", {}), {"bodies": []})
+            self.assertEqual(["If-None-Match" in head for head in heard], [False, True, False])
+
+    def test_tags_made_weak_by_a_proxy_are_the_same_tags(self):
+        weak = answer(200, b'{"bodies": [1]}', 'ETag: W/"a"')
+        with host(weak, answer(304, b"", 'ETag: "a"'), answer(304, b"", 'ETag: W/"a"')) as (address, heard):
+            service = toothwave_client.Service(address)
+            for _ in range(3):
+                self.assertEqual(service.drawing("ring", {}), {"bodies": [1]})
+            self.assertIn('If-None-Match: "a"\r\n', heard[2])
+
+    def test_an_answer_without_a_tag_is_an_answer(self):
+        with host(answer(200, b'{"bodies": []}')) as (address, heard):
+            service = toothwave_client.Service(address)
+            for _ in range(2):
+                self.assertEqual(service.drawing("ring", {}), {"bodies": []})
+            self.assertNotIn("If-None-Match", heard[1])
+
+
+class Key(NoPause, unittest.TestCase):
+    def test_it_comes_from_the_environment_and_goes_to_no_other_address(self):
+        with mock.patch.dict(os.environ, TOOTHWAVE_KEY=" secret\n"), host(DRAWING) as (other, heard_there):
+            with host(answer(307, b"", f"Location: http://{other}/v1/examples")) as (address, heard):
+                with self.assertRaises(toothwave_client.NoService):
+                    toothwave_client.Service(address).examples()
+        self.assertIn("Authorization: Bearer secret\r\n", heard[0])
+        self.assertNotIn("Authorization", heard_there[0])
+
+    def test_one_that_is_none_is_objected_to_and_not_told(self):
+        for key in ("se cret", "se\ncret", "secret\u00e9"):
+            with self.subTest(key), mock.patch.dict(os.environ, TOOTHWAVE_KEY=key), host(DRAWING) as (address, _):
+                with self.assertRaisesRegex(toothwave_client.NoService, "TOOTHWAVE_KEY has blanks") as caught:
+                    toothwave_client.Service(address).sweep({})
+                self.assertNotIn("cret", str(caught.exception))
+
+    def test_the_readme_says_where_it_comes_from(self):
+        self.assertIn("TOOTHWAVE_KEY", (CLIENT / "README.md").read_text(encoding="utf-8"))
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from service import ROOT, running_service
+from service import DIES_WITHIN, ROOT, answer, host, running_service
 
 PROGRAM = ROOT / "clients/python/plug_in.py"
 
@@ -39,6 +39,46 @@ class PlugIn(unittest.TestCase):
             done = run(url, design)
         self.assertEqual(done.returncode, 1)
         self.assertIn("Values that no design can have\n/drive/wave_generator/semi_major_mm: ", done.stderr)
+
+
+class NoAnswer(unittest.TestCase):
+    """Whatever stands at the address, the program says so in a line and ends, without a traceback."""
+
+    def assert_says(self, address, pattern):
+        done = run(address, ROOT / "examples/paper-5.1.json")
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stderr, pattern)
+        self.assertNotIn("Traceback", done.stderr)
+
+    def test_an_address_that_can_be_none(self):
+        for address in ("", " ", "http://", "local host:80", "127.0.0.1:port", "127.0.0.1:99999", "ftp://x", "http://[::1"):
+            with self.subTest(address):
+                self.assert_says(address, "No toothwave service answers at ")
+
+    def test_a_host_that_is_no_service_or_dies(self):
+        for said in (
+            b"SSH-2.0-OpenSSH_9.2\r\n",
+            answer(200, b"<html>"),
+            answer(200, b"[]"),
+            answer(404, b"<html>"),
+            answer(422, b'{"errors": [1]}'),
+            answer(304, b"", 'ETag: "b"'),
+            answer(503, b"<html>", "Retry-After: Thu, 01 Jan 1970 00:00:00 GMT"),
+        ):
+            with self.subTest(said), host(said) as (address, _):
+                self.assert_says(address, f"No toothwave service answers at {address}: ")
+
+    def test_a_replica_that_dies_within_its_answer_is_not_the_last_word(self):
+        drawing = answer(200, b'{"bodies": []}', 'ETag: "x"')
+        with host(DIES_WITHIN, drawing) as (address, heard):
+            done = run(f" {address}/", ROOT / "examples/paper-5.1.json")
+        self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "1 drawings were sent\n", ""))
+        self.assertEqual(len(heard), 4)
+
+    def test_a_date_to_come_again_is_understood(self):
+        full = answer(503, b"{}", "Retry-After: Thu, 01 Jan 1970 00:00:00 GMT")
+        with host(full, answer(200, b'{"bodies": []}')) as (address, _):
+            self.assertEqual(run(address, ROOT / "examples/paper-5.1.json").returncode, 0)
 
 
 if __name__ == "__main__":

@@ -1044,7 +1044,10 @@ test('the theme is chosen and remembered', async () => {
   assert.equal(await background(), dark);
 });
 
-/** Designs with much to report, which together have every finding. */
+/** Findings about parts as drawn come with the drawings, not with the sweep that the page reports. */
+const OF_DRAWINGS = ['tooth_leaves_slot', 'thin_wall_as_made', 'clearance_undercuts_ring'];
+
+/** Designs with much to report, which together have every finding of a sweep. */
 const NO_STEEL = { wave_generator: { youngs_modulus_gpa: 70 }, ring: { youngs_modulus_gpa: 120 }, carrier: { youngs_modulus_gpa: 110 } };
 const CLEARANCE = { wave_generator_um: 2, ring_um: 5, carrier_um: 1 };
 const LONG_REPORTS = [
@@ -1143,7 +1146,8 @@ test('a long report has two pages, with every finding, and can be read', async (
     assert.deepEqual(tooSmall, []);
     assert.deepEqual(tooWide, []);
   }
-  assert.deepEqual([...codes].sort(), [...known.enum].sort(), 'every finding there is stands in one of the reports');
+  const others = known.enum.filter((code) => !OF_DRAWINGS.includes(code));
+  assert.deepEqual([...codes].sort(), others.sort(), 'every finding of a sweep stands in one of the reports');
 });
 
 test('headers: a strict policy, and files that are asked for anew', async () => {

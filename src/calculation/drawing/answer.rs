@@ -57,7 +57,7 @@ pub struct DrawingAnswer {
     pub input_angle_deg: Option<f64>,
     /// The parts that are drawn.
     pub bodies: Vec<BodyAnswer>,
-    /// What a designer should be told about the drive.
+    /// What a designer should be told about the drive, and about the drawn parts as they are made.
     pub findings: Vec<FindingAnswer>,
 }
 
@@ -153,7 +153,7 @@ pub enum EdgeAnswer {
 }
 
 /// Where a section stands: turned about its origin, then moved.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ToSchema)]
 pub struct PlacementAnswer {
     /// x of its origin.
     pub x_mm: f64,

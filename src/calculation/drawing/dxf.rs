@@ -1,7 +1,8 @@
-//! Drawings as DXF of AutoCAD 2000: the oldest with light polylines and declared units, read by every CAD and CAM program.
+//! Drawings as DXF of AutoCAD 2000: the oldest with light polylines and declared units.
 //!
 //! Written here because the one library for it (crate dxf 0.6) leaves its tables without handles, which readers have to mend.
-//! Structure and group codes are those of Autodesk's DXF reference.
+//! Structure and group codes are those of Autodesk's DXF reference. docs/dxf.md lists what AutoCAD requires beyond what other
+//! readers do, and which programs have opened these files.
 
 use std::io::{self, Write};
 
@@ -16,7 +17,15 @@ const MODEL_SPACE: u32 = 0x10;
 const PAPER_SPACE: u32 = 0x11;
 const ROOT_DICTIONARY: u32 = 0x12;
 const GROUP_DICTIONARY: u32 = 0x13;
+const PLOT_STYLE_DICTIONARY: u32 = 0x14;
+const PLOT_STYLE: u32 = 0x15;
 const FIRST_FREE: u32 = 0x20;
+
+/// Line weight of layers: the default one.
+const DEFAULT_LINE_WEIGHT: i64 = -3;
+
+/// Share of the view's height that is left free around the drawing when it is opened.
+const VIEW_MARGIN: f64 = 0.1;
 
 /// A layer's name and its colour in the AutoCAD index.
 struct Layer(&'static str, u8);
@@ -40,6 +49,7 @@ pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Resu
     dxf.text(999, &title)?;
     let outlines: usize = drawing.bodies.iter().map(|body| body.placements.len() * (1 + body.holes.len())).sum();
     dxf.header(drawing, outlines)?;
+    dxf.classes()?;
     dxf.tables(drawing)?;
     dxf.blocks()?;
     dxf.section("ENTITIES")?;
@@ -131,9 +141,26 @@ impl Dxf<'_> {
         self.text(0, "ENDSEC")
     }
 
+    /// The kinds of object that are none of AutoCAD's own and stand in this file.
+    fn classes(&mut self) -> io::Result<()> {
+        self.section("CLASSES")?;
+        for (kind, class) in
+            [("ACDBDICTIONARYWDFLT", "AcDbDictionaryWithDefault"), ("ACDBPLACEHOLDER", "AcDbPlaceHolder")]
+        {
+            self.text(0, "CLASS")?;
+            self.text(1, kind)?;
+            self.text(2, class)?;
+            self.text(3, "ObjectDBX Classes")?;
+            for code in [90, 280, 281] {
+                self.integer(code, 0)?;
+            }
+        }
+        self.text(0, "ENDSEC")
+    }
+
     fn tables(&mut self, drawing: &DrawingAnswer) -> io::Result<()> {
         self.section("TABLES")?;
-        self.table("VPORT", 0, |_, _| Ok(()))?;
+        self.table("VPORT", 1, |dxf, table| dxf.view(table, svg::reach_mm(&drawing.bodies)))?;
         self.table("LTYPE", 3, |dxf, table| {
             for name in ["ByBlock", "ByLayer", "Continuous"] {
                 dxf.record("LTYPE", "AcDbLinetypeTableRecord", table, name)?;
@@ -150,6 +177,8 @@ impl Dxf<'_> {
                 dxf.record("LAYER", "AcDbLayerTableRecord", table, name)?;
                 dxf.integer(62, color.into())?;
                 dxf.text(6, "Continuous")?;
+                dxf.integer(370, DEFAULT_LINE_WEIGHT)?;
+                dxf.handle(390, PLOT_STYLE)?;
             }
             Ok(())
         })?;
@@ -209,6 +238,32 @@ impl Dxf<'_> {
         self.text(100, class)?;
         self.text(2, name)?;
         self.integer(70, 0)
+    }
+
+    /// What is seen when the file is opened: the whole drawing, from above, without snap and grid.
+    fn view(&mut self, table: u32, reach_mm: f64) -> io::Result<()> {
+        self.record("VPORT", "AcDbViewportTableRecord", table, "*Active")?;
+        // Its corners on the screen, its centre, snap and grid.
+        for (code, point) in
+            [(10, [0.0; 2]), (11, [1.0; 2]), (12, [0.0; 2]), (13, [0.0; 2]), (14, [10.0; 2]), (15, [10.0; 2])]
+        {
+            self.point(code, point)?;
+        }
+        // The direction that it is seen from, and the point looked at.
+        for (code, z) in [(16, 1.0), (17, 0.0)] {
+            self.point(code, [0.0; 2])?;
+            self.number(code + 20, z)?;
+        }
+        let height_mm = 2.0 * reach_mm * (1.0 + VIEW_MARGIN);
+        // Height, aspect, lens, clipping planes, rotations of snap and view.
+        for (code, value) in [(40, height_mm), (41, 1.0), (42, 50.0), (43, 0.0), (44, 0.0), (50, 0.0), (51, 0.0)] {
+            self.number(code, value)?;
+        }
+        // Mode, smoothness of circles, fast zoom, coordinate icon, and the rest off.
+        for (code, value) in [(71, 0), (72, 1000), (73, 1), (74, 3), (75, 0), (76, 0), (77, 0), (78, 0)] {
+            self.integer(code, value)?;
+        }
+        Ok(())
     }
 
     fn blocks(&mut self) -> io::Result<()> {
@@ -277,17 +332,29 @@ impl Dxf<'_> {
         }
     }
 
+    /// The named dictionaries: of groups, empty, and of plot styles, which every layer has to have one of.
     fn objects(&mut self) -> io::Result<()> {
         self.section("OBJECTS")?;
-        self.object_as("DICTIONARY", ROOT_DICTIONARY, 0)?;
-        self.text(100, "AcDbDictionary")?;
-        self.integer(281, 1)?;
-        self.text(3, "ACAD_GROUP")?;
-        self.handle(350, GROUP_DICTIONARY)?;
-        self.object_as("DICTIONARY", GROUP_DICTIONARY, ROOT_DICTIONARY)?;
-        self.text(100, "AcDbDictionary")?;
-        self.integer(281, 1)?;
+        let entries = [("ACAD_GROUP", GROUP_DICTIONARY), ("ACAD_PLOTSTYLENAME", PLOT_STYLE_DICTIONARY)];
+        self.dictionary("DICTIONARY", ROOT_DICTIONARY, 0, &entries)?;
+        self.dictionary("DICTIONARY", GROUP_DICTIONARY, ROOT_DICTIONARY, &[])?;
+        let normal = [("Normal", PLOT_STYLE)];
+        self.dictionary("ACDBDICTIONARYWDFLT", PLOT_STYLE_DICTIONARY, ROOT_DICTIONARY, &normal)?;
+        self.text(100, "AcDbDictionaryWithDefault")?;
+        self.handle(340, PLOT_STYLE)?;
+        self.object_as("ACDBPLACEHOLDER", PLOT_STYLE, PLOT_STYLE_DICTIONARY)?;
         self.text(0, "ENDSEC")
+    }
+
+    fn dictionary(&mut self, kind: &str, handle: u32, owner: u32, entries: &[(&str, u32)]) -> io::Result<()> {
+        self.object_as(kind, handle, owner)?;
+        self.text(100, "AcDbDictionary")?;
+        self.integer(281, 1)?;
+        for (name, entry) in entries {
+            self.text(3, name)?;
+            self.handle(350, *entry)?;
+        }
+        Ok(())
     }
 }
 

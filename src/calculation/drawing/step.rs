@@ -1,24 +1,39 @@
-//! Drawings as STEP: every part's prisms as solids in place, flanks as cubic splines.
+//! Drawings as STEP: every part one solid, made once, and an assembly of as many instances of each as there are; flanks as cubic
+//! splines, swept along z.
 //!
-//! A prism needs a few kinds of record only: planes, cylinders and splines swept along z, and what joins them. They are those
-//! of ISO 10303-214 (`AUTOMOTIVE_DESIGN`), which every CAD program reads.
+//! A prism needs a few kinds of record only: planes, cylinders and extruded splines, and what joins them. They are those of
+//! ISO 10303-214 (`AUTOMOTIVE_DESIGN`).
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use super::answer::{BodyAnswer, BodyPart, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
 use super::svg;
+use crate::json;
+
+/// How far a spline may be from its curve, as a share of the chord tolerance. A spline through few points is as near to the curve
+/// as chords through many, so points are left out as long as this holds.
+const SPLINE_SHARE_OF_CHORD: f64 = 0.01;
+
+/// Digits of the design's hash in the names of parts: enough to tell designs apart in a tree, few enough to be read there.
+const HASH_DIGITS: usize = 8;
 
 /// Writes a drawing.
 ///
 /// # Errors
 /// Those of the writer.
 pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
-    let mut step = Step { writer, last: 0 };
+    let mut step = Step { writer, last: 0, spline_tolerance_mm: SPLINE_SHARE_OF_CHORD * drawing.chord_tolerance_mm };
     step.head(drawing)?;
     let frame = step.frame()?;
+    let hash = drawing.design_hash.get(..HASH_DIGITS).unwrap_or_default();
+    let mut components = Vec::new();
     for body in &drawing.bodies {
-        step.product(body, &frame)?;
+        components.push((body, step.part(body, hash, &frame)?));
+    }
+    let stands_alone = matches!(&drawing.bodies[..], [body] if body.placements[..] == [PlacementAnswer::default()]);
+    if !stands_alone {
+        step.assembly(&format!("{} {hash}", json::word(&drawing.subject)), &components, &frame)?;
     }
     writeln!(step.writer, "ENDSEC;\nEND-ISO-10303-21;")
 }
@@ -43,8 +58,15 @@ struct Frame {
 
 /// An edge of the bottom, as it is drawn on a prism: counter-clockwise around the material, which is on its left.
 enum Side {
-    Line { end: [f64; 2] },
-    Arc { end: [f64; 2], center: [f64; 2], radius_mm: f64, is_counter_clockwise: bool },
+    Line {
+        end: [f64; 2],
+    },
+    /// Around the origin.
+    Arc {
+        end: [f64; 2],
+        radius_mm: f64,
+        is_counter_clockwise: bool,
+    },
     Curve(Spline),
 }
 
@@ -62,14 +84,21 @@ struct Level {
     z_mm: f64,
     corners: Vec<Id>,
     edges: Vec<Id>,
-    /// Of the splines among the edges, which the surfaces over them share; none of the others.
-    poles: Vec<Vec<Id>>,
+    /// What lies under each edge.
+    curves: Vec<Id>,
+}
+
+/// What others refer to of a product.
+struct Product {
+    definition: Id,
+    representation: Id,
 }
 
 /// The file as it is written: numbered records.
 struct Step<'a> {
     writer: &'a mut dyn Write,
     last: u64,
+    spline_tolerance_mm: f64,
 }
 
 impl Step<'_> {
@@ -111,35 +140,87 @@ impl Step<'_> {
         Ok(Frame { product_context, definition_context, units, origin })
     }
 
-    fn product(&mut self, body: &BodyAnswer, frame: &Frame) -> io::Result<()> {
-        let name = match body.part {
-            BodyPart::WaveGenerator => "wave_generator",
-            BodyPart::Teeth => "teeth",
-            BodyPart::Ring => "ring",
-            BodyPart::Carrier => "carrier",
+    /// A part, made once where its section is drawn.
+    fn part(&mut self, body: &BodyAnswer, hash: &str, frame: &Frame) -> io::Result<Product> {
+        let (name, [red, green, blue]) = match body.part {
+            BodyPart::WaveGenerator => ("wave_generator", [0.33, 0.62, 0.84]),
+            BodyPart::Teeth => ("tooth", [0.94, 0.95, 0.96]),
+            BodyPart::Ring => ("ring", [0.55, 0.62, 0.70]),
+            BodyPart::Carrier => ("carrier_finger", [0.93, 0.72, 0.33]),
         };
-        let Frame { product_context, definition_context, units, origin, .. } = frame;
+        let name = format!("{name} {hash}");
+        let solid = self.solid(body, &name)?;
+        let Frame { units, origin, .. } = frame;
+        let representation =
+            self.record(format_args!("ADVANCED_BREP_SHAPE_REPRESENTATION('{name}',({origin},{solid}),{units})"))?;
+        let colour = self.record(format_args!("COLOUR_RGB('',{},{},{})", Real(red), Real(green), Real(blue)))?;
+        let mut style = self.record(format_args!("FILL_AREA_STYLE_COLOUR('',{colour})"))?;
+        for (kind, arguments) in
+            [("FILL_AREA_STYLE", "'',("), ("SURFACE_STYLE_FILL_AREA", ""), ("SURFACE_SIDE_STYLE", "'',(")]
+        {
+            let end = if arguments.is_empty() { "" } else { ")" };
+            style = self.record(format_args!("{kind}({arguments}{style}{end})"))?;
+        }
+        let usage = self.record(format_args!("SURFACE_STYLE_USAGE(.BOTH.,{style})"))?;
+        let assignment = self.record(format_args!("PRESENTATION_STYLE_ASSIGNMENT(({usage}))"))?;
+        let styled = self.record(format_args!("STYLED_ITEM('colour',({assignment}),{solid})"))?;
+        self.record(format_args!("MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',({styled}),{units})"))?;
+        self.product(&name, representation, frame)
+    }
+
+    /// What names a shape.
+    fn product(&mut self, name: &str, representation: Id, frame: &Frame) -> io::Result<Product> {
+        let Frame { product_context, definition_context, .. } = frame;
         let product = self.record(format_args!("PRODUCT('{name}','{name}','',({product_context}))"))?;
         self.record(format_args!("PRODUCT_RELATED_PRODUCT_CATEGORY('part',$,({product}))"))?;
         let formation = self.record(format_args!("PRODUCT_DEFINITION_FORMATION('','',{product})"))?;
         let definition =
             self.record(format_args!("PRODUCT_DEFINITION('design','',{formation},{definition_context})"))?;
         let shape = self.record(format_args!("PRODUCT_DEFINITION_SHAPE('','',{definition})"))?;
-        let mut items = origin.to_string();
-        for (index, placement) in body.placements.iter().enumerate() {
-            let solid = self.solid(body, placement, &format!("{name} {index}"))?;
-            // Writing to a string does not fail.
-            let _ = write!(items, ",{solid}");
+        self.record(format_args!("SHAPE_DEFINITION_REPRESENTATION({shape},{representation})"))?;
+        Ok(Product { definition, representation })
+    }
+
+    /// The parts in place: of each as many instances as there are placements.
+    fn assembly(&mut self, name: &str, components: &[(&BodyAnswer, Product)], frame: &Frame) -> io::Result<()> {
+        let Frame { units, origin, .. } = frame;
+        let mut places = Vec::new();
+        for (body, _) in components {
+            let mut of_body = Vec::new();
+            for PlacementAnswer { x_mm, y_mm, rotation_deg } in &body.placements {
+                let (sin, cos) = rotation_deg.to_radians().sin_cos();
+                of_body.push(self.placement([*x_mm, *y_mm, 0.0], [0.0, 0.0, 1.0], [cos, sin, 0.0])?);
+            }
+            places.push(of_body);
         }
-        let representation =
-            self.record(format_args!("ADVANCED_BREP_SHAPE_REPRESENTATION('{name}',({items}),{units})"))?;
-        self.record(format_args!("SHAPE_DEFINITION_REPRESENTATION({shape},{representation})")).map(drop)
+        let items = list(&places.concat());
+        let representation = self.record(format_args!("SHAPE_REPRESENTATION('{name}',({origin},{items}),{units})"))?;
+        let whole = self.product(name, representation, frame)?;
+        for ((body, part), places) in components.iter().zip(places) {
+            let part_name = json::word(&body.part);
+            for (index, place) in places.into_iter().enumerate() {
+                let use_name = format!("{part_name} {index}");
+                let (of_whole, of_part) = (whole.definition, part.definition);
+                let occurrence = self.record(format_args!(
+                    "NEXT_ASSEMBLY_USAGE_OCCURRENCE('{use_name}','{use_name}','',{of_whole},{of_part},$)"
+                ))?;
+                let shape = self.record(format_args!("PRODUCT_DEFINITION_SHAPE('','',{occurrence})"))?;
+                let motion = self.record(format_args!("ITEM_DEFINED_TRANSFORMATION('','',{origin},{place})"))?;
+                let (of_whole, of_part) = (whole.representation, part.representation);
+                let relation = self.record(format_args!(
+                    "(REPRESENTATION_RELATIONSHIP('','',{of_part},{of_whole})REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION({motion})SHAPE_REPRESENTATION_RELATIONSHIP())"
+                ))?;
+                self.record(format_args!("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION({relation},{shape})"))?;
+            }
+        }
+        Ok(())
     }
 
     /// A prism from z = 0 up: a face on every edge, a bottom and a top.
-    fn solid(&mut self, body: &BodyAnswer, placement: &PlacementAnswer, name: &str) -> io::Result<Id> {
-        let outer = (sides(&body.outer, placement, false), "FACE_OUTER_BOUND");
-        let holes = body.holes.iter().map(|hole| (sides(hole, placement, true), "FACE_BOUND"));
+    fn solid(&mut self, body: &BodyAnswer, name: &str) -> io::Result<Id> {
+        let tolerance_mm = self.spline_tolerance_mm;
+        let outer = (sides(&body.outer, false, tolerance_mm), "FACE_OUTER_BOUND");
+        let holes = body.holes.iter().map(|hole| (sides(hole, true, tolerance_mm), "FACE_BOUND"));
         let (mut faces, mut bottom_bounds, mut top_bounds) = (Vec::new(), Vec::new(), Vec::new());
         for (sides, bound) in [outer].into_iter().chain(holes) {
             let bottom = self.level(&sides, 0.0)?;
@@ -169,41 +250,35 @@ impl Step<'_> {
         }
         // Each side ends at the corner of its index and starts at the one before.
         corners.rotate_right(1);
-        let (mut edges, mut poles) = (Vec::new(), Vec::new());
+        let (mut edges, mut curves) = (Vec::new(), Vec::new());
         for (index, side) in sides.iter().enumerate() {
             let start = sides[(index + sides.len() - 1) % sides.len()].end();
-            poles.push(self.poles(side, z_mm)?);
-            let (curve, runs_along) = self.curve(side, start, z_mm, &poles[index])?;
+            let (curve, runs_along) = self.curve(side, start, z_mm)?;
+            curves.push(curve);
             let (from, to) = (corners[index], corners[(index + 1) % corners.len()]);
             edges.push(self.record(format_args!("EDGE_CURVE('',{from},{to},{curve},{runs_along})"))?);
         }
-        Ok(Level { z_mm, corners, edges, poles })
-    }
-
-    fn poles(&mut self, side: &Side, z_mm: f64) -> io::Result<Vec<Id>> {
-        match side {
-            Side::Line { .. } | Side::Arc { .. } => Ok(Vec::new()),
-            Side::Curve(spline) => spline.poles.iter().map(|[x, y]| self.point([*x, *y, z_mm])).collect(),
-        }
+        Ok(Level { z_mm, corners, edges, curves })
     }
 
     /// The curve under an edge, and whether the edge runs along it.
-    fn curve(&mut self, side: &Side, start: [f64; 2], z_mm: f64, poles: &[Id]) -> io::Result<(Id, &'static str)> {
+    fn curve(&mut self, side: &Side, start: [f64; 2], z_mm: f64) -> io::Result<(Id, &'static str)> {
         match side {
             Side::Line { end } => {
                 let point = self.point([start[0], start[1], z_mm])?;
                 let [x, y] = unit([end[0] - start[0], end[1] - start[1]]);
                 Ok((self.line(point, [x, y, 0.0])?, ".T."))
             }
-            Side::Arc { center: [x, y], radius_mm, is_counter_clockwise, .. } => {
-                let place = self.placement([*x, *y, z_mm], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
+            Side::Arc { radius_mm, is_counter_clockwise, .. } => {
+                let place = self.placement([0.0, 0.0, z_mm], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
                 let circle = self.record(format_args!("CIRCLE('',{place},{})", Real(*radius_mm)))?;
                 Ok((circle, if *is_counter_clockwise { ".T." } else { ".F." }))
             }
-            Side::Curve(Spline { multiplicities, knots, .. }) => {
+            Side::Curve(Spline { poles, multiplicities, knots }) => {
+                let poles: Vec<_> = poles.iter().map(|[x, y]| self.point([*x, *y, z_mm])).collect::<Result<_, _>>()?;
                 let spline = self.record(format_args!(
                     "B_SPLINE_CURVE_WITH_KNOTS('',3,({}),.UNSPECIFIED.,.F.,.F.,({multiplicities}),({knots}),.UNSPECIFIED.)",
-                    list(poles)
+                    list(&poles)
                 ))?;
                 Ok((spline, ".T."))
             }
@@ -222,7 +297,7 @@ impl Step<'_> {
         let mut faces = Vec::new();
         for (index, side) in sides.iter().enumerate() {
             let start = sides[(index + sides.len() - 1) % sides.len()].end();
-            let (surface, faces_outward) = self.surface(index, side, start, bottom, top)?;
+            let (surface, faces_outward) = self.surface(side, start, bottom, bottom.curves[index])?;
             let next = (index + 1) % sides.len();
             let around = self.edge_loop([
                 (bottom.edges[index], true),
@@ -236,38 +311,25 @@ impl Step<'_> {
         Ok(faces)
     }
 
-    /// The surface over the edge of an index, and whether its normal points out of the material, to the right of the edge.
-    fn surface(
-        &mut self,
-        index: usize,
-        side: &Side,
-        start: [f64; 2],
-        bottom: &Level,
-        top: &Level,
-    ) -> io::Result<(Id, &'static str)> {
+    /// The surface over an edge, and whether its normal points out of the material, to the right of the edge.
+    fn surface(&mut self, side: &Side, start: [f64; 2], bottom: &Level, curve: Id) -> io::Result<(Id, &'static str)> {
         match side {
             Side::Line { end } => {
                 let [x, y] = unit([end[0] - start[0], end[1] - start[1]]);
                 let place = self.placement([start[0], start[1], bottom.z_mm], [y, -x, 0.0], [x, y, 0.0])?;
                 Ok((self.record(format_args!("PLANE('',{place})"))?, ".T."))
             }
-            Side::Arc { center: [x, y], radius_mm, is_counter_clockwise, .. } => {
-                let place = self.placement([*x, *y, bottom.z_mm], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
+            Side::Arc { radius_mm, is_counter_clockwise, .. } => {
+                let place = self.placement([0.0, 0.0, bottom.z_mm], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
                 let cylinder = self.record(format_args!("CYLINDRICAL_SURFACE('',{place},{})", Real(*radius_mm)))?;
                 // A cylinder's normal points away from its axis.
                 Ok((cylinder, if *is_counter_clockwise { ".T." } else { ".F." }))
             }
-            Side::Curve(Spline { multiplicities, knots, .. }) => {
-                let pairs: Vec<_> = bottom.poles[index]
-                    .iter()
-                    .zip(&top.poles[index])
-                    .map(|(low, high)| format!("({low},{high})"))
-                    .collect();
-                let pairs = pairs.join(",");
-                let surface = self.record(format_args!(
-                    "B_SPLINE_SURFACE_WITH_KNOTS('',3,1,({pairs}),.UNSPECIFIED.,.F.,.F.,.F.,({multiplicities}),(2,2),({knots}),(0.,1.),.UNSPECIFIED.)"
-                ))?;
-                Ok((surface, ".T."))
+            Side::Curve(_) => {
+                let up = self.direction([0.0, 0.0, 1.0])?;
+                let sweep = self.record(format_args!("VECTOR('',{up},1.)"))?;
+                // Its normal is that of the curve's direction times z.
+                Ok((self.record(format_args!("SURFACE_OF_LINEAR_EXTRUSION('',{curve},{sweep})"))?, ".T."))
             }
         }
     }
@@ -302,15 +364,10 @@ impl Step<'_> {
 }
 
 /// The sides of a prism over an outline; those of a hole run clockwise, so that the material is on their left too.
-fn sides(outline: &OutlineAnswer, placement: &PlacementAnswer, is_hole: bool) -> Vec<Side> {
-    let place = placement.placing();
-    let center = [placement.x_mm, placement.y_mm];
+fn sides(outline: &OutlineAnswer, is_hole: bool, tolerance_mm: f64) -> Vec<Side> {
     let mut sides: Vec<_> = match outline {
         OutlineAnswer::Circle { radius_mm } => {
-            let half = |x: f64| {
-                let end = place([x, 0.0]);
-                Side::Arc { end, center, radius_mm: *radius_mm, is_counter_clockwise: !is_hole }
-            };
+            let half = |x: f64| Side::Arc { end: [x, 0.0], radius_mm: *radius_mm, is_counter_clockwise: !is_hole };
             // Halves, because an edge from a corner to itself is not every reader's strength. A hole's are the same ones.
             return vec![half(-radius_mm), half(*radius_mm)];
         }
@@ -319,17 +376,14 @@ fn sides(outline: &OutlineAnswer, placement: &PlacementAnswer, is_hole: bool) ->
             .map(|edge| {
                 let end = if is_hole { edge.start() } else { edge.end() };
                 match edge {
-                    EdgeAnswer::Line { .. } => Side::Line { end: place(end) },
-                    EdgeAnswer::Arc { radius_mm, sweep_deg, .. } => Side::Arc {
-                        end: place(end),
-                        center,
-                        radius_mm: *radius_mm,
-                        is_counter_clockwise: (*sweep_deg > 0.0) != is_hole,
-                    },
+                    EdgeAnswer::Line { .. } => Side::Line { end },
+                    EdgeAnswer::Arc { radius_mm, sweep_deg, .. } => {
+                        Side::Arc { end, radius_mm: *radius_mm, is_counter_clockwise: (*sweep_deg > 0.0) != is_hole }
+                    }
                     EdgeAnswer::Curve { x_mm, y_mm, start_tangent_deg, end_tangent_deg } => {
-                        let mut points: Vec<_> = x_mm.iter().zip(y_mm).map(|(&x, &y)| place([x, y])).collect();
+                        let mut points: Vec<_> = x_mm.iter().zip(y_mm).map(|(&x, &y)| [x, y]).collect();
                         let direction = |deg: &f64| {
-                            let (sin, cos) = (deg + placement.rotation_deg).to_radians().sin_cos();
+                            let (sin, cos) = deg.to_radians().sin_cos();
                             if is_hole { [-cos, -sin] } else { [cos, sin] }
                         };
                         let mut end_tangents = [direction(start_tangent_deg), direction(end_tangent_deg)];
@@ -337,7 +391,7 @@ fn sides(outline: &OutlineAnswer, placement: &PlacementAnswer, is_hole: bool) ->
                             points.reverse();
                             end_tangents.reverse();
                         }
-                        Side::Curve(Spline::through(&points, &end_tangents))
+                        Side::Curve(Spline::near(&points, &end_tangents, tolerance_mm))
                     }
                 }
             })
@@ -349,6 +403,55 @@ fn sides(outline: &OutlineAnswer, placement: &PlacementAnswer, is_hole: bool) ->
     sides
 }
 
+/// A cubic spline through points: of two continuous derivatives over the length of the chords, with unit tangents at both ends.
+/// It leaves the curve by the fourth power of the chord.
+struct Interpolation {
+    points: Vec<[f64; 2]>,
+    chords_mm: Vec<f64>,
+    slopes: Vec<[f64; 2]>,
+}
+
+impl Interpolation {
+    fn through(points: Vec<[f64; 2]>, end_tangents: &[[f64; 2]; 2]) -> Self {
+        let chords_mm: Vec<f64> =
+            points.windows(2).map(|two| (two[1][0] - two[0][0]).hypot(two[1][1] - two[0][1])).collect();
+        let [along_x, along_y] = [0, 1].map(|axis| {
+            let column: Vec<f64> = points.iter().map(|point| point[axis]).collect();
+            slopes(&column, &chords_mm, end_tangents[0][axis], end_tangents[1][axis])
+        });
+        let slopes = along_x.into_iter().zip(along_y).map(|(x, y)| [x, y]).collect();
+        Self { points, chords_mm, slopes }
+    }
+
+    /// Bézier's polygon of a piece: its inner points a third of the chord from the ends, along the slopes there.
+    fn polygon(&self, piece: usize) -> [[f64; 2]; 4] {
+        let third_mm = self.chords_mm[piece] / 3.0;
+        let after = |i: usize, mm: f64| [0, 1].map(|axis| self.points[i][axis] + mm * self.slopes[i][axis]);
+        [self.points[piece], after(piece, third_mm), after(piece + 1, -third_mm), self.points[piece + 1]]
+    }
+
+    /// How far a point that is near to a piece is from it.
+    fn distance_mm(&self, piece: usize, [x, y]: [f64; 2]) -> f64 {
+        let [p, q, r, s] = self.polygon(piece);
+        let between = |a: [f64; 2], b: [f64; 2], t: f64| [0, 1].map(|axis| a[axis] + t * (b[axis] - a[axis]));
+        // The point on the piece at a share of it, and the derivative there, by de Casteljau.
+        let at = |t: f64| {
+            let (pq, qr, rs) = (between(p, q, t), between(q, r, t), between(r, s, t));
+            let (first, last) = (between(pq, qr, t), between(qr, rs, t));
+            (between(first, last, t), [0, 1].map(|axis| 3.0 * (last[axis] - first[axis])))
+        };
+        let chord = [s[0] - p[0], s[1] - p[1]];
+        let mut t = ((x - p[0]) * chord[0] + (y - p[1]) * chord[1]) / (chord[0] * chord[0] + chord[1] * chord[1]);
+        // Gauss and Newton: every step squares the error of the foot, and the error of the distance is its square again.
+        for _ in 0..4 {
+            let (foot, along) = at(t);
+            t += ((x - foot[0]) * along[0] + (y - foot[1]) * along[1]) / (along[0] * along[0] + along[1] * along[1]);
+        }
+        let (foot, _) = at(t);
+        (x - foot[0]).hypot(y - foot[1])
+    }
+}
+
 /// A cubic spline as STEP has it.
 struct Spline {
     poles: Vec<[f64; 2]>,
@@ -357,26 +460,36 @@ struct Spline {
 }
 
 impl Spline {
-    /// Through points, of two continuous derivatives over the length of the chords, with unit tangents at both ends; it leaves the
-    /// curve by the fourth power of the chord.
-    fn through(points: &[[f64; 2]], end_tangents: &[[f64; 2]; 2]) -> Self {
-        let chords_mm: Vec<f64> =
-            points.windows(2).map(|two| (two[1][0] - two[0][0]).hypot(two[1][1] - two[0][1])).collect();
-        let [along_x, along_y] = [0, 1].map(|axis| {
-            let column: Vec<f64> = points.iter().map(|point| point[axis]).collect();
-            slopes(&column, &chords_mm, end_tangents[0][axis], end_tangents[1][axis])
-        });
+    /// Through as few of the points of a curve as it takes to pass all others within a tolerance: pieces that do not are halved.
+    fn near(points: &[[f64; 2]], end_tangents: &[[f64; 2]; 2], tolerance_mm: f64) -> Self {
+        let mut kept = vec![0, points.len() - 1];
+        loop {
+            let spline = Interpolation::through(kept.iter().map(|&index| points[index]).collect(), end_tangents);
+            let mut next = vec![0];
+            for (piece, ends) in kept.windows(2).enumerate() {
+                let (from, to) = (ends[0], ends[1]);
+                if points[from + 1..to].iter().any(|&point| spline.distance_mm(piece, point) > tolerance_mm) {
+                    next.push(from.midpoint(to));
+                }
+                next.push(to);
+            }
+            if next.len() == kept.len() {
+                return Self::of(&spline);
+            }
+            kept = next;
+        }
+    }
+
+    fn of(spline: &Interpolation) -> Self {
+        let Interpolation { points, chords_mm, .. } = spline;
         let last = chords_mm.len();
-        // The inner points of Bézier's polygon of a piece: a third of a chord from its ends, along the slopes there.
-        let after = |i: usize, part: f64| [points[i][0] + part * along_x[i], points[i][1] + part * along_y[i]];
-        let inner = |i: usize| [after(i, chords_mm[i] / 3.0), after(i + 1, -chords_mm[i] / 3.0)];
-        let mut poles = vec![points[0], inner(0)[0]];
+        let mut poles = vec![points[0], spline.polygon(0)[1]];
         for i in 1..last {
             // Blossoming: the pole of three knots in a row lies on the line through the inner points of the piece after the middle one.
-            let ([first, second], ratio) = (inner(i), chords_mm[i - 1] / chords_mm[i]);
+            let ([_, first, second, _], ratio) = (spline.polygon(i), chords_mm[i - 1] / chords_mm[i]);
             poles.push([0, 1].map(|axis| first[axis] - ratio * (second[axis] - first[axis])));
         }
-        poles.extend([inner(last - 1)[1], points[last]]);
+        poles.extend([spline.polygon(last - 1)[2], points[last]]);
         let (mut multiplicities, mut knots) = (String::from("4"), String::from("0."));
         let mut length_mm = 0.0;
         for (i, chord_mm) in chords_mm.iter().enumerate() {

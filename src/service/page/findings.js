@@ -75,6 +75,24 @@ const KINDS = {
     why: 'Lever arms and directions are those of the drive without load; a wind-up of one period moves every tooth on by a whole spacing.',
     change: 'A torque that suits the drive, or clearances that do.',
   },
+  tooth_leaves_slot: {
+    title: 'Tooth leaves its slot',
+    tests: 'How far the teeth’s centres go, against where the drawn carrier’s slot walls end.',
+    basis: GEOMETRY,
+    why: 'Beyond the end of its wall a tooth presses on an edge, or on nothing.',
+  },
+  thin_wall_as_made: {
+    title: 'Thin wall of a drawn part',
+    tests: 'The drawn ring’s rim, or the wave generator’s wall around its bore, against a quarter of a slot’s width.',
+    basis: RULE_OF_THUMB,
+    why: 'Forces and stresses are those of rigid parts.',
+  },
+  clearance_undercuts_ring: {
+    title: 'Clearance undercuts the ring',
+    tests: 'The drawn flank’s distance from the path of the teeth’s centres, the tooth radius and the ring’s clearance, against the one that undercuts.',
+    basis: GEOMETRY,
+    why: 'Results are those of the flank without clearance, which is longer.',
+  },
   stress_above_fatigue_limit: {
     title: 'Stress above the fatigue limit',
     tests: 'The peak contact stress over a period against the fatigue limit of bearing steel.',
