@@ -1,6 +1,6 @@
 //! Wave generators, one file a kind (docs/theory.md section 2).
 //!
-//! A further kind is a file that implements [`Kind`], a line of [`Cam`] with its arm in [`Cam::kind`], and a line of [`WaveGenerator`]
+//! A further kind is a file that implements `Kind`, a line of [`Cam`] with its arm in `Cam::kind`, and a line of [`WaveGenerator`]
 //! that says what a designer gives for it.
 
 mod ellipse;
