@@ -1,6 +1,7 @@
 //! Friction against exact equilibria (tests/reference/friction.py), closed forms and brute force.
 
 use std::f64::consts::PI;
+use std::sync::atomic::AtomicBool;
 
 use proptest::prelude::*;
 use serde_json::Value;
@@ -9,13 +10,18 @@ use toothwave_solver::losses::bearing::{LoadForRevolutions, RollingElement};
 use toothwave_solver::losses::duty::{
     BearingLoadForTime, ColumnForTime, DutyPoint, bearing_life_h, mean_at_each_place,
 };
+use toothwave_solver::losses::period::{Losses, RadialForces};
 use toothwave_solver::losses::wear::WearParameters;
 use toothwave_solver::losses::{
     AtInputAngle, Efficiency, Fixed, Friction, FrictionParameters, LoadedTooth, Mechanism, RaceBearing, Turning,
     WaveGeneratorFriction, mean_over_period, power_w, pressure_velocity_mpa_m_per_s,
 };
 use toothwave_solver::mesh::{Mesh, Samples};
-use toothwave_solver::{Compatibility, Contact, DriveParameters, LoadCase, Parameter, PerContact, Violation};
+use toothwave_solver::sweep::{Points, sweep};
+use toothwave_solver::{
+    Compatibility, Contact, DriveParameters, LoadCase, Never, Parameter, PerContact, SolveError, ToothShape, Violation,
+    WaveGenerator,
+};
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, load};
 use crate::reference::number;
@@ -705,4 +711,98 @@ fn friction_of_nothing_takes_nothing() {
     assert!(teeth.iter().all(|slip| slip.rolls.is_none()));
     assert_eq!(work_nmm_per_rad, PerContact::default());
     assert_eq!(case.mechanism(true).efficiency(Fixed::Ring, 0.0), Efficiency { driven: 1.0, back_driven: 1.0 });
+}
+
+#[test]
+fn a_period_loses_what_its_input_angles_lose_one_by_one() {
+    for parameters in [PAPER_5_1, PAPER_5_2] {
+        let (drive, mechanism) = (drive(&parameters), mechanism(&parameters));
+        let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
+        let sweep = sweep(&drive, &load, Points::samples(40).unwrap(), &Never).unwrap();
+        let race = WaveGeneratorFriction::Race { coefficient: 0.05, bearing: bearing_of_5_1(0.002) };
+        for friction in [plain(0.03, 0.05), with(race, 0.04)] {
+            let losses = Losses::of(&drive, &sweep, &friction, &Never).unwrap();
+            let expected = mean_loss_ratio(&parameters, &mechanism, &friction);
+            assert_near(losses.mean.total(), expected, 1e-12 * expected, "mean");
+            let loaded = LoadedDrive::new(&drive, &load).unwrap();
+            let slips: Vec<_> = (0..=40)
+                .flat_map(|sample| mechanism.turning(&friction, &teeth_at(&loaded, sample, 40)).teeth)
+                .collect();
+            assert_eq!(slips.len(), sweep.states.len());
+            for (state, slip) in slips.iter().enumerate() {
+                for contact in CONTACTS {
+                    let found = losses.slip_mm_per_rad.get(contact)[state];
+                    assert_near(found, *slip.slip_mm_per_rad.get(contact), 1e-10, "slip");
+                }
+            }
+            assert_eq!(losses.loss_ratio.len(), sweep.input_angles.input_angle_deg.len());
+        }
+    }
+}
+
+#[test]
+fn a_sweep_to_a_tolerance_loses_what_many_samples_lose() {
+    for parameters in [PAPER_5_1, PAPER_5_2] {
+        let drive = drive(&parameters);
+        let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
+        let mean = |points| {
+            let sweep = sweep(&drive, &load, points, &Never).unwrap();
+            let losses = Losses::of(&drive, &sweep, &plain(0.03, 0.05), &Never).unwrap();
+            // Where a tooth enters the angle stands twice, and counts twice here too.
+            assert_eq!(losses.loss_ratio.len(), sweep.input_angles.input_angle_deg.len());
+            losses.mean.total()
+        };
+        let fine = mean(Points::samples(4000).unwrap());
+        for tolerance in [1e-3, 1e-6] {
+            let found = mean(Points::tolerance(tolerance, 1_000_000).unwrap());
+            println!("{tolerance:e}: {found} {fine} {:e}", found / fine - 1.0);
+            assert_near(found, fine, 1e-2 * fine, "mean");
+        }
+    }
+}
+
+#[test]
+fn a_race_runs_around_each_kind_of_cam_at_its_mean_radius() {
+    let radius_mm = |wave_generator: WaveGenerator| wave_generator.race_radius_mm(4.0);
+    assert_eq!(radius_mm(WaveGenerator::Ellipse { semi_major_mm: 58.0, semi_minor_mm: 56.0 }), 57.0);
+    assert_eq!(radius_mm(WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 }), 30.8);
+    assert_eq!(radius_mm(WaveGenerator::Harmonic { lobes: 3, mean_radius_mm: 48.0, amplitude_mm: 1.0 }), 48.0);
+    let path = WaveGenerator::HarmonicPath { lobes: 3, mean_path_radius_mm: 52.0, amplitude_mm: 1.0 };
+    assert_eq!(radius_mm(path), 48.0);
+    let flat = DriveParameters { tooth: ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 4.0 }, ..PAPER_5_1 };
+    assert!(!mechanism(&flat).tooth_spins && mechanism(&PAPER_5_1).tooth_spins);
+}
+
+#[test]
+fn the_radial_force_of_a_sweep_is_that_of_the_torque_on_an_eccentric_and_none_on_lobes_alike() {
+    let parameters = DriveParameters {
+        wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
+        teeth: 28,
+        installed: 28,
+        tooth_radius_mm: 2.5,
+        tooth: ToothShape::Cylinder { width_mm: 10.0 },
+        ring_teeth: 27,
+        tip_radius_mm: None,
+    };
+    let load = LoadCase::new(&load(5.0, Compatibility::VirtualWork)).unwrap();
+    let forces = |parameters: &DriveParameters| {
+        let drive = drive(parameters);
+        let sweep = sweep(&drive, &load, Points::samples(9).unwrap(), &Never).unwrap();
+        RadialForces::of(&drive, &sweep, &Never).unwrap()
+    };
+    let RadialForces { force_n, direction_deg } = forces(&parameters).unwrap();
+    assert_eq!(force_n.len(), 10);
+    for (force_n, direction_deg) in force_n.iter().zip(direction_deg) {
+        assert_near(force_n * direction_deg.to_radians().sin(), -5e3 / 1.2, 1e-8, "across the eccentricity");
+    }
+    assert_eq!(forces(&PAPER_5_1), None);
+}
+
+#[test]
+fn losses_of_a_sweep_stop_when_told_to() {
+    let drive = drive(&PAPER_5_1);
+    let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
+    let sweep = sweep(&drive, &load, Points::samples(4).unwrap(), &Never).unwrap();
+    let stopped = Losses::of(&drive, &sweep, &plain(0.03, 0.05), &AtomicBool::new(true));
+    assert_eq!(stopped, Err(SolveError::Stopped));
 }
