@@ -4,6 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 use toothwave_solver::drawing::DrawingParameters;
+use toothwave_solver::losses::Friction;
 use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::profile::{Extent, ProfileParameters};
 use toothwave_solver::sweep::Points;
@@ -19,11 +20,13 @@ use crate::no_answer::NoAnswer;
 
 mod asked;
 mod drive;
+mod friction;
 mod load;
 mod number;
 
 pub use asked::*;
 pub use drive::*;
+pub use friction::*;
 pub use load::*;
 pub use number::Whole;
 
@@ -51,6 +54,10 @@ pub struct Design {
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub load: Option<LoadDocument>,
+    /// Friction; only a sweep reads it, and left out, nothing of it is computed.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub friction: Option<FrictionDocument>,
     /// The model of load sharing.
     #[serde(default)]
     pub model: ModelDocument,
@@ -179,6 +186,27 @@ impl Design {
             }),
             allowable_stress_mpa: load.allowable_stress_mpa,
         })
+    }
+
+    /// Speed of the wave generator.
+    ///
+    /// # Errors
+    /// The violation of its range.
+    pub fn input_speed_rpm(&self) -> Result<Option<f64>, Violation> {
+        let speed_rpm = self.load.as_ref().and_then(|load| load.input_speed_rpm);
+        speed_rpm.and_then(|speed_rpm| Parameter::InputSpeed.check(speed_rpm)).map_or(Ok(speed_rpm), Err)
+    }
+
+    /// Friction, where there is any.
+    ///
+    /// # Errors
+    /// Every value that is out of its range.
+    pub fn friction(&self) -> Result<Option<Friction>, Vec<Violation>> {
+        let Some(document) = &self.friction else { return Ok(None) };
+        match (document.idle_violation(), Friction::new(&document.into())) {
+            (None, friction) => friction.map(Some),
+            (Some(idle), friction) => Err(std::iter::once(idle).chain(friction.err().into_iter().flatten()).collect()),
+        }
     }
 
     fn contact_law(&self) -> ContactLaw {

@@ -77,6 +77,10 @@ pub enum FindingCode {
     ThinWallAsMade,
     /// The ring's flank is undercut only because its clearance sets it back.
     ClearanceUndercutsRing,
+    /// Friction beyond the range in which first order was held against exact equilibria.
+    FrictionBeyondMeasured,
+    /// Friction so large that an exact equilibrium may have quite another efficiency.
+    EfficiencyUncertain,
     /// A stress above the fatigue limit of bearing steel.
     StressAboveFatigueLimit,
 }
@@ -317,6 +321,30 @@ impl From<&Finding> for FindingAnswer {
                 "mm",
                 "the ring's clearance alone cuts away its tooth tips: the flank as drawn ends before the one that is computed with, so teeth enter later than the results say".into(),
                 "make the clearance smaller, or take it from the teeth's radius instead",
+            ),
+            Finding::FrictionBeyondMeasured { is_along_cam, coefficient, limit } => new(
+                Code::FrictionBeyondMeasured,
+                Warning,
+                &["/friction"],
+                coefficient,
+                limit,
+                "",
+                if is_along_cam {
+                    "the friction along the wave generator lies beyond the range in which losses were held against exact equilibria: efficiencies are tendencies".into()
+                } else {
+                    "a coefficient of friction lies beyond the range in which losses were held against exact equilibria: efficiencies are tendencies".into()
+                },
+                "let the teeth run on a bearing, or choose surfaces that slide better",
+            ),
+            Finding::EfficiencyUncertain { error, limit } => new(
+                Code::EfficiencyUncertain,
+                Info,
+                &["/friction"],
+                error,
+                limit,
+                "",
+                "friction alters the normal forces themselves, which losses to first order leave out: an exact equilibrium may have an efficiency that is off by as much as this".into(),
+                "let the teeth run on a bearing, or take the efficiency for a tendency",
             ),
             Finding::StressAboveFatigueLimit { contact, stress_mpa } => new(
                 Code::StressAboveFatigueLimit,

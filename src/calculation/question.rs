@@ -99,6 +99,7 @@ pub(crate) fn checked_load(
 ) -> Result<Option<LoadCase>, NoAnswer> {
     let parameters = design.load_parameters()?;
     let load = LoadCase::new(&parameters).map_err(|found| violations.extend(found)).ok();
+    violations.extend(design.input_speed_rpm().err());
     violations.extend(parameters.clearance_violations(draft).map_err(SolveError::from)?);
     Ok(load)
 }

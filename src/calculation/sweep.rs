@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use toothwave_solver::losses::{Friction, Mechanism, period};
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self as solver, Points};
@@ -16,8 +17,10 @@ use crate::key::Encode;
 use crate::no_answer::{NoAnswer, NoAnswerCode, too_many};
 use crate::question::{Limits, Question, checked_drive, checked_load, require_finite};
 use crate::sweep::answer::{ChecksAnswer, LoadAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
+use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
 
 pub mod answer;
+pub mod losses;
 mod plots;
 
 /// The checked parameters of a sweep.
@@ -25,6 +28,8 @@ mod plots;
 pub struct CheckedSweep {
     drive: Drive,
     load: LoadCase,
+    friction: Option<Friction>,
+    input_speed_rpm: Option<f64>,
     points: Points,
     with_clearance: bool,
     with_wind_up: bool,
@@ -43,7 +48,7 @@ impl Question for Sweep {
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
-        (&design.drive, &design.materials, &design.load, &design.model, &design.sweep)
+        (&design.drive, &design.materials, &design.load, &design.friction, &design.model, &design.sweep)
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedSweep, NoAnswer> {
@@ -51,6 +56,10 @@ impl Question for Sweep {
         let draft = checked_drive(design, &mut violations)?;
         // In the document's order: of structural faults the first is told.
         let load = checked_load(design, &draft, &mut violations)?;
+        let friction = design.friction().unwrap_or_else(|found| {
+            violations.extend(found);
+            None
+        });
         let points = design.sweep_points(limits.max_states)?;
         let (drive, load, points) = match (draft.drive(), load, points) {
             (Some(drive), Some(load), Ok(points)) if violations.is_empty() => (drive, load, points),
@@ -70,14 +79,21 @@ impl Question for Sweep {
             }
         }
         let (with_clearance, with_wind_up) = (design.model.clearance.is_some(), design.sweep.wind_up);
-        Ok(CheckedSweep { drive, load, points, with_clearance, with_wind_up })
+        // In its range, or its violation would be among the others.
+        let input_speed_rpm = design.input_speed_rpm().unwrap_or_default();
+        Ok(CheckedSweep { drive, load, friction, input_speed_rpm, points, with_clearance, with_wind_up })
     }
 
     fn columns_bytes(checked: &CheckedSweep) -> u64 {
         // Eleven columns of doubles and one of teeth; of a sweep to a tolerance nobody knows how long they will be.
         const STATE_BYTES: u64 = 11 * 8 + 4;
+        // Three columns of slips and one of words.
+        const LOSSES_BYTES: u64 = 3 * 8 + 2;
         match checked.points {
-            Points::Samples(samples) => STATE_BYTES * Mesh::new(&checked.drive).state_count(samples),
+            Points::Samples(samples) => {
+                let of_losses = if checked.friction.is_some() { LOSSES_BYTES } else { 0 };
+                (STATE_BYTES + of_losses) * Mesh::new(&checked.drive).state_count(samples)
+            }
             Points::Tolerance { .. } => 0,
         }
     }
@@ -85,15 +101,17 @@ impl Question for Sweep {
     fn is_short(checked: &CheckedSweep) -> bool {
         /// They are solved and written in about 0.1 ms; with Palmgren's law and all that can be asked for in a quarter of a millisecond.
         const FEW_STATES: u64 = 400;
-        let CheckedSweep { drive, points, with_clearance, .. } = checked;
+        let CheckedSweep { drive, friction, points, with_clearance, .. } = checked;
         match points {
-            Points::Samples(samples) => !with_clearance && Mesh::new(drive).state_count(*samples) <= FEW_STATES,
+            Points::Samples(samples) => {
+                !with_clearance && friction.is_none() && Mesh::new(drive).state_count(*samples) <= FEW_STATES
+            }
             Points::Tolerance { .. } => false,
         }
     }
 
     fn answer(checked: &CheckedSweep, stop: &impl Stop) -> Result<SweepAnswer, NoAnswer> {
-        let CheckedSweep { drive, load, points, with_clearance, with_wind_up } = checked;
+        let CheckedSweep { drive, load, friction, input_speed_rpm, points, with_clearance, with_wind_up } = checked;
         let sweep = solver::sweep(drive, load, *points, stop)?;
         let mesh = Mesh::new(drive);
         let mut findings = drive_findings(drive)?;
@@ -101,7 +119,19 @@ impl Question for Sweep {
         let of_contacts = findings::of_contacts(drive, load, &sweep.peaks, approaches_matter);
         let of_half_widths = findings::of_half_widths(drive, load, &sweep.states);
         let of_wind_up = findings::of_wind_up(drive, &sweep);
-        findings.extend(of_wind_up.iter().chain(&of_half_widths).chain(&of_contacts).map(FindingAnswer::from));
+        let radial_force_n = period::RadialForces::of(drive, &sweep, stop)?
+            .map(|forces| RadialForceAnswer::new(&sweep, forces))
+            .transpose()?;
+        let mut of_friction = None;
+        let mut losses = None;
+        if let Some(friction) = friction {
+            let of_period = period::Losses::of(drive, &sweep, friction, stop)?;
+            of_friction = findings::of_friction(&Mechanism::of(drive), friction, of_period.mean.total());
+            let input_torque_nm = load.input_torque_nm(drive);
+            losses = Some(LossesAnswer::new(drive, friction, input_torque_nm, *input_speed_rpm, &sweep, of_period)?);
+        }
+        let of_sweep = of_wind_up.iter().chain(&of_half_widths).chain(&of_friction).chain(&of_contacts);
+        findings.extend(of_sweep.map(FindingAnswer::from));
         let answer = SweepAnswer {
             solver_version: toothwave_solver::VERSION,
             build: crate::BUILD,
@@ -117,6 +147,8 @@ impl Question for Sweep {
             loaded_teeth_per_zone: sweep.loaded_teeth().into(),
             wind_up: with_wind_up.then(|| WindUpAnswer::new(drive, &sweep)),
             torque_capacity: sweep.torque_capacity.map(Into::into),
+            losses,
+            radial_force_n,
             checks: ChecksAnswer {
                 torque_balance_residual: sweep.torque_balance_residual,
                 period_closure_residual: sweep.period_closure_residual,
@@ -165,7 +197,8 @@ impl Forms for SweepAnswer {
 
     fn expected_bytes(&self) -> usize {
         // Eleven numbers of about 18 characters and a short one, each with its comma.
-        4096 + 220 * self.states.tooth.len()
+        let of_losses = if self.losses.is_some() { 80 } else { 0 };
+        4096 + (220 + of_losses) * self.states.tooth.len()
     }
 }
 
@@ -245,6 +278,13 @@ impl SweepAnswer {
             writeln!(writer, "\nwind-up of the input                {least:.6} to {most:.6} deg")?;
             writeln!(writer, "torsional stiffness at the output   {softest:.6e} to {stiffest:.6e} N·m/rad")?;
             writeln!(writer, "transmission error, peak to peak    {error_deg:.3e} deg")?;
+        }
+        if let Some(losses) = &self.losses {
+            losses.write_text(writer)?;
+        }
+        if let Some(radial_force) = &self.radial_force_n {
+            let most_n = radial_force.value.iter().copied().fold(0.0, f64::max);
+            writeln!(writer, "\nlargest force on the wave generator {most_n:.6} N, across its axis")?;
         }
         write_findings(&self.findings, writer)
     }

@@ -6,6 +6,7 @@ use crate::cam::Cam;
 use crate::contact::{Contact, ContactLaw, Material, Materials, PerContact, half_width_mm};
 use crate::drive::{Drive, ToothShape};
 use crate::load_sharing::LoadCase;
+use crate::losses::{FirstOrderError, Fixed, Friction, MEASURED_TO, MEASURED_TO_ALONG_CAM, Mechanism};
 use crate::mesh::Mesh;
 use crate::parts::{CarrierPart, RingPart, WaveGeneratorPart};
 use crate::ring::FlankEnd;
@@ -30,6 +31,9 @@ pub const STEEL_TOLERANCE: f64 = 0.1;
 /// A wind-up beyond this share of the period is reported. Lever arms and directions are those of the positions without load, and a wind-up of
 /// one period moves every tooth on by one spacing: a tenth of it by a tenth of a spacing, which begins to be a matter of per cent.
 pub const WIND_UP_SHARE_OF_PERIOD: f64 = 0.1;
+
+/// An efficiency that may be further off than this is reported.
+pub const UNCERTAIN_EFFICIENCY: f64 = 0.05;
 
 const STEEL: Material = Material::STEEL;
 
@@ -180,6 +184,22 @@ pub enum Finding {
         /// The least one that undercuts.
         critical_distance_mm: f64,
     },
+    /// Friction beyond the range in which first order was held against exact equilibria.
+    FrictionBeyondMeasured {
+        /// Whether it is that along the wave generator as a whole.
+        is_along_cam: bool,
+        /// The coefficient.
+        coefficient: f64,
+        /// The end of the range.
+        limit: f64,
+    },
+    /// Friction so large that an exact equilibrium may have quite another efficiency.
+    EfficiencyUncertain {
+        /// The largest error that was measured at such a loss and such coefficients.
+        error: f64,
+        /// What it is measured against.
+        limit: f64,
+    },
     /// A stress above the fatigue limit of bearing steel.
     StressAboveFatigueLimit {
         /// Where.
@@ -271,6 +291,21 @@ pub fn of_wind_up(drive: &Drive, sweep: &Sweep) -> Option<Finding> {
     let wind_up_deg = sweep.input_angles.wind_up_deg.iter().copied().fold(0.0, f64::max);
     let limit_deg = WIND_UP_SHARE_OF_PERIOD * Mesh::new(drive).period_deg();
     (wind_up_deg > limit_deg).then_some(Finding::WindUpBeyondModel { wind_up_deg, limit_deg })
+}
+
+/// How far first order holds for the friction of a sweep with this mean loss ratio (docs/theory.md section 10.6).
+pub fn of_friction(mechanism: &Mechanism, friction: &Friction, loss_ratio: f64) -> Option<Finding> {
+    let FirstOrderError { efficiency, coefficient, coefficient_along_cam, is_within_measured_range } =
+        friction.first_order_error(mechanism, mechanism.loss_share(Fixed::Ring, loss_ratio));
+    if !is_within_measured_range {
+        // Beyond, no error is known.
+        let is_along_cam = coefficient <= MEASURED_TO;
+        let (coefficient, limit) =
+            if is_along_cam { (coefficient_along_cam, MEASURED_TO_ALONG_CAM) } else { (coefficient, MEASURED_TO) };
+        return Some(Finding::FrictionBeyondMeasured { is_along_cam, coefficient, limit });
+    }
+    (efficiency > UNCERTAIN_EFFICIENCY)
+        .then_some(Finding::EfficiencyUncertain { error: efficiency, limit: UNCERTAIN_EFFICIENCY })
 }
 
 /// The findings about the ring as it is made (docs/theory.md section 8).

@@ -47,7 +47,6 @@ pub mod mesh;
 pub mod parts;
 pub mod position;
 pub mod profile;
-pub mod radial_force;
 pub mod ring;
 pub mod root;
 pub mod springs;

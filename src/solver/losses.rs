@@ -9,12 +9,17 @@
 
 pub mod bearing;
 pub mod duty;
+pub mod period;
 pub mod wear;
 
 use std::f64::consts::PI;
 
 use crate::contact::{Contact, PerContact};
-use crate::violation::Range;
+use crate::drive::{Drive, ToothShape};
+use crate::locus::ToothCenter;
+use crate::mesh::greatest_common_divisor;
+use crate::ring::FlankPoint;
+use crate::violation::{Parameter, Violation};
 
 /// What losses need to know of a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,6 +36,9 @@ pub struct Mechanism {
     pub tooth_radius_mm: f64,
     /// Whether a tooth is free to spin about its own axis; a flat-sided one is not.
     pub tooth_spins: bool,
+    /// `R_race`: speed of a race along the cam over its turning: `R0` of a harmonic cam and an eccentric, `(a + b)/2` of an ellipse,
+    /// `R - r` of a harmonic path.
+    pub race_radius_mm: f64,
 }
 
 /// A tooth in mesh and what it bears.
@@ -92,44 +100,6 @@ pub struct RaceBearing {
     pub coefficient: f64,
     /// `R_b`: the radius that the coefficient belongs to.
     pub radius_mm: f64,
-    /// `R_race`: race's speed along the cam over its turning: `R0` of a harmonic cam and an eccentric, `(a + b)/2` of an ellipse,
-    /// `R - r` of a harmonic path.
-    pub race_radius_mm: f64,
-}
-
-/// A number of [`FrictionParameters`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum FrictionParameter {
-    /// The coefficient of a contact.
-    Coefficient(Contact),
-    /// `μ_b`.
-    BearingCoefficient,
-    /// `R_b`, mm.
-    BearingRadius,
-    /// `R_race`, mm.
-    RaceRadius,
-}
-
-/// A value that friction cannot have.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("{parameter:?} is {value}, beyond {limit}")]
-pub struct FrictionOutOfRange {
-    /// Which.
-    pub parameter: FrictionParameter,
-    /// Its value.
-    pub value: f64,
-    /// The end of its range that it is beyond.
-    pub limit: f64,
-}
-
-impl FrictionParameter {
-    /// The range that it has to lie in.
-    pub const fn range(self) -> Range {
-        match self {
-            Self::Coefficient(_) | Self::BearingCoefficient => Range { low: 0.0, high: 1.0, closed: true, unit: "" },
-            Self::BearingRadius | Self::RaceRadius => Range { low: 1e-6, high: 1e6, closed: true, unit: "mm" },
-        }
-    }
 }
 
 /// Friction that was checked.
@@ -204,11 +174,36 @@ impl Efficiency {
 pub struct FirstOrderError {
     /// The largest error that was measured at such a loss and such coefficients.
     pub efficiency: f64,
+    /// μ: the largest coefficient.
+    pub coefficient: f64,
+    /// `μ_p`: the friction that there can be along the wave generator as a whole.
+    pub coefficient_along_cam: f64,
     /// Whether the coefficients lie where it was measured; beyond, the error is no bound.
     pub is_within_measured_range: bool,
 }
 
 impl Mechanism {
+    /// That of a drive.
+    pub fn of(drive: &Drive) -> Self {
+        let p = drive.parameters();
+        // Counts of a checked drive are positive and small.
+        let whole = |count: i64| u32::try_from(count).unwrap_or(u32::MAX);
+        Self {
+            lobes: drive.lobes(),
+            teeth: whole(p.teeth),
+            installed: whole(p.installed),
+            ring_teeth: whole(p.ring_teeth),
+            tooth_radius_mm: p.tooth_radius_mm,
+            tooth_spins: !matches!(p.tooth, ToothShape::FlatSided { .. }),
+            race_radius_mm: p.wave_generator.race_radius_mm(p.tooth_radius_mm),
+        }
+    }
+
+    /// `g = gcd(U, Z'_G)`: so many lobes are loaded alike.
+    pub fn lobes_loaded_alike(&self) -> u64 {
+        greatest_common_divisor(self.lobes.into(), self.installed.into())
+    }
+
     /// `k = Z_K/U`.
     pub fn ring_teeth_per_wave(&self) -> f64 {
         f64::from(self.ring_teeth) / f64::from(self.lobes)
@@ -278,7 +273,7 @@ impl Mechanism {
             teeth: slipping,
             race_mm_per_rad,
             work_nmm_per_rad: work,
-            bearing_work_nmm_per_rad: friction.bearing_work_nmm_per_rad(load_n, race_mm_per_rad),
+            bearing_work_nmm_per_rad: self.bearing_work_nmm_per_rad(friction, load_n, race_mm_per_rad),
             input_torque_nmm,
         }
     }
@@ -297,17 +292,23 @@ impl Mechanism {
         ToothSlip { slip_mm_per_rad: PerContact::of(|contact| slip.get(contact) - spin_mm_per_rad), rolls }
     }
 
+    /// `D |v_R|`: what the bearing takes under the forces of all teeth.
+    fn bearing_work_nmm_per_rad(&self, friction: &Friction, load_n: f64, race_mm_per_rad: f64) -> f64 {
+        let drag_n = |bearing: RaceBearing| bearing.drag_n(load_n, self.race_radius_mm);
+        friction.bearing().map_or(0.0, |bearing| drag_n(bearing) * race_mm_per_rad.abs())
+    }
+
     /// `v_R`: the speed of the race at which least is lost, `Σ min_ω Σ μ_c F_c |v_c| + D |v_R|`. Each tooth's part is convex and piecewise
     /// linear; its slope changes where its contact with the race would roll together with another one, at `a_H - a_K` and `a_H - a_S`.
     /// The whole is therefore a weighted median of these places and of 0.
     fn race_mm_per_rad(&self, friction: &Friction, teeth: &[LoadedTooth], slips: &[PerContact<f64>]) -> f64 {
         let bearing = match friction.0.wave_generator {
             WaveGeneratorFriction::Plain { .. } => return 0.0,
-            WaveGeneratorFriction::Rolling { bearing } => return bearing.race_radius_mm,
+            WaveGeneratorFriction::Rolling { .. } => return self.race_radius_mm,
             WaveGeneratorFriction::Race { bearing, .. } => bearing,
         };
         let load_n: f64 = teeth.iter().map(|tooth| tooth.force_n.wave_generator).sum();
-        let drag = Weighted { place: 0.0, weight: bearing.drag_n(load_n), of: () };
+        let drag = Weighted { place: 0.0, weight: bearing.drag_n(load_n, self.race_radius_mm), of: () };
         let of_teeth = teeth.iter().zip(slips).flat_map(|(tooth, slip)| {
             let limit_n = friction.limit_n(&tooth.force_n);
             let with = |other: f64, weight: f64| Weighted { place: slip.wave_generator - other, weight, of: () };
@@ -326,6 +327,19 @@ impl Mechanism {
 }
 
 impl LoadedTooth {
+    /// A tooth where it stands, under these forces.
+    pub const fn new(lobe: u32, center: &ToothCenter, flank: &FlankPoint, force_n: PerContact<f64>) -> Self {
+        Self {
+            position_rad: center.position.from_lobe_rad,
+            lobe,
+            center_radius_mm: center.center_radius_mm,
+            tan_pressure_angle: center.tan_pressure_angle,
+            cam_curvature_per_mm: center.cam_contact.curvature_per_mm,
+            regularity: flank.regularity,
+            force_n,
+        }
+    }
+
     /// `|h'| = d sin γ`: lever arm of `F_H`.
     pub fn lever_arm_mm(&self) -> f64 {
         self.center_radius_mm * self.tan_pressure_angle / secant(self.tan_pressure_angle)
@@ -337,25 +351,16 @@ impl Friction {
     ///
     /// # Errors
     /// Every value that is out of its range.
-    pub fn new(parameters: &FrictionParameters) -> Result<Self, Vec<FrictionOutOfRange>> {
+    pub fn new(parameters: &FrictionParameters) -> Result<Self, Vec<Violation>> {
         let friction = Self(*parameters);
         let coefficient = friction.coefficient();
-        let contacts = coefficient.iter().map(|(contact, &value)| (FrictionParameter::Coefficient(contact), value));
+        let contacts = coefficient.iter().map(|(contact, &value)| (Parameter::FrictionCoefficient(contact), value));
         let of_bearing = friction.bearing().into_iter().flat_map(|bearing| {
-            [
-                (FrictionParameter::BearingCoefficient, bearing.coefficient),
-                (FrictionParameter::BearingRadius, bearing.radius_mm),
-                (FrictionParameter::RaceRadius, bearing.race_radius_mm),
-            ]
+            [(Parameter::BearingCoefficient, bearing.coefficient), (Parameter::BearingRadius, bearing.radius_mm)]
         });
-        let out_of_range: Vec<_> = contacts
-            .chain(of_bearing)
-            .filter_map(|(parameter, value)| {
-                let limit = parameter.range().limit_exceeded_by(value)?;
-                Some(FrictionOutOfRange { parameter, value, limit })
-            })
-            .collect();
-        if out_of_range.is_empty() { Ok(friction) } else { Err(out_of_range) }
+        let violations: Vec<_> =
+            contacts.chain(of_bearing).filter_map(|(parameter, value)| parameter.check(value)).collect();
+        if violations.is_empty() { Ok(friction) } else { Err(violations) }
     }
 
     /// The parameters, as given.
@@ -388,17 +393,12 @@ impl Friction {
         PerContact::of(|contact| coefficient.get(contact) * force_n.get(contact))
     }
 
-    /// `D |v_R|`: what the bearing takes under the forces of all teeth.
-    fn bearing_work_nmm_per_rad(&self, load_n: f64, race_mm_per_rad: f64) -> f64 {
-        self.bearing().map_or(0.0, |bearing| bearing.drag_n(load_n) * race_mm_per_rad.abs())
-    }
-
     /// How far an efficiency at the loss ℓ may be from that of an exact equilibrium with Coulomb friction: `(C μ + 10 μ_p) ℓ`, μ the
     /// largest coefficient, `μ_p` what friction there can be along the wave generator as a whole: on a race no more than its bearing
     /// has. C and the ranges were measured (docs/theory.md section 10.6, `tests/reference/friction.py ranges`).
     pub fn first_order_error(&self, mechanism: &Mechanism, loss_share: f64) -> FirstOrderError {
         let of_bearing =
-            self.bearing().map_or(0.0, |bearing| bearing.coefficient * bearing.radius_mm / bearing.race_radius_mm);
+            self.bearing().map_or(0.0, |bearing| bearing.coefficient * bearing.radius_mm / mechanism.race_radius_mm);
         let coefficient = self.coefficient();
         let largest = coefficient.iter().map(|(_, &coefficient)| coefficient).fold(of_bearing, f64::max);
         let on_race = if mechanism.tooth_spins { ERROR_ON_RACE } else { ERROR_ON_RACE_WITHOUT_SPIN };
@@ -409,6 +409,8 @@ impl Friction {
         };
         FirstOrderError {
             efficiency: (share * largest + ERROR_ALONG_CAM * along) * loss_share,
+            coefficient: largest,
+            coefficient_along_cam: along,
             is_within_measured_range: largest <= MEASURED_TO && along <= MEASURED_TO_ALONG_CAM,
         }
     }
@@ -421,14 +423,14 @@ const ERROR_ON_RACE: f64 = 2.5;
 /// The same of teeth that cannot spin.
 const ERROR_ON_RACE_WITHOUT_SPIN: f64 = 9.5;
 /// The largest coefficient for which these hold.
-const MEASURED_TO: f64 = 0.1;
+pub const MEASURED_TO: f64 = 0.1;
 /// The same along the cam.
-const MEASURED_TO_ALONG_CAM: f64 = 0.05;
+pub const MEASURED_TO_ALONG_CAM: f64 = 0.05;
 
 impl RaceBearing {
     /// `D = μ_b R_b ΣF_H/R_race`: friction of the bearing along the race.
-    fn drag_n(&self, load_n: f64) -> f64 {
-        self.coefficient * self.radius_mm * load_n / self.race_radius_mm
+    fn drag_n(&self, load_n: f64, race_radius_mm: f64) -> f64 {
+        self.coefficient * self.radius_mm * load_n / race_radius_mm
     }
 }
 

@@ -68,7 +68,7 @@ pub struct PlacedTooth {
     pub position_deg: f64,
 }
 
-const fn greatest_common_divisor(one: u64, other: u64) -> u64 {
+pub(crate) const fn greatest_common_divisor(one: u64, other: u64) -> u64 {
     let (mut a, mut b) = (one, other);
     while b > 0 {
         (a, b) = (b, a % b);

@@ -61,6 +61,14 @@ pub enum Parameter {
     Deviations,
     /// Allowable contact stress, MPa.
     AllowableStress,
+    /// `n`: speed of the wave generator, 1/min.
+    InputSpeed,
+    /// μ of a contact.
+    FrictionCoefficient(Contact),
+    /// `μ_b`: friction of the bearing between cam and race.
+    BearingCoefficient,
+    /// `R_b`: the radius that it belongs to, mm.
+    BearingRadius,
     /// Intervals of a sweep.
     Samples,
     /// Relative tolerance of a sweep.
@@ -166,6 +174,7 @@ impl Parameter {
             | Self::CarrierOuterRadius
             | Self::BoreRadius
             | Self::Depth(_)
+            | Self::BearingRadius
             | Self::ChordTolerance => Range::closed(1e-6, 1e6, "mm"),
             Self::Lobes => Range::closed(1.0, MAX_LOBES as f64, ""),
             Self::ToothCount | Self::InstalledTeeth | Self::RingTeeth => Range::closed(2.0, MAX_TEETH as f64, ""),
@@ -193,6 +202,8 @@ impl Parameter {
             // At its ends the rounding of the angle is 2e-9 deg.
             Self::InputAngle => Range::closed(-1e7, 1e7, "deg"),
             Self::AllowableStress => Range::closed(1e-3, 1e6, "MPa"),
+            Self::InputSpeed => Range::closed(1e-6, 1e6, "1/min"),
+            Self::FrictionCoefficient(_) | Self::BearingCoefficient => Range::closed(0.0, 1.0, ""),
             Self::Samples => Range::closed(1.0, MAX_SAMPLES as f64, ""),
             Self::RequestedError => Range::closed(1e-12, 1.0, ""),
             Self::SweepTolerance => Range::closed(1e-12, 0.1, ""),

@@ -93,7 +93,9 @@ pub(crate) fn finding_codes() -> Vec<FindingCode> {
         WindUpBeyondModel => ToothLeavesSlot,
         ToothLeavesSlot => ThinWallAsMade,
         ThinWallAsMade => ClearanceUndercutsRing,
-        ClearanceUndercutsRing => StressAboveFatigueLimit;
+        ClearanceUndercutsRing => FrictionBeyondMeasured,
+        FrictionBeyondMeasured => EfficiencyUncertain,
+        EfficiencyUncertain => StressAboveFatigueLimit;
         StressAboveFatigueLimit)
 }
 

@@ -316,6 +316,37 @@ async fn parts_that_are_not_drawn_are_not_judged() {
     assert_eq!(findings_at("/v1/drawings/ring", &thin_walls()).await.len(), 1);
 }
 
+/// Case 5.1 with the same friction everywhere, on a plain cam.
+fn rubbing(coefficient: f64) -> Value {
+    let contact = json!({ "coefficient": coefficient });
+    let cam = json!({ "kind": "plain", "coefficient": coefficient });
+    with(&shortest(), "/friction", json!({ "wave_generator": cam, "ring": contact, "carrier": contact }))
+}
+
+#[tokio::test]
+async fn friction_beyond_what_was_measured_is_a_warning_with_the_end_of_the_range() {
+    let along = finding(&rubbing(0.06), "friction_beyond_measured").await;
+    assert_numbers(&along, 0.06, 0.05, "");
+    assert_eq!(along["severity"], "warning");
+    assert_numbers(&finding(&rubbing(0.2), "friction_beyond_measured").await, 0.2, 0.1, "");
+    for document in [rubbing(0.05), rubbing(0.001)] {
+        assert!(!codes_of(&findings(&document).await).contains(&"friction_beyond_measured".to_owned()));
+    }
+}
+
+#[tokio::test]
+async fn an_efficiency_that_may_be_far_off_is_information_with_its_error() {
+    let found = Service::new().post("/v1/sweep", &rubbing(0.03)).await.found();
+    let losses = &found["losses"];
+    let share = 1.0 / losses["efficiency"]["ring_fixed"].as_f64().unwrap() - 1.0;
+    let finding = finding(&rubbing(0.03), "efficiency_uncertain").await;
+    // On a plain cam ten times the coefficient of what is lost over what comes out.
+    assert_numbers(&finding, 10.0 * 0.03 * share, 0.05, "");
+    assert_numbers(&finding, losses["efficiency_error"].as_f64().unwrap(), 0.05, "");
+    assert_eq!(finding["severity"], "info");
+    assert!(!codes_of(&findings(&rubbing(0.005)).await).contains(&"efficiency_uncertain".to_owned()));
+}
+
 #[tokio::test]
 async fn every_kind_of_finding_can_be_met_over_http() {
     let bore_without_effect = with(&shortest(), "/drive/ring/tip_radius_mm", json!(60.0));
@@ -341,7 +372,7 @@ async fn every_kind_of_finding_can_be_met_over_http() {
     }
     let johnson = json!({ "compatibility": "virtual_work", "stiffness": { "law": "johnson" } });
     let wide = with(&with(&shortest(), "/model", johnson), "/load/input_torque_nm", json!(2000.0));
-    for document in [linear, brass, wide, loose()] {
+    for document in [linear, brass, wide, loose(), rubbing(0.03), rubbing(0.2)] {
         all.extend(findings(&document).await);
     }
     for document in [undercut(), thin_walls(), cleared(9000.0)] {

@@ -22,6 +22,7 @@ mod examples;
 mod extremes;
 mod findings;
 mod fire;
+mod friction;
 mod openapi;
 mod operations;
 mod overload;

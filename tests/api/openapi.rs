@@ -227,6 +227,9 @@ fn parameters() -> Vec<Parameter> {
         Parameter::InputTorque,
         Parameter::OutputTorque,
         Parameter::AllowableStress,
+        Parameter::InputSpeed,
+        Parameter::BearingCoefficient,
+        Parameter::BearingRadius,
         Parameter::Samples,
         Parameter::SweepTolerance,
         Parameter::RequestedError,
@@ -240,6 +243,7 @@ fn parameters() -> Vec<Parameter> {
     parameters.extend(parts.map(Parameter::YoungsModulus));
     parameters.extend(parts.map(Parameter::PoissonsRatio));
     parameters.extend(contacts.map(Parameter::GrooveRadius));
+    parameters.extend(contacts.map(Parameter::FrictionCoefficient));
     parameters.extend(contacts.map(Parameter::Depth));
     parameters.extend(contacts.map(Parameter::SeriesCompliance));
     parameters.extend(contacts.map(Parameter::Stiffness));
@@ -558,6 +562,15 @@ fn kinds() -> Vec<Value> {
     let johnson = json!({ "law": "johnson", "depth_mm": { "ring": 4.0 } });
     let model = with(&virtual_work(johnson), "/series_compliance_mm_per_n", json!({ "carrier": 1e-6 }));
     kinds.push(with(&shortest(), "/model", model));
+    let bearing = json!({ "coefficient": 0.05, "bearing_coefficient": 0.002, "bearing_radius_mm": 52.0 });
+    for (kind, wave_generator) in
+        [("plain", json!({ "coefficient": 0.03 })), ("race", bearing.clone()), ("rolling", bearing)]
+    {
+        let wave_generator = with(&wave_generator, "/kind", json!(kind));
+        let document = with(&shortest(), "/friction", crate::friction::on(&wave_generator));
+        kinds.push(with(&document, "/load/input_speed_rpm", json!(1500.0)));
+        kinds.push(with(&eccentric(), "/friction", document["friction"].clone()));
+    }
     kinds
 }
 
@@ -591,7 +604,7 @@ fn every_discriminator_leads_to_schemas_that_require_its_word() {
         }
         unions += 1;
     }
-    assert_eq!(unions, 5);
+    assert_eq!(unions, 6);
 }
 
 #[tokio::test]

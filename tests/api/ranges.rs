@@ -58,6 +58,19 @@ fn fields() -> Vec<Field> {
     fields.push(field("/load/input_torque_nm", 1e-12, 1e15));
     let by_output = with(&every_number(), "/load", json!({ "output_torque_nm": 280.0 }));
     fields.push(Field { document: by_output, ..field("/load/output_torque_nm", 1e-12, 1e15) });
+    let bearing = json!({
+        "kind": "race", "coefficient": 0.05, "bearing_coefficient": 0.002, "bearing_radius_mm": 52.0
+    });
+    let rubbing = with(&every_number(), "/friction", crate::friction::on(&bearing));
+    let rubbing = with(&rubbing, "/load/input_speed_rpm", json!(1500.0));
+    let of_friction = |pointer: &str, low, high| Field { document: rubbing.clone(), ..field(pointer, low, high) };
+    fields.push(of_friction("/load/input_speed_rpm", 1e-6, 1e6));
+    for pointer in
+        ["wave_generator/coefficient", "wave_generator/bearing_coefficient", "ring/coefficient", "carrier/coefficient"]
+    {
+        fields.push(of_friction(&format!("/friction/{pointer}"), 0.0, 1.0));
+    }
+    fields.push(of_friction("/friction/wave_generator/bearing_radius_mm", 1e-6, 1e6));
     for part in ["wave_generator", "teeth", "ring", "carrier"] {
         fields.push(field(&format!("/materials/{part}/youngs_modulus_gpa"), 1e-3, 1e5));
     }

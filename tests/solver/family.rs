@@ -8,9 +8,9 @@ use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::drive::DriveError;
 use toothwave_solver::load_sharing::LoadedDrive;
+use toothwave_solver::losses::{LoadedTooth, Mechanism};
 use toothwave_solver::mesh::{Mesh, Samples, TeethInMesh};
 use toothwave_solver::profile::{Extent, ProfileParameters, profiles};
-use toothwave_solver::radial_force::{CamLoad, radial_force_n};
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self, Points, Sweep};
 use toothwave_solver::{
@@ -584,10 +584,15 @@ fn forces(p: &DriveParameters, sample: u64, samples: u64) -> (Vector2<f64>, f64,
     let placed: Vec<_> = mesh.placed_at(sample, Samples::new(samples).unwrap()).collect();
     let teeth: Vec<_> = placed.iter().map(|placed| loaded.tooth(placed.position).unwrap()).collect();
     let wind_up = loaded.wind_up(&teeth).unwrap();
-    let force_n: Vec<_> = teeth.iter().map(|tooth| loaded.forces_n(tooth, &wind_up).unwrap().wave_generator).collect();
-    let loads = placed.iter().zip(&teeth).zip(&force_n);
-    let loads = loads.map(|((placed, tooth), &force_n)| CamLoad { lobe: placed.lobe, center: &tooth.center, force_n });
-    (radial_force_n(&mesh, loads), force_n.iter().sum(), loaded.input_torque_nmm())
+    let loads: Vec<_> = placed
+        .iter()
+        .zip(&teeth)
+        .map(|(placed, tooth)| {
+            LoadedTooth::new(placed.lobe, &tooth.center, &tooth.flank, loaded.forces_n(tooth, &wind_up).unwrap())
+        })
+        .collect();
+    let sum_n = loads.iter().map(|tooth| tooth.force_n.wave_generator).sum();
+    (Mechanism::of(&drive).radial_force_n(&loads), sum_n, loaded.input_torque_nmm())
 }
 
 /// The sum of the forces at the cam, along the lines from the circle's centre to the teeth's centres.

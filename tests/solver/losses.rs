@@ -1,6 +1,7 @@
 //! Friction against exact equilibria (tests/reference/friction.py), closed forms and brute force.
 
 use std::f64::consts::PI;
+use std::sync::atomic::AtomicBool;
 
 use proptest::prelude::*;
 use serde_json::Value;
@@ -9,15 +10,20 @@ use toothwave_solver::losses::bearing::{LoadForRevolutions, RollingElement};
 use toothwave_solver::losses::duty::{
     BearingLoadForTime, ColumnForTime, DutyPoint, bearing_life_h, mean_at_each_place,
 };
+use toothwave_solver::losses::period::{Losses, RadialForces};
 use toothwave_solver::losses::wear::WearParameters;
 use toothwave_solver::losses::{
-    AtInputAngle, Efficiency, Fixed, Friction, FrictionParameter, FrictionParameters, LoadedTooth, Mechanism,
-    RaceBearing, Turning, WaveGeneratorFriction, mean_over_period, power_w, pressure_velocity_mpa_m_per_s,
+    AtInputAngle, Efficiency, Fixed, Friction, FrictionParameters, LoadedTooth, Mechanism, RaceBearing, Turning,
+    WaveGeneratorFriction, mean_over_period, power_w, pressure_velocity_mpa_m_per_s,
 };
 use toothwave_solver::mesh::{Mesh, Samples};
-use toothwave_solver::{Compatibility, Contact, DriveParameters, LoadCase, PerContact};
+use toothwave_solver::sweep::{Points, sweep};
+use toothwave_solver::{
+    Compatibility, Contact, DriveParameters, LoadCase, Never, Parameter, PerContact, SolveError, ToothShape, Violation,
+    WaveGenerator,
+};
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, load, semi_axes_mm};
+use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, load};
 use crate::reference::number;
 
 const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
@@ -48,6 +54,7 @@ impl Case {
             ring_teeth: whole("ring_teeth"),
             tooth_radius_mm: self.float("tooth_radius_mm"),
             tooth_spins,
+            race_radius_mm: self.float("race_radius_mm"),
         }
     }
 
@@ -72,7 +79,6 @@ impl Case {
         let bearing = RaceBearing {
             coefficient: factor * entry["bearing_coefficient"].as_f64().unwrap(),
             radius_mm: self.float("bearing_radius_mm"),
-            race_radius_mm: self.float("race_radius_mm"),
         };
         let on_cam = factor * coefficient.wave_generator;
         let wave_generator = match entry["wave_generator"].as_str().unwrap() {
@@ -285,11 +291,11 @@ fn the_point_of_contact_moves_over_each_part_as_its_curve_says() {
 }
 
 #[test]
-fn the_radial_load_is_the_sum_of_the_teeths_forces() {
+fn the_radial_force_is_the_sum_of_the_teeths_forces() {
     for case in Case::all() {
         let (mechanism, teeth) = (case.mechanism(true), case.teeth());
         let total: f64 = teeth.iter().map(|tooth| tooth.force_n.wave_generator).sum();
-        let load = mechanism.radial_load_n(&teeth);
+        let load = mechanism.radial_force_n(&teeth);
         for axis in 0..2 {
             let expected = number(&case.0["radial_load_n"][axis]).unwrap();
             assert_near(load[axis], expected, 1e-13 * total, case.name());
@@ -312,28 +318,12 @@ fn teeth_at(loaded: &LoadedDrive<'_>, sample: u64, samples: u64) -> Vec<LoadedTo
     let wind_up = loaded.wind_up(&states).unwrap();
     states
         .iter()
-        .map(|state| LoadedTooth {
-            position_rad: state.center.position.from_lobe_rad,
-            lobe: 0,
-            center_radius_mm: state.center.center_radius_mm,
-            tan_pressure_angle: state.center.tan_pressure_angle,
-            cam_curvature_per_mm: state.center.cam_contact.curvature_per_mm,
-            regularity: state.flank.regularity,
-            force_n: loaded.forces_n(state, &wind_up).unwrap(),
-        })
+        .map(|state| LoadedTooth::new(0, &state.center, &state.flank, loaded.forces_n(state, &wind_up).unwrap()))
         .collect()
 }
 
 fn mechanism(parameters: &DriveParameters) -> Mechanism {
-    let whole = |count: i64| u32::try_from(count).unwrap();
-    Mechanism {
-        lobes: 2,
-        teeth: whole(parameters.teeth),
-        installed: whole(parameters.installed),
-        ring_teeth: whole(parameters.ring_teeth),
-        tooth_radius_mm: parameters.tooth_radius_mm,
-        tooth_spins: true,
-    }
+    Mechanism::of(&drive(parameters))
 }
 
 fn plain(on_cam: f64, elsewhere: f64) -> Friction {
@@ -346,7 +336,7 @@ fn with(wave_generator: WaveGeneratorFriction, elsewhere: f64) -> Friction {
 }
 
 fn bearing_of_5_1(coefficient: f64) -> RaceBearing {
-    RaceBearing { coefficient, radius_mm: 52.0, race_radius_mm: 57.0 }
+    RaceBearing { coefficient, radius_mm: 52.0 }
 }
 
 /// The mean of ν over 40 intervals of a period, `virtual_work`, 20 N·m.
@@ -437,7 +427,7 @@ fn lost_at(mechanism: &Mechanism, friction: &FrictionParameters, teeth: &[Loaded
         let at = |spin: f64| (0..3).map(|contact| limit[contact] * (v[contact] - spin).abs()).sum::<f64>();
         lost +=
             if mechanism.tooth_spins { v.iter().map(|&spin| at(spin)).fold(f64::INFINITY, f64::min) } else { at(0.0) };
-        lost += bearing.coefficient * bearing.radius_mm / bearing.race_radius_mm
+        lost += bearing.coefficient * bearing.radius_mm / mechanism.race_radius_mm
             * tooth.force_n.wave_generator
             * race_mm_per_rad.abs();
     }
@@ -457,9 +447,8 @@ proptest! {
         let load = LoadCase::new(&load(5.0, Compatibility::VirtualWork)).unwrap();
         let loaded = LoadedDrive::new(&drive, &load).unwrap();
         let mechanism = Mechanism { tooth_spins, ..mechanism(&parameters) };
-        let (semi_major_mm, semi_minor_mm) = semi_axes_mm(&parameters);
-        let race_radius_mm = 0.5 * (semi_major_mm + semi_minor_mm);
-        let bearing = RaceBearing { coefficient: on_balls, radius_mm: 0.9 * race_radius_mm, race_radius_mm };
+        let race_radius_mm = mechanism.race_radius_mm;
+        let bearing = RaceBearing { coefficient: on_balls, radius_mm: 0.9 * race_radius_mm };
         let friction = FrictionParameters {
             wave_generator: WaveGeneratorFriction::Race { coefficient: on_race, bearing },
             ring_coefficient: ring,
@@ -489,8 +478,7 @@ proptest! {
         let friction = plain(on_cam, elsewhere);
         let lost = |mechanism: &Mechanism, friction: &Friction| mechanism.turning(friction, &teeth).lost_nmm_per_rad();
         prop_assert!(lost(&spinning, &friction) <= lost(&flat, &friction) * (1.0 + 1e-14));
-        let race_radius_mm = semi_axes_mm(&parameters).0;
-        let bearing = |coefficient| RaceBearing { coefficient, radius_mm: race_radius_mm, race_radius_mm };
+        let bearing = |coefficient| RaceBearing { coefficient, radius_mm: spinning.race_radius_mm };
         let race = |on_balls| WaveGeneratorFriction::Race { coefficient: on_cam, bearing: bearing(on_balls) };
         // A bearing rougher than the teeth never turns.
         let stuck = spinning.turning(&with(race(2.0 * on_cam), elsewhere), &teeth);
@@ -693,19 +681,25 @@ fn a_mean_over_a_period_counts_its_ends_half_and_a_jump_twice() {
 
 #[test]
 fn impossible_friction_is_refused_with_every_value() {
-    let bearing = RaceBearing { coefficient: 2.0, radius_mm: 0.0, race_radius_mm: 57.0 };
+    let bearing = RaceBearing { coefficient: 2.0, radius_mm: 0.0 };
     let parameters = FrictionParameters {
         wave_generator: WaveGeneratorFriction::Race { coefficient: -0.1, bearing },
         ring_coefficient: f64::NAN,
         carrier_coefficient: 0.05,
     };
-    let refused: Vec<_> =
-        Friction::new(&parameters).unwrap_err().iter().map(|fault| (fault.parameter, fault.limit)).collect();
+    let refused: Vec<_> = Friction::new(&parameters)
+        .unwrap_err()
+        .iter()
+        .map(|violation| match *violation {
+            Violation::OutOfRange { parameter, limit, .. } => (parameter, limit),
+            ref other => panic!("{other:?}"),
+        })
+        .collect();
     let expected = [
-        (FrictionParameter::Coefficient(Contact::WaveGenerator), 0.0),
-        (FrictionParameter::Coefficient(Contact::Ring), 0.0),
-        (FrictionParameter::BearingCoefficient, 1.0),
-        (FrictionParameter::BearingRadius, 1e-6),
+        (Parameter::FrictionCoefficient(Contact::WaveGenerator), 0.0),
+        (Parameter::FrictionCoefficient(Contact::Ring), 0.0),
+        (Parameter::BearingCoefficient, 1.0),
+        (Parameter::BearingRadius, 1e-6),
     ];
     assert_eq!(refused, expected);
 }
@@ -717,4 +711,98 @@ fn friction_of_nothing_takes_nothing() {
     assert!(teeth.iter().all(|slip| slip.rolls.is_none()));
     assert_eq!(work_nmm_per_rad, PerContact::default());
     assert_eq!(case.mechanism(true).efficiency(Fixed::Ring, 0.0), Efficiency { driven: 1.0, back_driven: 1.0 });
+}
+
+#[test]
+fn a_period_loses_what_its_input_angles_lose_one_by_one() {
+    for parameters in [PAPER_5_1, PAPER_5_2] {
+        let (drive, mechanism) = (drive(&parameters), mechanism(&parameters));
+        let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
+        let sweep = sweep(&drive, &load, Points::samples(40).unwrap(), &Never).unwrap();
+        let race = WaveGeneratorFriction::Race { coefficient: 0.05, bearing: bearing_of_5_1(0.002) };
+        for friction in [plain(0.03, 0.05), with(race, 0.04)] {
+            let losses = Losses::of(&drive, &sweep, &friction, &Never).unwrap();
+            let expected = mean_loss_ratio(&parameters, &mechanism, &friction);
+            assert_near(losses.mean.total(), expected, 1e-12 * expected, "mean");
+            let loaded = LoadedDrive::new(&drive, &load).unwrap();
+            let slips: Vec<_> = (0..=40)
+                .flat_map(|sample| mechanism.turning(&friction, &teeth_at(&loaded, sample, 40)).teeth)
+                .collect();
+            assert_eq!(slips.len(), sweep.states.len());
+            for (state, slip) in slips.iter().enumerate() {
+                for contact in CONTACTS {
+                    let found = losses.slip_mm_per_rad.get(contact)[state];
+                    assert_near(found, *slip.slip_mm_per_rad.get(contact), 1e-10, "slip");
+                }
+            }
+            assert_eq!(losses.loss_ratio.len(), sweep.input_angles.input_angle_deg.len());
+        }
+    }
+}
+
+#[test]
+fn a_sweep_to_a_tolerance_loses_what_many_samples_lose() {
+    for parameters in [PAPER_5_1, PAPER_5_2] {
+        let drive = drive(&parameters);
+        let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
+        let mean = |points| {
+            let sweep = sweep(&drive, &load, points, &Never).unwrap();
+            let losses = Losses::of(&drive, &sweep, &plain(0.03, 0.05), &Never).unwrap();
+            // Where a tooth enters the angle stands twice, and counts twice here too.
+            assert_eq!(losses.loss_ratio.len(), sweep.input_angles.input_angle_deg.len());
+            losses.mean.total()
+        };
+        let fine = mean(Points::samples(4000).unwrap());
+        for tolerance in [1e-3, 1e-6] {
+            let found = mean(Points::tolerance(tolerance, 1_000_000).unwrap());
+            println!("{tolerance:e}: {found} {fine} {:e}", found / fine - 1.0);
+            assert_near(found, fine, 1e-2 * fine, "mean");
+        }
+    }
+}
+
+#[test]
+fn a_race_runs_around_each_kind_of_cam_at_its_mean_radius() {
+    let radius_mm = |wave_generator: WaveGenerator| wave_generator.race_radius_mm(4.0);
+    assert_eq!(radius_mm(WaveGenerator::Ellipse { semi_major_mm: 58.0, semi_minor_mm: 56.0 }), 57.0);
+    assert_eq!(radius_mm(WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 }), 30.8);
+    assert_eq!(radius_mm(WaveGenerator::Harmonic { lobes: 3, mean_radius_mm: 48.0, amplitude_mm: 1.0 }), 48.0);
+    let path = WaveGenerator::HarmonicPath { lobes: 3, mean_path_radius_mm: 52.0, amplitude_mm: 1.0 };
+    assert_eq!(radius_mm(path), 48.0);
+    let flat = DriveParameters { tooth: ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 4.0 }, ..PAPER_5_1 };
+    assert!(!mechanism(&flat).tooth_spins && mechanism(&PAPER_5_1).tooth_spins);
+}
+
+#[test]
+fn the_radial_force_of_a_sweep_is_that_of_the_torque_on_an_eccentric_and_none_on_lobes_alike() {
+    let parameters = DriveParameters {
+        wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
+        teeth: 28,
+        installed: 28,
+        tooth_radius_mm: 2.5,
+        tooth: ToothShape::Cylinder { width_mm: 10.0 },
+        ring_teeth: 27,
+        tip_radius_mm: None,
+    };
+    let load = LoadCase::new(&load(5.0, Compatibility::VirtualWork)).unwrap();
+    let forces = |parameters: &DriveParameters| {
+        let drive = drive(parameters);
+        let sweep = sweep(&drive, &load, Points::samples(9).unwrap(), &Never).unwrap();
+        RadialForces::of(&drive, &sweep, &Never).unwrap()
+    };
+    let RadialForces { force_n, direction_deg } = forces(&parameters).unwrap();
+    assert_eq!(force_n.len(), 10);
+    for (force_n, direction_deg) in force_n.iter().zip(direction_deg) {
+        assert_near(force_n * direction_deg.to_radians().sin(), -5e3 / 1.2, 1e-8, "across the eccentricity");
+    }
+    assert_eq!(forces(&PAPER_5_1), None);
+}
+
+#[test]
+fn losses_of_a_sweep_stop_when_told_to() {
+    let drive = drive(&PAPER_5_1);
+    let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
+    let sweep = sweep(&drive, &load, Points::samples(4).unwrap(), &Never).unwrap();
+    let stopped = Losses::of(&drive, &sweep, &plain(0.03, 0.05), &AtomicBool::new(true));
+    assert_eq!(stopped, Err(SolveError::Stopped));
 }

@@ -58,6 +58,10 @@ pub struct LoadDocument {
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-3, maximum = 1e6, nullable = false)]
     pub allowable_stress_mpa: Option<f64>,
+    /// Speed of the wave generator; given `friction`, powers and sliding speeds follow from it.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    pub input_speed_rpm: Option<f64>,
 }
 
 /// The model of load sharing.
@@ -204,7 +208,7 @@ impl From<&CompliancesDocument> for PerContact<f64> {
 encoded! {
     struct MaterialsDocument { wave_generator, teeth, ring, carrier }
     struct MaterialDocument { youngs_modulus_gpa, poissons_ratio }
-    struct LoadDocument { input_torque_nm, output_torque_nm, allowable_stress_mpa }
+    struct LoadDocument { input_torque_nm, output_torque_nm, allowable_stress_mpa, input_speed_rpm }
     struct ModelDocument { compatibility, stiffness, series_compliance_mm_per_n, clearance }
     struct ClearanceDocument { wave_generator_um, ring_um, carrier_um }
     struct CompliancesDocument { wave_generator, ring, carrier }

@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 
 use crate::coincidence_degree::TeethInMeshAnswer;
 use crate::findings::FindingAnswer;
+use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
 
 /// Forces and contact stresses of one meshing zone over one period; the other zone is its point reflection.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -40,6 +41,14 @@ pub struct SweepAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub torque_capacity: Option<TorqueCapacityAnswer>,
+    /// What friction takes, given `friction`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub losses: Option<LossesAnswer>,
+    /// What the teeth push the wave generator aside with, in N, where no two lobes are loaded alike; elsewhere they balance each other.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub radial_force_n: Option<RadialForceAnswer>,
     /// How well the results fulfil what must hold.
     pub checks: ChecksAnswer,
     /// What a designer should be told.

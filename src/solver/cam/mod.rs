@@ -197,6 +197,16 @@ impl WaveGenerator {
         matches!(self, Self::HarmonicPath { .. })
     }
 
+    /// `R_race`: speed of a race along the cam over its turning (docs/theory.md section 10.2).
+    pub fn race_radius_mm(&self, tooth_radius_mm: f64) -> f64 {
+        match *self {
+            Self::Ellipse { semi_major_mm, semi_minor_mm } => 0.5 * (semi_major_mm + semi_minor_mm),
+            Self::Eccentric { radius_mm, .. } => radius_mm,
+            Self::Harmonic { mean_radius_mm, .. } => mean_radius_mm,
+            Self::HarmonicPath { mean_path_radius_mm, .. } => mean_path_radius_mm - tooth_radius_mm,
+        }
+    }
+
     /// The parameter that says how large the cam is.
     const fn size_parameter(&self) -> Parameter {
         match self {

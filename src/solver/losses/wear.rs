@@ -68,8 +68,8 @@ impl Mechanism {
                 return 0.0;
             }
             let depth_mm_per_rad = match (contact, friction.bearing()) {
-                (Contact::WaveGenerator, Some(bearing)) => {
-                    self.zones_in_torque() * area_mm2_per_rad / (2.0 * PI * bearing.race_radius_mm)
+                (Contact::WaveGenerator, Some(_)) => {
+                    self.zones_in_torque() * area_mm2_per_rad / (2.0 * PI * self.race_radius_mm)
                 }
                 _ => area_mm2_per_rad / advance.get(contact) * passes.get(contact),
             };
