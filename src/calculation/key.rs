@@ -1,7 +1,7 @@
 //! What tells answers apart: a hash of everything that they depend on, in an encoding of its own.
 //!
 //! Every field is written always, in the order of the document and without its name, so that no two designs share their bytes. A structure
-//! is encoded by [`encoded!`], which names all its fields: one that was forgotten does not compile.
+//! is encoded by `encoded!`, which names all its fields: one that was forgotten does not compile.
 
 use crate::BUILD;
 use crate::arithmetic::arithmetic;

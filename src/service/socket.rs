@@ -41,7 +41,7 @@ pub struct Socket {
 }
 
 impl Socket {
-    /// Of a client that takes [`LEAST_TAKEN_BYTES_PER_S`] over each `patience`, or is left.
+    /// Of a client that takes `LEAST_TAKEN_BYTES_PER_S` over each `patience`, or is left.
     pub fn new(stream: TcpStream, patience: Duration) -> Self {
         // Without it small answers could wait for the client's acknowledgement of earlier ones.
         let _ = stream.set_nodelay(true);

@@ -365,7 +365,7 @@ async fn a_word_that_is_no_choice_is_refused_with_the_choices() {
         ("/model/stiffness/law", &["linear", "fixed"]),
         ("/profile/extent", &["tooth", "full"]),
     ] {
-        for word in ["", "Projection", "LINEAR", "tooth ", "hertz"] {
+        for word in ["", "Projection", "LINEAR", "tooth ", "hertzian"] {
             let document = with(&spelled_out(), pointer, json!(word));
             let (at, code, detail) = Service::new().post("/v1/sweep", &document).await.faulty_field();
             assert_eq!((at.as_str(), code.as_str()), (pointer, "unknown_choice"));

@@ -169,7 +169,9 @@ fn overloaded() -> Value {
 #[tokio::test]
 async fn a_stress_above_the_fatigue_limit_is_a_warning_for_each_contact() {
     let found = Service::new().post("/v1/sweep", &overloaded()).await.found();
-    let findings = findings(&overloaded()).await;
+    let mut findings = findings(&overloaded()).await;
+    // So heavy a load also winds the drive up beyond what the model holds for.
+    findings.retain(|finding| finding["code"] != "wind_up_beyond_model");
     assert_eq!(findings.len(), 3, "{findings:?}");
     for (finding, contact) in findings.iter().zip(["wave_generator", "ring", "carrier"]) {
         assert_eq!(finding["code"], "stress_above_fatigue_limit");

@@ -174,10 +174,14 @@ async fn the_smallest_and_the_largest_drive_are_answered_like_any_other() {
     for scale in [1e-6 / 5.0, 1e-3, 1.0, 1e3, 1e6 / 58.0] {
         for path in crate::asking::ENDPOINTS {
             let found = service.post(path, &scaled(scale)).await.found();
-            assert_eq!(
-                found["findings"].as_array().unwrap().len(),
-                usize::from(scale < 1e-2 && path == "/v1/sweep") * 3,
-                "{scale}"
+            let is_crushed = scale < 1e-2 && path == "/v1/sweep";
+            let codes: Vec<_> = found["findings"].as_array().unwrap().iter().map(|one| &one["code"]).collect();
+            // Under 20 N·m a drive of a hundredth of the size is pressed flat: its stresses, and in the end its wind-up too, are beyond everything.
+            let stresses = codes.iter().filter(|&&code| code == "stress_above_fatigue_limit").count();
+            assert_eq!(stresses, usize::from(is_crushed) * 3, "{scale}: {codes:?}");
+            assert!(
+                codes.len() == stresses || is_crushed && codes.contains(&&json!("wind_up_beyond_model")),
+                "{scale}: {codes:?}"
             );
         }
         let found = service.post("/v1/sweep", &scaled(scale)).await.found();

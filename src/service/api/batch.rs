@@ -24,6 +24,7 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 use tokio_util::task::AbortOnDropHandle;
 use toothwave_calculation::coincidence_degree::CoincidenceDegree;
+use toothwave_calculation::coincidence_degree::TeethInMeshAnswer;
 use toothwave_calculation::columns;
 use toothwave_calculation::design::Design;
 use toothwave_calculation::findings::FindingAnswer;
@@ -31,7 +32,7 @@ use toothwave_calculation::forms::Forms as _;
 use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::question::{self, Question};
 use toothwave_calculation::sweep::Sweep;
-use toothwave_calculation::sweep::answer::{ChecksAnswer, PeaksAnswer, SweepAnswer, TorqueCapacityAnswer};
+use toothwave_calculation::sweep::answer::{ChecksAnswer, LoadAnswer, PeaksAnswer, SweepAnswer, TorqueCapacityAnswer};
 use utoipa::ToSchema;
 
 use super::{App, Growing, broken_body, write_problem};
@@ -129,7 +130,11 @@ struct PeaksOnly<'a> {
     build: &'static str,
     coincidence_degree: f64,
     period_deg: f64,
+    load: &'a LoadAnswer,
+    enters_under_load: bool,
     peaks: &'a PeaksAnswer,
+    teeth_in_mesh_per_zone: &'a TeethInMeshAnswer,
+    loaded_teeth_per_zone: &'a TeethInMeshAnswer,
     #[serde(skip_serializing_if = "Option::is_none")]
     torque_capacity: &'a Option<TorqueCapacityAnswer>,
     checks: &'a ChecksAnswer,
@@ -213,7 +218,11 @@ fn peaks_line(
         build: sweep.build,
         coincidence_degree: sweep.coincidence_degree,
         period_deg: sweep.period_deg,
+        load: &sweep.load,
+        enters_under_load: sweep.enters_under_load,
         peaks: &sweep.peaks,
+        teeth_in_mesh_per_zone: &sweep.teeth_in_mesh_per_zone,
+        loaded_teeth_per_zone: &sweep.loaded_teeth_per_zone,
         torque_capacity: &sweep.torque_capacity,
         checks: &sweep.checks,
         findings: &sweep.findings,
