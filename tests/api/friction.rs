@@ -94,10 +94,6 @@ async fn power_in_is_power_out_and_what_is_lost() {
 
 #[tokio::test]
 async fn what_is_lost_is_friction_times_the_slips_of_the_states() {
-    let bearing = |losses: &Value, at: usize| {
-        // What the contacts do not take, which is the bearing's.
-        float(&losses["by_input_angle"]["loss_ratio"][at])
-    };
     for (kind, friction, of_cam) in [("plain", plain(), 0.03), ("race", on_bearing("race"), 0.05)] {
         let found = swept(&case_5_1(friction)).await;
         let (states, losses) = (&found["states"], &found["losses"]);
@@ -118,11 +114,12 @@ async fn what_is_lost_is_friction_times_the_slips_of_the_states() {
                     assert!(contact != rolls || slips[state] == 0.0, "{contact} rolls at state {state}");
                 }
             }
-            let ratio = bearing(losses, at);
+            let ratio = float(&losses["by_input_angle"]["loss_ratio"][at]);
             if kind == "plain" {
                 assert_near(ratio, lost_nmm / 20e3, 1e-12, "loss ratio");
             } else {
-                assert!(ratio > lost_nmm / 20e3 && ratio < 1.3 * lost_nmm / 20e3, "{ratio} {lost_nmm}");
+                // The bearing takes the rest.
+                assert!(ratio > lost_nmm / 20e3 && ratio < 2.0 * lost_nmm / 20e3, "{ratio} {lost_nmm}");
             }
             let driven = float(&losses["by_input_angle"]["efficiency"]["ring_fixed"][at]);
             assert_near(driven, 1.0 / (1.0 + ratio * 26.0 / 28.0), 1e-14, "efficiency there");

@@ -94,6 +94,7 @@ fn every_variant_of_a_choice_has_a_name_and_the_word_that_leads_to_it() {
         ("WaveGenerator", vec!["ellipse", "eccentric", "harmonic", "harmonic_path"]),
         ("Teeth", vec!["cylinder", "ball", "flat_sided"]),
         ("Stiffness", vec!["linear", "fixed", "palmgren", "johnson", "hertz"]),
+        ("WaveGeneratorFriction", vec!["plain", "race", "rolling"]),
         ("EdgeAnswer", vec!["line", "arc", "curve"]),
         ("OutlineAnswer", vec!["circle", "path"]),
     ] {
