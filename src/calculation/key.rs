@@ -82,7 +82,7 @@ macro_rules! encode_tuples {
     )+};
 }
 
-encode_tuples!((A B)(A B C)(A B C D)(A B C D E));
+encode_tuples!((A B)(A B C)(A B C D)(A B C D E)(A B C D E F));
 
 /// Encodes structures field by field, and enums of words by their order.
 macro_rules! encoded {

@@ -22,6 +22,7 @@ mod examples;
 mod extremes;
 mod findings;
 mod fire;
+mod modification;
 mod openapi;
 mod operations;
 mod overload;

@@ -558,6 +558,10 @@ fn kinds() -> Vec<Value> {
     let johnson = json!({ "law": "johnson", "depth_mm": { "ring": 4.0 } });
     let model = with(&virtual_work(johnson), "/series_compliance_mm_per_n", json!({ "carrier": 1e-6 }));
     kinds.push(with(&shortest(), "/model", model));
+    let relief = json!({ "amount_um": 4.0, "start_deg": 60.0, "power": 2.0 });
+    let modification = json!({ "ring_equidistant_um": 4.0, "tooth_radius_um": 0.5, "ring_tip_relief": relief });
+    let modified = with(&shortest(), "/model", json!({ "compatibility": "virtual_work" }));
+    kinds.push(with(&modified, "/modification", modification));
     kinds
 }
 

@@ -171,6 +171,7 @@ fn what_is_left_out_has_the_key_of_its_default() {
     long["materials"] = json!({ "teeth": { "poissons_ratio": 0.3 } });
     long["model"] = json!({ "compatibility": "projection", "stiffness": { "law": "linear" } });
     long["sweep"] = json!({ "samples": 50, "wind_up": false });
+    long["modification"] = json!({ "slot_wall_um": 0.0, "tooth_radius_um": -0.0 });
     long["parts"] = json!({ "ring": { "clearance_um": -0.0 } });
     long["assembly"] = json!({ "input_angle_deg": -0.0 });
     assert_eq!(keys(&read(&short).unwrap()), keys(&read(&long).unwrap()));
