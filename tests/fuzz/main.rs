@@ -197,7 +197,7 @@ fn relative(bytes: &[u8; 32]) -> Value {
             teeth["flat_length_mm"] = json!(2.0 * r * f64::from(flat) / 256.0);
         }
     }
-    let stiffness = |place: usize| 10.0_f64.powi(i32::from(depth) % 19 - 3 + place as i32 % 2);
+    let stiffness = |place: usize| 10.0_f64.powi(i32::from(depth) % 18 - 3) * [1.0, 10.0, 1.0][place];
     let mut model = json!({});
     match law % 6 {
         0 => {}
@@ -221,7 +221,7 @@ fn relative(bytes: &[u8; 32]) -> Value {
         _ => model["compatibility"] = json!("virtual_work"),
     }
     if series % 4 == 0 {
-        let compliance = |place: usize| 10.0_f64.powi(-i32::from(series) % 13 + place as i32);
+        let compliance = |place: usize| 10.0_f64.powi(-i32::from(series) % 13) * [1.0, 10.0, 100.0][place];
         model["series_compliance_mm_per_n"] = by_contact(grooves >> 5, &compliance);
     }
     if gap % 2 == 0 {
