@@ -141,7 +141,7 @@ impl Question for Accuracy {
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
-        (&design.drive, &design.materials, &design.load, &design.model, &design.accuracy)
+        (&design.drive, &design.materials, &design.load, &design.model, &design.modification, &design.accuracy)
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedAccuracy, NoAnswer> {

@@ -9,8 +9,8 @@ use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::profile::{Extent, ProfileParameters};
 use toothwave_solver::sweep::Points;
 use toothwave_solver::{
-    Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, Modification, Parameter,
-    PerContact, Torque, Violation,
+    Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, Parameter, PerContact, Torque,
+    Violation,
 };
 use utoipa::ToSchema;
 
@@ -22,12 +22,14 @@ mod asked;
 mod drive;
 mod friction;
 mod load;
+mod modification;
 mod number;
 
 pub use asked::*;
 pub use drive::*;
 pub use friction::*;
 pub use load::*;
+pub use modification::*;
 pub use number::Whole;
 
 use drive::Counted;
@@ -61,6 +63,9 @@ pub struct Design {
     /// The model of load sharing.
     #[serde(default)]
     pub model: ModelDocument,
+    /// Parts made otherwise than conjugate.
+    #[serde(default)]
+    pub modification: ModificationDocument,
     /// The input angles of a sweep.
     #[serde(default)]
     pub sweep: SweepDocument,
@@ -178,7 +183,7 @@ impl Design {
             compatibility,
             law: self.contact_law(),
             series_compliance_mm_per_n: (&self.model.series_compliance_mm_per_n).into(),
-            modification: Modification::default(),
+            modification: (&self.modification).into(),
             clearance_um: self.model.clearance.as_ref().map_or_else(PerContact::default, |clearance| PerContact {
                 wave_generator: clearance.wave_generator_um,
                 ring: clearance.ring_um,

@@ -33,6 +33,8 @@ pub enum NoAnswerCode {
     NoToothInMesh,
     /// A `projection` whose stiffnesses give a tooth a compliance that is not positive.
     ComplianceNotPositive,
+    /// A part is too full for a tooth that is to carry.
+    Interference,
     /// The sweep has more states than `max_states`.
     TooManyStates,
     /// The profiles have more points than `max_profile_points`.
@@ -126,9 +128,16 @@ impl From<SolveError> for NoAnswer {
                 format!("{detail}. Choose `virtual_work`, or stiffnesses that differ less"),
             ),
             SolveError::Impossible(violations) => Self::impossible(&violations),
-            SolveError::JohnsonBeyondHalfWidth { .. }
-            | SolveError::Interference { .. }
-            | SolveError::FlatOffCarrier { .. } => Self::new(NoAnswerCode::ImpossibleDesign, detail),
+            // The document has nothing that tells slots apart.
+            SolveError::Interference { position_deg, gap_um, .. } => Self::new(
+                NoAnswerCode::Interference,
+                format!(
+                    "a tooth {position_deg:?} deg from the middle of its lobe has a total gap of {gap_um:?} µm along the wave generator's force: a part is too full there. Make `model.clearance` larger, or `modification` smaller"
+                ),
+            ),
+            SolveError::JohnsonBeyondHalfWidth { .. } | SolveError::FlatOffCarrier { .. } => {
+                Self::new(NoAnswerCode::ImpossibleDesign, detail)
+            }
             SolveError::NoLeverArm => Self::new(NoAnswerCode::NoToothInMesh, detail),
             SolveError::TooManyPoints { points, limit } => {
                 let detail = format!("{detail} by `max_profile_points`; widen the chord tolerance");

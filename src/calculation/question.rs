@@ -101,5 +101,6 @@ pub(crate) fn checked_load(
     let load = LoadCase::new(&parameters).map_err(|found| violations.extend(found)).ok();
     violations.extend(design.input_speed_rpm().err());
     violations.extend(parameters.clearance_violations(draft).map_err(SolveError::from)?);
+    violations.extend(draft.drive().and_then(|drive| parameters.modification.violation_in(&drive)));
     Ok(load)
 }

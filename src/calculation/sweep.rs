@@ -31,7 +31,7 @@ pub struct CheckedSweep {
     friction: Option<Friction>,
     input_speed_rpm: Option<f64>,
     points: Points,
-    with_clearance: bool,
+    with_gaps: bool,
     with_wind_up: bool,
 }
 
@@ -48,7 +48,8 @@ impl Question for Sweep {
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
-        (&design.drive, &design.materials, &design.load, &design.friction, &design.model, &design.sweep)
+        let Design { drive, materials, load, friction, model, modification, sweep, .. } = design;
+        (drive, materials, load, friction, model, (modification, sweep))
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedSweep, NoAnswer> {
@@ -78,10 +79,11 @@ impl Question for Sweep {
                 return Err(too_many(code, field_code, "/sweep/samples", &detail, Some(states), limit));
             }
         }
-        let (with_clearance, with_wind_up) = (design.model.clearance.is_some(), design.sweep.wind_up);
+        let with_gaps = design.model.clearance.is_some() || load.has_gaps();
         // In its range, or its violation would be among the others.
         let input_speed_rpm = design.input_speed_rpm().unwrap_or_default();
-        Ok(CheckedSweep { drive, load, friction, input_speed_rpm, points, with_clearance, with_wind_up })
+        let with_wind_up = design.sweep.wind_up;
+        Ok(CheckedSweep { drive, load, friction, input_speed_rpm, points, with_gaps, with_wind_up })
     }
 
     fn columns_bytes(checked: &CheckedSweep) -> u64 {
@@ -101,21 +103,21 @@ impl Question for Sweep {
     fn is_short(checked: &CheckedSweep) -> bool {
         /// They are solved and written in about 0.1 ms; with Palmgren's law and all that can be asked for in a quarter of a millisecond.
         const FEW_STATES: u64 = 400;
-        let CheckedSweep { drive, friction, points, with_clearance, .. } = checked;
+        let CheckedSweep { drive, friction, points, with_gaps, .. } = checked;
         match points {
             Points::Samples(samples) => {
-                !with_clearance && friction.is_none() && Mesh::new(drive).state_count(*samples) <= FEW_STATES
+                !with_gaps && friction.is_none() && Mesh::new(drive).state_count(*samples) <= FEW_STATES
             }
             Points::Tolerance { .. } => false,
         }
     }
 
     fn answer(checked: &CheckedSweep, stop: &impl Stop) -> Result<SweepAnswer, NoAnswer> {
-        let CheckedSweep { drive, load, friction, input_speed_rpm, points, with_clearance, with_wind_up } = checked;
+        let CheckedSweep { drive, load, friction, input_speed_rpm, points, with_gaps, with_wind_up } = checked;
         let sweep = solver::sweep(drive, load, *points, stop)?;
         let mesh = Mesh::new(drive);
         let mut findings = drive_findings(drive)?;
-        let approaches_matter = *with_wind_up || load.has_clearance();
+        let approaches_matter = *with_wind_up || load.has_gaps();
         let of_contacts = findings::of_contacts(drive, load, &sweep.peaks, approaches_matter);
         let of_half_widths = findings::of_half_widths(drive, load, &sweep.states);
         let of_wind_up = findings::of_wind_up(drive, &sweep);
@@ -153,7 +155,7 @@ impl Question for Sweep {
                 torque_balance_residual: sweep.torque_balance_residual,
                 period_closure_residual: sweep.period_closure_residual,
             },
-            states: StatesAnswer::new(sweep.states, *with_clearance),
+            states: StatesAnswer::new(sweep.states, *with_gaps),
             findings,
         };
         let states = &answer.states;

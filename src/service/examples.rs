@@ -12,7 +12,7 @@ pub struct Example {
 }
 
 /// All of them.
-pub const EXAMPLES: [Example; 4] = [
+pub const EXAMPLES: [Example; 9] = [
     Example {
         name: "paper-5.1",
         title: "The paper's case 5.1: no undercut, seven teeth in each zone",
@@ -32,6 +32,31 @@ pub const EXAMPLES: [Example; 4] = [
         name: "ring-with-more-teeth",
         title: "A ring with two teeth more than the carrier, fixed stiffnesses, virtual work",
         document: include_str!("../../examples/ring-with-more-teeth.json"),
+    },
+    Example {
+        name: "eccentric-roller",
+        title: "An eccentric circle pushes rollers, the ring has one tooth more: the usual form of open wave reducers",
+        document: include_str!("../../examples/eccentric-roller.json"),
+    },
+    Example {
+        name: "harmonic-three-lobes",
+        title: "A harmonic cam of three lobes: three zones share the load",
+        document: include_str!("../../examples/harmonic-three-lobes.json"),
+    },
+    Example {
+        name: "harmonic-path",
+        title: "Teeth that move along a cosine",
+        document: include_str!("../../examples/harmonic-path.json"),
+    },
+    Example {
+        name: "balls",
+        title: "Balls in grooves around an eccentric circle, by Hertz's law of point contacts",
+        document: include_str!("../../examples/balls.json"),
+    },
+    Example {
+        name: "flat-sided",
+        title: "Case 5.1 with flat-sided teeth, which lie on the walls of their slots",
+        document: include_str!("../../examples/flat-sided.json"),
     },
 ];
 

@@ -90,6 +90,8 @@ pub enum ProblemCode {
     NoToothInMesh,
     /// 422: a `projection` whose stiffnesses give a tooth a compliance that is not positive.
     ComplianceNotPositive,
+    /// 422: a part is too full for a tooth that is to carry.
+    Interference,
     /// 422: the sweep has more states than `max_states`.
     TooManyStates,
     /// 422: the profiles have more points than `max_profile_points`.
@@ -125,6 +127,7 @@ impl ProblemCode {
             | Self::ImpossibleDesign
             | Self::NoToothInMesh
             | Self::ComplianceNotPositive
+            | Self::Interference
             | Self::TooManyStates
             | Self::TooManyPoints => StatusCode::UNPROCESSABLE_ENTITY,
             Self::QueueFull
@@ -153,6 +156,7 @@ impl ProblemCode {
             Self::ImpossibleDesign => "Values that no design can have",
             Self::NoToothInMesh => "At some input angle no tooth carries load",
             Self::ComplianceNotPositive => "The projection form has no solution",
+            Self::Interference => "A part is too full",
             Self::TooManyStates => "The sweep has too many states",
             Self::TooManyPoints => "The profiles have too many points",
             Self::QueueFull => "The service is full",
@@ -187,6 +191,7 @@ impl From<NoAnswerCode> for ProblemCode {
             NoAnswerCode::ImpossibleDesign => Self::ImpossibleDesign,
             NoAnswerCode::NoToothInMesh => Self::NoToothInMesh,
             NoAnswerCode::ComplianceNotPositive => Self::ComplianceNotPositive,
+            NoAnswerCode::Interference => Self::Interference,
             NoAnswerCode::TooManyStates => Self::TooManyStates,
             NoAnswerCode::TooManyPoints => Self::TooManyPoints,
             NoAnswerCode::Stopped => Self::DeadlineExceeded,

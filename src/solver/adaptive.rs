@@ -159,7 +159,7 @@ struct Search<'a, S> {
     mesh: Mesh,
     allowable_stress_mpa: Option<f64>,
     /// Whether teeth begin and cease to carry between their entry and their exit.
-    has_clearance: bool,
+    has_gaps: bool,
     /// Whether loads are smooth between two entries.
     is_smooth: bool,
     tolerance: Tolerance,
@@ -182,7 +182,7 @@ pub(crate) fn moments(
         loaded: loaded.with_zones(mesh.teeth_at_each_place()),
         mesh,
         allowable_stress_mpa: load.parameters().allowable_stress_mpa,
-        has_clearance: load.has_clearance(),
+        has_gaps: load.has_gaps(),
         is_smooth: loaded.linear_compliance_mm_per_n().is_some(),
         tolerance,
         stop,
@@ -308,7 +308,7 @@ impl<S: Stop> Search<'_, S> {
             let fraction = 0.5 * (from.moment.fraction + to.moment.fraction);
             let middle = self.see_inside(fraction, &piece)?;
             let width = to.moment.fraction - from.moment.fraction;
-            let is_told_apart = !self.has_clearance
+            let is_told_apart = !self.has_gaps
                 || width < 0.1 * self.tolerance.relative()
                 || from.teeth_changed(&middle) + middle.teeth_changed(&to) < 2;
             if depth < MAX_DEPTH && (self.bend(&from, &middle, &to) > resolution || !is_told_apart) {

@@ -181,9 +181,12 @@ impl Modification {
         parameters
     }
 
-    /// That its tip relief starts where a drive has no flank.
-    pub(crate) fn violation_in(&self, drive: &Drive) -> Option<Violation> {
+    /// That its tip relief starts where a drive has no flank; one that starts where no position is has another fault.
+    pub fn violation_in(&self, drive: &Drive) -> Option<Violation> {
         let start_deg = self.ring_tip_relief?.start_deg;
+        if Parameter::Modification(Modified::TipReliefStart).check(start_deg).is_some() {
+            return None;
+        }
         let engagement_start_deg = drive.flank_limit().position.from_lobe_deg();
         (start_deg >= engagement_start_deg)
             .then_some(Violation::TipReliefBeyondFlank { start_deg, engagement_start_deg })

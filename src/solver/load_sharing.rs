@@ -146,8 +146,8 @@ impl LoadCase {
     }
 
     /// Whether any contact has a gap.
-    pub fn has_clearance(&self) -> bool {
-        self.0.clearance_um.iter().any(|(_, &gap)| gap > 0.0)
+    pub fn has_gaps(&self) -> bool {
+        self.0.clearance_um.iter().any(|(_, &gap)| gap > 0.0) || self.0.modification.first().is_some()
     }
 }
 

@@ -189,7 +189,8 @@ impl Parameter {
             Self::Clearance(_) | Self::PartClearance(_) => Range::closed(0.0, 1e6, "µm"),
             Self::Modification(modified) => match modified {
                 Modified::RingRotation | Modified::CarrierRotation => Range::closed(-1e5, 1e5, "arcsec"),
-                Modified::TipReliefStart => Range::closed(0.0, 90.0, "deg"),
+                // A single lobe has its valley at the end.
+                Modified::TipReliefStart => Range::closed(0.0, 180.0, "deg"),
                 Modified::TipReliefPower => Range::closed(0.1, 100.0, ""),
                 Modified::RingEquidistant
                 | Modified::RingPathShift

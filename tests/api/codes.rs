@@ -33,7 +33,8 @@ pub(crate) fn problem_codes() -> Vec<ProblemCode> {
         InvalidDocument => ImpossibleDesign,
         ImpossibleDesign => NoToothInMesh,
         NoToothInMesh => ComplianceNotPositive,
-        ComplianceNotPositive => TooManyStates,
+        ComplianceNotPositive => Interference,
+        Interference => TooManyStates,
         TooManyStates => TooManyPoints,
         TooManyPoints => QueueFull,
         QueueFull => DeadlineExceeded,
@@ -132,6 +133,7 @@ fn every_kind_of_problem_has_its_status_and_a_type_of_its_own() {
         | ProblemCode::ImpossibleDesign
         | ProblemCode::NoToothInMesh
         | ProblemCode::ComplianceNotPositive
+        | ProblemCode::Interference
         | ProblemCode::TooManyStates
         | ProblemCode::TooManyPoints => 422,
         ProblemCode::QueueFull

@@ -38,7 +38,7 @@ fn example(name: &str) -> String {
 
 #[tokio::test]
 async fn json_is_the_body_that_the_service_answers_with() {
-    for name in ["paper-5.1", "paper-5.2", "paper-5.2-bored", "ring-with-more-teeth"] {
+    for name in ["paper-5.1", "paper-5.2", "paper-5.2-bored", "ring-with-more-teeth", "balls", "flat-sided"] {
         for (command, path) in COMMANDS {
             let served = Service::new().post_text(path, std::fs::read(example(name)).unwrap()).await;
             let output = run(&[command, &example(name), "--format", "json"], b"");

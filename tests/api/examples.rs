@@ -56,6 +56,33 @@ async fn an_example_is_the_file_of_its_name() {
 }
 
 #[tokio::test]
+async fn every_kind_of_wave_generator_and_every_shape_of_teeth_has_an_example_without_a_warning() {
+    let service = Service::new();
+    let (mut kinds, mut shapes) = (Vec::new(), Vec::new());
+    for name in names(&service).await {
+        let document = service.get(&format!("/v1/examples/{name}")).await.found();
+        let word = |pointer: &str, by_default: &str| {
+            document.pointer(pointer).and_then(Value::as_str).unwrap_or(by_default).to_owned()
+        };
+        kinds.push(word("/drive/wave_generator/kind", "ellipse"));
+        shapes.push(word("/drive/teeth/shape", "cylinder"));
+        if !name.starts_with("paper") {
+            let found = service.post("/v1/sweep", &document).await.found();
+            let findings = found["findings"].as_array().unwrap();
+            assert!(findings.iter().all(|finding| finding["severity"] != "warning"), "{name}: {findings:?}");
+        }
+    }
+    for (words, found) in [
+        (vec!["ellipse", "eccentric", "harmonic", "harmonic_path"], kinds),
+        (vec!["cylinder", "ball", "flat_sided"], shapes),
+    ] {
+        for word in words {
+            assert!(found.contains(&word.to_owned()), "no example of {word}");
+        }
+    }
+}
+
+#[tokio::test]
 async fn an_unknown_example_is_answered_with_the_known_ones() {
     let service = Service::new();
     let problem = service.get("/v1/examples/paper-5.3").await.refused(404, "not_found");

@@ -23,6 +23,7 @@ mod extremes;
 mod findings;
 mod fire;
 mod friction;
+mod modification;
 mod openapi;
 mod operations;
 mod overload;

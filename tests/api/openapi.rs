@@ -6,6 +6,7 @@ use std::sync::LazyLock;
 use serde_json::{Value, json};
 use toothwave::config::Limits;
 use toothwave_calculation::field::pointer;
+use toothwave_solver::violation::Modified;
 use toothwave_solver::{Contact, Parameter, Part};
 
 use crate::asking::{Answer, ENDPOINTS, LIMITS, Occupied, Question, Service};
@@ -250,6 +251,22 @@ fn parameters() -> Vec<Parameter> {
     parameters.extend(contacts.map(Parameter::Stiffness));
     parameters.extend(contacts.map(Parameter::Clearance));
     parameters.extend(parts.map(Parameter::PartClearance));
+    parameters.extend(
+        [
+            Modified::RingEquidistant,
+            Modified::RingPathShift,
+            Modified::RingProfileShift,
+            Modified::RingRotation,
+            Modified::WaveGeneratorEquidistant,
+            Modified::SlotWall,
+            Modified::CarrierRotation,
+            Modified::ToothRadius,
+            Modified::TipReliefAmount,
+            Modified::TipReliefStart,
+            Modified::TipReliefPower,
+        ]
+        .map(Parameter::Modification),
+    );
     parameters
 }
 
@@ -455,7 +472,7 @@ async fn every_success_is_as_described() {
     for path in ["/v1/limits", "/v1/examples", "/health/live", "/health/ready", "/metrics"] {
         assert_described("get", path, &service.get(path).await);
     }
-    for name in ["paper-5.1", "paper-5.2", "paper-5.2-bored", "ring-with-more-teeth"] {
+    for name in ["paper-5.1", "paper-5.2", "paper-5.2-bored", "ring-with-more-teeth", "balls", "harmonic-path"] {
         assert_described("get", "/v1/examples/{name}", &service.get(&format!("/v1/examples/{name}")).await);
     }
 }
@@ -572,6 +589,10 @@ fn kinds() -> Vec<Value> {
         kinds.push(with(&document, "/load/input_speed_rpm", json!(1500.0)));
         kinds.push(with(&eccentric(), "/friction", document["friction"].clone()));
     }
+    let relief = json!({ "amount_um": 4.0, "start_deg": 60.0, "power": 2.0 });
+    let modification = json!({ "ring_equidistant_um": 4.0, "tooth_radius_um": 0.5, "ring_tip_relief": relief });
+    let modified = with(&shortest(), "/model", json!({ "compatibility": "virtual_work" }));
+    kinds.push(with(&modified, "/modification", modification));
     kinds
 }
 

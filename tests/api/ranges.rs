@@ -74,6 +74,26 @@ fn fields() -> Vec<Field> {
     for part in ["wave_generator", "teeth", "ring", "carrier"] {
         fields.push(field(&format!("/materials/{part}/youngs_modulus_gpa"), 1e-3, 1e5));
     }
+    let modified = with(
+        &with(&spelled_out(), "/model", json!({ "compatibility": "virtual_work" })),
+        "/modification",
+        json!({
+            "ring_tip_relief": { "amount_um": 1.0, "start_deg": 60.0, "power": 2.0 }
+        }),
+    );
+    let modification = |name: &str, low, high| Field {
+        document: modified.clone(),
+        ..field(&format!("/modification/{name}"), low, high)
+    };
+    for name in ["ring_equidistant", "ring_path_shift", "ring_profile_shift", "wave_generator_equidistant", "slot_wall"]
+    {
+        fields.push(modification(&format!("{name}_um"), -1e6, 1e6));
+    }
+    fields.push(modification("tooth_radius_um", -1e6, 1e6));
+    fields.push(modification("ring_rotation_arcsec", -1e5, 1e5));
+    fields.push(modification("carrier_rotation_arcsec", -1e5, 1e5));
+    fields.push(modification("ring_tip_relief/amount_um", -1e6, 1e6));
+    fields.push(modification("ring_tip_relief/power", 0.1, 100.0));
     for contact in ["wave_generator", "ring", "carrier"] {
         fields.push(field(&format!("/model/stiffness/{contact}_n_per_mm"), 1e-3, 1e15));
     }

@@ -14,6 +14,8 @@ use toothwave_calculation::key::Key;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::question::Question;
 use toothwave_calculation::sweep::Sweep;
+use toothwave_solver::Modification;
+use toothwave_solver::gaps::TipRelief;
 
 use crate::schema::{Chance, Schemas, leaves, objects};
 
@@ -171,7 +173,31 @@ fn what_is_left_out_has_the_key_of_its_default() {
     long["materials"] = json!({ "teeth": { "poissons_ratio": 0.3 } });
     long["model"] = json!({ "compatibility": "projection", "stiffness": { "law": "linear" } });
     long["sweep"] = json!({ "samples": 50, "wind_up": false });
+    long["modification"] = json!({ "slot_wall_um": 0.0, "tooth_radius_um": -0.0 });
     long["parts"] = json!({ "ring": { "clearance_um": -0.0 } });
     long["assembly"] = json!({ "input_angle_deg": -0.0 });
     assert_eq!(keys(&read(&short).unwrap()), keys(&read(&long).unwrap()));
+}
+
+#[test]
+fn each_number_of_the_modification_reaches_the_solver_as_itself() {
+    let mut document = short();
+    document["model"] = json!({ "compatibility": "virtual_work" });
+    document["modification"] = json!({
+        "ring_equidistant_um": 1.0, "ring_path_shift_um": 2.0, "ring_profile_shift_um": 3.0, "ring_rotation_arcsec": 4.0,
+        "wave_generator_equidistant_um": 5.0, "slot_wall_um": 6.0, "carrier_rotation_arcsec": 7.0, "tooth_radius_um": 8.0,
+        "ring_tip_relief": { "amount_um": 9.0, "start_deg": 10.0, "power": 11.0 }
+    });
+    let expected = Modification {
+        ring_equidistant_um: 1.0,
+        ring_path_shift_um: 2.0,
+        ring_profile_shift_um: 3.0,
+        ring_rotation_arcsec: 4.0,
+        wave_generator_equidistant_um: 5.0,
+        slot_wall_um: 6.0,
+        carrier_rotation_arcsec: 7.0,
+        tooth_radius_um: 8.0,
+        ring_tip_relief: Some(TipRelief { amount_um: 9.0, start_deg: 10.0, power: 11.0 }),
+    };
+    assert_eq!(read(&document).unwrap().load_parameters().unwrap().modification, expected);
 }

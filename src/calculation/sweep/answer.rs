@@ -227,10 +227,10 @@ pub struct ChecksAnswer {
 }
 
 impl StatesAnswer {
-    pub(super) fn new(states: States, with_clearance: bool) -> Self {
+    pub(super) fn new(states: States, with_gaps: bool) -> Self {
         let forces = &states.force_n.wave_generator;
         Self {
-            loaded: with_clearance.then(|| forces.iter().map(|force| *force > 0.0).collect()),
+            loaded: with_gaps.then(|| forces.iter().map(|force| *force > 0.0).collect()),
             input_angle_deg: states.input_angle_deg,
             tooth: states.tooth,
             lobe: (!states.lobe.is_empty()).then_some(states.lobe),
