@@ -79,7 +79,7 @@ export const launch = () =>
 
 /** One server and one browser for the tests of a file, and a page for each: `bed.page` is set by the test with `bed.open(…)`, and must
  *  have had no fault at its end. */
-export function testBed({ before, after, afterEach }) {
+export function testBed({ before, after, afterEach }, settings = []) {
   const bed = {
     async open(options) {
       bed.page = await open(bed.browser, bed.server, options);
@@ -87,7 +87,7 @@ export function testBed({ before, after, afterEach }) {
     },
   };
   before(async () => {
-    bed.server = await Server.start();
+    bed.server = await Server.start(undefined, settings);
     bed.browser = await launch();
   });
   after(async () => {
@@ -104,7 +104,7 @@ export function testBed({ before, after, afterEach }) {
 }
 
 /** A page that remembers what must not happen: errors, violations of its policy, requests to elsewhere. */
-export async function open(browser, server, { address = '', ...options } = {}) {
+export async function open(browser, server, { address = '', hasClock = false, ...options } = {}) {
   const context = await browser.newContext({
     viewport: { width: 1366, height: 900 },
     colorScheme: 'light',
@@ -129,6 +129,8 @@ export async function open(browser, server, { address = '', ...options } = {}) {
     const url = request.url();
     if (!url.startsWith(server.origin) && !url.startsWith('blob:') && !url.startsWith('data:')) page.faults.push(`request to ${url}`);
   });
+  // A clock that the test can put forward.
+  if (hasClock) await page.clock.install();
   await page.goto(`${server.origin}/${address}`);
   await settled(page);
   return page;

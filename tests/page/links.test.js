@@ -21,11 +21,12 @@ test('a link that was cut short says so, and its address stays until something i
   const whole = await linkOf(page);
   for (const cut of [whole.slice(0, -40), '#design=', '#desig']) {
     await page.context().close();
-    page = await bed.open({ address: cut });
+    page = await bed.open({ address: cut, hasClock: true });
     assert.match(await page.textContent('#notice'), /damaged or was cut short.*ready design is shown instead/);
     assert.deepEqual(await designOf(page), await bed.server.example('paper-5.1'));
-    // Longer than the address is put off after a change.
-    await page.waitForTimeout(900);
+    // Much longer than the address is put off after a change.
+    await page.clock.fastForward(10_000);
+    await settled(page);
     assert.equal(await hash(page), cut);
   }
   await page.click('#notice-hide');

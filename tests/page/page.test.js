@@ -1013,7 +1013,7 @@ for (const [name, options] of Object.entries({
     await measure();
     await enter(page, '/load/allowable_stress_mpa', 1500);
     await enter(page, '/model/clearance/ring_um', 2);
-    for (const details of await page.$$('main details:not([open]) > summary')) await details.click();
+    for (const details of await page.$$('main details:not([open]) > summary')) if (await details.isVisible()) await details.click();
     await page.check(field('/sweep/wind_up'));
     await enter(page, BORE, 100);
     await page.click('[data-file="assembly.svg"]');

@@ -9,7 +9,8 @@ import { after, afterEach, before, test } from 'node:test';
 import { BINARY, Server, enter, field, open, resultOf, settled, testBed } from './harness.js';
 
 const RADIUS = '/drive/teeth/radius_mm';
-const bed = testBed({ before, after, afterEach });
+// A machine that has much else to do is slow, not too slow.
+const bed = testBed({ before, after, afterEach }, ['--deadline-ms', '60000']);
 
 test('of a service that hangs the page tells, and goes on when it answers', async () => {
   const page = await bed.open();

@@ -1,12 +1,12 @@
 // How wrong and how slow each choice of model and input angles is, as the service measures it for the design at hand.
 
-import { at, changed, isSame } from './design.js';
+import { at, changed, compatibilityOf, isSame, lawOf } from './design.js';
 import { html, setText } from './dom.js';
 import { fixed, number } from './format.js';
 import { ask } from './service.js';
 
 const COMPATIBILITIES = { projection: 'Projection', virtual_work: 'Virtual work' };
-const LAWS = { linear: 'linear', fixed: 'fixed', palmgren: 'Palmgren' };
+const LAWS = { linear: 'linear', fixed: 'fixed', palmgren: 'Palmgren', johnson: 'Johnson', hertz: 'Hertz' };
 const WANTED = '/accuracy/requested_error';
 const WANTED_ERRORS = [1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10];
 const WANTED_PRESET = 1e-6;
@@ -21,8 +21,8 @@ const questionOf = ({ drive, materials, load, model, accuracy }) => ({ drive, ma
 function choiceOf(design) {
   const tolerance = at(design, '/sweep/tolerance');
   return {
-    compatibility: at(design, '/model/compatibility') ?? 'projection',
-    law: at(design, '/model/stiffness/law') ?? 'linear',
+    compatibility: compatibilityOf(design),
+    law: lawOf(design),
     samples: tolerance === undefined ? (at(design, '/sweep/samples') ?? 50) : undefined,
     tolerance,
   };
@@ -31,13 +31,13 @@ function choiceOf(design) {
 const isSameModel = (one, other) => one.compatibility === other.compatibility && one.law === other.law;
 const isSameWay = (one, other) => isSameModel(one, other) && one.samples === other.samples && one.tolerance === other.tolerance;
 
-/** The design with another choice; the stiffnesses of a fixed law are those that were measured. */
+/** The design with another choice; what a law has of its own is what was measured. */
 function applied(way, design, measured) {
   let next = design;
   const own = choiceOf(design);
   if (way.compatibility !== own.compatibility) next = changed(next, '/model/compatibility', way.compatibility);
-  const stiffness = way.law === 'fixed' ? measured.model.stiffness : { law: way.law };
-  if (way.law !== own.law || (way.law === 'fixed' && !isSame(stiffness, design.model.stiffness))) next = changed(next, '/model/stiffness', stiffness);
+  const given = way.law === lawOf(measured) ? measured.model?.stiffness : undefined;
+  if (way.law !== own.law || (given && !isSame(given, design.model?.stiffness))) next = changed(next, '/model/stiffness', given ?? { law: way.law });
   const { samples, tolerance, ...others } = design.sweep ?? {};
   const points = way.tolerance === undefined ? { samples: way.samples } : { tolerance: way.tolerance };
   return changed(next, '/sweep', { ...points, ...others });

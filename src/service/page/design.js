@@ -2,8 +2,10 @@
 // is one entry here; nothing else in the page knows field names except what is drawn from them.
 //
 // What comes in several kinds, as a wave generator does, is a `variant`: its tag is chosen, and of all the fields only those of the
-// chosen kind are shown. A kind may be `implied`: it is meant where the document has no tag, and then none is written. A kind's field
-// starts with its `preset`, a value or what makes one of the design, where the document has none.
+// chosen kind are shown. A kind may be `implied`: it is meant where the document has no tag, and then none is written; `otherwise` finds
+// it where it depends on the design. A kind's field
+// starts with its `start`, a value or what makes one of the design, where the document has none; a field's `preset` is what the service
+// takes where nothing is given. What another kind changes beside itself, `adjust` does.
 
 /** Shares of the value on either side that a slider spans. */
 const NARROW = 0.05;
@@ -35,27 +37,92 @@ const setBack = (part, label, what) =>
 /** A radius that the mechanics leave free, with what is taken where it is left out. */
 const freeRadius = (part, label, key, what, otherwise) => number(`/parts/${part}/${key}_mm`, what, '', 'mm', { of: label, optional: () => otherwise });
 
-/** Lobes of the wave generator: as many teeth the carrier has more or fewer than the ring. */
-const LOBES = 2;
+/** What a document means that names no law, and no way of adding approaches up. */
+export const lawOf = (design) => at(design, '/model/stiffness/law') ?? (isBall(design) ? 'hertz' : 'linear');
+export const compatibilityOf = (design) => at(design, '/model/compatibility') ?? 'projection';
+
+const isBall = (design) => at(design, '/drive/teeth/shape') === 'ball';
+
+/** Laws that `projection` takes: the others give way by more than in proportion to the force, or know more than one contact. */
+const PROJECTED = new Set(['linear', 'palmgren', 'fixed']);
+
+/** Lobes of the wave generator: as many teeth the carrier has to have more or fewer than the ring. */
+export function lobesOf(design) {
+  const { kind = 'ellipse', lobes } = design.drive?.wave_generator ?? {};
+  return { ellipse: 2, eccentric: 1 }[kind] ?? (Number.isInteger(lobes) && lobes > 0 ? lobes : 2);
+}
+
+/** The document with a ring that suits the number of lobes. */
+function withRing(design) {
+  const [count, teeth] = [at(design, '/drive/teeth/count'), at(design, '/drive/ring/teeth')];
+  if (typeof count !== 'number' || typeof teeth !== 'number') return design;
+  return changed(design, '/drive/ring/teeth', count + (teeth > count ? 1 : -1) * lobesOf(design));
+}
+
+/** Mean radius and stroke of a wave generator of whatever kind: another kind begins as the one that comes nearest. */
+function sizeOf(design) {
+  const wave = design.drive?.wave_generator ?? {};
+  const toothRadius = at(design, '/drive/teeth/radius_mm') ?? 0;
+  const { semi_major_mm: a = 58, semi_minor_mm: b = 56 } = wave;
+  const means = { eccentric: wave.radius_mm, harmonic: wave.mean_radius_mm, harmonic_path: wave.mean_path_radius_mm - toothRadius };
+  const strokes = { eccentric: wave.eccentricity_mm, harmonic: wave.amplitude_mm, harmonic_path: wave.amplitude_mm };
+  const [mean = (a + b) / 2, stroke = (a - b) / 2] = [means[wave.kind], strokes[wave.kind]];
+  const tidy = (value) => Number(value.toPrecision(9));
+  return { mean: tidy(mean), stroke: tidy(stroke), low: tidy(mean - stroke), high: tidy(mean + stroke), path: tidy(mean + toothRadius) };
+}
+
+/** Laws suit shapes: balls have Hertz's, and only they; and Hertz's wants virtual work. */
+function withLaw(design) {
+  const isSuited = lawOf(design) === 'fixed' || isBall(design) === (lawOf(design) === 'hertz');
+  const suited = isSuited ? design : changed(design, '/model/stiffness', undefined);
+  return PROJECTED.has(lawOf(suited)) ? suited : changed(suited, '/model/compatibility', 'virtual_work');
+}
+
+/** Johnson's law gives way to the linear one where approaches are projected. */
+const withProjectedLaw = (design) =>
+  compatibilityOf(design) === 'projection' && !PROJECTED.has(lawOf(design)) ? changed(design, '/model/stiffness', { law: 'linear' }) : design;
 
 /** The document with the counts that a ratio of input to output speed asks for, ring fixed: of the slots as many hold a tooth as
  *  before, all or every second and so on, where that is possible. */
 function withRatio(design, ratio) {
   const { count, installed } = design.drive?.teeth ?? {};
-  const next = LOBES * Math.abs(ratio);
-  const counted = changed(changed(design, '/drive/teeth/count', next), '/drive/ring/teeth', next - LOBES * Math.sign(ratio));
+  const lobes = lobesOf(design);
+  const next = Math.round(lobes * Math.abs(ratio));
+  const counted = changed(changed(design, '/drive/teeth/count', next), '/drive/ring/teeth', next - lobes * Math.sign(ratio));
   if (typeof installed !== 'number') return counted;
   let left = Math.max(1, Math.round(count / installed));
-  while (next % (LOBES * left) !== 0) left -= 1;
+  while (next % left !== 0) left -= 1;
   return changed(counted, '/drive/teeth/installed', next / left);
 }
 
 const ratio = {
   ...whole('/ratio', 'Ratio, ring fixed', 'i_HG'),
-  derived: { read: ({ geometry }) => geometry?.transmission_ratio, write: withRatio },
-  refuses: (value) => (Number.isInteger(value) && Math.abs(value) >= 2 ? undefined : 'A ratio is a whole number, 2 or more; negative where the carrier turns against the input. The last one stands.'),
+  derived: { read: ({ geometry }) => geometry && Number(geometry.transmission_ratio.toPrecision(6)), write: withRatio },
+  refuses: (value, design) => {
+    const lobes = lobesOf(design);
+    const others = lobes > 2 ? `, or ${lobes} times it is whole` : '';
+    const isWhole = Number.isInteger(value) || (lobes > 2 && Math.abs(lobes * value - Math.round(lobes * value)) < 0.005);
+    return isWhole && Math.abs(value) >= 2 ? undefined : `A ratio is a whole number, 2 or more${others}; negative where the carrier turns against the input. The last one stands.`;
+  },
   next: (value, sense) => (value + sense > -2 && value + sense < 2 ? 2 * sense : value + sense),
 };
+
+const LOBES = whole('/drive/wave_generator/lobes', 'Lobes', 'U', { likely: 2, start: lobesOf, adjust: withRing });
+const AMPLITUDE = number('/drive/wave_generator/amplitude_mm', 'Amplitude', 'e', 'mm', { slider: WIDE, likely: 1, start: (design) => sizeOf(design).stroke });
+const WIDTH = number('/drive/teeth/width_mm', 'Tooth width', 'L_1', 'mm', { slider: WIDE, likely: 15, start: (design) => 3 * (at(design, '/drive/teeth/radius_mm') ?? 5) });
+
+/** Across the path; without one the part is straight there. */
+const groove = (contact, label) =>
+  number(`/drive/teeth/groove_radius_mm/${contact}`, label, '', 'mm', { slider: 0.05, optional: () => 'no groove', step: 0.1 });
+
+/** How far below a contact its body stands still. */
+const depth = (contact, label) =>
+  number(`/model/stiffness/depth_mm/${contact}`, label, '', 'mm', { optional: (design) => `tooth radius ${at(design, '/drive/teeth/radius_mm') ?? ''}`.trim(), step: 0.5 });
+
+const stiffness = (contact, label, symbol) => number(`/model/stiffness/${contact}_n_per_mm`, label, symbol, 'N/mm', { start: 500000, likely: 500000 });
+
+const compliance = (contact, label) =>
+  number(`/model/series_compliance_mm_per_n/${contact}`, label, '', 'mm/N', { optional: () => '0', likely: 1e-6 });
 
 export const GROUPS = [
   {
@@ -69,11 +136,37 @@ export const GROUPS = [
           label: 'Ellipse',
           implied: true,
           fields: [
-            number('/drive/wave_generator/semi_major_mm', 'Semi-major axis', 'a', 'mm', { slider: NARROW, likely: 58 }),
-            number('/drive/wave_generator/semi_minor_mm', 'Semi-minor axis', 'b', 'mm', { slider: NARROW, likely: 56 }),
+            number('/drive/wave_generator/semi_major_mm', 'Semi-major axis', 'a', 'mm', { slider: NARROW, likely: 58, start: (design) => sizeOf(design).high }),
+            number('/drive/wave_generator/semi_minor_mm', 'Semi-minor axis', 'b', 'mm', { slider: NARROW, likely: 56, start: (design) => sizeOf(design).low }),
           ],
         },
-      ], { name: 'Wave generator' }),
+        {
+          value: 'eccentric',
+          label: 'Eccentric circle',
+          fields: [
+            number('/drive/wave_generator/radius_mm', 'Radius', 'R_0', 'mm', { slider: NARROW, likely: 57, start: (design) => sizeOf(design).mean }),
+            number('/drive/wave_generator/eccentricity_mm', 'Eccentricity', 'e', 'mm', { slider: WIDE, likely: 1, start: (design) => sizeOf(design).stroke }),
+          ],
+        },
+        {
+          value: 'harmonic',
+          label: 'Harmonic support',
+          fields: [
+            LOBES,
+            number('/drive/wave_generator/mean_radius_mm', 'Mean radius', 'R_0', 'mm', { slider: NARROW, likely: 57, start: (design) => sizeOf(design).mean }),
+            AMPLITUDE,
+          ],
+        },
+        {
+          value: 'harmonic_path',
+          label: 'Harmonic path of the teeth',
+          fields: [
+            LOBES,
+            number('/drive/wave_generator/mean_path_radius_mm', 'Mean radius of the path', 'R', 'mm', { slider: NARROW, likely: 62, start: (design) => sizeOf(design).path }),
+            AMPLITUDE,
+          ],
+        },
+      ], { name: 'Wave generator', adjust: withRing, terms: ['lobes'] }),
     ],
   },
   {
@@ -88,13 +181,30 @@ export const GROUPS = [
         mark: (answers) => {
           const radius = answers.geometry?.undercut.critical_tooth_radius_mm;
           return radius === undefined
-            ? { text: 'no radius undercuts this ellipse' }
+            ? { text: 'no radius undercuts this ring' }
             : { value: radius, text: 'ring tips are undercut from' };
         },
       }),
       variant('/drive/teeth', 'shape', 'Shape', [
-        { value: 'cylinder', label: 'Cylinders', implied: true, fields: [number('/drive/teeth/width_mm', 'Tooth width', 'L_1', 'mm', { slider: WIDE, likely: 15 })] },
-      ], { name: 'Teeth' }),
+        { value: 'cylinder', label: 'Cylinders', implied: true, fields: [WIDTH] },
+        {
+          value: 'ball',
+          label: 'Balls',
+          fields: [groove('wave_generator', 'Groove of the wave generator'), groove('ring', 'Groove of the ring'), groove('carrier', 'Groove of the slots')],
+        },
+        {
+          value: 'flat_sided',
+          label: 'Cylinders with flats',
+          fields: [
+            WIDTH,
+            number('/drive/teeth/flat_length_mm', 'Length of the flats', 'l', 'mm', {
+              slider: WIDE,
+              likely: 4,
+              start: (design) => Number((0.8 * (at(design, '/drive/teeth/radius_mm') ?? 5)).toPrecision(6)),
+            }),
+          ],
+        },
+      ], { name: 'Teeth', adjust: withLaw }),
       whole('/drive/teeth/count', 'Slots in theory', 'Z_G', { step: 2, likely: 28, terms: ['slots'] }),
       whole('/drive/teeth/installed', 'Teeth installed', 'Z′_G', {
         step: 2,
@@ -156,28 +266,38 @@ export const GROUPS = [
         '/model/compatibility',
         'Compatibility',
         [
-          { value: 'projection', label: 'Projection (the paper’s)' },
+          { value: 'projection', label: 'Projection (the paper’s)', suits: (design) => !isBall(design) || lawOf(design) === 'fixed' },
           { value: 'virtual_work', label: 'Virtual work' },
         ],
-        { terms: ['projection', 'virtual_work', 'paper'] },
+        { terms: ['projection', 'virtual_work', 'paper'], otherwise: compatibilityOf, adjust: withProjectedLaw },
       ),
       variant('/model/stiffness', 'law', 'Contact law', [
-        { value: 'linear', label: 'Linear, from the materials', fields: [] },
-        { value: 'palmgren', label: 'Palmgren, steel on steel', fields: [] },
+        { value: 'linear', label: 'Linear, from the materials', fields: [], suits: (design) => !isBall(design) },
+        { value: 'palmgren', label: 'Palmgren, steel on steel', fields: [], suits: (design) => !isBall(design) },
+        {
+          value: 'johnson',
+          label: 'Johnson, logarithmic',
+          fields: [depth('wave_generator', 'Depth in the wave generator'), depth('ring', 'Depth in the ring'), depth('carrier', 'Depth in the carrier')],
+          suits: (design) => !isBall(design),
+        },
+        { value: 'hertz', label: 'Hertz, of balls', fields: [], suits: isBall },
         {
           value: 'fixed',
           label: 'Fixed stiffnesses',
-          fields: [
-            number('/model/stiffness/wave_generator_n_per_mm', 'At the wave generator', 'k_H', 'N/mm', { preset: 500000 }),
-            number('/model/stiffness/ring_n_per_mm', 'At the ring', 'k_K', 'N/mm', { preset: 500000 }),
-            number('/model/stiffness/carrier_n_per_mm', 'At the carrier', 'k_S', 'N/mm', { preset: 500000 }),
-          ],
+          fields: [stiffness('wave_generator', 'At the wave generator', 'k_H'), stiffness('ring', 'At the ring', 'k_K'), stiffness('carrier', 'At the carrier', 'k_S')],
         },
-      ]),
+      ], { otherwise: lawOf, adjust: withLaw }),
       clearance('wave_generator', 'Gap at the wave generator', ''),
       clearance('ring', 'Gap at the ring', ''),
       clearance('carrier', 'Gap at the carrier', ''),
     ],
+  },
+  {
+    title: 'What gives way behind the contacts',
+    pointer: '/model/series_compliance_mm_per_n',
+    hint: 'Beside the contacts themselves, such as a bearing under the cam. Only virtual work takes it.',
+    summary: (design) => (Object.values(at(design, '/model/series_compliance_mm_per_n') ?? {}).some((value) => value) ? 'given' : 'nothing'),
+    fields: [compliance('wave_generator', 'Compliance, wave generator'), compliance('ring', 'Compliance, ring'), compliance('carrier', 'Compliance, carrier')],
   },
   {
     title: 'Materials',
@@ -267,22 +387,23 @@ export function fieldsOf(group) {
 }
 
 /** The kind of a variant that a document has: the implied or first one where it has no tag, undefined where it has another. */
-export function kindOf({ pointer, tag, options }, design) {
+export function kindOf({ pointer, tag, options, otherwise }, design) {
   const given = at(design, pointer)?.[tag];
-  if (given === undefined || given === null) return (options.find(({ implied }) => implied) ?? options[0]).value;
+  if (given === undefined || given === null) return otherwise?.(design) ?? (options.find(({ implied }) => implied) ?? options[0]).value;
   return options.find(({ value }) => value === given)?.value;
 }
 
 /** The value of a variant when another kind is chosen: what does not belong to a kind stays, with the fields that both kinds have. */
 export function keptBy({ pointer, tag, options }, kind, design) {
   const chosen = options.find(({ value }) => value === kind);
-  const keyOf = (field) => field.pointer.split('/').at(-1);
+  // Of what stands deeper within, the object that holds it.
+  const keyOf = (field) => field.pointer.slice(pointer.length + 1).split('/')[0];
   const own = new Map(chosen.fields.map((field) => [keyOf(field), field]));
   const others = new Set(options.flatMap(({ fields }) => fields).map(keyOf).filter((key) => !own.has(key)));
   const kept = Object.entries(at(design, pointer) ?? {}).filter(([key]) => key !== tag && !others.has(key));
   const given = new Set(kept.map(([key]) => key));
-  const presets = [...own].filter(([key, { preset }]) => preset !== undefined && !given.has(key)).map(([key, { preset }]) => [key, typeof preset === 'function' ? preset(design) : preset]);
-  return { ...(chosen.implied ? {} : { [tag]: kind }), ...Object.fromEntries([...kept, ...presets]) };
+  const starts = [...own].filter(([key, { start }]) => start !== undefined && !given.has(key)).map(([key, { start }]) => [key, typeof start === 'function' ? start(design) : start]);
+  return { ...(chosen.implied ? {} : { [tag]: kind }), ...Object.fromEntries([...kept, ...starts]) };
 }
 
 /** A field's label where it stands without its group. */

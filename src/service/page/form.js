@@ -93,15 +93,16 @@ export class Form {
   }
 
   #buildField(field) {
-    if (field.kind === 'choice') return this.#buildChoice(field, (value) => this.#edit(field.pointer, value));
+    if (field.kind === 'choice') return this.#buildChoice(field, (value) => this.#edit(field.pointer, value, field.adjust));
     if (field.kind === 'variant') return this.#buildVariant(field);
     if (field.kind === 'oneOf') return this.#buildOneOf(field);
     if (field.kind === 'flag') return this.#buildFlag(field);
     return this.#buildNumber(field);
   }
 
-  #edit(pointer, value) {
-    this.#replace(changed(this.#design, pointer, value), pointer);
+  /** `adjust` changes what follows from it. */
+  #edit(pointer, value, adjust = (design) => design) {
+    this.#replace(adjust(changed(this.#design, pointer, value)), pointer);
   }
 
   #replace(design, gesture) {
@@ -131,10 +132,10 @@ export class Form {
 
   /** A tagged object: its kind is chosen, the fields of that kind follow. Kinds may share fields. */
   #buildVariant(field) {
-    const element = this.#buildChoice(field, (kind) => this.#edit(field.pointer, keptBy(field, kind, this.#design)));
-    for (const inner of new Map(field.options.flatMap(({ fields }) => fields).map((each) => [each.pointer, each])).values()) {
-      element.append(this.#buildField(inner));
-    }
+    const element = this.#buildChoice(field, (kind) => this.#edit(field.pointer, keptBy(field, kind, this.#design), field.adjust));
+    // What kinds share stands in the order of each of them.
+    const placed = field.options.flatMap(({ fields }) => fields.map((inner, index) => ({ inner, index }))).sort((one, other) => one.index - other.index);
+    for (const inner of new Map(placed.map((each) => [each.inner.pointer, each.inner])).values()) element.append(this.#buildField(inner));
     return element;
   }
 
@@ -211,11 +212,11 @@ export class Form {
   #take(entry) {
     const { field, input } = entry;
     const { value, fault } = typed(input.value);
-    entry.fault = fault ?? (value === undefined ? undefined : field.refuses?.(value));
+    entry.fault = fault ?? (value === undefined ? undefined : field.refuses?.(value, this.#design));
     if (entry.fault !== undefined) this.#renderNotes();
     else if (field.derived) {
       if (value !== undefined) this.#replace(field.derived.write(this.#design, value), field.pointer);
-    } else this.#edit(field.pointer, value);
+    } else this.#edit(field.pointer, value, field.adjust);
   }
 
   #stepBy(entry, sense) {
@@ -270,12 +271,20 @@ export class Form {
     for (const { group, summary } of this.#groups) setText(summary, group.summary?.(design) ?? '');
   }
 
+  /** Shows the option that is chosen; what no design like this one can have is not offered. */
+  #offer({ field, input }, chosen) {
+    field.options.forEach(({ value, suits }, index) => {
+      input.options[index].hidden = value !== chosen && suits !== undefined && !suits(this.#design);
+    });
+    input.value = chosen ?? '';
+  }
+
   #showValue(entry, respan) {
     const { field, input } = entry;
     const design = this.#design;
     if (field.kind === 'variant') {
       const kind = kindOf(field, design);
-      input.value = kind ?? '';
+      this.#offer(entry, kind);
       const wanted = new Set(field.options.find(({ value }) => value === kind)?.fields.map(({ pointer }) => pointer));
       for (const { pointer } of field.options.flatMap(({ fields }) => fields)) this.#fields.get(pointer).element.hidden = !wanted.has(pointer);
       return;
@@ -292,7 +301,7 @@ export class Form {
       return;
     }
     if (field.kind === 'choice') {
-      input.value = at(design, field.pointer) ?? field.options[0].value;
+      this.#offer(entry, at(design, field.pointer) ?? field.otherwise?.(design) ?? field.options[0].value);
       return;
     }
     const value = field.derived ? field.derived.read(this.#isOwn ? this.#answers : {}) : (at(design, field.pointer) ?? field.preset);

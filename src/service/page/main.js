@@ -24,6 +24,8 @@ import { Toolbar } from './toolbar.js';
 const FIRST_EXAMPLE = 'paper-5.1';
 /** Degrees of the input angle per second while it plays: a turn takes 20 seconds. */
 const PLAY_SPEED = 18;
+/** Positions closer than this are alike. */
+const ALIKE_DEG = 1e-6;
 const ADDRESS_DELAY_MS = 400;
 const ANNOUNCE_DELAY_MS = 700;
 
@@ -393,8 +395,9 @@ function select(tooth) {
 function showPeak({ input_angle_deg: inputDeg, position_deg: positionDeg }) {
   play(false);
   const distance = (tooth) => Math.abs(motion.positionDeg(tooth, inputDeg) - positionDeg);
-  const teeth = [...Array(motion.installed / 2).keys()];
-  state.selected = teeth.reduce((best, tooth) => (distance(tooth) < distance(best) ? tooth : best));
+  // Of those that stand alike, on several lobes, the first.
+  const teeth = [...Array(motion.installed).keys()];
+  state.selected = teeth.reduce((best, tooth) => (distance(tooth) < distance(best) - ALIKE_DEG ? tooth : best));
   turnTo(inputDeg);
 }
 

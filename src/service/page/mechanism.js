@@ -17,6 +17,9 @@ const FINEST = 4000;
  *  would fall on the same pixel. */
 const MOST_TEETH = 1440;
 
+/** Of more lobes than this only the first has a line from the axis. */
+const MOST_SPOKES = 12;
+
 /** Tooth spaces, slots and teeth that the enlarged view has on either side. */
 const NEAR = 5;
 
@@ -72,6 +75,23 @@ function arc(radius, fromDeg, toDeg) {
   return `M${xy(polar(radius, fromDeg))}A${radius} ${radius} 0 0 1 ${xy(polar(radius, toDeg))}`;
 }
 
+/** Where the lobes of the wave generator have their middles, in its own frame. */
+const lobeAngles = ({ lobes }) => Array.from({ length: lobes }, (_, lobe) => (360 * lobe) / lobes);
+
+/** A cross at the axis of rotation, and from there a line to the middle of each lobe, as far as they can be told apart. */
+function camAxis(motion, tip) {
+  const cross = tip * 0.05;
+  const angles = lobeAngles(motion);
+  const spokes = (angles.length <= MOST_SPOKES ? angles : [0]).map((deg) => `M0 0L${xy(polar(tip, deg))}`);
+  return `M${-cross} 0H${cross}M0 ${-cross}V${cross}${spokes.join('')}`;
+}
+
+/** A tooth with flats, its slot along x; of others nothing, they are circles. */
+function flatSided({ toothRadius: radius, halfFlatMm: half, toSlotWallMm: wall }) {
+  if (half === 0) return undefined;
+  return `M${half} ${wall}H${-half}A${radius} ${radius} 0 0 1 ${-half} ${-wall}H${half}A${radius} ${radius} 0 0 1 ${half} ${wall}Z`;
+}
+
 /** A pushing force: an arrow whose head is at the contact. */
 function arrow({ center, contacts, force }, key, lengthPerNewton, head) {
   const tip = contacts[key];
@@ -112,13 +132,15 @@ class Body {
 
   shape(outlines) {
     for (const part of ['ring', 'carrier', 'cam', 'axis', 'zones', 'track']) setAttributes(this[part], { d: outlines[part] ?? '' });
+    const tag = outlines.toothOutline ? 'path' : 'circle';
+    if (this.circles.some(({ tagName }) => tagName !== tag)) this.circles.splice(0).forEach((tooth) => tooth.remove());
     while (this.circles.length > outlines.teeth) this.circles.pop().remove();
     while (this.circles.length < outlines.teeth) {
-      const tooth = svg('circle', { class: 'tooth' });
+      const tooth = svg(tag, { class: 'tooth' });
       this.circles.push(tooth);
       this.teeth.append(tooth);
     }
-    for (const tooth of this.circles) setAttributes(tooth, { r: outlines.toothRadius });
+    for (const tooth of this.circles) setAttributes(tooth, outlines.toothOutline ? { d: outlines.toothOutline } : { r: outlines.toothRadius });
   }
 
   /** Places cam, carrier, each `stride`th tooth from the `first` on, and arrows; `turns` are those of ring and carrier pieces. */
@@ -133,10 +155,11 @@ class Body {
       const isSelected = stride > 1 && index === Math.floor(selected / stride);
       const tooth = isSelected ? selected : (first + index * stride + motion.installed) % motion.installed;
       drawn.add(tooth);
-      const { x, y } = motion.center(tooth, inputDeg);
+      const { x, y, deg } = motion.center(tooth, inputDeg);
       const state = byTooth.get(tooth);
       const share = state && Math.max(...Object.values(state.stress)) / loaded.mostStress;
-      setAttributes(element, { 'data-tooth': tooth, cx: x.toFixed(4), cy: y.toFixed(4) });
+      const [left, top] = [x.toFixed(4), y.toFixed(4)];
+      setAttributes(element, { 'data-tooth': tooth, ...(element.tagName === 'path' ? { transform: `translate(${left} ${top}) rotate(${deg})` } : { cx: left, cy: top }) });
       element.style.fill = state ? stressColor(share) : '';
       element.classList.toggle('selected', tooth === selected);
     });
@@ -200,17 +223,17 @@ export class Mechanism {
     this.outer = root * (1 + RING_BODY);
     const zone = this.outer * 1.025;
     const cam = points(geometry.wave_generator.profile);
-    const major = cam[0].x;
     this.stride = Math.ceil(installed / MOST_TEETH);
     const shown = Math.ceil(installed / this.stride);
     const whole = {
       ring: `${circle(this.outer)}${polyline(flanks(geometry, motion.ringTeeth, 0, motion.ringTeeth, this.outer / FINEST))}Z`,
       carrier: carrierOutline(motion, 0, shown, this.stride),
       cam: `${polyline(cam.slice(0, -1))}Z`,
-      axis: `M${-major} 0H${major}M0 ${-major * 0.05}V${major * 0.05}`,
-      zones: arc(zone, endDeg, startDeg) + arc(zone, 180 + endDeg, 180 + startDeg),
+      axis: camAxis(motion, cam[0].x),
+      zones: lobeAngles(motion).map((deg) => arc(zone, deg + endDeg, deg + startDeg)).join(''),
       teeth: shown,
       toothRadius,
+      toothOutline: flatSided(motion),
     };
     this.#whole.shape(whole);
     // Enlarged, only what is near is built, but with every point: it is turned to where the selected tooth stands.

@@ -20,7 +20,13 @@ export const polar = (radius, deg) => ({ x: radius * Math.cos(deg * RAD), y: rad
 
 const modulo = (value, base) => ((value % base) + base) % base;
 
-/** A sweep's states by input angle: `[{ angle, rows: Map(tooth → row) }]`. Where loads jump an angle may stand twice, without the
+/** Lobes of the wave generator, U: as many teeth the carrier has more or fewer than the ring. */
+export const lobesOf = ({ drive: { teeth, ring } }) => Math.abs(teeth.count - ring.teeth);
+
+/** A tooth on a lobe: where zones are unlike, the same slot comes to the next lobe before long. */
+const keyOf = ({ tooth, lobe }) => `${tooth} ${lobe ?? 0}`;
+
+/** A sweep's states by input angle: `[{ angle, rows: Map(tooth and lobe → row) }]`. Where loads jump an angle may stand twice, without the
  *  tooth that enters and then with it; teeth ascend within a frame, so a lower one begins the next. */
 export function framesOf(states) {
   const frames = [];
@@ -31,11 +37,11 @@ export function framesOf(states) {
       frame = { angle, rows: new Map() };
       frames.push(frame);
     }
-    const row = { tooth: states.tooth[index], center_radius_mm: states.center_radius_mm[index] };
+    const row = { tooth: states.tooth[index], lobe: states.lobe?.[index], center_radius_mm: states.center_radius_mm[index] };
     for (const column of COLUMNS) row[column] = states[column][index];
     // Only a drive with clearance has teeth in mesh that carry nothing.
     row.loaded = states.loaded?.[index] ?? true;
-    frame.rows.set(row.tooth, row);
+    frame.rows.set(keyOf(row), row);
     lastTooth = row.tooth;
   });
   return frames;
@@ -43,7 +49,7 @@ export function framesOf(states) {
 
 /** The tooth that makes every force jump between two frames of a sweep, by entering under load. */
 export const enteringBetween = (sweep, before, after) =>
-  sweep.enters_under_load ? [...after.rows.values()].find((row) => !before.rows.has(row.tooth) && row.loaded) : undefined;
+  sweep.enters_under_load ? [...after.rows.values()].find((row) => !before.rows.has(keyOf(row)) && row.loaded) : undefined;
 
 /** A column's value at a share of the way from one to another. Stress goes by the root of the force, so it is its square that is
  *  nearly straight between two states, and up to where both end together. */
@@ -58,7 +64,11 @@ export class Motion {
     this.theoretical = teeth.count;
     this.installed = teeth.installed ?? teeth.count;
     this.ringTeeth = ring.teeth;
+    this.lobes = lobesOf(design);
     this.toothRadius = teeth.radius_mm;
+    // Flats lie on the walls of the slot.
+    this.halfFlatMm = teeth.shape === 'flat_sided' ? teeth.flat_length_mm / 2 : 0;
+    this.toSlotWallMm = Math.sqrt(this.toothRadius ** 2 - this.halfFlatMm ** 2);
     this.geometry = geometry;
     this.sweep = sweep;
     this.period = geometry.period_deg;
@@ -80,16 +90,22 @@ export class Motion {
     return (tooth * 360) / this.installed + this.carrierDeg(inputDeg);
   }
 
-  /** Position ψ of a tooth from the nearer end of the major axis, in (-90, 90]. */
+  /** From the middle of a lobe to the valley beside it. */
+  get halfLobeDeg() {
+    return 180 / this.lobes;
+  }
+
+  /** Position ψ of a tooth from the middle of the nearest lobe, behind it where negative. */
   positionDeg(tooth, inputDeg) {
-    return 90 - modulo(90 - (this.toothDeg(tooth, inputDeg) - inputDeg), 180);
+    const half = this.halfLobeDeg;
+    return half - modulo(half - (this.toothDeg(tooth, inputDeg) - inputDeg), 2 * half);
   }
 
   /** The input angle nearest to `nearDeg` at which a tooth stands at position ψ. */
   inputDegAt(tooth, positionDeg, nearDeg) {
     // ψ falls by Z_K/Z_G of the input angle.
     const rate = this.ringTeeth / this.theoretical;
-    const pass = 180 / rate;
+    const pass = (2 * this.halfLobeDeg) / rate;
     const off = (this.positionDeg(tooth, nearDeg) - positionDeg) / rate;
     return nearDeg + off - pass * Math.round(off / pass);
   }
@@ -116,7 +132,8 @@ export class Motion {
     return { ...polar(this.centerRadius(deg), deg), deg };
   }
 
-  /** The loaded teeth of both zones: `{ tooth, zone, positionDeg, force, stress, contacts }`, by tooth number. */
+  /** The loaded teeth of all zones: `{ tooth, zone, isCopy, positionDeg, force, stress, contacts }`, by tooth number. Where the zones are
+   *  alike, the states are those of one, and the others' teeth are copies. */
   loaded(inputDeg) {
     if (this.frames.length === 0) return [];
     const periods = Math.floor(inputDeg / this.period);
@@ -127,9 +144,11 @@ export class Motion {
     for (const row of this.#between(index, to > from ? Math.min(1, Math.max(0, (within - from) / (to - from))) : 0)) {
       if (!row.loaded) continue;
       // One period on, each tooth stands where the one before it stood.
-      for (const zone of [0, 1]) {
-        const tooth = modulo(row.tooth + periods + (zone * this.installed) / 2, this.installed);
-        loaded.push(this.#loadedTooth(tooth, zone, row, inputDeg));
+      const zones = row.lobe === undefined ? Array(this.lobes).keys() : [row.lobe];
+      for (const zone of zones) {
+        const isCopy = row.lobe === undefined && zone > 0;
+        const tooth = modulo(row.tooth + periods + (row.lobe === undefined ? (zone * this.installed) / this.lobes : 0), this.installed);
+        loaded.push({ ...this.#loadedTooth(tooth, zone, row, inputDeg), isCopy });
       }
     }
     return loaded.sort((one, other) => one.tooth - other.tooth);
@@ -147,13 +166,13 @@ export class Motion {
     return low;
   }
 
-  /** The rows of one zone at a share of the way from sample `index` to the next. */
+  /** The rows at a share of the way from sample `index` to the next. */
   *#between(index, share) {
     const before = this.frames[index].rows;
     const after = this.frames[index + 1].rows;
     const start = this.geometry.engagement.start_deg;
     const blend = (one, other, t) => {
-      const row = { tooth: one.tooth, loaded: (one.loaded && t < 1) || (other.loaded && t > 0) };
+      const row = { tooth: one.tooth, lobe: one.lobe, loaded: (one.loaded && t < 1) || (other.loaded && t > 0) };
       for (const column of COLUMNS) row[column] = between(column, one[column], other[column], t);
       return row;
     };
@@ -162,7 +181,7 @@ export class Motion {
     const rate = (this.ringTeeth / this.theoretical) * (this.frames[index + 1].angle - this.frames[index].angle);
     const hasEntered = entering && entering.position_deg + (1 - share) * rate <= start;
     for (const row of before.values()) {
-      const next = after.get(row.tooth);
+      const next = after.get(keyOf(row));
       if (next) {
         const blended = blend(row, next, share);
         if (entering) {
@@ -178,13 +197,13 @@ export class Motion {
         const left = positionDeg / row.position_deg;
         const faded = { ...row, position_deg: positionDeg };
         for (const column of LOADS) faded[column] = between(column, 0, row[column], left);
-        faded.wave_generator_angle_deg = 90 - left * (90 - row.wave_generator_angle_deg);
+        faded.wave_generator_angle_deg = this.halfLobeDeg - left * (this.halfLobeDeg - row.wave_generator_angle_deg);
         faded.ring_angle_deg = 180 / this.ringTeeth - left * (180 / this.ringTeeth - row.ring_angle_deg);
         yield faded;
       }
     }
     for (const row of after.values()) {
-      if (before.has(row.tooth)) continue;
+      if (before.has(keyOf(row))) continue;
       const positionDeg = row.position_deg + (1 - share) * rate;
       if (entering) {
         if (hasEntered) yield { ...row, position_deg: positionDeg };
@@ -200,10 +219,9 @@ export class Motion {
   #loadedTooth(tooth, zone, row, inputDeg) {
     const center = this.center(tooth, inputDeg);
     const radius = Math.hypot(center.x, center.y);
-    const turn = zone * 180;
-    // φ_H counts from the cam's minor axis, φ_K from the tip of the ring's tooth, both as seen from the axis.
-    const camDeg = inputDeg + turn + 90 - row.wave_generator_angle_deg;
-    const spaceDeg = center.deg + (2 * Math.sign(this.ratio) * row.position_deg) / this.ringTeeth;
+    // φ_H counts from the cam's valley, φ_K from the tip of the ring's tooth, both as seen from the axis.
+    const camDeg = inputDeg + (2 * zone + 1) * this.halfLobeDeg - row.wave_generator_angle_deg;
+    const spaceDeg = center.deg + (this.lobes * Math.sign(this.ratio) * row.position_deg) / this.ringTeeth;
     const ringDeg = spaceDeg - Math.sign(this.ratio) * (180 / this.ringTeeth - row.ring_angle_deg);
     const contacts = {
       wave_generator: this.#onTooth(radius, center.deg, camDeg, -1),
@@ -228,7 +246,7 @@ export class Motion {
 
   /** The slot's wall, on the side that the service says. */
   #slotContact({ x, y, deg }) {
-    const reach = this.geometry.carrier.loaded_wall === 'leading' ? this.toothRadius : -this.toothRadius;
+    const reach = this.geometry.carrier.loaded_wall === 'leading' ? this.toSlotWallMm : -this.toSlotWallMm;
     return { x: x - reach * Math.sin(deg * RAD), y: y + reach * Math.cos(deg * RAD) };
   }
 }

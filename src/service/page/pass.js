@@ -1,35 +1,41 @@
 // One tooth's pass through the meshing zone, from where it enters to the root, put together from the samples of one period
 // as the paper does it (its figures 8 to 10): each loaded tooth stands for a part of the pass.
 
-import { CONTACTS, between, enteringBetween, framesOf } from './motion.js';
+import { CONTACTS, between, enteringBetween, framesOf, lobesOf } from './motion.js';
 
 export const ABSCISSAE = [
-  { key: 'input', label: 'Input angle', axis: 'input angle since the minor axis, Δj, deg', unit: 'deg', symbol: 'Δj' },
+  { key: 'input', label: 'Input angle', axis: 'input angle since the valley, Δj, deg', unit: 'deg', symbol: 'Δj' },
   { key: 'ring', label: 'Ring flank', axis: 'φ_K on the ring, from the tooth tip, deg', unit: 'deg', symbol: 'φ_K' },
-  { key: 'cam', label: 'Cam', axis: 'φ_H on the cam, from the minor axis, deg', unit: 'deg', symbol: 'φ_H' },
+  { key: 'cam', label: 'Cam', axis: 'φ_H on the cam, from the valley, deg', unit: 'deg', symbol: 'φ_H' },
   { key: 'slot', label: 'Slot', axis: 'distance of the tooth’s centre from the axis, mm', unit: 'mm', symbol: 'ρ' },
 ];
 
 /** Positions closer than this are one and the same, on both sides of a jump. */
 const SAME_DEG = 1e-9;
 
+const isSamePlace = (one, other) => one.breaksAfter === other.breaksAfter && Math.abs(one.row.position_deg - other.row.position_deg) <= SAME_DEG;
+
 /** `{ x: { abscissa: [] }, force: { contact: [] }, stress: { contact: [] }, position: [], breaks: Set of indices }`; a break at an
  *  index stands between that point and the one before it. */
 export function passOf(design, sweep) {
   const frames = framesOf(sweep.states);
   const rate = design.drive.teeth.count / design.drive.ring.teeth;
-  const points = [];
+  const all = [];
   // The last sample repeats the first, teeth renumbered.
   for (let index = 0; index < frames.length - 1; index += 1) {
-    const { rows } = frames[index];
+    const { angle, rows } = frames[index];
+    // How far a tooth goes to the next frame.
+    const step = (frames[index + 1].angle - angle) / rate;
     const breaksAfter = enteringBetween(sweep, frames[index], frames[index + 1]) !== undefined;
-    for (const row of rows.values()) points.push({ row, breaksAfter });
+    for (const row of rows.values()) all.push({ row, breaksAfter, step });
   }
   // Where an angle stands twice, what was before the jump comes first.
-  points.sort((one, other) => {
+  all.sort((one, other) => {
     const ahead = other.row.position_deg - one.row.position_deg;
     return Math.abs(ahead) > SAME_DEG ? ahead : other.breaksAfter - one.breaksAfter;
   });
+  // Where zones are unlike, teeth on several lobes come by the same place, and carry there the same.
+  const points = all.filter((point, index) => !(index > 0 && isSamePlace(all[index - 1], point)));
   const column = (name) => points.map(({ row }) => row[name]);
   const position = column('position_deg');
   const pass = {
@@ -37,7 +43,7 @@ export function passOf(design, sweep) {
     // Ascending, as the columns of x are.
     travelled: position.map((deg) => -deg),
     x: {
-      input: position.map((deg) => (90 - deg) * rate),
+      input: position.map((deg) => (180 / lobesOf(design) - deg) * rate),
       ring: column('ring_angle_deg'),
       cam: column('wave_generator_angle_deg'),
       slot: column('center_radius_mm'),
@@ -52,8 +58,12 @@ export function passOf(design, sweep) {
     pass.force[key] = column(`force_${key}_n`);
     pass.stress[key] = column(`stress_${key}_mpa`);
   }
-  points.forEach(({ breaksAfter }, index) => {
-    if (breaksAfter && index + 1 < points.length) pass.breaks.add(index + 1);
+  points.forEach(({ row, breaksAfter, step }, index) => {
+    const next = points[index + 1];
+    if (!breaksAfter || !next) return;
+    // A tooth on another lobe may come by between two frames of this one, and still before the jump.
+    const isBetween = row.position_deg - next.row.position_deg < step - SAME_DEG;
+    if (!(isBetween && next.breaksAfter)) pass.breaks.add(index + 1);
   });
   return pass;
 }

@@ -199,8 +199,8 @@ class Plot {
     context.clearRect(0, 0, this.marks.width, this.marks.height);
     if (!owner.pass || owner.isPrinting) return;
     const ratio = uPlot.pxRatio;
-    for (const { tooth, zone, positionDeg, force, stress } of teeth) {
-      if (zone === 1 && tooth !== selected) continue;
+    for (const { tooth, isCopy, positionDeg, force, stress } of teeth) {
+      if (isCopy && tooth !== selected) continue;
       const x = abscissaAt(owner.pass, owner.abscissa, positionDeg);
       if (x === undefined) continue;
       const left = chart.valToPos(x, 'x') * ratio;

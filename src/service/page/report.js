@@ -11,7 +11,7 @@ function shownValue(field, design) {
   const labelled = (wanted) => field.options.find((option) => option.value === wanted)?.label;
   // What has one kind alone is not told apart by it.
   if (field.kind === 'variant') return field.options.length > 1 ? labelled(kindOf(field, design)) : undefined;
-  if (field.kind === 'choice') return labelled(value ?? field.options[0].value);
+  if (field.kind === 'choice') return labelled(value ?? field.otherwise?.(design) ?? field.options[0].value);
   if (field.kind === 'flag') return value === true ? 'yes' : undefined;
   if (field.kind === 'oneOf' || field.derived) return undefined;
   const shown = value ?? field.preset;

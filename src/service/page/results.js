@@ -45,8 +45,9 @@ const KEY_ROWS = [
     note: ({ coincidence }) => `from ψ ${number(coincidence.engagement.start_deg, 4)}°`,
     terms: ['coincidence', 'position'],
   }),
-  row('Teeth in mesh, a zone', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, {
+  row('Teeth in mesh', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, {
     text: ({ coincidence: { teeth_in_mesh_per_zone: { min, max } } }) => (min === max ? `${min}` : `${min} to ${max}`),
+    scoped: true,
   }),
   largestRow('Largest force', 'force_n', 'N'),
   largestRow('Largest stress', 'stress_mpa', 'MPa'),
@@ -66,12 +67,12 @@ export const GROUPS = [
       row('Ratio, ring fixed', 'i_HG', '', ({ geometry }) => geometry?.transmission_ratio),
       row('Ratio, carrier fixed', 'i_HK', '', ({ geometry }) => geometry?.transmission_ratio_carrier_fixed),
       row('Period of the load pattern', '', 'deg', ({ geometry }) => geometry?.period_deg),
-      row('Coincidence degree, both zones', 'ε', '', ({ coincidence }) => coincidence?.coincidence_degree, { significant: 7, terms: ['coincidence'] }),
-      row('Fewest teeth in mesh, each zone', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.min),
-      row('Most teeth in mesh, each zone', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max),
-      row('Fewest teeth that carry, each zone', '', '', ({ sweep }) => sweep?.carrying_teeth?.min),
-      row('Most teeth that carry, each zone', '', '', ({ sweep }) => sweep?.carrying_teeth?.max),
-      row('Engagement begins, from the major axis', 'ψ_e', 'deg', ({ geometry }) => geometry?.engagement.start_deg, { terms: ['position'] }),
+      row('Coincidence degree, all zones', 'ε', '', ({ coincidence }) => coincidence?.coincidence_degree, { significant: 7, terms: ['coincidence'] }),
+      row('Fewest teeth in mesh', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.min, { scoped: true }),
+      row('Most teeth in mesh', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, { scoped: true }),
+      row('Fewest teeth that carry', '', '', ({ sweep }) => sweep?.carrying_teeth?.min, { scoped: true }),
+      row('Most teeth that carry', '', '', ({ sweep }) => sweep?.carrying_teeth?.max, { scoped: true }),
+      row('Engagement begins, from a lobe’s middle', 'ψ_e', 'deg', ({ geometry }) => geometry?.engagement.start_deg, { terms: ['position'] }),
       row('Undercut', '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
         text: ({ geometry }) => (geometry.undercut.occurs ? 'yes' : 'no'),
       }),
@@ -83,6 +84,7 @@ export const GROUPS = [
     title: 'Below the surface, where the stress peaks',
     rows: [
       ...contactRows('half_width_mm', 'Half-width of the contact', 'w', 'mm'),
+      ...contactRows('half_length_mm', 'Half-length of the contact, along the axis', 'c', 'mm'),
       ...contactRows('shear_stress_mpa', 'Largest shear stress', 'τ', 'MPa'),
       ...contactRows('shear_depth_mm', 'Its depth', 'z', 'mm'),
     ],
@@ -132,6 +134,9 @@ export const GROUPS = [
   },
 ];
 
+/** What a count of teeth is over: where zones are unlike, over all of them. */
+const scopeOf = ({ scoped }, { zones }) => (scoped ? (zones?.areAlike === false ? ', all zones' : ', each zone') : '');
+
 function show(entry, answers) {
   const value = entry.get(answers);
   if (value === undefined) return undefined;
@@ -159,8 +164,9 @@ export class Results {
       const value = html('data', { class: 'value number' });
       const unit = entry.unit && !entry.text ? html('span', { class: 'unit' }, entry.unit) : undefined;
       const note = html('span', { class: 'tile-note number' });
-      const tile = html('div', { class: 'tile' }, html('dt', {}, html('span', {}, entry.label), entry.terms && term(...entry.terms)), html('dd', {}, value, unit && [' ', unit], note));
-      this.#tiles.push({ entry, tile, value, note });
+      const scope = entry.scoped && html('span');
+      const tile = html('div', { class: 'tile' }, html('dt', {}, html('span', {}, entry.label, scope), entry.terms && term(...entry.terms)), html('dd', {}, value, unit && [' ', unit], note));
+      this.#tiles.push({ entry, tile, value, note, scope });
       keyFigures.append(tile);
     }
     this.table = table;
@@ -180,12 +186,13 @@ export class Results {
         const [unit, referenceUnit] = [value, reference].map(() => !entry.text && html('span', { class: 'unit' }));
         const delta = html('td', { class: 'numeric compared number' });
         const place = entry.place && html('button', { type: 'button', class: 'link number', title: 'Show in mechanism and plots' });
-        const cell = { entry, value, unit, reference, referenceUnit, delta, place };
+        const scope = entry.scoped && html('span');
+        const cell = { entry, scope, value, unit, reference, referenceUnit, delta, place };
         place?.addEventListener('click', () => onShow(cell.at));
         const line = html(
           'tr',
           {},
-          html('th', { scope: 'row' }, entry.label, entry.symbol && [' ', symbol(entry.symbol)], entry.terms && [' ', term(...entry.terms)]),
+          html('th', { scope: 'row' }, entry.label, scope, entry.symbol && [' ', symbol(entry.symbol)], entry.terms && [' ', term(...entry.terms)]),
           html('td', { class: 'numeric' }, value, unit),
           html('td', { class: 'numeric compared' }, reference, referenceUnit),
           [delta, html('td', { class: 'place' }, place)],
@@ -213,6 +220,7 @@ export class Results {
       // Paper shows only what was asked for.
       heading.classList.toggle('unasked', !isAnswered(answers) && !isAnswered(reference));
     }
+    for (const { entry, scope } of [...this.#tiles, ...this.#cells]) if (scope) setText(scope, scopeOf(entry, answers));
     for (const { entry, tile, value, note } of this.#tiles) {
       const shown = show(entry, answers);
       setText(value, shown?.text ?? DASH);

@@ -64,6 +64,12 @@ export async function ask(path, design, { signal, accept = JSON_TYPE, kind } = {
   return { answer: body, solveMs: solve ? Number(solve[1]) : undefined };
 }
 
+/** Whether the meshing zones are alike, so that the service answers about one of them: each lobe has as many slots. */
+function zonesOf({ drive }) {
+  const lobes = Math.abs(drive?.teeth?.count - drive?.ring?.teeth);
+  return { areAlike: !((drive?.teeth?.installed ?? drive?.teeth?.count) % lobes) };
+}
+
 /** All answers about a design, and the problems of those that there are none of. */
 export async function evaluate(design, signal) {
   // The picture joins copies of one tooth, whatever extent the document asks for.
@@ -72,7 +78,7 @@ export async function evaluate(design, signal) {
   const replies = await Promise.all(
     names.map((name) => ask(ENDPOINTS[name], name === 'geometry' ? drawn : design, { signal, kind: name })),
   );
-  const result = { design, answers: {}, problems: [], solveMs: 0 };
+  const result = { design, answers: { zones: zonesOf(design) }, problems: [], solveMs: 0 };
   names.forEach((name, index) => {
     const { answer, problem, solveMs } = replies[index];
     if (problem) result.problems.push(problem);

@@ -9,15 +9,19 @@ const PAPER =
 export const TERMS = {
   coincidence: {
     title: 'Coincidence degree ε',
-    text: 'The contact ratio: how many teeth touch the ring’s flanks at once, on average over a turn and in both meshing zones together. More teeth share the load.',
+    text: 'The contact ratio: how many teeth touch the ring’s flanks at once, on average over a turn and in all meshing zones together. More teeth share the load.',
   },
   position: {
     title: 'Position ψ',
-    text: 'Where a tooth stands, as the angle from the wave generator’s major axis. At ψ = 0° it is pushed out farthest, into the root of the ring; it enters the ring’s flank at ψ_e, 90° at most.',
+    text: 'Where a tooth stands, as the angle from the middle of a lobe of the wave generator, of an ellipse its major axis. At ψ = 0° it is pushed out farthest, into the root of the ring; it enters the ring’s flank at ψ_e, at most in the valley between two lobes, which an ellipse has at 90°.',
+  },
+  lobes: {
+    title: 'Lobes U',
+    text: 'How many times the wave generator pushes a tooth outward in one turn: an ellipse twice, an eccentric circle once. As many teeth the carrier has more or fewer than the ring; the page sets the ring’s teeth when the lobes change.',
   },
   slots: {
     title: 'Slots in theory Z_G',
-    text: 'How many slots the carrier has room for: the count that sets the ratio, two more or two fewer than the ring’s teeth. Of these slots all, or every second, third and so on, are made and hold a tooth.',
+    text: 'How many slots the carrier has room for: the count that sets the ratio, as many more or fewer than the ring’s teeth as the wave generator has lobes. Of these slots all, or every second, third and so on, are made and hold a tooth.',
   },
   projection: {
     title: 'Projection',

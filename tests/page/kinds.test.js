@@ -1,0 +1,242 @@
+// Wave generators, teeth and contact laws of each kind: chosen in the form, calculated, drawn.
+
+import assert from 'node:assert/strict';
+import { after, afterEach, before, test } from 'node:test';
+import { choose, designOf, enter, field, resultOf, setDocument, settled, testBed } from './harness.js';
+
+const WAVE_GENERATOR = '/drive/wave_generator';
+const TEETH = '/drive/teeth';
+const LAW = '/model/stiffness';
+const bed = testBed({ before, after, afterEach });
+
+const fieldsIn = (page, pointer) =>
+  page.$$eval(`#form input[id^="field${pointer.replaceAll('/', '-')}-"]`, (inputs) => inputs.filter((input) => input.checkVisibility()).map(({ id }) => id.split('-').at(-1)));
+
+async function pick(page, pointer, kind) {
+  await page.selectOption(field(pointer), kind);
+  await settled(page);
+}
+
+/** What is calculated for the design at hand, which is possible. */
+async function answered(page) {
+  assert.ok(await page.isHidden('#impossible'), await page.textContent('#impossible'));
+  const design = await designOf(page);
+  const answers = await bed.server.answers(design);
+  assert.equal(await resultOf(page, 'Force, ring'), answers.sweep.peaks.ring.force_n.value);
+  assert.equal(await resultOf(page, 'Ring tip radius'), answers.geometry.ring.tip_radius_mm);
+  return { design, ...answers };
+}
+
+/** How the forces of each loaded tooth add up, and how far its contacts lie off its outline, over two periods and a bit. */
+const balance = (page, design, { geometry, sweep }) =>
+  page.evaluate(
+    async (asked) => {
+      const { Motion } = await import('/page/motion.js');
+      const motion = new Motion(asked.design, asked.geometry, asked.sweep);
+      const worst = { force: 0, outline: 0, lobes: new Set() };
+      const { states } = asked.sweep;
+      for (const angle of [...new Set(states.input_angle_deg)].flatMap((deg) => [deg, deg + 2 * motion.period])) {
+        for (const { tooth, zone, center, contacts, force, positionDeg } of motion.loaded(angle)) {
+          const sum = { x: 0, y: 0 };
+          for (const [key, { x, y }] of Object.entries(contacts)) {
+            const distance = Math.hypot(center.x - x, center.y - y);
+            sum.x += (force[key] * (center.x - x)) / distance;
+            sum.y += (force[key] * (center.y - y)) / distance;
+            const reach = key === 'carrier' ? motion.toSlotWallMm : motion.toothRadius;
+            worst.outline = Math.max(worst.outline, Math.abs(distance - reach));
+          }
+          // A tooth that has only just come to the flank carries nothing yet.
+          if (force.ring > 0) worst.force = Math.max(worst.force, Math.hypot(sum.x, sum.y) / force.ring);
+          worst.outline = Math.max(worst.outline, Math.abs(motion.positionDeg(tooth, angle) - positionDeg) % (2 * motion.halfLobeDeg - 1e-9));
+          worst.lobes.add(zone);
+        }
+      }
+      return { ...worst, lobes: worst.lobes.size };
+    },
+    { design, geometry, sweep },
+  );
+
+for (const [kind, fields, lobes] of [
+  ['ellipse', ['semi_major_mm', 'semi_minor_mm'], 2],
+  ['eccentric', ['radius_mm', 'eccentricity_mm'], 1],
+  ['harmonic', ['lobes', 'mean_radius_mm', 'amplitude_mm'], 3],
+  ['harmonic_path', ['lobes', 'mean_path_radius_mm', 'amplitude_mm'], 3],
+]) {
+  test(`wave generator ${kind}: chosen, its ring follows, its result stands and its ${lobes} lobes are drawn`, async () => {
+    const page = await bed.open();
+    if (kind === 'ellipse') await pick(page, WAVE_GENERATOR, 'eccentric');
+    await pick(page, WAVE_GENERATOR, kind);
+    assert.deepEqual(await fieldsIn(page, WAVE_GENERATOR), fields);
+    if (fields.includes('lobes')) await enter(page, `${WAVE_GENERATOR}/lobes`, lobes);
+    const found = await answered(page);
+    assert.equal(found.design.drive.ring.teeth, 28 - lobes);
+    assert.equal(found.design.drive.wave_generator.kind, kind === 'ellipse' ? undefined : kind, 'the ellipse is meant where no kind is named');
+    const arcs = await page.getAttribute('#whole .zones', 'd');
+    assert.equal(arcs.match(/M/g).length, lobes);
+    const worst = await balance(page, found.design, found);
+    assert.ok(worst.force < 2e-3, `out of balance by ${worst.force}`);
+    assert.ok(worst.outline < 2e-3, `a contact ${worst.outline} mm off the tooth`);
+    assert.equal(worst.lobes, lobes, 'each zone carries');
+    const coloured = await page.$$eval('#whole .tooth', (teeth) => teeth.filter(({ style }) => style.fill).length);
+    assert.ok(coloured > 0, 'loaded teeth are coloured');
+  });
+}
+
+test('an ellipse becomes the other kinds of its own size, and comes back', async () => {
+  const page = await bed.open();
+  await pick(page, WAVE_GENERATOR, 'eccentric');
+  assert.deepEqual((await designOf(page)).drive.wave_generator, { kind: 'eccentric', radius_mm: 57, eccentricity_mm: 1 });
+  await pick(page, WAVE_GENERATOR, 'harmonic');
+  assert.deepEqual((await designOf(page)).drive.wave_generator, { kind: 'harmonic', lobes: 1, mean_radius_mm: 57, amplitude_mm: 1 });
+  await pick(page, WAVE_GENERATOR, 'harmonic_path');
+  assert.deepEqual((await designOf(page)).drive.wave_generator, { kind: 'harmonic_path', lobes: 1, amplitude_mm: 1, mean_path_radius_mm: 62 });
+  await pick(page, WAVE_GENERATOR, 'ellipse');
+  const { drive } = await designOf(page);
+  assert.deepEqual([drive.wave_generator, drive.ring.teeth], [{ semi_major_mm: 58, semi_minor_mm: 56 }, 26]);
+});
+
+test('a ring with more teeth than slots stays so when the lobes change', async () => {
+  const page = await bed.open();
+  await choose(page, 'ring-with-more-teeth');
+  const { drive: before } = await designOf(page);
+  assert.equal(before.ring.teeth, before.teeth.count + 2);
+  await pick(page, WAVE_GENERATOR, 'eccentric');
+  assert.equal((await designOf(page)).drive.ring.teeth, before.teeth.count + 1);
+});
+
+test('unlike zones are told as such: all their teeth are counted, each on its lobe', async () => {
+  const page = await bed.open();
+  await pick(page, WAVE_GENERATOR, 'harmonic');
+  await enter(page, `${WAVE_GENERATOR}/lobes`, 3);
+  const found = await answered(page);
+  assert.ok(found.sweep.states.lobe, '28 slots have no third');
+  assert.equal(await resultOf(page, 'Most teeth in mesh, all zones'), found.coincidence.teeth_in_mesh_per_zone.max);
+  const worst = await balance(page, found.design, found);
+  assert.equal(worst.lobes, 3);
+  assert.ok(worst.force < 2e-3 && worst.outline < 2e-3, JSON.stringify(worst));
+  // One curve: what a tooth carries follows from where it stands alone.
+  const { positions, breaks } = await page.evaluate(
+    async ({ design, sweep }) => {
+      const { passOf } = await import('/page/pass.js');
+      const pass = passOf(design, sweep);
+      return { positions: pass.position, breaks: pass.breaks.size };
+    },
+    found,
+  );
+  positions.forEach((deg, index) => assert.ok(index === 0 || deg < positions[index - 1] - 1e-9));
+  assert.equal(breaks, 0, 'nothing jumps');
+  // With a slot number that three lobes share alike, one zone stands for all.
+  await enter(page, `${TEETH}/count`, 30);
+  await enter(page, '/drive/ring/teeth', 27);
+  assert.equal((await answered(page)).sweep.states.lobe, undefined);
+  assert.ok((await resultOf(page, 'Most teeth in mesh, each zone')) > 0);
+});
+
+test('a ratio counts in thirds where there are three lobes', async () => {
+  const page = await bed.open();
+  await pick(page, WAVE_GENERATOR, 'harmonic');
+  await enter(page, `${WAVE_GENERATOR}/lobes`, 3);
+  assert.equal(await page.inputValue(field('/ratio')), '9.33333');
+  await page.fill(field('/ratio'), '9.667');
+  await page.keyboard.press('Enter');
+  await settled(page);
+  const { drive } = await designOf(page);
+  assert.deepEqual([drive.teeth.count, drive.ring.teeth], [29, 26]);
+});
+
+for (const [shape, fields] of [
+  ['cylinder', ['width_mm', 'count', 'installed']],
+  ['ball', ['wave_generator', 'ring', 'carrier', 'count', 'installed']],
+  ['flat_sided', ['width_mm', 'flat_length_mm', 'count', 'installed']],
+]) {
+  test(`teeth ${shape}: chosen, only their fields are shown, their result stands and they are drawn`, async () => {
+    const page = await bed.open();
+    if (shape === 'cylinder') await pick(page, TEETH, 'ball');
+    await pick(page, TEETH, shape);
+    assert.deepEqual(await fieldsIn(page, TEETH), ['radius_mm', ...fields]);
+    const found = await answered(page);
+    assert.equal(found.design.drive.teeth.shape, shape === 'cylinder' ? undefined : shape, 'cylinders are meant where no shape is named');
+    const laws = await page.$$eval(`${field(LAW)} option`, (options) => options.filter(({ hidden }) => !hidden).map(({ value }) => value));
+    assert.deepEqual(laws, shape === 'ball' ? ['hertz', 'fixed'] : ['linear', 'palmgren', 'johnson', 'fixed']);
+    const worst = await balance(page, found.design, found);
+    assert.ok(worst.force < 2e-3 && worst.outline < 2e-3, JSON.stringify(worst));
+    const tags = await page.$$eval('#whole .tooth', (teeth) => [...new Set(teeth.map(({ tagName }) => tagName))]);
+    assert.deepEqual(tags, [shape === 'flat_sided' ? 'path' : 'circle']);
+    // A slot is as wide as what lies on its walls.
+    const corner = found.geometry.carrier.finger.corners.y_mm[0];
+    assert.ok(Math.abs(corner - Math.sqrt(25 - (found.design.drive.teeth.flat_length_mm ?? 0) ** 2 / 4)) < 1e-9);
+    if (shape === 'ball') {
+      assert.equal(found.design.model.compatibility, 'virtual_work', 'Hertz’s law wants it');
+      assert.equal(await resultOf(page, 'Half-length of the contact, along the axis, ring'), found.sweep.peaks.ring.half_length_mm);
+      await enter(page, `${TEETH}/groove_radius_mm/ring`, 5.2);
+      const grooved = await answered(page);
+      assert.deepEqual(grooved.design.drive.teeth.groove_radius_mm, { ring: 5.2 });
+      assert.ok(grooved.sweep.peaks.ring.stress_mpa.value < found.sweep.peaks.ring.stress_mpa.value, 'a groove holds a ball closer');
+      await enter(page, `${TEETH}/groove_radius_mm/ring`, '');
+      assert.equal((await designOf(page)).drive.teeth.groove_radius_mm, undefined);
+    }
+  });
+}
+
+for (const [law, fields, pointer, value] of [
+  ['linear', []],
+  ['palmgren', []],
+  ['johnson', ['wave_generator', 'ring', 'carrier'], `${LAW}/depth_mm/ring`, 8],
+  ['fixed', ['wave_generator_n_per_mm', 'ring_n_per_mm', 'carrier_n_per_mm'], `${LAW}/ring_n_per_mm`, 400000],
+]) {
+  test(`contact law ${law}: chosen, only its fields are shown, and what they say moves the answer`, async () => {
+    const page = await bed.open();
+    await pick(page, '/model/compatibility', 'virtual_work');
+    await pick(page, LAW, law === 'linear' ? 'johnson' : law);
+    await pick(page, LAW, law);
+    await page.evaluate(() => document.querySelectorAll('#form details').forEach((group) => (group.open = true)));
+    assert.deepEqual(await fieldsIn(page, LAW), fields);
+    const before = await answered(page);
+    assert.equal(before.design.model.stiffness.law, law);
+    if (!pointer) return;
+    await enter(page, pointer, value);
+    const after = await answered(page);
+    assert.notEqual(after.sweep.peaks.ring.force_n.value, before.sweep.peaks.ring.force_n.value);
+  });
+}
+
+test('projection takes no law of Johnson’s: choosing either leaves a design that is possible', async () => {
+  const page = await bed.open();
+  await pick(page, '/model/compatibility', 'projection');
+  await pick(page, LAW, 'johnson');
+  assert.equal((await answered(page)).design.model.compatibility, 'virtual_work');
+  await pick(page, '/model/compatibility', 'projection');
+  assert.equal((await answered(page)).design.model.stiffness.law, 'linear');
+});
+
+test('what gives way behind a contact moves the answer', async () => {
+  const page = await bed.open();
+  await pick(page, '/model/compatibility', 'virtual_work');
+  const before = await answered(page);
+  await page.click('summary:has-text("What gives way behind the contacts")');
+  await enter(page, '/model/series_compliance_mm_per_n/ring', '1e-6');
+  const after = await answered(page);
+  assert.deepEqual(after.design.model.series_compliance_mm_per_n, { ring: 1e-6 });
+  assert.notEqual(after.sweep.peaks.ring.force_n.value, before.sweep.peaks.ring.force_n.value);
+});
+
+test('a document with kinds spelled out opens as it is, in the form and in a link', async () => {
+  const design = {
+    drive: {
+      wave_generator: { kind: 'eccentric', radius_mm: 30.8, eccentricity_mm: 1.2 },
+      teeth: { shape: 'ball', count: 20, radius_mm: 2.5, groove_radius_mm: { ring: 2.6 } },
+      ring: { teeth: 19 },
+    },
+    load: { input_torque_nm: 1 },
+    model: { compatibility: 'virtual_work', stiffness: { law: 'hertz' } },
+  };
+  let page = await bed.open();
+  await setDocument(page, design);
+  assert.deepEqual((await answered(page)).design, design);
+  for (const [pointer, kind] of [[WAVE_GENERATOR, 'eccentric'], [TEETH, 'ball'], [LAW, 'hertz']]) assert.equal(await page.inputValue(field(pointer)), kind);
+  await page.click('#copy-link');
+  const address = await page.evaluate(() => location.hash);
+  await page.context().close();
+  page = await bed.open({ address });
+  assert.deepEqual((await answered(page)).design, design);
+});
