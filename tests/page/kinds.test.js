@@ -126,6 +126,7 @@ test('unlike zones are told as such: all their teeth are counted, each on its lo
   positions.forEach((deg, index) => assert.ok(index === 0 || deg < positions[index - 1] - 1e-9));
   assert.equal(breaks, 0, 'nothing jumps');
   // With a slot number that three lobes share alike, one zone stands for all.
+  await enter(page, `${TEETH}/installed`, '');
   await enter(page, `${TEETH}/count`, 30);
   await enter(page, '/drive/ring/teeth', 27);
   assert.equal((await answered(page)).sweep.states.lobe, undefined);
