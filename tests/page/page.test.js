@@ -920,7 +920,7 @@ test('play, pause, drag; both angles are read out', async () => {
 test('all of it by keyboard', async () => {
   page = await open(browser, server);
   const tabTo = async (id) => {
-    for (let presses = 0; presses < 80; presses += 1) {
+    for (let presses = 0; presses < 160; presses += 1) {
       await page.keyboard.press('Tab');
       const found = await page.evaluate((wanted) => document.activeElement.matches(wanted), id);
       if (found) {
@@ -933,7 +933,13 @@ test('all of it by keyboard', async () => {
   };
   await page.keyboard.press('Tab');
   assert.equal(await page.evaluate(() => document.activeElement.className), 'skip');
-  await tabTo('[data-example="paper-5.2"]');
+  // The examples are one stop; arrows move among them.
+  await tabTo('[data-example]');
+  for (let moves = 0; moves < 20; moves += 1) {
+    if (await page.evaluate(() => document.activeElement.matches('[data-example="paper-5.2"]'))) break;
+    await page.keyboard.press('ArrowRight');
+  }
+  assert.equal(await page.evaluate(() => document.activeElement.dataset.example), 'paper-5.2');
   await page.keyboard.press('Enter');
   await settled(page);
   await tabTo(field(RADIUS));
@@ -1077,6 +1083,22 @@ const LONG_REPORTS = [
   },
 ];
 
+/** What these do not have: findings of other kinds, laws and loads, each in a report of its own. */
+const CASE_5_1 = { wave_generator: { semi_major_mm: 58, semi_minor_mm: 56 }, teeth: { count: 28, radius_mm: 5, width_mm: 15 }, ring: { teeth: 26 } };
+const VIRTUAL_WORK = { compatibility: 'virtual_work', stiffness: { law: 'linear' } };
+const OTHER_REPORTS = {
+  hollow_wave_generator: {
+    drive: { wave_generator: { kind: 'harmonic_path', lobes: 3, mean_path_radius_mm: 60, amplitude_mm: 6.5 }, teeth: { count: 9, radius_mm: 7, width_mm: 15 }, ring: { teeth: 6 } },
+    load: { input_torque_nm: 20 },
+  },
+  flat_cuts_the_contact: { drive: { ...CASE_5_1, teeth: { ...CASE_5_1.teeth, shape: 'flat_sided', flat_length_mm: 9.7 } }, load: { input_torque_nm: 20 }, model: VIRTUAL_WORK },
+  johnson_beyond_half_width: { drive: CASE_5_1, load: { input_torque_nm: 2000 }, model: { compatibility: 'virtual_work', stiffness: { law: 'johnson' } } },
+  wind_up_beyond_model: { drive: CASE_5_1, load: { input_torque_nm: 20 }, model: { ...VIRTUAL_WORK, clearance: { carrier_um: 1000 } } },
+};
+
+/** The page has no friction yet. */
+const OF_FRICTION = ['friction_beyond_measured', 'efficiency_uncertain'];
+
 async function pagesOfReport() {
   const pdf = (await page.pdf({ preferCSSPageSize: true, printBackground: true })).toString('latin1');
   return pdf.match(/\/Type\s*\/Page\b/g).length;
@@ -1146,7 +1168,14 @@ test('a long report has two pages, with every finding, and can be read', async (
     assert.deepEqual(tooSmall, []);
     assert.deepEqual(tooWide, []);
   }
-  const others = known.enum.filter((code) => !OF_DRAWINGS.includes(code));
+  for (const [code, design] of Object.entries(OTHER_REPORTS)) {
+    await setDocument(design);
+    const { findings } = (await server.answers(design)).sweep;
+    for (const finding of findings) codes.add(finding.code);
+    assert.ok(codes.has(code), code);
+    assert.ok((await pagesOfReport()) <= 2, code);
+  }
+  const others = known.enum.filter((code) => !OF_DRAWINGS.includes(code) && !OF_FRICTION.includes(code));
   assert.deepEqual([...codes].sort(), others.sort(), 'every finding of a sweep stands in one of the reports');
 });
 

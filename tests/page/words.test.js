@@ -8,7 +8,7 @@ const bed = testBed({ before, after, afterEach });
 
 test('one sentence and one picture say what this is, until they are hidden', async () => {
   const page = await bed.open();
-  assert.match(await page.textContent('#intro p'), /wave generator pushes loose teeth.*change the design/);
+  assert.match(await page.textContent('#intro p'), /wave generator, here an ellipse, pushes loose teeth.*change the design/);
   assert.equal((await page.textContent('#intro p')).match(/\.(\s|$)/g).length, 1, 'one sentence');
   for (const label of ['Ring', 'Tooth', 'Carrier', 'Wave generator']) assert.ok((await page.textContent('.picture')).includes(label));
   // No label is cut off.

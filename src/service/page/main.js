@@ -662,6 +662,7 @@ function showExamples() {
     });
     byId('examples').append(example.button);
   }
+  new Toolbar(byId('examples'));
 }
 
 const originOf = ({ title, design }) => ({ title: title.split(':')[0], design });
