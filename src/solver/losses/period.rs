@@ -144,7 +144,7 @@ fn at_each_input_angle(
         let next = state + 1;
         teeth.push(loaded_tooth(drive, states, state)?);
         let goes_on = next < states.len()
-            && states.input_angle_deg[next] == states.input_angle_deg[state]
+            && states.input_angle_deg[next].total_cmp(&states.input_angle_deg[state]).is_eq()
             && states.tooth[next] > states.tooth[state];
         if !goes_on {
             if stop.stopped() {
