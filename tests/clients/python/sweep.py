@@ -11,8 +11,8 @@ from generated.models import Design, DrawnPart, OutlineAnswerCircle, Problem, Sw
 
 design = {
     "drive": {
-        "wave_generator": {"semi_major_mm": 58.0, "semi_minor_mm": 56.0},
-        "teeth": {"count": 28, "radius_mm": 5.0, "width_mm": 15.0},
+        "wave_generator": {"kind": "ellipse", "semi_major_mm": 58.0, "semi_minor_mm": 56.0},
+        "teeth": {"shape": "cylinder", "count": 28, "radius_mm": 5.0, "width_mm": 15.0},
         "ring": {"teeth": 26},
     },
     "load": {"input_torque_nm": 20.0},

@@ -7,8 +7,8 @@ const client = createClient<paths, 'application/json' | 'application/problem+jso
 
 const design: components['schemas']['Design'] = {
   drive: {
-    wave_generator: { semi_major_mm: 58, semi_minor_mm: 56 },
-    teeth: { count: 28, radius_mm: 5, width_mm: 15 },
+    wave_generator: { kind: 'ellipse', semi_major_mm: 58, semi_minor_mm: 56 },
+    teeth: { shape: 'cylinder', count: 28, radius_mm: 5, width_mm: 15 },
     ring: { teeth: 26 },
   },
   load: { input_torque_nm: 20 },
