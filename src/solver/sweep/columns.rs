@@ -150,6 +150,66 @@ pub struct Sweep {
     pub period_closure_residual: f64,
 }
 
+/// What a sweep comes to, its states left out: what searches ask of millions of drives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SweepPeaks {
+    /// Peaks over the states.
+    pub contacts: PerContact<ContactPeaks>,
+    /// Of `Δφ` over the input angles.
+    pub wind_up_deg: Extremes,
+    /// Of the stiffness at the output over the input angles.
+    pub torsional_stiffness_nm_per_rad: Extremes,
+    /// Of the teeth that are listed, those that carry load.
+    pub loaded_teeth: TeethInMesh,
+    /// The torque capacity, given an allowable stress.
+    pub torque_capacity: Option<TorqueCapacity>,
+    /// Largest relative deviation of the input, ring and carrier torques from `M0`, `M0 Z_K/U`, `M0 Z_G/U`.
+    pub torque_balance_residual: f64,
+}
+
+/// The least and the largest of a column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extremes {
+    /// The least.
+    pub least: f64,
+    /// The largest.
+    pub largest: f64,
+}
+
+impl Extremes {
+    /// Of no value yet.
+    pub(crate) const NONE: Self = Self { least: f64::INFINITY, largest: f64::NEG_INFINITY };
+
+    pub(crate) fn of(column: &[f64]) -> Self {
+        column.iter().fold(Self::NONE, |seen, &value| seen.with(value))
+    }
+
+    #[inline(always)]
+    pub(crate) fn with(self, value: f64) -> Self {
+        Self { least: self.least.min(value), largest: self.largest.max(value) }
+    }
+}
+
+impl SweepPeaks {
+    /// How far the carrier lags and leads over the period under the load: the range of the wind-up at the output.
+    pub fn transmission_error_peak_to_peak_deg(&self, drive: &Drive) -> f64 {
+        (self.wind_up_deg.largest - self.wind_up_deg.least) / drive.teeth_per_wave()
+    }
+}
+
+impl From<&Sweep> for SweepPeaks {
+    fn from(sweep: &Sweep) -> Self {
+        Self {
+            contacts: sweep.peaks,
+            wind_up_deg: Extremes::of(&sweep.input_angles.wind_up_deg),
+            torsional_stiffness_nm_per_rad: Extremes::of(&sweep.input_angles.torsional_stiffness_nm_per_rad),
+            loaded_teeth: sweep.loaded_teeth(),
+            torque_capacity: sweep.torque_capacity,
+            torque_balance_residual: sweep.torque_balance_residual,
+        }
+    }
+}
+
 impl Sweep {
     /// How far the carrier lags and leads over the period under the load: the range of the wind-up at the output.
     pub fn transmission_error_peak_to_peak_deg(&self, drive: &Drive) -> f64 {

@@ -10,7 +10,9 @@ use crate::drive::Drive;
 use crate::load_sharing::{LoadCase, LoadedDrive};
 use crate::{SolveError, Stop};
 
-pub use columns::{ContactPeaks, InputAngles, Peak, PeakShear, States, Sweep, TorqueBalance, TorqueCapacity};
+pub use columns::{
+    ContactPeaks, Extremes, InputAngles, Peak, PeakShear, States, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity,
+};
 pub use points::{Points, Tolerance};
 
 /// The sweep over one period.
@@ -29,6 +31,14 @@ pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -
         return columns::finished(&loaded, points, columns, None);
     }
     plain::sweep(&loaded, load, points, stop)
+}
+
+/// What the sweep over one period comes to, without its states: the same peaks, in less time.
+///
+/// # Errors
+/// As [`sweep`].
+pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -> Result<SweepPeaks, SolveError> {
+    sweep(drive, load, points, stop).map(|sweep| SweepPeaks::from(&sweep))
 }
 
 /// The same sweep, state by state: what the fast path is held against, and what is left where it does not reach.
