@@ -1,6 +1,6 @@
 //! Equilibrium of a tooth and compatibility of all of them at one input angle (docs/theory.md section 4).
 
-use crate::contact::{Contact, ContactLaw, HertzLine, Materials, PerContact, half_width_mm};
+use crate::contact::{Contact, ContactLaw, HertzLine, Material, Materials, Part, PerContact, half_width_mm};
 use crate::drive::{Draft, Drive};
 use crate::gaps::{Deviations, Gaps, Modification, Place};
 use crate::locus::ToothCenter;
@@ -104,7 +104,13 @@ impl LoadCase {
             Torque::Input(value) => (Parameter::InputTorque, value),
             Torque::Output(value) => (Parameter::OutputTorque, value),
         };
-        let mut values: Vec<_> = parameters.materials.parameters().collect();
+        let of_material = |(part, material): (Part, &Material)| {
+            [
+                (Parameter::YoungsModulus(part), material.youngs_modulus_gpa),
+                (Parameter::PoissonsRatio(part), material.poissons_ratio),
+            ]
+        };
+        let mut values: Vec<_> = parameters.materials.iter().flat_map(of_material).collect();
         values.push(torque);
         values.extend(parameters.law.parameters());
         let series = parameters.series_compliance_mm_per_n.iter();
