@@ -7,7 +7,9 @@ use serde::Serialize;
 use toothwave_solver::drive::Draft;
 use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::sweep::{ContactPeaks, Points, Tolerance, sweep};
-use toothwave_solver::{Compatibility, ContactLaw, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop};
+use toothwave_solver::{
+    Compatibility, ContactLaw, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, ToothShape,
+};
 use utoipa::ToSchema;
 
 use crate::design::{CompatibilityDocument, Design};
@@ -171,7 +173,7 @@ impl Question for Accuracy {
             error => error.into(),
         })?;
         let (mut ways, mut unavailable) = (Vec::new(), Vec::new());
-        for model in models(&own) {
+        for model in models(drive, &own) {
             let (compatibility, law) = (model.compatibility.into(), model.law.into());
             match Model::new(drive, &model, &own_peaks, *max_states, stop) {
                 Ok(Some(model)) => model.measure(&mut ways, stop)?,
@@ -201,13 +203,24 @@ impl Question for Accuracy {
     }
 }
 
-/// The design's own model first, then every other form of compatibility and law that needs no further numbers.
-fn models(own: &LoadParameters) -> Vec<LoadParameters> {
+/// The design's own model first, then every other form of compatibility with a law that it and the teeth take and that needs no
+/// further numbers.
+fn models(drive: &Drive, own: &LoadParameters) -> Vec<LoadParameters> {
+    let laws = match drive.parameters().tooth {
+        ToothShape::Ball { .. } => vec![own.law, ContactLaw::Hertz],
+        ToothShape::Cylinder { .. } | ToothShape::FlatSided { .. } => {
+            // With other depths it would be another model under the same name.
+            let johnson = ContactLaw::Johnson { depth_mm: PerContact::default() };
+            let johnson = if matches!(own.law, ContactLaw::Johnson { .. }) { own.law } else { johnson };
+            vec![own.law, ContactLaw::Linear, ContactLaw::Palmgren, johnson]
+        }
+    };
     let mut models = vec![*own];
     for compatibility in [Compatibility::Projection, Compatibility::VirtualWork] {
-        for law in [own.law, ContactLaw::Linear, ContactLaw::Palmgren] {
+        for &law in &laws {
             let model = LoadParameters { compatibility, law, ..*own };
-            if !models.contains(&model) {
+            let is_possible = compatibility == Compatibility::VirtualWork || law.is_of_projection();
+            if is_possible && !models.contains(&model) {
                 models.push(model);
             }
         }
