@@ -4,12 +4,13 @@ use crate::adaptive;
 use crate::batch::{self, BatchSweep};
 use crate::contact::{Contact, Materials, PerContact, SHEAR_DEPTH, SHEAR_SHARE, half_width_mm};
 use crate::drive::Drive;
+use crate::gaps::Deviations;
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
 use crate::mesh::{Mesh, PlacedTooth, Samples, TeethInMesh};
 use crate::root::NotConverged;
 use crate::springs::WindUp;
-use crate::tooth::Pressure;
 use crate::tooth::point::ShearBelow;
+use crate::tooth::{Pressure, ToothContact};
 use crate::violation::{Parameter, Violation};
 use crate::{SolveError, Stop};
 
@@ -209,9 +210,11 @@ pub struct TorqueCapacity {
     pub input_angle_deg: f64,
 }
 
-/// A sweep over one period.
+/// A sweep over one period; where items deviate, over as many as it takes until they meet again as they did.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sweep {
+    /// The mesh that it went through.
+    pub mesh: Mesh,
     /// The states.
     pub states: States,
     /// What holds at each input angle.
@@ -346,6 +349,26 @@ pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -
     plain(&loaded, load, points, stop)
 }
 
+/// The sweep of a drive of which single items deviate: by slot and lobe, over as many load periods as it takes until they meet again as they
+/// did ([`Deviations::mesh`]).
+///
+/// # Errors
+/// As [`sweep`]; [`SolveError::Impossible`] for deviations that this drive or this load cannot have, [`SolveError::Interference`] where
+/// a part is too full.
+pub fn sweep_with_deviations(
+    drive: &Drive,
+    load: &LoadCase,
+    deviations: &Deviations,
+    points: Points,
+    stop: &impl Stop,
+) -> Result<Sweep, SolveError> {
+    if deviations.is_nil() && deviations.violations(drive.parameters()).is_empty() {
+        return sweep(drive, load, points, stop);
+    }
+    let loaded = LoadedDrive::with_deviations(drive, load, &ToothContact::of(drive), Some(deviations))?;
+    plain(&loaded, load, points, stop)
+}
+
 /// The same sweep, state by state: what the fast path is held against, and what is left where it does not reach.
 ///
 /// # Errors
@@ -355,12 +378,12 @@ pub fn sweep_plain(drive: &Drive, load: &LoadCase, points: Points, stop: &impl S
 }
 
 fn plain(loaded: &LoadedDrive<'_>, load: &LoadCase, points: Points, stop: &impl Stop) -> Result<Sweep, SolveError> {
-    let mesh = Mesh::new(loaded.drive());
+    let mesh = *loaded.mesh();
     let mut columns = Columns::new(loaded, load.parameters().allowable_stress_mpa);
     match points {
         Points::Samples(samples) => {
             columns.reserve(mesh.state_count(samples));
-            for sample in 0..=samples.count() {
+            for sample in 0..=mesh.last_sample(samples) {
                 if stop.stopped() {
                     return Err(SolveError::Stopped);
                 }
@@ -368,16 +391,17 @@ fn plain(loaded: &LoadedDrive<'_>, load: &LoadCase, points: Points, stop: &impl 
             }
         }
         Points::Tolerance(tolerance) => {
-            let moments = adaptive::moments(loaded, load, tolerance, stop)?;
+            let by_lap = adaptive::moments(loaded, load, tolerance, stop)?;
             // Each place was counted once; listed it may stand for several teeth, and in every lap.
-            let listed =
-                moments.iter().map(|moment| moment.places()).sum::<u64>() * mesh.laps() * mesh.listed_at_each_place();
+            let places = by_lap.iter().flatten().map(|moment| moment.places()).sum::<u64>();
+            let listed = places * (mesh.laps() / by_lap.len() as u64) * mesh.listed_at_each_place();
             let limit = tolerance.max_states();
             if listed > limit {
                 return Err(SolveError::TooManyStates { limit });
             }
-            let lap_deg = mesh.period_deg() / mesh.laps() as f64;
-            for lap in 0..mesh.laps() {
+            let lap_deg = mesh.sweep_period_deg() / mesh.laps() as f64;
+            // Where items are alike, all laps are.
+            for (lap, moments) in (0..mesh.laps()).zip(by_lap.iter().cycle()) {
                 // A lap begins where the one before has ended.
                 for moment in &moments[usize::from(lap > 0)..] {
                     if stop.stopped() {
@@ -440,7 +464,7 @@ impl<'a> Columns<'a> {
             torque_capacity: None,
             balance: TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm()),
             torque_balance_residual: 0.0,
-            lists_lobes: !Mesh::new(loaded.drive()).zones_are_alike(),
+            lists_lobes: !loaded.mesh().zones_are_alike(),
             teeth: Vec::new(),
             hardest: PerContact::default(),
         }
@@ -454,8 +478,9 @@ impl<'a> Columns<'a> {
     /// Appends the states of the teeth in mesh at one input angle.
     fn add(&mut self, input_angle_deg: f64, placed: impl Iterator<Item = PlacedTooth>) -> Result<(), SolveError> {
         self.teeth.clear();
-        for PlacedTooth { number, lobe, position, position_deg } in placed {
-            self.teeth.push(self.loaded.tooth(position)?);
+        for PlacedTooth { number, lobe, place, position, position_deg } in placed {
+            let tooth = self.loaded.tooth_at(&place, position);
+            self.teeth.push(tooth.map_err(|error| error.at_input_angle(input_angle_deg))?);
             self.states.input_angle_deg.push(input_angle_deg);
             self.states.tooth.push(u32::try_from(number).unwrap_or(u32::MAX));
             if self.lists_lobes {
@@ -557,14 +582,22 @@ fn finished(
             }),
         }
     });
-    let period_closure_residual = period_closure(loaded, points, &states, &peaks)?;
+    let mut period_closure_residual = period_closure(loaded, points, &states, &peaks)?;
+    if loaded.mesh().tells_items_apart() {
+        // That the items have met again as they did shows in what all teeth together make.
+        let wind_up_deg = &input_angles.wind_up_deg;
+        let [first_deg, last_deg] =
+            [wind_up_deg.first(), wind_up_deg.last()].map(|end| end.copied().unwrap_or(f64::NAN));
+        period_closure_residual = worse((last_deg - first_deg).abs() / last_deg, period_closure_residual);
+    }
     for (check, residual) in [("torque balance", torque_balance_residual), ("period closure", period_closure_residual)]
     {
         if residual.is_nan() || residual > MOST_RESIDUAL {
             return Err(SolveError::Inconsistent { check, residual });
         }
     }
-    Ok(Sweep { states, input_angles, peaks, torque_capacity, torque_balance_residual, period_closure_residual })
+    let mesh = *loaded.mesh();
+    Ok(Sweep { mesh, states, input_angles, peaks, torque_capacity, torque_balance_residual, period_closure_residual })
 }
 
 /// The largest difference of a load at the last input angle from that angle worked out anew, one state at a time and from positions found
@@ -575,13 +608,14 @@ fn period_closure(
     states: &States,
     peaks: &PerContact<ContactPeaks>,
 ) -> Result<f64, SolveError> {
-    let mesh = Mesh::new(loaded.drive());
+    let mesh = *loaded.mesh();
     let position = |place| match points {
         Points::Samples(_) => mesh.position_between(place, 1.0),
         Points::Tolerance(_) => mesh.position_after_lap(place),
     };
     let placed: Vec<_> = mesh.placed_between(2..=mesh.whole_spacings() + 1, mesh.laps() - 1, position).collect();
-    let teeth = placed.iter().map(|placed| loaded.tooth(placed.position)).collect::<Result<Vec<_>, _>>()?;
+    let teeth = placed.iter().map(|placed| loaded.tooth_at(&placed.place, placed.position));
+    let teeth = teeth.collect::<Result<Vec<_>, _>>()?;
     let wind_up = loaded.wind_up(&teeth)?;
     let last_angle_deg = states.input_angle_deg.last();
     let first = states.len().checked_sub(teeth.len());
