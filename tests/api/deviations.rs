@@ -210,7 +210,7 @@ async fn a_sweep_of_deviations_stays_within_the_limit_on_states() {
     let problem = service.post("/v1/sweep", &document).await.refused(422, "too_many_states");
     let error = &problem["errors"][0];
     let states = Service::new().post("/v1/sweep", &document).await.found()["states"]["tooth"].as_array().unwrap().len();
-    assert_eq!((&error["pointer"], error["value"].as_u64()), (&json!("/sweep/samples"), Some(states as u64)));
+    assert_eq!((&error["pointer"], error["value"].as_f64()), (&json!("/sweep/samples"), Some(states as f64)));
     let document = with(&document, "/sweep", json!({ "tolerance": 1e-3 }));
     let problem = service.post("/v1/sweep", &document).await.refused(422, "too_many_states");
     assert_eq!(problem["errors"][0]["pointer"], "/sweep/tolerance");
