@@ -19,6 +19,7 @@ use crate::json::{self, Fault};
 use crate::no_answer::NoAnswer;
 
 mod asked;
+mod deviations;
 mod drive;
 mod friction;
 mod load;
@@ -26,6 +27,7 @@ mod modification;
 mod number;
 
 pub use asked::*;
+pub use deviations::*;
 pub use drive::*;
 pub use friction::*;
 pub use load::*;
@@ -66,6 +68,9 @@ pub struct Design {
     /// Parts made otherwise than conjugate.
     #[serde(default)]
     pub modification: ModificationDocument,
+    /// Single items of the parts as they came out.
+    #[serde(default)]
+    pub deviations: DeviationsDocument,
     /// The input angles of a sweep.
     #[serde(default)]
     pub sweep: SweepDocument,

@@ -107,12 +107,16 @@ fn split(pointer: &str) -> (&str, &str) {
     pointer.rsplit_once('/').expect("a pointer to a field")
 }
 
-/// The document with the field set; the object that holds it is there already.
+/// The document with the field or the entry set; the object or the list that holds it is there already.
 pub(crate) fn with(document: &Value, pointer: &str, value: Value) -> Value {
     if pointer.is_empty() {
         return value;
     }
     let mut document = document.clone();
+    if let Some(entry) = document.pointer_mut(pointer) {
+        *entry = value;
+        return document;
+    }
     let (object, field) = split(pointer);
     let object = document.pointer_mut(object).and_then(Value::as_object_mut);
     object.unwrap_or_else(|| panic!("nothing holds {pointer}")).insert(field.into(), value);

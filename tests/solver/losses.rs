@@ -55,6 +55,7 @@ impl Case {
             tooth_radius_mm: self.float("tooth_radius_mm"),
             tooth_spins,
             race_radius_mm: self.float("race_radius_mm"),
+            tells_items_apart: false,
         }
     }
 

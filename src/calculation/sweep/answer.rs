@@ -18,8 +18,13 @@ pub struct SweepAnswer {
     pub build: &'static str,
     /// Contact ratio ε, counted over both meshing zones.
     pub coincidence_degree: f64,
-    /// The input angle after which the load pattern repeats.
+    /// The input angle after which the load pattern repeats, where no item deviates.
     pub period_deg: f64,
+    /// The input angle that the sweep goes over, given `deviations`: so many of these periods as it takes until the items that deviate meet
+    /// again as they did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub sweep_period_deg: Option<f64>,
     /// The load at both shafts.
     pub load: LoadAnswer,
     /// Whether a tooth takes load the moment it enters, because its flank ends before the place where its lever arm is zero: the
