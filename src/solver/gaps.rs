@@ -233,6 +233,12 @@ impl<'a> Gaps<'a> {
             && self.clearance_mm.iter().all(|(_, &gap_mm)| gap_mm == 0.0)
     }
 
+    /// The gap at each contact where it is the same for every tooth and position.
+    pub(crate) fn uniform_mm(&self) -> Option<&PerContact<f64>> {
+        let is_uniform = self.deviations.is_none() && self.modification.first().is_none();
+        is_uniform.then_some(&self.clearance_mm)
+    }
+
     /// Whether zones are unlike, so that all teeth of all zones share the load together.
     pub const fn tell_zones_apart(&self) -> bool {
         self.deviations.is_some()

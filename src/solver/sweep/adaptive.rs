@@ -183,7 +183,7 @@ pub(crate) fn moments(
         mesh,
         allowable_stress_mpa: load.parameters().allowable_stress_mpa,
         has_gaps: load.has_gaps(),
-        is_smooth: loaded.linear_compliance_mm_per_n().is_some(),
+        is_smooth: loaded.is_linear(),
         tolerance,
         stop,
         states: 0,
