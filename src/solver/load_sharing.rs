@@ -329,11 +329,6 @@ impl<'a> LoadedDrive<'a> {
         matches!(self.line_law(), Some(LineLaw::Linear { .. })) && self.gaps.is_nil()
     }
 
-    /// Whether all loads of lines are in proportion, whatever the torque: the law is a single power and no contact has a gap.
-    pub(crate) fn is_in_proportion(&self) -> bool {
-        matches!(self.line_law(), Some(LineLaw::Linear { .. } | LineLaw::Power { .. })) && self.gaps.is_nil()
-    }
-
     /// The law of cylinders, for whoever works in columns.
     pub(crate) fn line_law(&self) -> Option<LineLaw> {
         self.contacts.line_law()

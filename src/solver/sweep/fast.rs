@@ -23,15 +23,18 @@ mod tile;
 use std::f64::consts::PI;
 use std::iter::zip;
 
+use pulp::Simd;
+
 use crate::cam::Cam;
 use crate::contact::PerContact;
 use crate::load_sharing::{Compatibility, LoadedDrive};
 use crate::mesh::{Mesh, Samples};
-use crate::sweep::columns::{Columns, SweepPeaks, TorqueBalance, worse};
+use crate::sweep::columns::{self, ContactPeaks, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity, worse};
+use crate::sweep::points::Points;
 use crate::tooth::LineLaw;
 use crate::{SolveError, Stop};
 use lanes::{LANES, arctangent_terms, arctangents, repeat_each};
-use sharing::{Shared, Sharing, Teeth};
+use sharing::{Limit, Shared, Sharing, Teeth};
 use sinks::{ColumnSink, PeakSink, Sink};
 use tile::{Run, Tile, TileSize};
 
@@ -41,20 +44,27 @@ const MAX_STEPS: u32 = 8;
 /// A relative step this small is the last: the next one would be of its cube, less than the last digit.
 const LAST_STEP: f64 = 5e-6;
 
-/// The sweep, or nothing where the plain path has to make it: for laws, gaps and wave generators that are not known here, and for drives beyond the
-/// caps.
+/// The sweep and its capacity, given an allowable stress, or nothing where the plain path has to make it: for laws, gaps and wave generators that are
+/// not known here, and for drives beyond the caps.
 ///
 /// # Errors
-/// [`SolveError::Stopped`] when `stop` says so.
+/// As [`columns::finished`].
 pub(crate) fn sweep(
     loaded: &LoadedDrive<'_>,
     samples: Samples,
+    allowable_mpa: Option<f64>,
     stop: &impl Stop,
-) -> Result<Option<Columns>, SolveError> {
+) -> Result<Option<Sweep>, SolveError> {
+    let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
     let mesh = Mesh::new(loaded.drive());
-    let Some(kernel) = Kernel::new(loaded) else { return Ok(None) };
     let mut sink = ColumnSink::new(&mesh, samples);
-    Ok(kernel.fill(loaded, samples, stop, &mut sink)?.map(|residual| sink.columns(&mesh, samples, residual)))
+    let Some(Filled { torque_balance_residual, capacity }) = kernel.fill(loaded, samples, stop, &mut sink)? else {
+        return Ok(None);
+    };
+    let columns = sink.columns(&mesh, samples, torque_balance_residual);
+    let mut sweep = columns::finished(loaded, Points::Samples(samples), columns, None)?;
+    sweep.torque_capacity = capacity.or_else(|| in_proportion(loaded, allowable_mpa, &sweep.peaks));
+    Ok(Some(sweep))
 }
 
 /// The peaks of the same sweep, no state kept; nothing where [`sweep`] has nothing.
@@ -64,11 +74,29 @@ pub(crate) fn sweep(
 pub(crate) fn peaks(
     loaded: &LoadedDrive<'_>,
     samples: Samples,
+    allowable_mpa: Option<f64>,
     stop: &impl Stop,
 ) -> Result<Option<SweepPeaks>, SolveError> {
-    let Some(kernel) = Kernel::new(loaded) else { return Ok(None) };
+    let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
     let mut sink = PeakSink::default();
-    Ok(kernel.fill(loaded, samples, stop, &mut sink)?.map(|residual| sink.peaks(loaded.drive(), residual)))
+    let Some(Filled { torque_balance_residual, capacity }) = kernel.fill(loaded, samples, stop, &mut sink)? else {
+        return Ok(None);
+    };
+    columns::check("torque balance", torque_balance_residual)?;
+    let mut peaks = sink.peaks(loaded.drive(), torque_balance_residual);
+    peaks.torque_capacity = capacity.or_else(|| in_proportion(loaded, allowable_mpa, &peaks.contacts));
+    Ok(Some(peaks))
+}
+
+/// The capacity where all loads are in proportion (docs/theory.md section 4.7): that of the largest stress.
+fn in_proportion(
+    loaded: &LoadedDrive<'_>,
+    allowable_mpa: Option<f64>,
+    peaks: &PerContact<ContactPeaks>,
+) -> Option<TorqueCapacity> {
+    let input_torque_nm = 1e-3 * loaded.input_torque_nmm();
+    allowable_mpa
+        .map(|allowable_mpa| TorqueCapacity::in_proportion(loaded.drive(), input_torque_nm, allowable_mpa, peaks))
 }
 
 /// The sweep as `pulp` wants it: compiled once for each instruction set, the best one of this machine picked when the program runs. Whatever
@@ -82,11 +110,11 @@ struct Vectorised<'a, S, K> {
 }
 
 impl<S: Stop, K: Sink> pulp::WithSimd for Vectorised<'_, S, K> {
-    type Output = Result<Option<f64>, SolveError>;
+    type Output = Result<Option<Filled>, SolveError>;
 
     #[inline(always)]
-    fn with_simd<V: pulp::Simd>(self, _: V) -> Self::Output {
-        self.kernel.sweep(self.loaded, self.samples, self.stop, self.sink)
+    fn with_simd<V: Simd>(self, _: V) -> Self::Output {
+        self.kernel.sweep::<V, K>(self.loaded, self.samples, self.stop, self.sink)
     }
 }
 
@@ -105,6 +133,14 @@ struct Kernel {
     cam_terms: usize,
     ring_terms: usize,
     guess: Guess,
+    /// The stress that a torque capacity is asked for, where it does not follow from the peaks.
+    allowable_mpa: Option<f64>,
+}
+
+/// What a sweep comes to beside what its sink holds.
+struct Filled {
+    torque_balance_residual: f64,
+    capacity: Option<TorqueCapacity>,
 }
 
 /// How the teeth share the load.
@@ -205,12 +241,16 @@ impl Guess {
 }
 
 impl Kernel {
-    fn new(loaded: &LoadedDrive<'_>) -> Option<Self> {
+    fn new(loaded: &LoadedDrive<'_>, allowable_mpa: Option<f64>) -> Option<Self> {
         let law = match loaded.line_law()? {
             LineLaw::Linear { compliance_mm_per_n } if loaded.is_linear() => {
                 Law::Linear(Compliance::new(&compliance_mm_per_n, loaded))
             }
             _ => Law::Sharing(Sharing::new(loaded)?),
+        };
+        let is_in_proportion = match &law {
+            Law::Linear(_) => true,
+            Law::Sharing(sharing) => sharing.is_in_proportion(),
         };
         let drive = loaded.drive();
         // The formulas are those of an ellipse, and one zone stands for both.
@@ -235,6 +275,7 @@ impl Kernel {
             cam_terms: arctangent_terms(cam_ratio)?,
             ring_terms: arctangent_terms(ring_ratio)?,
             guess: Guess::new(a, b, r),
+            allowable_mpa: allowable_mpa.filter(|_| !is_in_proportion),
         })
     }
 
@@ -245,25 +286,25 @@ impl Kernel {
         samples: Samples,
         stop: &impl Stop,
         sink: &mut impl Sink,
-    ) -> Result<Option<f64>, SolveError> {
+    ) -> Result<Option<Filled>, SolveError> {
         pulp::Arch::new().dispatch(Vectorised { kernel: self, loaded, samples, stop, sink })
     }
 
     #[inline(always)]
-    fn sweep<K: Sink>(
+    fn sweep<V: Simd, K: Sink>(
         &self,
         loaded: &LoadedDrive<'_>,
         samples: Samples,
         stop: &impl Stop,
         sink: &mut K,
-    ) -> Result<Option<f64>, SolveError> {
+    ) -> Result<Option<Filled>, SolveError> {
         let mesh = Mesh::new(loaded.drive());
         let with_work = matches!(self.law, Law::Sharing(_));
         let size = TileSize::of(&mesh, samples, K::COLUMNS, with_work);
         let mut arena = vec![0.0; size.doubles()];
         let mut tile = Tile::new(&mut arena, &size, 2.0 * PI / mesh.steps(samples) as f64);
         let balance = TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm());
-        let mut worst_residual = 0.0;
+        let mut filled = Filled { torque_balance_residual: 0.0, capacity: None };
         let mut first = 0;
         while first < samples.count() {
             let run = Run::from(first, samples, &mesh);
@@ -286,8 +327,23 @@ impl Kernel {
                 match &self.law {
                     Law::Linear(_) => Self::scale(loaded, run.teeth, &mut tile),
                     Law::Sharing(sharing) => {
-                        if !Self::share_load(sharing, loaded, run.teeth, &mut tile) {
-                            return Ok(None);
+                        let limit =
+                            match Self::share_load::<V>(sharing, self.allowable_mpa, loaded, run.teeth, &mut tile) {
+                                Some(limit) => limit,
+                                None => return Ok(None),
+                            };
+                        if let Some(Limit { torque_nmm, contact, row }) = limit {
+                            let input_torque_nm = 1e-3 * (loaded.zones() * torque_nmm);
+                            if filled.capacity.is_none_or(|capacity| input_torque_nm < capacity.input_torque_nm) {
+                                let output_torque_nm = input_torque_nm * loaded.drive().teeth_per_wave();
+                                let input_angle_deg = mesh.input_angle_deg(start + row as u64, samples);
+                                filled.capacity = Some(TorqueCapacity {
+                                    input_torque_nm,
+                                    output_torque_nm,
+                                    contact,
+                                    input_angle_deg,
+                                });
+                            }
                         }
                     }
                 }
@@ -296,8 +352,9 @@ impl Kernel {
                     let torque = PerContact::of(|contact| tile.row_torque.get(contact)[row]);
                     tile.row_residual[row] = balance.residual(&torque);
                 }
-                worst_residual =
-                    tile.row_residual[..rows].iter().fold(worst_residual, |worst, &residual| worse(residual, worst));
+                filled.torque_balance_residual = tile.row_residual[..rows]
+                    .iter()
+                    .fold(filled.torque_balance_residual, |worst, &residual| worse(residual, worst));
                 for (angle_deg, sample) in zip(&mut tile.row_input_angle_deg[..rows], tile_samples) {
                     *angle_deg = mesh.input_angle_deg(sample, samples);
                 }
@@ -305,7 +362,7 @@ impl Kernel {
             }
             first = run.samples.end;
         }
-        Ok(Some(worst_residual))
+        Ok(Some(filled))
     }
 
     /// Geometry of a stretch of states, and their forces and stresses for one unit; false where the support takes too many steps.
@@ -468,9 +525,15 @@ impl Kernel {
         repeat_each(rotation_root, teeth, tile.scale_root);
     }
 
-    /// Lets the teeth of each input angle share the load; false where that takes the plain path.
+    /// Lets the teeth of each input angle share the load, and finds what limits them where that is asked for; nothing where it takes the plain path.
     #[inline(always)]
-    fn share_load(sharing: &Sharing, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) -> bool {
+    fn share_load<V: Simd>(
+        sharing: &Sharing,
+        allowable_mpa: Option<f64>,
+        loaded: &LoadedDrive<'_>,
+        count: usize,
+        tile: &mut Tile<'_>,
+    ) -> Option<Option<Limit>> {
         let (zones, rows) = (loaded.zones(), tile.count / count);
         let len = tile.count.next_multiple_of(LANES);
         let teeth = Teeth {
@@ -482,12 +545,17 @@ impl Kernel {
             carrier_ratio: tile.force.carrier,
             cam_stress: tile.stress.wave_generator,
             ring_stress: tile.stress.ring,
+            carrier_stress: tile.stress.carrier,
         };
         let mut shared =
             Shared { force: tile.scale, rotation_rad: tile.row_rotation_rad, stiffness: tile.row_stiffness };
-        if !sharing.share(loaded.input_torque_nmm() / zones, &teeth, &mut tile.work, &mut shared) {
-            return false;
+        if !sharing.share::<V>(loaded.input_torque_nmm() / zones, &teeth, &mut tile.work, &mut shared) {
+            return None;
         }
+        let limit = match allowable_mpa {
+            Some(allowable_mpa) => Some(sharing.limit::<V>(allowable_mpa, &teeth, &mut tile.work)?),
+            None => None,
+        };
         let (scale, root) = (&tile.scale[..len], &mut tile.scale_root[..len]);
         let cam = &mut tile.torque.wave_generator[..len];
         let (ring, carrier) = (&mut tile.torque.ring[..len], &mut tile.torque.carrier[..len]);
@@ -503,6 +571,6 @@ impl Kernel {
         tile.row_loaded.clear();
         let carrying = |row: &[f64]| row.iter().filter(|&&force| force > 0.0).count();
         tile.row_loaded.extend(tile.scale[..tile.count].chunks_exact(count).map(carrying));
-        true
+        Some(limit)
     }
 }

@@ -1,5 +1,7 @@
 //! Elementary functions and columns without a branch or a call, so that the compiler makes vectors of them.
 
+use pulp::Simd;
+
 /// States worked on in one stretch of straight code; a multiple of every vector's width.
 pub(super) const LANES: usize = 64;
 
@@ -21,15 +23,30 @@ const WHOLE: f64 = 4_503_599_627_370_496.0;
 const LN_2_HIGH: f64 = f64::from_bits(0x3fe6_2e42_fee0_0000);
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 
-/// Terms of `artanh s = s (1 + s²/3 + s⁴/5 + …)` that reach the last digit for `|s| ≤ (√2 - 1)/(√2 + 1)`.
-const ARTANH_TERMS: usize = 10;
+/// The coefficients of `(artanh s)/s - 1` over `s²` and its powers, as many as reach the last digit for `|s| ≤ (√2 - 1)/(√2 + 1)`.
+const ARTANH: [f64; 9] =
+    [1.0 / 3.0, 0.2, 1.0 / 7.0, 1.0 / 9.0, 1.0 / 11.0, 1.0 / 13.0, 1.0 / 15.0, 1.0 / 17.0, 1.0 / 19.0];
 
-/// Terms of the exponential series that reach the last digit for `|x| ≤ ln 2/2`.
-const EXP_TERMS: usize = 14;
+/// Those of `e^x`, as many as reach the last digit for `|x| ≤ ln 2/2`.
+const EXPONENTIAL: [f64; 14] = {
+    let mut coefficients = [1.0; 14];
+    let mut term = 1;
+    while term < 14 {
+        coefficients[term] = coefficients[term - 1] / term as f64;
+        term += 1;
+    }
+    coefficients
+};
+
+/// `ab + c`, rounded once where vectors can do that.
+#[inline(always)]
+fn fused<V: Simd>(a: f64, b: f64, c: f64) -> f64 {
+    if V::IS_SCALAR { a * b + c } else { a.mul_add(b, c) }
+}
 
 /// `ln x` of a normal positive number, to two units of the last digit.
 #[inline(always)]
-pub(super) fn ln(x: f64) -> f64 {
+pub(super) fn ln<V: Simd>(x: f64) -> f64 {
     let shifted = x.to_bits().wrapping_add(FROM_ROOT_HALF);
     let exponent = f64::from_bits((shifted >> 52) | WHOLE.to_bits()) - (WHOLE + 1023.0);
     let mantissa = f64::from_bits((shifted & MANTISSA).wrapping_add(ROOT_HALF));
@@ -38,13 +55,11 @@ pub(super) fn ln(x: f64) -> f64 {
     let s = above / (2.0 + above);
     let z = s * s;
     let mut sum = 0.0;
-    let mut term = ARTANH_TERMS;
-    while term > 1 {
-        term -= 1;
-        sum = (sum + 1.0 / (2 * term + 1) as f64) * z;
+    for coefficient in ARTANH.iter().rev() {
+        sum = fused::<V>(sum, z, *coefficient);
     }
     let twice = 2.0 * s;
-    exponent * LN_2_HIGH + (twice + (twice * sum + exponent * LN_2_LOW))
+    fused::<V>(exponent, LN_2_HIGH, twice + fused::<V>(twice * z, sum, exponent * LN_2_LOW))
 }
 
 /// `ln x` of a normal positive number, to 0.03: a start for a search.
@@ -59,18 +74,16 @@ pub(super) fn ln_roughly(x: f64) -> f64 {
 
 /// `e^x` for `|x| ≤ 700`, and what is next to nothing below that, to two units of the last digit.
 #[inline(always)]
-pub(super) fn exp(x: f64) -> f64 {
+fn exp<V: Simd>(x: f64) -> f64 {
     /// 1.5 · 2^52: a sum with it is rounded to a whole number, which stands in its last bits.
     const ROUND: f64 = 1.5 * WHOLE;
     let x = if x > -700.0 { x } else { -700.0 };
     let shifted = x * std::f64::consts::LOG2_E + ROUND;
     let exponent = shifted - ROUND;
     let rest = (x - exponent * LN_2_HIGH) - exponent * LN_2_LOW;
-    let mut sum = 1.0;
-    let mut term = EXP_TERMS;
-    while term > 1 {
-        term -= 1;
-        sum = 1.0 + sum * rest * (1.0 / term as f64);
+    let mut sum = 0.0;
+    for coefficient in EXPONENTIAL.iter().rev() {
+        sum = fused::<V>(sum, rest, *coefficient);
     }
     let power = f64::from_bits((shifted.to_bits() << 52).wrapping_add(1.0_f64.to_bits()));
     sum * power
@@ -78,8 +91,8 @@ pub(super) fn exp(x: f64) -> f64 {
 
 /// `x^p` of a normal positive number, where that lies within e^±700.
 #[inline(always)]
-pub(super) fn power(x: f64, exponent: f64) -> f64 {
-    exp(exponent * ln(x))
+pub(super) fn power<V: Simd>(x: f64, exponent: f64) -> f64 {
+    exp::<V>(exponent * ln::<V>(x))
 }
 
 /// How many terms of `atan q = q (1 - q²/3 + q⁴/5 - …)` reach the last digit for `0 ≤ q ≤ largest`.
@@ -149,21 +162,29 @@ pub(super) fn repeat_each(values: &[f64], times: usize, repeated: &mut [f64]) {
 mod tests {
     use super::*;
 
-    #[test]
-    fn logarithms_and_exponentials_are_right_to_two_units_of_the_last_digit() {
+    fn assert_to_two_units<V: Simd>() {
+        let close = |found: f64, expected: f64| (found - expected).abs() <= 2.0 * f64::EPSILON * expected.abs();
         let mut x = 1e-300;
         while x < 1e300 {
-            let (found, expected) = (ln(x), x.ln());
-            assert!((found - expected).abs() <= 2.0 * f64::EPSILON * expected.abs(), "ln {x}: {found} {expected}");
-            assert!((ln_roughly(x) - expected).abs() < 0.031, "ln {x}");
+            assert!(close(ln::<V>(x), x.ln()), "ln {x}");
+            assert!((ln_roughly(x) - x.ln()).abs() < 0.031, "ln {x}");
             x *= 1.003_7;
         }
         for step in -100_000..100_000 {
             let x = 1.0 + f64::from(step) * 9e-6;
-            assert!((ln(x) - x.ln()).abs() <= 2.0 * f64::EPSILON * x.ln().abs(), "ln {x}");
+            assert!(close(ln::<V>(x), x.ln()), "ln {x}");
             let x = f64::from(step) * 6.9e-3;
-            assert!((exp(x) / x.exp() - 1.0).abs() <= 2.0 * f64::EPSILON, "exp {x}");
+            assert!(close(exp::<V>(x), x.exp()), "exp {x}");
         }
-        assert!(exp(-1e6) < 1e-300);
+        assert!(exp::<V>(-1e6) < 1e-300);
+    }
+
+    #[test]
+    fn logarithms_and_exponentials_are_right_to_two_units_of_the_last_digit_on_any_machine() {
+        assert_to_two_units::<pulp::Scalar>();
+        #[cfg(target_arch = "x86_64")]
+        assert_to_two_units::<pulp::x86::V3>();
+        #[cfg(target_arch = "aarch64")]
+        assert_to_two_units::<pulp::aarch64::Neon>();
     }
 }

@@ -4,6 +4,8 @@
 //! in the rotation, so that the tangents of all of them, wherever they touch, together never make more torque than the springs, and their root
 //! stands at or beyond the true one. A tooth that is open there is open at the true rotation too.
 
+use pulp::Simd;
+
 use super::lanes::{LANES, largest, ln, ln_roughly, power, repeat_each};
 use crate::contact::{Contact, PerContact};
 use crate::load_sharing::{Compatibility, LoadedDrive};
@@ -41,6 +43,18 @@ pub(super) struct Teeth<'a> {
     pub(super) cam_stress: &'a [f64],
     /// Stress at the ring.
     pub(super) ring_stress: &'a [f64],
+    /// Stress at the carrier.
+    pub(super) carrier_stress: &'a [f64],
+}
+
+/// The least torque of a tile under which a contact reaches a stress.
+pub(super) struct Limit {
+    /// Of one zone.
+    pub(super) torque_nmm: f64,
+    /// The contact that does.
+    pub(super) contact: Contact,
+    /// The input angle of the tile.
+    pub(super) row: usize,
 }
 
 /// What comes of it.
@@ -77,13 +91,17 @@ pub(super) struct Work<'a> {
     excess: &'a mut [f64],
     /// Closing angle that `excess` counts from, by state: that of the last tooth that carries, so that light loads keep their digits.
     last: &'a mut [f64],
+    /// `F_H` under a limit.
+    limit: &'a mut [f64],
     row_excess: &'a mut [f64],
     row_last: &'a mut [f64],
+    /// What the forces under Johnson's law are counted in.
+    typical_n: f64,
 }
 
 impl<'a> Work<'a> {
     /// Columns of states.
-    pub(super) const COLUMNS: usize = 11;
+    pub(super) const COLUMNS: usize = 12;
     /// Columns of input angles.
     pub(super) const ROWS: usize = 2;
 
@@ -101,8 +119,10 @@ impl<'a> Work<'a> {
             margin: slice(column),
             excess: slice(column),
             last: slice(column),
+            limit: slice(column),
             row_excess: slice(rows),
             row_last: slice(rows),
+            typical_n: 1.0,
         }
     }
 }
@@ -192,6 +212,87 @@ fn start_above(excess_alone: f64, weight: impl Fn(usize) -> f64, closing: &[f64]
     carrying.is_finite().then_some((carrying, excess + (last - carrying)))
 }
 
+/// How far each tooth is pressed at the rotation of its row.
+#[inline(always)]
+fn press<const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>) {
+    let rows = teeth.rows;
+    repeat_each(&work.row_excess[..rows], teeth.count, work.excess);
+    let len = teeth.len;
+    let (excess, pressed) = (&work.excess[..len], &mut work.pressed[..len]);
+    if GAPS {
+        repeat_each(&work.row_last[..rows], teeth.count, work.last);
+        let (last, closing) = (&work.last[..len], &work.closing[..len]);
+        for i in 0..len {
+            pressed[i] = excess[i] + (last[i] - closing[i]);
+        }
+    } else {
+        pressed.copy_from_slice(excess);
+    }
+}
+
+/// The force at which the first contact of each tooth reaches a stress, lines of contact all: `(σ_a/σ)²` of the stress under 1 N.
+#[inline(always)]
+fn forces_at_stress(allowable_mpa: f64, teeth: &Teeth<'_>, force: &mut [f64]) {
+    let len = teeth.len;
+    let (cam, ring) = (&teeth.cam_stress[..len], &teeth.ring_stress[..len]);
+    let (carrier, force) = (&teeth.carrier_stress[..len], &mut force[..len]);
+    for i in 0..len {
+        let most = if ring[i] > cam[i] { ring[i] } else { cam[i] };
+        let most = if carrier[i] > most { carrier[i] } else { most };
+        let share = allowable_mpa / most;
+        force[i] = share * share;
+    }
+}
+
+/// Turns each row to where the first of its teeth is pressed as far as its limit, which stands in `work.pressed`.
+#[inline(always)]
+fn turn_to_limit(teeth: &Teeth<'_>, work: &mut Work<'_>) {
+    for row in 0..teeth.rows {
+        let at = row * teeth.count..(row + 1) * teeth.count;
+        let (closing, pressed) = (&work.closing[at.clone()], &work.pressed[at]);
+        let earliest = closing.iter().fold(f64::INFINITY, |earliest, &closing| earliest.min(closing));
+        let mut least = f64::INFINITY;
+        for (&closing, &pressed) in closing.iter().zip(pressed) {
+            let from_earliest = pressed + (closing - earliest);
+            if from_earliest < least {
+                least = from_earliest;
+                (work.row_last[row], work.row_excess[row]) = (closing, pressed);
+            }
+        }
+    }
+    press::<true>(teeth, work);
+}
+
+/// The least torque of the rows, each turned to its limit, under these forces.
+#[inline(always)]
+fn least_torque(teeth: &Teeth<'_>, work: &Work<'_>, force: &[f64]) -> Option<Limit> {
+    let mut least: Option<Limit> = None;
+    for row in 0..teeth.rows {
+        let at = row * teeth.count..(row + 1) * teeth.count;
+        let mut torque_nmm = 0.0;
+        for i in at.clone() {
+            torque_nmm += if work.pressed[i] > 0.0 { teeth.arm[i] * force[i] } else { 0.0 };
+        }
+        if least.as_ref().is_none_or(|least| torque_nmm < least.torque_nmm) {
+            let stress = |&i: &usize| {
+                let hardest = teeth.cam_stress[i].max(teeth.ring_stress[i]).max(teeth.carrier_stress[i]);
+                hardest * if work.pressed[i] > 0.0 { force[i].sqrt() } else { 0.0 }
+            };
+            let at_limit = at.clone().max_by(|one, other| stress(one).total_cmp(&stress(other)))?;
+            let (cam, ring) = (teeth.cam_stress[at_limit], teeth.ring_stress[at_limit]);
+            let contact = if teeth.carrier_stress[at_limit] > cam.max(ring) {
+                Contact::Carrier
+            } else if ring > cam {
+                Contact::Ring
+            } else {
+                Contact::WaveGenerator
+            };
+            least = Some(Limit { torque_nmm, contact, row });
+        }
+    }
+    least.filter(|least| least.torque_nmm.is_finite())
+}
+
 /// `ξ = c F^p`, a linear law with gaps among them.
 pub(super) struct PowerLaw {
     exponent: f64,
@@ -257,7 +358,7 @@ impl Sharing {
 
     /// Forces that make a torque together, that of one zone; false where they are not found, or where the law ends.
     #[inline(always)]
-    pub(super) fn share(
+    pub(super) fn share<V: Simd>(
         &self,
         torque_nmm: f64,
         teeth: &Teeth<'_>,
@@ -265,19 +366,62 @@ impl Sharing {
         shared: &mut Shared<'_>,
     ) -> bool {
         match self {
-            Self::Power(law) => law.share(torque_nmm, teeth, work, shared),
+            Self::Power(law) => law.share::<V>(torque_nmm, teeth, work, shared),
             Self::Logarithmic(law @ LogarithmicLaw { gaps: None, .. }) => {
-                law.share::<false>(torque_nmm, teeth, work, shared)
+                law.share::<V, false>(torque_nmm, teeth, work, shared)
             }
-            Self::Logarithmic(law) => law.share::<true>(torque_nmm, teeth, work, shared),
+            Self::Logarithmic(law) => law.share::<V, true>(torque_nmm, teeth, work, shared),
+        }
+    }
+}
+
+impl Sharing {
+    /// Whether all loads are in proportion, whatever the torque.
+    pub(super) const fn is_in_proportion(&self) -> bool {
+        matches!(self, Self::Power(PowerLaw { gaps: None, .. }))
+    }
+
+    /// The least torque of the tile, of one zone, under which a contact reaches a stress, once the load is shared; nothing where it is not found, or
+    /// where the law ends before.
+    #[inline(always)]
+    pub(super) fn limit<V: Simd>(&self, allowable_mpa: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) -> Option<Limit> {
+        match self {
+            Self::Power(law) => law.limit::<V>(allowable_mpa, teeth, work),
+            Self::Logarithmic(law) => law.limit::<V>(allowable_mpa, teeth, work),
         }
     }
 }
 
 impl PowerLaw {
+    #[inline(always)]
+    fn limit<V: Simd>(&self, allowable_mpa: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) -> Option<Limit> {
+        let len = teeth.len;
+        forces_at_stress(allowable_mpa, teeth, work.limit);
+        {
+            let (force, unit, arm) = (&work.limit[..len], &work.unit[..len], &teeth.arm[..len]);
+            let pressed = &mut work.pressed[..len];
+            for i in 0..len {
+                let share = force[i] / if arm[i] > 0.0 { unit[i] } else { 1.0 };
+                let by_power = power::<V>(share, self.exponent);
+                let by_law = if self.exponent < 1.0 { by_power } else { share };
+                pressed[i] = if arm[i] > 0.0 { by_law } else { f64::INFINITY };
+            }
+        }
+        turn_to_limit(teeth, work);
+        let (pressed, unit, force) = (&work.pressed[..len], &work.unit[..len], &mut work.limit[..len]);
+        let inverse = 1.0 / self.exponent;
+        for i in 0..len {
+            let safe = if pressed[i] > NOTHING { pressed[i] } else { NOTHING };
+            let by_power = power::<V>(safe, inverse);
+            let by_law = if self.exponent < 1.0 { by_power } else { pressed[i] };
+            force[i] = if pressed[i] > 0.0 { unit[i] * by_law } else { 0.0 };
+        }
+        least_torque(teeth, work, work.limit)
+    }
+
     /// The force at the rotation 1, `(|h'|/c)^(1/p)`, with `c = Σ w q (F_c/F_H)^p`.
     #[inline(always)]
-    fn units(&self, teeth: &Teeth<'_>, unit: &mut [f64]) {
+    fn units<V: Simd>(&self, teeth: &Teeth<'_>, unit: &mut [f64]) {
         let len = teeth.len;
         let unit = &mut unit[..len];
         let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
@@ -288,12 +432,12 @@ impl PowerLaw {
             let inverse = 1.0 / exponent;
             for i in 0..len {
                 let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
-                let of_ring = coefficient.ring * along * power(ring[i], ring_exponent);
+                let of_ring = coefficient.ring * along * power::<V>(ring[i], ring_exponent);
                 let carrier = if carrier[i] > NOTHING { carrier[i] } else { NOTHING };
-                let c = coefficient.wave_generator + of_ring + of_carrier * power(carrier, carrier_exponent);
+                let c = coefficient.wave_generator + of_ring + of_carrier * power::<V>(carrier, carrier_exponent);
                 let share = arm[i] / c;
                 let share = if share > NOTHING { share } else { NOTHING };
-                unit[i] = if arm[i] > 0.0 { power(share, inverse) } else { 0.0 };
+                unit[i] = if arm[i] > 0.0 { power::<V>(share, inverse) } else { 0.0 };
             }
         } else {
             for i in 0..len {
@@ -307,17 +451,17 @@ impl PowerLaw {
     }
 
     #[inline(always)]
-    fn share(&self, torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
-        self.units(teeth, work.unit);
+    fn share<V: Simd>(&self, torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
+        self.units::<V>(teeth, work.unit);
         match &self.gaps {
             None => {
-                self.share_in_proportion(torque_nmm, teeth, work, shared);
+                self.share_in_proportion::<V>(torque_nmm, teeth, work, shared);
                 true
             }
             Some(gaps) => {
                 gaps.close(teeth, work.closing);
                 if self.exponent < 1.0 {
-                    self.share_beyond_gaps(torque_nmm, teeth, work, shared)
+                    self.share_beyond_gaps::<V>(torque_nmm, teeth, work, shared)
                 } else {
                     share_linearly(torque_nmm, teeth, work, shared)
                 }
@@ -327,7 +471,13 @@ impl PowerLaw {
 
     /// Without gaps the forces of all rotations are in proportion.
     #[inline(always)]
-    fn share_in_proportion(&self, torque_nmm: f64, teeth: &Teeth<'_>, work: &Work<'_>, shared: &mut Shared<'_>) {
+    fn share_in_proportion<V: Simd>(
+        &self,
+        torque_nmm: f64,
+        teeth: &Teeth<'_>,
+        work: &Work<'_>,
+        shared: &mut Shared<'_>,
+    ) {
         for row in 0..teeth.rows {
             let at = row * teeth.count..(row + 1) * teeth.count;
             let (arm, unit) = (&teeth.arm[at.clone()], &work.unit[at.clone()]);
@@ -336,7 +486,7 @@ impl PowerLaw {
                 of_unit += arm[i] * unit[i];
             }
             let share = torque_nmm / of_unit;
-            let rotation_rad = if self.exponent < 1.0 { power(share, self.exponent) } else { share };
+            let rotation_rad = if self.exponent < 1.0 { power::<V>(share, self.exponent) } else { share };
             shared.rotation_rad[row] = rotation_rad;
             shared.stiffness[row] = torque_nmm / (self.exponent * rotation_rad);
             for (force, unit) in shared.force[at].iter_mut().zip(unit) {
@@ -347,7 +497,7 @@ impl PowerLaw {
 
     /// Newton's method from above, by the tangents of all forces.
     #[inline(always)]
-    fn share_beyond_gaps(
+    fn share_beyond_gaps<V: Simd>(
         &self,
         torque_nmm: f64,
         teeth: &Teeth<'_>,
@@ -362,7 +512,7 @@ impl PowerLaw {
             for i in 0..count {
                 of_unit += arm[i] * unit[i];
             }
-            let alone = power(torque_nmm / of_unit, self.exponent);
+            let alone = power::<V>(torque_nmm / of_unit, self.exponent);
             let Some((last, excess)) = start_above(alone, |i| arm[i] * unit[i], &work.closing[at]) else {
                 return false;
             };
@@ -370,7 +520,7 @@ impl PowerLaw {
         }
         let mut is_last_round = false;
         for _ in 0..MAX_ROUNDS {
-            self.tangents(teeth, work);
+            self.tangents::<V>(teeth, work);
             let mut is_done = true;
             for row in 0..teeth.rows {
                 let at = row * count..(row + 1) * count;
@@ -418,7 +568,7 @@ impl PowerLaw {
 
     /// `F/(Δφ - θ)` of the teeth that are pressed, p times the slope.
     #[inline(always)]
-    fn tangents(&self, teeth: &Teeth<'_>, work: &mut Work<'_>) {
+    fn tangents<V: Simd>(&self, teeth: &Teeth<'_>, work: &mut Work<'_>) {
         let rows = teeth.rows;
         repeat_each(&work.row_excess[..rows], teeth.count, work.excess);
         repeat_each(&work.row_last[..rows], teeth.count, work.last);
@@ -431,7 +581,7 @@ impl PowerLaw {
             let x = excess[i] + (last[i] - closing[i]);
             pressed[i] = x;
             let safe = if x > NOTHING { x } else { NOTHING };
-            slope[i] = if x > 0.0 { unit[i] * power(safe, bend) } else { 0.0 };
+            slope[i] = if x > 0.0 { unit[i] * power::<V>(safe, bend) } else { 0.0 };
         }
     }
 }
@@ -473,7 +623,7 @@ fn share_linearly(torque_nmm: f64, teeth: &Teeth<'_>, work: &Work<'_>, shared: &
 impl LogarithmicLaw {
     /// `A`, `B` and the reach of each tooth, forces counted in `typical_n`.
     #[inline(always)]
-    fn coefficients(&self, typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) {
+    fn coefficients<V: Simd>(&self, typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) {
         let len = teeth.len;
         let (ring, carrier) = (&teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
         let (cam_stress, ring_stress) = (&teeth.cam_stress[..len], &teeth.ring_stress[..len]);
@@ -485,9 +635,9 @@ impl LogarithmicLaw {
         for i in 0..len {
             let ring_stress = ring_stress[i] / ring[i];
             let carrier_ratio = if carrier[i] > NOTHING { carrier[i] } else { NOTHING };
-            let of_cam = ln(reference.wave_generator * (cam_stress[i] * cam_stress[i]));
-            let of_ring = ln(reference.ring * (ring_stress * ring_stress));
-            let of_carrier = -ln(per_carrier_reference * carrier_ratio);
+            let of_cam = ln::<V>(reference.wave_generator * (cam_stress[i] * cam_stress[i]));
+            let of_ring = ln::<V>(reference.ring * (ring_stress * ring_stress));
+            let of_carrier = -ln::<V>(per_carrier_reference * carrier_ratio);
             let (ring2, carrier2) = (ring[i] * ring[i], carrier[i] * carrier[i]);
             a[i] = (compliance.wave_generator + growth.wave_generator * of_cam)
                 + ring2 * (compliance.ring + growth.ring * of_ring)
@@ -524,44 +674,70 @@ impl LogarithmicLaw {
                 (0.0, alone)
             };
         }
-        Self::press::<GAPS>(teeth, work);
-        let (a, b, pressed) = (&work.unit[..len], &work.growth[..len], &work.pressed[..len]);
-        let (excess, secant, force) = (&work.excess[..len], &work.secant[..len], &mut force[..len]);
+        press::<GAPS>(teeth, work);
+        Self::guess(teeth, work, force);
+        true
+    }
+
+    /// The forces near those that the teeth are pressed by.
+    #[inline(always)]
+    fn guess(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) {
+        let len = teeth.len;
+        let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len]);
+        let pressed = &work.pressed[..len];
+        let (excess, force) = (&work.excess[..len], &mut force[..len]);
         for i in 0..len {
             // Of a tooth that is open as if it were not: it may turn out to carry.
             let pressed = if pressed[i] > 0.0 { pressed[i] } else { excess[i] };
-            let first = pressed * secant[i];
-            let first = if first > NOTHING { first } else { NOTHING };
             let least = 0.5 * b[i];
+            let first = pressed * arm[i] / if a[i] > least { a[i] } else { least };
+            let first = if first > NOTHING { first } else { NOTHING };
             let approach = a[i] - b[i] * ln_roughly(first);
             let second = pressed * arm[i] / if approach > least { approach } else { least };
             force[i] = if second > NOTHING { second } else { NOTHING };
         }
-        true
     }
 
-    /// How far each tooth is pressed at the rotation of its row.
+    /// Forces here are counted in that of the sharing before, and the limit too.
     #[inline(always)]
-    fn press<const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>) {
-        let rows = teeth.rows;
-        repeat_each(&work.row_excess[..rows], teeth.count, work.excess);
+    fn limit<V: Simd>(&self, allowable_mpa: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) -> Option<Limit> {
         let len = teeth.len;
-        let (excess, pressed) = (&work.excess[..len], &mut work.pressed[..len]);
-        if GAPS {
-            repeat_each(&work.row_last[..rows], teeth.count, work.last);
-            let (last, closing) = (&work.last[..len], &work.closing[..len]);
-            for i in 0..len {
-                pressed[i] = excess[i] + (last[i] - closing[i]);
-            }
-        } else {
-            pressed.copy_from_slice(excess);
+        let typical_n = work.typical_n;
+        if self.gaps.is_none() {
+            work.closing[..len].fill(0.0);
         }
+        let mut limit = std::mem::take(&mut work.limit);
+        forces_at_stress(allowable_mpa, teeth, limit);
+        {
+            let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len]);
+            let (force, pressed) = (&limit[..len], &mut work.pressed[..len]);
+            let per_typical = 1.0 / typical_n;
+            for i in 0..len {
+                let force = force[i] * per_typical;
+                let approach = force * (a[i] - b[i] * ln::<V>(force));
+                pressed[i] = if arm[i] > 0.0 { approach / arm[i] } else { f64::INFINITY };
+            }
+        }
+        turn_to_limit(teeth, work);
+        Self::guess(teeth, work, limit);
+        let mut is_done = false;
+        for _ in 0..MAX_ROUNDS {
+            Self::tangents::<V, true>(teeth, work, limit);
+            is_done = Self::follow::<true>(teeth, work, limit);
+            if is_done {
+                break;
+            }
+        }
+        let is_within = Self::cut_and_check(typical_n, teeth, work, limit);
+        let least = least_torque(teeth, work, limit);
+        std::mem::swap(&mut work.limit, &mut limit);
+        least.filter(|_| is_done && is_within)
     }
 
     /// Newton's method for all forces and the rotations together: each force follows the tangent of its law, and the rotation is the one at which the
     /// tangents make the torque. A round costs one logarithm a state.
     #[inline(always)]
-    fn share<const GAPS: bool>(
+    fn share<V: Simd, const GAPS: bool>(
         &self,
         torque_nmm: f64,
         teeth: &Teeth<'_>,
@@ -571,8 +747,9 @@ impl LogarithmicLaw {
         let count = teeth.count;
         // Forces are counted in one near to them all, so that no logarithm is large.
         let typical_n = torque_nmm / teeth.arm[..count].iter().sum::<f64>();
+        work.typical_n = typical_n;
         let torque = torque_nmm / typical_n;
-        self.coefficients(typical_n, teeth, work);
+        self.coefficients::<V>(typical_n, teeth, work);
         if let Some(gaps) = &self.gaps {
             gaps.close(teeth, work.closing);
         }
@@ -580,7 +757,7 @@ impl LogarithmicLaw {
             return false;
         }
         for _ in 0..MAX_ROUNDS {
-            Self::tangents::<GAPS>(teeth, work, shared.force);
+            Self::tangents::<V, GAPS>(teeth, work, shared.force);
             let mut is_done = true;
             for row in 0..teeth.rows {
                 let at = row * count..(row + 1) * count;
@@ -618,14 +795,14 @@ impl LogarithmicLaw {
 
     /// The tangents of all laws at the forces so far.
     #[inline(always)]
-    fn tangents<const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &[f64]) {
+    fn tangents<V: Simd, const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &[f64]) {
         let len = teeth.len;
         let (a, b, arm, force) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len], &force[..len]);
         let (reach, pressed) = (&work.reach[..len], &work.pressed[..len]);
         let (slope, offset) = (&mut work.slope[..len], &mut work.offset[..len]);
         let (secant, margin) = (&mut work.secant[..len], &mut work.margin[..len]);
         for i in 0..len {
-            let ln = ln(force[i]);
+            let ln = ln::<V>(force[i]);
             let at_force = a[i] - b[i] * ln;
             // Where the law has a meaning its slope is more than this.
             let (beyond, least) = (at_force - b[i], 0.2 * b[i]);
@@ -646,7 +823,7 @@ impl LogarithmicLaw {
     fn follow<const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) -> bool {
         let len = teeth.len;
         // What was pressed before is what has a slope.
-        Self::press::<GAPS>(teeth, work);
+        press::<GAPS>(teeth, work);
         let (arm, pressed, slope) = (&teeth.arm[..len], &work.pressed[..len], &work.slope[..len]);
         let (secant, offset) = (&work.secant[..len], &mut work.offset[..len]);
         let force = &mut force[..len];
@@ -677,17 +854,8 @@ impl LogarithmicLaw {
     /// Forces in newtons, rotations and stiffnesses; false where a contact is wider than the law allows.
     #[inline(always)]
     fn finish(typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
-        let len = teeth.len;
-        let (count, arm) = (teeth.count, &teeth.arm[..len]);
-        let (slope, change, pressed) = (&work.slope[..len], &work.offset[..len], &work.pressed[..len]);
-        let margin = &mut work.margin[..len];
-        let force = &mut shared.force[..len];
-        for i in 0..len {
-            let carries = pressed[i] > 0.0 && arm[i] > 0.0;
-            force[i] = if carries { typical_n * force[i] } else { 0.0 };
-            // A little early, so that the plain way decides at the limit itself.
-            margin[i] = if carries { (1e-6 - 2.0 * WIDEST_SHARE.ln()) - margin[i] } else { 0.0 };
-        }
+        let (count, arm) = (teeth.count, &teeth.arm[..teeth.len]);
+        let (slope, change) = (&work.slope[..teeth.len], &work.offset[..teeth.len]);
         for row in 0..teeth.rows {
             let mut stiffness = 0.0;
             for i in row * count..(row + 1) * count {
@@ -697,6 +865,21 @@ impl LogarithmicLaw {
             shared.stiffness[row] = typical_n * stiffness;
         }
         let is_finite = shared.rotation_rad[..teeth.rows].iter().all(|rotation| rotation.is_finite());
-        is_finite && largest(&margin[..teeth.rows * count]) <= 0.0
+        Self::cut_and_check(typical_n, teeth, work, shared.force) && is_finite
+    }
+
+    /// Forces in newtons, none of teeth that are not pressed; whether all are within the law.
+    #[inline(always)]
+    fn cut_and_check(typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) -> bool {
+        let len = teeth.len;
+        let (arm, pressed) = (&teeth.arm[..len], &work.pressed[..len]);
+        let (margin, force) = (&mut work.margin[..len], &mut force[..len]);
+        for i in 0..len {
+            let carries = pressed[i] > 0.0 && arm[i] > 0.0;
+            force[i] = if carries { typical_n * force[i] } else { 0.0 };
+            // A little early, so that the plain way decides at the limit itself.
+            margin[i] = if carries { (1e-6 - 2.0 * WIDEST_SHARE.ln()) - margin[i] } else { 0.0 };
+        }
+        largest(&margin[..teeth.rows * teeth.count]) <= 0.0
     }
 }
