@@ -41,6 +41,21 @@ impl<'a> Contestant<'a> {
         Self::new(name, Box::new(run))
     }
 
+    /// The same by the time that this thread was on a processor, which what else runs does not count in.
+    pub(crate) fn of_processor<T>(
+        name: impl Into<String>,
+        mut compute: impl FnMut() -> Result<T, Failure> + 'a,
+    ) -> Self {
+        let run = move |runs| {
+            let started = processor_time();
+            for _ in 0..runs {
+                black_box(compute()?);
+            }
+            Ok(processor_time().saturating_sub(started))
+        };
+        Self::new(name, Box::new(run))
+    }
+
     pub(crate) fn spread(&self, runs_per_unit: f64) -> Spread {
         Spread::of(self.seconds.iter().map(|seconds| seconds * runs_per_unit))
     }
@@ -64,4 +79,11 @@ pub(crate) fn take_turns(contestants: &mut [Contestant<'_>], rounds: usize) -> R
         }
     }
     Ok(())
+}
+
+/// How long this thread was on a processor, as the kernel counts it, to a few milliseconds.
+fn processor_time() -> Duration {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    let nanoseconds = text.split(' ').next().and_then(|field| field.parse().ok());
+    Duration::from_nanos(nanoseconds.unwrap_or_default())
 }

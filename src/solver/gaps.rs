@@ -194,6 +194,10 @@ impl Modification {
 
     /// The first of its numbers that opens or closes a gap.
     pub(crate) fn first(&self) -> Option<Parameter> {
+        // Asked at every tooth.
+        if *self == Self::NONE {
+            return None;
+        }
         let opens = |modified: &Modified| !matches!(modified, Modified::TipReliefStart | Modified::TipReliefPower);
         let parameters = self.parameters().into_iter();
         let mut set = parameters.filter(|(modified, value)| *value != 0.0 && opens(modified));

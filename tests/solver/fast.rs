@@ -251,6 +251,7 @@ fn the_fast_path_is_taken_under_every_law_with_and_without_gaps() {
             let clearance_um = PerContact { wave_generator: gap_um, ring: gap_um, carrier: gap_um };
             let load = LoadParameters { law, clearance_um, ..load(20.0, Compatibility::VirtualWork) };
             assert_both_paths_agree(&PAPER_5_1, &load, 50);
+            assert_both_paths_agree(&PAPER_5_1, &LoadParameters { allowable_stress_mpa: Some(1500.0), ..load }, 50);
             let (fast, plain) = (swept(&PAPER_5_1, &load, 50), {
                 let load = LoadCase::new(&load).unwrap();
                 sweep_plain(&drive(&PAPER_5_1), &load, Points::samples(50).unwrap(), &Never).unwrap()
@@ -258,6 +259,30 @@ fn the_fast_path_is_taken_under_every_law_with_and_without_gaps() {
             // The same numbers but for their last digits, which no two ways share throughout.
             assert_ne!(fast.states.stress_mpa, plain.states.stress_mpa, "{law:?} {gap_um}");
         }
+    }
+}
+
+#[test]
+fn a_drive_whose_contacts_are_wider_than_johnsons_law_allows_is_refused_by_either_path() {
+    for torque_nm in [1e4, 1e5, 1e6, 1e7] {
+        let load = LoadParameters { law: JOHNSON, ..load(torque_nm, Compatibility::VirtualWork) };
+        assert_both_paths_agree(&PAPER_5_1, &load, 10);
+    }
+    // The load at which the law ends at some input angle, from below and from above.
+    let ends = |torque_nm: f64| {
+        let load =
+            LoadCase::new(&LoadParameters { law: JOHNSON, ..load(torque_nm, Compatibility::VirtualWork) }).unwrap();
+        sweep(&drive(&PAPER_5_1), &load, Points::samples(10).unwrap(), &Never).is_err()
+    };
+    let (mut low, mut high) = (20.0, 1e7);
+    assert!(!ends(low) && ends(high));
+    while high / low > 1.0 + 1e-9 {
+        let middle = 0.5 * (low + high);
+        if ends(middle) { high = middle } else { low = middle }
+    }
+    for torque_nm in [low, high] {
+        let load = LoadParameters { law: JOHNSON, ..load(torque_nm, Compatibility::VirtualWork) };
+        assert_both_paths_agree(&PAPER_5_1, &load, 10);
     }
 }
 
