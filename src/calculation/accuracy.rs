@@ -8,8 +8,7 @@ use toothwave_solver::drive::Draft;
 use toothwave_solver::mesh::Samples;
 use toothwave_solver::sweep::{ContactPeaks, Points, Tolerance, sweep_with_deviations};
 use toothwave_solver::{
-    Compatibility, ContactLaw, Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop,
-    ToothShape,
+    Compatibility, ContactLaw, Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, ToothShape,
 };
 use utoipa::ToSchema;
 

@@ -10,7 +10,7 @@ use crate::ring::{FlankPoint, RingFlank, RingTooth};
 use crate::root::NotConverged;
 use crate::springs::{Rotation, Spring, Springs, WindUp};
 use crate::tooth::line::{WIDEST_SHARE, least_length_mm};
-use crate::tooth::{Contacts, Pressure, ToothContact, ToothSize};
+use crate::tooth::{Contacts, LineLaw, Pressure, ToothContact, ToothSize};
 use crate::violation::{Parameter, Violation};
 use crate::{SolveError, tooth};
 
@@ -342,9 +342,19 @@ impl<'a> LoadedDrive<'a> {
         self.compatibility
     }
 
-    /// `1/k` of each contact, where the law is linear and no contact has a gap: where unit loads only have to be scaled.
-    pub(crate) fn linear_compliance_mm_per_n(&self) -> Option<PerContact<f64>> {
-        self.contacts.linear_compliance_mm_per_n().filter(|_| self.gaps.is_nil())
+    /// Whether the law is linear and no contact has a gap: where unit loads only have to be scaled.
+    pub(crate) fn is_linear(&self) -> bool {
+        matches!(self.line_law(), Some(LineLaw::Linear { .. })) && self.gaps.is_nil()
+    }
+
+    /// The law of cylinders, for whoever works in columns.
+    pub(crate) fn line_law(&self) -> Option<LineLaw> {
+        self.contacts.line_law()
+    }
+
+    /// The gap at each contact where it is the same for every tooth and position.
+    pub(crate) fn uniform_gap_mm(&self) -> Option<&PerContact<f64>> {
+        self.gaps.uniform_mm()
     }
 
     /// Hertz stress of a contact.
