@@ -244,9 +244,9 @@ fn forces_at_stress(allowable_mpa: f64, teeth: &Teeth<'_>, force: &mut [f64]) {
     }
 }
 
-/// Turns each row to where the first of its teeth is pressed as far as its limit, which stands in `work.pressed`.
+/// Turns each row to where the first of its teeth is pressed as far as its limit, which stands in `work.pressed`; false where a row has none.
 #[inline(always)]
-fn turn_to_limit(teeth: &Teeth<'_>, work: &mut Work<'_>) {
+fn turn_to_limit(teeth: &Teeth<'_>, work: &mut Work<'_>) -> bool {
     for row in 0..teeth.rows {
         let at = row * teeth.count..(row + 1) * teeth.count;
         let (closing, pressed) = (&work.closing[at.clone()], &work.pressed[at]);
@@ -259,8 +259,12 @@ fn turn_to_limit(teeth: &Teeth<'_>, work: &mut Work<'_>) {
                 (work.row_last[row], work.row_excess[row]) = (closing, pressed);
             }
         }
+        if least == f64::INFINITY {
+            return false;
+        }
     }
     press::<true>(teeth, work);
+    true
 }
 
 /// The least torque of the rows, each turned to its limit, under these forces.
@@ -407,7 +411,9 @@ impl PowerLaw {
                 pressed[i] = if arm[i] > 0.0 { by_law } else { f64::INFINITY };
             }
         }
-        turn_to_limit(teeth, work);
+        if !turn_to_limit(teeth, work) {
+            return None;
+        }
         let (pressed, unit, force) = (&work.pressed[..len], &work.unit[..len], &mut work.limit[..len]);
         let inverse = 1.0 / self.exponent;
         for i in 0..len {
@@ -714,11 +720,16 @@ impl LogarithmicLaw {
             let per_typical = 1.0 / typical_n;
             for i in 0..len {
                 let force = force[i] * per_typical;
-                let approach = force * (a[i] - b[i] * ln::<V>(force));
-                pressed[i] = if arm[i] > 0.0 { approach / arm[i] } else { f64::INFINITY };
+                let at_force = a[i] - b[i] * ln::<V>(force);
+                // A stress beyond the end of the law, where its slope falls to nothing, limits nothing within it.
+                let is_within = at_force - b[i] > 0.2 * b[i];
+                pressed[i] = if arm[i] > 0.0 && is_within { force * at_force / arm[i] } else { f64::INFINITY };
             }
         }
-        turn_to_limit(teeth, work);
+        if !turn_to_limit(teeth, work) {
+            work.limit = limit;
+            return None;
+        }
         Self::guess(teeth, work, limit);
         let mut is_done = false;
         for _ in 0..MAX_ROUNDS {
