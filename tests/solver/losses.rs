@@ -557,11 +557,7 @@ fn with_any_member_fixed_power_goes_through_and_torques_balance() {
     {
         let wave_generator = match lobes {
             1 => WaveGenerator::Eccentric { radius_mm: 90.0, eccentricity_mm: 0.5 },
-            _ => WaveGenerator::Harmonic {
-                lobes: lobes.into(),
-                mean_radius_mm: 90.0,
-                amplitude_mm: 0.5,
-            },
+            _ => WaveGenerator::Harmonic { lobes: lobes.into(), mean_radius_mm: 90.0, amplitude_mm: 0.5 },
         };
         let p = DriveParameters { wave_generator, teeth, installed, ring_teeth, tooth_radius_mm: 3.0, ..PAPER_5_1 };
         let (drive, mechanism) = (drive(&p), mechanism(&p));
