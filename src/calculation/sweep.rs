@@ -136,6 +136,11 @@ impl Question for Sweep {
         }
         let of_sweep = of_wind_up.iter().chain(&of_half_widths).chain(&of_friction).chain(&of_contacts);
         findings.extend(of_sweep.map(FindingAnswer::from));
+        let unloaded_wind_up_deg = if *with_wind_up && *with_gaps {
+            Some(solver::unloaded_wind_up_deg(drive, load, deviations, &sweep, stop)?)
+        } else {
+            None
+        };
         let answer = SweepAnswer {
             solver_version: toothwave_solver::VERSION,
             build: crate::BUILD,
@@ -150,7 +155,7 @@ impl Question for Sweep {
             peaks: sweep.peaks.into(),
             teeth_in_mesh_per_zone: mesh.teeth_in_mesh().into(),
             loaded_teeth_per_zone: sweep.loaded_teeth().into(),
-            wind_up: with_wind_up.then(|| WindUpAnswer::new(drive, &sweep)),
+            wind_up: with_wind_up.then(|| WindUpAnswer::new(drive, &sweep, unloaded_wind_up_deg)),
             torque_capacity: sweep.torque_capacity.map(Into::into),
             losses,
             radial_force_n,
@@ -174,7 +179,8 @@ impl Question for Sweep {
             &states.stress_carrier_mpa,
         ])?;
         if let Some(wind_up) = &answer.wind_up {
-            require_finite([&wind_up.wind_up_deg, &wind_up.torsional_stiffness_nm_per_rad])?;
+            let unloaded = wind_up.unloaded_wind_up_deg.iter();
+            require_finite(unloaded.chain([&wind_up.wind_up_deg, &wind_up.torsional_stiffness_nm_per_rad]))?;
         }
         Ok(answer)
     }
@@ -284,8 +290,15 @@ impl SweepAnswer {
             let (softest, stiffest) = range(&wind_up.torsional_stiffness_nm_per_rad);
             let error_deg = wind_up.transmission_error_peak_to_peak_deg;
             writeln!(writer, "\nwind-up of the input                {least:.6} to {most:.6} deg")?;
+            if let Some(unloaded_deg) = &wind_up.unloaded_wind_up_deg {
+                let (least, most) = range(unloaded_deg);
+                writeln!(writer, "the same without load               {least:.6} to {most:.6} deg")?;
+            }
             writeln!(writer, "torsional stiffness at the output   {softest:.6e} to {stiffest:.6e} N·m/rad")?;
             writeln!(writer, "transmission error, peak to peak    {error_deg:.3e} deg")?;
+            if let Some(error_deg) = wind_up.unloaded_transmission_error_peak_to_peak_deg {
+                writeln!(writer, "the same without load               {error_deg:.3e} deg")?;
+            }
         }
         if let Some(losses) = &self.losses {
             losses.write_text(writer)?;

@@ -3,9 +3,9 @@
 
 use std::f64::consts::PI;
 
+use crate::cam::ToothCenter;
 use crate::contact::PerContact;
 use crate::drive::{Drive, DriveParameters};
-use crate::locus::ToothCenter;
 use crate::mesh::{Mesh, Place, greatest_common_divisor};
 use crate::ring::FlankPoint;
 use crate::violation::{Listed, Modified, Parameter, Violation};

@@ -1,9 +1,9 @@
 //! Equilibrium of a tooth and compatibility of all of them at one input angle (docs/theory.md section 4).
 
+use crate::cam::ToothCenter;
 use crate::contact::{Contact, ContactLaw, HertzLine, Material, Materials, Part, PerContact, half_width_mm};
 use crate::drive::{Draft, Drive, DriveParameters};
 use crate::gaps::{Deviations, Gaps, Modification};
-use crate::locus::ToothCenter;
 use crate::mesh::{Mesh, Place};
 use crate::position::Position;
 use crate::ring::{FlankPoint, RingFlank, RingTooth};

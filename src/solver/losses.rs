@@ -14,9 +14,9 @@ pub mod wear;
 
 use std::f64::consts::PI;
 
+use crate::cam::ToothCenter;
 use crate::contact::{Contact, PerContact};
 use crate::drive::{Drive, ToothShape};
-use crate::locus::ToothCenter;
 use crate::mesh::greatest_common_divisor;
 use crate::ring::FlankPoint;
 use crate::violation::{Parameter, Violation};
@@ -221,6 +221,28 @@ impl Mechanism {
     pub fn zones_in_torque(&self) -> f64 {
         let is_one_zone = !self.tells_items_apart && self.installed.is_multiple_of(self.lobes);
         if is_one_zone { f64::from(self.lobes) } else { 1.0 }
+    }
+
+    /// Speed of the driving member over that of the driven one, both against the fixed one; losses neglected also the torque that is taken off
+    /// over the torque that drives: `s Z_G/U`, `-s Z_K/U`, `Z_G/Z_K`.
+    pub fn speed_ratio(&self, fixed: Fixed) -> f64 {
+        let over = |one: u32, other: u32| f64::from(one) / f64::from(other);
+        match fixed {
+            Fixed::Ring => self.sense() * over(self.teeth, self.lobes),
+            Fixed::Carrier => -self.sense() * over(self.ring_teeth, self.lobes),
+            Fixed::WaveGenerator => over(self.teeth, self.ring_teeth),
+        }
+    }
+
+    /// The torque that holds the fixed member over the torque that drives, in its sense where positive: what is taken off less what is put in.
+    pub fn holding_torque_ratio(&self, fixed: Fixed) -> f64 {
+        // As whole numbers of teeth, so that nothing cancels.
+        let over = |one: u32, other: u32| f64::from(one) / f64::from(other);
+        match fixed {
+            Fixed::Ring => self.sense() * over(self.ring_teeth, self.lobes),
+            Fixed::Carrier => -self.sense() * over(self.teeth, self.lobes),
+            Fixed::WaveGenerator => self.sense() * over(self.lobes, self.ring_teeth),
+        }
     }
 
     /// The loss over the power at the driven end, `ℓ`, from the loss ratio ν: `ν Z_K/Z_G`, `ν`, `ν U/Z_G`.

@@ -286,6 +286,20 @@ impl Mesh {
         Place { slot: slot % self.installed, ring_space: ring_space % self.ring_teeth, lobe: lobe % self.lobes() }
     }
 
+    /// Where the tooth is that stands at a position on a lobe: its slot is a whole number, which rounding does not reach.
+    pub(crate) fn place_at(&self, input_angle_deg: f64, lobe: u32, position_deg: f64) -> Place {
+        let from_lobe_0 = position_deg / 360.0 + f64::from(lobe) / f64::from(self.lobes);
+        let slots_passed = input_angle_deg / self.period_deg();
+        let slot = (from_lobe_0 * self.installed as f64 + slots_passed).round();
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "whole, not negative, far below 2^53"
+        )]
+        let slot = slot as u64;
+        self.place(slot, u64::from(lobe))
+    }
+
     /// The teeth in mesh at sample `sample`, at most the last, by number, where zones are alike.
     pub fn teeth_at(&self, sample: u64, samples: Samples) -> RangeInclusive<u64> {
         let sample = sample.min(samples.0);

@@ -73,11 +73,39 @@ async fn with_deviations_all_zones_are_listed_by_slot_over_the_whole_sweep() {
         let lobes = numbers(&states["lobe"]);
         assert_eq!((lobes.len(), lobes.iter().copied().fold(0.0, f64::max)), (angles.len(), 1.0));
         assert_eq!(states["loaded"].as_array().unwrap().len(), angles.len());
+        let unloaded = numbers(&answer["wind_up"]["unloaded_wind_up_deg"]);
+        assert!(unloaded.iter().zip(numbers(&answer["wind_up"]["wind_up_deg"])).all(|(&without, with)| without < with));
+        let range = |column: &[f64]| {
+            column.iter().copied().fold(0.0, f64::max) - column.iter().copied().fold(f64::INFINITY, f64::min)
+        };
+        let error_deg = answer["wind_up"]["unloaded_transmission_error_peak_to_peak_deg"].as_f64().unwrap();
+        assert!((14.0 * error_deg / range(&unloaded) - 1.0).abs() < 1e-12);
         assert!(answer["checks"]["period_closure_residual"].as_f64().unwrap() < 1e-11);
         // Unlike lobes no longer balance each other.
         let aside = numbers(&answer["radial_force_n"]["value"]);
         assert!(aside.iter().any(|&force_n| force_n > 0.1), "{deviations}");
     }
+}
+
+#[tokio::test]
+async fn without_gaps_nothing_is_said_of_the_wind_up_without_load() {
+    let document = with(&spelled_out(), "/sweep", json!({ "wind_up": true }));
+    let wind_up = swept(&document).await["wind_up"].clone();
+    assert!(wind_up.get("unloaded_wind_up_deg").is_none(), "{wind_up}");
+    assert!(wind_up.get("unloaded_transmission_error_peak_to_peak_deg").is_none());
+}
+
+#[tokio::test]
+async fn geometry_has_ratios_and_torques_with_any_member_fixed() {
+    let members = Service::new().post("/v1/geometry", &spelled_out()).await.found()["members"].clone();
+    assert_eq!(
+        members,
+        json!({
+            "ring_fixed": { "ratio": 14.0, "holding_torque_ratio": 13.0 },
+            "carrier_fixed": { "ratio": -13.0, "holding_torque_ratio": -14.0 },
+            "wave_generator_fixed": { "ratio": 28.0 / 26.0, "holding_torque_ratio": 2.0 / 26.0 }
+        })
+    );
 }
 
 #[tokio::test]

@@ -36,6 +36,10 @@ function expected({ geometry, coincidence, sweep }) {
   return {
     'Ratio, ring fixed': geometry.transmission_ratio,
     'Ratio, carrier fixed': geometry.transmission_ratio_carrier_fixed,
+    'Ratio of ring to carrier, wave generator fixed': geometry.members.wave_generator_fixed.ratio,
+    'Torque that holds the ring over the input': geometry.members.ring_fixed.holding_torque_ratio,
+    'Torque that holds the carrier over the input': geometry.members.carrier_fixed.holding_torque_ratio,
+    'Torque that holds the wave generator over the ring’s': geometry.members.wave_generator_fixed.holding_torque_ratio,
     'Period of the load pattern': geometry.period_deg,
     'Coincidence degree': coincidence.coincidence_degree,
     'Fewest teeth in mesh': coincidence.teeth_in_mesh_per_zone.min,

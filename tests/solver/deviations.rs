@@ -287,6 +287,8 @@ fn every_state_of_a_sweep_with_deviations_is_that_of_free_teeth_on_springs() {
             let samples = Samples::new(3).unwrap();
             let sweep = swept_with(&drive, &load, &deviations, Points::Samples(samples)).unwrap();
             let states = &sweep.states;
+            let case = LoadCase::new(&load).unwrap();
+            let unloaded_deg = sweep::unloaded_wind_up_deg(&drive, &case, &deviations, &sweep, &Never).unwrap();
             let reach_rad = drive.flank_limit().position.from_lobe_rad + 1e-9;
             let mut state = 0;
             for (angle, &input_angle_deg) in sweep.input_angles.input_angle_deg.iter().enumerate() {
@@ -299,6 +301,8 @@ fn every_state_of_a_sweep_with_deviations_is_that_of_free_teeth_on_springs() {
                 let rotation_rad = rotation_rad(&chains, &law, width_mm, 60e3);
                 let off = (sweep.input_angles.wind_up_deg[angle].to_radians() - rotation_rad).abs() / rotation_rad;
                 worst = worst.max(off);
+                let first_rad = chains.iter().map(|chain| chain.gap_mm / chain.arm_mm).fold(f64::INFINITY, f64::min);
+                worst = worst.max((unloaded_deg[angle].to_radians() - first_rad).abs() / first_rad);
                 let loaded = forces_n(&chains, &law, width_mm, rotation_rad);
                 for (chain, cam_force_n) in chains.iter().zip(loaded) {
                     assert_eq!(states.input_angle_deg[state], input_angle_deg);
@@ -595,4 +599,27 @@ fn deviations_that_this_load_or_this_drive_cannot_have_are_all_told() {
     let nil = Deviations { slot_wall_um: vec![0.0; 27], ..Deviations::default() };
     let refused = swept_with(&drive, &load(20.0, Projection), &nil, Points::samples(4).unwrap()).unwrap_err();
     assert!(matches!(refused, SolveError::Impossible(violations) if violations.len() == 1));
+}
+
+#[test]
+fn the_wind_up_without_load_is_that_of_a_torque_that_goes_to_nothing() {
+    for p in drives() {
+        let drive = drive(&p);
+        let deviations = deviations(&p, ALL_KINDS[4], 11);
+        // Teeth of both zones, teeth of one zone, and both to a tolerance, where loads jump and angles stand twice.
+        for (deviations, points) in [
+            (&deviations, Points::samples(5).unwrap()),
+            (&Deviations::default(), Points::samples(5).unwrap()),
+            (&deviations, Points::tolerance(1e-2, 1_000_000).unwrap()),
+        ] {
+            let light = cleared(1e-9, FIXED);
+            let sweep = swept_with(&drive, &light, deviations, points).unwrap();
+            let case = LoadCase::new(&light).unwrap();
+            let unloaded_deg = sweep::unloaded_wind_up_deg(&drive, &case, deviations, &sweep, &Never).unwrap();
+            assert_eq!(unloaded_deg.len(), sweep.input_angles.wind_up_deg.len());
+            for (unloaded_deg, wind_up_deg) in unloaded_deg.iter().zip(&sweep.input_angles.wind_up_deg) {
+                assert!(wind_up_deg >= unloaded_deg && wind_up_deg / unloaded_deg - 1.0 < 1e-9, "{p:?}");
+            }
+        }
+    }
 }

@@ -218,7 +218,8 @@ impl Extremes {
     /// Of no value yet.
     pub(crate) const NONE: Self = Self { least: f64::INFINITY, largest: f64::NEG_INFINITY };
 
-    pub(crate) fn of(column: &[f64]) -> Self {
+    /// Those of a column.
+    pub fn of(column: &[f64]) -> Self {
         column.iter().fold(Self::NONE, |seen, &value| seen.with(value))
     }
 

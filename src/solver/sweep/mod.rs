@@ -5,6 +5,7 @@ mod columns;
 mod fast;
 mod plain;
 mod points;
+mod unloaded;
 
 use crate::drive::Drive;
 use crate::gaps::Deviations;
@@ -16,6 +17,7 @@ pub use columns::{
     ContactPeaks, Extremes, InputAngles, Peak, PeakShear, States, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity,
 };
 pub use points::{Points, Tolerance};
+pub use unloaded::unloaded_wind_up_deg;
 
 /// The sweep over one period.
 ///
