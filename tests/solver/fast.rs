@@ -268,6 +268,12 @@ fn a_drive_whose_contacts_are_wider_than_johnsons_law_allows_is_refused_by_eithe
         let load = LoadParameters { law: JOHNSON, ..load(torque_nm, Compatibility::VirtualWork) };
         assert_both_paths_agree(&PAPER_5_1, &load, 10);
     }
+    // A capacity may be wanted that lies beyond.
+    for exponent in 0..40 {
+        let allowable_stress_mpa = Some(1e3 * 1.2_f64.powi(exponent));
+        let load = LoadParameters { law: JOHNSON, allowable_stress_mpa, ..load(20.0, Compatibility::VirtualWork) };
+        assert_both_paths_agree(&PAPER_5_1, &load, 10);
+    }
     // The load at which the law ends at some input angle, from below and from above.
     let ends = |torque_nm: f64| {
         let load =

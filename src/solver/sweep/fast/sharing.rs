@@ -259,7 +259,7 @@ fn turn_to_limit(teeth: &Teeth<'_>, work: &mut Work<'_>) -> bool {
                 (work.row_last[row], work.row_excess[row]) = (closing, pressed);
             }
         }
-        if least == f64::INFINITY {
+        if least.is_infinite() {
             return false;
         }
     }
@@ -626,6 +626,12 @@ fn share_linearly(torque_nmm: f64, teeth: &Teeth<'_>, work: &Work<'_>, shared: &
     true
 }
 
+/// Logarithm of the force under which half the width is the whole length over that at which Johnson's law ends, a little early, so that the plain way
+/// decides at the end itself.
+fn least_margin() -> f64 {
+    1e-6 - 2.0 * WIDEST_SHARE.ln()
+}
+
 impl LogarithmicLaw {
     /// `A`, `B` and the reach of each tooth, forces counted in `typical_n`.
     #[inline(always)]
@@ -712,22 +718,24 @@ impl LogarithmicLaw {
         if self.gaps.is_none() {
             work.closing[..len].fill(0.0);
         }
+        // Lent out: a tile that ends here goes the plain way, and takes the sweep with it.
         let mut limit = std::mem::take(&mut work.limit);
         forces_at_stress(allowable_mpa, teeth, limit);
         {
             let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len]);
-            let (force, pressed) = (&limit[..len], &mut work.pressed[..len]);
+            let (force, reach, pressed) = (&limit[..len], &work.reach[..len], &mut work.pressed[..len]);
             let per_typical = 1.0 / typical_n;
+            let least_margin = least_margin();
             for i in 0..len {
                 let force = force[i] * per_typical;
-                let at_force = a[i] - b[i] * ln::<V>(force);
-                // A stress beyond the end of the law, where its slope falls to nothing, limits nothing within it.
-                let is_within = at_force - b[i] > 0.2 * b[i];
-                pressed[i] = if arm[i] > 0.0 && is_within { force * at_force / arm[i] } else { f64::INFINITY };
+                let ln = ln::<V>(force);
+                let approach = force * (a[i] - b[i] * ln);
+                // A tooth on which the law ends before is not the first to reach the stress, or it is seen below that the law has ended.
+                let is_within = arm[i] > 0.0 && reach[i] - ln > least_margin;
+                pressed[i] = if is_within { approach / arm[i] } else { f64::INFINITY };
             }
         }
         if !turn_to_limit(teeth, work) {
-            work.limit = limit;
             return None;
         }
         Self::guess(teeth, work, limit);
@@ -885,11 +893,11 @@ impl LogarithmicLaw {
         let len = teeth.len;
         let (arm, pressed) = (&teeth.arm[..len], &work.pressed[..len]);
         let (margin, force) = (&mut work.margin[..len], &mut force[..len]);
+        let least_margin = least_margin();
         for i in 0..len {
             let carries = pressed[i] > 0.0 && arm[i] > 0.0;
             force[i] = if carries { typical_n * force[i] } else { 0.0 };
-            // A little early, so that the plain way decides at the limit itself.
-            margin[i] = if carries { (1e-6 - 2.0 * WIDEST_SHARE.ln()) - margin[i] } else { 0.0 };
+            margin[i] = if carries { least_margin - margin[i] } else { 0.0 };
         }
         largest(&margin[..teeth.rows * teeth.count]) <= 0.0
     }
