@@ -597,6 +597,7 @@ async fn every_kind_of_fault_of_a_field_can_be_met_over_http() {
         )
         .to_string(),
         with(&document, INSTALLED, json!(8)).to_string(),
+        with(&document, "/deviations", json!({ "slot_wall_um": [1.0] })).to_string(),
         with(&document, RADIUS, json!(7.2)).to_string(),
         with(&document, RADIUS, json!(0.9)).to_string(),
         with(&document, TIP_RADIUS, json!(68.0)).to_string(),
