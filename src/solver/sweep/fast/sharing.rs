@@ -848,7 +848,7 @@ impl LogarithmicLaw {
         let force = &mut force[..len];
         let mut beyond = [0.0; LANES];
         for start in (0..len).step_by(LANES) {
-            for lane in 0..LANES {
+            for (lane, beyond) in beyond.iter_mut().enumerate() {
                 let i = start + lane;
                 let before = force[i];
                 let by_tangent = offset[i] + slope[i] * pressed[i];
@@ -864,7 +864,7 @@ impl LogarithmicLaw {
                 // What the slope changes by along the step.
                 offset[i] *= (next - before) / (before * before);
                 force[i] = next;
-                beyond[lane] = if step > beyond[lane] || step.is_nan() { step } else { beyond[lane] };
+                *beyond = if step > *beyond || step.is_nan() { step } else { *beyond };
             }
         }
         beyond.iter().all(|&beyond| beyond <= 0.0)
