@@ -332,7 +332,11 @@ impl GeometryAnswer {
         for (name, member) in
             [("ring", ring_fixed), ("carrier", carrier_fixed), ("wave generator", wave_generator_fixed)]
         {
-            writeln!(writer, "torque that holds the {name:<14}{:.12} of the driving one", member.holding_torque_ratio)?;
+            writeln!(
+                writer,
+                "torque on the fixed {name:<16}{:.12} times the driving one",
+                member.holding_torque_ratio
+            )?;
         }
         writeln!(writer, "period of the input angle           {:.6} deg", self.period_deg)?;
         self.undercut.write_text(writer)?;

@@ -124,7 +124,7 @@ impl Mesh {
     }
 
     /// The mesh of a drive in which single items deviate, which meet again as they did after so many load periods.
-    pub fn of_items(drive: &Drive, load_periods: u64) -> Self {
+    pub(crate) fn of_items(drive: &Drive, load_periods: u64) -> Self {
         Self { told_apart: Some(load_periods), ..Self::new(drive) }
     }
 

@@ -110,7 +110,8 @@ async fn geometry_has_ratios_and_torques_with_any_member_fixed() {
 
 #[tokio::test]
 async fn each_number_of_the_deviations_moves_an_answer() {
-    let document = with_deviations(every_kind());
+    // One interval of each of the 364 load periods is enough to see it.
+    let document = with(&with_deviations(every_kind()), "/sweep/samples", json!(1));
     let found = async |document: &Value| {
         let answer = swept(document).await;
         (numbers(&answer["states"]["force_ring_n"]), numbers(&answer["wind_up"]["wind_up_deg"]))
@@ -246,14 +247,14 @@ async fn a_sweep_of_deviations_stays_within_the_limit_on_states() {
 
 #[tokio::test]
 async fn accuracy_measures_the_design_with_its_deviations() {
-    let document = deviating();
+    let document = with_deviations(json!({ "wave_generator_runout": { "amount_um": 2.0 } }));
     let answer = Service::new().post("/v1/accuracy", &document).await.found();
     let ways = answer["ways"].as_array().unwrap();
     let finest = ways.iter().filter(|way| way["law"] == "palmgren" && way.get("tolerance").is_some()).last().unwrap();
     assert!(finest["error"].as_f64().unwrap() < 1e-9, "{finest}");
-    // Twenty-six load periods of at least fourteen teeth at eleven input angles.
+    // At least twelve teeth of both zones at eleven input angles.
     let coarsest = ways.iter().find(|way| way["samples"] == 10).unwrap();
-    assert!(coarsest["states"].as_u64().unwrap() > 26 * 10 * 13, "{coarsest}");
+    assert!(coarsest["states"].as_u64().unwrap() >= 11 * 12, "{coarsest}");
     // `projection` does not take them.
     let unavailable = answer["unavailable"].as_array().unwrap();
     assert!(unavailable.iter().all(|model| model["compatibility"] == "projection"), "{unavailable:?}");
