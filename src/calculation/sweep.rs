@@ -6,7 +6,7 @@ use toothwave_solver::losses::{Friction, Mechanism, period};
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self as solver, Points};
-use toothwave_solver::{Drive, LoadCase, Stop, findings};
+use toothwave_solver::{Drive, LoadCase, SolveError, Stop, findings};
 
 use crate::design::Design;
 use crate::field::FieldCode;
@@ -33,6 +33,36 @@ pub struct CheckedSweep {
     points: Points,
     with_gaps: bool,
     with_wind_up: bool,
+}
+
+impl CheckedSweep {
+    /// The drive.
+    pub const fn drive(&self) -> &Drive {
+        &self.drive
+    }
+
+    /// Its load.
+    pub const fn load(&self) -> &LoadCase {
+        &self.load
+    }
+
+    /// Its friction, where there is any.
+    pub const fn friction(&self) -> Option<&Friction> {
+        self.friction.as_ref()
+    }
+
+    /// Speed of the wave generator, where it is given.
+    pub const fn input_speed_rpm(&self) -> Option<f64> {
+        self.input_speed_rpm
+    }
+
+    /// Solves.
+    ///
+    /// # Errors
+    /// As [`solver::sweep`].
+    pub fn solve(&self, stop: &impl Stop) -> Result<solver::Sweep, SolveError> {
+        solver::sweep(&self.drive, &self.load, self.points, stop)
+    }
 }
 
 /// What is asked.
@@ -113,8 +143,8 @@ impl Question for Sweep {
     }
 
     fn answer(checked: &CheckedSweep, stop: &impl Stop) -> Result<SweepAnswer, NoAnswer> {
-        let CheckedSweep { drive, load, friction, input_speed_rpm, points, with_gaps, with_wind_up } = checked;
-        let sweep = solver::sweep(drive, load, *points, stop)?;
+        let CheckedSweep { drive, load, friction, input_speed_rpm, with_gaps, with_wind_up, .. } = checked;
+        let sweep = checked.solve(stop)?;
         let mesh = Mesh::new(drive);
         let mut findings = drive_findings(drive)?;
         let approaches_matter = *with_wind_up || load.has_gaps();
