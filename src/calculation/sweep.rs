@@ -63,6 +63,14 @@ impl CheckedSweep {
     pub fn solve(&self, stop: &impl Stop) -> Result<solver::Sweep, SolveError> {
         solver::sweep(&self.drive, &self.load, self.points, stop)
     }
+
+    /// Solves for the peaks alone.
+    ///
+    /// # Errors
+    /// As [`solver::peaks`].
+    pub fn peaks(&self, stop: &impl Stop) -> Result<solver::SweepPeaks, SolveError> {
+        solver::peaks(&self.drive, &self.load, self.points, stop)
+    }
 }
 
 /// What is asked.

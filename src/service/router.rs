@@ -24,7 +24,8 @@ use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use crate::api::{
-    App, CACHE_STATUS, SERVER_TIMING, accuracy, batch, coincidence_degree, drawings, geometry, page, side, studies, sweep,
+    App, CACHE_STATUS, SERVER_TIMING, accuracy, batch, coincidence_degree, drawings, geometry, page, side, studies,
+    sweep,
 };
 use crate::keys::{self, Keys};
 use crate::observe;

@@ -7,6 +7,9 @@ use toothwave_calculation::forms::{Form, Format, Forms};
 use utoipa::ToSchema;
 
 use crate::map::MapAnswer;
+use crate::search::SearchAnswer;
+use crate::sensitivity::SensitivityAnswer;
+use crate::tolerance::ToleranceAnswer;
 
 /// What a study comes to, as far as it has come.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -14,6 +17,12 @@ use crate::map::MapAnswer;
 pub enum StudyAnswer {
     /// Of a map.
     Map(MapAnswer),
+    /// Of a search.
+    Search(SearchAnswer),
+    /// Of a sensitivity.
+    Sensitivity(SensitivityAnswer),
+    /// Of a tolerance study.
+    Tolerance(ToleranceAnswer),
 }
 
 impl Forms for StudyAnswer {
@@ -22,6 +31,8 @@ impl Forms for StudyAnswer {
     fn expected_bytes(&self) -> usize {
         match self {
             Self::Map(map) => map.expected_bytes(),
+            Self::Search(search) => 4096 + 2048 * search.front.len(),
+            Self::Sensitivity(_) | Self::Tolerance(_) => 4096,
         }
     }
 }
@@ -30,14 +41,9 @@ impl StudyAnswer {
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
         match self {
             Self::Map(map) => map.write_csv(writer),
+            Self::Search(search) => search.write_csv(writer),
+            Self::Sensitivity(sensitivity) => sensitivity.write_csv(writer),
+            Self::Tolerance(tolerance) => tolerance.write_csv(writer),
         }
-    }
-}
-
-/// A CSV error as what it is: one of the writer.
-pub(crate) fn csv_error(error: csv::Error) -> io::Error {
-    match error.into_kind() {
-        csv::ErrorKind::Io(error) => error,
-        other => io::Error::other(format!("{other:?}")),
     }
 }

@@ -8,7 +8,7 @@ use toothwave_calculation::design::Design;
 use toothwave_calculation::json::{Tree, word};
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::question::{Limits, Question as _};
-use toothwave_calculation::sweep::{CheckedSweep, Sweep};
+use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::losses::period::{Losses, RadialForces};
 use toothwave_solver::parts::RIM;
 use toothwave_solver::{Drive, SolveError, Stop};
@@ -80,24 +80,24 @@ impl Evaluator {
         let checked = Sweep.check(&design, &self.limits)?;
         let drive = checked.drive();
         let ring_outer_radius_mm = ring_outer_radius_mm(&design, drive);
-        let loaded = Some(self.loaded(&checked, stop)?);
-        self.values(&Variant { drive, ring_outer_radius_mm, loaded })
-    }
-
-    /// The sweep of a variant, with as much around it as the quantities need. All that is computed under load passes through here.
-    fn loaded<'a>(&self, checked: &'a CheckedSweep, stop: &impl Stop) -> Result<Loaded<'a>, SolveError> {
+        if self.needs < Needs::Friction && !self.needs_radial_force {
+            let peaks = checked.peaks(stop)?;
+            let loaded = Loaded { load: checked.load(), peaks, friction: None, radial_forces: None };
+            return self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) });
+        }
         let sweep = checked.solve(stop)?;
         let friction = match checked.friction().filter(|_| self.needs >= Needs::Friction) {
             Some(friction) => Some(Rubbing {
                 friction,
-                losses: Losses::of(checked.drive(), &sweep, friction, stop)?,
+                sweep: &sweep,
+                losses: Losses::of(drive, &sweep, friction, stop)?,
                 input_speed_rpm: checked.input_speed_rpm(),
             }),
             None => None,
         };
-        let radial_forces =
-            if self.needs_radial_force { RadialForces::of(checked.drive(), &sweep, stop)? } else { None };
-        Ok(Loaded { load: checked.load(), sweep, friction, radial_forces })
+        let radial_forces = if self.needs_radial_force { RadialForces::of(drive, &sweep, stop)? } else { None };
+        let loaded = Loaded { load: checked.load(), peaks: (&sweep).into(), friction, radial_forces };
+        self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) })
     }
 
     fn values(&self, variant: &Variant<'_>) -> Result<Vec<f64>, NoAnswer> {
@@ -144,6 +144,8 @@ mod tests {
     #[test]
     fn a_panic_at_one_variant_is_its_reason() {
         let outcome = caught(|| panic!("on purpose"));
-        assert!(matches!(outcome, Ok(Outcome::Refused(refusal)) if refusal.reason.code == "panic" && refusal.detail == "on purpose"));
+        assert!(
+            matches!(outcome, Ok(Outcome::Refused(refusal)) if refusal.reason.code == "panic" && refusal.detail == "on purpose")
+        );
     }
 }

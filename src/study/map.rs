@@ -8,11 +8,12 @@ use toothwave_calculation::json::Tree;
 use toothwave_calculation::no_answer::NoAnswer;
 use utoipa::ToSchema;
 
-use crate::answer::csv_error;
+use crate::ask::{beyond, escaped, fault};
 use crate::document::{ChoiceDocument, MapDocument, OverDocument};
 use crate::evaluate::Evaluator;
 use crate::rows::{ImpossibleAnswer, PossibleAnswer, ReasonAnswer, Rows, RowsPart};
-use crate::variant::{Asked, Domain, Template, Value, Variable, beyond, escaped, fault};
+use crate::variant::{Asked, Domain, Template, Value, Variable};
+use toothwave_calculation::forms::csv_error;
 
 /// The grid of a map: the last axis is the fastest.
 #[derive(Debug, Clone)]
@@ -101,7 +102,11 @@ impl Axis {
             }
             (Domain::OneOf(count), None) => (0..*count).map(Value::Choice).collect(),
             (Domain::Real { .. }, None) => {
-                return Err(fault(&at, FieldCode::MissingField, "`steps` is required here: a range has numbers without end"));
+                return Err(fault(
+                    &at,
+                    FieldCode::MissingField,
+                    "`steps` is required here: a range has numbers without end",
+                ));
             }
             (Domain::Whole { min, max }, None) => {
                 let all = max - min + 1.0;
@@ -256,7 +261,8 @@ impl MapAnswer {
                 let count = axis.values.as_ref().map_or(0, Vec::len) + axis.choices.as_ref().map_or(0, Vec::len);
                 let index = usize::try_from(variant % count.max(1) as u64).unwrap_or_default();
                 variant /= count.max(1) as u64;
-                let number = axis.values.as_ref().and_then(|values| values.get(index)).map(|value| format!("{value:?}"));
+                let number =
+                    axis.values.as_ref().and_then(|values| values.get(index)).map(|value| format!("{value:?}"));
                 let word = axis.choices.as_ref().and_then(|choices| choices.get(index)).cloned();
                 number.or(word).unwrap_or_default()
             })

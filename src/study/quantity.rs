@@ -5,7 +5,7 @@ use toothwave_solver::losses::period::{Losses, RadialForces};
 use toothwave_solver::losses::{Efficiency, Fixed, Friction, Mechanism};
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::root::NotConverged;
-use toothwave_solver::sweep::{ContactPeaks, Sweep};
+use toothwave_solver::sweep::{ContactPeaks, Sweep, SweepPeaks};
 use toothwave_solver::{Contact, Drive, LoadCase};
 use utoipa::ToSchema;
 
@@ -82,7 +82,7 @@ pub(crate) struct Variant<'a> {
 #[derive(Debug)]
 pub(crate) struct Loaded<'a> {
     pub(crate) load: &'a LoadCase,
-    pub(crate) sweep: Sweep,
+    pub(crate) peaks: SweepPeaks,
     pub(crate) friction: Option<Rubbing<'a>>,
     pub(crate) radial_forces: Option<RadialForces>,
 }
@@ -91,6 +91,7 @@ pub(crate) struct Loaded<'a> {
 #[derive(Debug)]
 pub(crate) struct Rubbing<'a> {
     pub(crate) friction: &'a Friction,
+    pub(crate) sweep: &'a Sweep,
     pub(crate) losses: Losses,
     pub(crate) input_speed_rpm: Option<f64>,
 }
@@ -102,16 +103,16 @@ impl Variant<'_> {
     }
 
     fn peaks(&self, contact: Contact, of: impl Fn(&ContactPeaks) -> f64) -> f64 {
-        self.loaded(|loaded| of(loaded.sweep.peaks.get(contact)))
+        self.loaded(|loaded| of(loaded.peaks.contacts.get(contact)))
     }
 
     fn greatest(&self, of: impl Fn(&ContactPeaks) -> f64) -> f64 {
-        self.loaded(|loaded| loaded.sweep.peaks.iter().map(|(_, peaks)| of(peaks)).fold(f64::NEG_INFINITY, f64::max))
+        self.loaded(|loaded| loaded.peaks.contacts.iter().map(|(_, peaks)| of(peaks)).fold(f64::NEG_INFINITY, f64::max))
     }
 
     fn capacity(&self, of: impl Fn(f64, f64) -> f64) -> f64 {
         self.loaded(|loaded| {
-            let capacity = loaded.sweep.torque_capacity.as_ref();
+            let capacity = loaded.peaks.torque_capacity.as_ref();
             capacity.map_or(f64::NAN, |capacity| of(capacity.input_torque_nm, capacity.output_torque_nm))
         })
     }
@@ -126,40 +127,19 @@ impl Variant<'_> {
     }
 }
 
-fn least(column: &[f64]) -> f64 {
-    column.iter().copied().fold(f64::INFINITY, f64::min)
-}
-
 fn most(column: &[f64]) -> f64 {
     column.iter().copied().fold(f64::NEG_INFINITY, f64::max)
 }
 
-const fn of_drive(
-    name: &'static str,
-    unit: &'static str,
-    meaning: &'static str,
-    source: Source,
-    of: Of,
-) -> Quantity {
+const fn of_drive(name: &'static str, unit: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
     Quantity { name, unit, meaning, is_flag: false, needs: Needs::Drive, source, of }
 }
 
-const fn of_sweep(
-    name: &'static str,
-    unit: &'static str,
-    meaning: &'static str,
-    source: Source,
-    of: Of,
-) -> Quantity {
+const fn of_sweep(name: &'static str, unit: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
     Quantity { name, unit, meaning, is_flag: false, needs: Needs::Load, source, of }
 }
 
-const fn flag(
-    name: &'static str,
-    meaning: &'static str,
-    source: Source,
-    of: Of,
-) -> Quantity {
+const fn flag(name: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
     Quantity { name, unit: "", meaning, is_flag: true, needs: Needs::Drive, source, of }
 }
 
@@ -211,13 +191,9 @@ pub static QUANTITIES: [Quantity; 59] = [
         geometry("/ring/root_radius_mm"),
         |variant| Ok(variant.drive.root_radius_mm()),
     ),
-    of_drive(
-        "ring_tip_radius_mm",
-        "mm",
-        "Radius of the ring's tips.",
-        geometry("/ring/tip_radius_mm"),
-        |variant| Ok(variant.drive.tip_radius_mm()),
-    ),
+    of_drive("ring_tip_radius_mm", "mm", "Radius of the ring's tips.", geometry("/ring/tip_radius_mm"), |variant| {
+        Ok(variant.drive.tip_radius_mm())
+    }),
     of_drive(
         "ring_tooth_height_mm",
         "mm",
@@ -232,9 +208,12 @@ pub static QUANTITIES: [Quantity; 59] = [
         Source::Definition("`drive.teeth.width_mm`; a ball's diameter"),
         |variant| Ok(variant.drive.tooth_width_mm()),
     ),
-    flag("undercut", "Whether the ring's tips are cut away by their own envelope.", geometry("/undercut/occurs"), |variant| {
-        Ok(f64::from(u8::from(variant.drive.flank().is_undercut())))
-    }),
+    flag(
+        "undercut",
+        "Whether the ring's tips are cut away by their own envelope.",
+        geometry("/undercut/occurs"),
+        |variant| Ok(f64::from(u8::from(variant.drive.flank().is_undercut()))),
+    ),
     of_drive(
         "coincidence_degree",
         "",
@@ -257,9 +236,13 @@ pub static QUANTITIES: [Quantity; 59] = [
         mesh("/engagement/start_deg"),
         |variant| Ok(variant.drive.flank_limit().position.from_lobe_deg()),
     ),
-    of_drive("period_deg", "deg", "The input angle after which the load pattern repeats.", mesh("/period_deg"), |variant| {
-        Ok(Mesh::new(variant.drive).period_deg())
-    }),
+    of_drive(
+        "period_deg",
+        "deg",
+        "The input angle after which the load pattern repeats.",
+        mesh("/period_deg"),
+        |variant| Ok(Mesh::new(variant.drive).period_deg()),
+    ),
     of_drive(
         "ring_pressure_angle_max_deg",
         "deg",
@@ -422,42 +405,42 @@ pub static QUANTITIES: [Quantity; 59] = [
         "The fewest teeth of a zone that carry load at any input angle.",
         sweep("/loaded_teeth_per_zone/min"),
         #[expect(clippy::cast_precision_loss, reason = "a count of teeth")]
-        |variant| Ok(variant.loaded(|loaded| loaded.sweep.loaded_teeth().min as f64)),
+        |variant| Ok(variant.loaded(|loaded| loaded.peaks.loaded_teeth.min as f64)),
     ),
     of_sweep(
         "wind_up_min_deg",
         "deg",
         "The least wind-up of the input under the load.",
         Source::Definition("the least of `/wind_up/wind_up_deg` of the sweep"),
-        |variant| Ok(variant.loaded(|loaded| least(&loaded.sweep.input_angles.wind_up_deg))),
+        |variant| Ok(variant.loaded(|loaded| loaded.peaks.wind_up_deg.least)),
     ),
     of_sweep(
         "wind_up_max_deg",
         "deg",
         "The largest wind-up of the input under the load.",
         Source::Definition("the largest of `/wind_up/wind_up_deg` of the sweep"),
-        |variant| Ok(variant.loaded(|loaded| most(&loaded.sweep.input_angles.wind_up_deg))),
+        |variant| Ok(variant.loaded(|loaded| loaded.peaks.wind_up_deg.largest)),
     ),
     of_sweep(
         "torsional_stiffness_min_nm_per_rad",
         "N·m/rad",
         "The least torsional stiffness at the output over the period.",
         Source::Definition("the least of `/wind_up/torsional_stiffness_nm_per_rad` of the sweep"),
-        |variant| Ok(variant.loaded(|loaded| least(&loaded.sweep.input_angles.torsional_stiffness_nm_per_rad))),
+        |variant| Ok(variant.loaded(|loaded| loaded.peaks.torsional_stiffness_nm_per_rad.least)),
     ),
     of_sweep(
         "torsional_stiffness_max_nm_per_rad",
         "N·m/rad",
         "The largest torsional stiffness at the output over the period.",
         Source::Definition("the largest of `/wind_up/torsional_stiffness_nm_per_rad` of the sweep"),
-        |variant| Ok(variant.loaded(|loaded| most(&loaded.sweep.input_angles.torsional_stiffness_nm_per_rad))),
+        |variant| Ok(variant.loaded(|loaded| loaded.peaks.torsional_stiffness_nm_per_rad.largest)),
     ),
     of_sweep(
         "transmission_error_peak_to_peak_deg",
         "deg",
         "Range of the wind-up over the period, at the output.",
         sweep("/wind_up/transmission_error_peak_to_peak_deg"),
-        |variant| Ok(variant.loaded(|loaded| loaded.sweep.transmission_error_peak_to_peak_deg(variant.drive))),
+        |variant| Ok(variant.loaded(|loaded| loaded.peaks.transmission_error_peak_to_peak_deg(variant.drive))),
     ),
     of_sweep(
         "radial_force_max_n",
@@ -488,104 +471,152 @@ pub static QUANTITIES: [Quantity; 59] = [
     ),
     needing(
         Needs::Friction,
-        of_sweep("loss_ratio", "", "Mean power lost over the input torque times the speed of wave generator against carrier.", sweep("/losses/loss_ratio"), |variant| {
-            Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.total()))
-        }),
+        of_sweep(
+            "loss_ratio",
+            "",
+            "Mean power lost over the input torque times the speed of wave generator against carrier.",
+            sweep("/losses/loss_ratio"),
+            |variant| Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.total())),
+        ),
     ),
-    loss_at("loss_ratio_wave_generator", "The part of it that is lost between teeth and wave generator.", sweep("/losses/loss_ratio_by_place/wave_generator"), |variant| {
-        Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.contacts.wave_generator))
-    }),
-    loss_at("loss_ratio_ring", "The part of it that is lost between teeth and ring.", sweep("/losses/loss_ratio_by_place/ring"), |variant| {
-        Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.contacts.ring))
-    }),
-    loss_at("loss_ratio_carrier", "The part of it that is lost between teeth and carrier.", sweep("/losses/loss_ratio_by_place/carrier"), |variant| {
-        Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.contacts.carrier))
-    }),
-    loss_at("loss_ratio_bearing", "The part of it that is lost in the bearing.", sweep("/losses/loss_ratio_by_place/bearing"), |variant| {
-        Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.bearing))
-    }),
-    loss_at("efficiency_ring_fixed", "Efficiency where the wave generator drives the carrier.", sweep("/losses/efficiency/ring_fixed"), |variant| {
-        Ok(variant.efficiency(Fixed::Ring, |efficiency| efficiency.driven))
-    }),
-    loss_at("efficiency_carrier_fixed", "Efficiency where the wave generator drives the ring.", sweep("/losses/efficiency/carrier_fixed"), |variant| {
-        Ok(variant.efficiency(Fixed::Carrier, |efficiency| efficiency.driven))
-    }),
-    loss_at("efficiency_wave_generator_fixed", "Efficiency where the ring drives the carrier.", sweep("/losses/efficiency/wave_generator_fixed"), |variant| {
-        Ok(variant.efficiency(Fixed::WaveGenerator, |efficiency| efficiency.driven))
-    }),
-    loss_at("efficiency_ring_fixed_back_driven", "Efficiency where the carrier drives the wave generator; at or below 0 the drive locks itself.", sweep("/losses/efficiency/ring_fixed_back_driven"), |variant| {
-        Ok(variant.efficiency(Fixed::Ring, |efficiency| efficiency.back_driven))
-    }),
-    loss_at("efficiency_carrier_fixed_back_driven", "Efficiency where the ring drives the wave generator.", sweep("/losses/efficiency/carrier_fixed_back_driven"), |variant| {
-        Ok(variant.efficiency(Fixed::Carrier, |efficiency| efficiency.back_driven))
-    }),
-    loss_at("efficiency_wave_generator_fixed_back_driven", "Efficiency where the carrier drives the ring.", sweep("/losses/efficiency/wave_generator_fixed_back_driven"), |variant| {
-        Ok(variant.efficiency(Fixed::WaveGenerator, |efficiency| efficiency.back_driven))
-    }),
+    loss_at(
+        "loss_ratio_wave_generator",
+        "The part of it that is lost between teeth and wave generator.",
+        sweep("/losses/loss_ratio_by_place/wave_generator"),
+        |variant| Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.contacts.wave_generator)),
+    ),
+    loss_at(
+        "loss_ratio_ring",
+        "The part of it that is lost between teeth and ring.",
+        sweep("/losses/loss_ratio_by_place/ring"),
+        |variant| Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.contacts.ring)),
+    ),
+    loss_at(
+        "loss_ratio_carrier",
+        "The part of it that is lost between teeth and carrier.",
+        sweep("/losses/loss_ratio_by_place/carrier"),
+        |variant| Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.contacts.carrier)),
+    ),
+    loss_at(
+        "loss_ratio_bearing",
+        "The part of it that is lost in the bearing.",
+        sweep("/losses/loss_ratio_by_place/bearing"),
+        |variant| Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.bearing)),
+    ),
+    loss_at(
+        "efficiency_ring_fixed",
+        "Efficiency where the wave generator drives the carrier.",
+        sweep("/losses/efficiency/ring_fixed"),
+        |variant| Ok(variant.efficiency(Fixed::Ring, |efficiency| efficiency.driven)),
+    ),
+    loss_at(
+        "efficiency_carrier_fixed",
+        "Efficiency where the wave generator drives the ring.",
+        sweep("/losses/efficiency/carrier_fixed"),
+        |variant| Ok(variant.efficiency(Fixed::Carrier, |efficiency| efficiency.driven)),
+    ),
+    loss_at(
+        "efficiency_wave_generator_fixed",
+        "Efficiency where the ring drives the carrier.",
+        sweep("/losses/efficiency/wave_generator_fixed"),
+        |variant| Ok(variant.efficiency(Fixed::WaveGenerator, |efficiency| efficiency.driven)),
+    ),
+    loss_at(
+        "efficiency_ring_fixed_back_driven",
+        "Efficiency where the carrier drives the wave generator; at or below 0 the drive locks itself.",
+        sweep("/losses/efficiency/ring_fixed_back_driven"),
+        |variant| Ok(variant.efficiency(Fixed::Ring, |efficiency| efficiency.back_driven)),
+    ),
+    loss_at(
+        "efficiency_carrier_fixed_back_driven",
+        "Efficiency where the ring drives the wave generator.",
+        sweep("/losses/efficiency/carrier_fixed_back_driven"),
+        |variant| Ok(variant.efficiency(Fixed::Carrier, |efficiency| efficiency.back_driven)),
+    ),
+    loss_at(
+        "efficiency_wave_generator_fixed_back_driven",
+        "Efficiency where the carrier drives the ring.",
+        sweep("/losses/efficiency/wave_generator_fixed_back_driven"),
+        |variant| Ok(variant.efficiency(Fixed::WaveGenerator, |efficiency| efficiency.back_driven)),
+    ),
     needing(
         Needs::Friction,
-        of_sweep("efficiency_error", "", "The largest error of the efficiency that was measured at such losses.", sweep("/losses/efficiency_error"), |variant| {
-            let mechanism = Mechanism::of(variant.drive);
-            Ok(variant.rubbing(|_, Rubbing { friction, losses, .. }| {
-                friction.first_order_error(&mechanism, mechanism.loss_share(Fixed::Ring, losses.mean.total())).efficiency
-            }))
-        }),
+        of_sweep(
+            "efficiency_error",
+            "",
+            "The largest error of the efficiency that was measured at such losses.",
+            sweep("/losses/efficiency_error"),
+            |variant| {
+                let mechanism = Mechanism::of(variant.drive);
+                Ok(variant.rubbing(|_, Rubbing { friction, losses, .. }| {
+                    friction
+                        .first_order_error(&mechanism, mechanism.loss_share(Fixed::Ring, losses.mean.total()))
+                        .efficiency
+                }))
+            },
+        ),
     ),
     needing(
         Needs::Friction,
-        of_sweep("required_input_torque_nm", "N·m", "The torque that the wave generator really needs, ring fixed.", sweep("/losses/required_input_torque_nm"), |variant| {
-            let mechanism = Mechanism::of(variant.drive);
-            Ok(variant.rubbing(|loaded, rubbing| {
-                let efficiency = mechanism.efficiency(Fixed::Ring, rubbing.losses.mean.total());
-                loaded.load.input_torque_nm(variant.drive) / efficiency.driven
-            }))
-        }),
+        of_sweep(
+            "required_input_torque_nm",
+            "N·m",
+            "The torque that the wave generator really needs, ring fixed.",
+            sweep("/losses/required_input_torque_nm"),
+            |variant| {
+                let mechanism = Mechanism::of(variant.drive);
+                Ok(variant.rubbing(|loaded, rubbing| {
+                    let efficiency = mechanism.efficiency(Fixed::Ring, rubbing.losses.mean.total());
+                    loaded.load.input_torque_nm(variant.drive) / efficiency.driven
+                }))
+            },
+        ),
     ),
     needing(
         Needs::FrictionAndSpeed,
         of_sweep("power_loss_w", "W", "Mean power lost, ring fixed.", sweep("/losses/power_loss_w"), |variant| {
             let mechanism = Mechanism::of(variant.drive);
             Ok(variant.rubbing(|loaded, rubbing| {
-                let turning_rad_per_s = rubbing.input_speed_rpm.map_or(f64::NAN, |rpm| mechanism.turning_rad_per_s(rpm));
+                let turning_rad_per_s =
+                    rubbing.input_speed_rpm.map_or(f64::NAN, |rpm| mechanism.turning_rad_per_s(rpm));
                 rubbing.losses.mean.total() * loaded.load.input_torque_nm(variant.drive) * turning_rad_per_s
             }))
         }),
     ),
-    pressure_velocity("pressure_velocity_wave_generator_mpa_m_per_s", "Largest contact stress times slip at the wave generator.", sweep("/losses/pressure_velocity_mpa_m_per_s/wave_generator/value"), |variant| {
-        Ok(variant.pressure_velocity(Contact::WaveGenerator))
-    }),
-    pressure_velocity("pressure_velocity_ring_mpa_m_per_s", "Largest contact stress times slip at the ring.", sweep("/losses/pressure_velocity_mpa_m_per_s/ring/value"), |variant| {
-        Ok(variant.pressure_velocity(Contact::Ring))
-    }),
-    pressure_velocity("pressure_velocity_carrier_mpa_m_per_s", "Largest contact stress times slip at the carrier.", sweep("/losses/pressure_velocity_mpa_m_per_s/carrier/value"), |variant| {
-        Ok(variant.pressure_velocity(Contact::Carrier))
-    }),
+    pressure_velocity(
+        "pressure_velocity_wave_generator_mpa_m_per_s",
+        "Largest contact stress times slip at the wave generator.",
+        sweep("/losses/pressure_velocity_mpa_m_per_s/wave_generator/value"),
+        |variant| Ok(variant.pressure_velocity(Contact::WaveGenerator)),
+    ),
+    pressure_velocity(
+        "pressure_velocity_ring_mpa_m_per_s",
+        "Largest contact stress times slip at the ring.",
+        sweep("/losses/pressure_velocity_mpa_m_per_s/ring/value"),
+        |variant| Ok(variant.pressure_velocity(Contact::Ring)),
+    ),
+    pressure_velocity(
+        "pressure_velocity_carrier_mpa_m_per_s",
+        "Largest contact stress times slip at the carrier.",
+        sweep("/losses/pressure_velocity_mpa_m_per_s/carrier/value"),
+        |variant| Ok(variant.pressure_velocity(Contact::Carrier)),
+    ),
 ];
 
-const fn loss_at(
-    name: &'static str,
-    meaning: &'static str,
-    source: Source,
-    of: Of,
-) -> Quantity {
+const fn loss_at(name: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
     needing(Needs::Friction, of_sweep(name, "", meaning, source, of))
 }
 
-const fn pressure_velocity(
-    name: &'static str,
-    meaning: &'static str,
-    source: Source,
-    of: Of,
-) -> Quantity {
+const fn pressure_velocity(name: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
     needing(Needs::FrictionAndSpeed, of_sweep(name, "MPa m/s", meaning, source, of))
 }
 
 impl Variant<'_> {
     fn pressure_velocity(&self, contact: Contact) -> f64 {
         let mechanism = Mechanism::of(self.drive);
-        self.rubbing(|loaded, rubbing| {
+        self.rubbing(|_, rubbing| {
             let turning_rad_per_s = rubbing.input_speed_rpm.map_or(f64::NAN, |rpm| mechanism.turning_rad_per_s(rpm));
-            rubbing.losses.pressure_velocity_peaks(&loaded.sweep, turning_rad_per_s).get(contact).value
+            rubbing.losses.pressure_velocity_peaks(rubbing.sweep, turning_rad_per_s).get(contact).value
         })
     }
 }

@@ -96,7 +96,8 @@ mod tests {
         let mut stream = Stream::new(7, 3);
         let shares: f64 = (0..COUNT).map(|_| stream.share()).sum();
         assert!((shares / f64::from(COUNT) - 0.5).abs() < 0.004);
-        let (sum, squares) = (0..COUNT).map(|_| stream.normal()).fold((0.0, 0.0), |(sum, squares), x| (sum + x, squares + x * x));
+        let (sum, squares) =
+            (0..COUNT).map(|_| stream.normal()).fold((0.0, 0.0), |(sum, squares), x| (sum + x, squares + x * x));
         assert!((sum / f64::from(COUNT)).abs() < 0.014 && (squares / f64::from(COUNT) - 1.0).abs() < 0.02);
     }
 }

@@ -13,12 +13,17 @@ use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::Stop;
 
 use crate::answer::StudyAnswer;
+use crate::ask::{beyond, fault, index_of, named};
 use crate::document::StudyDocument;
 use crate::evaluate::{Evaluator, Stopped};
+use crate::limit;
 use crate::map::{Map, MapAnswer};
 use crate::quantity::{Needs, QUANTITIES, Quantity};
 use crate::rows::{CHUNK_VARIANTS, RowsPart, RowsWork};
-use crate::variant::{Template, beyond, fault};
+use crate::search::{Island, IslandPart, Search, SearchAnswer};
+use crate::sensitivity::{Sensitivity, SensitivityAnswer};
+use crate::tolerance::{Tolerance, ToleranceAnswer};
+use crate::variant::Template;
 
 /// What studies are computed at most.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,13 +49,18 @@ pub struct Study {
 #[derive(Debug)]
 enum Kind {
     Map(Map),
+    Search(Box<Search>),
+    Sensitivity(Sensitivity),
+    Tolerance(Tolerance),
 }
 
 /// What a chunk comes to. It can be kept anywhere and merged in any order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Part {
-    /// Of a map.
+    /// Of a map, a sensitivity or a tolerance study.
     Rows(RowsPart),
+    /// Of a search.
+    Island(IslandPart),
 }
 
 impl Part {
@@ -58,13 +68,15 @@ impl Part {
     pub const fn variants(&self) -> u64 {
         match self {
             Self::Rows(rows) => (rows.answered.len() + rows.refused.len()) as u64,
+            Self::Island(island) => island.evaluated(),
         }
     }
 
-    /// Of those, the ones without an answer.
+    /// Of those, the ones without an answer; of a search those of its scan.
     pub const fn refused(&self) -> u64 {
         match self {
             Self::Rows(rows) => rows.refused.len() as u64,
+            Self::Island(island) => island.refused(),
         }
     }
 }
@@ -91,8 +103,29 @@ impl Study {
                 let variants = grid.variants().unwrap_or(u64::MAX);
                 Self::checked(id, Kind::Map(grid), template, quantities, variants, limits)
             }
-            StudyDocument::Search(_) | StudyDocument::Sensitivity(_) | StudyDocument::Tolerance(_) => {
-                Err(fault("/study", FieldCode::UnknownChoice, "not yet"))
+            StudyDocument::Search(document) => {
+                let (search, template, quantities) = Search::new(document)?;
+                let variants = search.evaluations();
+                Self::checked(id, Kind::Search(Box::new(search)), template, quantities, variants, limits)
+            }
+            StudyDocument::Sensitivity(document) => {
+                let (sensitivity, template) = Sensitivity::new(document)?;
+                let quantities = asked_quantities(&document.quantities, &template)?;
+                let variants = sensitivity.variants();
+                Self::checked(id, Kind::Sensitivity(sensitivity), template, quantities, variants, limits)
+            }
+            StudyDocument::Tolerance(document) => {
+                let mut quantities = Vec::new();
+                for (index, name) in document.quantities.iter().enumerate() {
+                    index_of(named(name, &format!("/quantities/{index}"))?, &mut quantities);
+                }
+                let bounds = limit::limits(&document.require, &mut quantities)?;
+                let (tolerance, template) = Tolerance::new(document, bounds)?;
+                if quantities.is_empty() {
+                    quantities = asked_quantities(&[], &template)?;
+                }
+                let variants = tolerance.variants();
+                Self::checked(id, Kind::Tolerance(tolerance), template, quantities, variants, limits)
             }
         }
     }
@@ -139,6 +172,9 @@ impl Study {
     pub const fn kind(&self) -> &'static str {
         match self.kind {
             Kind::Map(_) => "map",
+            Kind::Search(_) => "search",
+            Kind::Sensitivity(_) => "sensitivity",
+            Kind::Tolerance(_) => "tolerance",
         }
     }
 
@@ -149,16 +185,23 @@ impl Study {
 
     /// Chunks that it consists of, each a computation of its own.
     pub const fn chunks(&self) -> u64 {
-        match self.kind {
-            Kind::Map(_) => self.variants.div_ceil(CHUNK_VARIANTS),
+        match &self.kind {
+            Kind::Search(search) => search.islands(),
+            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => self.variants.div_ceil(CHUNK_VARIANTS),
         }
     }
 
     /// About what it takes to keep what it comes to.
-    pub const fn stored_bytes(&self) -> u64 {
+    pub fn stored_bytes(&self) -> u64 {
         const OVERHEAD: u64 = 1 << 14;
-        let columns = self.evaluator.quantities.len() as u64 + 2;
-        OVERHEAD.saturating_add(self.variants.saturating_mul(8 * columns))
+        let quantities = self.evaluator.quantities.len();
+        let bytes = match &self.kind {
+            Kind::Search(search) => search.stored_bytes(quantities, self.template.variables().len()),
+            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => {
+                self.variants.saturating_mul(8 * (quantities as u64 + 2))
+            }
+        };
+        OVERHEAD.saturating_add(bytes)
     }
 }
 
@@ -171,7 +214,7 @@ fn id(document: &StudyDocument) -> Result<Key, NoAnswer> {
 }
 
 /// The quantities of these names; all that every document has what they need for, where none is named.
-pub(crate) fn asked_quantities(names: &[String], template: &Template) -> Result<Vec<&'static Quantity>, NoAnswer> {
+fn asked_quantities(names: &[String], template: &Template) -> Result<Vec<&'static Quantity>, NoAnswer> {
     if names.is_empty() {
         let has = template.examples().map(what_it_has).min().unwrap_or(Needs::Drive);
         let known = template.examples().all(has_allowable_stress);
@@ -189,14 +232,6 @@ pub(crate) fn asked_quantities(names: &[String], template: &Template) -> Result<
         }
     }
     Ok(quantities)
-}
-
-/// The quantity of this name, which stands at this place of the study's document.
-pub(crate) fn named(name: &str, at: &str) -> Result<&'static Quantity, NoAnswer> {
-    Quantity::named(name).ok_or_else(|| {
-        let detail = format!("no quantity is called `{name}`; `/v1/quantities` lists them");
-        fault(at, FieldCode::UnknownChoice, detail)
-    })
 }
 
 fn at<'a>(tree: &'a Tree, place: &[&str]) -> Option<&'a Tree> {
@@ -229,7 +264,9 @@ fn require_what_quantities_need(
         let needed: &[(&[&str], &str)] = match quantity.needs {
             Needs::Drive => &[],
             Needs::Load => &[(&["load"], "a load")],
-            Needs::AllowableStress => &[(&["load"], "a load"), (&["load", "allowable_stress_mpa"], "an allowable stress")],
+            Needs::AllowableStress => {
+                &[(&["load"], "a load"), (&["load", "allowable_stress_mpa"], "an allowable stress")]
+            }
             Needs::Friction => &[(&["load"], "a load"), (&["friction"], "friction")],
             Needs::FrictionAndSpeed => &[
                 (&["load"], "a load"),
@@ -269,13 +306,15 @@ pub struct Work {
 #[derive(Debug)]
 enum State {
     Rows(RowsWork),
+    Island(Box<Island>),
 }
 
 impl Work {
     /// A chunk of a study, not begun yet.
     pub fn new(study: &Arc<Study>, chunk: u64) -> Self {
         let state = match &study.kind {
-            Kind::Map(_) => {
+            Kind::Search(search) => State::Island(Box::new(Island::new(search, study.template.clone(), chunk))),
+            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => {
                 let quantities = study.evaluator.quantities.len();
                 State::Rows(RowsWork::new(study.template.clone(), quantities, chunk, study.variants))
             }
@@ -289,8 +328,14 @@ impl Work {
     /// When `stop` says so; the chunk is then as it was before.
     pub fn step(&mut self, stop: &impl Stop) -> Result<bool, Stopped> {
         let Self { study, state } = self;
+        let evaluator = &study.evaluator;
         match (&study.kind, state) {
-            (Kind::Map(map), State::Rows(rows)) => rows.step(map, &study.evaluator, stop),
+            (Kind::Map(map), State::Rows(rows)) => rows.step(map, evaluator, stop),
+            (Kind::Sensitivity(sensitivity), State::Rows(rows)) => rows.step(sensitivity, evaluator, stop),
+            (Kind::Tolerance(tolerance), State::Rows(rows)) => rows.step(tolerance, evaluator, stop),
+            (Kind::Search(search), State::Island(island)) => island.step(search, evaluator, stop),
+            // Made for each other above.
+            (Kind::Search(_), State::Rows(_)) | (_, State::Island(_)) => Ok(true),
         }
     }
 
@@ -298,6 +343,7 @@ impl Work {
     pub fn finish(self) -> Part {
         match self.state {
             State::Rows(rows) => Part::Rows(rows.finish()),
+            State::Island(island) => Part::Island(island.finish()),
         }
     }
 
@@ -367,15 +413,34 @@ impl Gathered {
     /// What the study comes to, as far as it has come.
     pub fn answer(&self) -> StudyAnswer {
         let study = &*self.study;
-        let parts = self.parts.iter().flatten();
+        let (evaluator, is_complete) = (&study.evaluator, self.is_complete());
         match &study.kind {
-            Kind::Map(map) => {
-                let mut rows = RowsPart::new(study.evaluator.quantities.len());
-                for Part::Rows(part) in parts {
-                    rows.append(part);
-                }
-                StudyAnswer::Map(MapAnswer::new(map, &study.evaluator, rows, self.is_complete()))
+            Kind::Map(map) => StudyAnswer::Map(MapAnswer::new(map, evaluator, self.rows(), is_complete)),
+            Kind::Search(search) => {
+                let islands = self.parts.iter().flatten().filter_map(|part| match part {
+                    Part::Island(island) => Some(island),
+                    Part::Rows(_) => None,
+                });
+                StudyAnswer::Search(SearchAnswer::new(search, &study.template, evaluator, islands, is_complete))
+            }
+            Kind::Sensitivity(sensitivity) => {
+                let answer = SensitivityAnswer::new(sensitivity, evaluator, &self.rows(), is_complete);
+                StudyAnswer::Sensitivity(answer)
+            }
+            Kind::Tolerance(tolerance) => {
+                StudyAnswer::Tolerance(ToleranceAnswer::new(tolerance, evaluator, &self.rows(), is_complete))
             }
         }
+    }
+
+    /// All rows that have come, in the order of their variants.
+    fn rows(&self) -> RowsPart {
+        let mut rows = RowsPart::new(self.study.evaluator.quantities.len());
+        for part in self.parts.iter().flatten() {
+            if let Part::Rows(part) = part {
+                rows.append(part);
+            }
+        }
+        rows
     }
 }

@@ -1,10 +1,11 @@
 //! Variants of a document: what is free in it, over which values, and the document with values put in.
 
-use serde::{Deserialize, Serialize};
 use toothwave_calculation::design::Design;
-use toothwave_calculation::field::{FieldCode, FieldError};
+use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::json::{Fault, Tree, path};
-use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
+use toothwave_calculation::no_answer::NoAnswer;
+
+use crate::ask::{beyond, escaped, fault};
 
 /// Combinations of choices at most: each is a document of its own, which is kept.
 const MOST_FORMS: usize = 256;
@@ -12,7 +13,7 @@ const MOST_FORMS: usize = 256;
 const RING_TEETH: [&str; 3] = ["drive", "ring", "teeth"];
 
 /// The values that a free field may have.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Domain {
     /// Any number of a range, both ends included.
     Real {
@@ -69,23 +70,6 @@ struct Form {
     /// Of the variables, whether this form takes it.
     takes: Vec<bool>,
     derives_ring_teeth: bool,
-}
-
-/// A fault of the study's own document.
-pub(crate) fn fault(pointer: &str, code: FieldCode, detail: impl Into<String>) -> NoAnswer {
-    Fault { pointer: pointer.into(), code, detail: detail.into() }.into()
-}
-
-/// A value of the study's document that is beyond a limit.
-pub(crate) fn beyond(pointer: &str, code: FieldCode, detail: impl Into<String>, value: f64, limit: f64) -> NoAnswer {
-    let detail = detail.into();
-    let error = FieldError { pointer: pointer.into(), code, detail: detail.clone(), value: Some(value), limit: Some(limit) };
-    NoAnswer::at_fields(NoAnswerCode::InvalidDocument, format!("{pointer}: {detail}"), vec![error])
-}
-
-/// A name as a JSON pointer spells it (RFC 6901).
-pub(crate) fn escaped(name: &str) -> String {
-    name.replace('~', "~0").replace('/', "~1")
 }
 
 impl Template {
@@ -220,11 +204,6 @@ impl Template {
         &form.tree
     }
 
-    /// Whether the document with these values takes each of the variables.
-    pub(crate) fn takes(&self, values: &[Value]) -> &[bool] {
-        &self.forms[self.form_index(values)].takes
-    }
-
     /// Some document of each form.
     pub(crate) fn examples(&self) -> impl Iterator<Item = &Tree> {
         self.forms.iter().map(|form| &form.tree)
@@ -293,6 +272,11 @@ impl Variable {
             Domain::Whole { min, max } => Value::Number((min + (share * (max - min + 1.0)).floor()).min(max)),
             Domain::OneOf(count) => Value::Choice(((share * count as f64) as usize).min(count - 1)),
         }
+    }
+
+    /// Where it stands in a design.
+    pub(crate) fn path(&self) -> &[String] {
+        &self.path
     }
 
     /// The choices, where it is one.

@@ -180,7 +180,8 @@ fn kept(app: &App, id: Result<Path<String>, PathRejection>) -> Result<Arc<Kept>,
     // An id that is no text is no study's either.
     let id = id.map(|Path(id)| id).unwrap_or_default();
     app.studies.find(&id).ok_or_else(|| {
-        let detail = format!("no study `{id}` is kept: it was never asked for here, or was forgotten; ask for it again");
+        let detail =
+            format!("no study `{id}` is kept: it was never asked for here, or was forgotten; ask for it again");
         Problem::new(ProblemCode::NotFound, detail)
     })
 }
