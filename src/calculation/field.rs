@@ -86,6 +86,8 @@ pub enum FieldCode {
     TooManyStates,
     /// More profile points than `max_profile_points`.
     TooManyPoints,
+    /// More variants than `max_study_variants`, or more bytes of them than `max_study_bytes`.
+    TooManyVariants,
 }
 
 /// A violation as the field that it is about.

@@ -49,7 +49,7 @@ pub trait Forms: Serialize + Sized + 'static {
 }
 
 /// A CSV error as what it is: one of the writer, whose kind tells a closed pipe from a full disk.
-pub(crate) fn csv_error(error: csv::Error) -> io::Error {
+pub fn csv_error(error: csv::Error) -> io::Error {
     match error.into_kind() {
         csv::ErrorKind::Io(error) => error,
         other => io::Error::other(format!("{other:?}")),

@@ -40,12 +40,20 @@ const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 /// # Errors
 /// See [`ReadError`].
 pub fn read<'de, T: Deserialize<'de>>(text: &[u8]) -> Result<T, ReadError> {
+    tree(text)?.read().map_err(ReadError::Fault)
+}
+
+/// Reads the tree of a text, whatever it is.
+///
+/// # Errors
+/// See [`ReadError`].
+pub fn tree(text: &[u8]) -> Result<Tree, ReadError> {
     let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
     if text.trim_ascii().is_empty() {
         return Err(ReadError::Malformed { detail: "nothing was sent; send a design document".into() });
     }
     let mut parser = serde_json::Deserializer::from_slice(text);
-    let tree: Node = serde_path_to_error::deserialize(&mut parser).map_err(|error| {
+    let tree: Tree = serde_path_to_error::deserialize(&mut parser).map_err(|error| {
         // serde_json takes a number beyond the doubles and deep nesting for bad syntax; they are JSON all the same, if the rest is.
         let fault = match error.inner().to_string() {
             text if text.starts_with("number out of range") => {
@@ -70,7 +78,7 @@ pub fn read<'de, T: Deserialize<'de>>(text: &[u8]) -> Result<T, ReadError> {
         }
     })?;
     parser.end().map_err(|error| ReadError::Malformed { detail: error.to_string() })?;
-    T::deserialize(&tree).map_err(ReadError::Fault)
+    Ok(tree)
 }
 
 /// A word of the API, as JSON spells it.
@@ -78,75 +86,170 @@ pub fn word(value: &impl Serialize) -> String {
     serde_json::to_value(value).ok().and_then(|value| Some(value.as_str()?.to_owned())).unwrap_or_default()
 }
 
-/// JSON as it stands in the text.
-#[derive(Debug)]
-enum Node {
+/// JSON as it stands in a text, or as it is put together: what documents are read from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Tree {
+    /// `null`.
     Null,
+    /// `true` or `false`.
     Bool(bool),
+    /// A number.
     Number(f64),
+    /// A text.
     Text(String),
+    /// An array.
     Array(Vec<Self>),
+    /// An object, its fields in the order in which they stand.
     Object(Vec<(String, Self)>),
 }
 
-impl<'de> Deserialize<'de> for Node {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(NodeVisitor)
+impl Tree {
+    /// What the tree holds.
+    ///
+    /// # Errors
+    /// The first structural fault.
+    pub fn read<'de, T: Deserialize<'de>>(&self) -> Result<T, Fault> {
+        T::deserialize(self)
+    }
+
+    /// What stands at a place, of which the path names the fields.
+    pub fn at(&self, path: &[String]) -> Option<&Self> {
+        path.iter().try_fold(self, |tree, name| match tree {
+            Self::Object(fields) => fields.iter().find(|(key, _)| key == name).map(|(_, value)| value),
+            _ => None,
+        })
+    }
+
+    /// Puts a value at a place, in objects that are made where there are none.
+    pub fn set(&mut self, path: &[String], value: Self) {
+        let Some((name, rest)) = path.split_first() else {
+            *self = value;
+            return;
+        };
+        if !matches!(self, Self::Object(_)) {
+            *self = Self::Object(Vec::new());
+        }
+        let Self::Object(fields) = self else { return };
+        let index = fields.iter().position(|(key, _)| key == name).unwrap_or_else(|| {
+            fields.push((name.clone(), Self::Null));
+            fields.len() - 1
+        });
+        fields[index].1.set(rest, value);
+    }
+
+    /// Takes away what stands at a place.
+    pub fn remove(&mut self, path: &[String]) -> Option<Self> {
+        let Self::Object(fields) = self else { return None };
+        let (name, rest) = path.split_first()?;
+        let index = fields.iter().position(|(key, _)| key == name)?;
+        if rest.is_empty() { Some(fields.remove(index).1) } else { fields[index].1.remove(rest) }
+    }
+
+    /// The same with the fields of every object by name, so that equal trees are equal bytes.
+    pub fn sorted(mut self) -> Self {
+        match &mut self {
+            Self::Object(fields) => {
+                for (_, value) in fields.iter_mut() {
+                    *value = std::mem::replace(value, Self::Null).sorted();
+                }
+                fields.sort_by(|(one, _), (other, _)| one.cmp(other));
+            }
+            Self::Array(items) => {
+                for item in items {
+                    *item = std::mem::replace(item, Self::Null).sorted();
+                }
+            }
+            Self::Null | Self::Bool(_) | Self::Number(_) | Self::Text(_) => {}
+        }
+        self
     }
 }
 
-struct NodeVisitor;
+impl Serialize for Tree {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Null => serializer.serialize_unit(),
+            Self::Bool(value) => serializer.serialize_bool(*value),
+            Self::Number(value) => serializer.serialize_f64(*value),
+            Self::Text(value) => serializer.serialize_str(value),
+            Self::Array(items) => serializer.collect_seq(items),
+            Self::Object(fields) => serializer.collect_map(fields.iter().map(|(name, value)| (name, value))),
+        }
+    }
+}
 
-impl<'de> Visitor<'de> for NodeVisitor {
-    type Value = Node;
+/// The names that a JSON pointer (RFC 6901) goes through; none where it is no pointer.
+pub fn path(pointer: &str) -> Option<Vec<String>> {
+    let names = pointer.strip_prefix('/')?.split('/');
+    Some(names.map(|name| name.replace("~1", "/").replace("~0", "~")).collect())
+}
+
+/// What a tree of a tree is asked for, so that it gives its arrays too.
+const ANY: &str = "any tree";
+
+impl<'de> Deserialize<'de> for Tree {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_newtype_struct(ANY, TreeVisitor)
+    }
+}
+
+struct TreeVisitor;
+
+impl<'de> Visitor<'de> for TreeVisitor {
+    type Value = Tree;
+
+    /// What other formats than trees do with a newtype.
+    fn visit_newtype_struct<D: serde::Deserializer<'de>>(self, deserializer: D) -> Result<Tree, D::Error> {
+        deserializer.deserialize_any(self)
+    }
 
     fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("JSON")
     }
 
-    fn visit_unit<E>(self) -> Result<Node, E> {
-        Ok(Node::Null)
+    fn visit_unit<E>(self) -> Result<Tree, E> {
+        Ok(Tree::Null)
     }
 
-    fn visit_bool<E>(self, value: bool) -> Result<Node, E> {
-        Ok(Node::Bool(value))
+    fn visit_bool<E>(self, value: bool) -> Result<Tree, E> {
+        Ok(Tree::Bool(value))
     }
 
-    fn visit_u64<E>(self, value: u64) -> Result<Node, E> {
-        Ok(Node::Number(value as f64))
+    fn visit_u64<E>(self, value: u64) -> Result<Tree, E> {
+        Ok(Tree::Number(value as f64))
     }
 
-    fn visit_i64<E>(self, value: i64) -> Result<Node, E> {
-        Ok(Node::Number(value as f64))
+    fn visit_i64<E>(self, value: i64) -> Result<Tree, E> {
+        Ok(Tree::Number(value as f64))
     }
 
-    fn visit_f64<E>(self, value: f64) -> Result<Node, E> {
+    fn visit_f64<E>(self, value: f64) -> Result<Tree, E> {
         // -0.0 means nothing else than 0.0, and must not be told from it.
-        Ok(Node::Number(value + 0.0))
+        Ok(Tree::Number(value + 0.0))
     }
 
-    fn visit_str<E>(self, value: &str) -> Result<Node, E> {
-        Ok(Node::Text(value.to_owned()))
+    fn visit_str<E>(self, value: &str) -> Result<Tree, E> {
+        Ok(Tree::Text(value.to_owned()))
     }
 
-    fn visit_seq<A: de::SeqAccess<'de>>(self, mut items: A) -> Result<Node, A::Error> {
-        let mut nodes = Vec::new();
-        while let Some(node) = items.next_element()? {
-            nodes.push(node);
+    fn visit_seq<A: de::SeqAccess<'de>>(self, mut items: A) -> Result<Tree, A::Error> {
+        let mut trees = Vec::new();
+        while let Some(tree) = items.next_element()? {
+            trees.push(tree);
         }
-        Ok(Node::Array(nodes))
+        Ok(Tree::Array(trees))
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Node, A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Tree, A::Error> {
         let mut fields = Vec::new();
         while let Some(entry) = entries.next_entry()? {
             fields.push(entry);
         }
-        Ok(Node::Object(fields))
+        Ok(Tree::Object(fields))
     }
 }
 
-impl Node {
+impl Tree {
     fn unexpected(&self) -> Unexpected<'_> {
         match self {
             Self::Null => Unexpected::Unit,
@@ -159,31 +262,31 @@ impl Node {
     }
 }
 
-impl<'de> serde::Deserializer<'de> for &Node {
+impl<'de> serde::Deserializer<'de> for &Tree {
     type Error = Fault;
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
         match self {
-            Node::Null => visitor.visit_unit(),
-            Node::Bool(value) => visitor.visit_bool(*value),
-            Node::Number(value) => visitor.visit_f64(*value),
-            Node::Text(value) => visitor.visit_str(value),
-            Node::Object(fields) => visitor.visit_map(Fields::new(fields, None)),
+            Tree::Null => visitor.visit_unit(),
+            Tree::Bool(value) => visitor.visit_bool(*value),
+            Tree::Number(value) => visitor.visit_f64(*value),
+            Tree::Text(value) => visitor.visit_str(value),
+            Tree::Object(fields) => visitor.visit_map(Fields::new(fields, None)),
             // What is read field by field would take an array for its fields in order.
-            Node::Array(_) => Err(de::Error::invalid_type(self.unexpected(), &visitor)),
+            Tree::Array(_) => Err(de::Error::invalid_type(self.unexpected(), &visitor)),
         }
     }
 
     fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
         match self {
-            Node::Null => visitor.visit_none(),
+            Tree::Null => visitor.visit_none(),
             _ => visitor.visit_some(self),
         }
     }
 
     fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
         match self {
-            Node::Array(items) => visitor.visit_seq(Items { items: items.iter().enumerate() }),
+            Tree::Array(items) => visitor.visit_seq(Items { items: items.iter().enumerate() }),
             _ => Err(de::Error::invalid_type(self.unexpected(), &"an array")),
         }
     }
@@ -197,8 +300,8 @@ impl<'de> serde::Deserializer<'de> for &Node {
         visitor: V,
     ) -> Result<V::Value, Fault> {
         match (self, name.strip_prefix("by:")) {
-            (Node::Text(value), None) => visitor.visit_enum(value.as_str().into_deserializer()),
-            (Node::Object(fields), Some(tag)) => {
+            (Tree::Text(value), None) => visitor.visit_enum(value.as_str().into_deserializer()),
+            (Tree::Object(fields), Some(tag)) => {
                 let (tag, by_default) = tag.split_once('=').map_or((tag, None), |(tag, kind)| (tag, Some(kind)));
                 visitor.visit_enum(Union { tag, by_default, fields })
             }
@@ -207,8 +310,12 @@ impl<'de> serde::Deserializer<'de> for &Node {
         }
     }
 
-    fn deserialize_newtype_struct<V: Visitor<'de>>(self, _: &'static str, visitor: V) -> Result<V::Value, Fault> {
-        visitor.visit_newtype_struct(self)
+    fn deserialize_newtype_struct<V: Visitor<'de>>(self, name: &'static str, visitor: V) -> Result<V::Value, Fault> {
+        match self {
+            Tree::Array(items) if name == ANY => visitor.visit_seq(Items { items: items.iter().enumerate() }),
+            _ if name == ANY => self.deserialize_any(visitor),
+            _ => visitor.visit_newtype_struct(self),
+        }
     }
 
     serde::forward_to_deserialize_any! {
@@ -218,14 +325,14 @@ impl<'de> serde::Deserializer<'de> for &Node {
 }
 
 struct Fields<'a> {
-    fields: std::slice::Iter<'a, (String, Node)>,
+    fields: std::slice::Iter<'a, (String, Tree)>,
     /// A field that was read already.
     passed_over: Option<&'a str>,
-    current: Option<&'a (String, Node)>,
+    current: Option<&'a (String, Tree)>,
 }
 
 impl<'a> Fields<'a> {
-    fn new(fields: &'a [(String, Node)], passed_over: Option<&'a str>) -> Self {
+    fn new(fields: &'a [(String, Tree)], passed_over: Option<&'a str>) -> Self {
         Self { fields: fields.iter(), passed_over, current: None }
     }
 }
@@ -247,7 +354,7 @@ impl<'de> MapAccess<'de> for Fields<'_> {
 }
 
 struct Items<'a> {
-    items: std::iter::Enumerate<std::slice::Iter<'a, Node>>,
+    items: std::iter::Enumerate<std::slice::Iter<'a, Tree>>,
 }
 
 impl<'de> de::SeqAccess<'de> for Items<'_> {
@@ -264,7 +371,7 @@ impl<'de> de::SeqAccess<'de> for Items<'_> {
 struct Union<'a> {
     tag: &'static str,
     by_default: Option<&'static str>,
-    fields: &'a [(String, Node)],
+    fields: &'a [(String, Tree)],
 }
 
 impl<'de> de::EnumAccess<'de> for Union<'_> {
@@ -274,7 +381,7 @@ impl<'de> de::EnumAccess<'de> for Union<'_> {
     fn variant_seed<S: de::DeserializeSeed<'de>>(self, seed: S) -> Result<(S::Value, Self), Fault> {
         let mut tags = self.fields.iter().filter(|(key, _)| key == self.tag).map(|(_, value)| value);
         let kind = match (tags.next(), self.by_default) {
-            (Some(Node::Text(word)), _) => word.as_str(),
+            (Some(Tree::Text(word)), _) => word.as_str(),
             (Some(other), _) => {
                 let fault: Fault = de::Error::invalid_type(other.unexpected(), &"a word");
                 return Err(fault.within(self.tag));
@@ -312,7 +419,7 @@ impl<'de> de::VariantAccess<'de> for Union<'_> {
 
 impl Fault {
     /// The same fault seen from the object that holds it under `key`.
-    fn within(mut self, key: &str) -> Self {
+    pub fn within(mut self, key: &str) -> Self {
         self.pointer.insert_str(0, &format!("/{}", escaped(key)));
         self
     }

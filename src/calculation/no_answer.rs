@@ -39,6 +39,8 @@ pub enum NoAnswerCode {
     TooManyStates,
     /// The profiles have more points than `max_profile_points`.
     TooManyPoints,
+    /// The study has more variants, or takes more bytes, than the service admits.
+    TooManyVariants,
     /// The stop signal was set.
     Stopped,
     /// A fault of the calculation itself; the detail says what, for whoever mends it.

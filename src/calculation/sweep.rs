@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use toothwave_solver::losses::{Friction, Mechanism, period};
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self as solver, Points};
-use toothwave_solver::{Deviations, Drive, LoadCase, Stop, findings};
+use toothwave_solver::{Deviations, Drive, LoadCase, SolveError, Stop, findings};
 
 use crate::design::Design;
 use crate::field::FieldCode;
@@ -33,6 +33,47 @@ pub struct CheckedSweep {
     points: Points,
     with_gaps: bool,
     with_wind_up: bool,
+}
+
+impl CheckedSweep {
+    /// The drive.
+    pub const fn drive(&self) -> &Drive {
+        &self.drive
+    }
+
+    /// Its load.
+    pub const fn load(&self) -> &LoadCase {
+        &self.load
+    }
+
+    /// Its friction, where there is any.
+    pub const fn friction(&self) -> Option<&Friction> {
+        self.friction.as_ref()
+    }
+
+    /// Speed of the wave generator, where it is given.
+    pub const fn input_speed_rpm(&self) -> Option<f64> {
+        self.input_speed_rpm
+    }
+
+    /// Solves.
+    ///
+    /// # Errors
+    /// As [`solver::sweep_with_deviations`].
+    pub fn solve(&self, stop: &impl Stop) -> Result<solver::Sweep, SolveError> {
+        solver::sweep_with_deviations(&self.drive, &self.load, &self.deviations, self.points, stop)
+    }
+
+    /// Solves for the peaks alone.
+    ///
+    /// # Errors
+    /// As [`Self::solve`].
+    pub fn peaks(&self, stop: &impl Stop) -> Result<solver::SweepPeaks, SolveError> {
+        if !self.deviations.is_nil() {
+            return Ok((&self.solve(stop)?).into());
+        }
+        solver::peaks(&self.drive, &self.load, self.points, stop)
+    }
 }
 
 /// What is asked.
@@ -114,9 +155,8 @@ impl Question for Sweep {
     }
 
     fn answer(checked: &CheckedSweep, stop: &impl Stop) -> Result<SweepAnswer, NoAnswer> {
-        let CheckedSweep { drive, load, deviations, friction, input_speed_rpm, points, with_gaps, with_wind_up } =
-            checked;
-        let sweep = solver::sweep_with_deviations(drive, load, deviations, *points, stop)?;
+        let CheckedSweep { drive, load, deviations, friction, input_speed_rpm, with_gaps, with_wind_up, .. } = checked;
+        let sweep = checked.solve(stop)?;
         let mesh = sweep.mesh;
         let mut findings = drive_findings(drive)?;
         let approaches_matter = *with_wind_up || load.has_gaps() || !deviations.is_nil();

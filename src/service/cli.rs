@@ -7,12 +7,14 @@ use std::iter;
 use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
+use parking_lot::Mutex;
 use rayon::prelude::*;
 use toothwave_calculation::accuracy::Accuracy;
 use toothwave_calculation::coincidence_degree::CoincidenceDegree;
@@ -22,6 +24,7 @@ use toothwave_calculation::forms::{Format, Forms};
 use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::question::{Limits, Question};
 use toothwave_calculation::sweep::Sweep;
+use toothwave_study::{Gathered, Study, StudyAnswer, Work};
 use tracing_subscriber::EnvFilter;
 
 use crate::api::batch::{BatchEnd, BatchEndpoint, BatchQuery, answer_line};
@@ -74,6 +77,14 @@ enum Command {
         /// Of sweeps, the peaks without the states
         #[arg(long)]
         peaks_only: bool,
+    },
+    /// Many variants of one design, on all cores: a map, a search, a sensitivity or a tolerance study
+    Study {
+        /// A study document, or `-` for standard input
+        file: PathBuf,
+        /// Form of the answer
+        #[arg(long, value_parser = one_of(&FORMATS), default_value = "json")]
+        format: Format,
     },
     /// Ask a running service whether it is well; exit status 0 if so
     Health {
@@ -151,6 +162,7 @@ pub fn run() -> ExitCode {
         Command::Accuracy(offline) => answer(Accuracy, &offline.file, offline.format),
         Command::Draw { part, file, format } => answer(Drawing(part), &file, format),
         Command::Batch { file, endpoint, peaks_only } => batch(&file, BatchQuery { endpoint, peaks_only }),
+        Command::Study { file, format } => study(&file, format),
         Command::Health { address } => health(address),
         Command::NewKey { name } => new_key(&name),
         Command::Openapi => print(|writer| writer.write_all(router::openapi_json().as_bytes())),
@@ -204,7 +216,7 @@ impl From<Problem> for Failure {
     fn from(problem: Problem) -> Self {
         observe::problem_is_told(&problem);
         // A service's limits can be set, those of the command line are its own.
-        let limits = ["`max_states`", "`max_profile_points`"];
+        let limits = ["`max_states`", "`max_profile_points`", "`max_study_variants`", "`max_study_bytes`"];
         let text = limits.iter().fold(problem.to_string(), |text, limit| text.replace(limit, "the command line"));
         match problem.cause {
             Some(_) => Self::Io(io::Error::other(text)),
@@ -247,6 +259,11 @@ fn answer<Q: Question>(question: Q, file: &Path, format: Format) -> Result<(), F
     // What fails inside says why in the log.
     tracing_subscriber::fmt().with_max_level(tracing::Level::ERROR).with_writer(io::stderr).init();
     require_form::<Q::Answer>(format)?;
+    let text = read(file)?;
+    print_answer(&question.ask(&text, &OFFLINE, &AtomicBool::new(false)).map_err(Problem::from)?, format)
+}
+
+fn read(file: &Path) -> Result<Vec<u8>, Failure> {
     let mut text = Vec::new();
     if file.as_os_str() == "-" {
         io::stdin().read_to_end(&mut text)?;
@@ -255,12 +272,45 @@ fn answer<Q: Question>(question: Q, file: &Path, format: Format) -> Result<(), F
             .and_then(|mut file| file.read_to_end(&mut text))
             .map_err(|error| Failure::BadInput(format!("{}: {error}", file.display())))?;
     }
-    let answer = question.ask(&text, &OFFLINE, &AtomicBool::new(false)).map_err(Problem::from)?;
+    Ok(text)
+}
+
+fn print_answer(answer: &impl Forms, format: Format) -> Result<(), Failure> {
     print(|writer| {
         answer.write(format, writer)?;
         // The other formats end their last line themselves.
         if format == Format::Json { writeln!(writer) } else { Ok(()) }
     })
+}
+
+/// Without a server only memory limits what is computed.
+const OFFLINE_STUDY: toothwave_study::Limits =
+    toothwave_study::Limits { calculation: OFFLINE, max_study_variants: 1_000_000_000, max_study_bytes: 8 << 30 };
+
+fn study(file: &Path, format: Format) -> Result<(), Failure> {
+    tracing_subscriber::fmt().with_max_level(tracing::Level::ERROR).with_writer(io::stderr).init();
+    require_form::<StudyAnswer>(format)?;
+    let study = Arc::new(Study::read(&read(file)?, &OFFLINE_STUDY).map_err(Problem::from)?);
+    let progress = progress_bar();
+    progress.set_length(study.variants());
+    let gathered = Mutex::new(Gathered::new(&study));
+    (0..study.chunks()).into_par_iter().for_each(|chunk| {
+        // Nobody stops it but by ending the process.
+        let Ok(part) = Work::new(&study, chunk).run(&AtomicBool::new(false)) else { return };
+        let mut gathered = gathered.lock();
+        gathered.add(chunk, part);
+        progress.set_position(gathered.variants());
+    });
+    progress.finish_and_clear();
+    print_answer(&gathered.into_inner().answer(), format)
+}
+
+/// Drawn on standard error, and only where that is a terminal.
+fn progress_bar() -> ProgressBar {
+    ProgressBar::new(0).with_style(
+        ProgressStyle::with_template("{bar:40} {percent}% {msg}, {elapsed} gone, {eta} to go")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    )
 }
 
 /// Lines that are answered side by side before the first of them is written: of whole answers few, because they are long.
@@ -279,11 +329,7 @@ fn batch(file: &Path, query: BatchQuery) -> Result<(), Failure> {
         let bytes = opened.metadata().map_err(open)?.len();
         (Box::new(io::BufReader::new(opened)), Some(bytes))
     };
-    // Drawn on standard error, and only where that is a terminal.
-    let progress = ProgressBar::new(0).with_style(
-        ProgressStyle::with_template("{bar:40} {percent}% {msg}, {elapsed} gone, {eta} to go")
-            .unwrap_or_else(|_| ProgressStyle::default_bar()),
-    );
+    let progress = progress_bar();
     progress.set_length(bytes.unwrap_or(0));
     let mut lines = input.split(b'\n');
     let mut index = 0;

@@ -26,6 +26,9 @@ const MOST_UNREAD_BYTES_PER_SOLVE: u64 = 512 << 20;
 /// By default.
 const MOST_CACHE_BYTES: u64 = 256 << 20;
 
+/// By default.
+const MOST_STUDY_BYTES: u64 = 256 << 20;
+
 /// States or points, by default.
 const MOST_OF_AN_ANSWER: u64 = 1_000_000;
 
@@ -82,6 +85,22 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_MAX_UNREAD_BYTES", value_name = "BYTES")]
     pub max_unread_bytes: Option<u64>,
 
+    /// Most variants of a study
+    #[arg(long, env = "TOOTHWAVE_MAX_STUDY_VARIANTS", value_name = "N", default_value_t = 10_000_000)]
+    pub max_study_variants: u64,
+
+    /// Most bytes that all studies which are kept come to; they count as unread [default: 256 MiB, or a quarter of max-unread-bytes]
+    #[arg(long, env = "TOOTHWAVE_MAX_STUDY_BYTES", value_name = "BYTES")]
+    pub max_study_bytes: Option<u64>,
+
+    /// Studies that may run at once
+    #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_STUDIES", value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(..=MOST_SOLVES))]
+    pub max_concurrent_studies: u32,
+
+    /// Milliseconds after which a study breaks off
+    #[arg(long, env = "TOOTHWAVE_STUDY_DEADLINE_MS", value_name = "MS", default_value_t = 3_600_000)]
+    pub study_deadline_ms: u64,
+
     /// Connections that may be open at once
     #[arg(long, env = "TOOTHWAVE_MAX_CONNECTIONS", value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=MOST_SOLVES))]
     pub max_connections: u32,
@@ -133,6 +152,14 @@ pub struct Limits {
     pub cache_max_bytes: u64,
     /// Most bytes of answers that nobody has read yet: being made, in batches, on their way; those up to 256 KiB not counted.
     pub max_unread_bytes: u64,
+    /// Most variants of a study.
+    pub max_study_variants: u64,
+    /// Most bytes that all studies which are kept come to; they are taken of `max_unread_bytes`.
+    pub max_study_bytes: u64,
+    /// Studies that may run at once.
+    pub max_concurrent_studies: usize,
+    /// Milliseconds after which a study breaks off.
+    pub study_deadline_ms: u64,
     /// Connections that may be open at once.
     pub max_connections: usize,
     /// Bytes of a request's line and headers together.
@@ -145,6 +172,15 @@ impl Limits {
     /// Those that the calculation keeps.
     pub const fn of_calculation(&self) -> question::Limits {
         question::Limits { max_states: self.max_states, max_profile_points: self.max_profile_points }
+    }
+
+    /// Those that studies keep.
+    pub const fn of_studies(&self) -> toothwave_study::Limits {
+        toothwave_study::Limits {
+            calculation: self.of_calculation(),
+            max_study_variants: self.max_study_variants,
+            max_study_bytes: self.max_study_bytes,
+        }
     }
 }
 
@@ -168,6 +204,10 @@ impl Settings {
             deadline_ms: self.deadline_ms,
             cache_max_bytes: self.cache_max_bytes.unwrap_or_else(|| MOST_CACHE_BYTES.min(memory_bytes / 8)),
             max_unread_bytes,
+            max_study_variants: self.max_study_variants,
+            max_study_bytes: self.max_study_bytes.unwrap_or_else(|| MOST_STUDY_BYTES.min(max_unread_bytes / 4)),
+            max_concurrent_studies: self.max_concurrent_studies as usize,
+            study_deadline_ms: self.study_deadline_ms,
             max_connections: self.max_connections as usize,
             max_header_bytes: MAX_HEADER_BYTES,
             header_timeout_ms: self.header_timeout_ms,

@@ -20,3 +20,4 @@ pub mod room;
 pub mod router;
 pub mod serve;
 pub mod socket;
+pub mod studies;

@@ -61,6 +61,8 @@ fn describe() {
     describe_gauge!("toothwave_solves_queued", "Single solves that wait.");
     describe_gauge!("toothwave_batches_running", "Batches that run.");
     describe_counter!("toothwave_batch_documents_total", "Documents of batches answered.");
+    describe_gauge!("toothwave_studies_running", "Studies that run.");
+    describe_counter!("toothwave_study_variants_total", "Variants of studies looked at.");
     describe_counter!("toothwave_refusals_total", "Requests that were not taken on, by the reason.");
     describe_counter!("toothwave_cancellations_total", "Computations that were stopped.");
     describe_gauge!("toothwave_connections", "Connections that are open.");
@@ -79,6 +81,7 @@ pub fn render(app: &App) -> String {
         gauge!("toothwave_cache_bytes").set(size.bytes as f64);
         gauge!("toothwave_cache_entries").set(size.entries as f64);
         gauge!("toothwave_batches_running").set(app.pool.batches() as f64);
+        gauge!("toothwave_studies_running").set(app.studies.running() as f64);
         gauge!("toothwave_solves_running").set(running as f64);
         gauge!("toothwave_solves_queued").set(app.pool.admitted().saturating_sub(running) as f64);
         gauge!("toothwave_connections").set(socket::open() as f64);

@@ -96,6 +96,8 @@ pub enum ProblemCode {
     TooManyStates,
     /// 422: the profiles have more points than `max_profile_points`.
     TooManyPoints,
+    /// 422: the study has more variants, or takes more bytes, than the service admits.
+    TooManyVariants,
     /// 503: as many solves run and wait as the service admits.
     QueueFull,
     /// 503: the deadline stopped the computation.
@@ -129,7 +131,8 @@ impl ProblemCode {
             | Self::ComplianceNotPositive
             | Self::Interference
             | Self::TooManyStates
-            | Self::TooManyPoints => StatusCode::UNPROCESSABLE_ENTITY,
+            | Self::TooManyPoints
+            | Self::TooManyVariants => StatusCode::UNPROCESSABLE_ENTITY,
             Self::QueueFull
             | Self::DeadlineExceeded
             | Self::ShuttingDown
@@ -159,6 +162,7 @@ impl ProblemCode {
             Self::Interference => "A part is too full",
             Self::TooManyStates => "The sweep has too many states",
             Self::TooManyPoints => "The profiles have too many points",
+            Self::TooManyVariants => "The study is too large",
             Self::QueueFull => "The service is full",
             Self::DeadlineExceeded => "The deadline stopped the computation",
             Self::ShuttingDown => "The service is stopping",
@@ -194,6 +198,7 @@ impl From<NoAnswerCode> for ProblemCode {
             NoAnswerCode::Interference => Self::Interference,
             NoAnswerCode::TooManyStates => Self::TooManyStates,
             NoAnswerCode::TooManyPoints => Self::TooManyPoints,
+            NoAnswerCode::TooManyVariants => Self::TooManyVariants,
             NoAnswerCode::Stopped => Self::DeadlineExceeded,
             NoAnswerCode::InternalError => Self::InternalError,
         }

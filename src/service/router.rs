@@ -24,7 +24,8 @@ use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use crate::api::{
-    App, CACHE_STATUS, SERVER_TIMING, accuracy, batch, coincidence_degree, drawings, geometry, page, side, sweep,
+    App, CACHE_STATUS, SERVER_TIMING, accuracy, batch, coincidence_degree, drawings, geometry, page, side, studies,
+    sweep,
 };
 use crate::keys::{self, Keys};
 use crate::observe;
@@ -39,6 +40,7 @@ use crate::problem::{PROBLEM_JSON, Problem, ProblemCode};
     ),
     tags(
         (name = "drive", description = "One design document for every endpoint."),
+        (name = "studies", description = "Many variants of one design: maps, searches, sensitivities, tolerances."),
         (name = "service", description = "Beside the drive.")
     )
 )]
@@ -51,7 +53,11 @@ fn api() -> OpenApiRouter<Arc<App>> {
         .routes(routes!(side::example))
         .routes(routes!(side::live))
         .routes(routes!(side::ready))
-        .routes(routes!(side::metrics));
+        .routes(routes!(side::metrics))
+        .routes(routes!(studies::quantities))
+        .routes(routes!(studies::study, studies::cancel))
+        .routes(routes!(studies::result))
+        .routes(routes!(studies::events));
     OpenApiRouter::with_openapi(Document::openapi())
         .routes(routes!(geometry::geometry))
         .routes(routes!(coincidence_degree::coincidence_degree))
@@ -59,6 +65,7 @@ fn api() -> OpenApiRouter<Arc<App>> {
         .routes(routes!(accuracy::accuracy))
         .routes(routes!(drawings::drawing))
         .routes(routes!(batch::batch))
+        .routes(routes!(studies::begin))
         // What reads a document refuses a query itself.
         .merge(side.layer(middleware::from_fn(without_query)))
 }
@@ -114,7 +121,7 @@ fn describe_entry(document: &mut openapi::OpenApi) {
     let seconds = HeaderBuilder::new().schema(Some(u32::schema())).description(Some("Seconds")).build();
     let full = problem("As many connections are open as the service admits.").header("Retry-After", seconds).build();
     for (path, item) in &mut document.paths.paths {
-        for operation in [&mut item.get, &mut item.post].into_iter().flatten() {
+        for operation in [&mut item.get, &mut item.post, &mut item.delete].into_iter().flatten() {
             let responses = &mut operation.responses.responses;
             if !path.starts_with("/health/") {
                 // Either a key or none.

@@ -110,6 +110,7 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
         server.accept_those_that_wait(&listener);
         drop(listener);
         server.closing.cancel();
+        app.studies.close();
         tokio::select! {
             () = drain(server.graceful, &app, settings.shutdown()) => {}
             () = told_to_stop() => tracing::warn!("told to stop again: what still ran is given up"),

@@ -38,6 +38,10 @@ pub(crate) const LIMITS: Limits = Limits {
     max_connections: 64,
     max_header_bytes: 16_384,
     max_concurrent_batches: 4,
+    max_study_variants: 1_000_000,
+    max_study_bytes: 67_108_864,
+    max_concurrent_studies: 4,
+    study_deadline_ms: 600_000,
     header_timeout_ms: 600_000,
 };
 

@@ -33,4 +33,5 @@ mod problems;
 mod profiles;
 mod ranges;
 mod serving;
+mod studies;
 mod violations;

@@ -17,6 +17,16 @@ impl Serialize for Whole {
 }
 
 impl Whole {
+    /// A small number as a document would have it.
+    pub const fn of(count: u32) -> Self {
+        Self(count as f64)
+    }
+
+    /// The number as it stands.
+    pub const fn value(self) -> f64 {
+        self.0
+    }
+
     /// As the solver counts; what lies beyond that lies beyond every range too.
     #[expect(clippy::cast_possible_truncation, reason = "whole, and saturating")]
     pub(super) const fn count(self) -> i64 {

@@ -5,7 +5,7 @@ use std::error::Error as _;
 use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use axum::body::Body;
 use axum::extract::Request;
@@ -29,6 +29,7 @@ use crate::negotiation::{self, Representation};
 use crate::problem::{Problem, ProblemCode};
 use crate::room::{NoRoom, Reserved, Room, Sent};
 use crate::router::require_no_query;
+use crate::studies::Studies;
 
 pub mod accuracy;
 pub mod batch;
@@ -37,6 +38,7 @@ pub mod drawings;
 pub mod geometry;
 pub mod page;
 pub mod side;
+pub mod studies;
 pub mod sweep;
 
 /// What handlers share.
@@ -50,6 +52,8 @@ pub struct App {
     pub cache: Cache,
     /// For answers on their way to clients.
     pub room: Room,
+    /// Studies, with what they have come to.
+    pub studies: Studies,
     /// Whether the service wants requests: false while it drains.
     pub ready: AtomicBool,
 }
@@ -57,11 +61,13 @@ pub struct App {
 impl App {
     /// An idle service within these limits.
     pub fn new(limits: Limits) -> Arc<Self> {
+        let (pool, room) = (Pool::new(limits), Room::new(limits.max_unread_bytes));
         Arc::new(Self {
             limits,
-            pool: Pool::new(limits),
+            studies: Studies::new(pool.clone(), room.clone(), limits),
+            pool,
             cache: Cache::new(limits.cache_max_bytes),
-            room: Room::new(limits.max_unread_bytes),
+            room,
             ready: AtomicBool::new(true),
         })
     }
@@ -231,11 +237,27 @@ fn solve<Q: Question>(
     let started = Instant::now();
     let columns_bytes = Q::columns_bytes(checked);
     let Representation { format, gzip } = representation;
-    let is_long = matches!(format, Format::Json | Format::Csv);
-    let text_bytes = if is_long { columns_bytes * if gzip { 1 } else { 2 } } else { 0 };
+    let text_bytes = if is_long(format) { columns_bytes * if gzip { 1 } else { 2 } } else { 0 };
     let reserved = room.reserve(columns_bytes + text_bytes)?;
     let answer = Q::answer(checked, stop)?;
-    let solve = started.elapsed();
+    written(answer, representation, reserved, columns_bytes, started.elapsed(), stop)
+}
+
+/// Whether a form is long where the columns are.
+const fn is_long(format: Format) -> bool {
+    matches!(format, Format::Json | Format::Csv)
+}
+
+/// Writes an answer, which took so long and whose columns take so many bytes, into its final bytes.
+fn written<A: Forms>(
+    answer: A,
+    Representation { format, gzip }: Representation,
+    reserved: Reserved,
+    columns_bytes: u64,
+    solve: Duration,
+    stop: &AtomicBool,
+) -> Result<Stored, Problem> {
+    let is_long = is_long(format);
     let expected_bytes = if gzip || !is_long { 0 } else { answer.expected_bytes() };
     let buffer = Growing::new(reserved, columns_bytes, expected_bytes)?;
     let written = if gzip {

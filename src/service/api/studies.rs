@@ -1,0 +1,266 @@
+//! `/v1/studies`: many variants of one design, and `/v1/quantities`, what can be asked of them.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use axum::Json;
+use axum::extract::rejection::PathRejection;
+use axum::extract::{Path, Request, State};
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::response::sse::{Event, Sse};
+use axum::response::{IntoResponse, Response};
+use futures_util::stream;
+use serde::Serialize;
+use toothwave_calculation::forms::{Form, Format, Forms};
+use toothwave_study::{QUANTITIES, Quantity, Study, StudyAnswer, StudyDocument};
+use utoipa::ToSchema;
+
+use super::{App, Problems, read_body, with_body, written};
+use crate::compute::Thread;
+use crate::negotiation::{self, Representation};
+use crate::problem::{Problem, ProblemCode};
+use crate::router::require_no_query;
+use crate::studies::{Kept, StudyResource};
+
+/// What a client would rather have (RFC 7240).
+const PREFER: HeaderName = HeaderName::from_static("prefer");
+const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
+
+/// Between two events of a study's progress.
+const PAUSE: Duration = Duration::from_millis(100);
+
+/// Every quantity that a study can be asked for.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct QuantitiesAnswer {
+    /// All of them.
+    pub quantities: &'static [Quantity],
+}
+
+/// Every quantity that a study can be asked for, with unit, meaning and where it comes from.
+#[utoipa::path(get, path = "/v1/quantities", tag = "studies", responses((status = 200, description = "The quantities.", body = QuantitiesAnswer)))]
+pub async fn quantities() -> Json<QuantitiesAnswer> {
+    Json(QuantitiesAnswer { quantities: &QUANTITIES })
+}
+
+/// A study: many variants of one design, looked at in the background.
+#[utoipa::path(
+    post,
+    path = "/v1/studies",
+    tag = "studies",
+    request_body(content = StudyDocument, description = "What is asked. The same question is the same study: it is found again, or goes on where it was cancelled."),
+    params(("Prefer" = Option<String>, Header, description = "RFC 7240: `wait=N` to be answered when the study is done, if that is within N seconds and within the service's deadline.")),
+    responses(
+        (status = 200, description = "The study does not run any more; with its result, as far as it has come.", body = StudyResource),
+        (status = 202, description = "It runs; `Location` says where it stands.", body = StudyResource, headers(("Location" = String, description = "The study."))),
+        Problems
+    )
+)]
+pub async fn begin(State(app): State<Arc<App>>, request: Request) -> Response {
+    respond_to_question(&app, request).await.unwrap_or_else(IntoResponse::into_response)
+}
+
+/// How a study stands.
+#[utoipa::path(
+    get,
+    path = "/v1/studies/{id}",
+    tag = "studies",
+    params(("id" = String, Path, description = "As the study's `id`.")),
+    responses(
+        (status = 200, description = "It.", body = StudyResource),
+        (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json")
+    )
+)]
+pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
+    match kept(&app, id) {
+        Ok(kept) => no_store(Json(kept.resource()).into_response()),
+        Err(problem) => problem.into_response(),
+    }
+}
+
+/// Cancels a study that runs: what it has come to is kept, and the same question lets it go on. One that does not run is forgotten.
+#[utoipa::path(
+    delete,
+    path = "/v1/studies/{id}",
+    tag = "studies",
+    params(("id" = String, Path, description = "As the study's `id`.")),
+    responses(
+        (status = 204, description = "It does not run any more, or is forgotten."),
+        (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json")
+    )
+)]
+pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
+    match kept(&app, id) {
+        Ok(kept) => {
+            app.studies.cancel_or_forget(&kept);
+            StatusCode::NO_CONTENT.into_response()
+        }
+        Err(problem) => problem.into_response(),
+    }
+}
+
+/// What a study has come to: whole, or as far as it has come.
+#[utoipa::path(
+    get,
+    path = "/v1/studies/{id}/result",
+    tag = "studies",
+    params(("id" = String, Path, description = "As the study's `id`.")),
+    responses(
+        (status = 200, description = "The result; `is_complete` says whether it is whole. As CSV a line each of what the study is about.",
+            content((StudyAnswer = "application/json"), (String = "text/csv"))),
+        (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
+        (status = 406, description = "No representation that the client accepts.", body = Problem, content_type = "application/problem+json"),
+        (status = 500, description = "A fault of the service itself.", body = Problem, content_type = "application/problem+json"),
+        (status = 503, description = "The service is full, or the deadline stopped the computation; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
+    )
+)]
+pub async fn result(
+    State(app): State<Arc<App>>,
+    id: Result<Path<String>, PathRejection>,
+    headers: HeaderMap,
+) -> Response {
+    let answer = async {
+        let kept = kept(&app, id)?;
+        let representation = Representation::negotiate(&headers, StudyAnswer::FORMS.iter().map(|(format, _)| *format))?;
+        let study = Arc::clone(&kept);
+        written_apart(&app, &kept, representation, move || study.answer()).await
+    };
+    no_store(answer.await.unwrap_or_else(IntoResponse::into_response))
+}
+
+/// A study's progress as server-sent events: `progress` while it runs, then one of the name of how it has ended. Each holds the study
+/// as it stands.
+#[utoipa::path(
+    get,
+    path = "/v1/studies/{id}/events",
+    tag = "studies",
+    params(("id" = String, Path, description = "As the study's `id`.")),
+    responses(
+        (status = 200, description = "The events; they end when the study does.", body = String, content_type = "text/event-stream"),
+        (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json")
+    )
+)]
+pub async fn events(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
+    let kept = match kept(&app, id) {
+        Ok(kept) => kept,
+        Err(problem) => return problem.into_response(),
+    };
+    let closing = app.studies.closing().clone();
+    let events = stream::unfold(Some(kept), move |kept| {
+        let closing = closing.clone();
+        async move {
+            let kept = kept?;
+            // Subscribed before it is looked at, so that nothing is missed.
+            let changed = kept.watch();
+            let resource = kept.resource();
+            let is_running = kept.is_running();
+            let name = if is_running { "progress" } else { "end" };
+            let event = Event::default().event(name).json_data(&resource).unwrap_or_default();
+            if !is_running {
+                return Some((Ok::<_, Infallible>(event), None));
+            }
+            let next = tokio::select! {
+                () = async { changed.await; tokio::time::sleep(PAUSE).await } => Some(kept),
+                () = closing.cancelled() => None,
+            };
+            Some((Ok(event), next))
+        }
+    });
+    no_store(Sse::new(events).into_response())
+}
+
+fn no_store(mut response: Response) -> Response {
+    response.headers_mut().insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+    response
+}
+
+fn kept(app: &App, id: Result<Path<String>, PathRejection>) -> Result<Arc<Kept>, Problem> {
+    // An id that is no text is no study's either.
+    let id = id.map(|Path(id)| id).unwrap_or_default();
+    app.studies.find(&id).ok_or_else(|| {
+        let detail =
+            format!("no study `{id}` is kept: it was never asked for here, or was forgotten; ask for it again");
+        Problem::new(ProblemCode::NotFound, detail)
+    })
+}
+
+async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Response, Problem> {
+    let deadline = app.pool.deadline();
+    let (Parts { headers, uri, .. }, body) = request.into_parts();
+    require_no_query(&uri)?;
+    negotiation::require_json(&headers)?;
+    let representation = Representation::negotiate(&headers, std::iter::empty())?;
+    let body = read_body(&headers, body, &app.limits, deadline).await?;
+    let kept = app.studies.begin(Study::read(&body, &app.limits.of_studies())?)?;
+    let wait = wait_wanted(&headers);
+    if let Some(wait) = wait {
+        let wait_until = deadline.min(tokio::time::Instant::now() + wait);
+        let is_over = async {
+            loop {
+                let changed = kept.watch();
+                if !kept.is_running() {
+                    return;
+                }
+                changed.await;
+            }
+        };
+        tokio::select! {
+            _ = tokio::time::timeout_at(wait_until, is_over) => {}
+            () = app.studies.closing().cancelled() => {}
+        }
+    }
+    let mut response = if kept.is_running() {
+        let location = format!("/v1/studies/{}", kept.resource().id);
+        (StatusCode::ACCEPTED, [(header::LOCATION, location)], Json(kept.resource())).into_response()
+    } else {
+        let study = Arc::clone(&kept);
+        let resource = move || {
+            let mut resource = study.resource();
+            resource.result = Some(study.answer());
+            resource
+        };
+        written_apart(app, &kept, representation, resource).await?
+    };
+    if let Some(wait) = wait {
+        let applied = format!("wait={}", wait.as_secs());
+        let applied = HeaderValue::try_from(applied).map_err(|error| Problem::internal(&error))?;
+        response.headers_mut().insert(PREFERENCE_APPLIED, applied);
+    }
+    Ok(no_store(response))
+}
+
+/// The seconds of `wait=N`, where the request has that.
+fn wait_wanted(headers: &HeaderMap) -> Option<Duration> {
+    let preferences = headers.get_all(PREFER).iter().filter_map(|value| value.to_str().ok());
+    preferences.flat_map(|list| list.split([',', ';'])).find_map(|preference| {
+        let (name, value) = preference.split_once('=')?;
+        let seconds = value.trim().trim_matches('"').parse::<u32>().ok()?;
+        name.trim().eq_ignore_ascii_case("wait").then(|| Duration::from_secs(u64::from(seconds)))
+    })
+}
+
+/// Writes an answer of a study on a thread of its own, taking room for it.
+async fn written_apart<A: Forms + Send>(
+    app: &App,
+    kept: &Kept,
+    representation: Representation,
+    answer: impl FnOnce() -> A + Send + 'static,
+) -> Result<Response, Problem> {
+    let (room, columns_bytes) = (app.room.clone(), kept.stored_bytes());
+    let job = move |stop: &AtomicBool| {
+        let reserved = room.reserve(columns_bytes)?;
+        written(answer(), representation, reserved, columns_bytes, Duration::ZERO, stop)
+    };
+    let stored = app.pool.run(app.pool.deadline(), Thread::Blocking, job).await?;
+    with_body(&app.room, stored, representation)
+}
+
+impl Forms for StudyResource {
+    const FORMS: &'static [(Format, Form<Self>)] = &[];
+
+    fn expected_bytes(&self) -> usize {
+        1024 + self.result.as_ref().map_or(0, Forms::expected_bytes)
+    }
+}

@@ -1,0 +1,49 @@
+//! What a study comes to, as it goes over the wire.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+use toothwave_calculation::forms::{Form, Format, Forms};
+use utoipa::ToSchema;
+
+use crate::map::MapAnswer;
+use crate::search::SearchAnswer;
+use crate::sensitivity::SensitivityAnswer;
+use crate::tolerance::ToleranceAnswer;
+
+/// What a study comes to, as far as it has come.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[serde(tag = "study", rename_all = "snake_case")]
+pub enum StudyAnswer {
+    /// Of a map.
+    Map(MapAnswer),
+    /// Of a search.
+    Search(SearchAnswer),
+    /// Of a sensitivity.
+    Sensitivity(SensitivityAnswer),
+    /// Of a tolerance study.
+    Tolerance(ToleranceAnswer),
+}
+
+impl Forms for StudyAnswer {
+    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Csv, Self::write_csv)];
+
+    fn expected_bytes(&self) -> usize {
+        match self {
+            Self::Map(map) => map.expected_bytes(),
+            Self::Search(search) => 4096 + 2048 * search.front.len(),
+            Self::Sensitivity(_) | Self::Tolerance(_) => 4096,
+        }
+    }
+}
+
+impl StudyAnswer {
+    fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
+        match self {
+            Self::Map(map) => map.write_csv(writer),
+            Self::Search(search) => search.write_csv(writer),
+            Self::Sensitivity(sensitivity) => sensitivity.write_csv(writer),
+            Self::Tolerance(tolerance) => tolerance.write_csv(writer),
+        }
+    }
+}

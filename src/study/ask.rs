@@ -1,0 +1,53 @@
+//! What the kinds of study read alike: faults of a study's document, names of quantities, whole numbers.
+
+use toothwave_calculation::field::{FieldCode, FieldError};
+use toothwave_calculation::json::Fault;
+use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
+
+use crate::quantity::Quantity;
+
+/// A fault of the study's own document.
+pub(crate) fn fault(pointer: &str, code: FieldCode, detail: impl Into<String>) -> NoAnswer {
+    Fault { pointer: pointer.into(), code, detail: detail.into() }.into()
+}
+
+/// A value of the study's document that is beyond a limit.
+pub(crate) fn beyond(pointer: &str, code: FieldCode, detail: impl Into<String>, value: f64, limit: f64) -> NoAnswer {
+    let detail = detail.into();
+    let error =
+        FieldError { pointer: pointer.into(), code, detail: detail.clone(), value: Some(value), limit: Some(limit) };
+    let text = if pointer.is_empty() { detail } else { format!("{pointer}: {detail}") };
+    NoAnswer::at_fields(NoAnswerCode::InvalidDocument, text, vec![error])
+}
+
+/// A name as a JSON pointer spells it (RFC 6901).
+pub(crate) fn escaped(name: &str) -> String {
+    name.replace('~', "~0").replace('/', "~1")
+}
+
+/// A whole number of the study's document within a range.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "whole, and within the range")]
+pub(crate) fn whole(at: &str, value: f64, low: f64, high: f64) -> Result<u64, NoAnswer> {
+    if (low..=high).contains(&value) {
+        return Ok(value as u64);
+    }
+    let limit = if value < low { low } else { high };
+    let detail = format!("must lie between {low:?} and {high:?}, not be {value:?}");
+    Err(beyond(at, FieldCode::OutOfRange, detail, value, limit))
+}
+
+/// Which of the quantities it is, appended where it is none of them.
+pub(crate) fn index_of(quantity: &'static Quantity, quantities: &mut Vec<&'static Quantity>) -> usize {
+    quantities.iter().position(|known| *known == quantity).unwrap_or_else(|| {
+        quantities.push(quantity);
+        quantities.len() - 1
+    })
+}
+
+/// The quantity of this name, which stands at this place of the study's document.
+pub(crate) fn named(name: &str, at: &str) -> Result<&'static Quantity, NoAnswer> {
+    Quantity::named(name).ok_or_else(|| {
+        let detail = format!("no quantity is called `{name}`; `/v1/quantities` lists them");
+        fault(at, FieldCode::UnknownChoice, detail)
+    })
+}

@@ -1,0 +1,151 @@
+//! One variant: its document in, its quantities out, or why it has none.
+
+use std::panic::{self, AssertUnwindSafe};
+
+use serde::{Deserialize, Serialize};
+use toothwave_calculation::coincidence_degree::CoincidenceDegree;
+use toothwave_calculation::design::Design;
+use toothwave_calculation::json::{Tree, word};
+use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
+use toothwave_calculation::question::{Limits, Question as _};
+use toothwave_calculation::sweep::Sweep;
+use toothwave_solver::losses::period::{Losses, RadialForces};
+use toothwave_solver::parts::RIM;
+use toothwave_solver::{Drive, SolveError, Stop};
+use utoipa::ToSchema;
+
+use crate::quantity::{Loaded, Needs, Quantity, Rubbing, Variant};
+
+/// Why a variant has no answer.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+pub struct Reason {
+    /// The code of the field at fault, of the problem where no field is, or `panic`.
+    pub code: String,
+    /// The field at fault, empty where none is.
+    pub pointer: String,
+}
+
+/// A variant without an answer.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Refusal {
+    pub(crate) reason: Reason,
+    pub(crate) detail: String,
+}
+
+/// What a variant comes to.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Outcome {
+    /// Its quantities, in the order in which they are asked for.
+    Answered(Vec<f64>),
+    /// Why there are none.
+    Refused(Refusal),
+}
+
+/// The stop signal was seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stopped;
+
+/// What is asked of every variant.
+#[derive(Debug, Clone)]
+pub(crate) struct Evaluator {
+    pub(crate) quantities: Vec<&'static Quantity>,
+    needs: Needs,
+    needs_radial_force: bool,
+    limits: Limits,
+}
+
+impl Evaluator {
+    pub(crate) fn new(quantities: Vec<&'static Quantity>, limits: Limits) -> Self {
+        let needs = quantities.iter().map(|quantity| quantity.needs).max().unwrap_or(Needs::Drive);
+        let needs_radial_force = quantities.iter().any(|quantity| quantity.name == "radial_force_max_n");
+        Self { quantities, needs, needs_radial_force, limits }
+    }
+
+    /// What becomes of a document; a panic is an outcome too.
+    pub(crate) fn outcome(&self, document: &Tree, stop: &impl Stop) -> Result<Outcome, Stopped> {
+        caught(|| match self.answer(document, stop) {
+            Ok(values) => Ok(Outcome::Answered(values)),
+            Err(NoAnswer { code: NoAnswerCode::Stopped, .. }) => Err(Stopped),
+            Err(reason) => Ok(Outcome::Refused(reason.into())),
+        })
+    }
+
+    fn answer(&self, document: &Tree, stop: &impl Stop) -> Result<Vec<f64>, NoAnswer> {
+        let design = document.read::<Design>()?.normalised();
+        if self.needs == Needs::Drive {
+            let drive = CoincidenceDegree.check(&design, &self.limits)?;
+            let ring_outer_radius_mm = ring_outer_radius_mm(&design, &drive);
+            return self.values(&Variant { drive: &drive, ring_outer_radius_mm, loaded: None });
+        }
+        let checked = Sweep.check(&design, &self.limits)?;
+        let drive = checked.drive();
+        let ring_outer_radius_mm = ring_outer_radius_mm(&design, drive);
+        if self.needs < Needs::Friction && !self.needs_radial_force {
+            let peaks = checked.peaks(stop)?;
+            let loaded = Loaded { load: checked.load(), peaks, friction: None, radial_forces: None };
+            return self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) });
+        }
+        let sweep = checked.solve(stop)?;
+        let friction = match checked.friction().filter(|_| self.needs >= Needs::Friction) {
+            Some(friction) => Some(Rubbing {
+                friction,
+                sweep: &sweep,
+                losses: Losses::of(drive, &sweep, friction, stop)?,
+                input_speed_rpm: checked.input_speed_rpm(),
+            }),
+            None => None,
+        };
+        let radial_forces = if self.needs_radial_force { RadialForces::of(drive, &sweep, stop)? } else { None };
+        let loaded = Loaded { load: checked.load(), peaks: (&sweep).into(), friction, radial_forces };
+        self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) })
+    }
+
+    fn values(&self, variant: &Variant<'_>) -> Result<Vec<f64>, NoAnswer> {
+        let value = |quantity: &&Quantity| match quantity.of(variant).map_err(SolveError::from) {
+            Ok(value) if value.is_finite() => Ok(value),
+            Ok(_) => Err(NoAnswer::internal(format_args!("`{}` is not finite", quantity.name))),
+            Err(error) => Err(error.into()),
+        };
+        self.quantities.iter().map(value).collect()
+    }
+}
+
+/// As drawn (docs/theory.md section 8).
+fn ring_outer_radius_mm(design: &Design, drive: &Drive) -> f64 {
+    let parts = design.parts_parameters();
+    parts.ring_outer_radius_mm.unwrap_or(RIM * (drive.root_radius_mm() + 1e-3 * parts.ring_clearance_um))
+}
+
+impl From<NoAnswer> for Refusal {
+    fn from(NoAnswer { code, detail, errors }: NoAnswer) -> Self {
+        let reason = match errors.first() {
+            Some(error) => Reason { code: word(&error.code), pointer: error.pointer.clone() },
+            None => Reason { code: word(&code), pointer: String::new() },
+        };
+        let detail = errors.into_iter().next().map_or(detail, |error| error.detail);
+        Self { reason, detail }
+    }
+}
+
+/// A fault at one variant is no reason to leave the others without an answer.
+fn caught(job: impl FnOnce() -> Result<Outcome, Stopped>) -> Result<Outcome, Stopped> {
+    panic::catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|panic| {
+        let text = panic.downcast_ref::<String>().map(String::as_str);
+        let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a text");
+        let reason = Reason { code: "panic".into(), pointer: String::new() };
+        Ok(Outcome::Refused(Refusal { reason, detail: text.into() }))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Outcome, caught};
+
+    #[test]
+    fn a_panic_at_one_variant_is_its_reason() {
+        let outcome = caught(|| panic!("on purpose"));
+        assert!(
+            matches!(outcome, Ok(Outcome::Refused(refusal)) if refusal.reason.code == "panic" && refusal.detail == "on purpose")
+        );
+    }
+}

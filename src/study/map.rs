@@ -1,0 +1,277 @@
+//! A map: quantities over a grid.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+use toothwave_calculation::field::FieldCode;
+use toothwave_calculation::json::Tree;
+use toothwave_calculation::no_answer::NoAnswer;
+use utoipa::ToSchema;
+
+use crate::ask::{beyond, escaped, fault};
+use crate::document::{ChoiceDocument, MapDocument, OverDocument};
+use crate::evaluate::Evaluator;
+use crate::rows::{ImpossibleAnswer, PossibleAnswer, ReasonAnswer, Rows, RowsPart};
+use crate::variant::{Asked, Domain, Template, Value, Variable};
+use toothwave_calculation::forms::csv_error;
+
+/// The grid of a map: the last axis is the fastest.
+#[derive(Debug, Clone)]
+pub(crate) struct Map {
+    axes: Vec<Axis>,
+}
+
+#[derive(Debug, Clone)]
+struct Axis {
+    variable: Variable,
+    values: Vec<Value>,
+}
+
+/// What `min` and `max` or `one_of` say.
+pub(crate) fn asked(
+    at: &str,
+    min: Option<f64>,
+    max: Option<f64>,
+    one_of: Option<&[ChoiceDocument]>,
+) -> Result<Asked, NoAnswer> {
+    match (min, max, one_of) {
+        (None, None, Some(choices)) => Ok(Asked::OneOf(choices.iter().map(Tree::from).collect())),
+        (Some(min), Some(max), None) => Ok(Asked::Range { min, max }),
+        (_, _, Some(_)) => {
+            Err(fault(at, FieldCode::ConflictingFields, "a range or `one_of` may stand here, and not both"))
+        }
+        _ => Err(fault(at, FieldCode::MissingField, "`min` and `max` are required here, or `one_of`")),
+    }
+}
+
+impl Map {
+    pub(crate) fn new(document: &MapDocument) -> Result<(Self, Template), NoAnswer> {
+        if document.over.is_empty() {
+            return Err(fault("/over", FieldCode::MissingField, "a map runs over at least one field"));
+        }
+        let mut free = Vec::new();
+        for (pointer, OverDocument { min, max, one_of, .. }) in &document.over {
+            let at = format!("/over/{}", escaped(pointer));
+            free.push((pointer.clone(), asked(&at, *min, *max, one_of.as_deref())?));
+        }
+        let template = Template::new(&document.base.0, &free, "over")?;
+        let axes = template.variables().iter().zip(document.over.values());
+        let axes = axes.map(|(variable, over)| Axis::new(variable, over)).collect::<Result<_, _>>()?;
+        Ok((Self { axes }, template))
+    }
+
+    /// Variants of the grid; none where there are more than can be counted.
+    pub(crate) fn variants(&self) -> Option<u64> {
+        self.axes.iter().try_fold(1_u64, |product, axis| product.checked_mul(axis.values.len() as u64))
+    }
+
+    fn values(&self, mut variant: u64) -> Vec<Value> {
+        let mut values: Vec<_> = self
+            .axes
+            .iter()
+            .rev()
+            .map(|axis| {
+                let count = axis.values.len() as u64;
+                // Below the number of the axis' values.
+                let value = axis.values[usize::try_from(variant % count).unwrap_or_default()];
+                variant /= count;
+                value
+            })
+            .collect();
+        values.reverse();
+        values
+    }
+}
+
+impl Axis {
+    fn new(variable: &Variable, over: &OverDocument) -> Result<Self, NoAnswer> {
+        const MOST_STEPS: f64 = 1e6;
+        let at = format!("/over/{}", escaped(&variable.pointer));
+        let steps = over.steps.map(|steps| steps.value());
+        if let Some(steps) = steps.filter(|steps| !(1.0..=MOST_STEPS).contains(steps)) {
+            let limit = if steps < 1.0 { 1.0 } else { MOST_STEPS };
+            let detail = format!("`steps` must lie between 1 and {MOST_STEPS:?}, not be {steps:?}");
+            return Err(beyond(&format!("{at}/steps"), FieldCode::OutOfRange, detail, steps, limit));
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the bounds above")]
+        let count = |steps: f64| steps as u32;
+        let values = match (&variable.domain, steps) {
+            (Domain::OneOf(_), Some(_)) => {
+                let detail = "`steps` are of a range, and `one_of` names the values";
+                return Err(fault(&at, FieldCode::ConflictingFields, detail));
+            }
+            (Domain::OneOf(count), None) => (0..*count).map(Value::Choice).collect(),
+            (Domain::Real { .. }, None) => {
+                return Err(fault(
+                    &at,
+                    FieldCode::MissingField,
+                    "`steps` is required here: a range has numbers without end",
+                ));
+            }
+            (Domain::Whole { min, max }, None) => {
+                let all = max - min + 1.0;
+                if all > MOST_STEPS {
+                    let detail = format!("the range has {all:?} whole numbers, more than {MOST_STEPS:?}");
+                    return Err(beyond(&at, FieldCode::OutOfRange, detail, all, MOST_STEPS));
+                }
+                (0..count(all)).map(|step| Value::Number(min + f64::from(step))).collect()
+            }
+            (Domain::Real { min, max } | Domain::Whole { min, max }, Some(steps)) => {
+                let intervals = (steps - 1.0).max(1.0);
+                let at_step = |step: u32| {
+                    let share = f64::from(step) / intervals;
+                    // Both ends are met exactly.
+                    if step + 1 == count(steps) && step > 0 { *max } else { min + share * (max - min) }
+                };
+                let values: Vec<f64> = (0..count(steps)).map(at_step).collect();
+                if matches!(variable.domain, Domain::Whole { .. })
+                    && let Some(value) = values.iter().find(|value| value.fract() != 0.0)
+                {
+                    let detail = format!("a whole number is wanted here, and these steps come to {value:?}");
+                    return Err(fault(&format!("{at}/steps"), FieldCode::WrongType, detail));
+                }
+                values.into_iter().map(Value::Number).collect()
+            }
+        };
+        Ok(Self { variable: variable.clone(), values })
+    }
+
+    fn answer(&self) -> AxisAnswer {
+        let trees: Vec<_> = self.values.iter().map(|&value| self.variable.spelled(value)).collect();
+        let numbers: Option<Vec<_>> = trees
+            .iter()
+            .map(|tree| match tree {
+                Tree::Number(number) => Some(*number),
+                _ => None,
+            })
+            .collect();
+        let choices = if numbers.is_some() { None } else { Some(trees.iter().map(spelled).collect()) };
+        AxisAnswer { pointer: self.variable.pointer.clone(), values: numbers, choices }
+    }
+}
+
+/// A value as a word.
+fn spelled(tree: &Tree) -> String {
+    match tree {
+        Tree::Text(text) => text.clone(),
+        other => serde_json::to_string(other).unwrap_or_default(),
+    }
+}
+
+impl Rows for Map {
+    fn document<'t>(&self, template: &'t mut Template, variant: u64) -> &'t Tree {
+        template.filled(&self.values(variant))
+    }
+}
+
+/// Quantities over a grid. The variants are numbered from 0, the last of `over` being the fastest.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct MapAnswer {
+    /// Version of the solver.
+    pub solver_version: &'static str,
+    /// The build that computed it: equal builds on equal processors give equal bytes.
+    pub build: &'static str,
+    /// Whether every variant was looked at.
+    pub is_complete: bool,
+    /// Variants of the grid.
+    pub variants: u64,
+    /// The axes of the grid.
+    pub over: Vec<AxisAnswer>,
+    /// The variants that have an answer.
+    pub possible: PossibleAnswer,
+    /// Those that have none.
+    pub impossible: ImpossibleAnswer,
+    /// Why they have none.
+    pub reasons: Vec<ReasonAnswer>,
+    #[serde(skip)]
+    #[schema(ignore)]
+    quantities: Vec<&'static str>,
+}
+
+/// An axis of a grid: `values`, or `choices` where they are no numbers.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct AxisAnswer {
+    /// JSON pointer into the design.
+    pub pointer: String,
+    /// The numbers that it takes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub values: Option<Vec<f64>>,
+    /// The words that it takes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub choices: Option<Vec<String>>,
+}
+
+impl MapAnswer {
+    pub(crate) fn new(map: &Map, evaluator: &Evaluator, rows: RowsPart, is_complete: bool) -> Self {
+        let quantities: Vec<_> = evaluator.quantities.iter().map(|quantity| quantity.name).collect();
+        Self {
+            solver_version: toothwave_solver::VERSION,
+            build: toothwave_calculation::BUILD,
+            is_complete,
+            variants: map.variants().unwrap_or(u64::MAX),
+            over: map.axes.iter().map(Axis::answer).collect(),
+            possible: PossibleAnswer {
+                variant: rows.answered,
+                quantities: quantities.iter().copied().zip(rows.columns).collect(),
+            },
+            impossible: ImpossibleAnswer { variant: rows.refused, reason: rows.reasons },
+            reasons: rows.refusals.iter().map(ReasonAnswer::from).collect(),
+            quantities,
+        }
+    }
+
+    /// A line a variant: its number, its place on each axis, its quantities or the code of its reason.
+    pub(crate) fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
+        let mut csv = csv::Writer::from_writer(writer);
+        let pointers = self.over.iter().map(|axis| axis.pointer.as_str());
+        let names = self.quantities.iter().copied();
+        let head: Vec<_> = std::iter::once("variant").chain(pointers).chain(names).chain(["reason"]).collect();
+        csv.write_record(&head).map_err(csv_error)?;
+        let (mut possible, mut impossible) = (0, 0);
+        loop {
+            let (answered, refused) = (self.possible.variant.get(possible), self.impossible.variant.get(impossible));
+            let is_answered = match (answered, refused) {
+                (None, None) => return csv.flush(),
+                (Some(answered), Some(refused)) => answered < refused,
+                (answered, None) => answered.is_some(),
+                (None, Some(_)) => false,
+            };
+            let variant = if is_answered { answered } else { refused }.copied().unwrap_or_default();
+            let mut record = vec![variant.to_string()];
+            record.extend(self.places(variant));
+            for name in &self.quantities {
+                let value = is_answered.then(|| self.possible.quantities.get(name)?.get(possible)).flatten();
+                record.push(value.map_or_else(String::new, |value| format!("{value:?}")));
+            }
+            let reason = (!is_answered).then(|| self.reasons.get(*self.impossible.reason.get(impossible)? as usize));
+            record.push(reason.flatten().map_or_else(String::new, |reason| reason.code.clone()));
+            csv.write_record(&record).map_err(csv_error)?;
+            if is_answered { possible += 1 } else { impossible += 1 }
+        }
+    }
+
+    fn places(&self, mut variant: u64) -> Vec<String> {
+        let mut places: Vec<_> = self
+            .over
+            .iter()
+            .rev()
+            .map(|axis| {
+                let count = axis.values.as_ref().map_or(0, Vec::len) + axis.choices.as_ref().map_or(0, Vec::len);
+                let index = usize::try_from(variant % count.max(1) as u64).unwrap_or_default();
+                variant /= count.max(1) as u64;
+                let number =
+                    axis.values.as_ref().and_then(|values| values.get(index)).map(|value| format!("{value:?}"));
+                let word = axis.choices.as_ref().and_then(|choices| choices.get(index)).cloned();
+                number.or(word).unwrap_or_default()
+            })
+            .collect();
+        places.reverse();
+        places
+    }
+
+    pub(crate) fn expected_bytes(&self) -> usize {
+        4096 + (20 * self.quantities.len() + 8) * self.possible.variant.len() + 12 * self.impossible.variant.len()
+    }
+}

@@ -1,0 +1,336 @@
+//! An optimiser that knows nothing of drives: points of a unit cube in, what they come to back, a front of those that none beats.
+//!
+//! A scan with a low-discrepancy sequence (M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018) comes first, then
+//! differential evolution (R. Storn, K. Price, Journal of Global Optimization 11, 1997, 341-359) with the constrained comparison of K. Deb
+//! (IEEE Transactions on Evolutionary Computation 6, 2002, 182-197): a point within all limits beats one beyond, and of two beyond the
+//! one that is less so. What nobody beats is kept in an archive, from which most steps begin.
+
+use serde::{Deserialize, Serialize};
+
+use crate::random::Stream;
+
+/// Points that evolve.
+const POPULATION: usize = 48;
+
+/// Points of the archive at most: of more the most crowded goes.
+pub(crate) const MOST_OF_FRONT: usize = 100;
+
+/// What a limit that is looked past weighs.
+const LOOKED_PAST: f64 = 1e-3;
+
+/// What a point comes to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Judged {
+    /// What is to be least.
+    pub objectives: Vec<f64>,
+    /// How far each limit is exceeded, as a share of it; 0 where it is kept.
+    pub violations: Vec<f64>,
+}
+
+/// A point with what it comes to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// Where in the unit cube.
+    pub place: Vec<f64>,
+    /// What it comes to.
+    pub judged: Judged,
+    /// Whatever else is known of it.
+    pub values: Vec<f64>,
+}
+
+/// How long each stage is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Plan {
+    /// Dimensions of the cube.
+    pub dimensions: usize,
+    /// Limits.
+    pub limits: usize,
+    /// Where the scan begins in its sequence.
+    pub scan_from: u64,
+    /// Points of the scan.
+    pub scan: u64,
+    /// Points altogether.
+    pub evaluations: u64,
+}
+
+/// The optimiser: asked for a point, told what it comes to.
+#[derive(Debug, Clone)]
+pub struct Optimiser {
+    plan: Plan,
+    stream: Stream,
+    shift: Vec<f64>,
+    /// Points that come first.
+    given: Vec<Vec<f64>>,
+    asked: u64,
+    scanned: u64,
+    population: Vec<Point>,
+    archive: Vec<Point>,
+    /// Of each limit, the point that exceeds it least and keeps all others.
+    relaxations: Vec<Option<Point>>,
+    nearest: Option<Point>,
+    parent: Option<usize>,
+}
+
+impl Judged {
+    fn is_good(&self) -> bool {
+        self.violations.iter().all(|&violation| violation <= 0.0)
+    }
+
+    fn beyond(&self, looked_past: Option<usize>) -> f64 {
+        let weighed = |(limit, violation): (usize, &f64)| {
+            if looked_past == Some(limit) { LOOKED_PAST * violation } else { *violation }
+        };
+        self.violations.iter().enumerate().map(weighed).sum()
+    }
+
+    /// Whether it is nowhere worse, and somewhere better or the same everywhere.
+    fn covers(&self, other: &Self) -> bool {
+        self.objectives.iter().zip(&other.objectives).all(|(one, other)| one <= other)
+    }
+
+    /// Whether it takes the place of another one.
+    fn is_no_worse(&self, other: &Self, looked_past: Option<usize>) -> bool {
+        let (own, others) = (self.beyond(looked_past), other.beyond(looked_past));
+        if own > 0.0 || others > 0.0 { own <= others } else { !other.covers(self) || self.covers(other) }
+    }
+}
+
+impl Optimiser {
+    /// A run of its own, from a seed; points that are given come first.
+    pub fn new(plan: Plan, given: Vec<Vec<f64>>, seed: u64, stream: u64) -> Self {
+        let mut shifts = Stream::new(seed, u64::MAX);
+        Self {
+            shift: (0..plan.dimensions).map(|_| shifts.share()).collect(),
+            stream: Stream::new(seed, stream),
+            relaxations: vec![None; plan.limits],
+            plan,
+            given,
+            asked: 0,
+            scanned: 0,
+            population: Vec::new(),
+            archive: Vec::new(),
+            nearest: None,
+            parent: None,
+        }
+    }
+
+    /// Whether the points asked for next are those of the scan, which nothing has led to.
+    pub fn is_scanning(&self) -> bool {
+        self.given.is_empty() && self.scanned < self.plan.scan
+    }
+
+    /// Whether all points were asked for.
+    pub const fn is_over(&self) -> bool {
+        self.asked >= self.plan.evaluations
+    }
+
+    /// The limit that is looked past at this time: where nothing good was found for long, each in turn.
+    fn looked_past(&self) -> Option<usize> {
+        let rest = self.asked.checked_sub(self.plan.evaluations / 2)?;
+        let limits = self.plan.limits as u64;
+        if !self.archive.is_empty() || limits == 0 {
+            return None;
+        }
+        let each = (self.plan.evaluations.div_ceil(2) / limits).max(1);
+        usize::try_from(rest / each).ok().filter(|&limit| limit < self.plan.limits)
+    }
+
+    /// The next point.
+    pub fn ask(&mut self) -> Vec<f64> {
+        self.asked += 1;
+        self.parent = None;
+        if let Some(given) = self.given.pop() {
+            return given;
+        }
+        if self.scanned < self.plan.scan {
+            self.scanned += 1;
+            return self.scan_point(self.plan.scan_from + self.scanned - 1);
+        }
+        if self.population.len() < 4 {
+            return (0..self.plan.dimensions).map(|_| self.stream.share()).collect();
+        }
+        self.offspring()
+    }
+
+    /// A point of the sequence: multiples of the powers of 1/φ, `φ^(d+1) = φ + 1`, shifted, modulo 1.
+    fn scan_point(&self, index: u64) -> Vec<f64> {
+        let dimensions = i32::try_from(self.plan.dimensions).unwrap_or(i32::MAX);
+        let mut phi = 1.5_f64;
+        // A contraction: after these steps nothing changes.
+        for _ in 0..64 {
+            phi = (1.0 + phi).powf(1.0 / f64::from(dimensions.saturating_add(1)));
+        }
+        let steps = (1..=dimensions).map(|power| phi.powi(-power));
+        steps.zip(&self.shift).map(|(step, shift)| (shift + (index + 1) as f64 * step).fract()).collect()
+    }
+
+    fn offspring(&mut self) -> Vec<f64> {
+        let count = self.population.len();
+        let target = self.stream.below(count);
+        let base = if !self.archive.is_empty() && self.stream.share() < 0.6 {
+            let chosen = self.stream.below(self.archive.len());
+            self.archive[chosen].place.clone()
+        } else {
+            let chosen = self.stream.below(count);
+            self.population[chosen].place.clone()
+        };
+        let (one, other) = (self.stream.below(count), self.stream.below(count));
+        let pool = |index: usize, archive: &[Point], population: &[Point]| match archive.get(index) {
+            Some(point) => point.place.clone(),
+            None => population[index % population.len()].place.clone(),
+        };
+        let from_archive = self.archive.len() > 8 && self.stream.share() < 0.5;
+        let archive = if from_archive { self.archive.as_slice() } else { &[] };
+        let (one, other) = (pool(one, archive, &self.population), pool(other, archive, &self.population));
+        let scale = 0.1 + 0.8 * self.stream.share();
+        let crossing = if self.stream.share() < 0.5 { 0.9 } else { 0.3 };
+        let forced = self.stream.below(self.plan.dimensions);
+        let parent = self.population[target].place.clone();
+        let mut child = parent.clone();
+        for axis in 0..self.plan.dimensions {
+            if axis == forced || self.stream.share() < crossing {
+                let moved = base[axis] + scale * (one[axis] - other[axis]);
+                // Beyond an end of the cube, somewhere between that end and where the step began.
+                child[axis] = if moved < 0.0 {
+                    base[axis] * self.stream.share()
+                } else if moved > 1.0 {
+                    1.0 - (1.0 - base[axis]) * self.stream.share()
+                } else {
+                    moved
+                };
+            }
+        }
+        // Choices of few values hold a difference still: now and then an axis is drawn anew.
+        if self.stream.share() < 0.1 {
+            child[forced] = self.stream.share();
+        }
+        self.parent = Some(target);
+        child
+    }
+
+    /// What the point asked for last comes to; nothing where it is impossible.
+    pub fn tell(&mut self, point: Option<Point>) {
+        let Some(point) = point else { return };
+        if point.judged.is_good() {
+            insert(&mut self.archive, point.clone());
+        } else {
+            let beyond = point.judged.beyond(None);
+            if self.nearest.as_ref().is_none_or(|nearest| beyond < nearest.judged.beyond(None)) {
+                self.nearest = Some(point.clone());
+            }
+            let mut exceeded = point.judged.violations.iter().enumerate().filter(|(_, violation)| **violation > 0.0);
+            if let (Some((limit, &violation)), None) = (exceeded.next(), exceeded.next()) {
+                let least = self.relaxations[limit].as_ref().map(|before| before.judged.violations[limit]);
+                if least.is_none_or(|least| violation < least) {
+                    self.relaxations[limit] = Some(point.clone());
+                }
+            }
+        }
+        let looked_past = self.looked_past();
+        match self.parent.take() {
+            Some(parent) => {
+                if point.judged.is_no_worse(&self.population[parent].judged, looked_past) {
+                    self.population[parent] = point;
+                }
+            }
+            None if self.population.len() < POPULATION => self.population.push(point),
+            // Of the scan the best begin: each takes the place of the worst.
+            None => {
+                let beyond = |point: &Point| point.judged.beyond(looked_past);
+                let worst = (0..POPULATION)
+                    .max_by(|&one, &other| beyond(&self.population[one]).total_cmp(&beyond(&self.population[other])));
+                if let Some(worst) = worst.filter(|&worst| beyond(&point) < beyond(&self.population[worst])) {
+                    self.population[worst] = point;
+                }
+            }
+        }
+    }
+
+    /// Begins again from the same points, to be judged anew, with so many more after them.
+    pub fn judge_anew(&mut self, more: u64) {
+        self.given.extend(self.population.drain(..).chain(self.archive.drain(..)).map(|point| point.place));
+        self.given.extend(self.relaxations.iter_mut().filter_map(Option::take).map(|point| point.place));
+        self.given.extend(self.nearest.take().map(|point| point.place));
+        self.plan.evaluations = self.asked + self.given.len() as u64 + more;
+    }
+
+    /// The points that nobody beats.
+    pub fn front(&self) -> &[Point] {
+        &self.archive
+    }
+
+    /// Of each limit, the point that exceeds it least and keeps all others.
+    pub fn relaxations(&self) -> &[Option<Point>] {
+        &self.relaxations
+    }
+
+    /// The point that exceeds limits least.
+    pub const fn nearest(&self) -> Option<&Point> {
+        self.nearest.as_ref()
+    }
+}
+
+/// Adds a point to a front, if nothing there is as good, and takes away what it beats.
+pub(crate) fn insert(front: &mut Vec<Point>, point: Point) {
+    if front.iter().any(|other| other.judged.covers(&point.judged)) {
+        return;
+    }
+    front.retain(|other| !point.judged.covers(&other.judged));
+    front.push(point);
+    thin(front, MOST_OF_FRONT);
+}
+
+/// Takes the most crowded away until no more than so many are left; the ends of each objective stay.
+pub(crate) fn thin(front: &mut Vec<Point>, most: usize) {
+    while front.len() > most {
+        let objectives = front[0].judged.objectives.len();
+        let range = |objective: usize| {
+            let values = front.iter().map(|point| point.judged.objectives[objective]);
+            let (least, largest) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, largest), value| {
+                (least.min(value), largest.max(value))
+            });
+            (least, (largest - least).max(f64::MIN_POSITIVE))
+        };
+        let ranges: Vec<_> = (0..objectives).map(range).collect();
+        let is_end =
+            |point: &Point| ranges.iter().zip(&point.judged.objectives).any(|((least, _), value)| value <= least);
+        let distance = |one: &Point, other: &Point| -> f64 {
+            let pairs = one.judged.objectives.iter().zip(&other.judged.objectives).zip(&ranges);
+            pairs.map(|((one, other), (_, range))| ((one - other) / range).powi(2)).sum()
+        };
+        let room = |index: usize| {
+            let others = front.iter().enumerate().filter(|&(other, _)| other != index);
+            others.map(|(_, other)| distance(&front[index], other)).fold(f64::INFINITY, f64::min)
+        };
+        let crowded = (0..front.len()).filter(|&index| !is_end(&front[index])).map(|index| (room(index), index));
+        // Of equal ones the later.
+        let crowded = crowded.min_by(|one, other| one.0.total_cmp(&other.0).then(other.1.cmp(&one.1)));
+        match crowded {
+            Some((_, index)) => drop(front.remove(index)),
+            None => front.truncate(most),
+        }
+    }
+}
+
+/// The front of several, in one order whatever the order in which they come.
+pub fn merged(fronts: impl IntoIterator<Item = Point>) -> Vec<Point> {
+    let mut points: Vec<_> = fronts.into_iter().collect();
+    points.sort_by(|one, other| {
+        let objectives = one.judged.objectives.iter().zip(&other.judged.objectives);
+        let places = one.place.iter().zip(&other.place);
+        objectives
+            .chain(places)
+            .map(|(one, other)| one.total_cmp(other))
+            .find(|order| order.is_ne())
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
+    let mut front: Vec<Point> = Vec::new();
+    for point in points {
+        // What comes later is nowhere better in the first objective that differs, so that it beats none before.
+        if !front.iter().any(|other| other.judged.covers(&point.judged)) {
+            front.push(point);
+        }
+    }
+    thin(&mut front, 2 * MOST_OF_FRONT);
+    front
+}

@@ -1,0 +1,634 @@
+//! What can be asked of a variant: each quantity once, with its unit, its meaning and where it comes from.
+
+use serde::Serialize;
+use toothwave_solver::losses::period::{Losses, RadialForces};
+use toothwave_solver::losses::{Efficiency, Fixed, Friction, Mechanism};
+use toothwave_solver::mesh::Mesh;
+use toothwave_solver::root::NotConverged;
+use toothwave_solver::sweep::{ContactPeaks, Sweep, SweepPeaks};
+use toothwave_solver::{Contact, Drive, LoadCase};
+use utoipa::ToSchema;
+
+/// Where a quantity comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Source {
+    /// An answer to the same document holds it: the path that is asked, and a JSON pointer into the answer.
+    Answer {
+        /// The path.
+        path: &'static str,
+        /// The pointer.
+        pointer: &'static str,
+    },
+    /// It follows from an answer.
+    Definition(&'static str),
+}
+
+/// What has to be known of a variant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Needs {
+    /// The drive alone.
+    Drive,
+    /// A load.
+    Load,
+    /// A load and `load.allowable_stress_mpa`.
+    AllowableStress,
+    /// A load and `friction`.
+    Friction,
+    /// A load, `friction` and `load.input_speed_rpm`.
+    FrictionAndSpeed,
+}
+
+/// What works a quantity out.
+type Of = fn(&Variant<'_>) -> Result<f64, NotConverged>;
+
+/// A quantity.
+#[derive(Debug, Clone, Copy, Serialize, ToSchema)]
+pub struct Quantity {
+    /// Its name, which ends in its unit.
+    pub name: &'static str,
+    /// Its unit, empty of a pure number.
+    pub unit: &'static str,
+    /// What it means.
+    pub meaning: &'static str,
+    /// Whether it is only true or false; as a number 1 or 0.
+    pub is_flag: bool,
+    /// What the document has to hold for it.
+    pub needs: Needs,
+    /// Where it comes from.
+    pub source: Source,
+    #[serde(skip)]
+    #[schema(ignore)]
+    of: Of,
+}
+
+impl PartialEq for Quantity {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+/// What is known of a variant, as far as its quantities need it.
+#[derive(Debug)]
+pub(crate) struct Variant<'a> {
+    pub(crate) drive: &'a Drive,
+    /// As drawn.
+    pub(crate) ring_outer_radius_mm: f64,
+    pub(crate) loaded: Option<Loaded<'a>>,
+}
+
+/// A variant under its load.
+#[derive(Debug)]
+pub(crate) struct Loaded<'a> {
+    pub(crate) load: &'a LoadCase,
+    pub(crate) peaks: SweepPeaks,
+    pub(crate) friction: Option<Rubbing<'a>>,
+    pub(crate) radial_forces: Option<RadialForces>,
+}
+
+/// A variant with friction.
+#[derive(Debug)]
+pub(crate) struct Rubbing<'a> {
+    pub(crate) friction: &'a Friction,
+    pub(crate) sweep: &'a Sweep,
+    pub(crate) losses: Losses,
+    pub(crate) input_speed_rpm: Option<f64>,
+}
+
+impl Variant<'_> {
+    /// A number of the loaded variant; those who ask have seen to it that it is there.
+    fn loaded(&self, of: impl Fn(&Loaded<'_>) -> f64) -> f64 {
+        self.loaded.as_ref().map_or(f64::NAN, of)
+    }
+
+    fn peaks(&self, contact: Contact, of: impl Fn(&ContactPeaks) -> f64) -> f64 {
+        self.loaded(|loaded| of(loaded.peaks.contacts.get(contact)))
+    }
+
+    fn greatest(&self, of: impl Fn(&ContactPeaks) -> f64) -> f64 {
+        self.loaded(|loaded| loaded.peaks.contacts.iter().map(|(_, peaks)| of(peaks)).fold(f64::NEG_INFINITY, f64::max))
+    }
+
+    fn capacity(&self, of: impl Fn(f64, f64) -> f64) -> f64 {
+        self.loaded(|loaded| {
+            let capacity = loaded.peaks.torque_capacity.as_ref();
+            capacity.map_or(f64::NAN, |capacity| of(capacity.input_torque_nm, capacity.output_torque_nm))
+        })
+    }
+
+    fn rubbing(&self, of: impl Fn(&Loaded<'_>, &Rubbing<'_>) -> f64) -> f64 {
+        self.loaded(|loaded| loaded.friction.as_ref().map_or(f64::NAN, |rubbing| of(loaded, rubbing)))
+    }
+
+    fn efficiency(&self, fixed: Fixed, of: impl Fn(Efficiency) -> f64) -> f64 {
+        let mechanism = Mechanism::of(self.drive);
+        self.rubbing(|_, rubbing| of(mechanism.efficiency(fixed, rubbing.losses.mean.total())))
+    }
+}
+
+fn most(column: &[f64]) -> f64 {
+    column.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+}
+
+const fn of_drive(name: &'static str, unit: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
+    Quantity { name, unit, meaning, is_flag: false, needs: Needs::Drive, source, of }
+}
+
+const fn of_sweep(name: &'static str, unit: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
+    Quantity { name, unit, meaning, is_flag: false, needs: Needs::Load, source, of }
+}
+
+const fn flag(name: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
+    Quantity { name, unit: "", meaning, is_flag: true, needs: Needs::Drive, source, of }
+}
+
+const fn needing(needs: Needs, quantity: Quantity) -> Quantity {
+    Quantity { needs, ..quantity }
+}
+
+const fn geometry(pointer: &'static str) -> Source {
+    Source::Answer { path: "/v1/geometry", pointer }
+}
+
+const fn mesh(pointer: &'static str) -> Source {
+    Source::Answer { path: "/v1/coincidence-degree", pointer }
+}
+
+const fn sweep(pointer: &'static str) -> Source {
+    Source::Answer { path: "/v1/sweep", pointer }
+}
+
+/// All quantities, in the order in which they are listed.
+pub static QUANTITIES: [Quantity; 59] = [
+    of_drive(
+        "transmission_ratio",
+        "",
+        "Input speed over carrier speed, ring fixed; below zero where they turn against each other.",
+        geometry("/transmission_ratio"),
+        |variant| Ok(variant.drive.transmission_ratio()),
+    ),
+    of_drive(
+        "transmission_ratio_carrier_fixed",
+        "",
+        "Input speed over ring speed, carrier fixed.",
+        geometry("/transmission_ratio_carrier_fixed"),
+        |variant| Ok(variant.drive.transmission_ratio_carrier_fixed()),
+    ),
+    of_drive(
+        "outer_diameter_mm",
+        "mm",
+        "Diameter of the whole drive.",
+        Source::Definition(
+            "twice the ring's outer radius as drawn: `parts.ring.outer_radius_mm`, or 1.2 times the root radius where that is left out",
+        ),
+        |variant| Ok(2.0 * variant.ring_outer_radius_mm),
+    ),
+    of_drive(
+        "ring_root_radius_mm",
+        "mm",
+        "Radius of the ring in the middle of a tooth space.",
+        geometry("/ring/root_radius_mm"),
+        |variant| Ok(variant.drive.root_radius_mm()),
+    ),
+    of_drive("ring_tip_radius_mm", "mm", "Radius of the ring's tips.", geometry("/ring/tip_radius_mm"), |variant| {
+        Ok(variant.drive.tip_radius_mm())
+    }),
+    of_drive(
+        "ring_tooth_height_mm",
+        "mm",
+        "Root radius less tip radius.",
+        geometry("/ring/tooth_height_mm"),
+        |variant| Ok(variant.drive.root_radius_mm() - variant.drive.tip_radius_mm()),
+    ),
+    of_drive(
+        "tooth_width_mm",
+        "mm",
+        "Extent of a tooth along the axis.",
+        Source::Definition("`drive.teeth.width_mm`; a ball's diameter"),
+        |variant| Ok(variant.drive.tooth_width_mm()),
+    ),
+    flag(
+        "undercut",
+        "Whether the ring's tips are cut away by their own envelope.",
+        geometry("/undercut/occurs"),
+        |variant| Ok(f64::from(u8::from(variant.drive.flank().is_undercut()))),
+    ),
+    of_drive(
+        "coincidence_degree",
+        "",
+        "Contact ratio over all meshing zones.",
+        mesh("/coincidence_degree"),
+        |variant| Ok(Mesh::new(variant.drive).coincidence_degree()),
+    ),
+    of_drive(
+        "teeth_in_mesh_min",
+        "",
+        "The fewest teeth of a zone that mesh at any input angle.",
+        mesh("/teeth_in_mesh_per_zone/min"),
+        #[expect(clippy::cast_precision_loss, reason = "a count of teeth")]
+        |variant| Ok(Mesh::new(variant.drive).teeth_in_mesh().min as f64),
+    ),
+    of_drive(
+        "engagement_start_deg",
+        "deg",
+        "Where a tooth starts to touch the ring's flank, from the middle of a lobe.",
+        mesh("/engagement/start_deg"),
+        |variant| Ok(variant.drive.flank_limit().position.from_lobe_deg()),
+    ),
+    of_drive(
+        "period_deg",
+        "deg",
+        "The input angle after which the load pattern repeats.",
+        mesh("/period_deg"),
+        |variant| Ok(Mesh::new(variant.drive).period_deg()),
+    ),
+    of_drive(
+        "ring_pressure_angle_max_deg",
+        "deg",
+        "Largest angle between the ring's normal and the radius on the engaged flank.",
+        geometry("/ring/pressure_angle_max_deg"),
+        |variant| {
+            let steepest = variant.drive.steepest_engaged()?;
+            Ok(variant.drive.flank().at(&steepest).tan_pressure_angle.atan().to_degrees())
+        },
+    ),
+    of_drive(
+        "wave_generator_pressure_angle_max_deg",
+        "deg",
+        "Largest angle between the cam's normal and the radius at an engaged tooth.",
+        geometry("/wave_generator/pressure_angle_max_deg"),
+        |variant| Ok(variant.drive.steepest_engaged()?.tan_pressure_angle.atan().to_degrees()),
+    ),
+    of_drive(
+        "slot_wall_mm",
+        "mm",
+        "The wall between two slots where it is thinnest; not positive where they run into each other.",
+        geometry("/carrier/slot_wall_mm"),
+        |variant| Ok(variant.drive.slot_wall_mm()),
+    ),
+    of_drive(
+        "slot_wall_over_slot_width",
+        "",
+        "The same over the width of a slot: below a quarter a finding warns.",
+        Source::Definition("`slot_wall_mm` over the width of a slot without clearance"),
+        |variant| Ok(variant.drive.slot_wall_mm() / (2.0 * variant.drive.slot_half_width_mm())),
+    ),
+    of_drive(
+        "carrier_radial_space_mm",
+        "mm",
+        "What wave generator and ring leave the carrier.",
+        geometry("/carrier/radial_space_mm"),
+        |variant| Ok(variant.drive.tip_radius_mm() - variant.drive.cam_outer_radius_mm()),
+    ),
+    of_drive(
+        "tooth_center_clearance_inner_mm",
+        "mm",
+        "How far the centre of an engaged tooth stays outside the carrier's inner limit at least.",
+        geometry("/carrier/tooth_center_clearance_inner_mm"),
+        |variant| {
+            let drive = variant.drive;
+            let innermost = drive.flank().locus().at(drive.flank_limit().position)?;
+            Ok(innermost.center_radius_mm - drive.cam_outer_radius_mm())
+        },
+    ),
+    of_drive(
+        "tooth_center_clearance_outer_mm",
+        "mm",
+        "How far the centre of an engaged tooth stays inside the carrier's outer limit at least.",
+        geometry("/carrier/tooth_center_clearance_outer_mm"),
+        |variant| {
+            let drive = variant.drive;
+            Ok(drive.tip_radius_mm() - (drive.cam_outer_radius_mm() + drive.parameters().tooth_radius_mm))
+        },
+    ),
+    of_drive(
+        "tooth_gap_min_mm",
+        "mm",
+        "The least gap between neighbouring teeth anywhere on their path.",
+        geometry("/teeth/gap_min_mm"),
+        |variant| {
+            let drive = variant.drive;
+            Ok(drive.least_center_distance_mm()? - 2.0 * drive.parameters().tooth_radius_mm)
+        },
+    ),
+    of_sweep("input_torque_nm", "N·m", "Torque at the wave generator.", sweep("/load/input_torque_nm"), |variant| {
+        Ok(variant.loaded(|loaded| loaded.load.input_torque_nm(variant.drive)))
+    }),
+    of_sweep(
+        "output_torque_nm",
+        "N·m",
+        "Torque at the carrier, ring fixed, losses neglected.",
+        sweep("/load/output_torque_nm"),
+        |variant| Ok(variant.loaded(|loaded| loaded.load.output_torque_nm(variant.drive))),
+    ),
+    of_sweep(
+        "peak_force_wave_generator_n",
+        "N",
+        "Largest force between tooth and wave generator.",
+        sweep("/peaks/wave_generator/force_n/value"),
+        |variant| Ok(variant.peaks(Contact::WaveGenerator, |peaks| peaks.force_n.value)),
+    ),
+    of_sweep(
+        "peak_force_ring_n",
+        "N",
+        "Largest force between tooth and ring.",
+        sweep("/peaks/ring/force_n/value"),
+        |variant| Ok(variant.peaks(Contact::Ring, |peaks| peaks.force_n.value)),
+    ),
+    of_sweep(
+        "peak_force_carrier_n",
+        "N",
+        "Largest force between tooth and carrier.",
+        sweep("/peaks/carrier/force_n/value"),
+        |variant| Ok(variant.peaks(Contact::Carrier, |peaks| peaks.force_n.value)),
+    ),
+    of_sweep(
+        "peak_stress_wave_generator_mpa",
+        "MPa",
+        "Largest contact stress between tooth and wave generator.",
+        sweep("/peaks/wave_generator/stress_mpa/value"),
+        |variant| Ok(variant.peaks(Contact::WaveGenerator, |peaks| peaks.stress_mpa.value)),
+    ),
+    of_sweep(
+        "peak_stress_ring_mpa",
+        "MPa",
+        "Largest contact stress between tooth and ring.",
+        sweep("/peaks/ring/stress_mpa/value"),
+        |variant| Ok(variant.peaks(Contact::Ring, |peaks| peaks.stress_mpa.value)),
+    ),
+    of_sweep(
+        "peak_stress_carrier_mpa",
+        "MPa",
+        "Largest contact stress between tooth and carrier.",
+        sweep("/peaks/carrier/stress_mpa/value"),
+        |variant| Ok(variant.peaks(Contact::Carrier, |peaks| peaks.stress_mpa.value)),
+    ),
+    of_sweep(
+        "peak_stress_mpa",
+        "MPa",
+        "Largest contact stress of all.",
+        Source::Definition("the largest of the three contacts' peak stresses"),
+        |variant| Ok(variant.greatest(|peaks| peaks.stress_mpa.value)),
+    ),
+    of_sweep(
+        "peak_force_n",
+        "N",
+        "Largest contact force of all.",
+        Source::Definition("the largest of the three contacts' peak forces"),
+        |variant| Ok(variant.greatest(|peaks| peaks.force_n.value)),
+    ),
+    of_sweep(
+        "half_width_wave_generator_mm",
+        "mm",
+        "Half the width of the wave generator's contact under its peak stress.",
+        sweep("/peaks/wave_generator/half_width_mm"),
+        |variant| Ok(variant.peaks(Contact::WaveGenerator, |peaks| peaks.half_width_mm)),
+    ),
+    of_sweep(
+        "half_width_ring_mm",
+        "mm",
+        "Half the width of the ring's contact under its peak stress.",
+        sweep("/peaks/ring/half_width_mm"),
+        |variant| Ok(variant.peaks(Contact::Ring, |peaks| peaks.half_width_mm)),
+    ),
+    of_sweep(
+        "half_width_carrier_mm",
+        "mm",
+        "Half the width of the carrier's contact under its peak stress.",
+        sweep("/peaks/carrier/half_width_mm"),
+        |variant| Ok(variant.peaks(Contact::Carrier, |peaks| peaks.half_width_mm)),
+    ),
+    of_sweep(
+        "loaded_teeth_min",
+        "",
+        "The fewest teeth of a zone that carry load at any input angle.",
+        sweep("/loaded_teeth_per_zone/min"),
+        #[expect(clippy::cast_precision_loss, reason = "a count of teeth")]
+        |variant| Ok(variant.loaded(|loaded| loaded.peaks.loaded_teeth.min as f64)),
+    ),
+    of_sweep(
+        "wind_up_min_deg",
+        "deg",
+        "The least wind-up of the input under the load.",
+        Source::Definition("the least of `/wind_up/wind_up_deg` of the sweep"),
+        |variant| Ok(variant.loaded(|loaded| loaded.peaks.wind_up_deg.least)),
+    ),
+    of_sweep(
+        "wind_up_max_deg",
+        "deg",
+        "The largest wind-up of the input under the load.",
+        Source::Definition("the largest of `/wind_up/wind_up_deg` of the sweep"),
+        |variant| Ok(variant.loaded(|loaded| loaded.peaks.wind_up_deg.largest)),
+    ),
+    of_sweep(
+        "torsional_stiffness_min_nm_per_rad",
+        "N·m/rad",
+        "The least torsional stiffness at the output over the period.",
+        Source::Definition("the least of `/wind_up/torsional_stiffness_nm_per_rad` of the sweep"),
+        |variant| Ok(variant.loaded(|loaded| loaded.peaks.torsional_stiffness_nm_per_rad.least)),
+    ),
+    of_sweep(
+        "torsional_stiffness_max_nm_per_rad",
+        "N·m/rad",
+        "The largest torsional stiffness at the output over the period.",
+        Source::Definition("the largest of `/wind_up/torsional_stiffness_nm_per_rad` of the sweep"),
+        |variant| Ok(variant.loaded(|loaded| loaded.peaks.torsional_stiffness_nm_per_rad.largest)),
+    ),
+    of_sweep(
+        "transmission_error_peak_to_peak_deg",
+        "deg",
+        "Range of the wind-up over the period, at the output.",
+        sweep("/wind_up/transmission_error_peak_to_peak_deg"),
+        |variant| Ok(variant.loaded(|loaded| loaded.peaks.transmission_error_peak_to_peak_deg(variant.drive))),
+    ),
+    of_sweep(
+        "radial_force_max_n",
+        "N",
+        "What the teeth push the wave generator aside with at most; 0 where lobes balance each other.",
+        Source::Definition("the largest of `/radial_force_n/value` of the sweep, 0 where it is left out"),
+        |variant| Ok(variant.loaded(|loaded| loaded.radial_forces.as_ref().map_or(0.0, |forces| most(&forces.force_n)))),
+    ),
+    needing(
+        Needs::AllowableStress,
+        of_sweep(
+            "torque_capacity_input_nm",
+            "N·m",
+            "The largest torque at the wave generator under which no contact exceeds the allowable stress.",
+            sweep("/torque_capacity/input_torque_nm"),
+            |variant| Ok(variant.capacity(|input_nm, _| input_nm)),
+        ),
+    ),
+    needing(
+        Needs::AllowableStress,
+        of_sweep(
+            "torque_capacity_output_nm",
+            "N·m",
+            "The same at the carrier.",
+            sweep("/torque_capacity/output_torque_nm"),
+            |variant| Ok(variant.capacity(|_, output_nm| output_nm)),
+        ),
+    ),
+    needing(
+        Needs::Friction,
+        of_sweep(
+            "loss_ratio",
+            "",
+            "Mean power lost over the input torque times the speed of wave generator against carrier.",
+            sweep("/losses/loss_ratio"),
+            |variant| Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.total())),
+        ),
+    ),
+    loss_at(
+        "loss_ratio_wave_generator",
+        "The part of it that is lost between teeth and wave generator.",
+        sweep("/losses/loss_ratio_by_place/wave_generator"),
+        |variant| Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.contacts.wave_generator)),
+    ),
+    loss_at(
+        "loss_ratio_ring",
+        "The part of it that is lost between teeth and ring.",
+        sweep("/losses/loss_ratio_by_place/ring"),
+        |variant| Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.contacts.ring)),
+    ),
+    loss_at(
+        "loss_ratio_carrier",
+        "The part of it that is lost between teeth and carrier.",
+        sweep("/losses/loss_ratio_by_place/carrier"),
+        |variant| Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.contacts.carrier)),
+    ),
+    loss_at(
+        "loss_ratio_bearing",
+        "The part of it that is lost in the bearing.",
+        sweep("/losses/loss_ratio_by_place/bearing"),
+        |variant| Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.bearing)),
+    ),
+    loss_at(
+        "efficiency_ring_fixed",
+        "Efficiency where the wave generator drives the carrier.",
+        sweep("/losses/efficiency/ring_fixed"),
+        |variant| Ok(variant.efficiency(Fixed::Ring, |efficiency| efficiency.driven)),
+    ),
+    loss_at(
+        "efficiency_carrier_fixed",
+        "Efficiency where the wave generator drives the ring.",
+        sweep("/losses/efficiency/carrier_fixed"),
+        |variant| Ok(variant.efficiency(Fixed::Carrier, |efficiency| efficiency.driven)),
+    ),
+    loss_at(
+        "efficiency_wave_generator_fixed",
+        "Efficiency where the ring drives the carrier.",
+        sweep("/losses/efficiency/wave_generator_fixed"),
+        |variant| Ok(variant.efficiency(Fixed::WaveGenerator, |efficiency| efficiency.driven)),
+    ),
+    loss_at(
+        "efficiency_ring_fixed_back_driven",
+        "Efficiency where the carrier drives the wave generator; at or below 0 the drive locks itself.",
+        sweep("/losses/efficiency/ring_fixed_back_driven"),
+        |variant| Ok(variant.efficiency(Fixed::Ring, |efficiency| efficiency.back_driven)),
+    ),
+    loss_at(
+        "efficiency_carrier_fixed_back_driven",
+        "Efficiency where the ring drives the wave generator.",
+        sweep("/losses/efficiency/carrier_fixed_back_driven"),
+        |variant| Ok(variant.efficiency(Fixed::Carrier, |efficiency| efficiency.back_driven)),
+    ),
+    loss_at(
+        "efficiency_wave_generator_fixed_back_driven",
+        "Efficiency where the carrier drives the ring.",
+        sweep("/losses/efficiency/wave_generator_fixed_back_driven"),
+        |variant| Ok(variant.efficiency(Fixed::WaveGenerator, |efficiency| efficiency.back_driven)),
+    ),
+    needing(
+        Needs::Friction,
+        of_sweep(
+            "efficiency_error",
+            "",
+            "The largest error of the efficiency that was measured at such losses.",
+            sweep("/losses/efficiency_error"),
+            |variant| {
+                let mechanism = Mechanism::of(variant.drive);
+                Ok(variant.rubbing(|_, Rubbing { friction, losses, .. }| {
+                    friction
+                        .first_order_error(&mechanism, mechanism.loss_share(Fixed::Ring, losses.mean.total()))
+                        .efficiency
+                }))
+            },
+        ),
+    ),
+    needing(
+        Needs::Friction,
+        of_sweep(
+            "required_input_torque_nm",
+            "N·m",
+            "The torque that the wave generator really needs, ring fixed.",
+            sweep("/losses/required_input_torque_nm"),
+            |variant| {
+                let mechanism = Mechanism::of(variant.drive);
+                Ok(variant.rubbing(|loaded, rubbing| {
+                    let efficiency = mechanism.efficiency(Fixed::Ring, rubbing.losses.mean.total());
+                    loaded.load.input_torque_nm(variant.drive) / efficiency.driven
+                }))
+            },
+        ),
+    ),
+    needing(
+        Needs::FrictionAndSpeed,
+        of_sweep("power_loss_w", "W", "Mean power lost, ring fixed.", sweep("/losses/power_loss_w"), |variant| {
+            let mechanism = Mechanism::of(variant.drive);
+            Ok(variant.rubbing(|loaded, rubbing| {
+                let turning_rad_per_s =
+                    rubbing.input_speed_rpm.map_or(f64::NAN, |rpm| mechanism.turning_rad_per_s(rpm));
+                rubbing.losses.mean.total() * loaded.load.input_torque_nm(variant.drive) * turning_rad_per_s
+            }))
+        }),
+    ),
+    pressure_velocity(
+        "pressure_velocity_wave_generator_mpa_m_per_s",
+        "Largest contact stress times slip at the wave generator.",
+        sweep("/losses/pressure_velocity_mpa_m_per_s/wave_generator/value"),
+        |variant| Ok(variant.pressure_velocity(Contact::WaveGenerator)),
+    ),
+    pressure_velocity(
+        "pressure_velocity_ring_mpa_m_per_s",
+        "Largest contact stress times slip at the ring.",
+        sweep("/losses/pressure_velocity_mpa_m_per_s/ring/value"),
+        |variant| Ok(variant.pressure_velocity(Contact::Ring)),
+    ),
+    pressure_velocity(
+        "pressure_velocity_carrier_mpa_m_per_s",
+        "Largest contact stress times slip at the carrier.",
+        sweep("/losses/pressure_velocity_mpa_m_per_s/carrier/value"),
+        |variant| Ok(variant.pressure_velocity(Contact::Carrier)),
+    ),
+];
+
+const fn loss_at(name: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
+    needing(Needs::Friction, of_sweep(name, "", meaning, source, of))
+}
+
+const fn pressure_velocity(name: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
+    needing(Needs::FrictionAndSpeed, of_sweep(name, "MPa m/s", meaning, source, of))
+}
+
+impl Variant<'_> {
+    fn pressure_velocity(&self, contact: Contact) -> f64 {
+        let mechanism = Mechanism::of(self.drive);
+        self.rubbing(|_, rubbing| {
+            let turning_rad_per_s = rubbing.input_speed_rpm.map_or(f64::NAN, |rpm| mechanism.turning_rad_per_s(rpm));
+            rubbing.losses.pressure_velocity_peaks(rubbing.sweep, turning_rad_per_s).get(contact).value
+        })
+    }
+}
+
+impl Quantity {
+    /// The quantity of this name.
+    pub fn named(name: &str) -> Option<&'static Self> {
+        QUANTITIES.iter().find(|quantity| quantity.name == name)
+    }
+
+    /// Its value.
+    pub(crate) fn of(&self, variant: &Variant<'_>) -> Result<f64, NotConverged> {
+        (self.of)(variant)
+    }
+}

@@ -1,0 +1,168 @@
+//! Variants in rows: what maps, sensitivities and tolerances have in common. Each variant follows from its number alone.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use toothwave_calculation::json::Tree;
+use toothwave_solver::Stop;
+use utoipa::ToSchema;
+
+use crate::evaluate::{Evaluator, Outcome, Reason, Refusal, Stopped};
+use crate::variant::Template;
+
+/// Variants of a chunk: some tens of milliseconds of the cheapest ones, so that a study keeps several cores busy and progress is seen.
+pub(crate) const CHUNK_VARIANTS: u64 = 4096;
+
+/// What tells the documents of the variants.
+pub(crate) trait Rows {
+    /// The document of a variant, put into the template.
+    fn document<'t>(&self, template: &'t mut Template, variant: u64) -> &'t Tree;
+}
+
+/// Rows of consecutive variants.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct RowsPart {
+    /// Variants that have quantities.
+    pub(crate) answered: Vec<u64>,
+    /// A column for each quantity.
+    pub(crate) columns: Vec<Vec<f64>>,
+    /// Variants that have none.
+    pub(crate) refused: Vec<u64>,
+    /// Which of the refusals each has.
+    pub(crate) reasons: Vec<u32>,
+    pub(crate) refusals: Vec<RefusalNoted>,
+}
+
+/// A kind of refusal with the first of its kind.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct RefusalNoted {
+    pub(crate) reason: Reason,
+    pub(crate) detail: String,
+    pub(crate) first: u64,
+    pub(crate) count: u64,
+}
+
+/// Rows as they are worked out.
+#[derive(Debug)]
+pub(crate) struct RowsWork {
+    template: Template,
+    next: u64,
+    end: u64,
+    part: RowsPart,
+}
+
+impl RowsPart {
+    pub(crate) fn new(quantities: usize) -> Self {
+        Self { columns: vec![Vec::new(); quantities], ..Self::default() }
+    }
+
+    fn push(&mut self, variant: u64, outcome: Outcome) {
+        match outcome {
+            Outcome::Answered(values) => {
+                self.answered.push(variant);
+                for (column, value) in self.columns.iter_mut().zip(values) {
+                    column.push(value);
+                }
+            }
+            Outcome::Refused(refusal) => {
+                let reason = note(&mut self.refusals, variant, 1, refusal);
+                self.refused.push(variant);
+                self.reasons.push(reason);
+            }
+        }
+    }
+
+    /// Appends the rows of later variants.
+    pub(crate) fn append(&mut self, other: &Self) {
+        self.answered.extend_from_slice(&other.answered);
+        for (column, values) in self.columns.iter_mut().zip(&other.columns) {
+            column.extend_from_slice(values);
+        }
+        let renumbered: Vec<_> = other
+            .refusals
+            .iter()
+            .map(|noted| {
+                let refusal = Refusal { reason: noted.reason.clone(), detail: noted.detail.clone() };
+                note(&mut self.refusals, noted.first, noted.count, refusal)
+            })
+            .collect();
+        self.refused.extend_from_slice(&other.refused);
+        self.reasons.extend(other.reasons.iter().map(|&reason| renumbered[reason as usize]));
+    }
+}
+
+/// Counts refusals under their reason, and returns its number.
+pub(crate) fn note(refusals: &mut Vec<RefusalNoted>, first: u64, count: u64, refusal: Refusal) -> u32 {
+    let index = refusals.iter().position(|noted| noted.reason == refusal.reason).unwrap_or_else(|| {
+        refusals.push(RefusalNoted { reason: refusal.reason, detail: refusal.detail.clone(), first, count: 0 });
+        refusals.len() - 1
+    });
+    let noted = &mut refusals[index];
+    noted.count += count;
+    if first < noted.first {
+        (noted.first, noted.detail) = (first, refusal.detail);
+    }
+    u32::try_from(index).unwrap_or(u32::MAX)
+}
+
+impl RowsWork {
+    pub(crate) fn new(template: Template, quantities: usize, chunk: u64, variants: u64) -> Self {
+        let first = chunk * CHUNK_VARIANTS;
+        Self { template, next: first, end: variants.min(first + CHUNK_VARIANTS), part: RowsPart::new(quantities) }
+    }
+
+    /// One variant further; whether that was the last one.
+    pub(crate) fn step(&mut self, rows: &impl Rows, evaluator: &Evaluator, stop: &impl Stop) -> Result<bool, Stopped> {
+        if self.next < self.end {
+            let document = rows.document(&mut self.template, self.next);
+            let outcome = evaluator.outcome(document, stop)?;
+            self.part.push(self.next, outcome);
+            self.next += 1;
+        }
+        Ok(self.next == self.end)
+    }
+
+    pub(crate) fn finish(self) -> RowsPart {
+        self.part
+    }
+}
+
+/// Why variants are impossible, and how many.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct ReasonAnswer {
+    /// The code of the field at fault, or of the problem where no field is.
+    pub code: String,
+    /// The field at fault, by JSON pointer into the design; empty where none is.
+    pub pointer: String,
+    /// Variants that have no answer for this reason.
+    pub variants: u64,
+    /// The first of them.
+    pub first_variant: u64,
+    /// What was wrong with that one.
+    pub detail: String,
+}
+
+impl From<&RefusalNoted> for ReasonAnswer {
+    fn from(RefusalNoted { reason, detail, first, count }: &RefusalNoted) -> Self {
+        let Reason { code, pointer } = reason.clone();
+        Self { code, pointer, variants: *count, first_variant: *first, detail: detail.clone() }
+    }
+}
+
+/// Quantities in columns of equal length, one entry a variant.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct PossibleAnswer {
+    /// Which variants.
+    pub variant: Vec<u64>,
+    /// A column for each quantity, by its name.
+    pub quantities: BTreeMap<&'static str, Vec<f64>>,
+}
+
+/// Variants without an answer, in columns of equal length.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct ImpossibleAnswer {
+    /// Which variants.
+    pub variant: Vec<u64>,
+    /// Which of the reasons, from 0.
+    pub reason: Vec<u32>,
+}

@@ -1,0 +1,260 @@
+//! A sensitivity: each input a little less and a little more, and what that does to each quantity.
+
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+
+use serde::Serialize;
+use toothwave_calculation::field::FieldCode;
+use toothwave_calculation::json::{Tree, path};
+use toothwave_calculation::no_answer::NoAnswer;
+use utoipa::ToSchema;
+
+use crate::ask::{escaped, fault};
+use crate::document::{InputDocument, SensitivityDocument};
+use crate::evaluate::Evaluator;
+use crate::rows::{ReasonAnswer, Rows, RowsPart};
+use crate::variant::{Asked, Domain, Template, Value};
+use toothwave_calculation::forms::csv_error;
+
+/// How far an input is moved where nothing is said, as a share of its value.
+const RELATIVE: f64 = 0.01;
+
+/// A quantity is called smooth where both one-sided differences agree to this share of them.
+const SMOOTH: f64 = 0.1;
+
+/// The variants of a sensitivity: the base, then each input less and more.
+#[derive(Debug, Clone)]
+pub(crate) struct Sensitivity {
+    inputs: Vec<Input>,
+}
+
+#[derive(Debug, Clone)]
+struct Input {
+    pointer: String,
+    value: f64,
+    plus_minus: f64,
+}
+
+impl Sensitivity {
+    pub(crate) fn new(document: &SensitivityDocument) -> Result<(Self, Template), NoAnswer> {
+        let base = &document.base.0;
+        let mut inputs = document.inputs.clone();
+        if inputs.is_empty() {
+            for part in ["drive", "materials", "load"] {
+                let part = [part.to_owned()];
+                if let Some(tree) = base.at(&part) {
+                    numbers(tree, &format!("/{}", part[0]), &mut inputs);
+                }
+            }
+        }
+        let mut moved = Vec::new();
+        for (pointer, input) in &inputs {
+            moved.push(Input::new(base, pointer, input)?);
+        }
+        let free = |input: &Input| {
+            let range = Asked::Range { min: input.value - input.plus_minus, max: input.value + input.plus_minus };
+            (input.pointer.clone(), range)
+        };
+        let free: Vec<_> = moved.iter().map(free).collect();
+        let template = Template::new(base, &free, "inputs")?;
+        let is_given = !document.inputs.is_empty();
+        for (input, variable) in moved.iter_mut().zip(template.variables()) {
+            if matches!(variable.domain, Domain::Whole { .. }) {
+                if document
+                    .inputs
+                    .get(&input.pointer)
+                    .is_some_and(|input| input.plus_minus.is_some_and(|by| by.fract() != 0.0))
+                {
+                    let at = format!("/inputs/{}/plus_minus", escaped(&input.pointer));
+                    return Err(fault(&at, FieldCode::WrongType, "a whole number is wanted here"));
+                }
+                input.plus_minus = input.plus_minus.ceil();
+            }
+        }
+        // Counts are moved only where that is asked for: a drive with another number of teeth is another drive.
+        if !is_given {
+            let counted: Vec<_> =
+                template.variables().iter().map(|variable| matches!(variable.domain, Domain::Whole { .. })).collect();
+            if counted.contains(&true) {
+                let inputs = moved.iter().zip(&counted).filter(|(_, counted)| !**counted);
+                let inputs = inputs.map(|(input, _)| (input.pointer.clone(), InputDocument::default())).collect();
+                return Self::new(&SensitivityDocument { inputs, ..document.clone() });
+            }
+        }
+        Ok((Self { inputs: moved }, template))
+    }
+
+    pub(crate) const fn variants(&self) -> u64 {
+        1 + 2 * self.inputs.len() as u64
+    }
+}
+
+/// The numbers below a place that are not zero.
+fn numbers(tree: &Tree, at: &str, found: &mut BTreeMap<String, InputDocument>) {
+    match tree {
+        Tree::Number(number) if *number != 0.0 => {
+            found.insert(at.to_owned(), InputDocument::default());
+        }
+        Tree::Object(fields) => {
+            for (name, tree) in fields {
+                numbers(tree, &format!("{at}/{}", escaped(name)), found);
+            }
+        }
+        _ => {}
+    }
+}
+
+impl Input {
+    fn new(base: &Tree, pointer: &str, input: &InputDocument) -> Result<Self, NoAnswer> {
+        let at = format!("/inputs/{}", escaped(pointer));
+        let Some(Tree::Number(value)) = path(pointer).and_then(|path| base.at(&path)) else {
+            let detail = "the base has no number here: write it down there, even where it is the default";
+            return Err(fault(&at, FieldCode::MissingField, detail));
+        };
+        let plus_minus = match (input.plus_minus, input.relative) {
+            (Some(_), Some(_)) => {
+                let detail = "at most one of `plus_minus` and `relative` may stand here";
+                return Err(fault(&at, FieldCode::ConflictingFields, detail));
+            }
+            (Some(plus_minus), None) => plus_minus,
+            (None, relative) => relative.unwrap_or(RELATIVE) * value.abs(),
+        };
+        if plus_minus.is_nan() || plus_minus <= 0.0 {
+            let detail = format!("an input is moved by more than zero, not by {plus_minus:?}: give `plus_minus`");
+            return Err(fault(&at, FieldCode::OutOfRange, detail));
+        }
+        Ok(Self { pointer: pointer.into(), value: *value, plus_minus })
+    }
+}
+
+impl Rows for Sensitivity {
+    fn document<'t>(&self, template: &'t mut Template, variant: u64) -> &'t Tree {
+        let moved = variant.checked_sub(1).map(|moved| (moved / 2, moved % 2));
+        let values = (0..).zip(&self.inputs).map(|(index, input)| {
+            Value::Number(match moved {
+                Some((moved, 0)) if moved == index => input.value - input.plus_minus,
+                Some((moved, _)) if moved == index => input.value + input.plus_minus,
+                _ => input.value,
+            })
+        });
+        template.filled(&values.collect::<Vec<_>>())
+    }
+}
+
+/// What each input does to each quantity.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SensitivityAnswer {
+    /// Version of the solver.
+    pub solver_version: &'static str,
+    /// The build that computed it: equal builds on equal processors give equal bytes.
+    pub build: &'static str,
+    /// Whether every variant was looked at.
+    pub is_complete: bool,
+    /// Each quantity, with what moves it most first; none where the base itself has no answer.
+    pub quantities: Vec<SensitivityOfQuantity>,
+    /// Why variants have no answer. The base is variant 0, the input i less 2i + 1, more 2i + 2.
+    pub reasons: Vec<ReasonAnswer>,
+}
+
+/// What moves a quantity.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SensitivityOfQuantity {
+    /// Its name.
+    pub quantity: &'static str,
+    /// Its value at the base.
+    pub value: f64,
+    /// The inputs, what moves it most first.
+    pub inputs: Vec<SensitivityToInput>,
+}
+
+/// What an input does to a quantity.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SensitivityToInput {
+    /// JSON pointer into the design.
+    pub pointer: String,
+    /// The input's value at the base.
+    pub value: f64,
+    /// How far it was moved either way.
+    pub plus_minus: f64,
+    /// The quantity with the input less; left out where that has no answer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub at_minus: Option<f64>,
+    /// The quantity with the input more; left out where that has no answer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub at_plus: Option<f64>,
+    /// The largest change either way.
+    pub change: f64,
+    /// Change of the quantity over change of the input, between less and more; left out where one of them has no answer or they tell of a
+    /// kink or a jump.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub derivative: Option<f64>,
+    /// Whether both ways agree, so that there is a derivative.
+    pub is_smooth: bool,
+}
+
+impl SensitivityAnswer {
+    pub(crate) fn new(sensitivity: &Sensitivity, evaluator: &Evaluator, rows: &RowsPart, is_complete: bool) -> Self {
+        let row = |variant: u64| rows.answered.binary_search(&variant).ok();
+        let quantities = evaluator.quantities.iter().zip(&rows.columns).filter_map(|(quantity, column)| {
+            let value = *column.get(row(0)?)?;
+            let inputs = (0..).zip(&sensitivity.inputs).map(|(index, input)| {
+                let at = |variant: u64| row(variant).and_then(|row| column.get(row).copied());
+                SensitivityToInput::new(input, value, at(2 * index + 1), at(2 * index + 2))
+            });
+            let mut inputs: Vec<_> = inputs.collect();
+            inputs.sort_by(|one, other| other.change.total_cmp(&one.change));
+            Some(SensitivityOfQuantity { quantity: quantity.name, value, inputs })
+        });
+        Self {
+            solver_version: toothwave_solver::VERSION,
+            build: toothwave_calculation::BUILD,
+            is_complete,
+            quantities: quantities.collect(),
+            reasons: rows.refusals.iter().map(ReasonAnswer::from).collect(),
+        }
+    }
+
+    /// A line a quantity and input.
+    pub(crate) fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
+        let mut csv = csv::Writer::from_writer(writer);
+        let names =
+            ["quantity", "pointer", "value", "plus_minus", "at_minus", "at_base", "at_plus", "change", "derivative"];
+        csv.write_record(names).map_err(csv_error)?;
+        for of in &self.quantities {
+            for to in &of.inputs {
+                let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:?}"));
+                let numbers = [
+                    Some(to.value),
+                    Some(to.plus_minus),
+                    to.at_minus,
+                    Some(of.value),
+                    to.at_plus,
+                    Some(to.change),
+                    to.derivative,
+                ];
+                let words = [of.quantity.to_owned(), to.pointer.clone()];
+                csv.write_record(words.into_iter().chain(numbers.map(number))).map_err(csv_error)?;
+            }
+        }
+        csv.flush()
+    }
+}
+
+impl SensitivityToInput {
+    fn new(input: &Input, value: f64, at_minus: Option<f64>, at_plus: Option<f64>) -> Self {
+        let Input { pointer, value: input_value, plus_minus } = input.clone();
+        let below = at_minus.map(|at_minus| value - at_minus);
+        let above = at_plus.map(|at_plus| at_plus - value);
+        let change = [below, above].into_iter().flatten().map(f64::abs).fold(0.0, f64::max);
+        // What rounding alone does to the value is no kink.
+        let rounding = 64.0 * f64::EPSILON * value.abs();
+        let both = below.zip(above);
+        let is_smooth = both
+            .is_some_and(|(below, above)| (above - below).abs() <= SMOOTH * below.abs().max(above.abs()) + rounding);
+        let derivative = both.filter(|_| is_smooth).map(|(below, above)| (above + below) / (2.0 * plus_minus));
+        Self { pointer, value: input_value, plus_minus, at_minus, at_plus, change, derivative, is_smooth }
+    }
+}

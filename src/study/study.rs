@@ -1,0 +1,446 @@
+//! The engine: a study is pure chunks, and a merge that does not depend on their order.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use toothwave_calculation::design::Design;
+use toothwave_calculation::field::FieldCode;
+use toothwave_calculation::json::{self, Tree};
+use toothwave_calculation::key::Key;
+use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
+use toothwave_calculation::question::{self, Question as _};
+use toothwave_calculation::sweep::Sweep;
+use toothwave_solver::Stop;
+
+use crate::answer::StudyAnswer;
+use crate::ask::{beyond, fault, index_of, named};
+use crate::document::StudyDocument;
+use crate::evaluate::{Evaluator, Stopped};
+use crate::limit;
+use crate::map::{Map, MapAnswer};
+use crate::quantity::{Needs, QUANTITIES, Quantity};
+use crate::rows::{CHUNK_VARIANTS, RowsPart, RowsWork};
+use crate::search::{Island, IslandPart, Search, SearchAnswer};
+use crate::sensitivity::{Sensitivity, SensitivityAnswer};
+use crate::tolerance::{Tolerance, ToleranceAnswer};
+use crate::variant::Template;
+
+/// What studies are computed at most.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Those of each variant.
+    pub calculation: question::Limits,
+    /// Most variants of a study.
+    pub max_study_variants: u64,
+    /// Most bytes of what studies come to.
+    pub max_study_bytes: u64,
+}
+
+/// A study that can be carried out.
+#[derive(Debug)]
+pub struct Study {
+    id: Key,
+    kind: Kind,
+    template: Template,
+    evaluator: Evaluator,
+    variants: u64,
+}
+
+#[derive(Debug)]
+enum Kind {
+    Map(Map),
+    Search(Box<Search>),
+    Sensitivity(Sensitivity),
+    Tolerance(Tolerance),
+}
+
+/// What a chunk comes to. It can be kept anywhere and merged in any order.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Part {
+    /// Of a map, a sensitivity or a tolerance study.
+    Rows(RowsPart),
+    /// Of a search.
+    Island(IslandPart),
+}
+
+impl Part {
+    /// Variants that it has looked at.
+    pub const fn variants(&self) -> u64 {
+        match self {
+            Self::Rows(rows) => (rows.answered.len() + rows.refused.len()) as u64,
+            Self::Island(island) => island.evaluated(),
+        }
+    }
+
+    /// Of those, the ones without an answer; of a search those of its scan.
+    pub const fn refused(&self) -> u64 {
+        match self {
+            Self::Rows(rows) => rows.refused.len() as u64,
+            Self::Island(island) => island.refused(),
+        }
+    }
+}
+
+impl Study {
+    /// The study that a text asks for.
+    ///
+    /// # Errors
+    /// Whatever is known to be impossible before anything is computed, at the field that says so.
+    pub fn read(text: &[u8], limits: &Limits) -> Result<Self, NoAnswer> {
+        Self::new(&json::read(text)?, limits)
+    }
+
+    /// The study that a document asks for.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn new(document: &StudyDocument, limits: &Limits) -> Result<Self, NoAnswer> {
+        let id = id(document)?;
+        match document {
+            StudyDocument::Map(map) => {
+                let (grid, template) = Map::new(map)?;
+                let quantities = asked_quantities(&map.quantities, &template)?;
+                let variants = grid.variants().unwrap_or(u64::MAX);
+                Self::checked(id, Kind::Map(grid), template, quantities, variants, limits)
+            }
+            StudyDocument::Search(document) => {
+                let (search, template, quantities) = Search::new(document)?;
+                let variants = search.evaluations();
+                Self::checked(id, Kind::Search(Box::new(search)), template, quantities, variants, limits)
+            }
+            StudyDocument::Sensitivity(document) => {
+                let (sensitivity, template) = Sensitivity::new(document)?;
+                let quantities = asked_quantities(&document.quantities, &template)?;
+                let variants = sensitivity.variants();
+                Self::checked(id, Kind::Sensitivity(sensitivity), template, quantities, variants, limits)
+            }
+            StudyDocument::Tolerance(document) => {
+                let mut quantities = Vec::new();
+                for (index, name) in document.quantities.iter().enumerate() {
+                    index_of(named(name, &format!("/quantities/{index}"))?, &mut quantities);
+                }
+                let bounds = limit::limits(&document.require, &mut quantities)?;
+                let (tolerance, template) = Tolerance::new(document, bounds)?;
+                if quantities.is_empty() {
+                    quantities = asked_quantities(&[], &template)?;
+                }
+                let variants = tolerance.variants();
+                Self::checked(id, Kind::Tolerance(tolerance), template, quantities, variants, limits)
+            }
+        }
+    }
+
+    fn checked(
+        id: Key,
+        kind: Kind,
+        template: Template,
+        quantities: Vec<&'static Quantity>,
+        variants: u64,
+        limits: &Limits,
+    ) -> Result<Self, NoAnswer> {
+        for example in template.examples() {
+            require_what_quantities_need(&quantities, example, &limits.calculation)?;
+        }
+        let study = Self { id, kind, template, evaluator: Evaluator::new(quantities, limits.calculation), variants };
+        #[expect(clippy::cast_precision_loss, reason = "told, not computed with")]
+        if variants > limits.max_study_variants {
+            let limit = limits.max_study_variants;
+            let detail = format!("the study has {variants} variants, more than the {limit} of `max_study_variants`");
+            let mut refused = beyond("", FieldCode::TooManyVariants, detail, variants as f64, limit as f64);
+            refused.code = NoAnswerCode::TooManyVariants;
+            return Err(refused);
+        }
+        #[expect(clippy::cast_precision_loss, reason = "told, not computed with")]
+        if study.stored_bytes() > limits.max_study_bytes {
+            let (bytes, limit) = (study.stored_bytes(), limits.max_study_bytes);
+            let detail = format!(
+                "what the study comes to takes {bytes} bytes, more than the {limit} of `max_study_bytes`: ask for fewer variants or quantities"
+            );
+            let mut refused = beyond("", FieldCode::TooManyVariants, detail, bytes as f64, limit as f64);
+            refused.code = NoAnswerCode::TooManyVariants;
+            return Err(refused);
+        }
+        Ok(study)
+    }
+
+    /// What tells it from every other one: a hash of what is asked, of the build and of the machine's arithmetic.
+    pub const fn id(&self) -> Key {
+        self.id
+    }
+
+    /// The kind, as documents spell it.
+    pub const fn kind(&self) -> &'static str {
+        match self.kind {
+            Kind::Map(_) => "map",
+            Kind::Search(_) => "search",
+            Kind::Sensitivity(_) => "sensitivity",
+            Kind::Tolerance(_) => "tolerance",
+        }
+    }
+
+    /// Variants that it looks at.
+    pub const fn variants(&self) -> u64 {
+        self.variants
+    }
+
+    /// Chunks that it consists of, each a computation of its own.
+    pub const fn chunks(&self) -> u64 {
+        match &self.kind {
+            Kind::Search(search) => search.islands(),
+            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => self.variants.div_ceil(CHUNK_VARIANTS),
+        }
+    }
+
+    /// About what it takes to keep what it comes to.
+    pub fn stored_bytes(&self) -> u64 {
+        const OVERHEAD: u64 = 1 << 14;
+        let quantities = self.evaluator.quantities.len();
+        let bytes = match &self.kind {
+            Kind::Search(search) => search.stored_bytes(quantities, self.template.variables().len()),
+            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => {
+                self.variants.saturating_mul(8 * (quantities as u64 + 2))
+            }
+        };
+        OVERHEAD.saturating_add(bytes)
+    }
+}
+
+/// The hash of what is asked: equal however the fields are ordered and the numbers spelled.
+fn id(document: &StudyDocument) -> Result<Key, NoAnswer> {
+    let text = serde_json::to_string(document).map_err(NoAnswer::internal)?;
+    let sorted = json::tree(text.as_bytes())?.sorted();
+    let text = serde_json::to_string(&sorted).map_err(NoAnswer::internal)?;
+    Ok(Key::new("study", &text.as_str(), &false))
+}
+
+/// The quantities of these names; all that every document has what they need for, where none is named.
+fn asked_quantities(names: &[String], template: &Template) -> Result<Vec<&'static Quantity>, NoAnswer> {
+    if names.is_empty() {
+        let has = template.examples().map(what_it_has).min().unwrap_or(Needs::Drive);
+        let known = template.examples().all(has_allowable_stress);
+        let is_had = |quantity: &&Quantity| match quantity.needs {
+            Needs::AllowableStress => known,
+            needs => needs <= has,
+        };
+        return Ok(QUANTITIES.iter().filter(is_had).collect());
+    }
+    let mut quantities: Vec<&'static Quantity> = Vec::new();
+    for (index, name) in names.iter().enumerate() {
+        let quantity = named(name, &format!("/quantities/{index}"))?;
+        if !quantities.contains(&quantity) {
+            quantities.push(quantity);
+        }
+    }
+    Ok(quantities)
+}
+
+fn at<'a>(tree: &'a Tree, place: &[&str]) -> Option<&'a Tree> {
+    let place: Vec<_> = place.iter().map(|&name| name.to_owned()).collect();
+    tree.at(&place)
+}
+
+fn has_allowable_stress(tree: &Tree) -> bool {
+    at(tree, &["load", "allowable_stress_mpa"]).is_some()
+}
+
+/// The most that quantities may need, allowable stresses apart.
+fn what_it_has(tree: &Tree) -> Needs {
+    let has = |place: &[&str]| at(tree, place).is_some();
+    match (has(&["load"]), has(&["friction"]), has(&["load", "input_speed_rpm"])) {
+        (false, ..) => Needs::Drive,
+        (true, false, _) => Needs::Load,
+        (true, true, false) => Needs::Friction,
+        (true, true, true) => Needs::FrictionAndSpeed,
+    }
+}
+
+/// That a document has what every quantity needs, and that it can be asked at all.
+fn require_what_quantities_need(
+    quantities: &[&'static Quantity],
+    tree: &Tree,
+    limits: &question::Limits,
+) -> Result<(), NoAnswer> {
+    for quantity in quantities {
+        let needed: &[(&[&str], &str)] = match quantity.needs {
+            Needs::Drive => &[],
+            Needs::Load => &[(&["load"], "a load")],
+            Needs::AllowableStress => {
+                &[(&["load"], "a load"), (&["load", "allowable_stress_mpa"], "an allowable stress")]
+            }
+            Needs::Friction => &[(&["load"], "a load"), (&["friction"], "friction")],
+            Needs::FrictionAndSpeed => &[
+                (&["load"], "a load"),
+                (&["friction"], "friction"),
+                (&["load", "input_speed_rpm"], "the speed of the wave generator"),
+            ],
+        };
+        if let Some((place, what)) = needed.iter().find(|(place, _)| at(tree, place).is_none()) {
+            let detail = format!("`{}` needs {what}, and the base has none", quantity.name);
+            return Err(fault(&format!("/base/{}", place.join("/")), FieldCode::MissingField, detail));
+        }
+    }
+    if quantities.iter().all(|quantity| quantity.needs == Needs::Drive) {
+        return Ok(());
+    }
+    // A fault of its form is one whatever the values.
+    let design = tree.read::<Design>()?.normalised();
+    match Sweep.check(&design, limits) {
+        Err(mut refused) if refused.code == NoAnswerCode::InvalidDocument => {
+            refused.detail = format!("/base{}", refused.detail);
+            for error in &mut refused.errors {
+                error.pointer.insert_str(0, "/base");
+            }
+            Err(refused)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A chunk as it is worked on, a variant at a time: it may be laid aside between any two of them.
+#[derive(Debug)]
+pub struct Work {
+    study: Arc<Study>,
+    state: State,
+}
+
+#[derive(Debug)]
+enum State {
+    Rows(RowsWork),
+    Island(Box<Island>),
+}
+
+impl Work {
+    /// A chunk of a study, not begun yet.
+    pub fn new(study: &Arc<Study>, chunk: u64) -> Self {
+        let state = match &study.kind {
+            Kind::Search(search) => State::Island(Box::new(Island::new(search, study.template.clone(), chunk))),
+            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => {
+                let quantities = study.evaluator.quantities.len();
+                State::Rows(RowsWork::new(study.template.clone(), quantities, chunk, study.variants))
+            }
+        };
+        Self { study: Arc::clone(study), state }
+    }
+
+    /// One variant further; whether that was the last one.
+    ///
+    /// # Errors
+    /// When `stop` says so; the chunk is then as it was before.
+    pub fn step(&mut self, stop: &impl Stop) -> Result<bool, Stopped> {
+        let Self { study, state } = self;
+        let evaluator = &study.evaluator;
+        match (&study.kind, state) {
+            (Kind::Map(map), State::Rows(rows)) => rows.step(map, evaluator, stop),
+            (Kind::Sensitivity(sensitivity), State::Rows(rows)) => rows.step(sensitivity, evaluator, stop),
+            (Kind::Tolerance(tolerance), State::Rows(rows)) => rows.step(tolerance, evaluator, stop),
+            (Kind::Search(search), State::Island(island)) => island.step(search, evaluator, stop),
+            // Made for each other above.
+            (Kind::Search(_), State::Rows(_)) | (_, State::Island(_)) => Ok(true),
+        }
+    }
+
+    /// What the chunk comes to, once it is over.
+    pub fn finish(self) -> Part {
+        match self.state {
+            State::Rows(rows) => Part::Rows(rows.finish()),
+            State::Island(island) => Part::Island(island.finish()),
+        }
+    }
+
+    /// The whole chunk at once.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn run(mut self, stop: &impl Stop) -> Result<Part, Stopped> {
+        while !self.step(stop)? {}
+        Ok(self.finish())
+    }
+}
+
+/// The parts of a study, in whatever order they come.
+#[derive(Debug)]
+pub struct Gathered {
+    study: Arc<Study>,
+    parts: Vec<Option<Part>>,
+    missing: u64,
+    variants: u64,
+    refused: u64,
+}
+
+impl Gathered {
+    /// None yet.
+    pub fn new(study: &Arc<Study>) -> Self {
+        let parts = (0..study.chunks()).map(|_| None).collect();
+        Self { study: Arc::clone(study), parts, missing: study.chunks(), variants: 0, refused: 0 }
+    }
+
+    /// The study.
+    pub const fn study(&self) -> &Arc<Study> {
+        &self.study
+    }
+
+    /// Takes what a chunk has come to; a second time it changes nothing.
+    pub fn add(&mut self, chunk: u64, part: Part) {
+        let place = usize::try_from(chunk).ok().and_then(|chunk| self.parts.get_mut(chunk));
+        if let Some(place @ None) = place {
+            self.missing -= 1;
+            self.variants += part.variants();
+            self.refused += part.refused();
+            *place = Some(part);
+        }
+    }
+
+    /// Chunks that have not come yet.
+    pub fn missing(&self) -> impl Iterator<Item = u64> {
+        (0..).zip(&self.parts).filter(|(_, part)| part.is_none()).map(|(chunk, _)| chunk)
+    }
+
+    /// Whether all have come.
+    pub const fn is_complete(&self) -> bool {
+        self.missing == 0
+    }
+
+    /// Variants that were looked at.
+    pub const fn variants(&self) -> u64 {
+        self.variants
+    }
+
+    /// Of those, the ones without an answer.
+    pub const fn refused(&self) -> u64 {
+        self.refused
+    }
+
+    /// What the study comes to, as far as it has come.
+    pub fn answer(&self) -> StudyAnswer {
+        let study = &*self.study;
+        let (evaluator, is_complete) = (&study.evaluator, self.is_complete());
+        match &study.kind {
+            Kind::Map(map) => StudyAnswer::Map(MapAnswer::new(map, evaluator, self.rows(), is_complete)),
+            Kind::Search(search) => {
+                let islands = self.parts.iter().flatten().filter_map(|part| match part {
+                    Part::Island(island) => Some(island),
+                    Part::Rows(_) => None,
+                });
+                StudyAnswer::Search(SearchAnswer::new(search, &study.template, evaluator, islands, is_complete))
+            }
+            Kind::Sensitivity(sensitivity) => {
+                let answer = SensitivityAnswer::new(sensitivity, evaluator, &self.rows(), is_complete);
+                StudyAnswer::Sensitivity(answer)
+            }
+            Kind::Tolerance(tolerance) => {
+                StudyAnswer::Tolerance(ToleranceAnswer::new(tolerance, evaluator, &self.rows(), is_complete))
+            }
+        }
+    }
+
+    /// All rows that have come, in the order of their variants.
+    fn rows(&self) -> RowsPart {
+        let mut rows = RowsPart::new(self.study.evaluator.quantities.len());
+        for part in self.parts.iter().flatten() {
+            if let Part::Rows(part) = part {
+                rows.append(part);
+            }
+        }
+        rows
+    }
+}

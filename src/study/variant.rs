@@ -1,0 +1,294 @@
+//! Variants of a document: what is free in it, over which values, and the document with values put in.
+
+use toothwave_calculation::design::Design;
+use toothwave_calculation::field::FieldCode;
+use toothwave_calculation::json::{Fault, Tree, path};
+use toothwave_calculation::no_answer::NoAnswer;
+
+use crate::ask::{beyond, escaped, fault};
+
+/// Combinations of choices at most: each is a document of its own, which is kept.
+const MOST_FORMS: usize = 256;
+
+const RING_TEETH: [&str; 3] = ["drive", "ring", "teeth"];
+
+/// The values that a free field may have.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Domain {
+    /// Any number of a range, both ends included.
+    Real {
+        /// Its least.
+        min: f64,
+        /// Its largest.
+        max: f64,
+    },
+    /// Any whole number of a range, both ends included.
+    Whole {
+        /// Its least.
+        min: f64,
+        /// Its largest.
+        max: f64,
+    },
+    /// One of several.
+    OneOf(usize),
+}
+
+/// A free field.
+#[derive(Debug, Clone)]
+pub(crate) struct Variable {
+    pub(crate) pointer: String,
+    path: Vec<String>,
+    pub(crate) domain: Domain,
+    choices: Vec<Tree>,
+}
+
+/// What is asked of a free field: a range, or a choice.
+#[derive(Debug, Clone)]
+pub(crate) enum Asked {
+    Range { min: f64, max: f64 },
+    OneOf(Vec<Tree>),
+}
+
+/// The value of a free field in one variant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Value {
+    Number(f64),
+    /// Which of the choices.
+    Choice(usize),
+}
+
+/// Documents with free fields: one for each combination of choices.
+#[derive(Debug, Clone)]
+pub(crate) struct Template {
+    variables: Vec<Variable>,
+    forms: Vec<Form>,
+}
+
+#[derive(Debug, Clone)]
+struct Form {
+    tree: Tree,
+    /// Of the variables, whether this form takes it.
+    takes: Vec<bool>,
+    derives_ring_teeth: bool,
+}
+
+impl Template {
+    /// The documents of a base with these free fields, of which `list` is the name in the study's document.
+    ///
+    /// # Errors
+    /// Where a document cannot be read, whatever the values; where a range is empty, or no document takes a free field.
+    pub(crate) fn new(base: &Tree, free: &[(String, Asked)], list: &str) -> Result<Self, NoAnswer> {
+        let at = |pointer: &str| format!("/{list}/{}", escaped(pointer));
+        let mut variables = Vec::new();
+        for (pointer, asked) in free {
+            let Some(path) = path(pointer) else {
+                let detail = format!("`{pointer}` is no JSON pointer into a design document: one begins with `/`");
+                return Err(fault(&at(pointer), FieldCode::UnknownField, detail));
+            };
+            let (domain, choices) = match asked {
+                Asked::Range { min, max } => (Domain::Real { min: *min, max: *max }, Vec::new()),
+                Asked::OneOf(choices) => (Domain::OneOf(choices.len()), choices.clone()),
+            };
+            match domain {
+                Domain::Real { min, max } if min > max => {
+                    let detail = format!("the range is empty: its least value {min:?} is above its largest {max:?}");
+                    return Err(beyond(&format!("{}/min", at(pointer)), FieldCode::OutOfRange, detail, min, max));
+                }
+                Domain::OneOf(0) => {
+                    let detail = "a choice of nothing: name at least one value";
+                    return Err(fault(&format!("{}/one_of", at(pointer)), FieldCode::OutOfRange, detail));
+                }
+                _ => {}
+            }
+            variables.push(Variable { pointer: pointer.clone(), path, domain, choices });
+        }
+        let mut template = Self { variables, forms: Vec::new() };
+        let mut combinations = template.variables.iter().map(|variable| variable.choices.len().max(1));
+        let combinations = combinations.try_fold(1_usize, usize::checked_mul).filter(|&count| count <= MOST_FORMS);
+        let Some(combinations) = combinations else {
+            let detail = format!("the choices have more than {MOST_FORMS} combinations");
+            return Err(fault(&format!("/{list}"), FieldCode::OutOfRange, detail));
+        };
+        for combination in 0..combinations {
+            let form = template.form(base, combination).map_err(|mut found| {
+                let of_variable = template.variables.iter().find(|variable| variable.pointer == found.pointer);
+                found.pointer = match of_variable {
+                    Some(variable) => at(&variable.pointer),
+                    None => format!("/base{}", found.pointer),
+                };
+                found
+            })?;
+            template.forms.push(form);
+        }
+        for (index, variable) in template.variables.iter_mut().enumerate() {
+            let Some(form) = template.forms.iter().find(|form| form.takes[index]) else {
+                let detail = format!("no variant takes `{}`", variable.pointer);
+                return Err(fault(&at(&variable.pointer), FieldCode::UnknownField, detail));
+            };
+            variable.domain = form.domain(variable);
+            if let Domain::Whole { min, max } = variable.domain
+                && min > max
+            {
+                let detail = "the range holds no whole number";
+                return Err(beyond(&format!("{}/min", at(&variable.pointer)), FieldCode::OutOfRange, detail, min, max));
+            }
+        }
+        Ok(template)
+    }
+
+    pub(crate) fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    /// The document of a combination of choices, in which everything else stands at some value.
+    fn form(&self, base: &Tree, combination: usize) -> Result<Form, Fault> {
+        let mut form = Form {
+            tree: base.clone(),
+            takes: vec![true; self.variables.len()],
+            derives_ring_teeth: base.at(&RING_TEETH.map(String::from)).is_none()
+                && self.variables.iter().all(|variable| variable.path != RING_TEETH),
+        };
+        let mut rest = combination;
+        for variable in &self.variables {
+            let value = match variable.domain {
+                Domain::OneOf(count) => {
+                    let chosen = variable.choices[rest % count].clone();
+                    rest /= count;
+                    chosen
+                }
+                Domain::Real { min, .. } | Domain::Whole { min, .. } => Tree::Number(min.ceil()),
+            };
+            form.tree.set(&variable.path, value);
+        }
+        loop {
+            form.derive();
+            let Err(found) = form.tree.read::<Design>() else { return Ok(form) };
+            // What only another kind, shape or law has is left out; nothing else is.
+            let is_of_choice = self.variables.iter().filter(|variable| !variable.choices.is_empty()).any(|variable| {
+                let parent = variable.pointer.rsplit_once('/').map_or("", |(parent, _)| parent);
+                found.pointer.strip_prefix(parent).is_some_and(|rest| rest.starts_with('/'))
+            });
+            let place = path(&found.pointer).filter(|_| found.code == FieldCode::UnknownField && is_of_choice);
+            let Some(place) = place else { return Err(found) };
+            if form.tree.remove(&place).is_none() {
+                return Err(found);
+            }
+            for (takes, variable) in form.takes.iter_mut().zip(&self.variables) {
+                *takes &= !variable.path.starts_with(&place);
+            }
+        }
+    }
+
+    /// Which form the choices lead to.
+    fn form_index(&self, values: &[Value]) -> usize {
+        let (mut index, mut weight) = (0, 1);
+        for (variable, value) in self.variables.iter().zip(values) {
+            if let (Domain::OneOf(count), Value::Choice(chosen)) = (&variable.domain, value) {
+                index += weight * chosen;
+                weight *= count;
+            }
+        }
+        index
+    }
+
+    /// The document with these values, one for each variable. What the form does not take stays out.
+    pub(crate) fn filled(&mut self, values: &[Value]) -> &Tree {
+        let index = self.form_index(values);
+        let form = &mut self.forms[index];
+        for ((variable, value), takes) in self.variables.iter().zip(values).zip(&form.takes) {
+            if let (Value::Number(number), true) = (value, takes) {
+                form.tree.set(&variable.path, Tree::Number(*number));
+            }
+        }
+        form.derive();
+        &form.tree
+    }
+
+    /// Some document of each form.
+    pub(crate) fn examples(&self) -> impl Iterator<Item = &Tree> {
+        self.forms.iter().map(|form| &form.tree)
+    }
+
+    /// Puts the same value at a place in every form.
+    pub(crate) fn set(&mut self, place: &[String], value: &Tree) {
+        for form in &mut self.forms {
+            form.tree.set(place, value.clone());
+        }
+    }
+
+    /// Takes away what stands at a place in every form.
+    pub(crate) fn remove(&mut self, place: &[String]) {
+        for form in &mut self.forms {
+            form.tree.remove(place);
+        }
+    }
+}
+
+impl Form {
+    /// The ring's teeth, where they are left out: one fewer than the carrier's for each lobe.
+    fn derive(&mut self) {
+        if !self.derives_ring_teeth {
+            return;
+        }
+        let number = |place: &[&str]| {
+            let place: Vec<_> = place.iter().map(|&name| name.to_owned()).collect();
+            match self.tree.at(&place) {
+                Some(Tree::Number(number)) => Some(*number),
+                _ => None,
+            }
+        };
+        let kind = self.tree.at(&["drive", "wave_generator", "kind"].map(String::from));
+        let lobes = match kind {
+            Some(Tree::Text(kind)) if kind == "eccentric" => Some(1.0),
+            Some(Tree::Text(kind)) if kind == "ellipse" => Some(2.0),
+            Some(_) => number(&["drive", "wave_generator", "lobes"]),
+            None => Some(2.0),
+        };
+        if let (Some(lobes), Some(count)) = (lobes, number(&["drive", "teeth", "count"])) {
+            self.tree.set(&RING_TEETH.map(String::from), Tree::Number(count - lobes));
+        }
+    }
+
+    /// The domain of a variable as this form reads it: a number between two whole ones is no whole number.
+    fn domain(&self, variable: &Variable) -> Domain {
+        let Domain::Real { min, max } = variable.domain else { return variable.domain.clone() };
+        let mut tree = self.tree.clone();
+        tree.set(&variable.path, Tree::Number(min.floor() + 0.5));
+        match tree.read::<Design>() {
+            Err(found) if found.pointer == variable.pointer && found.code == FieldCode::WrongType => {
+                Domain::Whole { min: min.ceil(), max: max.floor() }
+            }
+            _ => Domain::Real { min, max },
+        }
+    }
+}
+
+impl Variable {
+    /// The value at a share of the domain, 0 to 1; every whole number and every choice has an equal part of it.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of choices")]
+    pub(crate) fn at_share(&self, share: f64) -> Value {
+        match self.domain {
+            Domain::Real { min, max } => Value::Number((min + share * (max - min)).clamp(min, max)),
+            Domain::Whole { min, max } => Value::Number((min + (share * (max - min + 1.0)).floor()).min(max)),
+            Domain::OneOf(count) => Value::Choice(((share * count as f64) as usize).min(count - 1)),
+        }
+    }
+
+    /// Where it stands in a design.
+    pub(crate) fn path(&self) -> &[String] {
+        &self.path
+    }
+
+    /// The choices, where it is one.
+    pub(crate) fn choices(&self) -> &[Tree] {
+        &self.choices
+    }
+
+    /// A value as documents spell it.
+    pub(crate) fn spelled(&self, value: Value) -> Tree {
+        match value {
+            Value::Number(number) => Tree::Number(number),
+            Value::Choice(chosen) => self.choices[chosen].clone(),
+        }
+    }
+}

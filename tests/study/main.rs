@@ -1,0 +1,12 @@
+//! What is true of studies.
+#![allow(
+    clippy::float_cmp,
+    clippy::unwrap_used,
+    reason = "tests compare exactly where values are exact, and fail by panicking"
+)]
+
+mod asking;
+mod deviations;
+mod engine;
+mod maps;
+mod searches;
