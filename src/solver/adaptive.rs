@@ -4,6 +4,7 @@
 //! clearance: continuous). Each smooth piece is halved until straight lines between its input angles are true to a
 //! resolution, so that no peak hides between them; then every peak that may be the largest of its kind is closed in on.
 
+use crate::contact::PerContact;
 use crate::load_sharing::{LoadCase, LoadedDrive};
 use crate::mesh::{Mesh, PlacedTooth};
 use crate::position::Position;
@@ -157,7 +158,7 @@ struct Search<'a, S> {
     /// With one tooth at each place of the mesh, which stands for all that carry alike.
     loaded: LoadedDrive<'a>,
     mesh: Mesh,
-    allowable_stress_mpa: Option<f64>,
+    allowable_stress_mpa: Option<PerContact<f64>>,
     /// Whether teeth begin and cease to carry between their entry and their exit.
     has_gaps: bool,
     /// Whether loads are smooth between two entries.
@@ -257,7 +258,7 @@ impl<S: Stop> Search<'_, S> {
         let wind_up = self.loaded.wind_up(&teeth)?;
         let loads: Result<Vec<_>, _> = teeth.iter().map(|tooth| self.loaded.loads(tooth, &wind_up)).collect();
         let (rotation_rad, stiffness) = (wind_up.rotation_rad(), wind_up.stiffness_nmm_per_rad);
-        let per_capacity = match self.allowable_stress_mpa {
+        let per_capacity = match &self.allowable_stress_mpa {
             Some(allowable_mpa) => 1.0 / self.loaded.torque_limit(&teeth, allowable_mpa)?.input_torque_nmm,
             None => 0.0,
         };

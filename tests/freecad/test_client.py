@@ -44,6 +44,8 @@ NOT_IN_THE_FORM = (
     "/modification",
     "/friction",
     "/load/input_speed_rpm",
+    "/load/duty",
+    "/load/allowable_stress_mpa/",
 )
 
 
