@@ -31,9 +31,7 @@
 //! [`Drive::new`] checks parameters once and reports every reason why a drive cannot exist. A [`Drive`] answers for
 //! its geometry and its mesh; with a [`LoadCase`] it answers a [`sweep()`](sweep::sweep) over one period.
 
-mod adaptive;
 pub mod approach;
-mod batch;
 pub mod cam;
 pub mod contact;
 pub mod drawing;

@@ -24,7 +24,7 @@ use crate::contact::PerContact;
 use crate::load_sharing::{Compatibility, LoadedDrive};
 use crate::mesh::{Mesh, Samples};
 use crate::position::Position;
-use crate::sweep::{InputAngles, PeakAt, States, TorqueBalance, worse};
+use crate::sweep::columns::{Columns, InputAngles, PeakAt, States, TorqueBalance, worse};
 use crate::{SolveError, Stop};
 
 /// States worked on in one stretch of straight code; a multiple of every vector's width.
@@ -45,14 +45,6 @@ const LAST_STEP: f64 = 5e-6;
 /// Terms of the arctangent's series at most. A drive that needs more goes the plain way.
 const MAX_TERMS: usize = 24;
 
-/// What the plain path and this one both make of a sweep.
-pub(crate) struct BatchSweep {
-    pub(crate) states: States,
-    pub(crate) input_angles: InputAngles,
-    pub(crate) peaks: PerContact<PeakAt>,
-    pub(crate) torque_balance_residual: f64,
-}
-
 /// The sweep, or nothing where the plain path has to make it: for a power law, for clearances, and for drives beyond the caps above.
 ///
 /// # Errors
@@ -61,7 +53,7 @@ pub(crate) fn sweep(
     loaded: &LoadedDrive<'_>,
     samples: Samples,
     stop: &impl Stop,
-) -> Result<Option<BatchSweep>, SolveError> {
+) -> Result<Option<Columns>, SolveError> {
     let Some(kernel) = Kernel::new(loaded) else { return Ok(None) };
     pulp::Arch::new().dispatch(Vectorised { kernel: &kernel, loaded, samples, stop })
 }
@@ -76,7 +68,7 @@ struct Vectorised<'a, S> {
 }
 
 impl<S: Stop> pulp::WithSimd for Vectorised<'_, S> {
-    type Output = Result<Option<BatchSweep>, SolveError>;
+    type Output = Result<Option<Columns>, SolveError>;
 
     #[inline(always)]
     fn with_simd<V: pulp::Simd>(self, _: V) -> Self::Output {
@@ -188,10 +180,10 @@ impl Kernel {
         loaded: &LoadedDrive<'_>,
         samples: Samples,
         stop: &impl Stop,
-    ) -> Result<Option<BatchSweep>, SolveError> {
+    ) -> Result<Option<Columns>, SolveError> {
         let drive = loaded.drive();
         let mesh = Mesh::new(drive);
-        let mut sweep = BatchSweep {
+        let mut sweep = Columns {
             states: States::with_capacity(whole(mesh.state_count(samples))),
             input_angles: InputAngles::with_capacity(whole(samples.count() + 1)),
             peaks: PerContact::default(),
@@ -373,7 +365,7 @@ impl Kernel {
         samples: Range<u64>,
         run: &Run,
         tile: &mut Tile<'_>,
-        sweep: &mut BatchSweep,
+        sweep: &mut Columns,
     ) {
         let rows = tile.sum_torques(run.teeth);
         let input_nmm = loaded.input_torque_nmm();

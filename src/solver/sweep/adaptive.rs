@@ -9,7 +9,7 @@ use crate::load_sharing::{LoadCase, LoadedDrive};
 use crate::mesh::{Mesh, PlacedTooth};
 use crate::position::Position;
 use crate::ring::FlankEnd;
-use crate::sweep::Tolerance;
+use crate::sweep::points::Tolerance;
 use crate::{SolveError, Stop};
 
 /// Intervals that a smooth piece starts with.

@@ -1,0 +1,225 @@
+//! A sweep state by state: what the fast path is held against, and what is left where it does not reach.
+
+use crate::contact::{Contact, Materials, PerContact};
+use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
+use crate::mesh::{Mesh, PlacedTooth};
+use crate::root::NotConverged;
+use crate::springs::WindUp;
+use crate::sweep::adaptive;
+use crate::sweep::columns::{
+    Columns, ContactPeaks, InputAngles, PeakAt, PeakShear, States, Sweep, TorqueBalance, TorqueCapacity, finished,
+    worse,
+};
+use crate::sweep::points::Points;
+use crate::tooth::Pressure;
+use crate::tooth::point::ShearBelow;
+use crate::{SolveError, Stop};
+
+/// The pressure that has the largest stress of a contact so far.
+#[derive(Debug, Clone, Copy)]
+struct Hardest {
+    stress_mpa: f64,
+    force_n: f64,
+    pressure: Pressure,
+}
+
+/// The first of the largest values of a column.
+fn peak_at(column: &[f64]) -> usize {
+    column.iter().enumerate().fold(0, |at, (index, &value)| if value > column[at] { index } else { at })
+}
+
+/// The sweep.
+///
+/// # Errors
+/// As [`sweep`](crate::sweep::sweep()).
+pub(crate) fn sweep(
+    loaded: &LoadedDrive<'_>,
+    load: &LoadCase,
+    points: Points,
+    stop: &impl Stop,
+) -> Result<Sweep, SolveError> {
+    let mesh = Mesh::new(loaded.drive());
+    let mut columns = Growing::new(loaded, load.parameters().allowable_stress_mpa);
+    match points {
+        Points::Samples(samples) => {
+            columns.reserve(mesh.state_count(samples));
+            for sample in 0..=samples.count() {
+                if stop.stopped() {
+                    return Err(SolveError::Stopped);
+                }
+                columns.add(mesh.input_angle_deg(sample, samples), mesh.placed_at(sample, samples))?;
+            }
+        }
+        Points::Tolerance(tolerance) => {
+            let moments = adaptive::moments(loaded, load, tolerance, stop)?;
+            // Each place was counted once; listed it may stand for several teeth, and in every lap.
+            let listed =
+                moments.iter().map(|moment| moment.places()).sum::<u64>() * mesh.laps() * mesh.listed_at_each_place();
+            let limit = tolerance.max_states();
+            if listed > limit {
+                return Err(SolveError::TooManyStates { limit });
+            }
+            let lap_deg = mesh.period_deg() / mesh.laps() as f64;
+            for lap in 0..mesh.laps() {
+                // A lap begins where the one before has ended.
+                for moment in &moments[usize::from(lap > 0)..] {
+                    if stop.stopped() {
+                        return Err(SolveError::Stopped);
+                    }
+                    columns.add((lap as f64 + moment.fraction) * lap_deg, moment.placed(&mesh, lap))?;
+                }
+            }
+        }
+    }
+    columns.finish(points, &load.parameters().materials)
+}
+
+/// A sweep as it grows by input angles.
+struct Growing<'a> {
+    loaded: &'a LoadedDrive<'a>,
+    allowable_stress_mpa: Option<PerContact<f64>>,
+    states: States,
+    input_angles: InputAngles,
+    torque_capacity: Option<TorqueCapacity>,
+    balance: TorqueBalance,
+    torque_balance_residual: f64,
+    lists_lobes: bool,
+    teeth: Vec<ToothState>,
+    hardest: PerContact<Option<Hardest>>,
+}
+
+impl Hardest {
+    /// The peaks of a line with what is another contact's own.
+    fn complete(&self, peaks: ContactPeaks, materials: &Materials, contact: Contact) -> ContactPeaks {
+        match &self.pressure {
+            Pressure::Line { .. } => peaks,
+            Pressure::Flat(flat) => ContactPeaks { half_width_mm: 0.5 * flat.length_mm(), shear: None, ..peaks },
+            Pressure::Ellipse(ellipse) => {
+                let half_width_mm = ellipse.half_width_mm(self.force_n);
+                let half_length_mm = ellipse.half_length_mm(self.force_n);
+                // Of the two bodies the one where it is larger.
+                let shears = [materials.teeth, *materials.partner(contact)].map(|material| {
+                    let ShearBelow { share, depth } = ellipse.shear_below(material.poissons_ratio);
+                    PeakShear {
+                        stress_mpa: share * self.stress_mpa,
+                        depth_mm: depth * half_width_mm.min(half_length_mm),
+                    }
+                });
+                let [one, other] = shears;
+                let shear = if other.stress_mpa > one.stress_mpa { other } else { one };
+                ContactPeaks { half_width_mm, half_length_mm: Some(half_length_mm), shear: Some(shear), ..peaks }
+            }
+        }
+    }
+}
+
+impl<'a> Growing<'a> {
+    fn new(loaded: &'a LoadedDrive<'a>, allowable_stress_mpa: Option<PerContact<f64>>) -> Self {
+        Self {
+            loaded,
+            allowable_stress_mpa,
+            states: States::default(),
+            input_angles: InputAngles::default(),
+            torque_capacity: None,
+            balance: TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm()),
+            torque_balance_residual: 0.0,
+            lists_lobes: !Mesh::new(loaded.drive()).zones_are_alike(),
+            teeth: Vec::new(),
+            hardest: PerContact::default(),
+        }
+    }
+
+    fn reserve(&mut self, states: u64) {
+        // A count that memory can hold; the caller has bounded it.
+        self.states = States::with_capacity(usize::try_from(states).unwrap_or(usize::MAX));
+    }
+
+    /// Appends the states of the teeth in mesh at one input angle.
+    fn add(&mut self, input_angle_deg: f64, placed: impl Iterator<Item = PlacedTooth>) -> Result<(), SolveError> {
+        self.teeth.clear();
+        for PlacedTooth { number, lobe, position, position_deg } in placed {
+            self.teeth.push(self.loaded.tooth(position)?);
+            self.states.input_angle_deg.push(input_angle_deg);
+            self.states.tooth.push(u32::try_from(number).unwrap_or(u32::MAX));
+            if self.lists_lobes {
+                self.states.lobe.push(lobe);
+            }
+            self.states.position_deg.push(position_deg);
+        }
+        let wind_up = self.loaded.wind_up(&self.teeth)?;
+        let loaded_teeth = self.share_load(&wind_up)?;
+        self.input_angles.push(self.loaded.drive(), input_angle_deg, &wind_up, loaded_teeth);
+        if let Some(allowable_stress_mpa) = &self.allowable_stress_mpa {
+            let limit = self.loaded.torque_limit(&self.teeth, allowable_stress_mpa)?;
+            let input_torque_nm = 1e-3 * limit.input_torque_nmm;
+            if self.torque_capacity.is_none_or(|capacity| input_torque_nm < capacity.input_torque_nm) {
+                let output_torque_nm = input_torque_nm * self.loaded.drive().teeth_per_wave();
+                let contact = limit.contact;
+                let capacity = TorqueCapacity { input_torque_nm, output_torque_nm, contact, input_angle_deg };
+                self.torque_capacity = Some(capacity);
+            }
+        }
+        Ok(())
+    }
+
+    /// Appends geometry, forces and stresses of the teeth, and returns how many carry load.
+    fn share_load(&mut self, wind_up: &WindUp) -> Result<usize, NotConverged> {
+        let flank = self.loaded.drive().flank();
+        let states = &mut self.states;
+        let mut loaded_teeth = 0;
+        let zones = self.loaded.zones();
+        let mut torque_nmm = PerContact::<f64>::default();
+        for tooth in &self.teeth {
+            let ToothState { center, flank: point, .. } = tooth;
+            states.center_radius_mm.push(center.center_radius_mm);
+            let cam_angle_rad = flank.locus().contact_angle_from_valley_rad(center);
+            states.wave_generator_angle_deg.push(cam_angle_rad.to_degrees());
+            states.ring_angle_deg.push(flank.angle_from_tip_rad(center, point).to_degrees());
+
+            let force_n = self.loaded.forces_n(tooth, wind_up)?;
+            loaded_teeth += usize::from(force_n.wave_generator > 0.0);
+            let stress_mpa = self.loaded.stress_mpa(tooth, &force_n);
+            for (contact, &stress_mpa) in stress_mpa.iter() {
+                let hardest = self.hardest.get_mut(contact);
+                // The first of equal ones, as among the states.
+                if hardest.is_none_or(|before| stress_mpa > before.stress_mpa) {
+                    let (force_n, pressure) = (*force_n.get(contact), *tooth.pressure.get(contact));
+                    *hardest = Some(Hardest { stress_mpa, force_n, pressure });
+                }
+            }
+            states.force_n.push(force_n);
+            states.stress_mpa.push(stress_mpa);
+
+            let sin_ring = point.tan_pressure_angle * point.cos_pressure_angle;
+            torque_nmm.wave_generator += zones * force_n.wave_generator * center.cam_contact.lever_arm_mm;
+            torque_nmm.ring += zones * force_n.ring * sin_ring * center.center_radius_mm;
+            torque_nmm.carrier += zones * force_n.carrier * center.center_radius_mm;
+        }
+        let residual = self.balance.residual(&torque_nmm);
+        self.torque_balance_residual = worse(residual, self.torque_balance_residual);
+        Ok(loaded_teeth)
+    }
+
+    fn finish(self, points: Points, materials: &Materials) -> Result<Sweep, SolveError> {
+        let Self { loaded, states, input_angles, torque_capacity, torque_balance_residual, hardest, .. } = self;
+        let peaks = PerContact::of(|contact| PeakAt {
+            force: peak_at(states.force_n.get(contact)),
+            stress: peak_at(states.stress_mpa.get(contact)),
+        });
+        let columns = Columns { states, input_angles, peaks, torque_balance_residual };
+        let mut sweep = finished(loaded, points, columns, torque_capacity)?;
+        sweep.peaks = PerContact::of(|contact| match hardest.get(contact) {
+            Some(hardest) => hardest.complete(*sweep.peaks.get(contact), materials, contact),
+            None => *sweep.peaks.get(contact),
+        });
+        Ok(sweep)
+    }
+}
+
+impl PerContact<Vec<f64>> {
+    fn push(&mut self, values: PerContact<f64>) {
+        self.wave_generator.push(values.wave_generator);
+        self.ring.push(values.ring);
+        self.carrier.push(values.carrier);
+    }
+}
