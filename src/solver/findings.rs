@@ -418,7 +418,10 @@ pub fn of_contacts(
             peaks
                 .iter()
                 .map(|(contact, peaks)| (contact, peaks.stress_mpa.value, *allowable_mpa.get(contact)))
-                .filter(|(_, stress_mpa, allowable_mpa)| stress_mpa > allowable_mpa)
+                // Of the fatigue limit itself its own finding says the same.
+                .filter(|(_, stress_mpa, allowable_mpa)| {
+                    stress_mpa > allowable_mpa && allowable_mpa.total_cmp(&FATIGUE_LIMIT_STRESS_MPA).is_ne()
+                })
                 .map(|(contact, stress_mpa, allowable_mpa)| Finding::StressAboveAllowable {
                     contact,
                     stress_mpa,

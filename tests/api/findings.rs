@@ -367,6 +367,12 @@ async fn a_stress_above_the_allowable_one_is_a_warning_for_each_contact_with_its
     assert_eq!(finding["severity"], "warning");
     assert!(finding["pointers"].as_array().unwrap().contains(&json!("/materials/ring")));
     assert_eq!(exceeded(json!(1.0)).await.len(), 3);
+    // The fatigue limit has a finding of its own, which says the same.
+    let codes = codes_of(&findings(&with(&overloaded(), "/load/allowable_stress_mpa", json!(1500.0))).await);
+    assert!(
+        !codes.contains(&"stress_above_allowable".to_owned())
+            && codes.contains(&"stress_above_fatigue_limit".to_owned())
+    );
     // What a contact bears with a hair to spare, it may: with a stress to reach the sweep goes state by state, and rounds otherwise.
     let hair = 1.0 + 1e-12;
     let just = json!({ "wave_generator": hair * peak("wave_generator"), "ring": hair * peak("ring"), "carrier": hair * peak("carrier") });

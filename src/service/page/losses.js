@@ -34,7 +34,11 @@ function frictionOn(kind, design) {
 const on = (kind, design) => changed(design, '/friction', frictionOn(kind, design));
 
 /** What of a design the comparison depends on. */
-const questionOf = (design) => KINDS.map(({ kind }) => { const { drive, materials, load, model, modification, sweep, friction } = on(kind, design); return { drive, materials, load, model, modification, sweep, friction }; });
+const questionOf = (design) =>
+  KINDS.map(({ kind }) => {
+    const { drive, materials, load, model, modification, sweep, friction } = on(kind, design);
+    return { drive, materials, load, model, modification, sweep, friction };
+  });
 
 const percent = (share) => withUnit(number(100 * share, 3), '%');
 
@@ -42,7 +46,8 @@ const percent = (share) => withUnit(number(100 * share, 3), '%');
 function assumed(design) {
   const { wave_generator: race, ring, carrier } = frictionOn('race', design);
   const coefficients = `${race.coefficient} at the wave generator, ${ring.coefficient} at the ring, ${carrier.coefficient} in the slots, and ${race.bearing_coefficient} of the bearing at ${number(race.bearing_radius_mm, 4)} mm`;
-  return design.friction ? `With this design’s coefficients, ${coefficients} where it has none for one.` : `With coefficients taken for the comparison, since the design has none: ${coefficients}.`;
+  const whose = design.friction ? 'this design’s coefficients, and usual ones where it has none' : 'coefficients taken for the comparison, since the design has none';
+  return `With ${whose}: ${coefficients}.`;
 }
 
 export class Losses {
