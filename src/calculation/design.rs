@@ -8,6 +8,7 @@ use toothwave_solver::losses::Friction;
 use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::profile::{Extent, ProfileParameters};
 use toothwave_solver::sweep::Points;
+use toothwave_solver::violation::{OfDutyPoint, SHARES_TOLERANCE};
 use toothwave_solver::{
     Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, Parameter, PerContact, Torque,
     Violation,
@@ -88,6 +89,42 @@ pub struct Design {
     pub assembly: AssemblyDocument,
 }
 
+/// The loads in turn.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Duty {
+    /// Each of them.
+    pub points: Vec<DutyPoint>,
+    /// The one with the largest torque, which has the largest forces, stresses and wind-up of all.
+    pub hardest: usize,
+    /// Whether the document has a duty, or a single load.
+    pub is_asked: bool,
+}
+
+/// One of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DutyPoint {
+    /// Its torque.
+    pub torque: Torque,
+    /// Speed of the wave generator.
+    pub input_speed_rpm: Option<f64>,
+    /// Its share of the running time.
+    pub share_of_time: f64,
+}
+
+/// The torque where exactly one is given.
+fn one_torque(input_nm: Option<f64>, output_nm: Option<f64>, pointer: String) -> Result<Torque, Fault> {
+    let fault = |code, detail: &str| Fault { pointer, code, detail: detail.into() };
+    match (input_nm, output_nm) {
+        (Some(torque_nm), None) => Ok(Torque::Input(torque_nm)),
+        (None, Some(torque_nm)) => Ok(Torque::Output(torque_nm)),
+        (Some(_), Some(_)) => Err(fault(
+            FieldCode::ConflictingFields,
+            "only one of `input_torque_nm` and `output_torque_nm` may stand here",
+        )),
+        (None, None) => Err(fault(FieldCode::MissingField, "`input_torque_nm` or `output_torque_nm` is required here")),
+    }
+}
+
 impl Design {
     /// The document that a text holds, normalised.
     ///
@@ -165,18 +202,8 @@ impl Design {
             let detail = "forces need a load: give `load` an `input_torque_nm` or an `output_torque_nm`";
             Fault::of_field(FieldCode::MissingField, "load", detail.into())
         })?;
-        let torque = match (load.input_torque_nm, load.output_torque_nm) {
-            (Some(torque_nm), None) => Torque::Input(torque_nm),
-            (None, Some(torque_nm)) => Torque::Output(torque_nm),
-            (given, _) => {
-                let code = if given.is_some() { FieldCode::ConflictingFields } else { FieldCode::MissingField };
-                let detail = match given {
-                    Some(_) => "only one of `input_torque_nm` and `output_torque_nm` may stand here",
-                    None => "`input_torque_nm` or `output_torque_nm` is required here",
-                };
-                return Err(Fault::of_field(code, "load", detail.into()));
-            }
-        };
+        let Duty { points, hardest, .. } = self.duty_of(load)?;
+        let torque = points[hardest].torque;
         let material = |document: &MaterialDocument| Material {
             youngs_modulus_gpa: document.youngs_modulus_gpa,
             poissons_ratio: document.poissons_ratio,
@@ -202,17 +229,95 @@ impl Design {
                 ring: clearance.ring_um,
                 carrier: clearance.carrier_um,
             }),
-            allowable_stress_mpa: load.allowable_stress_mpa,
+            allowable_stress_mpa: load.allowable_stress_mpa.map(Into::into),
         })
     }
 
-    /// Speed of the wave generator.
+    /// The loads in turn, of a document with a load; a single one where it has no duty.
     ///
     /// # Errors
-    /// The violation of its range.
-    pub fn input_speed_rpm(&self) -> Result<Option<f64>, Violation> {
-        let speed_rpm = self.load.as_ref().and_then(|load| load.input_speed_rpm);
-        speed_rpm.and_then(|speed_rpm| Parameter::InputSpeed.check(speed_rpm)).map_or(Ok(speed_rpm), Err)
+    /// As [`Self::load_parameters`].
+    pub fn duty(&self) -> Result<Duty, Fault> {
+        self.load.as_ref().map_or_else(|| Ok(Duty::default()), |load| self.duty_of(load))
+    }
+
+    fn duty_of(&self, load: &LoadDocument) -> Result<Duty, Fault> {
+        let fault = |code, pointer: String, detail: &str| Fault { pointer, code, detail: detail.into() };
+        let LoadDocument { input_torque_nm, output_torque_nm, input_speed_rpm, duty, .. } = load;
+        let Some(duty) = duty else {
+            let torque = one_torque(*input_torque_nm, *output_torque_nm, "/load".into())?;
+            let point = DutyPoint { torque, input_speed_rpm: *input_speed_rpm, share_of_time: 1.0 };
+            return Ok(Duty { points: vec![point], ..Duty::default() });
+        };
+        if input_torque_nm.or(*output_torque_nm).or(*input_speed_rpm).is_some() {
+            let detail = "`duty` has torques and speeds of its own: no other may stand here";
+            return Err(fault(FieldCode::ConflictingFields, "/load".into(), detail));
+        }
+        if self.sweep.tolerance.is_some() {
+            let detail = "a duty adds wear place by place, and its points have to be swept over the same input angles: give `samples`";
+            return Err(fault(FieldCode::ConflictingFields, "/sweep/tolerance".into(), detail));
+        }
+        let points: Result<Vec<_>, _> = duty
+            .iter()
+            .enumerate()
+            .map(|(at, point)| {
+                let torque = one_torque(point.input_torque_nm, point.output_torque_nm, format!("/load/duty/{at}"))?;
+                let (input_speed_rpm, share_of_time) = (Some(point.input_speed_rpm), point.share_of_time);
+                Ok(DutyPoint { torque, input_speed_rpm, share_of_time })
+            })
+            .collect();
+        let points = points?;
+        if points.is_empty() {
+            return Err(fault(FieldCode::OutOfRange, "/load/duty".into(), "a duty has one point or more"));
+        }
+        // Every force grows with the torque, so the hardest point is that of the largest.
+        let drive = self.drive_parameters();
+        let ratio = drive.teeth as f64 / drive.wave_generator.lobes() as f64;
+        let input_nm = |point: &DutyPoint| match point.torque {
+            Torque::Input(torque_nm) => torque_nm,
+            Torque::Output(torque_nm) => torque_nm / ratio,
+        };
+        let hardest = (1..points.len())
+            .fold(0, |hardest, at| if input_nm(&points[at]) > input_nm(&points[hardest]) { at } else { hardest });
+        Ok(Duty { points, hardest, is_asked: true })
+    }
+
+    /// Every number of the duty that is out of its range, or else shares that do not add up to one; of a load without one that of the speed.
+    ///
+    /// # Errors
+    /// As [`Self::load_parameters`].
+    pub fn duty_violations(&self) -> Result<Vec<Violation>, Fault> {
+        let Duty { points, is_asked, .. } = self.duty()?;
+        if !is_asked {
+            let speeds = points.iter().filter_map(|point| point.input_speed_rpm);
+            return Ok(speeds.filter_map(|speed_rpm| Parameter::InputSpeed.check(speed_rpm)).collect());
+        }
+        let mut violations: Vec<_> = Parameter::DutyPoints.check(points.len() as f64).into_iter().collect();
+        for (at, point) in points.iter().enumerate() {
+            let torque = match point.torque {
+                Torque::Input(torque_nm) => (OfDutyPoint::InputTorque, Some(torque_nm)),
+                Torque::Output(torque_nm) => (OfDutyPoint::OutputTorque, Some(torque_nm)),
+            };
+            let speed = (OfDutyPoint::InputSpeed, point.input_speed_rpm);
+            let share = (OfDutyPoint::ShareOfTime, Some(point.share_of_time));
+            let out_of_range = |(of, value): (OfDutyPoint, Option<f64>)| Parameter::Duty(of, at).check(value?);
+            violations.extend([torque, speed, share].into_iter().filter_map(out_of_range));
+        }
+        let sum: f64 = points.iter().map(|point| point.share_of_time).sum();
+        if violations.is_empty() && (sum - 1.0).abs() > SHARES_TOLERANCE {
+            violations.push(Violation::DutyShares { sum });
+        }
+        Ok(violations)
+    }
+
+    /// The wear rates of the parts, where they are given.
+    pub fn wear_rate_mm3_per_nm(&self) -> Option<PerContact<f64>> {
+        self.friction.as_ref().and_then(FrictionDocument::wear_rate_mm3_per_nm)
+    }
+
+    /// What the life of the wave generator's bearing follows from, where it is asked for.
+    pub fn bearing_rating(&self) -> Option<BearingRating> {
+        self.friction.as_ref().and_then(FrictionDocument::bearing_rating)
     }
 
     /// Friction, where there is any.
@@ -221,9 +326,13 @@ impl Design {
     /// Every value that is out of its range.
     pub fn friction(&self) -> Result<Option<Friction>, Vec<Violation>> {
         let Some(document) = &self.friction else { return Ok(None) };
-        match (document.idle_violation(), Friction::new(&document.into())) {
-            (None, friction) => friction.map(Some),
-            (Some(idle), friction) => Err(std::iter::once(idle).chain(friction.err().into_iter().flatten()).collect()),
+        let mut violations = document.violations_beside();
+        if document.bearing_rating().is_some() && !self.drive_parameters().wave_generator.is_eccentric_circle() {
+            violations.push(Violation::NoBearingLife);
+        }
+        match Friction::new(&document.into()) {
+            Ok(friction) if violations.is_empty() => Ok(Some(friction)),
+            friction => Err(violations.into_iter().chain(friction.err().into_iter().flatten()).collect()),
         }
     }
 

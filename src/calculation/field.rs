@@ -1,7 +1,7 @@
 //! Fields of the design document: where each stands, and what can be wrong with it.
 
 use serde::Serialize;
-use toothwave_solver::violation::{Listed, Misfit, Modified, Violation};
+use toothwave_solver::violation::{Listed, Misfit, Modified, OfDutyPoint, Violation};
 use toothwave_solver::{Contact, Parameter, Part};
 use utoipa::ToSchema;
 
@@ -134,6 +134,8 @@ impl From<&Violation> for FieldError {
             Violation::DeviationCount { listed, count, items } => {
                 (FieldCode::WrongLength, Parameter::DeviationList(listed), count as f64, items as f64)
             }
+            Violation::DutyShares { sum } => (FieldCode::OutOfRange, Parameter::DutyPoints, sum, 1.0),
+            Violation::NoBearingLife => return Self::conflict(violation, Parameter::BearingLoadRating),
             Violation::LawOfOtherTeeth => return Self::conflict(violation, Parameter::Law),
             Violation::PartDoesNotFit { misfit, value, limit } => {
                 let code = match misfit {
@@ -209,10 +211,23 @@ pub fn pointer(parameter: Parameter) -> String {
         Parameter::RunoutAmount(contact) => format!("/deviations/{}_runout/amount_um", contact_name(contact)),
         Parameter::RunoutAngle(contact) => format!("/deviations/{}_runout/angle_deg", contact_name(contact)),
         Parameter::AllowableStress => "/load/allowable_stress_mpa".into(),
+        Parameter::AllowableStressAt(contact) => format!("/load/allowable_stress_mpa/{}", contact_name(contact)),
         Parameter::InputSpeed => "/load/input_speed_rpm".into(),
+        Parameter::DutyPoints => "/load/duty".into(),
+        Parameter::Duty(of, at) => {
+            let name = match of {
+                OfDutyPoint::InputTorque => "input_torque_nm",
+                OfDutyPoint::OutputTorque => "output_torque_nm",
+                OfDutyPoint::InputSpeed => "input_speed_rpm",
+                OfDutyPoint::ShareOfTime => "share_of_time",
+            };
+            format!("/load/duty/{at}/{name}")
+        }
         Parameter::FrictionCoefficient(contact) => format!("/friction/{}/coefficient", contact_name(contact)),
         Parameter::BearingCoefficient => "/friction/wave_generator/bearing_coefficient".into(),
         Parameter::BearingRadius => "/friction/wave_generator/bearing_radius_mm".into(),
+        Parameter::BearingLoadRating => "/friction/wave_generator/bearing_load_rating_n".into(),
+        Parameter::WearRate(contact) => format!("/friction/wear_rate_mm3_per_nm/{}", contact_name(contact)),
         Parameter::Samples => "/sweep/samples".into(),
         Parameter::RequestedError => "/accuracy/requested_error".into(),
         Parameter::SweepTolerance => "/sweep/tolerance".into(),

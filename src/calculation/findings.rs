@@ -81,6 +81,8 @@ pub enum FindingCode {
     FrictionBeyondMeasured,
     /// Friction so large that an exact equilibrium may have quite another efficiency.
     EfficiencyUncertain,
+    /// A stress above the one that the contact may have.
+    StressAboveAllowable,
     /// A stress above the fatigue limit of bearing steel.
     StressAboveFatigueLimit,
 }
@@ -345,6 +347,19 @@ impl From<&Finding> for FindingAnswer {
                 "",
                 "friction alters the normal forces themselves, which losses to first order leave out: an exact equilibrium may have an efficiency that is off by as much as this".into(),
                 "let the teeth run on a bearing, or take the efficiency for a tendency",
+            ),
+            Finding::StressAboveAllowable { contact, stress_mpa, allowable_mpa } => new(
+                Code::StressAboveAllowable,
+                Warning,
+                &["/load/allowable_stress_mpa", LOAD, WIDTH, RADIUS, &format!("/materials/{}", contact_name(contact))],
+                stress_mpa,
+                allowable_mpa,
+                "MPa",
+                format!(
+                    "the contact stress at the {} exceeds the one that it may have",
+                    contact_name(contact).replace('_', " ")
+                ),
+                "lower the torque, widen the teeth, let more of them mesh, or choose a stronger material",
             ),
             Finding::StressAboveFatigueLimit { contact, stress_mpa } => new(
                 Code::StressAboveFatigueLimit,

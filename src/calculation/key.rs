@@ -23,7 +23,7 @@ impl Encoder {
         self.0.push(byte);
     }
 
-    /// Writes a length, in groups of seven bits, the lowest first.
+    /// Writes a length in groups of seven bits, the lowest first.
     fn length(&mut self, mut length: usize) {
         while length >= 0x80 {
             self.byte(low_bits(length) | 0x80);

@@ -19,6 +19,7 @@ pub mod forms;
 pub mod geometry;
 pub mod json;
 pub mod key;
+pub mod materials;
 pub mod no_answer;
 pub mod question;
 pub mod sweep;

@@ -1,7 +1,7 @@
 //! The walk from a document to an answer, which all questions share.
 
 use toothwave_solver::drive::Draft;
-use toothwave_solver::{LoadCase, SolveError, Stop, Violation};
+use toothwave_solver::{LoadCase, Parameter, SolveError, Stop, Violation};
 
 use crate::design::Design;
 use crate::forms::Forms;
@@ -98,8 +98,16 @@ pub(crate) fn checked_load(
     violations: &mut Vec<Violation>,
 ) -> Result<Option<LoadCase>, NoAnswer> {
     let parameters = design.load_parameters()?;
-    let load = LoadCase::new(&parameters).map_err(|found| violations.extend(found)).ok();
-    violations.extend(design.input_speed_rpm().err());
+    let duty = design.duty()?;
+    // The torques of a duty have places of their own.
+    let of_duty = |violation: &Violation| {
+        use Parameter::{InputTorque, OutputTorque};
+        duty.is_asked && matches!(violation, Violation::OutOfRange { parameter: InputTorque | OutputTorque, .. })
+    };
+    let load = LoadCase::new(&parameters)
+        .map_err(|found| violations.extend(found.into_iter().filter(|violation| !of_duty(violation))))
+        .ok();
+    violations.extend(design.duty_violations()?);
     violations.extend(parameters.clearance_violations(draft).map_err(SolveError::from)?);
     violations.extend(draft.drive().and_then(|drive| parameters.modification.violation_in(&drive)));
     violations.extend(parameters.deviation_violations(&design.drive_parameters(), &(&design.deviations).into()));

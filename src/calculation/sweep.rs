@@ -2,12 +2,13 @@
 
 use std::io::{self, Write};
 
+use toothwave_solver::losses::wear::WearParameters;
 use toothwave_solver::losses::{Friction, Mechanism, period};
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self as solver, Points};
-use toothwave_solver::{Deviations, Drive, LoadCase, SolveError, Stop, findings};
+use toothwave_solver::{Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, findings};
 
-use crate::design::Design;
+use crate::design::{BearingRating, Design, Duty, DutyPoint};
 use crate::field::FieldCode;
 use crate::findings::{FindingAnswer, drive_findings, write_findings};
 use crate::forms::{Form, Format, Forms, csv_error};
@@ -16,20 +17,24 @@ use crate::key::Encode;
 use crate::no_answer::{NoAnswer, NoAnswerCode, too_many};
 use crate::question::{Limits, Question, checked_drive, checked_load, require_finite};
 use crate::sweep::answer::{ChecksAnswer, LoadAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
-use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
+use crate::sweep::duty::{DutyAnswer, DutyPointAnswer};
+use crate::sweep::losses::{Cost, Costs, LossesAnswer, RadialForceAnswer};
 
 pub mod answer;
+pub mod duty;
 pub mod losses;
+pub mod peak;
 mod plots;
 
 /// The checked parameters of a sweep.
 #[derive(Debug)]
 pub struct CheckedSweep {
     drive: Drive,
-    load: LoadCase,
+    duty: CheckedDuty,
     deviations: Deviations,
     friction: Option<Friction>,
-    input_speed_rpm: Option<f64>,
+    wear_rate_mm3_per_nm: Option<PerContact<f64>>,
+    bearing_rating: Option<BearingRating>,
     points: Points,
     with_gaps: bool,
     with_wind_up: bool,
@@ -41,9 +46,9 @@ impl CheckedSweep {
         &self.drive
     }
 
-    /// Its load.
-    pub const fn load(&self) -> &LoadCase {
-        &self.load
+    /// Its load, of a duty the hardest.
+    pub fn load(&self) -> &LoadCase {
+        &self.duty.hardest().load
     }
 
     /// Its friction, where there is any.
@@ -51,17 +56,21 @@ impl CheckedSweep {
         self.friction.as_ref()
     }
 
-    /// Speed of the wave generator, where it is given.
-    pub const fn input_speed_rpm(&self) -> Option<f64> {
-        self.input_speed_rpm
+    /// Speed of the wave generator, where it is given; of a duty at its hardest point.
+    pub fn input_speed_rpm(&self) -> Option<f64> {
+        self.duty.hardest().input_speed_rpm
     }
 
-    /// Solves.
+    /// Solves, of a duty its hardest point.
     ///
     /// # Errors
     /// As [`solver::sweep_with_deviations`].
     pub fn solve(&self, stop: &impl Stop) -> Result<solver::Sweep, SolveError> {
-        solver::sweep_with_deviations(&self.drive, &self.load, &self.deviations, self.points, stop)
+        self.solve_under(self.load(), stop)
+    }
+
+    fn solve_under(&self, load: &LoadCase, stop: &impl Stop) -> Result<solver::Sweep, SolveError> {
+        solver::sweep_with_deviations(&self.drive, load, &self.deviations, self.points, stop)
     }
 
     /// Solves for the peaks alone.
@@ -72,7 +81,42 @@ impl CheckedSweep {
         if !self.deviations.is_nil() {
             return Ok((&self.solve(stop)?).into());
         }
-        solver::peaks(&self.drive, &self.load, self.points, stop)
+        solver::peaks(&self.drive, self.load(), self.points, stop)
+    }
+}
+
+/// The loads that are swept, one at least.
+#[derive(Debug)]
+struct CheckedDuty {
+    points: Vec<CheckedDutyPoint>,
+    hardest: usize,
+    is_asked: bool,
+}
+
+#[derive(Debug)]
+struct CheckedDutyPoint {
+    load: LoadCase,
+    input_speed_rpm: Option<f64>,
+    share_of_time: f64,
+}
+
+impl CheckedDuty {
+    /// The loads of a document of which the hardest was checked, as all others but their torques were.
+    fn new(design: &Design, hardest: &LoadCase) -> Result<Self, NoAnswer> {
+        let Duty { points, hardest: at, is_asked } = design.duty()?;
+        let points: Result<Vec<_>, _> = points
+            .iter()
+            .map(|&DutyPoint { torque, input_speed_rpm, share_of_time }| {
+                let load = LoadCase::new(&LoadParameters { torque, ..*hardest.parameters() })?;
+                Ok(CheckedDutyPoint { load, input_speed_rpm, share_of_time })
+            })
+            .collect();
+        let points = points.map_err(|violations: Vec<_>| NoAnswer::impossible(&violations))?;
+        Ok(Self { points, hardest: at, is_asked })
+    }
+
+    fn hardest(&self) -> &CheckedDutyPoint {
+        &self.points[self.hardest]
     }
 }
 
@@ -112,20 +156,29 @@ impl Question for Sweep {
         };
         let deviations = Deviations::from(&design.deviations);
         if let Points::Samples(samples) = points {
-            let (states, limit) = (deviations.mesh(&drive).state_count(samples), limits.max_states);
+            let sweeps = design.duty()?.points.len() as u64;
+            let (states, limit) = (sweeps * deviations.mesh(&drive).state_count(samples), limits.max_states);
             if states > limit {
+                let of_duty = if sweeps > 1 { ", times the points of the duty" } else { "" };
                 let detail = format!(
-                    "the sweep has {states} states (input angles times teeth in mesh), more than the {limit} of `max_states`; take fewer samples"
+                    "the sweep has {states} states (input angles times teeth in mesh{of_duty}), more than the {limit} of `max_states`; take fewer samples"
                 );
                 let (code, field_code) = (NoAnswerCode::TooManyStates, FieldCode::TooManyStates);
                 return Err(too_many(code, field_code, "/sweep/samples", &detail, Some(states), limit));
             }
         }
         let with_gaps = design.model.clearance.is_some() || load.has_gaps() || !deviations.is_nil();
-        // In its range, or its violation would be among the others.
-        let input_speed_rpm = design.input_speed_rpm().unwrap_or_default();
-        let with_wind_up = design.sweep.wind_up;
-        Ok(CheckedSweep { drive, load, deviations, friction, input_speed_rpm, points, with_gaps, with_wind_up })
+        Ok(CheckedSweep {
+            drive,
+            duty: CheckedDuty::new(design, &load)?,
+            deviations,
+            friction,
+            wear_rate_mm3_per_nm: design.wear_rate_mm3_per_nm(),
+            bearing_rating: design.bearing_rating(),
+            points,
+            with_gaps,
+            with_wind_up: design.sweep.wind_up,
+        })
     }
 
     fn columns_bytes(checked: &CheckedSweep) -> u64 {
@@ -133,10 +186,17 @@ impl Question for Sweep {
         const STATE_BYTES: u64 = 11 * 8 + 2 * 4;
         // Three columns of slips and one of words.
         const LOSSES_BYTES: u64 = 3 * 8 + 2;
+        // Three columns of depths, of each point of a duty.
+        const WEAR_BYTES: u64 = 3 * 8;
+        let CheckedSweep { duty, friction, wear_rate_mm3_per_nm, .. } = checked;
+        let of = |is_asked, bytes| if is_asked { bytes } else { 0 };
         match checked.points {
             Points::Samples(samples) => {
-                let of_losses = if checked.friction.is_some() { LOSSES_BYTES } else { 0 };
-                (STATE_BYTES + of_losses) * checked.deviations.mesh(&checked.drive).state_count(samples)
+                // With friction every point is swept, one after the other beside the hardest.
+                let sweeps = 1 + of(friction.is_some() && duty.points.len() > 1, 1);
+                let of_sweeps = sweeps * (STATE_BYTES + of(friction.is_some(), LOSSES_BYTES));
+                let of_wear = duty.points.len() as u64 * of(wear_rate_mm3_per_nm.is_some(), WEAR_BYTES);
+                (of_sweeps + of_wear) * checked.deviations.mesh(&checked.drive).state_count(samples)
             }
             Points::Tolerance { .. } => 0,
         }
@@ -155,7 +215,8 @@ impl Question for Sweep {
     }
 
     fn answer(checked: &CheckedSweep, stop: &impl Stop) -> Result<SweepAnswer, NoAnswer> {
-        let CheckedSweep { drive, load, deviations, friction, input_speed_rpm, with_gaps, with_wind_up, .. } = checked;
+        let CheckedSweep { drive, duty, deviations, friction, with_gaps, with_wind_up, .. } = checked;
+        let load = checked.load();
         let sweep = checked.solve(stop)?;
         let mesh = sweep.mesh;
         let mut findings = drive_findings(drive)?;
@@ -163,17 +224,22 @@ impl Question for Sweep {
         let of_contacts = findings::of_contacts(drive, load, &sweep.peaks, approaches_matter);
         let of_half_widths = findings::of_half_widths(drive, load, &sweep.states);
         let of_wind_up = findings::of_wind_up(drive, &sweep);
-        let radial_force_n = period::RadialForces::of(drive, &sweep, stop)?
-            .map(|forces| RadialForceAnswer::new(&sweep, forces))
-            .transpose()?;
+        let forces = period::RadialForces::of(drive, &sweep, stop)?;
         let mut of_friction = None;
         let mut losses = None;
+        let mut points = duty.points.iter().map(|point| DutyPointAnswer::new(drive, point)).collect::<Vec<_>>();
         if let Some(friction) = friction {
             let of_period = period::Losses::of(drive, &sweep, friction, stop)?;
-            of_friction = findings::of_friction(&Mechanism::of_sweep(drive, &sweep), friction, of_period.mean.total());
-            let input_torque_nm = load.input_torque_nm(drive);
-            losses = Some(LossesAnswer::new(drive, friction, input_torque_nm, *input_speed_rpm, &sweep, of_period)?);
+            let costs = checked.costs(friction, &Swept { sweep: &sweep, forces: forces.as_ref() }, &of_period, stop)?;
+            for (point, cost) in points.iter_mut().zip(costs.of_points()) {
+                point.efficiency_ring_fixed = Some(cost.efficiency_ring_fixed);
+                point.power_loss_w = cost.power_loss_w;
+            }
+            of_friction =
+                findings::of_friction(&Mechanism::of_sweep(drive, &sweep), friction, costs.total_loss_ratio());
+            losses = Some(LossesAnswer::new(&costs, duty.hardest, &sweep, of_period)?);
         }
+        let radial_force_n = forces.map(|forces| RadialForceAnswer::new(&sweep, forces)).transpose()?;
         let of_sweep = of_wind_up.iter().chain(&of_half_widths).chain(&of_friction).chain(&of_contacts);
         findings.extend(of_sweep.map(FindingAnswer::from));
         let unloaded_wind_up_deg = if *with_wind_up && *with_gaps {
@@ -197,6 +263,11 @@ impl Question for Sweep {
             loaded_teeth_per_zone: sweep.loaded_teeth().into(),
             wind_up: with_wind_up.then(|| WindUpAnswer::new(drive, &sweep, unloaded_wind_up_deg)),
             torque_capacity: sweep.torque_capacity.map(Into::into),
+            duty: duty.is_asked.then(|| DutyAnswer {
+                hardest_point: duty.hardest,
+                mean_input_speed_rpm: duty.mean_input_speed_rpm(),
+                points,
+            }),
             losses,
             radial_force_n,
             checks: ChecksAnswer {
@@ -225,6 +296,94 @@ impl Question for Sweep {
         Ok(answer)
     }
 }
+
+/// A sweep with what its teeth push the wave generator aside with.
+struct Swept<'a> {
+    sweep: &'a solver::Sweep,
+    forces: Option<&'a period::RadialForces>,
+}
+
+impl CheckedSweep {
+    /// What each point of the duty costs; of the hardest the sweep is there already.
+    fn costs<'a>(
+        &'a self,
+        friction: &'a Friction,
+        hardest: &Swept<'_>,
+        losses: &period::Losses,
+        stop: &impl Stop,
+    ) -> Result<Costs<'a>, NoAnswer> {
+        let Self { drive, duty, bearing_rating, .. } = self;
+        let of_point = |(at, point): (usize, &CheckedDutyPoint)| {
+            if at == duty.hardest {
+                return self.cost(point, friction, hardest, losses, stop);
+            }
+            let sweep = self.solve_under(&point.load, stop)?;
+            let forces = period::RadialForces::of(drive, &sweep, stop)?;
+            let losses = period::Losses::of(drive, &sweep, friction, stop)?;
+            self.cost(point, friction, &Swept { sweep: &sweep, forces: forces.as_ref() }, &losses, stop)
+        };
+        let points = duty.points.iter().enumerate().map(of_point).collect::<Result<_, _>>()?;
+        Ok(Costs { mechanism: Mechanism::of(drive), friction, bearing_rating: *bearing_rating, points })
+    }
+
+    fn cost(
+        &self,
+        point: &CheckedDutyPoint,
+        friction: &Friction,
+        &Swept { sweep, forces }: &Swept<'_>,
+        losses: &period::Losses,
+        stop: &impl Stop,
+    ) -> Result<Cost, NoAnswer> {
+        let Self { drive, wear_rate_mm3_per_nm, bearing_rating, .. } = self;
+        let &CheckedDutyPoint { ref load, input_speed_rpm, share_of_time } = point;
+        let mechanism = Mechanism::of_sweep(drive, sweep);
+        let turning_rad_per_s = input_speed_rpm.map(|speed_rpm| mechanism.turning_rad_per_s(speed_rpm));
+        let wear = wear_rate_mm3_per_nm
+            .zip(turning_rad_per_s)
+            .map(|(rate_mm3_per_nm, turning_rad_per_s)| {
+                let parameters = WearParameters { rate_mm3_per_nm, turning_rad_per_s };
+                period::Wear::of(drive, load, sweep, losses, friction, &parameters, stop)
+            })
+            .transpose()?;
+        Ok(Cost {
+            input_torque_nm: load.input_torque_nm(drive),
+            input_speed_rpm,
+            share_of_time,
+            mean: losses.mean,
+            pressure_velocity: turning_rad_per_s.map(|turning| losses.pressure_velocity_peaks(sweep, turning)),
+            wear,
+            bearing: bearing_rating.zip(forces).and_then(|(rating, forces)| {
+                period::BearingLoad::of(&mechanism, rating.element, sweep, losses, forces)
+            }),
+        })
+    }
+}
+
+impl CheckedDuty {
+    fn mean_input_speed_rpm(&self) -> f64 {
+        let time: f64 = self.points.iter().map(|point| point.share_of_time).sum();
+        let turned = |point: &CheckedDutyPoint| point.share_of_time * point.input_speed_rpm.unwrap_or_default();
+        self.points.iter().map(turned).sum::<f64>() / time
+    }
+}
+
+impl DutyPointAnswer {
+    fn new(drive: &Drive, point: &CheckedDutyPoint) -> Self {
+        Self {
+            input_torque_nm: point.load.input_torque_nm(drive),
+            output_torque_nm: point.load.output_torque_nm(drive),
+            // Every point of a duty has one.
+            input_speed_rpm: point.input_speed_rpm.unwrap_or_default(),
+            share_of_time: point.share_of_time,
+            efficiency_ring_fixed: None,
+            power_loss_w: None,
+        }
+    }
+}
+
+/// The columns of the slips, which follow those of the states.
+const SLIP_COLUMNS: [&str; 4] =
+    ["slip_wave_generator_mm_per_rad", "slip_ring_mm_per_rad", "slip_carrier_mm_per_rad", "rolls"];
 
 /// The columns of the states, as JSON and CSV name them.
 const STATE_COLUMNS: [&str; 12] = [
@@ -258,7 +417,9 @@ impl SweepAnswer {
         let states = &self.states;
         let mut csv = csv::Writer::from_writer(writer);
         let names = STATE_COLUMNS.iter().chain(states.lobe.as_ref().map(|_| &"lobe"));
-        csv.write_record(names.chain(states.loaded.as_ref().map(|_| &"loaded"))).map_err(csv_error)?;
+        let names = names.chain(states.loaded.as_ref().map(|_| &"loaded"));
+        let of_losses = if self.losses.is_some() { &SLIP_COLUMNS[..] } else { &[] };
+        csv.write_record(names.chain(of_losses)).map_err(csv_error)?;
         for i in 0..states.tooth.len() {
             let state = (
                 states.input_angle_deg[i],
@@ -274,13 +435,14 @@ impl SweepAnswer {
                 states.stress_ring_mpa[i],
                 states.stress_carrier_mpa[i],
             );
-            match (&states.lobe, &states.loaded) {
-                (None, None) => csv.serialize(state),
-                (Some(lobe), None) => csv.serialize((state, lobe[i])),
-                (None, Some(loaded)) => csv.serialize((state, loaded[i])),
-                (Some(lobe), Some(loaded)) => csv.serialize((state, lobe[i], loaded[i])),
-            }
-            .map_err(csv_error)?;
+            // A column that is not there has no field.
+            let lobe = states.lobe.as_ref().map_or(&[][..], |lobe| &lobe[i..=i]);
+            let loaded = states.loaded.as_ref().map_or(&[][..], |loaded| &loaded[i..=i]);
+            let slips = self.losses.as_ref().map(|LossesAnswer { slip_mm_per_rad: slip, rolls, .. }| {
+                ([slip.wave_generator[i], slip.ring[i], slip.carrier[i]], [rolls[i]])
+            });
+            let (slips, rolls) = slips.as_ref().map_or((&[][..], &[][..]), |(slips, rolls)| (slips, rolls));
+            csv.serialize((state, lobe, loaded, slips, rolls)).map_err(csv_error)?;
         }
         csv.flush()
     }
@@ -341,7 +503,7 @@ impl SweepAnswer {
             }
         }
         if let Some(losses) = &self.losses {
-            losses.write_text(writer)?;
+            losses.totals.write_text(writer)?;
         }
         if let Some(radial_force) = &self.radial_force_n {
             let most_n = radial_force.value.iter().copied().fold(0.0, f64::max);

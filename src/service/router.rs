@@ -50,6 +50,7 @@ fn api() -> OpenApiRouter<Arc<App>> {
     let side = OpenApiRouter::new()
         .routes(routes!(side::limits))
         .routes(routes!(side::examples))
+        .routes(routes!(side::materials))
         .routes(routes!(side::example))
         .routes(routes!(side::live))
         .routes(routes!(side::ready))

@@ -200,6 +200,15 @@ pub enum Finding {
         /// What it is measured against.
         limit: f64,
     },
+    /// A stress above the one that the contact may have.
+    StressAboveAllowable {
+        /// Where.
+        contact: Contact,
+        /// The peak.
+        stress_mpa: f64,
+        /// What it may be.
+        allowable_mpa: f64,
+    },
     /// A stress above the fatigue limit of bearing steel.
     StressAboveFatigueLimit {
         /// Where.
@@ -403,6 +412,22 @@ pub fn of_contacts(
                 });
             }
         }
+    }
+    if let Some(allowable_mpa) = &p.allowable_stress_mpa {
+        findings.extend(
+            peaks
+                .iter()
+                .map(|(contact, peaks)| (contact, peaks.stress_mpa.value, *allowable_mpa.get(contact)))
+                // Of the fatigue limit itself its own finding says the same.
+                .filter(|(_, stress_mpa, allowable_mpa)| {
+                    stress_mpa > allowable_mpa && allowable_mpa.total_cmp(&FATIGUE_LIMIT_STRESS_MPA).is_ne()
+                })
+                .map(|(contact, stress_mpa, allowable_mpa)| Finding::StressAboveAllowable {
+                    contact,
+                    stress_mpa,
+                    allowable_mpa,
+                }),
+        );
     }
     let stressed = peaks.iter().filter(|(_, peaks)| peaks.stress_mpa.value > FATIGUE_LIMIT_STRESS_MPA);
     findings.extend(

@@ -49,8 +49,8 @@ pub struct LoadParameters {
     pub clearance_um: PerContact<f64>,
     /// Parts made otherwise than conjugate, with `VirtualWork` alone.
     pub modification: Modification,
-    /// The contact stress that the torque capacity is asked for.
-    pub allowable_stress_mpa: Option<f64>,
+    /// The stress that each contact may have, which the torque capacity is asked for.
+    pub allowable_stress_mpa: Option<PerContact<f64>>,
 }
 
 impl LoadParameters {
@@ -128,7 +128,7 @@ impl LoadCase {
         values.extend(modification.into_iter().map(|(modified, value)| (Parameter::Modification(modified), value)));
         let gaps = parameters.clearance_um.iter();
         values.extend(gaps.map(|(contact, &value)| (Parameter::Clearance(contact), value)));
-        values.extend(parameters.allowable_stress_mpa.map(|value| (Parameter::AllowableStress, value)));
+        values.extend(parameters.allowable_stress_mpa.into_iter().flat_map(allowable_stresses));
         let mut violations: Vec<_> =
             values.into_iter().filter_map(|(parameter, value)| parameter.check(value)).collect();
         if parameters.compatibility == Compatibility::Projection {
@@ -163,6 +163,16 @@ impl LoadCase {
     /// Whether any contact has a gap.
     pub fn has_gaps(&self) -> bool {
         self.0.clearance_um.iter().any(|(_, &gap)| gap > 0.0) || self.0.modification.first().is_some()
+    }
+}
+
+/// One number where the contacts share it.
+fn allowable_stresses(stress_mpa: PerContact<f64>) -> Vec<(Parameter, f64)> {
+    let PerContact { wave_generator, ring, carrier } = stress_mpa;
+    if wave_generator.to_bits() == ring.to_bits() && ring.to_bits() == carrier.to_bits() {
+        vec![(Parameter::AllowableStress, ring)]
+    } else {
+        stress_mpa.iter().map(|(contact, &value)| (Parameter::AllowableStressAt(contact), value)).collect()
     }
 }
 
@@ -387,25 +397,14 @@ impl<'a> LoadedDrive<'a> {
     fn state(&self, place: &Place, center: ToothCenter) -> Result<ToothState, SolveError> {
         let flank_curve = self.drive.flank();
         let flank = flank_curve.at(&center);
-        let r = self.drive.parameters().tooth_radius_mm;
         let force_ratio = force_ratio(self.drive.sense(), flank_curve, &center);
         let weights = Weights::of(self.compatibility, self.drive.sense(), flank_curve, &center).0;
-        let curvature_per_mm = PerContact {
-            wave_generator: 1.0 / r + center.cam_contact.curvature_per_mm,
-            ring: 1.0 / (r * flank.regularity),
-            carrier: 1.0 / r,
-        };
+        let curvature_per_mm = self.curvature_per_mm(&center, &flank);
         let places = PerContact::try_of(|contact| {
-            let center_radius_mm = center.center_radius_mm;
-            let pressure = self.contacts.pressure(contact, *curvature_per_mm.get(contact), center_radius_mm)?;
-            let pressure = pressure.ok_or_else(|| {
-                let position_deg = center.position.from_lobe_deg();
-                SolveError::FlatOffCarrier { position_deg, center_radius_mm }
-            })?;
             Ok::<_, SolveError>(tooth::Place {
                 force_ratio: *force_ratio.get(contact),
                 weight: *weights.get(contact),
-                pressure,
+                pressure: self.pressure(contact, &center, *curvature_per_mm.get(contact))?,
             })
         })?;
         let gap_mm = if self.gaps.is_nil() {
@@ -428,6 +427,44 @@ impl<'a> LoadedDrive<'a> {
         let spring = Spring::new(arm_mm, arm_mm, gap_mm, approach);
         let pressure = PerContact::of(|contact| places.get(contact).pressure);
         Ok(ToothState { center, flank, force_ratio, curvature_per_mm, pressure, spring })
+    }
+
+    /// Relative curvature of each contact of a tooth in the plane of motion.
+    fn curvature_per_mm(&self, center: &ToothCenter, flank: &FlankPoint) -> PerContact<f64> {
+        let r = self.drive.parameters().tooth_radius_mm;
+        PerContact {
+            wave_generator: 1.0 / r + center.cam_contact.curvature_per_mm,
+            ring: 1.0 / (r * flank.regularity),
+            carrier: 1.0 / r,
+        }
+    }
+
+    /// What the pressure at a contact of a tooth follows from.
+    fn pressure(&self, contact: Contact, center: &ToothCenter, curvature_per_mm: f64) -> Result<Pressure, SolveError> {
+        let center_radius_mm = center.center_radius_mm;
+        self.contacts.pressure(contact, curvature_per_mm, center_radius_mm)?.ok_or_else(|| {
+            let position_deg = center.position.from_lobe_deg();
+            SolveError::FlatOffCarrier { position_deg, center_radius_mm }
+        })
+    }
+
+    /// The pressure at the middle of each contact of a tooth, summed along its way over the part: what wears it (docs/theory.md
+    /// section 10.4).
+    ///
+    /// # Errors
+    /// [`NotConverged`] from the ellipse, [`SolveError::FlatOffCarrier`] where a flat-sided tooth has left its slot.
+    pub(crate) fn line_load_n_per_mm(
+        &self,
+        center: &ToothCenter,
+        flank: &FlankPoint,
+        force_n: &PerContact<f64>,
+    ) -> Result<PerContact<f64>, SolveError> {
+        let curvature_per_mm = self.curvature_per_mm(center, flank);
+        let width_mm = self.drive.tooth_width_mm();
+        PerContact::try_of(|contact| {
+            let pressure = self.pressure(contact, center, *curvature_per_mm.get(contact))?;
+            Ok(pressure.line_load_n_per_mm(*force_n.get(contact), width_mm))
+        })
     }
 
     /// The forces on a tooth when the wave generator has turned by `Δφ`; none where a gap is still open.
@@ -473,15 +510,19 @@ impl<'a> LoadedDrive<'a> {
         Ok(wind_up)
     }
 
-    /// The largest input torque under which no contact of these teeth exceeds a stress, and the contact that reaches it.
+    /// The largest input torque under which no contact of these teeth exceeds its stress, and the contact that reaches it.
     ///
-    /// Loads grow with `Δφ` and `Δφ` with the torque, so the first contact to reach the stress sets `Δφ`, and that the torque.
+    /// Loads grow with `Δφ` and `Δφ` with the torque, so the first contact to reach its stress sets `Δφ`, and that the torque.
     ///
     /// # Errors
     /// As [`Self::wind_up`].
-    pub fn torque_limit(&self, teeth: &[ToothState], allowable_stress_mpa: f64) -> Result<TorqueLimit, SolveError> {
+    pub fn torque_limit(
+        &self,
+        teeth: &[ToothState],
+        allowable_stress_mpa: &PerContact<f64>,
+    ) -> Result<TorqueLimit, SolveError> {
         let limit = Self::first_to_reach(teeth, |tooth, contact| {
-            tooth.pressure.get(contact).force_n(allowable_stress_mpa) / tooth.force_ratio.get(contact)
+            tooth.pressure.get(contact).force_n(*allowable_stress_mpa.get(contact)) / tooth.force_ratio.get(contact)
         });
         let FirstLimit { rotation, contact, .. } = limit.ok_or(SolveError::NoLeverArm)?;
         self.check_law(teeth, &rotation)?;

@@ -67,16 +67,26 @@ pub enum Parameter {
     RunoutAmount(Contact),
     /// In which direction, deg.
     RunoutAngle(Contact),
-    /// Allowable contact stress, MPa.
+    /// Allowable stress of all contacts, MPa.
     AllowableStress,
+    /// Allowable stress of a contact, MPa.
+    AllowableStressAt(Contact),
     /// `n`: speed of the wave generator, 1/min.
     InputSpeed,
+    /// A number of a point of the duty, counted from 0.
+    Duty(OfDutyPoint, usize),
+    /// Points of the duty.
+    DutyPoints,
     /// μ of a contact.
     FrictionCoefficient(Contact),
     /// `μ_b`: friction of the bearing between cam and race.
     BearingCoefficient,
     /// `R_b`: the radius that it belongs to, mm.
     BearingRadius,
+    /// `C`: dynamic load rating of that bearing, N.
+    BearingLoadRating,
+    /// `w`: wear rate of a part at its contact with the teeth, mm³/(N·m).
+    WearRate(Contact),
     /// Intervals of a sweep.
     Samples,
     /// Relative tolerance of a sweep.
@@ -97,6 +107,19 @@ pub enum Parameter {
     PartClearance(Part),
     /// Input angle of an assembly, deg.
     InputAngle,
+}
+
+/// What a point of a duty says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum OfDutyPoint {
+    /// Torque at the wave generator, N·m.
+    InputTorque,
+    /// Torque at the carrier, N·m.
+    OutputTorque,
+    /// Speed of the wave generator, 1/min.
+    InputSpeed,
+    /// Share of the running time.
+    ShareOfTime,
 }
 
 /// What a modification says.
@@ -175,6 +198,12 @@ pub const MAX_TEETH: i64 = 10_000;
 /// Most lobes of a wave generator; more than any has, and so few that some number of ring teeth is possible beside any of teeth.
 pub const MAX_LOBES: i64 = 1_000;
 
+/// Most points of a duty: more than a load spectrum has classes.
+pub const MAX_DUTY_POINTS: usize = 100;
+
+/// How far the shares of a duty may be from one: what writing them with some digits leaves.
+pub const SHARES_TOLERANCE: f64 = 1e-6;
+
 /// Most intervals of a sweep.
 pub const MAX_SAMPLES: i64 = 10_000_000;
 
@@ -205,7 +234,9 @@ impl Parameter {
             Self::ToothCount | Self::InstalledTeeth | Self::RingTeeth => Range::closed(2.0, MAX_TEETH as f64, ""),
             Self::YoungsModulus(_) => Range::closed(1e-3, 1e5, "GPa"),
             Self::PoissonsRatio(_) => Range { low: -1.0, high: 0.5, closed: false, unit: "" },
-            Self::InputTorque | Self::OutputTorque => Range::closed(1e-12, 1e15, "N·m"),
+            Self::InputTorque
+            | Self::OutputTorque
+            | Self::Duty(OfDutyPoint::InputTorque | OfDutyPoint::OutputTorque, _) => Range::closed(1e-12, 1e15, "N·m"),
             Self::Stiffness(_) => Range::closed(1e-3, 1e15, "N/mm"),
             // As soft as the least stiffness, and nothing.
             Self::SeriesCompliance(_) => Range::closed(0.0, 1e3, "mm/N"),
@@ -235,8 +266,12 @@ impl Parameter {
             },
             // At its ends the rounding of the angle is 2e-9 deg.
             Self::InputAngle => Range::closed(-1e7, 1e7, "deg"),
-            Self::AllowableStress => Range::closed(1e-3, 1e6, "MPa"),
-            Self::InputSpeed => Range::closed(1e-6, 1e6, "1/min"),
+            Self::AllowableStress | Self::AllowableStressAt(_) => Range::closed(1e-3, 1e6, "MPa"),
+            Self::InputSpeed | Self::Duty(OfDutyPoint::InputSpeed, _) => Range::closed(1e-6, 1e6, "1/min"),
+            Self::Duty(OfDutyPoint::ShareOfTime, _) => Range::closed(1e-9, 1.0, ""),
+            Self::DutyPoints => Range::closed(1.0, MAX_DUTY_POINTS as f64, ""),
+            Self::BearingLoadRating => Range::closed(1e-3, 1e12, "N"),
+            Self::WearRate(_) => Range::closed(0.0, 1e3, "mm³/(N·m)"),
             Self::FrictionCoefficient(_) | Self::BearingCoefficient => Range::closed(0.0, 1.0, ""),
             Self::Samples => Range::closed(1.0, MAX_SAMPLES as f64, ""),
             Self::RequestedError => Range::closed(1e-12, 1.0, ""),
@@ -414,6 +449,13 @@ pub enum Violation {
     },
     /// A contact law that teeth of this shape do not have.
     LawOfOtherTeeth,
+    /// Shares of a duty that do not add up to one.
+    DutyShares {
+        /// Their sum.
+        sum: f64,
+    },
+    /// A load rating of a bearing whose load is none that its life follows from.
+    NoBearingLife,
     /// The bore takes the whole flank away.
     BoreLeavesNoFlank {
         /// The bore.
@@ -535,6 +577,16 @@ impl std::fmt::Display for Violation {
             Self::LawOfOtherTeeth => write!(
                 f,
                 "balls take `hertz` or `fixed`, and `hertz` is nowhere else: choose a law that teeth of this shape have"
+            ),
+            Self::DutyShares { sum } => {
+                write!(
+                    f,
+                    "the shares of time add up to {sum:?}, not to 1: say for each point how much of the running time it takes"
+                )
+            }
+            Self::NoBearingLife => write!(
+                f,
+                "a bearing's life by ISO 281 follows from the load across an eccentric circle: lobes that are loaded alike leave none, and a race that they bend has another life"
             ),
             Self::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => write!(
                 f,

@@ -99,7 +99,8 @@ pub(crate) fn finding_codes() -> Vec<FindingCode> {
         ThinWallAsMade => ClearanceUndercutsRing,
         ClearanceUndercutsRing => FrictionBeyondMeasured,
         FrictionBeyondMeasured => EfficiencyUncertain,
-        EfficiencyUncertain => StressAboveFatigueLimit;
+        EfficiencyUncertain => StressAboveAllowable,
+        StressAboveAllowable => StressAboveFatigueLimit;
         StressAboveFatigueLimit)
 }
 

@@ -1,6 +1,6 @@
 //! The ready design documents.
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::asking::{ENDPOINTS, Service};
 
@@ -8,6 +8,24 @@ async fn names(service: &Service) -> Vec<String> {
     let found = service.get("/v1/examples").await.found();
     let examples = found["examples"].as_array().unwrap();
     examples.iter().map(|example| example["name"].as_str().unwrap().to_owned()).collect()
+}
+
+#[tokio::test]
+async fn every_material_names_the_source_of_its_numbers_and_can_stand_in_a_document() {
+    let service = Service::new();
+    let found = service.get("/v1/materials").await.found();
+    let materials = found["materials"].as_array().unwrap();
+    assert!(materials.len() >= 4);
+    for material in materials {
+        assert!(material["elasticity_source"].as_str().unwrap().len() > 20);
+        // A stress stands beside its source or not at all.
+        assert_eq!(material.get("allowable_stress_mpa").is_some(), material.get("allowable_stress_source").is_some());
+        let elastic = json!({
+            "youngs_modulus_gpa": material["youngs_modulus_gpa"], "poissons_ratio": material["poissons_ratio"]
+        });
+        let document = crate::designs::with(&crate::designs::spelled_out(), "/materials/ring", elastic);
+        service.post("/v1/sweep", &document).await.found();
+    }
 }
 
 #[tokio::test]

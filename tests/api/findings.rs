@@ -347,6 +347,38 @@ async fn an_efficiency_that_may_be_far_off_is_information_with_its_error() {
     assert!(!codes_of(&findings(&rubbing(0.005)).await).contains(&"efficiency_uncertain".to_owned()));
 }
 
+/// Case 5.1 with stresses that its contacts may have.
+fn limited(allowable: Value) -> Value {
+    with(&shortest(), "/load/allowable_stress_mpa", allowable)
+}
+
+#[tokio::test]
+async fn a_stress_above_the_allowable_one_is_a_warning_for_each_contact_with_its_own() {
+    let peaks = Service::new().post("/v1/sweep", &shortest()).await.found()["peaks"].clone();
+    let peak = |contact: &str| peaks[contact]["stress_mpa"]["value"].as_f64().unwrap();
+    let exceeded = async |allowable: Value| -> Vec<Value> {
+        let all = findings(&limited(allowable)).await;
+        all.into_iter().filter(|finding| finding["code"] == "stress_above_allowable").collect()
+    };
+    let [finding] = &exceeded(json!({ "wave_generator": 1e4, "ring": 500.0, "carrier": 1e4 })).await[..] else {
+        panic!("one contact exceeds its own")
+    };
+    assert_numbers(finding, peak("ring"), 500.0, "MPa");
+    assert_eq!(finding["severity"], "warning");
+    assert!(finding["pointers"].as_array().unwrap().contains(&json!("/materials/ring")));
+    assert_eq!(exceeded(json!(1.0)).await.len(), 3);
+    // The fatigue limit has a finding of its own, which says the same.
+    let codes = codes_of(&findings(&with(&overloaded(), "/load/allowable_stress_mpa", json!(1500.0))).await);
+    assert!(
+        !codes.contains(&"stress_above_allowable".to_owned())
+            && codes.contains(&"stress_above_fatigue_limit".to_owned())
+    );
+    // What a contact bears with a hair to spare, it may: with a stress to reach the sweep goes state by state, and rounds otherwise.
+    let hair = 1.0 + 1e-12;
+    let just = json!({ "wave_generator": hair * peak("wave_generator"), "ring": hair * peak("ring"), "carrier": hair * peak("carrier") });
+    assert!(exceeded(just).await.is_empty());
+}
+
 #[tokio::test]
 async fn every_kind_of_finding_can_be_met_over_http() {
     let bore_without_effect = with(&shortest(), "/drive/ring/tip_radius_mm", json!(60.0));
@@ -371,7 +403,7 @@ async fn every_kind_of_finding_can_be_met_over_http() {
         all.extend(findings(&document).await);
     }
     let wide = with(&shortest(), "/load/input_torque_nm", json!(2000.0));
-    for document in [linear, brass, wide, loose(), rubbing(0.03), rubbing(0.2)] {
+    for document in [linear, brass, wide, loose(), rubbing(0.03), rubbing(0.2), limited(json!(500.0))] {
         all.extend(findings(&document).await);
     }
     for document in [undercut(), thin_walls(), cleared(9000.0)] {

@@ -323,4 +323,298 @@ async fn losses_and_the_radial_force_can_be_read_as_text() {
     }
     assert!(!text_of(&without(&case_5_1(plain()), "/friction")).await.contains("efficiency"));
     assert!(text_of(&eccentric()).await.contains("largest force on the wave generator"));
+    let text = text_of(&worn(on_bearing("race"))).await;
+    assert!(text.contains("mm/h") && text.contains("all round"), "{text}");
+    assert!(text_of(&on_its_bearing("ball")).await.contains("million revolutions"));
+}
+
+fn worn(friction: Value) -> Value {
+    let rates = json!({ "wave_generator": 1e-6, "ring": 2e-6, "carrier": 3e-6 });
+    let mut friction = friction;
+    friction["wear_rate_mm3_per_nm"] = rates;
+    case_5_1(friction)
+}
+
+#[tokio::test]
+async fn wear_is_a_depth_an_hour_with_its_place_and_of_a_race_all_round() {
+    let found = swept(&worn(plain())).await;
+    let wear = found["losses"]["wear_mm_per_hour"].clone();
+    // 120 passes an hour of a slot at one turn a minute: at 1500 turns, a cam against the carrier of 26/28 of that.
+    let (states, slips) = (&found["states"], &found["losses"]["slip_mm_per_rad"]["carrier"]);
+    let at = (0..states["tooth"].as_array().unwrap().len())
+        .find(|&state| {
+            states["input_angle_deg"][state] == wear["carrier"]["input_angle_deg"]
+                && states["position_deg"][state] == wear["carrier"]["position_deg"]
+        })
+        .unwrap();
+    let force_n = float(&states["force_carrier_n"][at]);
+    // How far the slot's wall slips under the tooth for each mm that the tooth advances along it, d tan γ a radian: d times the slope of the path.
+    let d_mm = float(&states["center_radius_mm"][at]);
+    let k = 13.0;
+    let tan_ring = float(&states["force_carrier_n"][at]) / float(&states["force_ring_n"][at]);
+    // sin β Z_G/Z_K = F_S/F_K (section 4.1).
+    let sin_ring = tan_ring * 26.0 / 28.0;
+    let tan_cam = sin_ring / (1.0 - sin_ring * sin_ring).sqrt() / k;
+    let slip = float(&slips[at]).abs() / (d_mm * tan_cam);
+    let expected = 3e-6 * 1e-3 * force_n / 15.0 * slip * 120.0 * 1500.0 * 26.0 / 28.0;
+    assert_near(float(&wear["carrier"]["value"]), expected, 1e-9, "slot");
+    // Twice the rate, twice the depth; no speed, no hour.
+    let doubled = with(&worn(plain()), "/friction/wear_rate_mm3_per_nm/carrier", json!(6e-6));
+    let doubled = swept(&doubled).await["losses"]["wear_mm_per_hour"].clone();
+    assert_near(float(&doubled["carrier"]["value"]), 2.0 * expected, 1e-9, "slot");
+    assert_eq!(doubled["wave_generator"], wear["wave_generator"]);
+    let still = swept(&without(&worn(plain()), "/load/input_speed_rpm")).await;
+    assert!(still["losses"].get("wear_mm_per_hour").is_none());
+    let on_race = swept(&worn(on_bearing("race"))).await["losses"]["wear_mm_per_hour"].clone();
+    assert_eq!(on_race["wave_generator"].as_object().unwrap().keys().collect::<Vec<_>>(), ["value"]);
+    assert!(float(&on_race["wave_generator"]["value"]) > 0.0);
+    assert!(on_race["carrier"]["position_deg"].is_number());
+}
+
+/// An eccentric drive on its bearing.
+fn on_its_bearing(element: &str) -> Value {
+    let bearing = json!({
+        "kind": "rolling", "bearing_coefficient": 0.0015, "bearing_radius_mm": 25.0,
+        "bearing_load_rating_n": 9000.0, "bearing_element": element
+    });
+    with(&with(&eccentric(), "/friction", on(&bearing)), "/load/input_speed_rpm", json!(1500.0))
+}
+
+#[tokio::test]
+async fn the_bearing_of_an_eccentric_lasts_as_iso_281_says() {
+    for (element, exponent) in [("ball", 3.0), ("roller", 10.0 / 3.0)] {
+        let found = swept(&on_its_bearing(element)).await;
+        let bearing = &found["losses"]["bearing"];
+        let load_n = float(&bearing["mean_load_n"]);
+        let forces = floats(&found["radial_force_n"]["value"]);
+        let (least, most) =
+            forces.iter().fold((f64::MAX, 0.0_f64), |(least, most), &force| (least.min(force), most.max(force)));
+        assert!((least..=most).contains(&load_n), "{least} {load_n} {most}");
+        let millions = (9000.0 / load_n).powf(exponent);
+        assert_near(float(&bearing["life_million_revolutions"]), millions, 1e-12, "life");
+        // 28 teeth and 27 of the ring; at rest against the carrier the race turns as the wave generator does against it.
+        let speed_rpm = 1500.0 * 27.0 / 28.0;
+        assert_near(float(&bearing["speed_rpm"]), speed_rpm, 1e-12, "speed");
+        assert_near(float(&bearing["life_h"]), 1e6 * millions / 60.0 / speed_rpm, 1e-12, "hours");
+    }
+    let still = swept(&without(&on_its_bearing("ball"), "/load/input_speed_rpm")).await["losses"]["bearing"].clone();
+    assert_eq!(still.as_object().unwrap().len(), 2, "{still}");
+    // Half the load, eight times the life.
+    let torque = float(&eccentric()["load"]["input_torque_nm"]);
+    let half = with(&on_its_bearing("ball"), "/load/input_torque_nm", json!(0.5 * torque));
+    let half = swept(&half).await["losses"]["bearing"].clone();
+    let whole = swept(&on_its_bearing("ball")).await["losses"]["bearing"].clone();
+    assert_near(float(&half["life_h"]), 8.0 * float(&whole["life_h"]), 1e-9, "half");
+}
+
+#[tokio::test]
+async fn a_bearing_without_a_load_across_it_has_no_life() {
+    let mut friction = on_bearing("race");
+    friction["wave_generator"]["bearing_load_rating_n"] = json!(9000.0);
+    let problem = Service::new().post("/v1/sweep", &case_5_1(friction)).await.refused(422, "impossible_design");
+    let error = &problem["errors"][0];
+    assert_eq!(error["code"], "conflicting_fields");
+    assert_eq!(error["pointer"], "/friction/wave_generator/bearing_load_rating_n");
+}
+
+/// Case 5.1 with a duty, worn.
+fn on_duty(points: &[(f64, f64, f64)], friction: Value) -> Value {
+    let points: Vec<_> = points
+        .iter()
+        .map(|(torque_nm, speed_rpm, share)| {
+            json!({ "input_torque_nm": torque_nm, "input_speed_rpm": speed_rpm, "share_of_time": share })
+        })
+        .collect();
+    with(&worn(friction), "/load", json!({ "duty": points }))
+}
+
+const DUTY: [(f64, f64, f64); 3] = [(10.0, 1500.0, 0.5), (40.0, 300.0, 0.3), (20.0, 3000.0, 0.2)];
+
+fn alone(torque_nm: f64, speed_rpm: f64, friction: Value) -> Value {
+    with(&worn(friction), "/load", json!({ "input_torque_nm": torque_nm, "input_speed_rpm": speed_rpm }))
+}
+
+/// A clearance, so that forces are not in proportion to the torque.
+fn loose(document: &Value) -> Value {
+    with(document, "/model/clearance", json!({ "ring_um": 3.0 }))
+}
+
+#[tokio::test]
+async fn a_duty_has_the_peaks_of_its_hardest_point_and_the_means_of_all() {
+    for friction in [plain(), on_bearing("race")] {
+        let found = swept(&loose(&on_duty(&DUTY, friction.clone()))).await;
+        let mut points = Vec::new();
+        for (torque_nm, speed_rpm, _) in DUTY {
+            points.push(swept(&loose(&alone(torque_nm, speed_rpm, friction.clone()))).await);
+        }
+        // The second has the largest torque.
+        for field in ["peaks", "states", "load", "checks", "loaded_teeth_per_zone"] {
+            assert_eq!(found[field], points[1][field], "{field}");
+        }
+        let losses = &found["losses"];
+        for field in ["slip_mm_per_rad", "rolls", "by_input_angle", "required_input_torque_nm"] {
+            assert_eq!(losses[field], points[1]["losses"][field], "{field}");
+        }
+        let duty = &found["duty"];
+        assert_eq!(duty["hardest_point"], 1);
+        assert_near(float(&duty["mean_input_speed_rpm"]), 0.5 * 1500.0 + 0.3 * 300.0 + 0.2 * 3000.0, 1e-14, "speed");
+        let (mut in_w, mut out_w, mut lost_w) = (0.0, 0.0, 0.0);
+        for (((torque_nm, speed_rpm, share), point), listed) in
+            DUTY.iter().zip(&points).zip(duty["points"].as_array().unwrap())
+        {
+            let efficiency = float(&point["losses"]["efficiency"]["ring_fixed"]);
+            assert_eq!(float(&listed["efficiency_ring_fixed"]), efficiency);
+            assert_near(float(&listed["power_loss_w"]), float(&point["losses"]["power_loss_w"]), 1e-14, "power");
+            let ideal_w = share * torque_nm * speed_rpm * PI / 30.0;
+            out_w += ideal_w;
+            in_w += ideal_w / efficiency;
+            lost_w += share * float(&point["losses"]["power_loss_w"]);
+        }
+        assert_near(float(&losses["efficiency"]["ring_fixed"]), out_w / in_w, 1e-12, "energy out over energy in");
+        assert_near(float(&losses["power_loss_w"]), lost_w, 1e-12, "power");
+        assert_near(in_w, out_w + lost_w, 1e-12, "energy");
+        let places: f64 = losses["power_loss_by_place_w"].as_object().unwrap().values().map(float).sum();
+        assert_near(places, lost_w, 1e-12, "places");
+        for contact in CONTACTS {
+            let of = |point: &Value| float(&point["losses"]["pressure_velocity_mpa_m_per_s"][contact]["value"]);
+            let most = points.iter().map(of).fold(0.0, f64::max);
+            assert_eq!(of(&found), most, "p·v is that of the worst");
+            let wear = |point: &Value| float(&point["losses"]["wear_mm_per_hour"][contact]["value"]);
+            let mean_of_peaks: f64 = DUTY.iter().zip(&points).map(|((_, _, share), point)| share * wear(point)).sum();
+            assert!(wear(&found) <= mean_of_peaks * (1.0 + 1e-12), "{contact}");
+            assert!(wear(&found) >= 0.3 * mean_of_peaks, "{contact}: {} {mean_of_peaks}", wear(&found));
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_duty_of_one_point_is_that_load() {
+    let (mut one, mut other) =
+        (swept(&on_duty(&[(20.0, 1500.0, 1.0)], plain())).await, swept(&alone(20.0, 1500.0, plain())).await);
+    assert_eq!(one.as_object_mut().unwrap().remove("duty").unwrap()["hardest_point"], 0);
+    assert_eq!(one.take(), other.take());
+}
+
+#[tokio::test]
+async fn a_duty_uses_up_a_bearings_life_point_by_point() {
+    let torque_nm = float(&eccentric()["load"]["input_torque_nm"]);
+    let points = [(torque_nm, 1500.0, 0.75), (2.0 * torque_nm, 500.0, 0.25)];
+    let duty: Vec<_> = points
+        .iter()
+        .map(|(torque_nm, speed_rpm, share)| {
+            json!({ "output_torque_nm": 28.0 * torque_nm, "input_speed_rpm": speed_rpm, "share_of_time": share })
+        })
+        .collect();
+    let found = swept(&with(&on_its_bearing("ball"), "/load", json!({ "duty": duty }))).await;
+    assert_eq!(found["duty"]["hardest_point"], 1);
+    let mut used = 0.0;
+    for (torque_nm, speed_rpm, share) in points {
+        let load = json!({ "input_torque_nm": torque_nm, "input_speed_rpm": speed_rpm });
+        let alone = swept(&with(&on_its_bearing("ball"), "/load", load)).await;
+        used += share / float(&alone["losses"]["bearing"]["life_h"]);
+    }
+    let bearing = &found["losses"]["bearing"];
+    assert_near(float(&bearing["life_h"]) * used, 1.0, 1e-12, "life");
+    let millions = float(&bearing["life_h"]) * 60e-6 * float(&bearing["speed_rpm"]);
+    assert_near(float(&bearing["life_million_revolutions"]), millions, 1e-12, "revolutions");
+}
+
+#[tokio::test]
+async fn without_friction_a_duty_has_peaks_and_points_alone() {
+    let found = swept(&without(&on_duty(&DUTY, plain()), "/friction")).await;
+    assert!(found.get("losses").is_none());
+    assert_eq!(found["load"]["input_torque_nm"], 40.0);
+    assert_eq!(found["duty"]["points"][2]["output_torque_nm"], 280.0);
+    assert!(found["duty"]["points"][2].get("power_loss_w").is_none());
+}
+
+#[tokio::test]
+async fn a_duty_s_faults_are_told_at_their_places() {
+    let errors = async |document: Value, code: &str| -> Vec<(String, String)> {
+        let problem = Service::new().post("/v1/sweep", &document).await.refused(422, code);
+        let errors = problem["errors"].as_array().unwrap().iter();
+        errors
+            .map(|error| (error["pointer"].as_str().unwrap().into(), error["code"].as_str().unwrap().into()))
+            .collect()
+    };
+    let expect = |faults: &[(&str, &str)]| -> Vec<(String, String)> {
+        faults.iter().map(|&(pointer, code)| (pointer.into(), code.into())).collect()
+    };
+    let duty = on_duty(&DUTY, plain());
+    let short = on_duty(&[(10.0, 1500.0, 0.5), (20.0, 100.0, 0.4)], plain());
+    assert_eq!(errors(short, "impossible_design").await, expect(&[("/load/duty", "out_of_range")]));
+    let wrong = on_duty(&[(-10.0, 1500.0, 0.5), (20.0, 0.0, 2.0)], plain());
+    let places = ["/load/duty/0/input_torque_nm", "/load/duty/1/input_speed_rpm", "/load/duty/1/share_of_time"];
+    assert_eq!(errors(wrong, "impossible_design").await, expect(&places.map(|place| (place, "out_of_range"))));
+    let many = vec![(10.0, 1500.0, 1.0 / 101.0); 101];
+    assert_eq!(errors(on_duty(&many, plain()), "impossible_design").await, expect(&[("/load/duty", "out_of_range")]));
+    for (document, pointer, code) in [
+        (with(&duty, "/load/duty", json!([])), "/load/duty", "out_of_range"),
+        (with(&duty, "/load/duty", json!({})), "/load/duty", "wrong_type"),
+        (with(&duty, "/load/input_torque_nm", json!(20.0)), "/load", "conflicting_fields"),
+        (with(&duty, "/load/input_speed_rpm", json!(20.0)), "/load", "conflicting_fields"),
+        (with(&duty, "/sweep", json!({ "tolerance": 1e-4 })), "/sweep/tolerance", "conflicting_fields"),
+        (with(&duty, "/load/duty/1/output_torque_nm", json!(1.0)), "/load/duty/1", "conflicting_fields"),
+        (without(&duty, "/load/duty/1/input_torque_nm"), "/load/duty/1", "missing_field"),
+        (without(&duty, "/load/duty/1/share_of_time"), "/load/duty/1/share_of_time", "missing_field"),
+        (with(&duty, "/load/duty/2/colour", json!(1)), "/load/duty/2/colour", "unknown_field"),
+    ] {
+        assert_eq!(errors(document, "invalid_document").await, expect(&[(pointer, code)]));
+    }
+}
+
+#[tokio::test]
+async fn all_points_of_a_duty_count_towards_the_states_that_may_be() {
+    let limits = toothwave::config::Limits { max_states: 600, ..crate::asking::LIMITS };
+    // 40 intervals with 7 teeth.
+    let service = Service::within(limits);
+    assert_eq!(service.post("/v1/sweep", &on_duty(&[(20.0, 1500.0, 1.0)], plain())).await.status, 200);
+    let error = service.post("/v1/sweep", &on_duty(&DUTY, plain())).await.refused(422, "too_many_states");
+    assert_eq!(error["errors"][0]["value"], 3.0 * 287.0);
+}
+
+#[tokio::test]
+async fn an_allowable_stress_is_a_number_or_one_for_each_contact() {
+    let faulty = async |allowable: Value| {
+        let document = with(&shortest(), "/load/allowable_stress_mpa", allowable);
+        let problem = Service::new().post("/v1/sweep", &document).await.problem();
+        let error = &problem["errors"][0];
+        (error["pointer"].as_str().unwrap().to_owned(), error["code"].as_str().unwrap().to_owned())
+    };
+    let at = |place: &str, code: &str| (format!("/load/allowable_stress_mpa{place}"), code.to_owned());
+    assert_eq!(faulty(json!("much")).await, at("", "wrong_type"));
+    assert_eq!(faulty(json!([1.0])).await, at("", "wrong_type"));
+    assert_eq!(faulty(json!(0.0)).await, at("", "out_of_range"));
+    assert_eq!(faulty(json!({ "ring": 1.0 })).await, at("/wave_generator", "missing_field"));
+    let of = |ring: Value| json!({ "wave_generator": 900.0, "ring": ring, "carrier": 900.0 });
+    assert_eq!(faulty(of(json!(true))).await, at("/ring", "wrong_type"));
+    assert_eq!(faulty(of(json!(-1.0))).await, at("/ring", "out_of_range"));
+}
+
+#[tokio::test]
+async fn the_slips_stand_in_the_csv_behind_the_states() {
+    let unlike = with(&with(&shortest(), "/drive/teeth/count", json!(27)), "/drive/ring/teeth", json!(25));
+    for document in [shortest(), loose(&with(&unlike, "/model", json!({ "compatibility": "virtual_work" })))] {
+        let csv = async |document: &Value| -> Vec<Vec<String>> {
+            let question = Question::post("/v1/sweep", document.to_string()).with("accept", "text/csv");
+            let answer = Service::new().ask(&question).await;
+            assert_eq!(answer.status, 200, "{}", answer.text());
+            answer.text().lines().map(|line| line.split(',').map(str::to_owned).collect()).collect()
+        };
+        let rubbing = with(&document, "/friction", plain());
+        let losses = swept(&rubbing).await["losses"].clone();
+        let (bare, with_slips) = (csv(&document).await, csv(&rubbing).await);
+        let columns = bare[0].len();
+        assert_eq!(
+            with_slips[0][columns..],
+            ["slip_wave_generator_mm_per_rad", "slip_ring_mm_per_rad", "slip_carrier_mm_per_rad", "rolls"]
+        );
+        for (state, (bare, row)) in bare[1..].iter().zip(&with_slips[1..]).enumerate() {
+            assert_eq!(row[..columns], bare[..]);
+            for (field, contact) in row[columns..].iter().zip(CONTACTS) {
+                assert_eq!(field.parse::<f64>().unwrap(), float(&losses["slip_mm_per_rad"][contact][state]));
+            }
+            assert_eq!(row[columns + 3], losses["rolls"][state].as_str().unwrap());
+        }
+    }
 }

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use serde_json::{Value, json};
 use toothwave::config::Limits;
 use toothwave_calculation::field::pointer;
-use toothwave_solver::violation::{Listed, Modified};
+use toothwave_solver::violation::{Listed, Modified, OfDutyPoint};
 use toothwave_solver::{Contact, Parameter, Part};
 
 use crate::asking::{Answer, ENDPOINTS, LIMITS, Occupied, Question, Service};
@@ -170,6 +170,7 @@ fn every_path_and_every_status_that_it_can_have_is_described() {
         ("/v1/quantities", "get", &["200"]),
         ("/v1/limits", "get", &["200"]),
         ("/v1/examples", "get", &["200"]),
+        ("/v1/materials", "get", &["200"]),
         ("/v1/examples/{name}", "get", &["200", "404"]),
         ("/health/live", "get", &["200"]),
         ("/health/ready", "get", &["200", "503"]),
@@ -238,6 +239,7 @@ fn parameters() -> Vec<Parameter> {
         Parameter::OutputTorque,
         Parameter::AllowableStress,
         Parameter::InputSpeed,
+        Parameter::BearingLoadRating,
         Parameter::BearingCoefficient,
         Parameter::BearingRadius,
         Parameter::Samples,
@@ -254,6 +256,11 @@ fn parameters() -> Vec<Parameter> {
     parameters.extend(parts.map(Parameter::PoissonsRatio));
     parameters.extend(contacts.map(Parameter::GrooveRadius));
     parameters.extend(contacts.map(Parameter::FrictionCoefficient));
+    parameters.extend(contacts.map(Parameter::WearRate));
+    parameters.extend(contacts.map(Parameter::AllowableStressAt));
+    let of_duty =
+        [OfDutyPoint::InputTorque, OfDutyPoint::OutputTorque, OfDutyPoint::InputSpeed, OfDutyPoint::ShareOfTime];
+    parameters.extend(of_duty.map(|of| Parameter::Duty(of, 0)));
     parameters.extend(contacts.map(Parameter::Depth));
     parameters.extend(contacts.map(Parameter::SeriesCompliance));
     parameters.extend(contacts.map(Parameter::Stiffness));
@@ -308,12 +315,24 @@ fn fields_of<'a>(document: &'a Value, schema: &'a Value) -> Vec<(&'a str, &'a Va
     fields
 }
 
+/// What a schema offers to choose from, references followed.
+fn alternatives<'a>(document: &'a Value, schema: &'a Value) -> Vec<&'a Value> {
+    let schema = schema["$ref"].as_str().map_or(schema, |reference| document.pointer(&reference[1..]).unwrap());
+    schema["oneOf"].as_array().into_iter().flatten().collect()
+}
+
 /// The schemas of all fields below a schema, by pointer.
 fn below<'a>(document: &'a Value, schema: &'a Value, pointer: &str) -> Vec<(String, &'a Value)> {
     let mut all = Vec::new();
     for (name, schema) in fields_of(document, schema) {
         let pointer = format!("{pointer}/{name}");
         all.extend(below(document, schema, &pointer));
+        // What is a list is looked at by its first item, what may be a number or an object by either.
+        if let Some(items) = schema.get("items") {
+            all.extend(below(document, items, &format!("{pointer}/0")));
+        }
+        let numbers = alternatives(document, schema).into_iter().filter(|alternative| is_numeric(alternative));
+        all.extend(numbers.map(|number| (pointer.clone(), number)));
         all.push((pointer, schema));
     }
     all
@@ -492,7 +511,9 @@ async fn every_success_is_as_described() {
     }
     let csv = Question::post("/v1/sweep", shortest().to_string()).with("accept", "text/csv");
     assert_described("post", "/v1/sweep", &service.ask(&csv).await);
-    for path in ["/v1/limits", "/v1/quantities", "/v1/examples", "/health/live", "/health/ready", "/metrics"] {
+    for path in
+        ["/v1/limits", "/v1/quantities", "/v1/examples", "/v1/materials", "/health/live", "/health/ready", "/metrics"]
+    {
         assert_described("get", path, &service.get(path).await);
     }
     for name in ["paper-5.1", "paper-5.2", "paper-5.2-bored", "ring-with-more-teeth", "balls", "harmonic-path"] {

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::asking::{LIMITS, Service};
-use crate::designs::{every_number, fixed, spelled_out, with};
+use crate::designs::{eccentric, every_number, fixed, spelled_out, with};
 use toothwave::config::Limits;
 
 /// A field, the endpoint that reads it, a document that holds it, and its range.
@@ -71,6 +71,25 @@ fn fields() -> Vec<Field> {
         fields.push(of_friction(&format!("/friction/{pointer}"), 0.0, 1.0));
     }
     fields.push(of_friction("/friction/wave_generator/bearing_radius_mm", 1e-6, 1e6));
+    let worn = with(&rubbing, "/friction/wear_rate_mm3_per_nm", json!({}));
+    for contact in ["wave_generator", "ring", "carrier"] {
+        let pointer = format!("/friction/wear_rate_mm3_per_nm/{contact}");
+        fields.push(Field { document: worn.clone(), ..field(&pointer, 0.0, 1e3) });
+    }
+    let wave_generator = json!({
+        "kind": "race", "coefficient": 0.05, "bearing_coefficient": 0.002, "bearing_radius_mm": 25.0,
+        "bearing_element": "roller"
+    });
+    let rated = with(&eccentric(), "/friction", crate::friction::on(&wave_generator));
+    let rated = with(&rated, "/load/input_speed_rpm", json!(1500.0));
+    let pointer = "/friction/wave_generator/bearing_load_rating_n";
+    fields.push(Field { document: rated, ..field(pointer, 1e-3, 1e12) });
+    let own = json!({ "wave_generator": 900.0, "ring": 1000.0, "carrier": 500.0 });
+    let limited = with(&every_number(), "/load/allowable_stress_mpa", own);
+    for contact in ["wave_generator", "ring", "carrier"] {
+        let pointer = format!("/load/allowable_stress_mpa/{contact}");
+        fields.push(Field { document: limited.clone(), ..field(&pointer, 1e-3, 1e6) });
+    }
     for part in ["wave_generator", "teeth", "ring", "carrier"] {
         fields.push(field(&format!("/materials/{part}/youngs_modulus_gpa"), 1e-3, 1e5));
     }

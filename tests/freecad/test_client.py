@@ -45,6 +45,8 @@ NOT_IN_THE_FORM = (
     "/deviations",
     "/friction",
     "/load/input_speed_rpm",
+    "/load/duty",
+    "/load/allowable_stress_mpa/",
 )
 
 

@@ -124,7 +124,9 @@ fn document(bytes: &[u8; 20]) -> Value {
             wave_generator["bearing_coefficient"] = json!(coefficient(rest[1]));
             wave_generator["bearing_radius_mm"] = json!(length_mm(rest[2]));
         }
+        let rate = |byte: u8| 10.0_f64.powi(i32::from(byte % 14) - 11);
         json!({
+            "wear_rate_mm3_per_nm": { "wave_generator": rate(rest[1]), "ring": rate(rest[2]), "carrier": rate(rest[3]) },
             "wave_generator": wave_generator,
             "ring": { "coefficient": coefficient(rest[6]) },
             "carrier": { "coefficient": coefficient(rest[8]) }

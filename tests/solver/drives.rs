@@ -68,6 +68,11 @@ pub(crate) fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParamete
     }
 }
 
+/// One number at each contact.
+pub(crate) const fn everywhere(value: f64) -> PerContact<f64> {
+    PerContact { wave_generator: value, ring: value, carrier: value }
+}
+
 pub(crate) fn swept(parameters: &DriveParameters, load: &LoadParameters, samples: u64) -> Sweep {
     let load = LoadCase::new(load).expect("a possible load");
     sweep::sweep(&drive(parameters), &load, Points::samples(samples).unwrap(), &Never).expect("a solvable sweep")

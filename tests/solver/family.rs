@@ -18,7 +18,7 @@ use toothwave_solver::{
     Violation, WaveGenerator, findings,
 };
 
-use crate::drives::{PAPER_5_1, drive, ellipse, load, swept};
+use crate::drives::{PAPER_5_1, drive, ellipse, everywhere, load, swept};
 use crate::oracles::{EQUAL, UNEQUAL, worst_difference};
 
 const fn harmonic(lobes: i64, mean_radius_mm: f64, amplitude_mm: f64) -> WaveGenerator {
@@ -799,7 +799,7 @@ fn clearances_and_power_laws_work_on_teeth_of_all_zones() {
         let mut load = load(7.0, VirtualWork);
         load.law = ContactLaw::Palmgren;
         load.clearance_um = PerContact { wave_generator: 2.0, ring: 3.0, carrier: 1.0 };
-        load.allowable_stress_mpa = Some(1500.0);
+        load.allowable_stress_mpa = Some(everywhere(1500.0));
         let sweep = swept(&p, &load, 12);
         assert!(sweep.torque_balance_residual < 1e-11, "{:e} of {p:?}", sweep.torque_balance_residual);
         assert!(sweep.torque_capacity.is_some());

@@ -9,7 +9,7 @@ use toothwave_solver::{
     ToothShape,
 };
 
-use crate::drives::{PAPER_5_1, any_swept_drive, drive, ellipse, load, swept};
+use crate::drives::{PAPER_5_1, any_swept_drive, drive, ellipse, everywhere, load, swept};
 
 /// How far two ways to the same number may be apart, over what its terms came to.
 const ROUNDING: f64 = 1e-12;
@@ -193,7 +193,9 @@ proptest! {
         let law = ContactLaw::Fixed(stiffness);
         assert_both_paths_agree(
             &parameters,
-            &LoadParameters { law, allowable_stress_mpa, ..load(7.0, compatibility) },
+            &LoadParameters {
+                law, allowable_stress_mpa: allowable_stress_mpa.map(everywhere), ..load(7.0, compatibility)
+            },
             samples,
         );
     }
@@ -206,7 +208,7 @@ proptest! {
         torque_exponent in -4.0_f64..3.0,
         gaps in prop::option::of(prop::array::uniform3(prop_oneof![Just(0.0), (-4.0_f64..2.0).prop_map(|exponent| 10.0_f64.powf(exponent))])),
         series in prop::array::uniform3(prop_oneof![Just(0.0), Just(1e-6)]),
-        allowable_stress_mpa in prop::option::of((2.0_f64..6.0).prop_map(|exponent| 10.0_f64.powf(exponent))),
+        allowable_stress_mpa in prop::option::of(prop::array::uniform3((2.0_f64..6.0).prop_map(|exponent| 10.0_f64.powf(exponent)))),
         samples in any_samples(),
     ) {
         let [wave_generator, ring, carrier] = gaps.unwrap_or_default();
@@ -222,7 +224,8 @@ proptest! {
         }
         let compatibility = if is_projection { Compatibility::Projection } else { Compatibility::VirtualWork };
         let load = LoadParameters {
-            law, clearance_um, series_compliance_mm_per_n, allowable_stress_mpa,
+            law, clearance_um, series_compliance_mm_per_n,
+            allowable_stress_mpa: allowable_stress_mpa.map(|[wave_generator, ring, carrier]| PerContact { wave_generator, ring, carrier }),
             ..load(10.0_f64.powf(torque_exponent), compatibility)
         };
         assert_both_paths_agree(&parameters, &load, samples);
@@ -251,7 +254,11 @@ fn the_fast_path_is_taken_under_every_law_with_and_without_gaps() {
             let clearance_um = PerContact { wave_generator: gap_um, ring: gap_um, carrier: gap_um };
             let load = LoadParameters { law, clearance_um, ..load(20.0, Compatibility::VirtualWork) };
             assert_both_paths_agree(&PAPER_5_1, &load, 50);
-            assert_both_paths_agree(&PAPER_5_1, &LoadParameters { allowable_stress_mpa: Some(1500.0), ..load }, 50);
+            assert_both_paths_agree(
+                &PAPER_5_1,
+                &LoadParameters { allowable_stress_mpa: Some(everywhere(1500.0)), ..load },
+                50,
+            );
             let (fast, plain) = (swept(&PAPER_5_1, &load, 50), {
                 let load = LoadCase::new(&load).unwrap();
                 sweep_plain(&drive(&PAPER_5_1), &load, Points::samples(50).unwrap(), &Never).unwrap()
@@ -270,7 +277,7 @@ fn a_drive_whose_contacts_are_wider_than_johnsons_law_allows_is_refused_by_eithe
     }
     // A capacity may be wanted that lies beyond.
     for exponent in 0..38 {
-        let allowable_stress_mpa = Some(1e3 * 1.2_f64.powi(exponent));
+        let allowable_stress_mpa = Some(everywhere(1e3 * 1.2_f64.powi(exponent)));
         let load = LoadParameters { law: JOHNSON, allowable_stress_mpa, ..load(20.0, Compatibility::VirtualWork) };
         assert_both_paths_agree(&PAPER_5_1, &load, 10);
     }

@@ -16,7 +16,7 @@ use toothwave_solver::{
     Parameter, PerContact, Position, SolveError, Violation, findings,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, drive, load, swept};
+use crate::drives::{PAPER_5_1, PAPER_5_2, drive, everywhere, load, swept};
 
 const R_DEEP: ContactLaw =
     ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
@@ -318,7 +318,7 @@ fn johnsons_law_ends_where_a_contact_is_half_as_wide_as_the_tooth_and_says_at_wh
     assert!((loaded(input_torque_limit_nm * (1.0 - 1e-9)).unwrap() / 2.5 - 1.0).abs() < 1e-8);
     assert!(loaded(input_torque_limit_nm * (1.0 + 1e-9)).is_err());
     // A capacity beyond is none.
-    let parameters = LoadParameters { allowable_stress_mpa: Some(1e6), ..johnson(20.0) };
+    let parameters = LoadParameters { allowable_stress_mpa: Some(everywhere(1e6)), ..johnson(20.0) };
     let refused = sweep::sweep(&drive, &LoadCase::new(&parameters).unwrap(), Points::samples(4).unwrap(), &Never);
     assert!(matches!(refused, Err(SolveError::JohnsonBeyondHalfWidth { .. })), "{refused:?}");
 }
@@ -377,7 +377,7 @@ fn stiffness_is_the_slope_of_torque_over_wind_up_and_capacity_the_torque_at_whic
             let slope = 20.0 * 2e-5 * 14.0 * 14.0 / (turned(&more) - turned(&less));
             assert!((stiffness / slope - 1.0).abs() < 1e-7, "{stiffness} {slope}");
         }
-        let limited = LoadParameters { allowable_stress_mpa: Some(1500.0), ..load };
+        let limited = LoadParameters { allowable_stress_mpa: Some(everywhere(1500.0)), ..load };
         let capacity = swept(&PAPER_5_1, &limited, 6).torque_capacity.unwrap();
         let reached = at(capacity.input_torque_nm);
         let largest = reached.peaks.iter().map(|(_, peaks)| peaks.stress_mpa.value).fold(0.0, f64::max);

@@ -10,7 +10,7 @@ use toothwave_solver::losses::bearing::{LoadForRevolutions, RollingElement};
 use toothwave_solver::losses::duty::{
     BearingLoadForTime, ColumnForTime, DutyPoint, bearing_life_h, mean_at_each_place,
 };
-use toothwave_solver::losses::period::{Losses, RadialForces};
+use toothwave_solver::losses::period::{BearingLoad, Losses, RadialForces, Wear, WearForTime};
 use toothwave_solver::losses::wear::WearParameters;
 use toothwave_solver::losses::{
     AtInputAngle, Efficiency, Fixed, Friction, FrictionParameters, LoadedTooth, Mechanism, RaceBearing, Turning,
@@ -18,12 +18,13 @@ use toothwave_solver::losses::{
 };
 use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::sweep::{Points, sweep};
+use toothwave_solver::tooth::Pressure;
 use toothwave_solver::{
-    Compatibility, Contact, DriveParameters, LoadCase, Never, Parameter, PerContact, SolveError, ToothShape, Violation,
-    WaveGenerator,
+    Compatibility, Contact, ContactLaw, DriveParameters, LoadCase, LoadParameters, Never, Parameter, PerContact,
+    SolveError, ToothShape, Violation, WaveGenerator,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, load};
+use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, everywhere, load};
 use crate::reference::number;
 
 const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
@@ -835,4 +836,188 @@ fn losses_of_a_sweep_stop_when_told_to() {
     let sweep = sweep(&drive, &load, Points::samples(4).unwrap(), &Never).unwrap();
     let stopped = Losses::of(&drive, &sweep, &plain(0.03, 0.05), &AtomicBool::new(true));
     assert_eq!(stopped, Err(SolveError::Stopped));
+}
+
+/// What wears at 1000 revolutions a minute, with rates that tell the parts apart.
+fn wear_parameters(mechanism: &Mechanism) -> WearParameters {
+    WearParameters {
+        rate_mm3_per_nm: PerContact { wave_generator: 1e-6, ring: 2e-6, carrier: 3e-6 },
+        turning_rad_per_s: mechanism.turning_rad_per_s(1000.0),
+    }
+}
+
+#[test]
+fn a_sweep_wears_each_part_as_its_states_do_and_a_race_all_round() {
+    let (drive, mechanism) = (drive(&PAPER_5_1), mechanism(&PAPER_5_1));
+    let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
+    let loaded = LoadedDrive::new(&drive, &load).unwrap();
+    let sweep = sweep(&drive, &load, Points::samples(40).unwrap(), &Never).unwrap();
+    let parameters = wear_parameters(&mechanism);
+    let race = WaveGeneratorFriction::Race { coefficient: 0.05, bearing: bearing_of_5_1(0.002) };
+    for friction in [plain(0.03, 0.05), with(race, 0.04)] {
+        let losses = Losses::of(&drive, &sweep, &friction, &Never).unwrap();
+        let wear = Wear::of(&drive, &load, &sweep, &losses, &friction, &parameters, &Never).unwrap();
+        let mut expected = PerContact::of(|_| Vec::new());
+        let mut on_race = Vec::new();
+        for sample in 0..=40_u32 {
+            let teeth = teeth_at(&loaded, sample.into(), 40);
+            let turning = mechanism.turning(&friction, &teeth);
+            let mut sum = 0.0;
+            for (tooth, slip) in teeth.iter().zip(&turning.teeth) {
+                let line_load = PerContact::of(|contact| tooth.force_n.get(contact) / 15.0);
+                let depth = mechanism.wear_mm_per_hour(&friction, &parameters, tooth, slip, &line_load);
+                sum += depth.wave_generator;
+                for contact in CONTACTS {
+                    expected.get_mut(contact).push(*depth.get(contact));
+                }
+            }
+            on_race.push(AtInputAngle { input_angle: sample.into(), value: sum });
+        }
+        match wear.race_mm_per_hour {
+            Some(depth) => {
+                assert_near(depth, mean_over_period(&on_race), 1e-10 * depth, "race");
+                expected.wave_generator.clear();
+            }
+            None => assert!(friction.bearing().is_none()),
+        }
+        let peaks = wear.peaks(&sweep.states);
+        for contact in CONTACTS {
+            let (found, expected) = (wear.mm_per_hour.get(contact), expected.get(contact));
+            assert_eq!(found.len(), expected.len());
+            let most = expected.iter().copied().fold(0.0, f64::max);
+            for (found, expected) in found.iter().zip(expected) {
+                assert_near(*found, *expected, 1e-10 * most, &format!("{contact:?}"));
+            }
+            let peak = peaks.get(contact);
+            assert_eq!(peak.is_none(), expected.is_empty());
+            if let Some(peak) = peak {
+                let at = found.iter().position(|&depth| depth == peak.value).unwrap();
+                assert_near(peak.value, most, 1e-10 * most, "peak");
+                assert_eq!(peak.position_deg, sweep.states.position_deg[at]);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_duty_wears_each_place_by_its_mean_and_not_by_the_mean_of_the_largest() {
+    let wear = |ring: [f64; 2], race| Wear {
+        mm_per_hour: PerContact { wave_generator: Vec::new(), ring: ring.into(), carrier: vec![1.0, 2.0] },
+        race_mm_per_hour: Some(race),
+    };
+    let points = [(3.0, wear([4.0, 0.0], 1.0)), (1.0, wear([0.0, 8.0], 5.0))]
+        .map(|(share_of_time, wear)| WearForTime { share_of_time, wear });
+    assert_eq!(Wear::over_duty(&points), wear([3.0, 2.0], 2.0));
+}
+
+#[test]
+fn a_ball_wears_its_groove_by_the_pressure_that_passes_over_its_middle() {
+    let shape =
+        ToothShape::Ball { groove_radius_mm: PerContact { wave_generator: Some(5.4), ring: Some(5.3), carrier: None } };
+    let parameters = DriveParameters { tooth: shape, ..PAPER_5_1 };
+    let (drive, mechanism) = (drive(&parameters), mechanism(&parameters));
+    let load =
+        LoadCase::new(&LoadParameters { law: ContactLaw::Hertz, ..load(20.0, Compatibility::VirtualWork) }).unwrap();
+    let loaded = LoadedDrive::new(&drive, &load).unwrap();
+    let sweep = sweep(&drive, &load, Points::samples(6).unwrap(), &Never).unwrap();
+    // So rough a cam makes the teeth roll on it, and slip at ring and slot.
+    let (friction, parameters) = (plain(0.2, 0.05), wear_parameters(&mechanism));
+    let losses = Losses::of(&drive, &sweep, &friction, &Never).unwrap();
+    let wear = Wear::of(&drive, &load, &sweep, &losses, &friction, &parameters, &Never).unwrap();
+    let mut state = 0;
+    for sample in 0..=6 {
+        let teeth = teeth_at(&loaded, sample, 6);
+        let turning = mechanism.turning(&friction, &teeth);
+        let mesh = Mesh::new(&drive);
+        let placed = mesh.placed_at(sample, Samples::new(6).unwrap());
+        for ((tooth, slip), placed) in teeth.iter().zip(&turning.teeth).zip(placed) {
+            let pressures = loaded.tooth(placed.position).unwrap().pressure;
+            let line_load = PerContact::of(|contact| {
+                let Pressure::Ellipse(ellipse) = pressures.get(contact) else { panic!("a ball touches in an ellipse") };
+                let force_n = *tooth.force_n.get(contact);
+                let half_mm = ellipse.half_width_mm(force_n);
+                // Hertz's semi-ellipse, x = a sin t, by the rule of midpoints.
+                let steps = 200;
+                let step = PI / f64::from(steps);
+                let across = (0..steps).map(|i| (-0.5 * PI + (f64::from(i) + 0.5) * step).cos().powi(2)).sum::<f64>();
+                ellipse.stress_mpa(force_n) * half_mm * across * step
+            });
+            let expected = mechanism.wear_mm_per_hour(&friction, &parameters, tooth, slip, &line_load);
+            for contact in CONTACTS {
+                let found = wear.mm_per_hour.get(contact)[state];
+                assert_near(found, *expected.get(contact), 1e-9 * expected.get(contact).max(1e-12), "ball");
+            }
+            state += 1;
+        }
+    }
+    assert_eq!(state, sweep.states.len());
+    assert!(wear.peaks(&sweep.states).ring.unwrap().value > 0.0);
+}
+
+#[test]
+fn the_bearing_of_an_eccentric_bears_the_force_across_it_at_the_speed_of_its_race() {
+    let parameters = DriveParameters {
+        wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
+        teeth: 28,
+        installed: 28,
+        tooth_radius_mm: 2.5,
+        tooth: ToothShape::Cylinder { width_mm: 10.0 },
+        ring_teeth: 27,
+        tip_radius_mm: None,
+    };
+    let (drive, mechanism) = (drive(&parameters), mechanism(&parameters));
+    let load = LoadCase::new(&load(5.0, Compatibility::VirtualWork)).unwrap();
+    let sweep = sweep(&drive, &load, Points::samples(20).unwrap(), &Never).unwrap();
+    let forces = RadialForces::of(&drive, &sweep, &Never).unwrap().unwrap();
+    let bearing = RaceBearing { coefficient: 0.002, radius_mm: 25.0 };
+    let of = |wave_generator, element| {
+        let losses = Losses::of(&drive, &sweep, &with(wave_generator, 0.05), &Never).unwrap();
+        BearingLoad::of(&mechanism, element, &sweep, &losses, &forces)
+    };
+    for (element, exponent) in [(RollingElement::Ball, 3.0), (RollingElement::Roller, 10.0 / 3.0)] {
+        // A race at rest against the carrier turns as the wave generator does, at every angle alike.
+        let still = of(WaveGeneratorFriction::Rolling { bearing }, element).unwrap();
+        assert_near(still.speed_ratio, 1.0, 1e-14, "speed");
+        let powers: Vec<_> = forces
+            .force_n
+            .iter()
+            .enumerate()
+            .map(|(at, force_n)| AtInputAngle { input_angle: at as f64, value: force_n.powf(exponent) })
+            .collect();
+        let mean_n = mean_over_period(&powers).powf(1.0 / exponent);
+        assert_near(still.mean_load_n, mean_n, 1e-12 * mean_n, "mean load");
+        assert!(still.mean_load_n >= 5e3 / 1.2);
+        // One that rubs on the teeth follows them: it turns at another speed (section 10.2).
+        let rubbing = of(WaveGeneratorFriction::Race { coefficient: 0.05, bearing }, element).unwrap();
+        assert!((0.79..0.98).contains(&rubbing.speed_ratio), "{rubbing:?}");
+        // A bearing rougher than the teeth does not turn.
+        let rough = RaceBearing { coefficient: 0.9, ..bearing };
+        assert_eq!(of(WaveGeneratorFriction::Race { coefficient: 0.05, bearing: rough }, element), None);
+    }
+}
+
+#[test]
+fn the_capacity_is_the_least_that_any_contact_allows() {
+    for parameters in [PAPER_5_1, PAPER_5_2] {
+        let drive = drive(&parameters);
+        let capacity = |allowable: PerContact<f64>| {
+            let load =
+                LoadParameters { allowable_stress_mpa: Some(allowable), ..load(20.0, Compatibility::VirtualWork) };
+            let load = LoadCase::new(&load).unwrap();
+            sweep(&drive, &load, Points::samples(30).unwrap(), &Never).unwrap().torque_capacity.unwrap()
+        };
+        let allowable = PerContact { wave_generator: 1200.0, ring: 900.0, carrier: 400.0 };
+        // Alone, the others being as good as unlimited.
+        let alone = CONTACTS.map(|contact| {
+            let mut limits = everywhere(1e6);
+            *limits.get_mut(contact) = *allowable.get(contact);
+            let capacity = capacity(limits);
+            assert_eq!(capacity.contact, contact);
+            capacity.input_torque_nm
+        });
+        let least = alone.iter().copied().fold(f64::INFINITY, f64::min);
+        let all = capacity(allowable);
+        assert_eq!(all.input_torque_nm, least);
+        assert_eq!(alone[CONTACTS.iter().position(|&contact| contact == all.contact).unwrap()], least);
+    }
 }

@@ -15,7 +15,7 @@ use toothwave_solver::{
     Never, PerContact, SolveError, ToothShape, Torque,
 };
 
-use crate::drives::ellipse;
+use crate::drives::{ellipse, everywhere};
 
 /// What is allowed beside the condition, relative to the value or the column's peak.
 const TOLERANCE: f64 = 1e-14;
@@ -114,7 +114,7 @@ impl Case {
                 carrier: gap("carrier_um"),
             },
             modification: Modification::default(),
-            allowable_stress_mpa: load["allowable_stress_mpa"].as_f64(),
+            allowable_stress_mpa: load["allowable_stress_mpa"].as_f64().map(everywhere),
         })
         .unwrap()
     }

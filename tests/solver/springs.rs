@@ -12,7 +12,7 @@ use toothwave_solver::{
     Contact, ContactLaw, DriveParameters, LoadCase, Never, PerContact, Position, SolveError, Torque, Violation,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, load};
+use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, everywhere, load};
 
 const STIFFNESS: PerContact<f64> = PerContact { wave_generator: 4.1e5, ring: 6.3e5, carrier: 2.2e5 };
 
@@ -66,12 +66,12 @@ fn a_tooth_without_a_lever_arm_alone_carries_nothing_and_says_so() {
     for contact in [None, Some(Contact::WaveGenerator), Some(Contact::Carrier)] {
         let mut parameters = load(20.0, VirtualWork);
         parameters.clearance_um = PerContact::of(|at| if Some(at) == contact { 10.0 } else { 0.0 });
-        parameters.allowable_stress_mpa = Some(1500.0);
+        parameters.allowable_stress_mpa = Some(everywhere(1500.0));
         let loaded = LoadCase::new(&parameters).unwrap();
         let loaded = LoadedDrive::new(&drive, &loaded).unwrap();
         let tip = [loaded.tooth(Position::valley(2)).unwrap()];
         assert_eq!(loaded.wind_up(&tip), Err(SolveError::NoLeverArm));
-        assert_eq!(loaded.torque_limit(&tip, 1500.0).map(|_| ()), Err(SolveError::NoLeverArm));
+        assert_eq!(loaded.torque_limit(&tip, &everywhere(1500.0)).map(|_| ()), Err(SolveError::NoLeverArm));
         assert_eq!(loaded.wind_up(&[]), Err(SolveError::NoLeverArm));
     }
 }

@@ -10,7 +10,8 @@ use toothwave_solver::{
 };
 
 use crate::drives::{
-    PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, any_swept_drive, drive, ellipse, load, semi_axes_mm, swept,
+    PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, any_swept_drive, drive, ellipse, everywhere, load, semi_axes_mm,
+    swept,
 };
 
 /// More than any of these sweeps takes.
@@ -195,7 +196,7 @@ fn designs() -> Vec<(DriveParameters, LoadParameters)> {
                     let mut load = load(torque_nm, compatibility);
                     load.law = law;
                     load.clearance_um = PerContact { wave_generator: 0.0, ring, carrier };
-                    load.allowable_stress_mpa = Some(1500.0);
+                    load.allowable_stress_mpa = Some(everywhere(1500.0));
                     designs.push((parameters, load));
                 }
             }
@@ -272,7 +273,7 @@ proptest! {
         load.law = if is_linear { ContactLaw::Linear } else { ContactLaw::Palmgren };
         let [wave_generator, ring, carrier] = exponents.map(|exponent| 10.0_f64.powf(exponent));
         load.clearance_um = PerContact { wave_generator, ring, carrier };
-        load.allowable_stress_mpa = Some(1500.0);
+        load.allowable_stress_mpa = Some(everywhere(1500.0));
         let dense = Extremes::of(&parameters, &swept(&parameters, &load, 1500));
         let found = Extremes::of(&parameters, &swept_to(&parameters, &load, tolerance));
         for (found, dense) in found.peaks.iter().zip(&dense.peaks) {
@@ -290,7 +291,7 @@ proptest! {
 fn the_capacity_is_that_of_the_angle_where_it_is_least_and_not_of_those_where_loads_peak() {
     let mut load = load(1.0, VirtualWork);
     load.clearance_um.ring = 10.0;
-    load.allowable_stress_mpa = Some(1500.0);
+    load.allowable_stress_mpa = Some(everywhere(1500.0));
     let found = swept_to(&PAPER_5_1, &load, 1e-4).torque_capacity.unwrap().input_torque_nm;
     let dense = swept(&PAPER_5_1, &load, 100_000).torque_capacity.unwrap().input_torque_nm;
     assert!((found / dense - 1.0).abs() < 1e-4, "{found} {dense}");
@@ -302,7 +303,7 @@ fn without_gaps_the_capacity_is_the_torque_by_the_rule_of_three_for_every_single
     for law in [ContactLaw::Linear, ContactLaw::Palmgren] {
         for parameters in [PAPER_5_1, PAPER_5_2] {
             let mut load = load(7.0, VirtualWork);
-            (load.law, load.allowable_stress_mpa) = (law, Some(1500.0));
+            (load.law, load.allowable_stress_mpa) = (law, Some(everywhere(1500.0)));
             let sweep = swept(&parameters, &load, 400);
             let stress = sweep.peaks.iter().map(|(_, peaks)| peaks.stress_mpa.value).fold(0.0, f64::max);
             let expected = 7.0 * (1500.0 / stress).powi(2);

@@ -1,8 +1,9 @@
 //! Friction of the contacts.
 
 use serde::{Deserialize, Serialize};
+use toothwave_solver::losses::bearing::RollingElement;
 use toothwave_solver::losses::{FrictionParameters, RaceBearing, WaveGeneratorFriction};
-use toothwave_solver::{Contact, Parameter, Violation};
+use toothwave_solver::{Contact, Parameter, PerContact, Violation};
 use utoipa::ToSchema;
 
 use super::number::given;
@@ -19,6 +20,36 @@ pub struct FrictionDocument {
     pub ring: CoefficientDocument,
     /// Between teeth and carrier.
     pub carrier: CoefficientDocument,
+    /// How fast the parts wear, by Archard's law; left out, it is not computed.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub wear_rate_mm3_per_nm: Option<WearRatesDocument>,
+}
+
+/// The volume that a part loses at its contact with the teeth, in mm³, over force times way of the slip, in N·m.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
+pub struct WearRatesDocument {
+    /// Of the wave generator, or its race.
+    #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
+    pub wave_generator: f64,
+    /// Of the ring.
+    #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
+    pub ring: f64,
+    /// Of the carrier.
+    #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
+    pub carrier: f64,
+}
+
+/// What rolls in a bearing: its life falls with the third power of the load with balls, with the power 10/3 with rollers.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BearingElementDocument {
+    /// Balls.
+    #[default]
+    Ball,
+    /// Rollers.
+    Roller,
 }
 
 /// Friction of a contact.
@@ -55,6 +86,13 @@ pub struct RaceDocument {
     /// The radius that the bearing's coefficient belongs to.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub bearing_radius_mm: f64,
+    /// Dynamic load rating C of the bearing that is an eccentric circle: its life by ISO 281 is asked for.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-3, maximum = 1e12, nullable = false)]
+    pub bearing_load_rating_n: Option<f64>,
+    /// What rolls in it.
+    #[serde(default)]
+    pub bearing_element: BearingElementDocument,
 }
 
 /// A race that stands still against the carrier and does not rub on the teeth: the limit of a light bearing.
@@ -71,11 +109,54 @@ pub struct RollingDocument {
     /// The radius that the bearing's coefficient belongs to.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub bearing_radius_mm: f64,
+    /// Dynamic load rating C of the bearing that is an eccentric circle: its life by ISO 281 is asked for.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-3, maximum = 1e12, nullable = false)]
+    pub bearing_load_rating_n: Option<f64>,
+    /// What rolls in it.
+    #[serde(default)]
+    pub bearing_element: BearingElementDocument,
+}
+
+/// What the life of a bearing follows from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BearingRating {
+    /// C.
+    pub dynamic_load_rating_n: f64,
+    /// What rolls.
+    pub element: RollingElement,
 }
 
 impl FrictionDocument {
+    /// The wear rates, where there are any.
+    pub fn wear_rate_mm3_per_nm(&self) -> Option<PerContact<f64>> {
+        let WearRatesDocument { wave_generator, ring, carrier } = *self.wear_rate_mm3_per_nm.as_ref()?;
+        Some(PerContact { wave_generator, ring, carrier })
+    }
+
+    /// What the life of the bearing follows from, where it is asked for.
+    pub fn bearing_rating(&self) -> Option<BearingRating> {
+        let (rating_n, element) = match &self.wave_generator {
+            WaveGeneratorFrictionDocument::Plain(_) => return None,
+            WaveGeneratorFrictionDocument::Race(race) => (race.bearing_load_rating_n, race.bearing_element),
+            WaveGeneratorFrictionDocument::Rolling(rolling) => (rolling.bearing_load_rating_n, rolling.bearing_element),
+        };
+        Some(BearingRating { dynamic_load_rating_n: rating_n?, element: element.into() })
+    }
+
+    /// What is out of its range beside friction itself: wear rates, the bearing's rating, and a coefficient that stands where nothing depends on
+    /// it.
+    pub(super) fn violations_beside(&self) -> Vec<Violation> {
+        let rates = self.wear_rate_mm3_per_nm();
+        let rates =
+            rates.iter().flat_map(|rates| rates.iter().map(|(contact, &rate)| (Parameter::WearRate(contact), rate)));
+        let rating = self.bearing_rating().map(|rating| (Parameter::BearingLoadRating, rating.dynamic_load_rating_n));
+        let checked = rates.chain(rating).filter_map(|(parameter, value)| parameter.check(value));
+        self.idle_violation().into_iter().chain(checked).collect()
+    }
+
     /// The coefficient that stands where nothing depends on it, if it is out of its range.
-    pub(super) fn idle_violation(&self) -> Option<Violation> {
+    fn idle_violation(&self) -> Option<Violation> {
         match &self.wave_generator {
             WaveGeneratorFrictionDocument::Rolling(RollingDocument { coefficient: Some(coefficient), .. }) => {
                 Parameter::FrictionCoefficient(Contact::WaveGenerator).check(*coefficient)
@@ -90,10 +171,12 @@ impl From<&FrictionDocument> for FrictionParameters {
         use WaveGeneratorFrictionDocument::{Plain, Race, Rolling};
         let wave_generator = match document.wave_generator {
             Plain(CoefficientDocument { coefficient }) => WaveGeneratorFriction::Plain { coefficient },
-            Race(RaceDocument { coefficient, bearing_coefficient, bearing_radius_mm }) => WaveGeneratorFriction::Race {
-                coefficient,
-                bearing: RaceBearing { coefficient: bearing_coefficient, radius_mm: bearing_radius_mm },
-            },
+            Race(RaceDocument { coefficient, bearing_coefficient, bearing_radius_mm, .. }) => {
+                WaveGeneratorFriction::Race {
+                    coefficient,
+                    bearing: RaceBearing { coefficient: bearing_coefficient, radius_mm: bearing_radius_mm },
+                }
+            }
             Rolling(RollingDocument { bearing_coefficient, bearing_radius_mm, .. }) => WaveGeneratorFriction::Rolling {
                 bearing: RaceBearing { coefficient: bearing_coefficient, radius_mm: bearing_radius_mm },
             },
@@ -106,9 +189,21 @@ impl From<&FrictionDocument> for FrictionParameters {
     }
 }
 
-encoded! {
-    struct FrictionDocument { wave_generator, ring, carrier }
-    struct CoefficientDocument { coefficient }
-    struct RaceDocument { coefficient, bearing_coefficient, bearing_radius_mm }
-    struct RollingDocument { coefficient, bearing_coefficient, bearing_radius_mm }
+impl From<BearingElementDocument> for RollingElement {
+    fn from(document: BearingElementDocument) -> Self {
+        match document {
+            BearingElementDocument::Ball => Self::Ball,
+            BearingElementDocument::Roller => Self::Roller,
+        }
+    }
 }
+
+encoded! {
+    struct FrictionDocument { wave_generator, ring, carrier, wear_rate_mm3_per_nm }
+    struct CoefficientDocument { coefficient }
+    struct WearRatesDocument { wave_generator, ring, carrier }
+    struct RaceDocument { coefficient, bearing_coefficient, bearing_radius_mm, bearing_load_rating_n, bearing_element }
+    struct RollingDocument { coefficient, bearing_coefficient, bearing_radius_mm, bearing_load_rating_n, bearing_element }
+}
+
+encoded!(enum BearingElementDocument);

@@ -1,13 +1,15 @@
 //! A sweep as it goes over the wire.
 
 use serde::Serialize;
-use toothwave_solver::sweep::{self as solver, ContactPeaks, Extremes, InputAngles, Peak, States, TorqueCapacity};
+use toothwave_solver::sweep::{self as solver, ContactPeaks, Extremes, InputAngles, States, TorqueCapacity};
 use toothwave_solver::{Contact, Drive, PerContact};
 use utoipa::ToSchema;
 
 use crate::coincidence_degree::TeethInMeshAnswer;
 use crate::findings::FindingAnswer;
+use crate::sweep::duty::DutyAnswer;
 use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
+use crate::sweep::peak::PeakAnswer;
 
 /// Forces and contact stresses of one meshing zone over one period; the other zone is its point reflection.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -46,6 +48,10 @@ pub struct SweepAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub torque_capacity: Option<TorqueCapacityAnswer>,
+    /// The points of the duty, given `load.duty`: what stands beside it is of the one with the largest torque.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub duty: Option<DutyAnswer>,
     /// What friction takes, given `friction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
@@ -101,17 +107,6 @@ pub struct ContactPeaksAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub shear_depth_mm: Option<f64>,
-}
-
-/// A largest value and where it stands.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct PeakAnswer {
-    /// The value, in the unit of the field that holds the peak.
-    pub value: f64,
-    /// Input angle.
-    pub input_angle_deg: f64,
-    /// Position of the tooth, from the major axis.
-    pub position_deg: f64,
 }
 
 /// Columns of equal length: one entry for each input angle and tooth in mesh, by input angle, then tooth number.
@@ -264,12 +259,6 @@ impl StatesAnswer {
             stress_ring_mpa: states.stress_mpa.ring,
             stress_carrier_mpa: states.stress_mpa.carrier,
         }
-    }
-}
-
-impl From<Peak> for PeakAnswer {
-    fn from(Peak { value, input_angle_deg, position_deg }: Peak) -> Self {
-        Self { value, input_angle_deg, position_deg }
     }
 }
 

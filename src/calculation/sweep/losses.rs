@@ -1,21 +1,40 @@
 //! What friction takes, and what pushes the wave generator aside, as they go over the wire.
 
+use std::f64::consts::PI;
 use std::io::{self, Write};
 
 use serde::Serialize;
-use toothwave_solver::losses::period::{self, LossRatio, RadialForces};
+use toothwave_solver::losses::bearing::LoadForRevolutions;
+use toothwave_solver::losses::duty::{BearingLoadForTime, DutyPoint, bearing_life_h};
+use toothwave_solver::losses::period::{self, BearingLoad, LossRatio, RadialForces, Wear, WearForTime};
 use toothwave_solver::losses::{Efficiency, FirstOrderError, Fixed, Friction, Mechanism};
-use toothwave_solver::sweep::{Peak, Sweep};
-use toothwave_solver::{Contact, Drive, PerContact};
+use toothwave_solver::sweep::{Peak, States, Sweep};
+use toothwave_solver::{Contact, PerContact};
 use utoipa::ToSchema;
 
+use crate::design::BearingRating;
 use crate::no_answer::NoAnswer;
 use crate::question::require_finite;
-use crate::sweep::answer::PeakAnswer;
+use crate::sweep::peak::PeakAnswer;
 
 /// What friction takes, to first order in its coefficients; given `friction`.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct LossesAnswer {
+    /// What there is one number of.
+    #[serde(flatten)]
+    pub totals: LossTotalsAnswer,
+    /// How fast the tooth's surface slips over the part's, along the counter-clockwise tangent, per radian of wave generator against carrier;
+    /// at a race over the race.
+    pub slip_mm_per_rad: SlipAnswer,
+    /// The contact at which the tooth rolls, one entry a state.
+    pub rolls: Vec<RollsAnswer>,
+    /// The same at each input angle.
+    pub by_input_angle: LossesByInputAngleAnswer,
+}
+
+/// Losses over the period; over all points of a duty, as `duty` has it.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct LossTotalsAnswer {
     /// Efficiency over the period.
     pub efficiency: EfficiencyAnswer,
     /// Whether no torque at the output turns the drive, over the period.
@@ -24,13 +43,13 @@ pub struct LossesAnswer {
     pub efficiency_error: f64,
     /// Whether the coefficients lie where that error was measured; beyond, it is no bound.
     pub is_within_measured_range: bool,
-    /// The torque that the wave generator really needs, ring fixed: `load.input_torque_nm` over the efficiency.
+    /// The torque that the wave generator really needs, ring fixed: `load.input_torque_nm` over the efficiency. Of a duty, that of its hardest point.
     pub required_input_torque_nm: f64,
     /// Mean power lost over the input torque times the speed of wave generator against carrier.
     pub loss_ratio: f64,
     /// Where it is lost; these add up to it.
     pub loss_ratio_by_place: LossByPlaceAnswer,
-    /// Mean power lost with the ring fixed, given `load.input_speed_rpm`.
+    /// Mean power lost with the ring fixed, given a speed.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub power_loss_w: Option<f64>,
@@ -38,18 +57,62 @@ pub struct LossesAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub power_loss_by_place_w: Option<LossByPlaceAnswer>,
-    /// The largest Hertz stress times slip of each contact, ring fixed, in MPa m/s, given `load.input_speed_rpm`. Limits in handbooks hold for the
+    /// The largest Hertz stress times slip of each contact, ring fixed, in MPa m/s, given a speed. Limits in handbooks hold for the
     /// load over the projected area, which is far less: the two are never compared.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub pressure_velocity_mpa_m_per_s: Option<PressureVelocityAnswer>,
-    /// How fast the tooth's surface slips over the part's, along the counter-clockwise tangent, per radian of wave generator against carrier;
-    /// at a race over the race.
-    pub slip_mm_per_rad: SlipAnswer,
-    /// The contact at which the tooth rolls, one entry a state.
-    pub rolls: Vec<RollsAnswer>,
-    /// The same at each input angle.
-    pub by_input_angle: LossesByInputAngleAnswer,
+    /// The largest depth that each part loses in an hour where a tooth touches it, ring fixed, given `friction.wear_rate_mm3_per_nm` and a speed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub wear_mm_per_hour: Option<WearAnswer>,
+    /// The bearing that is the eccentric, given its `bearing_load_rating_n`; left out where it does not turn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub bearing: Option<BearingAnswer>,
+}
+
+/// How fast each part wears by Archard's law where it wears most.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct WearAnswer {
+    /// The wave generator, or its race.
+    pub wave_generator: WearPlaceAnswer,
+    /// The ring.
+    pub ring: WearPlaceAnswer,
+    /// The carrier.
+    pub carrier: WearPlaceAnswer,
+}
+
+/// A depth and where it is; a race wears all round, and has no place.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct WearPlaceAnswer {
+    /// The depth, in mm an hour.
+    pub value: f64,
+    /// Input angle at which a tooth touches it there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub input_angle_deg: Option<f64>,
+    /// Position of that tooth, from the middle of its lobe.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub position_deg: Option<f64>,
+}
+
+/// Load and basic rating life (ISO 281, 90 % reliability, no factor for lubrication) of the bearing that is the eccentric.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct BearingAnswer {
+    /// The constant radial load under which it would last as long.
+    pub mean_load_n: f64,
+    /// Millions of revolutions of one of its rings against the other.
+    pub life_million_revolutions: f64,
+    /// How fast they turn against each other, ring of the drive fixed, given a speed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub speed_rpm: Option<f64>,
+    /// The life in hours, given a speed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub life_h: Option<f64>,
 }
 
 /// Power out over power in, the torque at the driven end given, by the member that stands still. Driven from behind, an efficiency at or
@@ -82,7 +145,7 @@ pub struct SelfLockingAnswer {
 }
 
 /// A loss by where it is lost.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ToSchema)]
 pub struct LossByPlaceAnswer {
     /// Between teeth and wave generator, or its race.
     pub wave_generator: f64,
@@ -169,39 +232,199 @@ pub struct RadialForceAnswer {
     pub direction_deg: Vec<f64>,
 }
 
+/// What one point of a duty, or the only load, costs: all but its columns.
+#[derive(Debug)]
+pub(super) struct Cost {
+    pub(super) input_torque_nm: f64,
+    pub(super) input_speed_rpm: Option<f64>,
+    pub(super) share_of_time: f64,
+    pub(super) mean: LossRatio,
+    pub(super) pressure_velocity: Option<PerContact<Peak>>,
+    pub(super) wear: Option<Wear>,
+    pub(super) bearing: Option<BearingLoad>,
+}
+
+/// The costs of all points, one at least.
+pub(super) struct Costs<'a> {
+    pub(super) mechanism: Mechanism,
+    pub(super) friction: &'a Friction,
+    pub(super) bearing_rating: Option<BearingRating>,
+    pub(super) points: Vec<Cost>,
+}
+
+impl Costs<'_> {
+    /// A loss ratio over all points: by the powers without friction, since energies add.
+    fn loss_ratio(&self, of: impl Fn(&LossRatio) -> f64) -> f64 {
+        if let [only] = self.points.as_slice() {
+            return of(&only.mean);
+        }
+        let points: Vec<_> = self.points.iter().filter_map(|point| point.of_duty(of(&point.mean))).collect();
+        self.mechanism.duty(&points).loss_ratio
+    }
+
+    /// ν over all points.
+    pub(super) fn total_loss_ratio(&self) -> f64 {
+        self.loss_ratio(LossRatio::total)
+    }
+
+    /// Mean power over time; none without speeds.
+    fn power_w(&self, of: impl Fn(&LossRatio) -> f64) -> Option<f64> {
+        let time: f64 = self.points.iter().map(|point| point.share_of_time).sum();
+        let powers = self.points.iter().map(|point| {
+            let turning_rad_per_s = self.mechanism.turning_rad_per_s(point.input_speed_rpm?);
+            Some(point.share_of_time * (of(&point.mean) * point.input_torque_nm * turning_rad_per_s))
+        });
+        powers.sum::<Option<f64>>().map(|power_w| power_w / time)
+    }
+
+    fn by_place(&self, quantity: impl Fn(&dyn Fn(&LossRatio) -> f64) -> Option<f64>) -> Option<LossByPlaceAnswer> {
+        Some(LossByPlaceAnswer {
+            wave_generator: quantity(&|ratio| ratio.contacts.wave_generator)?,
+            ring: quantity(&|ratio| ratio.contacts.ring)?,
+            carrier: quantity(&|ratio| ratio.contacts.carrier)?,
+            bearing: quantity(&|ratio| ratio.bearing)?,
+        })
+    }
+
+    /// The largest of any point.
+    fn pressure_velocity(&self) -> Option<PressureVelocityAnswer> {
+        let points: Option<Vec<_>> = self.points.iter().map(|point| point.pressure_velocity).collect();
+        let points = points?;
+        let larger = |one: PerContact<Peak>, other: &PerContact<Peak>| {
+            PerContact::of(|contact| {
+                let (one, other) = (*one.get(contact), *other.get(contact));
+                if other.value > one.value { other } else { one }
+            })
+        };
+        Some(points.iter().skip(1).fold(*points.first()?, larger).into())
+    }
+
+    fn wear(&self, states: &States) -> Option<WearAnswer> {
+        let of_point =
+            |point: &Cost| Some(WearForTime { share_of_time: point.share_of_time, wear: point.wear.clone()? });
+        let points: Option<Vec<_>> = self.points.iter().map(of_point).collect();
+        let wear = Wear::over_duty(&points?);
+        let peaks = wear.peaks(states);
+        let place = |peak: Option<Peak>| {
+            peak.map(|Peak { value, input_angle_deg, position_deg }| WearPlaceAnswer {
+                value,
+                input_angle_deg: Some(input_angle_deg),
+                position_deg: Some(position_deg),
+            })
+        };
+        let of_race =
+            wear.race_mm_per_hour.map(|value| WearPlaceAnswer { value, input_angle_deg: None, position_deg: None });
+        Some(WearAnswer {
+            wave_generator: place(peaks.wave_generator).or(of_race)?,
+            ring: place(peaks.ring)?,
+            carrier: place(peaks.carrier)?,
+        })
+    }
+
+    /// A point at which the bearing does not turn uses nothing of its life up.
+    fn bearing(&self) -> Option<BearingAnswer> {
+        let BearingRating { dynamic_load_rating_n, element } = self.bearing_rating?;
+        let turning: Vec<_> = self.points.iter().filter_map(|point| Some((point, point.bearing?))).collect();
+        let (_, only) = turning.first()?;
+        let revolutions_million =
+            |mean_load_n: f64| 60.0 * 1e-6 * element.life_h(dynamic_load_rating_n, mean_load_n, 1.0);
+        let with_speed: Option<Vec<_>> = self
+            .points
+            .iter()
+            .map(|point| {
+                let turning_rpm = self.mechanism.turning_rad_per_s(point.input_speed_rpm?) * (60.0 / (2.0 * PI));
+                let (speed_ratio, mean_load_n) =
+                    point.bearing.map_or((0.0, 0.0), |bearing| (bearing.speed_ratio, bearing.mean_load_n));
+                let speed_rpm = speed_ratio * turning_rpm;
+                Some(BearingLoadForTime { share_of_time: point.share_of_time, speed_rpm, mean_load_n })
+            })
+            .collect();
+        let Some(points) = with_speed else {
+            // A single load without a speed.
+            let mean_load_n = only.mean_load_n;
+            let life_million_revolutions = revolutions_million(mean_load_n);
+            return Some(BearingAnswer { mean_load_n, life_million_revolutions, speed_rpm: None, life_h: None });
+        };
+        let loads: Vec<_> = points
+            .iter()
+            .map(|point| LoadForRevolutions {
+                load_n: point.mean_load_n,
+                revolutions: point.share_of_time * point.speed_rpm,
+            })
+            .collect();
+        let mean_load_n = element.mean_load_n(&loads);
+        let time: f64 = points.iter().map(|point| point.share_of_time).sum();
+        Some(BearingAnswer {
+            mean_load_n,
+            life_million_revolutions: revolutions_million(mean_load_n),
+            speed_rpm: Some(loads.iter().map(|load| load.revolutions).sum::<f64>() / time),
+            life_h: Some(bearing_life_h(element, dynamic_load_rating_n, &points)),
+        })
+    }
+
+    fn totals(&self, hardest: usize, states: &States) -> LossTotalsAnswer {
+        let Self { mechanism, friction, points, .. } = self;
+        let loss_ratio = self.total_loss_ratio();
+        let FirstOrderError { efficiency: efficiency_error, is_within_measured_range, .. } =
+            friction.first_order_error(mechanism, mechanism.loss_share(Fixed::Ring, loss_ratio));
+        let hardest = &points[hardest];
+        let efficiency_there = mechanism.efficiency(Fixed::Ring, hardest.mean.total()).driven;
+        LossTotalsAnswer {
+            efficiency: EfficiencyAnswer::new(mechanism, loss_ratio),
+            self_locking: SelfLockingAnswer::new(mechanism, loss_ratio),
+            efficiency_error,
+            is_within_measured_range,
+            required_input_torque_nm: hardest.input_torque_nm / efficiency_there,
+            loss_ratio,
+            loss_ratio_by_place: self.by_place(|of| Some(self.loss_ratio(of))).unwrap_or_default(),
+            power_loss_w: self.power_w(LossRatio::total),
+            power_loss_by_place_w: self.by_place(|of| self.power_w(of)),
+            pressure_velocity_mpa_m_per_s: self.pressure_velocity(),
+            wear_mm_per_hour: self.wear(states),
+            bearing: self.bearing(),
+        }
+    }
+
+    /// Each point, as the answer lists it.
+    pub(super) fn of_points(&self) -> impl Iterator<Item = PointCost> {
+        self.points.iter().map(|point| {
+            let ratio = point.mean.total();
+            let power_w = |speed_rpm| ratio * point.input_torque_nm * self.mechanism.turning_rad_per_s(speed_rpm);
+            PointCost {
+                efficiency_ring_fixed: self.mechanism.efficiency(Fixed::Ring, ratio).driven,
+                power_loss_w: point.input_speed_rpm.map(power_w),
+            }
+        })
+    }
+}
+
+/// What a point of a duty costs.
+pub(super) struct PointCost {
+    pub(super) efficiency_ring_fixed: f64,
+    pub(super) power_loss_w: Option<f64>,
+}
+
+impl Cost {
+    fn of_duty(&self, loss_ratio: f64) -> Option<DutyPoint> {
+        let Self { input_torque_nm, share_of_time, .. } = *self;
+        Some(DutyPoint { share_of_time, input_speed_rpm: self.input_speed_rpm?, input_torque_nm, loss_ratio })
+    }
+}
+
 impl LossesAnswer {
+    /// The losses over all points, with the columns of the hardest, whose sweep and losses these are.
     pub(super) fn new(
-        drive: &Drive,
-        friction: &Friction,
-        input_torque_nm: f64,
-        input_speed_rpm: Option<f64>,
+        costs: &Costs<'_>,
+        hardest: usize,
         sweep: &Sweep,
         losses: period::Losses,
     ) -> Result<Self, NoAnswer> {
-        let mechanism = Mechanism::of(drive);
-        let loss_ratio = losses.mean.total();
-        let efficiency = EfficiencyAnswer::new(&mechanism, loss_ratio);
-        let FirstOrderError { efficiency: efficiency_error, is_within_measured_range, .. } =
-            friction.first_order_error(&mechanism, mechanism.loss_share(Fixed::Ring, loss_ratio));
-        let turning_rad_per_s = input_speed_rpm.map(|speed_rpm| mechanism.turning_rad_per_s(speed_rpm));
-        let power_w = |ratio: f64, turning_rad_per_s: f64| ratio * input_torque_nm * turning_rad_per_s;
-        let by_place = LossByPlaceAnswer::of(&losses.mean, |ratio| ratio);
+        let mechanism = &costs.mechanism;
         let columns = |of: &dyn Fn(EfficiencyAnswer) -> f64| -> Vec<f64> {
-            losses.loss_ratio.iter().map(|&ratio| of(EfficiencyAnswer::new(&mechanism, ratio))).collect()
+            losses.loss_ratio.iter().map(|&ratio| of(EfficiencyAnswer::new(mechanism, ratio))).collect()
         };
         let answer = Self {
-            efficiency,
-            self_locking: SelfLockingAnswer::new(&mechanism, loss_ratio),
-            efficiency_error,
-            is_within_measured_range,
-            required_input_torque_nm: input_torque_nm / efficiency.ring_fixed,
-            loss_ratio,
-            loss_ratio_by_place: by_place,
-            power_loss_w: turning_rad_per_s.map(|turning| power_w(loss_ratio, turning)),
-            power_loss_by_place_w: turning_rad_per_s
-                .map(|turning| LossByPlaceAnswer::of(&losses.mean, |ratio| power_w(ratio, turning))),
-            pressure_velocity_mpa_m_per_s: turning_rad_per_s
-                .map(|turning| losses.pressure_velocity_peaks(sweep, turning).into()),
+            totals: costs.totals(hardest, &sweep.states),
             by_input_angle: LossesByInputAngleAnswer {
                 input_angle_deg: sweep.input_angles.input_angle_deg.clone(),
                 efficiency: EfficienciesAnswer {
@@ -221,12 +444,16 @@ impl LossesAnswer {
             },
             rolls: losses.rolls.into_iter().map(RollsAnswer::from).collect(),
         };
-        answer.require_finite()?;
+        let SlipAnswer { wave_generator, ring, carrier } = &answer.slip_mm_per_rad;
+        let numbers = answer.totals.numbers();
+        require_finite([wave_generator, ring, carrier, &answer.by_input_angle.loss_ratio, &numbers])?;
         Ok(answer)
     }
+}
 
-    fn require_finite(&self) -> Result<(), NoAnswer> {
-        let Self { slip_mm_per_rad: slip, by_input_angle, .. } = self;
+impl LossTotalsAnswer {
+    /// All that others follow from by finite means.
+    fn numbers(&self) -> Vec<f64> {
         let mut numbers = vec![
             self.loss_ratio,
             self.efficiency_error,
@@ -238,8 +465,14 @@ impl LossesAnswer {
         if let Some(PressureVelocityAnswer { wave_generator, ring, carrier }) = &self.pressure_velocity_mpa_m_per_s {
             numbers.extend([wave_generator.value, ring.value, carrier.value]);
         }
-        let columns = [&slip.wave_generator, &slip.ring, &slip.carrier, &by_input_angle.loss_ratio, &numbers];
-        require_finite(columns)
+        if let Some(WearAnswer { wave_generator, ring, carrier }) = &self.wear_mm_per_hour {
+            numbers.extend([wave_generator.value, ring.value, carrier.value]);
+        }
+        if let Some(BearingAnswer { mean_load_n, life_million_revolutions, speed_rpm, life_h }) = &self.bearing {
+            numbers.extend([*mean_load_n, *life_million_revolutions]);
+            numbers.extend(speed_rpm.iter().chain(life_h));
+        }
+        numbers
     }
 
     pub(super) fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
@@ -283,6 +516,24 @@ impl LossesAnswer {
                 )?;
             }
         }
+        if let Some(WearAnswer { wave_generator, ring, carrier }) = &self.wear_mm_per_hour {
+            for (name, wear) in [("wave generator", wave_generator), ("ring", ring), ("carrier", carrier)] {
+                write!(writer, "{name:<14} wear   {:>14.3e} mm/h    ", wear.value)?;
+                match wear.input_angle_deg.zip(wear.position_deg) {
+                    Some((input_angle_deg, position_deg)) => {
+                        writeln!(writer, "{input_angle_deg:>5.4} deg {position_deg:>9.4} deg")?;
+                    }
+                    None => writeln!(writer, "all round")?,
+                }
+            }
+        }
+        if let Some(BearingAnswer { mean_load_n, life_million_revolutions, speed_rpm, life_h }) = &self.bearing {
+            writeln!(writer, "mean load on the bearing            {mean_load_n:.6} N")?;
+            writeln!(writer, "its life                            {life_million_revolutions:.4e} million revolutions")?;
+            if let Some((speed_rpm, life_h)) = speed_rpm.zip(*life_h) {
+                writeln!(writer, "                                    {life_h:.4e} h at {speed_rpm:.6} rpm")?;
+            }
+        }
         Ok(())
     }
 }
@@ -310,18 +561,6 @@ impl SelfLockingAnswer {
             ring_fixed: locks(Fixed::Ring),
             carrier_fixed: locks(Fixed::Carrier),
             wave_generator_fixed: locks(Fixed::WaveGenerator),
-        }
-    }
-}
-
-impl LossByPlaceAnswer {
-    fn of(ratio: &LossRatio, quantity: impl Fn(f64) -> f64) -> Self {
-        let LossRatio { contacts: PerContact { wave_generator, ring, carrier }, bearing } = *ratio;
-        Self {
-            wave_generator: quantity(wave_generator),
-            ring: quantity(ring),
-            carrier: quantity(carrier),
-            bearing: quantity(bearing),
         }
     }
 }

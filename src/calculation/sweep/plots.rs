@@ -8,7 +8,8 @@ use kuva::render::figure::Figure;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 
-use super::answer::{PeakAnswer, StatesAnswer, SweepAnswer};
+use super::answer::{StatesAnswer, SweepAnswer};
+use super::peak::PeakAnswer;
 
 /// Apart for readers who do not tell red from green (Okabe and Ito): force, stress.
 const COLORS: [&str; 2] = ["#0072b2", "#d55e00"];

@@ -33,6 +33,8 @@ use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::question::{self, Question};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_calculation::sweep::answer::{ChecksAnswer, LoadAnswer, PeaksAnswer, SweepAnswer, TorqueCapacityAnswer};
+use toothwave_calculation::sweep::duty::DutyAnswer;
+use toothwave_calculation::sweep::losses::LossTotalsAnswer;
 use utoipa::ToSchema;
 
 use super::{App, Growing, broken_body, write_problem};
@@ -87,7 +89,7 @@ pub struct BatchQuery {
     /// The endpoint that every document is put to.
     #[param(inline, required = false)]
     pub endpoint: BatchEndpoint,
-    /// Of sweeps, the peaks without the states and without the columns of the wind-up.
+    /// Of sweeps, the peaks and the totals of the losses, without the states and all other columns.
     #[param(required = false)]
     pub peaks_only: bool,
 }
@@ -137,6 +139,10 @@ struct PeaksOnly<'a> {
     loaded_teeth_per_zone: &'a TeethInMeshAnswer,
     #[serde(skip_serializing_if = "Option::is_none")]
     torque_capacity: &'a Option<TorqueCapacityAnswer>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    duty: &'a Option<DutyAnswer>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    losses: Option<&'a LossTotalsAnswer>,
     checks: &'a ChecksAnswer,
     findings: &'a [FindingAnswer],
 }
@@ -224,6 +230,8 @@ fn peaks_line(
         teeth_in_mesh_per_zone: &sweep.teeth_in_mesh_per_zone,
         loaded_teeth_per_zone: &sweep.loaded_teeth_per_zone,
         torque_capacity: &sweep.torque_capacity,
+        duty: &sweep.duty,
+        losses: sweep.losses.as_ref().map(|losses| &losses.totals),
         checks: &sweep.checks,
         findings: &sweep.findings,
     };

@@ -53,6 +53,8 @@ const ASSETS: &[Asset] = assets![
     "format.js" as SCRIPT,
     "history.js" as SCRIPT,
     "large.js" as SCRIPT,
+    "lines.js" as SCRIPT,
+    "losses.js" as SCRIPT,
     "mechanism.js" as SCRIPT,
     "motion.js" as SCRIPT,
     "pass.js" as SCRIPT,

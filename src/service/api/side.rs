@@ -10,6 +10,7 @@ use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use toothwave_calculation::design::Design;
+use toothwave_calculation::materials::{MATERIALS, MaterialPreset};
 use utoipa::ToSchema;
 
 use super::App;
@@ -51,6 +52,19 @@ pub async fn examples() -> Json<ExamplesAnswer> {
         href: format!("/v1/examples/{}", example.name),
     });
     Json(ExamplesAnswer { examples: examples.collect() })
+}
+
+/// Materials that designers know by name.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct MaterialsAnswer {
+    /// All of them.
+    pub materials: &'static [MaterialPreset],
+}
+
+/// Materials by name, each number with its published source, to be copied into a design document.
+#[utoipa::path(get, path = "/v1/materials", tag = "service", responses((status = 200, description = "The materials.", body = MaterialsAnswer)))]
+pub async fn materials() -> Json<MaterialsAnswer> {
+    Json(MaterialsAnswer { materials: &MATERIALS })
 }
 
 /// One ready design document, to be sent to any endpoint as it is.

@@ -24,6 +24,7 @@ const clearance = (contact, label, symbol) =>
 /** Steel, as the service fills in what a document leaves out. */
 const material = (part, label) => ({
   title: label,
+  filled: `/materials/${part}`,
   fields: [
     number(`/materials/${part}/youngs_modulus_gpa`, 'Young’s modulus', 'E', 'GPa', { preset: 210, of: label }),
     number(`/materials/${part}/poissons_ratio`, 'Poisson’s ratio', 'ν', '', { preset: 0.3, of: label, step: 0.01 }),
@@ -123,6 +124,46 @@ const stiffness = (contact, label, symbol) => number(`/model/stiffness/${contact
 
 const compliance = (contact, label) =>
   number(`/model/series_compliance_mm_per_n/${contact}`, label, '', 'mm/N', { optional: () => '0', likely: 1e-6 });
+
+/** What the form starts friction with: a lubricated pair, and a light bearing under the middle of the race. */
+export const USUAL_FRICTION = { coefficient: 0.05, bearing: 0.002 };
+const USUAL_SPEED_RPM = 1500;
+
+/** The mean radius of the wave generator: where a bearing under the teeth would be. */
+export const bearingRadiusOf = (design) => sizeOf(design).mean;
+
+/** Friction is that of all contacts, or of none. */
+function withFriction(design) {
+  if (at(design, '/friction/wave_generator/kind') === undefined) return changed(design, '/friction', undefined);
+  const pointers = ['ring', 'carrier'].map((part) => `/friction/${part}/coefficient`);
+  return pointers.reduce((next, pointer) => (at(next, pointer) === undefined ? changed(next, pointer, USUAL_FRICTION.coefficient) : next), design);
+}
+
+/** A duty has speeds of its own, and is swept at equal intervals. */
+const withDuty = (design) =>
+  at(design, '/load/duty') === undefined ? design : changed(changed(design, '/load/input_speed_rpm', undefined), '/sweep/tolerance', undefined);
+
+const RUBBING = number('/friction/wave_generator/coefficient', 'Friction, teeth on the cam', 'μ_H', '', { slider: WIDE, likely: 0.05, start: USUAL_FRICTION.coefficient, step: 0.005 });
+const BEARING = [
+  number('/friction/wave_generator/bearing_coefficient', 'Friction of the bearing', 'μ_b', '', { slider: WIDE, likely: 0.002, start: USUAL_FRICTION.bearing, step: 0.0005 }),
+  number('/friction/wave_generator/bearing_radius_mm', 'Its radius', 'R_b', 'mm', { slider: NARROW, likely: 57, start: (design) => sizeOf(design).mean }),
+];
+const BEARING_LIFE = [
+  number('/friction/wave_generator/bearing_load_rating_n', 'Its dynamic load rating', 'C', 'N', { optional: () => 'no life asked', likely: 9000, step: 100 }),
+  choice('/friction/wave_generator/bearing_element', 'What rolls in it', [
+    { value: 'ball', label: 'Balls' },
+    { value: 'roller', label: 'Rollers' },
+  ]),
+];
+const wearRate = (contact, label) =>
+  number(`/friction/wear_rate_mm3_per_nm/${contact}`, label, '', 'mm³/(N·m)', { optional: () => '0', likely: 1e-8 });
+const ELSEWHERE = [
+  number('/friction/ring/coefficient', 'Friction, teeth on the ring', 'μ_K', '', { slider: WIDE, likely: 0.05, step: 0.005 }),
+  number('/friction/carrier/coefficient', 'Friction, teeth in the slots', 'μ_S', '', { slider: WIDE, likely: 0.05, step: 0.005 }),
+  wearRate('wave_generator', 'Wear rate, wave generator'),
+  wearRate('ring', 'Wear rate, ring'),
+  wearRate('carrier', 'Wear rate, carrier'),
+];
 
 export const GROUPS = [
   {
@@ -250,10 +291,39 @@ export const GROUPS = [
             preset: 280,
             field: number('/load/output_torque_nm', 'Output torque', 'M_G', 'N·m', { slider: 0.95 }),
           },
+          {
+            key: 'duty',
+            label: 'wave generator, several loads in turn',
+            preset: [{ input_torque_nm: 20, input_speed_rpm: USUAL_SPEED_RPM, share_of_time: 1 }],
+            field: {
+              kind: 'lines',
+              pointer: '/load/duty',
+              label: 'Duty, a load on each line',
+              columns: [
+                { key: 'input_torque_nm', others: ['output_torque_nm'], unit: 'N·m' },
+                { key: 'input_speed_rpm', unit: '1/min' },
+                { key: 'share_of_time', unit: '%', factor: 100 },
+              ],
+            },
+          },
         ],
-        // The same load seen from the other shaft, so that switching changes no result.
-        convert: (from, value, to, answers) => (answers.sweep?.load[from] === value ? answers.sweep.load[to] : undefined),
+        // The same load seen from the other shaft, so that switching changes no result; of a duty its hardest.
+        convert: (from, value, to, answers, design) => {
+          const { load } = answers.sweep ?? {};
+          if (to === 'duty') {
+            const torque = load?.[from] === value ? load.input_torque_nm : undefined;
+            return torque && [{ input_torque_nm: torque, input_speed_rpm: at(design, '/load/input_speed_rpm') ?? USUAL_SPEED_RPM, share_of_time: 1 }];
+          }
+          return from === 'duty' || load?.[from] === value ? load?.[to] : undefined;
+        },
+        adjust: withDuty,
       },
+      number('/load/input_speed_rpm', 'Input speed', 'n', '1/min', {
+        slider: WIDE,
+        optional: () => 'not given',
+        likely: USUAL_SPEED_RPM,
+        when: (design) => at(design, '/load/duty') === undefined,
+      }),
       number('/load/allowable_stress_mpa', 'Allowable stress', 'σ', 'MPa', { slider: WIDE, optional: () => 'not asked' }),
     ],
   },
@@ -290,6 +360,20 @@ export const GROUPS = [
       clearance('wave_generator', 'Gap at the wave generator', ''),
       clearance('ring', 'Gap at the ring', ''),
       clearance('carrier', 'Gap at the carrier', ''),
+    ],
+  },
+  {
+    title: 'Friction and wear',
+    pointer: '/friction',
+    hint: 'What the teeth run on decides what a turn costs; with an input speed it is told in watts, and with wear rates in millimetres an hour.',
+    summary: (design) => ({ plain: 'plain cam', race: 'race on a bearing', rolling: 'rolling' })[at(design, '/friction/wave_generator/kind')] ?? 'not computed',
+    fields: [
+      variant('/friction/wave_generator', 'kind', 'The teeth run on', [
+        { value: 'none', label: 'friction is not computed', implied: true, fields: [] },
+        { value: 'plain', label: 'the cam itself', fields: [RUBBING, ...ELSEWHERE] },
+        { value: 'race', label: 'a race on a bearing', fields: [RUBBING, ...BEARING, ...ELSEWHERE, ...BEARING_LIFE] },
+        { value: 'rolling', label: 'a race that does not rub on them', fields: [...BEARING, ...ELSEWHERE, ...BEARING_LIFE] },
+      ], { name: 'Friction', adjust: withFriction, terms: ['race', 'wear'] }),
     ],
   },
   {
@@ -396,10 +480,11 @@ export function kindOf({ pointer, tag, options, otherwise }, design) {
 /** The value of a variant when another kind is chosen: what does not belong to a kind stays, with the fields that both kinds have. */
 export function keptBy({ pointer, tag, options }, kind, design) {
   const chosen = options.find(({ value }) => value === kind);
-  // Of what stands deeper within, the object that holds it.
+  // Of what stands deeper within, the object that holds it; what stands beside the variant is not its own.
   const keyOf = (field) => field.pointer.slice(pointer.length + 1).split('/')[0];
-  const own = new Map(chosen.fields.map((field) => [keyOf(field), field]));
-  const others = new Set(options.flatMap(({ fields }) => fields).map(keyOf).filter((key) => !own.has(key)));
+  const within = (fields) => fields.filter((field) => field.pointer.startsWith(`${pointer}/`));
+  const own = new Map(within(chosen.fields).map((field) => [keyOf(field), field]));
+  const others = new Set(within(options.flatMap(({ fields }) => fields)).map(keyOf).filter((key) => !own.has(key)));
   const kept = Object.entries(at(design, pointer) ?? {}).filter(([key]) => key !== tag && !others.has(key));
   const given = new Set(kept.map(([key]) => key));
   const starts = [...own].filter(([key, { start }]) => start !== undefined && !given.has(key)).map(([key, { start }]) => [key, typeof start === 'function' ? start(design) : start]);

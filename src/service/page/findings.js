@@ -105,6 +105,13 @@ const KINDS = {
     basis: ['measured', 'The error is the largest that was measured at such coefficients and such a loss; the limit is a rule of thumb.'],
     why: 'The loss is large either way: a wave generator on a bearing loses a fraction of it, and is known better.',
   },
+  stress_above_allowable: {
+    title: 'Stress above the allowable one',
+    tests: 'The peak contact stress over a period against the one that the contact may have.',
+    basis: ['as given', 'The limit is the allowable stress of this design.'],
+    why: 'The torque capacity is the torque at which the first contact reaches its own.',
+    change: 'Stress grows with the square root of the torque.',
+  },
   stress_above_fatigue_limit: {
     title: 'Stress above the fatigue limit',
     tests: 'The peak contact stress over a period against the fatigue limit of bearing steel.',

@@ -1,6 +1,7 @@
 // The form, built from the field table in design.js, with problems and findings at the fields that they point at.
 
 import { GROUPS, at, changed, fieldsOf, fullLabel, isSame, keptBy, kindOf } from './design.js';
+import { linesOf, linesRead } from './lines.js';
 import { html, setChildren, setText, symbol } from './dom.js';
 import { explanation, sentence, titleOf } from './findings.js';
 import { number, typed } from './format.js';
@@ -40,6 +41,8 @@ export class Form {
   #answers = {};
   #isOwn = false;
   #findings = [];
+  #materials = [];
+  #fillings = [];
 
   /** `onEdit(design, gesture)` at each change; changes of one gesture are one step to undo; `onEnd()` ends it. */
   constructor(container, { onEdit, onEnd }, groups = GROUPS) {
@@ -85,6 +88,7 @@ export class Form {
     for (const part of group.parts ?? [group]) {
       const set = html('div', { class: 'set', role: 'group', 'aria-label': part.title });
       if (group.parts) set.append(html('h4', {}, part.title), part.hint ? html('p', { class: 'hint' }, part.hint) : '');
+      if (part.filled) set.append(this.#buildFilling(part));
       for (const field of part.fields) set.append(this.#buildField(field));
       details.append(set);
     }
@@ -92,11 +96,40 @@ export class Form {
     return details;
   }
 
+  /** What fills in a part's numbers by name; it is hidden until there are names. */
+  #buildFilling({ filled, title }) {
+    const select = html('select', { 'aria-label': `${title}: fill in a material` });
+    const source = html('p', { class: 'hint', hidden: true });
+    const element = html('div', { class: 'filling', hidden: true }, select, source);
+    select.addEventListener('change', () => {
+      const material = this.#materials.find(({ name }) => name === select.value);
+      const { youngs_modulus_gpa, poissons_ratio, elasticity_source, allowable_stress_mpa: allowable, allowable_stress_source } = material;
+      this.#edit(filled, { youngs_modulus_gpa, poissons_ratio });
+      this.setDesign(this.#design);
+      setText(source, `${elasticity_source}.${allowable === undefined ? ' No allowable Hertz stress is published.' : ` Allowable stress ${number(allowable)} MPa: ${allowable_stress_source}.`}`);
+      source.hidden = false;
+      select.value = '';
+      this.#onEnd();
+    });
+    this.#fillings.push({ element, select });
+    return element;
+  }
+
+  /** Offers materials by name, `{ name, title, youngs_modulus_gpa, … }`. */
+  offerMaterials(materials) {
+    this.#materials = materials;
+    for (const { element, select } of this.#fillings) {
+      select.replaceChildren(html('option', { value: '' }, 'Fill in a material…'), ...materials.map(({ name, title }) => html('option', { value: name }, title)));
+      element.hidden = materials.length === 0;
+    }
+  }
+
   #buildField(field) {
     if (field.kind === 'choice') return this.#buildChoice(field, (value) => this.#edit(field.pointer, value, field.adjust));
     if (field.kind === 'variant') return this.#buildVariant(field);
     if (field.kind === 'oneOf') return this.#buildOneOf(field);
     if (field.kind === 'flag') return this.#buildFlag(field);
+    if (field.kind === 'lines') return this.#buildLines(field);
     return this.#buildNumber(field);
   }
 
@@ -159,13 +192,13 @@ export class Form {
       const given = field.options.find((option) => at(this.#design, option.field.pointer) !== undefined);
       const option = field.options.find((candidate) => candidate.key === key);
       // What has no answer cannot be seen from the other side; it is asked for again rather than made up.
-      const value = given && field.convert ? field.convert(given.key, at(this.#design, given.field.pointer), key, this.#answers) : option.preset;
+      const value = given && field.convert ? field.convert(given.key, at(this.#design, given.field.pointer), key, this.#answers, this.#design) : option.preset;
       this.#fields.get(field.pointer).chosen = key;
       const others = Object.entries(at(this.#design, field.pointer) ?? {}).filter(([name]) => !field.options.some((candidate) => candidate.key === name));
-      const kept = value === undefined ? [] : [[key, Number(value.toPrecision(12))]];
-      this.#edit(field.pointer, Object.fromEntries([...kept, ...others]));
+      const kept = value === undefined ? [] : [[key, typeof value === 'number' ? Number(value.toPrecision(12)) : value]];
+      this.#edit(field.pointer, Object.fromEntries([...kept, ...others]), field.adjust);
     });
-    for (const option of field.options) element.append(this.#buildNumber(option.field));
+    for (const option of field.options) element.append(this.#buildField(option.field));
     return element;
   }
 
@@ -205,6 +238,26 @@ export class Form {
       event.preventDefault();
       this.#stepBy(entry, sense);
     });
+    return element;
+  }
+
+  /** A list of objects with the same few numbers: one on each line, the numbers apart by spaces, units or not. */
+  #buildLines(field) {
+    const id = idOf(field.pointer, 'field');
+    const order = field.columns.map(({ unit }) => unit).join(', ');
+    const input = html('textarea', { id, class: 'number', rows: 3, spellcheck: 'false', autocomplete: 'off', 'aria-describedby': `${idOf(field.pointer, 'unit')} ${idOf(field.pointer, 'notes')}` });
+    const unit = html('span', { class: 'unit', id: idOf(field.pointer, 'unit') }, order);
+    const element = html('div', { class: 'field lines' }, html('label', { for: id }, field.label), unit, input);
+    const entry = { field, element, input };
+    this.#notesFor(field.pointer, element);
+    this.#fields.set(field.pointer, entry);
+    input.addEventListener('input', () => {
+      const { value, fault } = linesRead(field, input.value, at(this.#design, field.pointer));
+      entry.fault = fault;
+      if (fault !== undefined) this.#renderNotes();
+      else this.#edit(field.pointer, value, field.adjust);
+    });
+    input.addEventListener('change', () => this.#onEnd());
     return element;
   }
 
@@ -300,10 +353,17 @@ export class Form {
       input.checked = at(design, field.pointer) === true;
       return;
     }
+    if (field.kind === 'lines') {
+      const isTyping = document.activeElement === input;
+      if (!isTyping) entry.fault = undefined;
+      if (!isTyping) input.value = linesOf(field, at(design, field.pointer)).join('\n');
+      return;
+    }
     if (field.kind === 'choice') {
       this.#offer(entry, at(design, field.pointer) ?? field.otherwise?.(design) ?? field.options[0].value);
       return;
     }
+    if (field.when) entry.element.hidden = !field.when(design);
     const value = field.derived ? field.derived.read(this.#isOwn ? this.#answers : {}) : (at(design, field.pointer) ?? field.preset);
     const isTyping = document.activeElement === input;
     if (!isTyping) entry.fault = undefined;

@@ -10,6 +10,7 @@ import { explanation, findingsOf, reasonsOf, titleOf } from './findings.js';
 import { Form } from './form.js';
 import { fixed, number } from './format.js';
 import { History } from './history.js';
+import { Losses } from './losses.js';
 import { Mechanism, stressColor } from './mechanism.js';
 import { CONTACTS, Motion } from './motion.js';
 import { passOf } from './pass.js';
@@ -92,6 +93,8 @@ const accuracy = new Accuracy(
   (design) => setDesign(design),
 );
 
+const losses = new Losses({ panel: byId('losses'), compare: byId('compare-losses'), state: byId('losses-state'), table: byId('losses-table') }, (design) => setDesign(design));
+
 const drawings = new Drawings(
   { list: byId('drawings-list'), state: byId('drawings-state') },
   { nameOf: fileName, onRefusal: showNotes, goTo: (pointer) => form.goTo(pointer), labelOf: (pointer) => form.labelOf(pointer) },
@@ -111,6 +114,7 @@ function replaceDesign(design, { origin, fromForm = false, respan = false, keeps
   state.origin = origin;
   form.setDesign(design, { respan: respan && !fromForm });
   accuracy.setDesign(design);
+  losses.setDesign(design);
   drawings.setDesign(design);
   service.request(design);
   byId('undo').disabled = !history.canUndo;
@@ -683,6 +687,8 @@ async function start() {
   }
   byId('away').hidden = true;
   showExamples();
+  // Names save typing; without them the numbers can still be entered.
+  getJson('v1/materials').then(({ materials }) => form.offerMaterials(materials), () => {});
   if (!fromAddress({ atStart: true })) {
     const first = state.examples.find(({ name }) => name === FIRST_EXAMPLE) ?? state.examples[0];
     setDesign(first.design, { origin: originOf(first), respan: true, keepsAddress: location.hash !== '' });

@@ -157,7 +157,7 @@ class Body {
       drawn.add(tooth);
       const { x, y, deg } = motion.center(tooth, inputDeg);
       const state = byTooth.get(tooth);
-      const share = state && Math.max(...Object.values(state.stress)) / loaded.mostStress;
+      const share = state && Math.max(...Object.values(state[loaded.colouring.key])) / loaded.colouring.most;
       const [left, top] = [x.toFixed(4), y.toFixed(4)];
       setAttributes(element, { 'data-tooth': tooth, ...(element.tagName === 'path' ? { transform: `translate(${left} ${top}) rotate(${deg})` } : { cx: left, cy: top }) });
       element.style.fill = state ? stressColor(share) : '';
@@ -170,6 +170,11 @@ class Body {
     }
   }
 }
+
+const COLOURINGS = [
+  { key: 'stress', name: 'Contact stress', unit: 'MPa' },
+  { key: 'rubbing', name: 'Pressure times velocity', unit: 'MPa m/s' },
+];
 
 /** Colour of a share of the largest stress: three stops, mixed by the style sheet so that each theme has its own. */
 export function stressColor(share) {
@@ -201,7 +206,13 @@ export class Mechanism {
   }
 
   #buildLegend() {
-    this.mostStress = html('span', { class: 'number' });
+    this.mostColour = html('span', { class: 'number' });
+    this.colouringName = html('span', {}, 'Tooth’s highest contact stress: 0 ');
+    this.chosenColouring = html(
+      'select',
+      { 'aria-label': 'Teeth are coloured by', hidden: true, onchange: () => this.#colourBy() },
+      COLOURINGS.map(({ key, name }) => html('option', { value: key }, name)),
+    );
     this.mostForce = html('span', { class: 'number' });
     const contacts = CONTACTS.map(({ key, name }) =>
       html('li', {}, html('span', { class: `swatch part-${key}`, 'aria-hidden': 'true' }), name),
@@ -209,7 +220,7 @@ export class Mechanism {
     this.ghostItem = html('li', { hidden: true }, html('span', { class: 'swatch ghost', 'aria-hidden': 'true' }), 'Reference');
     this.legend.append(
       html('ul', { class: 'key' }, contacts, html('li', {}, html('span', { class: 'swatch zone', 'aria-hidden': 'true' }), 'Meshing zones'), this.ghostItem),
-      html('p', { class: 'scale' }, 'Tooth’s highest contact stress: 0 ', html('span', { class: 'ramp', 'aria-hidden': 'true' }), ' ', this.mostStress),
+      html('p', { class: 'scale' }, this.chosenColouring, this.colouringName, html('span', { class: 'ramp', 'aria-hidden': 'true' }), ' ', this.mostColour),
       html('p', { class: 'scale' }, 'Longest arrow, over the whole period: ', this.mostForce),
     );
   }
@@ -256,8 +267,29 @@ export class Mechanism {
       force: peaks ? Math.max(...peaks.map((peak) => peak.force_n.value)) : 1,
       stress: peaks ? Math.max(...peaks.map((peak) => peak.stress_mpa.value)) : 1,
     };
-    setText(this.mostStress, peaks ? withUnit(number(this.most.stress, 4), 'MPa') : '–');
+    const rubbing = motion.rubbingScale === undefined ? [] : Object.values(motion.sweep.losses.pressure_velocity_mpa_m_per_s);
+    // Where nothing slips there is nothing to tell apart.
+    this.most.rubbing = Math.max(...rubbing.map((peak) => peak.value), 0) || 1;
+    this.rubs = rubbing.length > 0;
+    this.#showColouring();
     setText(this.mostForce, peaks ? withUnit(number(this.most.force, 4), 'N') : '–');
+  }
+
+  /** What teeth are coloured by: stress, unless pressure times velocity is known and chosen. */
+  get colouring() {
+    return this.rubs ? this.chosenColouring.value : 'stress';
+  }
+
+  #colourBy() {
+    this.#showColouring();
+    if (this.#shown) this.render(this.#shown);
+  }
+
+  #showColouring() {
+    this.chosenColouring.hidden = !this.rubs;
+    const { key, name, unit } = COLOURINGS.find((candidate) => candidate.key === this.colouring);
+    setText(this.colouringName, this.rubs ? ': 0 ' : `Tooth’s highest ${name[0].toLowerCase()}${name.slice(1)}: 0 `);
+    setText(this.mostColour, this.#motion.sweep ? withUnit(number(this.most[key], 4), unit) : '–');
   }
 
   /** Outlines another drive's ring and cam over this one; nothing takes them away. */
@@ -284,7 +316,8 @@ export class Mechanism {
     const motion = this.#motion;
     if (!motion) return;
     this.#shown = { inputDeg, selected, from };
-    const loaded = { teeth: motion.loaded(inputDeg), mostForce: this.most.force, mostStress: this.most.stress };
+    const key = this.colouring;
+    const loaded = { teeth: motion.loaded(inputDeg), mostForce: this.most.force, colouring: { key, most: this.most[key] } };
     const viewDeg = { ring: 0, carrier: motion.carrierDeg(inputDeg), wave_generator: inputDeg }[from];
     this.viewDeg = viewDeg;
     const half = Math.max(this.outer * (1 + 2 * LONGEST_ARROW - RING_BODY), this.outermost * 1.02);

@@ -13,7 +13,7 @@ export const CONTACTS = [
 ];
 
 /** The columns of a sweep's states, apart from angle and tooth number. */
-const LOADS = CONTACTS.flatMap(({ key }) => [`force_${key}_n`, `stress_${key}_mpa`]);
+const LOADS = CONTACTS.flatMap(({ key }) => [`force_${key}_n`, `stress_${key}_mpa`, `rubbing_${key}`]);
 const COLUMNS = ['position_deg', 'wave_generator_angle_deg', 'ring_angle_deg', ...LOADS];
 
 export const polar = (radius, deg) => ({ x: radius * Math.cos(deg * RAD), y: radius * Math.sin(deg * RAD) });
@@ -22,6 +22,14 @@ const modulo = (value, base) => ((value % base) + base) % base;
 
 /** Lobes of the wave generator, U: as many teeth the carrier has more or fewer than the ring. */
 export const lobesOf = ({ drive: { teeth, ring } }) => Math.abs(teeth.count - ring.teeth);
+
+/** What stress times slip over a radian is multiplied by to be pressure times velocity, in MPa m/s: the turning of the wave generator against
+ *  the carrier, ring fixed. Of a duty that of the point that is drawn; without friction or speed there is none. */
+export function rubbingScale({ drive: { teeth, ring }, load }, sweep) {
+  const speedRpm = load?.input_speed_rpm ?? sweep?.duty?.points[sweep.duty.hardest_point].input_speed_rpm;
+  if (!sweep?.losses || speedRpm === undefined) return undefined;
+  return (1e-3 * (2 * Math.PI * speedRpm) / 60) * (ring.teeth / teeth.count);
+}
 
 /** A tooth on a lobe: where zones are unlike, the same slot comes to the next lobe before long. */
 const keyOf = ({ tooth, lobe }) => `${tooth} ${lobe ?? 0}`;
@@ -38,7 +46,8 @@ export function framesOf(states) {
       frames.push(frame);
     }
     const row = { tooth: states.tooth[index], lobe: states.lobe?.[index], center_radius_mm: states.center_radius_mm[index] };
-    for (const column of COLUMNS) row[column] = states[column][index];
+    // Without friction nothing rubs.
+    for (const column of COLUMNS) row[column] = states[column] ? states[column][index] : 0;
     // Only a drive with clearance has teeth in mesh that carry nothing.
     row.loaded = states.loaded?.[index] ?? true;
     frame.rows.set(keyOf(row), row);
@@ -71,6 +80,7 @@ export class Motion {
     this.toSlotWallMm = Math.sqrt(this.toothRadius ** 2 - this.halfFlatMm ** 2);
     this.geometry = geometry;
     this.sweep = sweep;
+    this.rubbingScale = rubbingScale(design, sweep);
     this.period = geometry.period_deg;
     this.ratio = geometry.transmission_ratio;
     this.frames = sweep ? framesOf(sweep.states) : [];
@@ -229,12 +239,14 @@ export class Motion {
     };
     const force = {};
     const stress = {};
+    const rubbing = {};
     for (const { key } of CONTACTS) {
       force[key] = row[`force_${key}_n`];
       stress[key] = row[`stress_${key}_mpa`];
+      rubbing[key] = row[`rubbing_${key}`] * (this.rubbingScale ?? 0);
     }
     contacts.carrier = this.#slotContact(center);
-    return { tooth, zone, positionDeg: row.position_deg, center, force, stress, contacts };
+    return { tooth, zone, positionDeg: row.position_deg, center, force, stress, rubbing, contacts };
   }
 
   /** The point of a tooth's outline that is seen from the axis at an angle, on the near or the far side. */

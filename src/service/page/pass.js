@@ -1,7 +1,7 @@
 // One tooth's pass through the meshing zone, from where it enters to the root, put together from the samples of one period
 // as the paper does it (its figures 8 to 10): each loaded tooth stands for a part of the pass.
 
-import { CONTACTS, between, enteringBetween, framesOf, lobesOf } from './motion.js';
+import { CONTACTS, between, enteringBetween, framesOf, lobesOf, rubbingScale } from './motion.js';
 
 export const ABSCISSAE = [
   { key: 'input', label: 'Input angle', axis: 'input angle since the valley, Δj, deg', unit: 'deg', symbol: 'Δj' },
@@ -15,7 +15,8 @@ const SAME_DEG = 1e-9;
 
 const isSamePlace = (one, other) => one.breaksAfter === other.breaksAfter && Math.abs(one.row.position_deg - other.row.position_deg) <= SAME_DEG;
 
-/** `{ x: { abscissa: [] }, force: { contact: [] }, stress: { contact: [] }, position: [], breaks: Set of indices }`; a break at an
+/** `{ x: { abscissa: [] }, force: { contact: [] }, stress: { contact: [] }, rubbing: { contact: [] }, position: [], breaks: Set of indices }`,
+ *  `rubbing` being pressure times velocity where `rubs` says that it is known; a break at an
  *  index stands between that point and the one before it. */
 export function passOf(design, sweep) {
   const frames = framesOf(sweep.states);
@@ -50,13 +51,20 @@ export function passOf(design, sweep) {
     },
     force: {},
     stress: {},
+    rubbing: {},
     entersUnderLoad: sweep.enters_under_load,
     breaks: new Set(),
-    peaks: sweep.peaks,
+    peaks: {},
   };
+  const scale = rubbingScale(design, sweep);
+  pass.rubs = scale !== undefined;
+  // The peak of a duty may be another point's.
+  const rubbingPeaks = sweep.duty ? undefined : sweep.losses?.pressure_velocity_mpa_m_per_s;
   for (const { key } of CONTACTS) {
     pass.force[key] = column(`force_${key}_n`);
     pass.stress[key] = column(`stress_${key}_mpa`);
+    pass.rubbing[key] = column(`rubbing_${key}`).map((rubbing) => rubbing * (scale ?? 0));
+    pass.peaks[key] = { ...sweep.peaks[key], rubbing: rubbingPeaks?.[key] };
   }
   points.forEach(({ row, breaksAfter, step }, index) => {
     const next = points[index + 1];
@@ -107,9 +115,10 @@ export function readAt(pass, abscissa, x) {
   if (!place) return undefined;
   const share = pass.breaks.has(place.high) ? Math.round(place.share) : place.share;
   const value = (column) => column[place.low] + share * (column[place.high] - column[place.low]);
-  const reading = { position: value(pass.position), force: {}, stress: {} };
+  const reading = { position: value(pass.position), force: {}, stress: {}, rubbing: {} };
   for (const { key } of CONTACTS) {
     reading.force[key] = value(pass.force[key]);
+    reading.rubbing[key] = value(pass.rubbing[key]);
     const stress = pass.stress[key];
     reading.stress[key] = between(`stress_${key}_mpa`, stress[place.low], stress[place.high], share);
   }

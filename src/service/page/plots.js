@@ -10,6 +10,8 @@ import { ABSCISSAE, abscissaAt, plotted, readAt } from './pass.js';
 const QUANTITIES = [
   { key: 'force', title: 'Normal force', unit: 'N', symbol: 'F', peak: 'force_n' },
   { key: 'stress', title: 'Contact stress', unit: 'MPa', symbol: 'σ', peak: 'stress_mpa' },
+  // Shown where there is friction and a speed.
+  { key: 'rubbing', title: 'Pressure times velocity', unit: 'MPa m/s', symbol: 'p·v', peak: 'rubbing', isKnown: (pass) => pass?.rubs === true },
 ];
 
 /** Room on either side of the pass, so that its first jump does not fall on the axis. */
@@ -41,8 +43,9 @@ const faded = (color, alpha) => {
 };
 
 class Plot {
-  constructor(quantity, container, owner) {
+  constructor(quantity, figure, container, owner) {
     this.quantity = quantity;
+    this.figure = figure;
     this.container = container;
     this.owner = owner;
     this.marks = html('canvas', { class: 'marks', 'aria-hidden': 'true' });
@@ -99,14 +102,19 @@ class Plot {
   data() {
     const { owner, quantity } = this;
     const keys = CONTACTS.map(({ key }) => key);
-    const of = (pass) => (pass ? plotted(pass, owner.abscissa, quantity.key, keys) : [[], ...keys.map(() => [])]);
+    const isKnown = (pass) => pass && (quantity.isKnown?.(pass) ?? true);
+    const of = (pass) => (isKnown(pass) ? plotted(pass, owner.abscissa, quantity.key, keys) : [[], ...keys.map(() => [])]);
     const own = of(owner.pass);
-    if (owner.reference) return uPlot.join([own, of(owner.reference)]);
+    if (isKnown(owner.reference)) return uPlot.join([own, of(owner.reference)]);
     const nothing = own[0].map(() => null);
     return [...own, ...keys.map(() => nothing)];
   }
 
   update() {
+    const { isKnown } = this.quantity;
+    const wasHidden = this.figure.hidden;
+    this.figure.hidden = isKnown !== undefined && !isKnown(this.owner.pass);
+    if (wasHidden && !this.figure.hidden) this.resize();
     this.chart.setData(this.data());
   }
 
@@ -140,7 +148,7 @@ class Plot {
   #drawJumpsAndPeaks() {
     const { owner, quantity, chart } = this;
     const { pass, abscissa, colors } = owner;
-    if (!pass || !chart) return;
+    if (!pass || !chart || this.figure.hidden) return;
     const context = chart.ctx;
     const ratio = uPlot.pxRatio;
     const xs = pass.x[abscissa];
@@ -164,7 +172,7 @@ class Plot {
       }
       context.stroke();
       const peak = pass.peaks[key][quantity.peak];
-      const x = abscissaAt(pass, abscissa, peak.position_deg);
+      const x = peak && abscissaAt(pass, abscissa, peak.position_deg);
       if (x === undefined) continue;
       const [left, top] = at(x, peak.value);
       context.setLineDash([]);
@@ -197,9 +205,9 @@ class Plot {
     const { owner, quantity, chart } = this;
     const context = this.marks.getContext('2d');
     context.clearRect(0, 0, this.marks.width, this.marks.height);
-    if (!owner.pass || owner.isPrinting) return;
+    if (!owner.pass || owner.isPrinting || this.figure.hidden) return;
     const ratio = uPlot.pxRatio;
-    for (const { tooth, isCopy, positionDeg, force, stress } of teeth) {
+    for (const { tooth, isCopy, positionDeg, ...loads } of teeth) {
       if (isCopy && tooth !== selected) continue;
       const x = abscissaAt(owner.pass, owner.abscissa, positionDeg);
       if (x === undefined) continue;
@@ -213,7 +221,7 @@ class Plot {
         context.stroke();
       }
       for (const { key } of CONTACTS.filter((contact) => owner.visible.has(contact.key))) {
-        const value = { force, stress }[quantity.key][key];
+        const value = loads[quantity.key][key];
         context.fillStyle = owner.colors[`contact-${key}`];
         context.beginPath();
         context.arc(left, chart.valToPos(value, 'y') * ratio, (tooth === selected ? 4.5 : 2.8) * ratio, 0, 2 * Math.PI);
@@ -231,6 +239,7 @@ export class Plots {
   reference;
   #cursorX;
   #reading = new Map();
+  #readingRows = new Map();
 
   /** `onScrub(positionDeg)` when a place in the plots is picked. */
   constructor({ abscissae, contacts, charts, readout }, onScrub) {
@@ -238,8 +247,9 @@ export class Plots {
     this.scrubbed = onScrub;
     this.plots = QUANTITIES.map((quantity) => {
       const container = html('div', { class: 'chart', role: 'img', 'aria-label': `${quantity.title} over a tooth’s pass; the table of loaded teeth has the numbers` });
-      charts.append(html('figure', {}, html('figcaption', {}, `${quantity.title}, ${quantity.unit}`), container));
-      return new Plot(quantity, container, this);
+      const figure = html('figure', { hidden: quantity.isKnown !== undefined }, html('figcaption', {}, `${quantity.title}, ${quantity.unit}`), container);
+      charts.append(figure);
+      return new Plot(quantity, figure, container, this);
     });
     this.#buildChoices(abscissae, contacts);
     this.#buildReadout(readout);
@@ -290,7 +300,9 @@ export class Plots {
         this.#reading.set(`${key} ${contact.key}`, { value, delta });
         return html('td', {}, value, delta);
       });
-      return html('tr', {}, html('th', { scope: 'row' }, `${title}, ${unit}`), cells);
+      const row = html('tr', {}, html('th', { scope: 'row' }, `${title}, ${unit}`), cells);
+      this.#readingRows.set(key, row);
+      return row;
     });
     const head = CONTACTS.map(({ key, name }) => html('th', { scope: 'col' }, html('span', { class: `line contact-${key}`, 'aria-hidden': 'true' }), name));
     readout.append(html('table', { class: 'readout' }, this.place, html('thead', {}, html('tr', {}, html('td', {}), head)), html('tbody', {}, rows)));
@@ -344,7 +356,8 @@ export class Plots {
     const who = hovers ? 'At the cursor' : `Tooth ${this.selected}`;
     const place = x === undefined ? 'carries no load here' : `${symbol} = ${fixed(x, 2)} ${unit}`;
     setText(this.place, `${who}: ${place}${other ? '; differences are from the reference' : ''}`);
-    for (const { key } of QUANTITIES) {
+    for (const { key, isKnown } of QUANTITIES) {
+      this.#readingRows.get(key).hidden = isKnown !== undefined && !isKnown(pass);
       for (const contact of CONTACTS) {
         const { value, delta } = this.#reading.get(`${key} ${contact.key}`);
         const now = reading?.[key][contact.key];

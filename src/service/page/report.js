@@ -5,6 +5,7 @@ import { GROUPS, at, fieldsOf, fullLabel, kindOf } from './design.js';
 import { html } from './dom.js';
 import { basisOf, contactOf, kindOf as kindOfFinding, meaningOf, readable, sentence } from './findings.js';
 import { DASH, number, withUnit } from './format.js';
+import { linesOf } from './lines.js';
 
 function shownValue(field, design) {
   const value = at(design, field.pointer);
@@ -14,6 +15,7 @@ function shownValue(field, design) {
   if (field.kind === 'choice') return labelled(value ?? field.otherwise?.(design) ?? field.options[0].value);
   if (field.kind === 'flag') return value === true ? 'yes' : undefined;
   if (field.kind === 'oneOf' || field.derived) return undefined;
+  if (field.kind === 'lines') return value && linesOf(field, value).map((line) => line.split('  ').map((number, index) => withUnit(number, field.columns[index].unit)).join(', ')).join('; ');
   const shown = value ?? field.preset;
   return typeof shown === 'number' ? withUnit(String(shown), field.unit) : undefined;
 }

@@ -38,6 +38,45 @@ const largestRow = (label, field, unit) =>
     },
   });
 
+/** Of what friction takes. */
+const lossRow = (label, sign, unit, get, more) => row(label, sign, unit, ({ sweep }) => sweep?.losses && get(sweep.losses), more);
+
+const percentRow = (label, sign, get, more) => lossRow(label, sign, '%', (losses) => { const share = get(losses); return share === undefined ? undefined : 100 * share; }, more);
+
+const PLACES = [...CONTACTS.map(({ key, name }) => ({ key, name: key === 'wave_generator' ? 'cam or race' : name.toLowerCase() })), { key: 'bearing', name: 'bearing' }];
+
+const lossRows = [
+  percentRow('Efficiency, ring fixed', 'η', ({ efficiency }) => efficiency.ring_fixed, { significant: 4 }),
+  percentRow('Efficiency, carrier fixed', 'η', ({ efficiency }) => efficiency.carrier_fixed, { significant: 4 }),
+  percentRow('Efficiency, wave generator fixed', 'η', ({ efficiency }) => efficiency.wave_generator_fixed, { significant: 4 }),
+  ...[['ring_fixed', 'ring fixed'], ['carrier_fixed', 'carrier fixed'], ['wave_generator_fixed', 'wave generator fixed']].map(([key, name]) =>
+    percentRow(`Driven from behind, ${name}`, 'η', ({ efficiency }) => efficiency[`${key}_back_driven`], {
+      text: ({ sweep: { losses } }) => (losses.self_locking[key] ? 'locks itself' : `${number(100 * losses.efficiency[`${key}_back_driven`], 4)} %`),
+    }),
+  ),
+  percentRow('The efficiency may be off by', '', ({ efficiency_error: error }) => error, { significant: 2 }),
+  lossRow('Input torque with losses, ring fixed', 'M', 'N·m', ({ required_input_torque_nm: torque }) => torque),
+  lossRow('Power lost, ring fixed', 'P', 'W', ({ power_loss_w: power }) => power),
+  ...PLACES.map(({ key, name }) => percentRow(`Of it at the ${name}`, '', ({ loss_ratio: whole, loss_ratio_by_place: part }) => (whole > 0 ? part[key] / whole : undefined), { significant: 3 })),
+  ...CONTACTS.map(({ key, name, index }) =>
+    lossRow(`Pressure times velocity, ${name.toLowerCase()}`, `pv_${index}`, 'MPa m/s', ({ pressure_velocity_mpa_m_per_s: peaks }) => peaks?.[key].value, {
+      place: ({ sweep }) => sweep.losses.pressure_velocity_mpa_m_per_s[key],
+      significant: 4,
+      terms: key === 'wave_generator' ? ['pressure_velocity'] : undefined,
+    }),
+  ),
+  ...CONTACTS.map(({ key, name }) => {
+    const wear = (losses) => losses.wear_mm_per_hour?.[key];
+    return lossRow(`Wear, ${name.toLowerCase()}, µm/h`, '', '', (losses) => wear(losses) && 1000 * wear(losses).value, {
+      significant: 3,
+      place: ({ sweep }) => (wear(sweep.losses).position_deg === undefined ? undefined : wear(sweep.losses)),
+      terms: key === 'wave_generator' ? ['wear'] : undefined,
+    });
+  }),
+  lossRow('Mean load on the bearing', 'P', 'N', ({ bearing }) => bearing?.mean_load_n),
+  lossRow('Life of the bearing, h', 'L_10', '', ({ bearing }) => bearing?.life_h, { significant: 3 }),
+];
+
 /** Always in sight, however far one scrolls. */
 const KEY_ROWS = [
   row('Ratio, ring fixed', '', '', ({ geometry }) => geometry?.transmission_ratio),
@@ -51,6 +90,11 @@ const KEY_ROWS = [
   }),
   largestRow('Largest force', 'force_n', 'N'),
   largestRow('Largest stress', 'stress_mpa', 'MPa'),
+  percentRow('Efficiency', '', ({ efficiency }) => efficiency.ring_fixed, {
+    significant: 3,
+    note: ({ sweep: { losses } }) => (losses.self_locking.ring_fixed ? 'ring fixed; locks itself' : `ring fixed; ${number(100 * losses.efficiency.ring_fixed_back_driven, 3)} % from behind`),
+    isOptional: true,
+  }),
   row('Undercut', '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
     text: ({ geometry }) => (geometry.undercut.occurs ? 'yes' : 'no'),
     note: ({ geometry: { undercut } }) =>
@@ -116,6 +160,7 @@ export const GROUPS = [
       row('Transmission error, peak to peak', '', 'deg', ({ sweep }) => sweep?.wind_up?.transmission_error_peak_to_peak_deg),
     ],
   },
+  { title: 'What a turn costs', offer: '/friction/wave_generator', rows: lossRows },
   {
     title: 'Parts and room',
     rows: [
@@ -169,7 +214,7 @@ export class Results {
       const unit = entry.unit && !entry.text ? html('span', { class: 'unit' }, entry.unit) : undefined;
       const note = html('span', { class: 'tile-note number' });
       const scope = entry.scoped && html('span');
-      const tile = html('div', { class: 'tile' }, html('dt', {}, html('span', {}, entry.label, scope), entry.terms && term(...entry.terms)), html('dd', {}, value, unit && [' ', unit], note));
+      const tile = html('div', { class: 'tile', hidden: Boolean(entry.isOptional) }, html('dt', {}, html('span', {}, entry.label, scope), entry.terms && term(...entry.terms)), html('dd', {}, value, unit && [' ', unit], note));
       this.#tiles.push({ entry, tile, value, note, scope });
       keyFigures.append(tile);
     }
@@ -227,6 +272,8 @@ export class Results {
     for (const { entry, scope } of [...this.#tiles, ...this.#cells]) if (scope) setText(scope, scopeOf(entry, answers));
     for (const { entry, tile, value, note } of this.#tiles) {
       const shown = show(entry, answers);
+      // What a design need not ask for takes no room where it does not.
+      tile.hidden = Boolean(entry.isOptional) && !shown && (tile.hidden || !isHeld);
       setText(value, shown?.text ?? DASH);
       if (shown) value.value = shown.value;
       tile.dataset.state = (shown && entry.state?.(answers)) ?? '';
@@ -245,9 +292,9 @@ export class Results {
         setText(referenceUnit, otherShown ? entry.unit : '');
       }
       setText(delta, reference ? compare(entry, answers, reference) : '');
-      if (place) place.hidden = !shown;
-      if (place && shown) {
-        cell.at = entry.place(answers);
+      cell.at = place && shown && entry.place(answers);
+      if (place) place.hidden = !cell.at;
+      if (cell.at) {
         setText(place, `j ${number(cell.at.input_angle_deg, 4)}°, ψ ${number(cell.at.position_deg, 4)}°`);
       }
     }

@@ -1,6 +1,6 @@
 // A sweep as it is drawn: of very many input angles those that can be told apart on a screen, and what the others leave behind.
 
-import { enteringBetween, framesOf } from './motion.js';
+import { CONTACTS, enteringBetween, framesOf } from './motion.js';
 
 /** Most states that are drawn as they are: two plots with some thousands of points each. */
 const MOST_STATES = 6000;
@@ -29,9 +29,23 @@ function startsOf({ input_angle_deg: angles, tooth }) {
 
 const part = (states, from, to) => Object.fromEntries(Object.entries(states).map(([name, column]) => [name, column.slice(from, to)]));
 
+/** The sweep whose states have, at each contact, the stress times the slip: pressure times velocity but for the speed. */
+function withRubbing(sweep) {
+  const { states, losses } = sweep;
+  if (!losses) return sweep;
+  const rubbing = CONTACTS.map(({ key }) => {
+    const slip = losses.slip_mm_per_rad[key];
+    return [`rubbing_${key}`, states[`stress_${key}_mpa`].map((stress, row) => stress * Math.abs(slip[row]))];
+  });
+  // The columns that these were made of are drawn no further.
+  const { slip_mm_per_rad: _, rolls: __, ...others } = losses;
+  return { ...sweep, states: { ...states, ...Object.fromEntries(rubbing) }, losses: others };
+}
+
 /** The sweep with `carrying_teeth`, and with so few states that they can be drawn: every so many input angles, both sides of each jump,
  *  and the angles of the peaks. What the table shows stays that of all states. */
-export function drawable(sweep) {
+export function drawable(answer) {
+  const sweep = withRubbing(answer);
   const { states, peaks } = sweep;
   const starts = startsOf(states);
   const whole = { ...sweep, carrying_teeth: carrying(states, starts) };
@@ -39,6 +53,7 @@ export function drawable(sweep) {
   if (stride <= 1) return whole;
   const last = starts.length - 1;
   const peakAngles = new Set(Object.values(peaks).flatMap(({ force_n: force, stress_mpa: stress }) => [force.input_angle_deg, stress.input_angle_deg]));
+  for (const { input_angle_deg: angle } of Object.values(sweep.losses?.pressure_velocity_mpa_m_per_s ?? {})) peakAngles.add(angle);
   const kept = new Set([0, last]);
   const end = (frame) => starts[frame + 1] ?? states.tooth.length;
   const frame = (index) => framesOf(part(states, starts[index], end(index)))[0];

@@ -31,6 +31,18 @@ export const TERMS = {
     title: 'Virtual work',
     text: 'The frictionless solution for a tooth that is free to find its place: each contact’s approach counts with the force that it takes. It is the one that follows from mechanics alone.',
   },
+  race: {
+    title: 'Race',
+    text: 'A ring around the cam, free to turn: that of a thin bearing which the cam bends, or of the bearing that is itself the eccentric. Teeth on a plain cam slide with nearly the cam’s own speed; a race nearly stands still with them, and the bearing’s small friction takes the place of theirs.',
+  },
+  wear: {
+    title: 'Wear rate',
+    text: 'The volume that a surface loses, over the force and the way that it is rubbed with (Archard): it has to be measured for the pair of materials and its lubrication. From it follows how deep each part wears in an hour, where it wears most.',
+  },
+  pressure_velocity: {
+    title: 'Pressure times velocity p·v',
+    text: 'The largest contact pressure of a tooth times the speed at which it slips there. Limits in handbooks are for the load over the projected area, which is far less: they must not be compared with it.',
+  },
   paper: { title: 'The paper', text: PAPER },
 };
 

@@ -123,6 +123,11 @@ impl WaveGenerator {
         }
     }
 
+    /// Whether the cam is a circle off the axis: an eccentric, or a harmonic support with one lobe.
+    pub const fn is_eccentric_circle(&self) -> bool {
+        matches!(self, Self::Eccentric { .. } | Self::Harmonic { lobes: 1, .. })
+    }
+
     /// The parameter that says how large the cam is.
     const fn size_parameter(&self) -> Parameter {
         match self {

@@ -1,9 +1,15 @@
 //! What a period costs: the teeth of a sweep, input angle by input angle.
 
+use crate::cam::ToothCenter;
 use crate::contact::{Contact, PerContact};
 use crate::drive::Drive;
-use crate::losses::{AtInputAngle, Friction, LoadedTooth, Mechanism, mean_over_period};
+use crate::load_sharing::{LoadCase, LoadedDrive};
+use crate::losses::bearing::{LoadForRevolutions, RollingElement};
+use crate::losses::duty::{ColumnForTime, mean_at_each_place};
+use crate::losses::wear::WearParameters;
+use crate::losses::{AtInputAngle, Friction, LoadedTooth, Mechanism, ToothSlip, mean_over_period};
 use crate::position::{Position, half_lobe_rad};
+use crate::ring::FlankPoint;
 use crate::root::NotConverged;
 use crate::sweep::{Peak, States, Sweep};
 use crate::{SolveError, Stop};
@@ -35,6 +41,8 @@ pub struct Losses {
     pub slip_mm_per_rad: PerContact<Vec<f64>>,
     /// The contact that rolls, one entry a state.
     pub rolls: Vec<Option<Contact>>,
+    /// `v_R` at each input angle; 0 without a race.
+    pub race_mm_per_rad: Vec<f64>,
 }
 
 impl Mechanism {
@@ -56,20 +64,24 @@ impl Losses {
         let mut slip_mm_per_rad = PerContact::of(|_| column());
         let mut rolls = Vec::with_capacity(states.len());
         let mut ratios = Vec::with_capacity(sweep.input_angles.input_angle_deg.len());
+        let mut race_mm_per_rad = Vec::with_capacity(ratios.capacity());
         at_each_input_angle(drive, states, stop, |input_angle_deg, teeth| {
-            let turning = mechanism.turning(friction, teeth);
+            let teeth: Vec<_> = teeth.iter().map(|tooth| tooth.loaded).collect();
+            let turning = mechanism.turning(friction, &teeth);
             let over_torque = |work_nmm_per_rad: f64| work_nmm_per_rad / turning.input_torque_nmm;
             let ratio = LossRatio {
                 contacts: PerContact::of(|contact| over_torque(*turning.work_nmm_per_rad.get(contact))),
                 bearing: over_torque(turning.bearing_work_nmm_per_rad),
             };
             ratios.push((input_angle_deg, ratio));
+            race_mm_per_rad.push(turning.race_mm_per_rad);
             for slip in &turning.teeth {
                 for (contact, &slip) in slip.slip_mm_per_rad.iter() {
                     slip_mm_per_rad.get_mut(contact).push(slip);
                 }
                 rolls.push(slip.rolls);
             }
+            Ok(())
         })?;
         let mean = |of: &dyn Fn(&LossRatio) -> f64| {
             let column: Vec<_> = ratios
@@ -86,6 +98,7 @@ impl Losses {
             loss_ratio: ratios.iter().map(|(_, ratio)| ratio.total()).collect(),
             slip_mm_per_rad,
             rolls,
+            race_mm_per_rad,
         })
     }
 
@@ -95,17 +108,150 @@ impl Losses {
         let states = &sweep.states;
         PerContact::of(|contact| {
             let stresses = states.stress_mpa.get(contact).iter();
-            let mut peak = Peak { value: 0.0, input_angle_deg: 0.0, position_deg: 0.0 };
-            for (state, (stress_mpa, slip)) in stresses.zip(self.slip_mm_per_rad.get(contact)).enumerate() {
-                let value = 1e-3 * turning_rad_per_s * stress_mpa * slip.abs();
-                // The first, where nothing slips.
-                if state == 0 || value > peak.value {
-                    let (input_angle_deg, position_deg) = (states.input_angle_deg[state], states.position_deg[state]);
-                    peak = Peak { value, input_angle_deg, position_deg };
+            let values = stresses
+                .zip(self.slip_mm_per_rad.get(contact))
+                .map(|(stress_mpa, slip)| 1e-3 * turning_rad_per_s * stress_mpa * slip.abs());
+            // A sweep has states.
+            largest(states, values).unwrap_or(Peak { value: 0.0, input_angle_deg: 0.0, position_deg: 0.0 })
+        })
+    }
+}
+
+/// How fast the parts wear over the states of a sweep (docs/theory.md section 10.4).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wear {
+    /// Depth of each part where a tooth touches it, one entry a state; none at a race, which has no such place.
+    pub mm_per_hour: PerContact<Vec<f64>>,
+    /// Depth of a race, which wears all round.
+    pub race_mm_per_hour: Option<f64>,
+}
+
+/// The wear of one point of a duty.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WearForTime {
+    /// The point's share of the running time, or what is in proportion to it.
+    pub share_of_time: f64,
+    /// What it wears.
+    pub wear: Wear,
+}
+
+impl Wear {
+    /// That of the sweep that these losses belong to.
+    ///
+    /// # Errors
+    /// As [`Losses::of`].
+    pub fn of(
+        drive: &Drive,
+        load: &LoadCase,
+        sweep: &Sweep,
+        losses: &Losses,
+        friction: &Friction,
+        parameters: &WearParameters,
+        stop: &impl Stop,
+    ) -> Result<Self, SolveError> {
+        let (mechanism, loaded) = (Mechanism::of_sweep(drive, sweep), LoadedDrive::new(drive, load)?);
+        let mut mm_per_hour = PerContact::of(|_| Vec::with_capacity(sweep.states.len()));
+        let mut of_race = Vec::new();
+        at_each_input_angle(drive, &sweep.states, stop, |input_angle, teeth| {
+            let mut on_race = 0.0;
+            for ToothOfState { state, center, flank, loaded: tooth } in teeth {
+                let line_load = loaded.line_load_n_per_mm(center, flank, &tooth.force_n)?;
+                let slip_mm_per_rad = PerContact::of(|contact| losses.slip_mm_per_rad.get(contact)[*state]);
+                let slip = ToothSlip { slip_mm_per_rad, rolls: losses.rolls[*state] };
+                let depth = mechanism.wear_mm_per_hour(friction, parameters, tooth, &slip, &line_load);
+                on_race += depth.wave_generator;
+                for (contact, &depth) in depth.iter() {
+                    mm_per_hour.get_mut(contact).push(depth);
                 }
             }
-            peak
-        })
+            of_race.push(AtInputAngle { input_angle, value: on_race });
+            Ok(())
+        })?;
+        let race_mm_per_hour = friction.bearing().map(|_| mean_over_period(&of_race));
+        if race_mm_per_hour.is_some() {
+            mm_per_hour.wave_generator.clear();
+        }
+        Ok(Self { mm_per_hour, race_mm_per_hour })
+    }
+
+    /// The mean over a duty of at least one point, each with its share of the time and swept over the same input angles: at each place, since
+    /// depths add where they are.
+    pub fn over_duty(points: &[WearForTime]) -> Self {
+        let mm_per_hour = PerContact::of(|contact| {
+            let columns: Vec<_> = points
+                .iter()
+                .map(|WearForTime { share_of_time, wear }| ColumnForTime {
+                    share_of_time: *share_of_time,
+                    column: wear.mm_per_hour.get(contact),
+                })
+                .collect();
+            mean_at_each_place(&columns)
+        });
+        // A race is one place.
+        let of_race: Option<Vec<_>> =
+            points.iter().map(|point| point.wear.race_mm_per_hour.map(|depth| [depth])).collect();
+        let race_mm_per_hour = of_race.and_then(|depths| {
+            let columns: Vec<_> = points
+                .iter()
+                .zip(&depths)
+                .map(|(point, column)| ColumnForTime { share_of_time: point.share_of_time, column })
+                .collect();
+            mean_at_each_place(&columns).first().copied()
+        });
+        Self { mm_per_hour, race_mm_per_hour }
+    }
+
+    /// The largest depth of each part and where it is; none of a race.
+    pub fn peaks(&self, states: &States) -> PerContact<Option<Peak>> {
+        PerContact::of(|contact| largest(states, self.mm_per_hour.get(contact).iter().copied()))
+    }
+}
+
+/// The first of the largest values over the states, none of no values.
+fn largest(states: &States, values: impl Iterator<Item = f64>) -> Option<Peak> {
+    let mut peak: Option<Peak> = None;
+    for (state, value) in values.enumerate() {
+        if peak.is_none_or(|before| value > before.value) {
+            let (input_angle_deg, position_deg) = (states.input_angle_deg[state], states.position_deg[state]);
+            peak = Some(Peak { value, input_angle_deg, position_deg });
+        }
+    }
+    peak
+}
+
+/// The load on the bearing that is an eccentric, over a period.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BearingLoad {
+    /// Mean over its revolutions, see [`RollingElement::mean_load_n`].
+    pub mean_load_n: f64,
+    /// How fast its rings turn against each other, over the wave generator's turning against the carrier.
+    pub speed_ratio: f64,
+}
+
+impl BearingLoad {
+    /// That of the sweep which these losses and forces belong to; none where the race does not turn.
+    pub fn of(
+        mechanism: &Mechanism,
+        element: RollingElement,
+        sweep: &Sweep,
+        losses: &Losses,
+        forces: &RadialForces,
+    ) -> Option<Self> {
+        let speed_ratio = |at: usize| losses.race_mm_per_rad[at].abs() / mechanism.race_radius_mm;
+        let input_angle_deg = &sweep.input_angles.input_angle_deg;
+        let (mut loads, mut turned_deg) = (Vec::with_capacity(2 * input_angle_deg.len()), 0.0);
+        for at in 1..input_angle_deg.len() {
+            let step_deg = input_angle_deg[at] - input_angle_deg[at - 1];
+            turned_deg += step_deg;
+            // Half of the interval at either end, as the means over a period take it.
+            for end in [at - 1, at] {
+                let revolutions = 0.5 * step_deg * speed_ratio(end);
+                loads.push(LoadForRevolutions { load_n: forces.force_n[end], revolutions });
+            }
+        }
+        let revolutions: f64 = loads.iter().map(|load| load.revolutions).sum();
+        (revolutions > 0.0)
+            .then(|| Self { mean_load_n: element.mean_load_n(&loads), speed_ratio: revolutions / turned_deg })
     }
 }
 
@@ -130,9 +276,11 @@ impl RadialForces {
         }
         let mut forces = Self::default();
         at_each_input_angle(drive, &sweep.states, stop, |_, teeth| {
-            let force_n = mechanism.radial_force_n(teeth);
+            let teeth: Vec<_> = teeth.iter().map(|tooth| tooth.loaded).collect();
+            let force_n = mechanism.radial_force_n(&teeth);
             forces.force_n.push(force_n.norm());
             forces.direction_deg.push(force_n.y.atan2(force_n.x).to_degrees());
+            Ok(())
         })?;
         Ok(Some(forces))
     }
@@ -144,12 +292,12 @@ fn at_each_input_angle(
     drive: &Drive,
     states: &States,
     stop: &impl Stop,
-    mut each: impl FnMut(f64, &[LoadedTooth]),
+    mut each: impl FnMut(f64, &[ToothOfState]) -> Result<(), SolveError>,
 ) -> Result<(), SolveError> {
     let mut teeth = Vec::new();
     for state in 0..states.len() {
         let next = state + 1;
-        teeth.push(loaded_tooth(drive, states, state)?);
+        teeth.push(tooth_of(drive, states, state)?);
         let goes_on = next < states.len()
             && states.input_angle_deg[next].total_cmp(&states.input_angle_deg[state]).is_eq()
             && states.tooth[next] > states.tooth[state];
@@ -157,19 +305,28 @@ fn at_each_input_angle(
             if stop.stopped() {
                 return Err(SolveError::Stopped);
             }
-            each(states.input_angle_deg[state], &teeth);
+            each(states.input_angle_deg[state], &teeth)?;
             teeth.clear();
         }
     }
     Ok(())
 }
 
+/// The tooth of a state, with where it touches.
+struct ToothOfState {
+    state: usize,
+    center: ToothCenter,
+    flank: FlankPoint,
+    loaded: LoadedTooth,
+}
+
 /// The tooth of a state. Its place is known in degrees, near the valley to some 1e-14 rad, where it bears next to nothing.
-fn loaded_tooth(drive: &Drive, states: &States, state: usize) -> Result<LoadedTooth, NotConverged> {
+fn tooth_of(drive: &Drive, states: &States, state: usize) -> Result<ToothOfState, NotConverged> {
     let lobes = drive.lobes();
     let from_lobe_rad = states.position_deg[state].to_radians().min(half_lobe_rad(lobes));
     let center = drive.flank().locus().at(Position::from_lobe(from_lobe_rad, lobes))?;
     let flank = drive.flank().at(&center);
     let force_n = PerContact::of(|contact| states.force_n.get(contact)[state]);
-    Ok(LoadedTooth::new(states.lobe.get(state).copied().unwrap_or_default(), &center, &flank, force_n))
+    let loaded = LoadedTooth::new(states.lobe.get(state).copied().unwrap_or_default(), &center, &flank, force_n);
+    Ok(ToothOfState { state, center, flank, loaded })
 }

@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use crate::contact::PerContact;
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
 use crate::mesh::{Mesh, PlacedTooth};
 use crate::position::Position;
@@ -178,7 +179,7 @@ struct Search<'a, S> {
     teeth_at_each_place: u64,
     /// Laps that are unlike each other.
     laps: u64,
-    allowable_stress_mpa: Option<f64>,
+    allowable_stress_mpa: Option<PerContact<f64>>,
     /// Whether teeth begin and cease to carry between their entry and their exit.
     has_gaps: bool,
     /// Whether loads are smooth between two entries.
@@ -307,7 +308,7 @@ impl<S: Stop> Search<'_, S> {
         let wind_up = self.loaded.wind_up(&teeth)?;
         let loads: Result<Vec<_>, _> = teeth.iter().map(|tooth| self.loaded.loads(tooth, &wind_up)).collect();
         let (rotation_rad, stiffness) = (wind_up.rotation_rad(), wind_up.stiffness_nmm_per_rad);
-        let per_capacity = match self.allowable_stress_mpa {
+        let per_capacity = match &self.allowable_stress_mpa {
             Some(allowable_mpa) => 1.0 / self.loaded.torque_limit(&teeth, allowable_mpa)?.input_torque_nmm,
             None => 0.0,
         };

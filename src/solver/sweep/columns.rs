@@ -155,14 +155,17 @@ impl TorqueCapacity {
     pub(crate) fn in_proportion(
         drive: &Drive,
         input_torque_nm: f64,
-        allowable_mpa: f64,
+        allowable_mpa: &PerContact<f64>,
         peaks: &PerContact<ContactPeaks>,
     ) -> Self {
-        let hardest = peaks.iter().map(|(contact, peaks)| (contact, peaks.stress_mpa));
-        let first = (Contact::WaveGenerator, peaks.wave_generator.stress_mpa);
-        let (contact, peak) =
-            hardest.fold(first, |most, other| if other.1.value > most.1.value { other } else { most });
-        let share = allowable_mpa / peak.value;
+        let share_of = |contact| allowable_mpa.get(contact) / peaks.get(contact).stress_mpa.value;
+        let (contact, share) = [Contact::Ring, Contact::Carrier]
+            .map(|contact| (contact, share_of(contact)))
+            .into_iter()
+            .fold((Contact::WaveGenerator, share_of(Contact::WaveGenerator)), |least, other| {
+                if other.1 < least.1 { other } else { least }
+            });
+        let peak = peaks.get(contact).stress_mpa;
         let input_torque_nm = input_torque_nm * (share * share);
         let output_torque_nm = input_torque_nm * drive.teeth_per_wave();
         Self { input_torque_nm, output_torque_nm, contact, input_angle_deg: peak.input_angle_deg }

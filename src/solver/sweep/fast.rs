@@ -52,7 +52,7 @@ const LAST_STEP: f64 = 5e-6;
 pub(crate) fn sweep(
     loaded: &LoadedDrive<'_>,
     samples: Samples,
-    allowable_mpa: Option<f64>,
+    allowable_mpa: Option<PerContact<f64>>,
     stop: &impl Stop,
 ) -> Result<Option<Sweep>, SolveError> {
     let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
@@ -74,7 +74,7 @@ pub(crate) fn sweep(
 pub(crate) fn peaks(
     loaded: &LoadedDrive<'_>,
     samples: Samples,
-    allowable_mpa: Option<f64>,
+    allowable_mpa: Option<PerContact<f64>>,
     stop: &impl Stop,
 ) -> Result<Option<SweepPeaks>, SolveError> {
     let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
@@ -88,15 +88,15 @@ pub(crate) fn peaks(
     Ok(Some(peaks))
 }
 
-/// The capacity where all loads are in proportion (docs/theory.md section 4.7): that of the largest stress.
+/// The capacity where all loads are in proportion (docs/theory.md section 4.7): that of the stress nearest to what is allowed.
 fn in_proportion(
     loaded: &LoadedDrive<'_>,
-    allowable_mpa: Option<f64>,
+    allowable_mpa: Option<PerContact<f64>>,
     peaks: &PerContact<ContactPeaks>,
 ) -> Option<TorqueCapacity> {
     let input_torque_nm = 1e-3 * loaded.input_torque_nmm();
     allowable_mpa
-        .map(|allowable_mpa| TorqueCapacity::in_proportion(loaded.drive(), input_torque_nm, allowable_mpa, peaks))
+        .map(|allowable_mpa| TorqueCapacity::in_proportion(loaded.drive(), input_torque_nm, &allowable_mpa, peaks))
 }
 
 /// The sweep as `pulp` wants it: compiled once for each instruction set, the best one of this machine picked when the program runs. Whatever
@@ -134,7 +134,7 @@ struct Kernel {
     ring_terms: usize,
     guess: Guess,
     /// The stress that a torque capacity is asked for, where it does not follow from the peaks.
-    allowable_mpa: Option<f64>,
+    allowable_mpa: Option<PerContact<f64>>,
 }
 
 /// What a sweep comes to beside what its sink holds.
@@ -241,7 +241,7 @@ impl Guess {
 }
 
 impl Kernel {
-    fn new(loaded: &LoadedDrive<'_>, allowable_mpa: Option<f64>) -> Option<Self> {
+    fn new(loaded: &LoadedDrive<'_>, allowable_mpa: Option<PerContact<f64>>) -> Option<Self> {
         let law = match loaded.line_law()? {
             LineLaw::Linear { compliance_mm_per_n } if loaded.is_linear() => {
                 Law::Linear(Compliance::new(&compliance_mm_per_n, loaded))
@@ -529,7 +529,7 @@ impl Kernel {
     #[inline(always)]
     fn share_load<V: Simd>(
         sharing: &Sharing,
-        allowable_mpa: Option<f64>,
+        allowable_mpa: Option<PerContact<f64>>,
         loaded: &LoadedDrive<'_>,
         count: usize,
         tile: &mut Tile<'_>,
@@ -553,7 +553,10 @@ impl Kernel {
             return None;
         }
         let limit = match allowable_mpa {
-            Some(allowable_mpa) => Some(sharing.limit::<V>(allowable_mpa, &teeth, &mut tile.work)?),
+            Some(allowable_mpa) => {
+                let per_allowable = PerContact::of(|contact| 1.0 / allowable_mpa.get(contact));
+                Some(sharing.limit::<V>(&per_allowable, &teeth, &mut tile.work)?)
+            }
             None => None,
         };
         let (scale, root) = (&tile.scale[..len], &mut tile.scale_root[..len]);

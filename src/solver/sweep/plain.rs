@@ -78,7 +78,7 @@ pub(crate) fn sweep(
 /// A sweep as it grows by input angles.
 struct Growing<'a> {
     loaded: &'a LoadedDrive<'a>,
-    allowable_stress_mpa: Option<f64>,
+    allowable_stress_mpa: Option<PerContact<f64>>,
     states: States,
     input_angles: InputAngles,
     torque_capacity: Option<TorqueCapacity>,
@@ -115,7 +115,7 @@ impl Hardest {
 }
 
 impl<'a> Growing<'a> {
-    fn new(loaded: &'a LoadedDrive<'a>, allowable_stress_mpa: Option<f64>) -> Self {
+    fn new(loaded: &'a LoadedDrive<'a>, allowable_stress_mpa: Option<PerContact<f64>>) -> Self {
         Self {
             loaded,
             allowable_stress_mpa,
@@ -151,7 +151,7 @@ impl<'a> Growing<'a> {
         let wind_up = self.loaded.wind_up(&self.teeth)?;
         let loaded_teeth = self.share_load(&wind_up)?;
         self.input_angles.push(self.loaded.drive(), input_angle_deg, &wind_up, loaded_teeth);
-        if let Some(allowable_stress_mpa) = self.allowable_stress_mpa {
+        if let Some(allowable_stress_mpa) = &self.allowable_stress_mpa {
             let limit = self.loaded.torque_limit(&self.teeth, allowable_stress_mpa)?;
             let input_torque_nm = 1e-3 * limit.input_torque_nmm;
             if self.torque_capacity.is_none_or(|capacity| input_torque_nm < capacity.input_torque_nm) {

@@ -4,6 +4,8 @@ pub mod flat;
 pub(crate) mod line;
 pub mod point;
 
+use std::f64::consts::PI;
+
 use crate::approach::{Approach, Logarithmic};
 use crate::contact::{Contact, ContactLaw, HertzLine, Materials, PerContact};
 use crate::drive::{Drive, ToothShape};
@@ -105,6 +107,15 @@ impl Pressure {
         }
     }
 
+    /// The pressure in the middle plane, summed along the plane of motion: of an ellipse `π a p/2`, a its half-width; elsewhere the force
+    /// over the width.
+    pub fn line_load_n_per_mm(&self, force_n: f64, tooth_width_mm: f64) -> f64 {
+        match self {
+            Self::Line { .. } | Self::Flat(_) => force_n / tooth_width_mm,
+            Self::Ellipse(ellipse) => 0.5 * PI * ellipse.half_width_mm(force_n) * ellipse.stress_mpa(force_n),
+        }
+    }
+
     /// The inverse of [`Self::stress_mpa`].
     pub fn force_n(&self, stress_mpa: f64) -> f64 {
         match self {
@@ -152,7 +163,7 @@ fn law_of(
         _ if is_ball => return None,
         _ if is_flat => Law::Flat,
         ContactLaw::Linear => {
-            let stiffness = 0.5 * std::f64::consts::PI * size.width_mm * materials.contact_modulus_mpa(contact);
+            let stiffness = 0.5 * PI * size.width_mm * materials.contact_modulus_mpa(contact);
             Law::Linear { compliance_mm_per_n: 1.0 / stiffness }
         }
         ContactLaw::Palmgren => Law::Power { exponent: 0.9, coefficient: 3.84e-5 / size.width_mm.powf(0.8) },

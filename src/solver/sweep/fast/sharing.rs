@@ -230,16 +230,18 @@ fn press<const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>) {
     }
 }
 
-/// The force at which the first contact of each tooth reaches a stress, lines of contact all: `(σ_a/σ)²` of the stress under 1 N.
+/// The force at which the first contact of each tooth reaches its allowable stress, lines of contact all: `(σ_a/σ)²` of the stress under 1 N.
 #[inline(always)]
-fn forces_at_stress(allowable_mpa: f64, teeth: &Teeth<'_>, force: &mut [f64]) {
+fn forces_at_stress(per_allowable: &PerContact<f64>, teeth: &Teeth<'_>, force: &mut [f64]) {
     let len = teeth.len;
     let (cam, ring) = (&teeth.cam_stress[..len], &teeth.ring_stress[..len]);
     let (carrier, force) = (&teeth.carrier_stress[..len], &mut force[..len]);
     for i in 0..len {
-        let most = if ring[i] > cam[i] { ring[i] } else { cam[i] };
-        let most = if carrier[i] > most { carrier[i] } else { most };
-        let share = allowable_mpa / most;
+        let (cam, ring) = (cam[i] * per_allowable.wave_generator, ring[i] * per_allowable.ring);
+        let carrier = carrier[i] * per_allowable.carrier;
+        let most = if ring > cam { ring } else { cam };
+        let most = if carrier > most { carrier } else { most };
+        let share = 1.0 / most;
         force[i] = share * share;
     }
 }
@@ -269,7 +271,13 @@ fn turn_to_limit(teeth: &Teeth<'_>, work: &mut Work<'_>) -> bool {
 
 /// The least torque of the rows, each turned to its limit, under these forces.
 #[inline(always)]
-fn least_torque(teeth: &Teeth<'_>, work: &Work<'_>, force: &[f64]) -> Option<Limit> {
+fn least_torque(per_allowable: &PerContact<f64>, teeth: &Teeth<'_>, work: &Work<'_>, force: &[f64]) -> Option<Limit> {
+    // Of the allowable stress under 1 N.
+    let shares = |i: usize| PerContact {
+        wave_generator: teeth.cam_stress[i] * per_allowable.wave_generator,
+        ring: teeth.ring_stress[i] * per_allowable.ring,
+        carrier: teeth.carrier_stress[i] * per_allowable.carrier,
+    };
     let mut least: Option<Limit> = None;
     for row in 0..teeth.rows {
         let at = row * teeth.count..(row + 1) * teeth.count;
@@ -279,14 +287,14 @@ fn least_torque(teeth: &Teeth<'_>, work: &Work<'_>, force: &[f64]) -> Option<Lim
         }
         if least.as_ref().is_none_or(|least| torque_nmm < least.torque_nmm) {
             let stress = |&i: &usize| {
-                let hardest = teeth.cam_stress[i].max(teeth.ring_stress[i]).max(teeth.carrier_stress[i]);
-                hardest * if work.pressed[i] > 0.0 { force[i].sqrt() } else { 0.0 }
+                let PerContact { wave_generator, ring, carrier } = shares(i);
+                wave_generator.max(ring).max(carrier) * if work.pressed[i] > 0.0 { force[i].sqrt() } else { 0.0 }
             };
             let at_limit = at.clone().max_by(|one, other| stress(one).total_cmp(&stress(other)))?;
-            let (cam, ring) = (teeth.cam_stress[at_limit], teeth.ring_stress[at_limit]);
-            let contact = if teeth.carrier_stress[at_limit] > cam.max(ring) {
+            let PerContact { wave_generator, ring, carrier } = shares(at_limit);
+            let contact = if carrier > wave_generator.max(ring) {
                 Contact::Carrier
-            } else if ring > cam {
+            } else if ring > wave_generator {
                 Contact::Ring
             } else {
                 Contact::WaveGenerator
@@ -388,19 +396,24 @@ impl Sharing {
     /// The least torque of the tile, of one zone, under which a contact reaches a stress, once the load is shared; nothing where it is not found, or
     /// where the law ends before.
     #[inline(always)]
-    pub(super) fn limit<V: Simd>(&self, allowable_mpa: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) -> Option<Limit> {
+    pub(super) fn limit<V: Simd>(
+        &self,
+        per_allowable: &PerContact<f64>,
+        teeth: &Teeth<'_>,
+        work: &mut Work<'_>,
+    ) -> Option<Limit> {
         match self {
-            Self::Power(law) => law.limit::<V>(allowable_mpa, teeth, work),
-            Self::Logarithmic(law) => law.limit::<V>(allowable_mpa, teeth, work),
+            Self::Power(law) => law.limit::<V>(per_allowable, teeth, work),
+            Self::Logarithmic(law) => law.limit::<V>(per_allowable, teeth, work),
         }
     }
 }
 
 impl PowerLaw {
     #[inline(always)]
-    fn limit<V: Simd>(&self, allowable_mpa: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) -> Option<Limit> {
+    fn limit<V: Simd>(&self, per_allowable: &PerContact<f64>, teeth: &Teeth<'_>, work: &mut Work<'_>) -> Option<Limit> {
         let len = teeth.len;
-        forces_at_stress(allowable_mpa, teeth, work.limit);
+        forces_at_stress(per_allowable, teeth, work.limit);
         {
             let (force, unit, arm) = (&work.limit[..len], &work.unit[..len], &teeth.arm[..len]);
             let pressed = &mut work.pressed[..len];
@@ -422,7 +435,7 @@ impl PowerLaw {
             let by_law = if self.exponent < 1.0 { by_power } else { pressed[i] };
             force[i] = if pressed[i] > 0.0 { unit[i] * by_law } else { 0.0 };
         }
-        least_torque(teeth, work, work.limit)
+        least_torque(per_allowable, teeth, work, work.limit)
     }
 
     /// The force at the rotation 1, `(|h'|/c)^(1/p)`, with `c = Σ w q (F_c/F_H)^p`.
@@ -712,7 +725,7 @@ impl LogarithmicLaw {
 
     /// Forces here are counted in that of the sharing before, and the limit too.
     #[inline(always)]
-    fn limit<V: Simd>(&self, allowable_mpa: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) -> Option<Limit> {
+    fn limit<V: Simd>(&self, per_allowable: &PerContact<f64>, teeth: &Teeth<'_>, work: &mut Work<'_>) -> Option<Limit> {
         let len = teeth.len;
         let typical_n = work.typical_n;
         if self.gaps.is_none() {
@@ -720,7 +733,7 @@ impl LogarithmicLaw {
         }
         // Lent out: a tile that ends here goes the plain way, and takes the sweep with it.
         let mut limit = std::mem::take(&mut work.limit);
-        forces_at_stress(allowable_mpa, teeth, limit);
+        forces_at_stress(per_allowable, teeth, limit);
         {
             let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len]);
             let (force, reach, pressed) = (&limit[..len], &work.reach[..len], &mut work.pressed[..len]);
@@ -748,7 +761,7 @@ impl LogarithmicLaw {
             }
         }
         let is_within = Self::cut_and_check(typical_n, teeth, work, limit);
-        let least = least_torque(teeth, work, limit);
+        let least = least_torque(per_allowable, teeth, work, limit);
         std::mem::swap(&mut work.limit, &mut limit);
         least.filter(|_| is_done && is_within)
     }

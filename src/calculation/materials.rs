@@ -1,0 +1,76 @@
+//! Materials that designers know by name, each number with its published source. What has none is left out.
+
+use serde::Serialize;
+use toothwave_solver::findings::FATIGUE_LIMIT_STRESS_MPA;
+use utoipa::ToSchema;
+
+/// A material, as a document's `materials` spell its numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct MaterialPreset {
+    /// Its name.
+    pub name: &'static str,
+    /// What it is.
+    pub title: &'static str,
+    /// Young's modulus E.
+    pub youngs_modulus_gpa: f64,
+    /// Poisson's ratio ν.
+    pub poissons_ratio: f64,
+    /// Where both are published.
+    pub elasticity_source: &'static str,
+    /// The contact stress that it may have, for `load.allowable_stress_mpa`: under rolling with lubrication, without a factor of safety; left out
+    /// where none is published as a Hertz stress.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub allowable_stress_mpa: Option<f64>,
+    /// Where that is published.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub allowable_stress_source: Option<&'static str>,
+}
+
+const GEAR_STEEL: &str = "ISO 6336-2:2019, steel: E = 206 000 N/mm², ν = 0.3";
+
+/// All of them.
+pub const MATERIALS: [MaterialPreset; 4] = [
+    MaterialPreset {
+        name: "bearing-steel",
+        title: "Bearing steel, through-hardened",
+        youngs_modulus_gpa: 207.0,
+        poissons_ratio: 0.3,
+        elasticity_source: "ISO/TR 1281-1:2008, explanatory notes on ISO 281: E = 207 000 MPa, ν = 0.3",
+        allowable_stress_mpa: Some(FATIGUE_LIMIT_STRESS_MPA),
+        allowable_stress_source: Some(
+            "ISO 281:2007, contact stress at the fatigue load limit of common high-quality bearing steel",
+        ),
+    },
+    MaterialPreset {
+        name: "case-hardened-steel",
+        title: "Case-hardened wrought steel",
+        youngs_modulus_gpa: 206.0,
+        poissons_ratio: 0.3,
+        elasticity_source: GEAR_STEEL,
+        allowable_stress_mpa: Some(1500.0),
+        allowable_stress_source: Some("ISO 6336-5:2016, σ_H lim of case-hardened wrought steel, quality MQ"),
+    },
+    MaterialPreset {
+        name: "quenched-and-tempered-steel",
+        title: "Quenched and tempered alloy steel of 300 HV",
+        youngs_modulus_gpa: 206.0,
+        poissons_ratio: 0.3,
+        elasticity_source: GEAR_STEEL,
+        // 1.313 HV + 373
+        allowable_stress_mpa: Some(766.9),
+        allowable_stress_source: Some(
+            "ISO 6336-5:2016, σ_H lim = 1.313 HV + 373 of through-hardened wrought alloy steel, quality MQ",
+        ),
+    },
+    MaterialPreset {
+        name: "pom",
+        title: "POM, acetal homopolymer",
+        youngs_modulus_gpa: 3.0,
+        poissons_ratio: 0.35,
+        elasticity_source: "Margolis, Engineering Plastics Handbook, McGraw-Hill 2006, table 5.5: tensile modulus 3.0 GPa; ν by DuPont, Delrin Design Guide, Module III",
+        allowable_stress_mpa: None,
+        allowable_stress_source: None,
+    },
+];
