@@ -206,7 +206,7 @@ proptest! {
         torque_exponent in -4.0_f64..3.0,
         gaps in prop::option::of(prop::array::uniform3(prop_oneof![Just(0.0), (-4.0_f64..2.0).prop_map(|exponent| 10.0_f64.powf(exponent))])),
         series in prop::array::uniform3(prop_oneof![Just(0.0), Just(1e-6)]),
-        allowable_stress_mpa in prop::option::of(Just(1500.0)),
+        allowable_stress_mpa in prop::option::of((2.0_f64..6.0).prop_map(|exponent| 10.0_f64.powf(exponent))),
         samples in any_samples(),
     ) {
         let [wave_generator, ring, carrier] = gaps.unwrap_or_default();

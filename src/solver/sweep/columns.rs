@@ -169,9 +169,11 @@ impl TorqueCapacity {
     }
 }
 
-/// A sweep over one period.
+/// A sweep over one period; where items deviate, over as many as it takes until they meet again as they did.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sweep {
+    /// The mesh that it went through.
+    pub mesh: Mesh,
     /// The states.
     pub states: States,
     /// What holds at each input angle.
@@ -216,7 +218,8 @@ impl Extremes {
     /// Of no value yet.
     pub(crate) const NONE: Self = Self { least: f64::INFINITY, largest: f64::NEG_INFINITY };
 
-    pub(crate) fn of(column: &[f64]) -> Self {
+    /// Those of a column.
+    pub fn of(column: &[f64]) -> Self {
         column.iter().fold(Self::NONE, |seen, &value| seen.with(value))
     }
 
@@ -364,10 +367,18 @@ pub(crate) fn finished(
         let stress_mpa = states.peak(states.stress_mpa.get(contact), at.stress);
         ContactPeaks::of_line(states.peak(force, at.force), stress_mpa, force[at.stress], tooth_width_mm)
     });
-    let period_closure_residual = period_closure(loaded, points, &states, &peaks)?;
+    let mut period_closure_residual = period_closure(loaded, points, &states, &peaks)?;
+    if loaded.mesh().tells_items_apart() {
+        // That the items have met again as they did shows in what all teeth together make.
+        let wind_up_deg = &input_angles.wind_up_deg;
+        let ends_deg = [wind_up_deg.first(), wind_up_deg.last()].map(|end| end.copied().unwrap_or(f64::NAN));
+        let [first_deg, last_deg] = ends_deg;
+        period_closure_residual = worse((last_deg - first_deg).abs() / last_deg, period_closure_residual);
+    }
     check("torque balance", torque_balance_residual)?;
     check("period closure", period_closure_residual)?;
-    Ok(Sweep { states, input_angles, peaks, torque_capacity, torque_balance_residual, period_closure_residual })
+    let mesh = *loaded.mesh();
+    Ok(Sweep { mesh, states, input_angles, peaks, torque_capacity, torque_balance_residual, period_closure_residual })
 }
 
 /// That a residual is one of rounding.
@@ -386,13 +397,14 @@ fn period_closure(
     states: &States,
     peaks: &PerContact<ContactPeaks>,
 ) -> Result<f64, SolveError> {
-    let mesh = Mesh::new(loaded.drive());
+    let mesh = *loaded.mesh();
     let position = |place| match points {
         Points::Samples(_) => mesh.position_between(place, 1.0),
         Points::Tolerance(_) => mesh.position_after_lap(place),
     };
     let placed: Vec<_> = mesh.placed_between(2..=mesh.whole_spacings() + 1, mesh.laps() - 1, position).collect();
-    let teeth = placed.iter().map(|placed| loaded.tooth(placed.position)).collect::<Result<Vec<_>, _>>()?;
+    let teeth = placed.iter().map(|placed| loaded.tooth_at(&placed.place, placed.position));
+    let teeth = teeth.collect::<Result<Vec<_>, _>>()?;
     let wind_up = loaded.wind_up(&teeth)?;
     let last_angle_deg = states.input_angle_deg.last();
     let first = states.len().checked_sub(teeth.len());

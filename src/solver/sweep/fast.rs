@@ -255,7 +255,7 @@ impl Kernel {
         let drive = loaded.drive();
         // The formulas are those of an ellipse, and one zone stands for both.
         let Cam::Ellipse(cam) = drive.flank().locus().cam() else { return None };
-        if !Mesh::new(drive).zones_are_alike() {
+        if !loaded.mesh().zones_are_alike() {
             return None;
         }
         let (a, b, r) = (cam.semi_major_mm(), cam.semi_minor_mm(), drive.parameters().tooth_radius_mm);

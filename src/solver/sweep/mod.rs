@@ -5,15 +5,19 @@ mod columns;
 mod fast;
 mod plain;
 mod points;
+mod unloaded;
 
 use crate::drive::Drive;
+use crate::gaps::Deviations;
 use crate::load_sharing::{LoadCase, LoadedDrive};
+use crate::tooth::ToothContact;
 use crate::{SolveError, Stop};
 
 pub use columns::{
     ContactPeaks, Extremes, InputAngles, Peak, PeakShear, States, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity,
 };
 pub use points::{Points, Tolerance};
+pub use unloaded::unloaded_wind_up_deg;
 
 /// The sweep over one period.
 ///
@@ -29,6 +33,26 @@ pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -
     {
         return Ok(sweep);
     }
+    plain::sweep(&loaded, load, points, stop)
+}
+
+/// The sweep of a drive of which single items deviate: by slot and lobe, over as many load periods as it takes until they meet again as they
+/// did ([`Deviations::mesh`]).
+///
+/// # Errors
+/// As [`sweep`]; [`SolveError::Impossible`] for deviations that this drive or this load cannot have, [`SolveError::Interference`] where
+/// a part is too full.
+pub fn sweep_with_deviations(
+    drive: &Drive,
+    load: &LoadCase,
+    deviations: &Deviations,
+    points: Points,
+    stop: &impl Stop,
+) -> Result<Sweep, SolveError> {
+    if deviations.is_nil() && deviations.violations(drive.parameters()).is_empty() {
+        return sweep(drive, load, points, stop);
+    }
+    let loaded = LoadedDrive::with_deviations(drive, load, &ToothContact::of(drive), Some(deviations))?;
     plain::sweep(&loaded, load, points, stop)
 }
 

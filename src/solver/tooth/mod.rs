@@ -349,7 +349,7 @@ impl ContactLaw {
     }
 
     /// Whether the law goes with `projection`.
-    pub(crate) const fn is_of_projection(&self) -> bool {
+    pub const fn is_of_projection(&self) -> bool {
         match self {
             Self::Linear | Self::Fixed(_) | Self::Palmgren => true,
             Self::Johnson { .. } | Self::Hertz => false,
