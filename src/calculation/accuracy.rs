@@ -8,7 +8,7 @@ use toothwave_solver::drive::Draft;
 use toothwave_solver::mesh::Samples;
 use toothwave_solver::sweep::{ContactPeaks, Points, Tolerance, sweep_with_deviations};
 use toothwave_solver::{
-    Compatibility, ContactLaw, Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop,
+    Compatibility, ContactLaw, Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, ToothShape,
 };
 use utoipa::ToSchema;
 
@@ -176,7 +176,7 @@ impl Question for Accuracy {
             error => error.into(),
         })?;
         let (mut ways, mut unavailable) = (Vec::new(), Vec::new());
-        for model in models(&own) {
+        for model in models(drive, &own) {
             let (compatibility, law) = (model.compatibility.into(), model.law.into());
             match Model::new(checked, &model, &own_peaks, stop) {
                 Ok(Some(model)) => model.measure(&mut ways, stop)?,
@@ -206,13 +206,24 @@ impl Question for Accuracy {
     }
 }
 
-/// The design's own model first, then every other form of compatibility and law that needs no further numbers.
-fn models(own: &LoadParameters) -> Vec<LoadParameters> {
+/// The design's own model first, then every other form of compatibility with a law that it and the teeth take and that needs no
+/// further numbers.
+fn models(drive: &Drive, own: &LoadParameters) -> Vec<LoadParameters> {
+    let laws = match drive.parameters().tooth {
+        ToothShape::Ball { .. } => vec![own.law, ContactLaw::Hertz],
+        ToothShape::Cylinder { .. } | ToothShape::FlatSided { .. } => {
+            // With other depths it would be another model under the same name.
+            let johnson = ContactLaw::Johnson { depth_mm: PerContact::default() };
+            let johnson = if matches!(own.law, ContactLaw::Johnson { .. }) { own.law } else { johnson };
+            vec![own.law, ContactLaw::Linear, ContactLaw::Palmgren, johnson]
+        }
+    };
     let mut models = vec![*own];
     for compatibility in [Compatibility::Projection, Compatibility::VirtualWork] {
-        for law in [own.law, ContactLaw::Linear, ContactLaw::Palmgren] {
+        for &law in &laws {
             let model = LoadParameters { compatibility, law, ..*own };
-            if !models.contains(&model) {
+            let is_possible = compatibility == Compatibility::VirtualWork || law.is_of_projection();
+            if is_possible && !models.contains(&model) {
                 models.push(model);
             }
         }

@@ -223,6 +223,10 @@ impl Modification {
 
     /// The first of its numbers that opens or closes a gap.
     pub(crate) fn first(&self) -> Option<Parameter> {
+        // Asked at every tooth.
+        if *self == Self::NONE {
+            return None;
+        }
         let opens = |modified: &Modified| !matches!(modified, Modified::TipReliefStart | Modified::TipReliefPower);
         let parameters = self.parameters().into_iter();
         let mut set = parameters.filter(|(modified, value)| *value != 0.0 && opens(modified));
@@ -260,6 +264,12 @@ impl<'a> Gaps<'a> {
         self.deviations.is_none()
             && self.modification.first().is_none()
             && self.clearance_mm.iter().all(|(_, &gap_mm)| gap_mm == 0.0)
+    }
+
+    /// The gap at each contact where it is the same for every tooth and position.
+    pub(crate) fn uniform_mm(&self) -> Option<&PerContact<f64>> {
+        let is_uniform = self.deviations.is_none() && self.modification.first().is_none();
+        is_uniform.then_some(&self.clearance_mm)
     }
 
     /// The gap at each contact of a tooth, along its normal; negative where a part is too full.

@@ -1,7 +1,7 @@
 //! Equilibrium of a tooth and compatibility of all of them at one input angle (docs/theory.md section 4).
 
 use crate::cam::ToothCenter;
-use crate::contact::{Contact, ContactLaw, HertzLine, Materials, PerContact, half_width_mm};
+use crate::contact::{Contact, ContactLaw, HertzLine, Material, Materials, Part, PerContact, half_width_mm};
 use crate::drive::{Draft, Drive, DriveParameters};
 use crate::gaps::{Deviations, Gaps, Modification};
 use crate::mesh::{Mesh, Place};
@@ -10,7 +10,7 @@ use crate::ring::{FlankPoint, RingFlank, RingTooth};
 use crate::root::NotConverged;
 use crate::springs::{Rotation, Spring, Springs, WindUp};
 use crate::tooth::line::{WIDEST_SHARE, least_length_mm};
-use crate::tooth::{Contacts, Pressure, ToothContact, ToothSize};
+use crate::tooth::{Contacts, LineLaw, Pressure, ToothContact, ToothSize};
 use crate::violation::{Parameter, Violation};
 use crate::{SolveError, tooth};
 
@@ -113,7 +113,13 @@ impl LoadCase {
             Torque::Input(value) => (Parameter::InputTorque, value),
             Torque::Output(value) => (Parameter::OutputTorque, value),
         };
-        let mut values: Vec<_> = parameters.materials.parameters().collect();
+        let of_material = |(part, material): (Part, &Material)| {
+            [
+                (Parameter::YoungsModulus(part), material.youngs_modulus_gpa),
+                (Parameter::PoissonsRatio(part), material.poissons_ratio),
+            ]
+        };
+        let mut values: Vec<_> = parameters.materials.iter().flat_map(of_material).collect();
         values.push(torque);
         values.extend(parameters.law.parameters());
         let series = parameters.series_compliance_mm_per_n.iter();
@@ -336,9 +342,19 @@ impl<'a> LoadedDrive<'a> {
         self.compatibility
     }
 
-    /// `1/k` of each contact, where the law is linear and no contact has a gap: where unit loads only have to be scaled.
-    pub(crate) fn linear_compliance_mm_per_n(&self) -> Option<PerContact<f64>> {
-        self.contacts.linear_compliance_mm_per_n().filter(|_| self.gaps.is_nil())
+    /// Whether the law is linear and no contact has a gap: where unit loads only have to be scaled.
+    pub(crate) fn is_linear(&self) -> bool {
+        matches!(self.line_law(), Some(LineLaw::Linear { .. })) && self.gaps.is_nil()
+    }
+
+    /// The law of cylinders, for whoever works in columns.
+    pub(crate) fn line_law(&self) -> Option<LineLaw> {
+        self.contacts.line_law()
+    }
+
+    /// The gap at each contact where it is the same for every tooth and position.
+    pub(crate) fn uniform_gap_mm(&self) -> Option<&PerContact<f64>> {
+        self.gaps.uniform_mm()
     }
 
     /// Hertz stress of a contact.

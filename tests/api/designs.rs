@@ -19,7 +19,12 @@ pub(crate) const CONTRACT: &str = r#"{
   "profile": { "chord_tolerance_mm": 0.001, "extent": "tooth" }
 }"#;
 
-/// The paper's case 5.1 with every default spelled out.
+/// The paper's model of load sharing, which a document has to name.
+pub(crate) fn of_the_paper() -> Value {
+    json!({ "compatibility": "projection", "stiffness": { "law": "linear" } })
+}
+
+/// The paper's case 5.1 by the paper's model, every other field spelled out as it is by default.
 pub(crate) fn spelled_out() -> Value {
     let steel = json!({ "youngs_modulus_gpa": 210.0, "poissons_ratio": 0.3 });
     json!({
@@ -30,10 +35,15 @@ pub(crate) fn spelled_out() -> Value {
         },
         "materials": { "wave_generator": steel, "teeth": steel, "ring": steel, "carrier": steel },
         "load": { "input_torque_nm": 20.0 },
-        "model": { "compatibility": "projection", "stiffness": { "law": "linear" } },
+        "model": of_the_paper(),
         "sweep": { "samples": 50 },
         "profile": { "chord_tolerance_mm": 0.001, "extent": "tooth" }
     })
+}
+
+/// The same with every default spelled out, the model's too.
+pub(crate) fn defaults_spelled_out() -> Value {
+    with(&spelled_out(), "/model", json!({ "compatibility": "virtual_work", "stiffness": { "law": "johnson" } }))
 }
 
 /// The paper's case 5.1 with nothing said that need not be said.

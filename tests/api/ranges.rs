@@ -208,6 +208,7 @@ fn scaled(scale: f64) -> Value {
             "ring": { "teeth": 26 }
         },
         "load": { "input_torque_nm": 20.0 },
+        "model": crate::designs::of_the_paper(),
         "profile": { "chord_tolerance_mm": (1e-3 * scale).max(1e-6) }
     })
 }

@@ -171,7 +171,7 @@ fn what_is_left_out_has_the_key_of_its_default() {
     long["drive"]["teeth"]["installed"] = json!(28.0);
     long["drive"]["ring"]["tip_radius_mm"] = json!(null);
     long["materials"] = json!({ "teeth": { "poissons_ratio": 0.3 } });
-    long["model"] = json!({ "compatibility": "projection", "stiffness": { "law": "linear" } });
+    long["model"] = json!({ "compatibility": "virtual_work", "stiffness": { "law": "johnson", "depth_mm": {} } });
     long["sweep"] = json!({ "samples": 50, "wind_up": false });
     long["modification"] = json!({ "slot_wall_um": 0.0, "tooth_radius_um": -0.0 });
     long["parts"] = json!({ "ring": { "clearance_um": -0.0 } });

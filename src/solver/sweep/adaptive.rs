@@ -207,7 +207,7 @@ pub(crate) fn moments(
         laps: if tells_items_apart { mesh.laps() } else { 1 },
         allowable_stress_mpa: load.parameters().allowable_stress_mpa,
         has_gaps: load.has_gaps() || tells_items_apart,
-        is_smooth: loaded.linear_compliance_mm_per_n().is_some(),
+        is_smooth: loaded.is_linear(),
         tolerance,
         stop,
         states: 0,

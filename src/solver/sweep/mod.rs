@@ -28,11 +28,10 @@ pub use unloaded::unloaded_wind_up_deg;
 /// [`SolveError::Stopped`] when `stop` says so.
 pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -> Result<Sweep, SolveError> {
     let loaded = LoadedDrive::new(drive, load)?;
-    // The capacity is worked out tooth by tooth.
-    if let (Points::Samples(samples), None) = (points, load.parameters().allowable_stress_mpa)
-        && let Some(columns) = fast::sweep(&loaded, samples, stop)?
+    if let Points::Samples(samples) = points
+        && let Some(sweep) = fast::sweep(&loaded, samples, load.parameters().allowable_stress_mpa, stop)?
     {
-        return columns::finished(&loaded, points, columns, None);
+        return Ok(sweep);
     }
     plain::sweep(&loaded, load, points, stop)
 }
@@ -57,12 +56,18 @@ pub fn sweep_with_deviations(
     plain::sweep(&loaded, load, points, stop)
 }
 
-/// What the sweep over one period comes to, without its states: the same peaks, in less time.
+/// What the sweep over one period comes to, without its states: the same peaks, in less time. That the period closes is not looked at.
 ///
 /// # Errors
 /// As [`sweep`].
 pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -> Result<SweepPeaks, SolveError> {
-    sweep(drive, load, points, stop).map(|sweep| SweepPeaks::from(&sweep))
+    let loaded = LoadedDrive::new(drive, load)?;
+    if let Points::Samples(samples) = points
+        && let Some(peaks) = fast::peaks(&loaded, samples, load.parameters().allowable_stress_mpa, stop)?
+    {
+        return Ok(peaks);
+    }
+    plain::sweep(&loaded, load, points, stop).map(|sweep| SweepPeaks::from(&sweep))
 }
 
 /// The same sweep, state by state: what the fast path is held against, and what is left where it does not reach.
