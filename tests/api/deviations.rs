@@ -66,7 +66,7 @@ async fn with_deviations_all_zones_are_listed_by_slot_over_the_whole_sweep() {
         let states = &answer["states"];
         let angles = numbers(&states["input_angle_deg"]);
         assert_eq!(angles.last(), answer["sweep_period_deg"].as_f64().as_ref());
-        assert_eq!(numbers(&answer["wind_up"]["input_angle_deg"]).len(), 4 * periods as usize + 1);
+        assert_eq!(numbers(&answer["wind_up"]["input_angle_deg"]).len() as f64, 4.0 * periods + 1.0);
         // Seven teeth of either zone.
         assert_eq!(angles.iter().filter(|&&angle| angle == 0.0).count(), 14);
         assert!(numbers(&states["tooth"]).iter().all(|&slot| slot < 28.0));
@@ -250,7 +250,7 @@ async fn accuracy_measures_the_design_with_its_deviations() {
     let document = with_deviations(json!({ "wave_generator_runout": { "amount_um": 2.0 } }));
     let answer = Service::new().post("/v1/accuracy", &document).await.found();
     let ways = answer["ways"].as_array().unwrap();
-    let finest = ways.iter().filter(|way| way["law"] == "palmgren" && way.get("tolerance").is_some()).last().unwrap();
+    let finest = ways.iter().rfind(|way| way["law"] == "palmgren" && way.get("tolerance").is_some()).unwrap();
     assert!(finest["error"].as_f64().unwrap() < 1e-9, "{finest}");
     // At least twelve teeth of both zones at eleven input angles.
     let coarsest = ways.iter().find(|way| way["samples"] == 10).unwrap();

@@ -134,6 +134,11 @@ struct Placed {
     position_rad: f64,
 }
 
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small, and not negative")]
+const fn whole(value: f64) -> u64 {
+    value as u64
+}
+
 /// All teeth between a lobe and the valley ahead of it, with the lobe that each is on, when the input has turned.
 fn placed_by_angles(p: &DriveParameters, input_rad: f64) -> Vec<Placed> {
     let lobes = p.wave_generator.lobes() as f64;
@@ -155,8 +160,8 @@ fn placed_by_angles(p: &DriveParameters, input_rad: f64) -> Vec<Placed> {
         assert!((space - middle * p.ring_teeth as f64 / (2.0 * PI)).abs() < 1e-6, "{p:?}");
         placed.push(Placed {
             slot,
-            lobe: (lobe as u64) % p.wave_generator.lobes().unsigned_abs(),
-            ring_space: space.rem_euclid(p.ring_teeth as f64) as u64,
+            lobe: whole(lobe) % p.wave_generator.lobes().unsigned_abs(),
+            ring_space: whole(space.rem_euclid(p.ring_teeth as f64)),
             position_rad,
         });
     }
@@ -323,19 +328,18 @@ fn every_state_of_a_sweep_with_deviations_is_that_of_free_teeth_on_springs() {
     assert!(worst < 1e-12, "{worst:e}");
 }
 
+/// Where a tooth stands, and its slot, ring space and lobe as far as they are wanted.
+type Items = (u64, Option<u64>, Option<u64>, Option<u64>);
+
 /// Which items stand together, as far as they deviate: for every slot where it stands on its lobe, and what is where.
-fn pattern(
-    p: &DriveParameters,
-    kinds: Kinds,
-    load_periods: u64,
-) -> BTreeSet<(i64, Option<u64>, Option<u64>, Option<u64>)> {
+fn pattern(p: &DriveParameters, kinds: Kinds, load_periods: u64) -> BTreeSet<Items> {
     let removal = (p.teeth / p.installed) as f64;
     // A quarter of the way, so that none stands at a lobe or in a valley.
     let input_rad = (load_periods as f64 + 0.26) * 2.0 * PI * removal / p.ring_teeth as f64;
     let found = placed_by_angles(p, input_rad);
     let of = |is_wanted: bool, item: u64| is_wanted.then_some(item);
     let found = found.iter().map(|tooth| {
-        let place = (tooth.position_rad * 1e6).round() as i64;
+        let place = whole((tooth.position_rad * 1e6).round());
         (place, of(kinds.slots, tooth.slot), of(kinds.ring_spaces, tooth.ring_space), of(kinds.lobes, tooth.lobe))
     });
     found.collect()
