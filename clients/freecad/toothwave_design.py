@@ -135,7 +135,8 @@ def _model():
     for contact, label in CONTACTS:
         pointer, name = f"/model/series_compliance_mm_per_n/{contact}", f"{_named(label)}ComplianceMmPerN"
         yield Field(pointer, name, f"Compliance behind, {label.lower()}", group, 0.0, "mm/N", (0.0, 1e3), blank="none")
-    yield Field("/sweep/samples", "Samples", "Input angles, intervals", group, 0, limits=(1, 10**7), blank="50, or by the tolerance")
+    most, blank = 10**7, "50, or by the tolerance"
+    yield Field("/sweep/samples", "Samples", "Input angles, intervals", group, 0, limits=(1, most), blank=blank)
     yield Field("/sweep/tolerance", "SweepTolerance", "or to a tolerance", group, 0.0, limits=(1e-12, 0.1), blank="left out")
     yield Field("/sweep/wind_up", "WindUp", "Wind-up too", group, False)
 
@@ -302,7 +303,7 @@ def _without(document, own, place=""):
 
 
 def suited(values, chosen):
-    """What has to change with a choice just made, by the field's name, so that it suits: teeth of the ring, law, way of adding up."""
+    """The values, by the field's name, that go with a choice just made: teeth of the ring, or law and way of adding up."""
     if chosen in ("WaveGeneratorKind", "Lobes"):
         count, lobes = values["ToothCount"], LOBES.get(values["WaveGeneratorKind"], values["Lobes"])
         return {"RingTeeth": count + (lobes if values["RingTeeth"] > count else -lobes)}

@@ -11,7 +11,8 @@ import toothwave_design
 import toothwave_parts
 
 DEFAULT_URL = "http://127.0.0.1:8080"
-QUANTITIES = {"mm": "App::PropertyDistance", "deg": "App::PropertyAngle"}  # a distance may be negative: the service objects, not FreeCAD
+# A distance may be negative, where a length becomes 0 without a word: what is out of its range the service objects to.
+QUANTITIES = {"mm": "App::PropertyDistance", "deg": "App::PropertyAngle"}
 KINDS = {
     int: "App::PropertyInteger",
     float: "App::PropertyFloat",

@@ -1,4 +1,4 @@
-"""A drawing of the service as FreeCAD's shapes: prisms on the plane of the section, or balls, standing where the drawing puts them."""
+"""A drawing of the service as FreeCAD's shapes: prisms on the plane of the section, or balls, each where the drawing puts it."""
 
 import math
 

@@ -361,9 +361,11 @@ class Dialog(OfDrive):
 
     def test_another_number_of_lobes_changes_the_rings_teeth(self):
         self.choose("WaveGeneratorKind", "harmonic")
-        self.enter("Lobes", "4")
-        self.panel.edits["Lobes"].entry.editingFinished.emit()
-        self.assertEqual(self.panel.edits["RingTeeth"].entry.text(), "24")
+        for before, after in (("26", "24"), ("30", "32")):
+            self.enter("RingTeeth", before)
+            self.enter("Lobes", "4")
+            self.panel.edits["Lobes"].entry.editingFinished.emit()
+            self.assertEqual(self.panel.edits["RingTeeth"].entry.text(), after)
 
     def test_a_hidden_field_that_cannot_be_read_is_in_nobodys_way(self):
         self.choose("WaveGeneratorKind", "harmonic")

@@ -183,16 +183,13 @@ class Contacts(unittest.TestCase):
 
     def test_no_two_solids_have_a_volume_in_common(self):
         """By booleans, with teeth thinner by the chord tolerance: of surfaces that only touch OCCT's booleans tell nothing."""
+        pairs = (("ring", "teeth"), ("wave_generator", "teeth"), ("wave_generator", "carrier"), ("ring", "carrier"))
         for name in (*PAPER, "ring-with-more-teeth", *KINDS):
+            # Of the other kinds teeth alone: how the carrier is clear of the rest follows from radii, as above.
             for angle_deg in (131.7,) if name in KINDS else (0.0, 131.7):
                 thinner = example(name) | {"parts": {"teeth": {"clearance_um": 1.0}}}
                 solids = Assembly(service, thinner, angle_deg).solids
-                for one, other in (
-                    ("ring", "teeth"),
-                    ("wave_generator", "teeth"),
-                    ("wave_generator", "carrier"),
-                    ("ring", "carrier"),
-                ):
+                for one, other in pairs[:2] if name in KINDS else pairs:
                     with self.subTest(name, input_angle_deg=angle_deg, parts=(one, other)):
                         self.assertLess(common_mm3(solids[one][0], solids[other]), 1e-9)
                 with self.subTest(name, input_angle_deg=angle_deg, parts=("carrier", "teeth")):

@@ -1,8 +1,8 @@
 """Areas and positions from the theory alone (docs/theory.md), to hold the solids against.
 
-Nothing here asks the service or FreeCAD. Everything is written over a parameter of the wave generator of which the tooth's position psi
-is an explicit function: the angle phi of the cam's outward normal, or, of a path that is given, psi itself. For cams the service works
-the other way round.
+Nothing here asks the service or FreeCAD. Everything is written over a parameter of the wave generator of which the tooth's
+position psi is an explicit function: the angle phi of the cam's outward normal, or, of a path that is given, psi itself. For cams
+the service works the other way round.
 """
 
 import functools
