@@ -15,7 +15,7 @@ from theory import Theory
 PATHS = {"ring": "ring", "wave_generator": "wave-generator", "carrier": "carrier", "teeth": "tooth", None: "assembly"}
 
 OWN_VOLUME = 2e-5  # how far OpenCascade's own volume may be off, which takes few points along a spline
-OWN_VOLUME_OF_KINDS = 4e-5  # it takes a ring with longer flanks for up to 2.7e-5 more
+OWN_VOLUME_OF_KINDS = 4e-5  # of their rings it is off by up to 2.7e-5
 
 
 def setUpModule():
