@@ -40,6 +40,7 @@ class Field:
     choices: tuple = ()
     shown: tuple = ()  # the name of a choice, and at which of its values the document has the field
     is_object: bool = False  # whether there is an object at the pointer, whose values are fields of their own
+    held: tuple = ()  # of the limits what a property of FreeCAD holds, where it is less
 
     @property
     def absent(self):
@@ -51,10 +52,17 @@ class Field:
         """Where the value stands in the document, its range, and what it means to leave it out."""
         lines = [self.pointer] if self.pointer else []
         if self.limits:
-            lines.append(f"{self.limits[0]:g} to {self.limits[1]:g} {self.unit}".strip())
+            least, greatest = self.held or self.limits
+            lines.append(f"{least:g} to {greatest:g} {self.unit}".strip())
         if self.blank:
             lines.append(f"{self.default or 'empty'}: {self.blank}" if isinstance(self.default, str) else f"0: {self.blank}")
         return "\n".join(lines)
+
+    def takes(self, value):
+        """Whether a document's value can stand in the field; what has several values, or is too much for FreeCAD, cannot."""
+        if self.held and isinstance(value, (int, float)):
+            return self.held[0] <= value <= self.held[1]
+        return not isinstance(value, dict)
 
     def is_shown(self, values):
         """Whether the document has such a field, as the choices stand."""
@@ -100,7 +108,8 @@ def _drive():
     yield Field("/drive/ring/teeth", "RingTeeth", "Ring teeth", group, limits=COUNT, start=26)
     yield Field("/drive/ring/tip_radius_mm", "TipRadius", "Ring's tip bored to", group, 0.0, "mm", LENGTH_MM, blank="natural tip")
 
-    yield Field("/assembly/input_angle_deg", "InputAngle", "Input angle", "Assembly", 0.0, "deg", (-1e7, 1e7))
+    pointer, turns, turn = "/assembly/input_angle_deg", (-1e7, 1e7), (-360.0, 360.0)
+    yield Field(pointer, "InputAngle", "Input angle", "Assembly", 0.0, "deg", turns, held=turn)
 
 
 def _load():
@@ -261,7 +270,8 @@ def values_of(document):
     Raises NoDocument where it has a value that its field cannot hold.
     """
     values = {field.name: _value_of(field, _found(document, field.pointer)) for field in FIELDS if field.pointer}
-    own = {field.pointer for field in FIELDS if field.pointer and not field.is_object and field.is_shown(values)}
+    shown = (field for field in FIELDS if field.pointer and not field.is_object and field.is_shown(values))
+    own = {field.pointer for field in shown if field.takes(_found(document, field.pointer))}
     others = _without(document, own)
     values[OTHER] = json.dumps(others, ensure_ascii=False) if others else ""
     return values
@@ -276,7 +286,7 @@ def _found(document, pointer):
 def _value_of(field, value):
     if field.is_object:
         return isinstance(value, dict)
-    if value is None or isinstance(value, dict):
+    if value is None or not field.takes(value):
         return field.absent
     try:
         held = type(field.absent)(value)

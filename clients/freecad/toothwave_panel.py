@@ -89,6 +89,8 @@ class FieldEdit(QtGui.QWidget):
             value = math.nan
         if not math.isfinite(value):
             raise ValueError("a whole number is wanted here" if isinstance(self.field.absent, int) else "a number is wanted here")
+        if not self.field.takes(value):
+            raise ValueError("{:g} to {:g} is wanted here: FreeCAD's angles end at a turn".format(*self.field.held))
         return value
 
     def object_to(self, text):
@@ -149,10 +151,15 @@ class Panel:
                 column.addWidget(edit)
         if group == "Assembly":
             self.slider = QtGui.QSlider(QtCore.Qt.Horizontal, maximum=720, toolTip="Turns the drive: a turn of the input")
-            self.slider.setValue(round(2 * (self.drive.InputAngle.Value % 360)))
+            self._show_angle()
             self.slider.valueChanged.connect(self._turn)
             column.addWidget(self.slider)
         return box
+
+    def _show_angle(self):
+        self.slider.blockSignals(True)  # it shows the angle here, and does not set it
+        self.slider.setValue(round(2 * (self.drive.InputAngle.Value % 360)))
+        self.slider.blockSignals(False)
 
     def _show_properties(self):
         for name, edit in self.edits.items():
@@ -252,6 +259,7 @@ class Panel:
                 setattr(self.drive, name, value)
         self.drive.touch()  # asks again where only the service has changed, such as from absent to present
         self.drive.Document.recompute()
+        self._show_angle()
         self._show_outcome()
         return "Invalid" not in self.drive.State
 

@@ -186,6 +186,14 @@ class Kinds(OfDrive):
         self.document.recompute()
         self.assertEqual((self.drive.Problem, self.drive.State), ("", ["Up-to-date"]))
 
+    def test_an_input_angle_beyond_a_turn_which_freecads_angles_do_not_hold_is_another_field(self):
+        design = complete(example("paper-5.1")) | {"assembly": {"input_angle_deg": 392.3}}
+        toothwave_drive.set_document(self.drive, design)
+        self.document.recompute()
+        self.assertEqual(toothwave_drive.document_of(self.drive), design)
+        turned_deg = math.degrees(self.document.Carrier.Shape.Solids[0].Placement.Rotation.Angle)
+        self.assertAlmostEqual(turned_deg, 392.3 / 14, 9)
+
     def test_what_is_out_of_its_range_reaches_the_service_as_it_is(self):
         self.drive.TipRadius = -5
         self.document.recompute()
@@ -412,6 +420,16 @@ class Dialog(OfDrive):
         self.panel.slider.setValue(90)
         self.assertEqual(self.drive.InputAngle.Value, 45)
         self.assertEqual(self.panel.edits["InputAngle"].entry.text(), "45")
+
+    def test_the_slider_follows_an_angle_that_is_typed_and_does_not_round_it(self):
+        self.enter("InputAngle", "-327.7")
+        self.assertTrue(self.panel.apply())
+        self.assertEqual((self.panel.slider.value(), self.drive.InputAngle.Value), (65, -327.7))
+
+    def test_an_angle_beyond_a_turn_is_objected_to_and_not_cut_short(self):
+        self.enter("InputAngle", "392.3")
+        self.assertFalse(self.panel.apply())
+        self.assertIn("-360 to 360", self.panel.edits["InputAngle"].note.text())
 
 
 if __name__ == "__main__":
