@@ -172,8 +172,21 @@ class Kinds(OfDrive):
     def test_friction_and_speed_bring_losses_into_the_sheet(self):
         self.drive.FrictionKind, self.drive.InputSpeedRpm = "plain", 1500
         self.document.recompute()
-        names = [self.cell(f"A{row}") for row in range(1, 60) if self.document.Results.getContents(f"A{row}")]
-        self.assertIn("losses.efficiency.ring_fixed", names)
+        self.assertIn("losses.efficiency.ring_fixed", self.names())
+
+    def names(self):
+        """What stands in the spreadsheet's first column."""
+        sheet = self.document.Results
+        return [self.cell(f"A{row}") for row in range(1, sheet.Rows + 1) if sheet.getContents(f"A{row}")]
+
+    def test_deviations_of_a_measured_drive_are_computed_with(self):
+        runout = {"deviations": {"ring_runout": {"amount_um": 2.0, "angle_deg": 40.0}}}
+        toothwave_drive.set_document(self.drive, example("flat-sided") | {"sweep": {"samples": 4}} | runout)
+        self.drive.RingGapUm = 5.0  # else the ring interferes
+        self.document.recompute()
+        self.assertEqual(self.drive.Problem, "")
+        self.assertEqual(toothwave_drive.document_of(self.drive)["deviations"], runout["deviations"])
+        self.assertIn("sweep_period_deg", self.names())
 
     def test_other_fields_reach_the_service(self):
         self.drive.OtherFields = '{"profile": {"extent": "whole"}}'
