@@ -1,8 +1,27 @@
 """The design document as a table of fields: what the object's properties and the dialog are made of. No FreeCAD here."""
 
+import json
 from dataclasses import dataclass
 
-CONTACTS = (("wave_generator", "Wave generator"), ("teeth", "Teeth"), ("ring", "Ring"), ("carrier", "Carrier"))
+CONTACTS = (("wave_generator", "Wave generator"), ("ring", "Ring"), ("carrier", "Carrier"))
+PARTS = (CONTACTS[0], ("teeth", "Teeth"), *CONTACTS[1:])
+BY_DEFAULT = "default"  # a choice that the document leaves to the service
+LOBES = {"ellipse": 2, "eccentric": 1}  # of other kinds they are a field
+PROJECTED = ("linear", "palmgren", "fixed")  # the laws that `projection` takes
+
+# Of the service's API document.
+LENGTH_MM = (1e-6, 1e6)
+COUNT = (2, 10000)
+TORQUE_NM = (1e-12, 1e15)
+STIFFNESS_N_PER_MM = (1e-3, 1e15)
+GAP_UM = (0.0, 1e6)
+EITHER_WAY_UM = (-1e6, 1e6)
+EITHER_WAY_ARCSEC = (-1e5, 1e5)
+SHARE = (0.0, 1.0)
+
+
+class NoDocument(ValueError):
+    """What the fields and a design document cannot say to each other."""
 
 
 @dataclass(frozen=True)
@@ -13,96 +32,294 @@ class Field:
     name: str
     label: str
     group: str
-    default: object
+    default: object = None  # what holds where the document leaves the field out; a field that it must have has a `start`
     unit: str = ""
-    blank: str = ""  # what 0 stands for, where the document leaves the field out then
+    limits: tuple = ()  # least and greatest
+    start: object = None  # what it begins with, where the document must have it
+    blank: str = ""  # what the default stands for, where it is no value of its own
     choices: tuple = ()
+    shown: tuple = ()  # the name of a choice, and at which of its values the document has the field
+    is_object: bool = False  # whether there is an object at the pointer, whose values are fields of their own
+    held: tuple = ()  # of the limits what a property of FreeCAD holds, where it is less
+
+    @property
+    def absent(self):
+        """The value where a document has none."""
+        return self.default if self.start is None else self.start
 
     @property
     def tooltip(self):
-        """Where the value stands in the document, and what its 0 means."""
-        return self.pointer + (f"\n0: {self.blank}" if self.blank else "")
+        """Where the value stands in the document, its range, and what it means to leave it out."""
+        lines = [self.pointer] if self.pointer else []
+        if self.limits:
+            least, greatest = self.held or self.limits
+            lines.append(f"{least:g} to {greatest:g} {self.unit}".strip())
+        if self.blank:
+            lines.append(f"{self.default or 'empty'}: {self.blank}" if isinstance(self.default, str) else f"0: {self.blank}")
+        return "\n".join(lines)
+
+    def takes(self, value):
+        """Whether a document's value can stand in the field; what has several values, or is too much for FreeCAD, cannot."""
+        if self.held and isinstance(value, (int, float)):
+            return self.held[0] <= value <= self.held[1]
+        return not isinstance(value, dict)
+
+    def is_shown(self, values):
+        """Whether the document has such a field, as the choices stand."""
+        return not self.shown or values[self.shown[0]] in self.shown[1]
 
 
-def _fields():
-    group = "Drive"
-    yield Field("/drive/wave_generator/semi_major_mm", "SemiMajor", "Semi-major axis a", group, 58.0, "mm")
-    yield Field("/drive/wave_generator/semi_minor_mm", "SemiMinor", "Semi-minor axis b", group, 56.0, "mm")
-    yield Field("/drive/teeth/count", "ToothCount", "Teeth in theory", group, 28)
-    yield Field("/drive/teeth/installed", "InstalledTeeth", "Teeth installed", group, 0, blank="all")
-    yield Field("/drive/teeth/radius_mm", "ToothRadius", "Tooth radius r", group, 5.0, "mm")
-    yield Field("/drive/teeth/width_mm", "ToothWidth", "Tooth width", group, 15.0, "mm")
-    yield Field("/drive/ring/teeth", "RingTeeth", "Ring teeth", group, 26)
-    yield Field("/drive/ring/tip_radius_mm", "TipRadius", "Ring's tip bored to", group, 0.0, "mm", "natural tip")
+def _named(label):
+    return label.title().replace(" ", "")
 
-    group = "Assembly"
-    yield Field("/assembly/input_angle_deg", "InputAngle", "Input angle", group, 0.0, "deg")
 
-    group = "Load and model"
-    yield Field("/load/input_torque_nm", "InputTorqueNm", "Input torque", group, 20.0, "N·m", "left out")
-    yield Field("/load/output_torque_nm", "OutputTorqueNm", "or output torque", group, 0.0, "N·m", "left out")
-    yield Field("/load/allowable_stress_mpa", "AllowableStressMPa", "Allowable stress", group, 0.0, "MPa", "not asked")
-    ways = ("virtual_work", "projection")
-    yield Field("/model/compatibility", "Compatibility", "Approaches add up by", group, ways[0], choices=ways)
-    laws = ("johnson", "palmgren", "fixed", "linear")
-    yield Field("/model/stiffness/law", "StiffnessLaw", "Contact law", group, laws[0], choices=laws)
-    for contact, label in (CONTACTS[0], *CONTACTS[2:]):
-        name = label.title().replace(" ", "")
-        pointer = f"/model/stiffness/{contact}_n_per_mm"
-        yield Field(pointer, f"{name}StiffnessNPerMm", f"Stiffness, {label.lower()}", group, 0.0, "N/mm", "left out")
-    for contact, label in (CONTACTS[0], *CONTACTS[2:]):
-        name = label.title().replace(" ", "")
-        yield Field(f"/model/clearance/{contact}_um", f"{name}GapUm", f"Gap, {label.lower()}", group, 0.0, "µm", "none")
-    yield Field("/sweep/samples", "Samples", "Input angles, intervals", group, 0, blank="50, or by the tolerance")
-    yield Field("/sweep/tolerance", "SweepTolerance", "or to a tolerance", group, 0.0, blank="left out")
+def _drive():
+    kind, group = "WaveGeneratorKind", "Wave generator"
+    kinds = ("ellipse", "eccentric", "harmonic", "harmonic_path")
+    place = "/drive/wave_generator"
+
+    def length(key, name, label, start, *where):
+        return Field(f"{place}/{key}", name, label, group, unit="mm", limits=LENGTH_MM, start=start, shown=(kind, where))
+
+    yield Field(f"{place}/kind", kind, "Kind", group, start=kinds[0], choices=kinds)
+    yield length("semi_major_mm", "SemiMajor", "Semi-major axis a", 58.0, "ellipse")
+    yield length("semi_minor_mm", "SemiMinor", "Semi-minor axis b", 56.0, "ellipse")
+    yield length("radius_mm", "CircleRadius", "Radius R₀", 57.0, "eccentric")
+    yield length("eccentricity_mm", "Eccentricity", "Eccentricity e", 1.0, "eccentric")
+    yield Field(f"{place}/lobes", "Lobes", "Lobes U", group, limits=(1, 1000), start=2, shown=(kind, kinds[2:]))
+    yield length("mean_radius_mm", "MeanRadius", "Mean radius R₀", 57.0, "harmonic")
+    yield length("mean_path_radius_mm", "MeanPathRadius", "Mean radius of the path R", 62.0, "harmonic_path")
+    yield length("amplitude_mm", "Amplitude", "Amplitude e", 1.0, "harmonic", "harmonic_path")
+
+    shape, group, place = "ToothShape", "Teeth and ring", "/drive/teeth"
+    shapes = ("cylinder", "ball", "flat_sided")
+    yield Field(f"{place}/shape", shape, "Shape of the teeth", group, start=shapes[0], choices=shapes)
+    yield Field(f"{place}/count", "ToothCount", "Teeth in theory", group, limits=COUNT, start=28)
+    yield Field(f"{place}/installed", "InstalledTeeth", "Teeth installed", group, 0, limits=COUNT, blank="all")
+    yield Field(f"{place}/radius_mm", "ToothRadius", "Tooth radius r", group, unit="mm", limits=LENGTH_MM, start=5.0)
+    widths = (shape, ("cylinder", "flat_sided"))
+    yield Field(f"{place}/width_mm", "ToothWidth", "Tooth width", group, unit="mm", limits=LENGTH_MM, start=15.0, shown=widths)
+    flats = (shape, ("flat_sided",))
+    yield Field(f"{place}/flat_length_mm", "FlatLength", "Flats, length", group, None, "mm", LENGTH_MM, 4.0, shown=flats)
+    for contact, label in CONTACTS:
+        pointer, name = f"{place}/groove_radius_mm/{contact}", f"{_named(label)}GrooveRadius"
+        balls = (shape, ("ball",))
+        yield Field(pointer, name, f"Groove, {label.lower()}", group, 0.0, "mm", LENGTH_MM, blank="no groove", shown=balls)
+    yield Field("/drive/ring/teeth", "RingTeeth", "Ring teeth", group, limits=COUNT, start=26)
+    yield Field("/drive/ring/tip_radius_mm", "TipRadius", "Ring's tip bored to", group, 0.0, "mm", LENGTH_MM, blank="natural tip")
+
+    pointer, turns, turn = "/assembly/input_angle_deg", (-1e7, 1e7), (-360.0, 360.0)
+    yield Field(pointer, "InputAngle", "Input angle", "Assembly", 0.0, "deg", turns, held=turn)
+
+
+def _load():
+    group = "Load"
+
+    def load(key, name, label, unit, limits, blank):
+        return Field(f"/load/{key}", name, label, group, 0.0, unit, limits, blank=blank)
+
+    yield load("input_torque_nm", "InputTorqueNm", "Input torque", "N·m", TORQUE_NM, "left out")
+    yield load("output_torque_nm", "OutputTorqueNm", "or output torque", "N·m", TORQUE_NM, "left out")
+    yield load("input_speed_rpm", "InputSpeedRpm", "Input speed", "rpm", (1e-6, 1e6), "left out")
+    yield load("allowable_stress_mpa", "AllowableStressMPa", "Allowable stress", "MPa", (1e-3, 1e6), "not asked")
+
+
+def _model():
+    group, free = "Model", "left to the service"
+    ways = (BY_DEFAULT, "projection", "virtual_work")
+    yield Field("/model/compatibility", "Compatibility", "Approaches add up by", group, BY_DEFAULT, blank=free, choices=ways)
+    law, laws = "StiffnessLaw", (BY_DEFAULT, *PROJECTED, "johnson", "hertz")
+    yield Field("/model/stiffness/law", law, "Contact law", group, BY_DEFAULT, blank=free, choices=laws)
+    for contact, label in CONTACTS:
+        pointer, name = f"/model/stiffness/{contact}_n_per_mm", f"{_named(label)}StiffnessNPerMm"
+        label, limits = f"Stiffness, {label.lower()}", STIFFNESS_N_PER_MM
+        yield Field(pointer, name, label, group, None, "N/mm", limits, 500000.0, shown=(law, ("fixed",)))
+    for contact, label in CONTACTS:
+        pointer, name = f"/model/stiffness/depth_mm/{contact}", f"{_named(label)}Depth"
+        label, johnson = f"Depth, {label.lower()}", (law, ("johnson",))
+        yield Field(pointer, name, label, group, 0.0, "mm", LENGTH_MM, blank="tooth radius", shown=johnson)
+    for contact, label in CONTACTS:
+        pointer, name = f"/model/clearance/{contact}_um", f"{_named(label)}GapUm"
+        yield Field(pointer, name, f"Gap, {label.lower()}", group, 0.0, "µm", GAP_UM, blank="none")
+    for contact, label in CONTACTS:
+        pointer, name = f"/model/series_compliance_mm_per_n/{contact}", f"{_named(label)}ComplianceMmPerN"
+        yield Field(pointer, name, f"Compliance behind, {label.lower()}", group, 0.0, "mm/N", (0.0, 1e3), blank="none")
+    most, blank = 10**7, "50, or by the tolerance"
+    yield Field("/sweep/samples", "Samples", "Input angles, intervals", group, 0, limits=(1, most), blank=blank)
+    yield Field("/sweep/tolerance", "SweepTolerance", "or to a tolerance", group, 0.0, limits=(1e-12, 0.1), blank="left out")
     yield Field("/sweep/wind_up", "WindUp", "Wind-up too", group, False)
 
+
+def _friction():
+    group, place, kind = "Friction", "/friction/wave_generator", "FrictionKind"
+    kinds = ("plain", "race", "rolling")
+    choices = ("none", *kinds)
+    yield Field(f"{place}/kind", kind, "Teeth run on", group, choices[0], blank="no friction computed", choices=choices)
+
+    def coefficient(pointer, name, label, start, *where):
+        return Field(pointer, name, label, group, limits=SHARE, start=start, shown=(kind, where))
+
+    pointer = f"{place}/coefficient"
+    yield coefficient(pointer, "WaveGeneratorFriction", "μ, wave generator", 0.05, "plain", "race")
+    yield coefficient("/friction/ring/coefficient", "RingFriction", "μ, ring", 0.05, *kinds)
+    yield coefficient("/friction/carrier/coefficient", "CarrierFriction", "μ, carrier", 0.05, *kinds)
+    yield coefficient(f"{place}/bearing_coefficient", "BearingFriction", "μ, bearing", 0.0015, *kinds[1:])
+    pointer, bearings = f"{place}/bearing_radius_mm", (kind, kinds[1:])
+    yield Field(pointer, "BearingRadius", "Bearing's radius", group, None, "mm", LENGTH_MM, 28.0, shown=bearings)
+
+
+def _modification():
+    group, place = "Modification", "/modification"
+    for key, name, label in (
+        ("ring_equidistant", "RingSetBack", "Ring set back"),
+        ("ring_path_shift", "RingPathShift", "Ring's path outward"),
+        ("ring_profile_shift", "RingProfileShift", "Ring's profile outward"),
+        ("wave_generator_equidistant", "WaveGeneratorSetBack", "Wave generator set back"),
+        ("slot_wall", "SlotWallSetBack", "Slot walls set back"),
+        ("tooth_radius", "ThinnerTeeth", "Teeth thinner"),
+    ):
+        yield Field(f"{place}/{key}_um", f"{name}Um", label, group, 0.0, "µm", EITHER_WAY_UM, blank="none")
+    for part in ("ring", "carrier"):
+        pointer, name = f"{place}/{part}_rotation_arcsec", f"{part.title()}RotationArcsec"
+        yield Field(pointer, name, f"{part.title()} turned", group, 0.0, "arcsec", EITHER_WAY_ARCSEC, blank="none")
+    relief, place = "TipRelief", f"{place}/ring_tip_relief"
+    yield Field(place, relief, "Tip relief of the ring", group, False, is_object=True)
+    shown = (relief, (True,))
+    yield Field(f"{place}/amount_um", "TipReliefUm", "Relief at the tip", group, None, "µm", EITHER_WAY_UM, 5.0, shown=shown)
+    yield Field(f"{place}/start_deg", "TipReliefStart", "from the position", group, None, "deg", (0.0, 180.0), 60.0, shown=shown)
+    yield Field(f"{place}/power", "TipReliefPower", "to the power", group, limits=(0.1, 100.0), start=2.0, shown=shown)
+
+
+def _parts():
     group = "Parts as made"
-    yield Field("/parts/wave_generator/bore_radius_mm", "CamBoreRadius", "Cam's bore, radius", group, 0.0, "mm", "none")
-    yield Field("/parts/carrier/inner_radius_mm", "CarrierInnerRadius", "Carrier, inner radius", group, 0.0, "mm", "default")
-    yield Field("/parts/carrier/outer_radius_mm", "CarrierOuterRadius", "Carrier, outer radius", group, 0.0, "mm", "default")
-    yield Field("/parts/ring/outer_radius_mm", "RingOuterRadius", "Ring, outer radius", group, 0.0, "mm", "1.2 × root")
-    for part, label in CONTACTS:
-        name = label.title().replace(" ", "")
-        yield Field(f"/parts/{part}/clearance_um", f"{name}ClearanceUm", f"Clearance, {label.lower()}", group, 0.0, "µm", "none")
-    yield Field("/profile/chord_tolerance_mm", "ChordTolerance", "Chord tolerance", group, 0.001, "mm")
+
+    def radius(pointer, name, label, blank):
+        return Field(f"/parts/{pointer}_radius_mm", name, label, group, 0.0, "mm", LENGTH_MM, blank=blank)
+
+    yield radius("wave_generator/bore", "CamBoreRadius", "Cam's bore, radius", "none")
+    yield radius("carrier/inner", "CarrierInnerRadius", "Carrier, inner radius", "a tenth of the room stays free")
+    yield radius("carrier/outer", "CarrierOuterRadius", "Carrier, outer radius", "a tenth of the room stays free")
+    yield radius("ring/outer", "RingOuterRadius", "Ring, outer radius", "1.2 × root")
+    for part, label in PARTS:
+        pointer, name = f"/parts/{part}/clearance_um", f"{_named(label)}ClearanceUm"
+        yield Field(pointer, name, f"Clearance, {label.lower()}", group, 0.0, "µm", GAP_UM, blank="none")
+    yield Field("/profile/chord_tolerance_mm", "ChordTolerance", "Chord tolerance", group, 0.001, "mm", LENGTH_MM)
 
     group = "Materials"
-    for part, label in CONTACTS:
-        name = label.title().replace(" ", "")
-        yield Field(f"/materials/{part}/youngs_modulus_gpa", f"{name}ModulusGPa", f"E, {label.lower()}", group, 210.0, "GPa")
-        yield Field(f"/materials/{part}/poissons_ratio", f"{name}PoissonsRatio", f"ν, {label.lower()}", group, 0.3)
+    for part, label in PARTS:
+        place, name = f"/materials/{part}", _named(label)
+        pointer = f"{place}/youngs_modulus_gpa"
+        yield Field(pointer, f"{name}ModulusGPa", f"E, {label.lower()}", group, 210.0, "GPa", (1e-3, 1e5))
+        yield Field(f"{place}/poissons_ratio", f"{name}PoissonsRatio", f"ν, {label.lower()}", group, 0.3, limits=(-1.0, 0.5))
+
+    # What the document has besides, such as deviations of single teeth.
+    yield Field("", "OtherFields", "Other fields, as JSON", "Other", "", blank="none")
 
 
-FIELDS = tuple(_fields())
+FIELDS = (*_drive(), *_load(), *_model(), *_friction(), *_modification(), *_parts())
+CHOOSING = tuple(dict.fromkeys(field.shown[0] for field in FIELDS if field.shown))  # names of fields that others depend on
+OTHER = FIELDS[-1].name
+
+# The paper's case 5.1, with the values that the fields begin with.
+START = {"load": {"input_torque_nm": 20.0}, "model": {"compatibility": "projection", "stiffness": {"law": "linear"}}}
 
 
 def document_of(values):
-    """The design document of the values, by property name. A 0 that stands for nothing is left out."""
+    """The design document of the values, by property name. What is not set is left out.
+
+    Raises NoDocument where the other fields are no JSON object, or have what has a field of its own.
+    """
     document = {}
     for field in FIELDS:
         value = values[field.name]
-        if field.blank and value == 0:
-            continue
-        *parents, key = field.pointer.strip("/").split("/")
-        place = document
-        for parent in parents:
-            place = place.setdefault(parent, {})
-        place[key] = value
+        is_set = field.start is not None or value != field.default
+        if is_set and field.pointer and field.is_shown(values):
+            *parents, key = field.pointer.strip("/").split("/")
+            place = document
+            for parent in parents:
+                place = place.setdefault(parent, {})
+            place[key] = {} if field.is_object else value
+    _join(document, others_of(values[OTHER]))
     return document
 
 
+def others_of(text):
+    """The object that the other fields are. Raises NoDocument where they are none."""
+    try:
+        others = json.loads(text or "{}")
+    except ValueError as error:
+        raise NoDocument(f"The other fields are no JSON: {error}") from None
+    if not isinstance(others, dict):
+        raise NoDocument("The other fields are no JSON object")
+    return others
+
+
+def _join(document, others, place=""):
+    for key, value in others.items():
+        if key not in document:
+            document[key] = value
+        elif isinstance(value, dict) and isinstance(document[key], dict):
+            _join(document[key], value, f"{place}/{key}")
+        else:
+            raise NoDocument(f"{place}/{key} has a field of its own, and may not stand among the other fields too")
+
+
 def values_of(document):
-    """The values of a design document, by property name: defaults where it has none."""
-    values = {}
-    for field in FIELDS:
-        value = document
-        for key in field.pointer.strip("/").split("/"):
-            value = value.get(key) if isinstance(value, dict) else None
-        if value is None:
-            # A default load beside one that is given, or a law's stiffness, would be another design.
-            value = type(field.default)() if field.blank else field.default
-            if field.name == "StiffnessLaw" and values["Compatibility"] == "projection":
-                value = "linear"  # what the service takes then
-        values[field.name] = type(field.default)(value)
+    """The values of a design document, by property name; where it has none, what is meant then, or what the field begins with.
+
+    Raises NoDocument where it has a value that its field cannot hold.
+    """
+    values = {field.name: _value_of(field, _found(document, field.pointer)) for field in FIELDS if field.pointer}
+    shown = (field for field in FIELDS if field.pointer and not field.is_object and field.is_shown(values))
+    own = {field.pointer for field in shown if field.takes(_found(document, field.pointer))}
+    others = _without(document, own)
+    values[OTHER] = json.dumps(others, ensure_ascii=False) if others else ""
     return values
+
+
+def _found(document, pointer):
+    for key in pointer.strip("/").split("/"):
+        document = document.get(key) if isinstance(document, dict) else None
+    return document
+
+
+def _value_of(field, value):
+    if field.is_object:
+        return isinstance(value, dict)
+    if value is None or not field.takes(value):
+        return field.absent
+    try:
+        held = type(field.absent)(value)
+    except (TypeError, ValueError):
+        held = None
+    if held != value or field.choices and held not in field.choices:
+        raise NoDocument(f"{field.pointer}: the field cannot hold {value!r}")
+    return held
+
+
+def _without(document, own, place=""):
+    """What of the document has no field of its own."""
+    others = {}
+    for key, value in document.items():
+        pointer = f"{place}/{key}"
+        if isinstance(value, dict) and value:
+            value = _without(value, own, pointer)
+            if not value:
+                continue
+        elif pointer in own:
+            continue
+        others[key] = value
+    return others
+
+
+def suited(values, chosen):
+    """The values, by the field's name, that go with a choice just made: teeth of the ring, or law and way of adding up."""
+    if chosen in ("WaveGeneratorKind", "Lobes"):
+        count, lobes = values["ToothCount"], LOBES.get(values["WaveGeneratorKind"], values["Lobes"])
+        return {"RingTeeth": count + (lobes if values["RingTeeth"] > count else -lobes)}
+    is_ball, law, way = values["ToothShape"] == "ball", values["StiffnessLaw"], values["Compatibility"]
+    if law not in (BY_DEFAULT, "fixed") and is_ball != (law == "hertz"):
+        law = BY_DEFAULT
+    if way == "projection" and not (law == "fixed" or law in (BY_DEFAULT, *PROJECTED) and not is_ball):
+        law, way = (BY_DEFAULT, way) if chosen == "Compatibility" and not is_ball else (law, "virtual_work")
+    return {"StiffnessLaw": law, "Compatibility": way}

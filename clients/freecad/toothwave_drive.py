@@ -11,34 +11,42 @@ import toothwave_design
 import toothwave_parts
 
 DEFAULT_URL = "http://127.0.0.1:8080"
-QUANTITIES = {"mm": "App::PropertyLength", "deg": "App::PropertyAngle"}
-KINDS = {int: "App::PropertyInteger", float: "App::PropertyFloat", bool: "App::PropertyBool"}
-PARTS = {"ring": "Ring", "carrier": "Carrier", "teeth": "Teeth", "wave_generator": "WaveGenerator"}
-COLOURS = {
-    "ring": (0.55, 0.62, 0.70),
-    "carrier": (0.93, 0.72, 0.33),
-    "teeth": (0.94, 0.95, 0.96),
-    "wave_generator": (0.33, 0.62, 0.84),
+# A distance may be negative, where a length becomes 0 without a word: what is out of its range the service objects to.
+QUANTITIES = {"mm": "App::PropertyDistance", "deg": "App::PropertyAngle"}
+KINDS = {
+    int: "App::PropertyInteger",
+    float: "App::PropertyFloat",
+    bool: "App::PropertyBool",
+    str: "App::PropertyString",
 }
+SHOWN, HIDDEN = 0, 2  # FreeCAD's editor modes
+PARTS = {"ring": "Ring", "carrier": "Carrier", "teeth": "Teeth", "wave_generator": "WaveGenerator"}
 HEADINGS = ("Problem", "Peaks", "Period", "Findings", "No findings", "severity")
 WIDTHS = {"A": 210, "B": 140, "C": 110, "D": 110, "F": 700, "G": 420, "H": 420}  # of the spreadsheet's columns, in pixels
-OBJECTIONS = (toothwave_client.Problem, toothwave_client.NoService)
+OBJECTIONS = (toothwave_client.Problem, toothwave_client.NoService, toothwave_design.NoDocument)
 
+
+class NoWindow:
+    """What there is of a window where FreeCAD runs without; toothwave_panel puts its own in place."""
+
+    def wait(self, call):
+        """Makes a call to a service and gives its result."""
+        return call()
+
+    def show(self, problem):
+        """Tells a problem that has just come up."""
+
+    def dress(self, drive, parts):
+        """Gives a new drive and its parts icon and colours."""
+
+
+window = NoWindow()
 _services = {}
 
 
 def service_at(url):
     """One service for each address, so that all drives of a session share its answers."""
-    return _services.setdefault(url, toothwave_client.Service(url, wait=_wait))
-
-
-def _wait(call):
-    """Makes a call to a service; where there is a window, it goes on being drawn, and the call can be given up."""
-    if not FreeCAD.GuiUp:
-        return call()
-    import toothwave_panel
-
-    return toothwave_panel.patiently(call)
+    return _services.setdefault(url, toothwave_client.Service(url, wait=lambda call: window.wait(call)))
 
 
 class Stateless:
@@ -66,17 +74,42 @@ class HarmonicDrive(Stateless):
             "App::PropertyString", "ServiceUrl", "Service", "Address of the toothwave service"
         ).ServiceUrl = DEFAULT_URL
         obj.addProperty("App::PropertyString", "Problem", "Service", "What the service objects to", 1)  # 1: read only
+        self._complete(obj)
+        set_document(obj, toothwave_design.START)
+
+    def _complete(self, obj):
+        """Adds the fields that the object lacks: all of a new one, of an older file's those that came later."""
         for field in toothwave_design.FIELDS:
-            kind = "App::PropertyEnumeration" if field.choices else QUANTITIES.get(field.unit, KINDS[type(field.default)])
-            obj.addProperty(kind, field.name, field.group, f"{field.label}\n{field.tooltip}")
-            if field.choices:
+            if not hasattr(obj, field.name):
+                kind = "App::PropertyEnumeration" if field.choices else QUANTITIES.get(field.unit, KINDS[type(field.absent)])
+                obj.addProperty(kind, field.name, field.group, f"{field.label}\n{field.tooltip}")
+                setattr(obj, field.name, list(field.choices) or field.absent)
+            elif field.choices and obj.getEnumerationsOfProperty(field.name) != list(field.choices):
+                value = getattr(obj, field.name)
                 setattr(obj, field.name, list(field.choices))
-            setattr(obj, field.name, field.default)
+                setattr(obj, field.name, value)
+        self._show_fields(obj)
+
+    def _show_fields(self, obj):
+        """Shows the fields of the chosen kinds in the property view, and hides those of the others."""
+        choices = {name: getattr(obj, name) for name in toothwave_design.CHOOSING}
+        for field in toothwave_design.FIELDS:
+            if field.shown:
+                obj.setEditorMode(field.name, SHOWN if field.is_shown(choices) else HIDDEN)
+
+    def onDocumentRestored(self, obj):
+        self._complete(obj)
+
+    def onChanged(self, obj, name):
+        # The last field is there when all are; a file's properties come one by one.
+        if name in toothwave_design.CHOOSING and hasattr(obj, toothwave_design.OTHER):
+            self._show_fields(obj)
 
     def execute(self, obj):
         """Asks the service. A drive that cannot be drawn is an error; one whose loads cannot be computed is drawn without."""
-        service, document = service_at(obj.ServiceUrl), document_of(obj)
+        service = service_at(obj.ServiceUrl)
         try:
+            document = document_of(obj)
             self.drawing = service.drawing("assembly", document)
         except OBJECTIONS as problem:
             self._tell(obj, problem)
@@ -89,16 +122,19 @@ class HarmonicDrive(Stateless):
             FreeCAD.Console.PrintError(f"{obj.Label}: {problem}\n")
         self._tell(obj, problem)
 
+    def findings(self):
+        """What a designer is told of the drive, under load and as it is drawn, each once."""
+        findings = list(self.sweep["findings"]) if self.sweep else []
+        return findings + [finding for finding in (self.drawing or {}).get("findings", ()) if finding not in findings]
+
     def _tell(self, obj, problem):
         """Keeps the problem and, where there is a window, shows it when the recomputation is over."""
         self.problem = problem
         text = str(problem or "")
         if text != obj.Problem:
             obj.Problem = text
-            if text and FreeCAD.GuiUp:
-                import toothwave_panel
-
-                toothwave_panel.show_later(text)
+            if text:
+                window.show(text)
 
     def body(self, obj, part):
         """A part's body, asked for again where the document was just loaded."""
@@ -111,7 +147,7 @@ class DrivePart(Stateless):
     """The solids of one part, built anew only where its section has changed; else they just move."""
 
     section = None
-    prism = None
+    solid = None
 
     def __init__(self, obj, drive, part):
         obj.Proxy = self
@@ -120,10 +156,11 @@ class DrivePart(Stateless):
 
     def execute(self, obj):
         body = obj.Drive.Proxy.body(obj.Drive, obj.DrivePart)
-        section = {key: body[key] for key in ("outer", "holes", "width_mm")}
+        make = toothwave_parts.ball_of if is_ball(obj.Drive, obj.DrivePart) else toothwave_parts.prism_of
+        section = {key: body[key] for key in ("outer", "holes", "width_mm")} | {"make": make}
         if section != self.section:
-            self.section, self.prism = section, toothwave_parts.prism_of(body)
-        obj.Shape = shape = toothwave_parts.shape_of(body, self.prism)
+            self.section, self.solid = section, make(body)
+        obj.Shape = shape = toothwave_parts.shape_of(body, self.solid)
         obj.Placement = shape.Placement  # during a recomputation FreeCAD takes it from there, not from the shape
 
 
@@ -143,7 +180,7 @@ class Results(Stateless):
     def execute(self, obj):
         if obj.Drive.Proxy.drawing is None:
             return False  # just loaded: what the file has still holds
-        rows = _rows(obj.Drive.Proxy.sweep, obj.Drive.Problem)
+        rows = _rows(obj.Drive.Proxy.sweep, obj.Drive.Problem, obj.Drive.Proxy.findings())
         for number in range(1, max(obj.Rows, len(rows)) + 1):
             row = rows[number - 1] if number <= len(rows) else ()
             for column, letter in enumerate("ABCDEFGH"):
@@ -159,21 +196,22 @@ def _cell(value):
     return repr(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else f"'{value}" if value != "" else ""
 
 
-def _rows(sweep, problem):
-    if sweep is None:
-        return [("Problem",), *((line,) for line in problem.splitlines())]
+def _rows(sweep, problem, findings):
+    rows = [("Problem",), *((line,) for line in problem.splitlines())] if sweep is None else _results(sweep)
+    rows += [(), ("Findings" if findings else "No findings",)]
+    columns = ("severity", "code", "value", "limit", "unit", "detail", "advice")
+    if findings:
+        rows += [(*columns, "pointers")]
+    return rows + [(*(finding.get(name, "") for name in columns), ", ".join(finding["pointers"])) for finding in findings]
+
+
+def _results(sweep):
     peaks = {contact: dict(_leaves(values)) for contact, values in sweep["peaks"].items()}
     quantities = list(dict.fromkeys(name for values in peaks.values() for name in values))
     rows = [("Peaks", *peaks)]
     rows += [(name, *(values.get(name, "") for values in peaks.values())) for name in quantities]
     rows += [(), ("Period", "")]
-    rows += _leaves({name: value for name, value in sweep.items() if name not in ("peaks", "states", "findings")})
-    columns = ("severity", "code", "value", "limit", "unit", "detail", "advice")
-    rows += [(), ("Findings" if sweep["findings"] else "No findings",)]
-    if sweep["findings"]:
-        rows += [(*columns, "pointers")]
-    rows += [(*(finding.get(name, "") for name in columns), ", ".join(finding["pointers"])) for finding in sweep["findings"]]
-    return rows
+    return rows + list(_leaves({name: value for name, value in sweep.items() if name not in ("peaks", "states", "findings")}))
 
 
 def _leaves(values, prefix=""):
@@ -185,6 +223,11 @@ def _leaves(values, prefix=""):
             yield prefix + name, value
 
 
+def is_ball(drive, part):
+    """Whether a part is the balls that teeth may be; its section is then that of their middle."""
+    return part == "teeth" and drive.ToothShape == "ball"
+
+
 def document_of(obj):
     """The design document of a drive's properties."""
     values = {field.name: getattr(obj, field.name) for field in toothwave_design.FIELDS}
@@ -192,7 +235,7 @@ def document_of(obj):
 
 
 def set_document(obj, document):
-    """Gives a drive the values of a design document, defaults where it has none."""
+    """Gives a drive the values of a design document; where it has none, what is meant then, or what a field begins with."""
     for name, value in toothwave_design.values_of(document).items():
         setattr(obj, name, value)
 
@@ -215,8 +258,5 @@ def make_drive(design=None, url=None, document=None):
     Results(sheet, drive)
     objects.append(sheet)
     group.Group = objects
-    if FreeCAD.GuiUp:
-        import toothwave_panel
-
-        toothwave_panel.dress(drive, objects[1:-1])
+    window.dress(drive, objects[1:-1])
     return drive

@@ -1,6 +1,7 @@
 """The dialog: the design's fields in FreeCAD's task panel, with what the service says of them beside the fields it names."""
 
 import concurrent.futures
+import math
 import os
 import threading
 
@@ -15,6 +16,12 @@ import toothwave_drive
 ICON = os.path.join(os.path.dirname(__file__), "toothwave.svg")
 AT_FAULT = "border: 1px solid #c0392b; border-radius: 2px;"
 PROBLEM, FINDING = "#c0392b", "#b9770e"
+COLOURS = {
+    "ring": (0.55, 0.62, 0.70),
+    "carrier": (0.93, 0.72, 0.33),
+    "teeth": (0.94, 0.95, 0.96),
+    "wave_generator": (0.33, 0.62, 0.84),
+}
 AT_ONCE_S, SOON_MS, LOOK_MS = 0.05, 500, 20  # an answer from the cache; one that needs no word; how often to look for it
 
 
@@ -24,6 +31,7 @@ class FieldEdit(QtGui.QWidget):
     def __init__(self, field):
         super().__init__()
         self.field = field
+        self.is_shown = True
         self.entry = self._new_entry()
         self.entry.setToolTip(field.tooltip)
         self.note = QtGui.QLabel(wordWrap=True, visible=False)
@@ -43,7 +51,7 @@ class FieldEdit(QtGui.QWidget):
             for choice in self.field.choices:
                 entry.addItem(choice.replace("_", " "), choice)
             entry.wheelEvent = QtGui.QWheelEvent.ignore  # scrolling the panel would change the design
-        elif isinstance(self.field.default, bool):
+        elif isinstance(self.field.absent, bool):
             entry = QtGui.QCheckBox()
         else:
             entry = QtGui.QLineEdit(placeholderText=self.field.blank, alignment=QtCore.Qt.AlignRight)
@@ -52,29 +60,50 @@ class FieldEdit(QtGui.QWidget):
         return entry
 
     def show_value(self, value):
-        """Shows a property's value; a 0 that stands for nothing as its meaning."""
+        """Shows a property's value; one that stands for nothing as its meaning."""
+        value = getattr(value, "Value", value)
         if self.field.choices:
             self.entry.setCurrentIndex(self.field.choices.index(value))
         elif isinstance(value, bool):
             self.entry.setChecked(value)
+        elif self.field.blank and value == self.field.default:
+            self.entry.setText("")
         else:
-            value = getattr(value, "Value", value)
-            self.entry.setText("" if self.field.blank and value == 0 else f"{value:.15g}")
+            self.entry.setText(value if isinstance(value, str) else _digits(value))
 
     def value(self):
-        """The value entered. Raises ValueError where it is no number, or not whole where it must be."""
+        """The value entered. Raises ValueError, which says what is wanted, where it is none."""
         if self.field.choices:
             return self.entry.itemData(self.entry.currentIndex())
-        if isinstance(self.field.default, bool):
+        if isinstance(self.field.absent, bool):
             return self.entry.isChecked()
-        text = self.entry.text().strip().replace(",", ".")
-        return type(self.field.default)(text or ("0" if self.field.blank else ""))
+        text = self.entry.text().strip()
+        if not text and self.field.default is not None:
+            return self.field.default
+        if isinstance(self.field.absent, str):
+            toothwave_design.others_of(text)
+            return text
+        try:
+            value = type(self.field.absent)(text.replace(",", "."))
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise ValueError("a whole number is wanted here" if isinstance(self.field.absent, int) else "a number is wanted here")
+        if not self.field.takes(value):
+            raise ValueError("{:g} to {:g} is wanted here: FreeCAD's angles end at a turn".format(*self.field.held))
+        return value
 
     def object_to(self, text):
         """Marks the field; an empty text takes the mark away."""
         self.note.setText(text)
         self.note.setVisible(bool(text))
         self.entry.setStyleSheet(AT_FAULT if text else "")
+
+
+def _digits(value):
+    """A number in as few digits as tell it from all others."""
+    text = f"{value:.15g}"
+    return text if float(text) == value else repr(value)
 
 
 class Panel:
@@ -88,6 +117,7 @@ class Panel:
         groups = dict.fromkeys(field.group for field in toothwave_design.FIELDS)
         self.form = [self._service_box(), *map(self._group_box, groups)]
         self._show_properties()
+        self._follow_choices()
         self._show_outcome()
         if not is_new:  # else the transaction that made it is still open, and opening another would close it
             open_transaction("Edit harmonic drive")
@@ -121,14 +151,46 @@ class Panel:
                 column.addWidget(edit)
         if group == "Assembly":
             self.slider = QtGui.QSlider(QtCore.Qt.Horizontal, maximum=720, toolTip="Turns the drive: a turn of the input")
-            self.slider.setValue(round(2 * (self.drive.InputAngle.Value % 360)))
+            self._show_angle()
             self.slider.valueChanged.connect(self._turn)
             column.addWidget(self.slider)
         return box
 
+    def _show_angle(self):
+        self.slider.blockSignals(True)  # it shows the angle here, and does not set it
+        self.slider.setValue(round(2 * (self.drive.InputAngle.Value % 360)))
+        self.slider.blockSignals(False)
+
     def _show_properties(self):
         for name, edit in self.edits.items():
             edit.show_value(getattr(self.drive, name))
+
+    def _follow_choices(self):
+        """Shows the fields of the chosen kinds, and from here on of those that will be; what must suit a new kind is made to."""
+        for name in toothwave_design.CHOOSING:
+            entry = self.edits[name].entry
+            (entry.currentIndexChanged if self.edits[name].field.choices else entry.toggled).connect(self._show_fields)
+        for name in ("WaveGeneratorKind", "ToothShape", "StiffnessLaw", "Compatibility"):
+            self.edits[name].entry.activated.connect(lambda _index, name=name: self._suit(name))
+        self.edits["Lobes"].entry.editingFinished.connect(lambda: self._suit("Lobes"))
+        self._show_fields()
+
+    def _show_fields(self):
+        choices = {name: self.edits[name].value() for name in toothwave_design.CHOOSING}
+        for edit in self.edits.values():
+            edit.is_shown = edit.field.is_shown(choices)
+            edit.setVisible(edit.is_shown)
+
+    def _suit(self, chosen):
+        values = {}
+        for name, edit in self.edits.items():
+            try:
+                values[name] = edit.value()
+            except ValueError:
+                values[name] = 0
+        if values["Lobes"] > 0 and values["ToothCount"] > 0:
+            for name, value in toothwave_design.suited(values, chosen).items():
+                self.edits[name].show_value(value)
 
     def _show_outcome(self):
         """The problem, or the findings, and the peaks where there are any."""
@@ -136,7 +198,7 @@ class Panel:
         faults = {error["pointer"]: error["detail"] for error in getattr(problem, "errors", ())}
         for edit in self.edits.values():
             edit.object_to(faults.get(edit.field.pointer, ""))
-        findings = ["• " + finding["detail"] for finding in sweep["findings"]] if sweep else []
+        findings = ["• " + finding["detail"] for finding in self.drive.Proxy.findings()]
         self._say(str(problem or "\n".join(findings)), PROBLEM if problem else FINDING)
         peaks = sweep["peaks"].items() if sweep and not problem else ()
         lines = [f"Stress at {name.replace('_', ' ')} up to {peak['stress_mpa']['value']:.1f} MPa" for name, peak in peaks]
@@ -164,10 +226,11 @@ class Panel:
         if index > 0:
             try:
                 document = toothwave_drive.service_at(self.url.text()).example(self.examples.itemText(index))
+                values = toothwave_design.values_of(document)
             except toothwave_drive.OBJECTIONS as problem:
                 self._say(str(problem), PROBLEM)
                 return
-            for name, value in toothwave_design.values_of(document).items():
+            for name, value in values.items():
                 self.edits[name].show_value(value)
             self.apply()
 
@@ -181,12 +244,12 @@ class Panel:
         values, is_readable = {}, True
         for name, edit in self.edits.items():
             edit.object_to("")
+            if not edit.is_shown:
+                continue
             try:
                 values[name] = edit.value()
-            except ValueError:
-                edit.object_to(
-                    "a whole number is wanted here" if isinstance(edit.field.default, int) else "a number is wanted here"
-                )
+            except ValueError as error:
+                edit.object_to(str(error))
                 is_readable = False
         if not is_readable:
             return False
@@ -196,6 +259,7 @@ class Panel:
                 setattr(self.drive, name, value)
         self.drive.touch()  # asks again where only the service has changed, such as from absent to present
         self.drive.Document.recompute()
+        self._show_angle()
         self._show_outcome()
         return "Invalid" not in self.drive.State
 
@@ -311,26 +375,36 @@ def patiently(call):
     return outcome.result()
 
 
-def dress(drive, parts):
-    """Icon and colours, which only exist where there is a window."""
-    ViewDrive(drive.ViewObject)
-    drive.ViewObject.Visibility = True  # there is nothing to see of it, but grey in the tree looks switched off
-    for part in parts:
-        view = part.ViewObject
-        view.Proxy = 0  # shows a shape as FreeCAD does
-        view.ShapeColor = toothwave_drive.COLOURS[part.DrivePart]
-        view.LineWidth = 1
-        view.Deviation, view.AngularDeflection = 0.02, 5
+class Window:
+    """FreeCAD's window, as the drive needs it."""
+
+    def wait(self, call):
+        """Makes a call to a service; the window goes on being drawn, and the call can be given up."""
+        return patiently(call)
+
+    def show(self, problem):
+        """A message when the recomputation is over; the dialog, where it is open, shows it itself."""
+        title, _, text = problem.partition("\n")
+
+        def show():
+            box = QtGui.QMessageBox(QtGui.QMessageBox.Critical, "Toothwave", title, parent=FreeCADGui.getMainWindow())
+            box.setInformativeText(text)
+            box.exec_()
+
+        if not Panel.is_open:
+            QtCore.QTimer.singleShot(0, show)
+
+    def dress(self, drive, parts):
+        """Icon and colours, which only exist where there is a window."""
+        ViewDrive(drive.ViewObject)
+        drive.ViewObject.Visibility = True  # there is nothing to see of it, but grey in the tree looks switched off
+        for part in parts:
+            view = part.ViewObject
+            view.Proxy = 0  # shows a shape as FreeCAD does
+            view.ShapeColor = COLOURS[part.DrivePart]
+            view.LineWidth = 1
+            view.Deviation, view.AngularDeflection = 0.02, 5
 
 
-def show_later(problem):
-    """A message when the recomputation is over; the dialog, where it is open, shows it itself."""
-    title, _, text = problem.partition("\n")
-
-    def show():
-        box = QtGui.QMessageBox(QtGui.QMessageBox.Critical, "Toothwave", title, parent=FreeCADGui.getMainWindow())
-        box.setInformativeText(text)
-        box.exec_()
-
-    if not Panel.is_open:
-        QtCore.QTimer.singleShot(0, show)
+if FreeCAD.GuiUp:
+    toothwave_drive.window = Window()

@@ -1,4 +1,4 @@
-"""A drawing of the service as FreeCAD's shapes: prisms on the plane of the section, standing where the drawing puts them."""
+"""A drawing of the service as FreeCAD's shapes: prisms on the plane of the section, or balls, each where the drawing puts it."""
 
 import math
 
@@ -57,16 +57,21 @@ def prism_of(body):
     return Part.Face([wire_of(body["outer"]), *holes]).extrude(body["width_mm"] * Z)
 
 
+def ball_of(body):
+    """The ball of a tooth's section, before it is put anywhere: in the middle of the prism that the drawing has."""
+    return Part.makeSphere(body["outer"]["radius_mm"], body["width_mm"] / 2 * Z)
+
+
 def placement_of(placement):
-    """Where a prism stands."""
+    """Where a solid stands."""
     return Placement(Vector(placement["x_mm"], placement["y_mm"], 0), Rotation(Z, placement["rotation_deg"]))
 
 
-def shape_of(body, prism):
-    """The prism where it stands, or a compound of it where it stands several times; copies share their geometry."""
+def shape_of(body, solid):
+    """The solid where it stands, or a compound of it where it stands several times; copies share their geometry."""
     copies = []
     for placement in body["placements"]:
-        copy = Part.Shape(prism)
+        copy = Part.Shape(solid)
         copy.Placement = placement_of(placement)
         copies.append(copy)
     return copies[0] if len(copies) == 1 else Part.makeCompound(copies)

@@ -8,10 +8,12 @@ import os
 import sys
 import time
 import urllib.error
+import urllib.parse
 import urllib.request
 
 KEPT = 32  # as many tags as a request's headers have room for
 ATTEMPTS = 4
+LOST = (ConnectionResetError, ConnectionAbortedError, BrokenPipeError, http.client.IncompleteRead)
 
 answers = {}  # entity tag -> drawing: what this plug-in has already, the oldest first
 
@@ -38,7 +40,7 @@ def asked(url, design, known):
         try:
             request = urllib.request.Request(f"{address_of(url)}/v1/drawings/assembly", json.dumps(design).encode())
             request.add_header("Content-Type", "application/json")
-            if key := os.environ.get("TOOTHWAVE_KEY", "").strip():  # where the service wants one; nobody else gets it
+            if key := key_of(os.environ):  # where the service wants one; nobody else gets it
                 request.add_unredirected_header("Authorization", f"Bearer {key}")
             if known:
                 request.add_header("If-None-Match", ", ".join(filter(None, known)))
@@ -50,11 +52,10 @@ def asked(url, design, known):
             if error.code not in (502, 503, 504) or not left:
                 objection(url, error)
             pause_s = pause_of(error.headers["Retry-After"])
-        except (ConnectionResetError, http.client.IncompleteRead) as error:  # a replica died; another one may be there
-            if not left:
-                no_service(url, error)
         except (OSError, ValueError, OverflowError, http.client.HTTPException) as error:
-            no_service(url, getattr(error, "reason", error))
+            reason = getattr(error, "reason", error)
+            if not isinstance(reason, LOST) or not left:  # else a replica died; another one may be there
+                no_service(url, reason)
         time.sleep(pause_s)
 
 
@@ -62,9 +63,20 @@ def address_of(url):
     """The address as it is typed, with or without `http://`."""
     url = url.strip().rstrip("/")
     url = url if "://" in url else f"http://{url}"
-    if not url.startswith(("http://", "https://")):
+    parts = urllib.parse.urlsplit(url)
+    if parts.scheme not in ("http", "https"):
         raise ValueError("http and https are spoken here")
+    if not parts.hostname or parts.port == 0:  # `port` itself raises where no port can be such
+        raise ValueError("it names no host and port")
     return url
+
+
+def key_of(environment):
+    """The key, which no message may tell."""
+    key = environment.get("TOOTHWAVE_KEY", "").strip()
+    if not (key.isascii() and " " not in key and key.isprintable()):
+        raise ValueError("the key in TOOTHWAVE_KEY has blanks or letters that no key has")
+    return key
 
 
 def pause_of(retry_after):

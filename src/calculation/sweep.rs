@@ -6,11 +6,7 @@ use toothwave_solver::losses::wear::WearParameters;
 use toothwave_solver::losses::{Friction, Mechanism, period};
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self as solver, Points};
-<<<<<<< HEAD
 use toothwave_solver::{Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, findings};
-=======
-use toothwave_solver::{Deviations, Drive, LoadCase, SolveError, Stop, findings};
->>>>>>> study
 
 use crate::design::{BearingRating, Design, Duty, DutyPoint};
 use crate::field::FieldCode;
@@ -70,15 +66,11 @@ impl CheckedSweep {
     /// # Errors
     /// As [`solver::sweep_with_deviations`].
     pub fn solve(&self, stop: &impl Stop) -> Result<solver::Sweep, SolveError> {
-<<<<<<< HEAD
         self.solve_under(self.load(), stop)
     }
 
     fn solve_under(&self, load: &LoadCase, stop: &impl Stop) -> Result<solver::Sweep, SolveError> {
         solver::sweep_with_deviations(&self.drive, load, &self.deviations, self.points, stop)
-=======
-        solver::sweep_with_deviations(&self.drive, &self.load, &self.deviations, self.points, stop)
->>>>>>> study
     }
 
     /// Solves for the peaks alone.
@@ -87,7 +79,6 @@ impl CheckedSweep {
     /// As [`Self::solve`].
     pub fn peaks(&self, stop: &impl Stop) -> Result<solver::SweepPeaks, SolveError> {
         if !self.deviations.is_nil() {
-<<<<<<< HEAD
             return Ok((&self.solve(stop)?).into());
         }
         solver::peaks(&self.drive, self.load(), self.points, stop)
@@ -126,11 +117,6 @@ impl CheckedDuty {
 
     fn hardest(&self) -> &CheckedDutyPoint {
         &self.points[self.hardest]
-=======
-            return self.solve(stop).map(|sweep| (&sweep).into());
-        }
-        solver::peaks(&self.drive, &self.load, self.points, stop)
->>>>>>> study
     }
 }
 
@@ -229,12 +215,8 @@ impl Question for Sweep {
     }
 
     fn answer(checked: &CheckedSweep, stop: &impl Stop) -> Result<SweepAnswer, NoAnswer> {
-<<<<<<< HEAD
         let CheckedSweep { drive, duty, deviations, friction, with_gaps, with_wind_up, .. } = checked;
         let load = checked.load();
-=======
-        let CheckedSweep { drive, load, deviations, friction, input_speed_rpm, with_gaps, with_wind_up, .. } = checked;
->>>>>>> study
         let sweep = checked.solve(stop)?;
         let mesh = sweep.mesh;
         let mut findings = drive_findings(drive)?;

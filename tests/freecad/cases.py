@@ -7,11 +7,13 @@ import math
 import FreeCAD
 import Part  # after FreeCAD: before it, it crashes
 
+import toothwave_design
 import toothwave_parts
 from service import ROOT
 from theory import Theory
 
 PAPER = ("paper-5.1", "paper-5.2", "paper-5.2-bored")
+KINDS = ("eccentric-roller", "harmonic-three-lobes", "harmonic-path", "balls", "flat-sided")  # one of each other kind
 PIECES = 32  # of an edge that is no spline, for quadrature
 GAUSS = (  # five points, exact for the cubic spans of a spline
     (0.0, 128 / 225),
@@ -25,6 +27,25 @@ def example(name):
     return json.loads((ROOT / "examples" / f"{name}.json").read_text(encoding="utf-8"))
 
 
+def complete(document):
+    """A document as the fields have it: kind and shape named, values that are the API's defaults left out."""
+    document = json.loads(json.dumps(document))
+    document["drive"]["wave_generator"].setdefault("kind", "ellipse")
+    document["drive"]["teeth"].setdefault("shape", "cylinder")
+    for field in toothwave_design.FIELDS:
+        if field.default is not None and not field.blank and field.pointer and not field.is_object:
+            *parents, key = field.pointer.strip("/").split("/")
+            places = [document]
+            for parent in parents:
+                places.append(places[-1].get(parent, {}))
+            if places[-1].get(key) == field.default:
+                del places[-1][key]
+                for place, parent, inner in reversed(list(zip(places, parents, places[1:]))):
+                    if not inner:
+                        del place[parent]
+    return document
+
+
 def with_clearances(document):
     """The same drive, every working surface set back by another distance, the cam bored."""
     parts = {
@@ -35,20 +56,20 @@ def with_clearances(document):
 
 
 def designs():
-    """All drives by name: the paper's, one with fewer teeth than its ring, and those with clearances."""
-    documents = {name: example(name) for name in (*PAPER, "ring-with-more-teeth")}
-    documents |= {f"{name} with clearances": with_clearances(example(name)) for name in PAPER}
+    """All drives by name: the paper's, one with fewer teeth than its ring, one of each other kind, and those with clearances."""
+    documents = {name: example(name) for name in (*PAPER, "ring-with-more-teeth", *KINDS)}
+    documents |= {f"{name} with clearances": with_clearances(example(name)) for name in (*PAPER, *KINDS)}
     return documents
 
 
 @functools.lru_cache(maxsize=64)
-def _prism(section):
-    return toothwave_parts.prism_of(json.loads(section))
+def _solid(section, is_ball):
+    return (toothwave_parts.ball_of if is_ball else toothwave_parts.prism_of)(json.loads(section))
 
 
-def prism_of(body):
+def solid_of(body, is_ball):
     """Built once for all angles, as the drive does."""
-    return _prism(json.dumps({key: body[key] for key in ("outer", "holes", "width_mm")}))
+    return _solid(json.dumps({key: body[key] for key in ("outer", "holes", "width_mm")}), is_ball)
 
 
 class Assembly:
@@ -61,7 +82,10 @@ class Assembly:
         self.input_angle_deg = input_angle_deg
         self.tolerance_mm = drawing["chord_tolerance_mm"]
         bodies = {body["part"]: body for body in drawing["bodies"]}
-        self.solids = {part: toothwave_parts.shape_of(body, prism_of(body)).Solids for part, body in bodies.items()}
+        self.solids = {
+            part: toothwave_parts.shape_of(body, solid_of(body, self.theory.is_ball and part == "teeth")).Solids
+            for part, body in bodies.items()
+        }
         self.centres = [FreeCAD.Vector(place["x_mm"], place["y_mm"], 0) for place in bodies["teeth"]["placements"]]
 
     @property
@@ -73,7 +97,7 @@ class Assembly:
         return self.solids["wave_generator"][0]
 
     def positions_rad(self):
-        """psi of every tooth, from the theory, to the nearer end of the major axis."""
+        """psi of every tooth, from the theory, to the nearest lobe."""
         return [self.theory.position_of_tooth_rad(tooth, self.input_angle_deg) for tooth in range(len(self.centres))]
 
 

@@ -13,7 +13,7 @@ from unittest import mock
 
 import toothwave_client
 import toothwave_design
-from cases import designs, example
+from cases import complete, designs, example
 from service import DIES_WITHIN, ROOT, answer, host, running_service
 
 CLIENT = ROOT / "clients/freecad"
@@ -33,51 +33,222 @@ class Imports(unittest.TestCase):
                 for name in names:
                     self.assertIn(name.split(".")[0], allowed, path.name)
 
+    def test_no_file_depends_on_another_in_a_circle(self):
+        """Imports within functions count too."""
+        paths = {path.stem: path for path in CLIENT.glob("*.py")}
+        uses = {}
+        for stem, path in paths.items():
+            tree = ast.parse(path.read_text(encoding="utf-8"))
+            names = {name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names}
+            uses[stem] = names & set(paths)
+        while uses:
+            free = {stem for stem, names in uses.items() if not names & set(uses)}
+            self.assertTrue(free, f"in a circle: {uses}")
+            uses = {stem: names for stem, names in uses.items() if stem not in free}
 
-# The workbench has ellipses and cylinders under the laws that it offers, as its README says.
-NOT_IN_THE_FORM = (
-    *(f"/drive/wave_generator/{name}" for name in (
-        "kind", "radius_mm", "eccentricity_mm", "lobes", "mean_radius_mm", "mean_path_radius_mm", "amplitude_mm")),
-    *(f"/drive/teeth/{name}" for name in ("shape", "groove_radius_mm", "flat_length_mm")),
-    "/model/stiffness/depth_mm",
-    "/model/series_compliance_mm_per_n",
-    "/modification",
-    "/deviations",
-    "/friction",
-    "/load/input_speed_rpm",
-    "/load/duty",
-    "/load/allowable_stress_mpa/",
-)
+
+# What has no field of its own, and why; it goes through the other fields.
+NOT_IN_THE_FORM = {
+    "/accuracy": "no drawing and no sweep reads it",
+    "/profile/extent": "no drawing and no sweep reads it",
+    "/deviations": "lists of measured items, one entry for each tooth, slot or space, are no fields to fill in",
+    "/load/duty": "a list of loads, no field to fill in",
+    "/load/allowable_stress_mpa/": "one number for all contacts has a field",
+    "/friction/wave_generator/coefficient of rolling": "nothing depends on it",
+}
+
+
+def api_values():
+    """Schema of every value that a design document may have, by pointer, as the API document has it."""
+    schemas = json.loads((ROOT / "openapi/openapi.json").read_text(encoding="utf-8"))["components"]["schemas"]
+
+    def values(schema, place=""):
+        for option in schema.get("oneOf", schema.get("allOf", [schema])):
+            option = schemas.get(option.get("$ref", "").rpartition("/")[2], option)
+            if "oneOf" in option:
+                yield from values(option, place)
+            for key, value in option.get("properties", {}).items():
+                yield from values(value, f"{place}/{key}")
+            if "properties" not in option and "oneOf" not in option:
+                yield place, option
+
+    return values(schemas["Design"])
+
+
+EVERYTHING = {
+    "drive": {
+        "wave_generator": {"kind": "harmonic_path", "lobes": 2, "mean_path_radius_mm": 52.0, "amplitude_mm": 1.0},
+        "teeth": {"shape": "flat_sided", "count": 28, "installed": 14, "radius_mm": 4.0, "width_mm": 12.0, "flat_length_mm": 3.0},
+        "ring": {"teeth": 26, "tip_radius_mm": 54.7},
+    },
+    "materials": {"teeth": {"youngs_modulus_gpa": 310.0, "poissons_ratio": 0.26}, "ring": {"poissons_ratio": 0.0}},
+    "load": {"output_torque_nm": 200.0, "input_speed_rpm": 1500.0, "allowable_stress_mpa": 1500.0},
+    "friction": {
+        "wave_generator": {"kind": "race", "coefficient": 0.0, "bearing_coefficient": 0.0015, "bearing_radius_mm": 28.0},
+        "ring": {"coefficient": 0.0},
+        "carrier": {"coefficient": 0.05},
+    },
+    "model": {
+        "compatibility": "virtual_work",
+        "stiffness": {"law": "johnson", "depth_mm": {"wave_generator": 5.0, "carrier": 7.0}},
+        "series_compliance_mm_per_n": {"ring": 1e-7},
+        "clearance": {"wave_generator_um": 0.5, "carrier_um": 1.0},
+    },
+    "modification": {
+        "ring_equidistant_um": 4.0,
+        "ring_path_shift_um": -2.0,
+        "ring_profile_shift_um": 1.0,
+        "ring_rotation_arcsec": 20.0,
+        "wave_generator_equidistant_um": 1.0,
+        "slot_wall_um": 1.0,
+        "carrier_rotation_arcsec": -1.0,
+        "tooth_radius_um": 0.5,
+        "ring_tip_relief": {"amount_um": 0.0, "start_deg": 0.0, "power": 2.0},
+    },
+    "sweep": {"samples": 20, "wind_up": True},
+    "profile": {"chord_tolerance_mm": 0.002},
+    "parts": {
+        "wave_generator": {"bore_radius_mm": 20.0, "clearance_um": 7.0},
+        "teeth": {"clearance_um": 3.0},
+        "ring": {"outer_radius_mm": 70.0, "clearance_um": 2.0},
+        "carrier": {"inner_radius_mm": 49.5, "outer_radius_mm": 54.0, "clearance_um": 1.0},
+    },
+    "assembly": {"input_angle_deg": 12.5},
+}
 
 
 class Document(unittest.TestCase):
-    def test_it_survives_the_way_through_the_fields(self):
+    def test_every_example_comes_back_from_the_fields_as_it_was(self):
+        for path in (ROOT / "examples").glob("*.json"):
+            with self.subTest(path.stem):
+                document = example(path.stem)
+                through = toothwave_design.document_of(toothwave_design.values_of(document))
+                self.assertEqual(through, complete(document))
+
+    def test_a_document_with_everything_comes_back_as_it_was_and_needs_no_other_fields(self):
+        plain = {"kind": "plain", "coefficient": 0.03}
+        friction = {"wave_generator": plain, "ring": {"coefficient": 0.05}, "carrier": {"coefficient": 0.0}}
+        rolling = {"kind": "rolling", "bearing_coefficient": 0.0, "bearing_radius_mm": 28.0}
+        for change in ({}, {"friction": friction}, {"friction": friction | {"wave_generator": rolling}}):
+            document = EVERYTHING | change
+            values = toothwave_design.values_of(document)
+            self.assertEqual(values["OtherFields"], "")
+            self.assertEqual(toothwave_design.document_of(values), document)
+
+    def test_the_service_answers_it_as_it_would_have_been_answered(self):
         with running_service() as url:
-            for name, document in designs().items():
+            for name, document in (designs() | {"everything": EVERYTHING}).items():
                 with self.subTest(name):
                     through = toothwave_design.document_of(toothwave_design.values_of(document))
                     service = toothwave_client.Service(url)
                     self.assertIs(service.drawing("assembly", through), service.drawing("assembly", document))
                     self.assertIs(service.sweep(through), service.sweep(document))
 
+    def test_what_has_no_field_goes_through_the_other_fields(self):
+        document = complete(example("flat-sided")) | {
+            "deviations": {"tooth_radius_um": [1.0, -0.5], "ring_runout": {}},
+            "load": {"input_torque_nm": 20.0, "allowable_stress_mpa": {"ring": 1500.0}},
+            "profile": {"extent": "full"},
+        }
+        values = toothwave_design.values_of(document)
+        self.assertEqual(set(json.loads(values["OtherFields"])), {"deviations", "load", "profile"})
+        self.assertEqual(toothwave_design.document_of(values), document)
+
+    def test_other_fields_that_are_none_or_have_a_field_of_their_own_are_objected_to(self):
+        values = toothwave_design.values_of(example("paper-5.1"))
+        for text, why in {
+            "{": "are no JSON: ",
+            "[]": "are no JSON object",
+            '{"drive": {"ring": {"teeth": 28}}}': "/drive/ring/teeth has a field of its own",
+            '{"load": 3}': "/load has a field of its own",
+        }.items():
+            with self.subTest(text), self.assertRaisesRegex(toothwave_design.NoDocument, why):
+                toothwave_design.document_of(values | {"OtherFields": text})
+
+    def test_what_a_field_cannot_hold_is_objected_to_and_not_rounded(self):
+        for part, key, value in (
+            ("wave_generator", "kind", "square"),
+            ("teeth", "count", 28.5),
+            ("teeth", "radius_mm", "thick"),
+            ("teeth", "installed", [28]),
+        ):
+            document = example("paper-5.1")
+            document["drive"][part][key] = value
+            with self.subTest(key), self.assertRaisesRegex(toothwave_design.NoDocument, f"/drive/{part}/{key}: .*cannot hold"):
+                toothwave_design.values_of(document)
+
+    def test_what_is_not_set_is_left_out(self):
+        document = toothwave_design.document_of(toothwave_design.values_of(toothwave_design.START))
+        self.assertEqual(
+            document,
+            toothwave_design.START
+            | {
+                "drive": {
+                    "wave_generator": {"kind": "ellipse", "semi_major_mm": 58.0, "semi_minor_mm": 56.0},
+                    "teeth": {"shape": "cylinder", "count": 28, "radius_mm": 5.0, "width_mm": 15.0},
+                    "ring": {"teeth": 26},
+                }
+            },
+        )
+
+    def test_a_document_has_the_fields_of_the_chosen_kinds_alone(self):
+        values = toothwave_design.values_of(EVERYTHING)
+        changed = {"WaveGeneratorKind": "eccentric", "ToothShape": "ball", "StiffnessLaw": "default"}
+        document = toothwave_design.document_of(values | changed | {"FrictionKind": "none", "TipRelief": False})
+        self.assertEqual(document["drive"]["wave_generator"], {"kind": "eccentric", "radius_mm": 57.0, "eccentricity_mm": 1.0})
+        self.assertEqual(document["drive"]["teeth"], {"shape": "ball", "count": 28, "installed": 14, "radius_mm": 4.0})
+        self.assertNotIn("stiffness", document["model"])
+        self.assertNotIn("friction", document)
+        self.assertNotIn("ring_tip_relief", document["modification"])
+        self.assertEqual(toothwave_design.document_of(values), EVERYTHING)
+
     def test_there_is_a_field_for_all_that_drawings_and_sweeps_read(self):
-        schemas = json.loads((ROOT / "openapi/openapi.json").read_text(encoding="utf-8"))["components"]["schemas"]
-
-        def pointers(schema, place=""):
-            options = schema.get("oneOf", [schema])
-            for option in options:
-                name = option.get("$ref", "").rpartition("/")[2]
-                option = schemas.get(name, option)
-                if "oneOf" in option:
-                    yield from pointers(option, place)
-                for key, value in option.get("properties", {}).items():
-                    yield from pointers(value, f"{place}/{key}")
-                if "properties" not in option and "oneOf" not in option:
-                    yield place
-
         known = {field.pointer for field in toothwave_design.FIELDS}
-        missing = set(pointers(schemas["Design"])) - known - {"/accuracy/requested_error", "/profile/extent"}
-        self.assertEqual({pointer for pointer in missing if not pointer.startswith(NOT_IN_THE_FORM)}, set())
+        missing = {pointer for pointer, _ in api_values()} - known
+        self.assertEqual({pointer for pointer in missing if not pointer.startswith(tuple(NOT_IN_THE_FORM))}, set())
+
+    def test_fields_have_the_ranges_the_choices_and_the_defaults_of_the_api(self):
+        of_api = {}
+        for pointer, schema in api_values():
+            of_api.setdefault(pointer, []).append(schema)
+        for field in toothwave_design.FIELDS:
+            for schema in of_api.get(field.pointer, ()):
+                with self.subTest(field.pointer):
+                    limits = [schema.get(name, schema.get(f"exclusive{name.title()}")) for name in ("minimum", "maximum")]
+                    self.assertEqual(list(field.limits) or [None, None], limits)
+                    self.assertLessEqual(set(schema.get("enum", ())), set(field.choices))
+                    if "default" in schema and not field.blank:
+                        self.assertEqual(field.default, schema["default"])
+                    if field.blank and isinstance(schema.get("default"), (int, float)) and schema["default"]:
+                        self.assertIn(str(schema["default"]), field.blank, "a 0 that stands for it says so")
+            is_known = field.is_object or not field.pointer
+            self.assertTrue(is_known or field.pointer in of_api, f"{field.pointer} is none of the API's")
+            self.assertTrue(is_known or field.limits or field.choices or isinstance(field.default, bool), "a number has a range")
+
+    def test_what_a_field_is_hidden_with_is_no_other_kinds(self):
+        """Of each kind the fields are just those that the API document gives it."""
+        schemas = json.loads((ROOT / "openapi/openapi.json").read_text(encoding="utf-8"))["components"]["schemas"]
+        for union, place, choosing in (
+            ("WaveGenerator", "/drive/wave_generator", "WaveGeneratorKind"),
+            ("Teeth", "/drive/teeth", "ToothShape"),
+            ("Stiffness", "/model/stiffness", "StiffnessLaw"),
+            ("WaveGeneratorFriction", "/friction/wave_generator", "FrictionKind"),
+        ):
+            for kind, name in schemas[union]["discriminator"]["mapping"].items():
+                values = toothwave_design.values_of(EVERYTHING) | {choosing: kind}
+                shown = {field.pointer for field in toothwave_design.FIELDS if field.is_shown(values)}
+                shown = {pointer.removeprefix(f"{place}/").split("/")[0] for pointer in shown if pointer.startswith(f"{place}/")}
+                expected = set(schemas[name.rpartition("/")[2]]["properties"])
+                if f"{place}/coefficient of {kind}" in NOT_IN_THE_FORM:
+                    expected.remove("coefficient")
+                with self.subTest(union, kind=kind):
+                    self.assertEqual(shown, expected)
+
+    def test_every_wave_generator_and_shape_has_an_example(self):
+        drives = [complete(example(path.stem))["drive"] for path in (ROOT / "examples").glob("*.json")]
+        for name, part, tag in (("WaveGeneratorKind", "wave_generator", "kind"), ("ToothShape", "teeth", "shape")):
+            (field,) = (field for field in toothwave_design.FIELDS if field.name == name)
+            self.assertEqual({drive[part][tag] for drive in drives}, set(field.choices))
 
 
 class Cache(unittest.TestCase):

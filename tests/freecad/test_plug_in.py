@@ -1,10 +1,14 @@
 """docs/plug-ins.md shows a whole program: the file itself, and it runs."""
 
+import importlib.util
+import os
 import subprocess
 import sys
 import tempfile
 import unittest
+import urllib.error
 from pathlib import Path
+from unittest import mock
 
 from service import DIES_WITHIN, ROOT, answer, host, running_service
 
@@ -54,6 +58,29 @@ class NoAnswer(unittest.TestCase):
         for address in ("", " ", "http://", "local host:80", "127.0.0.1:port", "127.0.0.1:99999", "ftp://x", "http://[::1"):
             with self.subTest(address):
                 self.assert_says(address, "No toothwave service answers at ")
+
+    def test_a_port_that_no_port_can_be_is_not_taken_for_another_one(self):
+        for port, why in (("99999", "Port out of range"), ("0", "no host and port"), ("-1", "Port could not be cast")):
+            with self.subTest(port):
+                self.assert_says(f"127.0.0.1:{port}", why)
+
+    def test_a_key_that_is_none_is_objected_to_and_not_told(self):
+        for key in ("se cret", "se\ncret", "secret\u00e9"):
+            with self.subTest(key), mock.patch.dict(os.environ, TOOTHWAVE_KEY=key):
+                done = run("127.0.0.1:1", ROOT / "examples/paper-5.1.json")
+                self.assertIn("TOOTHWAVE_KEY has blanks", done.stderr)
+                self.assertNotIn("cret", done.stderr)
+
+    def test_a_connection_that_is_lost_while_asking_is_tried_again_and_one_that_is_refused_is_not(self):
+        spec = importlib.util.spec_from_file_location("plug_in", PROGRAM)
+        program = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(program)
+        for reason, attempts in ((BrokenPipeError(), 4), (ConnectionAbortedError(), 4), (ConnectionRefusedError(), 1)):
+            lost = mock.patch.object(program.urllib.request, "urlopen", side_effect=urllib.error.URLError(reason))
+            with self.subTest(reason), lost as urlopen, mock.patch.object(program.time, "sleep"):
+                with self.assertRaises(SystemExit):
+                    program.drawing("127.0.0.1:1", {})
+                self.assertEqual(urlopen.call_count, attempts)
 
     def test_a_host_that_is_no_service_or_dies(self):
         for said in (

@@ -8,13 +8,14 @@ import urllib.request
 import FreeCAD
 import Part  # after FreeCAD: before it, it crashes
 
-from cases import designs, example, section_area_mm2
+from cases import KINDS, designs, example, section_area_mm2
 from service import running_service
 from theory import Theory
 
 PATHS = {"ring": "ring", "wave_generator": "wave-generator", "carrier": "carrier", "teeth": "tooth", None: "assembly"}
 
 OWN_VOLUME = 2e-5  # how far OpenCascade's own volume may be off, which takes few points along a spline
+OWN_VOLUME_OF_KINDS = 4e-5  # of their rings it is off by up to 2.7e-5
 
 
 def setUpModule():
@@ -51,7 +52,8 @@ class Step(unittest.TestCase):
                         off = abs(section_area_mm2(solid) / area_mm2 - 1)
                         worst[part] = max(worst.get(part, 0.0), off)
                         self.assertLess(off, 1e-6)
-                        self.assertLess(abs(solid.Volume / (area_mm2 * theory.width_mm) - 1), OWN_VOLUME)
+                        own_volume = OWN_VOLUME_OF_KINDS if name.startswith(KINDS) else OWN_VOLUME
+                        self.assertLess(abs(solid.Volume / (area_mm2 * theory.width_mm) - 1), own_volume)
         print("\nSTEP, worst area: " + ", ".join(f"{part} {off:.2e}" for part, off in worst.items()))
 
     def test_the_thinnest_walls_that_are_drawn_are_valid_solids(self):

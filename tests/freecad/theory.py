@@ -1,7 +1,8 @@
 """Areas and positions from the theory alone (docs/theory.md), to hold the solids against.
 
-Nothing here asks the service or FreeCAD. Everything is written over the angle phi of the cam's outward normal, of which the
-tooth's position psi is an explicit function; the service works the other way round.
+Nothing here asks the service or FreeCAD. Everything is written over a parameter of the wave generator of which the tooth's
+position psi is an explicit function: the angle phi of the cam's outward normal, or, of a path that is given, psi itself. For cams
+the service works the other way round.
 """
 
 import functools
@@ -9,6 +10,105 @@ import math
 from dataclasses import dataclass, field
 
 POINTS = 4000  # of the coarser of two polygons along a flank; extrapolated, its area is converged far below 1e-9
+STEPS = 2000  # of the trapezoid rule over a whole turn, where it converges exponentially
+
+
+def whole_turn(values_at):
+    """The integral over a turn of what is periodic and smooth."""
+    return math.fsum(values_at(2 * math.pi * i / STEPS) for i in range(STEPS)) * 2 * math.pi / STEPS
+
+
+@dataclass(frozen=True)
+class Ellipse:
+    """Section 2.1."""
+
+    a_mm: float
+    b_mm: float
+    lobes = 2
+
+    def support(self, phi):
+        """h, h' and h'' where the cam's normal stands at phi from a lobe."""
+        a2, b2 = self.a_mm**2, self.b_mm**2
+        h = math.sqrt(a2 * math.cos(phi) ** 2 + b2 * math.sin(phi) ** 2)
+        h1 = -(a2 - b2) * math.sin(phi) * math.cos(phi) / h
+        return h, h1, (-(a2 - b2) * math.cos(2 * phi) - h1 * h1) / h
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """Section 2.9; of one lobe, an eccentric circle."""
+
+    lobes: int
+    mean_mm: float
+    e_mm: float
+
+    def support(self, phi):
+        u, angle = self.lobes, self.lobes * phi
+        return self.mean_mm + self.e_mm * math.cos(angle), -self.e_mm * u * math.sin(angle), -self.e_mm * u * u * math.cos(angle)
+
+
+@dataclass(frozen=True)
+class OfCam:
+    """The path of the teeth around a cam (section 2.2), over phi."""
+
+    cam: object
+    r_mm: float
+
+    @property
+    def lobes(self):
+        return self.cam.lobes
+
+    def at(self, phi):
+        """psi, the centre's radius d, and T = tan gamma."""
+        h, h1, _ = self.cam.support(phi)
+        return phi + math.atan2(h1, h + self.r_mm), math.hypot(h + self.r_mm, h1), -h1 / (h + self.r_mm)
+
+    def cam_area_mm2(self, set_back_mm):
+        """Of the inner parallel curve, whose support function is h less the distance: half the integral of h (h + h'')."""
+
+        def density(phi):
+            h, _, h2 = self.cam.support(phi)
+            return (h - set_back_mm) * (h - set_back_mm + h2) / 2
+
+        return whole_turn(density)
+
+
+@dataclass(frozen=True)
+class HarmonicPath:
+    """The path that is given (section 2.9), over psi."""
+
+    lobes: int
+    mean_mm: float
+    e_mm: float
+    r_mm: float
+
+    def at(self, psi):
+        d = self.mean_mm + self.e_mm * math.cos(self.lobes * psi)
+        return psi, d, self.e_mm * self.lobes * math.sin(self.lobes * psi) / d
+
+    def cam_area_mm2(self, set_back_mm):
+        """The cam is the path's inner parallel curve: A - s L + pi s^2."""
+        s = self.r_mm + set_back_mm
+
+        def length(psi):
+            _, d, t = self.at(psi)
+            return d * math.hypot(1, t)
+
+        area_mm2 = math.pi * (self.mean_mm**2 + self.e_mm**2 / 2)
+        return area_mm2 - s * whole_turn(length) + math.pi * s * s
+
+
+def path_of(wave_generator, r_mm):
+    """The path of the teeth's centres."""
+    match wave_generator.get("kind", "ellipse"), wave_generator:
+        case "ellipse", {"semi_major_mm": a_mm, "semi_minor_mm": b_mm}:
+            return OfCam(Ellipse(a_mm, b_mm), r_mm)
+        case "eccentric", {"radius_mm": radius_mm, "eccentricity_mm": e_mm}:
+            return OfCam(Harmonic(1, radius_mm, e_mm), r_mm)
+        case "harmonic", {"lobes": lobes, "mean_radius_mm": mean_mm, "amplitude_mm": e_mm}:
+            return OfCam(Harmonic(lobes, mean_mm, e_mm), r_mm)
+        case "harmonic_path", {"lobes": lobes, "mean_path_radius_mm": mean_mm, "amplitude_mm": e_mm}:
+            return HarmonicPath(lobes, mean_mm, e_mm, r_mm)
 
 
 @dataclass(eq=False)  # hashed by identity, for the cache
@@ -16,100 +116,85 @@ class Theory:
     """A drive as the design document has it, with the parts' clearances."""
 
     document: dict
-    a_mm: float = field(init=False)
-    b_mm: float = field(init=False)
     r_mm: float = field(init=False)
 
     def __post_init__(self):
         drive, parts = self.document["drive"], self.document.get("parts", {})
-        self.a_mm = drive["wave_generator"]["semi_major_mm"]
-        self.b_mm = drive["wave_generator"]["semi_minor_mm"]
-        self.r_mm = drive["teeth"]["radius_mm"]
-        self.width_mm = drive["teeth"]["width_mm"]
-        self.count = drive["teeth"]["count"]
-        self.installed = drive["teeth"].get("installed", self.count)
+        teeth = drive["teeth"]
+        self.r_mm = teeth["radius_mm"]
+        self.is_ball = teeth.get("shape") == "ball"
+        self.width_mm = 2 * self.r_mm if self.is_ball else teeth["width_mm"]
+        self.half_width_mm = math.sqrt(self.r_mm**2 - teeth.get("flat_length_mm", 0.0) ** 2 / 4)  # across the slot
+        self.count = teeth["count"]
+        self.installed = teeth.get("installed", self.count)
         self.ring_teeth = drive["ring"]["teeth"]
         self.bore_mm = drive["ring"].get("tip_radius_mm")
-        self.k = self.ring_teeth / 2
+        self.path = path_of(drive["wave_generator"], self.r_mm)
+        self.lobes = self.path.lobes
+        self.k = self.ring_teeth / self.lobes
+        self.valley_rad = math.pi / self.lobes
+        self.cam_outer_mm = self.path.at(0.0)[1] - self.r_mm
         self.parts = parts
 
     def clearance_mm(self, part):
         return self.parts.get(part, {}).get("clearance_um", 0.0) / 1000
 
-    # --- The cam's support function and what follows from it (section 2)
+    # --- The ring's flank (section 2.4)
 
-    def support(self, phi):
-        """h, h' and h'' where the cam's normal stands at phi from the major axis."""
-        a2, b2 = self.a_mm**2, self.b_mm**2
-        h = math.sqrt(a2 * math.cos(phi) ** 2 + b2 * math.sin(phi) ** 2)
-        h1 = -(a2 - b2) * math.sin(phi) * math.cos(phi) / h
-        return h, h1, (-(a2 - b2) * math.cos(2 * phi) - h1 * h1) / h
-
-    def position_rad(self, phi):
-        h, h1, _ = self.support(phi)
-        return phi + math.atan2(h1, h + self.r_mm)
-
-    def centre_radius_mm(self, phi):
-        h, h1, _ = self.support(phi)
-        return math.hypot(h + self.r_mm, h1)
-
-    def flank_point(self, phi, set_back_mm=0.0):
-        """Radius and angle, from the middle of the tooth space, of the ring's flank."""
-        h, h1, _ = self.support(phi)
-        beta = math.atan(self.k * -h1 / (h + self.r_mm))
+    def flank_point(self, place, set_back_mm=0.0):
+        """Radius and angle, from the middle of the tooth space, of the ring's flank where the path's parameter has this value."""
+        psi, d, t = self.path.at(place)
+        beta = math.atan(self.k * t)
         reach = self.r_mm + set_back_mm
-        along, across = self.centre_radius_mm(phi) + reach * math.cos(beta), reach * math.sin(beta)
-        return math.hypot(along, across), self.position_rad(phi) / self.k + math.atan2(across, along)
+        along, across = d + reach * math.cos(beta), reach * math.sin(beta)
+        return math.hypot(along, across), psi / self.k + math.atan2(across, along)
 
     @functools.cache  # noqa: B019, few drives, all alive to the end
-    def flank_end_phi(self, set_back_mm=0.0):
+    def flank_end(self, set_back_mm=0.0):
         """Where the flank ends, seen from the root: at the symmetry line of the ring's tooth, or at its bore."""
         tip_rad = math.pi / self.ring_teeth
         steps = 2000
 
-        def is_over(phi):
-            radius_mm, angle = self.flank_point(phi, set_back_mm)
+        def is_over(place):
+            radius_mm, angle = self.flank_point(place, set_back_mm)
             return angle > tip_rad or (self.bore_mm is not None and radius_mm < self.bore_mm)
 
         for step in range(1, steps):
-            low, high = (step - 1) * math.pi / 2 / steps, step * math.pi / 2 / steps
+            low, high = (step - 1) * self.valley_rad / steps, step * self.valley_rad / steps
             if is_over(high):
                 while low < (middle := (low + high) / 2) < high:
                     low, high = (low, middle) if is_over(middle) else (middle, high)
                 return low
-        return math.pi / 2
+        return self.valley_rad
 
     def engagement_rad(self):
         """psi_e, of the working surfaces without clearances."""
-        return self.position_rad(self.flank_end_phi())
+        return self.path.at(self.flank_end())[0]
 
     def tip_radius_mm(self):
-        return self.flank_point(self.flank_end_phi())[0]
+        return self.flank_point(self.flank_end())[0]
 
     # --- Areas
 
     def cam_area_mm2(self):
-        """The ellipse, set back inward: a parallel curve's area is A - c L + pi c^2."""
-        c = self.clearance_mm("wave_generator")
-        steps = 400  # the trapezoid rule over a whole period converges exponentially
-        length = (
-            sum(h + h2 for h, _, h2 in map(self.support, (2 * math.pi * i / steps for i in range(steps)))) * 2 * math.pi / steps
-        )
         bore = self.parts.get("wave_generator", {}).get("bore_radius_mm") or 0.0
-        return math.pi * self.a_mm * self.b_mm - c * length + math.pi * (c * c - bore * bore)
+        return self.path.cam_area_mm2(self.clearance_mm("wave_generator")) - math.pi * bore * bore
 
     def tooth_area_mm2(self):
-        return math.pi * (self.r_mm - self.clearance_mm("teeth")) ** 2
+        """Two arcs, and where there are flats two lines: sectors and triangles."""
+        c = self.clearance_mm("teeth")
+        r, w = self.r_mm - c, self.half_width_mm - c
+        return 2 * (r * r * math.asin(w / r) + w * math.sqrt(r * r - w * w))
 
     def carrier_radii_mm(self):
         carrier = self.parts.get("carrier", {})
-        play = 0.1 * (self.tip_radius_mm() - self.a_mm)
-        return carrier.get("inner_radius_mm", self.a_mm + play), carrier.get("outer_radius_mm", self.tip_radius_mm() - play)
+        play = 0.1 * (self.tip_radius_mm() - self.cam_outer_mm)
+        return carrier.get("inner_radius_mm", self.cam_outer_mm + play), carrier.get("outer_radius_mm", self.tip_radius_mm() - play)
 
     def finger_area_mm2(self):
         """A sector of the annulus without the half of a slot on either side; parallel walls w from the slot's middle."""
         inner, outer = self.carrier_radii_mm()
-        w = self.r_mm + self.clearance_mm("carrier")
+        w = self.half_width_mm + self.clearance_mm("carrier")
         inner = max(inner, w / math.sin(math.pi / self.installed))
 
         def half_slot(radius):
@@ -118,20 +203,20 @@ class Theory:
         return math.pi / self.installed * (outer**2 - inner**2) - 2 * (half_slot(outer) - half_slot(inner))
 
     def ring_outer_radius_mm(self):
-        root = self.a_mm + 2 * self.r_mm + self.clearance_mm("ring")
+        root = self.cam_outer_mm + 2 * self.r_mm + self.clearance_mm("ring")
         return self.parts.get("ring", {}).get("outer_radius_mm", 1.2 * root)
 
     def ring_opening_area_mm2(self, points=POINTS):
         """Inside the flanks, and inside the lands where the tips are bored. Two polygons, extrapolated."""
         c = self.clearance_mm("ring")
-        end_phi = self.flank_end_phi(c)
+        end = self.flank_end(c)
 
         def half_space(count):
-            flank = [self.flank_point(end_phi * i / count, c) for i in range(count + 1)]
+            flank = [self.flank_point(end * i / count, c) for i in range(count + 1)]
             return math.fsum(p[0] * q[0] * math.sin(q[1] - p[1]) for p, q in zip(flank, flank[1:])) / 2
 
         coarse, fine = half_space(points), half_space(2 * points)
-        radius_mm, angle = self.flank_point(end_phi, c)
+        radius_mm, angle = self.flank_point(end, c)
         land = radius_mm**2 * (math.pi / self.ring_teeth - angle) / 2
         return 2 * self.ring_teeth * ((4 * fine - coarse) / 3 + land)
 
@@ -143,9 +228,16 @@ class Theory:
             "ring": math.pi * self.ring_outer_radius_mm() ** 2 - self.ring_opening_area_mm2(),
         }
 
+    def volumes_mm3(self):
+        """Of one solid of each part; a ball's too."""
+        volumes = {part: area_mm2 * self.width_mm for part, area_mm2 in self.areas_mm2().items()}
+        if self.is_ball:
+            volumes["teeth"] = 4 / 3 * math.pi * (self.r_mm - self.clearance_mm("teeth")) ** 3
+        return volumes
+
     # --- Who touches (section 3)
 
     def position_of_tooth_rad(self, tooth, input_angle_deg):
-        """psi of a tooth, folded to within half a turn of the nearer end of the major axis: -pi/2 to pi/2."""
+        """psi of a tooth, folded to the nearest lobe."""
         psi = 2 * math.pi * tooth / self.installed - math.radians(input_angle_deg) * self.ring_teeth / self.count
-        return math.remainder(psi, math.pi)
+        return math.remainder(psi, 2 * math.pi / self.lobes)

@@ -93,6 +93,12 @@ class Window(unittest.TestCase):
         box.button(button).click()
         QtGui.QApplication.sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
 
+    def sheet(self):
+        """What stands in the spreadsheet, cell by cell."""
+        sheet = self.document.Results
+        cells = (f"{column}{row}" for column in "ABCDEFGH" for row in range(1, 60))
+        return {cell: sheet.get(cell) for cell in cells if sheet.getContents(cell)}
+
     def enter(self, name, text):
         """Into a field of the task panel."""
         Panel.latest.edits[name].entry.setText(text)
@@ -141,6 +147,38 @@ class Steps(Window):
                 self.document.recompute()
             self.assertEqual(drive.ToothWidth.Value, 15)
             self.assertAlmostEqual(self.document.Ring.Shape.BoundBox.ZMax, 15)
+
+
+    def test_cancel_and_undo_take_another_kind_back_with_its_fields(self):
+        drive = self.new_drive()
+        self.press(QtGui.QDialogButtonBox.Ok)
+        sheet = self.sheet()
+        for button, undo in ((QtGui.QDialogButtonBox.Cancel, None), (QtGui.QDialogButtonBox.Ok, self.document.undo)):
+            drive.ViewObject.doubleClicked()
+            entry = Panel.latest.edits["WaveGeneratorKind"].entry
+            entry.setCurrentIndex(entry.findData("eccentric"))
+            entry.activated.emit(entry.currentIndex())
+            FreeCADGui.updateGui()
+            shown = {name: edit.isVisible() for name, edit in Panel.latest.edits.items()}
+            self.assertEqual((shown["SemiMajor"], shown["Eccentricity"]), (False, True))
+            self.press(QtGui.QDialogButtonBox.Apply)
+            self.assertEqual((drive.Problem, drive.WaveGeneratorKind, drive.RingTeeth), ("", "eccentric", 27))
+            self.assertEqual((drive.getEditorMode("SemiMajor"), drive.getEditorMode("Eccentricity")), (["Hidden"], []))
+            self.press(button)
+            if undo:
+                undo()
+                self.document.recompute()
+            self.assertEqual((drive.WaveGeneratorKind, drive.RingTeeth), ("ellipse", 26))
+            self.assertEqual(self.sheet(), sheet)
+            self.assertEqual((drive.getEditorMode("SemiMajor"), drive.getEditorMode("Eccentricity")), ([], ["Hidden"]))
+
+    def test_a_new_drive_has_icon_and_colours(self):
+        drive = self.new_drive()
+        self.assertIsInstance(drive.ViewObject.Proxy, toothwave_panel.ViewDrive)
+        for part, name in toothwave_drive.PARTS.items():
+            colour = self.document.getObject(name).ViewObject.ShapeColor[:3]
+            for found, expected in zip(colour, toothwave_panel.COLOURS[part]):
+                self.assertAlmostEqual(found, expected, 2)
 
 
 class Silence(Window):
