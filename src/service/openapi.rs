@@ -13,8 +13,22 @@ pub(crate) fn for_generators(document: &mut Value) {
         if let Some(media) = object.get_mut(PROBLEM_JSON) {
             *media = json!({ "schema": reference("Problem") });
         }
+        parameter_that_is_never_null(object);
     });
     name_variants(document);
+}
+
+/// A parameter may be left out, but no header or query has a null.
+fn parameter_that_is_never_null(object: &mut Map<String, Value>) {
+    if object.contains_key("in")
+        && let Some(kind) = object.get_mut("schema").and_then(|schema| schema.get_mut("type"))
+        && let Some(types) = kind.as_array_mut()
+    {
+        types.retain(|name| name != "null");
+        if let [one] = &types[..] {
+            *kind = one.clone();
+        }
+    }
 }
 
 /// Every choice between objects that a field of one word tells apart: each becomes a schema of its own, and the word a discriminator.

@@ -6,6 +6,7 @@ mod drives;
 mod extremes;
 mod family;
 mod fast;
+mod finite_elements;
 mod gaps;
 mod laws;
 mod limits;
