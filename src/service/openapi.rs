@@ -15,7 +15,34 @@ pub(crate) fn for_generators(document: &mut Value) {
         }
         parameter_that_is_never_null(object);
     });
+    join_variants(document);
     name_variants(document);
+}
+
+/// A variant that is an object of its own and, beside it, the word that names it, becomes one object: where the one admits no other field, both
+/// together would admit nothing.
+fn join_variants(document: &mut Value) {
+    let Some(schemas) = document.pointer_mut(SCHEMAS).and_then(Value::as_object_mut) else { return };
+    let fields = schemas.clone();
+    let mut joined = Vec::new();
+    for variant in schemas.values_mut().filter_map(|schema| schema.get_mut("oneOf")?.as_array_mut()).flatten() {
+        let Some([own, word]) = variant.get("allOf").and_then(Value::as_array).map(Vec::as_slice) else { continue };
+        let name = own.get("$ref").and_then(Value::as_str).and_then(|path| path.rsplit('/').next());
+        let Some((name, object)) = name.and_then(|name| Some((name.to_owned(), fields.get(name)?))) else { continue };
+        let mut object = object.clone();
+        if let (Some(properties), Some(words)) =
+            (object["properties"].as_object_mut(), word.get("properties").and_then(Value::as_object))
+        {
+            properties.extend(words.clone());
+        }
+        let required = word.get("required").and_then(Value::as_array).into_iter().flatten();
+        let required = required.chain(object.get("required").and_then(Value::as_array).into_iter().flatten());
+        object["required"] = required.cloned().collect();
+        *variant = object;
+        joined.push(name);
+    }
+    let text = Value::Object(schemas.clone()).to_string();
+    schemas.retain(|name, _| !joined.contains(name) || text.contains(&format!("\"#{SCHEMAS}/{name}\"")));
 }
 
 /// A parameter may be left out, but no header or query has a null.

@@ -96,7 +96,7 @@ pub struct StudyResource {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub problem: Option<Problem>,
-    /// The result of a study that is done, where it was waited for.
+    /// The result, where the study was asked for and does not run any more.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub result: Option<StudyAnswer>,
@@ -266,9 +266,10 @@ impl Studies {
                 .buffer_unordered(limits.max_concurrent_solves)
                 .try_collect::<()>();
             let ended = tokio::select! {
-                ended = tokio::time::timeout_at(deadline, chunks) => ended,
-                // It was said to stand so already.
+                // First: what is cancelled begins nothing more. It was said to stand so already.
+                biased;
                 () = cancelled.cancelled() => return,
+                ended = tokio::time::timeout_at(deadline, chunks) => ended,
             };
             match ended {
                 Ok(Ok(())) => kept.stand(StudyState::Done, None),

@@ -36,7 +36,8 @@ pub(crate) fn problem_codes() -> Vec<ProblemCode> {
         ComplianceNotPositive => Interference,
         Interference => TooManyStates,
         TooManyStates => TooManyPoints,
-        TooManyPoints => QueueFull,
+        TooManyPoints => TooManyVariants,
+        TooManyVariants => QueueFull,
         QueueFull => DeadlineExceeded,
         DeadlineExceeded => ShuttingDown,
         ShuttingDown => TooManyConnections,
@@ -73,8 +74,9 @@ pub(crate) fn field_codes() -> Vec<FieldCode> {
         BoreTakesCam => ClearanceTakesCam,
         ClearanceTakesCam => ClearanceTakesTooth,
         ClearanceTakesTooth => TooManyStates,
-        TooManyStates => TooManyPoints;
-        TooManyPoints)
+        TooManyStates => TooManyPoints,
+        TooManyPoints => TooManyVariants;
+        TooManyVariants)
 }
 
 pub(crate) fn finding_codes() -> Vec<FindingCode> {
@@ -135,7 +137,8 @@ fn every_kind_of_problem_has_its_status_and_a_type_of_its_own() {
         | ProblemCode::ComplianceNotPositive
         | ProblemCode::Interference
         | ProblemCode::TooManyStates
-        | ProblemCode::TooManyPoints => 422,
+        | ProblemCode::TooManyPoints
+        | ProblemCode::TooManyVariants => 422,
         ProblemCode::QueueFull
         | ProblemCode::DeadlineExceeded
         | ProblemCode::ShuttingDown

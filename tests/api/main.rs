@@ -32,4 +32,5 @@ mod problems;
 mod profiles;
 mod ranges;
 mod serving;
+mod studies;
 mod violations;

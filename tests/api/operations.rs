@@ -38,6 +38,10 @@ async fn the_limits_can_be_read() {
         header_timeout_ms: 9,
         cache_max_bytes: 7,
         max_unread_bytes: 11,
+        max_study_variants: 12,
+        max_study_bytes: 13,
+        max_concurrent_studies: 14,
+        study_deadline_ms: 15,
     };
     let expected = json!({
         "max_states": 1,
@@ -51,7 +55,11 @@ async fn the_limits_can_be_read() {
         "max_connections": 8,
         "max_header_bytes": 16384,
         "max_concurrent_batches": 10,
-        "header_timeout_ms": 9
+        "header_timeout_ms": 9,
+        "max_study_variants": 12,
+        "max_study_bytes": 13,
+        "max_concurrent_studies": 14,
+        "study_deadline_ms": 15
     });
     assert_eq!(Service::within(limits).get("/v1/limits").await.found(), expected);
 }
@@ -79,6 +87,10 @@ async fn every_series_is_documented_and_every_documented_one_is_there() {
     service.post("/v1/sweep", &spelled_out()).await.found();
     let line = Question::post_as("application/x-ndjson", "/v1/batch", spelled_out().to_string());
     assert_eq!(service.ask(&line).await.status, 200);
+    let over = json!({ "/drive/teeth/radius_mm": { "one_of": [5.0] } });
+    let study = json!({ "study": "map", "base": spelled_out(), "over": over, "quantities": ["undercut"] });
+    let study = Question::post("/v1/studies", study.to_string()).with("prefer", "wait=600");
+    assert_eq!(service.ask(&study).await.status, 200);
     let slow = with(&spelled_out(), "/sweep/samples", json!(5_000_000));
     service.post("/v1/sweep", &slow).await.refused(503, "deadline_exceeded");
     let text = service.get("/metrics").await.text().to_owned();

@@ -107,6 +107,14 @@ fn settings_become_limits() {
         "9000",
         "--max-concurrent-batches",
         "10",
+        "--max-study-variants",
+        "12000",
+        "--max-study-bytes",
+        "1300",
+        "--max-concurrent-studies",
+        "14",
+        "--study-deadline-ms",
+        "15000",
     ];
     let process = Process::started(&arguments);
     let expected = json!({
@@ -121,7 +129,11 @@ fn settings_become_limits() {
         "max_connections": 8,
         "max_header_bytes": 40960,
         "header_timeout_ms": 9000,
-        "max_concurrent_batches": 10
+        "max_concurrent_batches": 10,
+        "max_study_variants": 12000,
+        "max_study_bytes": 1300,
+        "max_concurrent_studies": 14,
+        "study_deadline_ms": 15000
     });
     assert_eq!(ask_at(process.address, &Question::of("GET", "/v1/limits")).found(), expected);
 }

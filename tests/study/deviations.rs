@@ -1,0 +1,185 @@
+//! Sensitivities and tolerance studies, against closed forms.
+
+use serde_json::{Value, json};
+
+use crate::asking::{answer, faulty, paper, with};
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+fn named<'a>(list: &'a Value, member: &str, name: &str) -> &'a Value {
+    let list = list.as_array().unwrap();
+    list.iter().find(|item| item[member] == name).unwrap_or_else(|| panic!("no {name} in {list:?}"))
+}
+
+/// The root radius is `a + 2 r`.
+#[test]
+fn derivatives_are_those_of_the_closed_form() {
+    let study = json!({
+        "study": "sensitivity", "base": paper(), "quantities": ["ring_root_radius_mm"],
+        "inputs": { "/drive/teeth/radius_mm": { "plus_minus": 0.005 }, "/drive/wave_generator/semi_major_mm": { "relative": 0.001 }, "/drive/teeth/width_mm": {} }
+    });
+    let found = answer(&study);
+    let of = &found["quantities"][0];
+    assert_eq!(number(&of["value"]), 68.0);
+    let expected = [
+        ("/drive/wave_generator/semi_major_mm", 1.0, 0.058),
+        ("/drive/teeth/radius_mm", 2.0, 0.01),
+        ("/drive/teeth/width_mm", 0.0, 0.0),
+    ];
+    for (input, (pointer, derivative, change)) in of["inputs"].as_array().unwrap().iter().zip(expected) {
+        assert_eq!(input["pointer"], pointer, "what moves it most stands first");
+        assert!(
+            (number(&input["derivative"]) - derivative).abs() < 1e-9
+                && (number(&input["change"]) - change).abs() < 1e-9
+        );
+        assert_eq!(input["is_smooth"], true);
+    }
+}
+
+/// Stresses of the linear law go as the root of the torque; its own derivative is half of stress over torque.
+#[test]
+fn the_stress_goes_as_the_root_of_the_torque() {
+    let linear = with(&paper(), "/model", json!({ "compatibility": "projection", "stiffness": { "law": "linear" } }));
+    let study = json!({ "study": "sensitivity", "base": linear, "quantities": ["peak_stress_ring_mpa"], "inputs": { "/load/input_torque_nm": { "relative": 1e-4 } } });
+    let of = &answer(&study)["quantities"][0];
+    let derivative = number(&of["inputs"][0]["derivative"]);
+    assert!((derivative / (number(&of["value"]) / 40.0) - 1.0).abs() < 1e-8, "{of}");
+}
+
+#[test]
+fn a_count_has_differences_and_one_that_is_impossible_has_none() {
+    let base = with(&paper(), "/drive/ring", json!({}));
+    let study = json!({ "study": "sensitivity", "base": base, "quantities": ["transmission_ratio"], "inputs": { "/drive/teeth/count": {} } });
+    let input = answer(&study)["quantities"][0]["inputs"][0].clone();
+    assert_eq!(
+        (number(&input["at_minus"]), number(&input["at_plus"]), number(&input["plus_minus"])),
+        (13.5, 14.5, 1.0)
+    );
+    // With a ring of its own no other count fits.
+    let found = answer(&with(&study, "/base/drive/ring", json!({ "teeth": 26 })));
+    assert_eq!(found["quantities"][0]["inputs"][0].get("at_plus"), None);
+    assert_eq!(found["reasons"][0]["code"], "tooth_difference");
+}
+
+#[test]
+fn left_out_inputs_are_all_numbers_but_counts() {
+    let found = answer(&json!({ "study": "sensitivity", "base": paper(), "quantities": ["outer_diameter_mm"] }));
+    let mut pointers: Vec<_> = found["quantities"][0]["inputs"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|input| input["pointer"].as_str().unwrap())
+        .collect();
+    pointers.sort_unstable();
+    let expected = [
+        "/drive/teeth/radius_mm",
+        "/drive/teeth/width_mm",
+        "/drive/wave_generator/semi_major_mm",
+        "/drive/wave_generator/semi_minor_mm",
+        "/load/input_torque_nm",
+    ];
+    assert_eq!(pointers, expected);
+}
+
+fn tolerance(distribution: Value) -> Value {
+    json!({ "study": "tolerance", "base": paper(), "samples": 20_000, "quantities": ["ring_root_radius_mm"], "inputs": { "/drive/teeth/radius_mm": distribution } })
+}
+
+/// The root radius is twice the tooth's radius and more: twice its deviation.
+#[test]
+fn quantiles_of_a_linear_quantity_are_those_of_what_deviates() {
+    let of = answer(&tolerance(json!({ "distribution": "normal", "sigma": 0.01 })))["quantities"][0].clone();
+    assert_eq!(number(&of["nominal"]), 68.0);
+    assert!((number(&of["mean"]) - 68.0).abs() < 5.0 * 0.02 / 20_000_f64.sqrt());
+    assert!((number(&of["standard_deviation"]) / 0.02 - 1.0).abs() < 0.02);
+    for (quantile, standard) in of["quantiles"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip([-3.0902, -2.3263, -1.6449, -0.6745, 0.0, 0.6745, 1.6449, 2.3263, 3.0902])
+    {
+        let (low, high) = (number(&quantile["low"]), number(&quantile["high"]));
+        let expected = 68.0 + 0.02 * standard;
+        let value = number(&quantile["value"]);
+        assert!(low <= value && value <= high && low < expected && expected < high, "{quantile}: {expected}");
+    }
+    // Uniform: every share is a place of its own.
+    let of = answer(&tolerance(json!({ "distribution": "uniform", "limit": 0.05 })))["quantities"][0].clone();
+    for quantile in of["quantiles"].as_array().unwrap() {
+        let expected = 68.0 + 0.1 * (2.0 * number(&quantile["share"]) - 1.0);
+        assert!(number(&quantile["low"]) <= expected && expected <= number(&quantile["high"]), "{quantile}");
+    }
+}
+
+#[test]
+fn nothing_deviates_beyond_its_limit() {
+    let of =
+        answer(&tolerance(json!({ "distribution": "normal", "sigma": 0.01, "limit": 0.012 })))["quantities"][0].clone();
+    assert!(number(&of["least"]) >= 68.0 - 0.024 && number(&of["largest"]) <= 68.0 + 0.024);
+    assert!(number(&of["largest"]) > 68.0 + 0.0235);
+}
+
+#[test]
+fn the_yield_is_the_share_within_the_limits() {
+    let study = with(
+        &tolerance(json!({ "distribution": "uniform", "limit": 0.05 })),
+        "/require",
+        json!({ "ring_root_radius_mm": { "max": 68.05 } }),
+    );
+    let found = answer(&study);
+    let (share, low, high) =
+        (number(&found["yield"]["share"]), number(&found["yield"]["low"]), number(&found["yield"]["high"]));
+    assert!(low < 0.75 && 0.75 < high && low < share && share < high, "{}", found["yield"]);
+    assert_eq!(number(&found["limits"][0]["failed"]), 20_000.0 * (1.0 - share));
+}
+
+/// Twice the tooth's radius and once the semi-major axis: four parts of five of the variance.
+#[test]
+fn the_tightest_contributor_stands_first_with_its_share() {
+    let study = with(
+        &tolerance(json!({ "distribution": "normal", "sigma": 0.01 })),
+        "/inputs/~1drive~1wave_generator~1semi_major_mm",
+        json!({ "distribution": "normal", "sigma": 0.01 }),
+    );
+    let of = answer(&study)["quantities"][0].clone();
+    let first = &of["contributors"][0];
+    assert_eq!(first["deviation"], "/drive/teeth/radius_mm");
+    assert!((number(&first["share"]) - 0.8).abs() < 0.03, "{first}");
+    let others = named(&of["contributors"], "deviation", "/drive/wave_generator/semi_major_mm");
+    assert!((number(&others["share"]) + number(&first["share"]) - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn impossible_drives_fail_the_yield_and_enter_no_quantile() {
+    // Teeth of 6.4 mm nearly touch.
+    let study =
+        with(&tolerance(json!({ "distribution": "uniform", "limit": 0.3 })), "/base/drive/teeth/radius_mm", json!(7.0));
+    let study =
+        with(&with(&study, "/samples", json!(2000)), "/require", json!({ "ring_root_radius_mm": { "max": 100.0 } }));
+    let found = answer(&study);
+    let impossible = number(&found["impossible"]);
+    assert!(impossible > 0.0 && number(&found["samples"]) == 2000.0, "{found}");
+    assert_eq!(number(&found["yield"]["share"]), 1.0 - impossible / 2000.0);
+    assert_eq!(found["reasons"][0]["code"], "teeth_touch");
+}
+
+#[test]
+fn what_cannot_be_drawn_is_said_at_its_field() {
+    for (distribution, field, code) in [
+        (json!({ "distribution": "normal" }), "/sigma", "missing_field"),
+        (json!({ "distribution": "normal", "sigma": 0.0 }), "/sigma", "out_of_range"),
+        (json!({ "distribution": "normal", "sigma": 1.0, "limit": 0.001 }), "/limit", "out_of_range"),
+        (json!({ "distribution": "uniform", "sigma": 1.0, "limit": 1.0 }), "/sigma", "conflicting_fields"),
+        (json!({ "distribution": "uniform" }), "/limit", "missing_field"),
+        (json!({ "distribution": "gaussian" }), "/distribution", "unknown_choice"),
+    ] {
+        let expected = (format!("/inputs/~1drive~1teeth~1radius_mm{field}"), code.to_owned());
+        assert_eq!(faulty(&tolerance(distribution.clone())), expected, "{distribution}");
+    }
+    let nothing = json!({ "study": "tolerance", "base": paper() });
+    assert_eq!(faulty(&nothing), ("/deviations".into(), "missing_field".into()));
+    let unknown = with(&nothing, "/deviations", json!({ "colour": { "distribution": "uniform", "limit": 1.0 } }));
+    assert_eq!(faulty(&unknown), ("/deviations/colour".into(), "unknown_field".into()));
+}

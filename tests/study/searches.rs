@@ -1,0 +1,195 @@
+//! Searches.
+
+use serde_json::{Value, json};
+use toothwave_calculation::question::Question as _;
+use toothwave_calculation::sweep::Sweep;
+use toothwave_solver::Never;
+
+use crate::asking::{CALCULATION, answer, faulty, paper, with};
+
+/// Two objectives that pull at the teeth's radius, the diameter being theirs, and a limit.
+fn search() -> Value {
+    json!({
+        "study": "search", "base": paper(), "evaluations": 4000,
+        "free": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.5 }, "/drive/wave_generator/semi_minor_mm": { "min": 55.0, "max": 57.5 } },
+        "require": { "undercut": false },
+        "objectives": [{ "quantity": "slot_wall_mm", "goal": "max" }, { "quantity": "carrier_radial_space_mm", "goal": "max" }]
+    })
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// The area between a front and a corner that everything beats; both objectives are to be greatest.
+fn hypervolume(points: &[(f64, f64)], corner: (f64, f64)) -> f64 {
+    let mut points: Vec<_> = points.iter().filter(|point| point.0 > corner.0 && point.1 > corner.1).collect();
+    points.sort_by(|one, other| other.0.total_cmp(&one.0));
+    let mut area = 0.0;
+    let mut height = corner.1;
+    for &&(x, y) in &points {
+        if y > height {
+            area += (x - corner.0) * (y - height);
+            height = y;
+        }
+    }
+    area
+}
+
+#[test]
+fn the_front_is_that_of_all_drives_of_a_fine_grid() {
+    let map = json!({
+        "study": "map", "base": paper(), "quantities": ["slot_wall_mm", "carrier_radial_space_mm", "undercut"],
+        "over": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.5, "steps": 226 }, "/drive/wave_generator/semi_minor_mm": { "min": 55.0, "max": 57.5, "steps": 126 } }
+    });
+    let grid = answer(&map);
+    let column =
+        |name: &str| grid["possible"]["quantities"][name].as_array().unwrap().iter().map(number).collect::<Vec<_>>();
+    let walls = column("slot_wall_mm").into_iter().zip(column("carrier_radial_space_mm")).zip(column("undercut"));
+    let brute: Vec<_> = walls.filter(|(_, undercut)| *undercut == 0.0).map(|(point, _)| point).collect();
+    let found = answer(&search());
+    let front = found["front"].as_array().unwrap();
+    let front: Vec<_> = front
+        .iter()
+        .map(|found| {
+            (number(&found["quantities"]["slot_wall_mm"]), number(&found["quantities"]["carrier_radial_space_mm"]))
+        })
+        .collect();
+    assert!(front.len() > 50, "{}", front.len());
+    let corner = (0.0, 0.0);
+    let (own, best) = (hypervolume(&front, corner), hypervolume(&brute, corner));
+    assert!(own > 0.995 * best, "{own} of {best}");
+    for one in &front {
+        assert!(!front.iter().any(|other| other != one && other.0 >= one.0 && other.1 >= one.1), "{one:?} is beaten");
+    }
+}
+
+#[test]
+fn a_design_of_the_front_has_the_figures_that_its_own_document_is_answered_with() {
+    let study = with(&search(), "/objectives/0", json!({ "quantity": "peak_stress_ring_mpa", "goal": "min" }));
+    let study = with(&study, "/evaluations", json!(1000));
+    let found = answer(&study);
+    for found in found["front"].as_array().unwrap().iter().step_by(10) {
+        let sweep = Sweep.ask(found["design"].to_string().as_bytes(), &CALCULATION, &Never).unwrap();
+        assert_eq!(number(&found["quantities"]["peak_stress_ring_mpa"]), sweep.peaks.ring.stress_mpa.value);
+        assert_eq!(found["quantities"]["undercut"], 0.0);
+    }
+}
+
+#[test]
+fn the_reasons_of_what_is_not_in_the_front_add_up() {
+    let found = answer(&search());
+    let scan = &found["scan"];
+    let limit = &found["limits"][0];
+    assert_eq!((&limit["quantity"], &limit["bound"]), (&json!("undercut"), &json!("is")));
+    // There is one limit: what falls, falls to it alone.
+    assert_eq!(limit["fell"], limit["fell_alone"]);
+    let count = |value: &Value| value.as_u64().unwrap();
+    assert_eq!(count(&scan["variants"]), 800);
+    assert_eq!(count(&scan["good"]) + count(&limit["fell"]) + count(&scan["impossible"]), 800);
+    assert!(count(&limit["fell"]) > 0 && count(&scan["impossible"]) > 0);
+    let reasons: u64 = scan["reasons"].as_array().unwrap().iter().map(|reason| count(&reason["variants"])).sum();
+    assert_eq!(reasons, count(&scan["impossible"]));
+}
+
+/// The root radius is a + 2 r, 64 mm at least: 153.6 mm with its rim.
+#[test]
+fn where_nothing_is_possible_the_least_relaxation_is_told() {
+    let study = with(&search(), "/require/outer_diameter_mm", json!({ "max": 150.0 }));
+    let found = answer(&study);
+    assert_eq!(found["front"], json!([]));
+    let relaxed = &found["relaxations"][0];
+    assert_eq!((&relaxed["quantity"], &relaxed["bound"]), (&json!("outer_diameter_mm"), &json!("max")));
+    assert!((number(&relaxed["needed"]) - 153.6).abs() < 0.05, "{relaxed}");
+    assert_eq!(relaxed["found"]["quantities"]["undercut"], 0.0);
+    assert!((number(&found["nearest_miss"]["quantities"]["outer_diameter_mm"]) - 153.6).abs() < 0.5);
+}
+
+#[test]
+fn a_limit_that_the_front_leans_on_binds() {
+    let study = with(&search(), "/require/outer_diameter_mm", json!({ "max": 160.0 }));
+    let study = with(&study, "/objectives/0", json!({ "quantity": "ring_tooth_height_mm", "goal": "max" }));
+    let found = answer(&study);
+    let limits = found["limits"].as_array().unwrap();
+    let diameter = limits.iter().find(|limit| limit["quantity"] == "outer_diameter_mm").unwrap();
+    assert!(number(&diameter["fell"]) > 0.0);
+    for found in found["front"].as_array().unwrap() {
+        assert!(number(&found["quantities"]["outer_diameter_mm"]) <= 160.0);
+    }
+}
+
+#[test]
+fn counts_and_kinds_are_free_too() {
+    let base = json!({ "drive": { "wave_generator": { "lobes": 2, "mean_radius_mm": 57.0, "amplitude_mm": 1.0, "semi_major_mm": 58.0, "semi_minor_mm": 56.0 },
+        "teeth": { "width_mm": 15.0 } }, "load": { "input_torque_nm": 20.0 } });
+    let study = json!({
+        "study": "search", "base": base, "evaluations": 2000,
+        "free": {
+            "/drive/wave_generator/kind": { "one_of": ["ellipse", "harmonic"] },
+            "/drive/teeth/count": { "min": 20, "max": 40 },
+            "/drive/teeth/radius_mm": { "min": 2.0, "max": 8.0 }
+        },
+        "require": { "undercut": false },
+        "objectives": [{ "quantity": "transmission_ratio", "goal": "max" }, { "quantity": "peak_stress_mpa", "goal": "min" }]
+    });
+    let found = answer(&study);
+    let front = found["front"].as_array().unwrap();
+    assert!(front.len() > 5, "{}", front.len());
+    for found in front {
+        let design = &found["design"]["drive"];
+        let count = design["teeth"]["count"].as_i64().unwrap();
+        assert_eq!(design["ring"]["teeth"].as_i64().unwrap(), count - 2);
+        assert!((20..=40).contains(&count));
+    }
+}
+
+#[test]
+fn who_knows_only_ratio_torque_and_space_has_a_drive() {
+    let study = json!({
+        "study": "search", "evaluations": 6000,
+        "base": { "load": { "output_torque_nm": 200.0, "allowable_stress_mpa": 1500.0 } },
+        "require": { "transmission_ratio": { "min": 19.5, "max": 20.5 }, "outer_diameter_mm": { "max": 120.0 }, "undercut": false, "torque_capacity_output_nm": { "min": 200.0 } },
+        "objectives": [{ "quantity": "outer_diameter_mm", "goal": "min" }, { "quantity": "torque_capacity_output_nm", "goal": "max" }]
+    });
+    let found = answer(&study);
+    let front = found["front"].as_array().unwrap();
+    assert!(!front.is_empty(), "{found}");
+    for found in front {
+        let quantity = |name: &str| number(&found["quantities"][name]);
+        assert!(quantity("outer_diameter_mm") <= 120.0 && quantity("torque_capacity_output_nm") >= 200.0);
+        assert!((19.5..=20.5).contains(&quantity("transmission_ratio")) && quantity("undercut") == 0.0);
+    }
+}
+
+#[test]
+fn a_start_is_looked_at_first() {
+    let study = with(&search(), "/start", json!([paper()]));
+    let study = with(&study, "/evaluations", json!(100));
+    assert!(!answer(&study)["front"].as_array().unwrap().is_empty());
+    let elsewhere = with(&study, "/start/0/drive/teeth/radius_mm", json!(9.0));
+    assert_eq!(faulty(&elsewhere), ("/start/0/drive/teeth/radius_mm".into(), "out_of_range".into()));
+}
+
+#[test]
+fn what_cannot_be_searched_is_said_at_its_field() {
+    for (pointer, value, at, code) in [
+        ("/objectives", json!([]), "/objectives", "missing_field"),
+        ("/objectives/1/quantity", json!("slot_wall_mm"), "/objectives/1/quantity", "conflicting_fields"),
+        ("/objectives/1/quantity", json!("beauty"), "/objectives/1/quantity", "unknown_choice"),
+        ("/free", json!({}), "/free", "missing_field"),
+        (
+            "/free/~1drive~1teeth~1radius_mm",
+            json!({ "min": 5, "max": 4 }),
+            "/free/~1drive~1teeth~1radius_mm/min",
+            "out_of_range",
+        ),
+        ("/require/undercut", json!({ "max": 1 }), "/require/undercut", "wrong_type"),
+        ("/require/slot_wall_mm", json!(true), "/require/slot_wall_mm", "wrong_type"),
+        ("/require/slot_wall_mm", json!({}), "/require/slot_wall_mm", "missing_field"),
+        ("/require/slot_wall_mm", json!({ "min": 2, "max": 1 }), "/require/slot_wall_mm/min", "out_of_range"),
+        ("/evaluations", json!(1), "/evaluations", "out_of_range"),
+        ("/seed", json!(-1), "/seed", "out_of_range"),
+    ] {
+        assert_eq!(faulty(&with(&search(), pointer, value)), (at.to_owned(), code.to_owned()), "{pointer}");
+    }
+}
