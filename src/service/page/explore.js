@@ -31,6 +31,8 @@ const MOST_POINTS = 2400;
 /** From low to high, alike in light and dark: samples of viridis (van der Walt and Smith, 2015). */
 const HEAT = [[68, 1, 84], [72, 40, 120], [62, 74, 137], [49, 104, 142], [38, 130, 142], [31, 158, 137], [53, 183, 121], [109, 205, 89], [180, 222, 44], [253, 231, 37]];
 
+const ordinal = (count) => ({ 2: 'second', 3: 'third' })[count] ?? `${count}th`;
+
 const rgb = (color) => `rgb(${color.map(Math.round).join(' ')})`;
 
 function heatColor(share) {
@@ -114,7 +116,7 @@ export class Explore extends StudyView {
       return { slider, name, element: html('label', { class: 'place' }, name, slider) };
     });
     this.use = html('button', { type: 'button', onclick: () => this.#use() }, 'Take into the design');
-    this.extremes = html('span', { class: 'cluster' });
+    this.extremes = html('span', { class: 'extremes' });
     this.reading = html('div', { class: 'study-reading', hidden: true }, this.readout, this.places.map(({ element }) => element), html('div', { class: 'actions' }, this.use, this.extremes));
     this.reasons = html('div', { class: 'study-reasons' });
     this.section.append(
@@ -364,7 +366,7 @@ export class Explore extends StudyView {
       html('span', { class: 'swatch hatched', 'aria-hidden': 'true' }),
       html('span', {}, 'impossible'),
       ...(isWithin ? [html('span', {}, '+ the design')] : []),
-      ...(Math.max(...strides) > 1 ? [html('span', {}, `drawn every ${Math.max(...strides)}th step`)] : []),
+      ...(Math.max(...strides) > 1 ? [html('span', {}, `drawn at every ${ordinal(Math.max(...strides))} step`)] : []),
     );
   }
 
