@@ -87,8 +87,6 @@ export const FIRST = {
   },
 };
 
-const asAbove = (requirements) => `as all, ${asked(requirements, 'allowable_stress_mpa') ?? ''}`;
-
 export const GROUPS = [
   {
     title: 'Motion and load',
@@ -116,7 +114,7 @@ export const GROUPS = [
     open: true,
     fields: [
       number('allowable_stress_mpa', 'Allowable contact stress', 'σ', 'MPa', { likely: 1500, step: 50 }),
-      ...CONTACTS.map(({ key, name }) => number(`allowable_${key}_mpa`, `at the ${name.toLowerCase()}`, '', 'MPa', { optional: asAbove, step: 50 })),
+      ...CONTACTS.map(({ key, name }) => number(`allowable_${key}_mpa`, `Lower at the ${name.toLowerCase()}`, '', 'MPa', { optional: () => 'no lower', step: 50 })),
     ],
   },
   {
