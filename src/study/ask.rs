@@ -16,7 +16,8 @@ pub(crate) fn beyond(pointer: &str, code: FieldCode, detail: impl Into<String>, 
     let detail = detail.into();
     let error =
         FieldError { pointer: pointer.into(), code, detail: detail.clone(), value: Some(value), limit: Some(limit) };
-    NoAnswer::at_fields(NoAnswerCode::InvalidDocument, format!("{pointer}: {detail}"), vec![error])
+    let text = if pointer.is_empty() { detail } else { format!("{pointer}: {detail}") };
+    NoAnswer::at_fields(NoAnswerCode::InvalidDocument, text, vec![error])
 }
 
 /// A name as a JSON pointer spells it (RFC 6901).

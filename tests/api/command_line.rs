@@ -48,6 +48,20 @@ async fn json_is_the_body_that_the_service_answers_with() {
 }
 
 #[tokio::test]
+async fn a_study_is_the_one_that_the_service_answers_with() {
+    let over = json!({ "/drive/teeth/radius_mm": { "min": 3.0, "max": 9.0, "steps": 7 } });
+    let study = json!({ "study": "map", "base": shortest(), "over": over, "quantities": ["undercut"] }).to_string();
+    let service = Service::new();
+    let question = Question::post("/v1/studies", study.clone()).with("prefer", "wait=600");
+    let found = service.ask(&question).await.found();
+    let served = service.get(found["result_href"].as_str().unwrap()).await;
+    let output = run(&["study", "-"], study.as_bytes());
+    assert!(stdout(&output).strip_suffix('\n') == Some(served.text()), "{}", stdout(&output));
+    let refused = run(&["study", "-"], br#"{ "study": "map", "base": {}, "over": {} }"#);
+    assert_eq!((refused.status.code(), stderr(&refused).contains("/over")), (Some(2), true));
+}
+
+#[tokio::test]
 async fn csv_of_a_sweep_is_the_body_that_the_service_answers_with() {
     let question = Question::post("/v1/sweep", std::fs::read(example("paper-5.2")).unwrap()).with("accept", "text/csv");
     let served = Service::new().ask(&question).await;
