@@ -38,7 +38,7 @@ const over = (page, row, pointer) => page.locator('#explore .ask-row').nth(row).
 /** Begins a search with these requirements, of one kind with little effort, and waits for its end. */
 async function find(page, requirements = {}) {
   await show(page, 'find');
-  await page.uncheck(field('/find/wave_generators/eccentric'));
+  for (const kind of ['ellipse', 'eccentric']) await page.uncheck(field(`/find/wave_generators/${kind}`));
   await page.selectOption(field('/find/effort'), 'quick');
   for (const [name, value] of Object.entries(requirements)) await page.fill(field(`/find/${name}`), String(value));
   await page.click('.find button[type=submit]');

@@ -19,6 +19,9 @@ const LEAST_WALL = 0.25;
 const STEEPEST_DEG = 70;
 const LEAST_IN_MESH = 2;
 
+/** Sizes are looked at up to so many times what is asked: a search tells how far a limit would have to give only as far as it looks. */
+const BEYOND = 2;
+
 const EVALUATIONS = { quick: 10_000, usual: 40_000, thorough: 200_000 };
 
 const lobesAsked = (requirements) => asked(requirements, 'lobes') ?? 3;
@@ -28,17 +31,17 @@ const WAVE_GENERATORS = [
   {
     name: 'harmonic_two',
     label: 'two lobes, harmonic path of the teeth',
-    of: () => ({ lobes: 2, fixed: { kind: 'harmonic_path', lobes: 2 }, free: (root, tooth) => ({ mean_path_radius_mm: [0.25 * root, root], amplitude_mm: [0.03 * tooth, tooth] }) }),
+    of: () => ({ lobes: 2, fixed: { kind: 'harmonic_path', lobes: 2 }, free: (root, tooth) => ({ mean_path_radius_mm: [0.12 * root, root], amplitude_mm: [0.02 * tooth, tooth] }) }),
   },
   {
     name: 'ellipse',
     label: 'two lobes, ellipse',
-    of: () => ({ lobes: 2, fixed: { kind: 'ellipse' }, free: (root) => ({ semi_major_mm: [0.25 * root, root], semi_minor_mm: [0.25 * root, root] }) }),
+    of: () => ({ lobes: 2, fixed: { kind: 'ellipse' }, free: (root) => ({ semi_major_mm: [0.12 * root, root], semi_minor_mm: [0.12 * root, root] }) }),
   },
   {
     name: 'eccentric',
     label: 'one lobe, eccentric circle',
-    of: () => ({ lobes: 1, fixed: { kind: 'eccentric' }, free: (root, tooth) => ({ radius_mm: [0.25 * root, root], eccentricity_mm: [0.03 * tooth, tooth] }) }),
+    of: () => ({ lobes: 1, fixed: { kind: 'eccentric' }, free: (root, tooth) => ({ radius_mm: [0.12 * root, root], eccentricity_mm: [0.02 * tooth, tooth] }) }),
   },
   {
     name: 'harmonic_more',
@@ -46,7 +49,7 @@ const WAVE_GENERATORS = [
     of: (requirements) => ({
       lobes: lobesAsked(requirements),
       fixed: { kind: 'harmonic_path', lobes: lobesAsked(requirements) },
-      free: (root, tooth) => ({ mean_path_radius_mm: [0.25 * root, root], amplitude_mm: [0.03 * tooth, tooth] }),
+      free: (root, tooth) => ({ mean_path_radius_mm: [0.12 * root, root], amplitude_mm: [0.02 * tooth, tooth] }),
     }),
   },
 ];
@@ -54,8 +57,8 @@ const WAVE_GENERATORS = [
 const JOHNSON = { compatibility: 'virtual_work', stiffness: { law: 'johnson' } };
 
 const SHAPES = [
-  { name: 'cylinder', label: 'cylinders', model: JOHNSON, free: (tooth, width) => ({ width_mm: [0.15 * width, width] }) },
-  { name: 'flat_sided', label: 'cylinders with flats', model: JOHNSON, free: (tooth, width) => ({ width_mm: [0.15 * width, width], flat_length_mm: [0.1 * tooth, 1.2 * tooth] }) },
+  { name: 'cylinder', label: 'cylinders', model: JOHNSON, free: (tooth, width) => ({ width_mm: [0.08 * width, width] }) },
+  { name: 'flat_sided', label: 'cylinders with flats', model: JOHNSON, free: (tooth, width) => ({ width_mm: [0.08 * width, width], flat_length_mm: [0.05 * tooth, 1.2 * tooth] }) },
   { name: 'ball', label: 'balls, without grooves', model: { compatibility: 'virtual_work', stiffness: { law: 'hertz' } }, free: () => ({}) },
 ];
 
@@ -80,7 +83,7 @@ export const FIRST = {
     allowable_stress_mpa: 1500,
     wall: LEAST_WALL,
     friction: 0.05,
-    wave_generators: { harmonic_two: true, eccentric: true },
+    wave_generators: { harmonic_two: true, ellipse: true, eccentric: true },
     shapes: { cylinder: true },
     goals: { small: true, strong: true },
     effort: 'usual',
@@ -228,7 +231,7 @@ function ratiosOf(requirements) {
 /** A search for each kind of drive that may be: `[{ label, question }]`, with `fault` in words where no whole numbers of teeth make the ratio. */
 export function searchesOf(requirements) {
   const [least, most] = ratiosOf(requirements);
-  const rootMm = asked(requirements, 'outer_diameter_mm') / 2 / RIM;
+  const rootMm = (BEYOND * asked(requirements, 'outer_diameter_mm')) / 2 / RIM;
   const goals = goalsOf(requirements);
   const rubs = asked(requirements, 'efficiency') !== undefined || goals.some(({ quantity }) => quantity === 'efficiency_ring_fixed');
   const coefficient = asked(requirements, 'friction');
@@ -244,10 +247,10 @@ export function searchesOf(requirements) {
         continue;
       }
       const toothMm = Math.min(0.3 * rootMm, (Math.PI * rootMm) / fewest);
-      const widthMm = asked(requirements, 'width_mm');
+      const widthMm = BEYOND * asked(requirements, 'width_mm');
       const ranges = {
         ...Object.fromEntries(Object.entries(waveFree(rootMm, toothMm)).map(([name, ends]) => [`/drive/wave_generator/${name}`, range(ends)])),
-        '/drive/teeth/radius_mm': range([0.15 * toothMm, Math.min(toothMm, widthMm)]),
+        '/drive/teeth/radius_mm': range([0.08 * toothMm, Math.min(toothMm, widthMm)]),
         ...Object.fromEntries(Object.entries(shape.free(toothMm, widthMm)).map(([name, ends]) => [`/drive/teeth/${name}`, range(ends)])),
         ...(fewest === mostSlots ? {} : { '/drive/teeth/count': { min: fewest, max: mostSlots } }),
       };
