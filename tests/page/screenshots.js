@@ -49,6 +49,7 @@ await take('undercut', { viewport: { ...WIDE.viewport, height: 1000 } }, async (
 
 await take('find-a-drive', { viewport: { width: 1366, height: 1000 } }, async (page) => {
   await page.click('#views [data-view="find"]');
+  await page.selectOption('#field-find-effort', 'quick');
   await page.click('.find button[type=submit]');
   await page.waitForFunction(() => document.querySelector('#find .study-progress').hidden && document.querySelector('#find .headline')?.textContent);
   await page.locator('#find .drives-scroll tbody button').nth(3).click();

@@ -312,7 +312,7 @@ test('sensitivity ranks the inputs by what they really do', async () => {
 test('tolerances tell spread, yield and what matters most', async () => {
   const page = await bed.open();
   await show(page, 'tolerance');
-  await done(page, 'tolerance', 'tbody tr');
+  await page.waitForSelector('#tolerance .deviation:visible');
   const rows = page.locator('#tolerance .deviation:visible');
   for (let index = 0; index < (await rows.count()); index += 1) await rows.nth(index).locator('select').selectOption('none');
   for (const label of ['Radius of all teeth', 'Width of all teeth']) await page.locator('#tolerance .deviation', { hasText: label }).locator('select').selectOption('uniform');

@@ -6,6 +6,7 @@ import { at } from './design.js';
 import { html, oncePerFrame, setText, svg } from './dom.js';
 import { readable, sentence } from './findings.js';
 import { number, withUnit } from './format.js';
+import { thinned } from './grids.js';
 import { baseOf, parameterOf, parametersOf, rangeOf, withValues } from './parameters.js';
 import { StudyView } from './study-view.js';
 
@@ -400,24 +401,4 @@ export class Explore extends StudyView {
 /** Stripes for what cannot be. */
 function hatch() {
   return svg('defs', {}, svg('pattern', { id: 'hatch', width: 8, height: 8, patternUnits: 'userSpaceOnUse', patternTransform: 'rotate(45)' }, svg('rect', { class: 'hatch-ground', width: 8, height: 8 }), svg('rect', { class: 'hatch-stripe', width: 3, height: 8 })));
-}
-
-/** Of many values, by their index, those that can be told apart: of each stretch the least and the largest. */
-export function thinned(values, most) {
-  if (values.length <= most) return Array.from(values, (_, index) => index);
-  const stride = Math.ceil((2 * values.length) / most);
-  const kept = [];
-  for (let start = 0; start < values.length; start += stride) {
-    const end = Math.min(values.length, start + stride);
-    let [least, largest, gap] = [start, start, -1];
-    for (let index = start; index < end; index += 1) {
-      if (Number.isNaN(values[index])) gap = index;
-      else {
-        if (!(values[index] >= values[least])) least = index;
-        if (!(values[index] <= values[largest])) largest = index;
-      }
-    }
-    kept.push(...[...new Set([least, largest, ...(gap < 0 ? [] : [gap])])].sort((one, other) => one - other));
-  }
-  return kept;
 }

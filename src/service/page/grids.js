@@ -21,3 +21,23 @@ function gridOf({ variants, over, possible, impossible, reasons, is_complete: is
 
 /** The answer of a study of whatever kind. */
 export const drawableStudy = (answer) => (answer.study === 'map' ? gridOf(answer) : answer);
+
+/** Of many values, by their index, those that can be told apart: of each stretch the least and the largest. */
+export function thinned(values, most) {
+  if (values.length <= most) return Array.from(values, (_, index) => index);
+  const stride = Math.ceil((2 * values.length) / most);
+  const kept = [];
+  for (let start = 0; start < values.length; start += stride) {
+    const end = Math.min(values.length, start + stride);
+    let [least, largest, gap] = [start, start, -1];
+    for (let index = start; index < end; index += 1) {
+      if (Number.isNaN(values[index])) gap = index;
+      else {
+        if (!(values[index] >= values[least])) least = index;
+        if (!(values[index] <= values[largest])) largest = index;
+      }
+    }
+    kept.push(...[...new Set([least, largest, ...(gap < 0 ? [] : [gap])])].sort((one, other) => one - other));
+  }
+  return kept;
+}

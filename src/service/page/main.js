@@ -127,12 +127,12 @@ new Find(byId('find'), {
   quantities,
   onOpen(design, title) {
     takeDesign(design, { title, design });
-    views.show('design');
+    views.goTo('design');
   },
   onOpenBoth({ design, title }, reference) {
     keepReference({ design: reference.design, origin: reference });
     takeDesign(design, { title, design });
-    views.show('design');
+    views.goTo('design');
   },
 });
 
@@ -597,6 +597,7 @@ function listen() {
     showIntro(true, true);
     byId('intro').scrollIntoView({ block: 'start' });
   });
+  click('intro-find', () => views.goTo('find'));
   click('intro-hide', () => showIntro(false, true));
   click('notice-hide', () => {
     byId('notice').hidden = true;

@@ -243,7 +243,7 @@ export function searchesOf(requirements) {
       const label = `${wave.name === 'harmonic_more' ? `${lobes} lobes` : wave.label.split(',')[0]}, ${wave.label.split(', ')[1]}, ${shape.label}`;
       const [fewest, mostSlots] = [Math.ceil(lobes * least - 1e-9), Math.floor(lobes * most + 1e-9)];
       if (fewest > mostSlots) {
-        searches.push({ label, fault: `with ${lobes} lobes a ratio is a multiple of 1/${lobes}` });
+        searches.push({ label, fault: lobes === 1 ? 'with one lobe a ratio is a whole number' : `with ${lobes} lobes a ratio is a multiple of 1/${lobes}` });
         continue;
       }
       const toothMm = Math.min(0.3 * rootMm, (Math.PI * rootMm) / fewest);

@@ -25,14 +25,16 @@ function pause(ms, signal) {
   });
 }
 
-/** One reply: `{ answer }` or `{ problem }`. Where the service is full `onFull(detail)` is told, and it is asked again. */
-async function send(path, { signal, kind, onFull, ...options } = {}) {
+/** One reply: `{ answer }` or `{ problem }`. Where the service is full `onFull(detail)` is told, and it is asked again. What begins a study
+ *  `isAwaited` even when nobody wants it any more: only its reply says what to stop. */
+async function send(path, { signal, kind, onFull, isAwaited = false, ...options } = {}) {
+  const during = isAwaited ? undefined : signal;
   for (let attempt = 1; ; attempt += 1) {
     let response;
     let body;
     try {
-      response = await request(path, { ...options, signal });
-      body = await answerOf(response, response.ok ? kind : undefined, signal);
+      response = await request(path, { ...options, signal: during });
+      body = await answerOf(response, response.ok ? kind : undefined, during);
     } catch (error) {
       if (signal?.aborted) throw error;
       return { problem: { title: SILENT, detail: 'Ask again when it does.', errors: [] } };
@@ -52,6 +54,7 @@ export class Run {
   #controller = new AbortController();
   #id;
   #isOver = false;
+  #isCancelled = false;
 
   /** Whether somebody else's question has taken its place. */
   get isGivenUp() {
@@ -70,10 +73,13 @@ export class Run {
       signal,
       kind: 'study',
       onFull,
+      isAwaited: true,
     });
+    this.#id = reply.answer?.id;
+    if (reply.answer?.state === 'running' && (this.isGivenUp || this.#isCancelled)) await stop(this.#id);
+    signal.throwIfAborted();
     while (reply.answer?.state === 'running') {
       const { id, variants, looked_at: lookedAt } = reply.answer;
-      this.#id = id;
       onProgress?.({ variants, lookedAt });
       await pause(LOOK_MS, signal);
       reply = await send(`v1/studies/${id}`, { signal, kind: 'study', onFull });
@@ -87,8 +93,8 @@ export class Run {
 
   /** Ends it early: what it has come to is its answer. */
   cancel() {
+    this.#isCancelled = true;
     if (this.#id !== undefined && !this.#isOver) stop(this.#id);
-    else this.giveUp();
   }
 
   /** Nobody waits for it any more; `follow` then throws. */

@@ -2,7 +2,7 @@
 
 import { Choice, NumberBox } from './ask.js';
 import { axes } from './chart.js';
-import { at } from './design.js';
+import { at, changed } from './design.js';
 import { html, oncePerFrame, setText, svg } from './dom.js';
 import { readable, sentence } from './findings.js';
 import { number } from './format.js';
@@ -48,16 +48,16 @@ export class Tolerance extends StudyView {
   constructor(section, { quantities }) {
     super({ mostAtOnce: MOST_AT_ONCE, verb: 'Draw drives' });
     this.quantities = quantities;
-    const changed = () => this.later();
-    this.quantity = new Choice('Quantity', changed);
-    this.samples = new Choice('Drives', changed);
+    const onChange = () => this.later();
+    this.quantity = new Choice('Quantity', onChange);
+    this.samples = new Choice('Drives', onChange);
     this.samples.offer([{ options: [1000, 10_000, 100_000].map((count) => ({ value: String(count), label: number(count, 9) })) }], '1000');
-    this.ends = ['at least', 'at most'].map((words) => new NumberBox(`Good is ${words}`, changed));
+    this.ends = ['at least', 'at most'].map((words) => new NumberBox(`Good is ${words}`, onChange));
     this.unit = html('span', { class: 'unit' });
     this.rows = [...DEVIATIONS.map((kind) => ({ ...kind, list: 'deviations' })), ...INPUTS.map((kind) => ({ ...kind, list: 'inputs' }))].map((kind) => {
-      const distribution = new Choice(kind.label, changed);
+      const distribution = new Choice(kind.label, onChange);
       distribution.offer([{ options: DISTRIBUTIONS }], FIRST_DEVIATIONS.has(kind.name) ? 'normal' : 'none');
-      const limit = new NumberBox(`${kind.label}: plus and minus, ${kind.unit}`, changed);
+      const limit = new NumberBox(`${kind.label}: plus and minus, ${kind.unit}`, onChange);
       limit.value = kind.limit;
       const range = html('span', { class: 'range' }, '± ', limit.input, html('span', { class: 'unit' }, kind.unit));
       return { ...kind, distribution, limit, range, element: html('div', { class: 'ask-row deviation' }, distribution.element, range) };
@@ -108,7 +108,7 @@ export class Tolerance extends StudyView {
     const name = this.quantity.value;
     const require = min === undefined && max === undefined ? {} : { [name]: { ...(min === undefined ? {} : { min }), ...(max === undefined ? {} : { max }) } };
     const samples = Number(this.samples.value);
-    return { question: { study: 'tolerance', base: this.design, ...lists, quantities: [name], require, samples }, variants: samples, name };
+    return { question: { study: 'tolerance', base: changed(this.design, '/deviations', undefined), ...lists, quantities: [name], require, samples }, variants: samples, name };
   }
 
   take(answer, { name, question }) {

@@ -34,4 +34,10 @@ export class Views {
     scrollTo(0, 0);
     this.onShow(view);
   }
+
+  /** Shows a view from within another one, which goes, and the focus in it. */
+  goTo(view) {
+    this.show(view);
+    this.#buttons.get(view).focus();
+  }
 }
