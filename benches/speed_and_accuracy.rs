@@ -4,12 +4,15 @@
 
 mod baselines;
 mod harness;
+#[path = "harness/models.rs"]
+mod models;
 #[path = "harness/plot.rs"]
 mod plot;
 #[path = "harness/reference.rs"]
 mod reference;
+#[path = "harness/turns.rs"]
+mod turns;
 
-use std::error::Error;
 use std::fmt::Write as _;
 use std::fs;
 use std::hint::black_box;
@@ -28,21 +31,17 @@ use toothwave_solver::load_sharing::LoadCase;
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::sweep::{Points, Sweep, sweep, sweep_plain};
 use toothwave_solver::{Never, SolveError};
+use turns::{BATCH, Contestant, Failure, take_turns};
 
 /// The service's allocator.
 #[global_allocator]
 static ALLOCATOR: MiMalloc = MiMalloc;
-
-/// A batch of runs takes at least so long: what the one before left in caches and memory must not count.
-const BATCH: Duration = Duration::from_millis(50);
 
 /// As many states as a tolerance may take.
 const MAX_STATES: u64 = 10_000_000;
 
 /// Smaller errors are drawn here: the last digit of a double.
 const LEAST_DRAWN_ERROR: f64 = 1e-16;
-
-type Failure = Box<dyn Error>;
 
 type SweepFunction = fn(&Drive, &LoadCase, Points, &Never) -> Result<Sweep, SolveError>;
 
@@ -54,6 +53,11 @@ fn main() -> Result<(), Failure> {
         return scaling_child(intervals.parse()?);
     }
     let effort = Effort::of(&arguments);
+    if let Some(at) = arguments.iter().position(|argument| argument == "--models") {
+        let only = arguments.get(at + 1).map_or("", String::as_str);
+        models::table(effort, if only.starts_with("--") { "" } else { only })?;
+        return Ok(());
+    }
     let directory = effort.directory();
     fs::create_dir_all(directory.join(PLOTS))?;
     let reference = Reference::read()?;
@@ -66,6 +70,7 @@ fn main() -> Result<(), Failure> {
         report += &against_baselines(&reference, paper.as_mut(), intervals, rounds)?;
     }
     drop(paper);
+    report += &models::table(effort, "")?;
     report += &scaling(effort, &directory)?;
     report += &error_over_time(effort, &directory, &reference)?;
     let path = directory.join("speed-and-accuracy.md");
@@ -105,61 +110,6 @@ const BASELINES: &str = "\
     - (iii) [paper.py](../benches/baselines/paper.py): the paper's method as a plain NumPy script, Newton's method tooth by tooth; and once more with \
     all teeth of an input angle in one array, which is the kindest to NumPy.\n\
     - *plain path*: toothwave's own solver state by state, the oracle of the fast path.\n";
-
-/// Runs so many times and says how long that took.
-type Run<'a> = Box<dyn FnMut(u32) -> Result<Duration, Failure> + 'a>;
-
-/// One of those who take turns.
-struct Contestant<'a> {
-    name: String,
-    run: Run<'a>,
-    /// Runs in a batch.
-    batch: u32,
-    /// Seconds a run, one entry a round.
-    seconds: Vec<f64>,
-}
-
-impl<'a> Contestant<'a> {
-    fn new(name: impl Into<String>, run: Run<'a>) -> Self {
-        Self { name: name.into(), run, batch: 1, seconds: Vec::new() }
-    }
-
-    /// One that returns what it computes.
-    fn of<T>(name: impl Into<String>, mut compute: impl FnMut() -> Result<T, Failure> + 'a) -> Self {
-        let run = move |runs| {
-            let started = Instant::now();
-            for _ in 0..runs {
-                black_box(compute()?);
-            }
-            Ok(started.elapsed())
-        };
-        Self::new(name, Box::new(run))
-    }
-
-    fn spread(&self, runs_per_unit: f64) -> Spread {
-        Spread::of(self.seconds.iter().map(|seconds| seconds * runs_per_unit))
-    }
-}
-
-/// Lets the contestants take turns.
-fn take_turns(contestants: &mut [Contestant<'_>], rounds: usize) -> Result<(), Failure> {
-    for contestant in contestants.iter_mut() {
-        // The first run warms up: memory, caches, the clock of the core.
-        (contestant.run)(1)?;
-        while (contestant.run)(contestant.batch)? < BATCH {
-            contestant.batch *= 2;
-        }
-    }
-    for round in 0..rounds {
-        for turn in 0..contestants.len() {
-            let index = (turn + round) % contestants.len();
-            let contestant = &mut contestants[index];
-            let elapsed = (contestant.run)(contestant.batch)?;
-            contestant.seconds.push(elapsed.as_secs_f64() / f64::from(contestant.batch));
-        }
-    }
-    Ok(())
-}
 
 fn from_cold(setup: &Setup, points: Points, sweep: SweepFunction) -> Result<Sweep, Failure> {
     let setup = black_box(setup);

@@ -42,9 +42,9 @@ def _fields():
     yield Field("/load/input_torque_nm", "InputTorqueNm", "Input torque", group, 20.0, "N·m", "left out")
     yield Field("/load/output_torque_nm", "OutputTorqueNm", "or output torque", group, 0.0, "N·m", "left out")
     yield Field("/load/allowable_stress_mpa", "AllowableStressMPa", "Allowable stress", group, 0.0, "MPa", "not asked")
-    ways = ("projection", "virtual_work")
+    ways = ("virtual_work", "projection")
     yield Field("/model/compatibility", "Compatibility", "Approaches add up by", group, ways[0], choices=ways)
-    laws = ("linear", "fixed", "palmgren")
+    laws = ("johnson", "palmgren", "fixed", "linear")
     yield Field("/model/stiffness/law", "StiffnessLaw", "Contact law", group, laws[0], choices=laws)
     for contact, label in (CONTACTS[0], *CONTACTS[2:]):
         name = label.title().replace(" ", "")
@@ -102,5 +102,7 @@ def values_of(document):
         if value is None:
             # A default load beside one that is given, or a law's stiffness, would be another design.
             value = type(field.default)() if field.blank else field.default
+            if field.name == "StiffnessLaw" and values["Compatibility"] == "projection":
+                value = "linear"  # what the service takes then
         values[field.name] = type(field.default)(value)
     return values

@@ -5,9 +5,11 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use toothwave_solver::drive::Draft;
-use toothwave_solver::mesh::{Mesh, Samples};
-use toothwave_solver::sweep::{ContactPeaks, Points, Tolerance, sweep};
-use toothwave_solver::{Compatibility, ContactLaw, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop};
+use toothwave_solver::mesh::Samples;
+use toothwave_solver::sweep::{ContactPeaks, Points, Tolerance, sweep_with_deviations};
+use toothwave_solver::{
+    Compatibility, ContactLaw, Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, ToothShape,
+};
 use utoipa::ToSchema;
 
 use crate::design::{CompatibilityDocument, Design};
@@ -124,6 +126,7 @@ impl From<Compatibility> for CompatibilityDocument {
 pub struct CheckedAccuracy {
     drive: Drive,
     load: LoadCase,
+    deviations: Deviations,
     requested_error: f64,
     max_states: u64,
 }
@@ -141,7 +144,8 @@ impl Question for Accuracy {
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
-        (&design.drive, &design.materials, &design.load, &design.model, &design.modification, &design.accuracy)
+        let Design { drive, materials, load, model, modification, deviations, accuracy, .. } = design;
+        (drive, materials, load, model, modification, (deviations, accuracy))
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedAccuracy, NoAnswer> {
@@ -150,7 +154,8 @@ impl Question for Accuracy {
         let load = checked_load(design, &draft, &mut violations)?;
         match (draft.drive(), load, design.requested_error()) {
             (Some(drive), Some(load), Ok(requested_error)) if violations.is_empty() => {
-                Ok(CheckedAccuracy { drive, load, requested_error, max_states: limits.max_states })
+                let (deviations, max_states) = (Deviations::from(&design.deviations), limits.max_states);
+                Ok(CheckedAccuracy { drive, load, deviations, requested_error, max_states })
             }
             (_, _, requested_error) => {
                 violations.extend(requested_error.err());
@@ -160,9 +165,9 @@ impl Question for Accuracy {
     }
 
     fn answer(checked: &CheckedAccuracy, stop: &impl Stop) -> Result<AccuracyAnswer, NoAnswer> {
-        let CheckedAccuracy { drive, load, requested_error, max_states } = checked;
+        let CheckedAccuracy { drive, load, deviations, requested_error, max_states } = checked;
         let own = *load.parameters();
-        let own_peaks = converged(drive, load, *max_states, stop).map_err(|error| match error {
+        let own_peaks = converged(drive, load, deviations, *max_states, stop).map_err(|error| match error {
             // There is no field to blame: the reference's tolerance is ours.
             SolveError::TooManyStates { limit } => NoAnswer::new(
                 NoAnswerCode::TooManyStates,
@@ -171,9 +176,9 @@ impl Question for Accuracy {
             error => error.into(),
         })?;
         let (mut ways, mut unavailable) = (Vec::new(), Vec::new());
-        for model in models(&own) {
+        for model in models(drive, &own) {
             let (compatibility, law) = (model.compatibility.into(), model.law.into());
-            match Model::new(drive, &model, &own_peaks, *max_states, stop) {
+            match Model::new(checked, &model, &own_peaks, stop) {
                 Ok(Some(model)) => model.measure(&mut ways, stop)?,
                 // A gap that this form of compatibility would turn into load.
                 Ok(None) => {
@@ -201,13 +206,24 @@ impl Question for Accuracy {
     }
 }
 
-/// The design's own model first, then every other form of compatibility and law that needs no further numbers.
-fn models(own: &LoadParameters) -> Vec<LoadParameters> {
+/// The design's own model first, then every other form of compatibility with a law that it and the teeth take and that needs no
+/// further numbers.
+fn models(drive: &Drive, own: &LoadParameters) -> Vec<LoadParameters> {
+    let laws = match drive.parameters().tooth {
+        ToothShape::Ball { .. } => vec![own.law, ContactLaw::Hertz],
+        ToothShape::Cylinder { .. } | ToothShape::FlatSided { .. } => {
+            // With other depths it would be another model under the same name.
+            let johnson = ContactLaw::Johnson { depth_mm: PerContact::default() };
+            let johnson = if matches!(own.law, ContactLaw::Johnson { .. }) { own.law } else { johnson };
+            vec![own.law, ContactLaw::Linear, ContactLaw::Palmgren, johnson]
+        }
+    };
     let mut models = vec![*own];
     for compatibility in [Compatibility::Projection, Compatibility::VirtualWork] {
-        for law in [own.law, ContactLaw::Linear, ContactLaw::Palmgren] {
+        for &law in &laws {
             let model = LoadParameters { compatibility, law, ..*own };
-            if !models.contains(&model) {
+            let is_possible = compatibility == Compatibility::VirtualWork || law.is_of_projection();
+            if is_possible && !models.contains(&model) {
                 models.push(model);
             }
         }
@@ -218,10 +234,11 @@ fn models(own: &LoadParameters) -> Vec<LoadParameters> {
 fn converged(
     drive: &Drive,
     load: &LoadCase,
+    deviations: &Deviations,
     max_states: u64,
     stop: &impl Stop,
 ) -> Result<PerContact<ContactPeaks>, SolveError> {
-    Ok(sweep(drive, load, Points::finest(max_states), stop)?.peaks)
+    Ok(sweep_with_deviations(drive, load, deviations, Points::finest(max_states), stop)?.peaks)
 }
 
 /// The largest relative difference of six peaks from their reference.
@@ -236,6 +253,7 @@ fn difference(peaks: &PerContact<ContactPeaks>, reference: &PerContact<ContactPe
 /// A model of the design with its converged peaks.
 struct Model<'a> {
     drive: &'a Drive,
+    deviations: &'a Deviations,
     load: LoadCase,
     reference: PerContact<ContactPeaks>,
     difference: f64,
@@ -245,24 +263,23 @@ struct Model<'a> {
 impl<'a> Model<'a> {
     /// The model, or nothing where its clearances make no sense.
     fn new(
-        drive: &'a Drive,
+        &CheckedAccuracy { ref drive, ref deviations, max_states, .. }: &'a CheckedAccuracy,
         parameters: &LoadParameters,
         own_peaks: &PerContact<ContactPeaks>,
-        max_states: u64,
         stop: &impl Stop,
     ) -> Result<Option<Self>, SolveError> {
         let Ok(load) = LoadCase::new(parameters) else { return Ok(None) };
         if !parameters.clearance_violations(&Draft::new(drive.parameters())?)?.is_empty() {
             return Ok(None);
         }
-        let reference = converged(drive, &load, max_states, stop)?;
+        let reference = converged(drive, &load, deviations, max_states, stop)?;
         let difference = difference(&reference, own_peaks);
-        Ok(Some(Self { drive, load, reference, difference, max_states }))
+        Ok(Some(Self { drive, deviations, load, reference, difference, max_states }))
     }
 
     /// Tries every number of samples and every tolerance that the limit on states admits.
     fn measure(&self, ways: &mut Vec<WayAnswer>, stop: &impl Stop) -> Result<(), SolveError> {
-        let mesh = Mesh::new(self.drive);
+        let mesh = self.deviations.mesh(self.drive);
         // All of them lie within the ranges.
         let samples = SAMPLES.into_iter().filter_map(|samples| Samples::new(samples).ok());
         for samples in samples.filter(|&samples| mesh.state_count(samples) <= self.max_states) {
@@ -279,7 +296,7 @@ impl<'a> Model<'a> {
         let mut times_us = Vec::with_capacity(MOST_RUNS);
         let found = loop {
             let started = Instant::now();
-            let found = sweep(self.drive, &self.load, points, stop)?;
+            let found = sweep_with_deviations(self.drive, &self.load, self.deviations, points, stop)?;
             times_us.push(1e6 * started.elapsed().as_secs_f64());
             if times_us.len() == MOST_RUNS || begun.elapsed() > ENOUGH {
                 break found;

@@ -19,6 +19,7 @@ use crate::json::{self, Fault};
 use crate::no_answer::NoAnswer;
 
 mod asked;
+mod deviations;
 mod drive;
 mod friction;
 mod load;
@@ -26,6 +27,7 @@ mod modification;
 mod number;
 
 pub use asked::*;
+pub use deviations::*;
 pub use drive::*;
 pub use friction::*;
 pub use load::*;
@@ -66,6 +68,9 @@ pub struct Design {
     /// Parts made otherwise than conjugate.
     #[serde(default)]
     pub modification: ModificationDocument,
+    /// Single items of the parts as they came out.
+    #[serde(default)]
+    pub deviations: DeviationsDocument,
     /// The input angles of a sweep.
     #[serde(default)]
     pub sweep: SweepDocument,
@@ -97,14 +102,22 @@ impl Design {
         if self.sweep.tolerance.is_none() {
             self.sweep.samples.get_or_insert(DEFAULT_SAMPLES);
         }
-        let by_default = match &self.drive.teeth {
-            TeethDocument::Ball(_) => StiffnessDocument::Hertz(HertzDocument::default()),
-            TeethDocument::Cylinder(_) | TeethDocument::FlatSided(_) => {
-                StiffnessDocument::Linear(LinearDocument::default())
-            }
-        };
+        let by_default = self.law_by_default();
         self.model.stiffness.get_or_insert(by_default);
         self
+    }
+
+    /// The law of a document that names none: the one that holds best, and the paper's beside the paper's compatibility.
+    fn law_by_default(&self) -> StiffnessDocument {
+        match (&self.drive.teeth, self.model.compatibility) {
+            (TeethDocument::Ball(_), _) => StiffnessDocument::Hertz(HertzDocument::default()),
+            (TeethDocument::Cylinder(_) | TeethDocument::FlatSided(_), CompatibilityDocument::Projection) => {
+                StiffnessDocument::Linear(LinearDocument::default())
+            }
+            (TeethDocument::Cylinder(_) | TeethDocument::FlatSided(_), CompatibilityDocument::VirtualWork) => {
+                StiffnessDocument::Johnson(JohnsonDocument::default())
+            }
+        }
     }
 
     /// The drive's parameters.
@@ -215,11 +228,8 @@ impl Design {
     }
 
     fn contact_law(&self) -> ContactLaw {
-        match &self.model.stiffness {
-            // Only of a document that was not normalised.
-            None => ContactLaw::Linear,
-            Some(law) => law.into(),
-        }
+        // Only a document that was not normalised names none.
+        self.model.stiffness.as_ref().map_or_else(|| (&self.law_by_default()).into(), Into::into)
     }
 
     /// Where a sweep looks.

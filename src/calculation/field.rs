@@ -1,7 +1,7 @@
 //! Fields of the design document: where each stands, and what can be wrong with it.
 
 use serde::Serialize;
-use toothwave_solver::violation::{Misfit, Modified, Violation};
+use toothwave_solver::violation::{Listed, Misfit, Modified, Violation};
 use toothwave_solver::{Contact, Parameter, Part};
 use utoipa::ToSchema;
 
@@ -18,7 +18,7 @@ pub struct FieldError {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub value: Option<f64>,
-    /// The limit that the value is beyond, or, of a number of teeth, the nearest one that would do.
+    /// The limit that the value is beyond, or, of a number of teeth or entries, the nearest one that would do.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub limit: Option<f64>,
@@ -44,6 +44,8 @@ pub enum FieldCode {
     ConflictingFields,
     /// A value outside its range.
     OutOfRange,
+    /// A list that has neither no entry nor one for each item.
+    WrongLength,
     /// The semi-major axis does not exceed the semi-minor one.
     CamNotElongated,
     /// The wave generator is too small for its stroke.
@@ -129,10 +131,9 @@ impl From<&Violation> for FieldError {
                 let parameter = Parameter::Modification(Modified::TipReliefStart);
                 (FieldCode::OutOfRange, parameter, start_deg, engagement_start_deg)
             }
-            Violation::DeviationCount { count, items } => {
-                (FieldCode::OutOfRange, Parameter::Deviations, count as f64, items as f64)
+            Violation::DeviationCount { listed, count, items } => {
+                (FieldCode::WrongLength, Parameter::DeviationList(listed), count as f64, items as f64)
             }
-            Violation::DeviationNotFinite => return Self::conflict(violation, Parameter::Deviations),
             Violation::LawOfOtherTeeth => return Self::conflict(violation, Parameter::Law),
             Violation::PartDoesNotFit { misfit, value, limit } => {
                 let code = match misfit {
@@ -203,6 +204,10 @@ pub fn pointer(parameter: Parameter) -> String {
         Parameter::Clearance(contact) => format!("/model/clearance/{}_um", contact_name(contact)),
         Parameter::Modification(modified) => format!("/modification/{}", modified_name(modified)),
         Parameter::Deviations => "/deviations".into(),
+        Parameter::DeviationList(listed) => format!("/deviations/{}", listed_name(listed)),
+        Parameter::Deviation(listed, entry) => format!("/deviations/{}/{entry}", listed_name(listed)),
+        Parameter::RunoutAmount(contact) => format!("/deviations/{}_runout/amount_um", contact_name(contact)),
+        Parameter::RunoutAngle(contact) => format!("/deviations/{}_runout/angle_deg", contact_name(contact)),
         Parameter::AllowableStress => "/load/allowable_stress_mpa".into(),
         Parameter::InputSpeed => "/load/input_speed_rpm".into(),
         Parameter::FrictionCoefficient(contact) => format!("/friction/{}/coefficient", contact_name(contact)),
@@ -235,6 +240,18 @@ const fn modified_name(modified: Modified) -> &'static str {
         Modified::TipReliefAmount => "ring_tip_relief/amount_um",
         Modified::TipReliefStart => "ring_tip_relief/start_deg",
         Modified::TipReliefPower => "ring_tip_relief/power",
+    }
+}
+
+/// A list of the deviations as documents spell it.
+const fn listed_name(listed: Listed) -> &'static str {
+    match listed {
+        Listed::ToothRadius => "tooth_radius_um",
+        Listed::SlotAngle => "slot_angle_arcsec",
+        Listed::SlotWall => "slot_wall_um",
+        Listed::RingSpace => "ring_space_um",
+        Listed::RingSpaceAngle => "ring_space_angle_arcsec",
+        Listed::WaveGeneratorLobe => "wave_generator_lobe_um",
     }
 }
 

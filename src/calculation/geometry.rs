@@ -4,6 +4,7 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 use toothwave_solver::drawing::{self, Edge};
+use toothwave_solver::losses::{Fixed, Mechanism};
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::profile::{self, Polyline, ProfileParameters};
 use toothwave_solver::{Drive, SolveError, Stop};
@@ -28,6 +29,8 @@ pub struct GeometryAnswer {
     pub transmission_ratio: f64,
     /// `i_HK = -Z_K/(Z_G - Z_K)`: input speed over ring speed, carrier fixed.
     pub transmission_ratio_carrier_fixed: f64,
+    /// The members exchanged: ratios and torques by the one that stands still. What friction leaves of them is in a sweep's `losses`.
+    pub members: MembersAnswer,
     /// The input angle after which the load pattern repeats.
     pub period_deg: f64,
     /// Whether the ring's tips are cut away.
@@ -46,6 +49,27 @@ pub struct GeometryAnswer {
     pub tooth_center_path: ProfileAnswer,
     /// What a designer should be told.
     pub findings: Vec<FindingAnswer>,
+}
+
+/// The members exchanged, by the one that stands still. Driven the other way round every ratio is its reciprocal, and the torque that holds the
+/// fixed member is over the torque that is taken off.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct MembersAnswer {
+    /// The wave generator drives the carrier.
+    pub ring_fixed: MemberFixedAnswer,
+    /// The wave generator drives the ring.
+    pub carrier_fixed: MemberFixedAnswer,
+    /// The ring drives the carrier.
+    pub wave_generator_fixed: MemberFixedAnswer,
+}
+
+/// Ratio and torques with one member fixed, losses neglected; negative where the sense is the other one.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct MemberFixedAnswer {
+    /// Speed of the driving member over that of the driven one, and torque taken off the driven one over that put into the driving one.
+    pub ratio: f64,
+    /// Torque that holds the fixed member, over that put into the driving one.
+    pub holding_torque_ratio: f64,
 }
 
 /// Whether the ring's tips are cut away by their own envelope.
@@ -159,6 +183,21 @@ impl From<&Polyline> for ProfileAnswer {
     }
 }
 
+impl From<&Drive> for MembersAnswer {
+    fn from(drive: &Drive) -> Self {
+        let mechanism = Mechanism::of(drive);
+        let of = |fixed| MemberFixedAnswer {
+            ratio: mechanism.speed_ratio(fixed),
+            holding_torque_ratio: mechanism.holding_torque_ratio(fixed),
+        };
+        Self {
+            ring_fixed: of(Fixed::Ring),
+            carrier_fixed: of(Fixed::Carrier),
+            wave_generator_fixed: of(Fixed::WaveGenerator),
+        }
+    }
+}
+
 impl From<&Drive> for UndercutAnswer {
     fn from(drive: &Drive) -> Self {
         let flank = drive.flank();
@@ -228,6 +267,7 @@ impl Question for Geometry {
             build: crate::BUILD,
             transmission_ratio: drive.transmission_ratio(),
             transmission_ratio_carrier_fixed: drive.transmission_ratio_carrier_fixed(),
+            members: drive.into(),
             period_deg: Mesh::new(drive).period_deg(),
             undercut: drive.into(),
             engagement: drive.into(),
@@ -287,6 +327,13 @@ impl GeometryAnswer {
         let (ring, carrier) = (&self.ring, &self.carrier);
         writeln!(writer, "transmission ratio, ring fixed      {}", self.transmission_ratio)?;
         writeln!(writer, "transmission ratio, carrier fixed   {}", self.transmission_ratio_carrier_fixed)?;
+        let MembersAnswer { ring_fixed, carrier_fixed, wave_generator_fixed } = &self.members;
+        writeln!(writer, "ratio, wave generator fixed         {:.12}", wave_generator_fixed.ratio)?;
+        for (name, member) in
+            [("ring", ring_fixed), ("carrier", carrier_fixed), ("wave generator", wave_generator_fixed)]
+        {
+            writeln!(writer, "torque that holds the {name:<14}{:.12} of the driving one", member.holding_torque_ratio)?;
+        }
         writeln!(writer, "period of the input angle           {:.6} deg", self.period_deg)?;
         self.undercut.write_text(writer)?;
         self.engagement.write_text(writer)?;

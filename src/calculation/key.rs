@@ -22,6 +22,15 @@ impl Encoder {
     pub fn byte(&mut self, byte: u8) {
         self.0.push(byte);
     }
+
+    /// Writes a length, in groups of seven bits, the lowest first.
+    fn length(&mut self, mut length: usize) {
+        while length >= 0x80 {
+            self.byte(low_bits(length) | 0x80);
+            length >>= 7;
+        }
+        self.byte(low_bits(length));
+    }
 }
 
 /// Zeros of one sign: -0.0 means nothing else than 0.0.
@@ -37,16 +46,19 @@ impl Encode for bool {
     }
 }
 
-/// Its length before it, in groups of seven bits, the lowest first.
+/// Its length before it.
 impl Encode for str {
     fn encode(&self, encoder: &mut Encoder) {
-        let mut length = self.len();
-        while length >= 0x80 {
-            encoder.byte(low_bits(length) | 0x80);
-            length >>= 7;
-        }
-        encoder.byte(low_bits(length));
+        encoder.length(self.len());
         encoder.0.extend_from_slice(self.as_bytes());
+    }
+}
+
+/// Its length before it.
+impl<T: Encode> Encode for Vec<T> {
+    fn encode(&self, encoder: &mut Encoder) {
+        encoder.length(self.len());
+        self.iter().for_each(|item| item.encode(encoder));
     }
 }
 

@@ -130,11 +130,10 @@ impl From<SolveError> for NoAnswer {
                 format!("{detail}. Choose `virtual_work`, or stiffnesses that differ less"),
             ),
             SolveError::Impossible(violations) => Self::impossible(&violations),
-            // The document has nothing that tells slots apart.
-            SolveError::Interference { position_deg, gap_um, .. } => Self::new(
+            SolveError::Interference { .. } => Self::new(
                 NoAnswerCode::Interference,
                 format!(
-                    "a tooth {position_deg:?} deg from the middle of its lobe has a total gap of {gap_um:?} µm along the wave generator's force: a part is too full there. Make `model.clearance` larger, or `modification` smaller"
+                    "{detail}: a part is too full there. Make `model.clearance` larger, or `modification` and `deviations` smaller"
                 ),
             ),
             SolveError::JohnsonBeyondHalfWidth { .. } | SolveError::FlatOffCarrier { .. } => {

@@ -102,5 +102,6 @@ pub(crate) fn checked_load(
     violations.extend(design.input_speed_rpm().err());
     violations.extend(parameters.clearance_violations(draft).map_err(SolveError::from)?);
     violations.extend(draft.drive().and_then(|drive| parameters.modification.violation_in(&drive)));
+    violations.extend(parameters.deviation_violations(&design.drive_parameters(), &(&design.deviations).into()));
     Ok(load)
 }

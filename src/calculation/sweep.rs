@@ -3,10 +3,9 @@
 use std::io::{self, Write};
 
 use toothwave_solver::losses::{Friction, Mechanism, period};
-use toothwave_solver::mesh::Mesh;
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self as solver, Points};
-use toothwave_solver::{Drive, LoadCase, SolveError, Stop, findings};
+use toothwave_solver::{Deviations, Drive, LoadCase, SolveError, Stop, findings};
 
 use crate::design::Design;
 use crate::field::FieldCode;
@@ -28,6 +27,7 @@ mod plots;
 pub struct CheckedSweep {
     drive: Drive,
     load: LoadCase,
+    deviations: Deviations,
     friction: Option<Friction>,
     input_speed_rpm: Option<f64>,
     points: Points,
@@ -59,16 +59,19 @@ impl CheckedSweep {
     /// Solves.
     ///
     /// # Errors
-    /// As [`solver::sweep`].
+    /// As [`solver::sweep_with_deviations`].
     pub fn solve(&self, stop: &impl Stop) -> Result<solver::Sweep, SolveError> {
-        solver::sweep(&self.drive, &self.load, self.points, stop)
+        solver::sweep_with_deviations(&self.drive, &self.load, &self.deviations, self.points, stop)
     }
 
     /// Solves for the peaks alone.
     ///
     /// # Errors
-    /// As [`solver::peaks`].
+    /// As [`Self::solve`].
     pub fn peaks(&self, stop: &impl Stop) -> Result<solver::SweepPeaks, SolveError> {
+        if !self.deviations.is_nil() {
+            return self.solve(stop).map(|sweep| (&sweep).into());
+        }
         solver::peaks(&self.drive, &self.load, self.points, stop)
     }
 }
@@ -86,8 +89,8 @@ impl Question for Sweep {
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
-        let Design { drive, materials, load, friction, model, modification, sweep, .. } = design;
-        (drive, materials, load, friction, model, (modification, sweep))
+        let Design { drive, materials, load, friction, model, modification, deviations, sweep, .. } = design;
+        (drive, materials, load, friction, model, (modification, deviations, sweep))
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedSweep, NoAnswer> {
@@ -107,8 +110,9 @@ impl Question for Sweep {
                 return Err(NoAnswer::impossible(&violations));
             }
         };
+        let deviations = Deviations::from(&design.deviations);
         if let Points::Samples(samples) = points {
-            let (states, limit) = (Mesh::new(&drive).state_count(samples), limits.max_states);
+            let (states, limit) = (deviations.mesh(&drive).state_count(samples), limits.max_states);
             if states > limit {
                 let detail = format!(
                     "the sweep has {states} states (input angles times teeth in mesh), more than the {limit} of `max_states`; take fewer samples"
@@ -117,22 +121,22 @@ impl Question for Sweep {
                 return Err(too_many(code, field_code, "/sweep/samples", &detail, Some(states), limit));
             }
         }
-        let with_gaps = design.model.clearance.is_some() || load.has_gaps();
+        let with_gaps = design.model.clearance.is_some() || load.has_gaps() || !deviations.is_nil();
         // In its range, or its violation would be among the others.
         let input_speed_rpm = design.input_speed_rpm().unwrap_or_default();
         let with_wind_up = design.sweep.wind_up;
-        Ok(CheckedSweep { drive, load, friction, input_speed_rpm, points, with_gaps, with_wind_up })
+        Ok(CheckedSweep { drive, load, deviations, friction, input_speed_rpm, points, with_gaps, with_wind_up })
     }
 
     fn columns_bytes(checked: &CheckedSweep) -> u64 {
-        // Eleven columns of doubles and one of teeth; of a sweep to a tolerance nobody knows how long they will be.
-        const STATE_BYTES: u64 = 11 * 8 + 4;
+        // Eleven columns of doubles and two of numbers; of a sweep to a tolerance nobody knows how long they will be.
+        const STATE_BYTES: u64 = 11 * 8 + 2 * 4;
         // Three columns of slips and one of words.
         const LOSSES_BYTES: u64 = 3 * 8 + 2;
         match checked.points {
             Points::Samples(samples) => {
                 let of_losses = if checked.friction.is_some() { LOSSES_BYTES } else { 0 };
-                (STATE_BYTES + of_losses) * Mesh::new(&checked.drive).state_count(samples)
+                (STATE_BYTES + of_losses) * checked.deviations.mesh(&checked.drive).state_count(samples)
             }
             Points::Tolerance { .. } => 0,
         }
@@ -141,21 +145,21 @@ impl Question for Sweep {
     fn is_short(checked: &CheckedSweep) -> bool {
         /// They are solved and written in about 0.1 ms; with Palmgren's law and all that can be asked for in a quarter of a millisecond.
         const FEW_STATES: u64 = 400;
-        let CheckedSweep { drive, friction, points, with_gaps, .. } = checked;
+        let CheckedSweep { drive, deviations, friction, points, with_gaps, .. } = checked;
         match points {
             Points::Samples(samples) => {
-                !with_gaps && friction.is_none() && Mesh::new(drive).state_count(*samples) <= FEW_STATES
+                !with_gaps && friction.is_none() && deviations.mesh(drive).state_count(*samples) <= FEW_STATES
             }
             Points::Tolerance { .. } => false,
         }
     }
 
     fn answer(checked: &CheckedSweep, stop: &impl Stop) -> Result<SweepAnswer, NoAnswer> {
-        let CheckedSweep { drive, load, friction, input_speed_rpm, with_gaps, with_wind_up, .. } = checked;
+        let CheckedSweep { drive, load, deviations, friction, input_speed_rpm, with_gaps, with_wind_up, .. } = checked;
         let sweep = checked.solve(stop)?;
-        let mesh = Mesh::new(drive);
+        let mesh = sweep.mesh;
         let mut findings = drive_findings(drive)?;
-        let approaches_matter = *with_wind_up || load.has_gaps();
+        let approaches_matter = *with_wind_up || load.has_gaps() || !deviations.is_nil();
         let of_contacts = findings::of_contacts(drive, load, &sweep.peaks, approaches_matter);
         let of_half_widths = findings::of_half_widths(drive, load, &sweep.states);
         let of_wind_up = findings::of_wind_up(drive, &sweep);
@@ -166,17 +170,23 @@ impl Question for Sweep {
         let mut losses = None;
         if let Some(friction) = friction {
             let of_period = period::Losses::of(drive, &sweep, friction, stop)?;
-            of_friction = findings::of_friction(&Mechanism::of(drive), friction, of_period.mean.total());
+            of_friction = findings::of_friction(&Mechanism::of_sweep(drive, &sweep), friction, of_period.mean.total());
             let input_torque_nm = load.input_torque_nm(drive);
             losses = Some(LossesAnswer::new(drive, friction, input_torque_nm, *input_speed_rpm, &sweep, of_period)?);
         }
         let of_sweep = of_wind_up.iter().chain(&of_half_widths).chain(&of_friction).chain(&of_contacts);
         findings.extend(of_sweep.map(FindingAnswer::from));
+        let unloaded_wind_up_deg = if *with_wind_up && *with_gaps {
+            Some(solver::unloaded_wind_up_deg(drive, load, deviations, &sweep, stop)?)
+        } else {
+            None
+        };
         let answer = SweepAnswer {
             solver_version: toothwave_solver::VERSION,
             build: crate::BUILD,
             coincidence_degree: mesh.coincidence_degree(),
             period_deg: mesh.period_deg(),
+            sweep_period_deg: mesh.tells_items_apart().then(|| mesh.sweep_period_deg()),
             load: LoadAnswer {
                 input_torque_nm: load.input_torque_nm(drive),
                 output_torque_nm: load.output_torque_nm(drive),
@@ -185,7 +195,7 @@ impl Question for Sweep {
             peaks: sweep.peaks.into(),
             teeth_in_mesh_per_zone: mesh.teeth_in_mesh().into(),
             loaded_teeth_per_zone: sweep.loaded_teeth().into(),
-            wind_up: with_wind_up.then(|| WindUpAnswer::new(drive, &sweep)),
+            wind_up: with_wind_up.then(|| WindUpAnswer::new(drive, &sweep, unloaded_wind_up_deg)),
             torque_capacity: sweep.torque_capacity.map(Into::into),
             losses,
             radial_force_n,
@@ -209,7 +219,8 @@ impl Question for Sweep {
             &states.stress_carrier_mpa,
         ])?;
         if let Some(wind_up) = &answer.wind_up {
-            require_finite([&wind_up.wind_up_deg, &wind_up.torsional_stiffness_nm_per_rad])?;
+            let unloaded = wind_up.unloaded_wind_up_deg.iter();
+            require_finite(unloaded.chain([&wind_up.wind_up_deg, &wind_up.torsional_stiffness_nm_per_rad]))?;
         }
         Ok(answer)
     }
@@ -277,6 +288,9 @@ impl SweepAnswer {
     fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
         writeln!(writer, "coincidence degree                  {:.12}", self.coincidence_degree)?;
         writeln!(writer, "period of the input angle           {:.6} deg", self.period_deg)?;
+        if let Some(sweep_period_deg) = self.sweep_period_deg {
+            writeln!(writer, "input angle of the sweep            {sweep_period_deg:.6} deg")?;
+        }
         writeln!(writer, "teeth in mesh per zone              {}", self.teeth_in_mesh_per_zone)?;
         writeln!(writer, "teeth that carry per zone           {}", self.loaded_teeth_per_zone)?;
         writeln!(writer, "states                              {}", self.states.tooth.len())?;
@@ -316,8 +330,15 @@ impl SweepAnswer {
             let (softest, stiffest) = range(&wind_up.torsional_stiffness_nm_per_rad);
             let error_deg = wind_up.transmission_error_peak_to_peak_deg;
             writeln!(writer, "\nwind-up of the input                {least:.6} to {most:.6} deg")?;
+            if let Some(unloaded_deg) = &wind_up.unloaded_wind_up_deg {
+                let (least, most) = range(unloaded_deg);
+                writeln!(writer, "the same without load               {least:.6} to {most:.6} deg")?;
+            }
             writeln!(writer, "torsional stiffness at the output   {softest:.6e} to {stiffest:.6e} N·m/rad")?;
             writeln!(writer, "transmission error, peak to peak    {error_deg:.3e} deg")?;
+            if let Some(error_deg) = wind_up.unloaded_transmission_error_peak_to_peak_deg {
+                writeln!(writer, "the same without load               {error_deg:.3e} deg")?;
+            }
         }
         if let Some(losses) = &self.losses {
             losses.write_text(writer)?;

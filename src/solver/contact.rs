@@ -2,8 +2,6 @@
 
 use std::f64::consts::PI;
 
-use crate::violation::Parameter;
-
 /// A part with a material of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Part {
@@ -130,20 +128,15 @@ pub struct Materials {
 }
 
 impl Materials {
-    pub(crate) fn parameters(&self) -> impl Iterator<Item = (Parameter, f64)> {
+    /// The parts with their materials.
+    pub fn iter(&self) -> impl Iterator<Item = (Part, &Material)> {
         [
-            (Part::WaveGenerator, self.wave_generator),
-            (Part::Teeth, self.teeth),
-            (Part::Ring, self.ring),
-            (Part::Carrier, self.carrier),
+            (Part::WaveGenerator, &self.wave_generator),
+            (Part::Teeth, &self.teeth),
+            (Part::Ring, &self.ring),
+            (Part::Carrier, &self.carrier),
         ]
         .into_iter()
-        .flat_map(|(part, material)| {
-            [
-                (Parameter::YoungsModulus(part), material.youngs_modulus_gpa),
-                (Parameter::PoissonsRatio(part), material.poissons_ratio),
-            ]
-        })
     }
 
     /// The contact modulus E* of a contact: `1/E* = (1 - ν1²)/E1 + (1 - ν2²)/E2`.

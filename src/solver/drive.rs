@@ -2,9 +2,9 @@
 
 use std::f64::consts::{PI, SQRT_2};
 
-use crate::cam::{Cam, Ellipse, WaveGenerator};
+use crate::cam::{Cam, Ellipse, ToothCenter, WaveGenerator};
 use crate::contact::PerContact;
-use crate::locus::{Locus, ToothCenter};
+use crate::locus::Locus;
 use crate::position::{Position, half_lobe_rad};
 use crate::ring::{FlankLimit, RingFlank, RingTooth};
 use crate::root::{NotConverged, bracketed};

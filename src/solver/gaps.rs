@@ -3,11 +3,12 @@
 
 use std::f64::consts::PI;
 
+use crate::cam::ToothCenter;
 use crate::contact::PerContact;
-use crate::drive::Drive;
-use crate::locus::ToothCenter;
+use crate::drive::{Drive, DriveParameters};
+use crate::mesh::{Mesh, Place, greatest_common_divisor};
 use crate::ring::FlankPoint;
-use crate::violation::{Modified, Parameter, Violation};
+use crate::violation::{Listed, Modified, Parameter, Violation};
 
 const MM_PER_UM: f64 = 1e-3;
 const RAD_PER_ARCSEC: f64 = PI / 648_000.0;
@@ -74,69 +75,97 @@ pub struct Runout {
     pub angle_deg: f64,
 }
 
-/// Where a tooth is among the items of the parts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Place {
-    /// Its slot.
-    pub slot: u64,
-    /// The ring's space that it stands in.
-    pub ring_space: u64,
-    /// The lobe of the wave generator that pushes it.
-    pub lobe: u64,
-}
-
-impl Place {
-    /// Of the tooth that started `slot` slots from lobe 0 and is pushed by a lobe: `l = m i - s u`, modulo the ring's teeth.
-    pub fn new(drive: &Drive, slot: u64, lobe: u64) -> Self {
-        let p = drive.parameters();
-        // Counts of a checked drive are positive and small.
-        let spaces = i128::from(p.ring_teeth);
-        let turned = if p.teeth > p.ring_teeth { i128::from(lobe) } else { -i128::from(lobe) };
-        let ring_space = (i128::from(p.teeth / p.installed) * i128::from(slot) - turned).rem_euclid(spaces);
-        Self {
-            slot: slot % p.installed.unsigned_abs(),
-            // Between 0 and the count of spaces.
-            ring_space: u64::try_from(ring_space).unwrap_or(0),
-            lobe,
-        }
-    }
-}
-
 impl Deviations {
-    /// What of them cannot be for a drive.
-    pub(crate) fn violations(&self, drive: &Drive) -> Vec<Violation> {
-        let p = drive.parameters();
-        // Counts of a checked drive are positive and small.
-        let whole = |count: i64| usize::try_from(count).unwrap_or(0);
-        let (slots, spaces) = (whole(p.installed), whole(p.ring_teeth));
-        let lists = [
-            (&self.tooth_radius_um, slots),
-            (&self.slot_angle_arcsec, slots),
-            (&self.slot_wall_um, slots),
-            (&self.ring_space_um, spaces),
-            (&self.ring_space_angle_arcsec, spaces),
-            (&self.wave_generator_lobe_um, usize::try_from(drive.lobes()).unwrap_or(0)),
-        ];
-        let runouts = self.runout.iter().flat_map(|(_, runout)| [runout.amount_um, runout.angle_deg]);
-        let values = lists.iter().flat_map(|(list, _)| list.iter().copied()).chain(runouts);
-        let not_finite = values.into_iter().any(|value| !value.is_finite()).then_some(Violation::DeviationNotFinite);
-        let miscounted = lists.iter().filter(|(list, items)| !list.is_empty() && list.len() != *items);
-        let counts = miscounted.map(|(list, items)| Violation::DeviationCount { count: list.len(), items: *items });
-        counts.chain(not_finite).collect()
+    /// The lists, each with what it is of.
+    fn lists(&self) -> [(Listed, &[f64]); 6] {
+        [
+            (Listed::ToothRadius, &self.tooth_radius_um),
+            (Listed::SlotAngle, &self.slot_angle_arcsec),
+            (Listed::SlotWall, &self.slot_wall_um),
+            (Listed::RingSpace, &self.ring_space_um),
+            (Listed::RingSpaceAngle, &self.ring_space_angle_arcsec),
+            (Listed::WaveGeneratorLobe, &self.wave_generator_lobe_um),
+        ]
+    }
+
+    /// What of them cannot be: beside a drive of these parameters, as far as the numbers of its items can be.
+    pub fn violations(&self, drive: &DriveParameters) -> Vec<Violation> {
+        let mut violations = Vec::new();
+        for (listed, list) in self.lists() {
+            let (parameter, items) = match listed {
+                Listed::ToothRadius | Listed::SlotAngle | Listed::SlotWall => {
+                    (Parameter::InstalledTeeth, drive.installed)
+                }
+                Listed::RingSpace | Listed::RingSpaceAngle => (Parameter::RingTeeth, drive.ring_teeth),
+                Listed::WaveGeneratorLobe => (Parameter::Lobes, drive.wave_generator.lobes()),
+            };
+            let can_be = parameter.check(items as f64).is_none();
+            if let Some(items) = usize::try_from(items).ok().filter(|_| can_be)
+                && !list.is_empty()
+                && list.len() != items
+            {
+                violations.push(Violation::DeviationCount { listed, count: list.len(), items });
+            }
+            let entries = list.iter().enumerate();
+            violations.extend(entries.filter_map(|(entry, &value)| Parameter::Deviation(listed, entry).check(value)));
+        }
+        for (contact, &Runout { amount_um, angle_deg }) in self.runout.iter() {
+            violations.extend(Parameter::RunoutAmount(contact).check(amount_um));
+            violations.extend(Parameter::RunoutAngle(contact).check(angle_deg));
+        }
+        violations
     }
 
     /// Whether there are none: then zones are alike, and places do not matter.
     pub fn is_nil(&self) -> bool {
-        let lists = [
-            &self.tooth_radius_um,
-            &self.slot_angle_arcsec,
-            &self.slot_wall_um,
-            &self.ring_space_um,
-            &self.ring_space_angle_arcsec,
-            &self.wave_generator_lobe_um,
-        ];
-        lists.into_iter().flatten().all(|&value| value == 0.0)
-            && self.runout.iter().all(|(_, runout)| runout.amount_um == 0.0)
+        !(self.are_of_slots() || self.are_of_ring_spaces() || self.are_of_lobes())
+    }
+
+    fn are_of_slots(&self) -> bool {
+        any([&self.tooth_radius_um, &self.slot_angle_arcsec, &self.slot_wall_um]) || self.runout.carrier.is_any()
+    }
+
+    fn are_of_ring_spaces(&self) -> bool {
+        any([&self.ring_space_um, &self.ring_space_angle_arcsec]) || self.runout.ring.is_any()
+    }
+
+    fn are_of_lobes(&self) -> bool {
+        any([&self.wave_generator_lobe_um]) || self.runout.wave_generator.is_any()
+    }
+
+    /// The mesh of a drive with these deviations, over a sweep of as many load periods as it takes until the items that deviate meet again as
+    /// they did (docs/theory.md section 4.8).
+    pub fn mesh(&self, drive: &Drive) -> Mesh {
+        if self.is_nil() {
+            return Mesh::new(drive);
+        }
+        let p = drive.parameters();
+        // Counts of a checked drive are positive and small.
+        let whole = |count: i64| count.unsigned_abs();
+        let (lobes, teeth, slots, spaces) =
+            (u64::from(drive.lobes()), whole(p.teeth), whole(p.installed), whole(p.ring_teeth));
+        // The shift after which they meet again, in load periods: `items` over `alike`.
+        let (items, alike) = match (self.are_of_slots(), self.are_of_ring_spaces(), self.are_of_lobes()) {
+            (false, false, _) => (1, 1),
+            (true, false, false) => (slots, lobes),
+            (true, false, true) => (slots, 1),
+            (false, true, false) => (spaces, lobes),
+            (false, true, true) => (spaces, greatest_common_divisor(teeth / slots, lobes)),
+            (true, true, false) => (slots * spaces, lobes),
+            (true, true, true) => (slots * spaces, greatest_common_divisor(teeth, lobes)),
+        };
+        Mesh::of_items(drive, items / greatest_common_divisor(items, alike))
+    }
+}
+
+/// Whether any entry of some lists is not zero.
+fn any<const LISTS: usize>(lists: [&[f64]; LISTS]) -> bool {
+    lists.into_iter().flatten().any(|&value| value != 0.0)
+}
+
+impl Runout {
+    fn is_any(&self) -> bool {
+        self.amount_um != 0.0
     }
 }
 
@@ -194,6 +223,10 @@ impl Modification {
 
     /// The first of its numbers that opens or closes a gap.
     pub(crate) fn first(&self) -> Option<Parameter> {
+        // Asked at every tooth.
+        if *self == Self::NONE {
+            return None;
+        }
         let opens = |modified: &Modified| !matches!(modified, Modified::TipReliefStart | Modified::TipReliefPower);
         let parameters = self.parameters().into_iter();
         let mut set = parameters.filter(|(modified, value)| *value != 0.0 && opens(modified));
@@ -233,9 +266,10 @@ impl<'a> Gaps<'a> {
             && self.clearance_mm.iter().all(|(_, &gap_mm)| gap_mm == 0.0)
     }
 
-    /// Whether zones are unlike, so that all teeth of all zones share the load together.
-    pub const fn tell_zones_apart(&self) -> bool {
-        self.deviations.is_some()
+    /// The gap at each contact where it is the same for every tooth and position.
+    pub(crate) fn uniform_mm(&self) -> Option<&PerContact<f64>> {
+        let is_uniform = self.deviations.is_none() && self.modification.first().is_none();
+        is_uniform.then_some(&self.clearance_mm)
     }
 
     /// The gap at each contact of a tooth, along its normal; negative where a part is too full.

@@ -56,8 +56,9 @@ pub use cam::WaveGenerator;
 pub use contact::{Contact, ContactLaw, Material, Materials, Part, PerContact};
 pub use drive::{Drive, DriveParameters, ToothShape};
 pub use findings::Finding;
-pub use gaps::Modification;
+pub use gaps::{Deviations, Modification};
 pub use load_sharing::{Compatibility, LoadCase, LoadParameters, Torque};
+use mesh::Place;
 pub use position::Position;
 pub use violation::{Parameter, Violation};
 
@@ -109,13 +110,17 @@ pub enum SolveError {
     },
     /// A part that is too full: before any load a tooth would be pressed already.
     #[error(
-        "interference: the tooth in slot {slot}, {position_deg} deg from the major axis, has a total gap of {gap_um} µm along the wave generator's force; make the clearance larger than the deviations"
+        "interference: {tooth} {position_deg} deg from the middle of its lobe{at} has a total gap of {gap_um} µm along the wave generator's force",
+        tooth = .place.map_or_else(|| "a tooth".to_owned(), |place| format!("the tooth in slot {} on lobe {},", place.slot, place.lobe)),
+        at = .input_angle_deg.map_or_else(String::new, |input_angle_deg| format!(", at an input angle of {input_angle_deg} deg,"))
     )]
     Interference {
-        /// The tooth's slot.
-        slot: u64,
-        /// Where it stands.
+        /// Where the tooth is among the items, where these deviate.
+        place: Option<Place>,
+        /// Where it stands on its lobe.
         position_deg: f64,
+        /// The input angle, where one is looked at.
+        input_angle_deg: Option<f64>,
         /// Its total gap along `F_H`, below zero.
         gap_um: f64,
     },
@@ -159,6 +164,18 @@ pub enum SolveError {
     /// An iteration hit its cap.
     #[error(transparent)]
     NotConverged(#[from] root::NotConverged),
+}
+
+impl SolveError {
+    /// The same, of teeth that were looked at at an input angle.
+    pub(crate) fn at_input_angle(self, input_angle_deg: f64) -> Self {
+        match self {
+            Self::Interference { place, position_deg, gap_um, .. } => {
+                Self::Interference { place, position_deg, input_angle_deg: Some(input_angle_deg), gap_um }
+            }
+            other => other,
+        }
+    }
 }
 
 /// Asked now and then whether to go on; a computation that is told to stop returns [`SolveError::Stopped`].

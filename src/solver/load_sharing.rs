@@ -1,16 +1,16 @@
 //! Equilibrium of a tooth and compatibility of all of them at one input angle (docs/theory.md section 4).
 
-use crate::contact::{Contact, ContactLaw, HertzLine, Materials, PerContact, half_width_mm};
-use crate::drive::{Draft, Drive};
-use crate::gaps::{Deviations, Gaps, Modification, Place};
-use crate::locus::ToothCenter;
-use crate::mesh::Mesh;
+use crate::cam::ToothCenter;
+use crate::contact::{Contact, ContactLaw, HertzLine, Material, Materials, Part, PerContact, half_width_mm};
+use crate::drive::{Draft, Drive, DriveParameters};
+use crate::gaps::{Deviations, Gaps, Modification};
+use crate::mesh::{Mesh, Place};
 use crate::position::Position;
 use crate::ring::{FlankPoint, RingFlank, RingTooth};
 use crate::root::NotConverged;
 use crate::springs::{Rotation, Spring, Springs, WindUp};
 use crate::tooth::line::{WIDEST_SHARE, least_length_mm};
-use crate::tooth::{Contacts, Pressure, ToothContact, ToothSize};
+use crate::tooth::{Contacts, LineLaw, Pressure, ToothContact, ToothSize};
 use crate::violation::{Parameter, Violation};
 use crate::{SolveError, tooth};
 
@@ -65,6 +65,15 @@ impl LoadParameters {
         self.clearance_violations_in(sense, &ring)
     }
 
+    /// What of a drive's deviations cannot be, or not under this load.
+    pub fn deviation_violations(&self, drive: &DriveParameters, deviations: &Deviations) -> Vec<Violation> {
+        let mut violations = deviations.violations(drive);
+        if self.compatibility == Compatibility::Projection && !deviations.is_nil() {
+            violations.push(Violation::NeedsVirtualWork { parameter: Parameter::Deviations });
+        }
+        violations
+    }
+
     /// What `projection` does not take: its weights are not those of the work done, and may be negative.
     fn what_needs_virtual_work(&self) -> impl Iterator<Item = Parameter> {
         let law = (!self.law.is_of_projection()).then_some(Parameter::Law);
@@ -104,7 +113,13 @@ impl LoadCase {
             Torque::Input(value) => (Parameter::InputTorque, value),
             Torque::Output(value) => (Parameter::OutputTorque, value),
         };
-        let mut values: Vec<_> = parameters.materials.parameters().collect();
+        let of_material = |(part, material): (Part, &Material)| {
+            [
+                (Parameter::YoungsModulus(part), material.youngs_modulus_gpa),
+                (Parameter::PoissonsRatio(part), material.poissons_ratio),
+            ]
+        };
+        let mut values: Vec<_> = parameters.materials.iter().flat_map(of_material).collect();
         values.push(torque);
         values.extend(parameters.law.parameters());
         let series = parameters.series_compliance_mm_per_n.iter();
@@ -213,6 +228,7 @@ impl AsRef<Spring> for ToothState {
 #[derive(Debug, Clone, Copy)]
 pub struct LoadedDrive<'a> {
     drive: &'a Drive,
+    mesh: Mesh,
     compatibility: Compatibility,
     /// What a sum over the teeth that are listed is multiplied by, to be that over all.
     zones: f64,
@@ -264,9 +280,10 @@ impl<'a> LoadedDrive<'a> {
         let size = ToothSize { radius_mm: drive.parameters().tooth_radius_mm, width_mm: drive.tooth_width_mm() };
         let contacts = Contacts::new(shape, &p.law, &p.materials, size, &p.series_compliance_mm_per_n)
             .ok_or_else(|| SolveError::Impossible(vec![Violation::LawOfOtherTeeth]))?;
-        let mesh = Mesh::new(drive);
+        let mesh = deviations.map_or_else(|| Mesh::new(drive), |deviations| deviations.mesh(drive));
         let loaded = Self {
             drive,
+            mesh,
             compatibility: p.compatibility,
             zones: mesh.zones_in_torque(),
             input_torque_nmm: 1e3 * load.input_torque_nm(drive),
@@ -276,12 +293,8 @@ impl<'a> LoadedDrive<'a> {
         };
         let mut violations = p.clearance_violations_in(drive.sense(), drive.ring_tooth())?;
         violations.extend(p.modification.violation_in(drive));
-        if let Some(deviations) = deviations {
-            violations.extend(deviations.violations(drive));
-            if loaded.gaps.tell_zones_apart() && p.compatibility == Compatibility::Projection {
-                violations.push(Violation::NeedsVirtualWork { parameter: Parameter::Deviations });
-            }
-        }
+        let of_deviations = deviations.map(|deviations| p.deviation_violations(drive.parameters(), deviations));
+        violations.extend(of_deviations.into_iter().flatten());
         if !violations.is_empty() {
             return Err(SolveError::Impossible(violations));
         }
@@ -319,14 +332,29 @@ impl<'a> LoadedDrive<'a> {
         self.drive
     }
 
+    /// Its mesh, in which items that deviate are told apart.
+    pub const fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
     /// The form of compatibility.
     pub const fn compatibility(&self) -> Compatibility {
         self.compatibility
     }
 
-    /// `1/k` of each contact, where the law is linear and no contact has a gap: where unit loads only have to be scaled.
-    pub(crate) fn linear_compliance_mm_per_n(&self) -> Option<PerContact<f64>> {
-        self.contacts.linear_compliance_mm_per_n().filter(|_| self.gaps.is_nil())
+    /// Whether the law is linear and no contact has a gap: where unit loads only have to be scaled.
+    pub(crate) fn is_linear(&self) -> bool {
+        matches!(self.line_law(), Some(LineLaw::Linear { .. })) && self.gaps.is_nil()
+    }
+
+    /// The law of cylinders, for whoever works in columns.
+    pub(crate) fn line_law(&self) -> Option<LineLaw> {
+        self.contacts.line_law()
+    }
+
+    /// The gap at each contact where it is the same for every tooth and position.
+    pub(crate) fn uniform_gap_mm(&self) -> Option<&PerContact<f64>> {
+        self.gaps.uniform_mm()
     }
 
     /// Hertz stress of a contact.
@@ -388,7 +416,9 @@ impl<'a> LoadedDrive<'a> {
             // The weights of clearances under `projection` were looked at before: what is left of them is rounding.
             if gap_mm < 0.0 && self.compatibility == Compatibility::VirtualWork {
                 let position_deg = center.position.from_lobe_deg();
-                return Err(SolveError::Interference { slot: place.slot, position_deg, gap_um: 1e3 * gap_mm });
+                let place = self.mesh.tells_items_apart().then_some(*place);
+                let gap_um = 1e3 * gap_mm;
+                return Err(SolveError::Interference { place, position_deg, input_angle_deg: None, gap_um });
             }
             Some(gap_mm)
         };
@@ -430,7 +460,7 @@ impl<'a> LoadedDrive<'a> {
 
     /// The teeth of one zone, which stands for all; of all of them where zones are unlike.
     fn springs<'s>(&self, teeth: &'s [ToothState]) -> Springs<'s, ToothState> {
-        Springs::new(teeth, if self.gaps.tell_zones_apart() { 1.0 } else { self.zones })
+        Springs::new(teeth, self.zones)
     }
 
     /// The `Δφ` that balances the input torque over these teeth of one zone, or of all where zones are unlike.

@@ -1,6 +1,6 @@
 //! A tooth's centre over its position ψ (docs/theory.md section 2).
 
-use crate::cam::{Cam, CamContact, CamPoint};
+use crate::cam::{Cam, CamPoint, ToothCenter};
 use crate::position::{Position, half_lobe_rad};
 use crate::root::NotConverged;
 
@@ -9,55 +9,6 @@ use crate::root::NotConverged;
 pub struct Locus {
     cam: Cam,
     tooth_radius_mm: f64,
-}
-
-/// A tooth at one position. Mesh, ring and load follow from `d`, `T` and `T_ψ` alone.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ToothCenter {
-    /// Where it is.
-    pub position: Position,
-    /// Where it touches the cam.
-    pub cam_contact: CamContact,
-    /// `d`: distance of its centre from the axis.
-    pub center_radius_mm: f64,
-    /// `T = tan γ = |h'|/(h + r)`, γ the pressure angle at the wave generator.
-    pub tan_pressure_angle: f64,
-    /// `T_ψ = dT/dψ`.
-    pub tan_pressure_angle_derivative: f64,
-}
-
-impl ToothCenter {
-    /// On a cam that is known by its support function: `d² = (h + r)² + h'²`, `T_ψ = (1 + T²)(T |h'| - h'')/(r + ρ_H)`.
-    pub(crate) fn by_support(
-        position: Position,
-        tooth_radius_mm: f64,
-        cam_contact: CamContact,
-        cam_curvature_radius_mm: f64,
-        support_second_derivative_mm: f64,
-    ) -> Self {
-        let lever_arm_mm = cam_contact.lever_arm_mm;
-        let offset_support_mm = cam_contact.support_mm + tooth_radius_mm;
-        let t = lever_arm_mm / offset_support_mm;
-        Self {
-            position,
-            cam_contact,
-            center_radius_mm: offset_support_mm.hypot(lever_arm_mm),
-            tan_pressure_angle: t,
-            tan_pressure_angle_derivative: (1.0 + t * t) * (t * lever_arm_mm - support_second_derivative_mm)
-                / (tooth_radius_mm + cam_curvature_radius_mm),
-        }
-    }
-
-    /// cos γ.
-    pub fn cos_pressure_angle(&self) -> f64 {
-        let t = self.tan_pressure_angle;
-        1.0 / (1.0 + t * t).sqrt()
-    }
-
-    /// `φ = ψ + γ`: angle of the contact normal at the cam, from the lobe.
-    pub fn normal_rad(&self) -> f64 {
-        self.position.from_lobe_rad + self.tan_pressure_angle.atan()
-    }
 }
 
 impl Locus {

@@ -14,9 +14,9 @@ pub mod wear;
 
 use std::f64::consts::PI;
 
+use crate::cam::ToothCenter;
 use crate::contact::{Contact, PerContact};
 use crate::drive::{Drive, ToothShape};
-use crate::locus::ToothCenter;
 use crate::mesh::greatest_common_divisor;
 use crate::ring::FlankPoint;
 use crate::violation::{Parameter, Violation};
@@ -39,6 +39,8 @@ pub struct Mechanism {
     /// `R_race`: speed of a race along the cam over its turning: `R0` of a harmonic cam and an eccentric, `(a + b)/2` of an ellipse,
     /// `R - r` of a harmonic path.
     pub race_radius_mm: f64,
+    /// Whether items deviate, so that all teeth are listed and no two lobes are loaded alike.
+    pub tells_items_apart: bool,
 }
 
 /// A tooth in mesh and what it bears.
@@ -183,7 +185,7 @@ pub struct FirstOrderError {
 }
 
 impl Mechanism {
-    /// That of a drive.
+    /// That of a drive whose items are all alike.
     pub fn of(drive: &Drive) -> Self {
         let p = drive.parameters();
         // Counts of a checked drive are positive and small.
@@ -196,12 +198,13 @@ impl Mechanism {
             tooth_radius_mm: p.tooth_radius_mm,
             tooth_spins: !matches!(p.tooth, ToothShape::FlatSided { .. }),
             race_radius_mm: p.wave_generator.race_radius_mm(p.tooth_radius_mm),
+            tells_items_apart: false,
         }
     }
 
-    /// `g = gcd(U, Z'_G)`: so many lobes are loaded alike.
+    /// `g = gcd(U, Z'_G)`: so many lobes are loaded alike; none like another where items deviate.
     pub fn lobes_loaded_alike(&self) -> u64 {
-        greatest_common_divisor(self.lobes.into(), self.installed.into())
+        if self.tells_items_apart { 1 } else { greatest_common_divisor(self.lobes.into(), self.installed.into()) }
     }
 
     /// `k = Z_K/U`.
@@ -216,7 +219,30 @@ impl Mechanism {
 
     /// What the sum over the listed teeth is to be multiplied by: zones that are alike are listed once.
     pub fn zones_in_torque(&self) -> f64 {
-        if self.installed.is_multiple_of(self.lobes) { f64::from(self.lobes) } else { 1.0 }
+        let is_one_zone = !self.tells_items_apart && self.installed.is_multiple_of(self.lobes);
+        if is_one_zone { f64::from(self.lobes) } else { 1.0 }
+    }
+
+    /// Speed of the driving member over that of the driven one, both against the fixed one; losses neglected also the torque that is taken off
+    /// over the torque that drives: `s Z_G/U`, `-s Z_K/U`, `Z_G/Z_K`.
+    pub fn speed_ratio(&self, fixed: Fixed) -> f64 {
+        let over = |one: u32, other: u32| f64::from(one) / f64::from(other);
+        match fixed {
+            Fixed::Ring => self.sense() * over(self.teeth, self.lobes),
+            Fixed::Carrier => -self.sense() * over(self.ring_teeth, self.lobes),
+            Fixed::WaveGenerator => over(self.teeth, self.ring_teeth),
+        }
+    }
+
+    /// The torque that holds the fixed member over the torque that drives, in its sense where positive: what is taken off less what is put in.
+    pub fn holding_torque_ratio(&self, fixed: Fixed) -> f64 {
+        // As whole numbers of teeth, so that nothing cancels.
+        let over = |one: u32, other: u32| f64::from(one) / f64::from(other);
+        match fixed {
+            Fixed::Ring => self.sense() * over(self.ring_teeth, self.lobes),
+            Fixed::Carrier => -self.sense() * over(self.teeth, self.lobes),
+            Fixed::WaveGenerator => self.sense() * over(self.lobes, self.ring_teeth),
+        }
     }
 
     /// The loss over the power at the driven end, `ℓ`, from the loss ratio ν: `ν Z_K/Z_G`, `ν`, `ν U/Z_G`.

@@ -33,17 +33,22 @@ impl Samples {
 /// over one period that is the whole fraction `q/(U N Z'_G)` of a turn, `q = U (iN - n) - u N Z'_G` for the lobe u: which teeth mesh is
 /// decided in whole numbers.
 ///
-/// Where `U` divides `Z'_G` the zones are alike and one of them stands for all; its teeth are numbered on, past the last slot. Elsewhere
-/// the teeth of all zones are listed, by slot. With `g = gcd(U, Z'_G)` they stand at places `2π g/(U Z'_G)` apart, g at each.
+/// Where `U` divides `Z'_G` the zones are alike and one of them stands for all; its teeth are numbered on, past the last slot. Elsewhere,
+/// and wherever single items deviate, the teeth of all zones are listed, by slot. With `g = gcd(U, Z'_G)` they stand at places
+/// `2π g/(U Z'_G)` apart, g at each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mesh {
     installed: u64,
     removal: u64,
     ring_teeth: u64,
+    /// Whether the carrier has more teeth than the ring.
+    is_forward: bool,
     lobes: u32,
     limit: FlankLimit,
     /// `ε/g`, rounded once: whoever asks when a tooth enters asks this number, and takes it as exact.
     engaged_spacings: f64,
+    /// Load periods after which single items meet again as they did; none where all items are alike.
+    told_apart: Option<u64>,
 }
 
 /// How many teeth mesh, over the input angle: of a zone where all are alike, of all zones elsewhere.
@@ -55,6 +60,25 @@ pub struct TeethInMesh {
     pub max: u64,
 }
 
+/// Where a tooth is among the items of the parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Place {
+    /// Its slot.
+    pub slot: u64,
+    /// The ring's space that it stands in.
+    pub ring_space: u64,
+    /// The lobe of the wave generator that pushes it.
+    pub lobe: u64,
+}
+
+impl Place {
+    /// Of the tooth that started `slot` slots from lobe 0 and is pushed by the lobe that is so many behind it: `l = m i - s u`, modulo the ring's
+    /// teeth.
+    pub fn new(drive: &Drive, slot: u64, lobe: u64) -> Self {
+        Mesh::new(drive).place(slot, lobe)
+    }
+}
+
 /// A tooth in mesh at an input angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlacedTooth {
@@ -62,6 +86,8 @@ pub struct PlacedTooth {
     pub number: u64,
     /// The lobe that it is on, counted from the one where tooth 0 stands at the start.
     pub lobe: u32,
+    /// Where it is among the items that may deviate.
+    pub place: Place,
     /// Where it stands on it.
     pub position: Position,
     /// The same in degrees, rounded once where it is a whole fraction of a turn.
@@ -77,7 +103,7 @@ pub(crate) const fn greatest_common_divisor(one: u64, other: u64) -> u64 {
 }
 
 impl Mesh {
-    /// The mesh of a drive.
+    /// The mesh of a drive whose items are all alike.
     pub fn new(drive: &Drive) -> Self {
         let p = drive.parameters();
         // Counts of a checked drive are positive and small.
@@ -89,10 +115,27 @@ impl Mesh {
             installed,
             removal: whole(p.teeth / p.installed),
             ring_teeth: whole(p.ring_teeth),
+            is_forward: p.teeth > p.ring_teeth,
             lobes: drive.lobes(),
             limit,
             engaged_spacings: engaged_spacings(&limit, 0.5 * installed as f64 / alike as f64, places),
+            told_apart: None,
         }
+    }
+
+    /// The mesh of a drive in which single items deviate, which meet again as they did after so many load periods.
+    pub fn of_items(drive: &Drive, load_periods: u64) -> Self {
+        Self { told_apart: Some(load_periods), ..Self::new(drive) }
+    }
+
+    /// Whether single items are told apart, since they deviate.
+    pub const fn tells_items_apart(&self) -> bool {
+        self.told_apart.is_some()
+    }
+
+    /// How many load periods a sweep has.
+    pub fn load_periods(&self) -> u64 {
+        self.told_apart.unwrap_or(1)
     }
 
     /// Where and why the flank ends.
@@ -110,9 +153,9 @@ impl Mesh {
         greatest_common_divisor(self.lobes(), self.installed)
     }
 
-    /// Whether each zone looks like every other: `U` divides `Z'_G`.
+    /// Whether each zone looks like every other: `U` divides `Z'_G`, and all items are alike.
     pub fn zones_are_alike(&self) -> bool {
-        self.installed.is_multiple_of(self.lobes())
+        !self.tells_items_apart() && self.installed.is_multiple_of(self.lobes())
     }
 
     /// What the sum over the teeth listed has to be multiplied by to be that over all teeth.
@@ -135,9 +178,14 @@ impl Mesh {
         self.teeth_at_each_place() * self.engaged_spacings
     }
 
-    /// The input angle after which the load pattern repeats, teeth renumbered: `2π m/Z_K`, m = Z_G/Z'_G.
+    /// The input angle after which the load pattern repeats, teeth renumbered: `2π m/Z_K`, m = Z_G/Z'_G. Where items deviate only their places repeat.
     pub fn period_deg(&self) -> f64 {
         360.0 * self.removal as f64 / self.ring_teeth as f64
+    }
+
+    /// The input angle that a sweep goes over: one load period, where items deviate so many as it takes until they meet again as they did.
+    pub fn sweep_period_deg(&self) -> f64 {
+        360.0 * (self.removal * self.load_periods()) as f64 / self.ring_teeth as f64
     }
 
     /// Places of a whole turn: `U Z'_G/g`.
@@ -193,7 +241,13 @@ impl Mesh {
         // The steps that occur, `U p` modulo `N Z'_G`, are the multiples of their greatest common divisor, each as many times.
         let last_step = self.last_listed_step(samples);
         let alike = greatest_common_divisor(self.lobes(), self.steps(samples));
-        alike * (last_step / alike) + self.lobes_loaded_alike() * (last_step / (self.lobes_loaded_alike() * samples.0))
+        let at_end = self.lobes_loaded_alike() * (last_step / (self.lobes_loaded_alike() * samples.0));
+        self.load_periods().saturating_mul(alike * (last_step / alike)).saturating_add(at_end)
+    }
+
+    /// The last sample of a sweep.
+    pub fn last_sample(&self, samples: Samples) -> u64 {
+        self.load_periods().saturating_mul(samples.0)
     }
 
     /// The largest q in mesh.
@@ -203,23 +257,47 @@ impl Mesh {
 
     /// The teeth that are listed at sample `sample`, at most the last.
     pub fn placed_at(self, sample: u64, samples: Samples) -> impl Iterator<Item = PlacedTooth> {
-        let sample = sample.min(samples.0);
+        let sample = sample.min(self.last_sample(samples));
         let is_one_zone = self.zones_are_alike();
         let numbers = if is_one_zone { self.teeth_at(sample, samples) } else { 0..=self.installed - 1 };
         let last_step = self.last_listed_step(samples);
         let (lobes, steps) = (self.lobes(), self.steps(samples));
+        // Turns ahead, so that nothing falls below zero: the tooth in slot 0 soon stands behind the lobe where it began.
+        let turns = 1 + sample / steps;
         numbers.filter_map(move |number| {
-            // A turn ahead, so that nothing falls below zero: the tooth in slot 0 soon stands behind the lobe where it began.
-            let ahead = lobes * (number * samples.0 + steps - sample);
+            let ahead = lobes * (number * samples.0 + turns * steps - sample);
             let lobe = (ahead - 1) / steps;
             let step = ahead - lobe * steps;
             (is_one_zone || step <= last_step).then(|| PlacedTooth {
                 number,
                 lobe: u32::try_from(lobe % lobes).unwrap_or_default(),
+                place: self.place(number + turns * self.installed, lobe),
                 position: Position::of_lobe(step, steps, self.lobes),
                 position_deg: (360 * step) as f64 / (lobes * steps) as f64,
             })
         })
+    }
+
+    /// Where the tooth is that started so many slots from lobe 0, counted on over turns of the carrier, as the lobe that pushes it is.
+    fn place(&self, slot: u64, lobe: u64) -> Place {
+        let spaces = self.removal * slot % self.ring_teeth;
+        let turned = lobe % self.ring_teeth;
+        let ring_space = if self.is_forward { spaces + self.ring_teeth - turned } else { spaces + turned };
+        Place { slot: slot % self.installed, ring_space: ring_space % self.ring_teeth, lobe: lobe % self.lobes() }
+    }
+
+    /// Where the tooth is that stands at a position on a lobe: its slot is a whole number, which rounding does not reach.
+    pub(crate) fn place_at(&self, input_angle_deg: f64, lobe: u32, position_deg: f64) -> Place {
+        let from_lobe_0 = position_deg / 360.0 + f64::from(lobe) / f64::from(self.lobes);
+        let slots_passed = input_angle_deg / self.period_deg();
+        let slot = (from_lobe_0 * self.installed as f64 + slots_passed).round();
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "whole, not negative, far below 2^53"
+        )]
+        let slot = slot as u64;
+        self.place(slot, u64::from(lobe))
     }
 
     /// The teeth in mesh at sample `sample`, at most the last, by number, where zones are alike.
@@ -251,9 +329,9 @@ impl Mesh {
         Position::of_lobe(self.lobes() * (tooth * samples.0 - sample), self.steps(samples), self.lobes)
     }
 
-    /// How many times the pattern of places repeats in a period: `U/g`, once where zones are alike.
+    /// How many times the pattern of places repeats in a sweep: `U/g` in each load period, once where zones are alike.
     pub(crate) fn laps(&self) -> u64 {
-        self.lobes() / self.lobes_loaded_alike()
+        self.lobes() / self.lobes_loaded_alike() * self.load_periods()
     }
 
     /// How many spacings the engagement spans, `ε/g`.
@@ -290,19 +368,22 @@ impl Mesh {
         let is_one_zone = self.zones_are_alike();
         let numbers = if is_one_zone { places.clone() } else { 0..=self.installed - 1 };
         let (lobes, alike, turn) = (self.lobes(), self.lobes_loaded_alike(), self.installed);
+        let turns = 1 + alike * lap / (lobes * turn);
         numbers.filter_map(move |number| {
-            let (place, lobe) = if is_one_zone {
-                (number, 0)
+            let (place, slot, lobe) = if is_one_zone {
+                (number, number, 0)
             } else {
-                // `U i - g lap = g place + u Z'_G`, a turn ahead.
-                let ahead = lobes * (number + turn) - alike * lap;
+                // `U i - g lap = g place + u Z'_G`, turns ahead.
+                let slot = number + turns * turn;
+                let ahead = lobes * slot - alike * lap;
                 let lobe = (ahead - 1) / turn;
-                ((ahead - lobe * turn) / alike, lobe % lobes)
+                ((ahead - lobe * turn) / alike, slot, lobe)
             };
             places.contains(&place).then(|| {
                 let position = position(place);
-                let lobe = u32::try_from(lobe).unwrap_or_default();
-                PlacedTooth { number, lobe, position, position_deg: position.from_lobe_deg() }
+                let place = self.place(slot, lobe);
+                let lobe = u32::try_from(place.lobe).unwrap_or_default();
+                PlacedTooth { number, lobe, place, position, position_deg: position.from_lobe_deg() }
             })
         })
     }

@@ -3,7 +3,8 @@
 
 use nalgebra::{Point2, Unit, Vector2};
 
-use crate::locus::{Locus, ToothCenter};
+use crate::cam::ToothCenter;
+use crate::locus::Locus;
 use crate::position::{Position, half_lobe_rad};
 use crate::root::{NotConverged, bracketed};
 

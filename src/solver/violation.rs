@@ -57,8 +57,16 @@ pub enum Parameter {
     Clearance(Contact),
     /// A number of the modification.
     Modification(Modified),
-    /// A list of the deviations that has neither no entry nor one for each item.
+    /// The deviations.
     Deviations,
+    /// A list of the deviations.
+    DeviationList(Listed),
+    /// An entry of a list of the deviations, counted from 0.
+    Deviation(Listed, usize),
+    /// How far a part stands off the axis, µm.
+    RunoutAmount(Contact),
+    /// In which direction, deg.
+    RunoutAngle(Contact),
     /// Allowable contact stress, MPa.
     AllowableStress,
     /// `n`: speed of the wave generator, 1/min.
@@ -116,6 +124,23 @@ pub enum Modified {
     TipReliefStart,
     /// Its power.
     TipReliefPower,
+}
+
+/// What a list of the deviations is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Listed {
+    /// Teeth thinner in their radius, by slot, µm.
+    ToothRadius,
+    /// Slots turned away, arcsec.
+    SlotAngle,
+    /// Slots' walls set back, µm.
+    SlotWall,
+    /// Ring spaces set back, µm.
+    RingSpace,
+    /// Ring spaces turned away, arcsec.
+    RingSpaceAngle,
+    /// Lobes of the wave generator set back, µm.
+    WaveGeneratorLobe,
 }
 
 /// The range of a parameter and its unit.
@@ -185,8 +210,16 @@ impl Parameter {
             // As soft as the least stiffness, and nothing.
             Self::SeriesCompliance(_) => Range::closed(0.0, 1e3, "mm/N"),
             // A choice and lists, which have no number.
-            Self::Law | Self::Deviations => Range::closed(f64::NEG_INFINITY, f64::INFINITY, ""),
-            Self::Clearance(_) | Self::PartClearance(_) => Range::closed(0.0, 1e6, "µm"),
+            Self::Law | Self::Deviations | Self::DeviationList(_) => {
+                Range::closed(f64::NEG_INFINITY, f64::INFINITY, "")
+            }
+            Self::Clearance(_) | Self::PartClearance(_) | Self::RunoutAmount(_) => Range::closed(0.0, 1e6, "µm"),
+            Self::RunoutAngle(_) => Range::closed(-360.0, 360.0, "deg"),
+            Self::Deviation(Listed::SlotAngle | Listed::RingSpaceAngle, _) => Range::closed(-1e5, 1e5, "arcsec"),
+            Self::Deviation(
+                Listed::ToothRadius | Listed::SlotWall | Listed::RingSpace | Listed::WaveGeneratorLobe,
+                _,
+            ) => Range::closed(-1e6, 1e6, "µm"),
             Self::Modification(modified) => match modified {
                 Modified::RingRotation | Modified::CarrierRotation => Range::closed(-1e5, 1e5, "arcsec"),
                 // A single lobe has its valley at the end.
@@ -372,13 +405,13 @@ pub enum Violation {
     },
     /// A list of deviations that has neither no entry nor one for each item.
     DeviationCount {
+        /// Which list.
+        listed: Listed,
         /// Entries.
         count: usize,
         /// Items.
         items: usize,
     },
-    /// A deviation that is no finite number.
-    DeviationNotFinite,
     /// A contact law that teeth of this shape do not have.
     LawOfOtherTeeth,
     /// The bore takes the whole flank away.
@@ -496,10 +529,9 @@ impl std::fmt::Display for Violation {
                 f,
                 "a tip relief from {start_deg:?} deg on relieves nothing: the flank ends at {engagement_start_deg:?} deg"
             ),
-            Self::DeviationCount { count, items } => {
+            Self::DeviationCount { count, items, .. } => {
                 write!(f, "{count} entries for {items} items: give one for each, or none")
             }
-            Self::DeviationNotFinite => write!(f, "a deviation is no finite number"),
             Self::LawOfOtherTeeth => write!(
                 f,
                 "balls take `hertz` or `fixed`, and `hertz` is nowhere else: choose a law that teeth of this shape have"

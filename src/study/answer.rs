@@ -18,7 +18,7 @@ pub enum StudyAnswer {
     /// Of a map.
     Map(MapAnswer),
     /// Of a search.
-    Search(SearchAnswer),
+    Search(Box<SearchAnswer>),
     /// Of a sensitivity.
     Sensitivity(SensitivityAnswer),
     /// Of a tolerance study.

@@ -29,7 +29,6 @@ const fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     counter
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "the upper half")]
 const fn high(product: u64) -> u32 {
     (product >> 32) as u32
 }

@@ -421,7 +421,8 @@ impl Gathered {
                     Part::Island(island) => Some(island),
                     Part::Rows(_) => None,
                 });
-                StudyAnswer::Search(SearchAnswer::new(search, &study.template, evaluator, islands, is_complete))
+                let answer = SearchAnswer::new(search, &study.template, evaluator, islands, is_complete);
+                StudyAnswer::Search(Box::new(answer))
             }
             Kind::Sensitivity(sensitivity) => {
                 let answer = SensitivityAnswer::new(sensitivity, evaluator, &self.rows(), is_complete);

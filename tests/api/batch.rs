@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use toothwave::config::Limits;
 
 use crate::asking::{Answer, LIMITS, Listening, Occupied, Question, Service, ask_at, until};
-use crate::designs::{shortest, undercut, with};
+use crate::designs::{of_the_paper, shortest, undercut, with};
 
 fn question(query: &str, body: impl Into<Vec<u8>>) -> Question {
     Question::post_as("application/x-ndjson", &format!("/v1/batch{query}"), body)
@@ -30,7 +30,7 @@ fn lines(answer: &Answer) -> Vec<Value> {
 
 /// Case 5.1 with another torque for each index, so that every answer tells whose it is.
 fn variant(index: u64) -> Value {
-    with(&shortest(), "/load/input_torque_nm", json!(20.0 + index as f64))
+    with(&with(&shortest(), "/model", of_the_paper()), "/load/input_torque_nm", json!(20.0 + index as f64))
 }
 
 #[tokio::test]

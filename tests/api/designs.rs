@@ -19,7 +19,12 @@ pub(crate) const CONTRACT: &str = r#"{
   "profile": { "chord_tolerance_mm": 0.001, "extent": "tooth" }
 }"#;
 
-/// The paper's case 5.1 with every default spelled out.
+/// The paper's model of load sharing, which a document has to name.
+pub(crate) fn of_the_paper() -> Value {
+    json!({ "compatibility": "projection", "stiffness": { "law": "linear" } })
+}
+
+/// The paper's case 5.1 by the paper's model, every other field spelled out as it is by default.
 pub(crate) fn spelled_out() -> Value {
     let steel = json!({ "youngs_modulus_gpa": 210.0, "poissons_ratio": 0.3 });
     json!({
@@ -30,10 +35,15 @@ pub(crate) fn spelled_out() -> Value {
         },
         "materials": { "wave_generator": steel, "teeth": steel, "ring": steel, "carrier": steel },
         "load": { "input_torque_nm": 20.0 },
-        "model": { "compatibility": "projection", "stiffness": { "law": "linear" } },
+        "model": of_the_paper(),
         "sweep": { "samples": 50 },
         "profile": { "chord_tolerance_mm": 0.001, "extent": "tooth" }
     })
+}
+
+/// The same with every default spelled out, the model's too.
+pub(crate) fn defaults_spelled_out() -> Value {
+    with(&spelled_out(), "/model", json!({ "compatibility": "virtual_work", "stiffness": { "law": "johnson" } }))
 }
 
 /// The paper's case 5.1 with nothing said that need not be said.
@@ -97,12 +107,16 @@ fn split(pointer: &str) -> (&str, &str) {
     pointer.rsplit_once('/').expect("a pointer to a field")
 }
 
-/// The document with the field set; the object that holds it is there already.
+/// The document with the field or the entry set; the object or the list that holds it is there already.
 pub(crate) fn with(document: &Value, pointer: &str, value: Value) -> Value {
     if pointer.is_empty() {
         return value;
     }
     let mut document = document.clone();
+    if let Some(entry) = document.pointer_mut(pointer) {
+        *entry = value;
+        return document;
+    }
     let (object, field) = split(pointer);
     let object = document.pointer_mut(object).and_then(Value::as_object_mut);
     object.unwrap_or_else(|| panic!("nothing holds {pointer}")).insert(field.into(), value);

@@ -4,7 +4,8 @@ use serde_json::{Value, json};
 
 use crate::asking::{Answer, ENDPOINTS, Service};
 use crate::designs::{
-    self, every_number, fixed, in_reverse, pointers, shortest, spelled_out, with, with_twice, without,
+    self, defaults_spelled_out, every_number, fixed, in_reverse, of_the_paper, pointers, shortest, spelled_out, with,
+    with_twice, without,
 };
 
 /// That the text is the same question as the document, whose answer the service has already.
@@ -48,8 +49,8 @@ fn defaults() -> Vec<(&'static str, Value)> {
         ("/materials/carrier", json!({ "youngs_modulus_gpa": 70.0 })),
         ("/materials/carrier/youngs_modulus_gpa", json!(70.0)),
         ("/materials/carrier/poissons_ratio", json!(0.25)),
-        ("/model", json!({ "compatibility": "virtual_work" })),
-        ("/model/compatibility", json!("virtual_work")),
+        ("/model", json!({ "compatibility": "projection" })),
+        ("/model/compatibility", json!("projection")),
         ("/model/stiffness", fixed(4e5, 5e5, 3e5)),
         ("/sweep", json!({ "samples": 51 })),
         ("/sweep/samples", json!(51)),
@@ -61,7 +62,7 @@ fn defaults() -> Vec<(&'static str, Value)> {
 
 #[tokio::test]
 async fn each_field_left_out_means_its_default() {
-    let document = spelled_out();
+    let document = defaults_spelled_out();
     let fields = defaults().into_iter().map(|(pointer, _)| pointer);
     let shortened = fields.map(|pointer| without(&document, pointer).to_string());
     assert_all_same(&document, shortened).await;
@@ -72,17 +73,56 @@ async fn everything_optional_left_out_at_once_means_all_defaults() {
     let empty =
         ["/materials", "/model", "/sweep", "/profile"].map(|pointer| with(&shortest(), pointer, json!({})).to_string());
     let nulled = with(&shortest(), "/drive/ring/tip_radius_mm", Value::Null).to_string();
-    assert_all_same(&spelled_out(), [shortest().to_string(), nulled].into_iter().chain(empty)).await;
+    assert_all_same(&defaults_spelled_out(), [shortest().to_string(), nulled].into_iter().chain(empty)).await;
+}
+
+#[tokio::test]
+async fn beside_projection_a_missing_stiffness_means_linear() {
+    let named = with(&shortest(), "/model", of_the_paper());
+    let left_out = with(&shortest(), "/model", json!({ "compatibility": "projection" }));
+    assert_all_same(&named, [left_out.to_string()]).await;
+}
+
+#[tokio::test]
+async fn balls_need_no_model_and_mean_virtual_work_and_hertz() {
+    let balls = with(&shortest(), "/drive/teeth", json!({ "shape": "ball", "count": 28, "radius_mm": 5.0 }));
+    let named = with(&balls, "/model", json!({ "compatibility": "virtual_work", "stiffness": { "law": "hertz" } }));
+    assert_all_same(&named, [balls.to_string()]).await;
+}
+
+#[tokio::test]
+async fn projection_takes_no_logarithmic_law_no_balls_law_and_no_series_compliance() {
+    let model = |more: Value| {
+        let mut model = json!({ "compatibility": "projection" });
+        model.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        with(&shortest(), "/model", model)
+    };
+    let balls = with(&model(json!({})), "/drive/teeth", json!({ "shape": "ball", "count": 28, "radius_mm": 5.0 }));
+    for (document, pointer) in [
+        (model(json!({ "stiffness": { "law": "johnson" } })), "/model/stiffness/law"),
+        (balls, "/model/stiffness/law"),
+        (model(json!({ "series_compliance_mm_per_n": { "ring": 1e-6 } })), "/model/series_compliance_mm_per_n/ring"),
+    ] {
+        for path in ["/v1/sweep", "/v1/accuracy"] {
+            let problem = Service::new().post(path, &document).await.refused(422, "impossible_design");
+            assert_eq!(problem["errors"][0]["pointer"], pointer, "{problem}");
+        }
+    }
+    for law in [json!({ "law": "linear" }), json!({ "law": "palmgren" }), fixed(4e5, 5e5, 3e5)] {
+        Service::new().post("/v1/sweep", &model(json!({ "stiffness": law }))).await.found();
+    }
 }
 
 #[tokio::test]
 async fn a_value_other_than_the_default_is_another_question_to_some_endpoint() {
+    // Beside a law that it does not take `projection` would be refused.
+    let document = without(&defaults_spelled_out(), "/model/stiffness");
     for (pointer, other) in defaults() {
         let service = Service::new();
         let mut changed = 0;
         for path in ENDPOINTS {
-            let by_default = service.post(path, &spelled_out()).await;
-            let otherwise = service.post(path, &with(&spelled_out(), pointer, other.clone())).await;
+            let by_default = service.post(path, &document).await;
+            let otherwise = service.post(path, &with(&document, pointer, other.clone())).await;
             changed += usize::from(otherwise.etag() != by_default.etag());
         }
         assert!(changed > 0, "{pointer} = {other} changes nothing");

@@ -23,9 +23,10 @@ fn on_bearing(kind: &str) -> Value {
     on(&bearing)
 }
 
-/// Case 5.1 by virtual work over 40 intervals, as section 10.3 has it, at 1500 revolutions a minute.
+/// Case 5.1 by virtual work and the linear law over 40 intervals, as section 10.3 has it, at 1500 revolutions a minute.
 fn case_5_1(friction: Value) -> Value {
-    let document = with(&shortest(), "/model", json!({ "compatibility": "virtual_work" }));
+    let model = json!({ "compatibility": "virtual_work", "stiffness": { "law": "linear" } });
+    let document = with(&shortest(), "/model", model);
     let document = with(&document, "/sweep", json!({ "samples": 40 }));
     with(&with(&document, "/load/input_speed_rpm", json!(1500.0)), "/friction", friction)
 }

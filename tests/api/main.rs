@@ -13,6 +13,7 @@ mod codes;
 mod command_line;
 mod contact;
 mod designs;
+mod deviations;
 mod documents;
 mod drawings;
 mod dxf;

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use serde_json::{Value, json};
 use toothwave::config::Limits;
 use toothwave_calculation::field::pointer;
-use toothwave_solver::violation::Modified;
+use toothwave_solver::violation::{Listed, Modified};
 use toothwave_solver::{Contact, Parameter, Part};
 
 use crate::asking::{Answer, ENDPOINTS, LIMITS, Occupied, Question, Service};
@@ -275,6 +275,19 @@ fn parameters() -> Vec<Parameter> {
         ]
         .map(Parameter::Modification),
     );
+    parameters.extend(
+        [
+            Listed::ToothRadius,
+            Listed::SlotAngle,
+            Listed::SlotWall,
+            Listed::RingSpace,
+            Listed::RingSpaceAngle,
+            Listed::WaveGeneratorLobe,
+        ]
+        .map(|listed| Parameter::Deviation(listed, 0)),
+    );
+    parameters.extend(contacts.map(Parameter::RunoutAmount));
+    parameters.extend(contacts.map(Parameter::RunoutAngle));
     parameters
 }
 
@@ -289,6 +302,8 @@ fn fields_of<'a>(document: &'a Value, schema: &'a Value) -> Vec<(&'a str, &'a Va
             fields.extend(fields_of(document, alternative));
         }
     }
+    // The first entry of a list stands for all.
+    fields.extend(schema.get("items").map(|schema| ("0", schema)));
     fields.extend(schema["properties"].as_object().into_iter().flatten().map(|(name, schema)| (name.as_str(), schema)));
     fields
 }
@@ -601,6 +616,7 @@ fn kinds() -> Vec<Value> {
     let modification = json!({ "ring_equidistant_um": 4.0, "tooth_radius_um": 0.5, "ring_tip_relief": relief });
     let modified = with(&shortest(), "/model", json!({ "compatibility": "virtual_work" }));
     kinds.push(with(&modified, "/modification", modification));
+    kinds.push(crate::deviations::deviating());
     kinds
 }
 

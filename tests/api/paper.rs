@@ -89,7 +89,7 @@ fn assert_near(found: &Value, expected: f64, tolerance: f64) {
 #[tokio::test]
 async fn case_5_1_has_the_geometry_that_the_contract_prints() {
     let expected = json!({
-        "solver_version": "0.1.0",
+        "solver_version": "0.2.0",
         "transmission_ratio": 14.0, "transmission_ratio_carrier_fixed": -13.0,
         "period_deg": 13.846153846153847,
         "undercut": { "occurs": false, "critical_tooth_radius_mm": 6.749189868666484 },
@@ -106,7 +106,7 @@ async fn case_5_1_has_the_geometry_that_the_contract_prints() {
 #[tokio::test]
 async fn case_5_1_has_the_coincidence_degree_that_the_contract_prints() {
     let expected = json!({
-        "solver_version": "0.1.0",
+        "solver_version": "0.2.0",
         "coincidence_degree": 14.0,
         "engagement": { "start_deg": 90.0, "end_deg": 0.0 },
         "teeth_in_mesh_per_zone": { "min": 7, "max": 7 },
@@ -125,7 +125,7 @@ async fn case_5_1_has_the_sweep_that_the_contract_prints() {
     let peak = json!({ "value": [], "input_angle_deg": [], "position_deg": [] });
     let peak_fields: Vec<_> = peak.as_object().unwrap().keys().cloned().collect();
     let expected = json!({
-        "solver_version": "0.1.0",
+        "solver_version": "0.2.0",
         "coincidence_degree": 14.0, "period_deg": 13.846153846153847,
         "peaks": {
             "wave_generator": {

@@ -94,6 +94,30 @@ fn fields() -> Vec<Field> {
     fields.push(modification("carrier_rotation_arcsec", -1e5, 1e5));
     fields.push(modification("ring_tip_relief/amount_um", -1e6, 1e6));
     fields.push(modification("ring_tip_relief/power", 0.1, 100.0));
+    // One entry after the other would be another document each.
+    let items = |count: usize| vec![0.0; count];
+    let deviating = with(
+        &with(&spelled_out(), "/model", json!({ "compatibility": "virtual_work" })),
+        "/deviations",
+        json!({
+            "tooth_radius_um": items(28), "slot_angle_arcsec": items(28), "slot_wall_um": items(28),
+            "ring_space_um": items(26), "ring_space_angle_arcsec": items(26), "wave_generator_lobe_um": items(2),
+            "wave_generator_runout": {}, "ring_runout": {}, "carrier_runout": {}
+        }),
+    );
+    let deviation = |name: &str, low, high| Field {
+        document: deviating.clone(),
+        ..field(&format!("/deviations/{name}"), low, high)
+    };
+    for name in ["tooth_radius_um/27", "slot_wall_um/0", "ring_space_um/25", "wave_generator_lobe_um/1"] {
+        fields.push(deviation(name, -1e6, 1e6));
+    }
+    fields.push(deviation("slot_angle_arcsec/3", -1e5, 1e5));
+    fields.push(deviation("ring_space_angle_arcsec/7", -1e5, 1e5));
+    for contact in ["wave_generator", "ring", "carrier"] {
+        fields.push(deviation(&format!("{contact}_runout/amount_um"), 0.0, 1e6));
+        fields.push(deviation(&format!("{contact}_runout/angle_deg"), -360.0, 360.0));
+    }
     for contact in ["wave_generator", "ring", "carrier"] {
         fields.push(field(&format!("/model/stiffness/{contact}_n_per_mm"), 1e-3, 1e15));
     }
@@ -184,6 +208,7 @@ fn scaled(scale: f64) -> Value {
             "ring": { "teeth": 26 }
         },
         "load": { "input_torque_nm": 20.0 },
+        "model": crate::designs::of_the_paper(),
         "profile": { "chord_tolerance_mm": (1e-3 * scale).max(1e-6) }
     })
 }

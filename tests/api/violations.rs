@@ -597,14 +597,14 @@ async fn every_kind_of_fault_of_a_field_can_be_met_over_http() {
         )
         .to_string(),
         with(&document, INSTALLED, json!(8)).to_string(),
+        with(&document, "/deviations", json!({ "slot_wall_um": [1.0] })).to_string(),
         with(&document, RADIUS, json!(7.2)).to_string(),
         with(&document, RADIUS, json!(0.9)).to_string(),
         with(&document, TIP_RADIUS, json!(68.0)).to_string(),
     ];
-    let gap =
-        [(RING_TEETH, json!(30)), (RADIUS, json!(4.0)), ("/model", json!({ "clearance": { "carrier_um": 5.0 } }))]
-            .into_iter()
-            .fold(document.clone(), |document, (pointer, value)| with(&document, pointer, value));
+    let gap = [(RING_TEETH, json!(30)), (RADIUS, json!(4.0)), ("/model/clearance", json!({ "carrier_um": 5.0 }))]
+        .into_iter()
+        .fold(document.clone(), |document, (pointer, value)| with(&document, pointer, value));
     let service = Service::within(Limits { max_states: 1, max_profile_points: 1, ..LIMITS });
     let mut errors = Vec::new();
     for text in texts.into_iter().chain([gap.to_string(), document.to_string()]) {

@@ -14,8 +14,8 @@ use toothwave_calculation::key::Key;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::question::Question;
 use toothwave_calculation::sweep::Sweep;
-use toothwave_solver::Modification;
-use toothwave_solver::gaps::TipRelief;
+use toothwave_solver::gaps::{Runout, TipRelief};
+use toothwave_solver::{Deviations, Modification, PerContact};
 
 use crate::schema::{Chance, Schemas, leaves, objects};
 
@@ -171,7 +171,7 @@ fn what_is_left_out_has_the_key_of_its_default() {
     long["drive"]["teeth"]["installed"] = json!(28.0);
     long["drive"]["ring"]["tip_radius_mm"] = json!(null);
     long["materials"] = json!({ "teeth": { "poissons_ratio": 0.3 } });
-    long["model"] = json!({ "compatibility": "projection", "stiffness": { "law": "linear" } });
+    long["model"] = json!({ "compatibility": "virtual_work", "stiffness": { "law": "johnson", "depth_mm": {} } });
     long["sweep"] = json!({ "samples": 50, "wind_up": false });
     long["modification"] = json!({ "slot_wall_um": 0.0, "tooth_radius_um": -0.0 });
     long["parts"] = json!({ "ring": { "clearance_um": -0.0 } });
@@ -200,4 +200,29 @@ fn each_number_of_the_modification_reaches_the_solver_as_itself() {
         ring_tip_relief: Some(TipRelief { amount_um: 9.0, start_deg: 10.0, power: 11.0 }),
     };
     assert_eq!(read(&document).unwrap().load_parameters().unwrap().modification, expected);
+}
+
+#[test]
+fn each_number_of_the_deviations_reaches_the_solver_as_itself() {
+    let mut document = short();
+    document["deviations"] = json!({
+        "tooth_radius_um": [1.0, 2.0], "slot_angle_arcsec": [3.0], "slot_wall_um": [4.0], "ring_space_um": [5.0],
+        "ring_space_angle_arcsec": [6.0], "wave_generator_lobe_um": [7.0, 8.0],
+        "wave_generator_runout": { "amount_um": 9.0, "angle_deg": 10.0 }, "ring_runout": { "amount_um": 11.0 },
+        "carrier_runout": { "angle_deg": 12.0 }
+    });
+    let runout = |amount_um, angle_deg| Runout { amount_um, angle_deg };
+    let expected = Deviations {
+        tooth_radius_um: vec![1.0, 2.0],
+        slot_angle_arcsec: vec![3.0],
+        slot_wall_um: vec![4.0],
+        ring_space_um: vec![5.0],
+        ring_space_angle_arcsec: vec![6.0],
+        wave_generator_lobe_um: vec![7.0, 8.0],
+        runout: PerContact { wave_generator: runout(9.0, 10.0), ring: runout(11.0, 0.0), carrier: runout(0.0, 12.0) },
+    };
+    let design = read(&document).unwrap();
+    assert_eq!(Deviations::from(&design.deviations), expected);
+    // What was written reads back as itself.
+    assert_eq!(read(&serde_json::to_value(&design).unwrap()).unwrap(), design);
 }

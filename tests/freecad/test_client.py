@@ -42,6 +42,7 @@ NOT_IN_THE_FORM = (
     "/model/stiffness/depth_mm",
     "/model/series_compliance_mm_per_n",
     "/modification",
+    "/deviations",
     "/friction",
     "/load/input_speed_rpm",
 )

@@ -15,7 +15,7 @@ use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::question::{Limits, Question};
 use toothwave_calculation::sweep::Sweep;
-use toothwave_solver::Never;
+use toothwave_solver::{Deviations, Never};
 
 /// Small enough for thousands of answers.
 const LIMITS: Limits = Limits { max_states: 2_000, max_profile_points: 20_000 };
@@ -178,8 +178,8 @@ fn deviation(byte: u8, largest: f64) -> f64 {
     }
 }
 
-/// A document of any kind, shape and law, which fit each other most often, with modifications.
-fn relative(bytes: &[u8; 32]) -> Value {
+/// A document of any kind, shape and law, which fit each other most often, with modifications and deviations.
+fn relative(bytes: &[u8; 48]) -> Value {
     let [kind, size, stroke, lobes, half, removal, thickness, sense, bore, shape, rest @ ..] = *bytes;
     let [grooves, groove, flat, law, depth, series, form, torque, points, gap, modified, rest @ ..] = rest;
     let mean = length_mm(size);
@@ -195,7 +195,8 @@ fn relative(bytes: &[u8; 32]) -> Value {
     let count = installed * (1 + i64::from(removal) % 3);
     let sin = (std::f64::consts::PI / installed as f64).sin();
     let r = f64::from(thickness) / 255.0 * (mean - e) * sin / (1.0 - sin).max(0.05);
-    let mut ring = json!({ "teeth": if sense % 2 == 0 { count - lobes } else { count + lobes } });
+    let ring_teeth = if sense % 2 == 0 { count - lobes } else { count + lobes };
+    let mut ring = json!({ "teeth": ring_teeth });
     if bore % 4 == 0 {
         ring["tip_radius_mm"] = json!(mean - e + 2.0 * r + f64::from(bore) / 128.0 * e);
     }
@@ -278,12 +279,41 @@ fn relative(bytes: &[u8; 32]) -> Value {
             });
         }
     }
+    let [deviating, list, of_parts @ ..] =
+        [rest[11], rest[12], rest[13], rest[14], rest[15], rest[16], rest[17], rest[18]];
+    if deviating % 2 == 0 {
+        document["deviations"] = deviations(list, &of_parts, &rest[19..], [installed, ring_teeth, lobes], 1e3 * r);
+    }
     document
+}
+
+/// Now and then one list, most often of the right length, and now and then a runout; few enough for the sweep to stay short.
+fn deviations(list: u8, of_parts: &[u8], entries: &[u8], items: [i64; 3], size_um: f64) -> Value {
+    let [slots, spaces, lobes] = items;
+    let (name, count, size) = [
+        ("wave_generator_lobe_um", lobes, size_um),
+        ("tooth_radius_um", slots, size_um),
+        ("slot_wall_um", slots, size_um),
+        ("slot_angle_arcsec", slots, 1e3),
+        ("ring_space_um", spaces, size_um),
+        ("ring_space_angle_arcsec", spaces, 1e3),
+    ][usize::from(list) % 6];
+    let count = if list < 250 { count } else { count + 1 };
+    let value = |item: i64| deviation(entries[usize::try_from(item).unwrap() % entries.len()], size);
+    let mut deviations = json!({ name: (0..count).map(value).collect::<Vec<_>>() });
+    for (part, pair) in ["wave_generator", "ring", "carrier"].into_iter().zip(of_parts.chunks(2)) {
+        if pair[0] % 4 == 0 {
+            let angle_deg = 2.0 * f64::from(pair[1]) - 250.0;
+            let amount_um = deviation(pair[0], size_um).abs();
+            deviations[format!("{part}_runout")] = json!({ "amount_um": amount_um, "angle_deg": angle_deg });
+        }
+    }
+    deviations
 }
 
 #[test]
 fn any_member_of_the_family() {
-    bolero::check!().with_type::<[u8; 32]>().with_iterations(600).for_each(|bytes| {
+    bolero::check!().with_type::<[u8; 48]>().with_iterations(600).for_each(|bytes| {
         assert_text_is_answered(relative(bytes).to_string().as_bytes());
     });
 }
@@ -309,6 +339,9 @@ fn most_kinds_shapes_and_laws_are_among_those_that_have_an_answer() {
             answered.insert(word("/model/compatibility"));
             let is_modified = document["modification"].as_object().into_iter().flatten().any(|(_, value)| value != 0.0);
             answered.insert(if is_modified { "modified" } else { "conjugate" }.to_owned());
+            if !Deviations::from(&design.deviations).is_nil() {
+                answered.insert("deviating".to_owned());
+            }
         }
     }
     let expected = [
@@ -327,6 +360,7 @@ fn most_kinds_shapes_and_laws_are_among_those_that_have_an_answer() {
         "virtual_work",
         "modified",
         "conjugate",
+        "deviating",
     ];
     for word in expected {
         assert!(answered.contains(word), "no document of {word} has an answer");
@@ -339,7 +373,7 @@ fn any_accuracy() {
         let text = document(bytes).to_string();
         assert_answered(Accuracy, &Design::read(text.as_bytes()).unwrap());
     });
-    bolero::check!().with_type::<[u8; 32]>().with_iterations(8).for_each(|bytes| {
+    bolero::check!().with_type::<[u8; 48]>().with_iterations(8).for_each(|bytes| {
         let text = relative(bytes).to_string();
         assert_answered(Accuracy, &Design::read(text.as_bytes()).unwrap());
     });

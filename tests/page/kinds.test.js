@@ -210,6 +210,24 @@ test('projection takes no law of Johnson’s: choosing either leaves a design th
   assert.equal((await answered(page)).design.model.stiffness.law, 'linear');
 });
 
+test('a document that names no model shows the one that the service takes', async () => {
+  const page = await bed.open();
+  const { model, ...unnamed } = await designOf(page);
+  assert.ok(model, 'the paper’s examples name theirs');
+  for (const [design, compatibility, law] of [
+    [unnamed, 'virtual_work', 'johnson'],
+    [{ ...unnamed, model: { compatibility: 'projection' } }, 'projection', 'linear'],
+    [{ ...unnamed, drive: { ...unnamed.drive, teeth: { shape: 'ball', count: 28, radius_mm: 5 } } }, 'virtual_work', 'hertz'],
+  ]) {
+    await setDocument(page, design);
+    assert.deepEqual([await page.inputValue(field('/model/compatibility')), await page.inputValue(field(LAW))], [compatibility, law]);
+    const found = await answered(page);
+    assert.deepEqual(found.design, design);
+    const named = await bed.server.answers({ ...design, model: { compatibility, stiffness: { law } } });
+    assert.deepEqual(named.sweep, found.sweep);
+  }
+});
+
 test('what gives way behind a contact moves the answer', async () => {
   const page = await bed.open();
   await pick(page, '/model/compatibility', 'virtual_work');

@@ -36,6 +36,10 @@ function expected({ geometry, coincidence, sweep }) {
   return {
     'Ratio, ring fixed': geometry.transmission_ratio,
     'Ratio, carrier fixed': geometry.transmission_ratio_carrier_fixed,
+    'Ratio of ring to carrier, wave generator fixed': geometry.members.wave_generator_fixed.ratio,
+    'Torque that holds the ring over the input': geometry.members.ring_fixed.holding_torque_ratio,
+    'Torque that holds the carrier over the input': geometry.members.carrier_fixed.holding_torque_ratio,
+    'Torque that holds the wave generator over the ring’s': geometry.members.wave_generator_fixed.holding_torque_ratio,
     'Period of the load pattern': geometry.period_deg,
     'Coincidence degree': coincidence.coincidence_degree,
     'Fewest teeth in mesh': coincidence.teeth_in_mesh_per_zone.min,
@@ -1060,7 +1064,7 @@ const LONG_REPORTS = [
   {
     drive: { wave_generator: { semi_major_mm: 58, semi_minor_mm: 56 }, teeth: { radius_mm: 7, width_mm: 5, count: 28, installed: 28 }, ring: { teeth: 26, tip_radius_mm: 60 } },
     load: { input_torque_nm: 60, allowable_stress_mpa: 1500 },
-    model: { compatibility: 'virtual_work', clearance: CLEARANCE },
+    model: { compatibility: 'virtual_work', stiffness: { law: 'linear' }, clearance: CLEARANCE },
     materials: { ring: { youngs_modulus_gpa: 120 } },
     sweep: { wind_up: true },
     parts: PARTS,
@@ -1092,7 +1096,7 @@ const OTHER_REPORTS = {
     load: { input_torque_nm: 20 },
   },
   flat_cuts_the_contact: { drive: { ...CASE_5_1, teeth: { ...CASE_5_1.teeth, shape: 'flat_sided', flat_length_mm: 9.7 } }, load: { input_torque_nm: 20 }, model: VIRTUAL_WORK },
-  johnson_beyond_half_width: { drive: CASE_5_1, load: { input_torque_nm: 2000 }, model: { compatibility: 'virtual_work', stiffness: { law: 'johnson' } } },
+  johnson_beyond_half_width: { drive: CASE_5_1, load: { input_torque_nm: 2000 } },
   wind_up_beyond_model: { drive: CASE_5_1, load: { input_torque_nm: 20 }, model: { ...VIRTUAL_WORK, clearance: { carrier_um: 1000 } } },
 };
 

@@ -4,11 +4,11 @@ use std::f64::consts::PI;
 
 use nalgebra::{Rotation2, Vector2};
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
-use toothwave_solver::gaps::{Deviations, Gaps, Place, Runout, TipRelief};
+use toothwave_solver::gaps::{Deviations, Gaps, Runout, TipRelief};
 use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
-use toothwave_solver::mesh::{Mesh, Samples};
+use toothwave_solver::mesh::{Mesh, Place, Samples};
 use toothwave_solver::tooth::ToothContact;
-use toothwave_solver::violation::Modified;
+use toothwave_solver::violation::{Listed, Modified};
 use toothwave_solver::{
     Drive, DriveParameters, LoadCase, LoadParameters, Modification, Parameter, PerContact, Position, SolveError,
     Violation,
@@ -393,8 +393,12 @@ fn modification_and_deviations_need_virtual_work_and_lists_one_entry_for_each_it
     let violation = Violation::NeedsVirtualWork { parameter: Parameter::Deviations };
     assert_eq!(with(Projection, &some), Err(SolveError::Impossible(vec![violation])));
     let few = Deviations { ring_space_um: vec![1.0; 28], ..Deviations::default() };
-    let violation = Violation::DeviationCount { count: 28, items: 26 };
+    let violation = Violation::DeviationCount { listed: Listed::RingSpace, count: 28, items: 26 };
     assert_eq!(with(VirtualWork, &few), Err(SolveError::Impossible(vec![violation])));
-    let odd = Deviations { slot_wall_um: vec![f64::NAN; 28], ..Deviations::default() };
-    assert_eq!(with(VirtualWork, &odd), Err(SolveError::Impossible(vec![Violation::DeviationNotFinite])));
+    let mut odd = vec![0.0; 28];
+    odd[3] = f64::INFINITY;
+    let odd = Deviations { slot_wall_um: odd, ..Deviations::default() };
+    let parameter = Parameter::Deviation(Listed::SlotWall, 3);
+    let violation = Violation::OutOfRange { parameter, value: f64::INFINITY, limit: 1e6 };
+    assert_eq!(with(VirtualWork, &odd), Err(SolveError::Impossible(vec![violation])));
 }

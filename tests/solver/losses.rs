@@ -55,6 +55,7 @@ impl Case {
             tooth_radius_mm: self.float("tooth_radius_mm"),
             tooth_spins,
             race_radius_mm: self.float("race_radius_mm"),
+            tells_items_apart: false,
         }
     }
 
@@ -546,6 +547,35 @@ fn what_a_part_loses_is_what_the_teeth_take_off_it() {
         let (worn_mm2, taken_mm2) = (flanks * worn.get(contact), *taken.get(contact));
         assert!(taken_mm2 > 0.0, "{contact:?}");
         assert_near(worn_mm2, taken_mm2, 1e-12 * taken_mm2, &format!("{contact:?}"));
+    }
+}
+
+#[test]
+fn with_any_member_fixed_power_goes_through_and_torques_balance() {
+    for (teeth, installed, ring_teeth, lobes) in
+        [(28, 28, 26, 2_u32), (28, 14, 30, 2), (28, 28, 27, 1), (33, 11, 36, 3)]
+    {
+        let wave_generator = match lobes {
+            1 => WaveGenerator::Eccentric { radius_mm: 90.0, eccentricity_mm: 0.5 },
+            _ => WaveGenerator::Harmonic { lobes: lobes.into(), mean_radius_mm: 90.0, amplitude_mm: 0.5 },
+        };
+        let p = DriveParameters { wave_generator, teeth, installed, ring_teeth, tooth_radius_mm: 3.0, ..PAPER_5_1 };
+        let (drive, mechanism) = (drive(&p), mechanism(&p));
+        assert_eq!(mechanism.speed_ratio(Fixed::Ring), drive.transmission_ratio());
+        assert_eq!(mechanism.speed_ratio(Fixed::Carrier), drive.transmission_ratio_carrier_fixed());
+        // While the wave generator turns once, seen from the carrier, the ring turns by U teeth: any turning of all is added on top.
+        let (own, ring, carrier) = (1.0, -f64::from(lobes) * drive.sense() / ring_teeth as f64, 0.0);
+        for (fixed, driving, driven, standing) in [
+            (Fixed::Ring, own, carrier, ring),
+            (Fixed::Carrier, own, ring, carrier),
+            (Fixed::WaveGenerator, ring, carrier, own),
+        ] {
+            let ratio = (driving - standing) / (driven - standing);
+            assert!((mechanism.speed_ratio(fixed) / ratio - 1.0).abs() < 1e-14, "{fixed:?} of {p:?}");
+            let (put_in, taken_off) = (1.0, ratio);
+            let balance = put_in - taken_off + mechanism.holding_torque_ratio(fixed);
+            assert!(balance.abs() < 1e-13 * ratio.abs(), "{fixed:?} of {p:?}");
+        }
     }
 }
 

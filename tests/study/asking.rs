@@ -59,10 +59,14 @@ pub(crate) fn paper() -> Value {
     })
 }
 
+/// The document with the field set; the object or array that holds it is there already.
 pub(crate) fn with(document: &Value, pointer: &str, value: Value) -> Value {
     let mut document = document.clone();
     let (parent, name) = pointer.rsplit_once('/').unwrap();
-    let parent = document.pointer_mut(parent).unwrap();
-    parent[name] = value;
+    let name = name.replace("~1", "/").replace("~0", "~");
+    match document.pointer_mut(parent).unwrap() {
+        Value::Array(items) => items[name.parse::<usize>().unwrap()] = value,
+        parent => parent[name] = value,
+    }
     document
 }

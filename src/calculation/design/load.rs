@@ -71,7 +71,7 @@ pub struct ModelDocument {
     /// How the approaches at a tooth's contacts add up.
     #[serde(default)]
     pub compatibility: CompatibilityDocument,
-    /// The contact law; left out, `hertz` of balls, `linear` of other teeth.
+    /// The contact law; left out, `hertz` of balls, of other teeth `johnson`, and `linear` beside `projection`.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub stiffness: Option<StiffnessDocument>,
@@ -104,9 +104,9 @@ pub struct ClearanceDocument {
 #[serde(rename_all = "snake_case")]
 pub enum CompatibilityDocument {
     /// The paper's: each projected on the direction of the wave generator's force.
-    #[default]
     Projection,
     /// Virtual work: the frictionless solution for a tooth whose centre is free to move.
+    #[default]
     VirtualWork,
 }
 

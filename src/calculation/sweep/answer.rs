@@ -1,7 +1,7 @@
 //! A sweep as it goes over the wire.
 
 use serde::Serialize;
-use toothwave_solver::sweep::{self as solver, ContactPeaks, InputAngles, Peak, States, TorqueCapacity};
+use toothwave_solver::sweep::{self as solver, ContactPeaks, Extremes, InputAngles, Peak, States, TorqueCapacity};
 use toothwave_solver::{Contact, Drive, PerContact};
 use utoipa::ToSchema;
 
@@ -18,8 +18,13 @@ pub struct SweepAnswer {
     pub build: &'static str,
     /// Contact ratio ε, counted over both meshing zones.
     pub coincidence_degree: f64,
-    /// The input angle after which the load pattern repeats.
+    /// The input angle after which the load pattern repeats, where no item deviates.
     pub period_deg: f64,
+    /// The input angle that the sweep goes over, given `deviations`: so many of these periods as it takes until the items that deviate meet
+    /// again as they did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub sweep_period_deg: Option<f64>,
     /// The load at both shafts.
     pub load: LoadAnswer,
     /// Whether a tooth takes load the moment it enters, because its flank ends before the place where its lever arm is zero: the
@@ -151,10 +156,18 @@ pub struct StatesAnswer {
 pub struct WindUpAnswer {
     /// Range of the wind-up over the period, at the output.
     pub transmission_error_peak_to_peak_deg: f64,
+    /// The same without load, where there are gaps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub unloaded_transmission_error_peak_to_peak_deg: Option<f64>,
     /// Input angle j.
     pub input_angle_deg: Vec<f64>,
     /// How far the wave generator turns under the load, carrier held, clearances included.
     pub wind_up_deg: Vec<f64>,
+    /// How far it turns before the first tooth has closed its gaps, where there are any: the wind-up as the torque goes to nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub unloaded_wind_up_deg: Option<Vec<f64>>,
     /// Output torque over output rotation at the load, wave generator held.
     pub torsional_stiffness_nm_per_rad: Vec<f64>,
     /// Teeth of one zone that carry load.
@@ -197,13 +210,19 @@ impl From<Contact> for ContactName {
 }
 
 impl WindUpAnswer {
-    pub(super) fn new(drive: &Drive, sweep: &solver::Sweep) -> Self {
+    pub(super) fn new(drive: &Drive, sweep: &solver::Sweep, unloaded_wind_up_deg: Option<Vec<f64>>) -> Self {
+        let unloaded_peak_to_peak_deg = unloaded_wind_up_deg.as_ref().map(|column| {
+            let Extremes { least, largest } = Extremes::of(column);
+            (largest - least) / drive.teeth_per_wave()
+        });
         let InputAngles { input_angle_deg, wind_up_deg, torsional_stiffness_nm_per_rad, loaded_teeth } =
             sweep.input_angles.clone();
         Self {
             transmission_error_peak_to_peak_deg: sweep.transmission_error_peak_to_peak_deg(drive),
+            unloaded_transmission_error_peak_to_peak_deg: unloaded_peak_to_peak_deg,
             input_angle_deg,
             wind_up_deg,
+            unloaded_wind_up_deg,
             torsional_stiffness_nm_per_rad,
             loaded_teeth,
         }

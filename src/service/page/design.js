@@ -38,8 +38,8 @@ const setBack = (part, label, what) =>
 const freeRadius = (part, label, key, what, otherwise) => number(`/parts/${part}/${key}_mm`, what, '', 'mm', { of: label, optional: () => otherwise });
 
 /** What a document means that names no law, and no way of adding approaches up. */
-export const lawOf = (design) => at(design, '/model/stiffness/law') ?? (isBall(design) ? 'hertz' : 'linear');
-export const compatibilityOf = (design) => at(design, '/model/compatibility') ?? 'projection';
+export const lawOf = (design) => at(design, '/model/stiffness/law') ?? (isBall(design) ? 'hertz' : compatibilityOf(design) === 'projection' ? 'linear' : 'johnson');
+export const compatibilityOf = (design) => at(design, '/model/compatibility') ?? 'virtual_work';
 
 const isBall = (design) => at(design, '/drive/teeth/shape') === 'ball';
 

@@ -66,6 +66,10 @@ export const GROUPS = [
     rows: [
       row('Ratio, ring fixed', 'i_HG', '', ({ geometry }) => geometry?.transmission_ratio),
       row('Ratio, carrier fixed', 'i_HK', '', ({ geometry }) => geometry?.transmission_ratio_carrier_fixed),
+      row('Ratio of ring to carrier, wave generator fixed', 'i_KG', '', ({ geometry }) => geometry?.members.wave_generator_fixed.ratio),
+      row('Torque that holds the ring over the input', '', '', ({ geometry }) => geometry?.members.ring_fixed.holding_torque_ratio),
+      row('Torque that holds the carrier over the input', '', '', ({ geometry }) => geometry?.members.carrier_fixed.holding_torque_ratio),
+      row('Torque that holds the wave generator over the ring’s', '', '', ({ geometry }) => geometry?.members.wave_generator_fixed.holding_torque_ratio),
       row('Period of the load pattern', '', 'deg', ({ geometry }) => geometry?.period_deg),
       row('Coincidence degree, all zones', 'ε', '', ({ coincidence }) => coincidence?.coincidence_degree, { significant: 7, terms: ['coincidence'] }),
       row('Fewest teeth in mesh', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.min, { scoped: true }),

@@ -2,8 +2,7 @@
 
 use nalgebra::{Point2, Unit, Vector2};
 
-use crate::cam::{CamContact, CamPoint, Kind};
-use crate::locus::ToothCenter;
+use crate::cam::kind::{CamContact, CamPoint, Kind, ToothCenter};
 use crate::position::Position;
 use crate::root::{NotConverged, ValueAndSlope, bracketed, newton_in_bracket};
 

@@ -1,8 +1,7 @@
 //! The support function `h = R0 + e cos Uφ`; with one lobe exactly the circle of radius R0 about a point e beside the axis
 //! (docs/theory.md section 2.9).
 
-use crate::cam::{CamContact, Kind};
-use crate::locus::ToothCenter;
+use crate::cam::kind::{CamContact, Kind, ToothCenter};
 use crate::position::{Position, half_lobe_rad};
 use crate::root::{NotConverged, ValueAndSlope, newton_in_bracket};
 

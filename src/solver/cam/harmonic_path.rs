@@ -1,8 +1,7 @@
 //! The cam that moves the centres along `d = R + e cos Uψ`: explicit in the position, and hollow in its valleys where the stroke is large
 //! (docs/theory.md section 2.9).
 
-use crate::cam::{CamContact, Kind};
-use crate::locus::ToothCenter;
+use crate::cam::kind::{CamContact, Kind, ToothCenter};
 use crate::position::Position;
 use crate::root::NotConverged;
 

@@ -37,13 +37,20 @@ pub struct Losses {
     pub rolls: Vec<Option<Contact>>,
 }
 
+impl Mechanism {
+    /// That of a drive as a sweep lists its teeth.
+    pub fn of_sweep(drive: &Drive, sweep: &Sweep) -> Self {
+        Self { tells_items_apart: sweep.mesh.tells_items_apart(), ..Self::of(drive) }
+    }
+}
+
 impl Losses {
     /// What friction does over a sweep of this drive.
     ///
     /// # Errors
     /// [`SolveError::NotConverged`] from the geometry, [`SolveError::Stopped`] when `stop` says so.
     pub fn of(drive: &Drive, sweep: &Sweep, friction: &Friction, stop: &impl Stop) -> Result<Self, SolveError> {
-        let mechanism = Mechanism::of(drive);
+        let mechanism = Mechanism::of_sweep(drive, sweep);
         let states = &sweep.states;
         let column = || Vec::with_capacity(states.len());
         let mut slip_mm_per_rad = PerContact::of(|_| column());
@@ -117,7 +124,7 @@ impl RadialForces {
     /// # Errors
     /// As [`Losses::of`].
     pub fn of(drive: &Drive, sweep: &Sweep, stop: &impl Stop) -> Result<Option<Self>, SolveError> {
-        let mechanism = Mechanism::of(drive);
+        let mechanism = Mechanism::of_sweep(drive, sweep);
         if mechanism.lobes_loaded_alike() > 1 {
             return Ok(None);
         }

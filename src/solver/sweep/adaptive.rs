@@ -4,7 +4,9 @@
 //! clearance: continuous). Each smooth piece is halved until straight lines between its input angles are true to a
 //! resolution, so that no peak hides between them; then every peak that may be the largest of its kind is closed in on.
 
-use crate::load_sharing::{LoadCase, LoadedDrive};
+use std::ops::Range;
+
+use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
 use crate::mesh::{Mesh, PlacedTooth};
 use crate::position::Position;
 use crate::ring::FlankEnd;
@@ -29,6 +31,8 @@ const MAX_STEPS: u32 = 100;
 /// An input angle, and which teeth mesh there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Moment {
+    /// Laps before; none where all laps are alike.
+    lap: u64,
     /// Share of the lap that has passed.
     pub(crate) fraction: f64,
     first: u64,
@@ -73,10 +77,11 @@ const CONTINUOUS_TOTALS: [usize; 3] = [0, 1, 4];
 /// Loads of a tooth.
 type Loads = [f64; LOADS];
 
-/// A moment with what is known of it. Its first tooth has the number `moment.first`.
+/// A moment with what is known of it. The teeth are numbered from place to place, and keep their numbers while they mesh.
 #[derive(Debug, Clone)]
 struct Seen {
     moment: Moment,
+    first: u64,
     loads: Vec<Loads>,
     totals: [f64; TOTALS],
 }
@@ -84,13 +89,18 @@ struct Seen {
 impl Seen {
     /// The loads of a tooth; one that does not mesh yet or any more has none.
     fn of(&self, number: u64) -> Loads {
-        let index = number.checked_sub(self.moment.first).and_then(|index| usize::try_from(index).ok());
+        let index = number.checked_sub(self.first).and_then(|index| usize::try_from(index).ok());
         index.and_then(|index| self.loads.get(index)).copied().unwrap_or_default()
+    }
+
+    fn numbers(&self) -> Range<u64> {
+        self.first..self.first + self.loads.len() as u64
     }
 
     /// How many teeth carry here or there, but not at both.
     fn teeth_changed(&self, other: &Self) -> usize {
-        let numbers = self.moment.first.min(other.moment.first)..=self.moment.last.max(other.moment.last);
+        let (own, others) = (self.numbers(), other.numbers());
+        let numbers = own.start.min(others.start)..own.end.max(others.end);
         numbers.filter(|&number| (self.of(number)[0] > 0.0) != (other.of(number)[0] > 0.0)).count()
     }
 }
@@ -130,10 +140,16 @@ impl Link<'_> {
         }
     }
 
-    /// The same moment a period earlier.
-    fn before(self) -> Self {
-        Self { at: self.at - 1.0, shift: self.shift + 1, ..self }
+    /// The same moment on the track of the lap after it.
+    fn before(self, teeth_at_each_place: u64) -> Self {
+        Self { at: self.at - 1.0, shift: self.shift + teeth_at_each_place, ..self }
     }
+}
+
+/// The track that ends at the entry of a lap.
+struct Track<'a> {
+    lap: u64,
+    links: Vec<Link<'a>>,
 }
 
 /// A quantity whose largest value is looked for; of a load, the tooth by its number on the track.
@@ -146,6 +162,7 @@ struct Sought {
 /// A moment that stands above those beside it, and what the quantity may rise to between them.
 #[derive(Debug, Clone, Copy)]
 struct Candidate<'a> {
+    lap: u64,
     sought: Sought,
     before: Link<'a>,
     top: Link<'a>,
@@ -154,9 +171,13 @@ struct Candidate<'a> {
 }
 
 struct Search<'a, S> {
-    /// With one tooth at each place of the mesh, which stands for all that carry alike.
+    /// With one tooth at each place of the mesh, which stands for all that carry alike; where items deviate, with every tooth.
     loaded: LoadedDrive<'a>,
     mesh: Mesh,
+    /// Teeth that are told apart at each place.
+    teeth_at_each_place: u64,
+    /// Laps that are unlike each other.
+    laps: u64,
     allowable_stress_mpa: Option<f64>,
     /// Whether teeth begin and cease to carry between their entry and their exit.
     has_gaps: bool,
@@ -169,44 +190,62 @@ struct Search<'a, S> {
     peaks: [f64; QUANTITIES],
 }
 
-/// The input angles of a sweep to a tolerance, in order; where loads jump the same angle stands twice, first without the tooth that
-/// enters and then with it.
+/// The input angles of a sweep to a tolerance, in order, by lap: one that stands for all where items are alike. Where loads jump the same
+/// angle stands twice, first without the tooth that enters and then with it.
 pub(crate) fn moments(
     loaded: &LoadedDrive<'_>,
     load: &LoadCase,
     tolerance: Tolerance,
     stop: &impl Stop,
-) -> Result<Vec<Moment>, SolveError> {
-    let mesh = Mesh::new(loaded.drive());
+) -> Result<Vec<Vec<Moment>>, SolveError> {
+    let mesh = *loaded.mesh();
+    let tells_items_apart = mesh.tells_items_apart();
     let mut search = Search {
-        loaded: loaded.with_zones(mesh.teeth_at_each_place()),
+        loaded: if tells_items_apart { *loaded } else { loaded.with_zones(mesh.teeth_at_each_place()) },
         mesh,
+        teeth_at_each_place: if tells_items_apart { mesh.listed_at_each_place() } else { 1 },
+        laps: if tells_items_apart { mesh.laps() } else { 1 },
         allowable_stress_mpa: load.parameters().allowable_stress_mpa,
-        has_gaps: load.has_gaps(),
-        is_smooth: loaded.linear_compliance_mm_per_n().is_some(),
+        has_gaps: load.has_gaps() || tells_items_apart,
+        is_smooth: loaded.is_linear(),
         tolerance,
         stop,
         states: 0,
         peaks: [0.0; QUANTITIES],
     };
-    let (to_entry, from_entry) = pieces(&mesh);
-    let to_entry = search.resolve(to_entry)?;
-    let from_entry = from_entry.map(|piece| search.resolve(piece)).transpose()?.unwrap_or_default();
-    // What follows the entry stands before the period's start on the track. Both hold that start.
-    let followers = from_entry.iter().take(from_entry.len().saturating_sub(1));
-    let followers = followers.map(|seen| Link { at: seen.moment.fraction - 1.0, shift: 1, seen });
-    let leaders = to_entry.iter().map(|seen| Link { at: seen.moment.fraction, shift: 0, seen });
-    let track: Vec<_> = followers.chain(leaders).collect();
-    let extremes = search.extremes(&track)?;
-
-    let seen = to_entry.iter().chain(&from_entry).chain(&extremes);
-    let mut moments: Vec<_> = seen.map(|seen| seen.moment).collect();
-    if mesh.spacings_are_whole() && search.loads_jump() {
-        moments.push(search.at_end_with_entering());
+    let mut to_entry = Vec::new();
+    let mut from_entry = Vec::new();
+    for lap in 0..search.laps {
+        let (to, from) = pieces(&mesh, lap);
+        to_entry.push(search.resolve(to)?);
+        from_entry.push(from.map(|piece| search.resolve(piece)).transpose()?.unwrap_or_default());
     }
-    moments.sort_by(|one, other| one.fraction.total_cmp(&other.fraction).then(one.last.cmp(&other.last)));
-    moments.dedup();
-    Ok(moments)
+    // What follows the entry of the lap before stands ahead of the lap's start on the track. Both hold that start.
+    let befores = from_entry.iter().cycle().skip(from_entry.len() - 1);
+    let tracks: Vec<_> = (0..search.laps)
+        .zip(befores.zip(&to_entry))
+        .map(|(lap, (before, own))| {
+            let followers = before.iter().take(before.len().saturating_sub(1));
+            let shift = search.teeth_at_each_place;
+            let followers = followers.map(|seen| Link { at: seen.moment.fraction - 1.0, shift, seen });
+            let leaders = own.iter().map(|seen| Link { at: seen.moment.fraction, shift: 0, seen });
+            Track { lap, links: followers.chain(leaders).collect() }
+        })
+        .collect();
+    let extremes = search.extremes(&tracks)?;
+
+    let mut by_lap = Vec::new();
+    for lap in 0..search.laps {
+        let seen = to_entry.iter().chain(&from_entry).flatten().chain(&extremes);
+        let mut moments: Vec<_> = seen.map(|seen| seen.moment).filter(|moment| moment.lap == lap).collect();
+        if mesh.spacings_are_whole() && search.loads_jump() {
+            moments.push(search.at_end_with_entering(lap));
+        }
+        moments.sort_by(|one, other| one.fraction.total_cmp(&other.fraction).then(one.last.cmp(&other.last)));
+        moments.dedup();
+        by_lap.push(moments);
+    }
+    Ok(by_lap)
 }
 
 /// A stretch of the period in which no tooth enters, by its ends.
@@ -216,10 +255,10 @@ struct Piece {
     end: Moment,
 }
 
-/// The period up to the entry of a tooth, and what is left of it then.
-fn pieces(mesh: &Mesh) -> (Piece, Option<Piece>) {
+/// A lap up to the entry of a tooth, and what is left of it then.
+fn pieces(mesh: &Mesh, lap: u64) -> (Piece, Option<Piece>) {
     let (whole, entry) = (mesh.whole_spacings(), mesh.entry_fraction());
-    let at = |fraction, first, last, entering| Moment { fraction, first, last, entering };
+    let at = |fraction, first, last, entering| Moment { lap, fraction, first, last, entering };
     if mesh.spacings_are_whole() {
         let loads_jump = mesh.flank_limit().end != FlankEnd::RegularTip;
         let end = if loads_jump { at(1.0, 2, whole, None) } else { at(1.0, 2, whole + 1, Some(whole + 1)) };
@@ -235,25 +274,36 @@ impl<S: Stop> Search<'_, S> {
         self.mesh.flank_limit().end != FlankEnd::RegularTip
     }
 
-    /// The end of a period at which a tooth enters, with that tooth.
-    fn at_end_with_entering(&self) -> Moment {
+    /// The end of a lap at which a tooth enters, with that tooth.
+    fn at_end_with_entering(&self, lap: u64) -> Moment {
         let last = self.mesh.whole_spacings() + 1;
-        Moment { fraction: 1.0, first: 2, last, entering: Some(last) }
+        Moment { lap, fraction: 1.0, first: 2, last, entering: Some(last) }
+    }
+
+    /// The teeth of a moment, place by place.
+    fn teeth(&self, moment: Moment) -> Result<Vec<ToothState>, SolveError> {
+        if !self.mesh.tells_items_apart() {
+            let places = moment.first..=moment.last;
+            return places.map(|place| self.loaded.tooth(moment.position(&self.mesh, place))).collect();
+        }
+        let mut placed: Vec<_> = moment.placed(&self.mesh, moment.lap).collect();
+        // Those at one place stay in the order of their slots.
+        placed.sort_by(|one, other| one.position.from_lobe_rad.total_cmp(&other.position.from_lobe_rad));
+        placed.iter().map(|tooth| self.loaded.tooth_at(&tooth.place, tooth.position)).collect()
     }
 
     fn see(&mut self, moment: Moment) -> Result<Seen, SolveError> {
         if self.stop.stopped() {
             return Err(SolveError::Stopped);
         }
-        self.states += moment.places();
+        self.states += moment.places() * self.teeth_at_each_place;
         let limit = self.tolerance.max_states();
         if self.states > limit {
             return Err(SolveError::TooManyStates { limit });
         }
-        let places = moment.first..=moment.last;
-        let teeth: Result<Vec<_>, _> =
-            places.map(|place| self.loaded.tooth(moment.position(&self.mesh, place))).collect();
-        let teeth = teeth?;
+        let lap_deg = self.mesh.sweep_period_deg() / self.mesh.laps() as f64;
+        let input_angle_deg = (moment.lap as f64 + moment.fraction) * lap_deg;
+        let teeth = self.teeth(moment).map_err(|error| error.at_input_angle(input_angle_deg))?;
         let wind_up = self.loaded.wind_up(&teeth)?;
         let loads: Result<Vec<_>, _> = teeth.iter().map(|tooth| self.loaded.loads(tooth, &wind_up)).collect();
         let (rotation_rad, stiffness) = (wind_up.rotation_rad(), wind_up.stiffness_nmm_per_rad);
@@ -262,7 +312,8 @@ impl<S: Stop> Search<'_, S> {
             None => 0.0,
         };
         let totals = [rotation_rad, 1.0 / rotation_rad, stiffness, 1.0 / stiffness, per_capacity];
-        let seen = Seen { moment, loads: loads?, totals };
+        let first = moment.first * self.teeth_at_each_place;
+        let seen = Seen { moment, first, loads: loads?, totals };
         raise(&mut self.peaks, &peaks_of(&seen));
         Ok(seen)
     }
@@ -271,23 +322,25 @@ impl<S: Stop> Search<'_, S> {
     fn see_inside(&mut self, fraction: f64, Piece { start, end }: &Piece) -> Result<Seen, SolveError> {
         // Inside a piece mesh all teeth that mesh at either end.
         let (first, last) = (start.first.min(end.first), start.last.min(end.last));
-        self.see(Moment { fraction, first, last, entering: None })
+        self.see(Moment { lap: start.lap, fraction, first, last, entering: None })
     }
 
-    /// A moment of the track: how often a period was added to it, and what is seen there.
-    fn see_on_track(&mut self, at: f64) -> Result<(u64, Seen), SolveError> {
-        let (mut fraction, mut shift) = (at, 0);
+    /// A moment of the track that ends in a lap: how much larger a tooth's number is there, and what is seen there.
+    fn see_on_track(&mut self, lap: u64, at: f64) -> Result<(u64, Seen), SolveError> {
+        let (mut fraction, mut back) = (at, 0);
         while fraction < 0.0 {
-            (fraction, shift) = (fraction + 1.0, shift + 1);
+            (fraction, back) = (fraction + 1.0, back + 1);
         }
+        // At most two laps back.
+        let lap = (lap + 2 * self.laps - back) % self.laps;
         let entry = self.mesh.entry_fraction();
-        let has_entered = fraction > entry || shift > 0 && fraction >= entry;
+        let has_entered = fraction > entry || back > 0 && fraction >= entry;
         let last = self.mesh.whole_spacings() + u64::from(has_entered);
         let first = if fraction < 1.0 { 1 } else { 2 };
         // Only at the track's start does a tooth stand at the very end of the flank.
         let is_start = at.total_cmp(&(entry - 1.0)).is_eq();
         let entering = is_start.then_some(last);
-        Ok((shift, self.see(Moment { fraction, first, last, entering })?))
+        Ok((back * self.teeth_at_each_place, self.see(Moment { lap, fraction, first, last, entering })?))
     }
 
     /// The moments of a piece, halved until straight lines between them are true to the resolution, and until no more than one tooth begins or
@@ -329,7 +382,7 @@ impl<S: Stop> Search<'_, S> {
         let mut see = |quantity: usize, [from, middle, to]: [f64; 3]| {
             bend = bend.max((middle - 0.5 * (from + to)).abs() / self.peaks[quantity]);
         };
-        for number in middle.moment.first..=middle.moment.last {
+        for number in middle.numbers() {
             let (from, middle, to) = (from.of(number), middle.of(number), to.of(number));
             for quantity in 0..LOADS {
                 see(quantity, [from[quantity], middle[quantity], to[quantity]]);
@@ -343,12 +396,14 @@ impl<S: Stop> Search<'_, S> {
     }
 
     /// Closes in on every extreme that may be the largest of its kind by more than the tolerance, the most promising first.
-    fn extremes(&mut self, track: &[Link<'_>]) -> Result<Vec<Seen>, SolveError> {
+    fn extremes(&mut self, tracks: &[Track<'_>]) -> Result<Vec<Seen>, SolveError> {
         let mut kept = [0.0; QUANTITIES];
-        for link in track {
+        for link in tracks.iter().flat_map(|track| &track.links) {
             raise(&mut kept, &peaks_of(link.seen));
         }
-        let mut candidates = self.candidates(track, &kept);
+        let befores = tracks.iter().cycle().skip(tracks.len() - 1);
+        let mut candidates: Vec<_> =
+            befores.zip(tracks).flat_map(|(before, track)| self.candidates(before, track, &kept)).collect();
         candidates.sort_by(|one, other| other.bound.total_cmp(&one.bound));
         let mut extremes = Vec::new();
         for candidate in candidates {
@@ -362,13 +417,19 @@ impl<S: Stop> Search<'_, S> {
         Ok(extremes)
     }
 
-    fn candidates<'t>(&self, track: &[Link<'t>], peaks: &[f64; QUANTITIES]) -> Vec<Candidate<'t>> {
+    /// Those on a track; where no load jumps its end is the start of the next one, and its start the end of the one before.
+    fn candidates<'t>(
+        &self,
+        track_before: &Track<'t>,
+        &Track { lap, links: ref track }: &Track<'t>,
+        peaks: &[f64; QUANTITIES],
+    ) -> Vec<Candidate<'t>> {
         let mut candidates = Vec::new();
-        // The end of a closed track is its start.
         let own = if self.loads_jump() { track } else { &track[..track.len() - 1] };
         for (index, top) in own.iter().enumerate() {
-            let Some([before, after]) = self.beside(track, index) else { continue };
-            let numbers = top.seen.moment.first.saturating_sub(top.shift)..=top.seen.moment.last - top.shift;
+            let Some([before, after]) = self.beside(&track_before.links, track, index) else { continue };
+            let numbers = top.seen.numbers();
+            let numbers = numbers.start.saturating_sub(top.shift)..numbers.end - top.shift;
             let of_teeth = numbers.flat_map(|number| (0..LOADS).map(move |quantity| Sought { quantity, number }));
             let of_all = (LOADS..QUANTITIES).map(|quantity| Sought { quantity, number: 0 });
             for sought in of_teeth.chain(of_all) {
@@ -379,19 +440,20 @@ impl<S: Stop> Search<'_, S> {
                 if let Some(bound) = bound
                     && bound > peaks[sought.quantity]
                 {
-                    candidates.push(Candidate { sought, before, top: *top, after, bound });
+                    candidates.push(Candidate { lap, sought, before, top: *top, after, bound });
                 }
             }
         }
         candidates
     }
 
-    /// The moments beside one of the track, which is closed where no load jumps. At an open end they are that one itself and the next.
-    fn beside<'t>(&self, track: &[Link<'t>], index: usize) -> Option<[Link<'t>; 2]> {
+    /// The moments beside one of the track, which goes on from the one before it where no load jumps. At an open end they are that one itself
+    /// and the next.
+    fn beside<'t>(&self, track_before: &[Link<'t>], track: &[Link<'t>], index: usize) -> Option<[Link<'t>; 2]> {
         let last = track.len().checked_sub(1)?;
         let before = match index {
             0 if self.loads_jump() => track[0],
-            0 => track[last.checked_sub(1)?].before(),
+            0 => track_before[track_before.len().checked_sub(2)?].before(self.teeth_at_each_place),
             _ => track[index - 1],
         };
         Some([before, track[last.min(index + 1)]])
@@ -436,7 +498,7 @@ impl<S: Stop> Search<'_, S> {
     /// The moment of a quantity's largest value between two moments, to a relative tolerance of the value: parabolas where they are
     /// safe, golden sections elsewhere (Brent 1973).
     fn close_in(&mut self, candidate: &Candidate<'_>) -> Result<Seen, SolveError> {
-        let Candidate { sought, before, top, after, .. } = *candidate;
+        let Candidate { lap, sought, before, top, after, .. } = *candidate;
         let golden = 0.5 * (3.0 - 5.0_f64.sqrt());
         let (mut low, mut high) = (before.at, after.at);
         let (mut x, mut value) = (top.at, top.value(sought));
@@ -468,7 +530,7 @@ impl<S: Stop> Search<'_, S> {
             }
             let moved = if step.abs() < nearest { nearest.copysign(step) } else { step };
             let u = (x + moved).clamp(low, high);
-            let (shift, seen) = self.see_on_track(u)?;
+            let (shift, seen) = self.see_on_track(lap, u)?;
             let at_u = Link { at: u, shift, seen: &seen }.value(sought);
             if at_u >= value {
                 if u < x {

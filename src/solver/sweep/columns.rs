@@ -111,6 +111,23 @@ pub struct ContactPeaks {
     pub shear: Option<PeakShear>,
 }
 
+impl ContactPeaks {
+    /// Of a line contact, which bears `force_n` where its stress has its peak.
+    pub(crate) fn of_line(force_peak_n: Peak, stress_peak_mpa: Peak, force_n: f64, tooth_width_mm: f64) -> Self {
+        let half_width_mm = half_width_mm(force_n, stress_peak_mpa.value, tooth_width_mm);
+        Self {
+            force_n: force_peak_n,
+            stress_mpa: stress_peak_mpa,
+            half_width_mm,
+            half_length_mm: None,
+            shear: Some(PeakShear {
+                stress_mpa: SHEAR_SHARE * stress_peak_mpa.value,
+                depth_mm: SHEAR_DEPTH * half_width_mm,
+            }),
+        }
+    }
+}
+
 /// The largest shear stress below a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PeakShear {
@@ -133,9 +150,30 @@ pub struct TorqueCapacity {
     pub input_angle_deg: f64,
 }
 
-/// A sweep over one period.
+impl TorqueCapacity {
+    /// Where all loads are in proportion, `M0 min (σ_a/σ)²` of line contacts.
+    pub(crate) fn in_proportion(
+        drive: &Drive,
+        input_torque_nm: f64,
+        allowable_mpa: f64,
+        peaks: &PerContact<ContactPeaks>,
+    ) -> Self {
+        let hardest = peaks.iter().map(|(contact, peaks)| (contact, peaks.stress_mpa));
+        let first = (Contact::WaveGenerator, peaks.wave_generator.stress_mpa);
+        let (contact, peak) =
+            hardest.fold(first, |most, other| if other.1.value > most.1.value { other } else { most });
+        let share = allowable_mpa / peak.value;
+        let input_torque_nm = input_torque_nm * (share * share);
+        let output_torque_nm = input_torque_nm * drive.teeth_per_wave();
+        Self { input_torque_nm, output_torque_nm, contact, input_angle_deg: peak.input_angle_deg }
+    }
+}
+
+/// A sweep over one period; where items deviate, over as many as it takes until they meet again as they did.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sweep {
+    /// The mesh that it went through.
+    pub mesh: Mesh,
     /// The states.
     pub states: States,
     /// What holds at each input angle.
@@ -180,7 +218,8 @@ impl Extremes {
     /// Of no value yet.
     pub(crate) const NONE: Self = Self { least: f64::INFINITY, largest: f64::NEG_INFINITY };
 
-    pub(crate) fn of(column: &[f64]) -> Self {
+    /// Those of a column.
+    pub fn of(column: &[f64]) -> Self {
         column.iter().fold(Self::NONE, |seen, &value| seen.with(value))
     }
 
@@ -326,26 +365,28 @@ pub(crate) fn finished(
     let peaks = PerContact::of(|contact| {
         let (force, at) = (states.force_n.get(contact), peaks.get(contact));
         let stress_mpa = states.peak(states.stress_mpa.get(contact), at.stress);
-        let half_width_mm = half_width_mm(force[at.stress], stress_mpa.value, tooth_width_mm);
-        ContactPeaks {
-            force_n: states.peak(force, at.force),
-            stress_mpa,
-            half_width_mm,
-            half_length_mm: None,
-            shear: Some(PeakShear {
-                stress_mpa: SHEAR_SHARE * stress_mpa.value,
-                depth_mm: SHEAR_DEPTH * half_width_mm,
-            }),
-        }
+        ContactPeaks::of_line(states.peak(force, at.force), stress_mpa, force[at.stress], tooth_width_mm)
     });
-    let period_closure_residual = period_closure(loaded, points, &states, &peaks)?;
-    for (check, residual) in [("torque balance", torque_balance_residual), ("period closure", period_closure_residual)]
-    {
-        if residual.is_nan() || residual > MOST_RESIDUAL {
-            return Err(SolveError::Inconsistent { check, residual });
-        }
+    let mut period_closure_residual = period_closure(loaded, points, &states, &peaks)?;
+    if loaded.mesh().tells_items_apart() {
+        // That the items have met again as they did shows in what all teeth together make.
+        let wind_up_deg = &input_angles.wind_up_deg;
+        let ends_deg = [wind_up_deg.first(), wind_up_deg.last()].map(|end| end.copied().unwrap_or(f64::NAN));
+        let [first_deg, last_deg] = ends_deg;
+        period_closure_residual = worse((last_deg - first_deg).abs() / last_deg, period_closure_residual);
     }
-    Ok(Sweep { states, input_angles, peaks, torque_capacity, torque_balance_residual, period_closure_residual })
+    check("torque balance", torque_balance_residual)?;
+    check("period closure", period_closure_residual)?;
+    let mesh = *loaded.mesh();
+    Ok(Sweep { mesh, states, input_angles, peaks, torque_capacity, torque_balance_residual, period_closure_residual })
+}
+
+/// That a residual is one of rounding.
+pub(crate) fn check(check: &'static str, residual: f64) -> Result<(), SolveError> {
+    if residual.is_nan() || residual > MOST_RESIDUAL {
+        return Err(SolveError::Inconsistent { check, residual });
+    }
+    Ok(())
 }
 
 /// The largest difference of a load at the last input angle from that angle worked out anew, one state at a time and from positions found
@@ -356,13 +397,14 @@ fn period_closure(
     states: &States,
     peaks: &PerContact<ContactPeaks>,
 ) -> Result<f64, SolveError> {
-    let mesh = Mesh::new(loaded.drive());
+    let mesh = *loaded.mesh();
     let position = |place| match points {
         Points::Samples(_) => mesh.position_between(place, 1.0),
         Points::Tolerance(_) => mesh.position_after_lap(place),
     };
     let placed: Vec<_> = mesh.placed_between(2..=mesh.whole_spacings() + 1, mesh.laps() - 1, position).collect();
-    let teeth = placed.iter().map(|placed| loaded.tooth(placed.position)).collect::<Result<Vec<_>, _>>()?;
+    let teeth = placed.iter().map(|placed| loaded.tooth_at(&placed.place, placed.position));
+    let teeth = teeth.collect::<Result<Vec<_>, _>>()?;
     let wind_up = loaded.wind_up(&teeth)?;
     let last_angle_deg = states.input_angle_deg.last();
     let first = states.len().checked_sub(teeth.len());

@@ -15,26 +15,28 @@
 //! Vectors are four doubles wide where the machine has AVX2, which is found out when the program runs (`pulp`). Eight, with AVX-512, were
 //! 5 % slower on the Xeon that this was measured on.
 
-use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
+mod lanes;
+mod sharing;
+mod sinks;
+mod tile;
+
+use std::f64::consts::PI;
 use std::iter::zip;
-use std::ops::Range;
+
+use pulp::Simd;
 
 use crate::cam::Cam;
 use crate::contact::PerContact;
 use crate::load_sharing::{Compatibility, LoadedDrive};
 use crate::mesh::{Mesh, Samples};
-use crate::position::Position;
-use crate::sweep::columns::{Columns, InputAngles, PeakAt, States, TorqueBalance, worse};
+use crate::sweep::columns::{self, ContactPeaks, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity, worse};
+use crate::sweep::points::Points;
+use crate::tooth::LineLaw;
 use crate::{SolveError, Stop};
-
-/// States worked on in one stretch of straight code; a multiple of every vector's width.
-const LANES: usize = 64;
-
-/// States of a tile, where one input angle has no more: its columns stay in the first-level cache.
-const TILE: usize = 128;
-
-/// Doubles of the widest vector.
-const VECTOR: usize = 8;
+use lanes::{LANES, arctangent_terms, arctangents, repeat_each};
+use sharing::{Limit, Shared, Sharing, Teeth};
+use sinks::{ColumnSink, PeakSink, Sink};
+use tile::{Run, Tile, TileSize};
 
 /// Steps towards the support at most. A drive that needs more goes the plain way.
 const MAX_STEPS: u32 = 8;
@@ -42,37 +44,77 @@ const MAX_STEPS: u32 = 8;
 /// A relative step this small is the last: the next one would be of its cube, less than the last digit.
 const LAST_STEP: f64 = 5e-6;
 
-/// Terms of the arctangent's series at most. A drive that needs more goes the plain way.
-const MAX_TERMS: usize = 24;
-
-/// The sweep, or nothing where the plain path has to make it: for a power law, for clearances, and for drives beyond the caps above.
+/// The sweep and its capacity, given an allowable stress, or nothing where the plain path has to make it: for laws, gaps and wave generators that are
+/// not known here, and for drives beyond the caps.
 ///
 /// # Errors
-/// [`SolveError::Stopped`] when `stop` says so.
+/// As [`columns::finished`].
 pub(crate) fn sweep(
     loaded: &LoadedDrive<'_>,
     samples: Samples,
+    allowable_mpa: Option<f64>,
     stop: &impl Stop,
-) -> Result<Option<Columns>, SolveError> {
-    let Some(kernel) = Kernel::new(loaded) else { return Ok(None) };
-    pulp::Arch::new().dispatch(Vectorised { kernel: &kernel, loaded, samples, stop })
+) -> Result<Option<Sweep>, SolveError> {
+    let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
+    let mesh = Mesh::new(loaded.drive());
+    let mut sink = ColumnSink::new(&mesh, samples);
+    let Some(Filled { torque_balance_residual, capacity }) = kernel.fill(loaded, samples, stop, &mut sink)? else {
+        return Ok(None);
+    };
+    let columns = sink.columns(&mesh, samples, torque_balance_residual);
+    let mut sweep = columns::finished(loaded, Points::Samples(samples), columns, None)?;
+    sweep.torque_capacity = capacity.or_else(|| in_proportion(loaded, allowable_mpa, &sweep.peaks));
+    Ok(Some(sweep))
+}
+
+/// The peaks of the same sweep, no state kept; nothing where [`sweep`] has nothing.
+///
+/// # Errors
+/// As [`sweep`].
+pub(crate) fn peaks(
+    loaded: &LoadedDrive<'_>,
+    samples: Samples,
+    allowable_mpa: Option<f64>,
+    stop: &impl Stop,
+) -> Result<Option<SweepPeaks>, SolveError> {
+    let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
+    let mut sink = PeakSink::default();
+    let Some(Filled { torque_balance_residual, capacity }) = kernel.fill(loaded, samples, stop, &mut sink)? else {
+        return Ok(None);
+    };
+    columns::check("torque balance", torque_balance_residual)?;
+    let mut peaks = sink.peaks(loaded.drive(), torque_balance_residual);
+    peaks.torque_capacity = capacity.or_else(|| in_proportion(loaded, allowable_mpa, &peaks.contacts));
+    Ok(Some(peaks))
+}
+
+/// The capacity where all loads are in proportion (docs/theory.md section 4.7): that of the largest stress.
+fn in_proportion(
+    loaded: &LoadedDrive<'_>,
+    allowable_mpa: Option<f64>,
+    peaks: &PerContact<ContactPeaks>,
+) -> Option<TorqueCapacity> {
+    let input_torque_nm = 1e-3 * loaded.input_torque_nmm();
+    allowable_mpa
+        .map(|allowable_mpa| TorqueCapacity::in_proportion(loaded.drive(), input_torque_nm, allowable_mpa, peaks))
 }
 
 /// The sweep as `pulp` wants it: compiled once for each instruction set, the best one of this machine picked when the program runs. Whatever
 /// it calls must be inlined into it, or it would be compiled for none of them.
-struct Vectorised<'a, S> {
+struct Vectorised<'a, S, K> {
     kernel: &'a Kernel,
     loaded: &'a LoadedDrive<'a>,
     samples: Samples,
     stop: &'a S,
+    sink: &'a mut K,
 }
 
-impl<S: Stop> pulp::WithSimd for Vectorised<'_, S> {
-    type Output = Result<Option<Columns>, SolveError>;
+impl<S: Stop, K: Sink> pulp::WithSimd for Vectorised<'_, S, K> {
+    type Output = Result<Option<Filled>, SolveError>;
 
     #[inline(always)]
-    fn with_simd<V: pulp::Simd>(self, _: V) -> Self::Output {
-        self.kernel.sweep(self.loaded, self.samples, self.stop)
+    fn with_simd<V: Simd>(self, _: V) -> Self::Output {
+        self.kernel.sweep::<V, K>(self.loaded, self.samples, self.stop, self.sink)
     }
 }
 
@@ -84,13 +126,66 @@ struct Kernel {
     ring_teeth_per_wave: f64,
     teeth_per_wave: f64,
     difference_of_squares: f64,
-    compliance: Compliance,
+    law: Law,
     /// `E*/(π L1)` of each contact.
     hertz: PerContact<f64>,
     /// Terms of the arctangent for the angle on the cam and on the ring.
     cam_terms: usize,
     ring_terms: usize,
     guess: Guess,
+    /// The stress that a torque capacity is asked for, where it does not follow from the peaks.
+    allowable_mpa: Option<f64>,
+}
+
+/// What a sweep comes to beside what its sink holds.
+struct Filled {
+    torque_balance_residual: f64,
+    capacity: Option<TorqueCapacity>,
+}
+
+/// How the teeth share the load.
+enum Law {
+    /// A linear law without gaps: unit loads are those of a rotation of 1, and one factor for each input angle is left.
+    Linear(Compliance),
+    /// Any other one: unit loads are those of 1 N at the wave generator.
+    Sharing(Sharing),
+}
+
+/// What loads are those of one unit of.
+trait Unit: Copy {
+    /// What the reciprocal of a state's loads has to hold, from the squares of `h + r` and `h'`, which add up to `d²`.
+    fn denominator(self, above2: f64, lever2: f64) -> f64;
+
+    /// `F_H` over `d²`, with the reciprocal of that denominator.
+    fn load(self, lever: f64, per_denominator: f64) -> f64;
+}
+
+impl Unit for Compliance {
+    #[inline(always)]
+    fn denominator(self, above2: f64, lever2: f64) -> f64 {
+        self.of_above * above2 + self.of_lever * lever2
+    }
+
+    #[inline(always)]
+    fn load(self, lever: f64, per_denominator: f64) -> f64 {
+        lever * per_denominator
+    }
+}
+
+/// 1 N at the wave generator.
+#[derive(Clone, Copy)]
+struct Newton;
+
+impl Unit for Newton {
+    #[inline(always)]
+    fn denominator(self, above2: f64, lever2: f64) -> f64 {
+        above2 + lever2
+    }
+
+    #[inline(always)]
+    fn load(self, _: f64, per_denominator: f64) -> f64 {
+        per_denominator
+    }
 }
 
 /// `c d²` of a tooth for a linear law: this much for each `(h + r)²` and `h'²`, which add up to `d²`.
@@ -146,12 +241,21 @@ impl Guess {
 }
 
 impl Kernel {
-    fn new(loaded: &LoadedDrive<'_>) -> Option<Self> {
-        let contact = loaded.linear_compliance_mm_per_n()?;
+    fn new(loaded: &LoadedDrive<'_>, allowable_mpa: Option<f64>) -> Option<Self> {
+        let law = match loaded.line_law()? {
+            LineLaw::Linear { compliance_mm_per_n } if loaded.is_linear() => {
+                Law::Linear(Compliance::new(&compliance_mm_per_n, loaded))
+            }
+            _ => Law::Sharing(Sharing::new(loaded)?),
+        };
+        let is_in_proportion = match &law {
+            Law::Linear(_) => true,
+            Law::Sharing(sharing) => sharing.is_in_proportion(),
+        };
         let drive = loaded.drive();
         // The formulas are those of an ellipse, and one zone stands for both.
         let Cam::Ellipse(cam) = drive.flank().locus().cam() else { return None };
-        if !Mesh::new(drive).zones_are_alike() {
+        if !loaded.mesh().zones_are_alike() {
             return None;
         }
         let (a, b, r) = (cam.semi_major_mm(), cam.semi_minor_mm(), drive.parameters().tooth_radius_mm);
@@ -166,33 +270,41 @@ impl Kernel {
             ring_teeth_per_wave: drive.flank().teeth_per_wave(),
             teeth_per_wave: drive.teeth_per_wave(),
             difference_of_squares,
-            compliance: Compliance::new(&contact, loaded),
+            law,
             hertz: PerContact::of(|contact| loaded.hertz(contact).modulus_per_width_mpa_per_mm()),
             cam_terms: arctangent_terms(cam_ratio)?,
             ring_terms: arctangent_terms(ring_ratio)?,
             guess: Guess::new(a, b, r),
+            allowable_mpa: allowable_mpa.filter(|_| !is_in_proportion),
         })
     }
 
-    #[inline(always)]
-    fn sweep(
+    /// Fills the sink, by the best vectors of this machine; the worst residual of the torques, or nothing where the plain path is needed.
+    fn fill(
         &self,
         loaded: &LoadedDrive<'_>,
         samples: Samples,
         stop: &impl Stop,
-    ) -> Result<Option<Columns>, SolveError> {
-        let drive = loaded.drive();
-        let mesh = Mesh::new(drive);
-        let mut sweep = Columns {
-            states: States::with_capacity(whole(mesh.state_count(samples))),
-            input_angles: InputAngles::with_capacity(whole(samples.count() + 1)),
-            peaks: PerContact::default(),
-            torque_balance_residual: 0.0,
-        };
-        let mut peaks = PerContact::<[RunningPeak; 2]>::default();
-        let size = TileSize::of(&mesh, samples);
+        sink: &mut impl Sink,
+    ) -> Result<Option<Filled>, SolveError> {
+        pulp::Arch::new().dispatch(Vectorised { kernel: self, loaded, samples, stop, sink })
+    }
+
+    #[inline(always)]
+    fn sweep<V: Simd, K: Sink>(
+        &self,
+        loaded: &LoadedDrive<'_>,
+        samples: Samples,
+        stop: &impl Stop,
+        sink: &mut K,
+    ) -> Result<Option<Filled>, SolveError> {
+        let mesh = Mesh::new(loaded.drive());
+        let with_work = matches!(self.law, Law::Sharing(_));
+        let size = TileSize::of(&mesh, samples, K::COLUMNS, with_work);
         let mut arena = vec![0.0; size.doubles()];
         let mut tile = Tile::new(&mut arena, &size, 2.0 * PI / mesh.steps(samples) as f64);
+        let balance = TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm());
+        let mut filled = Filled { torque_balance_residual: 0.0, capacity: None };
         let mut first = 0;
         while first < samples.count() {
             let run = Run::from(first, samples, &mesh);
@@ -204,41 +316,62 @@ impl Kernel {
                 let tile_samples = start..run.samples.end.min(start + run.rows as u64);
                 run.place(tile_samples.clone(), &mut tile);
                 for chunk in 0..tile.count.div_ceil(LANES) {
-                    if !self.unit_states(&mut tile, chunk) {
+                    let is_known = match &self.law {
+                        Law::Linear(compliance) => self.unit_states::<K>(*compliance, &mut tile, chunk),
+                        Law::Sharing(_) => self.unit_states::<K>(Newton, &mut tile, chunk),
+                    };
+                    if !is_known {
                         return Ok(None);
                     }
                 }
-                self.share_load(loaded, &mesh, tile_samples, &run, &mut tile, &mut sweep);
-                tile.append_to(&mut sweep.states, &mut peaks);
+                match &self.law {
+                    Law::Linear(_) => Self::scale(loaded, run.teeth, &mut tile),
+                    Law::Sharing(sharing) => {
+                        let limit =
+                            match Self::share_load::<V>(sharing, self.allowable_mpa, loaded, run.teeth, &mut tile) {
+                                Some(limit) => limit,
+                                None => return Ok(None),
+                            };
+                        if let Some(Limit { torque_nmm, contact, row }) = limit {
+                            let input_torque_nm = 1e-3 * (loaded.zones() * torque_nmm);
+                            if filled.capacity.is_none_or(|capacity| input_torque_nm < capacity.input_torque_nm) {
+                                let output_torque_nm = input_torque_nm * loaded.drive().teeth_per_wave();
+                                let input_angle_deg = mesh.input_angle_deg(start + row as u64, samples);
+                                filled.capacity = Some(TorqueCapacity {
+                                    input_torque_nm,
+                                    output_torque_nm,
+                                    contact,
+                                    input_angle_deg,
+                                });
+                            }
+                        }
+                    }
+                }
+                let rows = tile.count / run.teeth;
+                for row in 0..rows {
+                    let torque = PerContact::of(|contact| tile.row_torque.get(contact)[row]);
+                    tile.row_residual[row] = balance.residual(&torque);
+                }
+                filled.torque_balance_residual = tile.row_residual[..rows]
+                    .iter()
+                    .fold(filled.torque_balance_residual, |worst, &residual| worse(residual, worst));
+                for (angle_deg, sample) in zip(&mut tile.row_input_angle_deg[..rows], tile_samples) {
+                    *angle_deg = mesh.input_angle_deg(sample, samples);
+                }
+                sink.take(loaded.drive(), &mut tile, run.teeth);
             }
             first = run.samples.end;
         }
-        sweep.peaks = PerContact::of(|contact| {
-            let [force, stress] = peaks.get(contact);
-            let states = &sweep.states;
-            PeakAt {
-                force: force.find(states.force_n.get(contact)),
-                stress: stress.find(states.stress_mpa.get(contact)),
-            }
-        });
-        // The last input angle repeats the first, every tooth one further.
-        let end_deg = mesh.input_angle_deg(samples.count(), samples);
-        sweep.states.repeat_first(mesh.teeth_at(0, samples).count(), end_deg);
-        sweep.input_angles.repeat_first(end_deg);
-        Ok(Some(sweep))
+        Ok(Some(filled))
     }
 
-    /// Geometry of a stretch of states, and their forces and stresses for `Δφ` = 1; false where the support takes too many steps.
+    /// Geometry of a stretch of states, and their forces and stresses for one unit; false where the support takes too many steps.
     #[inline(always)]
-    fn unit_states(&self, tile: &mut Tile<'_>, chunk: usize) -> bool {
+    fn unit_states<K: Sink>(&self, unit: impl Unit, tile: &mut Tile<'_>, chunk: usize) -> bool {
         let sin = &tile.sin.as_chunks::<LANES>().0[chunk];
         let cos = &tile.cos.as_chunks::<LANES>().0[chunk];
         let Some(support) = self.supports(sin, cos) else { return false };
-        let Self { a, b, r, ring_teeth_per_wave: k, difference_of_squares, compliance, .. } = *self;
-        let from_minor = &tile.from_minor_rad.as_chunks::<LANES>().0[chunk];
-        let center_radius_mm = &mut tile.center_radius_mm.as_chunks_mut::<LANES>().0[chunk];
-        let cam_angle_deg = &mut tile.wave_generator_angle_deg.as_chunks_mut::<LANES>().0[chunk];
-        let ring_angle_deg = &mut tile.ring_angle_deg.as_chunks_mut::<LANES>().0[chunk];
+        let Self { a, b, r, ring_teeth_per_wave: k, difference_of_squares, .. } = *self;
         let cam_force = &mut tile.force.wave_generator.as_chunks_mut::<LANES>().0[chunk];
         let ring_force = &mut tile.force.ring.as_chunks_mut::<LANES>().0[chunk];
         let carrier_force = &mut tile.force.carrier.as_chunks_mut::<LANES>().0[chunk];
@@ -249,6 +382,7 @@ impl Kernel {
         let ring_torque = &mut tile.torque.ring.as_chunks_mut::<LANES>().0[chunk];
         let carrier_torque = &mut tile.torque.carrier.as_chunks_mut::<LANES>().0[chunk];
 
+        let mut center_radius = [0.0; LANES];
         let mut cam_ratio = [0.0; LANES];
         let mut ring_ratio = [0.0; LANES];
         let (a2, b2, ab, k2) = (a * a, b * b, a * b, k * k);
@@ -282,22 +416,22 @@ impl Kernel {
             let regular = e3_d + r * (above * e2 + k2 * d2 * bend);
             let least = f64::EPSILON * e3_d;
             let regular = if regular > least { regular } else { least };
-            let compliance_d2 = compliance.of_above * above2 + compliance.of_lever * lever2;
+            let denominator = unit.denominator(above2, lever2);
             // Tangents of the angles that the contact points are off the position.
             let cam_below = b2 * (along_minor * sin_i) + a2 * (along_major * cos_i);
             let ring_below = de + r * above;
 
-            let (loads, angles) = (compliance_d2 * regular, cam_below * ring_below);
+            let (loads, angles) = (denominator * regular, cam_below * ring_below);
             let angles_e = angles * e;
             let all = 1.0 / (loads * angles_e);
             let (per_loads, per_angles_e) = (all * angles_e, all * loads);
-            let (per_compliance_d2, per_regular) = (per_loads * regular, per_loads * compliance_d2);
+            let (per_denominator, per_regular) = (per_loads * regular, per_loads * denominator);
             let (per_angles, per_e) = (per_angles_e * e, per_angles_e * angles);
             cam_ratio[i] = (cos_i * sin_i) * (difference_of_squares * r * h) * (per_angles * ring_below);
             ring_ratio[i] = r * k * lever * (per_angles * cam_below);
-            let load = lever * per_compliance_d2;
+            let load = unit.load(lever, per_denominator);
             let (force_h, force_k, force_s) = (load * d2, load * de, load * lever * d * self.teeth_per_wave);
-            center_radius_mm[i] = d;
+            center_radius[i] = d;
             cam_force[i] = force_h;
             ring_force[i] = force_k;
             carrier_force[i] = force_s;
@@ -309,6 +443,14 @@ impl Kernel {
             ring_torque[i] = force_k * (d * k * lever * per_e);
             carrier_torque[i] = force_s * d;
         }
+        if !K::COLUMNS {
+            return true;
+        }
+        let from_minor = &tile.from_minor_rad.as_chunks::<LANES>().0[chunk];
+        let center_radius_mm = &mut tile.center_radius_mm.as_chunks_mut::<LANES>().0[chunk];
+        let cam_angle_deg = &mut tile.wave_generator_angle_deg.as_chunks_mut::<LANES>().0[chunk];
+        let ring_angle_deg = &mut tile.ring_angle_deg.as_chunks_mut::<LANES>().0[chunk];
+        *center_radius_mm = center_radius;
         arctangents(&mut cam_ratio, self.cam_terms);
         arctangents(&mut ring_ratio, self.ring_terms);
         let (to_degrees, per_k) = (180.0 / PI, 1.0 / k);
@@ -358,428 +500,77 @@ impl Kernel {
 
     /// Turns the wave generator at each input angle of a tile until the unit loads of its teeth balance the torque.
     #[inline(always)]
-    fn share_load(
-        &self,
-        loaded: &LoadedDrive<'_>,
-        mesh: &Mesh,
-        samples: Range<u64>,
-        run: &Run,
-        tile: &mut Tile<'_>,
-        sweep: &mut Columns,
-    ) {
-        let rows = tile.sum_torques(run.teeth);
-        let input_nmm = loaded.input_torque_nmm();
-        let balance = TorqueBalance::new(loaded.drive(), input_nmm);
+    fn scale(loaded: &LoadedDrive<'_>, teeth: usize, tile: &mut Tile<'_>) {
+        let rows = tile.sum_torques(teeth);
+        let (input_nmm, zones) = (loaded.input_torque_nmm(), loaded.zones());
         let PerContact { wave_generator: cam, ring, carrier } = &mut tile.row_torque;
-        let (cam, ring, carrier) = (&cam[..rows], &ring[..rows], &carrier[..rows]);
+        let (cam, ring, carrier) = (&mut cam[..rows], &mut ring[..rows], &mut carrier[..rows]);
         let (rotation_rad, rotation_root) = (&mut tile.row_rotation_rad[..rows], &mut tile.row_rotation_root[..rows]);
-        let residual = &mut tile.row_residual[..rows];
+        let stiffness = &mut tile.row_stiffness[..rows];
         for row in 0..rows {
-            let rotation = input_nmm / (loaded.zones() * cam[row]);
+            let rotation = input_nmm / (zones * cam[row]);
             rotation_rad[row] = rotation;
             rotation_root[row] = rotation.sqrt();
-            let zones = loaded.zones() * rotation;
-            let [wave_generator, ring, carrier] = [cam[row], ring[row], carrier[row]].map(|torque| zones * torque);
-            residual[row] = balance.residual(&PerContact { wave_generator, ring, carrier });
+            stiffness[row] = zones * cam[row];
+            let scale = zones * rotation;
+            cam[row] *= scale;
+            ring[row] *= scale;
+            carrier[row] *= scale;
         }
-        sweep.torque_balance_residual =
-            residual.iter().fold(sweep.torque_balance_residual, |worst, &residual| worse(residual, worst));
-        for (angle_deg, sample) in zip(&mut tile.row_input_angle_deg[..rows], samples) {
-            *angle_deg = mesh.input_angle_deg(sample, run.of);
-        }
-        let stiffness_nmm_per_rad = cam.iter().map(|cam| loaded.zones() * cam);
-        // Only a tooth on the minor axis, the last one, has no lever arm and no load.
-        let lasts = tile.force.wave_generator[..tile.count].iter().skip(run.teeth - 1).step_by(run.teeth);
-        let loaded_teeth = lasts.map(|last| run.teeth - usize::from(*last <= 0.0));
-        sweep.input_angles.extend(
-            loaded.drive(),
-            &tile.row_input_angle_deg[..rows],
-            rotation_rad,
-            stiffness_nmm_per_rad,
-            loaded_teeth,
-        );
-        repeat_each(&tile.row_input_angle_deg[..rows], run.teeth, tile.input_angle_deg);
-        repeat_each(rotation_rad, run.teeth, tile.rotation_rad);
-        repeat_each(rotation_root, run.teeth, tile.rotation_root);
-    }
-}
-
-/// The largest of values that are not negative: first of each lane, since one running value could not be vectorised.
-#[inline(always)]
-fn largest(values: &[f64]) -> f64 {
-    let (stretches, rest) = values.as_chunks::<{ 2 * VECTOR }>();
-    let mut most = [0.0; 2 * VECTOR];
-    for stretch in stretches {
-        for i in 0..2 * VECTOR {
-            most[i] = if stretch[i] > most[i] { stretch[i] } else { most[i] };
-        }
-    }
-    most.iter().chain(rest).fold(0.0, |most, &value| if value > most { value } else { most })
-}
-
-/// Each value so many times in a row. Whole vectors are written, and what is too much is overwritten by the next; the last needs room.
-#[inline(always)]
-fn repeat_each(values: &[f64], times: usize, repeated: &mut [f64]) {
-    for (row, &value) in values.iter().enumerate() {
-        for start in (row * times..(row + 1) * times).step_by(VECTOR) {
-            repeated[start..start + VECTOR].fill(value);
-        }
-    }
-}
-
-/// A count that memory can hold, as an index; the caller has bounded the sweep.
-fn whole(count: u64) -> usize {
-    usize::try_from(count).unwrap_or(usize::MAX)
-}
-
-/// How many terms of `atan q = q (1 - q²/3 + q⁴/5 - …)` reach the last digit for `0 ≤ q ≤ largest`.
-fn arctangent_terms(largest: f64) -> Option<usize> {
-    let square = largest * largest;
-    let mut power = 1.0;
-    (1..=MAX_TERMS).find(|_| {
-        power *= square;
-        power < 0.25 * f64::EPSILON
-    })
-}
-
-/// The coefficients of `atan q` over `q` and the powers of `q²`.
-const ARCTANGENT: [f64; MAX_TERMS] = {
-    let mut coefficients = [0.0; MAX_TERMS];
-    let (mut term, mut sign) = (0, 1.0);
-    while term < MAX_TERMS {
-        coefficients[term] = sign / (2 * term + 1) as f64;
-        (term, sign) = (term + 1, -sign);
-    }
-    coefficients
-};
-
-/// Replaces small ratios by their arctangents.
-#[inline(always)]
-fn arctangents(ratios: &mut [f64; LANES], terms: usize) {
-    let mut sums = [0.0; LANES];
-    for coefficient in ARCTANGENT[..terms].iter().rev() {
-        for i in 0..LANES {
-            sums[i] = sums[i] * (ratios[i] * ratios[i]) + coefficient;
-        }
-    }
-    for i in 0..LANES {
-        ratios[i] *= sums[i];
-    }
-}
-
-/// Sines and cosines of angles.
-struct SineTable {
-    sin: Vec<f64>,
-    cos: Vec<f64>,
-}
-
-impl SineTable {
-    /// Of `count` multiples of a step, at most [`TILE`], from 0 to at most a quarter of a turn: those of a few steps and those of a few strides, added.
-    fn equally_spaced(step_rad: f64, count: usize) -> Self {
-        // Strides are one or two more than a stride is long.
-        const STRIDE: usize = TILE.isqrt() + 2;
-        let sines = |step_rad: f64, count: usize| {
-            let mut sines = [(0.0, 0.0); STRIDE];
-            for (index, sines) in sines[..count].iter_mut().enumerate() {
-                *sines = (step_rad * index as f64).sin_cos();
-            }
-            sines
-        };
-        let stride = count.isqrt().max(1);
-        let strides = count.div_ceil(stride);
-        let (fine, coarse) = (sines(step_rad, stride), sines(step_rad * stride as f64, strides));
-        let mut table = Self { sin: Vec::with_capacity(count + stride), cos: Vec::with_capacity(count + stride) };
-        for (coarse_sin, coarse_cos) in &coarse[..strides] {
-            table.sin.extend(fine[..stride].iter().map(|(sin, cos)| coarse_sin * cos + coarse_cos * sin));
-            table.cos.extend(fine[..stride].iter().map(|(sin, cos)| coarse_cos * cos - coarse_sin * sin));
-        }
-        table
-    }
-}
-
-/// Input angles at which the same teeth mesh.
-///
-/// There a tooth stands at the sum of three angles: its own at the start of the run, one of the tile and one of the input angle within
-/// the tile. The first and the last make a pattern that all tiles share, so that a tile takes the sine of a single angle. The teeth come
-/// nearer to the major axis, so only for the one next to it does such a sum cancel: it is counted from the end of the tile.
-struct Run {
-    samples: Range<u64>,
-    /// Samples of the period.
-    of: Samples,
-    teeth: usize,
-    /// Samples of a tile: equally many, but for the last.
-    rows: usize,
-    mesh: Mesh,
-    step_rad: f64,
-    /// Steps of a whole turn.
-    steps: f64,
-}
-
-impl Run {
-    fn from(first: u64, of: Samples, mesh: &Mesh) -> Self {
-        let samples = first..mesh.same_teeth_until(first, of);
-        let steps = mesh.steps(of) as f64;
-        let teeth = whole(*mesh.teeth_at(first, of).end());
-        let count = whole(samples.end - samples.start);
-        let rows = count.div_ceil(count.div_ceil((TILE / teeth).max(1)));
-        Self { samples, of, teeth, rows, mesh: *mesh, step_rad: 2.0 * PI / steps, steps }
+        // Only a tooth in the valley, the last one, has no lever arm and no load.
+        let lasts = tile.force.wave_generator[..tile.count].iter().skip(teeth - 1).step_by(teeth);
+        tile.row_loaded.clear();
+        tile.row_loaded.extend(lasts.map(|last| teeth - usize::from(*last <= 0.0)));
+        repeat_each(rotation_rad, teeth, tile.scale);
+        repeat_each(rotation_root, teeth, tile.scale_root);
     }
 
-    /// Lays the pattern of its tiles.
+    /// Lets the teeth of each input angle share the load, and finds what limits them where that is asked for; nothing where it takes the plain path.
     #[inline(always)]
-    fn lay_pattern(&self, tile: &mut Tile<'_>) {
-        let Self { teeth, rows, .. } = *self;
-        let (base_sin, base_cos) = (&mut tile.base_sin[..teeth], &mut tile.base_cos[..teeth]);
-        for (tooth, base) in zip(1.., zip(&mut *base_sin, &mut *base_cos)) {
-            let Position { phase_sin: sin, phase_cos: cos, .. } =
-                self.mesh.position_in_mesh(tooth, self.samples.start, self.of);
-            (*base.0, *base.1) = (sin, cos);
-        }
-        tile.tooth.clear();
-        let last_tooth = u32::try_from(teeth).unwrap_or(u32::MAX);
-        for row in 0..rows {
-            let of_row = row * teeth..(row + 1) * teeth;
-            let (row_sin, row_cos) = (tile.row_sines.sin[row], tile.row_sines.cos[row]);
-            let (sin, cos) = (&mut tile.pattern_sin[of_row.clone()], &mut tile.pattern_cos[of_row.clone()]);
-            let step = &mut tile.pattern_step[of_row];
-            for i in 0..teeth {
-                sin[i] = base_sin[i] * row_cos - base_cos[i] * row_sin;
-                cos[i] = base_cos[i] * row_cos + base_sin[i] * row_sin;
-                // Whole numbers below 2^53: exact.
-                step[i] = (i + 1) as f64 * self.of.count() as f64 - row as f64;
-            }
-            tile.tooth.extend(1..=last_tooth);
-        }
-    }
-
-    /// Positions of all teeth at some samples, by sample and then tooth.
-    #[inline(always)]
-    fn place(&self, samples: Range<u64>, tile: &mut Tile<'_>) {
-        let rows = whole(samples.end - samples.start);
-        tile.count = rows * self.teeth;
+    fn share_load<V: Simd>(
+        sharing: &Sharing,
+        allowable_mpa: Option<f64>,
+        loaded: &LoadedDrive<'_>,
+        count: usize,
+        tile: &mut Tile<'_>,
+    ) -> Option<Option<Limit>> {
+        let (zones, rows) = (loaded.zones(), tile.count / count);
         let len = tile.count.next_multiple_of(LANES);
-        let passed = samples.start as f64;
-        let (turn_sin, turn_cos) = ((samples.start - self.samples.start) as f64 * self.step_rad).sin_cos();
-        let (pattern_sin, pattern_cos) = (&tile.pattern_sin[..len], &tile.pattern_cos[..len]);
-        let pattern_step = &tile.pattern_step[..len];
-        let (sin, cos) = (&mut tile.sin[..len], &mut tile.cos[..len]);
-        let (position_deg, from_minor_rad) = (&mut tile.position_deg[..len], &mut tile.from_minor_rad[..len]);
-        let (steps, quarter_step_rad) = (self.steps, FRAC_PI_2 / self.steps);
-        for i in 0..len {
-            sin[i] = pattern_sin[i] * turn_cos - pattern_cos[i] * turn_sin;
-            cos[i] = pattern_cos[i] * turn_cos + pattern_sin[i] * turn_sin;
-            let step = pattern_step[i] - passed;
-            position_deg[i] = 360.0 * step / steps;
-            from_minor_rad[i] = (steps - 4.0 * step) * quarter_step_rad;
-        }
-        // The first tooth again, from where it will stand at the last sample.
-        let end = self.mesh.position_in_mesh(1, samples.end - 1, self.of);
-        for (row, to_end) in (0..rows).rev().enumerate() {
-            let (row_sin, row_cos) = (tile.row_sines.sin[to_end], tile.row_sines.cos[to_end]);
-            sin[row * self.teeth] = end.phase_sin * row_cos + end.phase_cos * row_sin;
-            cos[row * self.teeth] = end.phase_cos * row_cos - end.phase_sin * row_sin;
-        }
-    }
-}
-
-/// The most that the tiles of a sweep hold.
-struct TileSize {
-    /// States, with those that fill the last stretch and room for [`repeat_each`].
-    len: usize,
-    /// Input angles.
-    rows: usize,
-    /// Teeth at an input angle.
-    teeth: usize,
-}
-
-impl TileSize {
-    fn of(mesh: &Mesh, samples: Samples) -> Self {
-        let teeth_at = |sample| whole(*mesh.teeth_at(sample, samples).end());
-        let (least, most) = (teeth_at(0).max(1), teeth_at(samples.count() - 1));
-        let states = TILE.min(whole(mesh.state_count(samples))).max(most);
-        let rows = whole(samples.count()).min(TILE.div_ceil(least));
-        Self { len: states.next_multiple_of(LANES) + VECTOR, rows, teeth: most }
-    }
-
-    /// What all slices of a tile take together.
-    const fn doubles(&self) -> usize {
-        22 * self.len + 7 * self.rows + 2 * self.teeth
-    }
-}
-
-/// Columns of the states of a few input angles: where they stand, their geometry, and what a unit rotation makes of them. All lie in one
-/// stretch of memory.
-struct Tile<'a> {
-    /// States in it; lanes beyond the last one hold some tooth or other.
-    count: usize,
-    /// Of the steps from one input angle to the next.
-    row_sines: SineTable,
-    tooth: Vec<u32>,
-    // Of the teeth at the start of the run.
-    base_sin: &'a mut [f64],
-    base_cos: &'a mut [f64],
-    pattern_sin: &'a mut [f64],
-    pattern_cos: &'a mut [f64],
-    pattern_step: &'a mut [f64],
-    sin: &'a mut [f64],
-    cos: &'a mut [f64],
-    from_minor_rad: &'a mut [f64],
-    input_angle_deg: &'a mut [f64],
-    position_deg: &'a mut [f64],
-    center_radius_mm: &'a mut [f64],
-    wave_generator_angle_deg: &'a mut [f64],
-    ring_angle_deg: &'a mut [f64],
-    /// Over `Δφ`.
-    force: PerContact<&'a mut [f64]>,
-    /// Over the root of `Δφ`.
-    stress: PerContact<&'a mut [f64]>,
-    /// Of the forces over `Δφ`.
-    torque: PerContact<&'a mut [f64]>,
-    rotation_rad: &'a mut [f64],
-    rotation_root: &'a mut [f64],
-    // By input angle.
-    row_torque: PerContact<&'a mut [f64]>,
-    row_input_angle_deg: &'a mut [f64],
-    row_rotation_rad: &'a mut [f64],
-    row_rotation_root: &'a mut [f64],
-    row_residual: &'a mut [f64],
-}
-
-impl<'a> Tile<'a> {
-    fn new(arena: &'a mut [f64], &TileSize { len, rows, teeth }: &TileSize, step_rad: f64) -> Self {
-        let mut rest = arena;
-        let mut slice = |len| {
-            let (slice, others) = std::mem::take(&mut rest).split_at_mut(len);
-            rest = others;
-            slice
+        let teeth = Teeth {
+            count,
+            rows,
+            len,
+            arm: tile.torque.wave_generator,
+            ring_ratio: tile.force.ring,
+            carrier_ratio: tile.force.carrier,
+            cam_stress: tile.stress.wave_generator,
+            ring_stress: tile.stress.ring,
+            carrier_stress: tile.stress.carrier,
         };
-        let (base_sin, base_cos) = (slice(teeth), slice(teeth));
-        let row_torque = PerContact::of(|_| slice(rows));
-        let (row_input_angle_deg, row_residual) = (slice(rows), slice(rows));
-        let (row_rotation_rad, row_rotation_root) = (slice(rows), slice(rows));
-        let mut column = || slice(len);
-        let (pattern_sin, pattern_cos) = (column(), column());
-        pattern_sin.fill(FRAC_1_SQRT_2);
-        pattern_cos.fill(FRAC_1_SQRT_2);
-        Self {
-            count: 0,
-            row_sines: SineTable::equally_spaced(step_rad, rows),
-            tooth: Vec::with_capacity(len),
-            base_sin,
-            base_cos,
-            pattern_sin,
-            pattern_cos,
-            pattern_step: column(),
-            sin: column(),
-            cos: column(),
-            from_minor_rad: column(),
-            input_angle_deg: column(),
-            position_deg: column(),
-            center_radius_mm: column(),
-            wave_generator_angle_deg: column(),
-            ring_angle_deg: column(),
-            force: PerContact::of(|_| column()),
-            stress: PerContact::of(|_| column()),
-            torque: PerContact::of(|_| column()),
-            rotation_rad: column(),
-            rotation_root: column(),
-            row_torque,
-            row_input_angle_deg,
-            row_rotation_rad,
-            row_rotation_root,
-            row_residual,
+        let mut shared =
+            Shared { force: tile.scale, rotation_rad: tile.row_rotation_rad, stiffness: tile.row_stiffness };
+        if !sharing.share::<V>(loaded.input_torque_nmm() / zones, &teeth, &mut tile.work, &mut shared) {
+            return None;
         }
-    }
-
-    /// Torques of a unit rotation summed over the teeth at each input angle; how many of these there are.
-    #[inline(always)]
-    fn sum_torques(&mut self, teeth: usize) -> usize {
-        let rows = self.count / teeth;
-        for row in 0..rows {
-            let at = row * teeth..(row + 1) * teeth;
-            let (cam, ring) = (&self.torque.wave_generator[at.clone()], &self.torque.ring[at.clone()]);
-            let carrier = &self.torque.carrier[at];
-            let (mut of_cam, mut of_ring, mut of_carrier) = (0.0, 0.0, 0.0);
-            for ((cam, ring), carrier) in zip(zip(cam, ring), carrier) {
-                of_cam += cam;
-                of_ring += ring;
-                of_carrier += carrier;
-            }
-            self.row_torque.wave_generator[row] = of_cam;
-            self.row_torque.ring[row] = of_ring;
-            self.row_torque.carrier[row] = of_carrier;
+        let limit = match allowable_mpa {
+            Some(allowable_mpa) => Some(sharing.limit::<V>(allowable_mpa, &teeth, &mut tile.work)?),
+            None => None,
+        };
+        let (scale, root) = (&tile.scale[..len], &mut tile.scale_root[..len]);
+        let cam = &mut tile.torque.wave_generator[..len];
+        let (ring, carrier) = (&mut tile.torque.ring[..len], &mut tile.torque.carrier[..len]);
+        for i in 0..len {
+            root[i] = scale[i].sqrt();
+            let scale = zones * scale[i];
+            cam[i] *= scale;
+            ring[i] *= scale;
+            carrier[i] *= scale;
         }
-        rows
-    }
-
-    #[inline(always)]
-    fn append_to(&self, states: &mut States, peaks: &mut PerContact<[RunningPeak; 2]>) {
-        let count = self.count;
-        states.input_angle_deg.extend_from_slice(&self.input_angle_deg[..count]);
-        states.tooth.extend_from_slice(&self.tooth[..count]);
-        states.position_deg.extend_from_slice(&self.position_deg[..count]);
-        states.center_radius_mm.extend_from_slice(&self.center_radius_mm[..count]);
-        states.wave_generator_angle_deg.extend_from_slice(&self.wave_generator_angle_deg[..count]);
-        states.ring_angle_deg.extend_from_slice(&self.ring_angle_deg[..count]);
-        let PerContact { wave_generator: [force_h, stress_h], ring: [force_k, stress_k], carrier: [force_s, stress_s] } =
-            peaks;
-        let (rotation_rad, rotation_root) = (&self.rotation_rad[..count], &self.rotation_root[..count]);
-        force_h.append(&mut states.force_n.wave_generator, self.force.wave_generator, rotation_rad);
-        force_k.append(&mut states.force_n.ring, self.force.ring, rotation_rad);
-        force_s.append(&mut states.force_n.carrier, self.force.carrier, rotation_rad);
-        stress_h.append(&mut states.stress_mpa.wave_generator, self.stress.wave_generator, rotation_root);
-        stress_k.append(&mut states.stress_mpa.ring, self.stress.ring, rotation_root);
-        stress_s.append(&mut states.stress_mpa.carrier, self.stress.carrier, rotation_root);
-    }
-}
-
-/// The largest value of a growing column, and the first state of the tile that it stands in.
-#[derive(Clone, Copy, Default)]
-struct RunningPeak {
-    value: f64,
-    start: usize,
-}
-
-impl RunningPeak {
-    /// Appends unit loads times the rotations that go with them to the column, and looks at them while they are near.
-    #[inline(always)]
-    fn append(&mut self, column: &mut Vec<f64>, unit: &[f64], factor: &[f64]) {
-        let start = column.len();
-        column.extend(zip(unit, factor).map(|(unit, factor)| unit * factor));
-        let value = largest(&column[start..]);
-        if value > self.value {
-            *self = Self { value, start };
-        }
-    }
-
-    /// The state itself.
-    fn find(&self, column: &[f64]) -> usize {
-        self.start + column[self.start..].iter().position(|&value| value >= self.value).unwrap_or(0)
-    }
-}
-
-impl States {
-    /// Appends the first `teeth` states again, a period on.
-    fn repeat_first(&mut self, teeth: usize, input_angle_deg: f64) {
-        self.input_angle_deg.extend(std::iter::repeat_n(input_angle_deg, teeth));
-        self.tooth.extend_from_within(..teeth);
-        let last = self.tooth.len() - teeth;
-        self.tooth[last..].iter_mut().for_each(|tooth| *tooth += 1);
-        let PerContact { wave_generator: force_h, ring: force_k, carrier: force_s } = &mut self.force_n;
-        let PerContact { wave_generator: stress_h, ring: stress_k, carrier: stress_s } = &mut self.stress_mpa;
-        for column in [
-            &mut self.position_deg,
-            &mut self.center_radius_mm,
-            &mut self.wave_generator_angle_deg,
-            &mut self.ring_angle_deg,
-            force_h,
-            force_k,
-            force_s,
-            stress_h,
-            stress_k,
-            stress_s,
-        ] {
-            column.extend_from_within(..teeth);
-        }
+        tile.sum_torques(count);
+        tile.row_stiffness[..rows].iter_mut().for_each(|stiffness| *stiffness *= zones);
+        tile.row_loaded.clear();
+        let carrying = |row: &[f64]| row.iter().filter(|&&force| force > 0.0).count();
+        tile.row_loaded.extend(tile.scale[..tile.count].chunks_exact(count).map(carrying));
+        Some(limit)
     }
 }

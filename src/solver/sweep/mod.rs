@@ -5,15 +5,19 @@ mod columns;
 mod fast;
 mod plain;
 mod points;
+mod unloaded;
 
 use crate::drive::Drive;
+use crate::gaps::Deviations;
 use crate::load_sharing::{LoadCase, LoadedDrive};
+use crate::tooth::ToothContact;
 use crate::{SolveError, Stop};
 
 pub use columns::{
     ContactPeaks, Extremes, InputAngles, Peak, PeakShear, States, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity,
 };
 pub use points::{Points, Tolerance};
+pub use unloaded::unloaded_wind_up_deg;
 
 /// The sweep over one period.
 ///
@@ -24,21 +28,46 @@ pub use points::{Points, Tolerance};
 /// [`SolveError::Stopped`] when `stop` says so.
 pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -> Result<Sweep, SolveError> {
     let loaded = LoadedDrive::new(drive, load)?;
-    // The capacity is worked out tooth by tooth.
-    if let (Points::Samples(samples), None) = (points, load.parameters().allowable_stress_mpa)
-        && let Some(columns) = fast::sweep(&loaded, samples, stop)?
+    if let Points::Samples(samples) = points
+        && let Some(sweep) = fast::sweep(&loaded, samples, load.parameters().allowable_stress_mpa, stop)?
     {
-        return columns::finished(&loaded, points, columns, None);
+        return Ok(sweep);
     }
     plain::sweep(&loaded, load, points, stop)
 }
 
-/// What the sweep over one period comes to, without its states: the same peaks, in less time.
+/// The sweep of a drive of which single items deviate: by slot and lobe, over as many load periods as it takes until they meet again as they
+/// did ([`Deviations::mesh`]).
+///
+/// # Errors
+/// As [`sweep`]; [`SolveError::Impossible`] for deviations that this drive or this load cannot have, [`SolveError::Interference`] where
+/// a part is too full.
+pub fn sweep_with_deviations(
+    drive: &Drive,
+    load: &LoadCase,
+    deviations: &Deviations,
+    points: Points,
+    stop: &impl Stop,
+) -> Result<Sweep, SolveError> {
+    if deviations.is_nil() && deviations.violations(drive.parameters()).is_empty() {
+        return sweep(drive, load, points, stop);
+    }
+    let loaded = LoadedDrive::with_deviations(drive, load, &ToothContact::of(drive), Some(deviations))?;
+    plain::sweep(&loaded, load, points, stop)
+}
+
+/// What the sweep over one period comes to, without its states: the same peaks, in less time. That the period closes is not looked at.
 ///
 /// # Errors
 /// As [`sweep`].
 pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -> Result<SweepPeaks, SolveError> {
-    sweep(drive, load, points, stop).map(|sweep| SweepPeaks::from(&sweep))
+    let loaded = LoadedDrive::new(drive, load)?;
+    if let Points::Samples(samples) = points
+        && let Some(peaks) = fast::peaks(&loaded, samples, load.parameters().allowable_stress_mpa, stop)?
+    {
+        return Ok(peaks);
+    }
+    plain::sweep(&loaded, load, points, stop).map(|sweep| SweepPeaks::from(&sweep))
 }
 
 /// The same sweep, state by state: what the fast path is held against, and what is left where it does not reach.

@@ -2,7 +2,7 @@
 
 use crate::contact::{Contact, Materials, PerContact};
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
-use crate::mesh::{Mesh, PlacedTooth};
+use crate::mesh::PlacedTooth;
 use crate::root::NotConverged;
 use crate::springs::WindUp;
 use crate::sweep::adaptive;
@@ -38,12 +38,12 @@ pub(crate) fn sweep(
     points: Points,
     stop: &impl Stop,
 ) -> Result<Sweep, SolveError> {
-    let mesh = Mesh::new(loaded.drive());
+    let mesh = *loaded.mesh();
     let mut columns = Growing::new(loaded, load.parameters().allowable_stress_mpa);
     match points {
         Points::Samples(samples) => {
             columns.reserve(mesh.state_count(samples));
-            for sample in 0..=samples.count() {
+            for sample in 0..=mesh.last_sample(samples) {
                 if stop.stopped() {
                     return Err(SolveError::Stopped);
                 }
@@ -51,16 +51,17 @@ pub(crate) fn sweep(
             }
         }
         Points::Tolerance(tolerance) => {
-            let moments = adaptive::moments(loaded, load, tolerance, stop)?;
+            let by_lap = adaptive::moments(loaded, load, tolerance, stop)?;
             // Each place was counted once; listed it may stand for several teeth, and in every lap.
-            let listed =
-                moments.iter().map(|moment| moment.places()).sum::<u64>() * mesh.laps() * mesh.listed_at_each_place();
+            let places = by_lap.iter().flatten().map(|moment| moment.places()).sum::<u64>();
+            let listed = places * (mesh.laps() / by_lap.len() as u64) * mesh.listed_at_each_place();
             let limit = tolerance.max_states();
             if listed > limit {
                 return Err(SolveError::TooManyStates { limit });
             }
-            let lap_deg = mesh.period_deg() / mesh.laps() as f64;
-            for lap in 0..mesh.laps() {
+            let lap_deg = mesh.sweep_period_deg() / mesh.laps() as f64;
+            // Where items are alike, all laps are.
+            for (lap, moments) in (0..mesh.laps()).zip(by_lap.iter().cycle()) {
                 // A lap begins where the one before has ended.
                 for moment in &moments[usize::from(lap > 0)..] {
                     if stop.stopped() {
@@ -123,7 +124,7 @@ impl<'a> Growing<'a> {
             torque_capacity: None,
             balance: TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm()),
             torque_balance_residual: 0.0,
-            lists_lobes: !Mesh::new(loaded.drive()).zones_are_alike(),
+            lists_lobes: !loaded.mesh().zones_are_alike(),
             teeth: Vec::new(),
             hardest: PerContact::default(),
         }
@@ -137,8 +138,9 @@ impl<'a> Growing<'a> {
     /// Appends the states of the teeth in mesh at one input angle.
     fn add(&mut self, input_angle_deg: f64, placed: impl Iterator<Item = PlacedTooth>) -> Result<(), SolveError> {
         self.teeth.clear();
-        for PlacedTooth { number, lobe, position, position_deg } in placed {
-            self.teeth.push(self.loaded.tooth(position)?);
+        for PlacedTooth { number, lobe, place, position, position_deg } in placed {
+            let tooth = self.loaded.tooth_at(&place, position);
+            self.teeth.push(tooth.map_err(|error| error.at_input_angle(input_angle_deg))?);
             self.states.input_angle_deg.push(input_angle_deg);
             self.states.tooth.push(u32::try_from(number).unwrap_or(u32::MAX));
             if self.lists_lobes {

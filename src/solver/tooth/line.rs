@@ -13,9 +13,12 @@ pub(crate) const WIDEST_SHARE: f64 = 0.5;
 /// `δ = F (A + B ln(F_r/F))` at one contact, with `F_r` the force under which half the contact's width is `length_mm`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct JohnsonLine {
-    compliance_mm_per_n: f64,
-    growth_mm_per_n: f64,
-    length_mm: f64,
+    /// `A`.
+    pub(crate) compliance_mm_per_n: f64,
+    /// `B`.
+    pub(crate) growth_mm_per_n: f64,
+    /// The length that the half-width stays below.
+    pub(crate) length_mm: f64,
 }
 
 /// The numbers of [`JohnsonLine`] at a place.

@@ -68,6 +68,17 @@ enum Law {
     Flat,
 }
 
+/// The law of the three contacts of a cylinder.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum LineLaw {
+    /// `δ = F/k`, what stands behind the contact included.
+    Linear { compliance_mm_per_n: PerContact<f64> },
+    /// `δ = q F^p`, alike at all three.
+    Power { exponent: f64, coefficient: f64 },
+    /// Johnson's line, and what stands behind it.
+    Johnson { law: PerContact<JohnsonLine>, series_compliance_mm_per_n: PerContact<f64> },
+}
+
 /// What the pressure of a contact at a place follows from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Pressure {
@@ -208,17 +219,36 @@ impl Contacts {
         self.hertz.get(contact)
     }
 
-    /// `1/k` of each contact, what stands behind it included, where all are linear lines.
-    pub(crate) fn linear_compliance_mm_per_n(&self) -> Option<PerContact<f64>> {
-        let of = |contact| match *self.law.get(contact) {
-            Law::Linear { compliance_mm_per_n } => {
-                Some(compliance_mm_per_n + self.series_compliance_mm_per_n.get(contact))
+    /// The law of cylinders, for whoever works in columns; none of other shapes, nor where laws of two kinds add up at a tooth.
+    pub(crate) fn line_law(&self) -> Option<LineLaw> {
+        if self.shape != ToothContact::Cylinder {
+            return None;
+        }
+        let series = &self.series_compliance_mm_per_n;
+        let PerContact { wave_generator, ring, carrier } = &self.law;
+        match (wave_generator, ring, carrier) {
+            (
+                Law::Linear { compliance_mm_per_n: wave_generator },
+                Law::Linear { compliance_mm_per_n: ring },
+                Law::Linear { compliance_mm_per_n: carrier },
+            ) => Some(LineLaw::Linear {
+                compliance_mm_per_n: PerContact {
+                    wave_generator: wave_generator + series.wave_generator,
+                    ring: ring + series.ring,
+                    carrier: carrier + series.carrier,
+                },
+            }),
+            (&Law::Power { exponent, coefficient }, Law::Power { .. }, Law::Power { .. })
+                if series.iter().all(|(_, &compliance)| compliance == 0.0) =>
+            {
+                Some(LineLaw::Power { exponent, coefficient })
             }
-            Law::Power { .. } | Law::Johnson(_) | Law::Ellipse | Law::Flat => None,
-        };
-        let is_cylinder = self.shape == ToothContact::Cylinder;
-        let (wave_generator, ring, carrier) = (of(Contact::WaveGenerator)?, of(Contact::Ring)?, of(Contact::Carrier)?);
-        is_cylinder.then_some(PerContact { wave_generator, ring, carrier })
+            (&Law::Johnson(wave_generator), &Law::Johnson(ring), &Law::Johnson(carrier)) => Some(LineLaw::Johnson {
+                law: PerContact { wave_generator, ring, carrier },
+                series_compliance_mm_per_n: *series,
+            }),
+            _ => None,
+        }
     }
 
     /// What pressure a contact has where the curvatures in the plane of motion sum to `curvature_per_mm` and the tooth's centre is
@@ -319,7 +349,7 @@ impl ContactLaw {
     }
 
     /// Whether the law goes with `projection`.
-    pub(crate) const fn is_of_projection(&self) -> bool {
+    pub const fn is_of_projection(&self) -> bool {
         match self {
             Self::Linear | Self::Fixed(_) | Self::Palmgren => true,
             Self::Johnson { .. } | Self::Hertz => false,

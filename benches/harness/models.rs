@@ -1,0 +1,157 @@
+//! Every model beside the plain path, which is what all but the first of them took before.
+
+use std::fmt::Write as _;
+use std::hint::black_box;
+
+use toothwave_solver::drive::{Drive, DriveError};
+use toothwave_solver::load_sharing::LoadCase;
+use toothwave_solver::sweep::{Points, peaks, sweep, sweep_plain};
+use toothwave_solver::{
+    Compatibility, ContactLaw, DriveParameters, LoadParameters, Never, PerContact, ToothShape, WaveGenerator,
+};
+
+use crate::harness::{Effort, Spread};
+use crate::reference::Setup;
+use crate::turns::{Contestant, Failure, take_turns};
+
+const JOHNSON: ContactLaw =
+    ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
+
+/// The paper's case 5.2: undercut, every second slot filled.
+const PAPER_5_2: DriveParameters = DriveParameters {
+    wave_generator: WaveGenerator::Ellipse { semi_major_mm: 50.7, semi_minor_mm: 49.3 },
+    teeth: 80,
+    installed: 40,
+    tooth_radius_mm: 1.5,
+    tooth: ToothShape::Cylinder { width_mm: 15.0 },
+    ring_teeth: 78,
+    tip_radius_mm: None,
+};
+
+/// What is measured.
+#[derive(Clone, Copy)]
+enum Question {
+    /// A sweep of 5000 intervals with all its columns, by state.
+    Columns,
+    /// The peaks of 16 intervals from the parameters, no column kept.
+    Peaks,
+    /// True peaks.
+    TruePeaks,
+    /// Whether a drive is refused, and by which codes.
+    Refusal,
+}
+
+struct Row {
+    name: &'static str,
+    question: Question,
+    drive: DriveParameters,
+    load: LoadParameters,
+    goal: &'static str,
+    /// Where the path of before is not at hand any more: what it took, in the same unit.
+    before: Option<&'static str>,
+}
+
+fn rows() -> Vec<Row> {
+    let Setup { drive, load, .. } = Setup::PAPER_5_1;
+    let by_work = LoadParameters { compatibility: Compatibility::VirtualWork, ..load };
+    let (palmgren, johnson) =
+        (LoadParameters { law: ContactLaw::Palmgren, ..by_work }, LoadParameters { law: JOHNSON, ..by_work });
+    let with_gaps = |load: LoadParameters| LoadParameters {
+        clearance_um: PerContact { wave_generator: 0.0, ring: 10.0, carrier: 2.0 },
+        ..load
+    };
+    let row = |name, question, drive, load, goal| Row { name, question, drive, load, goal, before: None };
+    let undercut = |mut drive: DriveParameters| {
+        // The threshold of case 5.1 and a millionth more.
+        drive.tooth_radius_mm = 6.749_189_868_666_484 * (1.0 + 1e-6);
+        drive
+    };
+    use Question::{Columns, Peaks, Refusal, TruePeaks};
+    vec![
+        row("`linear`", Columns, drive, load, "16"),
+        row("allowable stress", Columns, drive, LoadParameters { allowable_stress_mpa: Some(1500.0), ..load }, "17"),
+        row("`palmgren`", Columns, drive, palmgren, "28"),
+        row("`linear`, gaps", Columns, drive, with_gaps(by_work), "25"),
+        row("`palmgren`, gaps", Columns, drive, with_gaps(palmgren), "70"),
+        row("`johnson`", Columns, drive, johnson, "50"),
+        row("`johnson`, gaps", Columns, drive, with_gaps(johnson), "70"),
+        row(
+            "`johnson`, allowable stress",
+            Columns,
+            drive,
+            LoadParameters { allowable_stress_mpa: Some(1500.0), ..johnson },
+            "",
+        ),
+        row("peaks of 16 intervals, 5.1 `linear`", Peaks, drive, load, "2.5"),
+        row("peaks of 16 intervals, 5.1 `johnson`", Peaks, drive, johnson, "8"),
+        row("peaks of 16 intervals, 5.2 `johnson`", Peaks, PAPER_5_2, johnson, "10"),
+        row("true peaks to 1e-9, 5.1 `linear`", TruePeaks, drive, load, "30"),
+        row("true peaks to 1e-9, 5.1 `johnson`", TruePeaks, drive, johnson, "30"),
+        row("true peaks to 1e-9, 5.2 `linear`", TruePeaks, PAPER_5_2, load, "30"),
+        row("true peaks to 1e-9, undercut threshold", TruePeaks, undercut(drive), load, "30"),
+        row("refusal where teeth touch", Refusal, DriveParameters { tooth_radius_mm: 8.0, ..drive }, load, "3"),
+    ]
+}
+
+/// Runs a row once, the way of now or the plain path; the number of states it is to be counted by.
+fn run(row: &Row, is_plain: bool) -> Result<f64, Failure> {
+    let row = black_box(row);
+    if let Question::Refusal = row.question {
+        return match Drive::new(&row.drive) {
+            Err(DriveError::Impossible(violations)) => Ok(if black_box(violations).is_empty() { 0.0 } else { 1.0 }),
+            _ => Err("the drive is not refused".into()),
+        };
+    }
+    let drive = Drive::new(&row.drive)?;
+    let load = LoadCase::new(&row.load).map_err(|violations| format!("{violations:?}"))?;
+    let points = match row.question {
+        Question::Columns => Points::samples(5000),
+        Question::Peaks | Question::Refusal => Points::samples(16),
+        Question::TruePeaks => Points::tolerance(1e-9, 10_000_000),
+    };
+    let points = points.map_err(|violation| violation.to_string())?;
+    match row.question {
+        Question::Columns => {
+            let way = if is_plain { sweep_plain } else { sweep };
+            Ok(black_box(way(&drive, &load, points, &Never)?).states.len() as f64)
+        }
+        Question::TruePeaks | Question::Peaks | Question::Refusal => {
+            if is_plain {
+                black_box(sweep_plain(&drive, &load, points, &Never)?);
+            } else {
+                black_box(peaks(&drive, &load, points, &Never)?);
+            }
+            Ok(1.0)
+        }
+    }
+}
+
+/// The table: goal, before and now, of each row whose name has these words.
+pub(crate) fn table(effort: Effort, only: &str) -> Result<String, Failure> {
+    let mut text = String::from(
+        "\n## Every model\n\nCase 5.1 unless another one is named; *before* is the plain path, state by state, which all of them but the first took until now, \
+         measured in the same run. Times are those on the processor, which what else runs does not count in. Sweeps are of 5000 intervals, from the parameters to all columns, in ns a state; the rest, from the parameters too, is in µs.\n\n\
+         | | unit | goal | before | now | times |\n|---|---|---|---|---|---|\n",
+    );
+    for row in rows().iter().filter(|row| row.name.contains(only)) {
+        let states = run(row, false)?;
+        let mut contestants = vec![
+            Contestant::of_processor("now", || run(row, false)),
+            Contestant::of_processor("before", || run(row, true)),
+        ];
+        take_turns(&mut contestants, effort.choose(11, 3))?;
+        let (unit, factor) = match row.question {
+            Question::Columns => ("ns", 1e9 / states),
+            _ => ("µs", 1e6),
+        };
+        let [now, before] = [0, 1].map(|at| contestants[at].spread(factor));
+        let ratio =
+            Spread::of(contestants[0].seconds.iter().zip(&contestants[1].seconds).map(|(now, before)| before / now));
+        let before = row.before.map_or_else(|| before.show(1.0), str::to_owned);
+        let line =
+            format!("| {} | {unit} | {} | {before} | {} | {} |", row.name, row.goal, now.show(1.0), ratio.show(1.0));
+        println!("{line}");
+        writeln!(text, "{line}")?;
+    }
+    Ok(text)
+}

@@ -1,0 +1,190 @@
+//! Elementary functions and columns without a branch or a call, so that the compiler makes vectors of them.
+
+use pulp::Simd;
+
+/// States worked on in one stretch of straight code; a multiple of every vector's width.
+pub(super) const LANES: usize = 64;
+
+/// Doubles of the widest vector.
+pub(super) const VECTOR: usize = 8;
+
+/// Terms of the arctangent's series at most. A drive that needs more goes the plain way.
+const MAX_TERMS: usize = 24;
+
+/// What is added to the bits of a number so that its exponent steps at √½ and not at 1: the mantissa then lies in [√½, √2).
+const FROM_ROOT_HALF: u64 = 0x3ff0_0000_0000_0000 - ROOT_HALF;
+/// The bits of √½.
+const ROOT_HALF: u64 = 0x3fe6_a09e_667f_3bcd;
+const MANTISSA: u64 = 0x000f_ffff_ffff_ffff;
+/// 2^52: in the bits of a sum with it whole numbers stand as they are.
+const WHOLE: f64 = 4_503_599_627_370_496.0;
+
+/// ln 2 in two parts, of which the first has so many zeros at its end that its product with any exponent is exact.
+const LN_2_HIGH: f64 = f64::from_bits(0x3fe6_2e42_fee0_0000);
+const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+
+/// The coefficients of `(artanh s)/s - 1` over `s²` and its powers, as many as reach the last digit for `|s| ≤ (√2 - 1)/(√2 + 1)`.
+const ARTANH: [f64; 9] =
+    [1.0 / 3.0, 0.2, 1.0 / 7.0, 1.0 / 9.0, 1.0 / 11.0, 1.0 / 13.0, 1.0 / 15.0, 1.0 / 17.0, 1.0 / 19.0];
+
+/// Those of `e^x`, as many as reach the last digit for `|x| ≤ ln 2/2`.
+const EXPONENTIAL: [f64; 14] = {
+    let mut coefficients = [1.0; 14];
+    let mut term = 1;
+    while term < 14 {
+        coefficients[term] = coefficients[term - 1] / term as f64;
+        term += 1;
+    }
+    coefficients
+};
+
+/// `ab + c`, rounded once where vectors can do that.
+#[inline(always)]
+fn fused<V: Simd>(a: f64, b: f64, c: f64) -> f64 {
+    if V::IS_SCALAR { a * b + c } else { a.mul_add(b, c) }
+}
+
+/// `ln x` of a normal positive number, to two units of the last digit.
+#[inline(always)]
+pub(super) fn ln<V: Simd>(x: f64) -> f64 {
+    let shifted = x.to_bits().wrapping_add(FROM_ROOT_HALF);
+    let exponent = f64::from_bits((shifted >> 52) | WHOLE.to_bits()) - (WHOLE + 1023.0);
+    let mantissa = f64::from_bits((shifted & MANTISSA).wrapping_add(ROOT_HALF));
+    // ln m = 2 artanh((m - 1)/(m + 1))
+    let above = mantissa - 1.0;
+    let s = above / (2.0 + above);
+    let z = s * s;
+    let mut sum = 0.0;
+    for coefficient in ARTANH.iter().rev() {
+        sum = fused::<V>(sum, z, *coefficient);
+    }
+    let twice = 2.0 * s;
+    fused::<V>(exponent, LN_2_HIGH, twice + fused::<V>(twice * z, sum, exponent * LN_2_LOW))
+}
+
+/// `ln x` of a normal positive number, to 0.03: a start for a search.
+#[inline(always)]
+pub(super) fn ln_roughly(x: f64) -> f64 {
+    /// Half of what `log2 m` exceeds `m - 1` by at most, 1 ≤ m ≤ 2.
+    const HALF_BULGE: f64 = 0.043;
+    // As a whole number the bits count exponent and mantissa on a scale that is straight from each power of two to the next.
+    let straight = f64::from_bits((x.to_bits() >> 12) | WHOLE.to_bits()) - WHOLE;
+    (straight / (1_u64 << 40) as f64 - (1023.0 - HALF_BULGE)) * std::f64::consts::LN_2
+}
+
+/// `e^x` for `|x| ≤ 700`, and what is next to nothing below that, to two units of the last digit.
+#[inline(always)]
+fn exp<V: Simd>(x: f64) -> f64 {
+    /// 1.5 · 2^52: a sum with it is rounded to a whole number, which stands in its last bits.
+    const ROUND: f64 = 1.5 * WHOLE;
+    let x = if x > -700.0 { x } else { -700.0 };
+    let shifted = x * std::f64::consts::LOG2_E + ROUND;
+    let exponent = shifted - ROUND;
+    let rest = (x - exponent * LN_2_HIGH) - exponent * LN_2_LOW;
+    let mut sum = 0.0;
+    for coefficient in EXPONENTIAL.iter().rev() {
+        sum = fused::<V>(sum, rest, *coefficient);
+    }
+    let power = f64::from_bits((shifted.to_bits() << 52).wrapping_add(1.0_f64.to_bits()));
+    sum * power
+}
+
+/// `x^p` of a normal positive number, where that lies within e^±700.
+#[inline(always)]
+pub(super) fn power<V: Simd>(x: f64, exponent: f64) -> f64 {
+    exp::<V>(exponent * ln::<V>(x))
+}
+
+/// How many terms of `atan q = q (1 - q²/3 + q⁴/5 - …)` reach the last digit for `0 ≤ q ≤ largest`.
+pub(super) fn arctangent_terms(largest: f64) -> Option<usize> {
+    let square = largest * largest;
+    let mut power = 1.0;
+    (1..=MAX_TERMS).find(|_| {
+        power *= square;
+        power < 0.25 * f64::EPSILON
+    })
+}
+
+/// The coefficients of `atan q` over `q` and the powers of `q²`.
+const ARCTANGENT: [f64; MAX_TERMS] = {
+    let mut coefficients = [0.0; MAX_TERMS];
+    let (mut term, mut sign) = (0, 1.0);
+    while term < MAX_TERMS {
+        coefficients[term] = sign / (2 * term + 1) as f64;
+        (term, sign) = (term + 1, -sign);
+    }
+    coefficients
+};
+
+/// Replaces small ratios by their arctangents.
+#[inline(always)]
+pub(super) fn arctangents(ratios: &mut [f64; LANES], terms: usize) {
+    let mut sums = [0.0; LANES];
+    for coefficient in ARCTANGENT[..terms].iter().rev() {
+        for i in 0..LANES {
+            sums[i] = sums[i] * (ratios[i] * ratios[i]) + coefficient;
+        }
+    }
+    for i in 0..LANES {
+        ratios[i] *= sums[i];
+    }
+}
+
+/// The largest of values that are not negative: first of each lane, since one running value could not be vectorised.
+#[inline(always)]
+pub(super) fn largest(values: &[f64]) -> f64 {
+    let (stretches, rest) = values.as_chunks::<{ 2 * VECTOR }>();
+    let mut most = [0.0; 2 * VECTOR];
+    for stretch in stretches {
+        for i in 0..2 * VECTOR {
+            most[i] = if stretch[i] > most[i] { stretch[i] } else { most[i] };
+        }
+    }
+    most.iter().chain(rest).fold(0.0, |most, &value| if value > most { value } else { most })
+}
+
+/// Each value so many times in a row, the last one up to the end of its stretch too. Whole vectors are written, and what is too much is overwritten by
+/// the next; the last needs room.
+#[inline(always)]
+pub(super) fn repeat_each(values: &[f64], times: usize, repeated: &mut [f64]) {
+    for (row, &value) in values.iter().enumerate() {
+        for start in (row * times..(row + 1) * times).step_by(VECTOR) {
+            repeated[start..start + VECTOR].fill(value);
+        }
+    }
+    let end = values.len() * times;
+    if let Some(&last) = values.last() {
+        repeated[end..end.next_multiple_of(LANES)].fill(last);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn assert_to_two_units<V: Simd>() {
+        let close = |found: f64, expected: f64| (found - expected).abs() <= 2.0 * f64::EPSILON * expected.abs();
+        let mut x = 1e-300;
+        while x < 1e300 {
+            assert!(close(ln::<V>(x), x.ln()), "ln {x}");
+            assert!((ln_roughly(x) - x.ln()).abs() < 0.031, "ln {x}");
+            x *= 1.003_7;
+        }
+        for step in -100_000..100_000 {
+            let x = 1.0 + f64::from(step) * 9e-6;
+            assert!(close(ln::<V>(x), x.ln()), "ln {x}");
+            let x = f64::from(step) * 6.9e-3;
+            assert!(close(exp::<V>(x), x.exp()), "exp {x}");
+        }
+        assert!(exp::<V>(-1e6) < 1e-300);
+    }
+
+    #[test]
+    fn logarithms_and_exponentials_are_right_to_two_units_of_the_last_digit_on_any_machine() {
+        assert_to_two_units::<pulp::Scalar>();
+        #[cfg(target_arch = "x86_64")]
+        assert_to_two_units::<pulp::x86::V3>();
+        #[cfg(target_arch = "aarch64")]
+        assert_to_two_units::<pulp::aarch64::Neon>();
+    }
+}

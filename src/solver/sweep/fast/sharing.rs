@@ -1,0 +1,904 @@
+//! How the teeth at an input angle share the load, for a tile of input angles together (docs/theory.md section 9, *Fast path*).
+//!
+//! The springs are those of [`crate::springs`], in columns. With gaps every search comes down to the rotation from above: each force is convex
+//! in the rotation, so that the tangents of all of them, wherever they touch, together never make more torque than the springs, and their root
+//! stands at or beyond the true one. A tooth that is open there is open at the true rotation too.
+
+use pulp::Simd;
+
+use super::lanes::{LANES, largest, ln, ln_roughly, power, repeat_each};
+use crate::contact::{Contact, PerContact};
+use crate::load_sharing::{Compatibility, LoadedDrive};
+use crate::tooth::LineLaw;
+use crate::tooth::line::{JohnsonLine, WIDEST_SHARE};
+
+/// Rounds of a search at most; a tile that needs more goes the plain way.
+const MAX_ROUNDS: u32 = 60;
+
+/// A relative step this small of a force under Johnson's law is the last: the next one would be of its square, less than the last digit.
+const LAST_FORCE_STEP: f64 = 3e-8;
+
+/// The same of the rotation under a power law, and the part of the torque that rounding leaves open.
+const LAST_ROTATION_STEP: f64 = 1e-9;
+const OPEN_TORQUE: f64 = 8.0 * f64::EPSILON;
+
+/// In place of nothing, where a logarithm is asked for: no contact knows a ratio or a force like this.
+const NOTHING: f64 = 1e-150;
+
+/// The teeth of a tile under 1 N at the wave generator, by input angle and then tooth.
+pub(super) struct Teeth<'a> {
+    /// Teeth at an input angle.
+    pub(super) count: usize,
+    /// Input angles.
+    pub(super) rows: usize,
+    /// States, with those that fill the last stretch.
+    pub(super) len: usize,
+    /// `|h'|`.
+    pub(super) arm: &'a [f64],
+    /// `F_K/F_H`.
+    pub(super) ring_ratio: &'a [f64],
+    /// `F_S/F_H`.
+    pub(super) carrier_ratio: &'a [f64],
+    /// Stress at the wave generator.
+    pub(super) cam_stress: &'a [f64],
+    /// Stress at the ring.
+    pub(super) ring_stress: &'a [f64],
+    /// Stress at the carrier.
+    pub(super) carrier_stress: &'a [f64],
+}
+
+/// The least torque of a tile under which a contact reaches a stress.
+pub(super) struct Limit {
+    /// Of one zone.
+    pub(super) torque_nmm: f64,
+    /// The contact that does.
+    pub(super) contact: Contact,
+    /// The input angle of the tile.
+    pub(super) row: usize,
+}
+
+/// What comes of it.
+pub(super) struct Shared<'a> {
+    /// `F_H`, by state.
+    pub(super) force: &'a mut [f64],
+    /// `Δφ`, by input angle.
+    pub(super) rotation_rad: &'a mut [f64],
+    /// `dM0/dΔφ` of one zone, by input angle.
+    pub(super) stiffness: &'a mut [f64],
+}
+
+/// Columns to work in.
+pub(super) struct Work<'a> {
+    /// Of a power law the force at the rotation 1; of Johnson's `A`.
+    unit: &'a mut [f64],
+    /// `B` of Johnson's law.
+    growth: &'a mut [f64],
+    /// Rotation at which the gaps of a tooth are closed.
+    closing: &'a mut [f64],
+    /// Rotation beyond that; nothing or less where a gap is open.
+    pressed: &'a mut [f64],
+    /// `dF_H/dΔφ` of the tangent.
+    slope: &'a mut [f64],
+    /// What the tangent makes of the force of a tooth that is not pressed.
+    offset: &'a mut [f64],
+    /// `F_H` over the approach along `F_H`.
+    secant: &'a mut [f64],
+    /// Logarithm of the force at which Johnson's law has no meaning any more.
+    reach: &'a mut [f64],
+    /// The same over the force.
+    margin: &'a mut [f64],
+    /// Rotation beyond `last`, by state.
+    excess: &'a mut [f64],
+    /// Closing angle that `excess` counts from, by state: that of the last tooth that carries, so that light loads keep their digits.
+    last: &'a mut [f64],
+    /// `F_H` under a limit.
+    limit: &'a mut [f64],
+    row_excess: &'a mut [f64],
+    row_last: &'a mut [f64],
+    /// What the forces under Johnson's law are counted in.
+    typical_n: f64,
+}
+
+impl<'a> Work<'a> {
+    /// Columns of states.
+    pub(super) const COLUMNS: usize = 12;
+    /// Columns of input angles.
+    pub(super) const ROWS: usize = 2;
+
+    /// From slices of any length.
+    pub(super) fn new(slice: &mut impl FnMut(usize) -> &'a mut [f64], column: usize, rows: usize) -> Self {
+        Self {
+            unit: slice(column),
+            growth: slice(column),
+            closing: slice(column),
+            pressed: slice(column),
+            slope: slice(column),
+            offset: slice(column),
+            secant: slice(column),
+            reach: slice(column),
+            margin: slice(column),
+            excess: slice(column),
+            last: slice(column),
+            limit: slice(column),
+            row_excess: slice(rows),
+            row_last: slice(rows),
+            typical_n: 1.0,
+        }
+    }
+}
+
+/// What an approach at each contact adds along `F_H` ([`Compatibility`]): 1 at the wave generator, `along_ring (F_K/F_H)^±1` at the ring,
+/// `carrier F_S/F_H` at the carrier.
+#[derive(Clone, Copy)]
+struct Weights {
+    ring_exponent: f64,
+    /// `along_ring = 1 - this (F_S/F_H)²`.
+    ring_decline: f64,
+    carrier: f64,
+}
+
+impl Weights {
+    fn new(loaded: &LoadedDrive<'_>) -> Self {
+        match loaded.compatibility() {
+            Compatibility::VirtualWork => Self { ring_exponent: 1.0, ring_decline: 0.0, carrier: 1.0 },
+            // cos(γ + sβ) and s sin γ, with sin γ = F_S/F_H over Z_G/U.
+            Compatibility::Projection => {
+                let drive = loaded.drive();
+                let (s, ratio) = (drive.sense(), drive.teeth_per_wave());
+                let ring_decline = (1.0 + s * drive.flank().teeth_per_wave()) / (ratio * ratio);
+                Self { ring_exponent: -1.0, ring_decline, carrier: s / ratio }
+            }
+        }
+    }
+}
+
+/// Gaps that are the same at all teeth.
+#[derive(Clone, Copy)]
+struct Gaps {
+    gap_mm: PerContact<f64>,
+    weights: Weights,
+}
+
+impl Gaps {
+    /// `g/|h'|`, without end where there is no arm.
+    #[inline(always)]
+    fn close(&self, teeth: &Teeth<'_>, closing: &mut [f64]) {
+        let len = teeth.len;
+        let closing = &mut closing[..len];
+        let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
+        let Self { gap_mm, weights } = self;
+        for i in 0..len {
+            let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
+            let ring = if weights.ring_exponent > 0.0 { ring[i] } else { 1.0 / ring[i] };
+            let carrier = weights.carrier * carrier[i];
+            let gap = gap_mm.wave_generator + gap_mm.ring * (along * ring) + gap_mm.carrier * carrier;
+            let gap = if gap > 0.0 { gap } else { 0.0 };
+            closing[i] = if arm[i] > 0.0 { gap / arm[i] } else { f64::INFINITY };
+        }
+    }
+}
+
+/// The closing angle of the last tooth that carries at a rotation that is given from another.
+#[inline(always)]
+fn last_below(closing: &[f64], from_last: f64, excess: f64) -> f64 {
+    closing.iter().fold(
+        f64::NEG_INFINITY,
+        |last, &closing| {
+            if closing - from_last < excess && closing > last { closing } else { last }
+        },
+    )
+}
+
+/// The last of closing angles that are finite.
+#[inline(always)]
+fn last_of(closing: &[f64]) -> f64 {
+    last_below(closing, 0.0, f64::INFINITY)
+}
+
+/// Where all springs together would stand if each kept the weight that it has here: a rotation to start from, above the true one where the weights are
+/// those of tangents. In two parts, of which the first is a closing angle.
+#[inline(always)]
+fn start_above(excess_alone: f64, weight: impl Fn(usize) -> f64, closing: &[f64]) -> Option<(f64, f64)> {
+    let last = last_of(closing);
+    let (mut sum, mut before) = (0.0, 0.0);
+    for (i, &closing) in closing.iter().enumerate() {
+        if closing <= last {
+            sum += weight(i);
+            before += weight(i) * (last - closing);
+        }
+    }
+    let excess = excess_alone - before / sum;
+    let carrying = last_below(closing, last, excess);
+    carrying.is_finite().then_some((carrying, excess + (last - carrying)))
+}
+
+/// How far each tooth is pressed at the rotation of its row.
+#[inline(always)]
+fn press<const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>) {
+    let rows = teeth.rows;
+    repeat_each(&work.row_excess[..rows], teeth.count, work.excess);
+    let len = teeth.len;
+    let (excess, pressed) = (&work.excess[..len], &mut work.pressed[..len]);
+    if GAPS {
+        repeat_each(&work.row_last[..rows], teeth.count, work.last);
+        let (last, closing) = (&work.last[..len], &work.closing[..len]);
+        for i in 0..len {
+            pressed[i] = excess[i] + (last[i] - closing[i]);
+        }
+    } else {
+        pressed.copy_from_slice(excess);
+    }
+}
+
+/// The force at which the first contact of each tooth reaches a stress, lines of contact all: `(σ_a/σ)²` of the stress under 1 N.
+#[inline(always)]
+fn forces_at_stress(allowable_mpa: f64, teeth: &Teeth<'_>, force: &mut [f64]) {
+    let len = teeth.len;
+    let (cam, ring) = (&teeth.cam_stress[..len], &teeth.ring_stress[..len]);
+    let (carrier, force) = (&teeth.carrier_stress[..len], &mut force[..len]);
+    for i in 0..len {
+        let most = if ring[i] > cam[i] { ring[i] } else { cam[i] };
+        let most = if carrier[i] > most { carrier[i] } else { most };
+        let share = allowable_mpa / most;
+        force[i] = share * share;
+    }
+}
+
+/// Turns each row to where the first of its teeth is pressed as far as its limit, which stands in `work.pressed`; false where a row has none.
+#[inline(always)]
+fn turn_to_limit(teeth: &Teeth<'_>, work: &mut Work<'_>) -> bool {
+    for row in 0..teeth.rows {
+        let at = row * teeth.count..(row + 1) * teeth.count;
+        let (closing, pressed) = (&work.closing[at.clone()], &work.pressed[at]);
+        let earliest = closing.iter().fold(f64::INFINITY, |earliest, &closing| earliest.min(closing));
+        let mut least = f64::INFINITY;
+        for (&closing, &pressed) in closing.iter().zip(pressed) {
+            let from_earliest = pressed + (closing - earliest);
+            if from_earliest < least {
+                least = from_earliest;
+                (work.row_last[row], work.row_excess[row]) = (closing, pressed);
+            }
+        }
+        if least.is_infinite() {
+            return false;
+        }
+    }
+    press::<true>(teeth, work);
+    true
+}
+
+/// The least torque of the rows, each turned to its limit, under these forces.
+#[inline(always)]
+fn least_torque(teeth: &Teeth<'_>, work: &Work<'_>, force: &[f64]) -> Option<Limit> {
+    let mut least: Option<Limit> = None;
+    for row in 0..teeth.rows {
+        let at = row * teeth.count..(row + 1) * teeth.count;
+        let mut torque_nmm = 0.0;
+        for i in at.clone() {
+            torque_nmm += if work.pressed[i] > 0.0 { teeth.arm[i] * force[i] } else { 0.0 };
+        }
+        if least.as_ref().is_none_or(|least| torque_nmm < least.torque_nmm) {
+            let stress = |&i: &usize| {
+                let hardest = teeth.cam_stress[i].max(teeth.ring_stress[i]).max(teeth.carrier_stress[i]);
+                hardest * if work.pressed[i] > 0.0 { force[i].sqrt() } else { 0.0 }
+            };
+            let at_limit = at.clone().max_by(|one, other| stress(one).total_cmp(&stress(other)))?;
+            let (cam, ring) = (teeth.cam_stress[at_limit], teeth.ring_stress[at_limit]);
+            let contact = if teeth.carrier_stress[at_limit] > cam.max(ring) {
+                Contact::Carrier
+            } else if ring > cam {
+                Contact::Ring
+            } else {
+                Contact::WaveGenerator
+            };
+            least = Some(Limit { torque_nmm, contact, row });
+        }
+    }
+    least.filter(|least| least.torque_nmm.is_finite())
+}
+
+/// `ξ = c F^p`, a linear law with gaps among them.
+pub(super) struct PowerLaw {
+    exponent: f64,
+    coefficient: PerContact<f64>,
+    weights: Weights,
+    gaps: Option<Gaps>,
+}
+
+/// `ξ = F (A - B ln F)`, Johnson's, with virtual work.
+pub(super) struct LogarithmicLaw {
+    /// `A` of each contact, what stands behind it included.
+    compliance: PerContact<f64>,
+    /// `B` of each contact.
+    growth: PerContact<f64>,
+    /// Force under which half a contact's width is the length that its law counts from: over the square of the stress under 1 N at wave generator and
+    /// ring, where the ratio of forces is to be counted in still; by itself at the carrier.
+    reference: PerContact<f64>,
+    gaps: Option<Gaps>,
+}
+
+/// How unit loads become loads.
+pub(super) enum Sharing {
+    Power(PowerLaw),
+    Logarithmic(LogarithmicLaw),
+}
+
+impl Sharing {
+    /// Of a drive under a load; nothing where its law or its gaps are other ones.
+    pub(super) fn new(loaded: &LoadedDrive<'_>) -> Option<Self> {
+        let weights = Weights::new(loaded);
+        let gap_mm = *loaded.uniform_gap_mm()?;
+        let has_gaps = gap_mm.iter().any(|(_, &gap_mm)| gap_mm > 0.0);
+        let gaps = has_gaps.then_some(Gaps { gap_mm, weights });
+        Some(match loaded.line_law()? {
+            LineLaw::Linear { compliance_mm_per_n } => {
+                Self::Power(PowerLaw { exponent: 1.0, coefficient: compliance_mm_per_n, weights, gaps })
+            }
+            LineLaw::Power { exponent, coefficient } => {
+                Self::Power(PowerLaw { exponent, coefficient: PerContact::of(|_| coefficient), weights, gaps })
+            }
+            LineLaw::Johnson { law, series_compliance_mm_per_n: series } => {
+                let tooth_radius_mm = loaded.drive().parameters().tooth_radius_mm;
+                let reference = |contact| {
+                    let JohnsonLine { growth_mm_per_n, length_mm, .. } = *law.get(contact);
+                    let of_curvature = length_mm * length_mm / (4.0 * growth_mm_per_n);
+                    match contact {
+                        // σ² = F Σ E*/(π L1), F = 1 at the wave generator and F_K/F_H at the ring.
+                        Contact::WaveGenerator | Contact::Ring => {
+                            of_curvature / loaded.hertz(contact).modulus_per_width_mpa_per_mm()
+                        }
+                        Contact::Carrier => of_curvature / tooth_radius_mm,
+                    }
+                };
+                Self::Logarithmic(LogarithmicLaw {
+                    compliance: PerContact::of(|contact| law.get(contact).compliance_mm_per_n + series.get(contact)),
+                    growth: PerContact::of(|contact| law.get(contact).growth_mm_per_n),
+                    reference: PerContact::of(reference),
+                    gaps,
+                })
+            }
+        })
+    }
+
+    /// Forces that make a torque together, that of one zone; false where they are not found, or where the law ends.
+    #[inline(always)]
+    pub(super) fn share<V: Simd>(
+        &self,
+        torque_nmm: f64,
+        teeth: &Teeth<'_>,
+        work: &mut Work<'_>,
+        shared: &mut Shared<'_>,
+    ) -> bool {
+        match self {
+            Self::Power(law) => law.share::<V>(torque_nmm, teeth, work, shared),
+            Self::Logarithmic(law @ LogarithmicLaw { gaps: None, .. }) => {
+                law.share::<V, false>(torque_nmm, teeth, work, shared)
+            }
+            Self::Logarithmic(law) => law.share::<V, true>(torque_nmm, teeth, work, shared),
+        }
+    }
+}
+
+impl Sharing {
+    /// Whether all loads are in proportion, whatever the torque.
+    pub(super) const fn is_in_proportion(&self) -> bool {
+        matches!(self, Self::Power(PowerLaw { gaps: None, .. }))
+    }
+
+    /// The least torque of the tile, of one zone, under which a contact reaches a stress, once the load is shared; nothing where it is not found, or
+    /// where the law ends before.
+    #[inline(always)]
+    pub(super) fn limit<V: Simd>(&self, allowable_mpa: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) -> Option<Limit> {
+        match self {
+            Self::Power(law) => law.limit::<V>(allowable_mpa, teeth, work),
+            Self::Logarithmic(law) => law.limit::<V>(allowable_mpa, teeth, work),
+        }
+    }
+}
+
+impl PowerLaw {
+    #[inline(always)]
+    fn limit<V: Simd>(&self, allowable_mpa: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) -> Option<Limit> {
+        let len = teeth.len;
+        forces_at_stress(allowable_mpa, teeth, work.limit);
+        {
+            let (force, unit, arm) = (&work.limit[..len], &work.unit[..len], &teeth.arm[..len]);
+            let pressed = &mut work.pressed[..len];
+            for i in 0..len {
+                let share = force[i] / if arm[i] > 0.0 { unit[i] } else { 1.0 };
+                let by_power = power::<V>(share, self.exponent);
+                let by_law = if self.exponent < 1.0 { by_power } else { share };
+                pressed[i] = if arm[i] > 0.0 { by_law } else { f64::INFINITY };
+            }
+        }
+        if !turn_to_limit(teeth, work) {
+            return None;
+        }
+        let (pressed, unit, force) = (&work.pressed[..len], &work.unit[..len], &mut work.limit[..len]);
+        let inverse = 1.0 / self.exponent;
+        for i in 0..len {
+            let safe = if pressed[i] > NOTHING { pressed[i] } else { NOTHING };
+            let by_power = power::<V>(safe, inverse);
+            let by_law = if self.exponent < 1.0 { by_power } else { pressed[i] };
+            force[i] = if pressed[i] > 0.0 { unit[i] * by_law } else { 0.0 };
+        }
+        least_torque(teeth, work, work.limit)
+    }
+
+    /// The force at the rotation 1, `(|h'|/c)^(1/p)`, with `c = Σ w q (F_c/F_H)^p`.
+    #[inline(always)]
+    fn units<V: Simd>(&self, teeth: &Teeth<'_>, unit: &mut [f64]) {
+        let len = teeth.len;
+        let unit = &mut unit[..len];
+        let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
+        let Self { exponent, coefficient, weights, .. } = self;
+        let of_carrier = coefficient.carrier * weights.carrier;
+        let (ring_exponent, carrier_exponent) = (exponent + weights.ring_exponent, exponent + 1.0);
+        if *exponent < 1.0 {
+            let inverse = 1.0 / exponent;
+            for i in 0..len {
+                let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
+                let of_ring = coefficient.ring * along * power::<V>(ring[i], ring_exponent);
+                let carrier = if carrier[i] > NOTHING { carrier[i] } else { NOTHING };
+                let c = coefficient.wave_generator + of_ring + of_carrier * power::<V>(carrier, carrier_exponent);
+                let share = arm[i] / c;
+                let share = if share > NOTHING { share } else { NOTHING };
+                unit[i] = if arm[i] > 0.0 { power::<V>(share, inverse) } else { 0.0 };
+            }
+        } else {
+            for i in 0..len {
+                let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
+                let ring = if weights.ring_exponent > 0.0 { ring[i] * ring[i] } else { 1.0 };
+                let of_ring = coefficient.ring * along * ring;
+                let c = coefficient.wave_generator + of_ring + of_carrier * (carrier[i] * carrier[i]);
+                unit[i] = arm[i] / c;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn share<V: Simd>(&self, torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
+        self.units::<V>(teeth, work.unit);
+        match &self.gaps {
+            None => {
+                self.share_in_proportion::<V>(torque_nmm, teeth, work, shared);
+                true
+            }
+            Some(gaps) => {
+                gaps.close(teeth, work.closing);
+                if self.exponent < 1.0 {
+                    self.share_beyond_gaps::<V>(torque_nmm, teeth, work, shared)
+                } else {
+                    share_linearly(torque_nmm, teeth, work, shared)
+                }
+            }
+        }
+    }
+
+    /// Without gaps the forces of all rotations are in proportion.
+    #[inline(always)]
+    fn share_in_proportion<V: Simd>(
+        &self,
+        torque_nmm: f64,
+        teeth: &Teeth<'_>,
+        work: &Work<'_>,
+        shared: &mut Shared<'_>,
+    ) {
+        for row in 0..teeth.rows {
+            let at = row * teeth.count..(row + 1) * teeth.count;
+            let (arm, unit) = (&teeth.arm[at.clone()], &work.unit[at.clone()]);
+            let mut of_unit = 0.0;
+            for i in 0..teeth.count {
+                of_unit += arm[i] * unit[i];
+            }
+            let share = torque_nmm / of_unit;
+            let rotation_rad = if self.exponent < 1.0 { power::<V>(share, self.exponent) } else { share };
+            shared.rotation_rad[row] = rotation_rad;
+            shared.stiffness[row] = torque_nmm / (self.exponent * rotation_rad);
+            for (force, unit) in shared.force[at].iter_mut().zip(unit) {
+                *force = unit * share;
+            }
+        }
+    }
+
+    /// Newton's method from above, by the tangents of all forces.
+    #[inline(always)]
+    fn share_beyond_gaps<V: Simd>(
+        &self,
+        torque_nmm: f64,
+        teeth: &Teeth<'_>,
+        work: &mut Work<'_>,
+        shared: &mut Shared<'_>,
+    ) -> bool {
+        let (count, inverse) = (teeth.count, 1.0 / self.exponent);
+        for row in 0..teeth.rows {
+            let at = row * count..(row + 1) * count;
+            let (arm, unit) = (&teeth.arm[at.clone()], &work.unit[at.clone()]);
+            let mut of_unit = 0.0;
+            for i in 0..count {
+                of_unit += arm[i] * unit[i];
+            }
+            let alone = power::<V>(torque_nmm / of_unit, self.exponent);
+            let Some((last, excess)) = start_above(alone, |i| arm[i] * unit[i], &work.closing[at]) else {
+                return false;
+            };
+            (work.row_last[row], work.row_excess[row]) = (last, excess);
+        }
+        let mut is_last_round = false;
+        for _ in 0..MAX_ROUNDS {
+            self.tangents::<V>(teeth, work);
+            let mut is_done = true;
+            for row in 0..teeth.rows {
+                let at = row * count..(row + 1) * count;
+                let (slope, arm) = (&work.slope[at.clone()], &teeth.arm[at.clone()]);
+                let pressed = &work.pressed[at.clone()];
+                let (mut torque, mut stiffness) = (0.0, 0.0);
+                for i in 0..count {
+                    let tangent = arm[i] * slope[i];
+                    stiffness += tangent;
+                    torque += if pressed[i] > 0.0 { tangent * pressed[i] } else { 0.0 };
+                }
+                let stiffness = inverse * stiffness;
+                shared.stiffness[row] = stiffness;
+                if is_last_round {
+                    continue;
+                }
+                let off = torque - torque_nmm;
+                let (last, step) = (work.row_last[row], off / stiffness);
+                let excess = work.row_excess[row] - step;
+                is_done &= step.abs() <= LAST_ROTATION_STEP * excess || off.abs() <= OPEN_TORQUE * torque_nmm;
+                (work.row_last[row], work.row_excess[row]) = if excess > 0.0 {
+                    (last, excess)
+                } else {
+                    is_done = false;
+                    let carrying = last_below(&work.closing[at], last, excess);
+                    (carrying, excess + (last - carrying))
+                };
+            }
+            if is_last_round {
+                for row in 0..teeth.rows {
+                    shared.rotation_rad[row] = work.row_last[row] + work.row_excess[row];
+                }
+                let len = teeth.len;
+                let (pressed, slope) = (&work.pressed[..len], &work.slope[..len]);
+                let force = &mut shared.force[..len];
+                for i in 0..len {
+                    force[i] = if pressed[i] > 0.0 { pressed[i] * slope[i] } else { 0.0 };
+                }
+                return shared.rotation_rad[..teeth.rows].iter().all(|rotation| rotation.is_finite());
+            }
+            is_last_round = is_done;
+        }
+        false
+    }
+
+    /// `F/(Δφ - θ)` of the teeth that are pressed, p times the slope.
+    #[inline(always)]
+    fn tangents<V: Simd>(&self, teeth: &Teeth<'_>, work: &mut Work<'_>) {
+        let rows = teeth.rows;
+        repeat_each(&work.row_excess[..rows], teeth.count, work.excess);
+        repeat_each(&work.row_last[..rows], teeth.count, work.last);
+        let len = teeth.len;
+        let (unit, closing, excess, last) =
+            (&work.unit[..len], &work.closing[..len], &work.excess[..len], &work.last[..len]);
+        let (pressed, slope) = (&mut work.pressed[..len], &mut work.slope[..len]);
+        let bend = 1.0 / self.exponent - 1.0;
+        for i in 0..len {
+            let x = excess[i] + (last[i] - closing[i]);
+            pressed[i] = x;
+            let safe = if x > NOTHING { x } else { NOTHING };
+            slope[i] = if x > 0.0 { unit[i] * power::<V>(safe, bend) } else { 0.0 };
+        }
+    }
+}
+
+/// Newton's method from "all carry": with a linear law its steps end where the set of teeth that carry stays the same.
+#[inline(always)]
+fn share_linearly(torque_nmm: f64, teeth: &Teeth<'_>, work: &Work<'_>, shared: &mut Shared<'_>) -> bool {
+    for row in 0..teeth.rows {
+        let at = row * teeth.count..(row + 1) * teeth.count;
+        let (arm, unit, closing) = (&teeth.arm[at.clone()], &work.unit[at.clone()], &work.closing[at.clone()]);
+        let mut last = last_of(closing);
+        let (stiffness, excess) = loop {
+            let (mut stiffness, mut before) = (0.0, 0.0);
+            for i in 0..teeth.count {
+                let of_tooth = arm[i] * unit[i];
+                stiffness += if closing[i] <= last { of_tooth } else { 0.0 };
+                before += if closing[i] <= last { of_tooth * (last - closing[i]) } else { 0.0 };
+            }
+            let excess = (torque_nmm - before) / stiffness;
+            if excess > 0.0 {
+                break (stiffness, excess);
+            }
+            // Fewer each time: the last one is open.
+            last = last_below(closing, last, excess);
+            if !last.is_finite() || excess.is_nan() {
+                return false;
+            }
+        };
+        shared.rotation_rad[row] = last + excess;
+        shared.stiffness[row] = stiffness;
+        for (force, (unit, closing)) in shared.force[at].iter_mut().zip(unit.iter().zip(closing)) {
+            let pressed = excess + (last - closing);
+            *force = if pressed > 0.0 { unit * pressed } else { 0.0 };
+        }
+    }
+    true
+}
+
+/// Logarithm of the force under which half the width is the whole length over that at which Johnson's law ends, a little early, so that the plain way
+/// decides at the end itself.
+fn least_margin() -> f64 {
+    1e-6 - 2.0 * WIDEST_SHARE.ln()
+}
+
+impl LogarithmicLaw {
+    /// `A`, `B` and the reach of each tooth, forces counted in `typical_n`.
+    #[inline(always)]
+    fn coefficients<V: Simd>(&self, typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) {
+        let len = teeth.len;
+        let (ring, carrier) = (&teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
+        let (cam_stress, ring_stress) = (&teeth.cam_stress[..len], &teeth.ring_stress[..len]);
+        let (a, b, reach) = (&mut work.unit[..len], &mut work.growth[..len], &mut work.reach[..len]);
+        let compliance = PerContact::of(|contact| typical_n * self.compliance.get(contact));
+        let growth = PerContact::of(|contact| typical_n * self.growth.get(contact));
+        let reference = PerContact::of(|contact| self.reference.get(contact) / typical_n);
+        let per_carrier_reference = 1.0 / reference.carrier;
+        for i in 0..len {
+            let ring_stress = ring_stress[i] / ring[i];
+            let carrier_ratio = if carrier[i] > NOTHING { carrier[i] } else { NOTHING };
+            let of_cam = ln::<V>(reference.wave_generator * (cam_stress[i] * cam_stress[i]));
+            let of_ring = ln::<V>(reference.ring * (ring_stress * ring_stress));
+            let of_carrier = -ln::<V>(per_carrier_reference * carrier_ratio);
+            let (ring2, carrier2) = (ring[i] * ring[i], carrier[i] * carrier[i]);
+            a[i] = (compliance.wave_generator + growth.wave_generator * of_cam)
+                + ring2 * (compliance.ring + growth.ring * of_ring)
+                + carrier2 * (compliance.carrier + growth.carrier * of_carrier);
+            b[i] = growth.wave_generator + ring2 * growth.ring + carrier2 * growth.carrier;
+            let least = if of_ring < of_cam { of_ring } else { of_cam };
+            reach[i] = if of_carrier < least { of_carrier } else { least };
+        }
+    }
+
+    /// A force near the true one for each tooth, and the rotation that goes with them.
+    #[inline(always)]
+    fn start<const GAPS: bool>(torque: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) -> bool {
+        let (count, len) = (teeth.count, teeth.len);
+        let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len]);
+        // As if all forces were the typical one.
+        let secant = &mut work.secant[..len];
+        for i in 0..len {
+            let least = 0.5 * b[i];
+            secant[i] = arm[i] / if a[i] > least { a[i] } else { least };
+        }
+        for row in 0..teeth.rows {
+            let at = row * count..(row + 1) * count;
+            let (arm, secant) = (&arm[at.clone()], &secant[at.clone()]);
+            let mut stiffness = 0.0;
+            for i in 0..count {
+                stiffness += arm[i] * secant[i];
+            }
+            let alone = torque / stiffness;
+            (work.row_last[row], work.row_excess[row]) = if GAPS {
+                let Some(start) = start_above(alone, |i| arm[i] * secant[i], &work.closing[at]) else { return false };
+                start
+            } else {
+                (0.0, alone)
+            };
+        }
+        press::<GAPS>(teeth, work);
+        Self::guess(teeth, work, force);
+        true
+    }
+
+    /// The forces near those that the teeth are pressed by.
+    #[inline(always)]
+    fn guess(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) {
+        let len = teeth.len;
+        let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len]);
+        let pressed = &work.pressed[..len];
+        let (excess, force) = (&work.excess[..len], &mut force[..len]);
+        for i in 0..len {
+            // Of a tooth that is open as if it were not: it may turn out to carry.
+            let pressed = if pressed[i] > 0.0 { pressed[i] } else { excess[i] };
+            let least = 0.5 * b[i];
+            let first = pressed * arm[i] / if a[i] > least { a[i] } else { least };
+            let first = if first > NOTHING { first } else { NOTHING };
+            let approach = a[i] - b[i] * ln_roughly(first);
+            let second = pressed * arm[i] / if approach > least { approach } else { least };
+            force[i] = if second > NOTHING { second } else { NOTHING };
+        }
+    }
+
+    /// Forces here are counted in that of the sharing before, and the limit too.
+    #[inline(always)]
+    fn limit<V: Simd>(&self, allowable_mpa: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) -> Option<Limit> {
+        let len = teeth.len;
+        let typical_n = work.typical_n;
+        if self.gaps.is_none() {
+            work.closing[..len].fill(0.0);
+        }
+        // Lent out: a tile that ends here goes the plain way, and takes the sweep with it.
+        let mut limit = std::mem::take(&mut work.limit);
+        forces_at_stress(allowable_mpa, teeth, limit);
+        {
+            let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len]);
+            let (force, reach, pressed) = (&limit[..len], &work.reach[..len], &mut work.pressed[..len]);
+            let per_typical = 1.0 / typical_n;
+            let least_margin = least_margin();
+            for i in 0..len {
+                let force = force[i] * per_typical;
+                let ln = ln::<V>(force);
+                let approach = force * (a[i] - b[i] * ln);
+                // A tooth on which the law ends before is not the first to reach the stress, or it is seen below that the law has ended.
+                let is_within = arm[i] > 0.0 && reach[i] - ln > least_margin;
+                pressed[i] = if is_within { approach / arm[i] } else { f64::INFINITY };
+            }
+        }
+        if !turn_to_limit(teeth, work) {
+            return None;
+        }
+        Self::guess(teeth, work, limit);
+        let mut is_done = false;
+        for _ in 0..MAX_ROUNDS {
+            Self::tangents::<V, true>(teeth, work, limit);
+            is_done = Self::follow::<true>(teeth, work, limit);
+            if is_done {
+                break;
+            }
+        }
+        let is_within = Self::cut_and_check(typical_n, teeth, work, limit);
+        let least = least_torque(teeth, work, limit);
+        std::mem::swap(&mut work.limit, &mut limit);
+        least.filter(|_| is_done && is_within)
+    }
+
+    /// Newton's method for all forces and the rotations together: each force follows the tangent of its law, and the rotation is the one at which the
+    /// tangents make the torque. A round costs one logarithm a state.
+    #[inline(always)]
+    fn share<V: Simd, const GAPS: bool>(
+        &self,
+        torque_nmm: f64,
+        teeth: &Teeth<'_>,
+        work: &mut Work<'_>,
+        shared: &mut Shared<'_>,
+    ) -> bool {
+        let count = teeth.count;
+        // Forces are counted in one near to them all, so that no logarithm is large.
+        let typical_n = torque_nmm / teeth.arm[..count].iter().sum::<f64>();
+        work.typical_n = typical_n;
+        let torque = torque_nmm / typical_n;
+        self.coefficients::<V>(typical_n, teeth, work);
+        if let Some(gaps) = &self.gaps {
+            gaps.close(teeth, work.closing);
+        }
+        if !Self::start::<GAPS>(torque, teeth, work, shared.force) {
+            return false;
+        }
+        for _ in 0..MAX_ROUNDS {
+            Self::tangents::<V, GAPS>(teeth, work, shared.force);
+            let mut is_done = true;
+            for row in 0..teeth.rows {
+                let at = row * count..(row + 1) * count;
+                let (arm, slope, offset) = (&teeth.arm[at.clone()], &work.slope[at.clone()], &work.offset[at.clone()]);
+                let (mut stiffness, mut of_offset) = (0.0, 0.0);
+                let last = work.row_last[row];
+                if GAPS {
+                    let closing = &work.closing[at.clone()];
+                    for i in 0..count {
+                        stiffness += arm[i] * slope[i];
+                        let before = if slope[i] > 0.0 { (last - closing[i]) * slope[i] } else { 0.0 };
+                        of_offset += arm[i] * (offset[i] + before);
+                    }
+                } else {
+                    for i in 0..count {
+                        stiffness += arm[i] * slope[i];
+                        of_offset += arm[i] * offset[i];
+                    }
+                }
+                let excess = (torque - of_offset) / stiffness;
+                work.row_excess[row] = excess;
+                if GAPS && excess <= 0.0 {
+                    is_done = false;
+                    let carrying = last_below(&work.closing[at], last, excess);
+                    (work.row_last[row], work.row_excess[row]) = (carrying, excess + (last - carrying));
+                }
+            }
+            is_done &= Self::follow::<GAPS>(teeth, work, shared.force);
+            if is_done {
+                return Self::finish(typical_n, teeth, work, shared);
+            }
+        }
+        false
+    }
+
+    /// The tangents of all laws at the forces so far.
+    #[inline(always)]
+    fn tangents<V: Simd, const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &[f64]) {
+        let len = teeth.len;
+        let (a, b, arm, force) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len], &force[..len]);
+        let (reach, pressed) = (&work.reach[..len], &work.pressed[..len]);
+        let (slope, offset) = (&mut work.slope[..len], &mut work.offset[..len]);
+        let (secant, margin) = (&mut work.secant[..len], &mut work.margin[..len]);
+        for i in 0..len {
+            let ln = ln::<V>(force[i]);
+            let at_force = a[i] - b[i] * ln;
+            // Where the law has a meaning its slope is more than this.
+            let (beyond, least) = (at_force - b[i], 0.2 * b[i]);
+            let beyond = if beyond > least { beyond } else { least };
+            let at_force = beyond + b[i];
+            let both = 1.0 / (at_force * beyond);
+            let per_slope = both * at_force;
+            let is_pressed = !GAPS || pressed[i] > 0.0;
+            slope[i] = if is_pressed { arm[i] * per_slope } else { 0.0 };
+            offset[i] = if is_pressed { -(b[i] * force[i]) * per_slope } else { 0.0 };
+            secant[i] = both * beyond;
+            margin[i] = reach[i] - ln;
+        }
+    }
+
+    /// The forces at the new rotations; whether that was the last step.
+    #[inline(always)]
+    fn follow<const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) -> bool {
+        let len = teeth.len;
+        // What was pressed before is what has a slope.
+        press::<GAPS>(teeth, work);
+        let (arm, pressed, slope) = (&teeth.arm[..len], &work.pressed[..len], &work.slope[..len]);
+        let (secant, offset) = (&work.secant[..len], &mut work.offset[..len]);
+        let force = &mut force[..len];
+        let mut beyond = [0.0; LANES];
+        for start in (0..len).step_by(LANES) {
+            for (lane, beyond) in beyond.iter_mut().enumerate() {
+                let i = start + lane;
+                let before = force[i];
+                let by_tangent = offset[i] + slope[i] * pressed[i];
+                // Far from the tangent's point its root may be none; there the law's chord leads on.
+                let by_chord = arm[i] * pressed[i] * secant[i];
+                let next = if by_tangent > 0.5 * by_chord { by_tangent } else { by_chord };
+                let next = if next > NOTHING { next } else { NOTHING };
+                let is_pressed = !GAPS || pressed[i] > 0.0;
+                let next = if is_pressed { next } else { before };
+                let has_changed = GAPS && is_pressed != (slope[i] > 0.0) && arm[i] > 0.0;
+                let step = (next - before).abs() - LAST_FORCE_STEP * before - f64::EPSILON * f64::EPSILON;
+                let step = if has_changed { 1.0 } else { step };
+                // What the slope changes by along the step.
+                offset[i] *= (next - before) / (before * before);
+                force[i] = next;
+                *beyond = if step > *beyond || step.is_nan() { step } else { *beyond };
+            }
+        }
+        beyond.iter().all(|&beyond| beyond <= 0.0)
+    }
+
+    /// Forces in newtons, rotations and stiffnesses; false where a contact is wider than the law allows.
+    #[inline(always)]
+    fn finish(typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
+        let (count, arm) = (teeth.count, &teeth.arm[..teeth.len]);
+        let (slope, change) = (&work.slope[..teeth.len], &work.offset[..teeth.len]);
+        for row in 0..teeth.rows {
+            let mut stiffness = 0.0;
+            for i in row * count..(row + 1) * count {
+                stiffness += arm[i] * slope[i] * (1.0 - change[i]);
+            }
+            shared.rotation_rad[row] = work.row_last[row] + work.row_excess[row];
+            shared.stiffness[row] = typical_n * stiffness;
+        }
+        let is_finite = shared.rotation_rad[..teeth.rows].iter().all(|rotation| rotation.is_finite());
+        Self::cut_and_check(typical_n, teeth, work, shared.force) && is_finite
+    }
+
+    /// Forces in newtons, none of teeth that are not pressed; whether all are within the law.
+    #[inline(always)]
+    fn cut_and_check(typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) -> bool {
+        let len = teeth.len;
+        let (arm, pressed) = (&teeth.arm[..len], &work.pressed[..len]);
+        let (margin, force) = (&mut work.margin[..len], &mut force[..len]);
+        let least_margin = least_margin();
+        for i in 0..len {
+            let carries = pressed[i] > 0.0 && arm[i] > 0.0;
+            force[i] = if carries { typical_n * force[i] } else { 0.0 };
+            margin[i] = if carries { least_margin - margin[i] } else { 0.0 };
+        }
+        largest(&margin[..teeth.rows * teeth.count]) <= 0.0
+    }
+}

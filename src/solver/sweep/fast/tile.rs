@@ -1,0 +1,303 @@
+//! Tiles: the columns of the states of a few input angles, small enough to stay in the first-level cache, and where their teeth stand.
+
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
+use std::iter::zip;
+use std::ops::Range;
+
+use super::lanes::{LANES, VECTOR};
+use super::sharing::Work;
+use crate::contact::PerContact;
+use crate::mesh::{Mesh, Samples};
+use crate::position::Position;
+
+/// States of a tile, where one input angle has no more: its columns stay in the first-level cache.
+const TILE: usize = 128;
+
+/// A count that memory can hold, as an index; the caller has bounded the sweep.
+pub(super) fn whole(count: u64) -> usize {
+    usize::try_from(count).unwrap_or(usize::MAX)
+}
+
+/// Sines and cosines of angles.
+pub(super) struct SineTable {
+    sin: Vec<f64>,
+    cos: Vec<f64>,
+}
+
+impl SineTable {
+    /// Of `count` multiples of a step, at most [`TILE`], from 0 to at most a quarter of a turn: those of a few steps and those of a few strides, added.
+    fn equally_spaced(step_rad: f64, count: usize) -> Self {
+        // Strides are one or two more than a stride is long.
+        const STRIDE: usize = TILE.isqrt() + 2;
+        let sines = |step_rad: f64, count: usize| {
+            let mut sines = [(0.0, 0.0); STRIDE];
+            for (index, sines) in sines[..count].iter_mut().enumerate() {
+                *sines = (step_rad * index as f64).sin_cos();
+            }
+            sines
+        };
+        let stride = count.isqrt().max(1);
+        let strides = count.div_ceil(stride);
+        let (fine, coarse) = (sines(step_rad, stride), sines(step_rad * stride as f64, strides));
+        let mut table = Self { sin: Vec::with_capacity(count + stride), cos: Vec::with_capacity(count + stride) };
+        for (coarse_sin, coarse_cos) in &coarse[..strides] {
+            table.sin.extend(fine[..stride].iter().map(|(sin, cos)| coarse_sin * cos + coarse_cos * sin));
+            table.cos.extend(fine[..stride].iter().map(|(sin, cos)| coarse_cos * cos - coarse_sin * sin));
+        }
+        table
+    }
+}
+
+/// Input angles at which the same teeth mesh.
+///
+/// There a tooth stands at the sum of three angles: its own at the start of the run, one of the tile and one of the input angle within
+/// the tile. The first and the last make a pattern that all tiles share, so that a tile takes the sine of a single angle. The teeth come
+/// nearer to the major axis, so only for the one next to it does such a sum cancel: it is counted from the end of the tile.
+pub(super) struct Run {
+    pub(super) samples: Range<u64>,
+    /// Samples of the period.
+    of: Samples,
+    pub(super) teeth: usize,
+    /// Samples of a tile: equally many, but for the last.
+    pub(super) rows: usize,
+    mesh: Mesh,
+    step_rad: f64,
+    /// Steps of a whole turn.
+    steps: f64,
+}
+
+impl Run {
+    pub(super) fn from(first: u64, of: Samples, mesh: &Mesh) -> Self {
+        let samples = first..mesh.same_teeth_until(first, of);
+        let steps = mesh.steps(of) as f64;
+        let teeth = whole(*mesh.teeth_at(first, of).end());
+        let count = whole(samples.end - samples.start);
+        let rows = count.div_ceil(count.div_ceil((TILE / teeth).max(1)));
+        Self { samples, of, teeth, rows, mesh: *mesh, step_rad: 2.0 * PI / steps, steps }
+    }
+
+    /// Lays the pattern of its tiles.
+    #[inline(always)]
+    pub(super) fn lay_pattern(&self, tile: &mut Tile<'_>) {
+        let Self { teeth, rows, .. } = *self;
+        let (base_sin, base_cos) = (&mut tile.base_sin[..teeth], &mut tile.base_cos[..teeth]);
+        for (tooth, base) in zip(1.., zip(&mut *base_sin, &mut *base_cos)) {
+            let Position { phase_sin: sin, phase_cos: cos, .. } =
+                self.mesh.position_in_mesh(tooth, self.samples.start, self.of);
+            (*base.0, *base.1) = (sin, cos);
+        }
+        tile.tooth.clear();
+        let last_tooth = u32::try_from(teeth).unwrap_or(u32::MAX);
+        for row in 0..rows {
+            let of_row = row * teeth..(row + 1) * teeth;
+            let (row_sin, row_cos) = (tile.row_sines.sin[row], tile.row_sines.cos[row]);
+            let (sin, cos) = (&mut tile.pattern_sin[of_row.clone()], &mut tile.pattern_cos[of_row.clone()]);
+            let step = &mut tile.pattern_step[of_row];
+            for i in 0..teeth {
+                sin[i] = base_sin[i] * row_cos - base_cos[i] * row_sin;
+                cos[i] = base_cos[i] * row_cos + base_sin[i] * row_sin;
+                // Whole numbers below 2^53: exact.
+                step[i] = (i + 1) as f64 * self.of.count() as f64 - row as f64;
+            }
+            tile.tooth.extend(1..=last_tooth);
+        }
+    }
+
+    /// Positions of all teeth at some samples, by sample and then tooth.
+    #[inline(always)]
+    pub(super) fn place(&self, samples: Range<u64>, tile: &mut Tile<'_>) {
+        let rows = whole(samples.end - samples.start);
+        tile.count = rows * self.teeth;
+        let len = tile.count.next_multiple_of(LANES);
+        let passed = samples.start as f64;
+        let (turn_sin, turn_cos) = ((samples.start - self.samples.start) as f64 * self.step_rad).sin_cos();
+        let (pattern_sin, pattern_cos) = (&tile.pattern_sin[..len], &tile.pattern_cos[..len]);
+        let pattern_step = &tile.pattern_step[..len];
+        let (sin, cos) = (&mut tile.sin[..len], &mut tile.cos[..len]);
+        for i in 0..len {
+            sin[i] = pattern_sin[i] * turn_cos - pattern_cos[i] * turn_sin;
+            cos[i] = pattern_cos[i] * turn_cos + pattern_sin[i] * turn_sin;
+        }
+        if !tile.position_deg.is_empty() {
+            let (position_deg, from_minor_rad) = (&mut tile.position_deg[..len], &mut tile.from_minor_rad[..len]);
+            let (steps, quarter_step_rad) = (self.steps, FRAC_PI_2 / self.steps);
+            for i in 0..len {
+                let step = pattern_step[i] - passed;
+                position_deg[i] = 360.0 * step / steps;
+                from_minor_rad[i] = (steps - 4.0 * step) * quarter_step_rad;
+            }
+        }
+        (tile.passed, tile.steps) = (passed, self.steps);
+        // The first tooth again, from where it will stand at the last sample.
+        let end = self.mesh.position_in_mesh(1, samples.end - 1, self.of);
+        for (row, to_end) in (0..rows).rev().enumerate() {
+            let (row_sin, row_cos) = (tile.row_sines.sin[to_end], tile.row_sines.cos[to_end]);
+            sin[row * self.teeth] = end.phase_sin * row_cos + end.phase_cos * row_sin;
+            cos[row * self.teeth] = end.phase_cos * row_cos - end.phase_sin * row_sin;
+        }
+    }
+}
+
+/// The most that the tiles of a sweep hold.
+pub(super) struct TileSize {
+    /// States, with those that fill the last stretch and room for [`repeat_each`].
+    len: usize,
+    /// Input angles.
+    rows: usize,
+    /// Teeth at an input angle.
+    teeth: usize,
+    /// Whether there is more to a state than its loads.
+    with_columns: bool,
+    /// Whether loads are more than unit loads times a number.
+    with_work: bool,
+}
+
+impl TileSize {
+    pub(super) fn of(mesh: &Mesh, samples: Samples, with_columns: bool, with_work: bool) -> Self {
+        let teeth_at = |sample| whole(*mesh.teeth_at(sample, samples).end());
+        let (least, most) = (teeth_at(0).max(1), teeth_at(samples.count() - 1));
+        let states = TILE.min(whole(mesh.state_count(samples))).max(most);
+        let rows = whole(samples.count()).min(TILE.div_ceil(least));
+        Self { len: states.next_multiple_of(LANES) + VECTOR, rows, teeth: most, with_columns, with_work }
+    }
+
+    /// What all slices of a tile take together.
+    pub(super) const fn doubles(&self) -> usize {
+        let (of_columns, of_work) = (self.with_columns as usize, self.with_work as usize);
+        (16 + 6 * of_columns + Work::COLUMNS * of_work) * self.len
+            + (8 + Work::ROWS * of_work) * self.rows
+            + 2 * self.teeth
+    }
+}
+
+/// Columns of the states of a few input angles: where they stand, their geometry, and what a unit rotation makes of them. All lie in one
+/// stretch of memory.
+pub(super) struct Tile<'a> {
+    /// States in it; lanes beyond the last one hold some tooth or other.
+    pub(super) count: usize,
+    /// Steps of the turn that have passed at its first input angle, and those of the whole.
+    pub(super) passed: f64,
+    pub(super) steps: f64,
+    /// Of the steps from one input angle to the next.
+    pub(super) row_sines: SineTable,
+    pub(super) tooth: Vec<u32>,
+    // Of the teeth at the start of the run.
+    pub(super) base_sin: &'a mut [f64],
+    pub(super) base_cos: &'a mut [f64],
+    pub(super) pattern_sin: &'a mut [f64],
+    pub(super) pattern_cos: &'a mut [f64],
+    pub(super) pattern_step: &'a mut [f64],
+    pub(super) sin: &'a mut [f64],
+    pub(super) cos: &'a mut [f64],
+    pub(super) from_minor_rad: &'a mut [f64],
+    pub(super) input_angle_deg: &'a mut [f64],
+    pub(super) position_deg: &'a mut [f64],
+    pub(super) center_radius_mm: &'a mut [f64],
+    pub(super) wave_generator_angle_deg: &'a mut [f64],
+    pub(super) ring_angle_deg: &'a mut [f64],
+    /// Over `scale`.
+    pub(super) force: PerContact<&'a mut [f64]>,
+    /// Over the root of `scale`.
+    pub(super) stress: PerContact<&'a mut [f64]>,
+    /// Of the forces over `scale`.
+    pub(super) torque: PerContact<&'a mut [f64]>,
+    /// What makes loads of unit loads: `Δφ`, or `F_H` of each tooth.
+    pub(super) scale: &'a mut [f64],
+    pub(super) scale_root: &'a mut [f64],
+    /// For laws that are not linear.
+    pub(super) work: Work<'a>,
+    // By input angle.
+    pub(super) row_torque: PerContact<&'a mut [f64]>,
+    pub(super) row_input_angle_deg: &'a mut [f64],
+    pub(super) row_rotation_rad: &'a mut [f64],
+    pub(super) row_rotation_root: &'a mut [f64],
+    pub(super) row_stiffness: &'a mut [f64],
+    /// Teeth that carry.
+    pub(super) row_loaded: Vec<usize>,
+    pub(super) row_residual: &'a mut [f64],
+}
+
+impl<'a> Tile<'a> {
+    pub(super) fn new(arena: &'a mut [f64], size: &TileSize, step_rad: f64) -> Self {
+        let &TileSize { len, rows, teeth, with_columns, with_work } = size;
+        let mut rest = arena;
+        let mut slice = |len| {
+            let (slice, others) = std::mem::take(&mut rest).split_at_mut(len);
+            rest = others;
+            slice
+        };
+        let (base_sin, base_cos) = (slice(teeth), slice(teeth));
+        let row_torque = PerContact::of(|_| slice(rows));
+        let (row_input_angle_deg, row_residual) = (slice(rows), slice(rows));
+        let (row_rotation_rad, row_rotation_root) = (slice(rows), slice(rows));
+        let row_stiffness = slice(rows);
+        let work = if with_work { Work::new(&mut slice, len, rows) } else { Work::new(&mut slice, 0, 0) };
+        let of_columns = if with_columns { len } else { 0 };
+        let (from_minor_rad, position_deg) = (slice(of_columns), slice(of_columns));
+        let (input_angle_deg, center_radius_mm) = (slice(of_columns), slice(of_columns));
+        let (wave_generator_angle_deg, ring_angle_deg) = (slice(of_columns), slice(of_columns));
+        let mut column = || slice(len);
+        let (pattern_sin, pattern_cos) = (column(), column());
+        pattern_sin.fill(FRAC_1_SQRT_2);
+        pattern_cos.fill(FRAC_1_SQRT_2);
+        Self {
+            count: 0,
+            passed: 0.0,
+            steps: 0.0,
+            row_sines: SineTable::equally_spaced(step_rad, rows),
+            tooth: Vec::with_capacity(len),
+            base_sin,
+            base_cos,
+            pattern_sin,
+            pattern_cos,
+            pattern_step: column(),
+            sin: column(),
+            cos: column(),
+            from_minor_rad,
+            input_angle_deg,
+            position_deg,
+            center_radius_mm,
+            wave_generator_angle_deg,
+            ring_angle_deg,
+            force: PerContact::of(|_| column()),
+            stress: PerContact::of(|_| column()),
+            torque: PerContact::of(|_| column()),
+            scale: column(),
+            scale_root: column(),
+            work,
+            row_torque,
+            row_input_angle_deg,
+            row_rotation_rad,
+            row_rotation_root,
+            row_stiffness,
+            row_loaded: Vec::with_capacity(rows),
+            row_residual,
+        }
+    }
+
+    /// The position of a state.
+    pub(super) fn position_deg_of(&self, state: usize) -> f64 {
+        360.0 * (self.pattern_step[state] - self.passed) / self.steps
+    }
+
+    /// Torques of a unit rotation summed over the teeth at each input angle; how many of these there are.
+    #[inline(always)]
+    pub(super) fn sum_torques(&mut self, teeth: usize) -> usize {
+        let rows = self.count / teeth;
+        for row in 0..rows {
+            let at = row * teeth..(row + 1) * teeth;
+            let (cam, ring) = (&self.torque.wave_generator[at.clone()], &self.torque.ring[at.clone()]);
+            let carrier = &self.torque.carrier[at];
+            let (mut of_cam, mut of_ring, mut of_carrier) = (0.0, 0.0, 0.0);
+            for ((cam, ring), carrier) in zip(zip(cam, ring), carrier) {
+                of_cam += cam;
+                of_ring += ring;
+                of_carrier += carrier;
+            }
+            self.row_torque.wave_generator[row] = of_cam;
+            self.row_torque.ring[row] = of_ring;
+            self.row_torque.carrier[row] = of_carrier;
+        }
+        rows
+    }
+}

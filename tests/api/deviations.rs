@@ -1,0 +1,299 @@
+//! Single items of the parts as they came out.
+
+use serde_json::{Value, json};
+use toothwave::config::Limits;
+
+use crate::asking::{LIMITS, Question, Service};
+use crate::designs::{spelled_out, with};
+
+/// Case 5.1 with clearances that cover what deviates by a few micrometres.
+fn cleared() -> Value {
+    let clearance = json!({ "wave_generator_um": 8.0, "ring_um": 8.0, "carrier_um": 8.0 });
+    let model = json!({ "compatibility": "virtual_work", "stiffness": { "law": "palmgren" }, "clearance": clearance });
+    let document = with(&spelled_out(), "/model", model);
+    with(&document, "/sweep", json!({ "samples": 4, "wind_up": true }))
+}
+
+fn with_deviations(deviations: Value) -> Value {
+    with(&cleared(), "/deviations", deviations)
+}
+
+/// A list of zeros but for one item.
+fn one(items: usize, item: usize, value: f64) -> Vec<f64> {
+    (0..items).map(|other| if other == item { value } else { 0.0 }).collect()
+}
+
+/// Deviations of every kind.
+fn every_kind() -> Value {
+    json!({
+        "tooth_radius_um": one(28, 3, 1.0), "slot_angle_arcsec": one(28, 4, 5.0), "slot_wall_um": one(28, 5, 1.0),
+        "ring_space_um": one(26, 6, 1.0), "ring_space_angle_arcsec": one(26, 7, 5.0),
+        "wave_generator_lobe_um": [0.0, 1.0],
+        "wave_generator_runout": { "amount_um": 2.0, "angle_deg": 40.0 },
+        "ring_runout": { "amount_um": 1.0, "angle_deg": -30.0 }, "carrier_runout": { "amount_um": 1.0, "angle_deg": 80.0 }
+    })
+}
+
+/// A document with a measured ring and a cam off its axis.
+pub(crate) fn deviating() -> Value {
+    with_deviations(json!({ "ring_space_um": one(26, 6, 2.0), "wave_generator_runout": { "amount_um": 2.0 } }))
+}
+
+async fn swept(document: &Value) -> Value {
+    Service::new().post("/v1/sweep", document).await.found()
+}
+
+fn numbers(column: &Value) -> Vec<f64> {
+    column.as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect()
+}
+
+#[tokio::test]
+async fn with_deviations_all_zones_are_listed_by_slot_over_the_whole_sweep() {
+    let nominal = swept(&cleared()).await;
+    assert!(nominal.get("sweep_period_deg").is_none() && nominal["states"].get("lobe").is_none());
+    // Load periods: one for the cam, as many as slots or ring spaces with it, half of them without (docs/theory.md section 4.8).
+    for (deviations, periods) in [
+        (json!({ "wave_generator_runout": { "amount_um": 2.0 } }), 1.0),
+        (json!({ "slot_wall_um": one(28, 5, 1.0) }), 14.0),
+        (json!({ "ring_space_um": one(26, 5, 1.0) }), 13.0),
+        (json!({ "slot_wall_um": one(28, 5, 1.0), "wave_generator_lobe_um": [0.0, 1.0] }), 28.0),
+        (every_kind(), 364.0),
+    ] {
+        let answer = swept(&with_deviations(deviations.clone())).await;
+        assert_eq!(answer["period_deg"], nominal["period_deg"]);
+        let ratio = answer["sweep_period_deg"].as_f64().unwrap() / answer["period_deg"].as_f64().unwrap();
+        assert!((ratio - periods).abs() < 1e-9, "{deviations}: {ratio}");
+        let states = &answer["states"];
+        let angles = numbers(&states["input_angle_deg"]);
+        assert_eq!(angles.last(), answer["sweep_period_deg"].as_f64().as_ref());
+        assert_eq!(numbers(&answer["wind_up"]["input_angle_deg"]).len(), 4 * periods as usize + 1);
+        // Seven teeth of either zone.
+        assert_eq!(angles.iter().filter(|&&angle| angle == 0.0).count(), 14);
+        assert!(numbers(&states["tooth"]).iter().all(|&slot| slot < 28.0));
+        let lobes = numbers(&states["lobe"]);
+        assert_eq!((lobes.len(), lobes.iter().copied().fold(0.0, f64::max)), (angles.len(), 1.0));
+        assert_eq!(states["loaded"].as_array().unwrap().len(), angles.len());
+        let unloaded = numbers(&answer["wind_up"]["unloaded_wind_up_deg"]);
+        assert!(unloaded.iter().zip(numbers(&answer["wind_up"]["wind_up_deg"])).all(|(&without, with)| without < with));
+        let range = |column: &[f64]| {
+            column.iter().copied().fold(0.0, f64::max) - column.iter().copied().fold(f64::INFINITY, f64::min)
+        };
+        let error_deg = answer["wind_up"]["unloaded_transmission_error_peak_to_peak_deg"].as_f64().unwrap();
+        assert!((14.0 * error_deg / range(&unloaded) - 1.0).abs() < 1e-12);
+        assert!(answer["checks"]["period_closure_residual"].as_f64().unwrap() < 1e-11);
+        // Unlike lobes no longer balance each other.
+        let aside = numbers(&answer["radial_force_n"]["value"]);
+        assert!(aside.iter().any(|&force_n| force_n > 0.1), "{deviations}");
+    }
+}
+
+#[tokio::test]
+async fn without_gaps_nothing_is_said_of_the_wind_up_without_load() {
+    let document = with(&spelled_out(), "/sweep", json!({ "wind_up": true }));
+    let wind_up = swept(&document).await["wind_up"].clone();
+    assert!(wind_up.get("unloaded_wind_up_deg").is_none(), "{wind_up}");
+    assert!(wind_up.get("unloaded_transmission_error_peak_to_peak_deg").is_none());
+}
+
+#[tokio::test]
+async fn geometry_has_ratios_and_torques_with_any_member_fixed() {
+    let members = Service::new().post("/v1/geometry", &spelled_out()).await.found()["members"].clone();
+    assert_eq!(
+        members,
+        json!({
+            "ring_fixed": { "ratio": 14.0, "holding_torque_ratio": 13.0 },
+            "carrier_fixed": { "ratio": -13.0, "holding_torque_ratio": -14.0 },
+            "wave_generator_fixed": { "ratio": 28.0 / 26.0, "holding_torque_ratio": 2.0 / 26.0 }
+        })
+    );
+}
+
+#[tokio::test]
+async fn each_number_of_the_deviations_moves_an_answer() {
+    let document = with_deviations(every_kind());
+    let found = async |document: &Value| {
+        let answer = swept(document).await;
+        (numbers(&answer["states"]["force_ring_n"]), numbers(&answer["wind_up"]["wind_up_deg"]))
+    };
+    let before = found(&document).await;
+    let lists = [
+        "tooth_radius_um/3",
+        "slot_angle_arcsec/4",
+        "slot_wall_um/5",
+        "ring_space_um/6",
+        "ring_space_angle_arcsec/7",
+        "wave_generator_lobe_um/1",
+    ];
+    let runouts = ["wave_generator", "ring", "carrier"];
+    let runouts =
+        runouts.iter().flat_map(|part| ["amount_um", "angle_deg"].map(|name| format!("{part}_runout/{name}")));
+    for field in lists.into_iter().map(str::to_owned).chain(runouts) {
+        let field = format!("/deviations/{field}");
+        let more = 1.1 * document.pointer(&field).unwrap().as_f64().unwrap();
+        assert!(found(&with(&document, &field, json!(more))).await != before, "{field} moves nothing");
+    }
+}
+
+#[tokio::test]
+async fn what_every_item_has_is_the_modification_of_the_same_name() {
+    let all = |items: usize, value: f64| vec![value; items];
+    let pairs = [
+        (json!({ "tooth_radius_um": all(28, 2.0) }), json!({ "tooth_radius_um": 2.0 })),
+        (json!({ "slot_wall_um": all(28, 2.0) }), json!({ "slot_wall_um": 2.0 })),
+        (json!({ "slot_angle_arcsec": all(28, -8.0) }), json!({ "carrier_rotation_arcsec": -8.0 })),
+        (json!({ "ring_space_um": all(26, -3.0) }), json!({ "ring_equidistant_um": -3.0 })),
+        (json!({ "ring_space_angle_arcsec": all(26, 8.0) }), json!({ "ring_rotation_arcsec": 8.0 })),
+        (json!({ "wave_generator_lobe_um": all(2, 3.0) }), json!({ "wave_generator_equidistant_um": 3.0 })),
+    ];
+    for (deviations, modification) in pairs {
+        let found = swept(&with_deviations(deviations.clone())).await;
+        let expected = swept(&with(&cleared(), "/modification", modification)).await;
+        for contact in ["wave_generator", "ring", "carrier"] {
+            for quantity in ["force_n", "stress_mpa"] {
+                let peak = |answer: &Value| answer["peaks"][contact][quantity]["value"].as_f64().unwrap();
+                assert!((peak(&found) / peak(&expected) - 1.0).abs() < 1e-12, "{deviations}");
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_list_that_does_not_fit_is_told_at_its_place_and_every_entry_out_of_range_at_its_own() {
+    let mut walls = one(27, 3, 2e6);
+    walls[5] = -2e6;
+    let deviations = json!({
+        "slot_wall_um": walls, "ring_space_um": one(28, 0, 1.0), "wave_generator_lobe_um": [1.0],
+        "carrier_runout": { "amount_um": -1.0, "angle_deg": 361.0 }
+    });
+    let document = with(&with_deviations(deviations), "/load", json!({ "input_torque_nm": 0.0 }));
+    let problem = Service::new().post("/v1/sweep", &document).await.refused(422, "impossible_design");
+    let mut errors: Vec<_> = problem["errors"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|error| {
+            let number = |name: &str| error[name].as_f64().unwrap();
+            (error["pointer"].as_str().unwrap(), error["code"].as_str().unwrap(), number("value"), number("limit"))
+        })
+        .collect();
+    errors.sort_by(|one, other| one.0.cmp(other.0));
+    assert_eq!(
+        errors,
+        [
+            ("/deviations/carrier_runout/amount_um", "out_of_range", -1.0, 0.0),
+            ("/deviations/carrier_runout/angle_deg", "out_of_range", 361.0, 360.0),
+            ("/deviations/ring_space_um", "wrong_length", 28.0, 26.0),
+            ("/deviations/slot_wall_um", "wrong_length", 27.0, 28.0),
+            ("/deviations/slot_wall_um/3", "out_of_range", 2e6, 1e6),
+            ("/deviations/slot_wall_um/5", "out_of_range", -2e6, -1e6),
+            ("/deviations/wave_generator_lobe_um", "wrong_length", 1.0, 2.0),
+            ("/load/input_torque_nm", "out_of_range", 0.0, 1e-12),
+        ]
+    );
+    // Whoever reads no deviations is not bothered by them.
+    Service::new().post("/v1/geometry", &document).await.found();
+}
+
+#[tokio::test]
+async fn a_list_takes_numbers_alone() {
+    for (wrong, pointer) in [
+        (json!({ "slot_wall_um": 1.0 }), "/deviations/slot_wall_um"),
+        (json!({ "slot_wall_um": [0.0, "1"] }), "/deviations/slot_wall_um/1"),
+        (json!({ "ring_runout": [1.0, 2.0] }), "/deviations/ring_runout"),
+    ] {
+        let problem = Service::new().post("/v1/sweep", &with_deviations(wrong)).await.refused(422, "invalid_document");
+        assert_eq!(problem["errors"][0]["pointer"], pointer);
+    }
+}
+
+#[tokio::test]
+async fn projection_takes_no_deviations_but_zeros() {
+    let document = with(&spelled_out(), "/deviations", every_kind());
+    let problem = Service::new().post("/v1/sweep", &document).await.refused(422, "impossible_design");
+    let errors = problem["errors"].as_array().unwrap();
+    assert_eq!(errors.len(), 1, "{problem}");
+    assert_eq!((&errors[0]["pointer"], &errors[0]["code"]), (&json!("/deviations"), &json!("conflicting_fields")));
+    let nothing = with(&spelled_out(), "/deviations", json!({ "slot_wall_um": one(28, 0, 0.0), "ring_runout": {} }));
+    assert_eq!(swept(&nothing).await, swept(&spelled_out()).await);
+}
+
+#[tokio::test]
+async fn a_part_too_full_is_told_with_slot_lobe_and_input_angle() {
+    let full = with_deviations(json!({ "tooth_radius_um": one(28, 11, -20.0) }));
+    for sweep in [json!({ "samples": 4 }), json!({ "tolerance": 1e-3 })] {
+        let document = with(&full, "/sweep", sweep);
+        let problem = Service::new().post("/v1/sweep", &document).await.refused(422, "interference");
+        let detail = problem["detail"].as_str().unwrap();
+        for word in ["slot 11 on lobe ", "input angle", "deg", "µm", "`deviations`"] {
+            assert!(detail.contains(word), "{detail}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_sweep_of_deviations_stays_within_the_limit_on_states() {
+    // Some 14 teeth at each of 364 times 4 input angles.
+    let document = with_deviations(every_kind());
+    let service = Service::within(Limits { max_states: 10_000, ..LIMITS });
+    let problem = service.post("/v1/sweep", &document).await.refused(422, "too_many_states");
+    let error = &problem["errors"][0];
+    let states = Service::new().post("/v1/sweep", &document).await.found()["states"]["tooth"].as_array().unwrap().len();
+    assert_eq!((&error["pointer"], error["value"].as_f64()), (&json!("/sweep/samples"), Some(states as f64)));
+    let document = with(&document, "/sweep", json!({ "tolerance": 1e-3 }));
+    let problem = service.post("/v1/sweep", &document).await.refused(422, "too_many_states");
+    assert_eq!(problem["errors"][0]["pointer"], "/sweep/tolerance");
+}
+
+#[tokio::test]
+async fn accuracy_measures_the_design_with_its_deviations() {
+    let document = deviating();
+    let answer = Service::new().post("/v1/accuracy", &document).await.found();
+    let ways = answer["ways"].as_array().unwrap();
+    let finest = ways.iter().filter(|way| way["law"] == "palmgren" && way.get("tolerance").is_some()).last().unwrap();
+    assert!(finest["error"].as_f64().unwrap() < 1e-9, "{finest}");
+    // Twenty-six load periods of at least fourteen teeth at eleven input angles.
+    let coarsest = ways.iter().find(|way| way["samples"] == 10).unwrap();
+    assert!(coarsest["states"].as_u64().unwrap() > 26 * 10 * 13, "{coarsest}");
+    // `projection` does not take them.
+    let unavailable = answer["unavailable"].as_array().unwrap();
+    assert!(unavailable.iter().all(|model| model["compatibility"] == "projection"), "{unavailable:?}");
+    assert!(!unavailable.is_empty());
+}
+
+#[tokio::test]
+async fn equal_deviations_have_one_key_and_others_another() {
+    let key = async |document: &Value| Service::new().post("/v1/sweep", document).await.etag().to_owned();
+    let own = key(&with_deviations(json!({ "wave_generator_lobe_um": [0.0, 1.0] }))).await;
+    assert_eq!(own, key(&with_deviations(json!({ "wave_generator_lobe_um": [-0.0, 1], "slot_wall_um": [] }))).await);
+    // An entry that wanders from one list into the next would leave the same numbers in a row.
+    let lists = [
+        json!({ "wave_generator_lobe_um": [1.0, 0.0] }),
+        json!({ "wave_generator_runout": { "angle_deg": 1.0 } }),
+        json!({ "wave_generator_lobe_um": [0.0, 0.0], "wave_generator_runout": { "amount_um": 1.0 } }),
+    ];
+    for deviations in lists {
+        assert_ne!(own, key(&with_deviations(deviations)).await);
+    }
+}
+
+#[tokio::test]
+async fn deviations_come_as_csv_text_and_plots_and_with_losses_too() {
+    let friction = crate::friction::on(&json!({ "kind": "plain", "coefficient": 0.02 }));
+    let document = with(&deviating(), "/friction", friction);
+    let service = Service::new();
+    let answer = service.post("/v1/sweep", &document).await.found();
+    let efficiency = answer["losses"]["efficiency"]["ring_fixed"].as_f64().unwrap();
+    let nominal = swept(&with(&document, "/deviations", json!({}))).await;
+    let without = nominal["losses"]["efficiency"]["ring_fixed"].as_f64().unwrap();
+    assert!((efficiency - without).abs() < 0.02 && efficiency != without, "{efficiency} {without}");
+    let as_form = async |form: &str| {
+        let question = Question::post("/v1/sweep", document.to_string()).with("accept", form);
+        service.ask(&question).await.text().to_owned()
+    };
+    let csv = as_form("text/csv").await;
+    assert!(csv.lines().next().unwrap().ends_with("lobe,loaded"), "{csv}");
+    let text = as_form("text/plain").await;
+    assert!(text.contains("input angle of the sweep            360.000000 deg"), "{text}");
+    let svg = as_form("image/svg+xml").await;
+    assert!(svg.contains("<svg") && !svg.contains("NaN"));
+}
