@@ -138,13 +138,13 @@ export class Find {
   #missNote({ label, miss, relaxations }, isNamed) {
     const name = isNamed ? [html('h3', {}, capital(label))] : [];
     if (!miss) return html('div', {}, name, html('p', {}, 'Nothing that was looked at is a drive at all: the reasons below say why.'));
-    const items = relaxations.map((relaxation) => {
+    // What makes a drive buildable is not to be had for less.
+    const items = relaxations.filter(({ quantity }) => fieldOf(quantity)).map((relaxation) => {
       const { quantity, limit, needed } = relaxation;
       const { label: what, is_flag: isFlag } = this.quantities.get(quantity);
       const words = isFlag ? `${what} allowed` : `${what} ${this.quantities.shown(quantity, needed)} instead of ${this.quantities.shown(quantity, limit)}`;
-      const field = fieldOf(quantity);
       const room = isFlag ? true : roomFor(relaxation);
-      const allow = field.endsWith('undefined') ? '' : html('button', { type: 'button', class: 'link', onclick: () => this.#relax(field, room) }, isFlag ? 'Allow it' : `Set ${this.quantities.shown(quantity, room)}`);
+      const allow = html('button', { type: 'button', class: 'link', onclick: () => this.#relax(fieldOf(quantity), room) }, isFlag ? 'Allow it' : `Set ${this.quantities.shown(quantity, room)}`);
       return html('li', {}, `${words}. `, allow);
     });
     const missed = miss.missed.map((limit) => `${small(this.quantities.get(limit.quantity).label)} ${this.quantities.shown(limit.quantity, miss.quantities[limit.quantity])} (${limitInWords(limit, this.quantities, { isWithin: true })})`);

@@ -161,20 +161,20 @@ export const GROUPS = [
   },
 ];
 
-/** Which field of the form a limit is of. */
-export const fieldOf = (quantity) =>
-  ROOT +
-  {
-    outer_diameter_mm: '/outer_diameter_mm',
-    tooth_width_mm: '/width_mm',
-    torque_capacity_output_nm: '/output_torque_nm',
-    undercut: '/undercut',
-    slot_wall_over_slot_width: '/wall',
-    efficiency_ring_fixed: '/efficiency',
-    peak_stress_wave_generator_mpa: '/allowable_wave_generator_mpa',
-    peak_stress_ring_mpa: '/allowable_ring_mpa',
-    peak_stress_carrier_mpa: '/allowable_carrier_mpa',
-  }[quantity];
+const FIELDS = {
+  outer_diameter_mm: 'outer_diameter_mm',
+  tooth_width_mm: 'width_mm',
+  torque_capacity_output_nm: 'output_torque_nm',
+  undercut: 'undercut',
+  slot_wall_over_slot_width: 'wall',
+  efficiency_ring_fixed: 'efficiency',
+  peak_stress_wave_generator_mpa: 'allowable_wave_generator_mpa',
+  peak_stress_ring_mpa: 'allowable_ring_mpa',
+  peak_stress_carrier_mpa: 'allowable_carrier_mpa',
+};
+
+/** Which field of the form a limit is of; undefined of those that are always asked. */
+export const fieldOf = (quantity) => (FIELDS[quantity] ? `${ROOT}/${FIELDS[quantity]}` : undefined);
 
 export const goalsOf = (requirements) => GOALS.filter(({ name }) => asked(requirements, `goals/${name}`)).map(({ quantity, goal }) => ({ quantity, goal }));
 
