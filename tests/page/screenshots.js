@@ -1,4 +1,4 @@
-// The pictures in docs/screenshots: both of the paper's cases in light, dark and narrow, and case 5.1 made to undercut.
+// The pictures in docs/screenshots: both of the paper's cases in light, dark and narrow, case 5.1 made to undercut, a search and a map.
 
 import { mkdir } from 'node:fs/promises';
 import { Server, choose, enter, launch, notes, open, settled } from './harness.js';
@@ -45,6 +45,29 @@ await take('undercut', { viewport: { ...WIDE.viewport, height: 1000 } }, async (
   await page.locator(`${notes('/drive/teeth/radius_mm')} .finding`).first().click();
   await showPeak(page);
   await page.evaluate(() => scrollTo(0, 0));
+});
+
+await take('find-a-drive', { viewport: { width: 1366, height: 1000 } }, async (page) => {
+  await page.click('#views [data-view="find"]');
+  await page.selectOption('#field-find-effort', 'quick');
+  await page.click('.find button[type=submit]');
+  await page.waitForFunction(() => document.querySelector('#find .study-progress').hidden && document.querySelector('#find .headline')?.textContent);
+  await page.locator('#find .drives-scroll tbody button').nth(3).click();
+  await page.waitForFunction(() => document.querySelectorAll('#find .drives-scroll svg').length > 4 && document.querySelector('#find .drive-card svg'));
+  await page.evaluate(() => {
+    document.activeElement.blur();
+    scrollTo(0, 0);
+  });
+});
+
+await take('explore', { viewport: { width: 1366, height: 1000 }, colorScheme: 'dark' }, async (page) => {
+  await choose(page, 'paper-5.1');
+  await page.click('#views [data-view="explore"]');
+  const rows = page.locator('#explore .ask-row');
+  await rows.nth(2).locator('select').selectOption('/drive/wave_generator/semi_major_mm');
+  await rows.nth(0).locator('select').nth(1).selectOption('fine');
+  await page.click('#explore button:has-text("Look")');
+  await page.waitForFunction(() => document.querySelector('#explore .study-progress').hidden && document.querySelector('#explore .heat'));
 });
 
 await browser.close();

@@ -1,5 +1,6 @@
 // Answers of the service, from bytes to what the page draws.
 
+import { drawableStudy } from './grids.js';
 import { drawable } from './states.js';
 
 /** As large as an answer may be to be read at once: some milliseconds. */
@@ -7,6 +8,8 @@ const MOST_BYTES = 1 << 20;
 
 const READERS = {
   sweep: (sweep) => drawable(sweep),
+  study: (study) => (study.result ? { ...study, result: drawableStudy(study.result) } : study),
+  result: drawableStudy,
 };
 
 /** The answer in the bytes of its JSON. */

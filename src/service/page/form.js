@@ -44,13 +44,14 @@ export class Form {
   #materials = [];
   #fillings = [];
 
-  /** `onEdit(design, gesture)` at each change; changes of one gesture are one step to undo; `onEnd()` ends it. */
-  constructor(container, { onEdit, onEnd }, groups = GROUPS) {
+  /** `onEdit(design, gesture)` at each change; changes of one gesture are one step to undo; `onEnd()` ends it. All fields stand below the
+   *  pointer `root`. */
+  constructor(container, { onEdit, onEnd }, groups = GROUPS, root = '') {
     this.container = container;
     this.groups = groups;
     this.#onEdit = onEdit;
     this.#onEnd = onEnd;
-    const general = this.#notesFor('', container);
+    const general = this.#notesFor(root, container);
     general.classList.add('general');
     for (const group of groups) container.append(this.#buildGroup(group));
     // Wherever the pointer is let go.

@@ -6,6 +6,8 @@ import { Accuracy } from './accuracy.js';
 import { isSame } from './design.js';
 import { html, oncePerFrame, setChildren, setText } from './dom.js';
 import { Drawings } from './drawings.js';
+import { Explore } from './explore.js';
+import { Find } from './find.js';
 import { explanation, findingsOf, reasonsOf, titleOf } from './findings.js';
 import { Form } from './form.js';
 import { fixed, number } from './format.js';
@@ -15,12 +17,16 @@ import { Mechanism, stressColor } from './mechanism.js';
 import { CONTACTS, Motion } from './motion.js';
 import { passOf } from './pass.js';
 import { Plots } from './plots.js';
+import { Quantities } from './quantities.js';
 import { findingsTable, inputDifferences, reportOf } from './report.js';
 import { Results } from './results.js';
+import { Sensitivity } from './sensitivity.js';
 import { Service, evaluate, getJson } from './service.js';
 import * as share from './share.js';
 import { glossary, term } from './terms.js';
+import { Tolerance } from './tolerance.js';
 import { Toolbar } from './toolbar.js';
+import { Views } from './views.js';
 
 const FIRST_EXAMPLE = 'paper-5.1';
 /** Degrees of the input angle per second while it plays: a turn takes 20 seconds. */
@@ -100,6 +106,39 @@ const drawings = new Drawings(
   { nameOf: fileName, onRefusal: showNotes, goTo: (pointer) => form.goTo(pointer), labelOf: (pointer) => form.labelOf(pointer) },
 );
 
+// ---- the views
+
+const quantities = new Quantities();
+const takeDesign = (design, origin = state.origin) => {
+  gesture = undefined;
+  setDesign(design, { origin, respan: true });
+};
+
+/** Views of studies, each of which knows the design at hand. */
+const studies = {
+  explore: new Explore(byId('explore'), { quantities, onUse: (design) => takeDesign(design) }),
+  sensitivity: new Sensitivity(byId('sensitivity'), { quantities, goTo: (pointer) => form.goTo(pointer) }),
+  tolerance: new Tolerance(byId('tolerance'), { quantities }),
+};
+
+const views = new Views(byId('views'), (view) => {
+  if (view !== 'design') play(false);
+  for (const [key, study] of Object.entries(studies)) study.show(key === view);
+});
+
+new Find(byId('find'), {
+  quantities,
+  onOpen(design, title) {
+    takeDesign(design, { title, design });
+    views.goTo('design');
+  },
+  onOpenBoth({ design, title }, reference) {
+    keepReference({ design: reference.design, origin: reference });
+    takeDesign(design, { title, design });
+    views.goTo('design');
+  },
+});
+
 // ---- the design
 
 function setDesign(design, { gesture: newGesture, origin = state.origin, fromForm = false, respan = false, keepsAddress = false } = {}) {
@@ -116,6 +155,7 @@ function replaceDesign(design, { origin, fromForm = false, respan = false, keeps
   accuracy.setDesign(design);
   losses.setDesign(design);
   drawings.setDesign(design);
+  for (const study of Object.values(studies)) study.setDesign(design);
   service.request(design);
   byId('undo').disabled = !history.canUndo;
   byId('redo').disabled = !history.canRedo;
@@ -561,6 +601,7 @@ function listen() {
     showIntro(true, true);
     byId('intro').scrollIntoView({ block: 'start' });
   });
+  click('intro-find', () => views.goTo('find'));
   click('intro-hide', () => showIntro(false, true));
   click('notice-hide', () => {
     byId('notice').hidden = true;
@@ -679,6 +720,7 @@ async function start() {
   listen();
   while (state.examples.length === 0) {
     try {
+      await quantities.load();
       state.examples = await loadExamples();
     } catch {
       if (byId('away').hidden && !access.isAsking()) onAway(true, 'The calculation service does not answer.');

@@ -105,8 +105,29 @@ function arrow({ center, contacts, force }, key, lengthPerNewton, head) {
   return `M${xy(tail)}L${xy(tip)}M${xy(barb(1))}L${xy(tip)}L${xy(barb(-1))}`;
 }
 
+/** The outlines of a whole drive, its tooth spaces no finer than this share of its radius; of very many teeth every so many. */
+export function outlinesOf(motion, finest = FINEST) {
+  const { geometry, installed, toothRadius } = motion;
+  const { start_deg: startDeg, end_deg: endDeg } = geometry.engagement;
+  const outer = geometry.ring.root_radius_mm * (1 + RING_BODY);
+  const cam = points(geometry.wave_generator.profile);
+  const stride = Math.ceil(installed / MOST_TEETH);
+  const teeth = Math.ceil(installed / stride);
+  const outlines = {
+    ring: `${circle(outer)}${polyline(flanks(geometry, motion.ringTeeth, 0, motion.ringTeeth, outer / finest))}Z`,
+    carrier: carrierOutline(motion, 0, teeth, stride),
+    cam: `${polyline(cam.slice(0, -1))}Z`,
+    axis: camAxis(motion, cam[0].x),
+    zones: lobeAngles(motion).map((deg) => arc(outer * 1.025, deg + endDeg, deg + startDeg)).join(''),
+    teeth,
+    toothRadius,
+    toothOutline: flatSided(motion),
+  };
+  return { outer, stride, outlines };
+}
+
 /** The parts as SVG elements, for one of the two views. */
-class Body {
+export class Body {
   constructor() {
     this.ring = svg('path', { class: 'part part-ring', 'fill-rule': 'evenodd' });
     this.carrier = svg('path', { class: 'part part-carrier' });
@@ -228,24 +249,9 @@ export class Mechanism {
   /** Takes a new drive; the places follow with the next `render`. */
   setMotion(motion) {
     this.#motion = motion;
-    const { geometry, installed, toothRadius } = motion;
-    const { start_deg: startDeg, end_deg: endDeg } = geometry.engagement;
-    const root = geometry.ring.root_radius_mm;
-    this.outer = root * (1 + RING_BODY);
-    const zone = this.outer * 1.025;
-    const cam = points(geometry.wave_generator.profile);
-    this.stride = Math.ceil(installed / MOST_TEETH);
-    const shown = Math.ceil(installed / this.stride);
-    const whole = {
-      ring: `${circle(this.outer)}${polyline(flanks(geometry, motion.ringTeeth, 0, motion.ringTeeth, this.outer / FINEST))}Z`,
-      carrier: carrierOutline(motion, 0, shown, this.stride),
-      cam: `${polyline(cam.slice(0, -1))}Z`,
-      axis: camAxis(motion, cam[0].x),
-      zones: lobeAngles(motion).map((deg) => arc(zone, deg + endDeg, deg + startDeg)).join(''),
-      teeth: shown,
-      toothRadius,
-      toothOutline: flatSided(motion),
-    };
+    const { geometry, installed } = motion;
+    const { outer, stride, outlines: whole } = outlinesOf(motion);
+    Object.assign(this, { outer, stride });
     this.#whole.shape(whole);
     // Enlarged, only what is near is built, but with every point: it is turned to where the selected tooth stands.
     const spaces = Math.min(motion.ringTeeth, 2 * NEAR + 1);

@@ -1,0 +1,83 @@
+// A view that asks one study about the design at hand, anew whenever something changes, and shows what it comes to.
+
+import { Progress, problemNote } from './ask.js';
+import { isSame } from './design.js';
+import { html } from './dom.js';
+import { number } from './format.js';
+import { Run } from './studies.js';
+
+const DELAY_MS = 300;
+
+/** Whoever extends it has `ask()`, which answers `{ question, variants, … }` or `{ fault }`, and `take(answer, asked)`; and `offer()`, called
+ *  before that, where choices follow from the design. */
+export class StudyView {
+  design;
+  isShown = false;
+  #run;
+  #timer;
+  #asked;
+
+  /** So many variants are looked at whenever something changes; more only when they are asked for. */
+  constructor({ mostAtOnce, verb }) {
+    this.mostAtOnce = mostAtOnce;
+    this.button = html('button', { type: 'button', class: 'primary', onclick: () => this.look() }, verb);
+    this.progress = new Progress(() => this.#run?.cancel());
+    this.state = html('div', { role: 'status', class: 'study-state' });
+  }
+
+  setDesign(design) {
+    this.design = design;
+    if (this.isShown) this.later();
+  }
+
+  show(isShown) {
+    this.isShown = isShown;
+    if (isShown) this.later(0);
+  }
+
+  /** Something has changed. */
+  later(delay = DELAY_MS) {
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => {
+      this.offer?.();
+      const { fault, variants, question } = this.ask();
+      if (fault === undefined && this.#asked && isSame(this.#asked, question)) return;
+      if (fault === undefined && variants <= this.mostAtOnce) this.look();
+      else {
+        this.#run?.giveUp();
+        this.progress.hide();
+        this.state.replaceChildren(fault ?? `${number(variants, 9)} variants are many: press “${this.button.textContent}” for them.`);
+      }
+    }, delay);
+  }
+
+  async look() {
+    clearTimeout(this.#timer);
+    const asked = { ...this.ask(), design: this.design };
+    const { fault, question, variants } = asked;
+    if (fault !== undefined) {
+      this.state.replaceChildren(fault);
+      return;
+    }
+    this.#run?.giveUp();
+    const run = new Run();
+    this.#run = run;
+    this.#asked = question;
+    const barTimer = setTimeout(() => this.progress.show(`${number(variants, 9)} variants…`), DELAY_MS);
+    try {
+      const { answer, state, problem } = await run.follow(question, ({ lookedAt, variants: all, full }) => {
+        if (full) this.progress.show(full);
+        else this.progress.show(`${number(lookedAt, 9)} of ${number(all, 9)} variants`, lookedAt / all);
+      });
+      this.state.replaceChildren(...(problem ? [problemNote(problem)] : state === 'cancelled' ? ['Cancelled: what was looked at until then is shown.'] : []));
+      if (answer) this.take(answer, asked);
+      // What broke off may be asked for again.
+      if (state !== 'done') this.#asked = undefined;
+    } catch (error) {
+      if (!run.isGivenUp) throw error;
+    } finally {
+      clearTimeout(barTimer);
+      if (this.#run === run) this.progress.hide();
+    }
+  }
+}

@@ -1,0 +1,182 @@
+// What parts as they are made do to a quantity: drives with deviations by chance, their spread, how many are good, and what does most.
+
+import { Choice, NumberBox } from './ask.js';
+import { axes } from './chart.js';
+import { at, changed } from './design.js';
+import { html, oncePerFrame, setText, svg } from './dom.js';
+import { readable, sentence } from './findings.js';
+import { number } from './format.js';
+import { wordsOf } from './parameters.js';
+import { StudyView } from './study-view.js';
+
+const FIRST_QUANTITY = 'transmission_error_peak_to_peak_deg';
+const MOST_AT_ONCE = 2000;
+const HEIGHT = 250;
+
+const DEVIATIONS = [
+  { name: 'tooth_radius_um', label: 'Radius of each tooth', unit: 'µm', limit: 2 },
+  { name: 'slot_angle_arcsec', label: 'Angle of each slot', unit: '″', limit: 20 },
+  { name: 'slot_wall_um', label: 'Wall of each slot', unit: 'µm', limit: 3 },
+  { name: 'ring_space_um', label: 'Depth of each ring space', unit: 'µm', limit: 5 },
+  { name: 'ring_space_angle_arcsec', label: 'Angle of each ring space', unit: '″', limit: 20 },
+  { name: 'wave_generator_lobe_um', label: 'Height of each lobe', unit: 'µm', limit: 5 },
+  { name: 'wave_generator_runout', label: 'Runout of the wave generator', unit: 'µm', limit: 5 },
+  { name: 'ring_runout', label: 'Runout of the ring', unit: 'µm', limit: 5 },
+  { name: 'carrier_runout', label: 'Runout of the carrier', unit: 'µm', limit: 5 },
+];
+/** Those that a design has at first. */
+const FIRST_DEVIATIONS = new Set(['tooth_radius_um', 'ring_space_um']);
+
+/** What stands in the document and deviates in a whole drive. */
+const INPUTS = [
+  { name: '/drive/teeth/radius_mm', label: 'Radius of all teeth', unit: 'mm', limit: 0.005 },
+  { name: '/drive/teeth/width_mm', label: 'Width of all teeth', unit: 'mm', limit: 0.05 },
+];
+
+/** A limit is three standard deviations of the normal distribution that it cuts off. */
+const SIGMAS = 3;
+
+const DISTRIBUTIONS = [
+  { value: 'none', label: 'exact' },
+  { value: 'normal', label: 'normal, ± is 3 σ' },
+  { value: 'uniform', label: 'uniform' },
+];
+
+export class Tolerance extends StudyView {
+  #result;
+
+  constructor(section, { quantities }) {
+    super({ mostAtOnce: MOST_AT_ONCE, verb: 'Draw drives' });
+    this.quantities = quantities;
+    const onChange = () => this.later();
+    this.quantity = new Choice('Quantity', onChange);
+    this.samples = new Choice('Drives', onChange);
+    this.samples.offer([{ options: [1000, 10_000, 100_000].map((count) => ({ value: String(count), label: number(count, 9) })) }], '1000');
+    this.ends = ['at least', 'at most'].map((words) => new NumberBox(`Good is ${words}`, onChange));
+    this.unit = html('span', { class: 'unit' });
+    this.rows = [...DEVIATIONS.map((kind) => ({ ...kind, list: 'deviations' })), ...INPUTS.map((kind) => ({ ...kind, list: 'inputs' }))].map((kind) => {
+      const distribution = new Choice(kind.label, onChange);
+      distribution.offer([{ options: DISTRIBUTIONS }], FIRST_DEVIATIONS.has(kind.name) ? 'normal' : 'none');
+      const limit = new NumberBox(`${kind.label}: plus and minus, ${kind.unit}`, onChange);
+      limit.value = kind.limit;
+      const range = html('span', { class: 'range' }, '± ', limit.input, html('span', { class: 'unit' }, kind.unit));
+      return { ...kind, distribution, limit, range, element: html('div', { class: 'ask-row deviation' }, distribution.element, range) };
+    });
+    this.value = html('p', { class: 'headline' });
+    this.chart = html('div', { class: 'study-chart', role: 'img', 'aria-label': 'The spread of the quantity; the table below has the numbers' });
+    this.tables = html('div', { class: 'tolerance-tables' });
+    section.append(
+      html('header', {}, html('h2', { id: 'tolerance-title', tabindex: '-1' }, 'Tolerances')),
+      html('p', { class: 'none' }, 'Drives with parts that deviate by chance, each swept over its period: how a quantity spreads, how many drives are good, and which tolerance matters most.'),
+      html('div', { class: 'ask' }, html('div', { class: 'ask-row' }, this.quantity.element, this.samples.element, this.button), html('div', { class: 'ask-row' }, html('span', { class: 'range' }, 'Good from ', this.ends[0].input, ' to ', this.ends[1].input, ' ', this.unit))),
+      html('details', { class: 'deviations', open: true }, html('summary', {}, 'What deviates'), this.rows.map(({ element }) => element)),
+      this.progress.element,
+      this.state,
+      this.value,
+      this.chart,
+      this.tables,
+    );
+    new ResizeObserver(oncePerFrame(() => this.isShown && this.#draw())).observe(this.chart);
+  }
+
+  offer() {
+    this.quantity.offer(
+      this.quantities.groupsFor(this.design).map(({ title, quantities }) => ({ title, options: quantities.filter(({ is_flag: isFlag }) => !isFlag).map(({ name, label }) => ({ value: name, label })) })),
+      FIRST_QUANTITY,
+    );
+    setText(this.unit, this.quantities.get(this.quantity.value).unit);
+    for (const { list, name, element, distribution, range } of this.rows) {
+      element.hidden = list === 'inputs' && typeof at(this.design, name) !== 'number';
+      range.hidden = distribution.value === 'none';
+    }
+  }
+
+  ask() {
+    const lists = { deviations: {}, inputs: {} };
+    for (const { list, name, distribution, limit, label, element } of this.rows) {
+      if (distribution.value === 'none' || element.hidden) continue;
+      const fault = limit.fault ?? (limit.value > 0 ? undefined : `${label}: how far it deviates is a number above 0.`);
+      if (fault) return { fault };
+      lists[list][name] = { distribution: distribution.value, limit: limit.value, ...(distribution.value === 'normal' ? { sigma: limit.value / SIGMAS } : {}) };
+    }
+    const kinds = Object.keys(lists.deviations).length + Object.keys(lists.inputs).length;
+    if (kinds === 0) return { fault: 'Nothing deviates: choose at least one distribution.' };
+    const fault = this.ends.map((end) => end.fault).find((text) => text !== undefined);
+    if (fault) return { fault };
+    const [min, max] = this.ends.map(({ value }) => value);
+    if (min > max) return { fault: 'No drive can be good: the range is empty.' };
+    const name = this.quantity.value;
+    const require = min === undefined && max === undefined ? {} : { [name]: { ...(min === undefined ? {} : { min }), ...(max === undefined ? {} : { max }) } };
+    const samples = Number(this.samples.value);
+    return { question: { study: 'tolerance', base: changed(this.design, '/deviations', undefined), ...lists, quantities: [name], require, samples }, variants: samples, name };
+  }
+
+  take(answer, { name, question }) {
+    const of = answer.quantities.find(({ quantity }) => quantity === name);
+    this.#result = { answer, of, name, require: question.require[name] ?? {} };
+    const { yield_share: share, interference, impossible, samples } = answer;
+    const percent = (value) => `${number(100 * value, 4)}\u202f%`;
+    const parts = [
+      share && `${percent(share.share)} of the drives are good (${percent(share.low)} to ${percent(share.high)} with 95\u202f% confidence).`,
+      interference > 0 && `${number(interference, 9)} of ${number(samples, 9)} cannot be put together.`,
+      impossible > 0 && `${number(impossible, 9)} have no answer.`,
+    ].filter(Boolean);
+    setText(this.value, parts.length > 0 ? parts.join(' ') : of ? `Of ${number(samples, 9)} drives nearly all lie between ${this.quantities.shown(name, of.quantiles[0].value)} and ${this.quantities.shown(name, of.quantiles.at(-1).value)}.` : '');
+    this.#showTables();
+    this.#draw();
+  }
+
+  #showTables() {
+    const { answer, of, name } = this.#result;
+    const shown = (value) => (value === undefined ? '–' : this.quantities.shown(name, value, 5));
+    const table = (title, head, rows) =>
+      html('div', {}, html('h3', {}, title), html('div', { class: 'scroll', tabindex: '0', role: 'region', 'aria-label': title }, html('table', { class: 'drives' }, html('thead', {}, html('tr', {}, head.map((text, index) => html('th', { scope: 'col', class: index > 0 && 'numeric' }, text)))), html('tbody', {}, rows))));
+    const row = (title, ...cells) => html('tr', {}, html('th', { scope: 'row' }, title), cells.map((text) => html('td', { class: 'numeric number' }, text)));
+    const tables = [];
+    if (of) {
+      const rows = of.quantiles.map(({ share, value, low, high }) => row(`${number(100 * share, 4)}\u202f%`, shown(value), low === undefined && high === undefined ? 'too few drives' : `${shown(low)} to ${shown(high)}`));
+      tables.push(table('So many drives lie below', ['Share', this.quantities.get(name).label, '95\u202f% confidence'], [...rows, row('Without deviations', shown(of.nominal), ''), row('Mean, standard deviation', shown(of.mean), shown(of.standard_deviation))]));
+      const kinds = new Map([...DEVIATIONS, ...INPUTS].map(({ name: kind, label }) => [kind, label]));
+      const contributors = of.contributors.map(({ deviation, share, standard_deviation: deviates }) => {
+        const line = row(kinds.get(deviation) ?? wordsOf(deviation).label, `${number(100 * share, 3)}\u202f%`, shown(deviates));
+        const bar = html('span', { class: 'bar', 'aria-hidden': 'true' });
+        bar.style.setProperty('--share', share);
+        line.children[1].append(bar);
+        return line;
+      });
+      if (contributors.length > 0) tables.push(table('What matters most', ['Deviation', 'Share of the variance', 'Alone it deviates by'], contributors));
+    }
+    if (answer.reasons.length > 0) tables.push(html('div', {}, html('h3', {}, 'Drives that cannot be'), html('ul', { class: 'plain' }, answer.reasons.map(({ variants, detail }) => html('li', {}, `${number(variants, 9)}, such as: ${sentence(readable(detail))}`)))));
+    this.tables.replaceChildren(...tables);
+  }
+
+  /** Shares of drives over the quantity, with bands of confidence, the design without deviations and the limits. */
+  #draw() {
+    const { of, name, require } = this.#result ?? {};
+    this.chart.hidden = !of || of.largest === of.least;
+    if (this.chart.hidden || this.chart.clientWidth === 0) return;
+    const width = Math.max(260, this.chart.clientWidth);
+    const ends = [of.least, of.largest, of.nominal, require.min, require.max].filter((value) => value !== undefined);
+    const [low, high] = [Math.min(...ends), Math.max(...ends)];
+    const room = 0.04 * (high - low);
+    const frame = axes(width, HEIGHT, { label: this.quantities.headed(name), min: low - room, max: high + room }, { label: 'Share of drives below, %', min: 0, max: 100 });
+    const { top, bottom } = frame.box;
+    const place = (value, share) => `${frame.x(value).toFixed(1)} ${frame.y(100 * share).toFixed(1)}`;
+    const points = [{ share: 0, value: of.least }, ...of.quantiles, { share: 1, value: of.largest }];
+    const sure = points.filter((point) => point.low !== undefined && point.high !== undefined);
+    if (sure.length > 1) frame.plot.append(svg('path', { class: 'confidence', d: `M${sure.map((point) => place(point.low, point.share)).join('L')}L${sure.toReversed().map((point) => place(point.high, point.share)).join('L')}Z` }));
+    for (const end of ['min', 'max']) {
+      if (require[end] === undefined) continue;
+      const x = frame.x(require[end]);
+      const [from, to] = end === 'min' ? [frame.box.left, x] : [x, frame.box.right];
+      frame.plot.append(svg('rect', { class: 'beyond', x: from, y: top, width: Math.max(0, to - from), height: bottom - top }), svg('path', { class: 'limit', d: `M${x} ${top}V${bottom}` }));
+    }
+    frame.plot.append(svg('path', { class: 'curve', d: `M${points.map((point) => place(point.value, point.share)).join('L')}` }));
+    for (const { value, share } of of.quantiles) frame.plot.append(svg('circle', { class: 'curve-dot', cx: frame.x(value), cy: frame.y(100 * share), r: 3 }));
+    if (of.nominal !== undefined) {
+      const x = frame.x(of.nominal);
+      frame.plot.append(svg('path', { class: 'now', d: `M${x} ${top}V${bottom}` }), svg('text', { class: 'now-label', x: x + 5, y: top + 14 }, 'exact'));
+    }
+    this.chart.replaceChildren(frame.root);
+  }
+}

@@ -1,0 +1,43 @@
+// What the page is about at the moment: the design, a search for one, or what studies tell of it.
+
+import { html } from './dom.js';
+import { Toolbar } from './toolbar.js';
+
+export const VIEWS = [
+  { key: 'design', label: 'Design' },
+  { key: 'find', label: 'Find a drive' },
+  { key: 'explore', label: 'Explore' },
+  { key: 'sensitivity', label: 'Sensitivity' },
+  { key: 'tolerance', label: 'Tolerances' },
+];
+
+export class Views {
+  #buttons;
+
+  /** `onShow(key)` when another view is shown. */
+  constructor(bar, onShow) {
+    this.onShow = onShow;
+    this.#buttons = new Map(VIEWS.map(({ key, label }) => [key, html('button', { type: 'button', 'data-view': key, onclick: () => this.show(key) }, label)]));
+    bar.append(...this.#buttons.values());
+    this.#mark('design');
+    new Toolbar(bar);
+  }
+
+  #mark(view) {
+    document.body.dataset.view = view;
+    for (const [key, button] of this.#buttons) button.setAttribute('aria-pressed', String(key === view));
+  }
+
+  show(view) {
+    if (document.body.dataset.view === view) return;
+    this.#mark(view);
+    scrollTo(0, 0);
+    this.onShow(view);
+  }
+
+  /** Shows a view from within another one, which goes, and the focus in it. */
+  goTo(view) {
+    this.show(view);
+    this.#buttons.get(view).focus();
+  }
+}

@@ -1,0 +1,350 @@
+// Studies on the page: a search for a drive, curves and maps, sensitivity and tolerances.
+
+import assert from 'node:assert/strict';
+import { createRequire } from 'node:module';
+import { readFile } from 'node:fs/promises';
+import { after, afterEach, before, test } from 'node:test';
+import { designOf, enter, field, notes, settled, testBed } from './harness.js';
+
+const AXE = createRequire(import.meta.url).resolve('axe-core/axe.min.js');
+const RADIUS = '/drive/teeth/radius_mm';
+const SEMI_MAJOR = '/drive/wave_generator/semi_major_mm';
+const VIEWS = ['find', 'explore', 'sensitivity', 'tolerance'];
+
+const bed = testBed({ before, after, afterEach });
+
+/** The number that a text ends or begins with, as people write it. */
+const numberIn = (text) => Number(/[\d.\u202f]+/.exec(text.replace('−', '-'))[0].replaceAll('\u202f', ''));
+
+async function show(page, view) {
+  await page.click(`#views [data-view="${view}"]`);
+}
+
+/** Waits until a study's view shows what came. */
+const done = (page, view, selector) =>
+  page.waitForFunction(
+    ([root, wanted]) => document.querySelector(`${root} .study-progress`).hidden && document.querySelector(`${root} ${wanted}`) !== null,
+    [`#${view}`, selector],
+  );
+
+async function range(page, row, from, to) {
+  await page.locator('#explore .ask-row').nth(row).locator('input').first().fill(String(from));
+  await page.locator('#explore .ask-row').nth(row).locator('input').last().fill(String(to));
+  await page.keyboard.press('Tab');
+}
+
+const over = (page, row, pointer) => page.locator('#explore .ask-row').nth(row).locator('select').selectOption(pointer);
+
+/** Begins a search with these requirements, of one kind with little effort, and waits for its end. */
+async function find(page, requirements = {}) {
+  await show(page, 'find');
+  for (const kind of ['ellipse', 'eccentric']) await page.uncheck(field(`/find/wave_generators/${kind}`));
+  await page.selectOption(field('/find/effort'), 'quick');
+  for (const [name, value] of Object.entries(requirements)) await page.fill(field(`/find/${name}`), String(value));
+  await page.click('.find button[type=submit]');
+  await found(page);
+}
+
+const found = (page) => page.waitForFunction(() => document.querySelector('#find .study-progress').hidden && document.querySelector('#find .headline')?.textContent);
+
+test('every view is reached from the head within a dozen tab stops, and arrow keys go from one to the next', async () => {
+  const page = await bed.open();
+  const focused = () => page.evaluate(() => document.activeElement.closest('#views button')?.dataset.view);
+  let stops = 0;
+  while ((await focused()) === undefined) {
+    await page.keyboard.press('Tab');
+    stops += 1;
+    assert.ok(stops <= 12, 'a dozen stops at most');
+  }
+  for (const view of VIEWS) {
+    await page.keyboard.press('ArrowRight');
+    assert.equal(await focused(), view);
+    await page.keyboard.press('Enter');
+    assert.ok(await page.isVisible(`#${view}`), view);
+    assert.equal(await page.getAttribute(`#views [data-view="${view}"]`, 'aria-pressed'), 'true');
+    for (const other of VIEWS) if (other !== view) assert.ok(!(await page.isVisible(`#${other}`)), `${other} beside ${view}`);
+    assert.equal(await page.isVisible('#whole'), false, 'the mechanism gives way');
+  }
+  await page.keyboard.press('Home');
+  await page.keyboard.press('Enter');
+  assert.ok(await page.isVisible('#whole'));
+});
+
+test('at 320 px no view is wider than the screen, and none has a fault of accessibility, light or dark', async () => {
+  for (const options of [{ viewport: { width: 320, height: 900 }, colorScheme: 'dark' }, {}]) {
+    await bed.page?.context().close();
+    const page = await bed.open(options);
+    await page.evaluate(await readFile(AXE, 'utf8'));
+    await find(page);
+    for (const view of VIEWS) {
+      await show(page, view);
+      if (view === 'explore') {
+        await over(page, 2, SEMI_MAJOR);
+        await done(page, view, '.heat');
+      } else if (view !== 'find') await done(page, view, 'tbody tr');
+      assert.ok((await page.evaluate(() => document.documentElement.scrollWidth)) <= page.viewportSize().width, view);
+      const { violations } = await page.evaluate(() => window.axe.run());
+      assert.deepEqual(violations.map(({ id, nodes }) => `${view} ${id}: ${nodes.map(({ html }) => html).join(' | ')}`), []);
+    }
+  }
+});
+
+test('a curve’s numbers are those of the sweep, and can be taken into the design', async () => {
+  const page = await bed.open();
+  await show(page, 'explore');
+  await done(page, 'explore', '.curve');
+  const readout = page.locator('#explore .study-readout strong');
+  assert.equal(numberIn(await readout.textContent()), 980.44, 'of the design at first');
+  await page.locator('#explore .place input').first().fill('120');
+  const shown = numberIn(await readout.textContent());
+  await page.click('#explore button:has-text("Take into the design")');
+  await settled(page);
+  const design = await designOf(page);
+  assert.equal(design.drive.teeth.radius_mm, 6, '120 of 160 steps from 3 to 7');
+  const { peaks } = await bed.server.ask('/v1/sweep', design);
+  const largest = Math.max(...Object.values(peaks).map(({ stress_mpa: stress }) => stress.value));
+  assert.ok(Math.abs(largest - shown) <= 5e-5 * largest, `${largest} is shown as ${shown}`);
+  await page.click('#undo');
+  await settled(page);
+  assert.equal((await designOf(page)).drive.teeth.radius_mm, 5);
+});
+
+test('where no drive is possible a curve has a gap, with its reason', async () => {
+  const page = await bed.open();
+  await show(page, 'explore');
+  await done(page, 'explore', '.curve');
+  await range(page, 1, 6, 9);
+  await done(page, 'explore', '.impossible-band');
+  assert.match(await page.textContent('#explore .study-reasons'), /Impossible here.*of 161, the first at tooth radius 7\.\d+.mm: Neighbouring teeth.*come as near as/);
+  await page.locator('#explore .place input').first().fill('160');
+  assert.match(await page.textContent('#explore .study-readout'), /Tooth radius 9.mm: impossible – neighbouring teeth/);
+  assert.ok(await page.isDisabled('#explore button:has-text("Take into the design")'));
+});
+
+test('a map takes two numbers at once into the design', async () => {
+  const page = await bed.open();
+  await show(page, 'explore');
+  await over(page, 2, SEMI_MAJOR);
+  await done(page, 'explore', '.heat');
+  assert.match(await page.textContent('#explore .study-reasons'), /semi-minor/i, 'axes that are no ellipse’s');
+  await page.click('#explore button:has-text("Least")');
+  const shown = numberIn(await page.textContent('#explore .study-readout strong'));
+  await page.click('#explore button:has-text("Take into the design")');
+  await settled(page);
+  const design = await designOf(page);
+  assert.notEqual(design.drive.teeth.radius_mm, 5);
+  assert.notEqual(design.drive.wave_generator.semi_major_mm, 58);
+  const { peaks } = await bed.server.ask('/v1/sweep', design);
+  const largest = Math.max(...Object.values(peaks).map(({ stress_mpa: stress }) => stress.value));
+  assert.ok(Math.abs(largest - shown) <= 5e-5 * largest);
+});
+
+test('slots vary with the ring’s teeth that belong to them', async () => {
+  const page = await bed.open();
+  await enter(page, '/drive/teeth/installed', '');
+  await show(page, 'explore');
+  await over(page, 1, '/drive/teeth/count');
+  await done(page, 'explore', '.curve-dot');
+  assert.equal(await page.locator('#explore .curve-dot').count(), 17, 'from 20 to 36, none impossible');
+  await page.locator('#explore .place input').first().fill('0');
+  await page.click('#explore button:has-text("Take into the design")');
+  await settled(page);
+  const { teeth, ring } = (await designOf(page)).drive;
+  assert.deepEqual([teeth.count, ring.teeth], [20, 18]);
+});
+
+test('a map of a million variants is read beside the page and drawn with as many cells as a screen has', async () => {
+  const page = await bed.open();
+  const steps = 1000;
+  const values = Array.from({ length: steps }, (_, index) => 1 + index);
+  const variant = Array.from({ length: steps * steps }, (_, index) => index);
+  const result = {
+    study: 'map',
+    is_complete: true,
+    variants: steps * steps,
+    over: [{ pointer: RADIUS, values }, { pointer: SEMI_MAJOR, values }],
+    possible: { variant, quantities: { peak_stress_mpa: variant.map((index) => index % 1000) } },
+    impossible: { variant: [], reason: [] },
+    reasons: [],
+  };
+  await show(page, 'explore');
+  await done(page, 'explore', '.curve');
+  await page.route('**/v1/studies', (route) => route.fulfill({ json: { id: 'x', state: 'done', variants: steps * steps, looked_at: steps * steps, result } }));
+  let workers = 0;
+  page.on('worker', () => (workers += 1));
+  await over(page, 2, SEMI_MAJOR);
+  await page.locator('#explore .ask-row').first().locator('select').nth(1).selectOption('finest');
+  await page.waitForFunction(() => document.querySelector('#explore .study-state').textContent.includes('press “Look”'));
+  assert.match(await page.textContent('#explore .study-state'), /1\u202f000\u202f000 variants are many/);
+  const before = workers;
+  await page.click('#explore button:has-text("Look")');
+  await page.waitForFunction(() => document.querySelector('#explore .heat-legend').textContent.includes('drawn at every third step'));
+  assert.ok(workers > before);
+  const size = await page.$eval('#explore .heat', async (image) => {
+    const drawn = new Image();
+    drawn.src = image.getAttribute('href');
+    await drawn.decode();
+    return [drawn.naturalWidth, drawn.naturalHeight];
+  });
+  assert.deepEqual(size, [334, 334]);
+});
+
+test('from ratio, torque and space follow drives that keep every limit, and one opens as design', async () => {
+  const page = await bed.open();
+  await find(page, { ratio: 20, output_torque_nm: 200, outer_diameter_mm: 120 });
+  assert.match(await page.textContent('#find .headline'), /\d+ drives keep every limit/);
+  const rows = page.locator('#find .drives-scroll tbody tr');
+  assert.ok((await rows.count()) > 5);
+  await page.waitForSelector('#find .drive-card .part-ring');
+  await rows.nth(2).locator('button').click();
+  assert.equal(await page.textContent('#find .drive-card h3'), 'Drive 3');
+  await page.click('#find button:has-text("Open as design")');
+  await settled(page);
+  assert.ok(await page.isVisible('#whole'));
+  assert.match(await page.textContent('#design-name'), /^Drive 3, /);
+  const design = await designOf(page);
+  const { geometry, sweep } = await bed.server.answers(design);
+  assert.equal(geometry.transmission_ratio, 20);
+  assert.equal(geometry.undercut.occurs, false);
+  assert.ok(2 * 1.2 * geometry.ring.root_radius_mm <= 120);
+  assert.ok(sweep.torque_capacity.output_torque_nm >= 200);
+  assert.equal(sweep.load.output_torque_nm, 200);
+  // What a finding warns of was among the limits.
+  assert.deepEqual(geometry.findings.filter(({ severity }) => severity === 'warning'), []);
+});
+
+test('the reasons why others fell are counted', async () => {
+  const page = await bed.open();
+  await find(page);
+  const reasons = page.locator('#find [aria-labelledby="reasons-title"]');
+  assert.match(await reasons.textContent(), /The drives found are held back by: .*Of \d.* variants spread evenly, .* kept every limit/);
+  const rows = await reasons.locator('tbody tr').allTextContents();
+  assert.ok(rows.some((row) => /^Torque capacity, output at least 200.N·m/.test(row)), rows.join('\n'));
+  assert.match(await reasons.locator('details').first().textContent(), /such as: /);
+});
+
+test('two drives are compared at one scale, and open as design and reference', async () => {
+  const page = await bed.open();
+  await find(page);
+  const checks = page.locator('#find .drives-scroll input[type=checkbox]');
+  await checks.nth(0).check();
+  assert.match(await page.textContent('#comparison-title'), /Drive 1, and…/);
+  await checks.nth(4).check();
+  assert.equal(await page.textContent('#comparison-title'), 'Drive 1 and drive 5');
+  const viewBoxes = () => page.$$eval('#find .pair svg', (pictures) => pictures.map((picture) => picture.getAttribute('viewBox')));
+  await page.waitForFunction(() => document.querySelectorAll('#find .pair svg').length === 2);
+  const [one, other] = await viewBoxes();
+  assert.equal(one, other);
+  await page.click('#find button:has-text("Open drive 5, drive 1 as reference")');
+  await page.waitForSelector('#comparing:not([hidden])');
+  await settled(page);
+  assert.match(await page.textContent('#design-name'), /^Drive 5/);
+  assert.match(await page.textContent('#reference-name'), /^Drive 1/);
+});
+
+test('where nothing is possible the least change that would do is offered, and does', async () => {
+  const page = await bed.open();
+  await find(page, { outer_diameter_mm: 40 });
+  assert.equal(await page.textContent('#find .headline'), 'No drive keeps every limit.');
+  assert.match(await page.textContent('#find .study-state'), /One of these would do, all other limits kept:.*instead of.*The nearest miss: /);
+  const change = page.locator('#find .miss li', { hasText: 'Outer diameter' }).locator('button').first();
+  await change.click();
+  await found(page);
+  assert.ok(Number(await page.inputValue(field('/find/outer_diameter_mm'))) > 40);
+});
+
+test('a search can be cancelled, and says so', async () => {
+  const page = await bed.open();
+  await show(page, 'find');
+  await page.selectOption(field('/find/effort'), 'thorough');
+  let cancelled;
+  page.on('request', (request) => (cancelled ??= request.method() === 'DELETE' ? request : undefined));
+  await page.click('.find button[type=submit]');
+  await page.waitForFunction(() => /of 200.000 variants/.test(document.querySelector('#find .study-progress').textContent));
+  await page.click('#find .study-progress button');
+  await page.waitForFunction(() => document.querySelector('#find .headline')?.textContent.startsWith('Cancelled'));
+  assert.match(cancelled.url(), /\/v1\/studies\/[0-9a-f]+$/);
+  const { state } = await (await fetch(cancelled.url())).json();
+  assert.equal(state, 'cancelled');
+});
+
+test('requirements that are missing or cannot be are told at their fields, and nothing runs', async () => {
+  const page = await bed.open();
+  await show(page, 'find');
+  let asked = 0;
+  page.on('request', (request) => (asked += request.url().endsWith('/v1/studies') ? 1 : 0));
+  await page.fill(field('/find/output_torque_nm'), '');
+  assert.match(await page.textContent(notes('/find/output_torque_nm')), /Wanted here: the output torque, a number in N·m, such as 200/);
+  await page.fill(field('/find/ratio_max'), '15');
+  assert.match(await page.textContent(notes('/find/ratio_max')), /range is empty/);
+  for (const goal of ['small', 'strong']) await page.uncheck(field(`/find/goals/${goal}`));
+  assert.match(await page.textContent(notes('/find/goals')), /choose at least one/i);
+  await page.click('.find button[type=submit]');
+  assert.match(await page.textContent('#find .study-state'), /marked fields/);
+  assert.equal(asked, 0);
+});
+
+test('sensitivity ranks the inputs by what they really do', async () => {
+  const page = await bed.open();
+  await show(page, 'sensitivity');
+  await done(page, 'sensitivity', 'tbody tr');
+  const rows = await page.$$eval('#sensitivity tbody tr', (lines) => lines.map((line) => [...line.querySelectorAll('th, td')].map((cell) => cell.textContent)));
+  assert.match(rows[0][0], /^Semi-major axis 58/);
+  const design = await bed.server.example('paper-5.1');
+  const largest = async (semiMajor) => {
+    const moved = structuredClone(design);
+    moved.drive.wave_generator.semi_major_mm = semiMajor;
+    const { peaks } = await bed.server.ask('/v1/sweep', moved);
+    return Math.max(...Object.values(peaks).map(({ stress_mpa: stress }) => stress.value));
+  };
+  const base = await largest(58);
+  for (const [cell, value] of [[2, await largest(58 * 0.99)], [3, await largest(58 * 1.01)]]) {
+    assert.equal(numberIn(rows[0][cell]), Number(Math.abs(value - base).toPrecision(3)), 'as a sweep of its own');
+  }
+  // Moved by its tolerance the axis does less than what else moves by 1 %.
+  await page.locator('#sensitivity tbody tr').first().locator('input').fill('0.0001');
+  await page.keyboard.press('Tab');
+  await page.waitForFunction(() => !document.querySelector('#sensitivity tbody th').textContent.startsWith('Semi-major'));
+  await page.click('#sensitivity button:has-text("Move all by 1 % again")');
+  await page.waitForFunction(() => document.querySelector('#sensitivity tbody th').textContent.startsWith('Semi-major'));
+});
+
+test('tolerances tell spread, yield and what matters most', async () => {
+  const page = await bed.open();
+  await show(page, 'tolerance');
+  await page.waitForSelector('#tolerance .deviation:visible');
+  const rows = page.locator('#tolerance .deviation:visible');
+  for (let index = 0; index < (await rows.count()); index += 1) await rows.nth(index).locator('select').selectOption('none');
+  for (const label of ['Radius of all teeth', 'Width of all teeth']) await page.locator('#tolerance .deviation', { hasText: label }).locator('select').selectOption('uniform');
+  await page.locator('#tolerance .ask-row').first().locator('select').first().selectOption('peak_stress_mpa');
+  await page.waitForFunction(() => /Width of all teeth/.test(document.querySelector('#tolerance .tolerance-tables').textContent));
+  // Half the square root of a width: 15 mm ± 0.05 mm moves 980.44 MPa by a third of a percent over its half, evenly.
+  const quantile = async (share) => numberIn(await page.locator('#tolerance tr', { hasText: new RegExp(`^${share}.%`) }).locator('td').first().textContent());
+  const median = await quantile(50);
+  assert.ok(Math.abs(median - 980.44) < 0.3, String(median));
+  const expected = 980.44 * (1 + 0.5 * (0.05 / 15) * 0.9);
+  assert.ok(Math.abs((await quantile(95)) - expected) < 0.3, `${await quantile(95)} beside ${expected}`);
+  assert.match(await page.locator('#tolerance tr', { hasText: 'Width of all teeth' }).textContent(), /9\d(\.\d)?.%/, 'nearly all of the variance');
+  await page.locator('#tolerance .range input').nth(1).fill('980.44');
+  await page.keyboard.press('Tab');
+  await page.waitForFunction(() => /of the drives are good/.test(document.querySelector('#tolerance .headline').textContent));
+  const good = numberIn(await page.textContent('#tolerance .headline'));
+  assert.ok(good > 40 && good < 60, `${good} % lie below the middle`);
+});
+
+test('a study asks anew when the design changes', async () => {
+  const page = await bed.open();
+  await show(page, 'sensitivity');
+  await done(page, 'sensitivity', 'tbody tr');
+  assert.match(await page.textContent('#sensitivity .headline'), /980\.4/);
+  await page.fill(field(RADIUS), '4');
+  await page.waitForFunction(() => /1026/.test(document.querySelector('#sensitivity .headline').textContent));
+});
+
+test('printed is the design’s report, whatever view is shown', async () => {
+  const page = await bed.open();
+  await show(page, 'find');
+  await page.emulateMedia({ media: 'print' });
+  assert.ok(!(await page.isVisible('#find')));
+  assert.ok(await page.isVisible('#table'));
+});
