@@ -6,7 +6,7 @@ use toothwave_solver::losses::{Friction, Mechanism, period};
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self as solver, Points};
-use toothwave_solver::{Drive, LoadCase, Stop, findings};
+use toothwave_solver::{Drive, LoadCase, SolveError, Stop, findings, model_error as error_of_model};
 
 use crate::design::Design;
 use crate::field::FieldCode;
@@ -18,9 +18,11 @@ use crate::no_answer::{NoAnswer, NoAnswerCode, too_many};
 use crate::question::{Limits, Question, checked_drive, checked_load, require_finite};
 use crate::sweep::answer::{ChecksAnswer, LoadAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
 use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
+use crate::sweep::model_error::ModelErrorAnswer;
 
 pub mod answer;
 pub mod losses;
+pub mod model_error;
 mod plots;
 
 /// The checked parameters of a sweep.
@@ -121,6 +123,8 @@ impl Question for Sweep {
         let of_contacts = findings::of_contacts(drive, load, &sweep.peaks, approaches_matter);
         let of_half_widths = findings::of_half_widths(drive, load, &sweep.states);
         let of_wind_up = findings::of_wind_up(drive, &sweep);
+        let of_projection = findings::of_projection(drive, load).map_err(SolveError::from)?;
+        let model_error = error_of_model::of(drive, load, &sweep).map_err(SolveError::from)?;
         let radial_force_n = period::RadialForces::of(drive, &sweep, stop)?
             .map(|forces| RadialForceAnswer::new(&sweep, forces))
             .transpose()?;
@@ -132,7 +136,8 @@ impl Question for Sweep {
             let input_torque_nm = load.input_torque_nm(drive);
             losses = Some(LossesAnswer::new(drive, friction, input_torque_nm, *input_speed_rpm, &sweep, of_period)?);
         }
-        let of_sweep = of_wind_up.iter().chain(&of_half_widths).chain(&of_friction).chain(&of_contacts);
+        let of_sweep =
+            of_wind_up.iter().chain(&of_half_widths).chain(&of_friction).chain(&of_projection).chain(&of_contacts);
         findings.extend(of_sweep.map(FindingAnswer::from));
         let answer = SweepAnswer {
             solver_version: toothwave_solver::VERSION,
@@ -151,6 +156,7 @@ impl Question for Sweep {
             torque_capacity: sweep.torque_capacity.map(Into::into),
             losses,
             radial_force_n,
+            model_error: ModelErrorAnswer::new(load, model_error),
             checks: ChecksAnswer {
                 torque_balance_residual: sweep.torque_balance_residual,
                 period_closure_residual: sweep.period_closure_residual,
@@ -288,6 +294,7 @@ impl SweepAnswer {
             let most_n = radial_force.value.iter().copied().fold(0.0, f64::max);
             writeln!(writer, "\nlargest force on the wave generator {most_n:.6} N, across its axis")?;
         }
+        self.model_error.write_text(writer)?;
         write_findings(&self.findings, writer)
     }
 }
