@@ -17,7 +17,7 @@ pub const PRESSURE_ANGLE_TO_DEG: f64 = 47.0;
 /// Gap at a contact, at most.
 pub const GAP_TO_UM: f64 = 10.0;
 
-/// Half the width of a contact over the tooth's radius, at most: the eccentric drive with its gap has 0.032 at the ring.
+/// Half the width of a contact over the tooth's radius, at most: all drives that were calculated stay below.
 pub const HALF_WIDTH_SHARE_TO: f64 = 0.035;
 
 /// How far the moduli of parts may differ to be alike: all bodies were of one steel.
