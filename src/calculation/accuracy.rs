@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use toothwave_solver::drive::Draft;
 use toothwave_solver::mesh::Samples;
+use toothwave_solver::model_error;
 use toothwave_solver::sweep::{ContactPeaks, Points, Tolerance, sweep_with_deviations};
 use toothwave_solver::{
     Compatibility, ContactLaw, Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, ToothShape,
@@ -67,6 +68,12 @@ pub struct WayAnswer {
     pub error: f64,
     /// Largest relative difference of the model's converged peaks from those of the design's own model.
     pub model_difference: f64,
+    /// Largest error of the model's forces that was measured against elastic bodies in drives of this case; left out where none was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub expected_model_error: Option<f64>,
+    /// Whether `error` is below a tenth of that: a finer way brings digits that the model does not have.
+    pub is_finer_than_model: bool,
     /// Median time of the solve.
     pub solve_us: f64,
     /// States of the sweep.
@@ -307,14 +314,22 @@ impl<'a> Model<'a> {
             Points::Samples(samples) => (Some(samples.count()), None),
             Points::Tolerance(tolerance) => (None, Some(tolerance.relative())),
         };
+        /// The share of the model's error below which a numerical one no longer counts.
+        const FINER: f64 = 0.1;
         let p = self.load.parameters();
+        let error = difference(&found.peaks, &self.reference);
+        let case = model_error::case_of(self.drive, &self.load, self.deviations);
+        let measured = model_error::measured(p.compatibility, &p.law, case);
+        let expected_model_error = measured.map(|measured| measured.force.largest());
         Ok(WayAnswer {
             compatibility: p.compatibility.into(),
             law: p.law.into(),
             samples,
             tolerance,
-            error: difference(&found.peaks, &self.reference),
+            error,
             model_difference: self.difference,
+            expected_model_error,
+            is_finer_than_model: expected_model_error.is_some_and(|expected| error < FINER * expected),
             solve_us: times_us[times_us.len() / 2],
             states: found.states.len(),
         })
@@ -328,7 +343,18 @@ impl Forms for AccuracyAnswer {
 impl AccuracyAnswer {
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
         let mut csv = csv::Writer::from_writer(writer);
-        let names = ["compatibility", "law", "samples", "tolerance", "error", "model_difference", "solve_us", "states"];
+        let names = [
+            "compatibility",
+            "law",
+            "samples",
+            "tolerance",
+            "error",
+            "model_difference",
+            "solve_us",
+            "states",
+            "expected_model_error",
+            "is_finer_than_model",
+        ];
         csv.write_record(names).map_err(csv_error)?;
         for way in &self.ways {
             csv.serialize((
@@ -340,6 +366,8 @@ impl AccuracyAnswer {
                 way.model_difference,
                 way.solve_us,
                 way.states,
+                way.expected_model_error,
+                way.is_finer_than_model,
             ))
             .map_err(csv_error)?;
         }
@@ -347,7 +375,10 @@ impl AccuracyAnswer {
     }
 
     fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
-        writeln!(writer, "compatibility  law       points            error   from own model      solve    states")?;
+        writeln!(
+            writer,
+            "compatibility  law       points            error   from own model      solve    states  model"
+        )?;
         for way in &self.ways {
             way.write_line(writer)?;
         }
@@ -360,7 +391,11 @@ impl AccuracyAnswer {
                 way.write_line(writer)
             }
             None => writeln!(writer, "\nno way of the design's own model is within {:e}", self.requested_error),
-        }
+        }?;
+        writeln!(
+            writer,
+            "\nmodel: its own error against elastic bodies; where an error is below a tenth of that (<), further digits are none of the drive's"
+        )
     }
 }
 
@@ -372,13 +407,17 @@ impl WayAnswer {
         };
         writeln!(
             writer,
-            "{:<14} {:<9} {points:<14} {:>8.1e}         {:>8.1e} {:>7.1} us {:>9}",
+            "{:<14} {:<9} {points:<14} {:>8.1e}         {:>8.1e} {:>7.1} us {:>9}  {}",
             word(&self.compatibility),
             word(&self.law),
             self.error,
             self.model_difference,
             self.solve_us,
-            self.states
+            self.states,
+            self.expected_model_error.map_or_else(
+                || "not measured".into(),
+                |expected| format!("{expected:.0e}{}", if self.is_finer_than_model { " <" } else { "" })
+            )
         )
     }
 }

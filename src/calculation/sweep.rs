@@ -6,7 +6,9 @@ use toothwave_solver::losses::wear::WearParameters;
 use toothwave_solver::losses::{Friction, Mechanism, period};
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self as solver, Points};
-use toothwave_solver::{Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, findings};
+use toothwave_solver::{
+    Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, findings, model_error as error_of_model,
+};
 
 use crate::design::{BearingRating, Design, Duty, DutyPoint};
 use crate::field::FieldCode;
@@ -19,10 +21,12 @@ use crate::question::{Limits, Question, checked_drive, checked_load, require_fin
 use crate::sweep::answer::{ChecksAnswer, LoadAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
 use crate::sweep::duty::{DutyAnswer, DutyPointAnswer};
 use crate::sweep::losses::{Cost, Costs, LossesAnswer, RadialForceAnswer};
+use crate::sweep::model_error::ModelErrorAnswer;
 
 pub mod answer;
 pub mod duty;
 pub mod losses;
+pub mod model_error;
 pub mod peak;
 mod plots;
 
@@ -224,6 +228,8 @@ impl Question for Sweep {
         let of_contacts = findings::of_contacts(drive, load, &sweep.peaks, approaches_matter);
         let of_half_widths = findings::of_half_widths(drive, load, &sweep.states);
         let of_wind_up = findings::of_wind_up(drive, &sweep);
+        let of_projection = findings::of_projection(drive, load).map_err(SolveError::from)?;
+        let model_error = error_of_model::of(drive, load, deviations, &sweep).map_err(SolveError::from)?;
         let forces = period::RadialForces::of(drive, &sweep, stop)?;
         let mut of_friction = None;
         let mut losses = None;
@@ -240,7 +246,8 @@ impl Question for Sweep {
             losses = Some(LossesAnswer::new(&costs, duty.hardest, &sweep, of_period)?);
         }
         let radial_force_n = forces.map(|forces| RadialForceAnswer::new(&sweep, forces)).transpose()?;
-        let of_sweep = of_wind_up.iter().chain(&of_half_widths).chain(&of_friction).chain(&of_contacts);
+        let of_sweep =
+            of_wind_up.iter().chain(&of_half_widths).chain(&of_friction).chain(&of_projection).chain(&of_contacts);
         findings.extend(of_sweep.map(FindingAnswer::from));
         let unloaded_wind_up_deg = if *with_wind_up && *with_gaps {
             Some(solver::unloaded_wind_up_deg(drive, load, deviations, &sweep, stop)?)
@@ -270,6 +277,7 @@ impl Question for Sweep {
             }),
             losses,
             radial_force_n,
+            model_error: ModelErrorAnswer::new(load, model_error),
             checks: ChecksAnswer {
                 torque_balance_residual: sweep.torque_balance_residual,
                 period_closure_residual: sweep.period_closure_residual,
@@ -509,6 +517,7 @@ impl SweepAnswer {
             let most_n = radial_force.value.iter().copied().fold(0.0, f64::max);
             writeln!(writer, "\nlargest force on the wave generator {most_n:.6} N, across its axis")?;
         }
+        self.model_error.write_text(writer)?;
         write_findings(&self.findings, writer)
     }
 }

@@ -223,6 +223,14 @@ impl Drive {
         self.ring.steepest_engaged()
     }
 
+    /// Largest pressure angle β of the engaged flank.
+    ///
+    /// # Errors
+    /// [`NotConverged`] from the path.
+    pub fn largest_pressure_angle_deg(&self) -> Result<f64, NotConverged> {
+        Ok((self.steepest_engaged()?.tan_pressure_angle * self.flank().teeth_per_wave()).atan().to_degrees())
+    }
+
     const fn neighbours(&self) -> Neighbours {
         Neighbours { locus: *self.ring.flank.locus(), installed: self.parameters.installed }
     }

@@ -42,6 +42,7 @@ pub mod load_sharing;
 pub mod locus;
 pub mod losses;
 pub mod mesh;
+pub mod model_error;
 pub mod parts;
 pub mod position;
 pub mod profile;

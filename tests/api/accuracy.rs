@@ -93,6 +93,16 @@ async fn every_form_and_law_is_tried_and_told_how_far_it_is_from_the_designs_own
     for way in ways(&answer) {
         let is_own = way["compatibility"] == "projection" && way["law"] == "linear";
         let difference = way["model_difference"].as_f64().unwrap();
+        // Whole hundredths of the force: johnson 1, palmgren by virtual work 1, linear 3, the projections 11 and 8.
+        let expected = match (way["compatibility"].as_str().unwrap(), way["law"].as_str().unwrap()) {
+            ("virtual_work", "linear") => 0.03,
+            ("virtual_work", _) => 0.01,
+            (_, "palmgren") => 0.11,
+            _ => 0.08,
+        };
+        assert_eq!(way["expected_model_error"], json!(expected), "{way}");
+        let is_finer = way["error"].as_f64().unwrap() < 0.1 * expected;
+        assert_eq!(way["is_finer_than_model"], json!(is_finer), "{way}");
         assert!(if is_own { difference == 0.0 } else { difference > 1e-3 && difference < 0.1 }, "{way}");
     }
     assert_eq!(answer["unavailable"], json!([]));

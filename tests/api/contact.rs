@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::asking::Service;
-use crate::designs::{spelled_out, with};
+use crate::designs::{shortest, spelled_out, undercut, with};
 
 /// Case 5.1 by virtual work and Palmgren's law, with a gap at the ring's normal.
 fn palmgren(ring_um: f64) -> Value {
@@ -157,4 +157,33 @@ async fn a_tolerance_that_takes_too_many_states_is_refused_with_the_limit() {
     let problem = Service::within(few).post("/v1/sweep", &fine).await.refused(422, "too_many_states");
     assert_eq!(problem["errors"][0]["pointer"], "/sweep/tolerance");
     assert_eq!(problem["errors"][0]["limit"], 100.0);
+}
+
+#[tokio::test]
+async fn a_sweep_says_how_far_its_model_is_off_elastic_bodies_and_whether_this_design_is_one_of_those_measured() {
+    let service = Service::new();
+    let told = async |document: &Value| service.post("/v1/sweep", document).await.found()["model_error"].clone();
+    let stiff = told(&shortest()).await;
+    assert_eq!((&stiff["is_within"], &stiff["beyond"]), (&json!(true), &json!([])));
+    assert_eq!(stiff["measured"]["force"], json!({ "low": -0.01, "high": 0.01 }));
+    let case =
+        json!({ "compatibility": "virtual_work", "law": "johnson", "has_gaps": false, "has_pointed_tips": false });
+    assert_eq!(stiff["measured"]["case"], case);
+    // The paper's model errs by more, where a gap is given by far more.
+    let paper = told(&spelled_out()).await;
+    assert_eq!(paper["measured"]["force"], json!({ "low": 0.01, "high": 0.08 }));
+    let gap = told(&with(&spelled_out(), "/model/clearance", json!({ "ring_um": 12.0 }))).await;
+    assert_eq!(gap["measured"]["case"]["has_gaps"], true);
+    assert!(gap["measured"]["force"]["high"].as_f64().unwrap() > 0.5);
+    assert_eq!((&gap["is_within"], &gap["beyond"]), (&json!(false), &json!(["gap"])));
+    let pointed = told(&undercut()).await;
+    assert_eq!(pointed["measured"]["case"]["has_pointed_tips"], true);
+    assert_eq!(pointed["beyond"], json!(["entry_under_load"]));
+    let fixed = told(&with(&shortest(), "/model", json!({ "stiffness": crate::designs::fixed(4e5, 4e5, 4e5) }))).await;
+    assert!(fixed.get("measured").is_none() && fixed["beyond"] == json!(["law"]));
+    let balls =
+        told(&with(&shortest(), "/drive/teeth", json!({ "shape": "ball", "count": 28, "radius_mm": 5.0 }))).await;
+    assert_eq!(balls["beyond"][0], "law");
+    assert_eq!(balls["beyond"][1], "tooth_shape");
+    assert_eq!(stiff["range"]["lobes"], 2);
 }

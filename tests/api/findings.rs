@@ -380,6 +380,31 @@ async fn a_stress_above_the_allowable_one_is_a_warning_for_each_contact_with_its
 }
 
 #[tokio::test]
+async fn projection_on_a_steep_flank_is_information_and_virtual_work_is_not() {
+    let document = with(&undercut(), "/model", of_the_paper());
+    let geometry = Service::new().post("/v1/geometry", &document).await.found();
+    let found = finding(&document, "projection_on_steep_flank").await;
+    assert_numbers(&found, geometry["ring"]["pressure_angle_max_deg"].as_f64().unwrap(), 30.0, "deg");
+    assert_eq!((&found["severity"], &found["pointers"]), (&json!("info"), &json!(["/model/compatibility"])));
+    for other in [undercut(), spelled_out()] {
+        assert!(!codes_of(&findings(&other).await).contains(&"projection_on_steep_flank".to_owned()));
+    }
+}
+
+#[tokio::test]
+async fn projection_with_a_gap_is_a_warning_and_virtual_work_is_not() {
+    let gap = |document: &Value| with(document, "/model/clearance", json!({ "ring_um": 4.0, "carrier_um": 2.5 }));
+    let found = finding(&gap(&spelled_out()), "projection_with_gap").await;
+    assert_numbers(&found, 4.0, 0.0, "µm");
+    assert_eq!(found["severity"], "warning");
+    for other in
+        [gap(&with(&shortest(), "/model", json!({}))), with(&gap(&spelled_out()), "/model/clearance", json!({}))]
+    {
+        assert!(!codes_of(&findings(&other).await).contains(&"projection_with_gap".to_owned()));
+    }
+}
+
+#[tokio::test]
 async fn every_kind_of_finding_can_be_met_over_http() {
     let bore_without_effect = with(&shortest(), "/drive/ring/tip_radius_mm", json!(60.0));
     let linear = with(&spelled_out(), "/sweep", json!({ "wind_up": true }));
@@ -403,7 +428,11 @@ async fn every_kind_of_finding_can_be_met_over_http() {
         all.extend(findings(&document).await);
     }
     let wide = with(&shortest(), "/load/input_torque_nm", json!(2000.0));
-    for document in [linear, brass, wide, loose(), rubbing(0.03), rubbing(0.2), limited(json!(500.0))] {
+    let gap = with(&spelled_out(), "/model/clearance", json!({ "ring_um": 10.0 }));
+    let steep_projection = with(&undercut(), "/model", of_the_paper());
+    for document in
+        [linear, brass, wide, loose(), rubbing(0.03), rubbing(0.2), limited(json!(500.0)), gap, steep_projection]
+    {
         all.extend(findings(&document).await);
     }
     for document in [undercut(), thin_walls(), cleared(9000.0)] {

@@ -228,6 +228,24 @@ test('a document that names no model shows the one that the service takes', asyn
   }
 });
 
+test('the peaks say how far to believe them', async () => {
+  const page = await bed.open();
+  const told = () => page.$$eval('#table .told', (lines) => lines.map((line) => line.textContent));
+  // The paper's model, whose forces are too large; no wind-up is asked for.
+  assert.deepEqual(await told(), ['The model’s own error: force +1 to +8 %, stress −1 to +5 %.', '']);
+  const { model, ...unnamed } = await designOf(page);
+  assert.ok(model);
+  await setDocument(page, { ...unnamed, sweep: { wind_up: true } });
+  assert.deepEqual(await told(), [
+    'The model’s own error: force −1 to +1 %, stress −2 to +2 %.',
+    'The model’s own error: wind-up −2 to 0 % where bodies are held at the law’s depth.',
+  ]);
+  await setDocument(page, { ...unnamed, model: { clearance: { ring_um: 20 } } });
+  assert.match((await told())[0], /; not measured with larger gaps\.$/);
+  await pick(page, LAW, 'fixed');
+  assert.equal((await told())[0], 'The model’s own error: not measured under this law.');
+});
+
 test('what gives way behind a contact moves the answer', async () => {
   const page = await bed.open();
   await pick(page, '/model/compatibility', 'virtual_work');

@@ -1097,6 +1097,12 @@ const OTHER_REPORTS = {
     load: { input_torque_nm: 20 },
   },
   flat_cuts_the_contact: { drive: { ...CASE_5_1, teeth: { ...CASE_5_1.teeth, shape: 'flat_sided', flat_length_mm: 9.7 } }, load: { input_torque_nm: 20 }, model: VIRTUAL_WORK },
+  projection_on_steep_flank: {
+    drive: { wave_generator: { semi_major_mm: 50.7, semi_minor_mm: 49.3 }, teeth: { count: 80, installed: 40, radius_mm: 1.5, width_mm: 15 }, ring: { teeth: 78 } },
+    load: { input_torque_nm: 3 },
+    model: { compatibility: 'projection' },
+  },
+  projection_with_gap: { drive: CASE_5_1, load: { input_torque_nm: 20 }, model: { compatibility: 'projection', clearance: { ring_um: 10 } } },
   johnson_beyond_half_width: { drive: CASE_5_1, load: { input_torque_nm: 2000 } },
   friction_beyond_measured: { drive: CASE_5_1, load: { input_torque_nm: 20 }, friction: rubbing(0.2) },
   efficiency_uncertain: { drive: CASE_5_1, load: { input_torque_nm: 20 }, friction: rubbing(0.03) },

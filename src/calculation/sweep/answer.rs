@@ -9,6 +9,7 @@ use crate::coincidence_degree::TeethInMeshAnswer;
 use crate::findings::FindingAnswer;
 use crate::sweep::duty::DutyAnswer;
 use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
+use crate::sweep::model_error::ModelErrorAnswer;
 use crate::sweep::peak::PeakAnswer;
 
 /// Forces and contact stresses of one meshing zone over one period; the other zone is its point reflection.
@@ -60,6 +61,8 @@ pub struct SweepAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub radial_force_n: Option<RadialForceAnswer>,
+    /// How far the model is off elastic bodies.
+    pub model_error: ModelErrorAnswer,
     /// How well the results fulfil what must hold.
     pub checks: ChecksAnswer,
     /// What a designer should be told.

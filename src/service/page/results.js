@@ -23,6 +23,31 @@ const contactRows = (field, name, sign, unit) =>
 const least = (column) => column?.reduce((most, value) => Math.min(most, value));
 const greatest = (column) => column?.reduce((most, value) => Math.max(most, value));
 
+const percent = (share) => `${share > 0 ? '+' : share < 0 ? '−' : ''}${Math.abs(Math.round(100 * share))}`;
+const span = ({ low, high }) => `${percent(low)} to ${percent(high)} %`;
+const BEYOND = {
+  law: 'its law',
+  tooth_shape: 'its shape of teeth',
+  lobes: 'its lobes',
+  ring_with_more_teeth: 'a ring with more teeth',
+  pressure_angle: 'a steeper flank',
+  entry_under_load: 'teeth that enter under load, where the peak comes out lower',
+  materials: 'unlike materials',
+  gap: 'larger gaps',
+  modification: 'its modification',
+  series_compliance: 'what gives way behind its contacts',
+  half_width: 'wider contacts',
+};
+
+/** How far to believe some numbers: what the model was found to err by in drives of this case, calculated as elastic bodies. */
+function believed(what, { sweep }) {
+  if (!sweep) return '';
+  const { measured, beyond } = sweep.model_error;
+  if (!measured) return 'The model’s own error: not measured under this law.';
+  const outside = beyond.length > 0 ? `; not measured with ${beyond.map((reason) => BEYOND[reason] ?? reason.replaceAll('_', ' ')).join(', ')}` : '';
+  return `The model’s own error: ${what(measured)}${outside}.`;
+}
+
 /** The contact that carries the largest of a quantity. */
 function largest(field, { sweep }) {
   if (!sweep) return undefined;
@@ -127,7 +152,11 @@ export const GROUPS = [
       row('Critical tooth radius', 'r_c', 'mm', ({ geometry }) => geometry?.undercut.critical_tooth_radius_mm, { significant: 6 }),
     ],
   },
-  { title: 'Peaks over a period', rows: [...peakRows('force_n', 'Force', 'F', 'N'), ...peakRows('stress_mpa', 'Contact stress', 'σ', 'MPa')] },
+  {
+    title: 'Peaks over a period',
+    told: (answers) => believed(({ force, stress }) => `force ${span(force)}, stress ${span(stress)}`, answers),
+    rows: [...peakRows('force_n', 'Force', 'F', 'N'), ...peakRows('stress_mpa', 'Contact stress', 'σ', 'MPa')],
+  },
   {
     title: 'Below the surface, where the stress peaks',
     rows: [
@@ -152,6 +181,7 @@ export const GROUPS = [
   {
     title: 'Wind-up and stiffness',
     offer: '/sweep/wind_up',
+    told: (answers) => (answers.sweep?.wind_up ? believed(({ wind_up: windUp }) => `wind-up ${span(windUp)} where bodies are held at the law’s depth`, answers) : ''),
     rows: [
       row('Least wind-up of the input', 'Δφ', 'deg', ({ sweep }) => least(sweep?.wind_up?.wind_up_deg)),
       row('Most wind-up of the input', 'Δφ', 'deg', ({ sweep }) => greatest(sweep?.wind_up?.wind_up_deg)),
@@ -205,6 +235,7 @@ export class Results {
   #cells = [];
   #tiles = [];
   #offers = [];
+  #told = [];
 
   /** `onShow({ input_angle_deg, position_deg })` when a peak's place is picked, `onAsk(pointer)` when a result is wanted that the
    *  design has to ask for. */
@@ -225,7 +256,9 @@ export class Results {
     table.append(html('thead', {}, head));
     for (const group of GROUPS) {
       const offer = group.offer && html('button', { type: 'button', class: 'link', 'aria-label': `${group.title}: ask for it`, onclick: () => onAsk(group.offer) }, 'ask for it');
-      const heading = html('tr', { class: 'group' }, html('th', { scope: 'rowgroup', colspan: 5 }, group.title, offer && [' ', offer]));
+      const told = group.told && html('span', { class: 'told' });
+      if (told) this.#told.push({ group, told });
+      const heading = html('tr', { class: 'group' }, html('th', { scope: 'rowgroup', colspan: 5 }, group.title, offer && [' ', offer], told && [' ', told]));
       const body = html('tbody', {}, heading);
       if (offer) this.#offers.push({ group, offer, heading });
       for (const entry of group.rows) {
@@ -269,6 +302,7 @@ export class Results {
       // Paper shows only what was asked for.
       heading.classList.toggle('unasked', !isAnswered(answers) && !isAnswered(reference));
     }
+    for (const { group, told } of this.#told) setText(told, group.told(answers));
     for (const { entry, scope } of [...this.#tiles, ...this.#cells]) if (scope) setText(scope, scopeOf(entry, answers));
     for (const { entry, tile, value, note } of this.#tiles) {
       const shown = show(entry, answers);

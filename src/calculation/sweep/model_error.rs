@@ -1,0 +1,184 @@
+//! How far the model is off elastic bodies, as it goes over the wire.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+use toothwave_solver::LoadCase;
+use toothwave_solver::model_error::{self as solver, Beyond, ErrorRange, Measured, ModelError};
+use utoipa::ToSchema;
+
+use crate::accuracy::LawName;
+use crate::design::CompatibilityDocument;
+use crate::json::word;
+
+/// The expected error of the model, numerical ones apart: how far it was off elastic bodies, calculated by finite elements, in drives
+/// of the same case (docs/validation.md).
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct ModelErrorAnswer {
+    /// The errors of the case; left out where nothing was measured of the law.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub measured: Option<MeasuredAnswer>,
+    /// The range of the drives that were calculated: cylinders of steel in a ring with fewer teeth.
+    pub range: RangeAnswer,
+    /// Whether this design lies within.
+    pub is_within: bool,
+    /// Why it does not.
+    pub beyond: Vec<BeyondWord>,
+}
+
+/// What was measured of a case.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct MeasuredAnswer {
+    /// Which case.
+    pub case: CaseAnswer,
+    /// Of the largest forces of the contacts.
+    pub force: ErrorRangeAnswer,
+    /// Of the stresses under them.
+    pub stress: ErrorRangeAnswer,
+    /// Of the wind-up, bodies being held at the law's depth; what gives way behind them, rim or fingers, comes on top.
+    pub wind_up: ErrorRangeAnswer,
+}
+
+/// What makes drives err alike.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct CaseAnswer {
+    /// The form of compatibility.
+    pub compatibility: CompatibilityDocument,
+    /// The contact law.
+    pub law: LawName,
+    /// Whether any contact has a gap.
+    pub has_gaps: bool,
+    /// Whether the ring's tips are pointed or bored, so that teeth enter under load.
+    pub has_pointed_tips: bool,
+}
+
+/// A relative error, (model - bodies)/bodies, from the least to the largest.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct ErrorRangeAnswer {
+    /// The least; below zero the model says too little.
+    pub low: f64,
+    /// The largest.
+    pub high: f64,
+}
+
+/// How far the drives went that were calculated.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct RangeAnswer {
+    /// Most lobes.
+    pub lobes: u32,
+    /// Largest pressure angle of the ring's flank.
+    pub pressure_angle_deg: f64,
+    /// Largest gap of a contact.
+    pub gap_um: f64,
+    /// Half of the largest width of a contact, over the tooth's radius.
+    pub half_width_over_tooth_radius: f64,
+}
+
+/// Why a design lies outside the range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BeyondWord {
+    /// Stiffnesses of the designer's own, or balls.
+    Law,
+    /// Teeth that are no cylinders.
+    ToothShape,
+    /// More lobes.
+    Lobes,
+    /// A ring with more teeth than the carrier.
+    RingWithMoreTeeth,
+    /// A steeper flank.
+    PressureAngle,
+    /// Teeth that enter under load, at angles that were left out: a real tip takes its load little by little, and the peak comes out lower.
+    EntryUnderLoad,
+    /// Parts of unlike moduli.
+    Materials,
+    /// A larger gap.
+    Gap,
+    /// Parts made otherwise than conjugate.
+    Modification,
+    /// Something that gives way behind a contact.
+    SeriesCompliance,
+    /// A wider contact.
+    HalfWidth,
+}
+
+impl From<Beyond> for BeyondWord {
+    fn from(beyond: Beyond) -> Self {
+        match beyond {
+            Beyond::Law => Self::Law,
+            Beyond::ToothShape => Self::ToothShape,
+            Beyond::Lobes => Self::Lobes,
+            Beyond::RingWithMoreTeeth => Self::RingWithMoreTeeth,
+            Beyond::PressureAngle => Self::PressureAngle,
+            Beyond::EntryUnderLoad => Self::EntryUnderLoad,
+            Beyond::Materials => Self::Materials,
+            Beyond::Gap => Self::Gap,
+            Beyond::Modification => Self::Modification,
+            Beyond::SeriesCompliance => Self::SeriesCompliance,
+            Beyond::HalfWidth => Self::HalfWidth,
+        }
+    }
+}
+
+impl From<ErrorRange> for ErrorRangeAnswer {
+    fn from(ErrorRange { low, high }: ErrorRange) -> Self {
+        Self { low, high }
+    }
+}
+
+impl ModelErrorAnswer {
+    pub(crate) fn new(load: &LoadCase, error: ModelError) -> Self {
+        let p = load.parameters();
+        let measured = error.measured.map(|Measured { case, force, stress, wind_up }| MeasuredAnswer {
+            case: CaseAnswer {
+                compatibility: p.compatibility.into(),
+                law: p.law.into(),
+                has_gaps: case.has_gaps,
+                has_pointed_tips: case.has_pointed_tips,
+            },
+            force: force.into(),
+            stress: stress.into(),
+            wind_up: wind_up.into(),
+        });
+        let beyond: Vec<_> = error.beyond.into_iter().map(BeyondWord::from).collect();
+        Self {
+            measured,
+            range: RangeAnswer {
+                lobes: solver::LOBES_TO,
+                pressure_angle_deg: solver::PRESSURE_ANGLE_TO_DEG,
+                gap_um: solver::GAP_TO_UM,
+                half_width_over_tooth_radius: solver::HALF_WIDTH_SHARE_TO,
+            },
+            is_within: beyond.is_empty(),
+            beyond,
+        }
+    }
+
+    pub(crate) fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
+        let percent = |ErrorRangeAnswer { low, high }: &ErrorRangeAnswer| {
+            format!("{:+.0} to {:+.0} %", 100.0 * low, 100.0 * high)
+        };
+        match &self.measured {
+            Some(MeasuredAnswer { force, stress, wind_up, .. }) => {
+                writeln!(
+                    writer,
+                    "\nmodel against elastic bodies        force {}, stress {}",
+                    percent(force),
+                    percent(stress)
+                )?;
+                writeln!(writer, "wind-up of bodies that are held     {}", percent(wind_up))?;
+            }
+            None => writeln!(writer, "\nmodel against elastic bodies        not measured")?,
+        }
+        if self.is_within {
+            return writeln!(writer, "this design                         within the range of those measured");
+        }
+        let beyond: Vec<_> = self.beyond.iter().map(word).collect();
+        writeln!(
+            writer,
+            "this design                         beyond the range of those measured: {}",
+            beyond.join(", ")
+        )
+    }
+}
