@@ -117,7 +117,7 @@ export class Tolerance extends StudyView {
   take(answer, { name, question }) {
     const of = answer.quantities.find(({ quantity }) => quantity === name);
     this.#result = { answer, of, name, require: question.require[name] ?? {} };
-    const { yield_share: share, interference, impossible, samples } = answer;
+    const { yield: share, interference, impossible, samples } = answer;
     const percent = (value) => `${number(100 * value, 4)}\u202f%`;
     const parts = [
       share && `${percent(share.share)} of the drives are good (${percent(share.low)} to ${percent(share.high)} with 95\u202f% confidence).`,
