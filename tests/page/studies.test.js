@@ -106,7 +106,7 @@ test('a curve’s numbers are those of the sweep, and can be taken into the desi
   await done(page, 'explore', '.curve');
   const readout = page.locator('#explore .study-readout strong');
   assert.equal(numberIn(await readout.textContent()), 980.44, 'of the design at first');
-  await page.locator('#explore .place input').first().fill('120');
+  await page.locator('#explore .study-place input').first().fill('120');
   const shown = numberIn(await readout.textContent());
   await page.click('#explore button:has-text("Take into the design")');
   await settled(page);
@@ -127,7 +127,7 @@ test('where no drive is possible a curve has a gap, with its reason', async () =
   await range(page, 1, 6, 9);
   await done(page, 'explore', '.impossible-band');
   assert.match(await page.textContent('#explore .study-reasons'), /Impossible here.*of 161, the first at tooth radius 7\.\d+.mm: Neighbouring teeth.*come as near as/);
-  await page.locator('#explore .place input').first().fill('160');
+  await page.locator('#explore .study-place input').first().fill('160');
   assert.match(await page.textContent('#explore .study-readout'), /Tooth radius 9.mm: impossible – neighbouring teeth/);
   assert.ok(await page.isDisabled('#explore button:has-text("Take into the design")'));
 });
@@ -157,7 +157,7 @@ test('slots vary with the ring’s teeth that belong to them', async () => {
   await over(page, 1, '/drive/teeth/count');
   await done(page, 'explore', '.curve-dot');
   assert.equal(await page.locator('#explore .curve-dot').count(), 17, 'from 20 to 36, none impossible');
-  await page.locator('#explore .place input').first().fill('0');
+  await page.locator('#explore .study-place input').first().fill('0');
   await page.click('#explore button:has-text("Take into the design")');
   await settled(page);
   const { teeth, ring } = (await designOf(page)).drive;
