@@ -53,7 +53,7 @@ await take('find-a-drive', { viewport: { width: 1366, height: 1000 } }, async (p
   await page.click('.find button[type=submit]');
   await page.waitForFunction(() => document.querySelector('#find .study-progress').hidden && document.querySelector('#find .headline')?.textContent);
   await page.locator('#find .drives-scroll tbody button').nth(3).click();
-  await page.waitForFunction(() => document.querySelectorAll('#find .drives-scroll svg').length > 4 && document.querySelector('#find .drive-card svg'));
+  await page.waitForFunction(() => document.querySelector('#find .drive-card svg'));
   await page.evaluate(() => {
     document.activeElement.blur();
     scrollTo(0, 0);

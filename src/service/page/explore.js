@@ -114,7 +114,7 @@ export class Explore extends StudyView {
         this.#point();
       });
       const name = html('span', {});
-      return { slider, name, element: html('label', { class: 'place' }, name, slider) };
+      return { slider, name, element: html('label', { class: 'study-place' }, name, slider) };
     });
     this.use = html('button', { type: 'button', onclick: () => this.#use() }, 'Take into the design');
     this.extremes = html('span', { class: 'extremes' });

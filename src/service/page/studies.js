@@ -80,7 +80,8 @@ export class Run {
     signal.throwIfAborted();
     while (reply.answer?.state === 'running') {
       const { id, variants, looked_at: lookedAt } = reply.answer;
-      onProgress?.({ variants, lookedAt });
+      // The best are looked at once more, and nobody knows how many these will be.
+      onProgress?.({ variants, lookedAt: Math.min(lookedAt, variants) });
       await pause(LOOK_MS, signal);
       reply = await send(`v1/studies/${id}`, { signal, kind: 'study', onFull });
     }

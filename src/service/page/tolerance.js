@@ -2,7 +2,7 @@
 
 import { Choice, NumberBox } from './ask.js';
 import { axes } from './chart.js';
-import { at, changed } from './design.js';
+import { at, changed, compatibilityOf } from './design.js';
 import { html, oncePerFrame, setText, svg } from './dom.js';
 import { readable, sentence } from './findings.js';
 import { number } from './format.js';
@@ -24,8 +24,8 @@ const DEVIATIONS = [
   { name: 'ring_runout', label: 'Runout of the ring', unit: 'µm', limit: 5 },
   { name: 'carrier_runout', label: 'Runout of the carrier', unit: 'µm', limit: 5 },
 ];
-/** Those that a design has at first. */
-const FIRST_DEVIATIONS = new Set(['tooth_radius_um', 'ring_space_um']);
+/** Those that a design has at first: without clearance, single parts that deviate either way cannot be put together. */
+const FIRST_DEVIATIONS = new Set(['/drive/teeth/radius_mm', '/drive/teeth/width_mm']);
 
 /** What stands in the document and deviates in a whole drive. */
 const INPUTS = [
@@ -101,6 +101,9 @@ export class Tolerance extends StudyView {
     }
     const kinds = Object.keys(lists.deviations).length + Object.keys(lists.inputs).length;
     if (kinds === 0) return { fault: 'Nothing deviates: choose at least one distribution.' };
+    if (Object.keys(lists.deviations).length > 0 && compatibilityOf(this.design) === 'projection') {
+      return { fault: 'What single parts deviate by is calculated by virtual work alone: choose that in the form, under “Model”, or let all of them be exact.' };
+    }
     const fault = this.ends.map((end) => end.fault).find((text) => text !== undefined);
     if (fault) return { fault };
     const [min, max] = this.ends.map(({ value }) => value);
@@ -114,11 +117,11 @@ export class Tolerance extends StudyView {
   take(answer, { name, question }) {
     const of = answer.quantities.find(({ quantity }) => quantity === name);
     this.#result = { answer, of, name, require: question.require[name] ?? {} };
-    const { yield_share: share, interference, impossible, samples } = answer;
+    const { yield: share, interference, impossible, samples } = answer;
     const percent = (value) => `${number(100 * value, 4)}\u202f%`;
     const parts = [
       share && `${percent(share.share)} of the drives are good (${percent(share.low)} to ${percent(share.high)} with 95\u202f% confidence).`,
-      interference > 0 && `${number(interference, 9)} of ${number(samples, 9)} cannot be put together.`,
+      interference > 0 && `${number(interference, 9)} of ${number(samples, 9)} cannot be put together${2 * interference > samples ? '; gaps in the model give their parts room' : ''}.`,
       impossible > 0 && `${number(impossible, 9)} have no answer.`,
     ].filter(Boolean);
     setText(this.value, parts.length > 0 ? parts.join(' ') : of ? `Of ${number(samples, 9)} drives nearly all lie between ${this.quantities.shown(name, of.quantiles[0].value)} and ${this.quantities.shown(name, of.quantiles.at(-1).value)}.` : '');
