@@ -35,6 +35,7 @@ use toothwave_calculation::sweep::Sweep;
 use toothwave_calculation::sweep::answer::{ChecksAnswer, LoadAnswer, PeaksAnswer, SweepAnswer, TorqueCapacityAnswer};
 use toothwave_calculation::sweep::duty::DutyAnswer;
 use toothwave_calculation::sweep::losses::LossTotalsAnswer;
+use toothwave_calculation::sweep::model_error::ModelErrorAnswer;
 use utoipa::ToSchema;
 
 use super::{App, Growing, broken_body, write_problem};
@@ -132,9 +133,12 @@ struct PeaksOnly<'a> {
     build: &'static str,
     coincidence_degree: f64,
     period_deg: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sweep_period_deg: Option<f64>,
     load: &'a LoadAnswer,
     enters_under_load: bool,
     peaks: &'a PeaksAnswer,
+    model_error: &'a ModelErrorAnswer,
     teeth_in_mesh_per_zone: &'a TeethInMeshAnswer,
     loaded_teeth_per_zone: &'a TeethInMeshAnswer,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -224,9 +228,11 @@ fn peaks_line(
         build: sweep.build,
         coincidence_degree: sweep.coincidence_degree,
         period_deg: sweep.period_deg,
+        sweep_period_deg: sweep.sweep_period_deg,
         load: &sweep.load,
         enters_under_load: sweep.enters_under_load,
         peaks: &sweep.peaks,
+        model_error: &sweep.model_error,
         teeth_in_mesh_per_zone: &sweep.teeth_in_mesh_per_zone,
         loaded_teeth_per_zone: &sweep.loaded_teeth_per_zone,
         torque_capacity: &sweep.torque_capacity,
