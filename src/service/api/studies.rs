@@ -15,6 +15,7 @@ use axum::response::{IntoResponse, Response};
 use futures_util::stream;
 use serde::Serialize;
 use toothwave_calculation::forms::{Form, Format, Forms};
+use toothwave_calculation::json::word;
 use toothwave_study::{QUANTITIES, Quantity, Study, StudyAnswer, StudyDocument};
 use utoipa::ToSchema;
 
@@ -130,15 +131,34 @@ pub async fn result(
     no_store(answer.await.unwrap_or_else(IntoResponse::into_response))
 }
 
-/// A study's progress as server-sent events: `progress` while it runs, then one of the name of how it has ended. Each holds the study
-/// as it stands.
+/// A server-sent event of a study.
+#[derive(Debug, ToSchema)]
+#[expect(dead_code, reason = "for the API document: axum writes its lines")]
+pub struct StudyEvent {
+    /// `progress` while it runs, then `end`.
+    event: EventName,
+    /// The study as it stands, as JSON.
+    data: String,
+}
+
+/// The name of an event.
+#[derive(Debug, Clone, Copy, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum EventName {
+    /// It runs.
+    Progress,
+    /// It is over.
+    End,
+}
+
+/// A study's progress as server-sent events: `progress` while it runs, then `end`. Each holds the study as it stands.
 #[utoipa::path(
     get,
     path = "/v1/studies/{id}/events",
     tag = "studies",
     params(("id" = String, Path, description = "As the study's `id`.")),
     responses(
-        (status = 200, description = "The events; they end when the study does.", body = String, content_type = "text/event-stream"),
+        (status = 200, description = "The events; they end when the study does.", body = StudyEvent, content_type = "text/event-stream"),
         (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json")
     )
 )]
@@ -156,8 +176,8 @@ pub async fn events(State(app): State<Arc<App>>, id: Result<Path<String>, PathRe
             let changed = kept.watch();
             let resource = kept.resource();
             let is_running = kept.is_running();
-            let name = if is_running { "progress" } else { "end" };
-            let event = Event::default().event(name).json_data(&resource).unwrap_or_default();
+            let name = if is_running { EventName::Progress } else { EventName::End };
+            let event = Event::default().event(word(&name)).json_data(&resource).unwrap_or_default();
             if !is_running {
                 return Some((Ok::<_, Infallible>(event), None));
             }
