@@ -385,7 +385,7 @@ test('new findings explain themselves, new reasons stand at their fields', async
   page = await open(browser, server);
   await enter(page, '/model/clearance/ring_um', 3);
   await page.click(`${notes('/model/stiffness')} .finding`);
-  assert.match(await page.textContent(notes('/model/stiffness')), /Linear law is too stiff.*What is tested.*µm against.*µm.*palmgren/);
+  assert.match(await page.textContent(notes('/model/stiffness')), /Linear law is too stiff.*What is tested.*µm against.*µm.*johnson/);
   await page.selectOption(field('/model/stiffness'), 'palmgren');
   await page.click('summary:has-text("Materials")');
   await enter(page, '/materials/ring/youngs_modulus_gpa', 100);
