@@ -31,7 +31,7 @@ const BEYOND = {
   lobes: 'its lobes',
   ring_with_more_teeth: 'a ring with more teeth',
   pressure_angle: 'a steeper flank',
-  entry_under_load: 'teeth that enter under load, where the peak comes out lower',
+  entry_under_load: 'teeth that enter under load',
   materials: 'unlike materials',
   gap: 'larger gaps',
   modification: 'its modification',
