@@ -39,12 +39,13 @@ const BEYOND = {
   half_width: 'wider contacts',
 };
 
-/** How far to believe some numbers: what the model was found to err by in drives of this case, calculated as elastic bodies. */
-function believed(what, { sweep }) {
+/** How far to believe some numbers: what the model was found to err by in drives of this case, calculated as elastic bodies. What is not like
+ *  those drives is said once, at the peaks. */
+function believed(what, { sweep }, saysWhatIsUnlike) {
   if (!sweep) return '';
   const { measured, beyond } = sweep.model_error;
   if (!measured) return 'The model’s own error: not measured under this law.';
-  const outside = beyond.length > 0 ? `; not measured with ${beyond.map((reason) => BEYOND[reason] ?? reason.replaceAll('_', ' ')).join(', ')}` : '';
+  const outside = saysWhatIsUnlike && beyond.length > 0 ? `; not measured with ${beyond.map((reason) => BEYOND[reason] ?? reason.replaceAll('_', ' ')).join(', ')}` : '';
   return `The model’s own error: ${what(measured)}${outside}.`;
 }
 
@@ -136,9 +137,9 @@ export const GROUPS = [
       row('Ratio, ring fixed', 'i_HG', '', ({ geometry }) => geometry?.transmission_ratio),
       row('Ratio, carrier fixed', 'i_HK', '', ({ geometry }) => geometry?.transmission_ratio_carrier_fixed),
       row('Ratio of ring to carrier, wave generator fixed', 'i_KG', '', ({ geometry }) => geometry?.members.wave_generator_fixed.ratio),
-      row('Torque that holds the ring over the input', '', '', ({ geometry }) => geometry?.members.ring_fixed.holding_torque_ratio),
-      row('Torque that holds the carrier over the input', '', '', ({ geometry }) => geometry?.members.carrier_fixed.holding_torque_ratio),
-      row('Torque that holds the wave generator over the ring’s', '', '', ({ geometry }) => geometry?.members.wave_generator_fixed.holding_torque_ratio),
+      row('Ring fixed, its torque over the input’s', '', '', ({ geometry }) => geometry?.members.ring_fixed.holding_torque_ratio, { followsFromRatio: true }),
+      row('Carrier fixed, its torque over the input’s', '', '', ({ geometry }) => geometry?.members.carrier_fixed.holding_torque_ratio, { followsFromRatio: true }),
+      row('Wave generator fixed, its over the ring’s', '', '', ({ geometry }) => geometry?.members.wave_generator_fixed.holding_torque_ratio, { followsFromRatio: true }),
       row('Period of the load pattern', '', 'deg', ({ geometry }) => geometry?.period_deg),
       row('Coincidence degree, all zones', 'ε', '', ({ coincidence }) => coincidence?.coincidence_degree, { significant: 7, terms: ['coincidence'] }),
       row('Fewest teeth in mesh', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.min, { scoped: true }),
@@ -154,7 +155,7 @@ export const GROUPS = [
   },
   {
     title: 'Peaks over a period',
-    told: (answers) => believed(({ force, stress }) => `force ${span(force)}, stress ${span(stress)}`, answers),
+    told: (answers) => believed(({ force, stress }) => `force ${span(force)}, stress ${span(stress)}`, answers, true),
     rows: [...peakRows('force_n', 'Force', 'F', 'N'), ...peakRows('stress_mpa', 'Contact stress', 'σ', 'MPa')],
   },
   {
@@ -181,7 +182,7 @@ export const GROUPS = [
   {
     title: 'Wind-up and stiffness',
     offer: '/sweep/wind_up',
-    told: (answers) => (answers.sweep?.wind_up ? believed(({ wind_up: windUp }) => `wind-up ${span(windUp)} where bodies are held at the law’s depth`, answers) : ''),
+    told: (answers) => (answers.sweep?.wind_up ? believed(({ wind_up: windUp }) => `wind-up ${span(windUp)} where bodies are held at the law’s depth`, answers, false) : ''),
     rows: [
       row('Least wind-up of the input', 'Δφ', 'deg', ({ sweep }) => least(sweep?.wind_up?.wind_up_deg)),
       row('Most wind-up of the input', 'Δφ', 'deg', ({ sweep }) => greatest(sweep?.wind_up?.wind_up_deg)),
@@ -273,7 +274,7 @@ export class Results {
         place?.addEventListener('click', () => onShow(cell.at));
         const line = html(
           'tr',
-          {},
+          { class: entry.followsFromRatio ? 'follows' : '' },
           html('th', { scope: 'row' }, entry.label, scope, entry.symbol && [' ', symbol(entry.symbol)], entry.terms && [' ', term(...entry.terms)]),
           html('td', { class: 'numeric' }, value, unit),
           html('td', { class: 'numeric compared' }, reference, referenceUnit),
