@@ -4,6 +4,7 @@
 //! line; documents and answers are in `toothwave_calculation`, every formula is in `toothwave_solver`.
 
 pub mod api;
+pub mod app;
 pub mod cache;
 pub mod cli;
 pub mod compute;
@@ -16,6 +17,7 @@ pub mod negotiation;
 pub mod observe;
 mod openapi;
 pub mod problem;
+pub mod query;
 pub mod room;
 pub mod router;
 pub mod serve;

@@ -22,7 +22,7 @@ use toothwave_calculation::BUILD;
 use toothwave_calculation::json::word;
 use tracing::{Instrument, Span};
 
-use crate::api::App;
+use crate::app::App;
 use crate::cache::Provenance;
 use crate::problem::{Problem, ProblemCode};
 use crate::{log, socket};

@@ -7,7 +7,7 @@ use axum::Router;
 use axum::body::Bytes;
 use axum::extract::Request;
 use axum::http::uri::Authority;
-use axum::http::{HeaderValue, StatusCode, Uri, header};
+use axum::http::{HeaderValue, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
@@ -24,12 +24,13 @@ use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use crate::api::{
-    App, CACHE_STATUS, SERVER_TIMING, accuracy, batch, coincidence_degree, drawings, geometry, page, side, studies,
-    sweep,
+    CACHE_STATUS, SERVER_TIMING, accuracy, batch, coincidence_degree, drawings, geometry, page, side, studies, sweep,
 };
+use crate::app::App;
 use crate::keys::{self, Keys};
 use crate::observe;
 use crate::problem::{PROBLEM_JSON, Problem, ProblemCode};
+use crate::query::require_no_query;
 
 #[derive(OpenApi)]
 #[openapi(
@@ -214,20 +215,6 @@ async fn without_query(request: Request, next: Next) -> Response {
     match require_no_query(request.uri()) {
         Ok(()) => next.run(request).await,
         Err(problem) => problem.into_response(),
-    }
-}
-
-/// Checks that there is no query, so that a typo is never a silent default.
-///
-/// # Errors
-/// `invalid_query`.
-pub fn require_no_query(uri: &Uri) -> Result<(), Problem> {
-    match uri.query() {
-        None | Some("") => Ok(()),
-        Some(query) => {
-            let detail = format!("`{}` knows no query, and the request has `{query}`", uri.path());
-            Err(Problem::new(ProblemCode::InvalidQuery, detail))
-        }
     }
 }
 

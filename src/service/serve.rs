@@ -24,7 +24,7 @@ use tokio::task::AbortHandle;
 use tokio_util::sync::CancellationToken;
 use tower::util::MapRequest;
 
-use crate::api::App;
+use crate::app::App;
 use crate::config::{Limits, MAX_HEADER_BYTES, Settings};
 use crate::observe;
 use crate::router::{self, Entry};

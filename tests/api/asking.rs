@@ -14,7 +14,7 @@ use serde_json::Value;
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::task::JoinHandle;
-use toothwave::api::App;
+use toothwave::app::App;
 use toothwave::compute::{Pool, Thread};
 use toothwave::config::Limits;
 use toothwave::keys::Keys;

@@ -7,7 +7,8 @@ use axum::response::Response;
 use toothwave_calculation::accuracy::{Accuracy, AccuracyAnswer};
 use toothwave_calculation::design::Design;
 
-use super::{App, Problems, respond_afresh};
+use super::{Problems, respond_afresh};
+use crate::app::App;
 
 /// How wrong and how slow each way of computing a design is, measured there and then beside whatever else the service does; never cached.
 #[utoipa::path(

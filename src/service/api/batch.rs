@@ -38,7 +38,8 @@ use toothwave_calculation::sweep::losses::LossTotalsAnswer;
 use toothwave_calculation::sweep::model_error::ModelErrorAnswer;
 use utoipa::ToSchema;
 
-use super::{App, Growing, broken_body, write_problem};
+use super::{Growing, broken_body, write_problem};
+use crate::app::App;
 use crate::compute::{self, Pool};
 use crate::config::Limits;
 use crate::problem::{Problem, ProblemCode};

@@ -7,7 +7,8 @@ use axum::response::Response;
 use toothwave_calculation::coincidence_degree::{CoincidenceDegree, CoincidenceDegreeAnswer};
 use toothwave_calculation::design::Design;
 
-use super::{App, Problems, respond};
+use super::{Problems, respond};
+use crate::app::App;
 
 /// How many teeth share the load.
 #[utoipa::path(

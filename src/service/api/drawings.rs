@@ -10,7 +10,8 @@ use toothwave_calculation::drawing::Drawing;
 use toothwave_calculation::drawing::answer::{DrawingAnswer, DrawnPart};
 use toothwave_calculation::json;
 
-use super::{App, Problems, respond};
+use super::{Problems, respond};
+use crate::app::App;
 use crate::problem::{Problem, ProblemCode};
 
 /// The sections of a part, or of all parts in place.

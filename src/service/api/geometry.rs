@@ -7,7 +7,8 @@ use axum::response::Response;
 use toothwave_calculation::design::Design;
 use toothwave_calculation::geometry::{Geometry, GeometryAnswer};
 
-use super::{App, Problems, respond};
+use super::{Problems, respond};
+use crate::app::App;
 
 /// The mating parts' profiles and what a designer decides by.
 #[utoipa::path(

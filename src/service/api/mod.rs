@@ -22,14 +22,14 @@ use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_calculation::question::Question;
 use utoipa::IntoResponses;
 
-use crate::cache::{Cache, Provenance, Served, Spelling, Stored, etag};
-use crate::compute::{Pool, Thread};
+use crate::app::App;
+use crate::cache::{Provenance, Served, Spelling, Stored, etag};
+use crate::compute::Thread;
 use crate::config::Limits;
 use crate::negotiation::{self, Representation};
 use crate::problem::{Problem, ProblemCode};
+use crate::query::require_no_query;
 use crate::room::{NoRoom, Reserved, Room, Sent};
-use crate::router::require_no_query;
-use crate::studies::Studies;
 
 pub mod accuracy;
 pub mod batch;
@@ -40,38 +40,6 @@ pub mod page;
 pub mod side;
 pub mod studies;
 pub mod sweep;
-
-/// What handlers share.
-#[derive(Debug)]
-pub struct App {
-    /// Limits of the service.
-    pub limits: Limits,
-    /// Where solves run.
-    pub pool: Pool,
-    /// Finished answers.
-    pub cache: Cache,
-    /// For answers on their way to clients.
-    pub room: Room,
-    /// Studies, with what they have come to.
-    pub studies: Studies,
-    /// Whether the service wants requests: false while it drains.
-    pub ready: AtomicBool,
-}
-
-impl App {
-    /// An idle service within these limits.
-    pub fn new(limits: Limits) -> Arc<Self> {
-        let (pool, room) = (Pool::new(limits), Room::new(limits.max_unread_bytes));
-        Arc::new(Self {
-            limits,
-            studies: Studies::new(pool.clone(), room.clone(), limits),
-            pool,
-            cache: Cache::new(limits.cache_max_bytes),
-            room,
-            ready: AtomicBool::new(true),
-        })
-    }
-}
 
 /// The statuses that every solving endpoint can answer with beside 200 and 304.
 #[derive(IntoResponses)]

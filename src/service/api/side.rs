@@ -13,7 +13,7 @@ use toothwave_calculation::design::Design;
 use toothwave_calculation::materials::{MATERIALS, MaterialPreset};
 use utoipa::ToSchema;
 
-use super::App;
+use crate::app::App;
 use crate::config::Limits;
 use crate::examples::{self, EXAMPLES};
 use crate::observe;

@@ -19,11 +19,12 @@ use toothwave_calculation::json::word;
 use toothwave_study::{QUANTITIES, Quantity, Study, StudyAnswer, StudyDocument};
 use utoipa::ToSchema;
 
-use super::{App, Problems, read_body, with_body, written};
+use super::{Problems, read_body, with_body, written};
+use crate::app::App;
 use crate::compute::Thread;
 use crate::negotiation::{self, Representation};
 use crate::problem::{Problem, ProblemCode};
-use crate::router::require_no_query;
+use crate::query::require_no_query;
 use crate::studies::{Kept, StudyResource};
 
 /// What a client would rather have (RFC 7240).

@@ -8,7 +8,8 @@ use toothwave_calculation::design::Design;
 use toothwave_calculation::sweep::Sweep;
 use toothwave_calculation::sweep::answer::SweepAnswer;
 
-use super::{App, Problems, respond};
+use super::{Problems, respond};
+use crate::app::App;
 
 /// Forces and contact stresses over one period.
 #[utoipa::path(
