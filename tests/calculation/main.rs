@@ -3,3 +3,4 @@
 
 mod documents;
 mod schema;
+mod tables;
