@@ -74,11 +74,7 @@ fn every_force_stress_and_wind_up_of_every_kind_is_that_of_the_reference() {
                     for (column_name, key) in
                         [(format!("force_{contact}_n"), "force_n"), (format!("stress_{contact}_mpa"), "stress_mpa")]
                     {
-                        compare(
-                            &column_name,
-                            number(&column(states, &column_name)[row]),
-                            number(&tooth[key][index]),
-                        );
+                        compare(&column_name, number(&column(states, &column_name)[row]), number(&tooth[key][index]));
                     }
                 }
             }

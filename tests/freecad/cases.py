@@ -67,11 +67,13 @@ def modified():
     relief = {"amount_um": 30.0, "start_deg": 30.0, "power": 2.0}
     ring = {"ring_equidistant_um": 8.0, "ring_path_shift_um": -15.0, "ring_tip_relief": relief}
     others = {"wave_generator_equidistant_um": 4.0, "slot_wall_um": 3.0, "tooth_radius_um": 2.0}
-    names = (*PAPER, "ring-with-more-teeth", "eccentric-roller", "harmonic-path")
-    documents = {f"{name} modified": with_clearances(example(name)) | {"modification": ring | others} for name in names}
-    for arcsec in (60.0, -60.0):
+    documents = {
+        f"{name} modified": with_clearances(example(name)) | {"modification": ring | others}
+        for name in ("paper-5.1", "paper-5.2", "harmonic-path")
+    }
+    for name, arcsec in (("eccentric-roller", 60.0), ("paper-5.2-bored", 60.0), ("paper-5.1", -60.0)):
         turned = {"ring_rotation_arcsec": arcsec, "ring_path_shift_um": 10.0}
-        documents |= {f"{name} turned by {arcsec}": example(name) | {"modification": turned} for name in names}
+        documents[f"{name} turned by {arcsec}"] = example(name) | {"modification": turned}
     return documents
 
 

@@ -15,9 +15,9 @@ use crate::json;
 /// as chords through many, so points are left out as long as this holds.
 const SPLINE_SHARE_OF_CHORD: f64 = 0.01;
 
-/// Faces that a curve is cut into, at points of its spline. CAD kernels sum volumes with a fixed number of places on a face: OpenCascade with
-/// nine, which on a whole tooth space miss its volume by 1e-5 (tests/freecad/test_step.py).
-const FACES_OF_A_CURVE: usize = 8;
+/// Spans of a spline for each face that stands on it. CAD kernels sum volumes with a fixed number of places on a face:
+/// OpenCascade with nine, which over a whole tooth space miss its volume by 1e-5 (tests/freecad/test_step.py). More faces make larger files.
+const SPANS_OF_A_FACE: usize = 6;
 
 /// Digits of the design's hash in the names of parts: enough to tell designs apart in a tree, few enough to be read there.
 const HASH_DIGITS: usize = 8;
@@ -430,7 +430,7 @@ fn sides(outline: &OutlineAnswer, is_hole: bool, tolerance_mm: f64) -> Vec<Side>
                             end_tangents.reverse();
                         }
                         let mut pieces: Vec<_> = Interpolation::near(&points, &end_tangents, tolerance_mm)
-                            .cut(FACES_OF_A_CURVE)
+                            .cut()
                             .iter()
                             .map(|piece| Side::Curve(Spline::of(piece)))
                             .collect();
@@ -489,10 +489,10 @@ impl Interpolation {
         }
     }
 
-    /// The same curve in so many pieces of as many spans, or in as many as it has spans.
-    fn cut(&self, pieces: usize) -> Vec<Self> {
+    /// The same curve in pieces, one for each face.
+    fn cut(&self) -> Vec<Self> {
         let spans = self.chords_mm.len();
-        let pieces = pieces.min(spans);
+        let pieces = (spans / SPANS_OF_A_FACE).max(1);
         let ends = |piece: usize| spans * piece / pieces;
         let piece = |from: usize, to: usize| Self {
             points: self.points[from..=to].to_vec(),
