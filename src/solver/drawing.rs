@@ -236,11 +236,11 @@ impl Drawing {
     ///
     /// # Errors
     /// [`SolveError::TooManyPoints`], [`SolveError::Stopped`], and [`SolveError::NotConverged`] from the geometry.
-    pub fn bodies(&self, stop: &impl Stop) -> Result<Vec<Body>, SolveError> {
+    pub fn bodies(&self, stop: &dyn Stop) -> Result<Vec<Body>, SolveError> {
         self.parts.iter().map(|part| self.body(part, stop)).collect()
     }
 
-    fn body(&self, part: &MadePart, stop: &impl Stop) -> Result<Body, SolveError> {
+    fn body(&self, part: &MadePart, stop: &dyn Stop) -> Result<Body, SolveError> {
         let (part, section) = match part {
             MadePart::Ring(ring) => (Part::Ring, self.ring_section(ring, stop)?),
             MadePart::WaveGenerator(cam) => (Part::WaveGenerator, self.cam_section(cam, stop)?),
@@ -251,7 +251,7 @@ impl Drawing {
     }
 
     /// The ring: a circle outside, inside its tooth spaces, from tip to tip each, with the lands between that bored or turned flanks leave.
-    fn ring_section(&self, ring: &RingPart, stop: &impl Stop) -> Result<Section, SolveError> {
+    fn ring_section(&self, ring: &RingPart, stop: &dyn Stop) -> Result<Section, SolveError> {
         let teeth = self.drive.parameters().ring_teeth.unsigned_abs();
         let mut half = ring.space.half(self.parameters.chord_tolerance_mm, stop)?;
         let chords: usize = half.pieces.iter().map(|piece| piece.points.len() - 1).sum();
@@ -291,7 +291,7 @@ impl Drawing {
     }
 
     /// The wave generator: a curve from each lobe to each valley and on.
-    fn cam_section(&self, cam: &WaveGeneratorPart, stop: &impl Stop) -> Result<Section, SolveError> {
+    fn cam_section(&self, cam: &WaveGeneratorPart, stop: &dyn Stop) -> Result<Section, SolveError> {
         let (locus, lobes) = (self.drive.flank().locus(), self.drive.lobes());
         let SampledCurve { points, .. } =
             cam_half_lobe(locus, cam.set_back_mm, self.parameters.chord_tolerance_mm, stop)?;

@@ -70,7 +70,7 @@ const MAX_DEPTH: u32 = 40;
 ///
 /// # Errors
 /// [`SolveError::TooManyPoints`], [`SolveError::Stopped`], and [`SolveError::NotConverged`] from the geometry.
-pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &impl Stop) -> Result<Profiles, SolveError> {
+pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &dyn Stop) -> Result<Profiles, SolveError> {
     let ring_teeth = drive.parameters().ring_teeth.unsigned_abs();
     let flank = ring_half_tooth(drive, parameters.chord_tolerance_mm, stop)?;
     let path = path_half_tooth(drive, parameters.chord_tolerance_mm, stop)?;
@@ -93,7 +93,7 @@ pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &impl Stop)
 }
 
 /// The ring from the middle of its tooth space to its tooth's symmetry line, land of a bored tip included.
-fn ring_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &impl Stop) -> Result<Polyline, SolveError> {
+fn ring_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &dyn Stop) -> Result<Polyline, SolveError> {
     let mut points = flank_curve(drive.flank(), drive.flank_limit(), tolerance_mm, stop)?.points;
     let tip_rad = PI / drive.parameters().ring_teeth as f64;
     match drive.flank_limit().end {
@@ -123,7 +123,7 @@ pub(crate) fn flank_curve(
     flank: &RingFlank,
     limit: &FlankLimit,
     tolerance_mm: f64,
-    stop: &impl Stop,
+    stop: &dyn Stop,
 ) -> Result<SampledCurve, SolveError> {
     let lobes = flank.locus().lobes();
     sampled(Position::lobe(lobes), limit.position, lobes, tolerance_mm, stop, |position| {
@@ -134,7 +134,7 @@ pub(crate) fn flank_curve(
 }
 
 /// The path of a tooth's centre from the middle of the tooth space to the symmetry line of the ring's tooth.
-fn path_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &impl Stop) -> Result<Polyline, SolveError> {
+fn path_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &dyn Stop) -> Result<Polyline, SolveError> {
     let flank = drive.flank();
     let lobes = drive.lobes();
     let mut points = sampled(Position::lobe(lobes), Position::valley(lobes), lobes, tolerance_mm, stop, |position| {
@@ -156,7 +156,7 @@ pub(crate) fn cam_half_lobe(
     locus: &Locus,
     clearance_mm: f64,
     tolerance_mm: f64,
-    stop: &impl Stop,
+    stop: &dyn Stop,
 ) -> Result<SampledCurve, SolveError> {
     let lobes = locus.lobes();
     let mut curve = sampled(Position::lobe(lobes), Position::valley(lobes), lobes, tolerance_mm, stop, |place| {
@@ -220,7 +220,7 @@ pub(crate) fn sampled(
     end: Position,
     lobes: u32,
     tolerance_mm: f64,
-    stop: &impl Stop,
+    stop: &dyn Stop,
     curve: impl Fn(Position) -> Result<CurvePoint, NotConverged>,
 ) -> Result<SampledCurve, SolveError> {
     // Measured from the valley, where cusps are; beyond the middle a `Position` is as good from the other side.

@@ -141,7 +141,7 @@ impl ToothSpace {
     }
 
     /// Its half, chords true to a tolerance.
-    pub(crate) fn half(&self, tolerance_mm: f64, stop: &impl Stop) -> Result<HalfSpace, SolveError> {
+    pub(crate) fn half(&self, tolerance_mm: f64, stop: &dyn Stop) -> Result<HalfSpace, SolveError> {
         let Some(ShapedSpace { flank, start, end, .. }) = &self.shaped else {
             let pieces = vec![flank_curve(&self.set_back.flank, &self.set_back.limit, tolerance_mm, stop)?];
             return Ok(HalfSpace { root_arc_rad: 0.0, is_smooth_at_root: true, pieces });
