@@ -51,6 +51,7 @@ pub mod root;
 pub mod springs;
 pub mod sweep;
 pub mod tooth;
+mod tooth_space;
 pub mod violation;
 
 pub use cam::WaveGenerator;
