@@ -312,7 +312,8 @@ fn a_newcomer_is_refused_at_what_was_given() {
 /// A sweep to a tolerance, which a duty refuses, was asked of whatever was to be in the front: it was empty.
 #[test]
 fn a_search_under_a_duty_has_a_front_at_its_hardest_point() {
-    let point = |torque_nm: f64| json!({ "input_torque_nm": torque_nm, "input_speed_rpm": 1000.0, "share_of_time": 0.5 });
+    let point =
+        |torque_nm: f64| json!({ "input_torque_nm": torque_nm, "input_speed_rpm": 1000.0, "share_of_time": 0.5 });
     let under = |load: Value| {
         let study = with(&search(), "/objectives/0", json!({ "quantity": "peak_stress_ring_mpa", "goal": "min" }));
         answer(&with(&with(&study, "/base/load", load), "/evaluations", json!(400)))
