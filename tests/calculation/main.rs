@@ -4,3 +4,4 @@
 mod documents;
 mod reference;
 mod schema;
+mod tables;
