@@ -90,7 +90,7 @@ fn every_force_stress_and_wind_up_of_every_kind_is_that_of_the_reference() {
                 let expected = number(&expected["unloaded_wind_up_deg"]);
                 compare("unloaded_wind_up_deg", number(&unloaded[row]), expected);
             } else {
-                assert_eq!(number(&expected["unloaded_wind_up_deg"]), 0.0, "{name}");
+                assert!(number(&expected["unloaded_wind_up_deg"]) == 0.0, "{name}");
             }
         }
         for (column, (off, most)) in columns {
