@@ -626,6 +626,25 @@ fn flat_sided_teeth_are_projected_only_where_no_part_of_their_approach_is_negati
 }
 
 #[test]
+fn palmgrens_law_is_not_questioned_at_a_flat_which_does_not_take_it() {
+    let bronze = Material { youngs_modulus_gpa: 110.0, poissons_ratio: 0.34 };
+    let flat = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 4.0 };
+    let mut parameters = LoadParameters { law: ContactLaw::Palmgren, ..load(20.0, VirtualWork) };
+    parameters.materials.carrier = bronze;
+    let found = |tooth| {
+        let p = DriveParameters { tooth, ..PAPER_5_1 };
+        let case = LoadCase::new(&parameters).unwrap();
+        findings::of_contacts(&drive(&p), &case, &swept(&p, &parameters, 10).peaks, false)
+    };
+    let of_cylinders = found(ToothShape::Cylinder { width_mm: 15.0 });
+    assert!(
+        matches!(of_cylinders[..], [Finding::PalmgrenBeyondSteel { contact: Contact::Carrier, .. }]),
+        "{of_cylinders:?}"
+    );
+    assert_eq!(found(flat), []);
+}
+
+#[test]
 fn balls_take_hertz_or_fixed_and_no_other_tooth_takes_hertz() {
     let drive = drive(&PAPER_5_1);
     let ball = ToothContact::Ball { groove_radius_mm: PerContact::default() };
