@@ -35,7 +35,7 @@ pub struct SweepAnswer {
     pub enters_under_load: bool,
     /// The largest force and stress of each contact, over the states.
     pub peaks: PeaksAnswer,
-    /// How many teeth mesh, over the input angle: of a zone where the zones are alike, elsewhere of all that `states` lists.
+    /// How many teeth mesh, over the input angle: of a zone where the zones are alike, elsewhere of all of them together.
     pub teeth_in_mesh_per_zone: TeethInMeshAnswer,
     /// How many of them carry load, over the input angles of the sweep: with clearance fewer.
     pub loaded_teeth_per_zone: TeethInMeshAnswer,
