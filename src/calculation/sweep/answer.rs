@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 
 use crate::coincidence_degree::TeethInMeshAnswer;
 use crate::findings::FindingAnswer;
+use crate::sweep::backing::EstimateAnswer;
 use crate::sweep::duty::DutyAnswer;
 use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
 use crate::sweep::model_error::ModelErrorAnswer;
@@ -63,6 +64,9 @@ pub struct SweepAnswer {
     pub radial_force_n: Option<RadialForceAnswer>,
     /// How far the model is off elastic bodies.
     pub model_error: ModelErrorAnswer,
+    /// What gives way behind the contacts, estimated from the document's `parts`, each a number for `model.series_compliance_mm_per_n`; nothing of it is in the
+    /// forces. Of parts that cannot be made, and of balls, there are none.
+    pub series_compliance_estimates: Vec<EstimateAnswer>,
     /// How well the results fulfil what must hold.
     pub checks: ChecksAnswer,
     /// What a designer should be told.
