@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use crate::contact::{Contact, ContactLaw, Material, Materials, Part, PerContact};
 use crate::drive::{Draft, Drive, ToothShape};
-use crate::load_sharing::{Compatibility, LoadCase};
+use crate::load_sharing::LoadCase;
 use crate::parts::{CarrierPart, PartsParameters, RingPart};
 use crate::root::NotConverged;
 use crate::sweep::ContactPeaks;
@@ -299,13 +299,12 @@ pub struct Shares {
 }
 
 impl Shares {
-    /// At the peaks of a load; none of other teeth than cylinders, nor where the approach is `fixed` or weighed by `projection`. A contact that is given
-    /// a series compliance has its backing in it.
+    /// At the peaks of a load under the logarithmic law; none of other teeth than cylinders, nor under other laws, whose own error is as large. A contact that
+    /// is given a series compliance has its backing in it.
     pub fn of(drive: &Drive, load: &LoadCase, backings: &Backings, peaks: &PerContact<ContactPeaks>) -> Option<Self> {
         let p = load.parameters();
         let is_line = matches!(drive.parameters().tooth, ToothShape::Cylinder { .. });
-        let has_law = !matches!(p.law, ContactLaw::Fixed(_) | ContactLaw::Hertz);
-        if !is_line || !has_law || p.compatibility == Compatibility::Projection {
+        if !is_line || !matches!(p.law, ContactLaw::Johnson { .. }) {
             return None;
         }
         let cam_force_n = peaks.wave_generator.force_n.value;
@@ -343,7 +342,7 @@ impl Shares {
     }
 }
 
-/// A contact's own approach over its force, by the logarithmic law (docs/theory.md section 4.3), whatever the load's law.
+/// A contact's own approach over its force, by the logarithmic law (docs/theory.md section 4.3).
 fn line_compliance_mm_per_n(
     drive: &Drive,
     materials: &Materials,

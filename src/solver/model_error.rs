@@ -129,10 +129,9 @@ pub struct Held {
 }
 
 impl Held {
-    /// Of the logarithmic law, the only one whose own wind-up is near enough for this to be told.
-    fn of(load: &LoadCase, support: &Support, shares: &Shares) -> Option<Self> {
-        let p = load.parameters();
-        if !matches!(p.law, ContactLaw::Johnson { .. }) || shares.shares.is_empty() {
+    /// Of parts that have estimates.
+    fn of(support: &Support, shares: &Shares) -> Option<Self> {
+        if shares.shares.is_empty() {
             return None;
         }
         let has = |wanted: Backing| shares.shares.iter().find(|(estimate, _)| estimate.backing == wanted);
@@ -258,6 +257,6 @@ pub fn of(
         (widest_mm > HALF_WIDTH_SHARE_TO * drive.parameters().tooth_radius_mm, Beyond::HalfWidth),
     ];
     let beyond = reasons.into_iter().filter(|&(is_beyond, _)| is_beyond).map(|(_, reason)| reason).collect();
-    let held = parts.and_then(|(support, shares)| Held::of(load, support, shares));
+    let held = parts.and_then(|(support, shares)| Held::of(support, shares));
     Ok(ModelError { measured, held, beyond })
 }

@@ -121,7 +121,7 @@ def main():
         results["free_rims"].append(dict(inner_radius_mm=inner, outer_radius_mm=outer, width_mm=width_mm, teeth=teeth, lobes=lobes, compliance_mm_per_n=found))
         print(results["free_rims"][-1], flush=True)
     for surface, held, tooth_radius_mm, width_mm, teeth, lobes in [(68.0, 81.6, 5.0, 15.0, 28, 2), (68.0, 73.0, 5.0, 15.0, 28, 2), (52.2, 62.64, 1.5, 15.0, 40, 2), (36.0, 43.2, 2.0, 12.0, 20, 1),
-                                                                   (57.0, 20.0, 5.0, 15.0, 28, 2), (57.0, 45.0, 5.0, 15.0, 28, 2), (50.0, 25.0, 1.5, 15.0, 40, 2), (30.8, 15.0, 2.0, 12.0, 20, 1)]:
+                                                                   (57.0, 20.0, 5.0, 15.0, 28, 2), (57.0, 45.0, 5.0, 15.0, 28, 2), (50.0, 25.0, 1.5, 15.0, 40, 2)]:
         found = held_body(surface, held, tooth_radius_mm, width_mm, teeth, lobes)
         results["held_bodies"].append(dict(surface_radius_mm=surface, held_radius_mm=held, tooth_radius_mm=tooth_radius_mm, width_mm=width_mm, teeth=teeth, lobes=lobes, compliance_mm_per_n=found))
         print(results["held_bodies"][-1], flush=True)

@@ -21,8 +21,8 @@ pub struct EstimateAnswer {
     pub compliance_mm_per_n: f64,
     /// Whether the parts are held so as far as `parts` says; where it says nothing, as the stiffer of the two.
     pub is_as_held: bool,
-    /// What it adds to the approach of a tooth at its three contacts, over that, of parts that are held so; left out where the designer gives the stiffness or the
-    /// series compliance, and of other teeth than cylinders.
+    /// What it adds to the approach of a tooth at its three contacts, over that, of cylinders whose parts are held so under `johnson`; left out where the
+    /// designer gives a series compliance there.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub share: Option<f64>,
