@@ -69,7 +69,7 @@ impl Question for Drawing {
         })
     }
 
-    fn answer(checked: &CheckedDrawing, stop: &impl Stop) -> Result<DrawingAnswer, NoAnswer> {
+    fn answer(checked: &CheckedDrawing, stop: &dyn Stop) -> Result<DrawingAnswer, NoAnswer> {
         let bodies = checked.drawing.bodies(stop)?;
         let of_parts = checked.drawing.findings().map_err(SolveError::from)?;
         let mut findings = drive_findings(checked.drawing.drive())?;

@@ -73,11 +73,11 @@ impl CheckedSweep {
     ///
     /// # Errors
     /// As [`solver::sweep_with_deviations`].
-    pub fn solve(&self, stop: &impl Stop) -> Result<solver::Sweep, SolveError> {
+    pub fn solve(&self, stop: &dyn Stop) -> Result<solver::Sweep, SolveError> {
         self.solve_under(self.load(), stop)
     }
 
-    fn solve_under(&self, load: &LoadCase, stop: &impl Stop) -> Result<solver::Sweep, SolveError> {
+    fn solve_under(&self, load: &LoadCase, stop: &dyn Stop) -> Result<solver::Sweep, SolveError> {
         solver::sweep_with_deviations(&self.drive, load, &self.deviations, self.points, stop)
     }
 
@@ -85,7 +85,7 @@ impl CheckedSweep {
     ///
     /// # Errors
     /// As [`Self::solve`].
-    pub fn peaks(&self, stop: &impl Stop) -> Result<solver::SweepPeaks, SolveError> {
+    pub fn peaks(&self, stop: &dyn Stop) -> Result<solver::SweepPeaks, SolveError> {
         if !self.deviations.is_nil() {
             return Ok((&self.solve(stop)?).into());
         }
@@ -227,7 +227,7 @@ impl Question for Sweep {
         }
     }
 
-    fn answer(checked: &CheckedSweep, stop: &impl Stop) -> Result<SweepAnswer, NoAnswer> {
+    fn answer(checked: &CheckedSweep, stop: &dyn Stop) -> Result<SweepAnswer, NoAnswer> {
         let CheckedSweep { drive, duty, deviations, backings, friction, with_gaps, with_wind_up, .. } = checked;
         let load = checked.load();
         let sweep = checked.solve(stop)?;
@@ -331,7 +331,7 @@ impl CheckedSweep {
         friction: &'a Friction,
         hardest: &Swept<'_>,
         losses: &period::Losses,
-        stop: &impl Stop,
+        stop: &dyn Stop,
     ) -> Result<Costs<'a>, NoAnswer> {
         let Self { drive, duty, bearing_rating, .. } = self;
         let of_point = |(at, point): (usize, &CheckedDutyPoint)| {
@@ -353,7 +353,7 @@ impl CheckedSweep {
         friction: &Friction,
         &Swept { sweep, forces }: &Swept<'_>,
         losses: &period::Losses,
-        stop: &impl Stop,
+        stop: &dyn Stop,
     ) -> Result<Cost, NoAnswer> {
         let Self { drive, wear_rate_mm3_per_nm, bearing_rating, .. } = self;
         let &CheckedDutyPoint { ref load, input_speed_rpm, share_of_time } = point;

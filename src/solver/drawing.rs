@@ -217,11 +217,11 @@ impl Drawing {
     ///
     /// # Errors
     /// [`SolveError::TooManyPoints`], [`SolveError::Stopped`], and [`SolveError::NotConverged`] from the geometry.
-    pub fn bodies(&self, stop: &impl Stop) -> Result<Vec<Body>, SolveError> {
+    pub fn bodies(&self, stop: &dyn Stop) -> Result<Vec<Body>, SolveError> {
         self.parts.iter().map(|part| self.body(part, stop)).collect()
     }
 
-    fn body(&self, part: &MadePart, stop: &impl Stop) -> Result<Body, SolveError> {
+    fn body(&self, part: &MadePart, stop: &dyn Stop) -> Result<Body, SolveError> {
         let (part, section) = match part {
             MadePart::Ring(ring) => (Part::Ring, self.ring_section(ring, stop)?),
             MadePart::WaveGenerator(cam) => (Part::WaveGenerator, self.cam_section(cam, stop)?),
@@ -232,7 +232,7 @@ impl Drawing {
     }
 
     /// The ring: a circle outside, inside its tooth spaces, from tip to tip each, with the lands of a bored tip between.
-    fn ring_section(&self, ring: &RingPart, stop: &impl Stop) -> Result<Section, SolveError> {
+    fn ring_section(&self, ring: &RingPart, stop: &dyn Stop) -> Result<Section, SolveError> {
         let teeth = self.drive.parameters().ring_teeth.unsigned_abs();
         let SampledCurve { mut points, end_tangent } =
             flank_curve(&ring.tooth.flank, &ring.tooth.limit, self.parameters.chord_tolerance_mm, stop)?;
@@ -273,7 +273,7 @@ impl Drawing {
     }
 
     /// The wave generator: a curve from each lobe to each valley and on.
-    fn cam_section(&self, cam: &WaveGeneratorPart, stop: &impl Stop) -> Result<Section, SolveError> {
+    fn cam_section(&self, cam: &WaveGeneratorPart, stop: &dyn Stop) -> Result<Section, SolveError> {
         let (locus, lobes) = (self.drive.flank().locus(), self.drive.lobes());
         let SampledCurve { points, .. } =
             cam_half_lobe(locus, cam.clearance_mm, self.parameters.chord_tolerance_mm, stop)?;

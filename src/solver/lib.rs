@@ -186,6 +186,13 @@ pub trait Stop {
     fn stopped(&self) -> bool;
 }
 
+/// A reference to what is asked: with `dyn` a sweep is compiled once, in this crate, however it is stopped.
+impl<S: Stop + ?Sized> Stop for &S {
+    fn stopped(&self) -> bool {
+        (**self).stopped()
+    }
+}
+
 /// Never stops.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Never;

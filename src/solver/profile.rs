@@ -69,7 +69,7 @@ const MAX_DEPTH: u32 = 40;
 ///
 /// # Errors
 /// [`SolveError::TooManyPoints`], [`SolveError::Stopped`], and [`SolveError::NotConverged`] from the geometry.
-pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &impl Stop) -> Result<Profiles, SolveError> {
+pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &dyn Stop) -> Result<Profiles, SolveError> {
     let ring_teeth = drive.parameters().ring_teeth.unsigned_abs();
     let flank = ring_half_tooth(drive, parameters.chord_tolerance_mm, stop)?;
     let path = path_half_tooth(drive, parameters.chord_tolerance_mm, stop)?;
@@ -92,7 +92,7 @@ pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &impl Stop)
 }
 
 /// The ring from the middle of its tooth space to its tooth's symmetry line, land of a bored tip included.
-fn ring_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &impl Stop) -> Result<Polyline, SolveError> {
+fn ring_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &dyn Stop) -> Result<Polyline, SolveError> {
     let mut points = flank_curve(drive.flank(), drive.flank_limit(), tolerance_mm, stop)?.points;
     let tip_rad = PI / drive.parameters().ring_teeth as f64;
     match drive.flank_limit().end {
@@ -122,7 +122,7 @@ pub(crate) fn flank_curve(
     flank: &RingFlank,
     limit: &FlankLimit,
     tolerance_mm: f64,
-    stop: &impl Stop,
+    stop: &dyn Stop,
 ) -> Result<SampledCurve, SolveError> {
     let lobes = flank.locus().lobes();
     sampled(limit.position, lobes, tolerance_mm, stop, |position| {
@@ -133,7 +133,7 @@ pub(crate) fn flank_curve(
 }
 
 /// The path of a tooth's centre from the middle of the tooth space to the symmetry line of the ring's tooth.
-fn path_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &impl Stop) -> Result<Polyline, SolveError> {
+fn path_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &dyn Stop) -> Result<Polyline, SolveError> {
     let flank = drive.flank();
     let lobes = drive.lobes();
     let mut points = sampled(Position::valley(lobes), lobes, tolerance_mm, stop, |position| {
@@ -155,7 +155,7 @@ pub(crate) fn cam_half_lobe(
     locus: &Locus,
     clearance_mm: f64,
     tolerance_mm: f64,
-    stop: &impl Stop,
+    stop: &dyn Stop,
 ) -> Result<SampledCurve, SolveError> {
     let lobes = locus.lobes();
     let mut curve = sampled(Position::valley(lobes), lobes, tolerance_mm, stop, |place| {
@@ -218,7 +218,7 @@ fn sampled(
     end: Position,
     lobes: u32,
     tolerance_mm: f64,
-    stop: &impl Stop,
+    stop: &dyn Stop,
     curve: impl Fn(Position) -> Result<CurvePoint, NotConverged>,
 ) -> Result<SampledCurve, SolveError> {
     // Measured from the valley, where cusps are; beyond the middle a `Position` is as good from the other side.

@@ -314,7 +314,7 @@ impl Island {
     }
 
     /// One variant further; whether that was the last one.
-    pub(crate) fn step(&mut self, search: &Search, evaluator: &Evaluator, stop: &impl Stop) -> Result<bool, Stopped> {
+    pub(crate) fn step(&mut self, search: &Search, evaluator: &Evaluator, stop: &dyn Stop) -> Result<bool, Stopped> {
         // A point that was asked for when the work was stopped is taken up again.
         let (place, is_scanning) = match self.pending.take() {
             Some(pending) => pending,

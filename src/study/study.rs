@@ -326,7 +326,7 @@ impl Work {
     ///
     /// # Errors
     /// When `stop` says so; the chunk is then as it was before.
-    pub fn step(&mut self, stop: &impl Stop) -> Result<bool, Stopped> {
+    pub fn step(&mut self, stop: &dyn Stop) -> Result<bool, Stopped> {
         let Self { study, state } = self;
         let evaluator = &study.evaluator;
         match (&study.kind, state) {
@@ -351,7 +351,7 @@ impl Work {
     ///
     /// # Errors
     /// As [`Self::step`].
-    pub fn run(mut self, stop: &impl Stop) -> Result<Part, Stopped> {
+    pub fn run(mut self, stop: &dyn Stop) -> Result<Part, Stopped> {
         while !self.step(stop)? {}
         Ok(self.finish())
     }
