@@ -5,9 +5,9 @@ use std::f64::consts::PI;
 
 use crate::contact::{Contact, ContactLaw, Material, Materials, Part, PerContact};
 use crate::drive::{Draft, Drive, ToothShape};
+use crate::gaps::MM_PER_UM;
 use crate::load_sharing::LoadCase;
-use crate::parts::{CarrierPart, PartsParameters, RingPart};
-use crate::root::NotConverged;
+use crate::parts::{CarrierPart, PartsParameters, RIM};
 use crate::sweep::ContactPeaks;
 
 /// What joins the fingers between the carrier's slots beside the teeth.
@@ -139,10 +139,12 @@ pub struct RimStrip {
 }
 
 impl RimStrip {
-    fn of(drive: &Drive, ring: &RingPart) -> Self {
+    /// Of the ring as it is made; its flanks' modification is of no weight here.
+    fn of(drive: &Drive, parts: &PartsParameters) -> Self {
+        let inner_radius_mm = drive.root_radius_mm() + MM_PER_UM * parts.ring_clearance_um;
         Self {
-            inner_radius_mm: ring.tooth.flank.root_radius_mm(),
-            outer_radius_mm: ring.outer_radius_mm,
+            inner_radius_mm,
+            outer_radius_mm: parts.ring_outer_radius_mm.unwrap_or(RIM * inner_radius_mm),
             width_mm: drive.tooth_width_mm(),
             teeth: drive.parameters().installed,
             lobes: drive.lobes(),
@@ -224,13 +226,10 @@ pub struct Backings {
 
 impl Backings {
     /// Of the parts as they are made and held. Only cylinders, whole or with flats, press their parts along a line.
-    ///
-    /// # Errors
-    /// [`NotConverged`] from the geometry.
     pub fn of(drive: &Drive, draft: &Draft, parts: &PartsParameters, support: Support) -> Result<Self, NotConverged> {
         let mut backings = Self { finger: None, rim: None, housed: None, cam: None, support };
         if matches!(drive.parameters().tooth, ToothShape::Ball { .. }) {
-            return Ok(backings);
+            return backings;
         }
         let is_possible = |part| parts.violations(part, draft).is_empty();
         if is_possible(Part::Carrier) {
@@ -242,7 +241,7 @@ impl Backings {
             width_mm: drive.tooth_width_mm(),
         };
         if is_possible(Part::Ring) {
-            let rim = RimStrip::of(drive, &RingPart::new(drive, parts)?);
+            let rim = RimStrip::of(drive, parts);
             backings.housed = Some(strip(rim.inner_radius_mm, rim.outer_radius_mm - rim.inner_radius_mm));
             backings.rim = Some(rim);
         }
@@ -250,7 +249,7 @@ impl Backings {
             let mean_mm = 0.5 * (drive.cam_outer_radius_mm() + drive.flank().locus().cam_inner_radius_mm());
             backings.cam = Some(strip(mean_mm, mean_mm - bore_mm));
         }
-        Ok(backings)
+        backings
     }
 
     /// How the parts are held.

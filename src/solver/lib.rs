@@ -52,6 +52,7 @@ pub mod root;
 pub mod springs;
 pub mod sweep;
 pub mod tooth;
+mod tooth_space;
 pub mod violation;
 
 pub use cam::WaveGenerator;

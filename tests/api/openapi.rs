@@ -207,7 +207,10 @@ fn every_problem_is_described_as_problem_json_and_every_503_of_a_solve_says_when
         assert!(responses["503"]["headers"]["Retry-After"].is_object(), "{path}");
         let found: BTreeSet<_> = responses["200"]["content"].as_object().unwrap().keys().map(String::as_str).collect();
         let expected = match path {
-            "/v1/sweep" => &["application/json", "image/svg+xml", "text/csv", "text/plain"][..],
+            "/v1/sweep" => {
+                &["application/json", "application/vnd.apache.arrow.stream", "image/svg+xml", "text/csv", "text/plain"]
+                    [..]
+            }
             "/v1/drawings/assembly" => &["application/json", "image/svg+xml", "image/vnd.dxf", "model/step"],
             _ => &["application/json", "text/csv", "text/plain"],
         };

@@ -65,7 +65,7 @@ fn johnson(torque_nm: f64) -> LoadParameters {
 }
 
 fn backings(parameters: &DriveParameters, parts: &PartsParameters, support: Support) -> Backings {
-    Backings::of(&drive(parameters), &Draft::new(parameters).unwrap(), parts, support).unwrap()
+    Backings::of(&drive(parameters), &Draft::new(parameters).unwrap(), parts, support)
 }
 
 /// Estimates and shares of a drive under a load.
