@@ -28,6 +28,7 @@ use crate::sweep::model_error::ModelErrorAnswer;
 pub mod answer;
 mod arrow;
 pub mod backing;
+pub mod contact;
 pub mod duty;
 pub mod losses;
 pub mod model_error;

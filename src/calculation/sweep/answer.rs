@@ -2,12 +2,13 @@
 
 use serde::Serialize;
 use toothwave_solver::sweep::{self as solver, ContactPeaks, Extremes, InputAngles, States, TorqueCapacity};
-use toothwave_solver::{Contact, Drive, PerContact};
+use toothwave_solver::{Drive, PerContact};
 use utoipa::ToSchema;
 
 use crate::coincidence_degree::TeethInMeshAnswer;
 use crate::findings::FindingAnswer;
 use crate::sweep::backing::EstimateAnswer;
+use crate::sweep::contact::ContactName;
 use crate::sweep::duty::DutyAnswer;
 use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
 use crate::sweep::model_error::ModelErrorAnswer;
@@ -187,28 +188,6 @@ pub struct TorqueCapacityAnswer {
     pub limited_by: ContactName,
     /// The input angle where it does.
     pub input_angle_deg: f64,
-}
-
-/// A contact of a tooth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ContactName {
-    /// With the wave generator.
-    WaveGenerator,
-    /// With the ring.
-    Ring,
-    /// With the carrier.
-    Carrier,
-}
-
-impl From<Contact> for ContactName {
-    fn from(contact: Contact) -> Self {
-        match contact {
-            Contact::WaveGenerator => Self::WaveGenerator,
-            Contact::Ring => Self::Ring,
-            Contact::Carrier => Self::Carrier,
-        }
-    }
 }
 
 impl WindUpAnswer {

@@ -8,7 +8,7 @@ use toothwave_solver::{Drive, LoadCase};
 use utoipa::ToSchema;
 
 use crate::json::word;
-use crate::sweep::answer::ContactName;
+use crate::sweep::contact::ContactName;
 
 /// An estimate of what gives way behind a contact (docs/theory.md section 4.10).
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]

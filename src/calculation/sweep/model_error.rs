@@ -53,7 +53,7 @@ pub struct HeldAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub wind_up: Option<ErrorRangeAnswer>,
-    /// What the estimates of this design's own parts come to.
+    /// What the estimates of this design's own parts come to, of that part of the wind-up which the load adds to what gaps leave.
     pub estimated_wind_up: f64,
 }
 
