@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use crate::backing::{Backing, Estimate, Shares};
 use crate::cam::Cam;
 use crate::contact::{Contact, ContactLaw, Material, Materials, PerContact, half_width_mm};
 use crate::drive::{Drive, ToothShape};
@@ -38,6 +39,10 @@ pub const STEEP_FOR_PROJECTION_DEG: f64 = 30.0;
 
 /// An efficiency that may be further off than this is reported.
 pub const UNCERTAIN_EFFICIENCY: f64 = 0.05;
+
+/// A part behind a contact that adds more than this to what a tooth gives way at its contacts is reported: the wind-up is then a sixth too small, as much
+/// as elastic bodies in a housing were found to add together (docs/validation.md).
+pub const SOFT_BACKING_SHARE: f64 = 0.2;
 
 const STEEL: Material = Material::STEEL;
 
@@ -145,6 +150,20 @@ pub enum Finding {
     ProjectionWithGap {
         /// The largest gap of a contact.
         gap_um: f64,
+    },
+    /// The carrier's fingers give way by more than the model, which takes them as rigid, can leave out.
+    SlenderFingers {
+        /// What they add to a tooth's approach at its contacts, over that.
+        share: f64,
+        /// Whether they are held at one end; otherwise at both, or nothing is said.
+        is_held_at_one_end: bool,
+    },
+    /// The ring's rim does so.
+    SoftRim {
+        /// What it adds to a tooth's approach at its contacts, over that.
+        share: f64,
+        /// Whether nothing stands around it; otherwise it is housed, or nothing is said.
+        is_free: bool,
     },
     /// Palmgren's law for a contact that is not steel on steel.
     PalmgrenBeyondSteel {
@@ -328,6 +347,19 @@ pub fn of_projection(drive: &Drive, load: &LoadCase) -> Result<Vec<Finding>, Not
         findings.push(Finding::ProjectionWithGap { gap_um });
     }
     Ok(findings)
+}
+
+/// What gives way behind the contacts by more than can be left out.
+pub fn of_backing(shares: &Shares) -> Vec<Finding> {
+    let soft = shares.shares.iter().filter(|(_, share)| *share > SOFT_BACKING_SHARE);
+    let finding = |&(estimate, share): &(Estimate, f64)| match estimate.backing {
+        Backing::FingerAtOneEnd => Some(Finding::SlenderFingers { share, is_held_at_one_end: true }),
+        Backing::FingerAtBothEnds => Some(Finding::SlenderFingers { share, is_held_at_one_end: false }),
+        Backing::FreeRim => Some(Finding::SoftRim { share, is_free: true }),
+        Backing::HousedRim => Some(Finding::SoftRim { share, is_free: false }),
+        Backing::CamOnBore => None,
+    };
+    soft.filter_map(finding).collect()
 }
 
 /// That the wind-up of a sweep goes beyond what the model holds for.

@@ -50,6 +50,8 @@ class Imports(unittest.TestCase):
 # What has no field of its own, and why; it goes through the other fields.
 NOT_IN_THE_FORM = {
     "/accuracy": "no drawing and no sweep reads it",
+    "/parts/carrier/fingers": "no drawing and no spreadsheet cell reads it",
+    "/parts/ring/rim": "no drawing and no spreadsheet cell reads it",
     "/profile/extent": "no drawing and no sweep reads it",
     **{
         f"/deviations/{name}": "a list of measured items, one entry for each tooth, slot or space, is pasted as it is, not typed"

@@ -2,11 +2,13 @@
 
 use serde::Serialize;
 use toothwave_solver::sweep::{self as solver, ContactPeaks, Extremes, InputAngles, States, TorqueCapacity};
-use toothwave_solver::{Contact, Drive, PerContact};
+use toothwave_solver::{Drive, PerContact};
 use utoipa::ToSchema;
 
 use crate::coincidence_degree::TeethInMeshAnswer;
 use crate::findings::FindingAnswer;
+use crate::sweep::backing::EstimateAnswer;
+use crate::sweep::contact::ContactName;
 use crate::sweep::duty::DutyAnswer;
 use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
 use crate::sweep::model_error::ModelErrorAnswer;
@@ -63,6 +65,9 @@ pub struct SweepAnswer {
     pub radial_force_n: Option<RadialForceAnswer>,
     /// How far the model is off elastic bodies.
     pub model_error: ModelErrorAnswer,
+    /// What gives way behind the contacts, estimated from the document's `parts`, each a number for `model.series_compliance_mm_per_n`; nothing of it is in the
+    /// forces. Of parts that cannot be made, and of balls, there are none.
+    pub series_compliance_estimates: Vec<EstimateAnswer>,
     /// How well the results fulfil what must hold.
     pub checks: ChecksAnswer,
     /// What a designer should be told.
@@ -183,28 +188,6 @@ pub struct TorqueCapacityAnswer {
     pub limited_by: ContactName,
     /// The input angle where it does.
     pub input_angle_deg: f64,
-}
-
-/// A contact of a tooth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ContactName {
-    /// With the wave generator.
-    WaveGenerator,
-    /// With the ring.
-    Ring,
-    /// With the carrier.
-    Carrier,
-}
-
-impl From<Contact> for ContactName {
-    fn from(contact: Contact) -> Self {
-        match contact {
-            Contact::WaveGenerator => Self::WaveGenerator,
-            Contact::Ring => Self::Ring,
-            Contact::Carrier => Self::Carrier,
-        }
-    }
 }
 
 impl WindUpAnswer {
