@@ -22,7 +22,7 @@ use crate::question::{Limits, Question, checked_drive, checked_load, require_fin
 use crate::sweep::answer::{ChecksAnswer, LoadAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
 use crate::sweep::backing::EstimateAnswer;
 use crate::sweep::duty::{DutyAnswer, DutyPointAnswer};
-use crate::sweep::losses::{Cost, Costs, LossesAnswer, RadialForceAnswer, RollsAnswer};
+use crate::sweep::losses::{Cost, Costs, LossTotalsAnswer, LossesAnswer, RadialForceAnswer, RollsAnswer};
 use crate::sweep::model_error::ModelErrorAnswer;
 
 pub mod answer;
@@ -61,14 +61,24 @@ impl CheckedSweep {
         &self.duty.hardest().load
     }
 
-    /// Its friction, where there is any.
-    pub const fn friction(&self) -> Option<&Friction> {
-        self.friction.as_ref()
+    /// The same, of which wear and the life of a bearing are not asked.
+    pub fn without_wear(self) -> Self {
+        Self { wear_rate_mm3_per_nm: None, bearing_rating: None, ..self }
     }
 
-    /// Speed of the wave generator, where it is given; of a duty at its hardest point.
-    pub fn input_speed_rpm(&self) -> Option<f64> {
-        self.duty.hardest().input_speed_rpm
+    /// What friction takes over all points of a duty, as the answer has it, given the sweep of the hardest; nothing without friction.
+    ///
+    /// # Errors
+    /// As [`Self::solve`].
+    pub fn loss_totals(&self, hardest: &solver::Sweep, stop: &dyn Stop) -> Result<Option<LossTotalsAnswer>, NoAnswer> {
+        let Some(friction) = &self.friction else { return Ok(None) };
+        let forces = match self.bearing_rating {
+            Some(_) => period::RadialForces::of(&self.drive, hardest, stop)?,
+            None => None,
+        };
+        let losses = period::Losses::of(&self.drive, hardest, friction, stop)?;
+        let costs = self.costs(friction, &Swept { sweep: hardest, forces: forces.as_ref() }, &losses, stop)?;
+        Ok(Some(costs.totals(self.duty.hardest, &hardest.states)))
     }
 
     /// Solves, of a duty its hardest point.
@@ -496,8 +506,9 @@ impl SweepAnswer {
         if let Some(sweep_period_deg) = self.sweep_period_deg {
             writeln!(writer, "input angle of the sweep            {sweep_period_deg:.6} deg")?;
         }
-        writeln!(writer, "teeth in mesh per zone              {}", self.teeth_in_mesh_per_zone)?;
-        writeln!(writer, "teeth that carry per zone           {}", self.loaded_teeth_per_zone)?;
+        let zones = if self.states.lobe.is_none() { "per zone" } else { "in all zones" };
+        writeln!(writer, "teeth in mesh {zones:<22}{}", self.teeth_in_mesh_per_zone)?;
+        writeln!(writer, "teeth that carry {zones:<19}{}", self.loaded_teeth_per_zone)?;
         writeln!(writer, "states                              {}", self.states.tooth.len())?;
         writeln!(writer, "torque balance residual             {:.1e}", self.checks.torque_balance_residual)?;
         writeln!(writer, "period closure residual             {:.1e}", self.checks.period_closure_residual)?;

@@ -448,6 +448,11 @@ fn thin_wall(drive: &Drive, wall: Wall, wall_mm: f64) -> Vec<Finding> {
     if wall_mm < limit_mm { vec![Finding::ThinWallAsMade { wall, wall_mm, limit_mm }] } else { Vec::new() }
 }
 
+/// Whether a contact is that of a flat.
+fn is_flat(drive: &Drive, contact: Contact) -> bool {
+    contact == Contact::Carrier && matches!(drive.parameters().tooth, ToothShape::FlatSided { .. })
+}
+
 /// The findings about a drive's contacts under a load. `approaches_matter` where wind-up or clearance was asked for.
 pub fn of_contacts(
     drive: &Drive,
@@ -469,7 +474,8 @@ pub fn of_contacts(
     if p.law == ContactLaw::Palmgren {
         let steel = Materials { wave_generator: STEEL, teeth: STEEL, ring: STEEL, carrier: STEEL };
         let steel_mpa = steel.contact_modulus_mpa(Contact::Ring);
-        for (contact, _) in peaks.iter() {
+        // A flat has a law of its own, which follows the modulus.
+        for (contact, _) in peaks.iter().filter(|&(contact, _)| !is_flat(drive, contact)) {
             let contact_mpa = p.materials.contact_modulus_mpa(contact);
             if (contact_mpa / steel_mpa - 1.0).abs() > STEEL_TOLERANCE {
                 findings.push(Finding::PalmgrenBeyondSteel {
@@ -508,9 +514,7 @@ pub fn of_contacts(
 pub fn of_half_widths(drive: &Drive, load: &LoadCase, states: &States) -> Vec<Finding> {
     let ContactLaw::Johnson { depth_mm } = &load.parameters().law else { return Vec::new() };
     let (tooth_radius_mm, tooth_width_mm) = (drive.parameters().tooth_radius_mm, drive.tooth_width_mm());
-    let is_flat =
-        |contact| contact == Contact::Carrier && matches!(drive.parameters().tooth, ToothShape::FlatSided { .. });
-    let widest = states.force_n.iter().filter(|&(contact, _)| !is_flat(contact)).map(|(contact, forces_n)| {
+    let widest = states.force_n.iter().filter(|&(contact, _)| !is_flat(drive, contact)).map(|(contact, forces_n)| {
         let loaded = forces_n.iter().zip(states.stress_mpa.get(contact)).filter(|&(&force_n, _)| force_n > 0.0);
         let half_widths = loaded.map(|(&force_n, &stress_mpa)| half_width_mm(force_n, stress_mpa, tooth_width_mm));
         (contact, half_widths.fold(0.0, f64::max))

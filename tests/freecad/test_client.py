@@ -101,7 +101,6 @@ EVERYTHING = {
             "coefficient": 0.0,
             "bearing_coefficient": 0.0015,
             "bearing_radius_mm": 28.0,
-            "bearing_load_rating_n": 14000.0,
             "bearing_element": "roller",
         },
         "ring": {"coefficient": 0.0},
@@ -149,7 +148,8 @@ class Document(unittest.TestCase):
     def test_a_document_with_everything_comes_back_as_it_was_and_needs_no_other_fields(self):
         plain = {"kind": "plain", "coefficient": 0.03}
         friction = {"wave_generator": plain, "ring": {"coefficient": 0.05}, "carrier": {"coefficient": 0.0}}
-        rolling = {"kind": "rolling", "bearing_coefficient": 0.0, "bearing_radius_mm": 28.0}
+        bearing = {"bearing_radius_mm": 28.0, "bearing_load_rating_n": 14000.0, "bearing_element": "ball"}
+        rolling = {"kind": "rolling", "bearing_coefficient": 0.0} | bearing
         for change in ({}, {"friction": friction}, {"friction": friction | {"wave_generator": rolling}}):
             document = EVERYTHING | change
             values = toothwave_design.values_of(document)

@@ -14,7 +14,7 @@ use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
 use crate::sweep::model_error::ModelErrorAnswer;
 use crate::sweep::peak::PeakAnswer;
 
-/// Forces and contact stresses of one meshing zone over one period; the other zone is its point reflection.
+/// Forces and contact stresses over one period: of one meshing zone where the zones are alike, elsewhere of all of them.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct SweepAnswer {
     /// Version of the solver.
@@ -37,7 +37,7 @@ pub struct SweepAnswer {
     pub enters_under_load: bool,
     /// The largest force and stress of each contact, over the states.
     pub peaks: PeaksAnswer,
-    /// How many teeth of a zone mesh, over the input angle.
+    /// How many teeth mesh, over the input angle: of a zone where the zones are alike, elsewhere of all of them together.
     pub teeth_in_mesh_per_zone: TeethInMeshAnswer,
     /// How many of them carry load, over the input angles of the sweep: with clearance fewer.
     pub loaded_teeth_per_zone: TeethInMeshAnswer,
@@ -173,7 +173,7 @@ pub struct WindUpAnswer {
     pub unloaded_wind_up_deg: Option<Vec<f64>>,
     /// Output torque over output rotation at the load, wave generator held.
     pub torsional_stiffness_nm_per_rad: Vec<f64>,
-    /// Teeth of one zone that carry load.
+    /// Teeth that carry load: of one zone where the zones are alike, elsewhere of all that `states` lists.
     pub loaded_teeth: Vec<u32>,
 }
 
