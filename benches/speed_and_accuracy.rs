@@ -30,7 +30,7 @@ use toothwave_solver::drive::Drive;
 use toothwave_solver::load_sharing::LoadCase;
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::sweep::{Points, Sweep, sweep, sweep_plain};
-use toothwave_solver::{Never, SolveError};
+use toothwave_solver::{Never, SolveError, Stop};
 use turns::{BATCH, Contestant, Failure, take_turns};
 
 /// The service's allocator.
@@ -43,7 +43,7 @@ const MAX_STATES: u64 = 10_000_000;
 /// Smaller errors are drawn here: the last digit of a double.
 const LEAST_DRAWN_ERROR: f64 = 1e-16;
 
-type SweepFunction = fn(&Drive, &LoadCase, Points, &Never) -> Result<Sweep, SolveError>;
+type SweepFunction = fn(&Drive, &LoadCase, Points, &dyn Stop) -> Result<Sweep, SolveError>;
 
 fn main() -> Result<(), Failure> {
     let arguments: Vec<String> = std::env::args().collect();

@@ -166,6 +166,15 @@ def _friction():
     yield coefficient(f"{place}/bearing_coefficient", "BearingFriction", "μ, bearing", 0.0015, *kinds[1:])
     pointer, bearings = f"{place}/bearing_radius_mm", (kind, kinds[1:])
     yield Field(pointer, "BearingRadius", "Bearing's radius", group, None, "mm", LENGTH_MM, 28.0, shown=bearings)
+    pointer, blank = f"{place}/bearing_load_rating_n", "no life asked for; an eccentric's alone"
+    yield Field(pointer, "BearingRatingN", "Bearing's rating C", group, 0.0, "N", (1e-3, 1e12), blank=blank, shown=bearings)
+    pointer, elements = f"{place}/bearing_element", (BY_DEFAULT, "ball", "roller")
+    blank = "left to the service"
+    yield Field(pointer, "BearingElement", "What rolls in it", group, BY_DEFAULT, blank=blank, choices=elements, shown=bearings)
+    for contact, label in CONTACTS:
+        pointer, name = f"/friction/wear_rate_mm3_per_nm/{contact}", f"{_named(label)}WearMm3PerNm"
+        label, limits, rubs = f"Wear rate, {label.lower()}", (0.0, 1e3), (kind, kinds)
+        yield Field(pointer, name, label, group, 0.0, "mm³/(N·m)", limits, blank="none", shown=rubs)
 
 
 def _modification():
@@ -212,7 +221,14 @@ def _parts():
         yield Field(pointer, f"{name}ModulusGPa", f"E, {label.lower()}", group, 210.0, "GPa", (1e-3, 1e5))
         yield Field(f"{place}/poissons_ratio", f"{name}PoissonsRatio", f"ν, {label.lower()}", group, 0.3, limits=(-1.0, 0.5))
 
-    # What the document has besides, such as deviations of single teeth.
+    group = "Parts off the axis"
+    for part, label in CONTACTS:
+        place, name = f"/deviations/{part}_runout", f"{_named(label)}Runout"
+        label = f"{label}, runout"
+        yield Field(f"{place}/amount_um", f"{name}Um", label, group, 0.0, "µm", GAP_UM, blank="none")
+        yield Field(f"{place}/angle_deg", f"{name}Angle", "in the direction", group, 0.0, "deg", (-360.0, 360.0))
+
+    # What the document has besides: lists, such as a load spectrum or what single teeth were measured to have.
     yield Field("", "OtherFields", "Other fields, as JSON", "Other", "", blank="none")
 
 

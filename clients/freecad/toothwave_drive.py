@@ -156,10 +156,9 @@ class DrivePart(Stateless):
 
     def execute(self, obj):
         body = obj.Drive.Proxy.body(obj.Drive, obj.DrivePart)
-        make = toothwave_parts.ball_of if is_ball(obj.Drive, obj.DrivePart) else toothwave_parts.prism_of
-        section = {key: body[key] for key in ("outer", "holes", "width_mm")} | {"make": make}
+        section = {key: body[key] for key in ("outer", "holes", "width_mm", "solid")}
         if section != self.section:
-            self.section, self.solid = section, make(body)
+            self.section, self.solid = section, toothwave_parts.solid_of(body)
         obj.Shape = shape = toothwave_parts.shape_of(body, self.solid)
         obj.Placement = shape.Placement  # during a recomputation FreeCAD takes it from there, not from the shape
 
@@ -221,11 +220,6 @@ def _leaves(values, prefix=""):
             yield from _leaves(value, f"{prefix}{name}.")
         elif not isinstance(value, list):
             yield prefix + name, value
-
-
-def is_ball(drive, part):
-    """Whether a part is the balls that teeth may be; its section is then that of their middle."""
-    return part == "teeth" and drive.ToothShape == "ball"
 
 
 def document_of(obj):

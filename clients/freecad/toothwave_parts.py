@@ -62,6 +62,11 @@ def ball_of(body):
     return Part.makeSphere(body["outer"]["radius_mm"], body["width_mm"] / 2 * Z)
 
 
+def solid_of(body):
+    """The solid that stands on a body's section, before it is put anywhere."""
+    return {"prism": prism_of, "ball": ball_of}[body["solid"]](body)
+
+
 def placement_of(placement):
     """Where a solid stands."""
     return Placement(Vector(placement["x_mm"], placement["y_mm"], 0), Rotation(Z, placement["rotation_deg"]))

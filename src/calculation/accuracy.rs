@@ -171,7 +171,7 @@ impl Question for Accuracy {
         }
     }
 
-    fn answer(checked: &CheckedAccuracy, stop: &impl Stop) -> Result<AccuracyAnswer, NoAnswer> {
+    fn answer(checked: &CheckedAccuracy, stop: &dyn Stop) -> Result<AccuracyAnswer, NoAnswer> {
         let CheckedAccuracy { drive, load, deviations, requested_error, max_states } = checked;
         let own = *load.parameters();
         let own_peaks = converged(drive, load, deviations, *max_states, stop).map_err(|error| match error {
@@ -243,7 +243,7 @@ fn converged(
     load: &LoadCase,
     deviations: &Deviations,
     max_states: u64,
-    stop: &impl Stop,
+    stop: &dyn Stop,
 ) -> Result<PerContact<ContactPeaks>, SolveError> {
     Ok(sweep_with_deviations(drive, load, deviations, Points::finest(max_states), stop)?.peaks)
 }
@@ -273,7 +273,7 @@ impl<'a> Model<'a> {
         &CheckedAccuracy { ref drive, ref deviations, max_states, .. }: &'a CheckedAccuracy,
         parameters: &LoadParameters,
         own_peaks: &PerContact<ContactPeaks>,
-        stop: &impl Stop,
+        stop: &dyn Stop,
     ) -> Result<Option<Self>, SolveError> {
         let Ok(load) = LoadCase::new(parameters) else { return Ok(None) };
         if !parameters.clearance_violations(&Draft::new(drive.parameters())?)?.is_empty() {
@@ -285,7 +285,7 @@ impl<'a> Model<'a> {
     }
 
     /// Tries every number of samples and every tolerance that the limit on states admits.
-    fn measure(&self, ways: &mut Vec<WayAnswer>, stop: &impl Stop) -> Result<(), SolveError> {
+    fn measure(&self, ways: &mut Vec<WayAnswer>, stop: &dyn Stop) -> Result<(), SolveError> {
         let mesh = self.deviations.mesh(self.drive);
         // All of them lie within the ranges.
         let samples = SAMPLES.into_iter().filter_map(|samples| Samples::new(samples).ok());
@@ -298,7 +298,7 @@ impl<'a> Model<'a> {
         Ok(())
     }
 
-    fn way(&self, points: Points, stop: &impl Stop) -> Result<WayAnswer, SolveError> {
+    fn way(&self, points: Points, stop: &dyn Stop) -> Result<WayAnswer, SolveError> {
         let begun = Instant::now();
         let mut times_us = Vec::with_capacity(MOST_RUNS);
         let found = loop {

@@ -79,7 +79,7 @@ impl Question for CoincidenceDegree {
         checked_drive(design, &mut violations)?.drive().ok_or_else(|| NoAnswer::impossible(&violations))
     }
 
-    fn answer(drive: &Drive, _: &impl Stop) -> Result<CoincidenceDegreeAnswer, NoAnswer> {
+    fn answer(drive: &Drive, _: &dyn Stop) -> Result<CoincidenceDegreeAnswer, NoAnswer> {
         let mesh = Mesh::new(drive);
         Ok(CoincidenceDegreeAnswer {
             solver_version: toothwave_solver::VERSION,

@@ -382,6 +382,7 @@ impl Design {
             teeth_clearance_um: teeth.clearance_um,
             ring_clearance_um: ring.clearance_um,
             carrier_clearance_um: carrier.clearance_um,
+            modification: (&self.modification).into(),
         }
     }
 

@@ -47,12 +47,12 @@ impl Question for Drawing {
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
         let assembly = (self.0 == DrawnPart::Assembly).then_some(&design.assembly);
-        (&design.drive, &design.parts, design.profile.chord_tolerance_mm, assembly)
+        (&design.drive, &design.parts, &design.modification, design.profile.chord_tolerance_mm, assembly)
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedDrawing, NoAnswer> {
         let subject = self.0;
-        let of_design = (&design.drive, &design.parts, design.profile.chord_tolerance_mm);
+        let of_design = (&design.drive, &design.parts, &design.modification, design.profile.chord_tolerance_mm);
         let parameters = design.drawing_parameters(limits.max_profile_points);
         let draft = Draft::new(&design.drive_parameters()).map_err(SolveError::from)?;
         let drawing = solver::Drawing::new(&draft, subject.subject(), &design.parts_parameters(), &parameters);
@@ -69,7 +69,7 @@ impl Question for Drawing {
         })
     }
 
-    fn answer(checked: &CheckedDrawing, stop: &impl Stop) -> Result<DrawingAnswer, NoAnswer> {
+    fn answer(checked: &CheckedDrawing, stop: &dyn Stop) -> Result<DrawingAnswer, NoAnswer> {
         let bodies = checked.drawing.bodies(stop)?;
         let of_parts = checked.drawing.findings().map_err(SolveError::from)?;
         let mut findings = drive_findings(checked.drawing.drive())?;
@@ -81,10 +81,7 @@ impl Question for Drawing {
             subject: checked.subject,
             chord_tolerance_mm: checked.chord_tolerance_mm,
             input_angle_deg: checked.input_angle_deg,
-            bodies: bodies
-                .into_iter()
-                .map(|body| BodyAnswer::new(body, checked.drawing.drive().tooth_width_mm()))
-                .collect(),
+            bodies: bodies.into_iter().map(|body| BodyAnswer::new(body, checked.drawing.drive())).collect(),
             findings,
         })
     }

@@ -82,6 +82,8 @@ pub enum FieldCode {
     ClearanceTakesCam,
     /// The teeth's clearance reaches their radius.
     ClearanceTakesTooth,
+    /// A modification that leaves nothing of a part's outline.
+    ModificationLeavesNothing,
     /// More states than `max_states`.
     TooManyStates,
     /// More profile points than `max_profile_points`.
@@ -130,6 +132,15 @@ impl From<&Violation> for FieldError {
             Violation::TipReliefBeyondFlank { start_deg, engagement_start_deg } => {
                 let parameter = Parameter::Modification(Modified::TipReliefStart);
                 (FieldCode::OutOfRange, parameter, start_deg, engagement_start_deg)
+            }
+            Violation::ModificationLeavesNothing { modified, value, limit } => {
+                return FieldError {
+                    pointer: pointer(Parameter::Modification(modified)),
+                    code: FieldCode::ModificationLeavesNothing,
+                    detail: violation.to_string(),
+                    value: Some(value),
+                    limit,
+                };
             }
             Violation::DeviationCount { listed, count, items } => {
                 (FieldCode::WrongLength, Parameter::DeviationList(listed), count as f64, items as f64)

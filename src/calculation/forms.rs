@@ -13,6 +13,10 @@ pub enum Format {
     Json,
     /// Columns.
     Csv,
+    /// Columns in Apache Arrow's IPC stream.
+    Arrow,
+    /// Columns in Apache Parquet.
+    Parquet,
     /// For a terminal.
     Text,
     /// A picture.

@@ -254,7 +254,7 @@ impl Question for Geometry {
         }
     }
 
-    fn answer((drive, profile): &Self::Checked, stop: &impl Stop) -> Result<GeometryAnswer, NoAnswer> {
+    fn answer((drive, profile): &Self::Checked, stop: &dyn Stop) -> Result<GeometryAnswer, NoAnswer> {
         let profiles = profile::profiles(drive, profile, stop)?;
         let (p, cam_outer_mm) = (drive.parameters(), drive.cam_outer_radius_mm());
         let flank = drive.flank();

@@ -116,6 +116,7 @@ impl Tree {
     pub fn at(&self, path: &[String]) -> Option<&Self> {
         path.iter().try_fold(self, |tree, name| match tree {
             Self::Object(fields) => fields.iter().find(|(key, _)| key == name).map(|(_, value)| value),
+            Self::Array(items) => items.get(name.parse::<usize>().ok()?),
             _ => None,
         })
     }
@@ -126,6 +127,12 @@ impl Tree {
             *self = value;
             return;
         };
+        if let Self::Array(items) = self
+            && let Some(item) = name.parse::<usize>().ok().and_then(|index| items.get_mut(index))
+        {
+            item.set(rest, value);
+            return;
+        }
         if !matches!(self, Self::Object(_)) {
             *self = Self::Object(Vec::new());
         }

@@ -31,7 +31,7 @@ pub struct MaterialPreset {
 const GEAR_STEEL: &str = "ISO 6336-2:2019, steel: E = 206 000 N/mm², ν = 0.3";
 
 /// All of them.
-pub const MATERIALS: [MaterialPreset; 4] = [
+pub const MATERIALS: [MaterialPreset; 6] = [
     MaterialPreset {
         name: "bearing-steel",
         title: "Bearing steel, through-hardened",
@@ -40,7 +40,7 @@ pub const MATERIALS: [MaterialPreset; 4] = [
         elasticity_source: "ISO/TR 1281-1:2008, explanatory notes on ISO 281: E = 207 000 MPa, ν = 0.3",
         allowable_stress_mpa: Some(FATIGUE_LIMIT_STRESS_MPA),
         allowable_stress_source: Some(
-            "ISO 281:2007, contact stress at the fatigue load limit of common high-quality bearing steel",
+            "ISO 281:2007, contact stress at the fatigue load limit of common high-quality bearing steel; Zaretsky, Tribology & Lubrication Technology 66(8), 2010: von Mises stress 900 MPa, Hertz stress 1500 MPa",
         ),
     },
     MaterialPreset {
@@ -65,11 +65,29 @@ pub const MATERIALS: [MaterialPreset; 4] = [
         ),
     },
     MaterialPreset {
+        name: "bronze",
+        title: "Bearing bronze UNS C93200 (SAE 660)",
+        youngs_modulus_gpa: 100.0,
+        poissons_ratio: 0.34,
+        elasticity_source: "AZoM, Bearing Bronze (UNS C93200), article 6294: E = 100 GPa, ν = 0.34",
+        allowable_stress_mpa: None,
+        allowable_stress_source: None,
+    },
+    MaterialPreset {
         name: "pom",
         title: "POM, acetal homopolymer",
         youngs_modulus_gpa: 3.0,
         poissons_ratio: 0.35,
         elasticity_source: "Margolis, Engineering Plastics Handbook, McGraw-Hill 2006, table 5.5: tensile modulus 3.0 GPa; ν by DuPont, Delrin Design Guide, Module III",
+        allowable_stress_mpa: None,
+        allowable_stress_source: None,
+    },
+    MaterialPreset {
+        name: "pla",
+        title: "PLA, injection moulded; printed parts have less, by direction and filling",
+        youngs_modulus_gpa: 3.5,
+        poissons_ratio: 0.36,
+        elasticity_source: "Farah, Anderson, Langer, Advanced Drug Delivery Reviews 107, 2016, 367-392: E = 3.5 GPa, ν = 0.36",
         allowable_stress_mpa: None,
         allowable_stress_source: None,
     },

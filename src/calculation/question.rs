@@ -50,7 +50,7 @@ pub trait Question: Send + 'static {
     ///
     /// # Errors
     /// Why there is no answer; also where `stop` was set.
-    fn answer(checked: &Self::Checked, stop: &impl Stop) -> Result<Self::Answer, NoAnswer>;
+    fn answer(checked: &Self::Checked, stop: &dyn Stop) -> Result<Self::Answer, NoAnswer>;
 
     /// The key of the answer in a form that `form` stands for: equal keys are equal bytes, whatever process they come from.
     fn key(&self, design: &Design, form: &impl Encode) -> Key {
@@ -61,7 +61,7 @@ pub trait Question: Send + 'static {
     ///
     /// # Errors
     /// Why there is no answer.
-    fn ask(&self, document: &[u8], limits: &Limits, stop: &impl Stop) -> Result<Self::Answer, NoAnswer> {
+    fn ask(&self, document: &[u8], limits: &Limits, stop: &dyn Stop) -> Result<Self::Answer, NoAnswer> {
         Self::answer(&self.check(&Design::read(document)?, limits)?, stop)
     }
 }

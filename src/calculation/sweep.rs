@@ -20,10 +20,11 @@ use crate::no_answer::{NoAnswer, NoAnswerCode, too_many};
 use crate::question::{Limits, Question, checked_drive, checked_load, require_finite};
 use crate::sweep::answer::{ChecksAnswer, LoadAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
 use crate::sweep::duty::{DutyAnswer, DutyPointAnswer};
-use crate::sweep::losses::{Cost, Costs, LossesAnswer, RadialForceAnswer};
+use crate::sweep::losses::{Cost, Costs, LossesAnswer, RadialForceAnswer, RollsAnswer};
 use crate::sweep::model_error::ModelErrorAnswer;
 
 pub mod answer;
+mod arrow;
 pub mod duty;
 pub mod losses;
 pub mod model_error;
@@ -69,11 +70,11 @@ impl CheckedSweep {
     ///
     /// # Errors
     /// As [`solver::sweep_with_deviations`].
-    pub fn solve(&self, stop: &impl Stop) -> Result<solver::Sweep, SolveError> {
+    pub fn solve(&self, stop: &dyn Stop) -> Result<solver::Sweep, SolveError> {
         self.solve_under(self.load(), stop)
     }
 
-    fn solve_under(&self, load: &LoadCase, stop: &impl Stop) -> Result<solver::Sweep, SolveError> {
+    fn solve_under(&self, load: &LoadCase, stop: &dyn Stop) -> Result<solver::Sweep, SolveError> {
         solver::sweep_with_deviations(&self.drive, load, &self.deviations, self.points, stop)
     }
 
@@ -81,7 +82,7 @@ impl CheckedSweep {
     ///
     /// # Errors
     /// As [`Self::solve`].
-    pub fn peaks(&self, stop: &impl Stop) -> Result<solver::SweepPeaks, SolveError> {
+    pub fn peaks(&self, stop: &dyn Stop) -> Result<solver::SweepPeaks, SolveError> {
         if !self.deviations.is_nil() {
             return Ok((&self.solve(stop)?).into());
         }
@@ -218,7 +219,7 @@ impl Question for Sweep {
         }
     }
 
-    fn answer(checked: &CheckedSweep, stop: &impl Stop) -> Result<SweepAnswer, NoAnswer> {
+    fn answer(checked: &CheckedSweep, stop: &dyn Stop) -> Result<SweepAnswer, NoAnswer> {
         let CheckedSweep { drive, duty, deviations, friction, with_gaps, with_wind_up, .. } = checked;
         let load = checked.load();
         let sweep = checked.solve(stop)?;
@@ -318,7 +319,7 @@ impl CheckedSweep {
         friction: &'a Friction,
         hardest: &Swept<'_>,
         losses: &period::Losses,
-        stop: &impl Stop,
+        stop: &dyn Stop,
     ) -> Result<Costs<'a>, NoAnswer> {
         let Self { drive, duty, bearing_rating, .. } = self;
         let of_point = |(at, point): (usize, &CheckedDutyPoint)| {
@@ -340,7 +341,7 @@ impl CheckedSweep {
         friction: &Friction,
         &Swept { sweep, forces }: &Swept<'_>,
         losses: &period::Losses,
-        stop: &impl Stop,
+        stop: &dyn Stop,
     ) -> Result<Cost, NoAnswer> {
         let Self { drive, wear_rate_mm3_per_nm, bearing_rating, .. } = self;
         let &CheckedDutyPoint { ref load, input_speed_rpm, share_of_time } = point;
@@ -389,29 +390,22 @@ impl DutyPointAnswer {
     }
 }
 
-/// The columns of the slips, which follow those of the states.
-const SLIP_COLUMNS: [&str; 4] =
-    ["slip_wave_generator_mm_per_rad", "slip_ring_mm_per_rad", "slip_carrier_mm_per_rad", "rolls"];
-
-/// The columns of the states, as JSON and CSV name them.
-const STATE_COLUMNS: [&str; 12] = [
-    "input_angle_deg",
-    "tooth",
-    "position_deg",
-    "center_radius_mm",
-    "wave_generator_angle_deg",
-    "ring_angle_deg",
-    "force_wave_generator_n",
-    "force_ring_n",
-    "force_carrier_n",
-    "stress_wave_generator_mpa",
-    "stress_ring_mpa",
-    "stress_carrier_mpa",
-];
+/// A column of the states.
+#[derive(Debug, Clone, Copy)]
+enum Column<'a> {
+    Numbers(&'a [f64]),
+    Counts(&'a [u32]),
+    Flags(&'a [bool]),
+    Rolls(&'a [RollsAnswer]),
+}
 
 impl Forms for SweepAnswer {
-    const FORMS: &'static [(Format, Form<Self>)] =
-        &[(Format::Csv, Self::write_csv), (Format::Text, Self::write_text), (Format::Svg, plots::write)];
+    const FORMS: &'static [(Format, Form<Self>)] = &[
+        (Format::Csv, Self::write_csv),
+        (Format::Arrow, arrow::write),
+        (Format::Text, Self::write_text),
+        (Format::Svg, plots::write),
+    ];
 
     fn expected_bytes(&self) -> usize {
         // Eleven numbers of about 18 characters and a short one, each with its comma.
@@ -421,13 +415,40 @@ impl Forms for SweepAnswer {
 }
 
 impl SweepAnswer {
+    /// The columns of the states by their names in JSON, those of the slips after them.
+    fn columns(&self) -> Vec<(&'static str, Column<'_>)> {
+        let states = &self.states;
+        let mut columns = vec![
+            ("input_angle_deg", Column::Numbers(&states.input_angle_deg)),
+            ("tooth", Column::Counts(&states.tooth)),
+            ("position_deg", Column::Numbers(&states.position_deg)),
+            ("center_radius_mm", Column::Numbers(&states.center_radius_mm)),
+            ("wave_generator_angle_deg", Column::Numbers(&states.wave_generator_angle_deg)),
+            ("ring_angle_deg", Column::Numbers(&states.ring_angle_deg)),
+            ("force_wave_generator_n", Column::Numbers(&states.force_wave_generator_n)),
+            ("force_ring_n", Column::Numbers(&states.force_ring_n)),
+            ("force_carrier_n", Column::Numbers(&states.force_carrier_n)),
+            ("stress_wave_generator_mpa", Column::Numbers(&states.stress_wave_generator_mpa)),
+            ("stress_ring_mpa", Column::Numbers(&states.stress_ring_mpa)),
+            ("stress_carrier_mpa", Column::Numbers(&states.stress_carrier_mpa)),
+        ];
+        columns.extend(states.lobe.as_deref().map(|lobe| ("lobe", Column::Counts(lobe))));
+        columns.extend(states.loaded.as_deref().map(|loaded| ("loaded", Column::Flags(loaded))));
+        if let Some(LossesAnswer { slip_mm_per_rad: slip, rolls, .. }) = &self.losses {
+            columns.extend([
+                ("slip_wave_generator_mm_per_rad", Column::Numbers(&slip.wave_generator)),
+                ("slip_ring_mm_per_rad", Column::Numbers(&slip.ring)),
+                ("slip_carrier_mm_per_rad", Column::Numbers(&slip.carrier)),
+                ("rolls", Column::Rolls(rolls)),
+            ]);
+        }
+        columns
+    }
+
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
         let states = &self.states;
         let mut csv = csv::Writer::from_writer(writer);
-        let names = STATE_COLUMNS.iter().chain(states.lobe.as_ref().map(|_| &"lobe"));
-        let names = names.chain(states.loaded.as_ref().map(|_| &"loaded"));
-        let of_losses = if self.losses.is_some() { &SLIP_COLUMNS[..] } else { &[] };
-        csv.write_record(names.chain(of_losses)).map_err(csv_error)?;
+        csv.write_record(self.columns().into_iter().map(|(name, _)| name)).map_err(csv_error)?;
         for i in 0..states.tooth.len() {
             let state = (
                 states.input_angle_deg[i],

@@ -127,9 +127,11 @@ const fn choice<T>(value: T, word: &'static str, help: &'static str) -> Choice<T
     Choice { value, word, alias: None, help }
 }
 
-const FORMATS: [Choice<Format>; 6] = [
+const FORMATS: [Choice<Format>; 8] = [
     choice(Format::Json, "json", "As programs read it"),
     choice(Format::Csv, "csv", "Columns"),
+    choice(Format::Arrow, "arrow", "Columns as an Apache Arrow stream"),
+    choice(Format::Parquet, "parquet", "Columns as an Apache Parquet file"),
     Choice { value: Format::Text, word: "text", alias: Some("table"), help: "For a terminal" },
     choice(Format::Svg, "svg", "A picture"),
     choice(Format::Dxf, "dxf", "Outlines for CAD and workshops"),

@@ -17,6 +17,8 @@ const fn media_type(format: Format) -> MediaType<'static> {
     match format {
         Format::Json => MediaType::new(names::APPLICATION, names::JSON),
         Format::Csv => MediaType::new(names::TEXT, Name::new_unchecked("csv")),
+        Format::Arrow => MediaType::new(names::APPLICATION, Name::new_unchecked("vnd.apache.arrow.stream")),
+        Format::Parquet => MediaType::new(names::APPLICATION, Name::new_unchecked("vnd.apache.parquet")),
         Format::Text => MediaType::new(names::TEXT, names::PLAIN),
         Format::Svg => MediaType::from_parts(names::IMAGE, names::SVG, Some(names::XML), &[]),
         Format::Dxf => MediaType::new(names::IMAGE, Name::new_unchecked("vnd.dxf")),
@@ -29,6 +31,8 @@ pub const fn content_type(format: Format) -> &'static str {
     match format {
         Format::Json => "application/json",
         Format::Csv => "text/csv; charset=utf-8; header=present",
+        Format::Arrow => "application/vnd.apache.arrow.stream",
+        Format::Parquet => "application/vnd.apache.parquet",
         Format::Text => "text/plain; charset=utf-8",
         Format::Svg => "image/svg+xml",
         Format::Dxf => "image/vnd.dxf",

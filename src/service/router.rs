@@ -1,10 +1,9 @@
 //! Every path on one screen, and the layers around them in order.
 
 use std::net::IpAddr;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use axum::Router;
-use axum::body::Bytes;
 use axum::extract::Request;
 use axum::http::uri::Authority;
 use axum::http::{HeaderValue, StatusCode, header};
@@ -47,6 +46,9 @@ use crate::query::require_no_query;
 )]
 struct Document;
 
+/// Paths with their description, made once: it takes long, and is the same for every router of the process.
+static API: LazyLock<(Router<Arc<App>>, openapi::OpenApi)> = LazyLock::new(|| api().split_for_parts());
+
 fn api() -> OpenApiRouter<Arc<App>> {
     let side = OpenApiRouter::new()
         .routes(routes!(side::limits))
@@ -84,17 +86,21 @@ pub struct Entry {
 }
 
 /// The API document as it is committed and served.
-pub fn openapi_json() -> String {
-    pretty(&document())
+pub fn openapi_json() -> &'static str {
+    static JSON: LazyLock<String> = LazyLock::new(|| pretty(&DOCUMENT));
+    &JSON
 }
 
 /// The same in OpenAPI 3.0.3.
-pub fn openapi_3_0_json() -> String {
-    pretty(&crate::openapi::as_3_0(&document()))
+pub fn openapi_3_0_json() -> &'static str {
+    static JSON: LazyLock<String> = LazyLock::new(|| pretty(&crate::openapi::as_3_0(&DOCUMENT)));
+    &JSON
 }
 
+static DOCUMENT: LazyLock<Value> = LazyLock::new(document);
+
 fn document() -> Value {
-    let mut document = api().into_openapi();
+    let mut document = API.1.clone();
     describe_entry(&mut document);
     let mut document = serde_json::to_value(document).unwrap_or_default();
     crate::openapi::for_generators(&mut document);
@@ -140,17 +146,17 @@ fn describe_entry(document: &mut openapi::OpenApi) {
 
 /// The whole service.
 pub fn router(app: Arc<App>, entry: &Entry) -> Router {
-    let [openapi, openapi_3_0] = [openapi_json(), openapi_3_0_json()].map(Bytes::from);
     // The bundled page alone: without "none" it would ask a validator elsewhere.
     let config = Config::new(["/openapi.json"]).validator_url("none");
     let docs: Router<Arc<App>> = SwaggerUi::new("/docs").config(config).into();
     let docs = docs.layer(middleware::map_response(as_documentation));
-    let (paths, _) = api().split_for_parts();
-    let paths = paths
+    let paths = API
+        .0
+        .clone()
         .route("/", get(page::index))
         .route("/page/{*name}", get(page::asset))
-        .route("/openapi.json", get(move || openapi_document(openapi.clone())))
-        .route("/openapi-3.0.json", get(move || openapi_document(openapi_3_0.clone())))
+        .route("/openapi.json", get(|| openapi_document(openapi_json())))
+        .route("/openapi-3.0.json", get(|| openapi_document(openapi_3_0_json())))
         .merge(docs)
         .fallback(not_found)
         .method_not_allowed_fallback(method_not_allowed);
@@ -218,7 +224,7 @@ async fn without_query(request: Request, next: Next) -> Response {
     }
 }
 
-async fn openapi_document(document: Bytes) -> Response {
+async fn openapi_document(document: &'static str) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], document).into_response()
 }
 

@@ -8,10 +8,11 @@ use nalgebra::{Point2, Rotation2, Unit, Vector2};
 use crate::contact::Part;
 use crate::drive::{Draft, Drive, DriveError};
 use crate::findings::{self, Finding};
+use crate::gaps::RAD_PER_ARCSEC;
 use crate::parts::{CarrierPart, PartsParameters, RingPart, ToothPart, WaveGeneratorPart};
-use crate::profile::{Polyline, SampledCurve, cam_half_lobe, cam_outline, direction, flank_curve};
-use crate::ring::FlankEnd;
+use crate::profile::{Polyline, SampledCurve, cam_half_lobe, cam_outline, direction};
 use crate::root::NotConverged;
+use crate::tooth_space::HalfSpace;
 use crate::violation::{Parameter, Violation};
 use crate::{SolveError, Stop};
 
@@ -84,6 +85,22 @@ impl Edge {
             Self::Curve { points, .. } => points.last().copied().unwrap_or_default(),
         }
     }
+
+    /// The same turned about the origin.
+    fn turned(&self, rotation: &Rotation2<f64>) -> Self {
+        let tangent = |tangent: &Unit<Vector2<f64>>| Unit::new_unchecked(rotation * tangent.into_inner());
+        match self {
+            Self::Line { start, end } => Self::Line { start: rotation * start, end: rotation * end },
+            Self::Arc { start, end, radius_mm, sweep_rad } => {
+                Self::Arc { start: rotation * start, end: rotation * end, radius_mm: *radius_mm, sweep_rad: *sweep_rad }
+            }
+            Self::Curve { points, start_tangent, end_tangent } => Self::Curve {
+                points: points.iter().map(|point| rotation * point).collect(),
+                start_tangent: tangent(start_tangent),
+                end_tangent: tangent(end_tangent),
+            },
+        }
+    }
 }
 
 /// A face: an outline with holes in it.
@@ -152,6 +169,7 @@ impl DrawingParameters {
 pub struct Drawing {
     drive: Drive,
     parts: Vec<MadePart>,
+    carrier_rotation_rad: f64,
     subject: Subject,
     parameters: DrawingParameters,
 }
@@ -181,6 +199,7 @@ impl Drawing {
         let Some(drive) = draft.drive().filter(|_| violations.is_empty()) else {
             return Err(DriveError::Impossible(violations));
         };
+        let carrier_rotation_rad = RAD_PER_ARCSEC * parts.modification.carrier_rotation_arcsec;
         let made = |part: &Part| {
             Ok(match part {
                 Part::Ring => MadePart::Ring(RingPart::new(&drive, parts)?),
@@ -189,8 +208,8 @@ impl Drawing {
                 Part::WaveGenerator => MadePart::WaveGenerator(WaveGeneratorPart::new(parts)),
             })
         };
-        let parts = subject.parts().iter().map(made).collect::<Result<_, NotConverged>>()?;
-        Ok(Self { drive, parts, subject, parameters: *parameters })
+        let parts = subject.parts().iter().map(made).collect::<Result<_, DriveError>>()?;
+        Ok(Self { drive, parts, carrier_rotation_rad, subject, parameters: *parameters })
     }
 
     /// The drive.
@@ -217,11 +236,11 @@ impl Drawing {
     ///
     /// # Errors
     /// [`SolveError::TooManyPoints`], [`SolveError::Stopped`], and [`SolveError::NotConverged`] from the geometry.
-    pub fn bodies(&self, stop: &impl Stop) -> Result<Vec<Body>, SolveError> {
+    pub fn bodies(&self, stop: &dyn Stop) -> Result<Vec<Body>, SolveError> {
         self.parts.iter().map(|part| self.body(part, stop)).collect()
     }
 
-    fn body(&self, part: &MadePart, stop: &impl Stop) -> Result<Body, SolveError> {
+    fn body(&self, part: &MadePart, stop: &dyn Stop) -> Result<Body, SolveError> {
         let (part, section) = match part {
             MadePart::Ring(ring) => (Part::Ring, self.ring_section(ring, stop)?),
             MadePart::WaveGenerator(cam) => (Part::WaveGenerator, self.cam_section(cam, stop)?),
@@ -231,52 +250,51 @@ impl Drawing {
         Ok(Body { part, section, placements: self.placements(part)? })
     }
 
-    /// The ring: a circle outside, inside its tooth spaces, from tip to tip each, with the lands of a bored tip between.
-    fn ring_section(&self, ring: &RingPart, stop: &impl Stop) -> Result<Section, SolveError> {
+    /// The ring: a circle outside, inside its tooth spaces, from tip to tip each, with the lands between that bored or turned flanks leave.
+    fn ring_section(&self, ring: &RingPart, stop: &dyn Stop) -> Result<Section, SolveError> {
         let teeth = self.drive.parameters().ring_teeth.unsigned_abs();
-        let SampledCurve { mut points, end_tangent } =
-            flank_curve(&ring.tooth.flank, &ring.tooth.limit, self.parameters.chord_tolerance_mm, stop)?;
-        self.require_points(2 * (points.len() as u64 - 1) * teeth)?;
+        let mut half = ring.space.half(self.parameters.chord_tolerance_mm, stop)?;
+        let chords: usize = half.pieces.iter().map(|piece| piece.points.len() - 1).sum();
+        self.require_points(2 * chords as u64 * teeth)?;
         let tip_rad = PI / teeth as f64;
-        let tip_radius_mm = ring.tooth.tip_radius_mm;
-        let is_bored = ring.tooth.limit.end == FlankEnd::Bore;
-        if !is_bored {
+        let tip = ring.space.tip();
+        if !tip.has_land
+            && let Some(end) = half.pieces.last_mut().and_then(|piece| piece.points.last_mut())
+        {
             // Both flanks end on the symmetry line; there the tip is a point, or regular.
-            points.pop();
-            points.push(Point2::from(tip_radius_mm * Vector2::new(tip_rad.cos(), tip_rad.sin())));
+            *end = Point2::from(tip.radius_mm * Vector2::new(tip_rad.cos(), tip_rad.sin()));
         }
-        let space = points.iter().rev().map(|point| Point2::new(point.x, 0.0 - point.y));
-        let space: Polyline = space.chain(points.iter().skip(1).copied()).collect();
-        let land_rad = match (is_bored, points.last()) {
-            (true, Some(end)) => 2.0 * (tip_rad - end.y.atan2(end.x)),
+        let land_rad = match half.pieces.last().and_then(|piece| piece.points.last()) {
+            Some(end) if tip.has_land => 2.0 * (tip_rad - end.y.atan2(end.x)),
             _ => 0.0,
         };
+        let space = tooth_space(half);
+        let start = space.first().map(Edge::start).unwrap_or_default();
         let turned = |copy: u64| Rotation2::new(2.0 * PI * ((copy % teeth) as f64 / teeth as f64));
         let mut edges = Vec::new();
         for copy in 0..teeth {
-            let rotation = turned(copy);
-            let mut curve: Polyline = space.iter().map(|point| rotation * point).collect();
-            let next = turned(copy + 1) * space[0];
-            let tangents = [Vector2::new(-end_tangent.x, end_tangent.y), end_tangent.into_inner()];
-            let [start_tangent, end_tangent] = tangents.map(|tangent| Unit::new_unchecked(rotation * tangent));
-            if is_bored {
-                let start = curve.last().copied().unwrap_or_default();
-                edges.push(Edge::Curve { points: curve, start_tangent, end_tangent });
-                edges.push(Edge::Arc { start, end: next, radius_mm: tip_radius_mm, sweep_rad: land_rad });
-            } else {
-                curve.pop();
-                curve.push(next);
-                edges.push(Edge::Curve { points: curve, start_tangent, end_tangent });
+            let next = turned(copy + 1) * start;
+            edges.extend(space.iter().map(|edge| edge.turned(&turned(copy))));
+            match edges.last_mut() {
+                Some(last) if tip.has_land => {
+                    let start = last.end();
+                    edges.push(Edge::Arc { start, end: next, radius_mm: tip.radius_mm, sweep_rad: land_rad });
+                }
+                Some(Edge::Curve { points, .. }) => {
+                    points.pop();
+                    points.push(next);
+                }
+                _ => {}
             }
         }
         Ok(Section { outer: Outline::Circle { radius_mm: ring.outer_radius_mm }, holes: vec![Outline::Edges(edges)] })
     }
 
     /// The wave generator: a curve from each lobe to each valley and on.
-    fn cam_section(&self, cam: &WaveGeneratorPart, stop: &impl Stop) -> Result<Section, SolveError> {
+    fn cam_section(&self, cam: &WaveGeneratorPart, stop: &dyn Stop) -> Result<Section, SolveError> {
         let (locus, lobes) = (self.drive.flank().locus(), self.drive.lobes());
         let SampledCurve { points, .. } =
-            cam_half_lobe(locus, cam.clearance_mm, self.parameters.chord_tolerance_mm, stop)?;
+            cam_half_lobe(locus, cam.set_back_mm, self.parameters.chord_tolerance_mm, stop)?;
         let half = points.len() - 1;
         self.require_points(u64::from(2 * lobes) * half as u64)?;
         let whole = cam_outline(&points, lobes);
@@ -315,11 +333,16 @@ impl Drawing {
         let turned =
             |turns: f64| Placement { origin_mm: Point2::origin(), rotation_rad: 2.0 * PI * turns.rem_euclid(1.0) };
         let carrier_turns = input_turns / self.drive.transmission_ratio();
+        // A carrier that is turned away from the flank under load stands a little further on than its teeth.
+        let turned_away = match self.subject {
+            Subject::Part(_) => 0.0,
+            Subject::Assembly => self.drive.sense() * self.carrier_rotation_rad / (2.0 * PI),
+        };
         let slots = (0..p.installed).map(|slot| slot as f64 / p.installed as f64);
         Ok(match (part, self.subject) {
             (Part::Ring, _) | (Part::Teeth, Subject::Part(_)) => vec![Placement::default()],
             (Part::WaveGenerator, _) => vec![turned(input_turns)],
-            (Part::Carrier, _) => slots.map(|slot| turned(slot + carrier_turns)).collect(),
+            (Part::Carrier, _) => slots.map(|slot| turned(slot + carrier_turns + turned_away)).collect(),
             (Part::Teeth, Subject::Assembly) => {
                 let from_lobe = input_turns * (p.ring_teeth as f64 / p.teeth as f64);
                 let placed = slots.map(|slot| {
@@ -339,6 +362,49 @@ impl Drawing {
         let limit = self.parameters.max_points;
         if points > limit { Err(SolveError::TooManyPoints { points, limit }) } else { Ok(()) }
     }
+}
+
+/// A tooth space of the ring, its middle along x, from tip to tip.
+fn tooth_space(half: HalfSpace) -> Vec<Edge> {
+    let HalfSpace { root_arc_rad, is_smooth_at_root, mut pieces } = half;
+    if let Some(first) = pieces.first_mut().and_then(|piece| piece.points.first_mut())
+        && root_arc_rad == 0.0
+    {
+        // Both flanks start on the middle of the space.
+        *first = Point2::new(first.coords.norm(), 0.0);
+    }
+    let image = |point: &Point2<f64>| Point2::new(point.x, 0.0 - point.y);
+    let image_tangent = |tangent: Unit<Vector2<f64>>| Unit::new_unchecked(Vector2::new(-tangent.x, tangent.y));
+    let mut edges: Vec<_> = pieces
+        .iter()
+        .rev()
+        .map(|SampledCurve { points, start_tangent, end_tangent }| Edge::Curve {
+            points: points.iter().rev().map(image).collect(),
+            start_tangent: image_tangent(*end_tangent),
+            end_tangent: image_tangent(*start_tangent),
+        })
+        .collect();
+    let root = pieces.first().and_then(|piece| piece.points.first()).copied().unwrap_or_default();
+    if root_arc_rad > 0.0 {
+        edges.push(Edge::Arc {
+            start: image(&root),
+            end: root,
+            radius_mm: root.coords.norm(),
+            sweep_rad: 2.0 * root_arc_rad,
+        });
+    }
+    for SampledCurve { points, start_tangent, end_tangent } in pieces {
+        match edges.last_mut() {
+            Some(Edge::Curve { points: before, end_tangent: end, .. })
+                if is_smooth_at_root && before.last() == Some(&root) && points.first() == Some(&root) =>
+            {
+                before.extend(&points[1..]);
+                *end = end_tangent;
+            }
+            _ => edges.push(Edge::Curve { points, start_tangent, end_tangent }),
+        }
+    }
+    edges
 }
 
 /// A tooth: a circle, or, with flats on the walls of its slot, which runs along x, two arcs joined by lines.

@@ -354,9 +354,9 @@ pub fn of_friction(mechanism: &Mechanism, friction: &Friction, loss_ratio: f64) 
 
 /// The findings about the ring as it is made (docs/theory.md section 8).
 pub(crate) fn of_ring(drive: &Drive, ring: &RingPart) -> Vec<Finding> {
-    let flank = &ring.tooth.flank;
-    let mut findings = thin_wall(drive, Wall::RingRim, ring.outer_radius_mm - flank.root_radius_mm());
-    if ring.tooth.limit.end == FlankEnd::Undercut
+    let flank = ring.space.set_back_flank();
+    let mut findings = thin_wall(drive, Wall::RingRim, ring.outer_radius_mm - ring.space.root_radius_mm());
+    if ring.space.is_undercut_by_distance()
         && !drive.flank().is_undercut()
         && let Some(critical_distance_mm) = flank.critical_distance_mm()
     {
@@ -367,7 +367,7 @@ pub(crate) fn of_ring(drive: &Drive, ring: &RingPart) -> Vec<Finding> {
 
 /// The findings about the wave generator as it is made; a solid cam has no wall.
 pub(crate) fn of_wave_generator(drive: &Drive, cam: &WaveGeneratorPart) -> Vec<Finding> {
-    let wall_mm = |bore_mm: f64| drive.flank().locus().cam_inner_radius_mm() - cam.clearance_mm - bore_mm;
+    let wall_mm = |bore_mm: f64| drive.flank().locus().cam_inner_radius_mm() - cam.set_back_mm - bore_mm;
     cam.bore_radius_mm.map_or_else(Vec::new, |bore_mm| thin_wall(drive, Wall::Cam, wall_mm(bore_mm)))
 }
 

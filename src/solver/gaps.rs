@@ -10,8 +10,8 @@ use crate::mesh::{Mesh, Place, greatest_common_divisor};
 use crate::ring::FlankPoint;
 use crate::violation::{Listed, Modified, Parameter, Violation};
 
-const MM_PER_UM: f64 = 1e-3;
-const RAD_PER_ARCSEC: f64 = PI / 648_000.0;
+pub(crate) const MM_PER_UM: f64 = 1e-3;
+pub(crate) const RAD_PER_ARCSEC: f64 = PI / 648_000.0;
 
 /// Parts made otherwise than conjugate on purpose, all teeth alike. Angles are turned away from the flank under load.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -208,6 +208,24 @@ impl Modification {
             ]);
         }
         parameters
+    }
+
+    /// The largest of the numbers that shape the ring, each in its unit.
+    pub(crate) fn greatest_of_ring(&self) -> (Modified, f64) {
+        let shapes_ring = |modified: &Modified| {
+            matches!(
+                modified,
+                Modified::RingPathShift
+                    | Modified::RingProfileShift
+                    | Modified::RingRotation
+                    | Modified::TipReliefAmount
+            )
+        };
+        self.parameters()
+            .into_iter()
+            .filter(|(modified, _)| shapes_ring(modified))
+            .max_by(|(_, one), (_, other)| one.abs().total_cmp(&other.abs()))
+            .unwrap_or((Modified::RingEquidistant, self.ring_equidistant_um))
     }
 
     /// That its tip relief starts where a drive has no flank; one that starts where no position is has another fault.

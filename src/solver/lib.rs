@@ -51,6 +51,7 @@ pub mod root;
 pub mod springs;
 pub mod sweep;
 pub mod tooth;
+mod tooth_space;
 pub mod violation;
 
 pub use cam::WaveGenerator;
@@ -183,6 +184,13 @@ impl SolveError {
 pub trait Stop {
     /// Whether to stop.
     fn stopped(&self) -> bool;
+}
+
+/// A reference to what is asked: with `dyn` a sweep is compiled once, in this crate, however it is stopped.
+impl<S: Stop + ?Sized> Stop for &S {
+    fn stopped(&self) -> bool {
+        (**self).stopped()
+    }
 }
 
 /// Never stops.

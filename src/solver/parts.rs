@@ -2,15 +2,16 @@
 //!
 //! A part's clearance sets its working surface back into the part, along the surface's normal: the ring's flank outward, the cam
 //! inward, the slot's walls apart, the tooth's radius down. The gap at a contact is the sum of its two parts' clearances.
-//! Whatever the clearances, the teeth's centres are drawn where they stand without any.
+//! A modification shapes the same surfaces, and may set them forward too. Whatever the gaps, the teeth's centres are drawn where they
+//! stand without any.
 
 use std::f64::consts::PI;
 
 use crate::contact::Part;
-use crate::drive::{Draft, Drive};
-use crate::ring::RingTooth;
-use crate::root::NotConverged;
-use crate::violation::{Misfit, Parameter, Violation};
+use crate::drive::{Draft, Drive, DriveError};
+use crate::gaps::{MM_PER_UM, Modification};
+use crate::tooth_space::ToothSpace;
+use crate::violation::{Misfit, Modified, Parameter, Violation};
 
 /// What the mechanics leave free. A radius that is `None` takes its default.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -31,6 +32,8 @@ pub struct PartsParameters {
     pub ring_clearance_um: f64,
     /// How far each wall of a slot is set back.
     pub carrier_clearance_um: f64,
+    /// How parts are made otherwise than conjugate.
+    pub modification: Modification,
 }
 
 /// Outer over root radius of a ring that none is given for: a rim as thick as a fifth of the radius is rigid beside what it holds.
@@ -43,13 +46,15 @@ pub const CARRIER_PLAY: f64 = 0.1;
 /// within a hundredth of a micrometre of their curves, and one that they pass is invalid to CAD kernels.
 pub const LEAST_WALL: f64 = 1e-6;
 
-const MM_PER_UM: f64 = 1e-3;
-
 impl PartsParameters {
     /// Every reason why a part cannot be made: values out of their ranges, and whatever does not fit among those of part and drive
     /// that are possible.
     pub fn violations(&self, part: Part, draft: &Draft) -> Vec<Violation> {
         let mut checks = Checks(Vec::new());
+        let of_part = self.modification.parameters().into_iter().filter(|(modified, _)| modified.part() == part);
+        for (modified, value) in of_part {
+            checks.in_range(Parameter::Modification(modified), value);
+        }
         match part {
             Part::Ring => self.check_ring(draft, &mut checks),
             Part::Carrier => self.check_carrier(draft, &mut checks),
@@ -67,6 +72,9 @@ impl PartsParameters {
         {
             checks.above(Misfit::RingWithoutRim, outer_mm, (a + (r + (r + clearance_mm))) * (1.0 + LEAST_WALL));
         }
+        if let Some(drive) = draft.drive() {
+            checks.0.extend(self.modification.violation_in(&drive));
+        }
     }
 
     fn check_wave_generator(&self, draft: &Draft, checks: &mut Checks) {
@@ -74,10 +82,23 @@ impl PartsParameters {
         let bore_mm = checks.radius_mm(Parameter::BoreRadius, self.bore_radius_mm, None);
         let Some(clearance_mm) = clearance_mm else { return };
         if let Some(greatest_mm) = draft.greatest_set_back_mm {
-            checks.below(Misfit::ClearanceTakesCam, self.wave_generator_clearance_um, greatest_mm / MM_PER_UM);
+            let greatest_um = greatest_mm / MM_PER_UM;
+            checks.below(Misfit::ClearanceTakesCam, self.wave_generator_clearance_um, greatest_um);
+            if self.wave_generator_clearance_um < greatest_um {
+                let (modified, value) =
+                    (Modified::WaveGeneratorEquidistant, self.modification.wave_generator_equidistant_um);
+                let left_um = greatest_um - self.wave_generator_clearance_um;
+                checks.modification(value < left_um, modified, value, left_um);
+                // Set forward it stays inside the path of the teeth's centres, up to which its parallel curves are regular.
+                if let Some(r) = draft.tooth_radius_mm {
+                    let least_um = -r / MM_PER_UM - self.wave_generator_clearance_um;
+                    checks.modification(value > least_um, modified, value, least_um);
+                }
+            }
         }
-        // Where the clearance takes all of the cam, no bore is small enough.
-        let cam_mm = draft.cam_inner_mm.map(|inner_mm| inner_mm - clearance_mm).filter(|&cam_mm| cam_mm > 0.0);
+        // Where nothing of the cam is left, no bore is small enough.
+        let set_back_mm = clearance_mm + MM_PER_UM * self.modification.wave_generator_equidistant_um;
+        let cam_mm = draft.cam_inner_mm.map(|inner_mm| inner_mm - set_back_mm).filter(|&cam_mm| cam_mm > 0.0);
         if let (Some(bore_mm), Some(cam_mm)) = (bore_mm, cam_mm) {
             checks.below(Misfit::BoreTakesCam, bore_mm, cam_mm * (1.0 - LEAST_WALL));
         }
@@ -92,7 +113,13 @@ impl PartsParameters {
         let outer_mm = annulus.map(|annulus| annulus.carrier_outer_mm());
         let outer_mm = checks.radius_mm(Parameter::CarrierOuterRadius, self.carrier_outer_radius_mm, outer_mm);
         if let (Some(inner_mm), Some(a)) = (inner_mm, draft.cam_outer_mm) {
-            checks.above(Misfit::CarrierMeetsCam, inner_mm, a);
+            let set_forward_mm = MM_PER_UM
+                * (-self.modification.wave_generator_equidistant_um - self.wave_generator_clearance_um).max(0.0);
+            checks.above(Misfit::CarrierMeetsCam, inner_mm, a + set_forward_mm);
+        }
+        if let (Some(clearance_mm), Some(half_width_mm)) = (clearance_mm, draft.slot_half_width_mm) {
+            let (value, least_um) = (self.modification.slot_wall_um, -(half_width_mm + clearance_mm) / MM_PER_UM);
+            checks.modification(value > least_um, Modified::SlotWall, value, least_um);
         }
         let Some(outer_mm) = outer_mm else { return };
         if let Some(annulus) = annulus {
@@ -104,6 +131,7 @@ impl PartsParameters {
         if let (Some(clearance_mm), Some(wall_mm), Some(installed)) =
             (clearance_mm, draft.slot_half_width_mm, draft.installed)
         {
+            let clearance_mm = clearance_mm + MM_PER_UM * self.modification.slot_wall_um;
             let half_spacing_rad = PI / installed as f64;
             checks.above(Misfit::SlotsTakeCarrier, outer_mm, (wall_mm + clearance_mm) / half_spacing_rad.sin());
         }
@@ -113,7 +141,10 @@ impl PartsParameters {
         let clearance_mm = checks.clearance_mm(Part::Teeth, self.teeth_clearance_um);
         // Between flats a tooth is thinnest.
         if let (Some(_), Some(half_width_mm)) = (clearance_mm, draft.slot_half_width_mm) {
-            checks.below(Misfit::ClearanceTakesTooth, self.teeth_clearance_um, half_width_mm / MM_PER_UM);
+            let half_width_um = half_width_mm / MM_PER_UM;
+            checks.below(Misfit::ClearanceTakesTooth, self.teeth_clearance_um, half_width_um);
+            let (value, left_um) = (self.modification.tooth_radius_um, half_width_um - self.teeth_clearance_um);
+            checks.modification(value < left_um || left_um <= 0.0, Modified::ToothRadius, value, left_um);
         }
     }
 }
@@ -148,14 +179,14 @@ impl Annulus {
 /// The ring as it is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RingPart {
-    pub(crate) tooth: RingTooth,
+    pub(crate) space: ToothSpace,
     pub(crate) outer_radius_mm: f64,
 }
 
 /// The wave generator as it is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WaveGeneratorPart {
-    pub(crate) clearance_mm: f64,
+    pub(crate) set_back_mm: f64,
     pub(crate) bore_radius_mm: Option<f64>,
 }
 
@@ -178,17 +209,24 @@ pub struct ToothPart {
 // The parts of [`PartsParameters`] that have no violation for the drive.
 
 impl RingPart {
-    pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Result<Self, NotConverged> {
-        let flank = drive.flank().set_back_by(MM_PER_UM * parameters.ring_clearance_um);
-        let outer_radius_mm = parameters.ring_outer_radius_mm.unwrap_or(RIM * flank.root_radius_mm());
-        Ok(Self { tooth: RingTooth::new(flank, drive.parameters().tip_radius_mm)?, outer_radius_mm })
+    pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Result<Self, DriveError> {
+        let space = ToothSpace::new(drive, MM_PER_UM * parameters.ring_clearance_um, &parameters.modification)?;
+        let root_radius_mm = space.root_radius_mm();
+        let outer_radius_mm = parameters.ring_outer_radius_mm.unwrap_or(RIM * root_radius_mm);
+        let limit = root_radius_mm * (1.0 + LEAST_WALL);
+        if outer_radius_mm > limit {
+            return Ok(Self { space, outer_radius_mm });
+        }
+        let misfit = Misfit::RingWithoutRim;
+        Err(DriveError::Impossible(vec![Violation::PartDoesNotFit { misfit, value: outer_radius_mm, limit }]))
     }
 }
 
 impl WaveGeneratorPart {
     pub(crate) fn new(parameters: &PartsParameters) -> Self {
-        let clearance_mm = MM_PER_UM * parameters.wave_generator_clearance_um;
-        Self { clearance_mm, bore_radius_mm: parameters.bore_radius_mm }
+        let set_back_um =
+            parameters.wave_generator_clearance_um + parameters.modification.wave_generator_equidistant_um;
+        Self { set_back_mm: MM_PER_UM * set_back_um, bore_radius_mm: parameters.bore_radius_mm }
     }
 }
 
@@ -198,7 +236,8 @@ impl CarrierPart {
         Self {
             inner_radius_mm: parameters.carrier_inner_radius_mm.unwrap_or(annulus.carrier_inner_mm()),
             outer_radius_mm: parameters.carrier_outer_radius_mm.unwrap_or(annulus.carrier_outer_mm()),
-            slot_half_width_mm: drive.slot_half_width_mm() + MM_PER_UM * parameters.carrier_clearance_um,
+            slot_half_width_mm: drive.slot_half_width_mm()
+                + MM_PER_UM * (parameters.carrier_clearance_um + parameters.modification.slot_wall_um),
         }
     }
 }
@@ -216,10 +255,10 @@ impl CarrierPart {
 
 impl ToothPart {
     pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Self {
-        let clearance_mm = MM_PER_UM * parameters.teeth_clearance_um;
+        let thinner_mm = MM_PER_UM * (parameters.teeth_clearance_um + parameters.modification.tooth_radius_um);
         Self {
-            radius_mm: drive.parameters().tooth_radius_mm - clearance_mm,
-            half_width_mm: drive.slot_half_width_mm() - clearance_mm,
+            radius_mm: drive.parameters().tooth_radius_mm - thinner_mm,
+            half_width_mm: drive.slot_half_width_mm() - thinner_mm,
         }
     }
 }
@@ -243,6 +282,13 @@ impl Checks {
         match given_mm {
             Some(given_mm) => self.in_range(parameter, given_mm),
             None => default_mm,
+        }
+    }
+
+    /// That a modification leaves something of its part.
+    fn modification(&mut self, holds: bool, modified: Modified, value: f64, limit: f64) {
+        if !holds {
+            self.0.push(Violation::ModificationLeavesNothing { modified, value, limit: Some(limit) });
         }
     }
 

@@ -48,14 +48,15 @@ pub struct Profiles {
 
 /// A point of a curve with its tangent.
 #[derive(Debug, Clone, Copy)]
-struct CurvePoint {
-    point: Point2<f64>,
-    tangent: Unit<Vector2<f64>>,
+pub(crate) struct CurvePoint {
+    pub(crate) point: Point2<f64>,
+    pub(crate) tangent: Unit<Vector2<f64>>,
 }
 
-/// A sampled curve with its direction at the end.
+/// A sampled curve with its directions at both ends.
 pub(crate) struct SampledCurve {
     pub(crate) points: Polyline,
+    pub(crate) start_tangent: Unit<Vector2<f64>>,
     pub(crate) end_tangent: Unit<Vector2<f64>>,
 }
 
@@ -69,7 +70,7 @@ const MAX_DEPTH: u32 = 40;
 ///
 /// # Errors
 /// [`SolveError::TooManyPoints`], [`SolveError::Stopped`], and [`SolveError::NotConverged`] from the geometry.
-pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &impl Stop) -> Result<Profiles, SolveError> {
+pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &dyn Stop) -> Result<Profiles, SolveError> {
     let ring_teeth = drive.parameters().ring_teeth.unsigned_abs();
     let flank = ring_half_tooth(drive, parameters.chord_tolerance_mm, stop)?;
     let path = path_half_tooth(drive, parameters.chord_tolerance_mm, stop)?;
@@ -92,7 +93,7 @@ pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &impl Stop)
 }
 
 /// The ring from the middle of its tooth space to its tooth's symmetry line, land of a bored tip included.
-fn ring_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &impl Stop) -> Result<Polyline, SolveError> {
+fn ring_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &dyn Stop) -> Result<Polyline, SolveError> {
     let mut points = flank_curve(drive.flank(), drive.flank_limit(), tolerance_mm, stop)?.points;
     let tip_rad = PI / drive.parameters().ring_teeth as f64;
     match drive.flank_limit().end {
@@ -122,10 +123,10 @@ pub(crate) fn flank_curve(
     flank: &RingFlank,
     limit: &FlankLimit,
     tolerance_mm: f64,
-    stop: &impl Stop,
+    stop: &dyn Stop,
 ) -> Result<SampledCurve, SolveError> {
     let lobes = flank.locus().lobes();
-    sampled(limit.position, lobes, tolerance_mm, stop, |position| {
+    sampled(Position::lobe(lobes), limit.position, lobes, tolerance_mm, stop, |position| {
         let tooth = flank.locus().at(position)?;
         let point = flank.at(&tooth);
         Ok(CurvePoint { point: flank.point(&tooth, &point), tangent: flank.tangent(&tooth, &point) })
@@ -133,10 +134,10 @@ pub(crate) fn flank_curve(
 }
 
 /// The path of a tooth's centre from the middle of the tooth space to the symmetry line of the ring's tooth.
-fn path_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &impl Stop) -> Result<Polyline, SolveError> {
+fn path_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &dyn Stop) -> Result<Polyline, SolveError> {
     let flank = drive.flank();
     let lobes = drive.lobes();
-    let mut points = sampled(Position::valley(lobes), lobes, tolerance_mm, stop, |position| {
+    let mut points = sampled(Position::lobe(lobes), Position::valley(lobes), lobes, tolerance_mm, stop, |position| {
         let tooth = flank.locus().at(position)?;
         let point = flank.at(&tooth);
         let angle_rad = position.from_lobe_rad / flank.teeth_per_wave();
@@ -155,10 +156,10 @@ pub(crate) fn cam_half_lobe(
     locus: &Locus,
     clearance_mm: f64,
     tolerance_mm: f64,
-    stop: &impl Stop,
+    stop: &dyn Stop,
 ) -> Result<SampledCurve, SolveError> {
     let lobes = locus.lobes();
-    let mut curve = sampled(Position::valley(lobes), lobes, tolerance_mm, stop, |place| {
+    let mut curve = sampled(Position::lobe(lobes), Position::valley(lobes), lobes, tolerance_mm, stop, |place| {
         let CamPoint { point, tangent } = locus.cam_outline(clearance_mm, place)?;
         Ok(CurvePoint { point, tangent })
     })?;
@@ -213,12 +214,13 @@ fn on_circle(radius_mm: f64, angle_rad: f64) -> Point2<f64> {
     Point2::new(radius_mm * cos, radius_mm * sin)
 }
 
-/// The curve over positions from the root to `end`, both included, by halving pieces until each chord is true.
-fn sampled(
+/// The curve over positions from `start` to `end`, both included, by halving pieces until each chord is true.
+pub(crate) fn sampled(
+    start: Position,
     end: Position,
     lobes: u32,
     tolerance_mm: f64,
-    stop: &impl Stop,
+    stop: &dyn Stop,
     curve: impl Fn(Position) -> Result<CurvePoint, NotConverged>,
 ) -> Result<SampledCurve, SolveError> {
     // Measured from the valley, where cusps are; beyond the middle a `Position` is as good from the other side.
@@ -232,11 +234,12 @@ fn sampled(
             curve(Position::from_lobe(half_rad - x, lobes))
         }
     };
-    let span = half_rad - end.from_valley_rad;
-    let mut from = (half_rad, curve(Position::lobe(lobes))?);
+    let span = start.from_valley_rad - end.from_valley_rad;
+    let mut from = (start.from_valley_rad, curve(start)?);
+    let start_tangent = from.1.tangent;
     let mut points = vec![from.1.point];
     for piece in 1..=PIECES {
-        let x = half_rad - span * (f64::from(piece) / f64::from(PIECES));
+        let x = start.from_valley_rad - span * (f64::from(piece) / f64::from(PIECES));
         let mut pending = vec![(x.max(end.from_valley_rad), at(x)?, 0)];
         while let Some(to) = pending.pop() {
             let (x, to_point, depth) = to;
@@ -253,7 +256,7 @@ fn sampled(
             }
         }
     }
-    Ok(SampledCurve { points, end_tangent: from.1.tangent })
+    Ok(SampledCurve { points, start_tangent, end_tangent: from.1.tangent })
 }
 
 /// An upper bound of the distance between an arc and its chord.

@@ -149,6 +149,24 @@ pub enum Modified {
     TipReliefPower,
 }
 
+impl Modified {
+    /// The part that it changes.
+    pub const fn part(self) -> Part {
+        match self {
+            Self::RingEquidistant
+            | Self::RingPathShift
+            | Self::RingProfileShift
+            | Self::RingRotation
+            | Self::TipReliefAmount
+            | Self::TipReliefStart
+            | Self::TipReliefPower => Part::Ring,
+            Self::WaveGeneratorEquidistant => Part::WaveGenerator,
+            Self::SlotWall | Self::CarrierRotation => Part::Carrier,
+            Self::ToothRadius => Part::Teeth,
+        }
+    }
+}
+
 /// What a list of the deviations is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Listed {
@@ -438,6 +456,15 @@ pub enum Violation {
         /// Where the flank ends.
         engagement_start_deg: f64,
     },
+    /// A modification that leaves nothing of a part's outline.
+    ModificationLeavesNothing {
+        /// Which of its numbers.
+        modified: Modified,
+        /// Its value.
+        value: f64,
+        /// What it has to stay away from, where that is one number.
+        limit: Option<f64>,
+    },
     /// A list of deviations that has neither no entry nor one for each item.
     DeviationCount {
         /// Which list.
@@ -571,6 +598,13 @@ impl std::fmt::Display for Violation {
                 f,
                 "a tip relief from {start_deg:?} deg on relieves nothing: the flank ends at {engagement_start_deg:?} deg"
             ),
+            Self::ModificationLeavesNothing { value, limit, .. } => {
+                write!(f, "modified by {value:?} a part has no outline left that could be made: choose ")?;
+                match limit {
+                    Some(limit) => write!(f, "a value between {limit:?} and zero"),
+                    None => write!(f, "a value nearer to zero"),
+                }
+            }
             Self::DeviationCount { count, items, .. } => {
                 write!(f, "{count} entries for {items} items: give one for each, or none")
             }

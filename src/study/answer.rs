@@ -9,6 +9,7 @@ use utoipa::ToSchema;
 use crate::map::MapAnswer;
 use crate::search::SearchAnswer;
 use crate::sensitivity::SensitivityAnswer;
+use crate::table::Table;
 use crate::tolerance::ToleranceAnswer;
 
 /// What a study comes to, as far as it has come.
@@ -26,7 +27,8 @@ pub enum StudyAnswer {
 }
 
 impl Forms for StudyAnswer {
-    const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Csv, Self::write_csv)];
+    const FORMS: &'static [(Format, Form<Self>)] =
+        &[(Format::Csv, Self::write_csv), (Format::Parquet, Self::write_parquet)];
 
     fn expected_bytes(&self) -> usize {
         match self {
@@ -38,12 +40,20 @@ impl Forms for StudyAnswer {
 }
 
 impl StudyAnswer {
-    fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
+    fn table(&self) -> Table<'_> {
         match self {
-            Self::Map(map) => map.write_csv(writer),
-            Self::Search(search) => search.write_csv(writer),
-            Self::Sensitivity(sensitivity) => sensitivity.write_csv(writer),
-            Self::Tolerance(tolerance) => tolerance.write_csv(writer),
+            Self::Map(map) => map.table(),
+            Self::Search(search) => search.table(),
+            Self::Sensitivity(sensitivity) => sensitivity.table(),
+            Self::Tolerance(tolerance) => tolerance.table(),
         }
+    }
+
+    fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
+        self.table().write_csv(writer)
+    }
+
+    fn write_parquet(&self, writer: &mut dyn Write) -> io::Result<()> {
+        self.table().write_parquet(writer)
     }
 }

@@ -62,7 +62,7 @@ impl Evaluator {
     }
 
     /// What becomes of a document; a panic is an outcome too.
-    pub(crate) fn outcome(&self, document: &Tree, stop: &impl Stop) -> Result<Outcome, Stopped> {
+    pub(crate) fn outcome(&self, document: &Tree, stop: &dyn Stop) -> Result<Outcome, Stopped> {
         caught(|| match self.answer(document, stop) {
             Ok(values) => Ok(Outcome::Answered(values)),
             Err(NoAnswer { code: NoAnswerCode::Stopped, .. }) => Err(Stopped),
@@ -70,7 +70,7 @@ impl Evaluator {
         })
     }
 
-    fn answer(&self, document: &Tree, stop: &impl Stop) -> Result<Vec<f64>, NoAnswer> {
+    fn answer(&self, document: &Tree, stop: &dyn Stop) -> Result<Vec<f64>, NoAnswer> {
         let design = document.read::<Design>()?.normalised();
         if self.needs == Needs::Drive {
             let drive = CoincidenceDegree.check(&design, &self.limits)?;

@@ -18,6 +18,7 @@ mod rows;
 mod search;
 mod sensitivity;
 mod study;
+mod table;
 mod tolerance;
 mod variant;
 
@@ -32,4 +33,6 @@ pub use rows::{GapAnswer, ImpossibleAnswer, PossibleAnswer, ReasonAnswer, RowsPa
 pub use search::{FoundAnswer, FreeAnswer, IslandPart, LimitAnswer, RelaxationAnswer, ScanAnswer, SearchAnswer};
 pub use sensitivity::{SensitivityAnswer, SensitivityOfQuantity, SensitivityToInput};
 pub use study::{Gathered, Limits, Part, Study, Work};
-pub use tolerance::{ContributorAnswer, ToleranceAnswer, ToleranceLimitAnswer, ToleranceQuantityAnswer};
+pub use tolerance::{
+    ContributorAnswer, HistogramAnswer, ToleranceAnswer, ToleranceLimitAnswer, ToleranceQuantityAnswer,
+};

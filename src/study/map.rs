@@ -1,6 +1,6 @@
 //! A map: quantities over a grid.
 
-use std::io::{self, Write};
+use std::iter;
 
 use serde::Serialize;
 use toothwave_calculation::field::FieldCode;
@@ -12,8 +12,8 @@ use crate::ask::{beyond, escaped, fault};
 use crate::document::{ChoiceDocument, MapDocument, OverDocument};
 use crate::evaluate::Evaluator;
 use crate::rows::{GapAnswer, ImpossibleAnswer, PossibleAnswer, ReasonAnswer, Rows, RowsPart};
+use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Domain, Template, Value, Variable};
-use toothwave_calculation::forms::csv_error;
 
 /// The grid of a map: the last axis is the fastest.
 #[derive(Debug, Clone)]
@@ -227,37 +227,45 @@ impl MapAnswer {
         }
     }
 
-    /// A line a variant: its number, its place on each axis, its quantities or the code of its reason.
-    pub(crate) fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
-        let mut csv = csv::Writer::from_writer(writer);
-        let pointers = self.over.iter().map(|axis| axis.pointer.as_str());
-        let names = self.quantities.iter().copied();
-        let head: Vec<_> = std::iter::once("variant").chain(pointers).chain(names).chain(["reason"]).collect();
-        csv.write_record(&head).map_err(csv_error)?;
+    /// A row a variant: its number, its place on each axis, its quantities or the code of its reason.
+    pub(crate) fn table(&self) -> Table<'_> {
+        let axis = |axis: &AxisAnswer| {
+            let kind = if axis.values.is_some() { Content::Number } else { Content::Word };
+            Column::new(axis.pointer.as_str(), kind)
+        };
+        let mut columns = vec![Column::new("variant", Content::Count)];
+        columns.extend(self.over.iter().map(axis));
+        columns.extend(self.quantities.iter().map(|name| Column::new(*name, Content::Number)));
+        columns.push(Column::new("reason", Content::Word));
         let (mut possible, mut impossible) = (0, 0);
-        loop {
+        let rows = iter::from_fn(move || {
             let (answered, refused) = (self.possible.variant.get(possible), self.impossible.variant.get(impossible));
             let is_answered = match (answered, refused) {
-                (None, None) => return csv.flush(),
+                (None, None) => return None,
                 (Some(answered), Some(refused)) => answered < refused,
                 (answered, None) => answered.is_some(),
                 (None, Some(_)) => false,
             };
             let variant = if is_answered { answered } else { refused }.copied().unwrap_or_default();
-            let mut record = vec![variant.to_string()];
-            record.extend(self.places(variant));
-            for name in &self.quantities {
+            let mut row = vec![Cell::Count(variant)];
+            row.extend(self.places(variant));
+            row.extend(self.quantities.iter().map(|name| {
                 let value = is_answered.then(|| self.possible.quantities.get(name)?.get(possible)).flatten();
-                record.push(value.map_or_else(String::new, |value| format!("{value:?}")));
-            }
+                Cell::from(value.copied())
+            }));
             let reason = (!is_answered).then(|| self.reasons.get(*self.impossible.reason.get(impossible)? as usize));
-            record.push(reason.flatten().map_or_else(String::new, |reason| reason.code.clone()));
-            csv.write_record(&record).map_err(csv_error)?;
-            if is_answered { possible += 1 } else { impossible += 1 }
-        }
+            row.push(reason.flatten().map_or(Cell::Empty, |reason| Cell::Word(reason.code.clone())));
+            if is_answered {
+                possible += 1
+            } else {
+                impossible += 1
+            }
+            Some(row)
+        });
+        Table { columns, rows: Box::new(rows) }
     }
 
-    fn places(&self, mut variant: u64) -> Vec<String> {
+    fn places(&self, mut variant: u64) -> Vec<Cell> {
         let mut places: Vec<_> = self
             .over
             .iter()
@@ -266,10 +274,9 @@ impl MapAnswer {
                 let count = axis.values.as_ref().map_or(0, Vec::len) + axis.choices.as_ref().map_or(0, Vec::len);
                 let index = usize::try_from(variant % count.max(1) as u64).unwrap_or_default();
                 variant /= count.max(1) as u64;
-                let number =
-                    axis.values.as_ref().and_then(|values| values.get(index)).map(|value| format!("{value:?}"));
-                let word = axis.choices.as_ref().and_then(|choices| choices.get(index)).cloned();
-                number.or(word).unwrap_or_default()
+                let number = axis.values.as_ref().and_then(|values| values.get(index).copied()).map(Cell::Number);
+                let word = axis.choices.as_ref().and_then(|choices| choices.get(index).cloned()).map(Cell::Word);
+                number.or(word).unwrap_or(Cell::Empty)
             })
             .collect();
         places.reverse();

@@ -282,39 +282,102 @@ pub(crate) fn insert(front: &mut Vec<Point>, point: Point) {
 
 /// Takes the most crowded away until no more than so many are left; the ends of each objective stay.
 pub(crate) fn thin(front: &mut Vec<Point>, most: usize) {
+    let mut rooms = Vec::new();
+    let mut before = Vec::new();
     while front.len() > most {
-        let objectives = front[0].judged.objectives.len();
-        let range = |objective: usize| {
-            let values = front.iter().map(|point| point.judged.objectives[objective]);
-            let (least, largest) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, largest), value| {
-                (least.min(value), largest.max(value))
-            });
-            (least, (largest - least).max(f64::MIN_POSITIVE))
+        let ranges = ranges(front);
+        // What was measured by other ranges is measured anew; else only what the last to go was nearest to.
+        let is_new = ranges != before;
+        if is_new {
+            rooms.clear();
+            rooms.extend((0..front.len()).map(|index| Room::of(index, front, &ranges)));
+            before.clone_from(&ranges);
+        }
+        let is_end = |point: &Point| {
+            ranges.iter().zip(&point.judged.objectives).any(|(Span { least, .. }, value)| value <= least)
         };
-        let ranges: Vec<_> = (0..objectives).map(range).collect();
-        let is_end =
-            |point: &Point| ranges.iter().zip(&point.judged.objectives).any(|((least, _), value)| value <= least);
-        let distance = |one: &Point, other: &Point| -> f64 {
-            let pairs = one.judged.objectives.iter().zip(&other.judged.objectives).zip(&ranges);
-            pairs.map(|((one, other), (_, range))| ((one - other) / range).powi(2)).sum()
-        };
-        let room = |index: usize| {
-            let others = front.iter().enumerate().filter(|&(other, _)| other != index);
-            others.map(|(_, other)| distance(&front[index], other)).fold(f64::INFINITY, f64::min)
-        };
-        let crowded = (0..front.len()).filter(|&index| !is_end(&front[index])).map(|index| (room(index), index));
+        let inner = (0..front.len()).filter(|&index| !is_end(&front[index]));
         // Of equal ones the later.
-        let crowded = crowded.min_by(|one, other| one.0.total_cmp(&other.0).then(other.1.cmp(&one.1)));
-        match crowded {
-            Some((_, index)) => drop(front.remove(index)),
-            None => front.truncate(most),
+        let crowded =
+            inner.min_by(|&one, &other| rooms[one].squared.total_cmp(&rooms[other].squared).then(other.cmp(&one)));
+        let Some(crowded) = crowded else {
+            front.truncate(most);
+            return;
+        };
+        front.remove(crowded);
+        rooms.remove(crowded);
+        for (index, room) in rooms.iter_mut().enumerate() {
+            match room.nearest {
+                Some(nearest) if nearest == crowded => *room = Room::of(index, front, &ranges),
+                Some(nearest) if nearest > crowded => room.nearest = Some(nearest - 1),
+                _ => {}
+            }
         }
     }
 }
 
-/// The front of several, in one order whatever the order in which they come.
+/// Where the values of an objective lie.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Span {
+    least: f64,
+    width: f64,
+}
+
+fn ranges(front: &[Point]) -> Vec<Span> {
+    let objectives = front.first().map_or(0, |point| point.judged.objectives.len());
+    let range = |objective: usize| {
+        let values = front.iter().map(|point| point.judged.objectives[objective]);
+        let (least, largest) = values
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, largest), value| (least.min(value), largest.max(value)));
+        Span { least, width: (largest - least).max(f64::MIN_POSITIVE) }
+    };
+    (0..objectives).map(range).collect()
+}
+
+/// How far a point of a front is from the nearest other one.
+#[derive(Debug, Clone, Copy)]
+struct Room {
+    /// The square of the distance, objectives over their ranges.
+    squared: f64,
+    nearest: Option<usize>,
+}
+
+impl Room {
+    fn of(index: usize, front: &[Point], ranges: &[Span]) -> Self {
+        let own = &front[index].judged.objectives;
+        let mut room = Self { squared: f64::INFINITY, nearest: None };
+        for (other, point) in front.iter().enumerate().filter(|&(other, _)| other != index) {
+            let pairs = own.iter().zip(&point.judged.objectives).zip(ranges);
+            let squared = pairs.map(|((one, other), range)| ((one - other) / range.width).powi(2)).sum();
+            if squared < room.squared {
+                room = Self { squared, nearest: Some(other) };
+            }
+        }
+        room
+    }
+}
+
+/// Points of several fronts that are looked at together, at most: of more the front is thinned to half of them first.
+const MOST_AT_ONCE: usize = 2048;
+
+/// The front of several. It depends on their order only where there are more points than [`MOST_AT_ONCE`]: whoever merges gives the fronts
+/// by their numbers.
 pub fn merged(fronts: impl IntoIterator<Item = Point>) -> Vec<Point> {
-    let mut points: Vec<_> = fronts.into_iter().collect();
+    let mut points = Vec::new();
+    for point in fronts {
+        points.push(point);
+        if points.len() == MOST_AT_ONCE {
+            points = front_of(points);
+            thin(&mut points, MOST_AT_ONCE / 2);
+        }
+    }
+    let mut front = front_of(points);
+    thin(&mut front, 2 * MOST_OF_FRONT);
+    front
+}
+
+/// Those that no other beats, by their objectives, then by their places.
+fn front_of(mut points: Vec<Point>) -> Vec<Point> {
     points.sort_by(|one, other| {
         let objectives = one.judged.objectives.iter().zip(&other.judged.objectives);
         let places = one.place.iter().zip(&other.place);
@@ -331,6 +394,76 @@ pub fn merged(fronts: impl IntoIterator<Item = Point>) -> Vec<Point> {
             front.push(point);
         }
     }
-    thin(&mut front, 2 * MOST_OF_FRONT);
     front
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Judged, Point, Stream, merged, thin};
+
+    fn points(count: usize, objectives: usize, seed: u64) -> Vec<Point> {
+        let mut stream = Stream::new(seed, 0);
+        let mut point = || {
+            let objectives: Vec<_> = (0..objectives).map(|_| (64.0 * stream.share()).floor() + 1.0).collect();
+            // On a sphere nobody beats another; whole numbers before bring equal distances.
+            let length = objectives.iter().map(|value| value * value).sum::<f64>().sqrt();
+            let objectives = objectives.iter().map(|value| -value / length).collect();
+            Point {
+                place: vec![stream.share()],
+                judged: Judged { objectives, violations: Vec::new() },
+                values: Vec::new(),
+            }
+        };
+        (0..count).map(|_| point()).collect()
+    }
+
+    /// As it is defined: all distances anew whenever one has gone.
+    fn thinned_slowly(front: &mut Vec<Point>, most: usize) {
+        while front.len() > most {
+            let objectives = front[0].judged.objectives.len();
+            let of = |objective: usize| front.iter().map(move |point| point.judged.objectives[objective]);
+            let least: Vec<f64> =
+                (0..objectives).map(|objective| of(objective).fold(f64::INFINITY, f64::min)).collect();
+            let widths: Vec<f64> = (0..objectives)
+                .map(|objective| of(objective).fold(f64::NEG_INFINITY, f64::max) - least[objective])
+                .collect();
+            let distance = |one: &Point, other: &Point| -> f64 {
+                (0..objectives)
+                    .map(|at| ((one.judged.objectives[at] - other.judged.objectives[at]) / widths[at]).powi(2))
+                    .sum()
+            };
+            let room = |index: usize| {
+                let others = (0..front.len()).filter(|&other| other != index);
+                others.map(|other| distance(&front[index], &front[other])).fold(f64::INFINITY, f64::min)
+            };
+            let is_end = |index: usize| (0..objectives).any(|at| front[index].judged.objectives[at] <= least[at]);
+            let crowded = (0..front.len()).filter(|&index| !is_end(index)).map(|index| (room(index), index));
+            let crowded = crowded.min_by(|one, other| one.0.total_cmp(&other.0).then(other.1.cmp(&one.1)));
+            front.remove(crowded.unwrap().1);
+        }
+    }
+
+    #[test]
+    fn the_crowded_go_as_if_all_distances_were_measured_anew() {
+        for (objectives, seed) in [(2, 1), (2, 2), (3, 3), (4, 4)] {
+            let mut front = points(150, objectives, seed);
+            let mut slowly = front.clone();
+            thin(&mut front, 40);
+            thinned_slowly(&mut slowly, 40);
+            assert_eq!(front, slowly, "{objectives} objectives");
+        }
+    }
+
+    /// As many as the islands of the largest search bring: it took hours.
+    #[test]
+    fn a_front_of_hundreds_of_thousands_is_merged() {
+        let front = merged(points(200_000, 2, 5));
+        assert!(front.len() > 100 && front.len() <= 200, "{}", front.len());
+        let objective =
+            |front: &[Point], at: usize| front.iter().map(|point| point.judged.objectives[at]).fold(0.0, f64::min);
+        let all = points(200_000, 2, 5);
+        for at in 0..2 {
+            assert_eq!(objective(&front, at).to_bits(), objective(&all, at).to_bits(), "the ends stay");
+        }
+    }
 }

@@ -112,7 +112,7 @@ impl RowsWork {
     }
 
     /// One variant further; whether that was the last one.
-    pub(crate) fn step(&mut self, rows: &impl Rows, evaluator: &Evaluator, stop: &impl Stop) -> Result<bool, Stopped> {
+    pub(crate) fn step(&mut self, rows: &impl Rows, evaluator: &Evaluator, stop: &dyn Stop) -> Result<bool, Stopped> {
         if self.next < self.end {
             let document = rows.document(&mut self.template, self.next);
             let outcome = evaluator.outcome(document, stop)?;

@@ -1,18 +1,17 @@
 //! A search: the best designs within limits, and why there are no better ones.
 
 use std::collections::BTreeMap;
-use std::io::{self, Write};
 
 use serde::{Deserialize, Serialize};
 use toothwave_calculation::design::Design;
 use toothwave_calculation::field::FieldCode;
-use toothwave_calculation::json::Tree;
+use toothwave_calculation::json::{Tree, path};
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_solver::Stop;
 use toothwave_solver::parts::RIM;
 use utoipa::ToSchema;
 
-use crate::ask::{escaped, fault, index_of, named, whole};
+use crate::ask::{beyond, escaped, fault, index_of, named, whole};
 use crate::document::{FreeDocument, Goal, RangeDocument, RequireDocument, SearchDocument};
 use crate::evaluate::{Evaluator, Outcome, Stopped};
 use crate::limit::{Bound, Limit, limits};
@@ -20,8 +19,8 @@ use crate::map::asked;
 use crate::optimise::{Judged, Optimiser, Plan, Point, merged};
 use crate::quantity::{Needs, Quantity};
 use crate::rows::{GapAnswer, ReasonAnswer, RefusalNoted, note};
-use crate::variant::{Domain, Template, Value};
-use toothwave_calculation::forms::csv_error;
+use crate::table::{Cell, Column, Content, Table};
+use crate::variant::{Domain, Template, Value, Variable};
 
 /// Evaluations of an island, about; each is a chunk.
 const ISLAND_EVALUATIONS: u64 = 6250;
@@ -40,6 +39,13 @@ const SAMPLES: f64 = 16.0;
 
 /// Objectives at most.
 const MOST_OBJECTIVES: usize = 4;
+
+const KIND: &str = "/drive/wave_generator/kind";
+const TOOTH_COUNT: &str = "/drive/teeth/count";
+
+/// The range of the teeth's number, as documents have it.
+const LEAST_COUNT: f64 = 2.0;
+const LARGEST_COUNT: f64 = 10_000.0;
 
 /// A search that can be carried out.
 #[derive(Debug, Clone)]
@@ -218,8 +224,8 @@ fn objectives(document: &SearchDocument, quantities: &mut Vec<&'static Quantity>
     Ok(objectives)
 }
 
-/// What is free where nothing is said: a wave generator of two lobes, its teeth and their number, within the limits on the outer diameter and
-/// the transmission ratio. What stands in the base stays.
+/// What is free where nothing is said: the wave generator, of two lobes where the base names none, the teeth and their number, within the
+/// limits on the outer diameter and the transmission ratio. What stands in the base stays.
 fn from_envelope(
     document: &SearchDocument,
     base: &mut Tree,
@@ -229,69 +235,179 @@ fn from_envelope(
         Some(RequireDocument::Range(RangeDocument { min, max })) => (*min, *max),
         _ => (None, None),
     };
-    let (ratio, diameter_mm) = (range("transmission_ratio"), range("outer_diameter_mm").1);
-    let ((Some(least_ratio), Some(largest_ratio)), Some(diameter_mm)) = (ratio, diameter_mm) else {
-        let detail = "nothing is free: name fields with their ranges, or limit `transmission_ratio` from both sides and `outer_diameter_mm`, from which they follow";
-        return Err(fault("/free", FieldCode::MissingField, detail));
+    let missing = |what: &str| {
+        let detail = format!(
+            "nothing is free, and nothing follows from `require`: {what} there, or name fields with their ranges here"
+        );
+        fault("/free", FieldCode::MissingField, detail)
     };
-    const LOBES: f64 = 2.0;
-    let path = |pointer: &str| toothwave_calculation::json::path(pointer).unwrap_or_default();
-    if base.at(&path("/drive/wave_generator")).is_none() {
-        base.set(&path("/drive/wave_generator/kind"), Tree::Text("harmonic_path".into()));
-        base.set(&path("/drive/wave_generator/lobes"), Tree::Number(LOBES));
-    }
-    // As drawn, a rim included.
-    let root_mm = 0.5 * diameter_mm / RIM;
-    let ranges = [
-        ("/drive/wave_generator/mean_path_radius_mm", 0.4 * root_mm, root_mm),
-        ("/drive/wave_generator/amplitude_mm", 0.002 * root_mm, 0.08 * root_mm),
-        ("/drive/teeth/count", (LOBES * least_ratio).ceil(), (LOBES * largest_ratio).floor()),
-        ("/drive/teeth/radius_mm", 0.02 * root_mm, 0.15 * root_mm),
-        ("/drive/teeth/width_mm", 0.1 * root_mm, 0.6 * root_mm),
-    ];
-    for (pointer, min, max) in ranges {
-        if base.at(&path(pointer)).is_none() {
-            free.insert(pointer.into(), FreeDocument { min: Some(min), max: Some(max), one_of: None });
+    let lobes = with_wave_generator(base)?;
+    let is_missing = |base: &Tree, pointer: &str| base.at(&path(pointer).unwrap_or_default()).is_none();
+    if is_missing(base, TOOTH_COUNT) {
+        if let Some(Tree::Number(ring_teeth)) = base.at(&path("/drive/ring/teeth").unwrap_or_default()) {
+            let count = ring_teeth + lobes;
+            base.set(&path(TOOTH_COUNT).unwrap_or_default(), Tree::Number(count));
+        } else {
+            let (Some(least_ratio), Some(largest_ratio)) = range("transmission_ratio") else {
+                return Err(missing("limit `transmission_ratio` from both sides"));
+            };
+            let (min, max) = ((lobes * least_ratio).ceil(), (lobes * largest_ratio).floor());
+            if min.max(LEAST_COUNT) > max.min(LARGEST_COUNT) {
+                let detail = format!(
+                    "no number of teeth has such a ratio: it is their number, {LEAST_COUNT:?} to {LARGEST_COUNT:?}, over the lobes of the wave generator, here {lobes:?}"
+                );
+                let nearest = min.clamp(LEAST_COUNT, LARGEST_COUNT) / lobes;
+                return Err(beyond("/require/transmission_ratio", FieldCode::OutOfRange, detail, least_ratio, nearest));
+            }
+            let range =
+                FreeDocument { min: Some(min.max(LEAST_COUNT)), max: Some(max.min(LARGEST_COUNT)), one_of: None };
+            free.insert(TOOTH_COUNT.into(), range);
         }
+    }
+    let lengths = lengths_over_root_radius(base);
+    let lengths: Vec<_> = lengths.into_iter().filter(|(pointer, ..)| is_missing(base, pointer)).collect();
+    if !lengths.is_empty() {
+        let Some(diameter_mm) = range("outer_diameter_mm").1 else {
+            return Err(missing("limit `outer_diameter_mm` from above"));
+        };
+        if diameter_mm <= 0.0 {
+            let detail = format!("must be above zero, not {diameter_mm:?}");
+            return Err(beyond("/require/outer_diameter_mm/max", FieldCode::OutOfRange, detail, diameter_mm, 0.0));
+        }
+        // As drawn, a rim included.
+        let root_mm = 0.5 * diameter_mm / RIM;
+        free.extend(lengths.into_iter().map(|(pointer, least, largest)| {
+            let range = FreeDocument { min: Some(least * root_mm), max: Some(largest * root_mm), one_of: None };
+            (pointer.to_owned(), range)
+        }));
+    }
+    if free.is_empty() {
+        let detail = "nothing is free: the base names everything that would be; take fields out of it, or name them here with their ranges";
+        return Err(fault("/free", FieldCode::MissingField, detail));
     }
     Ok(())
 }
 
+/// The lobes of the base's wave generator. Where it names none, one is put in, whose path tells the teeth's extremes; where it does not say
+/// how many lobes, they are two.
+fn with_wave_generator(base: &mut Tree) -> Result<f64, NoAnswer> {
+    const LOBES: &str = "/drive/wave_generator/lobes";
+    const TWO: f64 = 2.0;
+    const MOST: f64 = 1000.0;
+    let place = |pointer: &str| path(pointer).unwrap_or_default();
+    if base.at(&place("/drive/wave_generator")).is_none() {
+        base.set(&place(KIND), Tree::Text("harmonic_path".into()));
+    }
+    match (word_at(base, KIND), base.at(&place(LOBES))) {
+        (Some("eccentric"), _) => Ok(1.0),
+        (Some("harmonic" | "harmonic_path"), Some(Tree::Number(lobes))) => {
+            if (1.0..=MOST).contains(lobes) {
+                return Ok(*lobes);
+            }
+            let limit = if *lobes < 1.0 { 1.0 } else { MOST };
+            let detail = format!("must lie between 1 and {MOST:?}, not be {lobes:?}");
+            Err(beyond(&format!("/base{LOBES}"), FieldCode::OutOfRange, detail, *lobes, limit))
+        }
+        (Some("harmonic" | "harmonic_path"), None) => {
+            base.set(&place(LOBES), Tree::Number(TWO));
+            Ok(TWO)
+        }
+        // An ellipse, or what reading the base refuses.
+        _ => Ok(TWO),
+    }
+}
+
+/// The lengths that the base's wave generator and teeth have, with their least and largest over the ring's root radius.
+fn lengths_over_root_radius(base: &Tree) -> Vec<(&'static str, f64, f64)> {
+    let mut lengths = match word_at(base, KIND) {
+        None | Some("ellipse") => {
+            vec![("/drive/wave_generator/semi_major_mm", 0.3, 1.0), ("/drive/wave_generator/semi_minor_mm", 0.25, 1.0)]
+        }
+        Some("eccentric") => {
+            vec![("/drive/wave_generator/radius_mm", 0.3, 1.0), ("/drive/wave_generator/eccentricity_mm", 0.002, 0.08)]
+        }
+        Some("harmonic") => vec![
+            ("/drive/wave_generator/mean_radius_mm", 0.3, 1.0),
+            ("/drive/wave_generator/amplitude_mm", 0.002, 0.08),
+        ],
+        Some("harmonic_path") => vec![
+            ("/drive/wave_generator/mean_path_radius_mm", 0.4, 1.0),
+            ("/drive/wave_generator/amplitude_mm", 0.002, 0.08),
+        ],
+        // Reading the base refuses it.
+        Some(_) => Vec::new(),
+    };
+    lengths.push(("/drive/teeth/radius_mm", 0.02, 0.15));
+    let width = ("/drive/teeth/width_mm", 0.1, 0.6);
+    match word_at(base, "/drive/teeth/shape") {
+        None | Some("cylinder") => lengths.push(width),
+        Some("flat_sided") => lengths.extend([width, ("/drive/teeth/flat_length_mm", 0.01, 0.2)]),
+        Some(_) => {}
+    }
+    lengths
+}
+
+fn word_at<'a>(tree: &'a Tree, pointer: &str) -> Option<&'a str> {
+    match tree.at(&path(pointer).unwrap_or_default()) {
+        Some(Tree::Text(word)) => Some(word),
+        _ => None,
+    }
+}
+
 /// Where a design stands among what is free.
 fn place_of(design: &Tree, template: &Template, index: usize) -> Result<Vec<f64>, NoAnswer> {
-    let at = |pointer: &str| format!("/start/{index}{pointer}");
+    let at = |variable: &Variable| format!("/start/{index}{}", variable.pointer);
+    let mut values = Vec::new();
     let mut place = Vec::new();
     for variable in template.variables() {
         let stands = design.at(variable.path());
-        let share =
-            match (&variable.domain, stands) {
-                (Domain::Real { min, max }, Some(Tree::Number(number))) if (*min..=*max).contains(number) => {
-                    if max > min { (number - min) / (max - min) } else { 0.5 }
+        let (value, share) = match (&variable.domain, stands) {
+            (Domain::Real { min, max } | Domain::Whole { min, max }, Some(Tree::Number(number))) => {
+                if !(*min..=*max).contains(number) {
+                    let limit = if number < min { *min } else { *max };
+                    let detail = format!("{number:?} lies outside what is free, {min:?} to {max:?}");
+                    return Err(beyond(&at(variable), FieldCode::OutOfRange, detail, *number, limit));
                 }
-                (Domain::Whole { min, max }, Some(Tree::Number(number))) if (*min..=*max).contains(number) => {
-                    (number - min + 0.5) / (max - min + 1.0)
+                let is_whole = matches!(variable.domain, Domain::Whole { .. });
+                if is_whole && number.fract() != 0.0 {
+                    let detail = format!("a whole number is wanted here, not {number:?}");
+                    return Err(fault(&at(variable), FieldCode::WrongType, detail));
                 }
-                (Domain::OneOf(count), Some(chosen)) => {
-                    match variable.choices().iter().position(|choice| choice == chosen) {
-                        Some(choice) => (choice as f64 + 0.5) / *count as f64,
-                        None => {
-                            return Err(fault(
-                                &at(&variable.pointer),
-                                FieldCode::UnknownChoice,
-                                "none of the choices of `free`",
-                            ));
-                        }
-                    }
-                }
-                // What a kind does not take may stand anywhere.
-                (_, None) => 0.5,
-                (_, Some(_)) => {
-                    return Err(fault(&at(&variable.pointer), FieldCode::OutOfRange, "outside its range in `free`"));
-                }
-            };
+                let share = match (is_whole, max > min) {
+                    (true, _) => (number - min + 0.5) / (max - min + 1.0),
+                    (false, true) => (number - min) / (max - min),
+                    (false, false) => 0.5,
+                };
+                (Value::Number(*number), share)
+            }
+            (Domain::OneOf(count), Some(chosen)) => {
+                let Some(choice) = variable.choices().iter().position(|choice| choice == chosen) else {
+                    let detail = "none of the choices that are free";
+                    return Err(fault(&at(variable), FieldCode::UnknownChoice, detail));
+                };
+                (Value::Choice(choice), (choice as f64 + 0.5) / *count as f64)
+            }
+            (Domain::Real { .. } | Domain::Whole { .. }, Some(_)) => {
+                return Err(fault(&at(variable), FieldCode::WrongType, "a number is wanted here"));
+            }
+            // What a kind does not take may stand anywhere.
+            (Domain::Real { min, .. } | Domain::Whole { min, .. }, None) => (Value::Number(*min), 0.5),
+            (Domain::OneOf(_), None) => {
+                let detail = "it is free: a design to begin with says which";
+                return Err(fault(&at(variable), FieldCode::MissingField, detail));
+            }
+        };
+        values.push(value);
         place.push(share);
     }
-    Ok(place)
+    let missing = template.taken(&values).find(|variable| design.at(variable.path()).is_none());
+    match missing {
+        Some(variable) => {
+            let detail = "it is free: a design to begin with says where it stands";
+            Err(fault(&at(variable), FieldCode::MissingField, detail))
+        }
+        None => Ok(place),
+    }
 }
 
 impl Island {
@@ -314,7 +430,7 @@ impl Island {
     }
 
     /// One variant further; whether that was the last one.
-    pub(crate) fn step(&mut self, search: &Search, evaluator: &Evaluator, stop: &impl Stop) -> Result<bool, Stopped> {
+    pub(crate) fn step(&mut self, search: &Search, evaluator: &Evaluator, stop: &dyn Stop) -> Result<bool, Stopped> {
         // A point that was asked for when the work was stopped is taken up again.
         let (place, is_scanning) = match self.pending.take() {
             Some(pending) => pending,
@@ -418,6 +534,10 @@ pub struct SearchAnswer {
     pub nearest_miss: Option<FoundAnswer>,
     /// Where nothing keeps all limits: for each that can be relaxed alone, how far it must be.
     pub relaxations: Vec<RelaxationAnswer>,
+    /// The names of the quantities in the order of the columns.
+    #[serde(skip)]
+    #[schema(ignore)]
+    quantities: Vec<&'static str>,
 }
 
 /// What was free.
@@ -524,6 +644,8 @@ impl SearchAnswer {
             }
         }
         let front = merged(points);
+        let mut quantities: Vec<_> = evaluator.quantities.iter().map(|quantity| quantity.name).collect();
+        quantities.sort_unstable();
         let name = |limit: &Limit| evaluator.quantities[limit.quantity].name;
         let mut template = search.at_true_peaks.as_ref().unwrap_or(template).clone();
         let free = template.variables().iter().map(FreeAnswer::from).collect();
@@ -569,30 +691,38 @@ impl SearchAnswer {
             },
             nearest_miss,
             relaxations,
+            quantities,
         }
     }
 
-    /// A line a design of the front: its quantities, then the fields that were free.
-    pub(crate) fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
-        let mut csv = csv::Writer::from_writer(writer);
-        let Some(first) = self.front.first() else { return csv.flush() };
-        let names: Vec<_> = first.quantities.keys().copied().collect();
-        let pointers: Vec<_> = self.free.iter().map(|free| free.pointer.as_str()).collect();
-        csv.write_record(names.iter().chain(&pointers)).map_err(csv_error)?;
-        for found in &self.front {
-            let design = serde_json::to_value(&found.design)?;
-            let quantities = names.iter().map(|name| found.quantities.get(name).map(|value| format!("{value:?}")));
-            let values = pointers.iter().map(|pointer| {
-                design.pointer(pointer).map(|value| value.as_str().map_or_else(|| value.to_string(), str::to_owned))
-            });
-            csv.write_record(quantities.chain(values).map(Option::unwrap_or_default)).map_err(csv_error)?;
-        }
-        csv.flush()
+    /// A row a design of the front: its quantities, then the fields that were free.
+    pub(crate) fn table(&self) -> Table<'_> {
+        let mut columns: Vec<_> = self.quantities.iter().map(|name| Column::new(*name, Content::Number)).collect();
+        columns.extend(self.free.iter().map(|free| {
+            let kind = if free.choices.is_some() { Content::Word } else { Content::Number };
+            Column::new(free.pointer.as_str(), kind)
+        }));
+        let rows = self.front.iter().map(|found| {
+            let mut row: Vec<_> =
+                self.quantities.iter().map(|name| Cell::from(found.quantities.get(name).copied())).collect();
+            let design = serde_json::to_value(&found.design).unwrap_or_default();
+            row.extend(self.free.iter().map(|free| match design.pointer(&free.pointer) {
+                None => Cell::Empty,
+                Some(value) => match (value.as_str(), value.as_u64(), value.as_f64()) {
+                    (Some(word), ..) => Cell::Word(word.to_owned()),
+                    (_, Some(count), _) => Cell::Count(count),
+                    (_, _, Some(number)) => Cell::Number(number),
+                    _ => Cell::Word(value.to_string()),
+                },
+            }));
+            row
+        });
+        Table { columns, rows: Box::new(rows) }
     }
 }
 
-impl From<&crate::variant::Variable> for FreeAnswer {
-    fn from(variable: &crate::variant::Variable) -> Self {
+impl From<&Variable> for FreeAnswer {
+    fn from(variable: &Variable) -> Self {
         let (range, choices) = match variable.domain {
             Domain::Real { min, max } | Domain::Whole { min, max } => (Some((min, max)), None),
             Domain::OneOf(count) => (None, Some(count as u64)),

@@ -1,7 +1,6 @@
 //! A sensitivity: each input a little less and a little more, and what that does to each quantity.
 
 use std::collections::BTreeMap;
-use std::io::{self, Write};
 
 use serde::Serialize;
 use toothwave_calculation::field::FieldCode;
@@ -13,8 +12,8 @@ use crate::ask::{escaped, fault};
 use crate::document::{InputDocument, SensitivityDocument};
 use crate::evaluate::Evaluator;
 use crate::rows::{GapAnswer, ReasonAnswer, Rows, RowsPart};
+use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Domain, Template, Value};
-use toothwave_calculation::forms::csv_error;
 
 /// How far an input is moved where nothing is said, as a share of its value.
 const RELATIVE: f64 = 0.01;
@@ -222,15 +221,14 @@ impl SensitivityAnswer {
         }
     }
 
-    /// A line a quantity and input.
-    pub(crate) fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
-        let mut csv = csv::Writer::from_writer(writer);
-        let names =
-            ["quantity", "pointer", "value", "plus_minus", "at_minus", "at_base", "at_plus", "change", "derivative"];
-        csv.write_record(names).map_err(csv_error)?;
-        for of in &self.quantities {
-            for to in &of.inputs {
-                let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:?}"));
+    /// A row a quantity and input.
+    pub(crate) fn table(&self) -> Table<'_> {
+        let words = ["quantity", "pointer"].map(|name| Column::new(name, Content::Word));
+        let numbers = ["value", "plus_minus", "at_minus", "at_base", "at_plus", "change", "derivative"];
+        let columns = words.into_iter().chain(numbers.map(|name| Column::new(name, Content::Number))).collect();
+        let rows = self.quantities.iter().flat_map(|of| {
+            of.inputs.iter().map(|to| {
+                let mut row = vec![Cell::Word(of.quantity.into()), Cell::Word(to.pointer.clone())];
                 let numbers = [
                     Some(to.value),
                     Some(to.plus_minus),
@@ -240,11 +238,11 @@ impl SensitivityAnswer {
                     Some(to.change),
                     to.derivative,
                 ];
-                let words = [of.quantity.to_owned(), to.pointer.clone()];
-                csv.write_record(words.into_iter().chain(numbers.map(number))).map_err(csv_error)?;
-            }
-        }
-        csv.flush()
+                row.extend(numbers.map(Cell::from));
+                row
+            })
+        });
+        Table { columns, rows: Box::new(rows) }
     }
 }
 

@@ -4,9 +4,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
+use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::design::Design;
-use toothwave_calculation::field::FieldCode;
-use toothwave_calculation::json::{self, Tree};
+use toothwave_calculation::field::{FieldCode, FieldError};
+use toothwave_calculation::json::{self, Tree, path};
 use toothwave_calculation::key::Key;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::question::{self, Question as _};
@@ -142,7 +143,8 @@ impl Study {
         limits: &Limits,
     ) -> Result<Self, NoAnswer> {
         for example in template.examples() {
-            require_what_quantities_need(&quantities, example, &limits.calculation)?;
+            require_what_quantities_need(&quantities, example)?;
+            require_possible_base(&quantities, &template, example, &limits.calculation)?;
         }
         let evaluator = Evaluator::new(quantities, limits.calculation);
         let study = Self { id, kind, template, evaluator, variants, chunk_variants: CHUNK_VARIANTS };
@@ -279,12 +281,8 @@ fn what_it_has(tree: &Tree) -> Needs {
     }
 }
 
-/// That a document has what every quantity needs, and that it can be asked at all.
-fn require_what_quantities_need(
-    quantities: &[&'static Quantity],
-    tree: &Tree,
-    limits: &question::Limits,
-) -> Result<(), NoAnswer> {
+/// That a document has what every quantity needs.
+fn require_what_quantities_need(quantities: &[&'static Quantity], tree: &Tree) -> Result<(), NoAnswer> {
     for quantity in quantities {
         let needed: &[(&[&str], &str)] = match quantity.needs {
             Needs::Drive => &[],
@@ -304,21 +302,45 @@ fn require_what_quantities_need(
             return Err(fault(&format!("/base/{}", place.join("/")), FieldCode::MissingField, detail));
         }
     }
-    if quantities.iter().all(|quantity| quantity.needs == Needs::Drive) {
-        return Ok(());
+    Ok(())
+}
+
+/// That a document can be asked at all: a fault of its form is one whatever the values, and so is a number of the base outside its range.
+fn require_possible_base(
+    quantities: &[&'static Quantity],
+    template: &Template,
+    example: &Tree,
+    limits: &question::Limits,
+) -> Result<(), NoAnswer> {
+    let design = example.read::<Design>()?.normalised();
+    let checked = if quantities.iter().all(|quantity| quantity.needs == Needs::Drive) {
+        CoincidenceDegree.check(&design, limits).map(|_| ())
+    } else {
+        Sweep.check(&design, limits).map(|_| ())
+    };
+    let Err(mut refused) = checked else { return Ok(()) };
+    if refused.code != NoAnswerCode::InvalidDocument {
+        refused.errors.retain(|error| is_of_base(template, example, error));
+        let Some(error) = refused.errors.first() else { return Ok(()) };
+        refused.detail = format!("{}: {}", error.pointer, error.detail);
     }
-    // A fault of its form is one whatever the values.
-    let design = tree.read::<Design>()?.normalised();
-    match Sweep.check(&design, limits) {
-        Err(mut refused) if refused.code == NoAnswerCode::InvalidDocument => {
-            refused.detail = format!("/base{}", refused.detail);
-            for error in &mut refused.errors {
-                error.pointer.insert_str(0, "/base");
-            }
-            Err(refused)
-        }
-        _ => Ok(()),
+    for error in &mut refused.errors {
+        let blamed = template.blamed(&error.pointer);
+        refused.detail = refused.detail.replacen(&error.pointer, &blamed, 1);
+        error.pointer = blamed;
     }
+    Err(refused)
+}
+
+/// Whether a value is outside its range that every variant has.
+fn is_of_base(template: &Template, example: &Tree, error: &FieldError) -> bool {
+    // Where the relief may begin, the rest of the drive says.
+    const OF_THE_DRIVE: [&str; 1] = ["/modification/ring_tip_relief/start_deg"];
+    let stands = path(&error.pointer).and_then(|path| example.at(&path));
+    error.code == FieldCode::OutOfRange
+        && matches!(stands, Some(Tree::Number(_)))
+        && !template.is_varied(&error.pointer)
+        && !OF_THE_DRIVE.contains(&error.pointer.as_str())
 }
 
 /// A chunk as it is worked on, a variant at a time: it may be laid aside between any two of them.
@@ -363,7 +385,7 @@ impl Work {
     ///
     /// # Errors
     /// When `stop` says so; the chunk is then as it was before.
-    pub fn step(&mut self, stop: &impl Stop) -> Result<bool, Stopped> {
+    pub fn step(&mut self, stop: &dyn Stop) -> Result<bool, Stopped> {
         let Self { study, state } = self;
         let evaluator = &study.evaluator;
         match (&study.kind, state) {
@@ -388,7 +410,7 @@ impl Work {
     ///
     /// # Errors
     /// As [`Self::step`].
-    pub fn run(mut self, stop: &impl Stop) -> Result<Part, Stopped> {
+    pub fn run(mut self, stop: &dyn Stop) -> Result<Part, Stopped> {
         while !self.step(stop)? {}
         Ok(self.finish())
     }

@@ -1,7 +1,5 @@
 //! A tolerance study: drives with parts that deviate by chance, and what that does to each quantity.
 
-use std::io::{self, Write};
-
 use serde::Serialize;
 use toothwave_calculation::design::Design;
 use toothwave_calculation::field::FieldCode;
@@ -16,8 +14,8 @@ use crate::limit::{Bound, Limit};
 use crate::random::Stream;
 use crate::rank::{QuantileAnswer, ShareAnswer, quantile, share};
 use crate::rows::{GapAnswer, ReasonAnswer, Rows, RowsPart};
+use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Template, Value};
-use toothwave_calculation::forms::csv_error;
 
 /// Drives in which one kind of deviation stands alone, for each kind.
 const ALONE: u64 = 1000;
@@ -310,8 +308,20 @@ pub struct ToleranceQuantityAnswer {
     pub largest: f64,
     /// Its quantiles.
     pub quantiles: Vec<QuantileAnswer>,
+    /// How its values are spread between the least and the largest.
+    pub histogram: HistogramAnswer,
     /// What each kind of deviation does alone, what does most first; empty where there is only one kind.
     pub contributors: Vec<ContributorAnswer>,
+}
+
+/// Drives in bins of equal width.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct HistogramAnswer {
+    /// Where the bins meet, their ends included: one more than there are bins. A value at an edge is in the bin above it, the largest in
+    /// the last one.
+    pub edges: Vec<f64>,
+    /// How many drives are in each.
+    pub drives: Vec<u64>,
 }
 
 /// What a kind of deviation does alone.
@@ -338,6 +348,29 @@ fn spread(values: &[f64]) -> Spread {
     let mean = values.iter().sum::<f64>() / count;
     let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
     Spread { mean, standard_deviation: (squares / (count - 1.0).max(1.0)).sqrt() }
+}
+
+impl HistogramAnswer {
+    /// Of a sorted sample, which is not empty: as many bins as twice the cube root of its size (Rice's rule), one where all values are equal.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number, not negative")]
+    fn of(sorted: &[f64]) -> Self {
+        let (least, largest) = match sorted {
+            [] => return Self { edges: Vec::new(), drives: Vec::new() },
+            [one] => (*one, *one),
+            [first, .., last] => (*first, *last),
+        };
+        let bins = if largest > least { (2.0 * (sorted.len() as f64).cbrt()).ceil() as usize } else { 1 };
+        let edge = |index: usize| {
+            if index == bins { largest } else { least + (largest - least) * (index as f64 / bins as f64) }
+        };
+        let below = |index: usize| {
+            if index == bins { sorted.len() } else { sorted.partition_point(|&value| value < edge(index)) }
+        };
+        Self {
+            edges: (0..=bins).map(edge).collect(),
+            drives: (0..bins).map(|index| (below(index + 1) - below(index)) as u64).collect(),
+        }
+    }
 }
 
 impl ToleranceAnswer {
@@ -391,6 +424,7 @@ impl ToleranceAnswer {
                 least: sorted.first().copied().unwrap_or_default(),
                 largest: sorted.last().copied().unwrap_or_default(),
                 quantiles: SHARES.iter().filter_map(|&share| quantile(&sorted, share)).collect(),
+                histogram: HistogramAnswer::of(&sorted),
                 contributors,
             }
         });
@@ -409,17 +443,17 @@ impl ToleranceAnswer {
         }
     }
 
-    /// A line a quantity and quantile.
-    pub(crate) fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
-        let mut csv = csv::Writer::from_writer(writer);
-        csv.write_record(["quantity", "share", "value", "low", "high"]).map_err(csv_error)?;
-        for of in &self.quantities {
-            for QuantileAnswer { share, value, low, high } in &of.quantiles {
-                let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:?}"));
-                let numbers = [Some(*share), Some(*value), *low, *high].map(number);
-                csv.write_record(std::iter::once(of.quantity.to_owned()).chain(numbers)).map_err(csv_error)?;
-            }
-        }
-        csv.flush()
+    /// A row a quantity and quantile.
+    pub(crate) fn table(&self) -> Table<'_> {
+        let mut columns = vec![Column::new("quantity", Content::Word)];
+        columns.extend(["share", "value", "low", "high"].map(|name| Column::new(name, Content::Number)));
+        let rows = self.quantities.iter().flat_map(|of| {
+            of.quantiles.iter().map(|&QuantileAnswer { share, value, low, high }| {
+                let mut row = vec![Cell::Word(of.quantity.into())];
+                row.extend([Some(share), Some(value), low, high].map(Cell::from));
+                row
+            })
+        });
+        Table { columns, rows: Box::new(rows) }
     }
 }

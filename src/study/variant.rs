@@ -60,6 +60,8 @@ pub(crate) enum Value {
 /// Documents with free fields: one for each combination of choices.
 #[derive(Debug, Clone)]
 pub(crate) struct Template {
+    /// What the study's document calls the list of the variables.
+    list: &'static str,
     variables: Vec<Variable>,
     forms: Vec<Form>,
 }
@@ -77,7 +79,7 @@ impl Template {
     ///
     /// # Errors
     /// Where a document cannot be read, whatever the values; where a range is empty, or no document takes a free field.
-    pub(crate) fn new(base: &Tree, free: &[(String, Asked)], list: &str) -> Result<Self, NoAnswer> {
+    pub(crate) fn new(base: &Tree, free: &[(String, Asked)], list: &'static str) -> Result<Self, NoAnswer> {
         let at = |pointer: &str| format!("/{list}/{}", escaped(pointer));
         let mut variables = Vec::new();
         for (pointer, asked) in free {
@@ -102,7 +104,7 @@ impl Template {
             }
             variables.push(Variable { pointer: pointer.clone(), path, domain, choices });
         }
-        let mut template = Self { variables, forms: Vec::new() };
+        let mut template = Self { list, variables, forms: Vec::new() };
         let mut combinations = template.variables.iter().map(|variable| variable.choices.len().max(1));
         let combinations = combinations.try_fold(1_usize, usize::checked_mul).filter(|&count| count <= MOST_FORMS);
         let Some(combinations) = combinations else {
@@ -111,11 +113,10 @@ impl Template {
         };
         for combination in 0..combinations {
             let form = template.form(base, combination).map_err(|mut found| {
-                let of_variable = template.variables.iter().find(|variable| variable.pointer == found.pointer);
-                found.pointer = match of_variable {
-                    Some(variable) => at(&variable.pointer),
-                    None => format!("/base{}", found.pointer),
-                };
+                if found.code == FieldCode::MissingField {
+                    found.detail = format!("{}: neither the base has it nor `{list}`", found.detail);
+                }
+                found.pointer = template.blamed(&found.pointer);
                 found
             })?;
             template.forms.push(form);
@@ -134,6 +135,27 @@ impl Template {
             }
         }
         Ok(template)
+    }
+
+    /// Where in the study's document that stands which a design has at a place.
+    pub(crate) fn blamed(&self, pointer: &str) -> String {
+        match self.variables.iter().any(|variable| variable.pointer == pointer) {
+            true => format!("/{}/{}", self.list, escaped(pointer)),
+            false => format!("/base{pointer}"),
+        }
+    }
+
+    /// Whether variants differ in what stands at a place.
+    pub(crate) fn is_varied(&self, pointer: &str) -> bool {
+        let derives = self.forms.iter().any(|form| form.derives_ring_teeth);
+        self.variables.iter().any(|variable| variable.pointer == pointer)
+            || derives && path(pointer).is_some_and(|path| path == RING_TEETH)
+    }
+
+    /// The variables that the form takes to which these values lead, one for each variable.
+    pub(crate) fn taken(&self, values: &[Value]) -> impl Iterator<Item = &Variable> {
+        let takes = &self.forms[self.form_index(values)].takes;
+        self.variables.iter().zip(takes).filter(|(_, takes)| **takes).map(|(variable, _)| variable)
     }
 
     pub(crate) fn variables(&self) -> &[Variable] {

@@ -76,7 +76,8 @@ pub(crate) fn field_codes() -> Vec<FieldCode> {
         SlotsTakeCarrier => BoreTakesCam,
         BoreTakesCam => ClearanceTakesCam,
         ClearanceTakesCam => ClearanceTakesTooth,
-        ClearanceTakesTooth => TooManyStates,
+        ClearanceTakesTooth => ModificationLeavesNothing,
+        ModificationLeavesNothing => TooManyStates,
         TooManyStates => TooManyPoints,
         TooManyPoints => TooManyVariants;
         TooManyVariants)

@@ -133,8 +133,10 @@ async fn a_step_makes_a_part_once_names_it_by_the_design_colours_it_and_extrudes
     }
     assert_eq!((count("=PRODUCT("), count("=MANIFOLD_SOLID_BREP("), count("=STYLED_ITEM(")), (5, 4, 4));
     assert_eq!(count("=NEXT_ASSEMBLY_USAGE_OCCURRENCE("), 2 + 2 * 40);
-    // The cam's quarters and the ring's spaces.
-    assert_eq!((count("=SURFACE_OF_LINEAR_EXTRUSION("), count("=B_SPLINE_SURFACE_WITH_KNOTS(")), (4 + 78, 0));
+    // The cam's quarters and the ring's spaces, all alike, each cut into a few faces.
+    let extruded = count("=SURFACE_OF_LINEAR_EXTRUSION(");
+    assert!(extruded > 4 + 2 * 78 && extruded < 8 * (4 + 78), "{extruded}");
+    assert_eq!((count("=B_SPLINE_CURVE_WITH_KNOTS("), count("=B_SPLINE_SURFACE_WITH_KNOTS(")), (2 * extruded, 0));
     assert_eq!(written("tooth", &undercut(), "model/step").await.matches("NEXT_ASSEMBLY_USAGE_OCCURRENCE").count(), 0);
 }
 
@@ -143,11 +145,70 @@ async fn a_step_makes_a_part_once_names_it_by_the_design_colours_it_and_extrudes
 async fn a_step_leaves_out_the_points_that_its_splines_pass_without_them() {
     let document = with(&undercut(), "/profile", json!({ "chord_tolerance_mm": 1e-5 }));
     let drawing = drawn("ring", &document).await;
-    let edge = &drawing["bodies"][0]["holes"][0]["edges"][0];
+    let edges = drawing["bodies"][0]["holes"][0]["edges"].as_array().unwrap();
+    let points: usize = edges.iter().map(|edge| numbers(&edge["x_mm"]).len()).sum();
     let text = written("ring", &document, "model/step").await;
-    let spline = text.lines().find(|line| line.contains("B_SPLINE_CURVE_WITH_KNOTS")).unwrap();
-    let poles = spline.split("),.UNSPECIFIED.").next().unwrap().matches('#').count() - 1;
-    assert!(4 * poles < numbers(&edge["x_mm"]).len(), "{poles} of {}", numbers(&edge["x_mm"]).len());
+    let of_spline = |line: &str| line.split("),.UNSPECIFIED.").next().unwrap().matches('#').count() - 1;
+    let splines = text.lines().filter(|line| line.contains("B_SPLINE_CURVE_WITH_KNOTS"));
+    // Each stands twice, below and above.
+    let poles = splines.map(of_spline).sum::<usize>() / 2;
+    assert!(3 * poles < points, "{poles} of {points}");
+}
+
+#[tokio::test]
+async fn a_modification_that_leaves_nothing_names_its_number_and_a_limit_where_there_is_one() {
+    let refused = async |modification: Value| {
+        let document = with(&shortest(), "/modification", modification);
+        let problem = Service::new().post("/v1/drawings/assembly", &document).await.refused(422, "impossible_design");
+        let [error] = problem["errors"].as_array().unwrap().as_slice() else { panic!("{problem}") };
+        assert_eq!(error["code"], "modification_leaves_nothing");
+        (error["pointer"].as_str().unwrap().to_owned(), error["value"].as_f64().unwrap(), error["limit"].as_f64())
+    };
+    let slot = refused(json!({ "slot_wall_um": -6000.0 })).await;
+    assert_eq!(slot, ("/modification/slot_wall_um".to_owned(), -6000.0, Some(-5000.0)));
+    let ring = refused(json!({ "ring_rotation_arcsec": 30_000.0 })).await;
+    assert_eq!(ring, ("/modification/ring_rotation_arcsec".to_owned(), 30_000.0, None));
+}
+
+/// A drawing's tag follows from what it shows, so a modification is another drawing, and another design.
+#[tokio::test]
+async fn a_modification_is_drawn_by_every_part_that_it_is_of() {
+    for (part, modification) in [
+        ("ring", json!({ "ring_tip_relief": { "amount_um": 5.0, "start_deg": 60.0, "power": 2.0 } })),
+        ("ring", json!({ "ring_path_shift_um": -2.0 })),
+        ("wave-generator", json!({ "wave_generator_equidistant_um": 3.0 })),
+        ("carrier", json!({ "slot_wall_um": 2.0 })),
+        ("tooth", json!({ "tooth_radius_um": 1.0 })),
+        ("assembly", json!({ "carrier_rotation_arcsec": 9.0 })),
+    ] {
+        let modified = with(&shortest(), "/modification", modification);
+        let (plain, modified) = (drawn(part, &shortest()).await, drawn(part, &modified).await);
+        assert_ne!(plain["bodies"], modified["bodies"], "{part}");
+        assert_ne!(plain["design_hash"], modified["design_hash"], "{part}");
+    }
+}
+
+#[tokio::test]
+async fn a_turned_carrier_stands_that_much_further_on_than_its_teeth() {
+    let turned = with(&shortest(), "/modification", json!({ "carrier_rotation_arcsec": 36.0 }));
+    let angle = async |document: &Value| {
+        let drawing = drawn("assembly", document).await;
+        let carrier = drawing["bodies"].as_array().unwrap().iter().find(|body| body["part"] == "carrier").unwrap();
+        carrier["placements"][3]["rotation_deg"].as_f64().unwrap()
+    };
+    assert!((angle(&turned).await - angle(&shortest()).await - 0.01).abs() < 1e-12);
+}
+
+#[tokio::test]
+async fn balls_are_spheres_and_every_other_part_a_prism() {
+    let document: Value = serde_json::from_str(include_str!("../../examples/balls.json")).unwrap();
+    let drawing = drawn("assembly", &document).await;
+    for body in drawing["bodies"].as_array().unwrap() {
+        assert_eq!(body["solid"], if body["part"] == "teeth" { "ball" } else { "prism" });
+    }
+    let ball = written("tooth", &document, "model/step").await;
+    let count = |what: &str| ball.matches(what).count();
+    assert_eq!((count("=SPHERICAL_SURFACE("), count("=ADVANCED_FACE("), count("=CYLINDRICAL_SURFACE(")), (1, 2, 0));
 }
 
 #[tokio::test]

@@ -18,7 +18,7 @@ pub(crate) const COMMITTED: &str = include_str!("../../openapi/openapi.json");
 
 fn document() -> &'static Value {
     static DOCUMENT: LazyLock<Value> =
-        LazyLock::new(|| serde_json::from_str(&toothwave::router::openapi_json()).unwrap());
+        LazyLock::new(|| serde_json::from_str(toothwave::router::openapi_json()).unwrap());
     &DOCUMENT
 }
 
@@ -117,7 +117,7 @@ fn every_variant_of_a_choice_has_a_name_and_the_word_that_leads_to_it() {
 
 #[test]
 fn the_rendering_in_3_0_has_no_word_that_only_3_1_knows() {
-    let document: Value = serde_json::from_str(&toothwave::router::openapi_3_0_json()).unwrap();
+    let document: Value = serde_json::from_str(toothwave::router::openapi_3_0_json()).unwrap();
     assert_eq!(document["openapi"], "3.0.3");
     assert_eq!(document["info"]["license"].get("identifier"), None);
     for object in objects(&document) {
@@ -142,7 +142,7 @@ fn the_rendering_in_3_0_has_no_word_that_only_3_1_knows() {
 #[tokio::test]
 async fn the_rendering_in_3_0_is_served_beside() {
     let answer = Service::new().ask(&Question::of("GET", "/openapi-3.0.json")).await;
-    assert_eq!((answer.status, answer.text()), (200, toothwave::router::openapi_3_0_json().as_str()));
+    assert_eq!((answer.status, answer.text()), (200, toothwave::router::openapi_3_0_json()));
 }
 
 #[test]
@@ -207,7 +207,10 @@ fn every_problem_is_described_as_problem_json_and_every_503_of_a_solve_says_when
         assert!(responses["503"]["headers"]["Retry-After"].is_object(), "{path}");
         let found: BTreeSet<_> = responses["200"]["content"].as_object().unwrap().keys().map(String::as_str).collect();
         let expected = match path {
-            "/v1/sweep" => &["application/json", "image/svg+xml", "text/csv", "text/plain"][..],
+            "/v1/sweep" => {
+                &["application/json", "application/vnd.apache.arrow.stream", "image/svg+xml", "text/csv", "text/plain"]
+                    [..]
+            }
             "/v1/drawings/assembly" => &["application/json", "image/svg+xml", "image/vnd.dxf", "model/step"],
             _ => &["application/json", "text/csv", "text/plain"],
         };

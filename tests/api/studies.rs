@@ -176,6 +176,12 @@ async fn a_map_is_a_table_too() {
     let mut lines = answer.text().lines();
     assert_eq!(lines.next(), Some("variant,/drive/teeth/radius_mm,peak_stress_ring_mpa,undercut,reason"));
     assert_eq!(lines.count(), 3);
+    let question =
+        Question::of("GET", found["result_href"].as_str().unwrap()).with("accept", "application/vnd.apache.parquet");
+    let answer = service.ask(&question).await;
+    assert_eq!((answer.status, answer.header("content-type")), (200, "application/vnd.apache.parquet"));
+    // The magic number at both ends (Apache Parquet, file format).
+    assert!(answer.body.starts_with(b"PAR1") && answer.body.ends_with(b"PAR1"));
 }
 
 /// Each quantity of a document that every answer has, against the answer that holds it.

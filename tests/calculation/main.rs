@@ -2,4 +2,6 @@
 #![allow(clippy::unwrap_used, reason = "tests fail by panicking")]
 
 mod documents;
+mod reference;
 mod schema;
+mod tables;

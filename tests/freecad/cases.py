@@ -62,14 +62,29 @@ def designs():
     return documents
 
 
+def modified():
+    """Drives whose parts are made otherwise than conjugate, by name."""
+    relief = {"amount_um": 30.0, "start_deg": 30.0, "power": 2.0}
+    ring = {"ring_equidistant_um": 8.0, "ring_path_shift_um": -15.0, "ring_tip_relief": relief}
+    others = {"wave_generator_equidistant_um": 4.0, "slot_wall_um": 3.0, "tooth_radius_um": 2.0}
+    documents = {
+        f"{name} modified": with_clearances(example(name)) | {"modification": ring | others}
+        for name in ("paper-5.1", "paper-5.2", "harmonic-path")
+    }
+    for name, arcsec in (("eccentric-roller", 60.0), ("paper-5.2-bored", 60.0), ("paper-5.1", -60.0)):
+        turned = {"ring_rotation_arcsec": arcsec, "ring_path_shift_um": 10.0}
+        documents[f"{name} turned by {arcsec}"] = example(name) | {"modification": turned}
+    return documents
+
+
 @functools.lru_cache(maxsize=64)
-def _solid(section, is_ball):
-    return (toothwave_parts.ball_of if is_ball else toothwave_parts.prism_of)(json.loads(section))
+def _solid(section):
+    return toothwave_parts.solid_of(json.loads(section))
 
 
-def solid_of(body, is_ball):
+def solid_of(body):
     """Built once for all angles, as the drive does."""
-    return _solid(json.dumps({key: body[key] for key in ("outer", "holes", "width_mm")}), is_ball)
+    return _solid(json.dumps({key: body[key] for key in ("outer", "holes", "width_mm", "solid")}))
 
 
 class Assembly:
@@ -83,7 +98,7 @@ class Assembly:
         self.tolerance_mm = drawing["chord_tolerance_mm"]
         bodies = {body["part"]: body for body in drawing["bodies"]}
         self.solids = {
-            part: toothwave_parts.shape_of(body, solid_of(body, self.theory.is_ball and part == "teeth")).Solids
+            part: toothwave_parts.shape_of(body, solid_of(body)).Solids
             for part, body in bodies.items()
         }
         self.centres = [FreeCAD.Vector(place["x_mm"], place["y_mm"], 0) for place in bodies["teeth"]["placements"]]

@@ -51,11 +51,18 @@ class Imports(unittest.TestCase):
 NOT_IN_THE_FORM = {
     "/accuracy": "no drawing and no sweep reads it",
     "/profile/extent": "no drawing and no sweep reads it",
-    "/deviations": "lists of measured items, one entry for each tooth, slot or space, are no fields to fill in",
-    "/load/duty": "a list of loads, no field to fill in",
-    "/friction/wear_rate_mm3_per_nm": "no drawing and no spreadsheet cell reads it",
-    "/friction/wave_generator/bearing_element": "no drawing and no spreadsheet cell reads it",
-    "/friction/wave_generator/bearing_load_rating_n": "no drawing and no spreadsheet cell reads it",
+    **{
+        f"/deviations/{name}": "a list of measured items, one entry for each tooth, slot or space, is pasted as it is, not typed"
+        for name in (
+            "tooth_radius_um",
+            "slot_angle_arcsec",
+            "slot_wall_um",
+            "ring_space_um",
+            "ring_space_angle_arcsec",
+            "wave_generator_lobe_um",
+        )
+    },
+    "/load/duty": "a load spectrum is a list too",
     "/load/allowable_stress_mpa/": "one number for all contacts has a field",
     "/friction/wave_generator/coefficient of rolling": "nothing depends on it",
 }
@@ -87,10 +94,19 @@ EVERYTHING = {
     "materials": {"teeth": {"youngs_modulus_gpa": 310.0, "poissons_ratio": 0.26}, "ring": {"poissons_ratio": 0.0}},
     "load": {"output_torque_nm": 200.0, "input_speed_rpm": 1500.0, "allowable_stress_mpa": 1500.0},
     "friction": {
-        "wave_generator": {"kind": "race", "coefficient": 0.0, "bearing_coefficient": 0.0015, "bearing_radius_mm": 28.0},
+        "wave_generator": {
+            "kind": "race",
+            "coefficient": 0.0,
+            "bearing_coefficient": 0.0015,
+            "bearing_radius_mm": 28.0,
+            "bearing_load_rating_n": 14000.0,
+            "bearing_element": "roller",
+        },
         "ring": {"coefficient": 0.0},
         "carrier": {"coefficient": 0.05},
+        "wear_rate_mm3_per_nm": {"wave_generator": 1e-6, "ring": 2e-6},
     },
+    "deviations": {"ring_runout": {"amount_um": 3.0, "angle_deg": -40.0}, "carrier_runout": {"amount_um": 2.0}},
     "model": {
         "compatibility": "virtual_work",
         "stiffness": {"law": "johnson", "depth_mm": {"wave_generator": 5.0, "carrier": 7.0}},

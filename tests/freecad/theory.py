@@ -9,6 +9,13 @@ import functools
 import math
 from dataclasses import dataclass, field
 
+# What sets a part's surface back by itself.
+EQUIDISTANT = {
+    "wave_generator": "wave_generator_equidistant_um",
+    "teeth": "tooth_radius_um",
+    "ring": "ring_equidistant_um",
+    "carrier": "slot_wall_um",
+}
 POINTS = 4000  # of the coarser of two polygons along a flank; extrapolated, its area is converged far below 1e-9
 STEPS = 2000  # of the trapezoid rule over a whole turn, where it converges exponentially
 
@@ -135,28 +142,42 @@ class Theory:
         self.valley_rad = math.pi / self.lobes
         self.cam_outer_mm = self.path.at(0.0)[1] - self.r_mm
         self.parts = parts
+        self.modification = self.document.get("modification", {})
 
     def clearance_mm(self, part):
-        return self.parts.get(part, {}).get("clearance_um", 0.0) / 1000
+        """How far a part's surface is set back, its equidistant modification included."""
+        equidistant_um = self.modification.get(EQUIDISTANT[part], 0.0)
+        return (self.parts.get(part, {}).get("clearance_um", 0.0) + equidistant_um) / 1000
+
+    @property
+    def turned_rad(self):
+        return math.radians(self.modification.get("ring_rotation_arcsec", 0.0) / 3600)
 
     # --- The ring's flank (section 2.4)
 
-    def flank_point(self, place, set_back_mm=0.0):
-        """Radius and angle, from the middle of the tooth space, of the ring's flank where the path's parameter has this value."""
+    def flank_point(self, place, set_back_mm=0.0, is_modified=False):
+        """Radius and angle, from the middle of the tooth space, of the ring's flank where the path's parameter has this value, before it is turned."""
         psi, d, t = self.path.at(place)
-        beta = math.atan(self.k * t)
-        reach = self.r_mm + set_back_mm
+        shifted = d + self.modification.get("ring_path_shift_um", 0.0) / 1000 * is_modified
+        beta = math.atan(self.k * t * d / shifted)
+        d, reach = shifted, self.r_mm + set_back_mm
+        relief = self.modification.get("ring_tip_relief")
+        if relief and is_modified:
+            start = math.radians(relief["start_deg"])
+            share = max(0.0, (psi - start) / (self.engagement_rad() - start))
+            reach += relief["amount_um"] / 1000 * share ** relief["power"]
         along, across = d + reach * math.cos(beta), reach * math.sin(beta)
         return math.hypot(along, across), psi / self.k + math.atan2(across, along)
 
     @functools.cache  # noqa: B019, few drives, all alive to the end
-    def flank_end(self, set_back_mm=0.0):
-        """Where the flank ends, seen from the root: at the symmetry line of the ring's tooth, or at its bore."""
-        tip_rad = math.pi / self.ring_teeth
+    def flank_end(self, set_back_mm=0.0, is_modified=False):
+        """Where the flank ends, seen from the root: at the symmetry line of the ring's tooth, or at its bore. Flanks that are turned
+        apart are over earlier, those turned together as they would be where they were."""
+        tip_rad = math.pi / self.ring_teeth - max(0.0, self.turned_rad) * is_modified
         steps = 2000
 
         def is_over(place):
-            radius_mm, angle = self.flank_point(place, set_back_mm)
+            radius_mm, angle = self.flank_point(place, set_back_mm, is_modified)
             return angle > tip_rad or (self.bore_mm is not None and radius_mm < self.bore_mm)
 
         for step in range(1, steps):
@@ -203,22 +224,33 @@ class Theory:
         return math.pi / self.installed * (outer**2 - inner**2) - 2 * (half_slot(outer) - half_slot(inner))
 
     def ring_outer_radius_mm(self):
-        root = self.cam_outer_mm + 2 * self.r_mm + self.clearance_mm("ring")
+        root = self.flank_point(0.0, self.clearance_mm("ring"), True)[0]
         return self.parts.get("ring", {}).get("outer_radius_mm", 1.2 * root)
 
     def ring_opening_area_mm2(self, points=POINTS):
         """Inside the flanks, and inside the lands where the tips are bored. Two polygons, extrapolated."""
         c = self.clearance_mm("ring")
-        end = self.flank_end(c)
+        end, start = self.flank_end(c, True), self.flank_start(c)
 
         def half_space(count):
-            flank = [self.flank_point(end * i / count, c) for i in range(count + 1)]
+            flank = [self.flank_point(start + (end - start) * i / count, c, True) for i in range(count + 1)]
             return math.fsum(p[0] * q[0] * math.sin(q[1] - p[1]) for p, q in zip(flank, flank[1:])) / 2
 
         coarse, fine = half_space(points), half_space(2 * points)
-        radius_mm, angle = self.flank_point(end, c)
-        land = radius_mm**2 * (math.pi / self.ring_teeth - angle) / 2
-        return 2 * self.ring_teeth * ((4 * fine - coarse) / 3 + land)
+        radius_mm, angle = self.flank_point(end, c, True)
+        land = radius_mm**2 * (math.pi / self.ring_teeth - angle - self.turned_rad) / 2
+        root = self.flank_point(0.0, c, True)[0] ** 2 * max(0.0, self.turned_rad) / 2
+        return 2 * self.ring_teeth * ((4 * fine - coarse) / 3 + land + root)
+
+    def flank_start(self, set_back_mm):
+        """Where flanks that are turned together cross in the middle of the space."""
+        low, high = 0.0, self.valley_rad / 2
+        if self.turned_rad >= 0:
+            return low
+        while low < (middle := (low + high) / 2) < high:
+            is_beyond = self.flank_point(middle, set_back_mm, True)[1] + self.turned_rad > 0
+            low, high = (low, middle) if is_beyond else (middle, high)
+        return low
 
     def areas_mm2(self):
         return {

@@ -28,14 +28,16 @@ fn assert_answered<Q: Question>(question: Q, design: &Design) {
             for format in Q::Answer::FORMS.iter().map(|(format, _)| *format).chain([Format::Json]) {
                 let mut written = Vec::new();
                 answer.write(format, &mut written).unwrap();
+                // Bytes of the numbers that the text has too.
+                if matches!(format, Format::Arrow | Format::Parquet) {
+                    continue;
+                }
                 let text = String::from_utf8(written).unwrap();
                 let is_none = match format {
                     // serde_json writes null where a number is none; elsewhere a word may be `info`.
                     Format::Json => text.contains("null"),
                     Format::Text => text.contains("NaN"),
-                    Format::Csv | Format::Svg | Format::Dxf | Format::Step => {
-                        text.contains("NaN") || text.contains("inf")
-                    }
+                    _ => text.contains("NaN") || text.contains("inf"),
                 };
                 assert!(!is_none, "{format:?}: {design:?}");
             }

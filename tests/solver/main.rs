@@ -12,6 +12,7 @@ mod gaps;
 mod laws;
 mod limits;
 mod losses;
+mod modified_parts;
 mod oracles;
 mod paper;
 mod parts;

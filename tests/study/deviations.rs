@@ -1,5 +1,7 @@
 //! Sensitivities and tolerance studies, against closed forms.
 
+use std::collections::BTreeMap;
+
 use serde_json::{Value, json};
 
 use crate::asking::{answer, faulty, paper, with};
@@ -165,6 +167,80 @@ fn the_tightest_contributor_stands_first_with_its_share() {
     assert!((number(&first["share"]) - 0.8).abs() < 0.03, "{first}");
     let others = named(&of["contributors"], "deviation", "/drive/wave_generator/semi_major_mm");
     assert!((number(&others["share"]) + number(&first["share"]) - 1.0).abs() < 1e-12);
+}
+
+/// Uniform: every bin holds the same share, give or take five of its standard deviations; each drive is in one of them.
+#[test]
+fn the_histogram_holds_every_drive_once() {
+    let of = answer(&tolerance(json!({ "distribution": "uniform", "limit": 0.05 })))["quantities"][0].clone();
+    let column = |name: &str| of["histogram"][name].as_array().unwrap().iter().map(number).collect::<Vec<_>>();
+    let (edges, drives) = (column("edges"), column("drives"));
+    assert_eq!((edges.len(), drives.len()), (56, 55), "twice the cube root of 20 000");
+    assert_eq!((edges[0], edges[55]), (number(&of["least"]), number(&of["largest"])));
+    assert_eq!(drives.iter().sum::<f64>(), 20_000.0);
+    let expected = 20_000.0 / 55.0;
+    assert!(drives.iter().all(|drives| (drives - expected).abs() < 5.0 * expected.sqrt()), "{drives:?}");
+    let even = edges.windows(2).all(|pair| (pair[1] - pair[0] - (edges[55] - edges[0]) / 55.0).abs() < 1e-12);
+    assert!(even, "{edges:?}");
+    // A quantity that nothing moves is in one bin.
+    let still = with(
+        &tolerance(json!({ "distribution": "uniform", "limit": 0.05 })),
+        "/quantities",
+        json!(["transmission_ratio"]),
+    );
+    let histogram = answer(&still)["quantities"][0]["histogram"].clone();
+    assert_eq!(histogram, json!({ "edges": [14.0, 14.0], "drives": [20_000] }));
+}
+
+/// tests/reference/tolerances.py: other load sharing, and which tooth meets which space counted anew.
+fn reference() -> Value {
+    serde_json::from_str(include_str!("../reference/tolerances.json")).unwrap()
+}
+
+#[test]
+fn drives_with_parts_that_deviate_have_the_figures_of_the_reference() {
+    let reference = reference();
+    for drive in reference["drives"].as_array().unwrap() {
+        let deviations = ["ring_space_um", "tooth_radius_um"].map(|name| (name, &drive[name]));
+        let base = with(&reference["design"], "/deviations", json!(BTreeMap::from(deviations)));
+        let values = drive["values"].as_object().unwrap();
+        let study = json!({ "study": "sensitivity", "base": base, "quantities": values.keys().collect::<Vec<_>>(), "inputs": { "/load/input_torque_nm": {} } });
+        let found = answer(&study);
+        for (name, value) in values {
+            let own = number(&named(&found["quantities"], "quantity", name)["value"]);
+            assert!((own / number(value) - 1.0).abs() < 1e-11, "{name}: {own} and not {value}");
+        }
+    }
+}
+
+/// With chance of its own. Below a quantile of ours lies the same share of its drives, within four standard deviations of both samples; where
+/// one tooth carries all, many drives have the very same value, and the share lies between those below it and those up to it.
+#[test]
+fn the_quantiles_are_those_of_an_independent_sampler_of_the_reference_calculation() {
+    const SAMPLES: u32 = 2000;
+    let reference = reference();
+    let values = reference["values"].as_object().unwrap();
+    let found = answer(&json!({
+        "study": "tolerance", "base": reference["design"], "deviations": reference["deviations"], "samples": SAMPLES,
+        "quantities": values.keys().collect::<Vec<_>>()
+    }));
+    assert_eq!((&found["interference"], &found["impossible"]), (&json!(0), &json!(0)));
+    for (name, column) in values {
+        let column: Vec<_> = column.as_array().unwrap().iter().map(number).collect();
+        let (own, others) = (f64::from(SAMPLES), column.len() as f64);
+        let of = named(&found["quantities"], "quantity", name);
+        for quantile in of["quantiles"].as_array().unwrap() {
+            let (share, value) = (number(&quantile["share"]), number(&quantile["value"]));
+            let below = |value: f64| column.partition_point(|&other| other <= value) as f64 / others;
+            // Beyond the digits that are written down.
+            let (fewest, most) = (below(value * (1.0 - 1e-8)), below(value * (1.0 + 1e-8)));
+            let room = 4.0 * (share * (1.0 - share) * (1.0 / own + 1.0 / others)).sqrt() + 1.0 / own;
+            assert!(
+                fewest - room < share && share < most + room,
+                "{name}: {fewest} to {most} below the quantile of {share}"
+            );
+        }
+    }
 }
 
 #[test]

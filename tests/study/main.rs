@@ -10,3 +10,4 @@ mod deviations;
 mod engine;
 mod maps;
 mod searches;
+mod tables;

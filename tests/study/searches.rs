@@ -161,6 +161,168 @@ fn who_knows_only_ratio_torque_and_space_has_a_drive() {
     }
 }
 
+/// What a designer knows who has no drive yet.
+fn requirements() -> Value {
+    json!({
+        "study": "search", "evaluations": 2000,
+        "base": { "load": { "output_torque_nm": 200.0 }, "model": { "compatibility": "projection", "stiffness": { "law": "linear" } } },
+        "require": { "transmission_ratio": { "min": 19.5, "max": 20.5 }, "outer_diameter_mm": { "max": 120.0 } },
+        "objectives": [{ "quantity": "outer_diameter_mm", "goal": "min" }, { "quantity": "peak_stress_mpa", "goal": "min" }]
+    })
+}
+
+/// A base with any kind of wave generator was refused at `/free/…/amplitude_mm`, which nobody had given.
+#[test]
+fn what_is_free_follows_for_every_kind_of_wave_generator_and_every_shape_of_teeth() {
+    for (wave_generator, lobes, free) in [
+        (json!({}), 2, ["semi_major_mm", "semi_minor_mm"]),
+        (json!({ "kind": "ellipse" }), 2, ["semi_major_mm", "semi_minor_mm"]),
+        (json!({ "kind": "eccentric" }), 1, ["eccentricity_mm", "radius_mm"]),
+        (json!({ "kind": "harmonic", "lobes": 3 }), 3, ["amplitude_mm", "mean_radius_mm"]),
+        (json!({ "kind": "harmonic_path" }), 2, ["amplitude_mm", "mean_path_radius_mm"]),
+    ] {
+        let study = with(&requirements(), "/base/drive", json!({ "wave_generator": wave_generator }));
+        let found = answer(&study);
+        let front = found["front"].as_array().unwrap();
+        assert!(!front.is_empty(), "{wave_generator}: {found}");
+        for found in front {
+            let drive = &found["design"]["drive"];
+            let count = drive["teeth"]["count"].as_i64().unwrap();
+            assert_eq!(count - drive["ring"]["teeth"].as_i64().unwrap(), lobes, "{wave_generator}");
+            assert!((19.5..=20.5).contains(&(count as f64 / lobes as f64)), "{wave_generator}: {count} teeth");
+        }
+        let pointers: Vec<_> = found["free"].as_array().unwrap().iter().map(|free| &free["pointer"]).collect();
+        for name in free {
+            let pointer = json!(format!("/drive/wave_generator/{name}"));
+            assert!(pointers.contains(&&pointer), "{pointer} is not free: {pointers:?}");
+        }
+    }
+    for (shape, law, free) in [("ball", "hertz", 4), ("flat_sided", "johnson", 6)] {
+        let base = json!({ "drive": { "teeth": { "shape": shape } }, "load": { "output_torque_nm": 20.0 }, "model": { "stiffness": { "law": law } } });
+        let found = answer(&with(&with(&requirements(), "/base", base), "/evaluations", json!(400)));
+        assert_eq!(found["free"].as_array().unwrap().len(), free, "{shape}: {}", found["free"]);
+        assert!(number(&found["scan"]["impossible"]) < number(&found["scan"]["variants"]), "{found}");
+    }
+}
+
+#[test]
+fn the_number_of_teeth_follows_from_those_of_the_ring() {
+    let study = with(&requirements(), "/base/drive", json!({ "ring": { "teeth": 38 } }));
+    for found in answer(&study)["front"].as_array().unwrap() {
+        assert_eq!(found["design"]["drive"]["teeth"]["count"], 40);
+    }
+}
+
+/// Each refusal stands at a field that was given, or names the one that is missing.
+#[test]
+fn a_newcomer_is_refused_at_what_was_given() {
+    let detail = |document: &Value| {
+        let refused = crate::asking::study(document).expect_err("the study can be carried out");
+        refused.errors[0].detail.clone()
+    };
+    let mut others = Vec::new();
+    for (pointer, value, at, code, says) in [
+        // Two lobes: ratios are halves.
+        (
+            "/require/transmission_ratio",
+            json!({ "min": 19.6, "max": 19.9 }),
+            "/require/transmission_ratio",
+            "out_of_range",
+            "lobes",
+        ),
+        (
+            "/require/transmission_ratio",
+            json!({ "min": -3, "max": -2 }),
+            "/require/transmission_ratio",
+            "out_of_range",
+            "lobes",
+        ),
+        (
+            "/require/transmission_ratio",
+            json!({ "min": 20 }),
+            "/free",
+            "missing_field",
+            "`transmission_ratio` from both sides",
+        ),
+        (
+            "/require/outer_diameter_mm",
+            json!({ "min": 100 }),
+            "/free",
+            "missing_field",
+            "`outer_diameter_mm` from above",
+        ),
+        (
+            "/require/outer_diameter_mm",
+            json!({ "max": -120 }),
+            "/require/outer_diameter_mm/max",
+            "out_of_range",
+            "above zero",
+        ),
+        (
+            "/base/drive",
+            json!({ "wave_generator": { "kind": "elipse" } }),
+            "/base/drive/wave_generator/kind",
+            "unknown_choice",
+            "ellipse",
+        ),
+        (
+            "/base/drive",
+            json!({ "wave_generator": { "kind": "harmonic", "lobes": 0 } }),
+            "/base/drive/wave_generator/lobes",
+            "out_of_range",
+            "1000",
+        ),
+        ("/base/drive", json!({ "teeth": { "width": 3 } }), "/base/drive/teeth/width", "unknown_field", "width_mm"),
+        ("/base/load/output_torque_nm", json!(-200), "/base/load/output_torque_nm", "out_of_range", "200"),
+        ("/base/drive", json!({ "teeth": { "width_mm": 0 } }), "/base/drive/teeth/width_mm", "out_of_range", "0"),
+        (
+            "/free",
+            json!({ "/drive/teeth/radius_mm": { "min": 3, "max": 4 } }),
+            "/base/drive/teeth/count",
+            "missing_field",
+            "`free`",
+        ),
+        ("/start", json!([{}]), "/start/0/drive/teeth/count", "missing_field", "begin with"),
+        (
+            "/start",
+            json!([{ "drive": { "teeth": { "count": 40.5 } } }]),
+            "/start/0/drive/teeth/count",
+            "wrong_type",
+            "whole",
+        ),
+        (
+            "/start",
+            json!([{ "drive": { "teeth": { "count": 50 } } }]),
+            "/start/0/drive/teeth/count",
+            "out_of_range",
+            "39.0 to 41.0",
+        ),
+    ] {
+        let document = with(&requirements(), pointer, value.clone());
+        let found = (faulty(&document), detail(&document));
+        if found.0 != (at.to_owned(), code.to_owned()) || !found.1.contains(says) {
+            others.push(format!("{pointer}: {value}: {found:?}"));
+        }
+    }
+    assert!(others.is_empty(), "{}", others.join("\n"));
+    let complete = with(&with(&requirements(), "/base", paper()), "/start", json!([]));
+    assert_eq!(faulty(&complete), ("/free".into(), "missing_field".into()), "everything stands in the base");
+}
+
+/// JSON pointers lead into arrays too (RFC 6901); the whole of the array was replaced, and the base blamed.
+#[test]
+fn an_entry_of_a_list_is_a_field() {
+    let point =
+        |torque_nm: f64| json!({ "output_torque_nm": torque_nm, "input_speed_rpm": 1000.0, "share_of_time": 0.5 });
+    let base = with(&paper(), "/load", json!({ "duty": [point(200.0), point(100.0)] }));
+    let study = json!({
+        "study": "map", "base": base, "quantities": ["peak_stress_mpa"],
+        "over": { "/load/duty/0/output_torque_nm": { "one_of": [200.0, 300.0] } }
+    });
+    let stresses = answer(&study)["possible"]["quantities"]["peak_stress_mpa"].clone();
+    assert!((number(&stresses[1]) / number(&stresses[0]) - 1.5_f64.sqrt()).abs() < 1e-9, "{stresses}");
+}
+
 #[test]
 fn a_start_is_looked_at_first() {
     let study = with(&search(), "/start", json!([paper()]));

@@ -1,8 +1,8 @@
 //! A drawing as it goes over the wire, which all its other forms are written from.
 
 use serde::{Deserialize, Serialize};
-use toothwave_solver::Part;
 use toothwave_solver::drawing::{Body, Edge, Outline, Placement, Subject};
+use toothwave_solver::{Drive, Part, ToothShape};
 use utoipa::ToSchema;
 
 use crate::findings::FindingAnswer;
@@ -38,7 +38,7 @@ impl DrawnPart {
     }
 }
 
-/// A drawing: prisms of the teeth's width, each given by its section and by where it stands.
+/// A drawing: prisms of the teeth's width, or balls, each given by its section and by where it stands.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct DrawingAnswer {
     /// Version of the solver.
@@ -66,7 +66,9 @@ pub struct DrawingAnswer {
 pub struct BodyAnswer {
     /// Which part.
     pub part: BodyPart,
-    /// Height of the prism.
+    /// What stands on its section.
+    pub solid: BodySolid,
+    /// Height of the prism; of a ball, that of the parts which it stands in the middle of.
     pub width_mm: f64,
     /// What bounds its section.
     pub outer: OutlineAnswer,
@@ -74,6 +76,16 @@ pub struct BodyAnswer {
     pub holes: Vec<OutlineAnswer>,
     /// Where each prism stands.
     pub placements: Vec<PlacementAnswer>,
+}
+
+/// What stands on a section.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BodySolid {
+    /// A prism, from the plane of the section up.
+    Prism,
+    /// A ball of the section's radius, its centre half the width above.
+    Ball,
 }
 
 /// A part of the drive.
@@ -232,10 +244,12 @@ impl From<Placement> for PlacementAnswer {
 }
 
 impl BodyAnswer {
-    pub(super) fn new(Body { part, section, placements }: Body, width_mm: f64) -> Self {
+    pub(super) fn new(Body { part, section, placements }: Body, drive: &Drive) -> Self {
+        let is_ball = part == Part::Teeth && matches!(drive.parameters().tooth, ToothShape::Ball { .. });
         Self {
             part: part.into(),
-            width_mm,
+            solid: if is_ball { BodySolid::Ball } else { BodySolid::Prism },
+            width_mm: drive.tooth_width_mm(),
             outer: section.outer.into(),
             holes: section.holes.into_iter().map(Into::into).collect(),
             placements: placements.into_iter().map(Into::into).collect(),

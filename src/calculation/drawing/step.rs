@@ -1,19 +1,23 @@
 //! Drawings as STEP: every part one solid, made once, and an assembly of as many instances of each as there are; flanks as cubic
 //! splines, swept along z.
 //!
-//! A prism needs a few kinds of record only: planes, cylinders and extruded splines, and what joins them. They are those of
-//! ISO 10303-214 (`AUTOMOTIVE_DESIGN`).
+//! A prism needs a few kinds of record only: planes, cylinders and extruded splines, and what joins them; a ball is two halves of a
+//! sphere. They are those of ISO 10303-214 (`AUTOMOTIVE_DESIGN`).
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use super::answer::{BodyAnswer, BodyPart, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
+use super::answer::{BodyAnswer, BodyPart, BodySolid, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
 use super::svg;
 use crate::json;
 
 /// How far a spline may be from its curve, as a share of the chord tolerance. A spline through few points is as near to the curve
 /// as chords through many, so points are left out as long as this holds.
 const SPLINE_SHARE_OF_CHORD: f64 = 0.01;
+
+/// Spans of a spline for each face that stands on it. CAD kernels sum volumes with a fixed number of places on a face:
+/// OpenCascade with nine, which over a whole tooth space miss its volume by 1e-5 (tests/freecad/test_step.py). More faces make larger files.
+const SPANS_OF_A_FACE: usize = 6;
 
 /// Digits of the design's hash in the names of parts: enough to tell designs apart in a tree, few enough to be read there.
 const HASH_DIGITS: usize = 8;
@@ -149,7 +153,12 @@ impl Step<'_> {
             BodyPart::Carrier => ("carrier_finger", [0.93, 0.72, 0.33]),
         };
         let name = format!("{name} {hash}");
-        let solid = self.solid(body, &name)?;
+        let solid = match (body.solid, &body.outer) {
+            (BodySolid::Ball, OutlineAnswer::Circle { radius_mm }) => {
+                self.ball(*radius_mm, 0.5 * body.width_mm, &name)?
+            }
+            _ => self.prism(body, &name)?,
+        };
         let Frame { units, origin, .. } = frame;
         let representation =
             self.record(format_args!("ADVANCED_BREP_SHAPE_REPRESENTATION('{name}',({origin},{solid}),{units})"))?;
@@ -217,7 +226,7 @@ impl Step<'_> {
     }
 
     /// A prism from z = 0 up: a face on every edge, a bottom and a top.
-    fn solid(&mut self, body: &BodyAnswer, name: &str) -> io::Result<Id> {
+    fn prism(&mut self, body: &BodyAnswer, name: &str) -> io::Result<Id> {
         let tolerance_mm = self.spline_tolerance_mm;
         let outer = (sides(&body.outer, false, tolerance_mm), "FACE_OUTER_BOUND");
         let holes = body.holes.iter().map(|hole| (sides(hole, true, tolerance_mm), "FACE_BOUND"));
@@ -235,6 +244,34 @@ impl Step<'_> {
             let place = self.placement([0.0, 0.0, z_mm], [0.0, 0.0, up], [1.0, 0.0, 0.0])?;
             let plane = self.record(format_args!("PLANE('',{place})"))?;
             faces.push(self.record(format_args!("ADVANCED_FACE('',({}),{plane},.T.)", list(&bounds)))?);
+        }
+        let shell = self.record(format_args!("CLOSED_SHELL('',({}))", list(&faces)))?;
+        self.record(format_args!("MANIFOLD_SOLID_BREP('{name}',{shell})"))
+    }
+
+    /// A ball around a place on the z axis: two halves that meet along a great circle through its poles.
+    fn ball(&mut self, radius_mm: f64, center_z_mm: f64, name: &str) -> io::Result<Id> {
+        let (center, y) = ([0.0, 0.0, center_z_mm], [0.0, 1.0, 0.0]);
+        let place = self.placement(center, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
+        let sphere = self.record(format_args!("SPHERICAL_SURFACE('',{place},{})", Real(radius_mm)))?;
+        let mut poles = Vec::new();
+        for z_mm in [center_z_mm - radius_mm, center_z_mm + radius_mm] {
+            let point = self.point([0.0, 0.0, z_mm])?;
+            poles.push(self.record(format_args!("VERTEX_POINT('',{point})"))?);
+        }
+        // Each from the lower pole to the upper one, through +x and through -x.
+        let mut meridians = Vec::new();
+        for x in [1.0, -1.0] {
+            let place = self.placement(center, y.map(|y| -x * y), [x, 0.0, 0.0])?;
+            let circle = self.record(format_args!("CIRCLE('',{place},{})", Real(radius_mm)))?;
+            meridians.push(self.record(format_args!("EDGE_CURVE('',{},{},{circle},.T.)", poles[0], poles[1]))?);
+        }
+        let mut faces = Vec::new();
+        // Seen from outside the half towards -y has +x on its right, so that it runs up along +x; the other one runs up along -x.
+        for (up, down) in [(meridians[0], meridians[1]), (meridians[1], meridians[0])] {
+            let around = self.edge_loop([(up, true), (down, false)])?;
+            let bound = self.record(format_args!("FACE_OUTER_BOUND('',{around},.T.)"))?;
+            faces.push(self.record(format_args!("ADVANCED_FACE('',({bound}),{sphere},.T.)"))?);
         }
         let shell = self.record(format_args!("CLOSED_SHELL('',({}))", list(&faces)))?;
         self.record(format_args!("MANIFOLD_SOLID_BREP('{name}',{shell})"))
@@ -373,12 +410,13 @@ fn sides(outline: &OutlineAnswer, is_hole: bool, tolerance_mm: f64) -> Vec<Side>
         }
         OutlineAnswer::Path { edges } => edges
             .iter()
-            .map(|edge| {
+            .flat_map(|edge| {
                 let end = if is_hole { edge.start() } else { edge.end() };
                 match edge {
-                    EdgeAnswer::Line { .. } => Side::Line { end },
+                    EdgeAnswer::Line { .. } => vec![Side::Line { end }],
                     EdgeAnswer::Arc { radius_mm, sweep_deg, .. } => {
-                        Side::Arc { end, radius_mm: *radius_mm, is_counter_clockwise: (*sweep_deg > 0.0) != is_hole }
+                        let is_counter_clockwise = (*sweep_deg > 0.0) != is_hole;
+                        vec![Side::Arc { end, radius_mm: *radius_mm, is_counter_clockwise }]
                     }
                     EdgeAnswer::Curve { x_mm, y_mm, start_tangent_deg, end_tangent_deg } => {
                         let mut points: Vec<_> = x_mm.iter().zip(y_mm).map(|(&x, &y)| [x, y]).collect();
@@ -391,7 +429,15 @@ fn sides(outline: &OutlineAnswer, is_hole: bool, tolerance_mm: f64) -> Vec<Side>
                             points.reverse();
                             end_tangents.reverse();
                         }
-                        Side::Curve(Spline::near(&points, &end_tangents, tolerance_mm))
+                        let mut pieces: Vec<_> = Interpolation::near(&points, &end_tangents, tolerance_mm)
+                            .cut()
+                            .iter()
+                            .map(|piece| Side::Curve(Spline::of(piece)))
+                            .collect();
+                        if is_hole {
+                            pieces.reverse();
+                        }
+                        pieces
                     }
                 }
             })
@@ -421,6 +467,39 @@ impl Interpolation {
         });
         let slopes = along_x.into_iter().zip(along_y).map(|(x, y)| [x, y]).collect();
         Self { points, chords_mm, slopes }
+    }
+
+    /// Through as few of the points of a curve as it takes to pass all others within a tolerance: pieces that do not are halved.
+    fn near(points: &[[f64; 2]], end_tangents: &[[f64; 2]; 2], tolerance_mm: f64) -> Self {
+        let mut kept = vec![0, points.len() - 1];
+        loop {
+            let spline = Interpolation::through(kept.iter().map(|&index| points[index]).collect(), end_tangents);
+            let mut next = vec![0];
+            for (piece, ends) in kept.windows(2).enumerate() {
+                let (from, to) = (ends[0], ends[1]);
+                if points[from + 1..to].iter().any(|&point| spline.distance_mm(piece, point) > tolerance_mm) {
+                    next.push(from.midpoint(to));
+                }
+                next.push(to);
+            }
+            if next.len() == kept.len() {
+                return spline;
+            }
+            kept = next;
+        }
+    }
+
+    /// The same curve in pieces, one for each face.
+    fn cut(&self) -> Vec<Self> {
+        let spans = self.chords_mm.len();
+        let pieces = (spans / SPANS_OF_A_FACE).max(1);
+        let ends = |piece: usize| spans * piece / pieces;
+        let piece = |from: usize, to: usize| Self {
+            points: self.points[from..=to].to_vec(),
+            chords_mm: self.chords_mm[from..to].to_vec(),
+            slopes: self.slopes[from..=to].to_vec(),
+        };
+        (0..pieces).map(|index| piece(ends(index), ends(index + 1))).collect()
     }
 
     /// Bézier's polygon of a piece: its inner points a third of the chord from the ends, along the slopes there.
@@ -460,26 +539,6 @@ struct Spline {
 }
 
 impl Spline {
-    /// Through as few of the points of a curve as it takes to pass all others within a tolerance: pieces that do not are halved.
-    fn near(points: &[[f64; 2]], end_tangents: &[[f64; 2]; 2], tolerance_mm: f64) -> Self {
-        let mut kept = vec![0, points.len() - 1];
-        loop {
-            let spline = Interpolation::through(kept.iter().map(|&index| points[index]).collect(), end_tangents);
-            let mut next = vec![0];
-            for (piece, ends) in kept.windows(2).enumerate() {
-                let (from, to) = (ends[0], ends[1]);
-                if points[from + 1..to].iter().any(|&point| spline.distance_mm(piece, point) > tolerance_mm) {
-                    next.push(from.midpoint(to));
-                }
-                next.push(to);
-            }
-            if next.len() == kept.len() {
-                return Self::of(&spline);
-            }
-            kept = next;
-        }
-    }
-
     fn of(spline: &Interpolation) -> Self {
         let Interpolation { points, chords_mm, .. } = spline;
         let last = chords_mm.len();

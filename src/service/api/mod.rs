@@ -213,7 +213,7 @@ fn solve<Q: Question>(
 
 /// Whether a form is long where the columns are.
 const fn is_long(format: Format) -> bool {
-    matches!(format, Format::Json | Format::Csv)
+    matches!(format, Format::Json | Format::Csv | Format::Arrow | Format::Parquet)
 }
 
 /// Writes an answer, which took so long and whose columns take so many bytes, into its final bytes.

@@ -63,7 +63,7 @@ export class Tolerance extends StudyView {
       return { ...kind, distribution, limit, range, element: html('div', { class: 'ask-row deviation' }, distribution.element, range) };
     });
     this.value = html('p', { class: 'headline' });
-    this.chart = html('div', { class: 'study-chart', role: 'img', 'aria-label': 'The spread of the quantity; the table below has the numbers' });
+    this.chart = html('div', { class: 'study-chart', role: 'img', 'aria-label': 'The spread of the quantity, as shares of drives below and in bins; the table below has the numbers' });
     this.tables = html('div', { class: 'tolerance-tables' });
     section.append(
       html('header', {}, html('h2', { id: 'tolerance-title', tabindex: '-1' }, 'Tolerances')),
@@ -153,6 +153,20 @@ export class Tolerance extends StudyView {
     this.tables.replaceChildren(...tables);
   }
 
+  /** How many drives lie where, over the same axis as the shares. */
+  #histogram(width, min, max) {
+    const { of, name } = this.#result;
+    const { edges, drives } = of.histogram;
+    const all = drives.reduce((sum, count) => sum + count, 0);
+    const shares = drives.map((count) => (100 * count) / all);
+    const frame = axes(width, HEIGHT / 2, { label: this.quantities.headed(name), min, max }, { label: 'Share of drives here, %', min: 0, max: 1.05 * Math.max(...shares) });
+    shares.forEach((share, index) => {
+      const [from, to] = [frame.x(edges[index]), frame.x(edges[index + 1])];
+      frame.plot.append(svg('rect', { class: 'histogram', x: from, y: frame.y(share), width: Math.max(0, to - from), height: frame.box.bottom - frame.y(share) }));
+    });
+    return frame.root;
+  }
+
   /** Shares of drives over the quantity, with bands of confidence, the design without deviations and the limits. */
   #draw() {
     const { of, name, require } = this.#result ?? {};
@@ -180,6 +194,6 @@ export class Tolerance extends StudyView {
       const x = frame.x(of.nominal);
       frame.plot.append(svg('path', { class: 'now', d: `M${x} ${top}V${bottom}` }), svg('text', { class: 'now-label', x: x + 5, y: top + 14 }, 'exact'));
     }
-    this.chart.replaceChildren(frame.root);
+    this.chart.replaceChildren(frame.root, this.#histogram(width, low - room, high + room));
   }
 }

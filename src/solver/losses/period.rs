@@ -57,7 +57,7 @@ impl Losses {
     ///
     /// # Errors
     /// [`SolveError::NotConverged`] from the geometry, [`SolveError::Stopped`] when `stop` says so.
-    pub fn of(drive: &Drive, sweep: &Sweep, friction: &Friction, stop: &impl Stop) -> Result<Self, SolveError> {
+    pub fn of(drive: &Drive, sweep: &Sweep, friction: &Friction, stop: &dyn Stop) -> Result<Self, SolveError> {
         let mechanism = Mechanism::of_sweep(drive, sweep);
         let states = &sweep.states;
         let column = || Vec::with_capacity(states.len());
@@ -147,7 +147,7 @@ impl Wear {
         losses: &Losses,
         friction: &Friction,
         parameters: &WearParameters,
-        stop: &impl Stop,
+        stop: &dyn Stop,
     ) -> Result<Self, SolveError> {
         let (mechanism, loaded) = (Mechanism::of_sweep(drive, sweep), LoadedDrive::new(drive, load)?);
         let mut mm_per_hour = PerContact::of(|_| Vec::with_capacity(sweep.states.len()));
@@ -269,7 +269,7 @@ impl RadialForces {
     ///
     /// # Errors
     /// As [`Losses::of`].
-    pub fn of(drive: &Drive, sweep: &Sweep, stop: &impl Stop) -> Result<Option<Self>, SolveError> {
+    pub fn of(drive: &Drive, sweep: &Sweep, stop: &dyn Stop) -> Result<Option<Self>, SolveError> {
         let mechanism = Mechanism::of_sweep(drive, sweep);
         if mechanism.lobes_loaded_alike() > 1 {
             return Ok(None);
@@ -291,7 +291,7 @@ impl RadialForces {
 fn at_each_input_angle(
     drive: &Drive,
     states: &States,
-    stop: &impl Stop,
+    stop: &dyn Stop,
     mut each: impl FnMut(f64, &[ToothOfState]) -> Result<(), SolveError>,
 ) -> Result<(), SolveError> {
     let mut teeth = Vec::new();

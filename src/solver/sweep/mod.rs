@@ -26,14 +26,14 @@ pub use unloaded::unloaded_wind_up_deg;
 /// [`SolveError::TooManyStates`] at a tolerance that takes more of them than allowed,
 /// [`SolveError::Inconsistent`] where the answer's own checks say that it is wrong,
 /// [`SolveError::Stopped`] when `stop` says so.
-pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -> Result<Sweep, SolveError> {
+pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<Sweep, SolveError> {
     let loaded = LoadedDrive::new(drive, load)?;
     if let Points::Samples(samples) = points
-        && let Some(sweep) = fast::sweep(&loaded, samples, load.parameters().allowable_stress_mpa, stop)?
+        && let Some(sweep) = fast::sweep(&loaded, samples, load.parameters().allowable_stress_mpa, &stop)?
     {
         return Ok(sweep);
     }
-    plain::sweep(&loaded, load, points, stop)
+    plain::sweep(&loaded, load, points, &stop)
 }
 
 /// The sweep of a drive of which single items deviate: by slot and lobe, over as many load periods as it takes until they meet again as they
@@ -47,33 +47,33 @@ pub fn sweep_with_deviations(
     load: &LoadCase,
     deviations: &Deviations,
     points: Points,
-    stop: &impl Stop,
+    stop: &dyn Stop,
 ) -> Result<Sweep, SolveError> {
     if deviations.is_nil() && deviations.violations(drive.parameters()).is_empty() {
         return sweep(drive, load, points, stop);
     }
     let loaded = LoadedDrive::with_deviations(drive, load, &ToothContact::of(drive), Some(deviations))?;
-    plain::sweep(&loaded, load, points, stop)
+    plain::sweep(&loaded, load, points, &stop)
 }
 
 /// What the sweep over one period comes to, without its states: the same peaks, in less time. That the period closes is not looked at.
 ///
 /// # Errors
 /// As [`sweep`].
-pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -> Result<SweepPeaks, SolveError> {
+pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<SweepPeaks, SolveError> {
     let loaded = LoadedDrive::new(drive, load)?;
     if let Points::Samples(samples) = points
-        && let Some(peaks) = fast::peaks(&loaded, samples, load.parameters().allowable_stress_mpa, stop)?
+        && let Some(peaks) = fast::peaks(&loaded, samples, load.parameters().allowable_stress_mpa, &stop)?
     {
         return Ok(peaks);
     }
-    plain::sweep(&loaded, load, points, stop).map(|sweep| SweepPeaks::from(&sweep))
+    plain::sweep(&loaded, load, points, &stop).map(|sweep| SweepPeaks::from(&sweep))
 }
 
 /// The same sweep, state by state: what the fast path is held against, and what is left where it does not reach.
 ///
 /// # Errors
 /// As [`sweep`].
-pub fn sweep_plain(drive: &Drive, load: &LoadCase, points: Points, stop: &impl Stop) -> Result<Sweep, SolveError> {
-    plain::sweep(&LoadedDrive::new(drive, load)?, load, points, stop)
+pub fn sweep_plain(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<Sweep, SolveError> {
+    plain::sweep(&LoadedDrive::new(drive, load)?, load, points, &stop)
 }

@@ -20,7 +20,7 @@ pub fn unloaded_wind_up_deg(
     load: &LoadCase,
     deviations: &Deviations,
     sweep: &Sweep,
-    stop: &impl Stop,
+    stop: &dyn Stop,
 ) -> Result<Vec<f64>, SolveError> {
     let loaded = LoadedDrive::with_deviations(drive, load, &ToothContact::of(drive), Some(deviations))?;
     let states = &sweep.states;

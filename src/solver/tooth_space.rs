@@ -1,0 +1,354 @@
+//! The ring's tooth space as it is made: its flank set back by a clearance and shaped by a modification (docs/theory.md section 8).
+
+use nalgebra::{Point2, Unit, Vector2};
+
+use crate::drive::{Drive, DriveError};
+use crate::gaps::{MM_PER_UM, Modification, RAD_PER_ARCSEC, TipRelief};
+use crate::position::{Position, half_lobe_rad};
+use crate::profile::{CurvePoint, SampledCurve, flank_curve, sampled};
+use crate::ring::{FlankEnd, RingFlank, RingTooth};
+use crate::root::{NotConverged, bracketed};
+use crate::violation::{Modified, Violation};
+use crate::{SolveError, Stop};
+
+/// One tooth space of the ring, which is symmetric.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ToothSpace {
+    /// The flank as its distance from the path sets it back, and, as far as no more than that shapes it, what ends it.
+    set_back: RingTooth,
+    shaped: Option<ShapedSpace>,
+}
+
+/// What ends a space at the ring's tip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Tip {
+    pub(crate) radius_mm: f64,
+    /// Whether the tip is an arc of this radius, and not a point or a regular place of the curve.
+    pub(crate) has_land: bool,
+}
+
+/// Half a tooth space from its middle outward, the mirror image of the other half.
+pub(crate) struct HalfSpace {
+    /// Half the angle of the arc that joins turned flanks at the root.
+    pub(crate) root_arc_rad: f64,
+    /// Whether the two flanks are one smooth curve at the root.
+    pub(crate) is_smooth_at_root: bool,
+    /// The flank, in two pieces where a tip relief starts.
+    pub(crate) pieces: Vec<SampledCurve>,
+}
+
+/// A flank that more shapes than its distance from the path, from where it starts to where it ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ShapedSpace {
+    flank: ShapedFlank,
+    start: Position,
+    end: Position,
+    tip: Tip,
+}
+
+/// What shapes a flank besides its distance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ShapedFlank {
+    flank: RingFlank,
+    path_shift_mm: f64,
+    profile_shift_mm: f64,
+    turned_rad: f64,
+    relief: Option<Relief>,
+}
+
+/// A tip relief beside the drive's own flank.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Relief {
+    amount_mm: f64,
+    start_rad: f64,
+    length_rad: f64,
+    power: f64,
+}
+
+/// A shaped flank at one position.
+struct ShapedPoint {
+    radius_mm: f64,
+    /// From the middle of the space.
+    angle_rad: f64,
+    /// From the symmetry line of the ring's tooth: with all its digits near the tip.
+    angle_from_tip_rad: f64,
+    tangent: Unit<Vector2<f64>>,
+    /// How fast the curve runs along the path's tangent, by position: not positive beyond a cusp.
+    speed_mm: f64,
+    distance_mm: f64,
+}
+
+/// Places at which a shaped flank is looked at for its end, over half a lobe: far more than it has bends.
+const PLACES: u32 = 720;
+
+impl ToothSpace {
+    /// The space of a ring with a clearance and a modification.
+    ///
+    /// # Errors
+    /// A modification that leaves no flank, and [`NotConverged`] from the geometry.
+    pub(crate) fn new(drive: &Drive, clearance_mm: f64, modification: &Modification) -> Result<Self, DriveError> {
+        let leaves_nothing = |modified, value, limit| {
+            DriveError::Impossible(vec![Violation::ModificationLeavesNothing { modified, value, limit }])
+        };
+        let bore_mm = drive.parameters().tip_radius_mm;
+        // The flank lies outside the path, and its root outside the bore.
+        let beside_bore_mm = bore_mm.map_or(f64::NEG_INFINITY, |bore_mm| bore_mm - drive.root_radius_mm());
+        let least_set_back_mm = beside_bore_mm.max(-drive.parameters().tooth_radius_mm);
+        let equidistant_mm = MM_PER_UM * modification.ring_equidistant_um;
+        if clearance_mm + equidistant_mm <= least_set_back_mm {
+            let limit = Some((least_set_back_mm - clearance_mm) / MM_PER_UM);
+            return Err(leaves_nothing(Modified::RingEquidistant, modification.ring_equidistant_um, limit));
+        }
+        let flank = drive.flank().set_back_by(clearance_mm + equidistant_mm);
+        let set_back = RingTooth::new(flank, bore_mm)?;
+        let Some(shaped) = ShapedFlank::new(drive, flank, modification) else {
+            return Ok(Self { set_back, shaped: None });
+        };
+        match shaped.space(bore_mm)? {
+            Some(shaped) => Ok(Self { set_back, shaped: Some(shaped) }),
+            None => {
+                let (modified, value) = modification.greatest_of_ring();
+                Err(leaves_nothing(modified, value, None))
+            }
+        }
+    }
+
+    /// The flank at its distance from the path, whatever else shapes it.
+    pub(crate) const fn set_back_flank(&self) -> &RingFlank {
+        &self.set_back.flank
+    }
+
+    /// Whether both flanks end where they cross, though those of the drive reach a regular tip: by their distance from the path alone.
+    pub(crate) fn is_undercut_by_distance(&self) -> bool {
+        self.set_back.limit.end == FlankEnd::Undercut
+    }
+
+    /// The largest radius of the space. A tip relief reaches beyond the root only where it is larger than the flank is high.
+    pub(crate) fn root_radius_mm(&self) -> f64 {
+        let shifted_mm = self.shaped.map_or(0.0, |ShapedSpace { flank, .. }| {
+            let relief_mm = flank.relief.map_or(0.0, |relief| relief.amount_mm);
+            flank.path_shift_mm + flank.profile_shift_mm + (relief_mm - flank.height_mm()).max(0.0)
+        });
+        self.set_back.flank.root_radius_mm() + shifted_mm
+    }
+
+    /// What ends it.
+    pub(crate) fn tip(&self) -> Tip {
+        match &self.shaped {
+            Some(shaped) => shaped.tip,
+            None => Tip { radius_mm: self.set_back.tip_radius_mm, has_land: self.set_back.limit.end == FlankEnd::Bore },
+        }
+    }
+
+    /// Its half, chords true to a tolerance.
+    pub(crate) fn half(&self, tolerance_mm: f64, stop: &dyn Stop) -> Result<HalfSpace, SolveError> {
+        let Some(ShapedSpace { flank, start, end, .. }) = &self.shaped else {
+            let pieces = vec![flank_curve(&self.set_back.flank, &self.set_back.limit, tolerance_mm, stop)?];
+            return Ok(HalfSpace { root_arc_rad: 0.0, is_smooth_at_root: true, pieces });
+        };
+        let lobes = flank.flank.locus().lobes();
+        let mut pieces = Vec::new();
+        let mut piece = |from: Position, to: Position, is_relieved: bool| {
+            let curve = |place| flank.at(place, is_relieved).map(|at| at.curve_point());
+            pieces.push(sampled(from, to, lobes, tolerance_mm, stop, curve)?);
+            Ok::<_, SolveError>(())
+        };
+        let relieved_from = flank.relief.map(|relief| Position::from_lobe(relief.start_rad, lobes));
+        match relieved_from.filter(|from| from.from_valley_rad > end.from_valley_rad) {
+            None => piece(*start, *end, false)?,
+            Some(from) if from.from_valley_rad < start.from_valley_rad => {
+                piece(*start, from, false)?;
+                piece(from, *end, true)?;
+            }
+            Some(_) => piece(*start, *end, true)?,
+        }
+        // A relief of a power above one starts along the curve.
+        let starts_bent = flank.relief.is_some_and(|relief| relief.start_rad == 0.0 && relief.power <= 1.0);
+        Ok(HalfSpace {
+            root_arc_rad: flank.turned_rad.max(0.0),
+            is_smooth_at_root: flank.turned_rad == 0.0 && !starts_bent,
+            pieces,
+        })
+    }
+}
+
+impl ShapedFlank {
+    /// The flank, where anything but its distance shapes it.
+    fn new(drive: &Drive, flank: RingFlank, modification: &Modification) -> Option<Self> {
+        let relief = modification.ring_tip_relief.filter(|relief| relief.amount_um != 0.0);
+        let shaped = Self {
+            flank,
+            path_shift_mm: MM_PER_UM * modification.ring_path_shift_um,
+            profile_shift_mm: MM_PER_UM * modification.ring_profile_shift_um,
+            turned_rad: RAD_PER_ARCSEC * modification.ring_rotation_arcsec,
+            relief: relief.map(|TipRelief { amount_um, start_deg, power }| {
+                let start_rad = start_deg.to_radians();
+                let length_rad = drive.flank_limit().position.from_lobe_rad - start_rad;
+                Relief { amount_mm: MM_PER_UM * amount_um, start_rad, length_rad, power }
+            }),
+        };
+        let is_shaped = shaped.relief.is_some()
+            || [shaped.path_shift_mm, shaped.profile_shift_mm, shaped.turned_rad].iter().any(|&by| by != 0.0);
+        is_shaped.then_some(shaped)
+    }
+
+    /// How far the root lies outside a regular tip.
+    fn height_mm(&self) -> f64 {
+        let locus = self.flank.locus();
+        locus.cam_outer_radius_mm() - locus.cam_inner_radius_mm()
+    }
+
+    /// Distance from the path and its derivative by ψ; `is_relieved` says which, where the relief starts.
+    fn distance_mm(&self, position: &Position, is_relieved: bool) -> (f64, f64) {
+        let plain_mm = self.flank.distance_mm();
+        let Some(Relief { amount_mm, start_rad, length_rad, power }) = self.relief.filter(|_| is_relieved) else {
+            return (plain_mm, 0.0);
+        };
+        let share = ((position.from_lobe_rad - start_rad) / length_rad).max(0.0);
+        (plain_mm + amount_mm * share.powf(power), amount_mm * power * share.powf(power - 1.0) / length_rad)
+    }
+
+    /// The flank at a position: the parallel curve, at its distance, of the path shifted along its radii, moved along its own radii and
+    /// turned. With `ρ = d + Δ` and `tan β' = kTd/ρ` its point is `ρ e(ψ/k) + D e(ψ/k + β')`.
+    fn at(&self, position: Position, is_relieved: bool) -> Result<ShapedPoint, NotConverged> {
+        let tooth = self.flank.locus().at(position)?;
+        let k = self.flank.teeth_per_wave();
+        let d = tooth.center_radius_mm;
+        let path_radius_mm = d + self.path_shift_mm;
+        let tan = k * tooth.tan_pressure_angle * d / path_radius_mm;
+        // By ψ, with d' = -Td.
+        let d_slope_mm = -tooth.tan_pressure_angle * d;
+        let tan_slope = (k * (tooth.tan_pressure_angle_derivative * d + tooth.tan_pressure_angle * d_slope_mm)
+            - tan * d_slope_mm)
+            / path_radius_mm;
+        let cos = 1.0 / tan.hypot(1.0);
+        let turning = 1.0 / k + tan_slope * cos * cos;
+        let (distance_mm, growth_mm) = self.distance_mm(&position, is_relieved);
+        let speed_mm = path_radius_mm / (k * cos) + distance_mm * turning;
+        let (along_mm, across_mm) = (path_radius_mm + distance_mm * cos, distance_mm * tan * cos);
+        let lead_rad = across_mm.atan2(along_mm);
+        let radius_mm = along_mm.hypot(across_mm);
+        // The curve's direction against the radius of its point, which stands `lead` before the path's.
+        let normal_rad = tan.atan() - lead_rad;
+        let (sin_normal, cos_normal) = normal_rad.sin_cos();
+        let (outward, around) = if growth_mm.is_finite() {
+            (growth_mm * cos_normal - speed_mm * sin_normal, growth_mm * sin_normal + speed_mm * cos_normal)
+        } else {
+            // A relief of a power below one starts along the normal.
+            (growth_mm.signum() * cos_normal, growth_mm.signum() * sin_normal)
+        };
+        // A shift along the radii stretches what runs across them.
+        let around = around * ((radius_mm + self.profile_shift_mm) / radius_mm);
+        let angle_rad = position.from_lobe_rad / k + lead_rad + self.turned_rad;
+        let (sin, cos) = angle_rad.sin_cos();
+        let tangent = Vector2::new(outward * cos - around * sin, outward * sin + around * cos);
+        Ok(ShapedPoint {
+            radius_mm: radius_mm + self.profile_shift_mm,
+            angle_rad,
+            angle_from_tip_rad: position.from_valley_rad / k - lead_rad - self.turned_rad,
+            tangent: Unit::new_normalize(tangent),
+            speed_mm,
+            distance_mm,
+        })
+    }
+
+    /// Where the flank starts and ends; nothing where none is left.
+    fn space(self, bore_mm: Option<f64>) -> Result<Option<ShapedSpace>, NotConverged> {
+        let lobes = self.flank.locus().lobes();
+        let half_rad = half_lobe_rad(lobes);
+        // By the angle from the valley, each place exact from its nearer end.
+        let place = |x: f64| {
+            if x < 0.5 * half_rad { Position::from_valley(x, lobes) } else { Position::from_lobe(half_rad - x, lobes) }
+        };
+        let places = |from: u32| (from..=PLACES).map(move |i| half_rad * (f64::from(PLACES - i) / f64::from(PLACES)));
+        let relieved = |position: Position| {
+            self.at(position, self.relief.is_some_and(|relief| position.from_lobe_rad > relief.start_rad))
+        };
+        // Flanks that are turned towards each other start where they cross, in the middle of the space.
+        let mut start = Position::lobe(lobes);
+        if self.turned_rad < 0.0 {
+            let Some(beyond) = first(places(1), |x| Ok(relieved(place(x))?.angle_rad > 0.0))? else { return Ok(None) };
+            let angle = |psi: f64| Ok(relieved(Position::from_lobe(psi, lobes))?.angle_rad);
+            let psi = bracketed("start of a turned flank", 0.0, self.turned_rad, half_rad - beyond, angle)?;
+            start = Position::from_lobe(psi, lobes);
+        }
+        // What has to stay positive along the flank. Flanks that are turned apart cross on the symmetry line of the ring's tooth; turned
+        // together each still ends where it would cross there as it was. Divided by the sine the crossing at a regular tip, which is
+        // none, is gone, as in `RingFlank::natural_limit`.
+        let is_turned_together = self.turned_rad < 0.0;
+        let apart = |position: Position| {
+            let at = relieved(position)?;
+            Ok(match (self.turned_rad > 0.0, position.from_valley_rad > 0.0) {
+                (true, _) => at.angle_from_tip_rad,
+                (false, true) => (at.angle_from_tip_rad + self.turned_rad) / position.phase_cos,
+                (false, false) => 2.0 / f64::from(lobes) * at.speed_mm / (at.radius_mm - self.profile_shift_mm),
+            })
+        };
+        let above_bore_mm =
+            |position: Position| Ok(bore_mm.map_or(1.0, |bore_mm| -bore_mm) + relieved(position)?.radius_mm);
+        let regular_mm = |position: Position| Ok(relieved(position)?.speed_mm);
+        let conditions: [(&dyn Fn(Position) -> Result<f64, NotConverged>, FlankEnd, bool); 3] = [
+            (&apart, FlankEnd::Undercut, is_turned_together),
+            (&above_bore_mm, FlankEnd::Bore, true),
+            (&regular_mm, FlankEnd::RegularTip, true),
+        ];
+        let at_start = relieved(start)?;
+        let is_flank = |at: &ShapedPoint| at.distance_mm > 0.0 && at.radius_mm > 0.0 && at.radius_mm.is_finite();
+        for (condition, ..) in &conditions {
+            if condition(start)? <= 0.0 {
+                return Ok(None);
+            }
+        }
+        if !is_flank(&at_start) {
+            return Ok(None);
+        }
+        let mut before = start.from_valley_rad;
+        for x in places(1).filter(|&x| x < start.from_valley_rad) {
+            if !is_flank(&relieved(place(x))?) {
+                return Ok(None);
+            }
+            let mut end: Option<(f64, FlankEnd, bool)> = None;
+            for (condition, kind, has_land) in &conditions {
+                let value = condition(place(x))?;
+                if value < 0.0 {
+                    let at = bracketed("end of a modified flank", x, value, before, |x| condition(place(x)))?;
+                    if end.is_none_or(|(other, ..)| at > other) {
+                        end = Some((at, *kind, *has_land));
+                    }
+                }
+            }
+            if let Some((x, kind, has_land)) = end {
+                let end = place(x);
+                let radius_mm = match (kind, bore_mm) {
+                    (FlankEnd::Bore, Some(bore_mm)) => bore_mm,
+                    _ => relieved(end)?.radius_mm,
+                };
+                return Ok(Some(ShapedSpace { flank: self, start, end, tip: Tip { radius_mm, has_land } }));
+            }
+            before = x;
+        }
+        let end = Position::valley(lobes);
+        let tip = Tip { radius_mm: relieved(end)?.radius_mm, has_land: is_turned_together };
+        Ok(Some(ShapedSpace { flank: self, start, end, tip }))
+    }
+}
+
+impl ShapedPoint {
+    fn curve_point(&self) -> CurvePoint {
+        let (sin, cos) = self.angle_rad.sin_cos();
+        CurvePoint { point: Point2::new(self.radius_mm * cos, self.radius_mm * sin), tangent: self.tangent }
+    }
+}
+
+/// The first of some places at which something holds.
+fn first(
+    places: impl Iterator<Item = f64>,
+    holds: impl Fn(f64) -> Result<bool, NotConverged>,
+) -> Result<Option<f64>, NotConverged> {
+    for place in places {
+        if holds(place)? {
+            return Ok(Some(place));
+        }
+    }
+    Ok(None)
+}

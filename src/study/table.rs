@@ -1,0 +1,160 @@
+//! What a study comes to as a table: one definition of its columns, which CSV and Parquet share.
+
+use std::io::{self, Write};
+use std::mem;
+use std::sync::Arc;
+
+use parquet::basic::{LogicalType, Repetition, Type};
+use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
+use parquet::errors::ParquetError;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
+use parquet::schema::types;
+use toothwave_calculation::forms::csv_error;
+
+/// Rows of a group in Parquet: what is held beside the answer until it is written.
+const GROUP_ROWS: usize = 1 << 16;
+
+/// A table, its rows made one after the other.
+pub(crate) struct Table<'a> {
+    pub(crate) columns: Vec<Column>,
+    /// Each with a cell for every column.
+    pub(crate) rows: Box<dyn Iterator<Item = Vec<Cell>> + 'a>,
+}
+
+/// A column by its name, with what its cells hold where they are not empty.
+#[derive(Debug)]
+pub(crate) struct Column {
+    name: String,
+    kind: Content,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Content {
+    Count,
+    Number,
+    Word,
+}
+
+/// A cell.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Cell {
+    Empty,
+    Count(u64),
+    Number(f64),
+    Word(String),
+}
+
+impl Column {
+    pub(crate) fn new(name: impl Into<String>, kind: Content) -> Self {
+        Self { name: name.into(), kind }
+    }
+}
+
+impl From<Option<f64>> for Cell {
+    fn from(number: Option<f64>) -> Self {
+        number.map_or(Self::Empty, Self::Number)
+    }
+}
+
+impl Cell {
+    fn text(&self) -> String {
+        match self {
+            Self::Empty => String::new(),
+            Self::Count(count) => count.to_string(),
+            Self::Number(number) => format!("{number:?}"),
+            Self::Word(word) => word.clone(),
+        }
+    }
+}
+
+impl Table<'_> {
+    /// A head of names, then a line a row.
+    pub(crate) fn write_csv(self, writer: &mut dyn Write) -> io::Result<()> {
+        let mut csv = csv::Writer::from_writer(writer);
+        csv.write_record(self.columns.iter().map(|column| &column.name)).map_err(csv_error)?;
+        for row in self.rows {
+            csv.write_record(row.iter().map(Cell::text)).map_err(csv_error)?;
+        }
+        csv.flush()
+    }
+
+    /// Columns of the same names in Apache Parquet; an empty cell is null.
+    pub(crate) fn write_parquet(mut self, writer: &mut dyn Write) -> io::Result<()> {
+        let fields = self.columns.iter().map(|column| column.schema().map(Arc::new));
+        let fields = fields.collect::<Result<_, _>>().map_err(parquet_error)?;
+        let schema = types::Type::group_type_builder("study").with_fields(fields).build().map_err(parquet_error)?;
+        let properties = WriterProperties::builder().build();
+        // Parquet wants a writer of its own: it gets a buffer, which is emptied after each group.
+        let file = SerializedFileWriter::new(Vec::new(), Arc::new(schema), Arc::new(properties));
+        let mut file = file.map_err(parquet_error)?;
+        loop {
+            let rows: Vec<_> = self.rows.by_ref().take(GROUP_ROWS).collect();
+            if rows.is_empty() {
+                return writer.write_all(&file.into_inner().map_err(parquet_error)?);
+            }
+            write_group(&mut file, &self.columns, &rows).map_err(parquet_error)?;
+            file.flush()?;
+            writer.write_all(&mem::take(file.inner_mut()))?;
+        }
+    }
+}
+
+impl Column {
+    fn schema(&self) -> Result<types::Type, ParquetError> {
+        let (physical, logical) = match self.kind {
+            Content::Count => (Type::INT64, None),
+            Content::Number => (Type::DOUBLE, None),
+            Content::Word => (Type::BYTE_ARRAY, Some(LogicalType::String)),
+        };
+        let column = types::Type::primitive_type_builder(&self.name, physical);
+        column.with_repetition(Repetition::OPTIONAL).with_logical_type(logical).build()
+    }
+
+    fn write(
+        &self,
+        writer: &mut SerializedColumnWriter<'_>,
+        cells: impl Iterator<Item = Cell>,
+    ) -> Result<(), ParquetError> {
+        let mut levels = Vec::new();
+        let (mut counts, mut numbers, mut words) = (Vec::new(), Vec::new(), Vec::new());
+        for cell in cells {
+            levels.push(i16::from(cell != Cell::Empty));
+            match (self.kind, cell) {
+                (_, Cell::Empty) => {}
+                (Content::Count, Cell::Count(count)) => counts.push(i64::try_from(count).unwrap_or(i64::MAX)),
+                (Content::Number, Cell::Number(number)) => numbers.push(number),
+                (Content::Number, Cell::Count(count)) => numbers.push(count as f64),
+                (Content::Word, cell) => words.push(ByteArray::from(cell.text().into_bytes())),
+                (Content::Count | Content::Number, cell) => {
+                    return Err(ParquetError::General(format!("{cell:?} in the column `{}`", self.name)));
+                }
+            }
+        }
+        let levels = Some(levels.as_slice());
+        match self.kind {
+            Content::Count => writer.typed::<Int64Type>().write_batch(&counts, levels, None),
+            Content::Number => writer.typed::<DoubleType>().write_batch(&numbers, levels, None),
+            Content::Word => writer.typed::<ByteArrayType>().write_batch(&words, levels, None),
+        }
+        .map(drop)
+    }
+}
+
+fn write_group(
+    file: &mut SerializedFileWriter<Vec<u8>>,
+    columns: &[Column],
+    rows: &[Vec<Cell>],
+) -> Result<(), ParquetError> {
+    let mut group = file.next_row_group()?;
+    let mut columns = columns.iter().enumerate();
+    while let (Some(mut writer), Some((index, column))) = (group.next_column()?, columns.next()) {
+        column.write(&mut writer, rows.iter().map(|row| row.get(index).cloned().unwrap_or(Cell::Empty)))?;
+        writer.close()?;
+    }
+    group.close().map(drop)
+}
+
+fn parquet_error(error: ParquetError) -> io::Error {
+    io::Error::other(error)
+}

@@ -1,0 +1,462 @@
+//! Outlines of modified parts, against the path of the teeth's centres as the cam's support function gives it: no curve of the solver's.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Point2, Rotation2, Vector2};
+use toothwave_solver::drawing::{Body, Drawing, DrawingParameters, Edge, Outline, Subject};
+use toothwave_solver::drive::{Draft, DriveError};
+use toothwave_solver::gaps::{Gaps, TipRelief};
+use toothwave_solver::mesh::Place;
+use toothwave_solver::parts::PartsParameters;
+use toothwave_solver::violation::Modified;
+use toothwave_solver::{
+    Drive, DriveParameters, Modification, Never, Parameter, Part, PerContact, Position, Violation, WaveGenerator,
+};
+
+use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive};
+
+const NONE: Modification = Modification::NONE;
+const ARCSEC: f64 = PI / 648_000.0;
+
+/// One lobe, and a ring with more teeth than the carrier.
+fn eccentric() -> DriveParameters {
+    DriveParameters {
+        wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
+        teeth: 20,
+        installed: 20,
+        ring_teeth: 21,
+        tooth_radius_mm: 3.0,
+        ..PAPER_5_1
+    }
+}
+
+/// Three lobes.
+fn three_lobes() -> DriveParameters {
+    DriveParameters {
+        wave_generator: WaveGenerator::Harmonic { lobes: 3, mean_radius_mm: 48.0, amplitude_mm: 1.0 },
+        teeth: 36,
+        installed: 36,
+        ring_teeth: 33,
+        tooth_radius_mm: 3.0,
+        ..PAPER_5_1
+    }
+}
+
+const RELIEF: TipRelief = TipRelief { amount_um: 30.0, start_deg: 20.0, power: 2.0 };
+
+/// Each of the ring's modifications by itself, both ways, and all together.
+fn of_the_ring() -> Vec<Modification> {
+    let reliefs = [(30.0, 2.0), (-20.0, 1.5), (30.0, 1.0), (10.0, 0.5), (25.0, 3.0)];
+    let relief =
+        |(amount_um, power)| Modification { ring_tip_relief: Some(TipRelief { amount_um, power, ..RELIEF }), ..NONE };
+    let mut all: Vec<_> = reliefs.into_iter().map(relief).collect();
+    for sign in [1.0, -1.0] {
+        all.extend([
+            Modification { ring_equidistant_um: sign * 40.0, ..NONE },
+            Modification { ring_path_shift_um: sign * 40.0, ..NONE },
+            Modification { ring_profile_shift_um: sign * 40.0, ..NONE },
+            Modification { ring_rotation_arcsec: sign * 120.0, ..NONE },
+        ]);
+    }
+    all.push(Modification {
+        ring_equidistant_um: 12.0,
+        ring_path_shift_um: -20.0,
+        ring_profile_shift_um: 7.0,
+        ring_rotation_arcsec: 60.0,
+        ring_tip_relief: Some(RELIEF),
+        ..NONE
+    });
+    all
+}
+
+fn unit(angle_rad: f64) -> Vector2<f64> {
+    Vector2::new(angle_rad.cos(), angle_rad.sin())
+}
+
+/// A tooth's centre around the cam, by the angle of the cam's normal: `(h + r) n + h' n'`.
+fn center(p: &DriveParameters, normal_rad: f64) -> Vector2<f64> {
+    let (support, slope) = match p.wave_generator {
+        WaveGenerator::Ellipse { semi_major_mm: a, semi_minor_mm: b } => {
+            let n = unit(normal_rad);
+            let h = (a * n.x).hypot(b * n.y);
+            (h, (b * b - a * a) * n.x * n.y / h)
+        }
+        WaveGenerator::Eccentric { radius_mm, eccentricity_mm } => {
+            (radius_mm + eccentricity_mm * normal_rad.cos(), -eccentricity_mm * normal_rad.sin())
+        }
+        WaveGenerator::Harmonic { lobes, mean_radius_mm, amplitude_mm } => {
+            let u = lobes as f64;
+            (mean_radius_mm + amplitude_mm * (u * normal_rad).cos(), -amplitude_mm * u * (u * normal_rad).sin())
+        }
+        WaveGenerator::HarmonicPath { .. } => panic!("not known by its support"),
+    };
+    let n = unit(normal_rad);
+    (support + p.tooth_radius_mm) * n + slope * Vector2::new(-n.y, n.x)
+}
+
+/// The same in the ring, its radius larger by the shift, and its position ψ.
+fn in_ring(p: &DriveParameters, normal_rad: f64, shift_mm: f64) -> (Vector2<f64>, f64) {
+    let k = p.ring_teeth as f64 / p.wave_generator.lobes() as f64;
+    let center = center(p, normal_rad);
+    let position = center.y.atan2(center.x);
+    (unit(position / k) * (center.norm() + shift_mm), position)
+}
+
+/// The least distance of a point from the shifted path of one space, and the position that is nearest.
+fn from_path(p: &DriveParameters, point: Vector2<f64>, shift_mm: f64) -> (f64, f64) {
+    let end = PI / p.wave_generator.lobes() as f64;
+    let distance = |normal: f64| (point - in_ring(p, normal, shift_mm).0).norm();
+    let steps = 400;
+    let at = |i: i32| end * f64::from(i) / f64::from(steps);
+    let best = (-20..=steps + 20).min_by(|&i, &j| distance(at(i)).total_cmp(&distance(at(j)))).unwrap();
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let (mut low, mut high) = (at(best - 1), at(best + 1));
+    for _ in 0..60 {
+        let (left, right) = (high - golden * (high - low), low + golden * (high - low));
+        if distance(left) < distance(right) { high = right } else { low = left }
+    }
+    let normal = 0.5 * (low + high);
+    (distance(normal), in_ring(p, normal, shift_mm).1)
+}
+
+fn parts(modification: Modification) -> PartsParameters {
+    PartsParameters { modification, ..PartsParameters::default() }
+}
+
+fn drawn(p: &DriveParameters, subject: Subject, parts: &PartsParameters, tolerance_mm: f64, deg: f64) -> Vec<Body> {
+    let parameters =
+        DrawingParameters { chord_tolerance_mm: tolerance_mm, max_points: 10_000_000, input_angle_deg: deg };
+    Drawing::new(&Draft::new(p).unwrap(), subject, parts, &parameters).unwrap().bodies(&Never).unwrap()
+}
+
+fn edges(outline: &Outline) -> &[Edge] {
+    match outline {
+        Outline::Edges(edges) => edges,
+        Outline::Circle { .. } => panic!("a circle"),
+    }
+}
+
+/// The ring's edges in one tooth space, from tip to tip.
+fn space(p: &DriveParameters, modification: Modification) -> Vec<Edge> {
+    let ring = drawn(p, Subject::Part(Part::Ring), &parts(modification), 1e-4, 0.0).remove(0);
+    let edges = edges(&ring.section.holes[0]);
+    let count = edges.len() / usize::try_from(p.ring_teeth).unwrap();
+    assert_eq!(edges.len() % count, 0);
+    edges[..count].to_vec()
+}
+
+fn points(edge: &Edge) -> &[Point2<f64>] {
+    match edge {
+        Edge::Curve { points, .. } => points,
+        Edge::Line { .. } | Edge::Arc { .. } => &[],
+    }
+}
+
+#[test]
+fn every_point_of_a_modified_flank_is_as_far_from_the_moved_path_as_the_modification_says() {
+    let mut worst: f64 = 0.0;
+    for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()] {
+        let flank_end_rad = drive(&p).flank_limit().position.from_lobe_rad;
+        for m in of_the_ring() {
+            for edge in space(&p, m) {
+                // The upper half; the lower one is its image. Ends stand on symmetry lines.
+                let points = points(&edge);
+                for point in points.iter().skip(1).take(points.len().saturating_sub(2)).filter(|point| point.y > 0.0) {
+                    let turned = Rotation2::new(-m.ring_rotation_arcsec * ARCSEC) * point.coords;
+                    let shifted = turned * (1.0 - 1e-3 * m.ring_profile_shift_um / turned.norm());
+                    let (distance, position) = from_path(&p, shifted, 1e-3 * m.ring_path_shift_um);
+                    let relief_um = m.ring_tip_relief.map_or(0.0, |relief| {
+                        let start = relief.start_deg.to_radians();
+                        let share = ((position - start) / (flank_end_rad - start)).max(0.0);
+                        relief.amount_um * share.powf(relief.power)
+                    });
+                    let off = distance - p.tooth_radius_mm - 1e-3 * (m.ring_equidistant_um + relief_um);
+                    // The position of the nearest point is known to the square root of a distance's digits; a relief of a power below
+                    // one is steep where it starts.
+                    let steep = m.ring_tip_relief.is_some_and(|relief| relief.power < 1.0);
+                    let allowed = if m.ring_tip_relief.is_none() {
+                        1e-12
+                    } else if steep {
+                        1e-5
+                    } else {
+                        1e-7
+                    };
+                    assert!(off.abs() < allowed, "{off:e} at {position} of {m:?} on {p:?}");
+                    if m.ring_tip_relief.is_none() {
+                        worst = worst.max(off.abs());
+                    }
+                }
+            }
+        }
+    }
+    println!("worst distance from the moved path: {worst:.1e} mm");
+}
+
+/// The farthest that the discs around the shifted path of all spaces reach along the symmetry line of a tooth: its tip.
+fn swept_tip_mm(p: &DriveParameters, shift_mm: f64, disc_mm: f64) -> f64 {
+    let line = unit(PI / p.ring_teeth as f64);
+    let end = PI / p.wave_generator.lobes() as f64;
+    let reach = |normal: f64| {
+        let center = in_ring(p, normal, shift_mm).0;
+        let (along, across) = (center.dot(&line), center.perp(&line));
+        if across.abs() < disc_mm { along + (disc_mm * disc_mm - across * across).sqrt() } else { 0.0 }
+    };
+    let steps = 4000;
+    let at = |i: i32| end * f64::from(i) / f64::from(steps);
+    let best = (0..=steps).max_by(|&i, &j| reach(at(i)).total_cmp(&reach(at(j)))).unwrap();
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let (mut low, mut high) = (at(best - 1), at(best + 1));
+    for _ in 0..70 {
+        let (left, right) = (high - golden * (high - low), low + golden * (high - low));
+        if reach(left) > reach(right) { high = right } else { low = left }
+    }
+    reach(0.5 * (low + high))
+}
+
+#[test]
+fn a_shifted_path_has_its_tip_where_the_swept_discs_end_undercut_or_not() {
+    for p in [PAPER_5_1, PAPER_5_2, eccentric(), three_lobes()] {
+        for (path_um, equidistant_um) in [(40.0, 0.0), (-40.0, 0.0), (25.0, -10.0), (-25.0, 10.0)] {
+            let m = Modification { ring_path_shift_um: path_um, ring_equidistant_um: equidistant_um, ..NONE };
+            let tip = points(&space(&p, m)[0])[0].coords.norm();
+            let swept = swept_tip_mm(&p, 1e-3 * path_um, p.tooth_radius_mm + 1e-3 * equidistant_um);
+            assert!((tip - swept).abs() < 1e-12 * swept, "{tip} is not {swept}: {m:?} on {p:?}");
+        }
+    }
+}
+
+/// By the radius at which the swept path's own undercut begins, less and more of it: the flank's end leaves the tip like a square root.
+#[test]
+fn beside_the_threshold_of_undercut_a_shifted_path_ends_where_the_swept_discs_do() {
+    let critical = drive(&PAPER_5_1).flank().critical_tooth_radius_mm().unwrap();
+    for off in [-1e-3, -1e-5, 1e-5, 1e-4, 1e-3] {
+        let p = DriveParameters { tooth_radius_mm: critical * (1.0 + off), ..PAPER_5_1 };
+        let m = Modification { ring_path_shift_um: 0.5, ..NONE };
+        let tip = points(&space(&p, m)[0])[0].coords.norm();
+        let swept = swept_tip_mm(&p, 5e-4, p.tooth_radius_mm);
+        assert!((tip - swept).abs() < 1e-12 * swept, "{tip} is not {swept} at {off}");
+    }
+}
+
+#[test]
+fn what_the_drawing_leaves_between_a_tooth_and_its_partners_is_the_gap_of_the_model() {
+    let size_um = 2.0;
+    let modifications = [
+        Modification { ring_equidistant_um: size_um, ..NONE },
+        Modification { ring_path_shift_um: size_um, ..NONE },
+        Modification { ring_profile_shift_um: size_um, ..NONE },
+        Modification { ring_rotation_arcsec: 10.0, ..NONE },
+        Modification { ring_tip_relief: Some(TipRelief { amount_um: size_um, ..RELIEF }), ..NONE },
+        Modification { wave_generator_equidistant_um: size_um, ..NONE },
+        Modification { slot_wall_um: size_um, ..NONE },
+        Modification { carrier_rotation_arcsec: 10.0, ..NONE },
+        Modification { tooth_radius_um: size_um, ..NONE },
+    ];
+    for p in [PAPER_5_1, PAPER_5_2, eccentric(), three_lobes()] {
+        let drive = drive(&p);
+        let sense = drive.sense();
+        let flank_end_rad = drive.flank_limit().position.from_lobe_rad;
+        for m in modifications {
+            let bodies = drawn(&p, Subject::Assembly, &parts(m), 1e-5, 7.0);
+            let [ring, carrier, teeth, cam] = &bodies[..] else { panic!("{bodies:?}") };
+            let ring_points = placed(edges(&ring.section.holes[0]), 0.0);
+            let cam_points = placed(edges(&cam.section.outer), cam.placements[0].rotation_rad);
+            let Outline::Circle { radius_mm } = teeth.section.outer else { panic!("a tooth is round") };
+            let fingers = carrier.placements.len();
+            let mut looked_at = 0;
+            for (slot, tooth) in teeth.placements.iter().enumerate() {
+                let center = tooth.origin_mm;
+                let lobes = drive.lobes();
+                let pitch = 2.0 * PI / f64::from(lobes);
+                let from_lobe = (tooth.rotation_rad - 7.0_f64.to_radians()).rem_euclid(pitch);
+                if from_lobe < 0.02 * pitch || from_lobe > 0.96 * flank_end_rad {
+                    continue;
+                }
+                looked_at += 1;
+                let at = drive.flank().locus().at(Position::from_lobe(from_lobe, lobes)).unwrap();
+                let gaps = Gaps::new(&drive, &PerContact::default(), m, None);
+                let gap = gaps.at(&Place::default(), &at, &drive.flank().at(&at));
+                // The wall under load: ahead of the tooth where the carrier turns forward, behind it elsewhere.
+                let finger = if sense > 0.0 { slot } else { (slot + fingers - 1) % fingers };
+                let walls = placed(edges(&carrier.section.outer), carrier.placements[finger].rotation_rad);
+                for (name, outline, gap_mm) in [
+                    ("ring", &ring_points, gap.ring),
+                    ("cam", &cam_points, gap.wave_generator),
+                    ("wall", &walls, gap.carrier),
+                ] {
+                    let off = distance(outline, center) - radius_mm - gap_mm;
+                    assert!(off.abs() < 4e-5, "{name} {off:e} of {gap_mm:e} at {from_lobe}: {m:?} on {p:?}");
+                }
+            }
+            assert!(looked_at >= 5, "{looked_at}");
+        }
+    }
+}
+
+fn placed(edges: &[Edge], rotation_rad: f64) -> Vec<Point2<f64>> {
+    let rotation = Rotation2::new(rotation_rad);
+    let of_edge = |edge: &Edge| match edge {
+        Edge::Curve { points, .. } => points.clone(),
+        Edge::Line { start, end } | Edge::Arc { start, end, .. } => vec![*start, *end],
+    };
+    edges.iter().flat_map(of_edge).map(|point| rotation * point).collect()
+}
+
+/// The least distance of a point from the chords of a closed outline.
+fn distance(outline: &[Point2<f64>], point: Point2<f64>) -> f64 {
+    let of_chord = |(from, to): (&Point2<f64>, &Point2<f64>)| {
+        let along = to - from;
+        let share = if along == Vector2::zeros() { 0.0 } else { (point - from).dot(&along) / along.norm_squared() };
+        (point - (from + along * share.clamp(0.0, 1.0))).norm()
+    };
+    outline.iter().zip(outline.iter().cycle().skip(1)).map(of_chord).fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn modified_outlines_close_and_their_curves_start_and_end_along_their_tangents() {
+    for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()] {
+        for m in of_the_ring() {
+            let ring = drawn(&p, Subject::Part(Part::Ring), &parts(m), 1e-6, 0.0).remove(0);
+            let edges = edges(&ring.section.holes[0]);
+            for (edge, next) in edges.iter().zip(edges.iter().cycle().skip(1)) {
+                assert_eq!(edge.end(), next.start());
+                let Edge::Curve { points, start_tangent, end_tangent } = edge else { continue };
+                // A chord of a thousandth of a radian turns by as much; a steep start of a relief by more.
+                let steep = m.ring_tip_relief.is_some_and(|relief| relief.power < 2.0);
+                let [first, second, .., before, last] = &points[..] else { panic!("{points:?}") };
+                for (chord, tangent) in [(second - first, start_tangent), (last - before, end_tangent)] {
+                    let along = chord.normalize().dot(tangent);
+                    assert!(along > if steep { 0.9 } else { 1.0 - 1e-5 }, "{along} of {m:?} on {p:?}");
+                }
+            }
+            // Counter-clockwise, its area positive and nearly the conjugate ring's.
+            let shoelace = |edges: &[Edge]| -> f64 {
+                let points = placed(edges, 0.0);
+                points.iter().zip(points.iter().cycle().skip(1)).map(|(a, b)| 0.5 * a.coords.perp(&b.coords)).sum()
+            };
+            let plain = drawn(&p, Subject::Part(Part::Ring), &PartsParameters::default(), 1e-4, 0.0).remove(0);
+            let ratio = shoelace(edges) / shoelace(self::edges(&plain.section.holes[0]));
+            assert!((ratio - 1.0).abs() < 5e-3, "{ratio} of {m:?} on {p:?}");
+        }
+    }
+}
+
+#[test]
+fn turned_flanks_leave_an_arc_at_the_root_and_flanks_turned_together_a_land_at_the_tip() {
+    let turned = |arcsec| space(&PAPER_5_1, Modification { ring_rotation_arcsec: arcsec, ..NONE });
+    let [Edge::Curve { points: lower, .. }, Edge::Arc { radius_mm, sweep_rad, .. }, Edge::Curve { points: upper, .. }] =
+        &turned(120.0)[..]
+    else {
+        panic!("{:?}", turned(120.0))
+    };
+    assert!((radius_mm - 68.0).abs() < 1e-12 && (sweep_rad - 240.0 * ARCSEC).abs() < 1e-15);
+    // Thinned from both sides, the ring's teeth are points, farther out than the regular tip at 66.
+    let tip = lower[0].coords.norm();
+    assert!(tip > 66.0 && tip < 66.2 && (upper.last().unwrap().coords.norm() - tip).abs() < 1e-12, "{tip}");
+    let together = turned(-120.0);
+    let [Edge::Curve { .. }, Edge::Curve { points: upper, .. }, Edge::Arc { radius_mm, sweep_rad, .. }] = &together[..]
+    else {
+        panic!("{together:?}")
+    };
+    assert!((radius_mm - 66.0).abs() < 1e-12 && (sweep_rad - 240.0 * ARCSEC).abs() < 1e-13);
+    assert!(upper[0].y == 0.0 && upper[0].x < 68.0);
+}
+
+#[test]
+fn an_equidistant_modification_draws_what_a_clearance_of_its_size_draws() {
+    for p in [PAPER_5_1, PAPER_5_2, eccentric()] {
+        for (part, clearance, modification) in [
+            (
+                Part::Ring,
+                PartsParameters { ring_clearance_um: 30.0, ..parts(NONE) },
+                Modification { ring_equidistant_um: 30.0, ..NONE },
+            ),
+            (
+                Part::WaveGenerator,
+                PartsParameters { wave_generator_clearance_um: 30.0, ..parts(NONE) },
+                Modification { wave_generator_equidistant_um: 30.0, ..NONE },
+            ),
+            (
+                Part::Carrier,
+                PartsParameters { carrier_clearance_um: 30.0, ..parts(NONE) },
+                Modification { slot_wall_um: 30.0, ..NONE },
+            ),
+            (
+                Part::Teeth,
+                PartsParameters { teeth_clearance_um: 30.0, ..parts(NONE) },
+                Modification { tooth_radius_um: 30.0, ..NONE },
+            ),
+        ] {
+            let draw = |parts: &PartsParameters| drawn(&p, Subject::Part(part), parts, 1e-3, 0.0);
+            assert_eq!(draw(&clearance), draw(&parts(modification)), "{part:?}");
+        }
+    }
+}
+
+#[test]
+fn a_relief_of_nothing_draws_the_conjugate_ring() {
+    let relief = Modification { ring_tip_relief: Some(TipRelief { amount_um: 0.0, ..RELIEF }), ..NONE };
+    assert_eq!(space(&PAPER_5_1, relief), space(&PAPER_5_1, NONE));
+}
+
+#[test]
+fn a_modification_that_leaves_no_outline_is_refused_with_the_number_at_fault() {
+    let refused = |p: &DriveParameters, part, modification| {
+        let parameters = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 1_000_000, input_angle_deg: 0.0 };
+        match Drawing::new(&Draft::new(p).unwrap(), Subject::Part(part), &parts(modification), &parameters) {
+            Err(DriveError::Impossible(violations)) => violations,
+            other => panic!("{other:?}"),
+        }
+    };
+    let nothing = |modified, value, limit| vec![Violation::ModificationLeavesNothing { modified, value, limit }];
+    let p = PAPER_5_1;
+    for (part, modification, expected) in [
+        (
+            Part::Ring,
+            Modification { ring_equidistant_um: -5000.0, ..NONE },
+            nothing(Modified::RingEquidistant, -5000.0, Some(-5000.0)),
+        ),
+        // 26 teeth stand 24 923 arc seconds from the middle of a space to that of a tooth.
+        (
+            Part::Ring,
+            Modification { ring_rotation_arcsec: 25_000.0, ..NONE },
+            nothing(Modified::RingRotation, 25_000.0, None),
+        ),
+        (
+            Part::Ring,
+            Modification { ring_path_shift_um: -70_000.0, ..NONE },
+            nothing(Modified::RingPathShift, -70_000.0, None),
+        ),
+        (
+            Part::WaveGenerator,
+            Modification { wave_generator_equidistant_um: -5001.0, ..NONE },
+            nothing(Modified::WaveGeneratorEquidistant, -5001.0, Some(-5000.0)),
+        ),
+        (
+            Part::Carrier,
+            Modification { slot_wall_um: -5000.0, ..NONE },
+            nothing(Modified::SlotWall, -5000.0, Some(-5000.0)),
+        ),
+        (
+            Part::Teeth,
+            Modification { tooth_radius_um: 5000.0, ..NONE },
+            nothing(Modified::ToothRadius, 5000.0, Some(5000.0)),
+        ),
+    ] {
+        assert_eq!(refused(&p, part, modification), expected);
+    }
+    let late = Modification { ring_tip_relief: Some(TipRelief { start_deg: 95.0, ..RELIEF }), ..NONE };
+    assert!(matches!(refused(&p, Part::Ring, late)[..], [Violation::TipReliefBeyondFlank { .. }]));
+    let far = Modification { slot_wall_um: 2e6, ..NONE };
+    let parameter = Parameter::Modification(Modified::SlotWall);
+    let out_of_range = Violation::OutOfRange { parameter, value: 2e6, limit: 1e6 };
+    assert!(refused(&p, Part::Carrier, far).contains(&out_of_range));
+    // A flank set so far inside that the bore takes it whole.
+    let root_mm = Drive::new(&PAPER_5_2_BORED).unwrap().root_radius_mm();
+    let least_um = 1e3 * (52.8227 - root_mm);
+    let found = refused(&PAPER_5_2_BORED, Part::Ring, Modification { ring_equidistant_um: least_um - 1.0, ..NONE });
+    assert!(
+        matches!(found[..], [Violation::ModificationLeavesNothing { limit: Some(limit), .. }] if (limit - least_um).abs() < 1e-9),
+        "{found:?}"
+    );
+}
