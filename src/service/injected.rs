@@ -3,24 +3,24 @@
 use std::time::Duration;
 
 /// What a chunk should take, where that is ordered: `chunk_ms=return(MS)`.
-pub fn chunk() -> Option<Duration> {
+pub(crate) fn chunk() -> Option<Duration> {
     milliseconds("chunk_ms")
 }
 
 /// Ends the process where this chunk is poison: `poison=return(CHUNK)`.
-pub fn poison(chunk: u64) {
+pub(crate) fn poison(chunk: u64) {
     if number("poison") == Some(chunk) {
         std::process::abort();
     }
 }
 
 /// For so long a worker sleeps over each chunk before it computes: `slow=return(MS)`.
-pub fn slow() -> Option<Duration> {
+pub(crate) fn slow() -> Option<Duration> {
     milliseconds("slow")
 }
 
 /// For so long chunks only sleep, and are not computed at all: `asleep=return(MS)`.
-pub fn asleep() -> Option<Duration> {
+pub(crate) fn asleep() -> Option<Duration> {
     milliseconds("asleep")
 }
 
