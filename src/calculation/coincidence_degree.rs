@@ -26,8 +26,12 @@ pub struct CoincidenceDegreeAnswer {
     pub coincidence_degree: f64,
     /// Where a tooth touches the ring's flank.
     pub engagement: EngagementAnswer,
-    /// How many teeth of a zone mesh, over the input angle.
+    /// How many teeth mesh, over the input angle: of a zone where the zones are alike, elsewhere of all of them together.
     pub teeth_in_mesh_per_zone: TeethInMeshAnswer,
+    /// Whether they are.
+    #[serde(skip)]
+    #[schema(ignore)]
+    zones_are_alike: bool,
     /// Whether the ring's tips are cut away.
     pub undercut: UndercutAnswer,
     /// The input angle after which the load pattern repeats.
@@ -36,7 +40,7 @@ pub struct CoincidenceDegreeAnswer {
     pub findings: Vec<FindingAnswer>,
 }
 
-/// How many teeth of a zone mesh, over the input angle.
+/// How many teeth, over the input angle: of a zone where the zones are alike, elsewhere, and given `deviations`, of all of them together.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct TeethInMeshAnswer {
     /// At least.
@@ -87,6 +91,7 @@ impl Question for CoincidenceDegree {
             coincidence_degree: mesh.coincidence_degree(),
             engagement: drive.into(),
             teeth_in_mesh_per_zone: mesh.teeth_in_mesh().into(),
+            zones_are_alike: mesh.zones_are_alike(),
             undercut: drive.into(),
             period_deg: mesh.period_deg(),
             findings: drive_findings(drive)?,
@@ -125,7 +130,8 @@ impl CoincidenceDegreeAnswer {
     fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
         let TeethInMeshAnswer { min, max } = self.teeth_in_mesh_per_zone;
         writeln!(writer, "coincidence degree                  {:.12}", self.coincidence_degree)?;
-        writeln!(writer, "teeth in mesh, each zone            {min} to {max}")?;
+        let zones = if self.zones_are_alike { "each zone" } else { "all zones" };
+        writeln!(writer, "teeth in mesh, {zones}            {min} to {max}")?;
         writeln!(writer, "period of the input angle           {:.6} deg", self.period_deg)?;
         self.engagement.write_text(writer)?;
         self.undercut.write_text(writer)?;

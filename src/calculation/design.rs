@@ -3,6 +3,7 @@
 //! A document that is written as JSON reads back as itself.
 
 use serde::{Deserialize, Serialize};
+use toothwave_solver::backing::Support;
 use toothwave_solver::drawing::DrawingParameters;
 use toothwave_solver::losses::Friction;
 use toothwave_solver::parts::PartsParameters;
@@ -81,7 +82,8 @@ pub struct Design {
     /// What is asked of `/v1/accuracy`.
     #[serde(default)]
     pub accuracy: AccuracyDocument,
-    /// The parts as they are made: what the mechanics leave free. Only drawings read it.
+    /// The parts as they are made: what the mechanics leave free. Drawings read it, and a sweep for what gives way behind the contacts, which its forces
+    /// leave out.
     #[serde(default)]
     pub parts: PartsDocument,
     /// How the parts stand in a drawing of all of them.
@@ -384,6 +386,12 @@ impl Design {
             carrier_clearance_um: carrier.clearance_um,
             modification: (&self.modification).into(),
         }
+    }
+
+    /// How the parts are held, as far as the document says.
+    pub fn support(&self) -> Support {
+        let PartsDocument { ring, carrier, .. } = &self.parts;
+        Support { fingers: carrier.fingers.map(Into::into), rim: ring.rim.map(Into::into) }
     }
 
     /// What a drawing is asked for.

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 use toothwave_solver::findings::{
-    self, Edge, FATIGUE_LIMIT_STRESS_MPA, STEEP_FLANK_DEG, STEEP_FOR_PROJECTION_DEG, Wall,
+    self, Edge, FATIGUE_LIMIT_STRESS_MPA, SOFT_BACKING_SHARE, STEEP_FLANK_DEG, STEEP_FOR_PROJECTION_DEG, Wall,
 };
 use toothwave_solver::{Drive, Finding, SolveError};
 use utoipa::ToSchema;
@@ -71,6 +71,10 @@ pub enum FindingCode {
     ProjectionOnSteepFlank,
     /// `projection` with a gap, which it does not weigh by the work done.
     ProjectionWithGap,
+    /// The carrier's fingers give way by more than can be left out.
+    SlenderFingers,
+    /// The ring's rim does so.
+    SoftRim,
     /// Palmgren's law for a contact that is not steel on steel.
     PalmgrenBeyondSteel,
     /// Johnson's law for a contact that is wide beside the tooth's radius or the depth.
@@ -251,6 +255,32 @@ impl From<&Finding> for FindingAnswer {
                 "µm",
                 "`projection` does not weigh a gap by the work done there: forces and wind-up come out far from those of elastic bodies".into(),
                 "choose `virtual_work`",
+            ),
+            Finding::SlenderFingers { share, is_held_at_one_end } => new(
+                Code::SlenderFingers,
+                if is_held_at_one_end { Warning } else { Info },
+                &["/parts/carrier/fingers", "/model/series_compliance_mm_per_n/carrier", WIDTH],
+                share,
+                SOFT_BACKING_SHARE,
+                "",
+                format!(
+                    "the carrier's fingers, {}, bend under their teeth: by an estimate they add this share to what a tooth gives way at its contacts, and forces and wind-up leave it out",
+                    if is_held_at_one_end { "held at one end" } else { "even if held at both ends" }
+                ),
+                "give the estimate as the carrier's series compliance, or make the fingers shorter or thicker",
+            ),
+            Finding::SoftRim { share, is_free } => new(
+                Code::SoftRim,
+                if is_free { Warning } else { Info },
+                &["/parts/ring/rim", "/parts/ring/outer_radius_mm", "/model/series_compliance_mm_per_n/ring"],
+                share,
+                SOFT_BACKING_SHARE,
+                "",
+                format!(
+                    "the ring's rim, {}: by an estimate it adds this share to what a tooth gives way at its contacts, and forces and wind-up leave it out",
+                    if is_free { "with nothing around it, bends" } else { "even if housed, gives way" }
+                ),
+                "house the ring or make its rim thicker, or give the estimate as the ring's series compliance",
             ),
             Finding::PalmgrenBeyondSteel { contact, contact_modulus_gpa, steel_gpa } => new(
                 Code::PalmgrenBeyondSteel,

@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use toothwave_solver::backing::{Backings, Shares};
 use toothwave_solver::losses::wear::WearParameters;
 use toothwave_solver::losses::{Friction, Mechanism, period};
 use toothwave_solver::ring::FlankEnd;
@@ -10,7 +11,7 @@ use toothwave_solver::{
     Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, findings, model_error as error_of_model,
 };
 
-use crate::design::{BearingRating, Design, Duty, DutyPoint};
+use crate::design::{BearingRating, Design, Duty, DutyPoint, PartsDocument};
 use crate::field::FieldCode;
 use crate::findings::{FindingAnswer, drive_findings, write_findings};
 use crate::forms::{Form, Format, Forms, csv_error};
@@ -19,12 +20,15 @@ use crate::key::Encode;
 use crate::no_answer::{NoAnswer, NoAnswerCode, too_many};
 use crate::question::{Limits, Question, checked_drive, checked_load, require_finite};
 use crate::sweep::answer::{ChecksAnswer, LoadAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
+use crate::sweep::backing::EstimateAnswer;
 use crate::sweep::duty::{DutyAnswer, DutyPointAnswer};
-use crate::sweep::losses::{Cost, Costs, LossesAnswer, RadialForceAnswer, RollsAnswer};
+use crate::sweep::losses::{Cost, Costs, LossTotalsAnswer, LossesAnswer, RadialForceAnswer, RollsAnswer};
 use crate::sweep::model_error::ModelErrorAnswer;
 
 pub mod answer;
 mod arrow;
+pub mod backing;
+pub mod contact;
 pub mod duty;
 pub mod losses;
 pub mod model_error;
@@ -37,6 +41,7 @@ pub struct CheckedSweep {
     drive: Drive,
     duty: CheckedDuty,
     deviations: Deviations,
+    backings: Backings,
     friction: Option<Friction>,
     wear_rate_mm3_per_nm: Option<PerContact<f64>>,
     bearing_rating: Option<BearingRating>,
@@ -56,14 +61,24 @@ impl CheckedSweep {
         &self.duty.hardest().load
     }
 
-    /// Its friction, where there is any.
-    pub const fn friction(&self) -> Option<&Friction> {
-        self.friction.as_ref()
+    /// The same, of which wear and the life of a bearing are not asked.
+    pub fn without_wear(self) -> Self {
+        Self { wear_rate_mm3_per_nm: None, bearing_rating: None, ..self }
     }
 
-    /// Speed of the wave generator, where it is given; of a duty at its hardest point.
-    pub fn input_speed_rpm(&self) -> Option<f64> {
-        self.duty.hardest().input_speed_rpm
+    /// What friction takes over all points of a duty, as the answer has it, given the sweep of the hardest; nothing without friction.
+    ///
+    /// # Errors
+    /// As [`Self::solve`].
+    pub fn loss_totals(&self, hardest: &solver::Sweep, stop: &dyn Stop) -> Result<Option<LossTotalsAnswer>, NoAnswer> {
+        let Some(friction) = &self.friction else { return Ok(None) };
+        let forces = match self.bearing_rating {
+            Some(_) => period::RadialForces::of(&self.drive, hardest, stop)?,
+            None => None,
+        };
+        let losses = period::Losses::of(&self.drive, hardest, friction, stop)?;
+        let costs = self.costs(friction, &Swept { sweep: hardest, forces: forces.as_ref() }, &losses, stop)?;
+        Ok(Some(costs.totals(self.duty.hardest, &hardest.states)))
     }
 
     /// Solves, of a duty its hardest point.
@@ -138,8 +153,10 @@ impl Question for Sweep {
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
-        let Design { drive, materials, load, friction, model, modification, deviations, sweep, .. } = design;
-        (drive, materials, load, friction, model, (modification, deviations, sweep))
+        let Design { drive, materials, load, friction, model, modification, deviations, sweep, parts, .. } = design;
+        let PartsDocument { wave_generator, ring, carrier, teeth: _ } = parts;
+        let parts = (wave_generator, ring, ring.rim, carrier, carrier.fingers);
+        (drive, materials, load, friction, model, (modification, deviations, sweep, parts))
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedSweep, NoAnswer> {
@@ -173,7 +190,10 @@ impl Question for Sweep {
             }
         }
         let with_gaps = design.model.clearance.is_some() || load.has_gaps() || !deviations.is_nil();
+        let parts = design.parts_parameters();
+        let backings = Backings::of(&drive, &draft, &parts, design.support());
         Ok(CheckedSweep {
+            backings,
             drive,
             duty: CheckedDuty::new(design, &load)?,
             deviations,
@@ -220,7 +240,7 @@ impl Question for Sweep {
     }
 
     fn answer(checked: &CheckedSweep, stop: &dyn Stop) -> Result<SweepAnswer, NoAnswer> {
-        let CheckedSweep { drive, duty, deviations, friction, with_gaps, with_wind_up, .. } = checked;
+        let CheckedSweep { drive, duty, deviations, backings, friction, with_gaps, with_wind_up, .. } = checked;
         let load = checked.load();
         let sweep = checked.solve(stop)?;
         let mesh = sweep.mesh;
@@ -230,7 +250,10 @@ impl Question for Sweep {
         let of_half_widths = findings::of_half_widths(drive, load, &sweep.states);
         let of_wind_up = findings::of_wind_up(drive, &sweep);
         let of_projection = findings::of_projection(drive, load).map_err(SolveError::from)?;
-        let model_error = error_of_model::of(drive, load, deviations, &sweep).map_err(SolveError::from)?;
+        let shares = Shares::of(drive, load, backings, &sweep.peaks);
+        let of_backing = shares.as_ref().map_or_else(Vec::new, findings::of_backing);
+        let parts = shares.as_ref().map(|shares| (backings.support(), shares));
+        let model_error = error_of_model::of(drive, load, deviations, &sweep, parts).map_err(SolveError::from)?;
         let forces = period::RadialForces::of(drive, &sweep, stop)?;
         let mut of_friction = None;
         let mut losses = None;
@@ -247,8 +270,8 @@ impl Question for Sweep {
             losses = Some(LossesAnswer::new(&costs, duty.hardest, &sweep, of_period)?);
         }
         let radial_force_n = forces.map(|forces| RadialForceAnswer::new(&sweep, forces)).transpose()?;
-        let of_sweep =
-            of_wind_up.iter().chain(&of_half_widths).chain(&of_friction).chain(&of_projection).chain(&of_contacts);
+        let of_model = of_half_widths.iter().chain(&of_friction).chain(&of_projection).chain(&of_backing);
+        let of_sweep = of_wind_up.iter().chain(of_model).chain(&of_contacts);
         findings.extend(of_sweep.map(FindingAnswer::from));
         let unloaded_wind_up_deg = if *with_wind_up && *with_gaps {
             Some(solver::unloaded_wind_up_deg(drive, load, deviations, &sweep, stop)?)
@@ -279,6 +302,7 @@ impl Question for Sweep {
             losses,
             radial_force_n,
             model_error: ModelErrorAnswer::new(load, model_error),
+            series_compliance_estimates: EstimateAnswer::all(backings, drive, load, shares.as_ref()),
             checks: ChecksAnswer {
                 torque_balance_residual: sweep.torque_balance_residual,
                 period_closure_residual: sweep.period_closure_residual,
@@ -482,8 +506,9 @@ impl SweepAnswer {
         if let Some(sweep_period_deg) = self.sweep_period_deg {
             writeln!(writer, "input angle of the sweep            {sweep_period_deg:.6} deg")?;
         }
-        writeln!(writer, "teeth in mesh per zone              {}", self.teeth_in_mesh_per_zone)?;
-        writeln!(writer, "teeth that carry per zone           {}", self.loaded_teeth_per_zone)?;
+        let zones = if self.states.lobe.is_none() { "per zone" } else { "in all zones" };
+        writeln!(writer, "teeth in mesh {zones:<22}{}", self.teeth_in_mesh_per_zone)?;
+        writeln!(writer, "teeth that carry {zones:<19}{}", self.loaded_teeth_per_zone)?;
         writeln!(writer, "states                              {}", self.states.tooth.len())?;
         writeln!(writer, "torque balance residual             {:.1e}", self.checks.torque_balance_residual)?;
         writeln!(writer, "period closure residual             {:.1e}", self.checks.period_closure_residual)?;
@@ -539,6 +564,7 @@ impl SweepAnswer {
             writeln!(writer, "\nlargest force on the wave generator {most_n:.6} N, across its axis")?;
         }
         self.model_error.write_text(writer)?;
+        backing::write_text(&self.series_compliance_estimates, writer)?;
         write_findings(&self.findings, writer)
     }
 }

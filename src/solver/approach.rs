@@ -159,6 +159,17 @@ impl Approach {
         }
     }
 
+    /// The least of what it is made of, under 1 N. Below zero it falls under some force, however light or heavy, and the approach is none of
+    /// those that this type is for.
+    pub(crate) fn least_part_mm(&self) -> f64 {
+        match *self {
+            Self::Power { coefficient, compliance_mm_per_n, .. } if compliance_mm_per_n >= 0.0 => coefficient,
+            Self::Linear { compliance_mm_per_n }
+            | Self::Power { compliance_mm_per_n, .. }
+            | Self::Logarithmic(Logarithmic { compliance_mm_per_n, .. }) => compliance_mm_per_n,
+        }
+    }
+
     /// The exponent of a law that is a single power.
     pub(crate) fn single_exponent(&self) -> Option<f64> {
         match *self {

@@ -176,7 +176,7 @@ pub struct Drawing {
 
 #[derive(Debug, Clone, PartialEq)]
 enum MadePart {
-    Ring(RingPart),
+    Ring(Box<RingPart>),
     Carrier(CarrierPart),
     Teeth(ToothPart),
     WaveGenerator(WaveGeneratorPart),
@@ -202,7 +202,7 @@ impl Drawing {
         let carrier_rotation_rad = RAD_PER_ARCSEC * parts.modification.carrier_rotation_arcsec;
         let made = |part: &Part| {
             Ok(match part {
-                Part::Ring => MadePart::Ring(RingPart::new(&drive, parts)?),
+                Part::Ring => MadePart::Ring(Box::new(RingPart::new(&drive, parts)?)),
                 Part::Carrier => MadePart::Carrier(CarrierPart::new(&drive, parts)),
                 Part::Teeth => MadePart::Teeth(ToothPart::new(&drive, parts)),
                 Part::WaveGenerator => MadePart::WaveGenerator(WaveGeneratorPart::new(parts)),

@@ -438,7 +438,7 @@ impl Neighbours {
         if center_distance_mm > tooth_diameter_mm {
             return Ok(None);
         }
-        let touching_radius_mm = self.touching_radius_mm()?;
+        let touching_radius_mm = self.touching_radius_mm(center_distance_mm)?;
         Ok(Some(Violation::TeethTouch { tooth_diameter_mm, center_distance_mm, touching_radius_mm }))
     }
 
@@ -489,10 +489,13 @@ impl Neighbours {
     }
 
     /// The radius, at most the one that the teeth have, at which they begin to touch: thicker teeth stand farther out, but by less than they
-    /// are thicker, so that the gap falls with the radius. Its logarithm is what is solved for, because radii range over twelve decades.
-    fn touching_radius_mm(&self) -> Result<f64, NotConverged> {
-        if let Cam::Ellipse(cam) = self.locus.cam() {
-            return self.touching_radius_of_ellipse_mm(cam);
+    /// are thicker, so that the gap falls with the radius. Its logarithm is what is solved for, because radii range over twelve decades. Where
+    /// the path itself is given it is the same for all radii, and what the centres leave is half their least distance.
+    fn touching_radius_mm(&self, center_distance_mm: f64) -> Result<f64, NotConverged> {
+        match self.locus.cam() {
+            Cam::Ellipse(cam) => return self.touching_radius_of_ellipse_mm(cam),
+            Cam::HarmonicPath(_) => return Ok(0.5 * center_distance_mm),
+            Cam::Harmonic(_) => {}
         }
         let free_mm = 0.5 * self.surely_free_radius_mm();
         let at = |exponent: f64| Self { locus: Locus::new(*self.locus.cam(), free_mm * exponent.exp()), ..*self };

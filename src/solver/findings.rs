@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use crate::backing::{Backing, Estimate, Shares};
 use crate::cam::Cam;
 use crate::contact::{Contact, ContactLaw, Material, Materials, PerContact, half_width_mm};
 use crate::drive::{Drive, ToothShape};
@@ -38,6 +39,10 @@ pub const STEEP_FOR_PROJECTION_DEG: f64 = 30.0;
 
 /// An efficiency that may be further off than this is reported.
 pub const UNCERTAIN_EFFICIENCY: f64 = 0.05;
+
+/// A part behind a contact that adds more than this to what a tooth gives way at its contacts is reported: the wind-up is then a sixth too small, as much
+/// as elastic bodies in a housing were found to add together (docs/validation.md).
+pub const SOFT_BACKING_SHARE: f64 = 0.2;
 
 const STEEL: Material = Material::STEEL;
 
@@ -145,6 +150,20 @@ pub enum Finding {
     ProjectionWithGap {
         /// The largest gap of a contact.
         gap_um: f64,
+    },
+    /// The carrier's fingers give way by more than the model, which takes them as rigid, can leave out.
+    SlenderFingers {
+        /// What they add to a tooth's approach at its contacts, over that.
+        share: f64,
+        /// Whether they are held at one end; otherwise at both, or nothing is said.
+        is_held_at_one_end: bool,
+    },
+    /// The ring's rim does so.
+    SoftRim {
+        /// What it adds to a tooth's approach at its contacts, over that.
+        share: f64,
+        /// Whether nothing stands around it; otherwise it is housed, or nothing is said.
+        is_free: bool,
     },
     /// Palmgren's law for a contact that is not steel on steel.
     PalmgrenBeyondSteel {
@@ -330,6 +349,19 @@ pub fn of_projection(drive: &Drive, load: &LoadCase) -> Result<Vec<Finding>, Not
     Ok(findings)
 }
 
+/// What gives way behind the contacts by more than can be left out.
+pub fn of_backing(shares: &Shares) -> Vec<Finding> {
+    let soft = shares.shares.iter().filter(|(_, share)| *share > SOFT_BACKING_SHARE);
+    let finding = |&(estimate, share): &(Estimate, f64)| match estimate.backing {
+        Backing::FingerAtOneEnd => Some(Finding::SlenderFingers { share, is_held_at_one_end: true }),
+        Backing::FingerAtBothEnds => Some(Finding::SlenderFingers { share, is_held_at_one_end: false }),
+        Backing::FreeRim => Some(Finding::SoftRim { share, is_free: true }),
+        Backing::HousedRim => Some(Finding::SoftRim { share, is_free: false }),
+        Backing::CamOnBore => None,
+    };
+    soft.filter_map(finding).collect()
+}
+
 /// That the wind-up of a sweep goes beyond what the model holds for.
 pub fn of_wind_up(drive: &Drive, sweep: &Sweep) -> Option<Finding> {
     let wind_up_deg = sweep.input_angles.wind_up_deg.iter().copied().fold(0.0, f64::max);
@@ -416,6 +448,11 @@ fn thin_wall(drive: &Drive, wall: Wall, wall_mm: f64) -> Vec<Finding> {
     if wall_mm < limit_mm { vec![Finding::ThinWallAsMade { wall, wall_mm, limit_mm }] } else { Vec::new() }
 }
 
+/// Whether a contact is that of a flat.
+fn is_flat(drive: &Drive, contact: Contact) -> bool {
+    contact == Contact::Carrier && matches!(drive.parameters().tooth, ToothShape::FlatSided { .. })
+}
+
 /// The findings about a drive's contacts under a load. `approaches_matter` where wind-up or clearance was asked for.
 pub fn of_contacts(
     drive: &Drive,
@@ -437,7 +474,8 @@ pub fn of_contacts(
     if p.law == ContactLaw::Palmgren {
         let steel = Materials { wave_generator: STEEL, teeth: STEEL, ring: STEEL, carrier: STEEL };
         let steel_mpa = steel.contact_modulus_mpa(Contact::Ring);
-        for (contact, _) in peaks.iter() {
+        // A flat has a law of its own, which follows the modulus.
+        for (contact, _) in peaks.iter().filter(|&(contact, _)| !is_flat(drive, contact)) {
             let contact_mpa = p.materials.contact_modulus_mpa(contact);
             if (contact_mpa / steel_mpa - 1.0).abs() > STEEL_TOLERANCE {
                 findings.push(Finding::PalmgrenBeyondSteel {
@@ -476,9 +514,7 @@ pub fn of_contacts(
 pub fn of_half_widths(drive: &Drive, load: &LoadCase, states: &States) -> Vec<Finding> {
     let ContactLaw::Johnson { depth_mm } = &load.parameters().law else { return Vec::new() };
     let (tooth_radius_mm, tooth_width_mm) = (drive.parameters().tooth_radius_mm, drive.tooth_width_mm());
-    let is_flat =
-        |contact| contact == Contact::Carrier && matches!(drive.parameters().tooth, ToothShape::FlatSided { .. });
-    let widest = states.force_n.iter().filter(|&(contact, _)| !is_flat(contact)).map(|(contact, forces_n)| {
+    let widest = states.force_n.iter().filter(|&(contact, _)| !is_flat(drive, contact)).map(|(contact, forces_n)| {
         let loaded = forces_n.iter().zip(states.stress_mpa.get(contact)).filter(|&(&force_n, _)| force_n > 0.0);
         let half_widths = loaded.map(|(&force_n, &stress_mpa)| half_width_mm(force_n, stress_mpa, tooth_width_mm));
         (contact, half_widths.fold(0.0, f64::max))

@@ -261,6 +261,20 @@ pub struct Gaps<'a> {
     deviations: Option<&'a Deviations>,
 }
 
+/// How far flanks and walls are turned away about the axis: lost motion alone (docs/theory.md section 4.8).
+#[derive(Debug, Clone, Copy, Default)]
+struct Turned {
+    ring_rad: f64,
+    carrier_rad: f64,
+}
+
+impl Turned {
+    /// `kτ` of a ring, `(Z_G/U) τ` of a carrier.
+    fn lost_motion_rad(&self, drive: &Drive) -> f64 {
+        drive.flank().teeth_per_wave() * self.ring_rad + drive.teeth_per_wave() * self.carrier_rad
+    }
+}
+
 impl<'a> Gaps<'a> {
     /// From clearances, which are the same at every tooth, modifications, which depend on its position, and deviations, which depend on its place.
     pub fn new(
@@ -292,6 +306,43 @@ impl<'a> Gaps<'a> {
 
     /// The gap at each contact of a tooth, along its normal; negative where a part is too full.
     pub fn at(&self, place: &Place, center: &ToothCenter, flank: &FlankPoint) -> PerContact<f64> {
+        let d = center.center_radius_mm;
+        let sin = flank.tan_pressure_angle * flank.cos_pressure_angle;
+        let (all, own) = (self.turned_alike(), self.turned_at(place));
+        let mut gap_mm = self.besides_turns(place, center, flank);
+        gap_mm.ring += (all.ring_rad + own.ring_rad) * d * sin;
+        gap_mm.carrier += (all.carrier_rad + own.carrier_rad) * d;
+        gap_mm
+    }
+
+    /// How far the wave generator turns to make up for what is turned alike at all teeth: without a rounding that would tell them apart, and
+    /// decide under a light load which of them carry.
+    pub(crate) fn lost_motion_rad(&self) -> f64 {
+        self.turned_alike().lost_motion_rad(self.drive)
+    }
+
+    /// The same of what is turned at one place.
+    pub(crate) fn lost_motion_at_rad(&self, place: &Place) -> f64 {
+        self.turned_at(place).lost_motion_rad(self.drive)
+    }
+
+    fn turned_alike(&self) -> Turned {
+        let Modification { ring_rotation_arcsec, carrier_rotation_arcsec, .. } = &self.modification;
+        Turned {
+            ring_rad: RAD_PER_ARCSEC * ring_rotation_arcsec,
+            carrier_rad: RAD_PER_ARCSEC * carrier_rotation_arcsec,
+        }
+    }
+
+    fn turned_at(&self, place: &Place) -> Turned {
+        self.deviations.map_or_else(Turned::default, |deviations| Turned {
+            ring_rad: RAD_PER_ARCSEC * of(&deviations.ring_space_angle_arcsec, place.ring_space),
+            carrier_rad: RAD_PER_ARCSEC * of(&deviations.slot_angle_arcsec, place.slot),
+        })
+    }
+
+    /// The gaps but for those that flanks and walls leave which are turned away about the axis.
+    pub(crate) fn besides_turns(&self, place: &Place, center: &ToothCenter, flank: &FlankPoint) -> PerContact<f64> {
         let mut gap_mm = self.clearance_mm;
         self.add_modification(center, flank, &mut gap_mm);
         if let Some(deviations) = self.deviations {
@@ -315,9 +366,8 @@ impl<'a> Gaps<'a> {
                 + m.ring_path_shift_um * cos
                 + m.ring_profile_shift_um * cos_to_profile
                 + self.tip_relief_um(center))
-            + RAD_PER_ARCSEC * m.ring_rotation_arcsec * d * sin
             + thinner_mm;
-        gap_mm.carrier += MM_PER_UM * m.slot_wall_um + RAD_PER_ARCSEC * m.carrier_rotation_arcsec * d + thinner_mm;
+        gap_mm.carrier += MM_PER_UM * m.slot_wall_um + thinner_mm;
     }
 
     fn tip_relief_um(&self, center: &ToothCenter) -> f64 {
@@ -338,8 +388,6 @@ impl<'a> Gaps<'a> {
     ) {
         let p = self.drive.parameters();
         let s = self.drive.sense();
-        let d = center.center_radius_mm;
-        let sin = flank.tan_pressure_angle * flank.cos_pressure_angle;
         let thinner_mm = MM_PER_UM * of(&deviations.tooth_radius_um, slot);
         // Directions, each in its own part: of the cam's normal, of the ring's outward normal, and in which a slot's wall is pressed.
         let normal_rad = center.normal_rad();
@@ -355,13 +403,9 @@ impl<'a> Gaps<'a> {
         gap_mm.wave_generator += MM_PER_UM * of(&deviations.wave_generator_lobe_um, lobe)
             - along_mm(&runout.wave_generator, cam_rad)
             + thinner_mm;
-        gap_mm.ring += MM_PER_UM * of(&deviations.ring_space_um, ring_space)
-            + RAD_PER_ARCSEC * of(&deviations.ring_space_angle_arcsec, ring_space) * d * sin
-            + along_mm(&runout.ring, ring_rad)
-            + thinner_mm;
-        gap_mm.carrier += MM_PER_UM * of(&deviations.slot_wall_um, slot)
-            + RAD_PER_ARCSEC * of(&deviations.slot_angle_arcsec, slot) * d
-            + along_mm(&runout.carrier, wall_rad)
-            + thinner_mm;
+        gap_mm.ring +=
+            MM_PER_UM * of(&deviations.ring_space_um, ring_space) + along_mm(&runout.ring, ring_rad) + thinner_mm;
+        gap_mm.carrier +=
+            MM_PER_UM * of(&deviations.slot_wall_um, slot) + along_mm(&runout.carrier, wall_rad) + thinner_mm;
     }
 }

@@ -32,6 +32,7 @@
 //! its geometry and its mesh; with a [`LoadCase`] it answers a [`sweep()`](sweep::sweep) over one period.
 
 pub mod approach;
+pub mod backing;
 pub mod cam;
 pub mod contact;
 pub mod drawing;

@@ -8,7 +8,7 @@ use crate::mesh::{Mesh, Place};
 use crate::position::Position;
 use crate::ring::{FlankPoint, RingFlank, RingTooth};
 use crate::root::NotConverged;
-use crate::springs::{Rotation, Spring, Springs, WindUp};
+use crate::springs::{Gap, Rotation, Spring, Springs, WindUp};
 use crate::tooth::line::{WIDEST_SHARE, least_length_mm};
 use crate::tooth::{Contacts, LineLaw, Pressure, ToothContact, ToothSize};
 use crate::violation::{Parameter, Violation};
@@ -314,15 +314,10 @@ impl<'a> LoadedDrive<'a> {
                 spacing_deg: mesh.spacing_deg(),
             });
         }
-        // Only `projection` can fall to zero, and only with unlike stiffnesses. It is then linear in sin²γ and positive at the root, so its
-        // least value stands there or where γ is largest.
+        // Only `projection` can fall to zero, and only with unlike stiffnesses. Of cylinders and balls it is then linear in sin²γ and positive at the
+        // root, so its least value stands there or where γ is largest. That of flats changes with what the carrier bears of them too.
         if p.compatibility == Compatibility::Projection {
-            let ToothState { center, spring, .. } = loaded.state(&Place::default(), drive.steepest_engaged()?)?;
-            let compliance_mm_per_n = spring.approach.approach_mm(1.0);
-            if compliance_mm_per_n <= 0.0 {
-                let position_deg = center.position.from_lobe_deg();
-                return Err(SolveError::ComplianceNotPositive { position_deg, compliance_mm_per_n });
-            }
+            loaded.state(&Place::default(), drive.steepest_engaged()?)?;
         }
         Ok(loaded)
     }
@@ -407,24 +402,38 @@ impl<'a> LoadedDrive<'a> {
                 pressure: self.pressure(contact, &center, *curvature_per_mm.get(contact))?,
             })
         })?;
-        let gap_mm = if self.gaps.is_nil() {
-            None
-        } else {
-            let gaps_mm = self.gaps.at(place, &center, &flank);
-            let gap_mm = weights.iter().fold(0.0, |sum, (contact, weight)| sum + weight * gaps_mm.get(contact));
-            // The weights of clearances under `projection` were looked at before: what is left of them is rounding.
-            if gap_mm < 0.0 && self.compatibility == Compatibility::VirtualWork {
-                let position_deg = center.position.from_lobe_deg();
-                let place = self.mesh.tells_items_apart().then_some(*place);
-                let gap_um = 1e3 * gap_mm;
-                return Err(SolveError::Interference { place, position_deg, input_angle_deg: None, gap_um });
-            }
-            Some(gap_mm)
-        };
-        let approach = self.contacts.approach(&places);
         // Without friction the way that the wave generator makes and the torque that it takes have one arm.
         let arm_mm = center.cam_contact.lever_arm_mm;
-        let spring = Spring::new(arm_mm, arm_mm, gap_mm, approach);
+        let gap = if self.gaps.is_nil() {
+            None
+        } else {
+            let gaps_mm = self.gaps.besides_turns(place, &center, &flank);
+            let along_mm = weights.iter().fold(0.0, |sum, (contact, weight)| sum + weight * gaps_mm.get(contact));
+            let lost_motion_rad = self.gaps.lost_motion_at_rad(place);
+            Some(match self.compatibility {
+                // The weights of clearances were looked at before: what is below zero of them is rounding.
+                Compatibility::Projection => Gap { along_mm: along_mm.max(0.0), lost_motion_rad },
+                Compatibility::VirtualWork => {
+                    let gap_mm = along_mm + (lost_motion_rad + self.lost_motion_rad()) * arm_mm;
+                    if gap_mm < 0.0 {
+                        let position_deg = center.position.from_lobe_deg();
+                        let place = self.mesh.tells_items_apart().then_some(*place);
+                        let gap_um = 1e3 * gap_mm;
+                        return Err(SolveError::Interference { place, position_deg, input_angle_deg: None, gap_um });
+                    }
+                    Gap { along_mm, lost_motion_rad }
+                }
+            })
+        };
+        let approach = self.contacts.approach(&places);
+        if self.compatibility == Compatibility::Projection {
+            let compliance_mm_per_n = approach.least_part_mm();
+            if compliance_mm_per_n <= 0.0 {
+                let position_deg = center.position.from_lobe_deg();
+                return Err(SolveError::ComplianceNotPositive { position_deg, compliance_mm_per_n });
+            }
+        }
+        let spring = Spring::new(arm_mm, arm_mm, gap, approach);
         let pressure = PerContact::of(|contact| places.get(contact).pressure);
         Ok(ToothState { center, flank, force_ratio, curvature_per_mm, pressure, spring })
     }
@@ -507,7 +516,12 @@ impl<'a> LoadedDrive<'a> {
     pub fn wind_up(&self, teeth: &[ToothState]) -> Result<WindUp, SolveError> {
         let wind_up = self.springs(teeth).wind_up(self.input_torque_nmm)?.ok_or(SolveError::NoLeverArm)?;
         self.check_law(teeth, &wind_up.rotation)?;
-        Ok(wind_up)
+        Ok(WindUp { lost_motion_rad: self.lost_motion_rad(), ..wind_up })
+    }
+
+    /// Lost motion that all teeth have alike: their closing angles leave it out.
+    pub(crate) fn lost_motion_rad(&self) -> f64 {
+        self.gaps.lost_motion_rad()
     }
 
     /// The largest input torque under which no contact of these teeth exceeds its stress, and the contact that reaches it.

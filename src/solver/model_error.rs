@@ -1,8 +1,10 @@
 //! How far the model is off elastic bodies: what was measured against finite elements (docs/validation.md), and whether a drive is one of
 //! those that this speaks for.
 
+use crate::backing::{Backing, Fingers, Rim, Shares, Support};
 use crate::contact::{ContactLaw, Material};
 use crate::drive::{Drive, ToothShape};
+use crate::findings::SOFT_BACKING_SHARE;
 use crate::gaps::Deviations;
 use crate::load_sharing::{Compatibility, LoadCase};
 use crate::ring::FlankEnd;
@@ -96,8 +98,60 @@ pub enum Beyond {
     Modification,
     /// Something that gives way behind a contact.
     SeriesCompliance,
+    /// A part behind a contact that gives way by more than can be left out, by its estimate.
+    SoftBacking,
     /// A wider contact.
     HalfWidth,
+}
+
+/// How parts are held that the law takes as held at its depth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HeldCase {
+    /// A rim in a housing, fingers at both ends; also where nothing is said.
+    Housed,
+    /// Fingers that are slender though held at both ends.
+    SlenderFingers,
+    /// Fingers held at one end.
+    FingersAtOneEnd,
+    /// A rim with nothing around it.
+    FreeRim,
+}
+
+/// How far the wind-up is off for what gives way behind the contacts and is not given as series compliance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Held {
+    /// The case.
+    pub case: HeldCase,
+    /// What earlier calculations of elastic bodies found in such a case, where there were any.
+    pub wind_up: Option<ErrorRange>,
+    /// What the estimates of the parts come to.
+    pub estimated_wind_up: f64,
+}
+
+impl Held {
+    /// Of parts that have estimates.
+    fn of(support: &Support, shares: &Shares) -> Option<Self> {
+        if shares.shares.is_empty() {
+            return None;
+        }
+        let has = |wanted: Backing| shares.shares.iter().find(|(estimate, _)| estimate.backing == wanted);
+        let is_soft = |&&(_, share): &&(_, f64)| share > SOFT_BACKING_SHARE;
+        let case = if support.rim == Some(Rim::Free) && has(Backing::FreeRim).is_some() {
+            HeldCase::FreeRim
+        } else if support.fingers == Some(Fingers::HeldAtOneEnd) && has(Backing::FingerAtOneEnd).is_some() {
+            HeldCase::FingersAtOneEnd
+        } else if has(Backing::FingerAtBothEnds).filter(is_soft).is_some() {
+            HeldCase::SlenderFingers
+        } else {
+            HeldCase::Housed
+        };
+        let wind_up = match case {
+            HeldCase::Housed => Some(ErrorRange::percent(-25, -20)),
+            HeldCase::FingersAtOneEnd | HeldCase::FreeRim => Some(ErrorRange::percent(-75, -50)),
+            HeldCase::SlenderFingers => None,
+        };
+        Some(Self { case, wind_up, estimated_wind_up: shares.wind_up_error() })
+    }
 }
 
 /// What is expected of the model for a drive under a load.
@@ -105,6 +159,8 @@ pub enum Beyond {
 pub struct ModelError {
     /// What was measured of the case that is nearest, where there is one.
     pub measured: Option<Measured>,
+    /// What comes on top of the wind-up's error, where that can be told.
+    pub held: Option<Held>,
     /// Why the drive is beyond it; empty where it lies within.
     pub beyond: Vec<Beyond>,
 }
@@ -165,11 +221,17 @@ pub fn case_of(drive: &Drive, load: &LoadCase, deviations: &Deviations) -> Case 
     }
 }
 
-/// What is expected of the model for this drive, load and sweep.
+/// What is expected of the model for this drive, load and sweep, with parts that are held so and add these shares.
 ///
 /// # Errors
 /// [`NotConverged`] from the geometry.
-pub fn of(drive: &Drive, load: &LoadCase, deviations: &Deviations, sweep: &Sweep) -> Result<ModelError, NotConverged> {
+pub fn of(
+    drive: &Drive,
+    load: &LoadCase,
+    deviations: &Deviations,
+    sweep: &Sweep,
+    parts: Option<(&Support, &Shares)>,
+) -> Result<ModelError, NotConverged> {
     let p = load.parameters();
     let measured = measured(p.compatibility, &p.law, case_of(drive, load, deviations));
     let own = p.materials.teeth;
@@ -188,8 +250,13 @@ pub fn of(drive: &Drive, load: &LoadCase, deviations: &Deviations, sweep: &Sweep
         (p.clearance_um.iter().any(|(_, &gap_um)| gap_um > GAP_TO_UM), Beyond::Gap),
         (p.modification.first().is_some() || !deviations.is_nil(), Beyond::Modification),
         (p.series_compliance_mm_per_n.iter().any(|(_, &compliance)| compliance > 0.0), Beyond::SeriesCompliance),
+        (
+            parts.is_some_and(|(_, shares)| shares.shares.iter().any(|(_, share)| *share > SOFT_BACKING_SHARE)),
+            Beyond::SoftBacking,
+        ),
         (widest_mm > HALF_WIDTH_SHARE_TO * drive.parameters().tooth_radius_mm, Beyond::HalfWidth),
     ];
     let beyond = reasons.into_iter().filter(|&(is_beyond, _)| is_beyond).map(|(_, reason)| reason).collect();
-    Ok(ModelError { measured, beyond })
+    let held = parts.and_then(|(support, shares)| Held::of(support, shares));
+    Ok(ModelError { measured, held, beyond })
 }

@@ -11,20 +11,30 @@ pub struct Spring {
     pub travel_arm_mm: f64,
     /// Torque at the wave generator for each newton of `F_H`: `|h'|` by statics. Friction will part the two.
     pub static_arm_mm: f64,
-    /// How far the wave generator turns before the gaps at this tooth are closed, `g/|h'|`; infinite where they never are.
+    /// How far the wave generator turns before the gaps at this tooth are closed, `g/|h'|`; infinite where they never are. Lost motion that
+    /// all teeth have alike may be left out, and then what is left may be below zero.
     pub closing_rad: f64,
     /// The tooth's approach under `F_H`.
     pub approach: Approach,
 }
 
+/// What has to be closed before a tooth carries.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Gap {
+    /// Along `F_H`.
+    pub(crate) along_mm: f64,
+    /// As a rotation of the wave generator, on top of it.
+    pub(crate) lost_motion_rad: f64,
+}
+
 impl Spring {
-    /// A tooth with a total gap along `F_H`, nothing where it has none. One without an arm never closes a gap: that of the slot vanishes
+    /// A tooth with a gap, nothing where it has none. One without an arm never closes a gap: that of the slot vanishes
     /// with the arm, but no rotation brings the tooth there.
-    pub(crate) fn new(travel_arm_mm: f64, static_arm_mm: f64, gap_mm: Option<f64>, approach: Approach) -> Self {
-        let closing_rad = match gap_mm {
+    pub(crate) fn new(travel_arm_mm: f64, static_arm_mm: f64, gap: Option<Gap>, approach: Approach) -> Self {
+        let closing_rad = match gap {
             Some(_) if travel_arm_mm <= 0.0 => f64::INFINITY,
-            Some(gap_mm) if gap_mm > 0.0 => gap_mm / travel_arm_mm,
-            Some(_) | None => 0.0,
+            Some(Gap { along_mm, lost_motion_rad }) => along_mm / travel_arm_mm + lost_motion_rad,
+            None => 0.0,
         };
         Self { travel_arm_mm, static_arm_mm, closing_rad, approach }
     }
@@ -68,7 +78,9 @@ pub struct Rotation {
 /// How far the wave generator turns under the load at one input angle, and how stiffly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WindUp {
-    /// `Δφ`.
+    /// Lost motion that all springs have alike, which their closing angles leave out.
+    pub lost_motion_rad: f64,
+    /// `Δφ` beyond it.
     pub rotation: Rotation,
     /// `dM0/dΔφ` at the load.
     pub stiffness_nmm_per_rad: f64,
@@ -84,7 +96,7 @@ impl Rotation {
 impl WindUp {
     /// `Δφ`.
     pub const fn rotation_rad(&self) -> f64 {
-        self.rotation.rad()
+        self.lost_motion_rad + self.rotation.rad()
     }
 }
 
@@ -145,7 +157,7 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
             Springs::new(&order, self.zones).rotation_in_order(torque_nmm)?
         };
         let stiffness_nmm_per_rad = self.torque_nmm(&rotation)?.slope;
-        Ok(Some(WindUp { rotation, stiffness_nmm_per_rad }))
+        Ok(Some(WindUp { lost_motion_rad: 0.0, rotation, stiffness_nmm_per_rad }))
     }
 
     /// The rotation of springs that stand in the order in which they close. A spring carries if those before it make less than the torque when

@@ -81,6 +81,9 @@ struct ShapedPoint {
 /// Places at which a shaped flank is looked at for its end, over half a lobe: far more than it has bends.
 const PLACES: u32 = 720;
 
+/// What may end a shaped flank; a regular tip does where it has become a cusp.
+const ENDS: [FlankEnd; 3] = [FlankEnd::Undercut, FlankEnd::Bore, FlankEnd::RegularTip];
+
 impl ToothSpace {
     /// The space of a ring with a clearance and a modification.
     ///
@@ -272,57 +275,54 @@ impl ShapedFlank {
             let psi = bracketed("start of a turned flank", 0.0, self.turned_rad, half_rad - beyond, angle)?;
             start = Position::from_lobe(psi, lobes);
         }
-        // What has to stay positive along the flank. Flanks that are turned apart cross on the symmetry line of the ring's tooth; turned
+        // What has to stay positive along the flank, by what it is ended by elsewhere. Flanks that are turned apart cross on the symmetry line of the ring's tooth; turned
         // together each still ends where it would cross there as it was. Divided by the sine the crossing at a regular tip, which is
         // none, is gone, as in `RingFlank::natural_limit`.
         let is_turned_together = self.turned_rad < 0.0;
-        let apart = |position: Position| {
+        let margin = |end: FlankEnd, position: Position| {
             let at = relieved(position)?;
-            Ok(match (self.turned_rad > 0.0, position.from_valley_rad > 0.0) {
-                (true, _) => at.angle_from_tip_rad,
-                (false, true) => (at.angle_from_tip_rad + self.turned_rad) / position.phase_cos,
-                (false, false) => 2.0 / f64::from(lobes) * at.speed_mm / (at.radius_mm - self.profile_shift_mm),
+            Ok(match end {
+                FlankEnd::Undercut if self.turned_rad > 0.0 => at.angle_from_tip_rad,
+                FlankEnd::Undercut if position.from_valley_rad > 0.0 => {
+                    (at.angle_from_tip_rad + self.turned_rad) / position.phase_cos
+                }
+                FlankEnd::Undercut => 2.0 / f64::from(lobes) * at.speed_mm / (at.radius_mm - self.profile_shift_mm),
+                FlankEnd::Bore => at.radius_mm - bore_mm.unwrap_or(0.0),
+                // Beyond a cusp the curve runs backwards.
+                FlankEnd::RegularTip => at.speed_mm,
             })
         };
-        let above_bore_mm =
-            |position: Position| Ok(bore_mm.map_or(1.0, |bore_mm| -bore_mm) + relieved(position)?.radius_mm);
-        let regular_mm = |position: Position| Ok(relieved(position)?.speed_mm);
-        let conditions: [(&dyn Fn(Position) -> Result<f64, NotConverged>, FlankEnd, bool); 3] = [
-            (&apart, FlankEnd::Undercut, is_turned_together),
-            (&above_bore_mm, FlankEnd::Bore, true),
-            (&regular_mm, FlankEnd::RegularTip, true),
-        ];
-        let at_start = relieved(start)?;
         let is_flank = |at: &ShapedPoint| at.distance_mm > 0.0 && at.radius_mm > 0.0 && at.radius_mm.is_finite();
-        for (condition, ..) in &conditions {
-            if condition(start)? <= 0.0 {
+        if !is_flank(&relieved(start)?) {
+            return Ok(None);
+        }
+        for end in ENDS {
+            if margin(end, start)? <= 0.0 {
                 return Ok(None);
             }
-        }
-        if !is_flank(&at_start) {
-            return Ok(None);
         }
         let mut before = start.from_valley_rad;
         for x in places(1).filter(|&x| x < start.from_valley_rad) {
             if !is_flank(&relieved(place(x))?) {
                 return Ok(None);
             }
-            let mut end: Option<(f64, FlankEnd, bool)> = None;
-            for (condition, kind, has_land) in &conditions {
-                let value = condition(place(x))?;
+            let mut first_end: Option<(f64, FlankEnd)> = None;
+            for end in ENDS {
+                let value = margin(end, place(x))?;
                 if value < 0.0 {
-                    let at = bracketed("end of a modified flank", x, value, before, |x| condition(place(x)))?;
-                    if end.is_none_or(|(other, ..)| at > other) {
-                        end = Some((at, *kind, *has_land));
+                    let at = bracketed("end of a modified flank", x, value, before, |x| margin(end, place(x)))?;
+                    if first_end.is_none_or(|(other, _)| at > other) {
+                        first_end = Some((at, end));
                     }
                 }
             }
-            if let Some((x, kind, has_land)) = end {
+            if let Some((x, kind)) = first_end {
                 let end = place(x);
                 let radius_mm = match (kind, bore_mm) {
                     (FlankEnd::Bore, Some(bore_mm)) => bore_mm,
                     _ => relieved(end)?.radius_mm,
                 };
+                let has_land = is_turned_together || kind != FlankEnd::Undercut;
                 return Ok(Some(ShapedSpace { flank: self, start, end, tip: Tip { radius_mm, has_land } }));
             }
             before = x;

@@ -9,12 +9,12 @@ use toothwave_calculation::json::{Tree, word};
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::question::{Limits, Question as _};
 use toothwave_calculation::sweep::Sweep;
-use toothwave_solver::losses::period::{Losses, RadialForces};
+use toothwave_solver::losses::period::RadialForces;
 use toothwave_solver::parts::RIM;
 use toothwave_solver::{Drive, SolveError, Stop};
 use utoipa::ToSchema;
 
-use crate::quantity::{Loaded, Needs, Quantity, Rubbing, Variant};
+use crate::quantity::{Loaded, Needs, Quantity, Variant};
 
 /// Why a variant has no answer.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
@@ -77,26 +77,18 @@ impl Evaluator {
             let ring_outer_radius_mm = ring_outer_radius_mm(&design, &drive);
             return self.values(&Variant { drive: &drive, ring_outer_radius_mm, loaded: None });
         }
-        let checked = Sweep.check(&design, &self.limits)?;
+        let checked = Sweep.check(&design, &self.limits)?.without_wear();
         let drive = checked.drive();
         let ring_outer_radius_mm = ring_outer_radius_mm(&design, drive);
         if self.needs < Needs::Friction && !self.needs_radial_force {
             let peaks = checked.peaks(stop)?;
-            let loaded = Loaded { load: checked.load(), peaks, friction: None, radial_forces: None };
+            let loaded = Loaded { load: checked.load(), peaks, losses: None, radial_forces: None };
             return self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) });
         }
         let sweep = checked.solve(stop)?;
-        let friction = match checked.friction().filter(|_| self.needs >= Needs::Friction) {
-            Some(friction) => Some(Rubbing {
-                friction,
-                sweep: &sweep,
-                losses: Losses::of(drive, &sweep, friction, stop)?,
-                input_speed_rpm: checked.input_speed_rpm(),
-            }),
-            None => None,
-        };
+        let losses = if self.needs >= Needs::Friction { checked.loss_totals(&sweep, stop)? } else { None };
         let radial_forces = if self.needs_radial_force { RadialForces::of(drive, &sweep, stop)? } else { None };
-        let loaded = Loaded { load: checked.load(), peaks: (&sweep).into(), friction, radial_forces };
+        let loaded = Loaded { load: checked.load(), peaks: (&sweep).into(), losses, radial_forces };
         self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) })
     }
 

@@ -360,7 +360,7 @@ impl Room {
 /// Points of several fronts that are looked at together, at most: of more the front is thinned to half of them first.
 const MOST_AT_ONCE: usize = 2048;
 
-/// The front of several. It depends on their order only where there are more points than [`MOST_AT_ONCE`]: whoever merges gives the fronts
+/// The front of several. It depends on their order only where there are more points than are looked at together: whoever merges gives the fronts
 /// by their numbers.
 pub fn merged(fronts: impl IntoIterator<Item = Point>) -> Vec<Point> {
     let mut points = Vec::new();

@@ -1,11 +1,12 @@
 //! What can be asked of a variant: each quantity once, with its unit, its meaning and where it comes from.
 
 use serde::Serialize;
-use toothwave_solver::losses::period::{Losses, RadialForces};
-use toothwave_solver::losses::{Efficiency, Fixed, Friction, Mechanism};
+use toothwave_calculation::sweep::losses::{LossTotalsAnswer, PressureVelocityAnswer};
+use toothwave_calculation::sweep::peak::PeakAnswer;
+use toothwave_solver::losses::period::RadialForces;
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::root::NotConverged;
-use toothwave_solver::sweep::{ContactPeaks, Sweep, SweepPeaks};
+use toothwave_solver::sweep::{ContactPeaks, SweepPeaks};
 use toothwave_solver::{Contact, Drive, LoadCase};
 use utoipa::ToSchema;
 
@@ -83,17 +84,9 @@ pub(crate) struct Variant<'a> {
 pub(crate) struct Loaded<'a> {
     pub(crate) load: &'a LoadCase,
     pub(crate) peaks: SweepPeaks,
-    pub(crate) friction: Option<Rubbing<'a>>,
+    /// Over all points of a duty; the rest is of its hardest.
+    pub(crate) losses: Option<LossTotalsAnswer>,
     pub(crate) radial_forces: Option<RadialForces>,
-}
-
-/// A variant with friction.
-#[derive(Debug)]
-pub(crate) struct Rubbing<'a> {
-    pub(crate) friction: &'a Friction,
-    pub(crate) sweep: &'a Sweep,
-    pub(crate) losses: Losses,
-    pub(crate) input_speed_rpm: Option<f64>,
 }
 
 impl Variant<'_> {
@@ -117,13 +110,12 @@ impl Variant<'_> {
         })
     }
 
-    fn rubbing(&self, of: impl Fn(&Loaded<'_>, &Rubbing<'_>) -> f64) -> f64 {
-        self.loaded(|loaded| loaded.friction.as_ref().map_or(f64::NAN, |rubbing| of(loaded, rubbing)))
+    fn losses(&self, of: impl Fn(&LossTotalsAnswer) -> f64) -> f64 {
+        self.loaded(|loaded| loaded.losses.as_ref().map_or(f64::NAN, &of))
     }
 
-    fn efficiency(&self, fixed: Fixed, of: impl Fn(Efficiency) -> f64) -> f64 {
-        let mechanism = Mechanism::of(self.drive);
-        self.rubbing(|_, rubbing| of(mechanism.efficiency(fixed, rubbing.losses.mean.total())))
+    fn pressure_velocity(&self, of: impl Fn(&PressureVelocityAnswer) -> &PeakAnswer) -> f64 {
+        self.losses(|losses| losses.pressure_velocity_mpa_m_per_s.as_ref().map_or(f64::NAN, |peaks| of(peaks).value))
     }
 }
 
@@ -224,7 +216,7 @@ pub static QUANTITIES: [Quantity; 59] = [
     of_drive(
         "teeth_in_mesh_min",
         "",
-        "The fewest teeth of a zone that mesh at any input angle.",
+        "The fewest teeth that mesh at any input angle: of a zone where the zones are alike, elsewhere of all of them together.",
         mesh("/teeth_in_mesh_per_zone/min"),
         #[expect(clippy::cast_precision_loss, reason = "a count of teeth")]
         |variant| Ok(Mesh::new(variant.drive).teeth_in_mesh().min as f64),
@@ -402,7 +394,7 @@ pub static QUANTITIES: [Quantity; 59] = [
     of_sweep(
         "loaded_teeth_min",
         "",
-        "The fewest teeth of a zone that carry load at any input angle.",
+        "The fewest teeth that carry load at any input angle: of a zone where the zones are alike, elsewhere of all of them together.",
         sweep("/loaded_teeth_per_zone/min"),
         #[expect(clippy::cast_precision_loss, reason = "a count of teeth")]
         |variant| Ok(variant.loaded(|loaded| loaded.peaks.loaded_teeth.min as f64)),
@@ -476,68 +468,68 @@ pub static QUANTITIES: [Quantity; 59] = [
             "",
             "Mean power lost over the input torque times the speed of wave generator against carrier.",
             sweep("/losses/loss_ratio"),
-            |variant| Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.total())),
+            |variant| Ok(variant.losses(|losses| losses.loss_ratio)),
         ),
     ),
     loss_at(
         "loss_ratio_wave_generator",
         "The part of it that is lost between teeth and wave generator.",
         sweep("/losses/loss_ratio_by_place/wave_generator"),
-        |variant| Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.contacts.wave_generator)),
+        |variant| Ok(variant.losses(|losses| losses.loss_ratio_by_place.wave_generator)),
     ),
     loss_at(
         "loss_ratio_ring",
         "The part of it that is lost between teeth and ring.",
         sweep("/losses/loss_ratio_by_place/ring"),
-        |variant| Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.contacts.ring)),
+        |variant| Ok(variant.losses(|losses| losses.loss_ratio_by_place.ring)),
     ),
     loss_at(
         "loss_ratio_carrier",
         "The part of it that is lost between teeth and carrier.",
         sweep("/losses/loss_ratio_by_place/carrier"),
-        |variant| Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.contacts.carrier)),
+        |variant| Ok(variant.losses(|losses| losses.loss_ratio_by_place.carrier)),
     ),
     loss_at(
         "loss_ratio_bearing",
         "The part of it that is lost in the bearing.",
         sweep("/losses/loss_ratio_by_place/bearing"),
-        |variant| Ok(variant.rubbing(|_, rubbing| rubbing.losses.mean.bearing)),
+        |variant| Ok(variant.losses(|losses| losses.loss_ratio_by_place.bearing)),
     ),
     loss_at(
         "efficiency_ring_fixed",
         "Efficiency where the wave generator drives the carrier.",
         sweep("/losses/efficiency/ring_fixed"),
-        |variant| Ok(variant.efficiency(Fixed::Ring, |efficiency| efficiency.driven)),
+        |variant| Ok(variant.losses(|losses| losses.efficiency.ring_fixed)),
     ),
     loss_at(
         "efficiency_carrier_fixed",
         "Efficiency where the wave generator drives the ring.",
         sweep("/losses/efficiency/carrier_fixed"),
-        |variant| Ok(variant.efficiency(Fixed::Carrier, |efficiency| efficiency.driven)),
+        |variant| Ok(variant.losses(|losses| losses.efficiency.carrier_fixed)),
     ),
     loss_at(
         "efficiency_wave_generator_fixed",
         "Efficiency where the ring drives the carrier.",
         sweep("/losses/efficiency/wave_generator_fixed"),
-        |variant| Ok(variant.efficiency(Fixed::WaveGenerator, |efficiency| efficiency.driven)),
+        |variant| Ok(variant.losses(|losses| losses.efficiency.wave_generator_fixed)),
     ),
     loss_at(
         "efficiency_ring_fixed_back_driven",
         "Efficiency where the carrier drives the wave generator; at or below 0 the drive locks itself.",
         sweep("/losses/efficiency/ring_fixed_back_driven"),
-        |variant| Ok(variant.efficiency(Fixed::Ring, |efficiency| efficiency.back_driven)),
+        |variant| Ok(variant.losses(|losses| losses.efficiency.ring_fixed_back_driven)),
     ),
     loss_at(
         "efficiency_carrier_fixed_back_driven",
         "Efficiency where the ring drives the wave generator.",
         sweep("/losses/efficiency/carrier_fixed_back_driven"),
-        |variant| Ok(variant.efficiency(Fixed::Carrier, |efficiency| efficiency.back_driven)),
+        |variant| Ok(variant.losses(|losses| losses.efficiency.carrier_fixed_back_driven)),
     ),
     loss_at(
         "efficiency_wave_generator_fixed_back_driven",
         "Efficiency where the carrier drives the ring.",
         sweep("/losses/efficiency/wave_generator_fixed_back_driven"),
-        |variant| Ok(variant.efficiency(Fixed::WaveGenerator, |efficiency| efficiency.back_driven)),
+        |variant| Ok(variant.losses(|losses| losses.efficiency.wave_generator_fixed_back_driven)),
     ),
     needing(
         Needs::Friction,
@@ -546,14 +538,7 @@ pub static QUANTITIES: [Quantity; 59] = [
             "",
             "The largest error of the efficiency that was measured at such losses.",
             sweep("/losses/efficiency_error"),
-            |variant| {
-                let mechanism = Mechanism::of(variant.drive);
-                Ok(variant.rubbing(|_, Rubbing { friction, losses, .. }| {
-                    friction
-                        .first_order_error(&mechanism, mechanism.loss_share(Fixed::Ring, losses.mean.total()))
-                        .efficiency
-                }))
-            },
+            |variant| Ok(variant.losses(|losses| losses.efficiency_error)),
         ),
     ),
     needing(
@@ -563,43 +548,32 @@ pub static QUANTITIES: [Quantity; 59] = [
             "N·m",
             "The torque that the wave generator really needs, ring fixed.",
             sweep("/losses/required_input_torque_nm"),
-            |variant| {
-                let mechanism = Mechanism::of(variant.drive);
-                Ok(variant.rubbing(|loaded, rubbing| {
-                    let efficiency = mechanism.efficiency(Fixed::Ring, rubbing.losses.mean.total());
-                    loaded.load.input_torque_nm(variant.drive) / efficiency.driven
-                }))
-            },
+            |variant| Ok(variant.losses(|losses| losses.required_input_torque_nm)),
         ),
     ),
     needing(
         Needs::FrictionAndSpeed,
         of_sweep("power_loss_w", "W", "Mean power lost, ring fixed.", sweep("/losses/power_loss_w"), |variant| {
-            let mechanism = Mechanism::of(variant.drive);
-            Ok(variant.rubbing(|loaded, rubbing| {
-                let turning_rad_per_s =
-                    rubbing.input_speed_rpm.map_or(f64::NAN, |rpm| mechanism.turning_rad_per_s(rpm));
-                rubbing.losses.mean.total() * loaded.load.input_torque_nm(variant.drive) * turning_rad_per_s
-            }))
+            Ok(variant.losses(|losses| losses.power_loss_w.unwrap_or(f64::NAN)))
         }),
     ),
     pressure_velocity(
         "pressure_velocity_wave_generator_mpa_m_per_s",
         "Largest contact stress times slip at the wave generator.",
         sweep("/losses/pressure_velocity_mpa_m_per_s/wave_generator/value"),
-        |variant| Ok(variant.pressure_velocity(Contact::WaveGenerator)),
+        |variant| Ok(variant.pressure_velocity(|peaks| &peaks.wave_generator)),
     ),
     pressure_velocity(
         "pressure_velocity_ring_mpa_m_per_s",
         "Largest contact stress times slip at the ring.",
         sweep("/losses/pressure_velocity_mpa_m_per_s/ring/value"),
-        |variant| Ok(variant.pressure_velocity(Contact::Ring)),
+        |variant| Ok(variant.pressure_velocity(|peaks| &peaks.ring)),
     ),
     pressure_velocity(
         "pressure_velocity_carrier_mpa_m_per_s",
         "Largest contact stress times slip at the carrier.",
         sweep("/losses/pressure_velocity_mpa_m_per_s/carrier/value"),
-        |variant| Ok(variant.pressure_velocity(Contact::Carrier)),
+        |variant| Ok(variant.pressure_velocity(|peaks| &peaks.carrier)),
     ),
 ];
 
@@ -609,16 +583,6 @@ const fn loss_at(name: &'static str, meaning: &'static str, source: Source, of: 
 
 const fn pressure_velocity(name: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
     needing(Needs::FrictionAndSpeed, of_sweep(name, "MPa m/s", meaning, source, of))
-}
-
-impl Variant<'_> {
-    fn pressure_velocity(&self, contact: Contact) -> f64 {
-        let mechanism = Mechanism::of(self.drive);
-        self.rubbing(|_, rubbing| {
-            let turning_rad_per_s = rubbing.input_speed_rpm.map_or(f64::NAN, |rpm| mechanism.turning_rad_per_s(rpm));
-            rubbing.losses.pressure_velocity_peaks(rubbing.sweep, turning_rad_per_s).get(contact).value
-        })
-    }
 }
 
 impl Quantity {

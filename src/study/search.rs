@@ -34,6 +34,9 @@ const TRUE_EVALUATIONS: u64 = 300;
 /// The tolerance of true peaks.
 const TRUE_PEAKS: f64 = 1e-4;
 
+/// A duty is swept over the same input angles at all its points, and not to a tolerance: its front over so many intervals at least.
+const SAMPLES_OF_DUTY: f64 = 200.0;
+
 /// Intervals of the period that are looked at before, where the base says nothing.
 const SAMPLES: f64 = 16.0;
 
@@ -158,10 +161,15 @@ impl Search {
             base.set(&samples, Tree::Number(SAMPLES));
         }
         let template = Template::new(&base, &list, "free")?;
+        let has_duty = base.at(&path("/load/duty").unwrap_or_default()).is_some();
         let at_true_peaks = (is_swept && !is_free && base.at(&tolerance).is_none()).then(|| {
             let mut template = template.clone();
-            template.remove(&samples);
-            template.set(&tolerance, &Tree::Number(TRUE_PEAKS));
+            if !has_duty {
+                template.remove(&samples);
+                template.set(&tolerance, &Tree::Number(TRUE_PEAKS));
+            } else if !matches!(base.at(&samples), Some(Tree::Number(given)) if *given >= SAMPLES_OF_DUTY) {
+                template.set(&samples, &Tree::Number(SAMPLES_OF_DUTY));
+            }
             template
         });
         let start = document.start.iter().enumerate();

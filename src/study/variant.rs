@@ -139,9 +139,10 @@ impl Template {
 
     /// Where in the study's document that stands which a design has at a place.
     pub(crate) fn blamed(&self, pointer: &str) -> String {
-        match self.variables.iter().any(|variable| variable.pointer == pointer) {
-            true => format!("/{}/{}", self.list, escaped(pointer)),
-            false => format!("/base{pointer}"),
+        if self.variables.iter().any(|variable| variable.pointer == pointer) {
+            format!("/{}/{}", self.list, escaped(pointer))
+        } else {
+            format!("/base{pointer}")
         }
     }
 

@@ -178,7 +178,13 @@ async fn a_sweep_says_how_far_its_model_is_off_elastic_bodies_and_whether_this_d
     assert_eq!((&gap["is_within"], &gap["beyond"]), (&json!(false), &json!(["gap"])));
     let pointed = told(&undercut()).await;
     assert_eq!(pointed["measured"]["case"]["has_pointed_tips"], true);
-    assert_eq!(pointed["beyond"], json!(["entry_under_load"]));
+    // Its carrier's fingers are a millimetre and a half high; the elastic bodies had none.
+    assert_eq!(pointed["beyond"], json!(["entry_under_load", "soft_backing"]));
+    assert_eq!(pointed["held"]["case"], "slender_fingers");
+    assert_eq!(
+        (&stiff["held"]["case"], &stiff["held"]["wind_up"]),
+        (&json!("housed"), &json!({ "low": -0.25, "high": -0.2 }))
+    );
     let fixed = told(&with(&shortest(), "/model", json!({ "stiffness": crate::designs::fixed(4e5, 4e5, 4e5) }))).await;
     assert!(fixed.get("measured").is_none() && fixed["beyond"] == json!(["law"]));
     let balls =

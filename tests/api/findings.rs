@@ -12,10 +12,12 @@ async fn findings_at(path: &str, document: &Value) -> Vec<Value> {
     let findings = found["findings"].as_array().unwrap().clone();
     let parts = json!({
         "wave_generator": { "bore_radius_mm": 20 },
-        "ring": { "outer_radius_mm": 80, "clearance_um": 0 },
-        "carrier": { "inner_radius_mm": 59, "outer_radius_mm": 65, "clearance_um": 0 }
+        "ring": { "outer_radius_mm": 80, "clearance_um": 0, "rim": "housed" },
+        "carrier": { "inner_radius_mm": 59, "outer_radius_mm": 65, "clearance_um": 0, "fingers": "held_at_both_ends" }
     });
     let spelled_out = with(&with(&spelled_out(), "/drive/ring/tip_radius_mm", json!(1.0)), "/parts", parts);
+    let series = json!({ "wave_generator": 0.0, "ring": 0.0, "carrier": 0.0 });
+    let spelled_out = with(&spelled_out, "/model/series_compliance_mm_per_n", series);
     for finding in &findings {
         for member in ["code", "severity", "detail", "advice"] {
             assert!(finding[member].as_str().is_some_and(|text| !text.is_empty()), "`{member}` of {finding}");
@@ -404,6 +406,42 @@ async fn projection_with_a_gap_is_a_warning_and_virtual_work_is_not() {
     }
 }
 
+/// Case 5.1 under the default model, its parts held so.
+fn held(parts: Value) -> Value {
+    with(&shortest(), "/parts", parts)
+}
+
+/// The estimate of one kind in a sweep's answer.
+async fn estimate(document: &Value, backing: &str) -> Value {
+    let found = Service::new().post("/v1/sweep", document).await.found();
+    let estimates = found["series_compliance_estimates"].as_array().unwrap();
+    estimates.iter().find(|estimate| estimate["backing"] == backing).unwrap().clone()
+}
+
+#[tokio::test]
+async fn fingers_held_at_one_end_and_a_free_rim_are_warnings_with_their_estimated_share() {
+    for (parts, backing, code, contact) in [
+        (json!({ "carrier": { "fingers": "held_at_one_end" } }), "finger_at_one_end", "slender_fingers", "carrier"),
+        (json!({ "ring": { "rim": "free" } }), "free_rim", "soft_rim", "ring"),
+    ] {
+        let document = held(parts);
+        let estimate = estimate(&document, backing).await;
+        assert_eq!((&estimate["contact"], &estimate["is_as_held"]), (&json!(contact), &json!(true)));
+        let found = finding(&document, code).await;
+        assert_numbers(&found, estimate["share"].as_f64().unwrap(), 0.2, "");
+        assert_eq!(found["severity"], "warning");
+        // Taken over into the design it is in the forces, and no longer left out.
+        let series = json!({ contact: estimate["compliance_mm_per_n"] });
+        let taken = with(&document, "/model", json!({ "series_compliance_mm_per_n": series }));
+        assert!(!codes_of(&findings(&taken).await).contains(&code.to_owned()));
+    }
+    // Held at both ends, those of case 5.2 are slender still; those of case 5.1 are not.
+    assert_eq!(finding(&undercut(), "slender_fingers").await["severity"], "info");
+    for parts in [json!({}), json!({ "carrier": { "fingers": "held_at_both_ends" }, "ring": { "rim": "housed" } })] {
+        assert!(findings(&held(parts)).await.is_empty());
+    }
+}
+
 #[tokio::test]
 async fn every_kind_of_finding_can_be_met_over_http() {
     let bore_without_effect = with(&shortest(), "/drive/ring/tip_radius_mm", json!(60.0));
@@ -435,6 +473,7 @@ async fn every_kind_of_finding_can_be_met_over_http() {
     {
         all.extend(findings(&document).await);
     }
+    all.extend(findings(&held(json!({ "ring": { "rim": "free" } }))).await);
     for document in [undercut(), thin_walls(), cleared(9000.0)] {
         all.extend(findings_of_parts(&document).await);
     }

@@ -1102,6 +1102,8 @@ const OTHER_REPORTS = {
     load: { input_torque_nm: 3 },
     model: { compatibility: 'projection' },
   },
+  slender_fingers: { drive: CASE_5_1, load: { input_torque_nm: 20 }, parts: { carrier: { fingers: 'held_at_one_end' } } },
+  soft_rim: { drive: CASE_5_1, load: { input_torque_nm: 20 }, parts: { ring: { rim: 'free' } } },
   projection_with_gap: { drive: CASE_5_1, load: { input_torque_nm: 20 }, model: { compatibility: 'projection', clearance: { ring_um: 10 } } },
   johnson_beyond_half_width: { drive: CASE_5_1, load: { input_torque_nm: 2000 } },
   friction_beyond_measured: { drive: CASE_5_1, load: { input_torque_nm: 20 }, friction: rubbing(0.2) },

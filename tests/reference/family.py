@@ -103,12 +103,10 @@ CASES = [
     ("balls, grooves and gaps", document(ECCENTRIC, 20, 21, 3.0, 5.0, "hertz", teeth=GROOVED, model=GAP), (0, 1)),
     ("balls, three lobes", document(THREE, 36, 33, 2.5, 20.0, "hertz", teeth=BALL), (2,)),
     ("balls, hollow path", document(HOLLOW, 12, 9, 6.0, 30.0, "hertz", teeth=BALL), (1,)),
-    ("flats", document(OVAL, 28, 26, 5.0, 20.0, "johnson", teeth=FLAT,
-                       parts={"carrier": {"inner_radius_mm": 58.5, "outer_radius_mm": 65.5}}), (0, 1)),
-    ("flats beyond the carrier, gaps", document(OVAL, 28, 26, 5.0, 20.0, "palmgren", teeth=FLAT, model=GAP,
-                                                parts={"carrier": {"inner_radius_mm": 60.0, "outer_radius_mm": 64.0}}), (0, 1)),
-    ("flats, eccentric", document(ECCENTRIC, 20, 21, 3.0, 5.0, "linear", teeth=FLAT | {"flat_length_mm": 2.0},
-                                  parts={"carrier": {"inner_radius_mm": 32.2, "outer_radius_mm": 35.4}}), (1,)),
+    ("flats", document(OVAL, 28, 26, 5.0, 20.0, "johnson", teeth=FLAT), (1,)),
+    ("flats beyond the carrier, gaps", document(OVAL, 28, 26, 5.0, 20.0, "palmgren", teeth=FLAT | {"flat_length_mm": 7.0},
+                                                model=GAP), (1,)),
+    ("flats, eccentric", document(ECCENTRIC, 20, 21, 3.0, 5.0, "linear", teeth=FLAT | {"flat_length_mm": 2.0}), (1,)),
     ("modified", document(OVAL, 28, 26, 5.0, 20.0, "johnson", modification=MODIFICATION), (0, 1)),
     ("modified, ring with more teeth", document(OVAL, 28, 30, 4.0, 20.0, "palmgren", modification=MODIFICATION), (2,)),
     ("modified eccentric", document(ECCENTRIC, 20, 21, 2.0, 5.0, "linear", modification=MODIFICATION, model=GAP), (1,)),
@@ -131,6 +129,10 @@ def drive_of(name, doc):
     drive = Drive(name, shape, *numbers, lobes, teeth["count"], installed, doc["drive"]["ring"]["teeth"], teeth["radius_mm"], ())
     drive.alike = drive.alike and "deviations" not in doc
     drive.end = drive.flank_end()
+    # The carrier whose radii are not given: a tenth of the annulus between cam and ring tips stays free on either side.
+    low, tip = drive.distance(mpf(0)) - drive.radius, drive.ring_contact(drive.end)[0]
+    high = mp.sqrt(dot(tip, tip))
+    drive.carrier = (low + (high - low) / 10, high - (high - low) / 10)
     return drive
 
 
@@ -274,9 +276,8 @@ def contact_laws(drive, doc, tooth):
         }[law]
         stress = (lambda f, c=curvature: mp.sqrt(f * c / (mp.pi * width * EACH)))
         if index == 2 and teeth["shape"] == "flat_sided":
-            carrier, flat = doc["parts"]["carrier"], mpf(teeth["flat_length_mm"])
-            low = max(tooth.distance - flat / 2, mpf(carrier["inner_radius_mm"]))
-            high = min(tooth.distance + flat / 2, mpf(carrier["outer_radius_mm"]))
+            flat = mpf(teeth["flat_length_mm"])
+            low, high = max(tooth.distance - flat / 2, drive.carrier[0]), min(tooth.distance + flat / 2, drive.carrier[1])
             l = high - low
             assert l > 0
             diagonal = mp.sqrt(l * l + width * width)

@@ -284,7 +284,7 @@ fn the_drives_that_were_calculated_lie_within_the_range_and_others_do_not() {
         let beyond = |parameters: &DriveParameters, load: &LoadParameters| {
             let drive = Drive::new(parameters).unwrap();
             let sweep = swept(parameters, load, INTERVALS);
-            model_error::of(&drive, &LoadCase::new(load).unwrap(), &Deviations::default(), &sweep).unwrap().beyond
+            model_error::of(&drive, &LoadCase::new(load).unwrap(), &Deviations::default(), &sweep, None).unwrap().beyond
         };
         // Of a drive with pointed tips the angles of entry are left out.
         let expected = if case.drive == "5.2" { vec![Beyond::EntryUnderLoad] } else { Vec::new() };

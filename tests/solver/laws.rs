@@ -8,12 +8,12 @@ use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
 use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::sweep::{self, Points};
-use toothwave_solver::tooth::ToothContact;
 use toothwave_solver::tooth::flat::FlatContact;
 use toothwave_solver::tooth::point::EllipticContact;
+use toothwave_solver::tooth::{Pressure, ToothContact};
 use toothwave_solver::{
     Contact, ContactLaw, Drive, DriveParameters, Finding, LoadCase, LoadParameters, Material, Materials, Never,
-    Parameter, PerContact, Position, SolveError, Violation, findings,
+    Parameter, PerContact, Position, SolveError, ToothShape, Violation, findings,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, drive, everywhere, load, swept};
@@ -587,6 +587,61 @@ fn flat_sided_teeth_share_the_load_with_any_law_of_cylinders() {
     let loaded = LoadedDrive::with_teeth(&drive, &case, &shape(60.0)).unwrap();
     let left = loaded.tooth(Position::from_lobe(0.1, 2));
     assert!(matches!(left, Err(SolveError::FlatOffCarrier { .. })), "{left:?}");
+}
+
+/// The flat's linear part was left out where its weight is negative, and forces leave the model by as much.
+#[test]
+fn flat_sided_teeth_are_projected_only_where_no_part_of_their_approach_is_negative() {
+    let flat = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 4.0 };
+    let forward = DriveParameters { tooth: flat, ..PAPER_5_1 };
+    let backward = DriveParameters { ring_teeth: 30, tooth_radius_mm: 4.0, ..forward };
+    let projected = |law| LoadParameters { law, ..load(20.0, Projection) };
+    let case = LoadCase::new(&projected(ContactLaw::Palmgren)).unwrap();
+    let refused = sweep::sweep(&drive(&backward), &case, Points::samples(10).unwrap(), &Never);
+    assert!(matches!(refused, Err(SolveError::ComplianceNotPositive { .. })), "{refused:?}");
+    for (p, law) in [(forward, ContactLaw::Palmgren), (forward, ContactLaw::Linear), (backward, ContactLaw::Linear)] {
+        let drive = drive(&p);
+        let case = LoadCase::new(&projected(law)).unwrap();
+        let loaded = LoadedDrive::new(&drive, &case).unwrap();
+        let mesh = Mesh::new(&drive);
+        let teeth: Vec<_> =
+            mesh.placed_at(1, Samples::new(3).unwrap()).map(|placed| loaded.tooth(placed.position).unwrap()).collect();
+        let wind_up = loaded.wind_up(&teeth).unwrap();
+        let (modulus_mpa, s) = (case.parameters().materials.contact_modulus_mpa(Contact::Carrier), drive.sense());
+        for tooth in &teeth {
+            let force_n = loaded.forces_n(tooth, &wind_up).unwrap();
+            let approach_mm = |force_n: f64| match law {
+                ContactLaw::Palmgren => 3.84e-5 * force_n.powf(0.9) / 15.0_f64.powf(0.8),
+                _ => force_n / (0.5 * PI * 15.0 * modulus_mpa),
+            };
+            let Pressure::Flat(borne) = &tooth.pressure.carrier else { panic!("no flat") };
+            let (gamma, beta) = (tooth.center.tan_pressure_angle.atan(), tooth.flank.tan_pressure_angle.atan());
+            let way_mm = approach_mm(force_n.wave_generator)
+                + (gamma + s * beta).cos() * approach_mm(force_n.ring)
+                + s * gamma.sin() * borne.compliance_mm_per_n(modulus_mpa) * force_n.carrier;
+            let off = way_mm / (wind_up.rotation_rad() * tooth.center.cam_contact.lever_arm_mm) - 1.0;
+            assert!(off.abs() < 1e-12, "{law:?}: {off:e}");
+        }
+    }
+}
+
+#[test]
+fn palmgrens_law_is_not_questioned_at_a_flat_which_does_not_take_it() {
+    let bronze = Material { youngs_modulus_gpa: 110.0, poissons_ratio: 0.34 };
+    let flat = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 4.0 };
+    let mut parameters = LoadParameters { law: ContactLaw::Palmgren, ..load(20.0, VirtualWork) };
+    parameters.materials.carrier = bronze;
+    let found = |tooth| {
+        let p = DriveParameters { tooth, ..PAPER_5_1 };
+        let case = LoadCase::new(&parameters).unwrap();
+        findings::of_contacts(&drive(&p), &case, &swept(&p, &parameters, 10).peaks, false)
+    };
+    let of_cylinders = found(ToothShape::Cylinder { width_mm: 15.0 });
+    assert!(
+        matches!(of_cylinders[..], [Finding::PalmgrenBeyondSteel { contact: Contact::Carrier, .. }]),
+        "{of_cylinders:?}"
+    );
+    assert_eq!(found(flat), []);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! What is true of drives: against closed forms, independent constructions and a 60-digit calculation.
 #![allow(clippy::float_cmp, clippy::unwrap_used, reason = "tests compare exactly where values are exact")]
 
+mod backing;
 mod contacts;
 mod deviations;
 mod drives;

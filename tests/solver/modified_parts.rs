@@ -88,7 +88,7 @@ fn center(p: &DriveParameters, normal_rad: f64) -> Vector2<f64> {
             let u = lobes as f64;
             (mean_radius_mm + amplitude_mm * (u * normal_rad).cos(), -amplitude_mm * u * (u * normal_rad).sin())
         }
-        WaveGenerator::HarmonicPath { .. } => panic!("not known by its support"),
+        other => panic!("{other:?} is not known by its support"),
     };
     let n = unit(normal_rad);
     (support + p.tooth_radius_mm) * n + slope * Vector2::new(-n.y, n.x)

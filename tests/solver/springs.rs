@@ -1,6 +1,7 @@
 //! The sharing of a load over springs, and light loads on wide gaps.
 
 use std::cell::Cell;
+use std::f64::consts::PI;
 
 use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
@@ -9,7 +10,8 @@ use toothwave_solver::load_sharing::LoadedDrive;
 use toothwave_solver::springs::{Spring, Springs};
 use toothwave_solver::sweep::{self, Points};
 use toothwave_solver::{
-    Contact, ContactLaw, DriveParameters, LoadCase, Never, PerContact, Position, SolveError, Torque, Violation,
+    Contact, ContactLaw, Deviations, DriveParameters, LoadCase, LoadParameters, Modification, Never, PerContact,
+    Position, SolveError, Torque, Violation,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, everywhere, load};
@@ -31,8 +33,7 @@ fn under_any_torque_and_any_gap_the_forces_balance_it_to_1e_12() {
                     for contact in [Contact::WaveGenerator, Contact::Ring, Contact::Carrier] {
                         let clearance_um = PerContact::of(|at| if at == contact { gap_um } else { 0.0 });
                         let torque = Torque::Input(10.0_f64.powi(exponent));
-                        let parameters =
-                            toothwave_solver::LoadParameters { torque, law, clearance_um, ..load(1.0, VirtualWork) };
+                        let parameters = LoadParameters { torque, law, clearance_um, ..load(1.0, VirtualWork) };
                         let case = LoadCase::new(&parameters).unwrap();
                         let sweep = sweep::sweep(&drive, &case, Points::samples(2).unwrap(), &Never).unwrap();
                         let residual = sweep.torque_balance_residual;
@@ -45,6 +46,44 @@ fn under_any_torque_and_any_gap_the_forces_balance_it_to_1e_12() {
         }
     }
     assert!(worst.0 <= 1e-12, "{worst:?}");
+}
+
+/// A rounding of the closing angles once told the teeth apart: under 1e-12 N·m forces came out five times too large, and a period of equally turned slots
+/// did not close.
+#[test]
+fn what_is_turned_alike_is_lost_motion_alone_however_light_the_load() {
+    let drive = drive(&DriveParameters { teeth: 14, installed: 14, ring_teeth: 12, ..PAPER_5_1 });
+    let arcsec = 60.0;
+    let rad = arcsec * PI / 648_000.0;
+    let modified = |modification| (modification, Deviations::default());
+    let deviating = |deviations| (Modification::default(), deviations);
+    let turned = [
+        (modified(Modification { ring_rotation_arcsec: arcsec, ..Modification::NONE }), 6.0 * rad),
+        (modified(Modification { carrier_rotation_arcsec: arcsec, ..Modification::NONE }), 7.0 * rad),
+        (modified(Modification { ring_rotation_arcsec: 1e5, ..Modification::NONE }), 6.0 * 1e5 / arcsec * rad),
+        (deviating(Deviations { slot_angle_arcsec: vec![arcsec; 14], ..Deviations::default() }), 7.0 * rad),
+        (deviating(Deviations { ring_space_angle_arcsec: vec![arcsec; 12], ..Deviations::default() }), 6.0 * rad),
+    ];
+    let johnson = ContactLaw::Johnson { depth_mm: PerContact::default() };
+    for law in laws().into_iter().chain([johnson]) {
+        for torque_nm in [1e-12, 1e-9, 1e-6, 1e-3, 1.0] {
+            let swept = |modification, deviations: &Deviations| {
+                let parameters = LoadParameters { law, modification, ..load(torque_nm, VirtualWork) };
+                let (case, points) = (LoadCase::new(&parameters).unwrap(), Points::samples(7).unwrap());
+                sweep::sweep_with_deviations(&drive, &case, deviations, points, &Never).unwrap()
+            };
+            let nominal = swept(Modification::NONE, &Deviations::default());
+            for ((modification, deviations), lost_rad) in &turned {
+                let found = swept(*modification, deviations);
+                for (contact, peaks) in nominal.peaks.iter() {
+                    let off = found.peaks.get(contact).force_n.value / peaks.force_n.value - 1.0;
+                    assert!(off.abs() < 1e-12, "{law:?}, {torque_nm} N·m, {modification:?}, {deviations:?}: {off:e}");
+                }
+                let expected_deg = nominal.input_angles.wind_up_deg[3] + lost_rad.to_degrees();
+                assert!((found.input_angles.wind_up_deg[3] / expected_deg - 1.0).abs() < 1e-14);
+            }
+        }
+    }
 }
 
 #[test]

@@ -309,6 +309,24 @@ fn a_newcomer_is_refused_at_what_was_given() {
     assert_eq!(faulty(&complete), ("/free".into(), "missing_field".into()), "everything stands in the base");
 }
 
+/// A sweep to a tolerance, which a duty refuses, was asked of whatever was to be in the front: it was empty.
+#[test]
+fn a_search_under_a_duty_has_a_front_at_its_hardest_point() {
+    let point =
+        |torque_nm: f64| json!({ "input_torque_nm": torque_nm, "input_speed_rpm": 1000.0, "share_of_time": 0.5 });
+    let under = |load: Value| {
+        let study = with(&search(), "/objectives/0", json!({ "quantity": "peak_stress_ring_mpa", "goal": "min" }));
+        answer(&with(&with(&study, "/base/load", load), "/evaluations", json!(400)))
+    };
+    let of_duty = under(json!({ "duty": [point(10.0), point(20.0)] }));
+    let of_hardest = under(json!({ "input_torque_nm": 20.0 }));
+    let front = of_duty["front"].as_array().unwrap();
+    assert!(front.len() > 5, "{of_duty}");
+    assert_eq!(front[0]["design"]["sweep"]["samples"], 200);
+    let best = |found: &Value| number(&found["front"][0]["quantities"]["peak_stress_ring_mpa"]);
+    assert!((best(&of_duty) / best(&of_hardest) - 1.0).abs() < 2e-3, "{} and {}", best(&of_duty), best(&of_hardest));
+}
+
 /// JSON pointers lead into arrays too (RFC 6901); the whole of the array was replaced, and the base blamed.
 #[test]
 fn an_entry_of_a_list_is_a_field() {

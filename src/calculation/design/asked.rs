@@ -1,10 +1,11 @@
 //! What is asked of the answers: where a sweep looks, how fine a profile is, what is drawn.
 
 use serde::{Deserialize, Serialize};
+use toothwave_solver::backing::{Fingers, Rim};
 use utoipa::ToSchema;
 
 use super::number::{Whole, given};
-use crate::key::encoded;
+use crate::key::{Encode, Encoder, encoded};
 
 /// The input angles of a sweep.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -122,6 +123,30 @@ pub struct RingPartDocument {
     #[serde(default)]
     #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
     pub clearance_um: f64,
+    /// What stands around its rim; a sweep says what gives way so, drawings do not read it. Left out, findings take it as housed.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub rim: Option<RimDocument>,
+}
+
+/// What stands around the ring's rim.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RimDocument {
+    /// A rigid housing.
+    Housed,
+    /// Nothing: it is kept from turning alone.
+    Free,
+}
+
+/// What joins the carrier's fingers beside the teeth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FingersDocument {
+    /// A disc at either end.
+    HeldAtBothEnds,
+    /// A disc at one end.
+    HeldAtOneEnd,
 }
 
 /// The carrier as it is made.
@@ -140,6 +165,11 @@ pub struct CarrierPartDocument {
     #[serde(default)]
     #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
     pub clearance_um: f64,
+    /// What joins the fingers between its slots beside the teeth; a sweep says what gives way so, drawings do not read it. Left out, findings take
+    /// them as held at both ends.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub fingers: Option<FingersDocument>,
 }
 
 /// How the parts stand in a drawing of all of them.
@@ -158,9 +188,43 @@ encoded! {
     struct PartsDocument { wave_generator, teeth, ring, carrier }
     struct WaveGeneratorPartDocument { bore_radius_mm, clearance_um }
     struct ToothPartDocument { clearance_um }
-    struct RingPartDocument { outer_radius_mm, clearance_um }
-    struct CarrierPartDocument { inner_radius_mm, outer_radius_mm, clearance_um }
     struct AssemblyDocument { input_angle_deg }
 }
 
 encoded!(enum ExtentDocument);
+encoded!(enum RimDocument);
+encoded!(enum FingersDocument);
+
+/// Without what holds the part, which drawings do not read: whoever does names it beside.
+impl Encode for RingPartDocument {
+    fn encode(&self, encoder: &mut Encoder) {
+        let Self { outer_radius_mm, clearance_um, rim: _ } = self;
+        (outer_radius_mm, clearance_um).encode(encoder);
+    }
+}
+
+/// Without what holds the part, as above.
+impl Encode for CarrierPartDocument {
+    fn encode(&self, encoder: &mut Encoder) {
+        let Self { inner_radius_mm, outer_radius_mm, clearance_um, fingers: _ } = self;
+        (inner_radius_mm, outer_radius_mm, clearance_um).encode(encoder);
+    }
+}
+
+impl From<RimDocument> for Rim {
+    fn from(rim: RimDocument) -> Self {
+        match rim {
+            RimDocument::Housed => Self::Housed,
+            RimDocument::Free => Self::Free,
+        }
+    }
+}
+
+impl From<FingersDocument> for Fingers {
+    fn from(fingers: FingersDocument) -> Self {
+        match fingers {
+            FingersDocument::HeldAtBothEnds => Self::HeldAtBothEnds,
+            FingersDocument::HeldAtOneEnd => Self::HeldAtOneEnd,
+        }
+    }
+}

@@ -2,17 +2,19 @@
 
 use serde::Serialize;
 use toothwave_solver::sweep::{self as solver, ContactPeaks, Extremes, InputAngles, States, TorqueCapacity};
-use toothwave_solver::{Contact, Drive, PerContact};
+use toothwave_solver::{Drive, PerContact};
 use utoipa::ToSchema;
 
 use crate::coincidence_degree::TeethInMeshAnswer;
 use crate::findings::FindingAnswer;
+use crate::sweep::backing::EstimateAnswer;
+use crate::sweep::contact::ContactName;
 use crate::sweep::duty::DutyAnswer;
 use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
 use crate::sweep::model_error::ModelErrorAnswer;
 use crate::sweep::peak::PeakAnswer;
 
-/// Forces and contact stresses of one meshing zone over one period; the other zone is its point reflection.
+/// Forces and contact stresses over one period: of one meshing zone where the zones are alike, elsewhere of all of them.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct SweepAnswer {
     /// Version of the solver.
@@ -35,7 +37,7 @@ pub struct SweepAnswer {
     pub enters_under_load: bool,
     /// The largest force and stress of each contact, over the states.
     pub peaks: PeaksAnswer,
-    /// How many teeth of a zone mesh, over the input angle.
+    /// How many teeth mesh, over the input angle: of a zone where the zones are alike, elsewhere of all of them together.
     pub teeth_in_mesh_per_zone: TeethInMeshAnswer,
     /// How many of them carry load, over the input angles of the sweep: with clearance fewer.
     pub loaded_teeth_per_zone: TeethInMeshAnswer,
@@ -63,6 +65,9 @@ pub struct SweepAnswer {
     pub radial_force_n: Option<RadialForceAnswer>,
     /// How far the model is off elastic bodies.
     pub model_error: ModelErrorAnswer,
+    /// What gives way behind the contacts, estimated from the document's `parts`, each a number for `model.series_compliance_mm_per_n`; nothing of it is in the
+    /// forces. Of parts that cannot be made, and of balls, there are none.
+    pub series_compliance_estimates: Vec<EstimateAnswer>,
     /// How well the results fulfil what must hold.
     pub checks: ChecksAnswer,
     /// What a designer should be told.
@@ -168,7 +173,7 @@ pub struct WindUpAnswer {
     pub unloaded_wind_up_deg: Option<Vec<f64>>,
     /// Output torque over output rotation at the load, wave generator held.
     pub torsional_stiffness_nm_per_rad: Vec<f64>,
-    /// Teeth of one zone that carry load.
+    /// Teeth that carry load: of one zone where the zones are alike, elsewhere of all that `states` lists.
     pub loaded_teeth: Vec<u32>,
 }
 
@@ -183,28 +188,6 @@ pub struct TorqueCapacityAnswer {
     pub limited_by: ContactName,
     /// The input angle where it does.
     pub input_angle_deg: f64,
-}
-
-/// A contact of a tooth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ContactName {
-    /// With the wave generator.
-    WaveGenerator,
-    /// With the ring.
-    Ring,
-    /// With the carrier.
-    Carrier,
-}
-
-impl From<Contact> for ContactName {
-    fn from(contact: Contact) -> Self {
-        match contact {
-            Contact::WaveGenerator => Self::WaveGenerator,
-            Contact::Ring => Self::Ring,
-            Contact::Carrier => Self::Carrier,
-        }
-    }
 }
 
 impl WindUpAnswer {

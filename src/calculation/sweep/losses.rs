@@ -63,6 +63,8 @@ pub struct LossTotalsAnswer {
     #[schema(nullable = false)]
     pub pressure_velocity_mpa_m_per_s: Option<PressureVelocityAnswer>,
     /// The largest depth that each part loses in an hour where a tooth touches it, ring fixed, given `friction.wear_rate_mm3_per_nm` and a speed.
+    /// Given `deviations` it is what a place would lose if every tooth that passes it bore as much as the one that bears most: no place loses more. A
+    /// race, which wears all round, has its true mean.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub wear_mm_per_hour: Option<WearAnswer>,
@@ -362,7 +364,7 @@ impl Costs<'_> {
         })
     }
 
-    fn totals(&self, hardest: usize, states: &States) -> LossTotalsAnswer {
+    pub(super) fn totals(&self, hardest: usize, states: &States) -> LossTotalsAnswer {
         let Self { mechanism, friction, points, .. } = self;
         let loss_ratio = self.total_loss_ratio();
         let FirstOrderError { efficiency: efficiency_error, is_within_measured_range, .. } =

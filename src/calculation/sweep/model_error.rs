@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 use toothwave_solver::LoadCase;
-use toothwave_solver::model_error::{self as solver, Beyond, ErrorRange, Measured, ModelError};
+use toothwave_solver::model_error::{self as solver, Beyond, ErrorRange, Held, HeldCase, Measured, ModelError};
 use utoipa::ToSchema;
 
 use crate::accuracy::LawName;
@@ -19,6 +19,10 @@ pub struct ModelErrorAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub measured: Option<MeasuredAnswer>,
+    /// What comes on top of the wind-up's error for what gives way behind the contacts, of cylinders under `virtual_work` with `johnson`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub held: Option<HeldAnswer>,
     /// The range of the drives that were calculated: cylinders of steel in a ring with fewer teeth.
     pub range: RangeAnswer,
     /// Whether this design lies within.
@@ -38,6 +42,44 @@ pub struct MeasuredAnswer {
     pub stress: ErrorRangeAnswer,
     /// Of the wind-up, bodies being held at the law's depth; what gives way behind them, rim or fingers, comes on top.
     pub wind_up: ErrorRangeAnswer,
+}
+
+/// How far the wind-up is off for parts that are not held at the law's depth, unless they are given as series compliance.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct HeldAnswer {
+    /// How they are held, after `parts`.
+    pub case: HeldWord,
+    /// What earlier calculations of elastic bodies held so found; left out where there were none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub wind_up: Option<ErrorRangeAnswer>,
+    /// What the estimates of this design's own parts come to, of that part of the wind-up which the load adds to what gaps leave.
+    pub estimated_wind_up: f64,
+}
+
+/// How parts are held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum HeldWord {
+    /// A rim in a housing, fingers at both ends; also where `parts` says nothing.
+    Housed,
+    /// Fingers that are slender though held at both ends.
+    SlenderFingers,
+    /// Fingers held at one end.
+    FingersAtOneEnd,
+    /// A rim with nothing around it.
+    FreeRim,
+}
+
+impl From<HeldCase> for HeldWord {
+    fn from(case: HeldCase) -> Self {
+        match case {
+            HeldCase::Housed => Self::Housed,
+            HeldCase::SlenderFingers => Self::SlenderFingers,
+            HeldCase::FingersAtOneEnd => Self::FingersAtOneEnd,
+            HeldCase::FreeRim => Self::FreeRim,
+        }
+    }
 }
 
 /// What makes drives err alike.
@@ -99,6 +141,8 @@ pub enum BeyondWord {
     Modification,
     /// Something that gives way behind a contact.
     SeriesCompliance,
+    /// A part behind a contact that gives way by more than can be left out.
+    SoftBacking,
     /// A wider contact.
     HalfWidth,
 }
@@ -116,6 +160,7 @@ impl From<Beyond> for BeyondWord {
             Beyond::Gap => Self::Gap,
             Beyond::Modification => Self::Modification,
             Beyond::SeriesCompliance => Self::SeriesCompliance,
+            Beyond::SoftBacking => Self::SoftBacking,
             Beyond::HalfWidth => Self::HalfWidth,
         }
     }
@@ -142,8 +187,14 @@ impl ModelErrorAnswer {
             wind_up: wind_up.into(),
         });
         let beyond: Vec<_> = error.beyond.into_iter().map(BeyondWord::from).collect();
+        let held = error.held.map(|Held { case, wind_up, estimated_wind_up }| HeldAnswer {
+            case: case.into(),
+            wind_up: wind_up.map(Into::into),
+            estimated_wind_up,
+        });
         Self {
             measured,
+            held,
             range: RangeAnswer {
                 lobes: solver::LOBES_TO,
                 pressure_angle_deg: solver::PRESSURE_ANGLE_TO_DEG,
@@ -170,6 +221,11 @@ impl ModelErrorAnswer {
                 writeln!(writer, "wind-up of bodies that are held     {}", percent(wind_up))?;
             }
             None => writeln!(writer, "\nmodel against elastic bodies        not measured")?,
+        }
+        if let Some(HeldAnswer { case, wind_up, estimated_wind_up }) = &self.held {
+            let earlier = wind_up.as_ref().map_or_else(String::new, |range| format!("{}, ", percent(range)));
+            let case = word(case).replace('_', " ");
+            writeln!(writer, "wind-up besides, {case:<18} {earlier}estimated {:+.0} %", 100.0 * estimated_wind_up)?;
         }
         if self.is_within {
             return writeln!(writer, "this design                         within the range of those measured");

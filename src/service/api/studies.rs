@@ -111,7 +111,7 @@ pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRe
     params(("id" = String, Path, description = "As the study's `id`.")),
     responses(
         (status = 200, description = "The result; `is_complete` says whether it is whole. As CSV a line each of what the study is about; as Apache Parquet the same columns.",
-            content((StudyAnswer = "application/json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.parquet"))),
+            content((StudyAnswer = "application/json"), (String = "text/csv"), (String = "application/vnd.apache.parquet"))),
         (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
         (status = 406, description = "No representation that the client accepts.", body = Problem, content_type = "application/problem+json"),
         (status = 500, description = "A fault of the service itself.", body = Problem, content_type = "application/problem+json"),

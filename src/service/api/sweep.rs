@@ -20,7 +20,7 @@ use crate::app::App;
     params(("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
     responses(
         (status = 200, description = "The sweep. As CSV one line a state, with the names of the columns of `states`; as an Apache Arrow stream the same columns; as text a summary; as SVG its plots.",
-            content((SweepAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.arrow.stream"), (String = "image/svg+xml")), headers(
+            content((SweepAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"), (String = "application/vnd.apache.arrow.stream"), (String = "image/svg+xml")), headers(
                 ("ETag" = String, description = "Entity tag of this representation."),
                 ("Cache-Status" = String, description = "RFC 9211: `hit`, `fwd=miss`, `collapsed`."),
                 ("Server-Timing" = String, description = "`solve;dur=` and the milliseconds of the solve.")

@@ -14,6 +14,8 @@ const WIDE = 0.75;
 const number = (pointer, label, symbol, unit, more) => ({ kind: 'number', pointer, label, symbol, unit, ...more });
 const whole = (pointer, label, symbol, more) => ({ kind: 'number', whole: true, pointer, label, symbol, ...more });
 const choice = (pointer, label, options, more) => ({ kind: 'choice', pointer, label, options, ...more });
+/** A choice that need not be made: left out, the document says nothing. */
+const unlessSaid = (pointer, label, options) => choice(pointer, label, [{ value: '', label: 'not said' }, ...options]);
 const flag = (pointer, label) => ({ kind: 'flag', pointer, label });
 const variant = (pointer, tag, label, options, more) => ({ kind: 'variant', pointer, tag, label, options, ...more });
 
@@ -402,7 +404,7 @@ export const GROUPS = [
   {
     title: 'Parts as they are made',
     pointer: '/parts',
-    hint: 'Only drawings read these: forces are computed with the gaps of the model. The gap at a contact is the sum of its two parts’ clearances.',
+    hint: 'Drawings read these, and what is estimated to give way behind the contacts; forces are computed with the gaps and compliances of the model. The gap at a contact is the sum of its two parts’ clearances.',
     summary: (design) => {
       const given = Object.values(at(design, '/parts') ?? {}).flatMap((part) => Object.values(part ?? {})).filter((value) => value !== null);
       return given.length === 0 ? 'defaults' : `${given.length} given`;
@@ -418,7 +420,14 @@ export const GROUPS = [
       { title: 'Teeth', fields: [setBack('teeth', 'Teeth', 'Clearance in radius')] },
       {
         title: 'Ring',
-        fields: [freeRadius('ring', 'Ring', 'outer_radius', 'Outer radius', '1.2 × root'), setBack('ring', 'Ring', 'Clearance outward')],
+        fields: [
+          freeRadius('ring', 'Ring', 'outer_radius', 'Outer radius', '1.2 × root'),
+          setBack('ring', 'Ring', 'Clearance outward'),
+          unlessSaid('/parts/ring/rim', 'Around its rim', [
+            { value: 'housed', label: 'a rigid housing' },
+            { value: 'free', label: 'nothing' },
+          ]),
+        ],
       },
       {
         title: 'Carrier',
@@ -427,6 +436,10 @@ export const GROUPS = [
           freeRadius('carrier', 'Carrier', 'inner_radius', 'Inner radius', 'tenth free'),
           freeRadius('carrier', 'Carrier', 'outer_radius', 'Outer radius', 'tenth free'),
           setBack('carrier', 'Carrier', 'Clearance per wall'),
+          unlessSaid('/parts/carrier/fingers', 'Its fingers are held', [
+            { value: 'held_at_both_ends', label: 'at both ends' },
+            { value: 'held_at_one_end', label: 'at one end' },
+          ]),
         ],
       },
     ],

@@ -137,6 +137,18 @@ const KINDS = {
     basis: ['measured', 'Drives with gaps were calculated as elastic bodies.'],
     why: 'With 10 µm at the ring the largest force came out 4 to 109 % too large.',
   },
+  slender_fingers: {
+    title: 'Slender fingers of the carrier',
+    tests: 'What a finger of the carrier gives way, as an estimated share of what a tooth gives way at its three contacts, against a fifth.',
+    basis: ['measured', 'The limit is what elastic bodies in a housing were found to add altogether.'],
+    why: 'The largest force comes out too large, the wind-up too small.',
+  },
+  soft_rim: {
+    title: 'Soft rim of the ring',
+    tests: 'What the ring’s rim gives way, as an estimated share of what a tooth gives way at its three contacts, against a fifth.',
+    basis: ['measured', 'The limit is what elastic bodies in a housing were found to add altogether.'],
+    why: 'The wind-up comes out too small; a ring with nothing around it follows the wave generator.',
+  },
   palmgren_beyond_steel: {
     title: 'Palmgren’s law is for steel',
     tests: 'The contact’s elastic modulus against that of steel on steel.',

@@ -126,7 +126,7 @@ export class Form {
   }
 
   #buildField(field) {
-    if (field.kind === 'choice') return this.#buildChoice(field, (value) => this.#edit(field.pointer, value, field.adjust));
+    if (field.kind === 'choice') return this.#buildChoice(field, (value) => this.#edit(field.pointer, value || undefined, field.adjust));
     if (field.kind === 'variant') return this.#buildVariant(field);
     if (field.kind === 'oneOf') return this.#buildOneOf(field);
     if (field.kind === 'flag') return this.#buildFlag(field);

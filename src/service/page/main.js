@@ -3,7 +3,7 @@
 
 import * as access from './access.js';
 import { Accuracy } from './accuracy.js';
-import { isSame } from './design.js';
+import { changed, isSame } from './design.js';
 import { html, oncePerFrame, setChildren, setText } from './dom.js';
 import { Drawings } from './drawings.js';
 import { Explore } from './explore.js';
@@ -92,7 +92,12 @@ const plots = new Plots(
   },
 );
 
-const results = new Results({ keyFigures: byId('key-figures'), table: byId('table') }, showPeak, (pointer) => form.goTo(pointer));
+const results = new Results(
+  { keyFigures: byId('key-figures'), table: byId('table') },
+  showPeak,
+  (pointer) => form.goTo(pointer),
+  ({ pointer, value }) => setDesign(changed(state.design, pointer, value)),
+);
 
 const accuracy = new Accuracy(
   { panel: byId('accuracy'), measure: byId('measure'), wanted: byId('accuracy-wanted'), state: byId('accuracy-state'), list: byId('accuracy-list') },

@@ -36,6 +36,7 @@ const BEYOND = {
   gap: 'larger gaps',
   modification: 'its modification',
   series_compliance: 'what gives way behind its contacts',
+  soft_backing: 'soft parts behind its contacts',
   half_width: 'wider contacts',
 };
 
@@ -47,6 +48,21 @@ function believed(what, { sweep }, saysWhatIsUnlike) {
   if (!measured) return 'The model’s own error: not measured under this law.';
   const outside = saysWhatIsUnlike && beyond.length > 0 ? `; not measured with ${beyond.map((reason) => BEYOND[reason] ?? reason.replaceAll('_', ' ')).join(', ')}` : '';
   return `The model’s own error: ${what(measured)}${outside}.`;
+}
+
+const HELD = {
+  housed: 'a housed rim and fingers held at both ends',
+  slender_fingers: 'slender fingers',
+  fingers_at_one_end: 'fingers held at one end',
+  free_rim: 'a rim with nothing around it',
+};
+
+/** What comes on top for how the parts are held. */
+function heldAs({ sweep }) {
+  const { held } = sweep.model_error;
+  if (!held) return '';
+  const earlier = held.wind_up ? `, ${span(held.wind_up)} in earlier calculations of elastic bodies` : '';
+  return ` Besides, for ${HELD[held.case] ?? held.case}: by the estimates ${percent(held.estimated_wind_up)} %${earlier}.`;
 }
 
 /** The contact that carries the largest of a quantity. */
@@ -102,6 +118,27 @@ const lossRows = [
   lossRow('Mean load on the bearing', 'P', 'N', ({ bearing }) => bearing?.mean_load_n),
   lossRow('Life of the bearing, h', 'L_10', '', ({ bearing }) => bearing?.life_h, { significant: 3 }),
 ];
+
+const BACKINGS = {
+  cam_on_bore: 'Cam on its bore',
+  housed_rim: 'Rim in a housing',
+  free_rim: 'Rim with nothing around it',
+  finger_at_both_ends: 'Finger held at both ends',
+  finger_at_one_end: 'Finger held at one end',
+};
+
+/** What parts behind the contacts are estimated to give way, to be taken over as series compliance. */
+const backingRows = Object.entries(BACKINGS).map(([key, label]) => {
+  const of = ({ sweep }) => sweep?.series_compliance_estimates?.find(({ backing }) => backing === key);
+  return row(label, '', 'mm/N', (answers) => of(answers)?.compliance_mm_per_n, {
+    significant: 3,
+    taken: (answers) => {
+      const { contact, compliance_mm_per_n: compliance, share } = of(answers);
+      const adds = share === undefined ? '' : `, adds ${number(100 * share, 2)} %`;
+      return { pointer: `/model/series_compliance_mm_per_n/${contact}`, value: Number(compliance.toPrecision(3)), text: `take over${adds}` };
+    },
+  });
+});
 
 /** Always in sight, however far one scrolls. */
 const KEY_ROWS = [
@@ -182,7 +219,7 @@ export const GROUPS = [
   {
     title: 'Wind-up and stiffness',
     offer: '/sweep/wind_up',
-    told: (answers) => (answers.sweep?.wind_up ? believed(({ wind_up: windUp }) => `wind-up ${span(windUp)} where bodies are held at the law’s depth`, answers, false) : ''),
+    told: (answers) => (answers.sweep?.wind_up ? `${believed(({ wind_up: windUp }) => `wind-up ${span(windUp)} where bodies are held at the law’s depth`, answers, false)}${heldAs(answers)}` : ''),
     rows: [
       row('Least wind-up of the input', 'Δφ', 'deg', ({ sweep }) => least(sweep?.wind_up?.wind_up_deg)),
       row('Most wind-up of the input', 'Δφ', 'deg', ({ sweep }) => greatest(sweep?.wind_up?.wind_up_deg)),
@@ -190,6 +227,13 @@ export const GROUPS = [
       row('Most torsional stiffness of the output, N·m/rad', '', '', ({ sweep }) => greatest(sweep?.wind_up?.torsional_stiffness_nm_per_rad)),
       row('Transmission error, peak to peak', '', 'deg', ({ sweep }) => sweep?.wind_up?.transmission_error_peak_to_peak_deg),
     ],
+  },
+  {
+    title: 'Behind the contacts, estimated',
+    // To work with, not to report: what was taken over stands in the design.
+    isOnScreenAlone: true,
+    told: ({ sweep }) => (sweep?.series_compliance_estimates?.length > 0 ? 'From the parts as they are made; forces leave it out until it is taken over.' : ''),
+    rows: backingRows,
   },
   { title: 'What a turn costs', offer: '/friction/wave_generator', rows: lossRows },
   {
@@ -239,8 +283,8 @@ export class Results {
   #told = [];
 
   /** `onShow({ input_angle_deg, position_deg })` when a peak's place is picked, `onAsk(pointer)` when a result is wanted that the
-   *  design has to ask for. */
-  constructor({ keyFigures, table }, onShow, onAsk) {
+   *  design has to ask for, `onTake({ pointer, value })` when an estimate is taken over into the design. */
+  constructor({ keyFigures, table }, onShow, onAsk, onTake) {
     for (const entry of KEY_ROWS) {
       const value = html('data', { class: 'value number' });
       const unit = entry.unit && !entry.text ? html('span', { class: 'unit' }, entry.unit) : undefined;
@@ -259,7 +303,7 @@ export class Results {
       const offer = group.offer && html('button', { type: 'button', class: 'link', 'aria-label': `${group.title}: ask for it`, onclick: () => onAsk(group.offer) }, 'ask for it');
       const told = group.told && html('span', { class: 'told' });
       if (told) this.#told.push({ group, told });
-      const heading = html('tr', { class: 'group' }, html('th', { scope: 'rowgroup', colspan: 5 }, group.title, offer && [' ', offer], told && [' ', told]));
+      const heading = html('tr', { class: group.isOnScreenAlone ? 'group unasked' : 'group' }, html('th', { scope: 'rowgroup', colspan: 5 }, group.title, offer && [' ', offer], told && [' ', told]));
       const body = html('tbody', {}, heading);
       if (offer) this.#offers.push({ group, offer, heading });
       for (const entry of group.rows) {
@@ -270,15 +314,17 @@ export class Results {
         const delta = html('td', { class: 'numeric compared number' });
         const place = entry.place && html('button', { type: 'button', class: 'link number', title: 'Show in mechanism and plots' });
         const scope = entry.scoped && html('span');
-        const cell = { entry, scope, value, unit, reference, referenceUnit, delta, place };
+        const taken = entry.taken && html('button', { type: 'button', class: 'link number', 'aria-label': `${entry.label}: take over as series compliance` });
+        const cell = { entry, taken, scope, value, unit, reference, referenceUnit, delta, place };
         place?.addEventListener('click', () => onShow(cell.at));
+        taken?.addEventListener('click', () => onTake(entry.taken(cell.answers)));
         const line = html(
           'tr',
-          { class: entry.followsFromRatio ? 'follows' : '' },
+          { class: group.isOnScreenAlone ? 'unasked' : entry.followsFromRatio ? 'follows' : '' },
           html('th', { scope: 'row' }, entry.label, scope, entry.symbol && [' ', symbol(entry.symbol)], entry.terms && [' ', term(...entry.terms)]),
           html('td', { class: 'numeric' }, value, unit),
           html('td', { class: 'numeric compared' }, reference, referenceUnit),
-          [delta, html('td', { class: 'place' }, place)],
+          [delta, html('td', { class: 'place' }, place ?? taken)],
         );
         this.#cells.push(Object.assign(cell, { line }));
         body.append(line);
@@ -328,6 +374,11 @@ export class Results {
       }
       setText(delta, reference ? compare(entry, answers, reference) : '');
       cell.at = place && shown && entry.place(answers);
+      if (cell.taken) {
+        cell.answers = answers;
+        cell.taken.hidden = !shown;
+        if (shown) setText(cell.taken, entry.taken(answers).text);
+      }
       if (place) place.hidden = !cell.at;
       if (cell.at) {
         setText(place, `j ${number(cell.at.input_angle_deg, 4)}°, ψ ${number(cell.at.position_deg, 4)}°`);

@@ -42,7 +42,7 @@ pub fn unloaded_wind_up_deg(
         for state in teeth {
             first_rad = first_rad.min(closing_rad(state)?);
         }
-        wind_up_deg.push(first_rad.to_degrees());
+        wind_up_deg.push((loaded.lost_motion_rad() + first_rad).to_degrees());
     }
     Ok(wind_up_deg)
 }

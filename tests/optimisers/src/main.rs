@@ -5,14 +5,22 @@ use std::io::{self, BufRead as _, Write as _};
 use std::sync::Mutex;
 
 use heuropt::prelude::*;
-use serde_json::json;
-use toothwave_calculation::design::Design;
-use toothwave_calculation::json;
-use toothwave_calculation::question::{Limits, Question as _};
-use toothwave_calculation::sweep::Sweep;
-use toothwave_solver::Never;
 use toothwave_solver::parts::RIM;
-use toothwave_study::optimise::{Judged, Optimiser, Plan, Point};
+use toothwave_solver::sweep::{Points, peaks};
+use toothwave_solver::{
+    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Modification,
+    Never, PerContact, ToothShape, Torque, WaveGenerator,
+};
+
+use crate::optimise::{Judged, Optimiser, Plan, Point};
+
+// The product's own files, without all that stands around them.
+#[allow(dead_code, reason = "what a search merges is not asked for here")]
+#[path = "../../../src/study/optimise.rs"]
+mod optimise;
+#[allow(dead_code, reason = "the normal distribution is not asked for here")]
+#[path = "../../../src/study/random.rs"]
+mod random;
 
 /// A problem over the unit cube: two objectives to be least, limits to be kept.
 #[derive(Clone, Copy)]
@@ -68,29 +76,40 @@ fn between(share: f64, low: f64, high: f64) -> f64 {
 fn drive(place: &[f64]) -> Option<Judged> {
     // The ranges that follow from the envelope, over the root radius.
     let root_mm = 60.0 / RIM;
-    let count = (39.0 + (3.0 * place[2]).floor()).min(41.0);
-    let document = json!({
-        "drive": {
-            "wave_generator": {
-                "kind": "harmonic_path", "lobes": 2,
-                "mean_path_radius_mm": between(place[0], 0.4 * root_mm, root_mm),
-                "amplitude_mm": between(place[1], 0.002 * root_mm, 0.08 * root_mm)
-            },
-            "teeth": {
-                "count": count, "radius_mm": between(place[3], 0.02 * root_mm, 0.15 * root_mm),
-                "width_mm": between(place[4], 0.1 * root_mm, 0.6 * root_mm)
-            },
-            "ring": { "teeth": count - 2.0 }
+    let count = 39 + i64::from(3.0 * place[2] >= 1.0) + i64::from(3.0 * place[2] >= 2.0);
+    let parameters = DriveParameters {
+        wave_generator: WaveGenerator::HarmonicPath {
+            lobes: 2,
+            mean_path_radius_mm: between(place[0], 0.4 * root_mm, root_mm),
+            amplitude_mm: between(place[1], 0.002 * root_mm, 0.08 * root_mm),
         },
-        "load": { "output_torque_nm": 200.0, "allowable_stress_mpa": 1500.0 },
-        "model": { "compatibility": "projection", "stiffness": { "law": "linear" } },
-        "sweep": { "samples": 16 }
-    });
-    let design = json::read::<Design>(document.to_string().as_bytes()).expect("a design").normalised();
-    let checked = Sweep.check(&design, &Limits { max_states: 1_000_000, max_profile_points: 1 }).ok()?;
-    let drive = checked.drive();
+        teeth: count,
+        installed: count,
+        tooth_radius_mm: between(place[3], 0.02 * root_mm, 0.15 * root_mm),
+        tooth: ToothShape::Cylinder { width_mm: between(place[4], 0.1 * root_mm, 0.6 * root_mm) },
+        ring_teeth: count - 2,
+        tip_radius_mm: None,
+    };
+    let load = LoadParameters {
+        materials: Materials {
+            wave_generator: Material::STEEL,
+            teeth: Material::STEEL,
+            ring: Material::STEEL,
+            carrier: Material::STEEL,
+        },
+        torque: Torque::Output(200.0),
+        compatibility: Compatibility::Projection,
+        law: ContactLaw::Linear,
+        series_compliance_mm_per_n: PerContact::default(),
+        clearance_um: PerContact::default(),
+        modification: Modification::default(),
+        allowable_stress_mpa: Some(PerContact { wave_generator: 1500.0, ring: 1500.0, carrier: 1500.0 }),
+    };
+    let drive = Drive::new(&parameters).ok()?;
+    let load = LoadCase::new(&load).expect("a load");
+    let points = Points::samples(16).expect("a number of samples");
     let diameter_mm = 2.0 * RIM * drive.root_radius_mm();
-    let capacity_nm = checked.peaks(&Never).ok()?.torque_capacity?.output_torque_nm;
+    let capacity_nm = peaks(&drive, &load, points, &Never).ok()?.torque_capacity?.output_torque_nm;
     let wall = drive.slot_wall_mm() / (2.0 * drive.slot_half_width_mm());
     let violations = vec![
         (diameter_mm - 120.0).max(0.0) / 120.0,
@@ -132,16 +151,11 @@ fn welded_beam(place: &[f64]) -> Judged {
     let arm = (0.25 * (l * l + (h + t) * (h + t))).sqrt();
     let second_shear =
         6000.0 * (14.0 + 0.5 * l) * arm / (2.0 * (0.707 * h * l * (l * l / 12.0 + 0.25 * (h + t) * (h + t))));
-    let shear =
-        (first_shear * first_shear + second_shear * second_shear + l * first_shear * second_shear / arm).sqrt();
+    let shear = (first_shear * first_shear + second_shear * second_shear + l * first_shear * second_shear / arm).sqrt();
     let bending = 504_000.0 / (t * t * b);
     let buckling = 64_746.022 * (1.0 - 0.028_234_6 * t) * t * b * b * b;
-    let kept = [
-        (13_600.0 - shear) / 13_600.0,
-        (30_000.0 - bending) / 30_000.0,
-        (b - h) / 5.0,
-        (buckling - 6000.0) / 6000.0,
-    ];
+    let kept =
+        [(13_600.0 - shear) / 13_600.0, (30_000.0 - bending) / 30_000.0, (b - h) / 5.0, (buckling - 6000.0) / 6000.0];
     Judged { objectives: vec![cost, deflection], violations: kept.map(|kept| (-kept).max(0.0)).to_vec() }
 }
 
