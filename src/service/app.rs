@@ -7,7 +7,7 @@ use crate::cache::Cache;
 use crate::compute::Pool;
 use crate::config::Limits;
 use crate::room::Room;
-use crate::studies::Studies;
+use crate::studies::{Keeping, Studies};
 
 /// What handlers share.
 #[derive(Debug)]
@@ -27,12 +27,17 @@ pub struct App {
 }
 
 impl App {
-    /// An idle service within these limits.
+    /// An idle service within these limits, which keeps studies in memory.
     pub fn new(limits: Limits) -> Arc<Self> {
+        Self::keeping(limits, Keeping::Memory)
+    }
+
+    /// An idle service within these limits, with its studies kept somewhere.
+    pub fn keeping(limits: Limits, keeping: Keeping) -> Arc<Self> {
         let (pool, room) = (Pool::new(limits), Room::new(limits.max_unread_bytes));
         Arc::new(Self {
             limits,
-            studies: Studies::new(pool.clone(), room.clone(), limits),
+            studies: Studies::new(pool.clone(), room.clone(), limits, keeping),
             pool,
             cache: Cache::new(limits.cache_max_bytes),
             room,

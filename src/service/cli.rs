@@ -24,11 +24,12 @@ use toothwave_calculation::forms::{Format, Forms};
 use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::question::{Limits, Question};
 use toothwave_calculation::sweep::Sweep;
+use toothwave_store::{Address, SCHEMA_VERSION, Store};
 use toothwave_study::{Gathered, Study, StudyAnswer, Work};
 use tracing_subscriber::EnvFilter;
 
 use crate::api::batch::{BatchEnd, BatchEndpoint, BatchQuery, answer_line};
-use crate::config::Settings;
+use crate::config::{Settings, StoreSettings, WorkerSettings};
 use crate::problem::Problem;
 use crate::room::Room;
 use crate::{keys, log, observe, router, serve};
@@ -86,6 +87,10 @@ enum Command {
         #[arg(long, value_parser = one_of(&FORMATS), default_value = "json")]
         format: Format,
     },
+    /// Compute chunks of the studies that a PostgreSQL database holds, until told to stop
+    Worker(WorkerSettings),
+    /// Bring the database of studies to the schema of this build
+    Migrate(StoreSettings),
     /// Ask a running service whether it is well; exit status 0 if so
     Health {
         /// Where it listens
@@ -165,6 +170,8 @@ pub fn run() -> ExitCode {
         Command::Draw { part, file, format } => answer(Drawing(part), &file, format),
         Command::Batch { file, endpoint, peaks_only } => batch(&file, BatchQuery { endpoint, peaks_only }),
         Command::Study { file, format } => study(&file, format),
+        Command::Worker(settings) => run_worker(&settings),
+        Command::Migrate(settings) => migrate(&settings),
         Command::Health { address } => health(address),
         Command::NewKey { name } => new_key(&name),
         Command::Openapi => print(|writer| writer.write_all(router::openapi_json().as_bytes())),
@@ -242,16 +249,47 @@ fn arguments() -> Vec<OsString> {
 }
 
 fn run_service(settings: &Settings) -> Result<(), Failure> {
+    let address = settings.store.address().map_err(Failure::BadInput)?;
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
     log::start(filter)?;
     // As many threads for solves as there are permits: with more of them each solve would wake another, whose memory is cold.
     let solves = settings.limits().max_concurrent_solves;
     let runtime = tokio::runtime::Builder::new_multi_thread().max_blocking_threads(solves).enable_all().build()?;
-    let result = runtime.block_on(serve::serve(settings));
+    let result = runtime.block_on(serve::serve(settings, address.as_ref()));
     // A solve beyond its bound must not hold up the exit.
     runtime.shutdown_background();
     log::flush();
     result.map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", settings.listen)).into())
+}
+
+/// The database that the settings name: a file would be one process's alone.
+fn shared_database(settings: &StoreSettings) -> Result<Address, Failure> {
+    match settings.address().map_err(Failure::BadInput)? {
+        Some(address) if address.is_shared() => Ok(address),
+        Some(file) => Err(Failure::BadInput(format!(
+            "{file}: a file serves one process, the service, which computes its studies itself; workers share `postgres://…`"
+        ))),
+        None => Err(Failure::BadInput("`--studies postgres://…` names the database that holds the studies".into())),
+    }
+}
+
+fn run_worker(settings: &WorkerSettings) -> Result<(), Failure> {
+    let address = shared_database(&settings.store)?;
+    let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
+    log::start(filter)?;
+    let solves = settings.limits().max_concurrent_solves;
+    let runtime = tokio::runtime::Builder::new_multi_thread().max_blocking_threads(solves).enable_all().build()?;
+    let result = runtime.block_on(serve::serve_chunks(settings, &address));
+    runtime.shutdown_background();
+    log::flush();
+    Ok(result?)
+}
+
+fn migrate(settings: &StoreSettings) -> Result<(), Failure> {
+    let address = shared_database(settings)?;
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    let before = runtime.block_on(async { Store::open(&address).await?.migrate().await }).map_err(io::Error::other)?;
+    print(|writer| writeln!(writer, "{address}: schema {before} before, {SCHEMA_VERSION} now"))
 }
 
 /// Without a server only memory limits what is computed: some two gigabytes of it.

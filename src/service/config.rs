@@ -1,13 +1,16 @@
 //! Settings of the service: each a flag and a `TOOTHWAVE_…` variable.
 
+use std::fs;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use axum::http::Uri;
 use clap::Args;
 use serde::Serialize;
 use toothwave_calculation::question;
+use toothwave_store::Address;
 use tracing_subscriber::EnvFilter;
 use utoipa::ToSchema;
 
@@ -37,6 +40,12 @@ const STATE_BYTES: u64 = 320;
 
 /// What a point takes in the longest form, STEP.
 const POINT_BYTES: u64 = 800;
+
+/// Chunks that a worker may compute at once: each holds a connection to the database.
+const MOST_CHUNKS: i64 = 1000;
+
+/// What a single variant of a study may take in a worker, where nobody waits for it.
+const MOST_OF_A_VARIANT_MS: u64 = 3_600_000;
 
 /// Bytes of a request's line and headers together, at most.
 pub const MAX_HEADER_BYTES: usize = 40_960;
@@ -101,6 +110,18 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_STUDY_DEADLINE_MS", value_name = "MS", default_value_t = 3_600_000)]
     pub study_deadline_ms: u64,
 
+    /// Where studies are kept
+    #[command(flatten)]
+    pub store: StoreSettings,
+
+    /// Replicas of the service that answer in turn: of several, each refuses studies unless they share a PostgreSQL database
+    #[arg(long, env = "TOOTHWAVE_REPLICAS", value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    pub replicas: u32,
+
+    /// Seconds after which a stored study that nobody has asked for is forgotten
+    #[arg(long, env = "TOOTHWAVE_STUDY_EXPIRY_S", value_name = "S", default_value_t = 2_592_000)]
+    pub study_expiry_s: u64,
+
     /// Connections that may be open at once
     #[arg(long, env = "TOOTHWAVE_MAX_CONNECTIONS", value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=MOST_SOLVES))]
     pub max_connections: u32,
@@ -129,6 +150,80 @@ pub struct Settings {
     /// What is logged, as tracing-subscriber's EnvFilter reads it
     #[arg(long, env = "TOOTHWAVE_LOG", value_name = "FILTER", default_value = "info", value_parser = log_filter)]
     pub log: String,
+}
+
+/// Where studies are kept.
+#[derive(Debug, Clone, Args)]
+pub struct StoreSettings {
+    /// File in which studies are kept, or `postgres://USER@HOST/DATABASE` [default: none, in memory]
+    #[arg(long, env = "TOOTHWAVE_STUDIES", value_name = "FILE|ADDRESS", hide_env_values = true)]
+    pub studies: Option<String>,
+
+    /// File that holds the database's password; PGPASSWORD may hold it too
+    #[arg(long, env = "TOOTHWAVE_STUDIES_PASSWORD_FILE", value_name = "FILE")]
+    pub studies_password_file: Option<PathBuf>,
+}
+
+impl StoreSettings {
+    /// Where studies are kept, if not in memory.
+    ///
+    /// # Errors
+    /// Where the address is none or holds a password, or the password's file cannot be read. The text names no password.
+    pub fn address(&self) -> Result<Option<Address>, String> {
+        let Some(studies) = &self.studies else { return Ok(None) };
+        let password = match &self.studies_password_file {
+            Some(file) => {
+                let text = fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
+                Some(text.trim_end_matches(['\r', '\n']).to_owned())
+            }
+            None => None,
+        };
+        Address::new(studies, password.as_deref()).map(Some).map_err(|error| error.to_string())
+    }
+}
+
+/// The settings of `toothwave worker`.
+#[derive(Debug, Clone, Args)]
+pub struct WorkerSettings {
+    /// Where studies are kept
+    #[command(flatten)]
+    pub store: StoreSettings,
+
+    /// Chunks that are computed at once [default: the cores that the process may use]
+    #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_SOLVES", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_CHUNKS))]
+    pub max_concurrent_solves: Option<u32>,
+
+    /// Milliseconds that chunks which are begun get to come to their end after a signal to stop
+    #[arg(long, env = "TOOTHWAVE_SHUTDOWN_MS", value_name = "MS", default_value_t = 8_000)]
+    pub shutdown_ms: u64,
+
+    /// What is logged, as tracing-subscriber's EnvFilter reads it
+    #[arg(long, env = "TOOTHWAVE_LOG", value_name = "FILTER", default_value = "info", value_parser = log_filter)]
+    pub log: String,
+}
+
+impl WorkerSettings {
+    /// Limits of a process that only computes chunks: each was admitted with its study.
+    pub fn limits(&self) -> Limits {
+        Limits {
+            max_states: u64::MAX,
+            max_profile_points: u64::MAX,
+            max_body_bytes: 0,
+            max_concurrent_solves: self.max_concurrent_solves.map_or_else(cores, |solves| solves as usize),
+            max_queued_solves: 0,
+            max_concurrent_batches: 0,
+            deadline_ms: MOST_OF_A_VARIANT_MS,
+            cache_max_bytes: 0,
+            max_unread_bytes: 0,
+            max_study_variants: u64::MAX,
+            max_study_bytes: u64::MAX,
+            max_concurrent_studies: 0,
+            study_deadline_ms: u64::MAX,
+            max_connections: 0,
+            max_header_bytes: 0,
+            header_timeout_ms: 0,
+        }
+    }
 }
 
 /// The limits that a client can read.
@@ -187,7 +282,6 @@ impl Limits {
 impl Settings {
     /// The limits among the settings.
     pub fn limits(&self) -> Limits {
-        let cores = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
         let max_concurrent_solves = self.max_concurrent_solves.map_or_else(cores, |solves| solves as usize);
         let memory_bytes = machine::memory_bytes().unwrap_or(UNKNOWN_MEMORY_BYTES);
         let max_unread_bytes = self
@@ -223,6 +317,11 @@ impl Settings {
     pub const fn shutdown(&self) -> Duration {
         Duration::from_millis(self.shutdown_ms)
     }
+}
+
+/// Those that the process may use.
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }
 
 /// An origin as browsers write it in `Origin`, or `*`, which stands for all.

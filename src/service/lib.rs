@@ -10,6 +10,9 @@ pub mod cli;
 pub mod compute;
 pub mod config;
 pub mod examples;
+pub mod frozen;
+#[cfg(feature = "fault-injection")]
+mod injected;
 pub mod keys;
 pub mod log;
 pub mod machine;
@@ -23,3 +26,4 @@ pub mod router;
 pub mod serve;
 pub mod socket;
 pub mod studies;
+pub mod worker;

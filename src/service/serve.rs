@@ -19,16 +19,21 @@ use parking_lot::Mutex;
 use rustix::process::{Resource, getrlimit, setrlimit};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::signal::unix::{SignalKind, signal};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 use tokio::task::AbortHandle;
 use tokio_util::sync::CancellationToken;
+use toothwave_calculation::BUILD;
+use toothwave_store::{Address, Store};
 use tower::util::MapRequest;
 
 use crate::app::App;
-use crate::config::{Limits, MAX_HEADER_BYTES, Settings};
+use crate::compute::Pool;
+use crate::config::{Limits, MAX_HEADER_BYTES, Settings, WorkerSettings};
 use crate::observe;
 use crate::router::{self, Entry};
 use crate::socket::Socket;
+use crate::studies::Keeping;
+use crate::worker::Workers;
 
 /// How long the service still listens at least after it has said that it is not ready, so that whoever asks can learn it.
 const NOTICE: Duration = Duration::from_millis(200);
@@ -53,8 +58,16 @@ const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 ///
 /// # Errors
 /// Where the address cannot be listened on, or the process gets no signals.
-pub async fn serve(settings: &Settings) -> io::Result<()> {
+pub async fn serve(settings: &Settings, studies: Option<&Address>) -> io::Result<()> {
     observe::install_recorder();
+    let keeping = match studies {
+        Some(address) if address.is_shared() || settings.replicas == 1 => Keeping::Store {
+            store: Store::open(address).await.map_err(io::Error::other)?,
+            expiry: Duration::from_secs(settings.study_expiry_s),
+        },
+        None if settings.replicas == 1 => Keeping::Memory,
+        _ => Keeping::Nowhere,
+    };
     let listener = TcpListener::bind(settings.listen).await?;
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
     let mut hang_up = signal(SignalKind::hangup())?;
@@ -74,7 +87,7 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
     }
     let mut limits = settings.limits();
     limits.max_connections = connections_that_fit(limits.max_connections);
-    let app = App::new(limits);
+    let app = App::keeping(limits, keeping);
     let entry = Entry {
         cors_origins: settings.cors_origins.clone(),
         // A page of another site that resolves its own name to this machine knows no key.
@@ -85,6 +98,10 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
     // Whoever started the service may not read its output.
     std::thread::spawn(move || greet(address));
     tokio::spawn(observe::keep_up());
+    let store = tokio::spawn({
+        let app = Arc::clone(&app);
+        async move { app.studies.serve_store().await }
+    });
     tokio::spawn(async move {
         while hang_up.recv().await.is_some() {
             if let Some(keys) = &keys {
@@ -115,6 +132,43 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
             () = drain(server.graceful, &app, settings.shutdown()) => {}
             () = told_to_stop() => tracing::warn!("told to stop again: what still ran is given up"),
         }
+        // Chunks that are in work are given back, so that they count as never begun.
+        if tokio::time::timeout(LAST_WORDS, store).await.is_err() {
+            tracing::warn!("the studies' store did not close in time");
+        }
+    }
+    tracing::info!("stopped");
+    Ok(())
+}
+
+/// Computes chunks until a signal; those that are begun then come to their end within the bound of the settings, or until a second signal.
+///
+/// # Errors
+/// Where the process gets no signals.
+pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address) -> io::Result<()> {
+    let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
+    let mut told_to_stop = async || {
+        tokio::select! {
+            _ = terminate.recv() => {}
+            _ = interrupt.recv() => {}
+        }
+    };
+    let store = Store::open(studies).await.map_err(io::Error::other)?;
+    let limits = settings.limits();
+    let stopping = CancellationToken::new();
+    let patience = Duration::from_millis(settings.shutdown_ms);
+    let slots = limits.max_concurrent_solves;
+    tracing::info!(studies = %studies, slots, build = BUILD, "working");
+    let workers = Workers::new(store, Pool::new(limits), slots, watch::Sender::default(), stopping.clone(), patience);
+    let stop = async {
+        told_to_stop().await;
+        tracing::info!("stopping: what is begun comes to its end");
+        stopping.cancel();
+        told_to_stop().await;
+    };
+    tokio::select! {
+        () = workers.work() => {}
+        () = stop => tracing::warn!("told to stop again: what still ran is given up"),
     }
     tracing::info!("stopped");
     Ok(())

@@ -1,7 +1,8 @@
-//! Studies that run and that are kept: in memory, within the bound on unread answers, the oldest forgotten first.
+//! Studies that run and that are kept: in memory, within the bound on unread answers, the oldest forgotten first; or in a store, of which
+//! this is then a view, likewise bounded.
 //!
 //! A study's chunks are worked on side by side, each in slices of a few milliseconds that wait for their turn behind single requests, as
-//! those of batches do.
+//! those of batches do. Those of a store are the workers', who are here where the store is a file, and elsewhere where it is a server.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -15,17 +16,31 @@ use serde::Serialize;
 use tokio::sync::watch;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
-use toothwave_calculation::no_answer::NoAnswer;
+use toothwave_store::{Figures, Standing as Stored, Store, StoreError};
 use toothwave_study::{Gathered, Study, StudyAnswer, Work};
 use utoipa::ToSchema;
 
 use crate::compute::Pool;
 use crate::config::Limits;
+use crate::frozen;
 use crate::problem::{Problem, ProblemCode};
 use crate::room::{Reserved, Room};
+use crate::worker::{Sliced, Workers, slice};
 
-/// A slice begins no variant after this time: so long at most does a single request wait behind short ones.
-const SLICE: Duration = Duration::from_millis(5);
+/// Between two looks at how a stored study stands.
+const LOOK: Duration = Duration::from_secs(1);
+
+/// Looks at a study take a share of the database's time, however many chunks it has: a tenth at most.
+const LOOKS_SHARE: u32 = 10;
+
+/// Between two looks at the whole store in numbers.
+const COUNT: Duration = Duration::from_secs(5);
+
+/// Between two times that old studies are forgotten.
+const EXPIRE: Duration = Duration::from_secs(60);
+
+/// Of what is read of a store at once.
+const READ_BYTES: u64 = 16 << 20;
 
 /// How a study stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
@@ -41,12 +56,33 @@ pub enum StudyState {
     Failed,
 }
 
+/// Where studies are kept.
+#[derive(Debug)]
+pub enum Keeping {
+    /// In this process alone.
+    Memory,
+    /// Beyond it.
+    Store {
+        /// Where.
+        store: Store,
+        /// Since it was last asked for, until it is forgotten.
+        expiry: Duration,
+    },
+    /// Not at all: this is one of several replicas, and the others would know nothing of them.
+    Nowhere,
+}
+
 /// The studies of the service.
 #[derive(Debug)]
 pub struct Studies {
     pool: Pool,
     room: Room,
     limits: Limits,
+    keeping: Keeping,
+    /// Told when a stored study was asked for, or has come further, in this process.
+    changed: watch::Sender<()>,
+    /// The store in numbers, as it was last seen.
+    figures: Mutex<Option<Figures>>,
     /// The oldest first.
     kept: Mutex<VecDeque<Arc<Kept>>>,
     /// Cancelled when the service stops: nobody waits for a study any more.
@@ -61,8 +97,13 @@ pub struct Kept {
     gathered: Mutex<Gathered>,
     /// Variants looked at, those of chunks that are not over yet among them.
     looked_at: AtomicU64,
+    /// Of those that the result holds, the ones without an answer.
+    impossible: AtomicU64,
     state: watch::Sender<Standing>,
     cancelled: Mutex<CancellationToken>,
+    /// Of a stored study: whether somebody looks how it stands while it runs, and one look at a time.
+    is_followed: AtomicBool,
+    looking: tokio::sync::Mutex<()>,
     _room: Reserved,
 }
 
@@ -113,7 +154,7 @@ impl Kept {
             state,
             variants: self.study.variants(),
             looked_at,
-            impossible: self.gathered.lock().refused(),
+            impossible: self.impossible.load(Ordering::Relaxed),
             result_href: format!("/v1/studies/{}/result", self.id),
             events_href: format!("/v1/studies/{}/events", self.id),
             problem,
@@ -148,29 +189,217 @@ impl Kept {
     fn stand(&self, state: StudyState, problem: Option<Problem>) {
         self.state.send_replace(Standing { state, problem });
     }
+
+    fn new(study: Arc<Study>, room: Reserved) -> Arc<Self> {
+        Arc::new(Self {
+            id: study.id().to_string(),
+            gathered: Mutex::new(Gathered::new(&study)),
+            study,
+            looked_at: AtomicU64::new(0),
+            impossible: AtomicU64::new(0),
+            state: watch::Sender::new(Standing { state: StudyState::Running, problem: None }),
+            cancelled: Mutex::default(),
+            is_followed: AtomicBool::new(false),
+            looking: tokio::sync::Mutex::default(),
+            _room: room,
+        })
+    }
+
+    /// Looks how a stored study stands; whether it is kept at all.
+    async fn look(&self, store: &Store) -> Result<bool, StoreError> {
+        // One at a time, so that what is seen last is what was last the case.
+        let _looking = self.looking.lock().await;
+        let Some(stored) = store.find(&self.id).await? else {
+            self.stand(StudyState::Cancelled, None);
+            return Ok(false);
+        };
+        self.looked_at.store(stored.looked_at, Ordering::Relaxed);
+        self.impossible.store(stored.refused, Ordering::Relaxed);
+        self.gathered.lock().give_up(stored.gaps.iter().map(|gap| (gap.chunk, gap.attempts)));
+        let (state, problem) = state_of(&stored);
+        self.stand(state, problem);
+        Ok(true)
+    }
+
+    /// Looks on while it runs.
+    async fn follow(&self, store: &Store, changed: &watch::Sender<()>, closing: &CancellationToken) {
+        let mut changed = changed.subscribe();
+        let mut pause = LOOK;
+        while !self.is_followed.swap(true, Ordering::SeqCst) {
+            while self.is_running() && !closing.is_cancelled() {
+                tokio::select! {
+                    _ = changed.changed() => {}
+                    () = tokio::time::sleep(pause) => {}
+                    () = closing.cancelled() => break,
+                }
+                let started = Instant::now();
+                if let Err(error) = self.look(store).await {
+                    tracing::warn!(study = self.id, %error, "how a study stands is not known");
+                }
+                pause = LOOK.max(LOOKS_SHARE * started.elapsed());
+            }
+            self.is_followed.store(false, Ordering::SeqCst);
+            // It may have been asked for again in this moment, by one who believed that it is followed.
+            if !self.is_running() || closing.is_cancelled() {
+                return;
+            }
+        }
+    }
+}
+
+/// How a stored study stands, in the words of the service.
+fn state_of(stored: &Stored) -> (StudyState, Option<Problem>) {
+    if stored.is_done() {
+        return (StudyState::Done, None);
+    }
+    if stored.is_cancelled {
+        return (StudyState::Cancelled, None);
+    }
+    if stored.is_exhausted() {
+        let (gaps, chunks) = (stored.gaps.len(), stored.study.chunks);
+        let detail = format!(
+            "{gaps} of the study's {chunks} chunks came to no result, each tried {} times; the others did, and `gaps` names those; the same question tries them anew",
+            toothwave_store::MOST_ATTEMPTS
+        );
+        return (StudyState::Failed, Some(Problem::new(ProblemCode::InternalError, detail)));
+    }
+    if stored.is_late() {
+        return (StudyState::Failed, Some(too_late("its")));
+    }
+    (StudyState::Running, None)
+}
+
+/// The problem of a study that ran out of time.
+fn too_late(time: &str) -> Problem {
+    let detail = format!(
+        "the study did not finish within {time} `study_deadline_ms`; what it has come to is kept, and the same question lets it go on"
+    );
+    Problem::new(ProblemCode::DeadlineExceeded, detail)
 }
 
 impl Studies {
-    /// None yet.
-    pub fn new(pool: Pool, room: Room, limits: Limits) -> Self {
-        Self { pool, room, limits, kept: Mutex::default(), closing: CancellationToken::new() }
+    /// None yet, but for those of the store.
+    pub fn new(pool: Pool, room: Room, limits: Limits, keeping: Keeping) -> Self {
+        Self {
+            pool,
+            room,
+            limits,
+            keeping,
+            changed: watch::Sender::default(),
+            figures: Mutex::default(),
+            kept: Mutex::default(),
+            closing: CancellationToken::new(),
+        }
     }
 
     /// Studies that run now.
     pub fn running(&self) -> usize {
-        self.kept.lock().iter().filter(|kept| kept.is_running()).count()
+        match self.figures() {
+            Some(figures) => usize::try_from(figures.running).unwrap_or(usize::MAX),
+            None => self.kept.lock().iter().filter(|kept| kept.is_running()).count(),
+        }
+    }
+
+    /// The store in numbers, where there is one, as it was last seen.
+    pub fn figures(&self) -> Option<Figures> {
+        *self.figures.lock()
+    }
+
+    fn find_here(&self, id: &str) -> Option<Arc<Kept>> {
+        self.kept.lock().iter().find(|kept| kept.id == id).cloned()
     }
 
     /// The study with this id, where it is kept.
-    pub fn find(&self, id: &str) -> Option<Arc<Kept>> {
-        self.kept.lock().iter().find(|kept| kept.id == id).cloned()
+    ///
+    /// # Errors
+    /// Where the store does not answer, or there is no room for what the study comes to.
+    pub async fn find(&self, id: &str) -> Result<Option<Arc<Kept>>, Problem> {
+        let here = self.find_here(id);
+        let Keeping::Store { store, .. } = &self.keeping else { return Ok(here) };
+        if let Some(kept) = here.filter(|kept| kept.is_followed.load(Ordering::SeqCst)) {
+            return Ok(Some(kept));
+        }
+        let Some(stored) = store.find(id).await? else {
+            self.kept.lock().retain(|kept| kept.id != id);
+            return Ok(None);
+        };
+        self.view(store, &stored).await.map(Some)
+    }
+
+    /// A stored study as it is seen from here.
+    async fn view(&self, store: &Store, stored: &Stored) -> Result<Arc<Kept>, Problem> {
+        let frozen = &stored.study;
+        let is_this = |kept: &&Arc<Kept>| kept.id == frozen.id && kept.study.chunk_variants() == frozen.chunk_variants;
+        let known = self.kept.lock().iter().find(is_this).cloned();
+        let kept = match known {
+            Some(kept) => kept,
+            None => {
+                let study = frozen::thaw(frozen).map_err(|reason| Problem::internal(&reason))?;
+                let mut all = self.kept.lock();
+                all.retain(|kept| kept.id != frozen.id);
+                let reserved = self.make_room(&mut all, study.stored_bytes())?;
+                let kept = Kept::new(study, reserved);
+                all.push_back(Arc::clone(&kept));
+                kept
+            }
+        };
+        kept.look(store).await?;
+        if kept.is_running() && !kept.is_followed.load(Ordering::SeqCst) {
+            let (followed, store) = (Arc::clone(&kept), store.clone());
+            let (changed, closing) = (self.changed.clone(), self.closing.clone());
+            tokio::spawn(async move { followed.follow(&store, &changed, &closing).await });
+        }
+        Ok(kept)
     }
 
     /// The study, which runs from now on if it is not done: one that is kept goes on where it was.
     ///
     /// # Errors
-    /// `queue_full` where as many run as the service admits, `too_many_unread_bytes` where there is no room for what it comes to.
-    pub fn begin(&self, study: Study) -> Result<Arc<Kept>, Problem> {
+    /// `queue_full` where as many run as the service admits, `too_many_unread_bytes` where there is no room for what it comes to,
+    /// `no_shared_store` where nobody else would know of it, `store_unavailable` where the store does not answer.
+    pub async fn begin(&self, study: Study, document: &[u8]) -> Result<Arc<Kept>, Problem> {
+        match &self.keeping {
+            Keeping::Memory => self.begin_here(study),
+            Keeping::Store { store, .. } => self.begin_there(store, study, document).await,
+            Keeping::Nowhere => {
+                let detail = "this is one of several replicas without a shared store, so the others would know nothing of the study: the setting `studies` names the PostgreSQL database that they share";
+                Err(Problem::new(ProblemCode::NoSharedStore, detail))
+            }
+        }
+    }
+
+    async fn begin_there(&self, store: &Store, study: Study, document: &[u8]) -> Result<Arc<Kept>, Problem> {
+        let id = study.id().to_string();
+        let time = Duration::from_secs(self.limits.study_deadline_ms.div_ceil(1000));
+        match store.find(&id).await? {
+            Some(stored) if stored.is_running() || stored.is_done() => store.touch(&id).await?,
+            found => {
+                if store.running().await? >= self.limits.max_concurrent_studies as u64 {
+                    return Err(self.too_many_studies());
+                }
+                if found.is_some() {
+                    store.resume(&id, time).await?;
+                } else {
+                    let limits = self.limits.of_calculation();
+                    store.create(&frozen::freeze(&self.pool, study, document, &limits, time).await?).await?;
+                }
+                self.changed.send_replace(());
+            }
+        }
+        let stored =
+            store.find(&id).await?.ok_or_else(|| Problem::internal(&"a study was forgotten while it began"))?;
+        self.view(store, &stored).await
+    }
+
+    fn too_many_studies(&self) -> Problem {
+        let most = self.limits.max_concurrent_studies;
+        let detail = format!(
+            "{most} studies run, as many as `max_concurrent_studies` admits; try again in a moment, or cancel one"
+        );
+        Problem::new(ProblemCode::QueueFull, detail)
+    }
+
+    fn begin_here(&self, study: Study) -> Result<Arc<Kept>, Problem> {
         let id = study.id().to_string();
         let mut all = self.kept.lock();
         let known = all.iter().position(|kept| kept.id == id).and_then(|index| all.remove(index));
@@ -181,27 +410,14 @@ impl Studies {
                 return Ok(Arc::clone(kept));
             }
         }
-        let (running, most) = (all.iter().filter(|kept| kept.is_running()).count(), self.limits.max_concurrent_studies);
-        if running >= most {
-            let detail = format!(
-                "{most} studies run, as many as `max_concurrent_studies` admits; try again in a moment, or cancel one"
-            );
-            return Err(Problem::new(ProblemCode::QueueFull, detail));
+        if all.iter().filter(|kept| kept.is_running()).count() >= self.limits.max_concurrent_studies {
+            return Err(self.too_many_studies());
         }
         let kept = match known {
             Some(kept) => kept,
             None => {
                 let reserved = self.make_room(&mut all, study.stored_bytes())?;
-                let study = Arc::new(study);
-                let kept = Arc::new(Kept {
-                    id,
-                    gathered: Mutex::new(Gathered::new(&study)),
-                    study,
-                    looked_at: AtomicU64::new(0),
-                    state: watch::Sender::new(Standing { state: StudyState::Running, problem: None }),
-                    cancelled: Mutex::default(),
-                    _room: reserved,
-                });
+                let kept = Kept::new(Arc::new(study), reserved);
                 all.push_back(Arc::clone(&kept));
                 kept
             }
@@ -233,12 +449,106 @@ impl Studies {
     }
 
     /// Cancels a study that runs, and forgets one that does not.
-    pub fn cancel_or_forget(&self, kept: &Arc<Kept>) {
-        if kept.is_running() {
+    ///
+    /// # Errors
+    /// Where the store does not answer.
+    pub async fn cancel_or_forget(&self, kept: &Arc<Kept>) -> Result<(), Problem> {
+        let is_running = kept.is_running();
+        if let Keeping::Store { store, .. } = &self.keeping {
+            if is_running { store.cancel(&kept.id).await? } else { store.forget(&kept.id).await? }
+        }
+        if is_running {
             kept.cancelled.lock().cancel();
             kept.stand(StudyState::Cancelled, None);
         } else {
             self.kept.lock().retain(|other| other.id != kept.id);
+        }
+        // Workers learn it at once where they are here.
+        self.changed.send_replace(());
+        Ok(())
+    }
+
+    /// Reads what a stored study has come to since it was last read.
+    ///
+    /// # Errors
+    /// Where the store does not answer.
+    pub async fn gather(&self, kept: &Kept) -> Result<(), Problem> {
+        let Keeping::Store { store, .. } = &self.keeping else { return Ok(()) };
+        let missing: Vec<_> = kept.gathered.lock().missing().collect();
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let done = store.chunks_done(&kept.id).await?;
+        let wanted: Vec<_> = done.into_iter().filter(|chunk| missing.binary_search(chunk).is_ok()).collect();
+        let a_part_bytes = (kept.stored_bytes() / kept.study.chunks().max(1)).max(1);
+        let at_once = usize::try_from(READ_BYTES / a_part_bytes).unwrap_or(usize::MAX).max(1);
+        for chunks in wanted.chunk_by(|one, next| one + 1 == *next).flat_map(|run| run.chunks(at_once)) {
+            let [first, .., last] = *chunks else {
+                self.read(store, kept, chunks[0], chunks[0]).await?;
+                continue;
+            };
+            self.read(store, kept, first, last).await?;
+        }
+        Ok(())
+    }
+
+    async fn read(&self, store: &Store, kept: &Kept, first: u64, last: u64) -> Result<(), Problem> {
+        for stored in store.parts(&kept.id, first, last).await? {
+            let part = frozen::decoded(&stored.part)?;
+            kept.gathered.lock().add(stored.chunk, part);
+        }
+        Ok(())
+    }
+
+    /// What a store is served by in this process, until it closes: the workers where it is a file, and whoever forgets old studies and
+    /// counts.
+    pub async fn serve_store(&self) {
+        let Keeping::Store { store, expiry } = &self.keeping else { return };
+        let workers = async {
+            if !store.address().is_shared() {
+                let slots = self.limits.max_concurrent_solves;
+                // What a chunk has come to is little: it is begun anew.
+                let patience = Duration::ZERO;
+                Workers::new(
+                    store.clone(),
+                    self.pool.clone(),
+                    slots,
+                    self.changed.clone(),
+                    self.closing.clone(),
+                    patience,
+                )
+                .work()
+                .await;
+            }
+        };
+        let count = async {
+            let mut pause = Duration::ZERO;
+            while !self.paused(pause).await {
+                let started = Instant::now();
+                if let Ok(figures) = store.figures().await {
+                    *self.figures.lock() = Some(figures);
+                }
+                pause = COUNT.max(LOOKS_SHARE * started.elapsed());
+            }
+        };
+        let forget = async {
+            while !self.paused(EXPIRE).await {
+                match store.expire(*expiry).await {
+                    Ok(0) => {}
+                    Ok(studies) => tracing::info!(studies, "forgotten, because nobody has asked for them for long"),
+                    Err(error) => tracing::warn!(%error, "old studies could not be forgotten"),
+                }
+            }
+        };
+        tokio::join!(workers, count, forget);
+        store.close().await;
+    }
+
+    /// Waits; whether the service closes instead.
+    async fn paused(&self, pause: Duration) -> bool {
+        tokio::select! {
+            () = tokio::time::sleep(pause) => false,
+            () = self.closing.cancelled() => true,
         }
     }
 
@@ -275,11 +585,7 @@ impl Studies {
                 Ok(Ok(())) => kept.stand(StudyState::Done, None),
                 Ok(Err(problem)) => kept.stand(StudyState::Failed, Some(problem)),
                 Err(_) => {
-                    let detail = format!(
-                        "the study did not finish within the {} ms of `study_deadline_ms`; what it has come to is kept, and the same question lets it go on",
-                        limits.study_deadline_ms
-                    );
-                    kept.stand(StudyState::Failed, Some(Problem::new(ProblemCode::DeadlineExceeded, detail)));
+                    kept.stand(StudyState::Failed, Some(too_late(&format!("the {} ms of", limits.study_deadline_ms))))
                 }
             }
         });
@@ -290,30 +596,19 @@ impl Studies {
 async fn run_chunk(pool: &Pool, kept: &Arc<Kept>, chunk: u64) -> Result<(), Problem> {
     let mut work = Work::new(&kept.study, chunk);
     loop {
-        let (slice, variants, is_over) = pool.run_in_turn(move |stop| slice(work, stop)).await?;
+        let sliced = pool.run_in_turn(move |stop| slice(work, stop)).await?;
+        let Sliced { work: rest, variants, is_over } = sliced;
         counter!("toothwave_study_variants_total").increment(variants);
         kept.looked_at.fetch_add(variants, Ordering::Relaxed);
         if is_over {
-            kept.gathered.lock().add(chunk, slice.finish());
+            let mut gathered = kept.gathered.lock();
+            gathered.add(chunk, rest.finish());
+            kept.impossible.store(gathered.refused(), Ordering::Relaxed);
+            drop(gathered);
             kept.state.send_modify(|_| {});
             return Ok(());
         }
         kept.state.send_modify(|_| {});
-        work = slice;
-    }
-}
-
-/// As many variants as the time of a slice allows; at least one.
-fn slice(mut work: Work, stop: &AtomicBool) -> Result<(Work, u64, bool), Problem> {
-    #[cfg(feature = "fault-injection")]
-    fail::fail_point!("solve");
-    let started = std::time::Instant::now();
-    let mut variants = 0;
-    loop {
-        let is_over = work.step(stop).map_err(|_| NoAnswer::stopped())?;
-        variants += 1;
-        if is_over || started.elapsed() >= SLICE {
-            return Ok((work, variants, is_over));
-        }
+        work = rest;
     }
 }

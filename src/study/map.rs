@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 use crate::ask::{beyond, escaped, fault};
 use crate::document::{ChoiceDocument, MapDocument, OverDocument};
 use crate::evaluate::Evaluator;
-use crate::rows::{ImpossibleAnswer, PossibleAnswer, ReasonAnswer, Rows, RowsPart};
+use crate::rows::{GapAnswer, ImpossibleAnswer, PossibleAnswer, ReasonAnswer, Rows, RowsPart};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Domain, Template, Value, Variable};
 
@@ -173,6 +173,10 @@ pub struct MapAnswer {
     pub build: &'static str,
     /// Whether every variant was looked at.
     pub is_complete: bool,
+    /// Variants that were given up, where there are any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(required = false)]
+    pub gaps: Vec<GapAnswer>,
     /// Variants of the grid.
     pub variants: u64,
     /// The axes of the grid.
@@ -210,6 +214,7 @@ impl MapAnswer {
             solver_version: toothwave_solver::VERSION,
             build: toothwave_calculation::BUILD,
             is_complete,
+            gaps: Vec::new(),
             variants: map.variants().unwrap_or(u64::MAX),
             over: map.axes.iter().map(Axis::answer).collect(),
             possible: PossibleAnswer {

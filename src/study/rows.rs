@@ -1,6 +1,7 @@
 //! Variants in rows: what maps, sensitivities and tolerances have in common. Each variant follows from its number alone.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 use toothwave_calculation::json::Tree;
@@ -106,9 +107,8 @@ pub(crate) fn note(refusals: &mut Vec<RefusalNoted>, first: u64, count: u64, ref
 }
 
 impl RowsWork {
-    pub(crate) fn new(template: Template, quantities: usize, chunk: u64, variants: u64) -> Self {
-        let first = chunk * CHUNK_VARIANTS;
-        Self { template, next: first, end: variants.min(first + CHUNK_VARIANTS), part: RowsPart::new(quantities) }
+    pub(crate) fn new(template: Template, quantities: usize, variants: Range<u64>) -> Self {
+        Self { template, next: variants.start, end: variants.end, part: RowsPart::new(quantities) }
     }
 
     /// One variant further; whether that was the last one.
@@ -165,4 +165,17 @@ pub struct ImpossibleAnswer {
     pub variant: Vec<u64>,
     /// Which of the reasons, from 0.
     pub reason: Vec<u32>,
+}
+
+/// Variants that were never looked at, because whatever looked at them came to an end with them.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct GapAnswer {
+    /// The chunk that they belong to.
+    pub chunk: u64,
+    /// The first of them; of a search's island its first evaluation.
+    pub first_variant: u64,
+    /// How many they are.
+    pub variants: u64,
+    /// How often they were tried.
+    pub attempts: u64,
 }

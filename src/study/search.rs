@@ -18,7 +18,7 @@ use crate::limit::{Bound, Limit, limits};
 use crate::map::asked;
 use crate::optimise::{Judged, Optimiser, Plan, Point, merged};
 use crate::quantity::{Needs, Quantity};
-use crate::rows::{ReasonAnswer, RefusalNoted, note};
+use crate::rows::{GapAnswer, ReasonAnswer, RefusalNoted, note};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Domain, Template, Value, Variable};
 
@@ -522,6 +522,10 @@ pub struct SearchAnswer {
     pub build: &'static str,
     /// Whether every variant was looked at.
     pub is_complete: bool,
+    /// Variants that were given up, where there are any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(required = false)]
+    pub gaps: Vec<GapAnswer>,
     /// Variants that were looked at.
     pub evaluated: u64,
     /// What was free.
@@ -682,6 +686,7 @@ impl SearchAnswer {
             solver_version: toothwave_solver::VERSION,
             build: toothwave_calculation::BUILD,
             is_complete,
+            gaps: Vec::new(),
             evaluated,
             free,
             front: front.iter().filter_map(&mut found).collect(),

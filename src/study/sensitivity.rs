@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 use crate::ask::{escaped, fault};
 use crate::document::{InputDocument, SensitivityDocument};
 use crate::evaluate::Evaluator;
-use crate::rows::{ReasonAnswer, Rows, RowsPart};
+use crate::rows::{GapAnswer, ReasonAnswer, Rows, RowsPart};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Domain, Template, Value};
 
@@ -149,6 +149,10 @@ pub struct SensitivityAnswer {
     pub build: &'static str,
     /// Whether every variant was looked at.
     pub is_complete: bool,
+    /// Variants that were given up, where there are any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(required = false)]
+    pub gaps: Vec<GapAnswer>,
     /// Each quantity, with what moves it most first; none where the base itself has no answer.
     pub quantities: Vec<SensitivityOfQuantity>,
     /// Why variants have no answer. The base is variant 0, the input i less 2i + 1, more 2i + 2.
@@ -211,6 +215,7 @@ impl SensitivityAnswer {
             solver_version: toothwave_solver::VERSION,
             build: toothwave_calculation::BUILD,
             is_complete,
+            gaps: Vec::new(),
             quantities: quantities.collect(),
             reasons: rows.refusals.iter().map(ReasonAnswer::from).collect(),
         }

@@ -1,5 +1,6 @@
 //! The engine: a study is pure chunks, and a merge that does not depend on their order.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
@@ -20,7 +21,7 @@ use crate::evaluate::{Evaluator, Stopped};
 use crate::limit;
 use crate::map::{Map, MapAnswer};
 use crate::quantity::{Needs, QUANTITIES, Quantity};
-use crate::rows::{CHUNK_VARIANTS, RowsPart, RowsWork};
+use crate::rows::{CHUNK_VARIANTS, GapAnswer, RowsPart, RowsWork};
 use crate::search::{Island, IslandPart, Search, SearchAnswer};
 use crate::sensitivity::{Sensitivity, SensitivityAnswer};
 use crate::tolerance::{Tolerance, ToleranceAnswer};
@@ -45,6 +46,8 @@ pub struct Study {
     template: Template,
     evaluator: Evaluator,
     variants: u64,
+    /// Of a chunk in rows.
+    chunk_variants: u64,
 }
 
 #[derive(Debug)]
@@ -143,7 +146,8 @@ impl Study {
             require_what_quantities_need(&quantities, example)?;
             require_possible_base(&quantities, &template, example, &limits.calculation)?;
         }
-        let study = Self { id, kind, template, evaluator: Evaluator::new(quantities, limits.calculation), variants };
+        let evaluator = Evaluator::new(quantities, limits.calculation);
+        let study = Self { id, kind, template, evaluator, variants, chunk_variants: CHUNK_VARIANTS };
         #[expect(clippy::cast_precision_loss, reason = "told, not computed with")]
         if variants > limits.max_study_variants {
             let limit = limits.max_study_variants;
@@ -189,8 +193,29 @@ impl Study {
     pub const fn chunks(&self) -> u64 {
         match &self.kind {
             Kind::Search(search) => search.islands(),
-            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => self.variants.div_ceil(CHUNK_VARIANTS),
+            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => self.variants.div_ceil(self.chunk_variants),
         }
+    }
+
+    /// The same study in chunks of so many variants each: its result is the same, to the bit. The islands of a search stay as they are, since
+    /// what they find depends on how many there are.
+    #[must_use]
+    pub fn in_chunks_of(self, variants: u64) -> Self {
+        Self { chunk_variants: variants.max(1), ..self }
+    }
+
+    /// Variants of a chunk, about.
+    pub const fn chunk_variants(&self) -> u64 {
+        match &self.kind {
+            Kind::Search(search) => search.evaluations().div_ceil(search.islands()),
+            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => self.chunk_variants,
+        }
+    }
+
+    /// The variants of a chunk in rows.
+    fn rows_of(&self, chunk: u64) -> Range<u64> {
+        let first = chunk.saturating_mul(self.chunk_variants).min(self.variants);
+        first..self.variants.min(first.saturating_add(self.chunk_variants))
     }
 
     /// About what it takes to keep what it comes to.
@@ -338,10 +363,22 @@ impl Work {
             Kind::Search(search) => State::Island(Box::new(Island::new(search, study.template.clone(), chunk))),
             Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => {
                 let quantities = study.evaluator.quantities.len();
-                State::Rows(RowsWork::new(study.template.clone(), quantities, chunk, study.variants))
+                State::Rows(RowsWork::new(study.template.clone(), quantities, study.rows_of(chunk)))
             }
         };
         Self { study: Arc::clone(study), state }
+    }
+
+    /// One variant of a study in rows alone; of a search its first island. To see what variants take, and what they come to here.
+    pub fn of_variant(study: &Arc<Study>, variant: u64) -> Self {
+        match &study.kind {
+            Kind::Search(_) => Self::new(study, 0),
+            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => {
+                let quantities = study.evaluator.quantities.len();
+                let rows = RowsWork::new(study.template.clone(), quantities, variant..study.variants.min(variant + 1));
+                Self { study: Arc::clone(study), state: State::Rows(rows) }
+            }
+        }
     }
 
     /// One variant further; whether that was the last one.
@@ -387,13 +424,14 @@ pub struct Gathered {
     missing: u64,
     variants: u64,
     refused: u64,
+    gaps: Vec<GapAnswer>,
 }
 
 impl Gathered {
     /// None yet.
     pub fn new(study: &Arc<Study>) -> Self {
         let parts = (0..study.chunks()).map(|_| None).collect();
-        Self { study: Arc::clone(study), parts, missing: study.chunks(), variants: 0, refused: 0 }
+        Self { study: Arc::clone(study), parts, missing: study.chunks(), variants: 0, refused: 0, gaps: Vec::new() }
     }
 
     /// The study.
@@ -410,6 +448,17 @@ impl Gathered {
             self.refused += part.refused();
             *place = Some(part);
         }
+    }
+
+    /// Takes note of the chunks that will not come, each with how often it was tried.
+    pub fn give_up(&mut self, chunks: impl IntoIterator<Item = (u64, u64)>) {
+        let study = &self.study;
+        let gap = |(chunk, attempts): (u64, u64)| {
+            let first_variant = chunk * study.chunk_variants();
+            let variants = study.chunk_variants().min(study.variants - first_variant.min(study.variants));
+            GapAnswer { chunk, first_variant, variants, attempts }
+        };
+        self.gaps = chunks.into_iter().map(gap).collect();
     }
 
     /// Chunks that have not come yet.
@@ -434,6 +483,18 @@ impl Gathered {
 
     /// What the study comes to, as far as it has come.
     pub fn answer(&self) -> StudyAnswer {
+        let mut answer = self.answer_without_gaps();
+        let gaps = match &mut answer {
+            StudyAnswer::Map(map) => &mut map.gaps,
+            StudyAnswer::Search(search) => &mut search.gaps,
+            StudyAnswer::Sensitivity(sensitivity) => &mut sensitivity.gaps,
+            StudyAnswer::Tolerance(tolerance) => &mut tolerance.gaps,
+        };
+        gaps.clone_from(&self.gaps);
+        answer
+    }
+
+    fn answer_without_gaps(&self) -> StudyAnswer {
         let study = &*self.study;
         let (evaluator, is_complete) = (&study.evaluator, self.is_complete());
         match &study.kind {

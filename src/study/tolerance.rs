@@ -13,7 +13,7 @@ use crate::evaluate::Evaluator;
 use crate::limit::{Bound, Limit};
 use crate::random::Stream;
 use crate::rank::{QuantileAnswer, ShareAnswer, quantile, share};
-use crate::rows::{ReasonAnswer, Rows, RowsPart};
+use crate::rows::{GapAnswer, ReasonAnswer, Rows, RowsPart};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Template, Value};
 
@@ -254,6 +254,10 @@ pub struct ToleranceAnswer {
     pub build: &'static str,
     /// Whether every drive was looked at.
     pub is_complete: bool,
+    /// Variants that were given up, where there are any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(required = false)]
+    pub gaps: Vec<GapAnswer>,
     /// Drives that were drawn and looked at.
     pub samples: u64,
     /// Of those, drives that cannot be put together because a part is too full. They enter no quantile.
@@ -428,6 +432,7 @@ impl ToleranceAnswer {
             solver_version: toothwave_solver::VERSION,
             build: toothwave_calculation::BUILD,
             is_complete,
+            gaps: Vec::new(),
             samples: looked_at,
             interference,
             impossible,

@@ -19,6 +19,7 @@ use toothwave::compute::{Pool, Thread};
 use toothwave::config::Limits;
 use toothwave::keys::Keys;
 use toothwave::router::{Entry, router};
+use toothwave::studies::Keeping;
 use tower::ServiceExt as _;
 
 /// Every path that a design document can be sent to.
@@ -212,6 +213,12 @@ impl Service {
         let origins: Vec<_> = origins.iter().map(|&origin| origin.into()).collect();
         let entry = Entry { cors_origins: origins, ..Entry::default() };
         Self { router: router(Arc::clone(&app), &entry), app }
+    }
+
+    /// With its studies kept somewhere, and served as they are in a whole service.
+    pub(crate) fn keeping(limits: Limits, keeping: Keeping) -> Self {
+        let app = App::keeping(limits, keeping);
+        Self { router: router(Arc::clone(&app), &Entry::default()), app }
     }
 
     /// Behind a keys file of this text.

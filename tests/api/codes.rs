@@ -42,7 +42,9 @@ pub(crate) fn problem_codes() -> Vec<ProblemCode> {
         DeadlineExceeded => ShuttingDown,
         ShuttingDown => TooManyConnections,
         TooManyConnections => TooManyUnreadBytes,
-        TooManyUnreadBytes => InternalError;
+        TooManyUnreadBytes => NoSharedStore,
+        NoSharedStore => StoreUnavailable,
+        StoreUnavailable => InternalError;
         InternalError)
 }
 
@@ -150,7 +152,9 @@ fn every_kind_of_problem_has_its_status_and_a_type_of_its_own() {
         | ProblemCode::DeadlineExceeded
         | ProblemCode::ShuttingDown
         | ProblemCode::TooManyConnections
-        | ProblemCode::TooManyUnreadBytes => 503,
+        | ProblemCode::TooManyUnreadBytes
+        | ProblemCode::StoreUnavailable => 503,
+        ProblemCode::NoSharedStore => 501,
         ProblemCode::InternalError => 500,
     };
     let mut types: Vec<_> = problem_codes()

@@ -33,5 +33,6 @@ mod problems;
 mod profiles;
 mod ranges;
 mod serving;
+mod stored;
 mod studies;
 mod violations;

@@ -1,15 +1,15 @@
 //! The engine: chunks are pure, and merged in any order to the same bits.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use toothwave_calculation::forms::Format;
 use toothwave_solver::{Never, Stop};
-use toothwave_study::{Gathered, Part, Work};
+use toothwave_study::{Gathered, Part, Study, Work};
 
-use crate::asking::{gathered, paper, study, text};
+use crate::asking::{LIMITS, gathered, paper, study, text};
 
 /// A study of each kind, each of several chunks.
 fn studies() -> [Value; 4] {
@@ -32,6 +32,10 @@ fn studies() -> [Value; 4] {
             "inputs": { "/drive/teeth/radius_mm": normal, "/drive/wave_generator/semi_major_mm": normal }
         }),
     ]
+}
+
+fn in_chunks_of(document: &Value, variants: u64) -> Arc<Study> {
+    Arc::new(Study::read(document.to_string().as_bytes(), &LIMITS).unwrap().in_chunks_of(variants))
 }
 
 /// A part as a store would keep it.
@@ -122,5 +126,49 @@ fn another_seed_is_another_study() {
         other["seed"] = json!(2);
         assert_ne!(study(&document).unwrap().id(), study(&other).unwrap().id());
         assert_ne!(text(&gathered(&document), Format::Json), text(&gathered(&other), Format::Json));
+    }
+}
+
+#[test]
+fn a_study_in_chunks_of_any_size_has_the_same_bits() {
+    for document in studies() {
+        let whole = text(&gathered(&document), Format::Json);
+        for variants in [1, 7, 1_000_000] {
+            let study = in_chunks_of(&document, variants);
+            let mut gathered = Gathered::new(&study);
+            for chunk in (0..study.chunks()).rev() {
+                gathered.add(chunk, Work::new(&study, chunk).run(&Never).unwrap());
+            }
+            assert!(text(&gathered, Format::Json) == whole, "{} in chunks of {variants}", study.kind());
+        }
+    }
+}
+
+#[test]
+fn a_variant_alone_is_what_it_is_among_the_others() {
+    let [map, _, sensitivity, tolerance] = studies();
+    for document in [map, sensitivity, tolerance] {
+        let study = in_chunks_of(&document, 1);
+        for variant in [0, study.variants() / 2, study.variants() - 1] {
+            let alone = Work::of_variant(&study, variant).run(&Never).unwrap();
+            assert_eq!(alone, Work::new(&study, variant).run(&Never).unwrap());
+            assert_eq!(alone.variants(), 1);
+        }
+    }
+}
+
+#[test]
+fn a_result_names_the_chunks_that_were_given_up() {
+    for document in studies() {
+        let study = in_chunks_of(&document, 100);
+        let last = study.chunks() - 1;
+        let mut gathered = Gathered::new(&study);
+        assert!(!text(&gathered, Format::Json).contains("\"gaps\""), "where there are none nothing is said");
+        gathered.give_up([(last, 3)]);
+        let answer: Value = serde_json::from_str(&text(&gathered, Format::Json)).unwrap();
+        let gap = &answer["gaps"][0];
+        assert_eq!((&gap["chunk"], &gap["attempts"]), (&json!(last), &json!(3)));
+        let (first, variants) = (gap["first_variant"].as_u64().unwrap(), gap["variants"].as_u64().unwrap());
+        assert!(variants > 0 && first + variants == study.variants(), "{gap}");
     }
 }

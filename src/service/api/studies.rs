@@ -76,7 +76,7 @@ pub async fn begin(State(app): State<Arc<App>>, request: Request) -> Response {
     )
 )]
 pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
-    match kept(&app, id) {
+    match kept(&app, id).await {
         Ok(kept) => no_store(Json(kept.resource()).into_response()),
         Err(problem) => problem.into_response(),
     }
@@ -94,11 +94,11 @@ pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRej
     )
 )]
 pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
-    match kept(&app, id) {
-        Ok(kept) => {
-            app.studies.cancel_or_forget(&kept);
-            StatusCode::NO_CONTENT.into_response()
-        }
+    match kept(&app, id).await {
+        Ok(kept) => match app.studies.cancel_or_forget(&kept).await {
+            Ok(()) => StatusCode::NO_CONTENT.into_response(),
+            Err(problem) => problem.into_response(),
+        },
         Err(problem) => problem.into_response(),
     }
 }
@@ -124,8 +124,9 @@ pub async fn result(
     headers: HeaderMap,
 ) -> Response {
     let answer = async {
-        let kept = kept(&app, id)?;
+        let kept = kept(&app, id).await?;
         let representation = Representation::negotiate(&headers, StudyAnswer::FORMS.iter().map(|(format, _)| *format))?;
+        app.studies.gather(&kept).await?;
         let study = Arc::clone(&kept);
         written_apart(&app, &kept, representation, move || study.answer()).await
     };
@@ -164,7 +165,7 @@ pub enum EventName {
     )
 )]
 pub async fn events(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
-    let kept = match kept(&app, id) {
+    let kept = match kept(&app, id).await {
         Ok(kept) => kept,
         Err(problem) => return problem.into_response(),
     };
@@ -197,10 +198,10 @@ fn no_store(mut response: Response) -> Response {
     response
 }
 
-fn kept(app: &App, id: Result<Path<String>, PathRejection>) -> Result<Arc<Kept>, Problem> {
+async fn kept(app: &App, id: Result<Path<String>, PathRejection>) -> Result<Arc<Kept>, Problem> {
     // An id that is no text is no study's either.
     let id = id.map(|Path(id)| id).unwrap_or_default();
-    app.studies.find(&id).ok_or_else(|| {
+    app.studies.find(&id).await?.ok_or_else(|| {
         let detail =
             format!("no study `{id}` is kept: it was never asked for here, or was forgotten; ask for it again");
         Problem::new(ProblemCode::NotFound, detail)
@@ -214,7 +215,7 @@ async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Respons
     negotiation::require_json(&headers)?;
     let representation = Representation::negotiate(&headers, std::iter::empty())?;
     let body = read_body(&headers, body, &app.limits, deadline).await?;
-    let kept = app.studies.begin(Study::read(&body, &app.limits.of_studies())?)?;
+    let kept = app.studies.begin(Study::read(&body, &app.limits.of_studies())?, &body).await?;
     let wait = wait_wanted(&headers);
     if let Some(wait) = wait {
         let wait_until = deadline.min(tokio::time::Instant::now() + wait);
@@ -236,6 +237,7 @@ async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Respons
         let location = format!("/v1/studies/{}", kept.resource().id);
         (StatusCode::ACCEPTED, [(header::LOCATION, location)], Json(kept.resource())).into_response()
     } else {
+        app.studies.gather(&kept).await?;
         let study = Arc::clone(&kept);
         let resource = move || {
             let mut resource = study.resource();

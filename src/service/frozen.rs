@@ -1,0 +1,212 @@
+//! What is frozen with a study that is kept in a store: its chunks, and a canary that tells whether another process computes the same bits.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+use toothwave_calculation::no_answer::NoAnswer;
+use toothwave_calculation::{BUILD, question};
+use toothwave_store::NewStudy;
+use toothwave_study::{Limits, Part, Study, Work};
+
+use crate::compute::Pool;
+use crate::problem::Problem;
+
+/// What a chunk should take: long against what it costs to claim and to keep one, short against what a worker's end loses.
+const CHUNK: Duration = Duration::from_secs(1);
+
+/// A canary is long enough to tell how long variants take.
+const CANARY: Duration = Duration::from_millis(50);
+
+/// Variants of a canary at most.
+const MOST_OF_A_CANARY: u64 = 4096;
+
+/// Bytes of what a chunk comes to, at most: one statement carries them.
+const MOST_OF_A_PART: u64 = 4 << 20;
+
+/// A worker is not taken for dead before it was silent over one chunk for as long as so many should take.
+const CHUNKS_OF_A_LEASE: u32 = 20;
+
+/// Nor before this time.
+const LEAST_LEASE: Duration = Duration::from_secs(30);
+
+/// No variant is begun after this time, so that single requests have their turn.
+const SLICE: Duration = Duration::from_millis(5);
+
+/// Why a stored study is not computed here.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NotHere {
+    /// The build is part of the study.
+    #[error("the study belongs to build {theirs}, and this is {BUILD}")]
+    OtherBuild {
+        /// The one that it was asked of.
+        theirs: String,
+    },
+    /// So is the arithmetic of its processor.
+    #[error("the study was asked of another kind of processor, whose last bits are others")]
+    OtherArithmetic,
+    /// Whatever the reason.
+    #[error("the study's canary comes to other bits here")]
+    OtherBits,
+    /// This build knows no such study, though it is its own.
+    #[error("the study cannot be read: {0}")]
+    Unreadable(String),
+}
+
+/// A study with all that is frozen with it when it is first kept.
+///
+/// # Errors
+/// Where the canary has no turn, or the service stops.
+pub async fn freeze(
+    pool: &Pool,
+    study: Study,
+    document: &[u8],
+    limits: &question::Limits,
+    time: Duration,
+) -> Result<NewStudy, Problem> {
+    let study = Arc::new(study);
+    let canary = sung(pool, Canary::new(&study, MOST_OF_A_CANARY, Some(CANARY))).await?;
+    let canary_variants = canary.sung.max(1);
+    let a_variant = canary.busy / u32::try_from(canary_variants).unwrap_or(u32::MAX);
+    let part_variants = MOST_OF_A_PART / (study.stored_bytes() / study.variants().max(1)).max(1);
+    #[cfg(not(feature = "fault-injection"))]
+    let chunk = CHUNK;
+    #[cfg(feature = "fault-injection")]
+    let chunk = crate::injected::chunk().unwrap_or(CHUNK);
+    let wanted = u64::try_from(chunk.as_nanos() / a_variant.as_nanos().max(1)).unwrap_or(u64::MAX);
+    let id = study.id().to_string();
+    let canary = canary.hash();
+    let study = Arc::into_inner(study).ok_or_else(|| Problem::internal(&"a canary goes on after its end"))?;
+    let study = study.in_chunks_of(wanted.min(part_variants).max(1));
+    let a_chunk = a_variant.saturating_mul(u32::try_from(study.chunk_variants()).unwrap_or(u32::MAX));
+    Ok(NewStudy {
+        id,
+        kind: study.kind().into(),
+        build: BUILD.into(),
+        document: String::from_utf8_lossy(document).into_owned(),
+        max_states: limits.max_states,
+        max_profile_points: limits.max_profile_points,
+        variants: study.variants(),
+        chunk_variants: study.chunk_variants(),
+        chunks: study.chunks(),
+        canary_variants,
+        canary,
+        lease: a_chunk.saturating_mul(CHUNKS_OF_A_LEASE).max(LEAST_LEASE),
+        time,
+    })
+}
+
+/// The study that was frozen.
+///
+/// # Errors
+/// Where it is another build's or another kind of processor's.
+pub fn thaw(frozen: &NewStudy) -> Result<Arc<Study>, NotHere> {
+    if frozen.build != BUILD {
+        return Err(NotHere::OtherBuild { theirs: frozen.build.clone() });
+    }
+    let calculation = question::Limits { max_states: frozen.max_states, max_profile_points: frozen.max_profile_points };
+    // Whoever took it on admitted as much.
+    let limits = Limits { calculation, max_study_variants: u64::MAX, max_study_bytes: u64::MAX };
+    let study = Study::read(frozen.document.as_bytes(), &limits)
+        .map_err(|refused| NotHere::Unreadable(refused.to_string()))?
+        .in_chunks_of(frozen.chunk_variants);
+    if study.id().to_string() != frozen.id {
+        return Err(NotHere::OtherArithmetic);
+    }
+    Ok(Arc::new(study))
+}
+
+/// Whether this process computes the study's bits.
+///
+/// # Errors
+/// Where the canary has no turn, or the service stops.
+pub async fn has_the_same_bits(pool: &Pool, study: &Arc<Study>, frozen: &NewStudy) -> Result<bool, Problem> {
+    let canary = sung(pool, Canary::new(study, frozen.canary_variants, None)).await?;
+    Ok(canary.hash() == frozen.canary)
+}
+
+/// A part as it is kept.
+pub fn encoded(part: &Part) -> Result<Vec<u8>, Problem> {
+    postcard::to_stdvec(part).map_err(|error| Problem::internal(&error))
+}
+
+/// A part as it was kept.
+pub fn decoded(bytes: &[u8]) -> Result<Part, Problem> {
+    postcard::from_bytes(bytes).map_err(|error| Problem::internal(&error))
+}
+
+/// Variants spread over a study; of a search the beginning of its first island.
+struct Canary {
+    study: Arc<Study>,
+    island: Option<Work>,
+    hasher: blake3::Hasher,
+    sung: u64,
+    most: u64,
+    until: Option<Duration>,
+    busy: Duration,
+}
+
+impl Canary {
+    fn new(study: &Arc<Study>, most: u64, until: Option<Duration>) -> Self {
+        let island = (study.kind() == "search").then(|| Work::new(study, 0));
+        let most = most.min(study.variants());
+        let hasher = blake3::Hasher::new();
+        Self { study: Arc::clone(study), island, hasher, sung: 0, most, until, busy: Duration::ZERO }
+    }
+
+    /// Variants in an order whose every beginning is spread evenly (van der Corput's sequence): those at one end may be quick to refuse.
+    fn variant(&self) -> u64 {
+        let share = u128::from(self.sung.reverse_bits());
+        u64::try_from((share * u128::from(self.study.variants())) >> 64).unwrap_or(0)
+    }
+
+    /// As far as a slice allows; whether it is over.
+    fn slice(&mut self, stop: &AtomicBool) -> Result<bool, Problem> {
+        let started = Instant::now();
+        while self.sung < self.most
+            && self.until.is_none_or(|until| self.sung == 0 || self.busy + started.elapsed() < until)
+        {
+            match &mut self.island {
+                Some(island) => {
+                    if island.step(stop).map_err(|_| NoAnswer::stopped())? {
+                        self.most = self.sung + 1;
+                    }
+                }
+                None => {
+                    let part =
+                        Work::of_variant(&self.study, self.variant()).run(stop).map_err(|_| NoAnswer::stopped())?;
+                    self.hasher.update(&encoded(&part)?);
+                }
+            }
+            self.sung += 1;
+            if started.elapsed() >= SLICE {
+                self.busy += started.elapsed();
+                return Ok(false);
+            }
+        }
+        self.busy += started.elapsed();
+        if let Some(island) = self.island.take() {
+            self.hasher.update(&encoded(&island.finish())?);
+        }
+        Ok(true)
+    }
+
+    fn hash(self) -> String {
+        self.hasher.finalize().to_hex().to_string()
+    }
+}
+
+async fn sung(pool: &Pool, mut canary: Canary) -> Result<Canary, Problem> {
+    loop {
+        let is_over;
+        (canary, is_over) = pool
+            .run_in_turn(move |stop| {
+                let is_over = canary.slice(stop)?;
+                Ok((canary, is_over))
+            })
+            .await?;
+        if is_over {
+            return Ok(canary);
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! Workers: they take chunks of stored studies, one after the other, compute them and keep what they come to.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+use futures_util::future::join_all;
+use metrics::counter;
+use parking_lot::Mutex;
+use tokio::sync::watch;
+use tokio_util::sync::CancellationToken;
+use toothwave_calculation::BUILD;
+use toothwave_calculation::no_answer::NoAnswer;
+use toothwave_store::{Claim, Lease, Store, StoreError, Waiting};
+use toothwave_study::{Part, Study, Work};
+
+use crate::compute::Pool;
+use crate::frozen::{self, NotHere};
+#[cfg(feature = "fault-injection")]
+use crate::injected;
+use crate::problem::Problem;
+
+/// Between two looks at what there is to do, and at what was cancelled.
+const PAUSE: Duration = Duration::from_secs(1);
+
+/// Between two tries to keep a result: at first, and at most.
+const RETRY: Duration = Duration::from_millis(200);
+const LONGEST_RETRY: Duration = Duration::from_secs(10);
+
+/// A slice begins no variant after this time: so long at most does a single request wait behind short ones.
+pub const SLICE: Duration = Duration::from_millis(5);
+
+/// The workers of this process.
+#[derive(Debug)]
+pub struct Workers {
+    store: Store,
+    pool: Pool,
+    /// Chunks that are computed side by side.
+    slots: usize,
+    /// Told when a study was asked for, or has come further, in this process.
+    changed: watch::Sender<()>,
+    /// Cancelled when no chunk is to be begun any more.
+    stopping: CancellationToken,
+    /// What a chunk that is in work then gets to come to its end.
+    patience: Duration,
+    known: tokio::sync::Mutex<HashMap<String, Known>>,
+    /// What was last said of the store.
+    trouble: Mutex<Option<String>>,
+}
+
+/// A study that this process computes, or why it does not.
+type Known = Result<(Arc<Study>, Duration), NotHere>;
+
+/// The studies that wait, as far as is known.
+type Tasks = watch::Receiver<Arc<Vec<Waiting>>>;
+
+impl Workers {
+    /// Workers who have not begun yet.
+    pub fn new(
+        store: Store,
+        pool: Pool,
+        slots: usize,
+        changed: watch::Sender<()>,
+        stopping: CancellationToken,
+        patience: Duration,
+    ) -> Self {
+        Self { store, pool, slots, changed, stopping, patience, known: Default::default(), trouble: Mutex::default() }
+    }
+
+    /// Works until it is told to stop.
+    pub async fn work(&self) {
+        let (tell, tasks) = watch::channel(Arc::default());
+        let over = CancellationToken::new();
+        let slots = async {
+            join_all((0..self.slots).map(|slot| self.fill(slot, tasks.clone()))).await;
+            over.cancel();
+        };
+        tokio::join!(slots, self.look(&tell, &over));
+    }
+
+    /// Looks every second what there is to do. Chunks that are in work when it stops still learn that they are not wanted.
+    async fn look(&self, tell: &watch::Sender<Arc<Vec<Waiting>>>, over: &CancellationToken) {
+        let mut changed = self.changed.subscribe();
+        while !over.is_cancelled() {
+            match self.store.waiting().await {
+                Ok(waiting) => {
+                    self.is_well();
+                    self.known.lock().await.retain(|id, _| waiting.iter().any(|task| task.id == *id));
+                    tell.send_replace(Arc::new(waiting));
+                }
+                // What was begun may go on: it is kept when the store is back.
+                Err(error) => self.is_in_trouble(&error),
+            }
+            tokio::select! {
+                () = tokio::time::sleep(PAUSE) => {}
+                _ = changed.changed() => {}
+                () = over.cancelled() => {}
+            }
+        }
+    }
+
+    /// One chunk after the other, of the studies in turn.
+    async fn fill(&self, slot: usize, mut tasks: Tasks) {
+        let mut turn = slot;
+        while !self.stopping.is_cancelled() {
+            let waiting = Arc::clone(&tasks.borrow_and_update());
+            let mut has_worked = false;
+            for offset in 0..waiting.len() {
+                if self.stopping.is_cancelled() {
+                    return;
+                }
+                let task = &waiting[(turn + offset) % waiting.len()];
+                let Some((study, lease)) = self.study(task).await else { continue };
+                match self.store.claim(&task.id, lease).await {
+                    Ok(Claim::Chunk(lease)) => {
+                        self.compute(&task.id, &study, lease, &mut tasks).await;
+                        has_worked = true;
+                    }
+                    Ok(Claim::Gap(chunk)) => {
+                        tracing::warn!(study = task.id, chunk, "a chunk was given up: no attempt came to a result");
+                        self.changed.send_replace(());
+                        has_worked = true;
+                    }
+                    Ok(Claim::None) => {}
+                    Err(error) => self.is_in_trouble(&error),
+                }
+                if has_worked {
+                    turn = turn.wrapping_add(offset + 1);
+                    break;
+                }
+            }
+            if !has_worked {
+                tokio::select! {
+                    _ = tasks.changed() => {}
+                    () = self.stopping.cancelled() => {}
+                }
+            }
+        }
+    }
+
+    /// The study, where this process computes it: of this build, with a canary of the same bits.
+    async fn study(&self, task: &Waiting) -> Option<(Arc<Study>, Duration)> {
+        let mut known = self.known.lock().await;
+        if let Some(known) = known.get(&task.id) {
+            return known.clone().ok();
+        }
+        let found = if task.build == BUILD {
+            match self.admitted(task).await {
+                Ok(found) => found?,
+                // Another time.
+                Err(problem) => {
+                    tracing::warn!(study = task.id, %problem, "a study could not be looked at");
+                    return None;
+                }
+            }
+        } else {
+            Err(NotHere::OtherBuild { theirs: task.build.clone() })
+        };
+        if let Err(reason) = &found {
+            tracing::warn!(study = task.id, %reason, "a study is left to other workers");
+        }
+        known.insert(task.id.clone(), found.clone());
+        found.ok()
+    }
+
+    async fn admitted(&self, task: &Waiting) -> Result<Option<Known>, Problem> {
+        let Some(standing) = self.store.find(&task.id).await? else { return Ok(None) };
+        let study = match frozen::thaw(&standing.study) {
+            Ok(study) => study,
+            Err(reason) => return Ok(Some(Err(reason))),
+        };
+        let is_same = frozen::has_the_same_bits(&self.pool, &study, &standing.study).await?;
+        Ok(Some(if is_same { Ok((study, standing.study.lease)) } else { Err(NotHere::OtherBits) }))
+    }
+
+    /// Computes a chunk and keeps what it comes to, unless it is not wanted any more.
+    async fn compute(&self, id: &str, study: &Arc<Study>, mut lease: Lease, tasks: &mut Tasks) {
+        let chunk = lease.chunk();
+        let time_is_over = async {
+            self.stopping.cancelled().await;
+            tokio::time::sleep(self.patience).await;
+        };
+        tokio::pin!(time_is_over);
+        let computed = {
+            let running = run_chunk(&self.pool, study, chunk);
+            tokio::pin!(running);
+            loop {
+                tokio::select! {
+                    computed = &mut running => break Some(computed),
+                    () = &mut time_is_over => break None,
+                    _ = tasks.changed() => {
+                        if !tasks.borrow_and_update().iter().any(|task| task.id == id) {
+                            break None;
+                        }
+                    }
+                }
+            }
+        };
+        let (part, busy) = match computed {
+            Some(Ok(computed)) => computed,
+            Some(Err(problem)) => {
+                // The attempt stays noted: it may be the chunk's fault.
+                tracing::error!(study = id, chunk, %problem, cause = problem.cause, "a chunk failed");
+                return;
+            }
+            None => {
+                if let Err(error) = lease.give_back().await {
+                    self.is_in_trouble(&error);
+                }
+                return;
+            }
+        };
+        let bytes = match frozen::encoded(&part) {
+            Ok(bytes) => bytes,
+            Err(problem) => {
+                tracing::error!(study = id, chunk, cause = problem.cause, "a chunk cannot be kept");
+                return;
+            }
+        };
+        let mut retry = RETRY;
+        // What is computed is not computed again because the store is away for a while.
+        while let Err(error) = lease.keep(&bytes, part.variants(), part.refused(), busy).await {
+            self.is_in_trouble(&error);
+            tokio::select! {
+                () = tokio::time::sleep(retry) => {}
+                () = &mut time_is_over => {
+                    // Nobody answers: that it was begun stays noted.
+                    let _ = lease.give_back().await;
+                    return;
+                }
+            }
+            retry = (2 * retry).min(LONGEST_RETRY);
+        }
+        self.is_well();
+        self.changed.send_replace(());
+    }
+
+    /// Says what is wrong with the store, once.
+    fn is_in_trouble(&self, error: &StoreError) {
+        let text = error.to_string();
+        let mut trouble = self.trouble.lock();
+        if trouble.as_ref() != Some(&text) {
+            tracing::warn!(error = text, "the studies' store is in trouble; tried again until it is well");
+            *trouble = Some(text);
+        }
+    }
+
+    fn is_well(&self) {
+        if self.trouble.lock().take().is_some() {
+            tracing::info!("the studies' store is well again");
+        }
+    }
+}
+
+/// What a chunk comes to, and the time that it was computed for.
+async fn run_chunk(pool: &Pool, study: &Arc<Study>, chunk: u64) -> Result<(Part, Duration), Problem> {
+    let mut work = Work::new(study, chunk);
+    #[cfg(feature = "fault-injection")]
+    {
+        injected::poison(chunk);
+        if let Some(time) = injected::slow() {
+            tokio::time::sleep(time).await;
+        }
+        if let Some(time) = injected::asleep() {
+            tokio::time::sleep(time).await;
+            return Ok((work.finish(), time));
+        }
+    }
+    let mut busy = Duration::ZERO;
+    loop {
+        let started = Instant::now();
+        let sliced = pool.run_in_turn(move |stop| slice(work, stop)).await?;
+        busy += started.elapsed();
+        counter!("toothwave_study_variants_total").increment(sliced.variants);
+        work = sliced.work;
+        if sliced.is_over {
+            return Ok((work.finish(), busy));
+        }
+    }
+}
+
+/// A slice of a chunk.
+#[derive(Debug)]
+pub struct Sliced {
+    /// The chunk, to go on with.
+    pub work: Work,
+    /// Variants that the slice looked at.
+    pub variants: u64,
+    /// Whether the chunk is over.
+    pub is_over: bool,
+}
+
+/// As many variants as the time of a slice allows; at least one.
+///
+/// # Errors
+/// When `stop` says so.
+pub fn slice(mut work: Work, stop: &AtomicBool) -> Result<Sliced, Problem> {
+    #[cfg(feature = "fault-injection")]
+    fail::fail_point!("solve");
+    let started = Instant::now();
+    let mut variants = 0;
+    loop {
+        let is_over = work.step(stop).map_err(|_| NoAnswer::stopped())?;
+        variants += 1;
+        if is_over || started.elapsed() >= SLICE {
+            return Ok(Sliced { work, variants, is_over });
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! Connections to either database, and what may go wrong with them.
+
+use std::collections::HashSet;
+use std::future::Future;
+use std::sync::Arc;
+use std::sync::Mutex;
+use std::time::Duration;
+
+use sqlx::ConnectOptions as _;
+use sqlx::pool::{PoolConnection, PoolOptions};
+use sqlx::postgres::{PgPool, Postgres};
+use sqlx::sqlite::{Sqlite, SqliteConnectOptions, SqliteJournalMode, SqliteLockingMode, SqlitePool, SqliteSynchronous};
+
+use crate::PATIENCE;
+use crate::address::Address;
+
+/// A chunk by its study and its number.
+pub(crate) type ChunkName = (String, u64);
+
+/// A store of studies.
+#[derive(Debug, Clone)]
+pub struct Store {
+    pub(crate) database: Database,
+    address: Address,
+    /// What this process is called in the store.
+    pub(crate) worker: Arc<str>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) enum Database {
+    /// One connection: the file belongs to it alone. The leases are this process's own.
+    File { pool: SqlitePool, leased: Arc<Mutex<HashSet<ChunkName>>> },
+    /// Those of leases are held while a chunk is computed; the others pass from hand to hand.
+    Server { pool: PgPool, leases: PgPool },
+}
+
+/// A connection to either database.
+#[derive(Debug)]
+pub(crate) enum Connection {
+    File(PoolConnection<Sqlite>),
+    Server(PoolConnection<Postgres>),
+}
+
+/// The same statements for both databases.
+macro_rules! on {
+    ($connection:expr, $inner:ident => $body:expr) => {
+        match $connection {
+            $crate::connection::Connection::File($inner) => {
+                let $inner = &mut **$inner;
+                $body
+            }
+            $crate::connection::Connection::Server($inner) => {
+                let $inner = &mut **$inner;
+                $body
+            }
+        }
+    };
+}
+pub(crate) use on;
+
+/// Why a store did not do what it was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// Nobody answers, or the server says no.
+    #[error("the studies' store fails: {0}")]
+    Failed(#[from] sqlx::Error),
+    /// It was silent for too long.
+    #[error("the studies' store did not answer within {} s", PATIENCE.as_secs())]
+    Silent,
+    /// The database has another schema than this build works with.
+    #[error("the studies' store has schema {found}, and this build works with {}: {}", crate::SCHEMA_VERSION, if *found < crate::SCHEMA_VERSION { "`toothwave migrate` brings it there" } else { "a newer build is needed" })]
+    OtherSchema {
+        /// What it has; 0 for none.
+        found: u64,
+    },
+    /// Another process has the file.
+    #[error(
+        "another process has the studies' file {0}: a file serves one process; several of them share a PostgreSQL database"
+    )]
+    InUse(String),
+    /// A file knows no workers elsewhere.
+    #[error("{0} is a file, which serves one process: workers share a PostgreSQL database")]
+    NotShared(String),
+}
+
+/// Connections that are not leases: few statements, each over soon.
+const CONNECTIONS: u32 = 8;
+
+/// More than any machine computes chunks side by side.
+const MOST_LEASES: u32 = 1024;
+
+impl Store {
+    /// The store at an address; a server is not connected to before it is needed.
+    ///
+    /// # Errors
+    /// Where a file cannot be opened, is another process's, or has a schema of a newer build.
+    pub async fn open(address: &Address) -> Result<Self, StoreError> {
+        let worker = worker_name().into();
+        match address {
+            Address::File(path) => {
+                let options = SqliteConnectOptions::new()
+                    .filename(path)
+                    .create_if_missing(true)
+                    // Whatever was committed outlives the process, and the machine too.
+                    .journal_mode(SqliteJournalMode::Wal)
+                    .synchronous(SqliteSynchronous::Full)
+                    .locking_mode(SqliteLockingMode::Exclusive)
+                    .foreign_keys(true)
+                    .busy_timeout(Duration::from_secs(1))
+                    .disable_statement_logging();
+                let pool = PoolOptions::<Sqlite>::new()
+                    .max_connections(1)
+                    .idle_timeout(None)
+                    .max_lifetime(None)
+                    .acquire_timeout(PATIENCE)
+                    .connect_with(options)
+                    .await
+                    .map_err(|error| in_use(error, address))?;
+                let store = Self {
+                    database: Database::File { pool, leased: Arc::default() },
+                    address: address.clone(),
+                    worker,
+                };
+                store.migrate().await.map_err(|error| match error {
+                    StoreError::Failed(error) => in_use(error, address),
+                    other => other,
+                })?;
+                Ok(store)
+            }
+            Address::Server(options) => {
+                let options = options.as_ref().clone().application_name("toothwave").disable_statement_logging();
+                // A lease's session waits for its worker; the server ends it when that takes too long.
+                let leases = PoolOptions::<Postgres>::new()
+                    .max_connections(MOST_LEASES)
+                    .acquire_timeout(PATIENCE)
+                    .connect_lazy_with(options.clone().application_name("toothwave lease"));
+                let pool = PoolOptions::<Postgres>::new()
+                    .max_connections(CONNECTIONS)
+                    .acquire_timeout(PATIENCE)
+                    .connect_lazy_with(options);
+                Ok(Self { database: Database::Server { pool, leases }, address: address.clone(), worker })
+            }
+        }
+    }
+
+    /// Where it is.
+    pub const fn address(&self) -> &Address {
+        &self.address
+    }
+
+    /// What is done with a connection, within the patience that one has with a silent server. What a connection was left in the middle of
+    /// cannot be known, so it is closed.
+    pub(crate) async fn with<T>(
+        &self,
+        patience: Duration,
+        job: impl AsyncFnOnce(&mut Connection) -> Result<T, StoreError>,
+    ) -> Result<T, StoreError> {
+        let mut connection = within(patience, async {
+            Ok(match &self.database {
+                Database::File { pool, .. } => Connection::File(pool.acquire().await?),
+                Database::Server { pool, .. } => Connection::Server(pool.acquire().await?),
+            })
+        })
+        .await?;
+        let done = within(patience, job(&mut connection)).await;
+        if done.is_err() {
+            match &mut connection {
+                Connection::Server(connection) => connection.close_on_drop(),
+                // The only one. Where nothing was begun there is nothing to be undone, which is an error of no interest.
+                Connection::File(connection) => drop(sqlx::query("ROLLBACK").execute(&mut **connection).await),
+            }
+        }
+        done
+    }
+
+    /// Closes all connections: a file is free for others then.
+    pub async fn close(&self) {
+        match &self.database {
+            Database::File { pool, .. } => pool.close().await,
+            Database::Server { pool, leases } => {
+                pool.close().await;
+                leases.close().await;
+            }
+        }
+    }
+}
+
+/// What comes of a future in time.
+pub(crate) async fn within<T>(
+    patience: Duration,
+    future: impl Future<Output = Result<T, StoreError>>,
+) -> Result<T, StoreError> {
+    tokio::time::timeout(patience, future).await.unwrap_or(Err(StoreError::Silent))
+}
+
+/// SQLite's word for a file that somebody else has.
+fn in_use(error: sqlx::Error, address: &Address) -> StoreError {
+    let is_locked = error.as_database_error().is_some_and(|error| error.message().contains("database is locked"));
+    if is_locked { StoreError::InUse(address.to_string()) } else { error.into() }
+}
+
+/// Machine and process, for whoever looks into the store.
+fn worker_name() -> String {
+    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    format!("{}:{}", host.trim(), std::process::id())
+}

@@ -1,0 +1,293 @@
+//! A chunk in somebody's hands.
+
+use std::time::Duration;
+
+use sqlx::pool::PoolConnection;
+use sqlx::postgres::Postgres;
+
+use crate::connection::{ChunkName, Connection, Database, Store, StoreError, on, within};
+use crate::studies::{begin, commit};
+use crate::{MOST_ATTEMPTS, PATIENCE, stored};
+
+/// What comes of asking for a chunk.
+#[derive(Debug)]
+pub enum Claim {
+    /// It is to be computed.
+    Chunk(Lease),
+    /// It was tried as often as chunks are: it is a gap from now on.
+    Gap(u64),
+    /// Nobody waits: all are done or in work.
+    None,
+}
+
+/// A chunk that nobody else computes meanwhile. One that is dropped is free again; that it was begun stays noted.
+#[derive(Debug)]
+pub struct Lease {
+    store: Store,
+    study: String,
+    chunk: u64,
+    held: Held,
+}
+
+#[derive(Debug)]
+enum Held {
+    /// Among this process's own.
+    Here,
+    /// An open transaction.
+    There(Box<PoolConnection<Postgres>>),
+    /// Not any more: the server ended it.
+    Lost,
+}
+
+impl Store {
+    /// A chunk of a study that is nobody's, held until it is kept, for so long at most on a server.
+    ///
+    /// # Errors
+    /// Where the store does not answer.
+    pub async fn claim(&self, study: &str, lease: Duration) -> Result<Claim, StoreError> {
+        let claimed = match &self.database {
+            Database::File { .. } => self.claim_here(study).await?,
+            Database::Server { leases, .. } => {
+                let mut connection = within(PATIENCE, async { Ok(leases.acquire().await?) }).await?;
+                match within(PATIENCE, claim_there(&mut connection, study, lease)).await {
+                    Ok(Some(chunk)) => Some((chunk, Held::There(Box::new(connection)))),
+                    Ok(None) => None,
+                    Err(error) => {
+                        connection.close_on_drop();
+                        return Err(error);
+                    }
+                }
+            }
+        };
+        let Some((chunk, held)) = claimed else { return Ok(Claim::None) };
+        // From here on dropping the lease sets the chunk free.
+        let lease = Lease { store: self.clone(), study: study.to_owned(), chunk, held };
+        if self.note_attempt(study, chunk).await? {
+            return Ok(Claim::Chunk(lease));
+        }
+        lease.give_up().await?;
+        Ok(Claim::Gap(chunk))
+    }
+
+    async fn claim_here(&self, study: &str) -> Result<Option<(u64, Held)>, StoreError> {
+        let Database::File { leased, .. } = &self.database else { return Ok(None) };
+        self.with(PATIENCE, async |connection| {
+            let limit = stored(leased.lock().map_or(0, |leased| leased.len() as u64) + 1);
+            let text = "SELECT chunk FROM chunks WHERE study = $1 ORDER BY chunk LIMIT $2";
+            let chunks: Vec<i64> =
+                on!(connection, inner => sqlx::query_scalar(text).bind(study).bind(limit).fetch_all(inner).await)?;
+            // The connection is held: nobody else claims meanwhile.
+            let Ok(mut leased) = leased.lock() else { return Ok(None) };
+            let free = chunks.into_iter().map(crate::read).find(|&chunk| leased.insert((study.to_owned(), chunk)));
+            Ok(free.map(|chunk| (chunk, Held::Here)))
+        })
+        .await
+    }
+
+    /// Notes that a chunk is about to be computed, unless it was begun as often as chunks are. Committed apart from the lease: it outlives
+    /// the worker.
+    async fn note_attempt(&self, study: &str, chunk: u64) -> Result<bool, StoreError> {
+        let text = "INSERT INTO attempts SELECT $1, $2, $3, unixepoch()
+            WHERE (SELECT COUNT(*) FROM attempts WHERE study = $1 AND chunk = $2) < $4";
+        self.with(PATIENCE, async |connection| {
+            let noted = on!(connection, inner => {
+                sqlx::query(text)
+                    .bind(study)
+                    .bind(stored(chunk))
+                    .bind(&*self.worker)
+                    .bind(stored(MOST_ATTEMPTS))
+                    .execute(inner)
+                    .await
+                    .map(|done| done.rows_affected() == 1)
+            })?;
+            Ok(noted)
+        })
+        .await
+    }
+}
+
+async fn claim_there(
+    connection: &mut PoolConnection<Postgres>,
+    study: &str,
+    lease: Duration,
+) -> Result<Option<u64>, StoreError> {
+    let lease_ms = lease.as_millis().to_string();
+    sqlx::query("BEGIN").execute(&mut **connection).await?;
+    let chunk: Option<i64> =
+        sqlx::query_scalar("SELECT chunk FROM chunks WHERE study = $1 ORDER BY chunk LIMIT 1 FOR UPDATE SKIP LOCKED")
+            .bind(study)
+            .fetch_optional(&mut **connection)
+            .await?;
+    let Some(chunk) = chunk else {
+        sqlx::query("ROLLBACK").execute(&mut **connection).await?;
+        return Ok(None);
+    };
+    // A worker that is silent for longer has its transaction ended, and the chunk is free.
+    sqlx::query("SELECT set_config('idle_in_transaction_session_timeout', $1, TRUE)")
+        .bind(lease_ms)
+        .execute(&mut **connection)
+        .await?;
+    Ok(Some(crate::read(chunk)))
+}
+
+/// What a chunk came to, as it is kept.
+#[derive(Debug, Clone, Copy)]
+struct Outcome<'a> {
+    part: &'a [u8],
+    variants: u64,
+    refused: u64,
+    busy: Duration,
+}
+
+impl Lease {
+    /// The chunk's number.
+    pub const fn chunk(&self) -> u64 {
+        self.chunk
+    }
+
+    /// Keeps what the chunk came to. Whoever comes second changes nothing: the bits are the same. Where the lease was lost, or is lost with
+    /// this error, another call keeps it all the same.
+    ///
+    /// # Errors
+    /// Where the store does not answer.
+    pub async fn keep(&mut self, part: &[u8], variants: u64, refused: u64, busy: Duration) -> Result<(), StoreError> {
+        let result = Outcome { part, variants, refused, busy };
+        let name = (self.study.clone(), self.chunk);
+        let worker = self.store.worker.to_string();
+        match std::mem::replace(&mut self.held, Held::Lost) {
+            Held::There(connection) => {
+                let mut connection = Connection::Server(*connection);
+                let kept = within(PATIENCE, async {
+                    write(&mut connection, &name, result, &worker, true).await?;
+                    commit(&mut connection).await
+                })
+                .await;
+                if let (Err(_), Connection::Server(connection)) = (&kept, &mut connection) {
+                    connection.close_on_drop();
+                }
+                kept
+            }
+            held => {
+                let kept = self
+                    .store
+                    .with(PATIENCE, async |connection| {
+                        begin(connection).await?;
+                        let is_ours = matches!(held, Held::Here);
+                        write(connection, &name, result, &worker, is_ours).await?;
+                        commit(connection).await
+                    })
+                    .await;
+                // Where it failed, it is ours for the next try.
+                self.held = held;
+                kept
+            }
+        }
+    }
+
+    /// Gives the chunk back as if it had not been begun: its worker stops, which is no fault of the chunk.
+    ///
+    /// # Errors
+    /// Where the store does not answer; the attempt then stays noted.
+    pub async fn give_back(self) -> Result<(), StoreError> {
+        let store = self.store.clone();
+        let (study, chunk, worker) = (self.study.clone(), stored(self.chunk), store.worker.to_string());
+        drop(self);
+        let text = "DELETE FROM attempts WHERE study = $1 AND chunk = $2 AND worker = $3";
+        store
+            .with(PATIENCE, async |connection| {
+                on!(connection, inner => sqlx::query(text).bind(study).bind(chunk).bind(worker).execute(inner).await.map(|_| ()))?;
+                Ok(())
+            })
+            .await
+    }
+
+    /// Makes the chunk a gap.
+    async fn give_up(mut self) -> Result<(), StoreError> {
+        let name = (self.study.clone(), self.chunk);
+        match std::mem::replace(&mut self.held, Held::Lost) {
+            Held::There(connection) => {
+                let mut connection = Connection::Server(*connection);
+                let given_up = within(PATIENCE, async {
+                    make_gap(&mut connection, &name).await?;
+                    commit(&mut connection).await
+                })
+                .await;
+                if let (Err(_), Connection::Server(connection)) = (&given_up, &mut connection) {
+                    connection.close_on_drop();
+                }
+                given_up
+            }
+            held => {
+                self.held = held;
+                self.store
+                    .with(PATIENCE, async |connection| {
+                        begin(connection).await?;
+                        make_gap(connection, &name).await?;
+                        commit(connection).await
+                    })
+                    .await
+            }
+        }
+    }
+}
+
+impl Drop for Lease {
+    fn drop(&mut self) {
+        match &mut self.held {
+            Held::Here => {
+                if let Database::File { leased, .. } = &self.store.database
+                    && let Ok(mut leased) = leased.lock()
+                {
+                    leased.remove(&(self.study.clone(), self.chunk));
+                }
+            }
+            // The transaction ends with its session.
+            Held::There(connection) => connection.close_on_drop(),
+            Held::Lost => {}
+        }
+    }
+}
+
+/// Writes a result. A chunk that another worker has in its hands by now is left to that one, who then finds the result there.
+async fn write(
+    connection: &mut Connection,
+    (study, chunk): &ChunkName,
+    result: Outcome<'_>,
+    worker: &str,
+    is_ours: bool,
+) -> Result<(), StoreError> {
+    let chunk = stored(*chunk);
+    let text = "INSERT INTO results SELECT $1, $2, $3, $4, $5, $6, $7 WHERE EXISTS (SELECT 1 FROM studies WHERE id = $1) ON CONFLICT DO NOTHING";
+    let busy_us = stored(u64::try_from(result.busy.as_micros()).unwrap_or(u64::MAX));
+    on!(connection, inner => {
+        sqlx::query(text)
+            .bind(study)
+            .bind(chunk)
+            .bind(result.part)
+            .bind(stored(result.variants))
+            .bind(stored(result.refused))
+            .bind(busy_us)
+            .bind(worker)
+            .execute(inner)
+            .await
+            .map(|_| ())
+    })?;
+    let free = match connection {
+        Connection::Server(_) if !is_ours => {
+            "DELETE FROM chunks WHERE (study, chunk) IN (SELECT study, chunk FROM chunks WHERE study = $1 AND chunk = $2 FOR UPDATE SKIP LOCKED)"
+        }
+        _ => "DELETE FROM chunks WHERE study = $1 AND chunk = $2",
+    };
+    on!(connection, inner => sqlx::query(free).bind(study).bind(chunk).execute(inner).await.map(|_| ()))?;
+    Ok(())
+}
+
+async fn make_gap(connection: &mut Connection, (study, chunk): &ChunkName) -> Result<(), StoreError> {
+    let chunk = stored(*chunk);
+    let gap = "INSERT INTO gaps SELECT $1, $2, (SELECT COUNT(*) FROM attempts WHERE study = $1 AND chunk = $2)
+        WHERE NOT EXISTS (SELECT 1 FROM results WHERE study = $1 AND chunk = $2) ON CONFLICT DO NOTHING";
+    for text in [gap, "DELETE FROM chunks WHERE study = $1 AND chunk = $2"] {
+        on!(connection, inner => sqlx::query(text).bind(study).bind(chunk).execute(inner).await.map(|_| ()))?;
+    }
+    Ok(())
+}

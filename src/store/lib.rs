@@ -1,0 +1,38 @@
+//! Where studies are kept: an SQLite file of one process, or a PostgreSQL server that many processes share.
+//!
+//! A study is chunks, and what they come to is the truth: unique by study and chunk, written once, never changed. There is no queue beside it.
+//! On PostgreSQL **the open transaction is the lease** of a chunk (`FOR UPDATE SKIP LOCKED`): a worker that dies, or falls silent for longer than
+//! its session may, has its transaction ended by the server, and the chunk is free again. Nobody sends heartbeats, nobody looks for the dead.
+//! Before a chunk is computed its attempt is committed apart from the lease; a chunk whose attempts all ended without a result becomes a gap.
+//!
+//! This crate knows neither what a study asks nor what a part holds: both are bytes.
+
+mod address;
+mod connection;
+mod lease;
+mod schema;
+mod studies;
+
+use std::time::Duration;
+
+pub use address::{Address, AddressError};
+pub use connection::{Store, StoreError};
+pub use lease::{Claim, Lease};
+pub use schema::SCHEMA_VERSION;
+pub use studies::{Figures, Gap, Kept, NewStudy, Standing, Waiting};
+
+/// Attempts without a result that make a chunk a gap.
+pub const MOST_ATTEMPTS: u64 = 3;
+
+/// What a single operation may take: a server that cannot be reached says nothing.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(15);
+
+/// A number as both databases keep it.
+pub(crate) fn stored(number: u64) -> i64 {
+    i64::try_from(number).unwrap_or(i64::MAX)
+}
+
+/// A number as it was kept.
+pub(crate) fn read(number: i64) -> u64 {
+    u64::try_from(number).unwrap_or(0)
+}

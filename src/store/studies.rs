@@ -1,0 +1,445 @@
+//! Studies in a store: how they stand, and what they have come to.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use crate::connection::{Connection, Database, Store, StoreError, on};
+use crate::schema::require_schema;
+use crate::{PATIENCE, read, stored};
+
+/// For what touches every chunk of a study, of which there may be a million.
+pub(crate) const LONG_PATIENCE: Duration = Duration::from_secs(120);
+
+/// A study as it is first kept: all that follows from it is frozen with it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NewStudy {
+    /// What tells it from every other study.
+    pub id: String,
+    /// Its kind.
+    pub kind: String,
+    /// The build that it belongs to.
+    pub build: String,
+    /// What is asked, as it was sent.
+    pub document: String,
+    /// Most states of a variant's sweep.
+    pub max_states: u64,
+    /// Most points of a variant's profiles.
+    pub max_profile_points: u64,
+    /// Variants that it looks at.
+    pub variants: u64,
+    /// Variants of a chunk.
+    pub chunk_variants: u64,
+    /// Chunks that it consists of.
+    pub chunks: u64,
+    /// Variants of the canary.
+    pub canary_variants: u64,
+    /// A hash of what the canary comes to.
+    pub canary: String,
+    /// So long may a worker be silent over one chunk.
+    pub lease: Duration,
+    /// So long may the whole study take.
+    pub time: Duration,
+}
+
+/// A chunk that never came to a result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Gap {
+    /// Its number.
+    pub chunk: u64,
+    /// How often it was tried.
+    pub attempts: u64,
+}
+
+/// How a study stands.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Standing {
+    /// As it was first kept; of `time` what is left.
+    pub study: NewStudy,
+    /// Whether it was told to stop.
+    pub is_cancelled: bool,
+    /// Chunks that have a result.
+    pub done: u64,
+    /// Variants that those looked at.
+    pub looked_at: u64,
+    /// Of them, the ones without an answer.
+    pub refused: u64,
+    /// Chunks without one.
+    pub gaps: Vec<Gap>,
+}
+
+impl Standing {
+    /// Whether every chunk has a result.
+    pub const fn is_done(&self) -> bool {
+        self.done >= self.study.chunks
+    }
+
+    /// Whether nothing is left to be tried.
+    pub const fn is_exhausted(&self) -> bool {
+        self.done + self.gaps.len() as u64 >= self.study.chunks
+    }
+
+    /// Whether its time is over.
+    pub const fn is_late(&self) -> bool {
+        self.study.time.is_zero()
+    }
+
+    /// Whether workers are wanted.
+    pub const fn is_running(&self) -> bool {
+        !self.is_cancelled && !self.is_exhausted() && !self.is_late()
+    }
+}
+
+/// What a chunk came to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Kept {
+    /// Its number.
+    pub chunk: u64,
+    /// What it came to.
+    pub part: Vec<u8>,
+}
+
+/// A study that waits for workers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Waiting {
+    /// Its id.
+    pub id: String,
+    /// The build that it belongs to.
+    pub build: String,
+}
+
+/// The whole store in numbers.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Figures {
+    /// Studies that are kept.
+    pub studies: u64,
+    /// Of these, the ones that run.
+    pub running: u64,
+    /// Chunks that have a result.
+    pub done: u64,
+    /// Chunks that are still to be computed, those in work among them.
+    pub waiting: u64,
+    /// Chunks that somebody computes.
+    pub in_work: u64,
+    /// Attempts at all chunks.
+    pub attempts: u64,
+    /// Chunks that never came to a result.
+    pub gaps: u64,
+    /// Since the oldest study that runs was asked for.
+    pub oldest: Duration,
+}
+
+type StudyRow = (String, String, String, String, i64, i64, i64, i64, i64, i64, String, i64, bool, i64);
+
+const STUDY: &str = "SELECT id, kind, build, document, max_states, max_profile_points, variants, chunk_variants, chunks, canary_variants,
+    canary, lease_ms, is_cancelled, CAST(ends_at_s - unixepoch() AS BIGINT) FROM studies WHERE id = $1";
+
+/// Those that wait for workers; of studies that are done no chunk is left.
+const WAITING: &str = "SELECT id, build FROM studies WHERE NOT is_cancelled AND ends_at_s > unixepoch()
+    AND EXISTS (SELECT 1 FROM chunks WHERE study = id) ORDER BY asked_at_s, id";
+
+impl Store {
+    /// Keeps a study, with all its chunks to be computed; where it is kept already, nothing happens.
+    ///
+    /// # Errors
+    /// Where the store does not answer, or has another schema.
+    pub async fn create(&self, study: &NewStudy) -> Result<(), StoreError> {
+        self.with(LONG_PATIENCE, async |connection| {
+            require_schema(connection).await?;
+            begin(connection).await?;
+            let time_s = stored(study.time.as_secs());
+            let is_new = on!(connection, inner => {
+                sqlx::query(
+                    "INSERT INTO studies VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, FALSE, unixepoch(), unixepoch() + $13)
+                        ON CONFLICT DO NOTHING",
+                )
+                .bind(&study.id)
+                .bind(&study.kind)
+                .bind(&study.build)
+                .bind(&study.document)
+                .bind(stored(study.max_states))
+                .bind(stored(study.max_profile_points))
+                .bind(stored(study.variants))
+                .bind(stored(study.chunk_variants))
+                .bind(stored(study.chunks))
+                .bind(stored(study.canary_variants))
+                .bind(&study.canary)
+                .bind(stored(u64::try_from(study.lease.as_millis()).unwrap_or(u64::MAX)))
+                .bind(time_s)
+                .execute(inner)
+                .await
+                .map(|done| done.rows_affected() == 1)
+            })?;
+            if is_new {
+                on!(connection, inner => {
+                    sqlx::query(
+                        "INSERT INTO chunks WITH RECURSIVE numbers (chunk) AS
+                            (SELECT CAST(0 AS BIGINT) UNION ALL SELECT chunk + 1 FROM numbers WHERE chunk + 1 < $2)
+                            SELECT $1, chunk FROM numbers WHERE chunk < $2",
+                    )
+                    .bind(&study.id)
+                    .bind(stored(study.chunks))
+                    .execute(inner)
+                    .await
+                    .map(|_| ())
+                })?;
+            }
+            commit(connection).await
+        })
+        .await
+    }
+
+    /// Lets a study go on, for so long at most: what was cancelled, what ran out of time, and what became a gap is tried anew.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub async fn resume(&self, id: &str, time: Duration) -> Result<(), StoreError> {
+        self.with(LONG_PATIENCE, async |connection| {
+            require_schema(connection).await?;
+            begin(connection).await?;
+            let time_s = stored(time.as_secs());
+            on!(connection, inner => {
+                sqlx::query("UPDATE studies SET is_cancelled = FALSE, asked_at_s = unixepoch(), ends_at_s = unixepoch() + $2 WHERE id = $1")
+                    .bind(id).bind(time_s).execute(inner).await.map(|_| ())
+            })?;
+            for text in [
+                "DELETE FROM attempts WHERE study = $1 AND chunk IN (SELECT chunk FROM gaps WHERE study = $1)",
+                "INSERT INTO chunks SELECT study, chunk FROM gaps WHERE study = $1 ON CONFLICT DO NOTHING",
+                "DELETE FROM gaps WHERE study = $1",
+            ] {
+                on!(connection, inner => sqlx::query(text).bind(id).execute(inner).await.map(|_| ()))?;
+            }
+            commit(connection).await
+        })
+        .await
+    }
+
+    /// Tells a study to stop.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub async fn cancel(&self, id: &str) -> Result<(), StoreError> {
+        self.once("UPDATE studies SET is_cancelled = TRUE WHERE id = $1", id).await
+    }
+
+    /// Notes that a study was asked for: it expires so much later.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub async fn touch(&self, id: &str) -> Result<(), StoreError> {
+        self.once("UPDATE studies SET asked_at_s = unixepoch() WHERE id = $1", id).await
+    }
+
+    /// Forgets a study with all that it has come to.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub async fn forget(&self, id: &str) -> Result<(), StoreError> {
+        self.once("DELETE FROM studies WHERE id = $1", id).await
+    }
+
+    /// A statement about one study.
+    async fn once(&self, text: &'static str, id: &str) -> Result<(), StoreError> {
+        self.with(LONG_PATIENCE, async |connection| {
+            require_schema(connection).await?;
+            on!(connection, inner => sqlx::query(text).bind(id).execute(inner).await.map(|_| ()))?;
+            Ok(())
+        })
+        .await
+    }
+
+    /// Forgets the studies that nobody has asked for in this time, but for those that run; returns how many.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub async fn expire(&self, unasked_for: Duration) -> Result<u64, StoreError> {
+        self.with(LONG_PATIENCE, async |connection| {
+            require_schema(connection).await?;
+            let text = "DELETE FROM studies WHERE asked_at_s <= unixepoch() - $1
+                AND (is_cancelled OR ends_at_s <= unixepoch() OR NOT EXISTS (SELECT 1 FROM chunks WHERE study = id))";
+            let unasked_for_s = stored(unasked_for.as_secs());
+            let gone = on!(connection, inner => {
+                sqlx::query(text).bind(unasked_for_s).execute(inner).await.map(|done| done.rows_affected())
+            })?;
+            Ok(gone)
+        })
+        .await
+    }
+
+    /// How a study stands, where it is kept.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub async fn find(&self, id: &str) -> Result<Option<Standing>, StoreError> {
+        self.with(PATIENCE, async |connection| {
+            require_schema(connection).await?;
+            let row: Option<StudyRow> = on!(connection, inner => sqlx::query_as(STUDY).bind(id).fetch_optional(inner).await)?;
+            let Some(row) = row else { return Ok(None) };
+            // Gaps before results: a chunk that came to a result at last is counted as one.
+            let gaps: Vec<(i64, i64)> = on!(connection, inner => {
+                sqlx::query_as(
+                    "SELECT chunk, attempts FROM gaps WHERE study = $1
+                        AND NOT EXISTS (SELECT 1 FROM results WHERE results.study = gaps.study AND results.chunk = gaps.chunk) ORDER BY chunk",
+                )
+                .bind(id)
+                .fetch_all(inner)
+                .await
+            })?;
+            let (done, looked_at, refused): (i64, i64, i64) = on!(connection, inner => {
+                sqlx::query_as(
+                    "SELECT COUNT(*), CAST(COALESCE(SUM(variants), 0) AS BIGINT), CAST(COALESCE(SUM(refused), 0) AS BIGINT)
+                        FROM results WHERE study = $1",
+                )
+                .bind(id)
+                .fetch_one(inner)
+                .await
+            })?;
+            let gaps = gaps.into_iter().map(|(chunk, attempts)| Gap { chunk: read(chunk), attempts: read(attempts) });
+            let (study, is_cancelled) = study(row);
+            let (done, looked_at, refused) = (read(done), read(looked_at), read(refused));
+            Ok(Some(Standing { study, is_cancelled, done, looked_at, refused, gaps: gaps.collect() }))
+        })
+        .await
+    }
+
+    /// Studies that run.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub async fn running(&self) -> Result<u64, StoreError> {
+        Ok(self.waiting().await?.len() as u64)
+    }
+
+    /// The studies that wait for workers, the oldest first.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub async fn waiting(&self) -> Result<Vec<Waiting>, StoreError> {
+        self.with(PATIENCE, async |connection| {
+            require_schema(connection).await?;
+            let rows: Vec<(String, String)> = on!(connection, inner => sqlx::query_as(WAITING).fetch_all(inner).await)?;
+            Ok(rows.into_iter().map(|(id, build)| Waiting { id, build }).collect())
+        })
+        .await
+    }
+
+    /// The numbers of the chunks that have a result.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub async fn chunks_done(&self, id: &str) -> Result<Vec<u64>, StoreError> {
+        self.with(PATIENCE, async |connection| {
+            let text = "SELECT chunk FROM results WHERE study = $1 ORDER BY chunk";
+            let rows: Vec<i64> = on!(connection, inner => sqlx::query_scalar(text).bind(id).fetch_all(inner).await)?;
+            Ok(rows.into_iter().map(read).collect())
+        })
+        .await
+    }
+
+    /// What the chunks between two numbers have come to, the ends included.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub async fn parts(&self, id: &str, first: u64, last: u64) -> Result<Vec<Kept>, StoreError> {
+        self.with(PATIENCE, async |connection| {
+            let text = "SELECT chunk, part FROM results WHERE study = $1 AND chunk BETWEEN $2 AND $3 ORDER BY chunk";
+            let rows: Vec<(i64, Vec<u8>)> = on!(connection, inner => {
+                sqlx::query_as(text).bind(id).bind(stored(first)).bind(stored(last)).fetch_all(inner).await
+            })?;
+            Ok(rows.into_iter().map(|(chunk, part)| Kept { chunk: read(chunk), part }).collect())
+        })
+        .await
+    }
+
+    /// Who has computed how many chunks of a study, and for how long.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub async fn workers(&self, id: &str) -> Result<BTreeMap<String, (u64, Duration)>, StoreError> {
+        self.with(PATIENCE, async |connection| {
+            let text =
+                "SELECT worker, COUNT(*), CAST(SUM(busy_us) AS BIGINT) FROM results WHERE study = $1 GROUP BY worker";
+            let rows: Vec<(String, i64, i64)> =
+                on!(connection, inner => sqlx::query_as(text).bind(id).fetch_all(inner).await)?;
+            Ok(rows
+                .into_iter()
+                .map(|(worker, chunks, busy_us)| (worker, (read(chunks), Duration::from_micros(read(busy_us)))))
+                .collect())
+        })
+        .await
+    }
+
+    /// The whole store in numbers.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub async fn figures(&self) -> Result<Figures, StoreError> {
+        self.with(LONG_PATIENCE, async |connection| {
+            require_schema(connection).await?;
+            let mut counts = [0_i64; 5];
+            for (count, text) in counts.iter_mut().zip([
+                "SELECT COUNT(*) FROM studies",
+                "SELECT COUNT(*) FROM results",
+                "SELECT COUNT(*) FROM chunks",
+                "SELECT COUNT(*) FROM attempts",
+                "SELECT COUNT(*) FROM gaps",
+            ]) {
+                *count = on!(connection, inner => sqlx::query_scalar(text).fetch_one(inner).await)?;
+            }
+            let running: Vec<i64> = on!(connection, inner => {
+                sqlx::query_scalar(
+                    "SELECT CAST(unixepoch() - asked_at_s AS BIGINT) FROM studies WHERE NOT is_cancelled AND ends_at_s > unixepoch()
+                        AND EXISTS (SELECT 1 FROM chunks WHERE study = id)",
+                )
+                .fetch_all(inner)
+                .await
+            })?;
+            let in_work = match (&self.database, connection) {
+                (Database::File { leased, .. }, _) => leased.lock().map_or(0, |leased| leased.len() as u64),
+                (Database::Server { .. }, connection) => sessions_that_compute(connection).await?,
+            };
+            let [studies, done, waiting, attempts, gaps] = counts.map(read);
+            let oldest = Duration::from_secs(running.iter().copied().max().map_or(0, read));
+            Ok(Figures { studies, running: running.len() as u64, done, waiting, in_work, attempts, gaps, oldest })
+        })
+        .await
+    }
+}
+
+/// Sessions of leases whose transactions are open.
+async fn sessions_that_compute(connection: &mut Connection) -> Result<u64, StoreError> {
+    let Connection::Server(inner) = connection else { return Ok(0) };
+    let text = "SELECT COUNT(*) FROM pg_stat_activity
+        WHERE datname = current_database() AND application_name = 'toothwave lease' AND xact_start IS NOT NULL";
+    Ok(read(sqlx::query_scalar(text).fetch_one(&mut **inner).await?))
+}
+
+pub(crate) async fn begin(connection: &mut Connection) -> Result<(), StoreError> {
+    on!(connection, inner => sqlx::query("BEGIN").execute(inner).await.map(|_| ()))?;
+    Ok(())
+}
+
+pub(crate) async fn commit(connection: &mut Connection) -> Result<(), StoreError> {
+    on!(connection, inner => sqlx::query("COMMIT").execute(inner).await.map(|_| ()))?;
+    Ok(())
+}
+
+fn study(row: StudyRow) -> (NewStudy, bool) {
+    #[rustfmt::skip]
+    let (id, kind, build, document, max_states, max_profile_points, variants, chunk_variants, chunks, canary_variants, canary, lease_ms, is_cancelled, left_s) = row;
+    let study = NewStudy {
+        id,
+        kind,
+        build,
+        document,
+        max_states: read(max_states),
+        max_profile_points: read(max_profile_points),
+        variants: read(variants),
+        chunk_variants: read(chunk_variants),
+        chunks: read(chunks),
+        canary_variants: read(canary_variants),
+        canary,
+        lease: Duration::from_millis(read(lease_ms)),
+        time: Duration::from_secs(read(left_s)),
+    };
+    (study, is_cancelled)
+}

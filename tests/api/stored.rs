@@ -1,0 +1,265 @@
+//! Studies that are kept in a file, and by several replicas.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use tokio::task::JoinHandle;
+use toothwave::config::Limits;
+use toothwave::studies::Keeping;
+use toothwave_store::{Address, Claim, Figures, NewStudy, Store};
+
+use crate::asking::{Answer, LIMITS, Question, Service};
+use crate::designs::shortest;
+
+const EXPIRY: Duration = Duration::from_secs(3600);
+
+/// A file of its own, gone with it.
+struct File(PathBuf);
+
+impl File {
+    fn new() -> Self {
+        static FILES: AtomicU64 = AtomicU64::new(0);
+        let name = format!("toothwave-stored-{}-{}", std::process::id(), FILES.fetch_add(1, Ordering::Relaxed));
+        Self(std::env::temp_dir().join(name))
+    }
+
+    async fn store(&self) -> Store {
+        Store::open(&Address::File(self.0.clone())).await.unwrap()
+    }
+}
+
+impl Drop for File {
+    fn drop(&mut self) {
+        for ending in ["", "-wal", "-shm"] {
+            let _ = std::fs::remove_file(format!("{}{ending}", self.0.display()));
+        }
+    }
+}
+
+/// A service that keeps its studies in a file, with its workers where it has some.
+struct Keeper {
+    service: Service,
+    store: Store,
+    workers: Option<JoinHandle<()>>,
+}
+
+impl Keeper {
+    async fn of(file: &File, limits: Limits, has_workers: bool) -> Self {
+        let store = file.store().await;
+        let service = Service::keeping(limits, Keeping::Store { store: store.clone(), expiry: EXPIRY });
+        let app = std::sync::Arc::clone(&service.app);
+        let workers = has_workers.then(|| tokio::spawn(async move { app.studies.serve_store().await }));
+        Self { service, store, workers }
+    }
+
+    /// As when the process is told to stop.
+    async fn end(self) {
+        self.service.app.studies.close();
+        match self.workers {
+            Some(workers) => workers.await.unwrap(),
+            None => self.store.close().await,
+        }
+    }
+
+    async fn ask(&self, study: &Value) -> Answer {
+        self.service.ask(&Question::post("/v1/studies", study.to_string())).await
+    }
+
+    async fn wait_for(&self, study: &Value) -> Value {
+        let question = Question::post("/v1/studies", study.to_string()).with("prefer", "wait=600");
+        self.service.ask(&question).await.found()
+    }
+}
+
+fn map(steps: u64) -> Value {
+    json!({
+        "study": "map", "base": shortest(),
+        "over": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.0, "steps": steps } },
+        "quantities": ["peak_stress_ring_mpa", "undercut"]
+    })
+}
+
+fn tolerance() -> Value {
+    json!({
+        "study": "tolerance", "base": shortest(), "samples": 500, "quantities": ["peak_stress_ring_mpa"],
+        "inputs": { "/drive/teeth/radius_mm": { "distribution": "normal", "sigma": 0.01, "limit": 0.03 } }
+    })
+}
+
+fn search() -> Value {
+    json!({
+        "study": "search", "base": shortest(), "evaluations": 100,
+        "free": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.5 } }, "require": { "undercut": false },
+        "objectives": [{ "quantity": "slot_wall_mm", "goal": "max" }, { "quantity": "outer_diameter_mm", "goal": "min" }]
+    })
+}
+
+fn place(study: &Value) -> String {
+    format!("/v1/studies/{}", study["id"].as_str().unwrap())
+}
+
+#[tokio::test]
+async fn a_stored_study_has_the_bytes_of_one_in_memory() {
+    let (file, memory) = (File::new(), Service::new());
+    let keeper = Keeper::of(&file, LIMITS, true).await;
+    for study in [map(300), tolerance(), search()] {
+        let question = Question::post("/v1/studies", study.to_string()).with("prefer", "wait=600");
+        let expected = memory.ask(&question).await.found();
+        let found = keeper.wait_for(&study).await;
+        assert_eq!(found, expected);
+        let result = memory.get(&format!("{}/result", place(&expected))).await;
+        let kept = keeper.service.get(&format!("{}/result", place(&found))).await;
+        assert!(kept.body == result.body, "{}", study["study"]);
+    }
+    keeper.end().await;
+}
+
+#[tokio::test]
+async fn a_restart_goes_on_where_it_was_and_loses_nothing_that_was_finished() {
+    let file = File::new();
+    // Nobody computes: the study stays as it is.
+    let asked = Keeper::of(&file, LIMITS, false).await;
+    let study = asked.ask(&map(40)).await;
+    assert_eq!(study.status, 202, "{}", study.text());
+    let study = study.json();
+    assert_eq!((&study["state"], &study["looked_at"]), (&json!("running"), &json!(0)));
+    asked.end().await;
+    let again = Keeper::of(&file, LIMITS, true).await;
+    let stands = again.service.get(&place(&study)).await.found();
+    assert_eq!((&stands["id"], &stands["variants"]), (&study["id"], &json!(40)));
+    let done = again.wait_for(&map(40)).await;
+    assert_eq!((&done["state"], &done["looked_at"]), (&json!("done"), &json!(40)));
+    again.end().await;
+    let after = Keeper::of(&file, LIMITS, false).await;
+    assert_eq!(after.service.get(&format!("{}/result", place(&study))).await.found(), done["result"]);
+    after.end().await;
+}
+
+#[tokio::test]
+async fn a_stored_study_is_cancelled_goes_on_and_is_forgotten() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    let study = keeper.ask(&map(5)).await.json();
+    let delete = Question::of("DELETE", &place(&study));
+    assert_eq!(keeper.service.ask(&delete).await.status, 204);
+    assert_eq!(keeper.service.get(&place(&study)).await.found()["state"], "cancelled");
+    assert_eq!(keeper.ask(&map(5)).await.status, 202, "the same question lets it go on");
+    assert_eq!(keeper.service.get(&place(&study)).await.found()["state"], "running");
+    assert_eq!(keeper.service.ask(&delete).await.status, 204);
+    assert_eq!(keeper.service.ask(&delete).await.status, 204);
+    keeper.service.get(&place(&study)).await.refused(404, "not_found");
+    assert_eq!(keeper.service.ask(&delete).await.status, 404);
+    keeper.end().await;
+}
+
+#[tokio::test]
+async fn more_stored_studies_than_may_run_are_refused() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, Limits { max_concurrent_studies: 1, ..LIMITS }, false).await;
+    assert_eq!(keeper.ask(&map(5)).await.status, 202);
+    assert_eq!(keeper.ask(&map(5)).await.status, 202, "it runs already");
+    keeper.ask(&map(6)).await.refused(503, "queue_full");
+    keeper.end().await;
+}
+
+#[tokio::test]
+async fn a_stored_study_beyond_its_time_says_so() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, Limits { study_deadline_ms: 0, ..LIMITS }, false).await;
+    let found = keeper.ask(&map(5)).await.found();
+    assert_eq!((&found["state"], &found["problem"]["code"]), (&json!("failed"), &json!("deadline_exceeded")));
+    assert_eq!(found["result"]["is_complete"], false);
+    keeper.end().await;
+}
+
+#[tokio::test]
+async fn a_chunk_that_never_came_to_a_result_is_named_and_tried_anew_when_it_is_asked_for_again() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    let study = keeper.ask(&map(5)).await.json();
+    let id = study["id"].as_str().unwrap();
+    // As workers do who die at it.
+    loop {
+        match keeper.store.claim(id, Duration::from_secs(60)).await.unwrap() {
+            Claim::Chunk(lease) => drop(lease),
+            Claim::Gap(chunk) => break assert_eq!(chunk, 0),
+            Claim::None => panic!("nobody waits"),
+        }
+    }
+    keeper.end().await;
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    let stands = keeper.service.get(&place(&study)).await.found();
+    assert_eq!((&stands["state"], &stands["problem"]["code"]), (&json!("failed"), &json!("internal_error")));
+    let result = keeper.service.get(&format!("{}/result", place(&study))).await.found();
+    let gap = json!([{ "chunk": 0, "first_variant": 0, "variants": 5, "attempts": 3 }]);
+    assert_eq!((&result["is_complete"], &result["gaps"]), (&json!(false), &gap));
+    keeper.end().await;
+    let keeper = Keeper::of(&file, LIMITS, true).await;
+    let found = keeper.wait_for(&map(5)).await;
+    assert_eq!((&found["state"], found["result"].get("gaps")), (&json!("done"), None));
+    keeper.end().await;
+}
+
+#[tokio::test]
+async fn a_study_of_another_build_or_of_other_bits_is_left_to_others() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    let study = keeper.ask(&map(5)).await.json();
+    let store = &keeper.store;
+    let frozen = store.find(study["id"].as_str().unwrap()).await.unwrap().unwrap().study;
+    store.forget(&frozen.id).await.unwrap();
+    for other in [
+        NewStudy { id: "of-another-build".into(), build: "another".into(), ..frozen.clone() },
+        NewStudy { id: "of-another-processor".into(), ..frozen.clone() },
+        NewStudy { canary: "of other bits".into(), ..frozen.clone() },
+    ] {
+        store.create(&other).await.unwrap();
+    }
+    keeper.end().await;
+    let keeper = Keeper::of(&file, Limits { max_concurrent_studies: 10, ..LIMITS }, true).await;
+    // Once this one is done, the workers have looked at those as well.
+    assert_eq!(keeper.wait_for(&map(6)).await["state"], "done");
+    for id in ["of-another-build", "of-another-processor", &frozen.id] {
+        let standing = keeper.store.find(id).await.unwrap().unwrap();
+        assert_eq!((standing.done, standing.is_running()), (0, true), "{id}");
+    }
+    keeper.end().await;
+}
+
+#[tokio::test]
+async fn a_replica_without_a_shared_store_refuses_studies_and_says_so() {
+    let service = Service::keeping(LIMITS, Keeping::Nowhere);
+    let answer = service.ask(&Question::post("/v1/studies", map(5).to_string())).await;
+    let problem = answer.refused(501, "no_shared_store");
+    assert!(problem["detail"].as_str().unwrap().contains("replicas"), "{problem}");
+}
+
+#[tokio::test]
+async fn a_store_that_does_not_answer_is_a_problem_that_passes() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    keeper.store.close().await;
+    let answer = keeper.ask(&map(5)).await;
+    answer.refused(503, "store_unavailable");
+    assert_eq!(answer.header("retry-after"), "1");
+}
+
+#[tokio::test]
+async fn the_service_knows_how_the_store_stands() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, true).await;
+    keeper.wait_for(&map(5)).await;
+    keeper.end().await;
+    let keeper = Keeper::of(&file, LIMITS, true).await;
+    let figures = loop {
+        match keeper.service.app.studies.figures() {
+            Some(figures) => break figures,
+            None => tokio::task::yield_now().await,
+        }
+    };
+    let Figures { studies, running, done, waiting, attempts, gaps, .. } = figures;
+    assert_eq!((studies, running, done, waiting, attempts, gaps), (1, 0, 1, 0, 1, 0));
+    keeper.end().await;
+}

@@ -1,0 +1,273 @@
+//! The store of studies: in a file, and on a PostgreSQL server where `TOOTHWAVE_TEST_POSTGRES` names an empty database.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use toothwave_store::{Address, AddressError, Claim, Gap, Lease, MOST_ATTEMPTS, NewStudy, Store, StoreError};
+
+const LEASE: Duration = Duration::from_secs(60);
+const BUSY: Duration = Duration::from_millis(3);
+
+/// A file of its own, gone with it.
+struct File(PathBuf);
+
+impl File {
+    fn new() -> Self {
+        static FILES: AtomicU64 = AtomicU64::new(0);
+        let name = format!("toothwave-store-{}-{}", std::process::id(), FILES.fetch_add(1, Ordering::Relaxed));
+        Self(std::env::temp_dir().join(name))
+    }
+
+    fn address(&self) -> Address {
+        Address::File(self.0.clone())
+    }
+}
+
+impl Drop for File {
+    fn drop(&mut self) {
+        for ending in ["", "-wal", "-shm"] {
+            let _ = std::fs::remove_file(format!("{}{ending}", self.0.display()));
+        }
+    }
+}
+
+fn server() -> Option<Address> {
+    let text = std::env::var("TOOTHWAVE_TEST_POSTGRES").ok()?;
+    Some(Address::new(&text, None).unwrap())
+}
+
+fn study(id: &str, chunks: u64) -> NewStudy {
+    NewStudy {
+        id: format!("{id}-{}", std::process::id()),
+        kind: "map".into(),
+        build: "this".into(),
+        document: "{}".into(),
+        max_states: 10,
+        max_profile_points: 20,
+        variants: 7 * chunks,
+        chunk_variants: 7,
+        chunks,
+        canary_variants: 3,
+        canary: "yellow".into(),
+        lease: LEASE,
+        time: Duration::from_secs(3600),
+    }
+}
+
+/// Does the same with a file and with a server.
+async fn with_each_store(job: impl AsyncFn(Store)) {
+    let file = File::new();
+    job(Store::open(&file.address()).await.unwrap()).await;
+    if let Some(address) = server() {
+        let store = Store::open(&address).await.unwrap();
+        store.migrate().await.unwrap();
+        job(store).await;
+    }
+}
+
+async fn claimed(store: &Store, study: &NewStudy) -> Lease {
+    match store.claim(&study.id, LEASE).await.unwrap() {
+        Claim::Chunk(lease) => lease,
+        other => panic!("{other:?}"),
+    }
+}
+
+async fn keep(lease: &mut Lease) {
+    let part = lease.chunk().to_le_bytes();
+    lease.keep(&part, 7, 1, BUSY).await.unwrap();
+}
+
+#[tokio::test]
+async fn a_study_is_kept_as_it_was_asked_and_once() {
+    with_each_store(async |store| {
+        let study = study("kept", 3);
+        assert_eq!(store.find(&study.id).await.unwrap(), None);
+        store.create(&study).await.unwrap();
+        store.create(&NewStudy { document: "another".into(), ..study.clone() }).await.unwrap();
+        let standing = store.find(&study.id).await.unwrap().unwrap();
+        assert!(standing.study.time <= study.time && standing.study.time > study.time / 2);
+        assert_eq!(NewStudy { time: study.time, ..standing.study.clone() }, study);
+        assert!(standing.is_running() && !standing.is_done());
+        assert!(store.waiting().await.unwrap().iter().any(|waiting| waiting.id == study.id && waiting.build == "this"));
+        store.forget(&study.id).await.unwrap();
+        assert_eq!(store.find(&study.id).await.unwrap(), None);
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn a_chunk_is_in_one_pair_of_hands_and_its_result_is_kept_once() {
+    with_each_store(async |store| {
+        let study = study("hands", 3);
+        store.create(&study).await.unwrap();
+        let mut leases = [claimed(&store, &study).await, claimed(&store, &study).await, claimed(&store, &study).await];
+        assert_eq!(leases.each_ref().map(Lease::chunk), [0, 1, 2]);
+        assert!(matches!(store.claim(&study.id, LEASE).await.unwrap(), Claim::None));
+        for lease in &mut leases {
+            keep(lease).await;
+        }
+        // A second time changes nothing.
+        leases[0].keep(&[9; 8], 100, 100, BUSY).await.unwrap();
+        let standing = store.find(&study.id).await.unwrap().unwrap();
+        assert!(standing.is_done() && !standing.is_running());
+        assert_eq!((standing.done, standing.looked_at, standing.refused), (3, 21, 3));
+        assert_eq!(store.chunks_done(&study.id).await.unwrap(), [0, 1, 2]);
+        for kept in store.parts(&study.id, 0, 2).await.unwrap() {
+            assert_eq!(kept.part, kept.chunk.to_le_bytes());
+        }
+        assert_eq!(store.parts(&study.id, 1, 1).await.unwrap().len(), 1);
+        assert!(matches!(store.claim(&study.id, LEASE).await.unwrap(), Claim::None));
+        store.forget(&study.id).await.unwrap();
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn a_lease_that_is_dropped_sets_its_chunk_free_and_three_of_them_make_it_a_gap() {
+    with_each_store(async |store| {
+        let study = study("gap", 2);
+        store.create(&study).await.unwrap();
+        for _ in 0..MOST_ATTEMPTS {
+            let lease = free_again(&store, &study, 0).await;
+            drop(lease);
+        }
+        let gap = loop {
+            match store.claim(&study.id, LEASE).await.unwrap() {
+                Claim::Gap(chunk) => break chunk,
+                // The server has not seen the end of the session yet.
+                Claim::Chunk(lease) if lease.chunk() == 1 => lease.give_back().await.unwrap(),
+                other => panic!("{other:?}"),
+            }
+        };
+        assert_eq!(gap, 0);
+        // Its neighbour goes on.
+        let mut other = free_again(&store, &study, 1).await;
+        keep(&mut other).await;
+        let standing = store.find(&study.id).await.unwrap().unwrap();
+        assert_eq!(standing.gaps, [Gap { chunk: 0, attempts: MOST_ATTEMPTS }]);
+        assert!(standing.is_exhausted() && !standing.is_done() && !standing.is_running());
+        // Asked for again it is tried again.
+        store.resume(&study.id, Duration::from_secs(60)).await.unwrap();
+        assert!(store.find(&study.id).await.unwrap().unwrap().is_running());
+        let mut again = free_again(&store, &study, 0).await;
+        keep(&mut again).await;
+        assert!(store.find(&study.id).await.unwrap().unwrap().is_done());
+        store.forget(&study.id).await.unwrap();
+    })
+    .await;
+}
+
+/// The chunk, as soon as it is free.
+async fn free_again(store: &Store, study: &NewStudy, chunk: u64) -> Lease {
+    loop {
+        match store.claim(&study.id, LEASE).await.unwrap() {
+            Claim::Chunk(lease) if lease.chunk() == chunk => return lease,
+            Claim::Chunk(lease) => lease.give_back().await.unwrap(),
+            other => assert!(matches!(other, Claim::None), "{other:?}"),
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_chunk_that_is_given_back_was_never_tried() {
+    with_each_store(async |store| {
+        let study = study("back", 1);
+        store.create(&study).await.unwrap();
+        for _ in 0..2 * MOST_ATTEMPTS {
+            free_again(&store, &study, 0).await.give_back().await.unwrap();
+        }
+        keep(&mut free_again(&store, &study, 0).await).await;
+        assert!(store.find(&study.id).await.unwrap().unwrap().is_done());
+        store.forget(&study.id).await.unwrap();
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn a_cancelled_study_waits_for_nobody_until_it_is_asked_for_again() {
+    with_each_store(async |store| {
+        let study = study("cancelled", 2);
+        store.create(&study).await.unwrap();
+        keep(&mut claimed(&store, &study).await).await;
+        store.cancel(&study.id).await.unwrap();
+        let standing = store.find(&study.id).await.unwrap().unwrap();
+        assert!(standing.is_cancelled && !standing.is_running() && standing.done == 1);
+        assert!(store.waiting().await.unwrap().iter().all(|waiting| waiting.id != study.id));
+        store.resume(&study.id, Duration::from_secs(60)).await.unwrap();
+        assert!(store.waiting().await.unwrap().iter().any(|waiting| waiting.id == study.id));
+        store.forget(&study.id).await.unwrap();
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn a_study_whose_time_is_over_does_not_run_and_expires_once_nobody_asks() {
+    with_each_store(async |store| {
+        let study = NewStudy { time: Duration::ZERO, ..study("late", 2) };
+        store.create(&study).await.unwrap();
+        let standing = store.find(&study.id).await.unwrap().unwrap();
+        assert!(standing.is_late() && !standing.is_running());
+        assert_eq!(store.expire(Duration::from_secs(60)).await.unwrap(), 0);
+        assert!(store.expire(Duration::ZERO).await.unwrap() >= 1);
+        assert_eq!(store.find(&study.id).await.unwrap(), None);
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn what_was_kept_in_a_file_is_there_after_its_process() {
+    let file = File::new();
+    let study = study("again", 2);
+    let store = Store::open(&file.address()).await.unwrap();
+    store.create(&study).await.unwrap();
+    keep(&mut claimed(&store, &study).await).await;
+    let unfinished = claimed(&store, &study).await;
+    store.close().await;
+    drop(unfinished);
+    let store = Store::open(&file.address()).await.unwrap();
+    assert_eq!(store.chunks_done(&study.id).await.unwrap(), [0]);
+    assert_eq!(claimed(&store, &study).await.chunk(), 1);
+}
+
+#[tokio::test]
+async fn a_file_serves_one_process() {
+    let file = File::new();
+    let _first = Store::open(&file.address()).await.unwrap();
+    let second = Store::open(&file.address()).await;
+    assert!(matches!(second, Err(StoreError::InUse(_))), "{second:?}");
+}
+
+#[tokio::test]
+async fn two_workers_share_a_server_and_a_lost_lease_is_somebody_elses() {
+    let Some(address) = server() else { return };
+    let (one, other) = (Store::open(&address).await.unwrap(), Store::open(&address).await.unwrap());
+    one.migrate().await.unwrap();
+    let study = study("two", 1);
+    one.create(&study).await.unwrap();
+    let Claim::Chunk(mut silent) = one.claim(&study.id, Duration::from_millis(50)).await.unwrap() else { panic!() };
+    // Silent for longer than its session may be.
+    let mut lease = free_again(&other, &study, 0).await;
+    silent.keep(&[1], 1, 0, BUSY).await.unwrap_err();
+    // It is kept all the same, apart from the lease that another worker has now.
+    silent.keep(&[1], 1, 0, BUSY).await.unwrap();
+    lease.keep(&[1], 1, 0, BUSY).await.unwrap();
+    let standing = one.find(&study.id).await.unwrap().unwrap();
+    assert!(standing.is_done());
+    assert_eq!((standing.done, standing.looked_at), (1, 1));
+    one.forget(&study.id).await.unwrap();
+}
+
+#[test]
+fn an_address_holds_no_password_and_shows_none() {
+    for text in ["postgres://me:secret@db/studies", "postgresql://db/studies?sslmode=require&password=secret"] {
+        assert_eq!(Address::new(text, None).unwrap_err(), AddressError::HoldsPassword);
+    }
+    let address = Address::new("postgres://me@db:5433/studies?sslmode=verify-full", Some("secret")).unwrap();
+    assert!(address.is_shared());
+    assert_eq!(
+        (address.to_string(), format!("{address:?}")),
+        ("postgres://db:5433/studies".into(), "postgres://db:5433/studies".into())
+    );
+    assert!(!Address::new("/var/lib/toothwave/studies.sqlite", None).unwrap().is_shared());
+}
