@@ -3,7 +3,7 @@
 use toothwave_solver::drive::DriveError;
 use toothwave_solver::{
     Compatibility, ContactLaw, Drive, DriveParameters, Finding, LoadCase, Never, Parameter, PerContact, Position,
-    SolveError, ToothShape, Torque, Violation, findings,
+    SolveError, ToothShape, Torque, Violation, WaveGenerator, findings,
     mesh::{Mesh, Samples},
     sweep::{self, Points},
 };
@@ -237,6 +237,22 @@ fn four_teeth_have_a_geometry_but_no_sweep() {
     let load = LoadCase::new(&load(1.0, Compatibility::Projection)).unwrap();
     let refused = sweep::sweep(&drive(&p), &load, Points::samples(10).unwrap(), &Never).unwrap_err();
     assert!(matches!(refused, SolveError::NoToothInMesh { .. }));
+}
+
+#[test]
+fn teeth_on_a_path_that_is_given_touch_where_their_radius_passes_half_the_chord_of_its_valley() {
+    // d_v sin(π/28) with d_v = 59 mm.
+    let half_chord_mm = 59.0 * (std::f64::consts::PI / 28.0).sin();
+    let touches = |share: f64| {
+        let wave_generator = WaveGenerator::HarmonicPath { lobes: 2, mean_path_radius_mm: 60.0, amplitude_mm: 1.0 };
+        let p = DriveParameters { wave_generator, tooth_radius_mm: share * half_chord_mm, ..PAPER_5_1 };
+        match Drive::new(&p) {
+            Ok(_) => false,
+            Err(DriveError::Impossible(found)) => found.iter().any(|v| matches!(v, Violation::TeethTouch { .. })),
+            Err(other) => panic!("{other}"),
+        }
+    };
+    assert!(!touches(0.99) && touches(1.02));
 }
 
 #[test]

@@ -996,6 +996,34 @@ fn the_bearing_of_an_eccentric_bears_the_force_across_it_at_the_speed_of_its_rac
     }
 }
 
+/// Where a tooth enters under load the force across the bearing jumps, and either side of the jump has its own intervals.
+#[test]
+fn a_bearings_mean_load_takes_half_of_each_interval_at_either_end_jumps_too() {
+    let parameters = DriveParameters {
+        wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
+        teeth: 12,
+        installed: 12,
+        tooth_radius_mm: 2.5,
+        tooth: ToothShape::Cylinder { width_mm: 10.0 },
+        ring_teeth: 11,
+        tip_radius_mm: Some(35.5),
+    };
+    let (drive, mechanism) = (drive(&parameters), mechanism(&parameters));
+    let load = LoadCase::new(&load(5.0, Compatibility::VirtualWork)).unwrap();
+    let sweep = sweep(&drive, &load, Points::tolerance(1e-2, 100_000).unwrap(), &Never).unwrap();
+    let forces = RadialForces::of(&drive, &sweep, &Never).unwrap().unwrap();
+    let rolling = WaveGeneratorFriction::Rolling { bearing: RaceBearing { coefficient: 0.002, radius_mm: 25.0 } };
+    let losses = Losses::of(&drive, &sweep, &with(rolling, 0.05), &Never).unwrap();
+    let found = BearingLoad::of(&mechanism, RollingElement::Ball, &sweep, &losses, &forces).unwrap();
+    let angles = &sweep.input_angles.input_angle_deg;
+    assert!(angles.windows(2).any(|pair| pair[0] == pair[1]), "a jump stands twice");
+    let cubes = angles.iter().zip(&forces.force_n);
+    let cubes: Vec<_> =
+        cubes.map(|(&input_angle, force_n)| AtInputAngle { input_angle, value: force_n.powi(3) }).collect();
+    let mean_n = mean_over_period(&cubes).cbrt();
+    assert_near(found.mean_load_n, mean_n, 1e-12 * mean_n, "mean load");
+}
+
 #[test]
 fn the_capacity_is_the_least_that_any_contact_allows() {
     for parameters in [PAPER_5_1, PAPER_5_2] {

@@ -81,6 +81,10 @@ fn what_is_turned_alike_is_lost_motion_alone_however_light_the_load() {
                 }
                 let expected_deg = nominal.input_angles.wind_up_deg[3] + lost_rad.to_degrees();
                 assert!((found.input_angles.wind_up_deg[3] / expected_deg - 1.0).abs() < 1e-14);
+                let parameters = LoadParameters { law, modification: *modification, ..load(torque_nm, VirtualWork) };
+                let case = LoadCase::new(&parameters).unwrap();
+                let unloaded = sweep::unloaded_wind_up_deg(&drive, &case, deviations, &found, &Never).unwrap();
+                assert!((unloaded[3] / lost_rad.to_degrees() - 1.0).abs() < 1e-14, "{}", unloaded[3]);
             }
         }
     }
