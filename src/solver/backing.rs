@@ -226,7 +226,7 @@ pub struct Backings {
 
 impl Backings {
     /// Of the parts as they are made and held. Only cylinders, whole or with flats, press their parts along a line.
-    pub fn of(drive: &Drive, draft: &Draft, parts: &PartsParameters, support: Support) -> Result<Self, NotConverged> {
+    pub fn of(drive: &Drive, draft: &Draft, parts: &PartsParameters, support: Support) -> Self {
         let mut backings = Self { finger: None, rim: None, housed: None, cam: None, support };
         if matches!(drive.parameters().tooth, ToothShape::Ball { .. }) {
             return backings;
