@@ -1,4 +1,5 @@
 //! The store of studies: in a file, and on a PostgreSQL server where `TOOTHWAVE_TEST_POSTGRES` names an empty database.
+#![allow(clippy::unwrap_used, reason = "tests fail by panicking")]
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
