@@ -366,13 +366,23 @@ async fn a_dxf_declares_millimetres_and_a_layer_a_part_and_closes_every_polyline
 }
 
 #[tokio::test]
-async fn parts_are_read_by_drawings_alone() {
+async fn parts_change_no_load_and_are_read_by_drawings_and_by_the_estimates_of_what_gives_way() {
     let service = Service::new();
     let document = made(r#"{ "ring": { "outer_radius_mm": 1, "clearance_um": -5 } }"#);
-    for path in ["/v1/geometry", "/v1/coincidence-degree", "/v1/sweep"] {
+    for path in ["/v1/geometry", "/v1/coincidence-degree"] {
         service.post(path, &shortest()).await.found();
         assert!(service.post(path, &document).await.is_hit(), "{path}");
     }
+    let [usual, made] = [service.post("/v1/sweep", &shortest()).await, service.post("/v1/sweep", &document).await]
+        .map(|answer| answer.found());
+    for name in ["states", "peaks"] {
+        assert_eq!(usual[name], made[name], "{name}");
+    }
+    let has_rim = |answer: &Value| {
+        let estimates = answer["series_compliance_estimates"].as_array().unwrap();
+        estimates.iter().any(|estimate| estimate["backing"] == "housed_rim")
+    };
+    assert!(has_rim(&usual) && !has_rim(&made), "a rim of 1 mm cannot be made");
 }
 
 #[tokio::test]

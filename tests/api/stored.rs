@@ -16,10 +16,10 @@ use crate::designs::shortest;
 const EXPIRY: Duration = Duration::from_secs(3600);
 
 /// A file of its own, gone with it.
-struct File(PathBuf);
+pub(crate) struct File(PathBuf);
 
 impl File {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         static FILES: AtomicU64 = AtomicU64::new(0);
         let name = format!("toothwave-stored-{}-{}", std::process::id(), FILES.fetch_add(1, Ordering::Relaxed));
         Self(std::env::temp_dir().join(name))
@@ -39,14 +39,14 @@ impl Drop for File {
 }
 
 /// A service that keeps its studies in a file, with its workers where it has some.
-struct Keeper {
-    service: Service,
+pub(crate) struct Keeper {
+    pub(crate) service: Service,
     store: Store,
     workers: Option<JoinHandle<()>>,
 }
 
 impl Keeper {
-    async fn of(file: &File, limits: Limits, has_workers: bool) -> Self {
+    pub(crate) async fn of(file: &File, limits: Limits, has_workers: bool) -> Self {
         let store = file.store().await;
         let service = Service::keeping(limits, Keeping::Store { store: store.clone(), expiry: EXPIRY });
         let app = std::sync::Arc::clone(&service.app);
@@ -55,7 +55,7 @@ impl Keeper {
     }
 
     /// As when the process is told to stop.
-    async fn end(self) {
+    pub(crate) async fn end(self) {
         self.service.app.studies.close();
         match self.workers {
             Some(workers) => workers.await.unwrap(),

@@ -33,6 +33,7 @@ use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::question::{self, Question};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_calculation::sweep::answer::{ChecksAnswer, LoadAnswer, PeaksAnswer, SweepAnswer, TorqueCapacityAnswer};
+use toothwave_calculation::sweep::backing::EstimateAnswer;
 use toothwave_calculation::sweep::duty::DutyAnswer;
 use toothwave_calculation::sweep::losses::LossTotalsAnswer;
 use toothwave_calculation::sweep::model_error::ModelErrorAnswer;
@@ -140,6 +141,7 @@ struct PeaksOnly<'a> {
     enters_under_load: bool,
     peaks: &'a PeaksAnswer,
     model_error: &'a ModelErrorAnswer,
+    series_compliance_estimates: &'a [EstimateAnswer],
     teeth_in_mesh_per_zone: &'a TeethInMeshAnswer,
     loaded_teeth_per_zone: &'a TeethInMeshAnswer,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -234,6 +236,7 @@ fn peaks_line(
         enters_under_load: sweep.enters_under_load,
         peaks: &sweep.peaks,
         model_error: &sweep.model_error,
+        series_compliance_estimates: &sweep.series_compliance_estimates,
         teeth_in_mesh_per_zone: &sweep.teeth_in_mesh_per_zone,
         loaded_teeth_per_zone: &sweep.loaded_teeth_per_zone,
         torque_capacity: &sweep.torque_capacity,
