@@ -439,7 +439,7 @@ mod tests {
             let is_end = |index: usize| (0..objectives).any(|at| front[index].judged.objectives[at] <= least[at]);
             let crowded = (0..front.len()).filter(|&index| !is_end(index)).map(|index| (room(index), index));
             let crowded = crowded.min_by(|one, other| one.0.total_cmp(&other.0).then(other.1.cmp(&one.1)));
-            front.remove(crowded.unwrap().1);
+            front.remove(crowded.expect("a front that is thinned has members").1);
         }
     }
 
