@@ -152,8 +152,12 @@ class Kinds(OfDrive):
             ("ToothShape", "flat_sided", {"ToothWidth", "FlatLength"}),
             ("StiffnessLaw", "johnson", {"WaveGeneratorDepth", "RingDepth", "CarrierDepth"}),
             ("StiffnessLaw", "fixed", {"WaveGeneratorStiffnessNPerMm", "RingStiffnessNPerMm", "CarrierStiffnessNPerMm"}),
-            ("FrictionKind", "plain", {"WaveGeneratorFriction", "RingFriction", "CarrierFriction"}),
-            ("FrictionKind", "rolling", {"RingFriction", "CarrierFriction", "BearingFriction", "BearingRadius"}),
+            (
+                "FrictionKind",
+                "plain",
+                {f"{part}{of}" for part in ("WaveGenerator", "Ring", "Carrier") for of in ("Friction", "WearMm3PerNm")},
+            ),
+            ("FrictionKind", "rolling", {"BearingFriction", "BearingRadius", "BearingRatingN", "BearingElement"}),
             ("TipRelief", True, {"TipReliefUm", "TipReliefStart", "TipReliefPower"}),
         ):
             before = self.shown()
