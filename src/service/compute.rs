@@ -14,6 +14,9 @@ use tracing::Span;
 use crate::config::Limits;
 use crate::problem::{Problem, ProblemCode};
 
+/// A slice of what runs in turn begins nothing further after this time: so long at most does a single request wait behind short ones.
+pub const SLICE: Duration = Duration::from_millis(5);
+
 /// Runs solves, a bounded number at once and a bounded number waiting.
 #[derive(Debug, Clone)]
 pub struct Pool {

@@ -9,7 +9,7 @@ use toothwave_calculation::{BUILD, question};
 use toothwave_store::NewStudy;
 use toothwave_study::{Limits, Part, Study, Work};
 
-use crate::compute::Pool;
+use crate::compute::{Pool, SLICE};
 use crate::problem::Problem;
 
 /// What a chunk should take: long against what it costs to claim and to keep one, short against what a worker's end loses.
@@ -29,9 +29,6 @@ const CHUNKS_OF_A_LEASE: u32 = 20;
 
 /// Nor before this time.
 const LEAST_LEASE: Duration = Duration::from_secs(30);
-
-/// No variant is begun after this time, so that single requests have their turn.
-const SLICE: Duration = Duration::from_millis(5);
 
 /// Why a stored study is not computed here.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -15,7 +15,7 @@ use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_store::{Claim, Lease, Store, StoreError, Waiting};
 use toothwave_study::{Part, Study, Work};
 
-use crate::compute::Pool;
+use crate::compute::{Pool, SLICE};
 use crate::frozen::{self, NotHere};
 use crate::problem::Problem;
 
@@ -25,9 +25,6 @@ const PAUSE: Duration = Duration::from_secs(1);
 /// Between two tries to keep a result: at first, and at most.
 const RETRY: Duration = Duration::from_millis(200);
 const LONGEST_RETRY: Duration = Duration::from_secs(10);
-
-/// A slice begins no variant after this time: so long at most does a single request wait behind short ones.
-pub const SLICE: Duration = Duration::from_millis(5);
 
 /// The workers of this process.
 #[derive(Debug)]

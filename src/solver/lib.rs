@@ -182,16 +182,10 @@ impl SolveError {
 }
 
 /// Asked now and then whether to go on; a computation that is told to stop returns [`SolveError::Stopped`].
+/// It is asked through `dyn`, so that a sweep is compiled once, in this crate.
 pub trait Stop {
     /// Whether to stop.
     fn stopped(&self) -> bool;
-}
-
-/// A reference to what is asked: with `dyn` a sweep is compiled once, in this crate, however it is stopped.
-impl<S: Stop + ?Sized> Stop for &S {
-    fn stopped(&self) -> bool {
-        (**self).stopped()
-    }
 }
 
 /// Never stops.

@@ -27,6 +27,9 @@ pub const MOST_ATTEMPTS: u64 = 3;
 /// What a single operation may take: a server that cannot be reached says nothing.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(15);
 
+/// For what touches every chunk of a study, of which there may be a million.
+pub(crate) const LONG_PATIENCE: Duration = Duration::from_secs(120);
+
 /// A number as both databases keep it.
 pub(crate) fn stored(number: u64) -> i64 {
     i64::try_from(number).unwrap_or(i64::MAX)

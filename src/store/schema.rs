@@ -1,8 +1,7 @@
 //! The tables, in versions that follow each other.
 
 use crate::connection::{Connection, Store, StoreError, on};
-use crate::studies::LONG_PATIENCE;
-use crate::{read, stored};
+use crate::{LONG_PATIENCE, PATIENCE, read, stored};
 
 /// The version that this build works with.
 pub const SCHEMA_VERSION: u64 = VERSIONS.len() as u64;
@@ -114,7 +113,7 @@ impl Store {
     /// # Errors
     /// Where it has another one, or does not answer.
     pub async fn check_schema(&self) -> Result<(), StoreError> {
-        self.with(crate::PATIENCE, async |connection| require_schema(connection).await).await
+        self.with(PATIENCE, async |connection| require_schema(connection).await).await
     }
 }
 

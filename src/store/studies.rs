@@ -5,10 +5,7 @@ use std::time::Duration;
 
 use crate::connection::{Connection, Database, Store, StoreError, on};
 use crate::schema::require_schema;
-use crate::{PATIENCE, read, stored};
-
-/// For what touches every chunk of a study, of which there may be a million.
-pub(crate) const LONG_PATIENCE: Duration = Duration::from_secs(120);
+use crate::{LONG_PATIENCE, PATIENCE, read, stored};
 
 /// A study as it is first kept: all that follows from it is frozen with it.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -41,7 +41,7 @@ use utoipa::ToSchema;
 
 use super::{Growing, broken_body, write_problem};
 use crate::app::App;
-use crate::compute::{self, Pool};
+use crate::compute::{self, Pool, SLICE};
 use crate::config::Limits;
 use crate::problem::{Problem, ProblemCode};
 use crate::room::{Reserved, Room, Sent};
@@ -49,9 +49,6 @@ use crate::{negotiation, observe};
 
 /// Lines of a chunk at most.
 const CHUNK_LINES: usize = 64;
-
-/// A slice begins no line after this time: so long at most does a single request wait behind short ones.
-const SLICE: Duration = Duration::from_millis(5);
 
 /// A slice begins no line when it holds so many bytes of answers.
 const SLICE_BYTES: usize = 1 << 20;

@@ -171,7 +171,7 @@ struct Candidate<'a> {
     bound: f64,
 }
 
-struct Search<'a, S> {
+struct Search<'a> {
     /// With one tooth at each place of the mesh, which stands for all that carry alike; where items deviate, with every tooth.
     loaded: LoadedDrive<'a>,
     mesh: Mesh,
@@ -185,7 +185,7 @@ struct Search<'a, S> {
     /// Whether loads are smooth between two entries.
     is_smooth: bool,
     tolerance: Tolerance,
-    stop: &'a S,
+    stop: &'a dyn Stop,
     states: u64,
     /// The largest values seen.
     peaks: [f64; QUANTITIES],
@@ -197,7 +197,7 @@ pub(crate) fn moments(
     loaded: &LoadedDrive<'_>,
     load: &LoadCase,
     tolerance: Tolerance,
-    stop: &impl Stop,
+    stop: &dyn Stop,
 ) -> Result<Vec<Vec<Moment>>, SolveError> {
     let mesh = *loaded.mesh();
     let tells_items_apart = mesh.tells_items_apart();
@@ -270,7 +270,7 @@ fn pieces(mesh: &Mesh, lap: u64) -> (Piece, Option<Piece>) {
     (to_entry, Some(from_entry))
 }
 
-impl<S: Stop> Search<'_, S> {
+impl Search<'_> {
     fn loads_jump(&self) -> bool {
         self.mesh.flank_limit().end != FlankEnd::RegularTip
     }

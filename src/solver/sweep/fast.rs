@@ -53,7 +53,7 @@ pub(crate) fn sweep(
     loaded: &LoadedDrive<'_>,
     samples: Samples,
     allowable_mpa: Option<PerContact<f64>>,
-    stop: &impl Stop,
+    stop: &dyn Stop,
 ) -> Result<Option<Sweep>, SolveError> {
     let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
     let mesh = Mesh::new(loaded.drive());
@@ -75,7 +75,7 @@ pub(crate) fn peaks(
     loaded: &LoadedDrive<'_>,
     samples: Samples,
     allowable_mpa: Option<PerContact<f64>>,
-    stop: &impl Stop,
+    stop: &dyn Stop,
 ) -> Result<Option<SweepPeaks>, SolveError> {
     let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
     let mut sink = PeakSink::default();
@@ -101,15 +101,15 @@ fn in_proportion(
 
 /// The sweep as `pulp` wants it: compiled once for each instruction set, the best one of this machine picked when the program runs. Whatever
 /// it calls must be inlined into it, or it would be compiled for none of them.
-struct Vectorised<'a, S, K> {
+struct Vectorised<'a, K> {
     kernel: &'a Kernel,
     loaded: &'a LoadedDrive<'a>,
     samples: Samples,
-    stop: &'a S,
+    stop: &'a dyn Stop,
     sink: &'a mut K,
 }
 
-impl<S: Stop, K: Sink> pulp::WithSimd for Vectorised<'_, S, K> {
+impl<K: Sink> pulp::WithSimd for Vectorised<'_, K> {
     type Output = Result<Option<Filled>, SolveError>;
 
     #[inline(always)]
@@ -284,7 +284,7 @@ impl Kernel {
         &self,
         loaded: &LoadedDrive<'_>,
         samples: Samples,
-        stop: &impl Stop,
+        stop: &dyn Stop,
         sink: &mut impl Sink,
     ) -> Result<Option<Filled>, SolveError> {
         pulp::Arch::new().dispatch(Vectorised { kernel: self, loaded, samples, stop, sink })
@@ -295,7 +295,7 @@ impl Kernel {
         &self,
         loaded: &LoadedDrive<'_>,
         samples: Samples,
-        stop: &impl Stop,
+        stop: &dyn Stop,
         sink: &mut K,
     ) -> Result<Option<Filled>, SolveError> {
         let mesh = Mesh::new(loaded.drive());

@@ -29,11 +29,11 @@ pub use unloaded::unloaded_wind_up_deg;
 pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<Sweep, SolveError> {
     let loaded = LoadedDrive::new(drive, load)?;
     if let Points::Samples(samples) = points
-        && let Some(sweep) = fast::sweep(&loaded, samples, load.parameters().allowable_stress_mpa, &stop)?
+        && let Some(sweep) = fast::sweep(&loaded, samples, load.parameters().allowable_stress_mpa, stop)?
     {
         return Ok(sweep);
     }
-    plain::sweep(&loaded, load, points, &stop)
+    plain::sweep(&loaded, load, points, stop)
 }
 
 /// The sweep of a drive of which single items deviate: by slot and lobe, over as many load periods as it takes until they meet again as they
@@ -53,7 +53,7 @@ pub fn sweep_with_deviations(
         return sweep(drive, load, points, stop);
     }
     let loaded = LoadedDrive::with_deviations(drive, load, &ToothContact::of(drive), Some(deviations))?;
-    plain::sweep(&loaded, load, points, &stop)
+    plain::sweep(&loaded, load, points, stop)
 }
 
 /// What the sweep over one period comes to, without its states: the same peaks, in less time. That the period closes is not looked at.
@@ -63,11 +63,11 @@ pub fn sweep_with_deviations(
 pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<SweepPeaks, SolveError> {
     let loaded = LoadedDrive::new(drive, load)?;
     if let Points::Samples(samples) = points
-        && let Some(peaks) = fast::peaks(&loaded, samples, load.parameters().allowable_stress_mpa, &stop)?
+        && let Some(peaks) = fast::peaks(&loaded, samples, load.parameters().allowable_stress_mpa, stop)?
     {
         return Ok(peaks);
     }
-    plain::sweep(&loaded, load, points, &stop).map(|sweep| SweepPeaks::from(&sweep))
+    plain::sweep(&loaded, load, points, stop).map(|sweep| SweepPeaks::from(&sweep))
 }
 
 /// The same sweep, state by state: what the fast path is held against, and what is left where it does not reach.
@@ -75,5 +75,5 @@ pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) ->
 /// # Errors
 /// As [`sweep`].
 pub fn sweep_plain(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<Sweep, SolveError> {
-    plain::sweep(&LoadedDrive::new(drive, load)?, load, points, &stop)
+    plain::sweep(&LoadedDrive::new(drive, load)?, load, points, stop)
 }

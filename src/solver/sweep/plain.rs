@@ -36,7 +36,7 @@ pub(crate) fn sweep(
     loaded: &LoadedDrive<'_>,
     load: &LoadCase,
     points: Points,
-    stop: &impl Stop,
+    stop: &dyn Stop,
 ) -> Result<Sweep, SolveError> {
     let mesh = *loaded.mesh();
     let mut columns = Growing::new(loaded, load.parameters().allowable_stress_mpa);
