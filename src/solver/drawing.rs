@@ -12,6 +12,7 @@ use crate::gaps::RAD_PER_ARCSEC;
 use crate::parts::{CarrierPart, PartsParameters, RingPart, ToothPart, WaveGeneratorPart};
 use crate::profile::{Polyline, SampledCurve, cam_half_lobe, cam_outline, direction};
 use crate::root::NotConverged;
+use crate::spline;
 use crate::tooth_space::HalfSpace;
 use crate::violation::{Parameter, Violation};
 use crate::{SolveError, Stop};
@@ -24,6 +25,14 @@ pub enum Subject {
     /// All of them in the ring's frame, at an input angle.
     Assembly,
 }
+
+/// How far polynomials may be from their curve, as a share of the chord tolerance: as little as solids of tolerance 1e-3 mm need to touch each other
+/// within 10 nm.
+pub const SPLINE_SHARE_OF_CHORD: f64 = 0.01;
+
+/// Chord tolerance of the points that polynomials are laid through and held against, as a share of the drawing's: where a tip bends
+/// most, points that only just carry chords do not tell what the curve does between them.
+const DENSE_SHARE_OF_CHORD: f64 = 0.1;
 
 /// A closed path. Each edge starts at the very point where the one before ends, the first where the last ends.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,6 +75,9 @@ pub enum Edge {
         start_tangent: Unit<Vector2<f64>>,
         /// Direction at the last point.
         end_tangent: Unit<Vector2<f64>>,
+        /// Bézier's polygons of polynomials that follow each other along it with one tangent, within [`SPLINE_SHARE_OF_CHORD`] of the
+        /// tolerance.
+        polynomials: Vec<Polyline>,
     },
 }
 
@@ -89,16 +101,35 @@ impl Edge {
     /// The same turned about the origin.
     fn turned(&self, rotation: &Rotation2<f64>) -> Self {
         let tangent = |tangent: &Unit<Vector2<f64>>| Unit::new_unchecked(rotation * tangent.into_inner());
+        let turned = |points: &Polyline| -> Polyline { points.iter().map(|point| rotation * point).collect() };
         match self {
             Self::Line { start, end } => Self::Line { start: rotation * start, end: rotation * end },
             Self::Arc { start, end, radius_mm, sweep_rad } => {
                 Self::Arc { start: rotation * start, end: rotation * end, radius_mm: *radius_mm, sweep_rad: *sweep_rad }
             }
-            Self::Curve { points, start_tangent, end_tangent } => Self::Curve {
-                points: points.iter().map(|point| rotation * point).collect(),
+            Self::Curve { points, start_tangent, end_tangent, polynomials } => Self::Curve {
+                points: turned(points),
                 start_tangent: tangent(start_tangent),
                 end_tangent: tangent(end_tangent),
+                polynomials: polynomials.iter().map(turned).collect(),
             },
+        }
+    }
+
+    /// A curve as it is drawn, sampled to the chord tolerance and densely.
+    fn curve(drawn: SampledCurve, dense: &SampledCurve, chord_tolerance_mm: f64) -> Self {
+        let polynomials = spline::polygons(dense, SPLINE_SHARE_OF_CHORD * chord_tolerance_mm);
+        let SampledCurve { points, tangents } = drawn;
+        Self::Curve { points, start_tangent: tangents[0], end_tangent: tangents[tangents.len() - 1], polynomials }
+    }
+
+    /// Lets a curve end at the very point where the next edge starts.
+    fn end_at(&mut self, next: Point2<f64>) {
+        if let Self::Curve { points, polynomials, .. } = self {
+            for polygon in polynomials.last_mut().into_iter().chain([points]) {
+                polygon.pop();
+                polygon.push(next);
+            }
         }
     }
 }
@@ -253,22 +284,26 @@ impl Drawing {
     /// The ring: a circle outside, inside its tooth spaces, from tip to tip each, with the lands between that bored or turned flanks leave.
     fn ring_section(&self, ring: &RingPart, stop: &dyn Stop) -> Result<Section, SolveError> {
         let teeth = self.drive.parameters().ring_teeth.unsigned_abs();
-        let mut half = ring.space.half(self.parameters.chord_tolerance_mm, stop)?;
+        let chord_tolerance_mm = self.parameters.chord_tolerance_mm;
+        let mut half = ring.space.half(chord_tolerance_mm, stop)?;
         let chords: usize = half.pieces.iter().map(|piece| piece.points.len() - 1).sum();
         self.require_points(2 * chords as u64 * teeth)?;
         let tip_rad = PI / teeth as f64;
         let tip = ring.space.tip();
-        if !tip.has_land
-            && let Some(end) = half.pieces.last_mut().and_then(|piece| piece.points.last_mut())
-        {
-            // Both flanks end on the symmetry line; there the tip is a point, or regular.
-            *end = Point2::from(tip.radius_mm * Vector2::new(tip_rad.cos(), tip_rad.sin()));
+        let mut dense = ring.space.half(DENSE_SHARE_OF_CHORD * chord_tolerance_mm, stop)?;
+        for half in [&mut half, &mut dense] {
+            if !tip.has_land
+                && let Some(end) = half.pieces.last_mut().and_then(|piece| piece.points.last_mut())
+            {
+                // Both flanks end on the symmetry line; there the tip is a point, or regular.
+                *end = Point2::from(tip.radius_mm * Vector2::new(tip_rad.cos(), tip_rad.sin()));
+            }
         }
         let land_rad = match half.pieces.last().and_then(|piece| piece.points.last()) {
             Some(end) if tip.has_land => 2.0 * (tip_rad - end.y.atan2(end.x)),
             _ => 0.0,
         };
-        let space = tooth_space(half);
+        let space = tooth_space(half, dense, chord_tolerance_mm);
         let start = space.first().map(Edge::start).unwrap_or_default();
         let turned = |copy: u64| Rotation2::new(2.0 * PI * ((copy % teeth) as f64 / teeth as f64));
         let mut edges = Vec::new();
@@ -280,11 +315,8 @@ impl Drawing {
                     let start = last.end();
                     edges.push(Edge::Arc { start, end: next, radius_mm: tip.radius_mm, sweep_rad: land_rad });
                 }
-                Some(Edge::Curve { points, .. }) => {
-                    points.pop();
-                    points.push(next);
-                }
-                _ => {}
+                Some(last) => last.end_at(next),
+                None => {}
             }
         }
         Ok(Section { outer: Outline::Circle { radius_mm: ring.outer_radius_mm }, holes: vec![Outline::Edges(edges)] })
@@ -293,20 +325,41 @@ impl Drawing {
     /// The wave generator: a curve from each lobe to each valley and on.
     fn cam_section(&self, cam: &WaveGeneratorPart, stop: &dyn Stop) -> Result<Section, SolveError> {
         let (locus, lobes) = (self.drive.flank().locus(), self.drive.lobes());
-        let SampledCurve { points, .. } =
-            cam_half_lobe(locus, cam.set_back_mm, self.parameters.chord_tolerance_mm, stop)?;
+        let half_lobe = |tolerance_mm: f64| cam_half_lobe(locus, cam.set_back_mm, tolerance_mm, stop);
+        let tolerance_mm = self.parameters.chord_tolerance_mm;
+        let points = half_lobe(tolerance_mm)?.points;
         let half = points.len() - 1;
         self.require_points(u64::from(2 * lobes) * half as u64)?;
         let whole = cam_outline(&points, lobes);
+        // The poles likewise, each polygon's last one the next one's first, so that they start and end in the outline's very points.
+        let dense = half_lobe(DENSE_SHARE_OF_CHORD * tolerance_mm)?;
+        let polygons = spline::polygons(&dense, SPLINE_SHARE_OF_CHORD * tolerance_mm);
+        let degrees: Vec<_> = polygons.iter().map(|polygon| polygon.len() - 1).collect();
+        let poles = polygons.iter().flat_map(|polygon| &polygon[1..]);
+        let whole_polygon = cam_outline(&points[..1].iter().chain(poles).copied().collect(), lobes);
         // Where a lobe or a valley lies the tangent stands across the radius.
         let across = |end: u32| {
             let radial = direction(end, 2 * lobes);
             Unit::new_unchecked(Vector2::new(0.0 - radial.y, radial.x))
         };
+        let mut first_pole = 0;
+        let mut polynomials = |index: u32| {
+            let mut degrees = degrees.clone();
+            if index % 2 == 1 {
+                degrees.reverse();
+            }
+            let polygon = |degree: usize| {
+                let first = first_pole;
+                first_pole += degree;
+                whole_polygon[first..=first_pole].to_vec()
+            };
+            degrees.into_iter().map(polygon).collect()
+        };
         let edges = (0..2 * lobes).zip((0..).step_by(half)).map(|(index, start)| Edge::Curve {
             points: whole[start..=start + half].to_vec(),
             start_tangent: across(index),
             end_tangent: across((index + 1) % (2 * lobes)),
+            polynomials: polynomials(index),
         });
         Ok(Section {
             outer: Outline::Edges(edges.collect()),
@@ -365,7 +418,22 @@ impl Drawing {
 }
 
 /// A tooth space of the ring, its middle along x, from tip to tip.
-fn tooth_space(half: HalfSpace) -> Vec<Edge> {
+fn tooth_space(half: HalfSpace, dense: HalfSpace, chord_tolerance_mm: f64) -> Vec<Edge> {
+    let root_arc_rad = half.root_arc_rad;
+    let mut edges: Vec<_> = (flanks(half).into_iter().zip(flanks(dense)))
+        .map(|(drawn, dense)| Edge::curve(drawn, &dense, chord_tolerance_mm))
+        .collect();
+    if root_arc_rad > 0.0 {
+        let middle = edges.len() / 2;
+        let (start, end) = (edges[middle - 1].end(), edges[middle].start());
+        let root = Edge::Arc { start, end, radius_mm: end.coords.norm(), sweep_rad: 2.0 * root_arc_rad };
+        edges.insert(middle, root);
+    }
+    edges
+}
+
+/// The flanks of a tooth space from tip to tip, one curve where they are smooth at the root.
+fn flanks(half: HalfSpace) -> Vec<SampledCurve> {
     let HalfSpace { root_arc_rad, is_smooth_at_root, mut pieces } = half;
     if let Some(first) = pieces.first_mut().and_then(|piece| piece.points.first_mut())
         && root_arc_rad == 0.0
@@ -374,37 +442,21 @@ fn tooth_space(half: HalfSpace) -> Vec<Edge> {
         *first = Point2::new(first.coords.norm(), 0.0);
     }
     let image = |point: &Point2<f64>| Point2::new(point.x, 0.0 - point.y);
-    let image_tangent = |tangent: Unit<Vector2<f64>>| Unit::new_unchecked(Vector2::new(-tangent.x, tangent.y));
-    let mut edges: Vec<_> = pieces
-        .iter()
-        .rev()
-        .map(|SampledCurve { points, start_tangent, end_tangent }| Edge::Curve {
-            points: points.iter().rev().map(image).collect(),
-            start_tangent: image_tangent(*end_tangent),
-            end_tangent: image_tangent(*start_tangent),
-        })
-        .collect();
-    let root = pieces.first().and_then(|piece| piece.points.first()).copied().unwrap_or_default();
-    if root_arc_rad > 0.0 {
-        edges.push(Edge::Arc {
-            start: image(&root),
-            end: root,
-            radius_mm: root.coords.norm(),
-            sweep_rad: 2.0 * root_arc_rad,
-        });
+    let image_tangent = |tangent: &Unit<Vector2<f64>>| Unit::new_unchecked(Vector2::new(-tangent.x, tangent.y));
+    let mirrored = |curve: &SampledCurve| SampledCurve {
+        points: curve.points.iter().rev().map(image).collect(),
+        tangents: curve.tangents.iter().rev().map(image_tangent).collect(),
+    };
+    let mut curves: Vec<_> = pieces.iter().rev().map(mirrored).collect();
+    let mut pieces = pieces.into_iter();
+    if is_smooth_at_root
+        && let (Some(before), Some(SampledCurve { points, tangents })) = (curves.last_mut(), pieces.next())
+    {
+        before.points.extend(&points[1..]);
+        before.tangents.extend(&tangents[1..]);
     }
-    for SampledCurve { points, start_tangent, end_tangent } in pieces {
-        match edges.last_mut() {
-            Some(Edge::Curve { points: before, end_tangent: end, .. })
-                if is_smooth_at_root && before.last() == Some(&root) && points.first() == Some(&root) =>
-            {
-                before.extend(&points[1..]);
-                *end = end_tangent;
-            }
-            _ => edges.push(Edge::Curve { points, start_tangent, end_tangent }),
-        }
-    }
-    edges
+    curves.extend(pieces);
+    curves
 }
 
 /// A tooth: a circle, or, with flats on the walls of its slot, which runs along x, two arcs joined by lines.

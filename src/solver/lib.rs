@@ -49,6 +49,7 @@ pub mod position;
 pub mod profile;
 pub mod ring;
 pub mod root;
+mod spline;
 pub mod springs;
 pub mod sweep;
 pub mod tooth;

@@ -53,11 +53,10 @@ pub(crate) struct CurvePoint {
     pub(crate) tangent: Unit<Vector2<f64>>,
 }
 
-/// A sampled curve with its directions at both ends.
+/// A sampled curve with its direction at each point.
 pub(crate) struct SampledCurve {
     pub(crate) points: Polyline,
-    pub(crate) start_tangent: Unit<Vector2<f64>>,
-    pub(crate) end_tangent: Unit<Vector2<f64>>,
+    pub(crate) tangents: Vec<Unit<Vector2<f64>>>,
 }
 
 /// Pieces that half a lobe starts with, so that no piece can hide more than one inflection.
@@ -236,15 +235,14 @@ pub(crate) fn sampled(
     };
     let span = start.from_valley_rad - end.from_valley_rad;
     let mut from = (start.from_valley_rad, curve(start)?);
-    let start_tangent = from.1.tangent;
-    let mut points = vec![from.1.point];
+    let mut curve_points = vec![from.1];
     for piece in 1..=PIECES {
         let x = start.from_valley_rad - span * (f64::from(piece) / f64::from(PIECES));
         let mut pending = vec![(x.max(end.from_valley_rad), at(x)?, 0)];
         while let Some(to) = pending.pop() {
             let (x, to_point, depth) = to;
             if chord_deviation_mm(&from.1, &to_point) <= tolerance_mm || depth == MAX_DEPTH {
-                points.push(to_point.point);
+                curve_points.push(to_point);
                 from = (x, to_point);
             } else {
                 if stop.stopped() {
@@ -256,7 +254,8 @@ pub(crate) fn sampled(
             }
         }
     }
-    Ok(SampledCurve { points, start_tangent, end_tangent: from.1.tangent })
+    let (points, tangents) = curve_points.into_iter().map(|CurvePoint { point, tangent }| (point, tangent)).unzip();
+    Ok(SampledCurve { points, tangents })
 }
 
 /// An upper bound of the distance between an arc and its chord.

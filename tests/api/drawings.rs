@@ -133,26 +133,38 @@ async fn a_step_makes_a_part_once_names_it_by_the_design_colours_it_and_extrudes
     }
     assert_eq!((count("=PRODUCT("), count("=MANIFOLD_SOLID_BREP("), count("=STYLED_ITEM(")), (5, 4, 4));
     assert_eq!(count("=NEXT_ASSEMBLY_USAGE_OCCURRENCE("), 2 + 2 * 40);
-    // The cam's quarters and the ring's spaces, all alike, each cut into a few faces.
+    // The cam's quarters and the ring's flanks, each a few polynomials.
     let extruded = count("=SURFACE_OF_LINEAR_EXTRUSION(");
-    assert!(extruded > 4 + 2 * 78 && extruded < 8 * (4 + 78), "{extruded}");
+    assert!(extruded >= 2 * 4 + 2 * 78 && extruded <= 3 * (4 + 2 * 78), "{extruded}");
     assert_eq!((count("=B_SPLINE_CURVE_WITH_KNOTS("), count("=B_SPLINE_SURFACE_WITH_KNOTS(")), (2 * extruded, 0));
     assert_eq!(written("tooth", &undercut(), "model/step").await.matches("NEXT_ASSEMBLY_USAGE_OCCURRENCE").count(), 0);
 }
 
-/// A spline is held to its own error, so it has fewer points the finer it is, beside chords of the same tolerance.
+/// Polynomials are held to their own error, not to that of chords, so a solid's faces are few, and no more where chords are finer.
 #[tokio::test]
-async fn a_step_leaves_out_the_points_that_its_splines_pass_without_them() {
-    let document = with(&undercut(), "/profile", json!({ "chord_tolerance_mm": 1e-5 }));
-    let drawing = drawn("ring", &document).await;
-    let edges = drawing["bodies"][0]["holes"][0]["edges"].as_array().unwrap();
-    let points: usize = edges.iter().map(|edge| numbers(&edge["x_mm"]).len()).sum();
-    let text = written("ring", &document, "model/step").await;
-    let of_spline = |line: &str| line.split("),.UNSPECIFIED.").next().unwrap().matches('#').count() - 1;
-    let splines = text.lines().filter(|line| line.contains("B_SPLINE_CURVE_WITH_KNOTS"));
+async fn a_step_of_ten_nanometres_has_a_quarter_of_a_megabyte() {
+    let [of_10_nm, of_1_nm] = [1e-3, 1e-4].map(async |tolerance_mm| {
+        let profile = json!({ "chord_tolerance_mm": tolerance_mm });
+        written("ring", &with(&shortest(), "/profile", profile), "model/step").await
+    });
+    let (of_10_nm, of_1_nm) = (of_10_nm.await, of_1_nm.await);
+    let polynomials = |text: &str| text.matches("=B_SPLINE_CURVE_WITH_KNOTS(").count();
     // Each stands twice, below and above.
-    let poles = splines.map(of_spline).sum::<usize>() / 2;
-    assert!(3 * poles < points, "{poles} of {points}");
+    assert_eq!(polynomials(&of_10_nm), 2 * 5 * 26);
+    assert!(of_10_nm.len() < 250_000, "{} bytes", of_10_nm.len());
+    assert!(polynomials(&of_1_nm) < 2 * 8 * 26, "{}", polynomials(&of_1_nm));
+}
+
+/// OpenCascade's nine places sum what stands on a polynomial of degree 9 exactly, and on nothing that is made of several.
+#[tokio::test]
+async fn every_face_of_a_step_is_one_polynomial_of_degree_eight_at_most() {
+    let text = written("assembly", &undercut(), "model/step").await;
+    for line in text.lines().filter(|line| line.contains("B_SPLINE_CURVE_WITH_KNOTS")) {
+        let degree: usize = line.split("('',").nth(1).unwrap().split(',').next().unwrap().parse().unwrap();
+        assert!((3..=8).contains(&degree), "{line}");
+        let ends = format!("({0},{0}),(0.,1.),.UNSPECIFIED.);", degree + 1);
+        assert!(line.ends_with(&ends), "{line}");
+    }
 }
 
 #[tokio::test]

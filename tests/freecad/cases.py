@@ -15,11 +15,22 @@ from theory import Theory
 PAPER = ("paper-5.1", "paper-5.2", "paper-5.2-bored")
 KINDS = ("eccentric-roller", "harmonic-three-lobes", "harmonic-path", "balls", "flat-sided")  # one of each other kind
 PIECES = 32  # of an edge that is no spline, for quadrature
-GAUSS = (  # five points, exact for the cubic spans of a spline
-    (0.0, 128 / 225),
-    *((sign * math.sqrt(5 - 2 * math.sqrt(10 / 7)) / 3, (322 + 13 * math.sqrt(70)) / 900) for sign in (-1, 1)),
-    *((sign * math.sqrt(5 + 2 * math.sqrt(10 / 7)) / 3, (322 - 13 * math.sqrt(70)) / 900) for sign in (-1, 1)),
-)
+
+
+def gauss_legendre(count):
+    """Places and weights over -1 to 1: Legendre's roots by Newton's method."""
+    for i in range(count):
+        x = math.cos(math.pi * (i + 0.75) / (count + 0.5))
+        for _ in range(10):
+            before, value = 1.0, x
+            for n in range(2, count + 1):
+                before, value = value, ((2 * n - 1) * x * value - (n - 1) * before) / n
+            slope = count * (x * value - before) / (x * x - 1)
+            x -= value / slope
+        yield x, 2 / ((1 - x * x) * slope * slope)
+
+
+GAUSS = tuple(gauss_legendre(8))  # exact for the polynomials of degree 8 that solids have, times their slopes
 
 
 def example(name):

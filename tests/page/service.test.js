@@ -136,3 +136,17 @@ test('a page opened at a service that is silent says so, and begins when it answ
     await server.stop();
   }
 });
+
+test('documents that came are kept while others are asked for again, so a page of many begins however many fail', async () => {
+  const page = await bed.open();
+  page.expectsOutage = true;
+  let asked = 0;
+  // Among those that a page begins with there are always some of these.
+  await page.route(/\/v1\/(quantities|examples)/, (route) => ((asked += 1) % 4 === 0 ? route.abort() : route.continue()));
+  await page.reload();
+  await settled(page);
+  const examples = await page.locator('[data-example]').count();
+  assert.ok(examples > 4);
+  // Each document that failed was asked for once more, as often as it failed, and no other one.
+  assert.equal(asked - Math.floor(asked / 4), examples + 2);
+});

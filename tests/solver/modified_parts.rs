@@ -320,7 +320,7 @@ fn modified_outlines_close_and_their_curves_start_and_end_along_their_tangents()
             let edges = edges(&ring.section.holes[0]);
             for (edge, next) in edges.iter().zip(edges.iter().cycle().skip(1)) {
                 assert_eq!(edge.end(), next.start());
-                let Edge::Curve { points, start_tangent, end_tangent } = edge else { continue };
+                let Edge::Curve { points, start_tangent, end_tangent, .. } = edge else { continue };
                 // A chord of a thousandth of a radian turns by as much; a steep start of a relief by more.
                 let steep = m.ring_tip_relief.is_some_and(|relief| relief.power < 2.0);
                 let [first, second, .., before, last] = &points[..] else { panic!("{points:?}") };
@@ -459,4 +459,79 @@ fn a_modification_that_leaves_no_outline_is_refused_with_the_number_at_fault() {
         matches!(found[..], [Violation::ModificationLeavesNothing { limit: Some(limit), .. }] if (limit - least_um).abs() < 1e-9),
         "{found:?}"
     );
+}
+
+/// Bézier's polygons of all curves.
+fn polynomials(edges: &[Edge]) -> Vec<Vec<Point2<f64>>> {
+    let of_edge = |edge: &Edge| match edge {
+        Edge::Curve { polynomials, .. } => polynomials.clone(),
+        Edge::Line { .. } | Edge::Arc { .. } => Vec::new(),
+    };
+    edges.iter().flat_map(of_edge).collect()
+}
+
+/// Points of a polynomial by Bernstein's own sum, both ends included.
+fn along(polygon: &[Point2<f64>]) -> impl Iterator<Item = Vector2<f64>> {
+    let degree = polygon.len() - 1;
+    (0..=60).map(move |i| {
+        let t = f64::from(i) / 60.0;
+        let mut binomial = 1.0;
+        let mut sum = Vector2::zeros();
+        for (k, pole) in polygon.iter().enumerate() {
+            sum += pole.coords * (binomial * t.powi(k as i32) * (1.0 - t).powi((degree - k) as i32));
+            binomial *= (degree - k) as f64 / (k + 1) as f64;
+        }
+        sum
+    })
+}
+
+#[test]
+fn solids_have_polynomials_that_are_everywhere_within_a_hundredth_of_the_chord_tolerance() {
+    for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()] {
+        for tolerance_mm in [1e-2, 1e-3, 1e-5] {
+            let near_mm = 0.01 * tolerance_mm;
+            let ring = drawn(&p, Subject::Part(Part::Ring), &parts(NONE), tolerance_mm, 0.0).remove(0);
+            let edges = edges(&ring.section.holes[0]);
+            let of_space = edges.len() / usize::try_from(p.ring_teeth).unwrap();
+            for polygon in polynomials(&edges[..of_space]) {
+                for point in along(&polygon) {
+                    let above = Vector2::new(point.x, point.y.abs());
+                    let off_mm = (from_path(&p, above, 0.0).0 - p.tooth_radius_mm).abs();
+                    assert!(off_mm < 1.1 * near_mm, "{off_mm} of {near_mm} on {p:?}");
+                }
+            }
+            if let WaveGenerator::Ellipse { semi_major_mm: a, semi_minor_mm: b } = p.wave_generator {
+                let cam = drawn(&p, Subject::Part(Part::WaveGenerator), &parts(NONE), tolerance_mm, 0.0).remove(0);
+                for point in polynomials(self::edges(&cam.section.outer)).iter().flat_map(|polygon| along(polygon)) {
+                    // To the first order, the distance from the ellipse.
+                    let slope = 2.0 * (point.x / (a * a)).hypot(point.y / (b * b));
+                    let off_mm = ((point.x / a).powi(2) + (point.y / b).powi(2) - 1.0).abs() / slope;
+                    assert!(off_mm < 1.1 * near_mm, "{off_mm} of {near_mm}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn polynomials_follow_each_other_along_one_tangent_and_end_with_their_curve() {
+    for p in [PAPER_5_1, PAPER_5_2_BORED, eccentric(), three_lobes()] {
+        for m in of_the_ring().into_iter().chain([NONE]) {
+            for part in [Part::Ring, Part::WaveGenerator] {
+                let body = drawn(&p, Subject::Part(part), &parts(m), 1e-3, 0.0).remove(0);
+                let outline = body.section.holes.first().unwrap_or(&body.section.outer);
+                for edge in edges(outline) {
+                    let Edge::Curve { polynomials: polygons, .. } = edge else { continue };
+                    let ends = (polygons[0][0], *polygons.last().unwrap().last().unwrap());
+                    assert_eq!(ends, (edge.start(), edge.end()));
+                    for (before, after) in polygons.iter().zip(&polygons[1..]) {
+                        let [.., last, joint] = &before[..] else { panic!("{before:?}") };
+                        assert_eq!(after[0], *joint);
+                        let (into, out) = ((joint - last).normalize(), (after[1] - joint).normalize());
+                        assert!(into.dot(&out) > 0.0 && into.perp(&out).abs() < 1e-9, "{into} {out} of {m:?}");
+                    }
+                }
+            }
+        }
+    }
 }

@@ -161,6 +161,9 @@ pub enum EdgeAnswer {
         start_tangent_deg: f64,
         /// Its direction at the last point.
         end_tangent_deg: f64,
+        /// Bézier's polygons of the polynomials that solids have in its place.
+        #[serde(skip)]
+        polynomials: Vec<Vec<[f64; 2]>>,
     },
 }
 
@@ -189,11 +192,15 @@ impl From<Edge> for EdgeAnswer {
                     sweep_deg: sweep_rad.to_degrees(),
                 }
             }
-            Edge::Curve { points, start_tangent, end_tangent } => Self::Curve {
+            Edge::Curve { points, start_tangent, end_tangent, polynomials } => Self::Curve {
                 x_mm: points.iter().map(|point| point.x).collect(),
                 y_mm: points.iter().map(|point| point.y).collect(),
                 start_tangent_deg: start_tangent.y.atan2(start_tangent.x).to_degrees(),
                 end_tangent_deg: end_tangent.y.atan2(end_tangent.x).to_degrees(),
+                polynomials: polynomials
+                    .iter()
+                    .map(|polygon| polygon.iter().map(|pole| [pole.x, pole.y]).collect())
+                    .collect(),
             },
         }
     }

@@ -1,23 +1,15 @@
-//! Drawings as STEP: every part one solid, made once, and an assembly of as many instances of each as there are; flanks as cubic
-//! splines, swept along z.
+//! Drawings as STEP: every part one solid, made once, and an assembly of as many instances of each as there are; flanks as
+//! polynomials, swept along z, each a face, since CAD kernels sum the volume over such a face exactly and over splines of several do not.
 //!
-//! A prism needs a few kinds of record only: planes, cylinders and extruded splines, and what joins them; a ball is two halves of a
+//! A prism needs a few kinds of record only: planes, cylinders and extruded polynomials, and what joins them; a ball is two halves of a
 //! sphere. They are those of ISO 10303-214 (`AUTOMOTIVE_DESIGN`).
 
-use std::fmt::Write as _;
+use std::collections::HashMap;
 use std::io::{self, Write};
 
 use super::answer::{BodyAnswer, BodyPart, BodySolid, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
 use super::svg;
 use crate::json;
-
-/// How far a spline may be from its curve, as a share of the chord tolerance. A spline through few points is as near to the curve
-/// as chords through many, so points are left out as long as this holds.
-const SPLINE_SHARE_OF_CHORD: f64 = 0.01;
-
-/// Spans of a spline for each face that stands on it. CAD kernels sum volumes with a fixed number of places on a face:
-/// OpenCascade with nine, which over a whole tooth space miss its volume by 1e-5 (tests/freecad/test_step.py). More faces make larger files.
-const SPANS_OF_A_FACE: usize = 6;
 
 /// Digits of the design's hash in the names of parts: enough to tell designs apart in a tree, few enough to be read there.
 const HASH_DIGITS: usize = 8;
@@ -27,7 +19,7 @@ const HASH_DIGITS: usize = 8;
 /// # Errors
 /// Those of the writer.
 pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
-    let mut step = Step { writer, last: 0, spline_tolerance_mm: SPLINE_SHARE_OF_CHORD * drawing.chord_tolerance_mm };
+    let mut step = Step { writer, last: 0, shared: HashMap::new() };
     step.head(drawing)?;
     let frame = step.frame()?;
     let hash = drawing.design_hash.get(..HASH_DIGITS).unwrap_or_default();
@@ -41,6 +33,9 @@ pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Resu
     }
     writeln!(step.writer, "ENDSEC;\nEND-ISO-10303-21;")
 }
+
+/// Points are written to a picometre: a ten-thousandth of what polynomials of the default chord tolerance leave their curves by.
+const LEAST_PER_MM: f64 = 1e9;
 
 /// A record's number.
 #[derive(Debug, Clone, Copy)]
@@ -71,14 +66,15 @@ enum Side {
         radius_mm: f64,
         is_counter_clockwise: bool,
     },
-    Curve(Spline),
+    /// Along a polynomial, by Bézier's polygon.
+    Curve(Vec<[f64; 2]>),
 }
 
 impl Side {
     fn end(&self) -> [f64; 2] {
         match self {
             Self::Line { end } | Self::Arc { end, .. } => *end,
-            Self::Curve(spline) => spline.poles.last().copied().unwrap_or_default(),
+            Self::Curve(poles) => poles.last().copied().unwrap_or_default(),
         }
     }
 }
@@ -102,7 +98,8 @@ struct Product {
 struct Step<'a> {
     writer: &'a mut dyn Write,
     last: u64,
-    spline_tolerance_mm: f64,
+    /// Points, directions and vectors, each written once.
+    shared: HashMap<String, Id>,
 }
 
 impl Step<'_> {
@@ -110,6 +107,16 @@ impl Step<'_> {
         self.last += 1;
         writeln!(self.writer, "#{}={text};", self.last)?;
         Ok(Id(self.last))
+    }
+
+    /// A record that stands for nothing but its value, so that who wants the same refers to the same one.
+    fn shared(&mut self, text: String) -> io::Result<Id> {
+        if let Some(&id) = self.shared.get(&text) {
+            return Ok(id);
+        }
+        let id = self.record(format_args!("{text}"))?;
+        self.shared.insert(text, id);
+        Ok(id)
     }
 
     fn head(&mut self, drawing: &DrawingAnswer) -> io::Result<()> {
@@ -227,9 +234,8 @@ impl Step<'_> {
 
     /// A prism from z = 0 up: a face on every edge, a bottom and a top.
     fn prism(&mut self, body: &BodyAnswer, name: &str) -> io::Result<Id> {
-        let tolerance_mm = self.spline_tolerance_mm;
-        let outer = (sides(&body.outer, false, tolerance_mm), "FACE_OUTER_BOUND");
-        let holes = body.holes.iter().map(|hole| (sides(hole, true, tolerance_mm), "FACE_BOUND"));
+        let outer = (sides(&body.outer, false), "FACE_OUTER_BOUND");
+        let holes = body.holes.iter().map(|hole| (sides(hole, true), "FACE_BOUND"));
         let (mut faces, mut bottom_bounds, mut top_bounds) = (Vec::new(), Vec::new(), Vec::new());
         for (sides, bound) in [outer].into_iter().chain(holes) {
             let bottom = self.level(&sides, 0.0)?;
@@ -311,10 +317,12 @@ impl Step<'_> {
                 let circle = self.record(format_args!("CIRCLE('',{place},{})", Real(*radius_mm)))?;
                 Ok((circle, if *is_counter_clockwise { ".T." } else { ".F." }))
             }
-            Side::Curve(Spline { poles, multiplicities, knots }) => {
+            Side::Curve(poles) => {
                 let poles: Vec<_> = poles.iter().map(|[x, y]| self.point([*x, *y, z_mm])).collect::<Result<_, _>>()?;
+                let order = poles.len();
                 let spline = self.record(format_args!(
-                    "B_SPLINE_CURVE_WITH_KNOTS('',3,({}),.UNSPECIFIED.,.F.,.F.,({multiplicities}),({knots}),.UNSPECIFIED.)",
+                    "B_SPLINE_CURVE_WITH_KNOTS('',{},({}),.UNSPECIFIED.,.F.,.F.,({order},{order}),(0.,1.),.UNSPECIFIED.)",
+                    order - 1,
                     list(&poles)
                 ))?;
                 Ok((spline, ".T."))
@@ -363,8 +371,7 @@ impl Step<'_> {
                 Ok((cylinder, if *is_counter_clockwise { ".T." } else { ".F." }))
             }
             Side::Curve(_) => {
-                let up = self.direction([0.0, 0.0, 1.0])?;
-                let sweep = self.record(format_args!("VECTOR('',{up},1.)"))?;
+                let sweep = self.vector([0.0, 0.0, 1.0])?;
                 // Its normal is that of the curve's direction times z.
                 Ok((self.record(format_args!("SURFACE_OF_LINEAR_EXTRUSION('',{curve},{sweep})"))?, ".T."))
             }
@@ -381,9 +388,14 @@ impl Step<'_> {
     }
 
     fn line(&mut self, point: Id, direction: [f64; 3]) -> io::Result<Id> {
-        let direction = self.direction(direction)?;
-        let vector = self.record(format_args!("VECTOR('',{direction},1.)"))?;
+        let vector = self.vector(direction)?;
         self.record(format_args!("LINE('',{point},{vector})"))
+    }
+
+    /// Of length one.
+    fn vector(&mut self, direction: [f64; 3]) -> io::Result<Id> {
+        let direction = self.direction(direction)?;
+        self.shared(format!("VECTOR('',{direction},1.)"))
     }
 
     fn placement(&mut self, origin: [f64; 3], z: [f64; 3], x: [f64; 3]) -> io::Result<Id> {
@@ -391,17 +403,19 @@ impl Step<'_> {
         self.record(format_args!("AXIS2_PLACEMENT_3D('',{origin},{z},{x})"))
     }
 
-    fn point(&mut self, [x, y, z]: [f64; 3]) -> io::Result<Id> {
-        self.record(format_args!("CARTESIAN_POINT('',({},{},{}))", Real(x), Real(y), Real(z)))
+    fn point(&mut self, position_mm: [f64; 3]) -> io::Result<Id> {
+        let [x, y, z] = position_mm.map(|mm| Real((mm * LEAST_PER_MM).round() / LEAST_PER_MM));
+        self.shared(format!("CARTESIAN_POINT('',({x},{y},{z}))"))
     }
 
-    fn direction(&mut self, [x, y, z]: [f64; 3]) -> io::Result<Id> {
-        self.record(format_args!("DIRECTION('',({},{},{}))", Real(x), Real(y), Real(z)))
+    fn direction(&mut self, direction: [f64; 3]) -> io::Result<Id> {
+        let [x, y, z] = direction.map(Real);
+        self.shared(format!("DIRECTION('',({x},{y},{z}))"))
     }
 }
 
 /// The sides of a prism over an outline; those of a hole run clockwise, so that the material is on their left too.
-fn sides(outline: &OutlineAnswer, is_hole: bool, tolerance_mm: f64) -> Vec<Side> {
+fn sides(outline: &OutlineAnswer, is_hole: bool) -> Vec<Side> {
     let mut sides: Vec<_> = match outline {
         OutlineAnswer::Circle { radius_mm } => {
             let half = |x: f64| Side::Arc { end: [x, 0.0], radius_mm: *radius_mm, is_counter_clockwise: !is_hole };
@@ -418,27 +432,11 @@ fn sides(outline: &OutlineAnswer, is_hole: bool, tolerance_mm: f64) -> Vec<Side>
                         let is_counter_clockwise = (*sweep_deg > 0.0) != is_hole;
                         vec![Side::Arc { end, radius_mm: *radius_mm, is_counter_clockwise }]
                     }
-                    EdgeAnswer::Curve { x_mm, y_mm, start_tangent_deg, end_tangent_deg } => {
-                        let mut points: Vec<_> = x_mm.iter().zip(y_mm).map(|(&x, &y)| [x, y]).collect();
-                        let direction = |deg: &f64| {
-                            let (sin, cos) = deg.to_radians().sin_cos();
-                            if is_hole { [-cos, -sin] } else { [cos, sin] }
-                        };
-                        let mut end_tangents = [direction(start_tangent_deg), direction(end_tangent_deg)];
-                        if is_hole {
-                            points.reverse();
-                            end_tangents.reverse();
-                        }
-                        let mut pieces: Vec<_> = Interpolation::near(&points, &end_tangents, tolerance_mm)
-                            .cut()
-                            .iter()
-                            .map(|piece| Side::Curve(Spline::of(piece)))
-                            .collect();
-                        if is_hole {
-                            pieces.reverse();
-                        }
-                        pieces
+                    EdgeAnswer::Curve { polynomials, .. } if is_hole => {
+                        let back = |poles: &Vec<[f64; 2]>| Side::Curve(poles.iter().rev().copied().collect());
+                        polynomials.iter().map(back).collect()
                     }
+                    EdgeAnswer::Curve { polynomials, .. } => polynomials.iter().cloned().map(Side::Curve).collect(),
                 }
             })
             .collect(),
@@ -447,138 +445,6 @@ fn sides(outline: &OutlineAnswer, is_hole: bool, tolerance_mm: f64) -> Vec<Side>
         sides.reverse();
     }
     sides
-}
-
-/// A cubic spline through points: of two continuous derivatives over the length of the chords, with unit tangents at both ends.
-/// It leaves the curve by the fourth power of the chord.
-struct Interpolation {
-    points: Vec<[f64; 2]>,
-    chords_mm: Vec<f64>,
-    slopes: Vec<[f64; 2]>,
-}
-
-impl Interpolation {
-    fn through(points: Vec<[f64; 2]>, end_tangents: &[[f64; 2]; 2]) -> Self {
-        let chords_mm: Vec<f64> =
-            points.windows(2).map(|two| (two[1][0] - two[0][0]).hypot(two[1][1] - two[0][1])).collect();
-        let [along_x, along_y] = [0, 1].map(|axis| {
-            let column: Vec<f64> = points.iter().map(|point| point[axis]).collect();
-            slopes(&column, &chords_mm, end_tangents[0][axis], end_tangents[1][axis])
-        });
-        let slopes = along_x.into_iter().zip(along_y).map(|(x, y)| [x, y]).collect();
-        Self { points, chords_mm, slopes }
-    }
-
-    /// Through as few of the points of a curve as it takes to pass all others within a tolerance: pieces that do not are halved.
-    fn near(points: &[[f64; 2]], end_tangents: &[[f64; 2]; 2], tolerance_mm: f64) -> Self {
-        let mut kept = vec![0, points.len() - 1];
-        loop {
-            let spline = Interpolation::through(kept.iter().map(|&index| points[index]).collect(), end_tangents);
-            let mut next = vec![0];
-            for (piece, ends) in kept.windows(2).enumerate() {
-                let (from, to) = (ends[0], ends[1]);
-                if points[from + 1..to].iter().any(|&point| spline.distance_mm(piece, point) > tolerance_mm) {
-                    next.push(from.midpoint(to));
-                }
-                next.push(to);
-            }
-            if next.len() == kept.len() {
-                return spline;
-            }
-            kept = next;
-        }
-    }
-
-    /// The same curve in pieces, one for each face.
-    fn cut(&self) -> Vec<Self> {
-        let spans = self.chords_mm.len();
-        let pieces = (spans / SPANS_OF_A_FACE).max(1);
-        let ends = |piece: usize| spans * piece / pieces;
-        let piece = |from: usize, to: usize| Self {
-            points: self.points[from..=to].to_vec(),
-            chords_mm: self.chords_mm[from..to].to_vec(),
-            slopes: self.slopes[from..=to].to_vec(),
-        };
-        (0..pieces).map(|index| piece(ends(index), ends(index + 1))).collect()
-    }
-
-    /// Bézier's polygon of a piece: its inner points a third of the chord from the ends, along the slopes there.
-    fn polygon(&self, piece: usize) -> [[f64; 2]; 4] {
-        let third_mm = self.chords_mm[piece] / 3.0;
-        let after = |i: usize, mm: f64| [0, 1].map(|axis| self.points[i][axis] + mm * self.slopes[i][axis]);
-        [self.points[piece], after(piece, third_mm), after(piece + 1, -third_mm), self.points[piece + 1]]
-    }
-
-    /// How far a point that is near to a piece is from it.
-    fn distance_mm(&self, piece: usize, [x, y]: [f64; 2]) -> f64 {
-        let [p, q, r, s] = self.polygon(piece);
-        let between = |a: [f64; 2], b: [f64; 2], t: f64| [0, 1].map(|axis| a[axis] + t * (b[axis] - a[axis]));
-        // The point on the piece at a share of it, and the derivative there, by de Casteljau.
-        let at = |t: f64| {
-            let (pq, qr, rs) = (between(p, q, t), between(q, r, t), between(r, s, t));
-            let (first, last) = (between(pq, qr, t), between(qr, rs, t));
-            (between(first, last, t), [0, 1].map(|axis| 3.0 * (last[axis] - first[axis])))
-        };
-        let chord = [s[0] - p[0], s[1] - p[1]];
-        let mut t = ((x - p[0]) * chord[0] + (y - p[1]) * chord[1]) / (chord[0] * chord[0] + chord[1] * chord[1]);
-        // Gauss and Newton: every step squares the error of the foot, and the error of the distance is its square again.
-        for _ in 0..4 {
-            let (foot, along) = at(t);
-            t += ((x - foot[0]) * along[0] + (y - foot[1]) * along[1]) / (along[0] * along[0] + along[1] * along[1]);
-        }
-        let (foot, _) = at(t);
-        (x - foot[0]).hypot(y - foot[1])
-    }
-}
-
-/// A cubic spline as STEP has it.
-struct Spline {
-    poles: Vec<[f64; 2]>,
-    multiplicities: String,
-    knots: String,
-}
-
-impl Spline {
-    fn of(spline: &Interpolation) -> Self {
-        let Interpolation { points, chords_mm, .. } = spline;
-        let last = chords_mm.len();
-        let mut poles = vec![points[0], spline.polygon(0)[1]];
-        for i in 1..last {
-            // Blossoming: the pole of three knots in a row lies on the line through the inner points of the piece after the middle one.
-            let ([_, first, second, _], ratio) = (spline.polygon(i), chords_mm[i - 1] / chords_mm[i]);
-            poles.push([0, 1].map(|axis| first[axis] - ratio * (second[axis] - first[axis])));
-        }
-        poles.extend([spline.polygon(last - 1)[2], points[last]]);
-        let (mut multiplicities, mut knots) = (String::from("4"), String::from("0."));
-        let mut length_mm = 0.0;
-        for (i, chord_mm) in chords_mm.iter().enumerate() {
-            length_mm += chord_mm;
-            // Writing to a string does not fail.
-            let _ = write!(multiplicities, ",{}", if i + 1 == last { 4 } else { 1 });
-            let _ = write!(knots, ",{}", Real(length_mm));
-        }
-        Self { poles, multiplicities, knots }
-    }
-}
-
-/// Slopes at the points of a clamped cubic spline: a tridiagonal system, dominant on its diagonal, solved from both ends.
-fn slopes(values: &[f64], chords: &[f64], first: f64, last: f64) -> Vec<f64> {
-    let end = chords.len();
-    let rise = |i: usize| (values[i + 1] - values[i]) / chords[i];
-    let (mut upper, mut right) = (vec![0.0; end + 1], vec![first; end + 1]);
-    for i in 1..end {
-        let (before, after) = (chords[i - 1], chords[i]);
-        let known = 3.0 * (after * rise(i - 1) + before * rise(i));
-        let pivot = 2.0 * (before + after) - after * upper[i - 1];
-        upper[i] = before / pivot;
-        right[i] = (known - after * right[i - 1]) / pivot;
-    }
-    let mut slopes = right;
-    slopes[end] = last;
-    for i in (1..end).rev() {
-        slopes[i] -= upper[i] * slopes[i + 1];
-    }
-    slopes
 }
 
 fn unit([x, y]: [f64; 2]) -> [f64; 2] {
@@ -595,7 +461,9 @@ struct Real(f64);
 
 impl std::fmt::Display for Real {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let text = format!("{:?}", self.0);
+        // Adding zero turns -0.0 into 0.0.
+        let text = format!("{:?}", self.0 + 0.0);
+        let text = text.strip_suffix(".0").map_or(text.clone(), |whole| format!("{whole}."));
         match text.split_once('e') {
             Some((mantissa, exponent)) if mantissa.contains('.') => write!(f, "{mantissa}E{exponent}"),
             Some((mantissa, exponent)) => write!(f, "{mantissa}.E{exponent}"),

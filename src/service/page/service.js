@@ -18,6 +18,7 @@ const HEARTBEAT_MS = 5000;
 const SLOW_MS = 1000;
 const SUSPICIOUS_MS = 3000;
 const ALIVE_MS = 2000;
+const MOST_PATIENCE_MS = 48_000;
 
 const SILENT = 'The calculation service does not answer.';
 
@@ -88,11 +89,28 @@ export async function evaluate(design, signal) {
   return result;
 }
 
-export const getJson = async (path) => {
-  const response = await request(path, { timeoutMs: SUSPICIOUS_MS });
+/** Documents that came or are under way, and how long the others are waited for. */
+const documents = new Map();
+const patience = new Map();
+
+async function fetchJson(path) {
+  const timeoutMs = patience.get(path) ?? SUSPICIOUS_MS;
+  patience.set(path, Math.min(2 * timeoutMs, MOST_PATIENCE_MS));
+  const response = await request(path, { timeoutMs });
   if (!response.ok) throw new Error(`${path}: ${response.status}`);
   return response.json();
-};
+}
+
+/** A document that stays as it is: what came is kept, and what did not gets twice the time when it is asked for again, so that a service
+ *  which is only slow has told everything at last, however many documents there are. */
+export function getJson(path) {
+  if (!documents.has(path)) {
+    const document = fetchJson(path);
+    documents.set(path, document);
+    document.catch(() => documents.delete(path));
+  }
+  return documents.get(path);
+}
 
 export class Service {
   #watch;

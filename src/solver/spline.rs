@@ -1,0 +1,160 @@
+//! Curves as few polynomials, for what draws solids (docs/theory.md section 8).
+
+use std::f64::consts::PI;
+
+use nalgebra::{Point2, Vector2};
+
+use crate::profile::{Polyline, SampledCurve};
+
+/// Degree of a polynomial. CAD kernels sum a face's share of a volume over a fixed number of places: OpenCascade over nine, which is exact for
+/// a polynomial of degree 9 at most, and for no curve that is made of several.
+const DEGREE: usize = 8;
+
+/// Points between the ends of a polynomial that it goes through; at the ends it has their directions too.
+const INNER: usize = DEGREE - 3;
+
+/// How many points of a piece are looked at: ten between two that its polynomial goes through.
+const LOOKED_AT: usize = 64;
+
+/// Bézier's polygons of polynomials that follow each other along a densely sampled curve, through points of it and along its tangents,
+/// passing the others within a tolerance: few, each of a low degree, and symmetric where the curve is.
+pub(crate) fn polygons(curve: &SampledCurve, tolerance_mm: f64) -> Vec<Polyline> {
+    let measured = MeasuredCurve::new(curve);
+    let lowest = |from: usize, to: usize, inner: std::ops::RangeInclusive<usize>| {
+        inner
+            .map(|inner| measured.polygon(from, to, inner))
+            .find(|polygon| measured.is_near(polygon, from, to, tolerance_mm))
+    };
+    let is_one = |from: usize, to: usize| lowest(from, to, INNER..=INNER).is_some();
+    let last = curve.points.len() - 1;
+    let (mut from, mut to) = (0, last);
+    let mut ends = vec![from, to];
+    while from < to && !is_one(from, to) {
+        let middle = from.midpoint(to);
+        if is_one(from, middle) && is_one(middle, to) {
+            ends.push(middle);
+            break;
+        }
+        // The longest from either end.
+        from += largest(to - from, |points| is_one(from, from + points));
+        to -= largest(to - from, |points| is_one(to - points, to));
+        ends.extend([from, to]);
+    }
+    ends.sort_unstable();
+    ends.dedup();
+    let of_piece = |ends: &[usize]| {
+        lowest(ends[0], ends[1], 0..=INNER).unwrap_or_else(|| measured.polygon(ends[0], ends[1], INNER))
+    };
+    ends.windows(2).map(of_piece).collect()
+}
+
+/// The largest number up to a limit for which something holds, as it does for all smaller ones; one at least.
+fn largest(limit: usize, holds: impl Fn(usize) -> bool) -> usize {
+    let (mut good, mut bad) = (1, limit + 1);
+    while bad - good > 1 {
+        let middle = good.midpoint(bad);
+        if holds(middle) {
+            good = middle;
+        } else {
+            bad = middle;
+        }
+    }
+    good
+}
+
+/// A curve and the length of its arc up to each of its points, which is what its polynomials have for a parameter.
+struct MeasuredCurve<'a> {
+    curve: &'a SampledCurve,
+    lengths_mm: Vec<f64>,
+}
+
+impl<'a> MeasuredCurve<'a> {
+    fn new(curve: &'a SampledCurve) -> Self {
+        let mut length_mm = 0.0;
+        let mut lengths_mm = vec![length_mm];
+        for (points, tangents) in curve.points.windows(2).zip(curve.tangents.windows(2)) {
+            let chord = points[1] - points[0];
+            let chord_mm = chord.norm();
+            if chord_mm > 0.0 {
+                let [a, b] = [0, 1].map(|end| chord.perp(&tangents[end]) / chord_mm);
+                // Of the cubic with these slopes at its ends, to the order of their squares.
+                length_mm += chord_mm * (1.0 + (2.0 * a * a - a * b + 2.0 * b * b) / 30.0);
+            }
+            lengths_mm.push(length_mm);
+        }
+        Self { curve, lengths_mm }
+    }
+
+    fn share(&self, from: usize, to: usize, point: usize) -> f64 {
+        (self.lengths_mm[point] - self.lengths_mm[from]) / (self.lengths_mm[to] - self.lengths_mm[from])
+    }
+
+    /// Bézier's polygon of the polynomial from one point to another: through some between, those that are nearest to Chebyshev's places.
+    fn polygon(&self, from: usize, to: usize, inner: usize) -> Polyline {
+        let SampledCurve { points, tangents } = self.curve;
+        let inner = inner.min(to - from - 1);
+        let mut through = vec![from, from];
+        for i in 0..inner {
+            // Of all places, the ends being two each.
+            let wanted = 0.5 - 0.5 * (PI * (i as f64 + 2.5) / (inner as f64 + 4.0)).cos();
+            let after = through[through.len() - 1] + 1;
+            let latest = to - (inner - i);
+            let beyond = (after..latest).find(|&point| self.share(from, to, point) >= wanted).unwrap_or(latest);
+            let off = |point: usize| (self.share(from, to, point) - wanted).abs();
+            through.push(if beyond > after && off(beyond - 1) < off(beyond) { beyond - 1 } else { beyond });
+        }
+        through.extend([to, to]);
+        // Newton's divided differences; where an end stands twice, the derivative there.
+        let length_mm = self.lengths_mm[to] - self.lengths_mm[from];
+        let places: Vec<_> = through.iter().map(|&point| self.share(from, to, point)).collect();
+        let mut differences: Vec<_> = through.iter().map(|&point| points[point] - points[from]).collect();
+        for order in 1..places.len() {
+            for i in (order..places.len()).rev() {
+                let between = places[i] - places[i - order];
+                differences[i] = if through[i] == through[i - order] {
+                    length_mm * tangents[through[i]].into_inner()
+                } else {
+                    (differences[i] - differences[i - 1]) / between
+                };
+            }
+        }
+        // Horner's scheme among Bézier's polygons: times (t - x), which is -x at the start and 1 - x at the end, and one more.
+        let mut polygon: Vec<Vector2<f64>> = Vec::new();
+        for (x, difference) in places.iter().zip(differences).rev() {
+            let degree = polygon.len();
+            let raised = |i: usize| {
+                let before = if i > 0 { polygon[i - 1] * (i as f64 * (1.0 - x)) } else { Vector2::zeros() };
+                let after = if i < degree { polygon[i] * ((degree - i) as f64 * x) } else { Vector2::zeros() };
+                difference + (before - after) / degree.max(1) as f64
+            };
+            polygon = (0..=degree).map(raised).collect();
+        }
+        let mut polygon: Polyline = polygon.into_iter().map(|pole| points[from] + pole).collect();
+        // The corners are shared with what comes before and after.
+        polygon[0] = points[from];
+        if let Some(end) = polygon.last_mut() {
+            *end = points[to];
+        }
+        polygon
+    }
+
+    /// Whether the points between lie within a tolerance of a polynomial, across the curve.
+    fn is_near(&self, polygon: &Polyline, from: usize, to: usize, tolerance_mm: f64) -> bool {
+        let step = (to - from).div_ceil(LOOKED_AT);
+        (from + 1..to).step_by(step).all(|point| {
+            let off = self.curve.points[point] - at(polygon, self.share(from, to, point));
+            off.perp(&self.curve.tangents[point]).abs() <= tolerance_mm
+        })
+    }
+}
+
+/// A polynomial's point, by de Casteljau.
+fn at(polygon: &Polyline, share: f64) -> Point2<f64> {
+    let mut poles = polygon.clone();
+    for last in (1..poles.len()).rev() {
+        for i in 0..last {
+            poles[i] = poles[i] + share * (poles[i + 1] - poles[i]);
+        }
+    }
+    poles[0]
+}
