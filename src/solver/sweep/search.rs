@@ -766,7 +766,7 @@ mod tests {
             let dense = (0..=1000).map(|step| curve((f64::from(at) + f64::from(step) * 1e-3) / 16.0));
             let most = dense.fold(0.0_f64, f64::max);
             if let Some(off) = off {
-                let bound = Nodes::of(&run, stretch).unwrap().summit(&seen, 0, off).bound;
+                let bound = Nodes::of(&run, stretch).expect("seventeen moments").summit(&seen, 0, off).bound;
                 assert!(bound >= most * (1.0 - 1e-14), "{bound} is below {most} on stretch {at}");
                 above = above.max(bound - most);
             }
@@ -811,7 +811,8 @@ mod tests {
             let summit = f64::from(step) * 0.005;
             let seen = seen_of(|x| 3.0 - (x - summit) * (x - summit));
             let run = Run { seen: &seen, moments: &seen.order, is_first: true, is_last: true };
-            let found = (0..16).map(|at| Nodes::of(&run, at).unwrap().summit(&seen, 0, OFF_SMOOTH).top);
+            let found =
+                (0..16).map(|at| Nodes::of(&run, at).expect("seventeen moments").summit(&seen, 0, OFF_SMOOTH).top);
             assert!((found.fold(0.0_f64, f64::max) - 3.0).abs() < 1e-13, "at {summit}");
         }
     }
