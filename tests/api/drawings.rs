@@ -151,7 +151,7 @@ async fn a_step_of_ten_nanometres_has_a_quarter_of_a_megabyte() {
     let polynomials = |text: &str| text.matches("=B_SPLINE_CURVE_WITH_KNOTS(").count();
     // Each stands twice, below and above.
     assert_eq!(polynomials(&of_10_nm), 2 * 5 * 26);
-    assert!(of_10_nm.len() < 250_000, "{} bytes", of_10_nm.len());
+    assert!(of_10_nm.len() < 240_000, "{} bytes", of_10_nm.len());
     assert!(polynomials(&of_1_nm) < 2 * 8 * 26, "{}", polynomials(&of_1_nm));
 }
 

@@ -265,7 +265,7 @@ export const GROUPS = [
         slider: 0.01,
         optional: (_, answers) => {
           const radius = answers.geometry?.ring.tip_radius_mm;
-          return radius === undefined ? 'natural' : `natural ${radius.toFixed(2)}`;
+          return radius === undefined ? 'natural' : `natural ${radius.toFixed(1)}`;
         },
       }),
     ],
