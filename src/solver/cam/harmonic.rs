@@ -41,6 +41,10 @@ impl Harmonic {
         self.lobes == 1
     }
 
+    pub(crate) const fn lobes(&self) -> u32 {
+        self.lobes
+    }
+
     /// `R0`.
     pub(crate) const fn mean_radius_mm(&self) -> f64 {
         self.mean_radius_mm

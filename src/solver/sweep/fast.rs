@@ -38,7 +38,7 @@ use crate::sweep::points::{Points, Tolerance};
 use crate::sweep::search::{Best, Found, Piece, search};
 use crate::tooth::LineLaw;
 use crate::{SolveError, Stop};
-use centers::{Center, Centers, EccentricCenters, HarmonicPathCenters};
+use centers::{CenterLanes, Centers, EccentricCenters, HarmonicCenters, HarmonicPathCenters};
 use lanes::{LANES, arctangent_terms, arctangents, repeat_each};
 use moments::FastLook;
 use sharing::{Limit, Shared, Sharing, Teeth, Work};
@@ -51,8 +51,7 @@ const MAX_STEPS: u32 = 8;
 /// A relative step this small is the last: the next one would be of its cube, less than the last digit.
 const LAST_STEP: f64 = 5e-6;
 
-/// The sweep and its capacity, given an allowable stress, or nothing where the plain path has to make it: for laws, gaps and wave generators that are
-/// not known here, and for drives beyond the caps.
+/// The sweep and its capacity, given an allowable stress, or nothing where the plain path has to make it: for laws and gaps that are not known here, and for drives beyond the caps.
 ///
 /// # Errors
 /// As [`columns::finished`].
@@ -210,18 +209,18 @@ struct Kernel {
 enum Shape {
     Ellipse(EllipseShape),
     Eccentric(EccentricCenters),
+    Harmonic(HarmonicCenters),
     HarmonicPath(HarmonicPathCenters),
 }
 
 impl Shape {
-    /// With bounds, over all positions, of how far the contact points on cam and ring are off the position, as tangents; nothing for wave generators that
-    /// are not known here.
-    fn new(cam: &Cam, r: f64) -> Option<(Self, PerContact<f64>)> {
+    /// With bounds, over all positions, of how far the contact points on cam and ring are off the position, as tangents.
+    fn new(cam: &Cam, r: f64) -> (Self, PerContact<f64>) {
         // On the ring by sin β ≤ 1, from the least distance of a centre.
         let bounds =
             |cam: f64, least_center: f64| PerContact { wave_generator: cam, ring: r / least_center, carrier: 0.0 };
         let off_path = |steepest: f64, least_center: f64| bounds(r * steepest / (least_center - r), least_center);
-        Some(match cam {
+        match cam {
             Cam::Ellipse(cam) => {
                 let shape = EllipseShape::new(cam, r);
                 let EllipseShape { a, b, difference_of_squares, .. } = shape;
@@ -231,15 +230,19 @@ impl Shape {
             }
             Cam::Harmonic(cam) => {
                 let (path, e) = (cam.mean_radius_mm() + r, cam.amplitude_mm());
-                let steepest = e / ((path - e) * (path + e)).sqrt();
-                (Self::Eccentric(EccentricCenters::new(cam, r)?), off_path(steepest, path - e))
+                let shape = if cam.is_circle() {
+                    Self::Eccentric(EccentricCenters::new(cam, r))
+                } else {
+                    Self::Harmonic(HarmonicCenters::new(cam, r))
+                };
+                (shape, off_path(e * f64::from(cam.lobes()) / (path - e), path - e))
             }
             Cam::HarmonicPath(cam) => {
                 let (mean, e) = (cam.mean_radius_mm(), cam.amplitude_mm());
                 let steepest = e * cam.lobe_count() / (mean - e);
                 (Self::HarmonicPath(HarmonicPathCenters::new(cam, r)), off_path(steepest, mean - e))
             }
-        })
+        }
     }
 }
 
@@ -417,7 +420,7 @@ impl Kernel {
             return None;
         }
         let r = drive.parameters().tooth_radius_mm;
-        let (shape, ratios) = Shape::new(drive.flank().locus().cam(), r)?;
+        let (shape, ratios) = Shape::new(drive.flank().locus().cam(), r);
         Some(Self {
             shape,
             r,
@@ -518,11 +521,11 @@ impl Kernel {
     fn loads_of<K: Sink>(&self, unit: impl Unit, tile: &mut Tile<'_>) -> bool {
         let mut chunks = 0..tile.count.div_ceil(LANES);
         match &self.shape {
-            Shape::Ellipse(ellipse) => return chunks.all(|chunk| self.on_ellipse::<K>(ellipse, unit, tile, chunk)),
-            Shape::Eccentric(centers) => chunks.for_each(|chunk| self.on_path::<K>(*centers, unit, tile, chunk)),
-            Shape::HarmonicPath(centers) => chunks.for_each(|chunk| self.on_path::<K>(*centers, unit, tile, chunk)),
+            Shape::Ellipse(ellipse) => chunks.all(|chunk| self.on_ellipse::<K>(ellipse, unit, tile, chunk)),
+            Shape::Eccentric(centers) => chunks.all(|chunk| self.on_path::<K>(centers, unit, tile, chunk)),
+            Shape::Harmonic(centers) => chunks.all(|chunk| self.on_path::<K>(centers, unit, tile, chunk)),
+            Shape::HarmonicPath(centers) => chunks.all(|chunk| self.on_path::<K>(centers, unit, tile, chunk)),
         }
-        true
     }
 
     /// Geometry of a stretch of states, and their forces and stresses for one unit; false where the support takes too many steps.
@@ -612,9 +615,12 @@ impl Kernel {
 
     /// The same for wave generators that tell where the centres are: `cos γ = 1/V`, `V² = 1 + T²`, and `cos β = 1/W`, `W² = 1 + k²T²`.
     #[inline(always)]
-    fn on_path<K: Sink>(&self, centers: impl Centers, unit: impl Unit, tile: &mut Tile<'_>, chunk: usize) {
+    fn on_path<K: Sink>(&self, centers: &impl Centers, unit: impl Unit, tile: &mut Tile<'_>, chunk: usize) -> bool {
         let sin = &tile.sin.as_chunks::<LANES>().0[chunk];
         let cos = &tile.cos.as_chunks::<LANES>().0[chunk];
+        let Some(CenterLanes { radius_mm, tan, tan_derivative, cam_curvature_per_mm }) = centers.at(sin, cos) else {
+            return false;
+        };
         let Self { r, ring_teeth_per_wave: k, .. } = *self;
         let cam_force = &mut tile.force.wave_generator.as_chunks_mut::<LANES>().0[chunk];
         let ring_force = &mut tile.force.ring.as_chunks_mut::<LANES>().0[chunk];
@@ -626,13 +632,12 @@ impl Kernel {
         let ring_torque = &mut tile.torque.ring.as_chunks_mut::<LANES>().0[chunk];
         let carrier_torque = &mut tile.torque.carrier.as_chunks_mut::<LANES>().0[chunk];
 
-        let mut center_radius = [0.0; LANES];
         let mut cam_ratio = [0.0; LANES];
         let mut ring_ratio = [0.0; LANES];
         let tooth_curvature = 1.0 / r;
         let (ring_hertz, carrier_hertz) = (self.hertz.ring * tooth_curvature, self.hertz.carrier * tooth_curvature);
         for i in 0..LANES {
-            let Center { radius_mm: d, tan, tan_derivative, cam_curvature_per_mm } = centers.at(sin[i], cos[i]);
+            let (d, tan) = (radius_mm[i], tan[i]);
             let (ring_tan, v2) = (k * tan, 1.0 + tan * tan);
             let w2 = 1.0 + ring_tan * ring_tan;
             let (v, w) = (v2.sqrt(), w2.sqrt());
@@ -642,7 +647,7 @@ impl Kernel {
             let (above2, lever2) = (above * above, lever * lever);
             // The regularity 1 + rκ is this over d W³.
             let flat = d * (w * w2);
-            let regular = flat + r * (w2 + k * k * tan_derivative);
+            let regular = flat + r * (w2 + k * k * tan_derivative[i]);
             let least = f64::EPSILON * flat;
             let regular = if regular > least { regular } else { least };
             let denominator = unit.denominator(above2, lever2);
@@ -651,11 +656,10 @@ impl Kernel {
             let force_h = unit.load(lever, per_denominator) * (d * d);
             let force_k = force_h * (w * cos_gamma);
             let force_s = force_h * (tan * cos_gamma) * self.teeth_per_wave;
-            center_radius[i] = d;
             cam_force[i] = force_h;
             ring_force[i] = force_k;
             carrier_force[i] = force_s;
-            let curvature = tooth_curvature + cam_curvature_per_mm;
+            let curvature = tooth_curvature + cam_curvature_per_mm[i];
             cam_stress[i] = (force_h * (curvature * self.hertz.wave_generator)).sqrt();
             ring_stress[i] = (force_k * (flat * per_regular) * ring_hertz).sqrt();
             carrier_stress[i] = (force_s * carrier_hertz).sqrt();
@@ -672,8 +676,9 @@ impl Kernel {
             }
         }
         if K::COLUMNS {
-            self.place(tile, chunk, center_radius, cam_ratio, ring_ratio);
+            self.place(tile, chunk, radius_mm, cam_ratio, ring_ratio);
         }
+        true
     }
 
     /// Notes where centres and contact points are, these by tangents of the angles by which they are off the position.
