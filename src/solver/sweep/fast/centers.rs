@@ -170,23 +170,25 @@ impl Centers for HarmonicCenters {
         let Self { mean_radius_mm, amplitude_mm: e, tooth_radius_mm: r, .. } = *self;
         let u = f64::from(self.lobes);
         let path_mm = mean_radius_mm + r;
-        let mut of_lobe = [[0.0; LANES]; 2];
+        let (mut of_lobe_sin, mut of_lobe_cos) = ([0.0; LANES], [0.0; LANES]);
         for i in 0..LANES {
-            of_lobe[0][i] = 2.0 * (sin[i] * cos[i]);
-            of_lobe[1][i] = cos[i] * cos[i] - sin[i] * sin[i];
+            of_lobe_sin[i] = 2.0 * (sin[i] * cos[i]);
+            of_lobe_cos[i] = cos[i] * cos[i] - sin[i] * sin[i];
         }
+        let of_lobe = [of_lobe_sin, of_lobe_cos];
         let mut lanes = CenterLanes::new();
         let mut is_found = false;
         // The first step is from γ = 0.
         let mut phases = of_lobe;
         for _ in 0..MAX_STEPS {
             let mut largest = [0.0; LANES];
+            let [sin, cos] = &phases;
             for i in 0..LANES {
-                let (tan, above, lever) = (lanes.tan[i], path_mm + e * phases[1][i], e * u * phases[0][i]);
+                let (tan, above, lever) = (lanes.tan[i], path_mm + e * cos[i], e * u * sin[i]);
                 let square = 1.0 + tan * tan;
                 // Both sides times what their difference's derivative is divided by.
                 let value = (tan * above - lever) * square;
-                let slope = above * square - (tan * lever + e * u * u * phases[1][i]);
+                let slope = above * square - (tan * lever + e * u * u * cos[i]);
                 let step = value / slope;
                 lanes.tan[i] = tan - step;
                 largest[i] = step.abs() - LAST_STEP * lanes.tan[i];
@@ -200,8 +202,9 @@ impl Centers for HarmonicCenters {
         if !is_found {
             return None;
         }
+        let [sin, cos] = &phases;
         for i in 0..LANES {
-            let [lever, along] = [e * u * phases[0][i], e * phases[1][i]];
+            let (lever, along) = (e * u * sin[i], e * cos[i]);
             let above = path_mm + along;
             let tan = lever / above;
             let curvature_radius_mm = mean_radius_mm - (u * u - 1.0) * along;
