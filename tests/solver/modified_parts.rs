@@ -478,7 +478,7 @@ fn along(polygon: &[Point2<f64>]) -> impl Iterator<Item = Vector2<f64>> {
         let mut binomial = 1.0;
         let mut sum = Vector2::zeros();
         for (k, pole) in polygon.iter().enumerate() {
-            sum += pole.coords * (binomial * t.powi(k as i32) * (1.0 - t).powi((degree - k) as i32));
+            sum += pole.coords * (binomial * t.powf(k as f64) * (1.0 - t).powf((degree - k) as f64));
             binomial *= (degree - k) as f64 / (k + 1) as f64;
         }
         sum
