@@ -3,6 +3,7 @@
 use std::error::Error;
 
 use serde_json::Value;
+use toothwave_solver::parts::CarrierRadii;
 use toothwave_solver::{
     Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, Modification, PerContact,
     ToothShape, Torque, WaveGenerator,
@@ -47,6 +48,7 @@ impl Setup {
             series_compliance_mm_per_n: PerContact { wave_generator: 0.0, ring: 0.0, carrier: 0.0 },
             clearance_um: PerContact { wave_generator: 0.0, ring: 0.0, carrier: 0.0 },
             modification: Modification::NONE,
+            carrier: CarrierRadii { inner_mm: None, outer_mm: None },
             allowable_stress_mpa: None,
         },
         input_torque_nm: 20.0,
@@ -112,6 +114,7 @@ impl Reference {
                 series_compliance_mm_per_n: PerContact::default(),
                 clearance_um: PerContact::default(),
                 modification: Modification::NONE,
+                carrier: CarrierRadii { inner_mm: None, outer_mm: None },
                 allowable_stress_mpa: None,
             },
             input_torque_nm,

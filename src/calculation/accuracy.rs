@@ -7,6 +7,7 @@ use serde::Serialize;
 use toothwave_solver::drive::Draft;
 use toothwave_solver::mesh::Samples;
 use toothwave_solver::model_error;
+use toothwave_solver::parts::CarrierRadii;
 use toothwave_solver::sweep::{ContactPeaks, Points, Tolerance, sweep_with_deviations};
 use toothwave_solver::{
     Compatibility, ContactLaw, Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, ToothShape,
@@ -152,7 +153,8 @@ impl Question for Accuracy {
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
         let Design { drive, materials, load, model, modification, deviations, accuracy, .. } = design;
-        (drive, materials, load, model, modification, (deviations, accuracy))
+        let CarrierRadii { inner_mm, outer_mm } = design.carrier_of_flats();
+        (drive, materials, load, model, modification, (deviations, accuracy, inner_mm, outer_mm))
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedAccuracy, NoAnswer> {

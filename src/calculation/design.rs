@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use toothwave_solver::backing::Support;
 use toothwave_solver::drawing::DrawingParameters;
 use toothwave_solver::losses::Friction;
-use toothwave_solver::parts::PartsParameters;
+use toothwave_solver::parts::{CarrierRadii, PartsParameters};
 use toothwave_solver::profile::{Extent, ProfileParameters};
 use toothwave_solver::sweep::Points;
 use toothwave_solver::violation::{OfDutyPoint, SHARES_TOLERANCE};
@@ -83,7 +83,7 @@ pub struct Design {
     #[serde(default)]
     pub accuracy: AccuracyDocument,
     /// The parts as they are made: what the mechanics leave free. Drawings read it, and a sweep for what gives way behind the contacts, which its forces
-    /// leave out.
+    /// leave out; forces on flat-sided teeth read the carrier's radii, between which the flats are borne.
     #[serde(default)]
     pub parts: PartsDocument,
     /// How the parts stand in a drawing of all of them.
@@ -226,6 +226,7 @@ impl Design {
             law: self.contact_law(),
             series_compliance_mm_per_n: (&self.model.series_compliance_mm_per_n).into(),
             modification: (&self.modification).into(),
+            carrier: self.carrier_of_flats(),
             clearance_um: self.model.clearance.as_ref().map_or_else(PerContact::default, |clearance| PerContact {
                 wave_generator: clearance.wave_generator_um,
                 ring: clearance.ring_um,
@@ -233,6 +234,15 @@ impl Design {
             }),
             allowable_stress_mpa: load.allowable_stress_mpa.map(Into::into),
         })
+    }
+
+    /// The radii of the carrier that bears the flats of flat-sided teeth, as far as they are given; forces on other teeth do not depend on them.
+    pub fn carrier_of_flats(&self) -> CarrierRadii {
+        let CarrierPartDocument { inner_radius_mm, outer_radius_mm, .. } = self.parts.carrier;
+        match self.drive.teeth {
+            TeethDocument::FlatSided(_) => CarrierRadii { inner_mm: inner_radius_mm, outer_mm: outer_radius_mm },
+            TeethDocument::Cylinder(_) | TeethDocument::Ball(_) => CarrierRadii::default(),
+        }
     }
 
     /// The loads in turn, of a document with a load; a single one where it has no duty.

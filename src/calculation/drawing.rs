@@ -72,8 +72,9 @@ impl Question for Drawing {
     fn answer(checked: &CheckedDrawing, stop: &dyn Stop) -> Result<DrawingAnswer, NoAnswer> {
         let bodies = checked.drawing.bodies(stop)?;
         let of_parts = checked.drawing.findings().map_err(SolveError::from)?;
-        let mut findings = drive_findings(checked.drawing.drive())?;
-        findings.extend(of_parts.iter().map(FindingAnswer::from));
+        let drive = checked.drawing.drive();
+        let mut findings = drive_findings(drive)?;
+        findings.extend(of_parts.iter().map(|finding| FindingAnswer::new(finding, drive)));
         Ok(DrawingAnswer {
             solver_version: toothwave_solver::VERSION,
             build: crate::BUILD,

@@ -6,7 +6,7 @@ use serde::Serialize;
 use toothwave_solver::findings::{
     self, Edge, FATIGUE_LIMIT_STRESS_MPA, SOFT_BACKING_SHARE, STEEP_FLANK_DEG, STEEP_FOR_PROJECTION_DEG, Wall,
 };
-use toothwave_solver::{Drive, Finding, SolveError};
+use toothwave_solver::{Drive, Finding, SolveError, ToothShape, WaveGenerator};
 use utoipa::ToSchema;
 
 use crate::field::contact_name;
@@ -99,16 +99,37 @@ pub enum FindingCode {
 
 const RADIUS: &str = "/drive/teeth/radius_mm";
 const INSTALLED: &str = "/drive/teeth/installed";
-const SEMI_MAJOR: &str = "/drive/wave_generator/semi_major_mm";
-const SEMI_MINOR: &str = "/drive/wave_generator/semi_minor_mm";
 const TIP_RADIUS: &str = "/drive/ring/tip_radius_mm";
 const WIDTH: &str = "/drive/teeth/width_mm";
 const LOAD: &str = "/load";
 
-impl From<&Finding> for FindingAnswer {
-    fn from(finding: &Finding) -> Self {
+/// The fields that shape a wave generator.
+const fn shape_of(wave_generator: &WaveGenerator) -> [&'static str; 2] {
+    const AMPLITUDE: &str = "/drive/wave_generator/amplitude_mm";
+    match wave_generator {
+        WaveGenerator::Ellipse { .. } => ["/drive/wave_generator/semi_major_mm", "/drive/wave_generator/semi_minor_mm"],
+        WaveGenerator::Eccentric { .. } => ["/drive/wave_generator/radius_mm", "/drive/wave_generator/eccentricity_mm"],
+        WaveGenerator::Harmonic { .. } => ["/drive/wave_generator/mean_radius_mm", AMPLITUDE],
+        WaveGenerator::HarmonicPath { .. } => ["/drive/wave_generator/mean_path_radius_mm", AMPLITUDE],
+    }
+}
+
+impl FindingAnswer {
+    /// A finding about this drive, which names fields that its document has.
+    pub(crate) fn new(finding: &Finding, drive: &Drive) -> Self {
         use FindingCode as Code;
         use Severity::{Info, Warning};
+        let parameters = drive.parameters();
+        let [size, stroke] = shape_of(&parameters.wave_generator);
+        let (lobe, rounder) = match parameters.wave_generator {
+            WaveGenerator::Ellipse { .. } => ("the major axis", "the ellipse rounder"),
+            _ => ("the middle of a lobe", "the wave generator's stroke smaller"),
+        };
+        // A ball has no width.
+        let (stressed, widen): (&[&str], _) = match parameters.tooth {
+            ToothShape::Ball { .. } => (&[LOAD, RADIUS], "make the balls larger"),
+            ToothShape::Cylinder { .. } | ToothShape::FlatSided { .. } => (&[LOAD, WIDTH, RADIUS], "widen the teeth"),
+        };
         let new = |code, severity, pointers: &[&str], value, limit, unit: &str, detail: String, advice: &str| Self {
             code,
             severity,
@@ -123,7 +144,7 @@ impl From<&Finding> for FindingAnswer {
             Finding::Undercut { tooth_radius_mm, critical_tooth_radius_mm, engagement_start_deg, is_bored_away } => new(
                 Code::Undercut,
                 if is_bored_away { Info } else { Warning },
-                &[RADIUS, SEMI_MAJOR, SEMI_MINOR],
+                &[RADIUS, size, stroke],
                 tooth_radius_mm,
                 critical_tooth_radius_mm,
                 "mm",
@@ -131,10 +152,10 @@ impl From<&Finding> for FindingAnswer {
                     "the ring's tooth tips would be undercut, but the bore takes more away than undercut does".into()
                 } else {
                     format!(
-                        "the ring's tooth tips are cut away by their own envelope: teeth start to touch the flank only {engagement_start_deg:.4} deg from the major axis, fewer of them mesh, and loads jump when one enters"
+                        "the ring's tooth tips are cut away by their own envelope: teeth start to touch the flank only {engagement_start_deg:.4} deg from {lobe}, fewer of them mesh, and loads jump when one enters"
                     )
                 },
-                "make the teeth thinner than the critical radius, or the ellipse rounder",
+                &format!("make the teeth thinner than the critical radius, or {rounder}"),
             ),
             Finding::BoreShortensFlank { tip_radius_mm, natural_tip_radius_mm, engagement_start_deg } => new(
                 Code::BoreShortensFlank,
@@ -144,7 +165,7 @@ impl From<&Finding> for FindingAnswer {
                 natural_tip_radius_mm,
                 "mm",
                 format!(
-                    "the bore ends the flank before its natural tip: teeth start to touch it {engagement_start_deg:.4} deg from the major axis and take load at once, so loads jump"
+                    "the bore ends the flank before its natural tip: teeth start to touch it {engagement_start_deg:.4} deg from {lobe} and take load at once, so loads jump"
                 ),
                 "bore less, or not at all, where the jump matters",
             ),
@@ -186,7 +207,7 @@ impl From<&Finding> for FindingAnswer {
             Finding::ToothBeyondCarrier { edge, center_radius_mm, limit_mm } => new(
                 Code::ToothBeyondCarrier,
                 Warning,
-                &[SEMI_MAJOR, SEMI_MINOR, RADIUS],
+                &[size, stroke, RADIUS],
                 center_radius_mm,
                 limit_mm,
                 "mm",
@@ -194,17 +215,17 @@ impl From<&Finding> for FindingAnswer {
                     Edge::Inner => "the centre of a loaded tooth comes nearer to the axis than the carrier's annulus begins: it presses on a slot's edge, not on its wall".into(),
                     Edge::Outer => "the centre of a loaded tooth goes further out than the ring's tips leave room for the carrier: it presses on a slot's edge, not on its wall".into(),
                 },
-                "make the ellipse rounder or the teeth thicker, or bore the ring",
+                &format!("make {rounder} or the teeth thicker, or bore the ring"),
             ),
             Finding::SteepRingFlank { pressure_angle_deg } => new(
                 Code::SteepRingFlank,
                 Warning,
-                &[SEMI_MAJOR, SEMI_MINOR, "/drive/ring/teeth"],
+                &[size, stroke, "/drive/ring/teeth"],
                 pressure_angle_deg,
                 STEEP_FLANK_DEG,
                 "deg",
                 "the ring's flank stands steep to the radius: its force is several times the wave generator's, and friction, which the model leaves out, may keep the drive from turning".into(),
-                "make the ellipse rounder, or take fewer teeth",
+                &format!("make {rounder}, or take fewer teeth"),
             ),
             Finding::HollowWaveGenerator { amplitude_mm, limit_mm } => new(
                 Code::HollowWaveGenerator,
@@ -407,7 +428,7 @@ impl From<&Finding> for FindingAnswer {
             Finding::StressAboveAllowable { contact, stress_mpa, allowable_mpa } => new(
                 Code::StressAboveAllowable,
                 Warning,
-                &["/load/allowable_stress_mpa", LOAD, WIDTH, RADIUS, &format!("/materials/{}", contact_name(contact))],
+                &[&["/load/allowable_stress_mpa"], stressed, &[&*format!("/materials/{}", contact_name(contact))]].concat(),
                 stress_mpa,
                 allowable_mpa,
                 "MPa",
@@ -415,12 +436,12 @@ impl From<&Finding> for FindingAnswer {
                     "the contact stress at the {} exceeds the one that it may have",
                     contact_name(contact).replace('_', " ")
                 ),
-                "lower the torque, widen the teeth, let more of them mesh, or choose a stronger material",
+                &format!("lower the torque, {widen}, let more of them mesh, or choose a stronger material"),
             ),
             Finding::StressAboveFatigueLimit { contact, stress_mpa } => new(
                 Code::StressAboveFatigueLimit,
                 Warning,
-                &[LOAD, WIDTH, RADIUS, &format!("/materials/{}", contact_name(contact))],
+                &[stressed, &[&*format!("/materials/{}", contact_name(contact))]].concat(),
                 stress_mpa,
                 FATIGUE_LIMIT_STRESS_MPA,
                 "MPa",
@@ -428,7 +449,7 @@ impl From<&Finding> for FindingAnswer {
                     "the contact stress at the {} exceeds the fatigue limit of bearing steel (ISO 281:2007)",
                     contact_name(contact).replace('_', " ")
                 ),
-                "lower the torque, widen the teeth, or let more of them mesh",
+                &format!("lower the torque, {widen}, or let more of them mesh"),
             ),
         }
     }
@@ -437,7 +458,7 @@ impl From<&Finding> for FindingAnswer {
 /// The findings about a drive, as they go over the wire.
 pub(crate) fn drive_findings(drive: &Drive) -> Result<Vec<FindingAnswer>, NoAnswer> {
     let findings = findings::of_drive(drive).map_err(SolveError::from)?;
-    Ok(findings.iter().map(FindingAnswer::from).collect())
+    Ok(findings.iter().map(|finding| FindingAnswer::new(finding, drive)).collect())
 }
 
 /// The findings, a paragraph each.

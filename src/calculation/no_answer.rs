@@ -136,9 +136,11 @@ impl From<SolveError> for NoAnswer {
                     "{detail}: a part is too full there. Make `model.clearance` larger, or `modification` and `deviations` smaller"
                 ),
             ),
-            SolveError::JohnsonBeyondHalfWidth { .. } | SolveError::FlatOffCarrier { .. } => {
-                Self::new(NoAnswerCode::ImpossibleDesign, detail)
-            }
+            SolveError::JohnsonBeyondHalfWidth { .. } => Self::new(NoAnswerCode::ImpossibleDesign, detail),
+            SolveError::FlatOffCarrier { .. } => Self::new(
+                NoAnswerCode::ImpossibleDesign,
+                format!("{detail}. Make the flats longer, or the carrier wider by `parts.carrier`"),
+            ),
             SolveError::NoLeverArm => Self::new(NoAnswerCode::NoToothInMesh, detail),
             SolveError::TooManyPoints { points, limit } => {
                 let detail = format!("{detail} by `max_profile_points`; widen the chord tolerance");

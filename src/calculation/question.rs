@@ -110,6 +110,7 @@ pub(crate) fn checked_load(
     violations.extend(design.duty_violations()?);
     violations.extend(parameters.clearance_violations(draft).map_err(SolveError::from)?);
     violations.extend(draft.drive().and_then(|drive| parameters.modification.violation_in(&drive)));
+    violations.extend(parameters.carrier_violations(draft));
     violations.extend(parameters.deviation_violations(&design.drive_parameters(), &(&design.deviations).into()));
     Ok(load)
 }

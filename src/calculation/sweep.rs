@@ -272,7 +272,7 @@ impl Question for Sweep {
         let radial_force_n = forces.map(|forces| RadialForceAnswer::new(&sweep, forces)).transpose()?;
         let of_model = of_half_widths.iter().chain(&of_friction).chain(&of_projection).chain(&of_backing);
         let of_sweep = of_wind_up.iter().chain(of_model).chain(&of_contacts);
-        findings.extend(of_sweep.map(FindingAnswer::from));
+        findings.extend(of_sweep.map(|finding| FindingAnswer::new(finding, drive)));
         let unloaded_wind_up_deg = if *with_wind_up && *with_gaps {
             Some(solver::unloaded_wind_up_deg(drive, load, deviations, &sweep, stop)?)
         } else {

@@ -401,6 +401,11 @@ impl Draft {
         &self.violations
     }
 
+    /// Whether its teeth have flats.
+    pub(crate) const fn has_flats(&self) -> bool {
+        matches!(self.parameters.tooth, ToothShape::FlatSided { .. })
+    }
+
     /// The drive, where it can exist.
     pub fn drive(&self) -> Option<Drive> {
         let ring = self.ring.filter(|_| self.violations.is_empty())?;

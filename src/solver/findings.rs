@@ -510,16 +510,21 @@ pub fn of_contacts(
     findings
 }
 
-/// The contacts that are too wide for Johnson's law, over all states: the widest is not the one with the largest stress.
-pub fn of_half_widths(drive: &Drive, load: &LoadCase, states: &States) -> Vec<Finding> {
-    let ContactLaw::Johnson { depth_mm } = &load.parameters().law else { return Vec::new() };
-    let (tooth_radius_mm, tooth_width_mm) = (drive.parameters().tooth_radius_mm, drive.tooth_width_mm());
-    let widest = states.force_n.iter().filter(|&(contact, _)| !is_flat(drive, contact)).map(|(contact, forces_n)| {
+/// Half the width of the widest contact of each kind, over all states: it is not the one with the largest stress. Flats are none.
+pub(crate) fn widest_half_widths_mm(drive: &Drive, states: &States) -> impl Iterator<Item = (Contact, f64)> {
+    let tooth_width_mm = drive.tooth_width_mm();
+    states.force_n.iter().filter(|&(contact, _)| !is_flat(drive, contact)).map(move |(contact, forces_n)| {
         let loaded = forces_n.iter().zip(states.stress_mpa.get(contact)).filter(|&(&force_n, _)| force_n > 0.0);
         let half_widths = loaded.map(|(&force_n, &stress_mpa)| half_width_mm(force_n, stress_mpa, tooth_width_mm));
         (contact, half_widths.fold(0.0, f64::max))
-    });
-    widest
+    })
+}
+
+/// The contacts that are too wide for Johnson's law, over all states.
+pub fn of_half_widths(drive: &Drive, load: &LoadCase, states: &States) -> Vec<Finding> {
+    let ContactLaw::Johnson { depth_mm } = &load.parameters().law else { return Vec::new() };
+    let tooth_radius_mm = drive.parameters().tooth_radius_mm;
+    widest_half_widths_mm(drive, states)
         .map(|(contact, half_width_mm)| {
             let limit_mm = WIDE_SHARE * least_length_mm(depth_mm, contact, tooth_radius_mm);
             Finding::JohnsonBeyondHalfWidth { contact, half_width_mm, limit_mm }

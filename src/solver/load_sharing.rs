@@ -2,9 +2,10 @@
 
 use crate::cam::ToothCenter;
 use crate::contact::{Contact, ContactLaw, HertzLine, Material, Materials, Part, PerContact, half_width_mm};
-use crate::drive::{Draft, Drive, DriveParameters};
+use crate::drive::{Draft, Drive, DriveParameters, ToothShape};
 use crate::gaps::{Deviations, Gaps, Modification};
 use crate::mesh::{Mesh, Place};
+use crate::parts::CarrierRadii;
 use crate::position::Position;
 use crate::ring::{FlankPoint, RingFlank, RingTooth};
 use crate::root::NotConverged;
@@ -49,6 +50,8 @@ pub struct LoadParameters {
     pub clearance_um: PerContact<f64>,
     /// Parts made otherwise than conjugate, with `VirtualWork` alone.
     pub modification: Modification,
+    /// The carrier that bears the flats of flat-sided teeth; of no other teeth is it asked.
+    pub carrier: CarrierRadii,
     /// The stress that each contact may have, which the torque capacity is asked for.
     pub allowable_stress_mpa: Option<PerContact<f64>>,
 }
@@ -63,6 +66,12 @@ impl LoadParameters {
     pub fn clearance_violations(&self, draft: &Draft) -> Result<Vec<Violation>, NotConverged> {
         let Some((sense, ring)) = draft.sense.zip(draft.ring) else { return Ok(Vec::new()) };
         self.clearance_violations_in(sense, &ring)
+    }
+
+    /// Why no carrier of this drive has the radii that bear flats.
+    pub fn carrier_violations(&self, draft: &Draft) -> Vec<Violation> {
+        let set_forward_um = -self.modification.wave_generator_equidistant_um;
+        if draft.has_flats() { self.carrier.violations(draft, set_forward_um) } else { Vec::new() }
     }
 
     /// What of a drive's deviations cannot be, or not under this load.
@@ -264,7 +273,7 @@ impl<'a> LoadedDrive<'a> {
     /// [`SolveError::NoToothInMesh`] and [`SolveError::ComplianceNotPositive`] where no finite forces exist, [`SolveError::Impossible`] where the
     /// drive cannot have the load's clearances.
     pub fn new(drive: &'a Drive, load: &LoadCase) -> Result<Self, SolveError> {
-        Self::with_deviations(drive, load, &ToothContact::of(drive), None)
+        Self::with_deviations(drive, load, &ToothContact::of(drive, load.parameters().carrier), None)
     }
 
     /// The drive under the load, with teeth of another shape.
@@ -303,6 +312,9 @@ impl<'a> LoadedDrive<'a> {
         };
         let mut violations = p.clearance_violations_in(drive.sense(), drive.ring_tooth())?;
         violations.extend(p.modification.violation_in(drive));
+        if matches!(drive.parameters().tooth, ToothShape::FlatSided { .. }) {
+            violations.extend(p.carrier.violations_in(drive, -p.modification.wave_generator_equidistant_um));
+        }
         let of_deviations = deviations.map(|deviations| p.deviation_violations(drive.parameters(), deviations));
         violations.extend(of_deviations.into_iter().flatten());
         if !violations.is_empty() {

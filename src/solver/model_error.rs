@@ -4,7 +4,7 @@
 use crate::backing::{Backing, Fingers, Rim, Shares, Support};
 use crate::contact::{ContactLaw, Material};
 use crate::drive::{Drive, ToothShape};
-use crate::findings::SOFT_BACKING_SHARE;
+use crate::findings::{SOFT_BACKING_SHARE, widest_half_widths_mm};
 use crate::gaps::Deviations;
 use crate::load_sharing::{Compatibility, LoadCase};
 use crate::ring::FlankEnd;
@@ -20,7 +20,7 @@ pub const PRESSURE_ANGLE_TO_DEG: f64 = 47.0;
 /// Gap at a contact, at most.
 pub const GAP_TO_UM: f64 = 10.0;
 
-/// Half the width of a contact over the tooth's radius, at most: all drives that were calculated stay below.
+/// Half the width of the widest contact of all states over the tooth's radius, at most: all drives that were calculated stay below.
 pub const HALF_WIDTH_SHARE_TO: f64 = 0.035;
 
 /// How far the moduli of parts may differ to be alike: all bodies were of one steel.
@@ -238,7 +238,10 @@ pub fn of(
     let is_alike =
         |material: &Material| (material.compliance_per_mpa() / own.compliance_per_mpa() - 1.0).abs() <= ALIKE;
     let mates = [&p.materials.wave_generator, &p.materials.ring, &p.materials.carrier];
-    let widest_mm = sweep.peaks.iter().map(|(_, peaks)| peaks.half_width_mm).fold(0.0, f64::max);
+    // Of lines the widest is not the one with the largest stress; flats and the ellipses of balls are known at their peaks alone.
+    let at_peaks = sweep.peaks.iter().map(|(_, peaks)| peaks.half_width_mm);
+    let of_lines = widest_half_widths_mm(drive, &sweep.states).map(|(_, half_width_mm)| half_width_mm);
+    let widest_mm = at_peaks.chain(of_lines).fold(0.0, f64::max);
     let reasons = [
         (measured.is_none(), Beyond::Law),
         (!matches!(drive.parameters().tooth, ToothShape::Cylinder { .. }), Beyond::ToothShape),

@@ -36,6 +36,49 @@ pub struct PartsParameters {
     pub modification: Modification,
 }
 
+/// The radii between which the carrier has its slots, as far as they are given.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct CarrierRadii {
+    /// Radius of the carrier's bore; by default [`CARRIER_PLAY`] outside the cam.
+    pub inner_mm: Option<f64>,
+    /// Its outer radius; by default [`CARRIER_PLAY`] inside the ring's tips.
+    pub outer_mm: Option<f64>,
+}
+
+impl CarrierRadii {
+    /// Both, those that are not given by default.
+    pub(crate) fn of(self, drive: &Drive) -> [f64; 2] {
+        let annulus = Annulus::of(drive);
+        [
+            self.inner_mm.unwrap_or_else(|| annulus.carrier_inner_mm()),
+            self.outer_mm.unwrap_or_else(|| annulus.carrier_outer_mm()),
+        ]
+    }
+
+    /// Why no carrier has these radii beside a cam that is set forward so far, as far as the drive is possible; nothing where none is given.
+    pub(crate) fn violations(self, draft: &Draft, set_forward_um: f64) -> Vec<Violation> {
+        self.violations_between(draft.cam_outer_mm, Annulus::of_draft(draft), set_forward_um)
+    }
+
+    /// The same of a drive that is possible.
+    pub(crate) fn violations_in(self, drive: &Drive, set_forward_um: f64) -> Vec<Violation> {
+        self.violations_between(Some(drive.cam_outer_radius_mm()), Some(Annulus::of(drive)), set_forward_um)
+    }
+
+    fn violations_between(
+        self,
+        cam_outer_mm: Option<f64>,
+        annulus: Option<Annulus>,
+        set_forward_um: f64,
+    ) -> Vec<Violation> {
+        let mut checks = Checks(Vec::new());
+        if self != Self::default() {
+            checks.carrier_radii(self, cam_outer_mm, annulus, set_forward_um);
+        }
+        checks.0
+    }
+}
+
 /// Outer over root radius of a ring that none is given for: a rim as thick as a fifth of the radius is rigid beside what it holds.
 pub const RIM: f64 = 1.2;
 
@@ -62,6 +105,11 @@ impl PartsParameters {
             Part::WaveGenerator => self.check_wave_generator(draft, &mut checks),
         }
         checks.0
+    }
+
+    /// The carrier's radii.
+    const fn carrier_radii(&self) -> CarrierRadii {
+        CarrierRadii { inner_mm: self.carrier_inner_radius_mm, outer_mm: self.carrier_outer_radius_mm }
     }
 
     fn check_ring(&self, draft: &Draft, checks: &mut Checks) {
@@ -105,29 +153,15 @@ impl PartsParameters {
     }
 
     fn check_carrier(&self, draft: &Draft, checks: &mut Checks) {
-        let annulus =
-            draft.ring.and_then(|ring| Annulus::between(ring.flank.locus().cam_outer_radius_mm(), ring.tip_radius_mm));
         let clearance_mm = checks.clearance_mm(Part::Carrier, self.carrier_clearance_um);
-        let inner_mm = annulus.map(|annulus| annulus.carrier_inner_mm());
-        let inner_mm = checks.radius_mm(Parameter::CarrierInnerRadius, self.carrier_inner_radius_mm, inner_mm);
-        let outer_mm = annulus.map(|annulus| annulus.carrier_outer_mm());
-        let outer_mm = checks.radius_mm(Parameter::CarrierOuterRadius, self.carrier_outer_radius_mm, outer_mm);
-        if let (Some(inner_mm), Some(a)) = (inner_mm, draft.cam_outer_mm) {
-            let set_forward_mm = MM_PER_UM
-                * (-self.modification.wave_generator_equidistant_um - self.wave_generator_clearance_um).max(0.0);
-            checks.above(Misfit::CarrierMeetsCam, inner_mm, a + set_forward_mm);
-        }
+        let set_forward_um = -self.modification.wave_generator_equidistant_um - self.wave_generator_clearance_um;
+        let annulus = Annulus::of_draft(draft);
+        let outer_mm = checks.carrier_radii(self.carrier_radii(), draft.cam_outer_mm, annulus, set_forward_um);
         if let (Some(clearance_mm), Some(half_width_mm)) = (clearance_mm, draft.slot_half_width_mm) {
             let (value, least_um) = (self.modification.slot_wall_um, -(half_width_mm + clearance_mm) / MM_PER_UM);
             checks.modification(value > least_um, Modified::SlotWall, value, least_um);
         }
         let Some(outer_mm) = outer_mm else { return };
-        if let Some(annulus) = annulus {
-            checks.below(Misfit::CarrierMeetsRing, outer_mm, annulus.outer_mm);
-        }
-        if let Some(inner_mm) = inner_mm {
-            checks.above(Misfit::CarrierWithoutWall, outer_mm, inner_mm);
-        }
         if let (Some(clearance_mm), Some(wall_mm), Some(installed)) =
             (clearance_mm, draft.slot_half_width_mm, draft.installed)
         {
@@ -157,6 +191,17 @@ struct Annulus {
 }
 
 impl Annulus {
+    /// Of a drive, which has one.
+    fn of(drive: &Drive) -> Self {
+        Self { inner_mm: drive.cam_outer_radius_mm(), outer_mm: drive.tip_radius_mm() }
+    }
+
+    /// The same, as far as the drive is possible.
+    fn of_draft(draft: &Draft) -> Option<Self> {
+        let ring = draft.ring?;
+        Self::between(ring.flank.locus().cam_outer_radius_mm(), ring.tip_radius_mm)
+    }
+
     /// The annulus, where there is one.
     fn between(inner_mm: f64, outer_mm: f64) -> Option<Self> {
         let annulus = Self { inner_mm, outer_mm };
@@ -232,10 +277,10 @@ impl WaveGeneratorPart {
 
 impl CarrierPart {
     pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Self {
-        let annulus = Annulus { inner_mm: drive.cam_outer_radius_mm(), outer_mm: drive.tip_radius_mm() };
+        let [inner_radius_mm, outer_radius_mm] = parameters.carrier_radii().of(drive);
         Self {
-            inner_radius_mm: parameters.carrier_inner_radius_mm.unwrap_or(annulus.carrier_inner_mm()),
-            outer_radius_mm: parameters.carrier_outer_radius_mm.unwrap_or(annulus.carrier_outer_mm()),
+            inner_radius_mm,
+            outer_radius_mm,
             slot_half_width_mm: drive.slot_half_width_mm()
                 + MM_PER_UM * (parameters.carrier_clearance_um + parameters.modification.slot_wall_um),
         }
@@ -283,6 +328,32 @@ impl Checks {
             Some(given_mm) => self.in_range(parameter, given_mm),
             None => default_mm,
         }
+    }
+
+    /// That the carrier's radii leave a wall between cam and ring tips, beside a cam that may be set forward; the outer one, where it is possible.
+    fn carrier_radii(
+        &mut self,
+        radii: CarrierRadii,
+        cam_outer_mm: Option<f64>,
+        annulus: Option<Annulus>,
+        set_forward_um: f64,
+    ) -> Option<f64> {
+        let inner_mm = annulus.map(|annulus| annulus.carrier_inner_mm());
+        let inner_mm = self.radius_mm(Parameter::CarrierInnerRadius, radii.inner_mm, inner_mm);
+        let outer_mm = annulus.map(|annulus| annulus.carrier_outer_mm());
+        let outer_mm = self.radius_mm(Parameter::CarrierOuterRadius, radii.outer_mm, outer_mm);
+        if let (Some(inner_mm), Some(a)) = (inner_mm, cam_outer_mm) {
+            self.above(Misfit::CarrierMeetsCam, inner_mm, a + MM_PER_UM * set_forward_um.max(0.0));
+        }
+        if let Some(outer_mm) = outer_mm {
+            if let Some(annulus) = annulus {
+                self.below(Misfit::CarrierMeetsRing, outer_mm, annulus.outer_mm);
+            }
+            if let Some(inner_mm) = inner_mm {
+                self.above(Misfit::CarrierWithoutWall, outer_mm, inner_mm);
+            }
+        }
+        outer_mm
     }
 
     /// That a modification leaves something of its part.

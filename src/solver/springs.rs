@@ -4,6 +4,10 @@
 use crate::approach::Approach;
 use crate::root::{NotConverged, ValueAndSlope, newton_from_above};
 
+/// A spring that is pressed by less is not pressed at all. The least torque of all presses some tooth by 1e-60 mm or more, so this share of the load
+/// is none; and a law's logarithm and slope would leave the range of doubles.
+const NOTHING_MM: f64 = 1e-200;
+
 /// A tooth as load sharing sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spring {
@@ -42,7 +46,8 @@ impl Spring {
     /// `Δφ |h'| - g`, or nothing while a gap is open.
     pub fn displacement_mm(&self, wind_up: &Rotation) -> f64 {
         let closed_rad = wind_up.excess_rad - (self.closing_rad - wind_up.closing_rad);
-        if closed_rad > 0.0 { closed_rad * self.travel_arm_mm } else { 0.0 }
+        let displacement_mm = closed_rad * self.travel_arm_mm;
+        if displacement_mm > NOTHING_MM { displacement_mm } else { 0.0 }
     }
 
     /// `F_H`; nothing while a gap is open.

@@ -37,7 +37,7 @@ pub enum Needs {
     AllowableStress,
     /// A load and `friction`.
     Friction,
-    /// A load, `friction` and `load.input_speed_rpm`.
+    /// A load, `friction` and a speed: `load.input_speed_rpm`, or those of a `load.duty`.
     FrictionAndSpeed,
 }
 
@@ -172,7 +172,7 @@ pub static QUANTITIES: [Quantity; 59] = [
         "mm",
         "Diameter of the whole drive.",
         Source::Definition(
-            "twice the ring's outer radius as drawn: `parts.ring.outer_radius_mm`, or 1.2 times the root radius where that is left out",
+            "twice the ring's outer radius: `parts.ring.outer_radius_mm`, or where that is left out 1.2 times the root radius with `parts.ring.clearance_um`, the ring's `modification` apart",
         ),
         |variant| Ok(2.0 * variant.ring_outer_radius_mm),
     ),

@@ -270,10 +270,15 @@ fn has_allowable_stress(tree: &Tree) -> bool {
     at(tree, &["load", "allowable_stress_mpa"]).is_some()
 }
 
+/// Whether it says how fast the wave generator turns; every point of a duty does.
+fn has_speed(tree: &Tree) -> bool {
+    [["load", "input_speed_rpm"], ["load", "duty"]].iter().any(|place| at(tree, place).is_some())
+}
+
 /// The most that quantities may need, allowable stresses apart.
 fn what_it_has(tree: &Tree) -> Needs {
     let has = |place: &[&str]| at(tree, place).is_some();
-    match (has(&["load"]), has(&["friction"]), has(&["load", "input_speed_rpm"])) {
+    match (has(&["load"]), has(&["friction"]), has_speed(tree)) {
         (false, ..) => Needs::Drive,
         (true, false, _) => Needs::Load,
         (true, true, false) => Needs::Friction,
@@ -291,6 +296,7 @@ fn require_what_quantities_need(quantities: &[&'static Quantity], tree: &Tree) -
                 &[(&["load"], "a load"), (&["load", "allowable_stress_mpa"], "an allowable stress")]
             }
             Needs::Friction => &[(&["load"], "a load"), (&["friction"], "friction")],
+            Needs::FrictionAndSpeed if has_speed(tree) => &[(&["friction"], "friction")],
             Needs::FrictionAndSpeed => &[
                 (&["load"], "a load"),
                 (&["friction"], "friction"),

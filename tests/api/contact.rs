@@ -193,3 +193,32 @@ async fn a_sweep_says_how_far_its_model_is_off_elastic_bodies_and_whether_this_d
     assert_eq!(balls["beyond"][1], "tooth_shape");
     assert_eq!(stiff["range"]["lobes"], 2);
 }
+
+/// Forces, stresses and what is kept of them follow the designer's carrier.
+#[tokio::test]
+async fn flat_sided_teeth_are_borne_by_the_carrier_of_the_document_and_others_do_not_ask_for_it() {
+    let flats =
+        json!({ "shape": "flat_sided", "count": 28, "radius_mm": 5.0, "width_mm": 15.0, "flat_length_mm": 4.0 });
+    let flat_sided = with(&shortest(), "/drive/teeth", flats);
+    let service = Service::new();
+    let carrier = |document: &Value, radii: Value| with(document, "/parts", json!({ "carrier": radii }));
+    let narrow = carrier(&flat_sided, json!({ "inner_radius_mm": 60.5, "outer_radius_mm": 62.5 }));
+    let stress_mpa = async |document: &Value| {
+        let answer = service.post("/v1/sweep", document).await.found();
+        answer["peaks"]["carrier"]["stress_mpa"]["value"].as_f64().unwrap()
+    };
+    let (by_default, given) = (stress_mpa(&flat_sided).await, stress_mpa(&narrow).await);
+    assert!(given > 1.5 * by_default, "{given} and {by_default} MPa");
+    let accuracy = async |document: &Value| service.post("/v1/accuracy", document).await.etag().to_owned();
+    assert_ne!(accuracy(&flat_sided).await, accuracy(&narrow).await);
+    assert_eq!(accuracy(&shortest()).await, accuracy(&carrier(&shortest(), json!({ "outer_radius_mm": 62.5 }))).await);
+
+    let within_cam = json!({ "inner_radius_mm": 57.0 });
+    for path in ["/v1/sweep", "/v1/accuracy"] {
+        let problem =
+            service.post(path, &carrier(&flat_sided, within_cam.clone())).await.refused(422, "impossible_design");
+        assert_eq!(problem["errors"][0]["pointer"], "/parts/carrier/inner_radius_mm");
+        assert_eq!(problem["errors"][0]["code"], "carrier_meets_cam");
+        service.post(path, &carrier(&shortest(), within_cam.clone())).await.found();
+    }
+}

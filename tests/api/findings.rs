@@ -479,3 +479,46 @@ async fn every_kind_of_finding_can_be_met_over_http() {
     }
     assert_eq!(codes_of(&all), words(&finding_codes()));
 }
+
+/// Findings of an eccentric pointed at the semi-axes of an ellipse and gave advice about one, those of balls at a width.
+#[tokio::test]
+async fn findings_name_fields_that_the_document_has_whatever_its_kind_and_shape() {
+    let cylinders = |count: u32| json!({ "count": count, "installed": count, "radius_mm": 2.0, "width_mm": 12.0 });
+    let eccentric = json!({ "kind": "eccentric", "radius_mm": 30.8, "eccentricity_mm": 2.4 });
+    let harmonic = json!({ "kind": "harmonic", "lobes": 3, "mean_radius_mm": 48.0, "amplitude_mm": 2.2 });
+    let path = json!({ "kind": "harmonic_path", "lobes": 3, "mean_path_radius_mm": 50.0, "amplitude_mm": 2.2 });
+    let balls = json!({ "shape": "ball", "count": 40, "installed": 40, "radius_mm": 2.0 });
+    let mut codes = Vec::new();
+    for (wave_generator, teeth, ring_teeth) in [
+        (&eccentric, cylinders(40), 39),
+        (&eccentric, balls, 39),
+        (&harmonic, cylinders(60), 57),
+        (&path, cylinders(60), 57),
+    ] {
+        for tip_radius_mm in [Value::Null, json!(36.0), json!(53.0)] {
+            let drive = json!({
+                "wave_generator": wave_generator,
+                "teeth": teeth,
+                "ring": { "teeth": ring_teeth, "tip_radius_mm": tip_radius_mm }
+            });
+            let document = json!({ "drive": drive, "load": { "input_torque_nm": 40.0, "allowable_stress_mpa": 1e3 } });
+            let reply = Service::new().post("/v1/sweep", &document).await;
+            if reply.status != 200 {
+                continue;
+            }
+            for finding in reply.found()["findings"].as_array().unwrap() {
+                for pointer in finding["pointers"].as_array().unwrap() {
+                    let pointer = pointer.as_str().unwrap();
+                    let is_of_drive = pointer.starts_with("/drive") || pointer.starts_with("/load/");
+                    assert!(!is_of_drive || document.pointer(pointer).is_some(), "{document} has no {pointer}");
+                }
+                let text = format!("{} {}", finding["detail"], finding["advice"]);
+                assert!(!text.contains("ellipse") && !text.contains("major"), "{text}");
+                codes.push(finding["code"].as_str().unwrap().to_owned());
+            }
+        }
+    }
+    for code in ["undercut", "tooth_beyond_carrier", "bore_shortens_flank", "stress_above_allowable"] {
+        assert!(codes.iter().any(|found| found == code), "no {code} among {codes:?}");
+    }
+}

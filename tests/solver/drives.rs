@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 use toothwave_solver::mesh::Mesh;
+use toothwave_solver::parts::CarrierRadii;
 use toothwave_solver::{
     Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Modification,
     Never, PerContact, ToothShape, Torque, WaveGenerator,
@@ -64,6 +65,7 @@ pub(crate) fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParamete
         series_compliance_mm_per_n: PerContact::default(),
         clearance_um: PerContact::default(),
         modification: Modification::default(),
+        carrier: CarrierRadii::default(),
         allowable_stress_mpa: None,
     }
 }

@@ -298,6 +298,11 @@ fn the_drives_that_were_calculated_lie_within_the_range_and_others_do_not() {
             let mut brass = own;
             brass.materials.carrier.youngs_modulus_gpa = 100.0;
             assert_eq!(beyond(&parameters, &brass), [Beyond::Materials]);
+            // Near the root contacts are wider than where their stress is largest, and reach 0.035 of the radius from 85 N·m on.
+            for (torque_nm, expected) in [(80.0, vec![]), (100.0, vec![Beyond::HalfWidth])] {
+                let torque = Torque::Input(torque_nm);
+                assert_eq!(beyond(&parameters, &LoadParameters { torque, ..own }), expected, "{torque_nm} N·m");
+            }
             assert_eq!(
                 beyond(&parameters, &LoadParameters { torque: Torque::Input(200.0), ..own }),
                 [Beyond::HalfWidth]

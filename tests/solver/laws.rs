@@ -5,8 +5,10 @@ use std::f64::consts::PI;
 use nalgebra::{Matrix2, Vector2};
 use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
+use toothwave_solver::drive::Draft;
 use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
 use toothwave_solver::mesh::{Mesh, Samples};
+use toothwave_solver::parts::CarrierRadii;
 use toothwave_solver::sweep::{self, Points};
 use toothwave_solver::tooth::flat::FlatContact;
 use toothwave_solver::tooth::point::EllipticContact;
@@ -587,6 +589,54 @@ fn flat_sided_teeth_share_the_load_with_any_law_of_cylinders() {
     let loaded = LoadedDrive::with_teeth(&drive, &case, &shape(60.0)).unwrap();
     let left = loaded.tooth(Position::from_lobe(0.1, 2));
     assert!(matches!(left, Err(SolveError::FlatOffCarrier { .. })), "{left:?}");
+}
+
+/// They were borne by the default carrier, whatever radii the designer gave.
+#[test]
+fn flats_are_borne_by_the_carrier_that_is_given() {
+    let flat_length_mm = 4.0;
+    let parameters = DriveParameters { tooth: ToothShape::FlatSided { width_mm: 15.0, flat_length_mm }, ..PAPER_5_1 };
+    let drive = drive(&parameters);
+    let draft = Draft::new(&parameters).unwrap();
+    for (inner_mm, outer_mm) in [(None, None), (Some(61.0), None), (None, Some(62.0)), (Some(60.5), Some(62.5))] {
+        let carrier = CarrierRadii { inner_mm, outer_mm };
+        let load = LoadParameters { law: R_DEEP, carrier, ..load(20.0, VirtualWork) };
+        assert!(load.carrier_violations(&draft).is_empty());
+        let found = sweep::sweep(&drive, &LoadCase::new(&load).unwrap(), Points::samples(8).unwrap(), &Never).unwrap();
+        assert!(found.torque_balance_residual < 1e-14);
+        // Between the cam at 58 mm and the tips at 66 mm, a tenth of the room free on either side.
+        let (inner_mm, outer_mm) = (inner_mm.unwrap_or(58.8), outer_mm.unwrap_or(65.2));
+        for state in 0..found.states.len() {
+            let d = found.states.center_radius_mm[state];
+            let borne_mm = (d + 2.0).min(outer_mm) - (d - 2.0).max(inner_mm);
+            let force_n = found.states.stress_mpa.carrier[state] * borne_mm * 15.0;
+            let expected_n = found.states.force_n.carrier[state];
+            assert!((force_n - expected_n).abs() < 1e-9, "{carrier:?} at {d} mm: {force_n} N, not {expected_n}");
+        }
+    }
+    let impossible = [
+        (Some(57.0), None, Parameter::CarrierInnerRadius),
+        (None, Some(67.0), Parameter::CarrierOuterRadius),
+        (Some(63.0), Some(62.0), Parameter::CarrierOuterRadius),
+        (Some(f64::NAN), None, Parameter::CarrierInnerRadius),
+    ];
+    for (inner_mm, outer_mm, at_fault) in impossible {
+        let load = LoadParameters { carrier: CarrierRadii { inner_mm, outer_mm }, ..load(20.0, VirtualWork) };
+        let parameter = |violations: &[Violation]| match violations {
+            [Violation::PartDoesNotFit { misfit, .. }] => misfit.parameter(),
+            [Violation::OutOfRange { parameter, .. }] => *parameter,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(parameter(&load.carrier_violations(&draft)), at_fault);
+        let case = LoadCase::new(&load).unwrap();
+        match sweep::sweep(&drive, &case, Points::samples(8).unwrap(), &Never) {
+            Err(SolveError::Impossible(violations)) => assert_eq!(parameter(&violations), at_fault),
+            other => panic!("{other:?}"),
+        }
+        // Cylinders do not ask for it.
+        let cylinders = crate::drives::drive(&PAPER_5_1);
+        assert!(sweep::sweep(&cylinders, &case, Points::samples(8).unwrap(), &Never).is_ok());
+    }
 }
 
 /// The flat's linear part was left out where its weight is negative, and forces leave the model by as much.

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 use toothwave_solver::load_sharing::LoadedDrive;
 use toothwave_solver::mesh::{Mesh, Samples};
+use toothwave_solver::parts::CarrierRadii;
 use toothwave_solver::sweep::{self, Points, States, Sweep};
 use toothwave_solver::tooth::ToothContact;
 use toothwave_solver::{
@@ -114,6 +115,7 @@ impl Case {
                 carrier: gap("carrier_um"),
             },
             modification: Modification::default(),
+            carrier: CarrierRadii::default(),
             allowable_stress_mpa: load["allowable_stress_mpa"].as_f64().map(everywhere),
         })
         .unwrap()

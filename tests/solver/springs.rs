@@ -48,6 +48,37 @@ fn under_any_torque_and_any_gap_the_forces_balance_it_to_1e_12() {
     assert!(worst.0 <= 1e-12, "{worst:?}");
 }
 
+/// A tooth that is pressed by 1e-313 mm at the closing angle of the next one took the logarithm of Johnson's law out of the range of doubles, and its
+/// stiffness.
+#[test]
+fn gaps_next_to_nothing_are_none_to_the_load() {
+    let drive = drive(&PAPER_5_1);
+    for law in [ContactLaw::Johnson { depth_mm: PerContact::default() }, ContactLaw::Palmgren, ContactLaw::Linear] {
+        for torque_nm in [1e-12, 20.0, 1e3] {
+            let without = LoadParameters { law, ..load(torque_nm, VirtualWork) };
+            let swept = |parameters: LoadParameters| {
+                let case = LoadCase::new(&parameters).unwrap();
+                let found = [sweep::sweep, sweep::sweep_plain]
+                    .map(|sweep| sweep(&drive, &case, Points::samples(4).unwrap(), &Never).unwrap());
+                found.map(|sweep| {
+                    assert!(sweep.torque_balance_residual <= 1e-12, "{law:?}: {:e}", sweep.torque_balance_residual);
+                    sweep.peaks.ring.force_n.value
+                })
+            };
+            let [force_n, _] = swept(without);
+            for gap_um in [5e-324, 1e-310, 1e-300, 1e-250, 1e-150] {
+                let clearance_um = PerContact { ring: gap_um, ..PerContact::default() };
+                let modification = Modification { ring_equidistant_um: gap_um, ..Modification::NONE };
+                for loaded in [LoadParameters { clearance_um, ..without }, LoadParameters { modification, ..without }] {
+                    for found_n in swept(loaded) {
+                        assert!((found_n / force_n - 1.0).abs() < 1e-12, "{law:?}, {torque_nm} N·m, {gap_um:e} µm");
+                    }
+                }
+            }
+        }
+    }
+}
+
 /// A rounding of the closing angles once told the teeth apart: under 1e-12 N·m forces came out five times too large, and a period of equally turned slots
 /// did not close.
 #[test]

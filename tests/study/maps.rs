@@ -118,3 +118,36 @@ fn what_cannot_be_mapped_is_said_at_its_field() {
     );
     assert_eq!(faulty(&capacity), ("/base/load/allowable_stress_mpa".into(), "missing_field".into()));
 }
+
+/// They were refused for want of a speed, which every point of a duty has.
+#[test]
+fn of_a_duty_losses_are_those_of_its_sweep_over_all_points() {
+    let point = |torque_nm: f64, speed_rpm: f64, share_of_time: f64| json!({ "input_torque_nm": torque_nm, "input_speed_rpm": speed_rpm, "share_of_time": share_of_time });
+    let duty = json!({ "duty": [point(2.0, 3000.0, 0.75), point(20.0, 500.0, 0.25)] });
+    let friction = json!({
+        "wave_generator": { "kind": "plain", "coefficient": 0.03 },
+        "ring": { "coefficient": 0.05 },
+        "carrier": { "coefficient": 0.05 }
+    });
+    let gapped =
+        json!({ "compatibility": "virtual_work", "stiffness": { "law": "linear" }, "clearance": { "ring_um": 10.0 } });
+    let base = with(&with(&with(&paper(), "/load", duty), "/friction", friction), "/model", gapped);
+    let over = json!({ "/drive/teeth/radius_mm": { "min": 5.0, "max": 5.5, "steps": 2 } });
+    let names = ["loss_ratio", "power_loss_w", "pressure_velocity_ring_mpa_m_per_s", "peak_force_ring_n"];
+    let found = answer(&json!({ "study": "map", "base": base, "over": over, "quantities": names }));
+    let sweep = Sweep.ask(base.to_string().as_bytes(), &CALCULATION, &Never).unwrap();
+    let losses = &sweep.losses.as_ref().unwrap().totals;
+    let of_sweep = [
+        losses.loss_ratio,
+        losses.power_loss_w.unwrap(),
+        losses.pressure_velocity_mpa_m_per_s.as_ref().unwrap().ring.value,
+        sweep.peaks.ring.force_n.value,
+    ];
+    for (name, of_sweep) in names.into_iter().zip(of_sweep) {
+        assert_eq!(numbers(&found["possible"]["quantities"][name])[0], of_sweep, "{name}");
+    }
+    // Without friction it is that which is wanting.
+    let base = with(&paper(), "/load", base["load"].clone());
+    let study = json!({ "study": "map", "base": base, "over": over, "quantities": ["power_loss_w"] });
+    assert_eq!(faulty(&study), ("/base/friction".into(), "missing_field".into()));
+}

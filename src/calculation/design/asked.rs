@@ -153,11 +153,11 @@ pub enum FingersDocument {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct CarrierPartDocument {
-    /// Inner radius; left out, a tenth of the annulus between cam and ring tips is left free inside.
+    /// Inner radius; left out, a tenth of the annulus between cam and ring tips is left free inside. Flat-sided teeth are borne from here.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
     pub inner_radius_mm: Option<f64>,
-    /// Outer radius; left out, a tenth of that annulus is left free outside.
+    /// Outer radius; left out, a tenth of that annulus is left free outside. Flat-sided teeth are borne up to here.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
     pub outer_radius_mm: Option<f64>,

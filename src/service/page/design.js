@@ -404,7 +404,7 @@ export const GROUPS = [
   {
     title: 'Parts as they are made',
     pointer: '/parts',
-    hint: 'Drawings read these, and what is estimated to give way behind the contacts; forces are computed with the gaps and compliances of the model. The gap at a contact is the sum of its two parts’ clearances.',
+    hint: 'Drawings read these, and what is estimated to give way behind the contacts; forces are computed with the gaps and compliances of the model, those on flat-sided teeth with the carrier’s radii too. The gap at a contact is the sum of its two parts’ clearances.',
     summary: (design) => {
       const given = Object.values(at(design, '/parts') ?? {}).flatMap((part) => Object.values(part ?? {})).filter((value) => value !== null);
       return given.length === 0 ? 'defaults' : `${given.length} given`;

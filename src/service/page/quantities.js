@@ -33,7 +33,7 @@ const HAS = {
   load: (design) => at(design, '/load') !== undefined,
   allowable_stress: (design) => at(design, '/load/allowable_stress_mpa') !== undefined,
   friction: (design) => at(design, '/load') !== undefined && at(design, '/friction') !== undefined,
-  friction_and_speed: (design) => at(design, '/friction') !== undefined && at(design, '/load/input_speed_rpm') !== undefined,
+  friction_and_speed: (design) => at(design, '/friction') !== undefined && (at(design, '/load/input_speed_rpm') ?? at(design, '/load/duty')) !== undefined,
 };
 
 function labelOf({ name }) {

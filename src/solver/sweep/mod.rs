@@ -54,7 +54,8 @@ pub fn sweep_with_deviations(
     if deviations.is_nil() && deviations.violations(drive.parameters()).is_empty() {
         return sweep(drive, load, points, stop);
     }
-    let loaded = LoadedDrive::with_deviations(drive, load, &ToothContact::of(drive), Some(deviations))?;
+    let shape = ToothContact::of(drive, load.parameters().carrier);
+    let loaded = LoadedDrive::with_deviations(drive, load, &shape, Some(deviations))?;
     plain::sweep(&loaded, load, points, Looking::Fast, stop)
 }
 

@@ -22,7 +22,8 @@ pub fn unloaded_wind_up_deg(
     sweep: &Sweep,
     stop: &dyn Stop,
 ) -> Result<Vec<f64>, SolveError> {
-    let loaded = LoadedDrive::with_deviations(drive, load, &ToothContact::of(drive), Some(deviations))?;
+    let shape = ToothContact::of(drive, load.parameters().carrier);
+    let loaded = LoadedDrive::with_deviations(drive, load, &shape, Some(deviations))?;
     let states = &sweep.states;
     let (lobes, half_rad) = (drive.lobes(), half_lobe_rad(drive.lobes()));
     let closing_rad = |state: usize| {

@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 use crate::approach::{Approach, Logarithmic};
 use crate::contact::{Contact, ContactLaw, HertzLine, Materials, PerContact};
 use crate::drive::{Drive, ToothShape};
-use crate::parts::CARRIER_PLAY;
+use crate::parts::CarrierRadii;
 use crate::root::NotConverged;
 use crate::violation::Parameter;
 use flat::FlatContact;
@@ -38,18 +38,14 @@ pub enum ToothContact {
 }
 
 impl ToothContact {
-    /// Of a drive's teeth. Flats are borne by a carrier with the play of one whose radii are not given.
-    pub fn of(drive: &Drive) -> Self {
+    /// Of a drive's teeth. Flats are borne by a carrier of these radii, which no other teeth ask for.
+    pub fn of(drive: &Drive, carrier: CarrierRadii) -> Self {
         match drive.parameters().tooth {
             ToothShape::Cylinder { .. } => Self::Cylinder,
             ToothShape::Ball { groove_radius_mm } => Self::Ball { groove_radius_mm },
             ToothShape::FlatSided { flat_length_mm, .. } => {
-                let play_mm = CARRIER_PLAY * (drive.tip_radius_mm() - drive.cam_outer_radius_mm());
-                Self::FlatSided {
-                    flat_length_mm,
-                    carrier_inner_radius_mm: drive.cam_outer_radius_mm() + play_mm,
-                    carrier_outer_radius_mm: drive.tip_radius_mm() - play_mm,
-                }
+                let [carrier_inner_radius_mm, carrier_outer_radius_mm] = carrier.of(drive);
+                Self::FlatSided { flat_length_mm, carrier_inner_radius_mm, carrier_outer_radius_mm }
             }
         }
     }

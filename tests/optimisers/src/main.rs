@@ -5,7 +5,7 @@ use std::io::{self, BufRead as _, Write as _};
 use std::sync::Mutex;
 
 use heuropt::prelude::*;
-use toothwave_solver::parts::RIM;
+use toothwave_solver::parts::{CarrierRadii, RIM};
 use toothwave_solver::sweep::{Points, peaks};
 use toothwave_solver::{
     Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Modification,
@@ -103,6 +103,7 @@ fn drive(place: &[f64]) -> Option<Judged> {
         series_compliance_mm_per_n: PerContact::default(),
         clearance_um: PerContact::default(),
         modification: Modification::default(),
+        carrier: CarrierRadii::default(),
         allowable_stress_mpa: Some(PerContact { wave_generator: 1500.0, ring: 1500.0, carrier: 1500.0 }),
     };
     let drive = Drive::new(&parameters).ok()?;
