@@ -6,15 +6,17 @@ use std::f64::consts::PI;
 use nalgebra::{Point2, Vector2};
 use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
-use toothwave_solver::drive::DriveError;
+use toothwave_solver::drawing::{Drawing, DrawingParameters, Subject};
+use toothwave_solver::drive::{Draft, DriveError};
 use toothwave_solver::load_sharing::LoadedDrive;
 use toothwave_solver::losses::{LoadedTooth, Mechanism};
 use toothwave_solver::mesh::{Mesh, Samples, TeethInMesh};
+use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::profile::{Extent, ProfileParameters, profiles};
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self, Points, Sweep};
 use toothwave_solver::{
-    ContactLaw, Drive, DriveParameters, Finding, LoadCase, Never, Parameter, PerContact, Position, ToothShape,
+    ContactLaw, Drive, DriveParameters, Finding, LoadCase, Never, Parameter, Part, PerContact, Position, ToothShape,
     Violation, WaveGenerator, findings,
 };
 
@@ -844,4 +846,25 @@ fn flats_may_not_end_the_arc_before_the_steepest_contact_with_the_ring() {
         found.iter().any(|finding| matches!(finding, Finding::FlatCutsTheContact { .. }))
     };
     assert!(is_told(limit_mm * 1.0001) && !is_told(limit_mm * 0.9999));
+}
+
+#[test]
+fn in_an_assembly_every_tooth_stands_in_its_slot_on_the_path() {
+    for p in family() {
+        let (n, input_angle_deg) = (p.installed as f64, 7.0_f64);
+        let parameters = DrawingParameters { chord_tolerance_mm: 1e-2, max_points: 1_000_000, input_angle_deg };
+        let draft = Draft::new(&p).unwrap();
+        let drawing = Drawing::new(&draft, Subject::Assembly, &PartsParameters::default(), &parameters).unwrap();
+        let teeth = drawing.bodies(&Never).unwrap().into_iter().find(|body| body.part == Part::Teeth).unwrap();
+        assert_eq!(teeth.placements.len(), p.installed as usize);
+        let cam_rad = input_angle_deg.to_radians();
+        let carrier_rad = cam_rad * (p.teeth - p.ring_teeth) as f64 / p.teeth as f64;
+        for (slot, placement) in teeth.placements.iter().enumerate() {
+            let angle_rad = carrier_rad + 2.0 * PI * slot as f64 / n;
+            let from_lobe_rad = (angle_rad - cam_rad).rem_euclid(2.0 * PI);
+            let expected = center_radius_mm(&p, from_lobe_rad) * Vector2::new(angle_rad.cos(), angle_rad.sin());
+            let off_mm = (placement.origin_mm.coords - expected).norm();
+            assert!(off_mm < 1e-9 * expected.norm(), "slot {slot} of {p:?} is {off_mm} mm off");
+        }
+    }
 }
