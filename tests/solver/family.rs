@@ -868,3 +868,25 @@ fn in_an_assembly_every_tooth_stands_in_its_slot_on_the_path() {
         }
     }
 }
+
+#[test]
+fn a_bored_flank_of_every_kind_ends_where_it_meets_the_bore() {
+    for unbored in family() {
+        let unbored = DriveParameters { tip_radius_mm: None, ..unbored };
+        let natural = drive(&unbored);
+        let (tip_mm, root_mm) = (natural.natural_tip_radius_mm(), natural.root_radius_mm());
+        for share in [0.01, 0.1, 0.3, 0.6, 0.9] {
+            let bore_mm = tip_mm + share * (root_mm - tip_mm);
+            // A bore may leave fewer teeth than a drive needs.
+            let Ok(bored) = Drive::new(&DriveParameters { tip_radius_mm: Some(bore_mm), ..unbored }) else { continue };
+            let end = bored.flank_limit();
+            assert_eq!(end.end, FlankEnd::Bore);
+            let tooth = bored.flank().locus().at(end.position).unwrap();
+            // The flank is the tooth's radius off the path, along its normal.
+            let (r, tan) = (unbored.tooth_radius_mm, tooth.tan_pressure_angle * bored.teeth_per_wave());
+            let along_mm = tooth.center_radius_mm + r / tan.hypot(1.0);
+            let radius_mm = along_mm.hypot(r * tan / tan.hypot(1.0));
+            assert!((radius_mm - bore_mm).abs() < 1e-12 * bore_mm, "{radius_mm} is not {bore_mm} on {unbored:?}");
+        }
+    }
+}

@@ -52,6 +52,9 @@ impl Counts {
     pub fn share(&self) -> String {
         let caught = (self.caught + self.timeout) as f64;
         let tried = caught + (self.missed + self.unreached + self.open) as f64;
+        if tried == 0.0 {
+            return format!("none tried of {}", self.not_tried);
+        }
         let (share, z) = (caught / tried, 1.96);
         let middle = (share + z * z / (2.0 * tried)) / (1.0 + z * z / tried);
         let half = z / (1.0 + z * z / tried) * (share * (1.0 - share) / tried + z * z / (4.0 * tried * tried)).sqrt();
