@@ -856,7 +856,7 @@ fn in_an_assembly_every_tooth_stands_in_its_slot_on_the_path() {
         let draft = Draft::new(&p).unwrap();
         let drawing = Drawing::new(&draft, Subject::Assembly, &PartsParameters::default(), &parameters).unwrap();
         let teeth = drawing.bodies(&Never).unwrap().into_iter().find(|body| body.part == Part::Teeth).unwrap();
-        assert_eq!(teeth.placements.len(), p.installed as usize);
+        assert_eq!(Ok(teeth.placements.len()), usize::try_from(p.installed));
         let cam_rad = input_angle_deg.to_radians();
         let carrier_rad = cam_rad * (p.teeth - p.ring_teeth) as f64 / p.teeth as f64;
         for (slot, placement) in teeth.placements.iter().enumerate() {

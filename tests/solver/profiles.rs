@@ -95,7 +95,7 @@ fn the_whole_wave_generator_is_an_ellipse_and_the_whole_ring_and_path_repeat_fro
         }
         let tooth = Rotation2::new(2.0 * PI / parameters.ring_teeth as f64);
         for curve in [&all.ring, &all.tooth_center_path] {
-            let step = (curve.len() - 1) / parameters.ring_teeth as usize;
+            let step = (curve.len() - 1) / usize::try_from(parameters.ring_teeth).unwrap();
             for (point, next) in curve.iter().zip(&curve[step..]) {
                 assert!((tooth * point - next).norm() < 1e-12 * a, "{point} is not followed by {next}");
             }
