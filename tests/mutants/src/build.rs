@@ -44,7 +44,10 @@ impl Tree {
         elsewhere: &HashSet<usize>,
     ) -> io::Result<Program> {
         let library = "src/solver/lib.rs";
-        let mut of_file: BTreeMap<&str, Vec<(usize, &Mutant)>> = [(library, Vec::new())].into();
+        // All sources, as those without mutants are compiled too.
+        let sources = self.sources()?;
+        let mut of_file: BTreeMap<&str, Vec<(usize, &Mutant)>> =
+            sources.iter().map(|file| (file.as_str(), Vec::new())).collect();
         for (number, mutant) in mutants.iter().enumerate() {
             of_file.entry(&mutant.file).or_default().push((number, mutant));
         }
@@ -114,6 +117,25 @@ impl Tree {
             left.extend(lines.into_iter().map(|mutant| (mutant, Left::Unviable)));
         }
         Err(io::Error::other("the mutants still do not compile"))
+    }
+
+    /// The solver's files, from the root.
+    fn sources(&self) -> io::Result<Vec<String>> {
+        let mut directories = vec!["src/solver".to_owned()];
+        let mut sources = Vec::new();
+        while let Some(directory) = directories.pop() {
+            fs::create_dir_all(self.copy.join(&directory))?;
+            for entry in fs::read_dir(self.root.join(&directory))? {
+                let entry = entry?;
+                let path = format!("{directory}/{}", entry.file_name().to_string_lossy());
+                if entry.file_type()?.is_dir() {
+                    directories.push(path);
+                } else if path.ends_with(".rs") {
+                    sources.push(path);
+                }
+            }
+        }
+        Ok(sources)
     }
 
     /// The errors, and the test program where one was made.
