@@ -883,7 +883,8 @@ fn a_bored_flank_of_every_kind_ends_where_it_meets_the_bore() {
             assert_eq!(end.end, FlankEnd::Bore);
             let tooth = bored.flank().locus().at(end.position).unwrap();
             // The flank is the tooth's radius off the path, along its normal.
-            let (r, tan) = (unbored.tooth_radius_mm, tooth.tan_pressure_angle * bored.teeth_per_wave());
+            let ring_teeth_per_lobe = unbored.ring_teeth as f64 / f64::from(bored.lobes());
+            let (r, tan) = (unbored.tooth_radius_mm, tooth.tan_pressure_angle * ring_teeth_per_lobe);
             let along_mm = tooth.center_radius_mm + r / tan.hypot(1.0);
             let radius_mm = along_mm.hypot(r * tan / tan.hypot(1.0));
             assert!((radius_mm - bore_mm).abs() < 1e-12 * bore_mm, "{radius_mm} is not {bore_mm} on {unbored:?}");
