@@ -6,15 +6,17 @@ use std::f64::consts::PI;
 use nalgebra::{Point2, Vector2};
 use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
-use toothwave_solver::drive::DriveError;
+use toothwave_solver::drawing::{Drawing, DrawingParameters, Subject};
+use toothwave_solver::drive::{Draft, DriveError};
 use toothwave_solver::load_sharing::LoadedDrive;
 use toothwave_solver::losses::{LoadedTooth, Mechanism};
 use toothwave_solver::mesh::{Mesh, Samples, TeethInMesh};
+use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::profile::{Extent, ProfileParameters, profiles};
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self, Points, Sweep};
 use toothwave_solver::{
-    ContactLaw, Drive, DriveParameters, Finding, LoadCase, Never, Parameter, PerContact, Position, ToothShape,
+    ContactLaw, Drive, DriveParameters, Finding, LoadCase, Never, Parameter, Part, PerContact, Position, ToothShape,
     Violation, WaveGenerator, findings,
 };
 
@@ -844,4 +846,48 @@ fn flats_may_not_end_the_arc_before_the_steepest_contact_with_the_ring() {
         found.iter().any(|finding| matches!(finding, Finding::FlatCutsTheContact { .. }))
     };
     assert!(is_told(limit_mm * 1.0001) && !is_told(limit_mm * 0.9999));
+}
+
+#[test]
+fn in_an_assembly_every_tooth_stands_in_its_slot_on_the_path() {
+    for p in family() {
+        let (n, input_angle_deg) = (p.installed as f64, 7.0_f64);
+        let parameters = DrawingParameters { chord_tolerance_mm: 1e-2, max_points: 1_000_000, input_angle_deg };
+        let draft = Draft::new(&p).unwrap();
+        let drawing = Drawing::new(&draft, Subject::Assembly, &PartsParameters::default(), &parameters).unwrap();
+        let teeth = drawing.bodies(&Never).unwrap().into_iter().find(|body| body.part == Part::Teeth).unwrap();
+        assert_eq!(Ok(teeth.placements.len()), usize::try_from(p.installed));
+        let cam_rad = input_angle_deg.to_radians();
+        let carrier_rad = cam_rad * (p.teeth - p.ring_teeth) as f64 / p.teeth as f64;
+        for (slot, placement) in teeth.placements.iter().enumerate() {
+            let angle_rad = carrier_rad + 2.0 * PI * slot as f64 / n;
+            let from_lobe_rad = (angle_rad - cam_rad).rem_euclid(2.0 * PI);
+            let expected = center_radius_mm(&p, from_lobe_rad) * Vector2::new(angle_rad.cos(), angle_rad.sin());
+            let off_mm = (placement.origin_mm.coords - expected).norm();
+            assert!(off_mm < 1e-9 * expected.norm(), "slot {slot} of {p:?} is {off_mm} mm off");
+        }
+    }
+}
+
+#[test]
+fn a_bored_flank_of_every_kind_ends_where_it_meets_the_bore() {
+    for unbored in family() {
+        let unbored = DriveParameters { tip_radius_mm: None, ..unbored };
+        let natural = drive(&unbored);
+        let (tip_mm, root_mm) = (natural.natural_tip_radius_mm(), natural.root_radius_mm());
+        for share in [0.01, 0.1, 0.3, 0.6, 0.9] {
+            let bore_mm = tip_mm + share * (root_mm - tip_mm);
+            // A bore may leave fewer teeth than a drive needs.
+            let Ok(bored) = Drive::new(&DriveParameters { tip_radius_mm: Some(bore_mm), ..unbored }) else { continue };
+            let end = bored.flank_limit();
+            assert_eq!(end.end, FlankEnd::Bore);
+            let tooth = bored.flank().locus().at(end.position).unwrap();
+            // The flank is the tooth's radius off the path, along its normal.
+            let ring_teeth_per_lobe = unbored.ring_teeth as f64 / f64::from(bored.lobes());
+            let (r, tan) = (unbored.tooth_radius_mm, tooth.tan_pressure_angle * ring_teeth_per_lobe);
+            let along_mm = tooth.center_radius_mm + r / tan.hypot(1.0);
+            let radius_mm = along_mm.hypot(r * tan / tan.hypot(1.0));
+            assert!((radius_mm - bore_mm).abs() < 1e-12 * bore_mm, "{radius_mm} is not {bore_mm} on {unbored:?}");
+        }
+    }
 }

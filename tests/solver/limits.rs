@@ -2,8 +2,8 @@
 
 use toothwave_solver::drive::DriveError;
 use toothwave_solver::{
-    Compatibility, ContactLaw, Drive, DriveParameters, Finding, LoadCase, Never, Parameter, PerContact, Position,
-    SolveError, ToothShape, Torque, Violation, WaveGenerator, findings,
+    Compatibility, ContactLaw, Drive, DriveParameters, Finding, LoadCase, LoadParameters, Never, Parameter, PerContact,
+    Position, SolveError, ToothShape, Torque, Violation, WaveGenerator, findings,
     mesh::{Mesh, Samples},
     sweep::{self, Points},
 };
@@ -14,6 +14,18 @@ fn violations(parameters: &DriveParameters) -> Vec<Violation> {
     match Drive::new(parameters) {
         Err(DriveError::Impossible(violations)) => violations,
         other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_value_out_of_range_is_written_as_a_person_would() {
+    let told = |tooth_radius_mm| {
+        let found = violations(&DriveParameters { tooth_radius_mm, ..PAPER_5_1 });
+        let of_radius = |v: &&Violation| matches!(v, Violation::OutOfRange { parameter: Parameter::ToothRadius, .. });
+        found.iter().find(of_radius).unwrap().to_string()
+    };
+    for (value, written) in [(0.0, "0"), (-0.5, "-0.5"), (2e6, "2000000"), (1e7, "1e7"), (5e-7, "5e-7")] {
+        assert_eq!(told(value), format!("{written} is out of range: choose a value from 1e-6 to 1000000 mm"));
     }
 }
 
@@ -385,4 +397,15 @@ fn a_tooth_of_the_critical_radius_or_a_few_roundings_beside_it_is_a_drive() {
         }
     }
     assert!(tried > 1_000, "{tried}");
+}
+
+#[test]
+fn a_gap_is_questionable_by_projection_and_not_by_virtual_work() {
+    let found = |compatibility| {
+        let gaps = PerContact { wave_generator: 0.0, ring: 10.0, carrier: 4.0 };
+        let load = LoadParameters { clearance_um: gaps, ..load(20.0, compatibility) };
+        findings::of_projection(&drive(&PAPER_5_1), &LoadCase::new(&load).unwrap()).unwrap()
+    };
+    assert!(found(Compatibility::Projection).contains(&Finding::ProjectionWithGap { gap_um: 10.0 }));
+    assert_eq!(found(Compatibility::VirtualWork), []);
 }

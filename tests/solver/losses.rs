@@ -772,6 +772,25 @@ fn a_period_loses_what_its_input_angles_lose_one_by_one() {
 }
 
 #[test]
+fn pressure_times_velocity_peaks_where_the_product_of_a_state_is_largest() {
+    let drive = drive(&PAPER_5_1);
+    let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
+    let sweep = sweep(&drive, &load, Points::samples(40).unwrap(), &Never).unwrap();
+    let losses = Losses::of(&drive, &sweep, &plain(0.03, 0.05), &Never).unwrap();
+    let peaks = losses.pressure_velocity_peaks(&sweep, 50.0);
+    for contact in CONTACTS {
+        let products = sweep.states.stress_mpa.get(contact).iter().zip(losses.slip_mm_per_rad.get(contact));
+        // Both in mm, turned into metres.
+        let values: Vec<_> = products.map(|(stress_mpa, slip)| stress_mpa * (slip * 50.0).abs() / 1000.0).collect();
+        let largest = values.iter().copied().fold(0.0, f64::max);
+        let peak = peaks.get(contact);
+        assert_near(peak.value, largest, 1e-13 * largest, "peak");
+        let state = values.iter().position(|&value| value == largest).unwrap();
+        assert_eq!(peak.position_deg, sweep.states.position_deg[state]);
+    }
+}
+
+#[test]
 fn a_sweep_to_a_tolerance_loses_what_many_samples_lose() {
     for parameters in [PAPER_5_1, PAPER_5_2] {
         let drive = drive(&parameters);

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::{Point2, Rotation2};
 use toothwave_solver::drawing::{Drawing, DrawingParameters, Edge, Outline, Subject};
 use toothwave_solver::drive::Draft;
-use toothwave_solver::findings::{self, Edge as CarrierEdge};
+use toothwave_solver::findings::{self, Edge as CarrierEdge, Wall};
 use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::{Drive, DriveParameters, Finding, Never, Part};
@@ -26,6 +26,13 @@ fn edges(parameters: &DriveParameters, part: Part, parts: &PartsParameters) -> V
             Outline::Circle { .. } => None,
         })
         .unwrap()
+}
+
+/// What there is to say about a part as it is made.
+fn findings_as_made(parameters: &DriveParameters, part: Part, parts: &PartsParameters) -> Vec<Finding> {
+    let drawing = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 1_000_000, input_angle_deg: 0.0 };
+    let draft = Draft::new(parameters).unwrap();
+    Drawing::new(&draft, Subject::Part(part), parts, &drawing).unwrap().findings().unwrap()
 }
 
 /// Where a wall of slot 0 cuts a circle, and its mirror image in the line between the slots 0 and 1.
@@ -131,4 +138,88 @@ fn a_bore_that_just_meets_an_undercut_tip_does_not_move_the_end_of_the_flank_out
         }
     }
     assert!(tried > 1000, "{tried}");
+}
+
+#[test]
+fn a_clearance_that_alone_undercuts_the_ring_is_told_with_the_distance_from_which_on_it_does() {
+    let critical = drive(&PAPER_5_1).flank().critical_tooth_radius_mm().unwrap();
+    let p = DriveParameters { tooth_radius_mm: 0.999 * critical, ..PAPER_5_1 };
+    let (a, b, r, k) = (58.0, 56.0, p.tooth_radius_mm, 13.0);
+    // As above: the clearance at which the flank's curvature radius at the tip is nothing.
+    let narrowing = k * k * (a * a - b * b) / (a * a + b * r);
+    let most_um = 1e3 * (b + 2.0 * r - r * narrowing) / (narrowing - 1.0);
+    let of = |parameters: &DriveParameters, ring_clearance_um| {
+        let parts = PartsParameters { ring_clearance_um, ..PartsParameters::default() };
+        findings_as_made(parameters, Part::Ring, &parts)
+    };
+    assert_eq!(of(&p, 0.999 * most_um), []);
+    let found = of(&p, 1.001 * most_um);
+    let [Finding::ClearanceUndercutsRing { distance_mm, critical_distance_mm }] = found[..] else {
+        panic!("{found:?}")
+    };
+    assert!((distance_mm - (r + 1.001e-3 * most_um)).abs() < 1e-12);
+    assert!((critical_distance_mm - (r + 1e-3 * most_um)).abs() < 1e-9, "{critical_distance_mm} at {most_um} µm");
+    // What undercuts without it is not the clearance's doing.
+    assert_eq!(of(&PAPER_5_2, 1.0), []);
+}
+
+#[test]
+fn walls_are_thin_below_a_quarter_of_a_slots_width() {
+    // Slots of 10 mm; the ring's root at 58 + 2 · 5, the cam's least radius 56.
+    for (thickness_mm, is_thin) in [(2.499, true), (2.501, false)] {
+        let rim = PartsParameters { ring_outer_radius_mm: Some(68.0 + thickness_mm), ..PartsParameters::default() };
+        let bore = PartsParameters { bore_radius_mm: Some(56.0 - thickness_mm), ..PartsParameters::default() };
+        for (part, parts, wall) in [(Part::Ring, rim, Wall::RingRim), (Part::WaveGenerator, bore, Wall::Cam)] {
+            let found = findings_as_made(&PAPER_5_1, part, &parts);
+            match found[..] {
+                [Finding::ThinWallAsMade { wall: thin, wall_mm, limit_mm }] if is_thin => {
+                    assert_eq!((thin, limit_mm), (wall, 2.5));
+                    assert!((wall_mm - thickness_mm).abs() < 1e-12, "{wall_mm}");
+                }
+                ref others => assert!(others.is_empty() && !is_thin, "{others:?}"),
+            }
+        }
+    }
+    let undercut_cam = PartsParameters {
+        bore_radius_mm: Some(53.0),
+        wave_generator_clearance_um: 600.0,
+        ..PartsParameters::default()
+    };
+    let found = findings_as_made(&PAPER_5_1, Part::WaveGenerator, &undercut_cam);
+    assert!(
+        matches!(found[..], [Finding::ThinWallAsMade { wall_mm, .. }] if (wall_mm - 2.4).abs() < 1e-12),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn a_tooth_leaves_a_slot_whose_walls_end_before_its_centre_does() {
+    // A wall that is 5 mm beside the slot's middle ends √(R² - 25) from the axis; centres run from 61 to 63 mm, loaded ones down to 61.
+    let wall_end_mm = |radius_mm: f64| (radius_mm * radius_mm - 25.0_f64).sqrt();
+    let of = |inner_mm, outer_mm| {
+        let parts = PartsParameters {
+            carrier_inner_radius_mm: Some(inner_mm),
+            carrier_outer_radius_mm: Some(outer_mm),
+            ..PartsParameters::default()
+        };
+        let found = findings_as_made(&PAPER_5_1, Part::Carrier, &parts);
+        let edge = |finding: &Finding| match *finding {
+            Finding::ToothLeavesSlot { edge, center_radius_mm, wall_end_mm, is_loaded } => {
+                (edge, center_radius_mm, wall_end_mm, is_loaded)
+            }
+            ref other => panic!("{other:?}"),
+        };
+        found.iter().map(edge).collect::<Vec<_>>()
+    };
+    // Between 60.9 and 63.1 there is wall for all.
+    let (enough_inner, enough_outer) = (60.9_f64.hypot(5.0), 63.1_f64.hypot(5.0));
+    assert_eq!(of(enough_inner, enough_outer), []);
+    for (found, edge, center_mm, radius_mm) in [
+        (of(61.1_f64.hypot(5.0), enough_outer), CarrierEdge::Inner, 61.0, 61.1_f64.hypot(5.0)),
+        (of(enough_inner, 62.9_f64.hypot(5.0)), CarrierEdge::Outer, 63.0, 62.9_f64.hypot(5.0)),
+    ] {
+        let [(found_edge, center_radius_mm, end_mm, is_loaded)] = found[..] else { panic!("{found:?}") };
+        assert_eq!((found_edge, is_loaded), (edge, true));
+        assert!((center_radius_mm - center_mm).abs() < 1e-9 && (end_mm - wall_end_mm(radius_mm)).abs() < 1e-12);
+    }
 }

@@ -1,5 +1,6 @@
 //! The sampled profiles: true to the chord tolerance, closed, joining.
 
+use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
 use nalgebra::{Point2, Rotation2};
@@ -83,6 +84,26 @@ proptest! {
 }
 
 #[test]
+fn the_whole_wave_generator_is_an_ellipse_and_the_whole_ring_and_path_repeat_from_tooth_to_tooth() {
+    for parameters in [PAPER_5_1, PAPER_5_2_BORED] {
+        let all = sampled(&parameters, 1e-2, Extent::Full);
+        let (a, b) = semi_axes_mm(&parameters);
+        let quadrants: BTreeSet<_> = all.wave_generator.iter().map(|point| (point.x > 0.0, point.y > 0.0)).collect();
+        assert_eq!(quadrants.len(), 4);
+        for point in &all.wave_generator {
+            assert!(((point.x / a).powi(2) + (point.y / b).powi(2) - 1.0).abs() < 1e-13, "{point} is on no ellipse");
+        }
+        let tooth = Rotation2::new(2.0 * PI / parameters.ring_teeth as f64);
+        for curve in [&all.ring, &all.tooth_center_path] {
+            let step = (curve.len() - 1) / usize::try_from(parameters.ring_teeth).unwrap();
+            for (point, next) in curve.iter().zip(&curve[step..]) {
+                assert!((tooth * point - next).norm() < 1e-12 * a, "{point} is not followed by {next}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_bored_tip_has_its_land_on_the_bore() {
     let ring = sampled(&PAPER_5_2_BORED, 1e-7, Extent::Tooth).ring;
     let on_land = ring.iter().filter(|point| (point.coords.norm() - 52.8227).abs() < 1e-12).count();
@@ -94,4 +115,25 @@ fn a_profile_of_too_many_points_is_refused_with_their_number() {
     let request = ProfileParameters { chord_tolerance_mm: 1e-3, extent: Extent::Full, max_points: 1000 };
     let refused = profiles(&drive(&PAPER_5_1), &request, &Never).unwrap_err();
     assert!(matches!(refused, SolveError::TooManyPoints { points, limit: 1000 } if points > 1000));
+}
+
+#[test]
+fn a_profile_is_refused_where_it_has_one_point_more_than_allowed() {
+    for (parameters, extent) in
+        [(PAPER_5_1, Extent::Tooth), (PAPER_5_1, Extent::Full), (PAPER_5_2, Extent::Full), (PAPER_5_2, Extent::Tooth)]
+    {
+        let all = sampled(&parameters, 1e-2, extent);
+        let count =
+            [&all.ring, &all.tooth_center_path, &all.wave_generator].iter().map(|curve| curve.len() as u64).sum();
+        let of_most = |max_points| {
+            let request = ProfileParameters { chord_tolerance_mm: 1e-2, extent, max_points };
+            profiles(&drive(&parameters), &request, &Never)
+        };
+        assert!(of_most(count).is_ok(), "{count} points of {extent:?}");
+        let refused = of_most(count - 1).unwrap_err();
+        assert!(
+            matches!(refused, SolveError::TooManyPoints { points, .. } if points == count),
+            "{refused:?}, not {count}"
+        );
+    }
 }
