@@ -131,7 +131,7 @@ const INTRODUCTION: &str = "\n## Every model\n\n\
     the same run. Times are those on the processor, which what else runs counts in only as far as it shares the core. Sweeps are of 5000 intervals, from the \
     parameters to all columns, in ns a state; the rest, from the parameters too, is in µs.\n\n\
     - `palmgren` takes three powers a state, each a logarithm and an exponential.\n\
-    - True peaks are still looked for state by state, each state of the answer worked out twice.\n\
+    - True peaks are looked for alike either way (docs/theory.md section 9); *before* works the moments out tooth by tooth, and the columns with them.\n\
     - Balls, flat-sided teeth, wave generators that are no ellipse, gaps that differ from tooth to tooth, and unlike zones go the plain way.\n\n\
     | | unit | goal | before | now | times |\n|---|---|---|---|---|---|\n";
 

@@ -34,7 +34,7 @@ const SCAN_SHARE: u64 = 5;
 const TRUE_EVALUATIONS: u64 = 300;
 
 /// The tolerance of true peaks.
-const TRUE_PEAKS: f64 = 1e-4;
+const TRUE_PEAKS: f64 = 1e-6;
 
 /// A duty is swept over the same input angles at all its points, and not to a tolerance: its front over so many intervals at least.
 const SAMPLES_OF_DUTY: f64 = 200.0;

@@ -9,7 +9,7 @@ use crate::reference::{Case, Worst, number};
 const CONTACTS: [(Contact, &str); 3] =
     [(Contact::WaveGenerator, "wave_generator"), (Contact::Ring, "ring"), (Contact::Carrier, "carrier")];
 
-fn cases(group: &str) -> Vec<Case> {
+pub(crate) fn cases(group: &str) -> Vec<Case> {
     let all = Case::of(include_str!("../reference/extremes.json"));
     all.into_iter().filter(|case| case.0["group"] == group).collect()
 }

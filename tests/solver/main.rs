@@ -22,6 +22,7 @@ mod properties;
 mod reference;
 mod springs;
 mod tolerances;
+mod true_peaks;
 
 /// Counts, thread by thread, for the tests that ask what a sweep takes.
 #[global_allocator]

@@ -174,7 +174,7 @@ impl Extremes {
 }
 
 /// Designs whose extremes stand at summits, at entries, at corners and at jumps of the stiffness.
-fn designs() -> Vec<(DriveParameters, LoadParameters)> {
+pub(crate) fn designs() -> Vec<(DriveParameters, LoadParameters)> {
     let mut designs = Vec::new();
     let elliptic = DriveParameters {
         wave_generator: ellipse(58.0, 40.0),
@@ -316,7 +316,7 @@ fn without_gaps_the_capacity_is_the_torque_by_the_rule_of_three_for_every_single
 // --- What it costs
 
 /// A drive of so many teeth, its radius this many times the critical one.
-fn of_many_teeth(teeth: i64, of_critical: f64) -> DriveParameters {
+pub(crate) fn of_many_teeth(teeth: i64, of_critical: f64) -> DriveParameters {
     let sin = (std::f64::consts::PI / teeth as f64).sin();
     let (a, ring) = (58.0, (teeth - 2) as f64 / 2.0);
     let tooth_radius_mm = 0.8 * a * sin / (1.0 - sin);

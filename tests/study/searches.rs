@@ -64,6 +64,7 @@ fn the_front_is_that_of_all_drives_of_a_fine_grid() {
     }
 }
 
+/// Both are true peaks, one without the columns: they agree as far as the document's tolerance says.
 #[test]
 fn a_design_of_the_front_has_the_figures_that_its_own_document_is_answered_with() {
     let study = with(&search(), "/objectives/0", json!({ "quantity": "peak_stress_ring_mpa", "goal": "min" }));
@@ -71,7 +72,10 @@ fn a_design_of_the_front_has_the_figures_that_its_own_document_is_answered_with(
     let found = answer(&study);
     for found in found["front"].as_array().unwrap().iter().step_by(10) {
         let sweep = Sweep.ask(found["design"].to_string().as_bytes(), &CALCULATION, &Never).unwrap();
-        assert_eq!(number(&found["quantities"]["peak_stress_ring_mpa"]), sweep.peaks.ring.stress_mpa.value);
+        let (stress_mpa, own_mpa) =
+            (number(&found["quantities"]["peak_stress_ring_mpa"]), sweep.peaks.ring.stress_mpa.value);
+        let tolerance = number(&found["design"]["sweep"]["tolerance"]);
+        assert!((stress_mpa / own_mpa - 1.0).abs() <= tolerance, "{stress_mpa} {own_mpa} {tolerance:e}");
         assert_eq!(found["quantities"]["undercut"], 0.0);
     }
 }

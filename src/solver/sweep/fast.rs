@@ -16,6 +16,7 @@
 //! 5 % slower on the Xeon that this was measured on.
 
 mod lanes;
+mod moments;
 mod sharing;
 mod sinks;
 mod tile;
@@ -28,15 +29,19 @@ use pulp::Simd;
 use crate::cam::Cam;
 use crate::contact::PerContact;
 use crate::load_sharing::{Compatibility, LoadedDrive};
-use crate::mesh::{Mesh, Samples};
-use crate::sweep::columns::{self, ContactPeaks, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity, worse};
-use crate::sweep::points::Points;
+use crate::mesh::{Mesh, Samples, TeethInMesh};
+use crate::sweep::columns::{
+    self, ContactPeaks, Extremes, Peak, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity, worse,
+};
+use crate::sweep::points::{Points, Tolerance};
+use crate::sweep::search::{Best, Found, Piece, search};
 use crate::tooth::LineLaw;
 use crate::{SolveError, Stop};
 use lanes::{LANES, arctangent_terms, arctangents, repeat_each};
-use sharing::{Limit, Shared, Sharing, Teeth};
+use moments::FastLook;
+use sharing::{Limit, Shared, Sharing, Teeth, Work};
 use sinks::{ColumnSink, PeakSink, Sink};
-use tile::{Run, Tile, TileSize};
+use tile::{Run, Tile, TileSize, whole};
 
 /// Steps towards the support at most. A drive that needs more goes the plain way.
 const MAX_STEPS: u32 = 8;
@@ -86,6 +91,71 @@ pub(crate) fn peaks(
     let mut peaks = sink.peaks(loaded.drive(), torque_balance_residual);
     peaks.torque_capacity = capacity.or_else(|| in_proportion(loaded, allowable_mpa, &peaks.contacts));
     Ok(Some(peaks))
+}
+
+/// The moments of a sweep to a tolerance, between which straight lines are true to a resolution; nothing where [`sweep`] has nothing.
+///
+/// # Errors
+/// As [`search()`].
+pub(crate) fn moments(
+    loaded: &LoadedDrive<'_>,
+    tolerance: Tolerance,
+    resolution: f64,
+    allowable_mpa: Option<PerContact<f64>>,
+    stop: &dyn Stop,
+) -> Result<Option<Found>, SolveError> {
+    let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
+    let size = kernel.tile_size(loaded);
+    let mut arena = vec![0.0; size.doubles()];
+    let mut look = FastLook::new(&kernel, loaded, &size, &mut arena, stop);
+    search(&mut look, Piece::of(loaded.mesh(), 0), tolerance, Some(resolution))
+}
+
+/// The true peaks to a tolerance; nothing where [`sweep`] has nothing.
+///
+/// # Errors
+/// As [`search()`], and as [`sweep`].
+pub(crate) fn true_peaks(
+    loaded: &LoadedDrive<'_>,
+    tolerance: Tolerance,
+    allowable_mpa: Option<PerContact<f64>>,
+    stop: &dyn Stop,
+) -> Result<Option<SweepPeaks>, SolveError> {
+    let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
+    let mesh = *loaded.mesh();
+    let size = kernel.tile_size(loaded);
+    let mut arena = vec![0.0; size.doubles()];
+    let mut look = FastLook::new(&kernel, loaded, &size, &mut arena, stop);
+    let Some(Found { seen, best }) = search(&mut look, Piece::of(&mesh, 0), tolerance, None)? else {
+        return Ok(None);
+    };
+    columns::check("torque balance", look.torque_balance_residual)?;
+    let drive = loaded.drive();
+    let peak = |Best { value, piece, moment, tooth }| {
+        let (seen, fraction) = (&seen[piece], seen[piece].fractions[moment]);
+        let position = seen.piece.position(&mesh, tooth as u64 + 1, fraction);
+        Peak { value, input_angle_deg: fraction * mesh.period_deg(), position_deg: position.from_lobe_deg() }
+    };
+    let contacts = PerContact::of(|contact| {
+        let force = contact as usize;
+        let hardest: Best = best[force + 3];
+        let force_n = seen[hardest.piece].load(hardest.moment, force, hardest.tooth);
+        ContactPeaks::of_line(peak(best[force]), peak(hardest), force_n, drive.tooth_width_mm())
+    });
+    let of_output = 1e-3 * drive.teeth_per_wave() * drive.teeth_per_wave();
+    let Extremes { least, largest } = look.rotation_rad;
+    let stiffness = look.stiffness_nmm_per_rad;
+    Ok(Some(SweepPeaks {
+        contacts,
+        wind_up_deg: Extremes { least: least.to_degrees(), largest: largest.to_degrees() },
+        torsional_stiffness_nm_per_rad: Extremes {
+            least: of_output * stiffness.least,
+            largest: of_output * stiffness.largest,
+        },
+        loaded_teeth: look.loaded_teeth.unwrap_or(TeethInMesh { min: 0, max: 0 }),
+        torque_capacity: look.capacity.or_else(|| in_proportion(loaded, allowable_mpa, &contacts)),
+        torque_balance_residual: look.torque_balance_residual,
+    }))
 }
 
 /// The capacity where all loads are in proportion (docs/theory.md section 4.7): that of the stress nearest to what is allowed.
@@ -279,6 +349,12 @@ impl Kernel {
         })
     }
 
+    /// Of tiles of input angles anywhere.
+    fn tile_size(&self, loaded: &LoadedDrive<'_>) -> TileSize {
+        let with_work = matches!(self.law, Law::Sharing(_));
+        TileSize::anywhere(whole(loaded.mesh().teeth_in_mesh().max), with_work)
+    }
+
     /// Fills the sink, by the best vectors of this machine; the worst residual of the torques, or nothing where the plain path is needed.
     fn fill(
         &self,
@@ -315,46 +391,28 @@ impl Kernel {
                 }
                 let tile_samples = start..run.samples.end.min(start + run.rows as u64);
                 run.place(tile_samples.clone(), &mut tile);
-                for chunk in 0..tile.count.div_ceil(LANES) {
-                    let is_known = match &self.law {
-                        Law::Linear(compliance) => self.unit_states::<K>(*compliance, &mut tile, chunk),
-                        Law::Sharing(_) => self.unit_states::<K>(Newton, &mut tile, chunk),
-                    };
-                    if !is_known {
-                        return Ok(None);
-                    }
+                if !self.unit_loads::<K>(&mut tile) {
+                    return Ok(None);
                 }
                 match &self.law {
                     Law::Linear(_) => Self::scale(loaded, run.teeth, &mut tile),
                     Law::Sharing(sharing) => {
-                        let limit =
-                            match Self::share_load::<V>(sharing, self.allowable_mpa, loaded, run.teeth, &mut tile) {
-                                Some(limit) => limit,
-                                None => return Ok(None),
-                            };
-                        if let Some(Limit { torque_nmm, contact, row }) = limit {
-                            let input_torque_nm = 1e-3 * (loaded.zones() * torque_nmm);
-                            if filled.capacity.is_none_or(|capacity| input_torque_nm < capacity.input_torque_nm) {
-                                let output_torque_nm = input_torque_nm * loaded.drive().teeth_per_wave();
-                                let input_angle_deg = mesh.input_angle_deg(start + row as u64, samples);
-                                filled.capacity = Some(TorqueCapacity {
-                                    input_torque_nm,
-                                    output_torque_nm,
-                                    contact,
-                                    input_angle_deg,
-                                });
-                            }
+                        if !Self::share::<V>(sharing, loaded, run.teeth, &mut tile) {
+                            return Ok(None);
                         }
+                        if let Some(allowable_mpa) = &self.allowable_mpa {
+                            let Some(limit) = Self::limit::<V>(sharing, allowable_mpa, run.teeth, &mut tile) else {
+                                return Ok(None);
+                            };
+                            let limit_deg = mesh.input_angle_deg(start + limit.row as u64, samples);
+                            filled.capacity = least(filled.capacity, limit.capacity(loaded, limit_deg));
+                        }
+                        Self::scale_shared(loaded, run.teeth, &mut tile);
                     }
                 }
                 let rows = tile.count / run.teeth;
-                for row in 0..rows {
-                    let torque = PerContact::of(|contact| tile.row_torque.get(contact)[row]);
-                    tile.row_residual[row] = balance.residual(&torque);
-                }
-                filled.torque_balance_residual = tile.row_residual[..rows]
-                    .iter()
-                    .fold(filled.torque_balance_residual, |worst, &residual| worse(residual, worst));
+                filled.torque_balance_residual =
+                    Self::residual(&balance, rows, &mut tile, filled.torque_balance_residual);
                 for (angle_deg, sample) in zip(&mut tile.row_input_angle_deg[..rows], tile_samples) {
                     *angle_deg = mesh.input_angle_deg(sample, samples);
                 }
@@ -363,6 +421,15 @@ impl Kernel {
             first = run.samples.end;
         }
         Ok(Some(filled))
+    }
+
+    /// Geometry of all states of a tile, and their forces and stresses for one unit; false where a support takes too many steps.
+    #[inline(always)]
+    fn unit_loads<K: Sink>(&self, tile: &mut Tile<'_>) -> bool {
+        (0..tile.count.div_ceil(LANES)).all(|chunk| match &self.law {
+            Law::Linear(compliance) => self.unit_states::<K>(*compliance, tile, chunk),
+            Law::Sharing(_) => self.unit_states::<K>(Newton, tile, chunk),
+        })
     }
 
     /// Geometry of a stretch of states, and their forces and stresses for one unit; false where the support takes too many steps.
@@ -525,21 +592,13 @@ impl Kernel {
         repeat_each(rotation_root, teeth, tile.scale_root);
     }
 
-    /// Lets the teeth of each input angle share the load, and finds what limits them where that is asked for; nothing where it takes the plain path.
+    /// The teeth of a tile under 1 N, what sharing works on, and what comes of it.
     #[inline(always)]
-    fn share_load<V: Simd>(
-        sharing: &Sharing,
-        allowable_mpa: Option<PerContact<f64>>,
-        loaded: &LoadedDrive<'_>,
-        count: usize,
-        tile: &mut Tile<'_>,
-    ) -> Option<Option<Limit>> {
-        let (zones, rows) = (loaded.zones(), tile.count / count);
-        let len = tile.count.next_multiple_of(LANES);
+    fn teeth_of<'t, 'a>(count: usize, tile: &'t mut Tile<'a>) -> (Teeth<'t>, &'t mut Work<'a>, Shared<'t>) {
         let teeth = Teeth {
             count,
-            rows,
-            len,
+            rows: tile.count / count,
+            len: tile.count.next_multiple_of(LANES),
             arm: tile.torque.wave_generator,
             ring_ratio: tile.force.ring,
             carrier_ratio: tile.force.carrier,
@@ -547,18 +606,35 @@ impl Kernel {
             ring_stress: tile.stress.ring,
             carrier_stress: tile.stress.carrier,
         };
-        let mut shared =
-            Shared { force: tile.scale, rotation_rad: tile.row_rotation_rad, stiffness: tile.row_stiffness };
-        if !sharing.share::<V>(loaded.input_torque_nmm() / zones, &teeth, &mut tile.work, &mut shared) {
-            return None;
-        }
-        let limit = match allowable_mpa {
-            Some(allowable_mpa) => {
-                let per_allowable = PerContact::of(|contact| 1.0 / allowable_mpa.get(contact));
-                Some(sharing.limit::<V>(&per_allowable, &teeth, &mut tile.work)?)
-            }
-            None => None,
-        };
+        let shared = Shared { force: tile.scale, rotation_rad: tile.row_rotation_rad, stiffness: tile.row_stiffness };
+        (teeth, &mut tile.work, shared)
+    }
+
+    /// Lets the teeth of each input angle share the load; false where it takes the plain path.
+    #[inline(always)]
+    fn share<V: Simd>(sharing: &Sharing, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) -> bool {
+        let (teeth, work, mut shared) = Self::teeth_of(count, tile);
+        sharing.share::<V>(loaded.input_torque_nmm() / loaded.zones(), &teeth, work, &mut shared)
+    }
+
+    /// What limits the teeth once they share the load; nothing where it takes the plain path.
+    #[inline(always)]
+    fn limit<V: Simd>(
+        sharing: &Sharing,
+        allowable_mpa: &PerContact<f64>,
+        count: usize,
+        tile: &mut Tile<'_>,
+    ) -> Option<Limit> {
+        let per_allowable = PerContact::of(|contact| 1.0 / allowable_mpa.get(contact));
+        let (teeth, work, _) = Self::teeth_of(count, tile);
+        sharing.limit::<V>(&per_allowable, &teeth, work)
+    }
+
+    /// Torques, stiffness and what carries, once the load is shared.
+    #[inline(always)]
+    fn scale_shared(loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) {
+        let (zones, rows) = (loaded.zones(), tile.count / count);
+        let len = tile.count.next_multiple_of(LANES);
         let (scale, root) = (&tile.scale[..len], &mut tile.scale_root[..len]);
         let cam = &mut tile.torque.wave_generator[..len];
         let (ring, carrier) = (&mut tile.torque.ring[..len], &mut tile.torque.carrier[..len]);
@@ -574,6 +650,29 @@ impl Kernel {
         tile.row_loaded.clear();
         let carrying = |row: &[f64]| row.iter().filter(|&&force| force > 0.0).count();
         tile.row_loaded.extend(tile.scale[..tile.count].chunks_exact(count).map(carrying));
-        Some(limit)
     }
+
+    /// The worst residual of the torques of a tile, and of those before.
+    #[inline(always)]
+    fn residual(balance: &TorqueBalance, rows: usize, tile: &mut Tile<'_>, before: f64) -> f64 {
+        for row in 0..rows {
+            let torque = PerContact::of(|contact| tile.row_torque.get(contact)[row]);
+            tile.row_residual[row] = balance.residual(&torque);
+        }
+        tile.row_residual[..rows].iter().fold(before, |worst, &residual| worse(residual, worst))
+    }
+}
+
+impl Limit {
+    /// The capacity that it stands for at an input angle.
+    fn capacity(&self, loaded: &LoadedDrive<'_>, input_angle_deg: f64) -> TorqueCapacity {
+        let input_torque_nm = 1e-3 * (loaded.zones() * self.torque_nmm);
+        let output_torque_nm = input_torque_nm * loaded.drive().teeth_per_wave();
+        TorqueCapacity { input_torque_nm, output_torque_nm, contact: self.contact, input_angle_deg }
+    }
+}
+
+/// The first of the least.
+fn least(before: Option<TorqueCapacity>, capacity: TorqueCapacity) -> Option<TorqueCapacity> {
+    Some(before.filter(|before| before.input_torque_nm <= capacity.input_torque_nm).unwrap_or(capacity))
 }

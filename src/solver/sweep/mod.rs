@@ -5,6 +5,7 @@ mod columns;
 mod fast;
 mod plain;
 mod points;
+mod search;
 mod unloaded;
 
 use crate::drive::Drive;
@@ -12,6 +13,7 @@ use crate::gaps::Deviations;
 use crate::load_sharing::{LoadCase, LoadedDrive};
 use crate::tooth::ToothContact;
 use crate::{SolveError, Stop};
+use adaptive::Looking;
 
 pub use columns::{
     ContactPeaks, Extremes, InputAngles, Peak, PeakShear, States, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity,
@@ -33,7 +35,7 @@ pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) ->
     {
         return Ok(sweep);
     }
-    plain::sweep(&loaded, load, points, stop)
+    plain::sweep(&loaded, load, points, Looking::Fast, stop)
 }
 
 /// The sweep of a drive of which single items deviate: by slot and lobe, over as many load periods as it takes until they meet again as they
@@ -53,7 +55,7 @@ pub fn sweep_with_deviations(
         return sweep(drive, load, points, stop);
     }
     let loaded = LoadedDrive::with_deviations(drive, load, &ToothContact::of(drive), Some(deviations))?;
-    plain::sweep(&loaded, load, points, stop)
+    plain::sweep(&loaded, load, points, Looking::Fast, stop)
 }
 
 /// What the sweep over one period comes to, without its states: the same peaks, in less time. That the period closes is not looked at.
@@ -62,12 +64,15 @@ pub fn sweep_with_deviations(
 /// As [`sweep`].
 pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<SweepPeaks, SolveError> {
     let loaded = LoadedDrive::new(drive, load)?;
-    if let Points::Samples(samples) = points
-        && let Some(peaks) = fast::peaks(&loaded, samples, load.parameters().allowable_stress_mpa, stop)?
-    {
-        return Ok(peaks);
+    let allowable_mpa = load.parameters().allowable_stress_mpa;
+    let peaks = match points {
+        Points::Samples(samples) => fast::peaks(&loaded, samples, allowable_mpa, stop)?,
+        Points::Tolerance(tolerance) => fast::true_peaks(&loaded, tolerance, allowable_mpa, stop)?,
+    };
+    match peaks {
+        Some(peaks) => Ok(peaks),
+        None => plain::sweep(&loaded, load, points, Looking::Fast, stop).map(|sweep| SweepPeaks::from(&sweep)),
     }
-    plain::sweep(&loaded, load, points, stop).map(|sweep| SweepPeaks::from(&sweep))
 }
 
 /// The same sweep, state by state: what the fast path is held against, and what is left where it does not reach.
@@ -75,5 +80,5 @@ pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) ->
 /// # Errors
 /// As [`sweep`].
 pub fn sweep_plain(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<Sweep, SolveError> {
-    plain::sweep(&LoadedDrive::new(drive, load)?, load, points, stop)
+    plain::sweep(&LoadedDrive::new(drive, load)?, load, points, Looking::Plain, stop)
 }

@@ -5,7 +5,7 @@ use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
 use crate::mesh::PlacedTooth;
 use crate::root::NotConverged;
 use crate::springs::WindUp;
-use crate::sweep::adaptive;
+use crate::sweep::adaptive::{self, Looking};
 use crate::sweep::columns::{
     Columns, ContactPeaks, InputAngles, PeakAt, PeakShear, States, Sweep, TorqueBalance, TorqueCapacity, finished,
     worse,
@@ -36,6 +36,7 @@ pub(crate) fn sweep(
     loaded: &LoadedDrive<'_>,
     load: &LoadCase,
     points: Points,
+    looking: Looking,
     stop: &dyn Stop,
 ) -> Result<Sweep, SolveError> {
     let mesh = *loaded.mesh();
@@ -51,7 +52,7 @@ pub(crate) fn sweep(
             }
         }
         Points::Tolerance(tolerance) => {
-            let by_lap = adaptive::moments(loaded, load, tolerance, stop)?;
+            let by_lap = adaptive::moments(loaded, load, tolerance, looking, stop)?;
             // Each place was counted once; listed it may stand for several teeth, and in every lap.
             let places = by_lap.iter().flatten().map(|moment| moment.places()).sum::<u64>();
             let listed = places * (mesh.laps() / by_lap.len() as u64) * mesh.listed_at_each_place();

@@ -95,6 +95,8 @@ pub(super) struct Work<'a> {
     limit: &'a mut [f64],
     row_excess: &'a mut [f64],
     row_last: &'a mut [f64],
+    /// Torque of one zone under which a contact reaches its limit, by input angle.
+    row_limit: &'a mut [f64],
     /// What the forces under Johnson's law are counted in.
     typical_n: f64,
 }
@@ -103,7 +105,7 @@ impl<'a> Work<'a> {
     /// Columns of states.
     pub(super) const COLUMNS: usize = 12;
     /// Columns of input angles.
-    pub(super) const ROWS: usize = 2;
+    pub(super) const ROWS: usize = 3;
 
     /// From slices of any length.
     pub(super) fn new(slice: &mut impl FnMut(usize) -> &'a mut [f64], column: usize, rows: usize) -> Self {
@@ -122,8 +124,20 @@ impl<'a> Work<'a> {
             limit: slice(column),
             row_excess: slice(rows),
             row_last: slice(rows),
+            row_limit: slice(rows),
             typical_n: 1.0,
         }
+    }
+
+    /// How far beyond the closing of each tooth an input angle is turned, once its load is shared beyond gaps: less than nothing where a gap is open.
+    pub(super) fn pressed_rad(&self, row: usize, count: usize) -> impl Iterator<Item = f64> {
+        let (last, excess) = (self.row_last[row], self.row_excess[row]);
+        self.closing[row * count..(row + 1) * count].iter().map(move |closing| excess + (last - closing))
+    }
+
+    /// What the last search for a limit found, by input angle: the torque of one zone.
+    pub(super) const fn limits_nmm(&self) -> &[f64] {
+        self.row_limit
     }
 }
 
@@ -271,7 +285,12 @@ fn turn_to_limit(teeth: &Teeth<'_>, work: &mut Work<'_>) -> bool {
 
 /// The least torque of the rows, each turned to its limit, under these forces.
 #[inline(always)]
-fn least_torque(per_allowable: &PerContact<f64>, teeth: &Teeth<'_>, work: &Work<'_>, force: &[f64]) -> Option<Limit> {
+fn least_torque(
+    per_allowable: &PerContact<f64>,
+    teeth: &Teeth<'_>,
+    work: &mut Work<'_>,
+    force: &[f64],
+) -> Option<Limit> {
     // Of the allowable stress under 1 N.
     let shares = |i: usize| PerContact {
         wave_generator: teeth.cam_stress[i] * per_allowable.wave_generator,
@@ -285,6 +304,7 @@ fn least_torque(per_allowable: &PerContact<f64>, teeth: &Teeth<'_>, work: &Work<
         for i in at.clone() {
             torque_nmm += if work.pressed[i] > 0.0 { teeth.arm[i] * force[i] } else { 0.0 };
         }
+        work.row_limit[row] = torque_nmm;
         if least.as_ref().is_none_or(|least| torque_nmm < least.torque_nmm) {
             let stress = |&i: &usize| {
                 let PerContact { wave_generator, ring, carrier } = shares(i);
@@ -388,6 +408,19 @@ impl Sharing {
 }
 
 impl Sharing {
+    /// Whether teeth begin and cease to carry between their entry and their exit.
+    pub(super) const fn has_gaps(&self) -> bool {
+        match self {
+            Self::Power(law) => law.gaps.is_some(),
+            Self::Logarithmic(law) => law.gaps.is_some(),
+        }
+    }
+
+    /// Whether forces are in proportion to what teeth are pressed by.
+    pub(super) fn is_linear(&self) -> bool {
+        matches!(self, Self::Power(law) if law.exponent >= 1.0)
+    }
+
     /// Whether all loads are in proportion, whatever the torque.
     pub(super) const fn is_in_proportion(&self) -> bool {
         matches!(self, Self::Power(PowerLaw { gaps: None, .. }))
@@ -427,7 +460,8 @@ impl PowerLaw {
         if !turn_to_limit(teeth, work) {
             return None;
         }
-        let (pressed, unit, force) = (&work.pressed[..len], &work.unit[..len], &mut work.limit[..len]);
+        let limit = std::mem::take(&mut work.limit);
+        let (pressed, unit, force) = (&work.pressed[..len], &work.unit[..len], &mut limit[..len]);
         let inverse = 1.0 / self.exponent;
         for i in 0..len {
             let safe = if pressed[i] > NOTHING { pressed[i] } else { NOTHING };
@@ -435,7 +469,9 @@ impl PowerLaw {
             let by_law = if self.exponent < 1.0 { by_power } else { pressed[i] };
             force[i] = if pressed[i] > 0.0 { unit[i] * by_law } else { 0.0 };
         }
-        least_torque(per_allowable, teeth, work, work.limit)
+        let least = least_torque(per_allowable, teeth, work, limit);
+        work.limit = limit;
+        least
     }
 
     /// The force at the rotation 1, `(|h'|/c)^(1/p)`, with `c = Σ w q (F_c/F_H)^p`.
@@ -607,7 +643,7 @@ impl PowerLaw {
 
 /// Newton's method from "all carry": with a linear law its steps end where the set of teeth that carry stays the same.
 #[inline(always)]
-fn share_linearly(torque_nmm: f64, teeth: &Teeth<'_>, work: &Work<'_>, shared: &mut Shared<'_>) -> bool {
+fn share_linearly(torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
     for row in 0..teeth.rows {
         let at = row * teeth.count..(row + 1) * teeth.count;
         let (arm, unit, closing) = (&teeth.arm[at.clone()], &work.unit[at.clone()], &work.closing[at.clone()]);
@@ -629,6 +665,7 @@ fn share_linearly(torque_nmm: f64, teeth: &Teeth<'_>, work: &Work<'_>, shared: &
                 return false;
             }
         };
+        (work.row_last[row], work.row_excess[row]) = (last, excess);
         shared.rotation_rad[row] = last + excess;
         shared.stiffness[row] = stiffness;
         for (force, (unit, closing)) in shared.force[at].iter_mut().zip(unit.iter().zip(closing)) {

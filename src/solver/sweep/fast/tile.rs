@@ -161,6 +161,18 @@ impl TileSize {
         Self { len: states.next_multiple_of(LANES) + VECTOR, rows, teeth: most, with_columns, with_work }
     }
 
+    /// For input angles anywhere, with at most so many teeth, of which no more than the loads are wanted.
+    pub(super) fn anywhere(teeth: usize, with_work: bool) -> Self {
+        let rows = (TILE / teeth).max(1);
+        let len = (rows * teeth).next_multiple_of(LANES) + VECTOR;
+        Self { len, rows, teeth, with_columns: false, with_work }
+    }
+
+    /// Input angles of a tile.
+    pub(super) const fn rows(&self) -> usize {
+        self.rows
+    }
+
     /// What all slices of a tile take together.
     pub(super) const fn doubles(&self) -> usize {
         let (of_columns, of_work) = (self.with_columns as usize, self.with_work as usize);

@@ -1,0 +1,223 @@
+//! Moments anywhere in a lap, in columns: what the search for extremes looks at.
+
+use std::f64::consts::FRAC_1_SQRT_2;
+
+use pulp::Simd;
+
+use super::lanes::LANES;
+use super::sinks::PeakSink;
+use super::tile::{Tile, TileSize};
+use super::{Kernel, Law, least};
+use crate::contact::Contact;
+use crate::load_sharing::LoadedDrive;
+use crate::mesh::{Mesh, TeethInMesh};
+use crate::position::Position;
+use crate::sweep::columns::{Extremes, TorqueBalance, TorqueCapacity};
+use crate::sweep::search::{LOADS, Look, Piece, Seen};
+use crate::{SolveError, Stop};
+
+/// Moments by the kernel.
+pub(super) struct FastLook<'a> {
+    kernel: &'a Kernel,
+    loaded: &'a LoadedDrive<'a>,
+    stop: &'a dyn Stop,
+    mesh: Mesh,
+    rows: usize,
+    tile: Tile<'a>,
+    balance: TorqueBalance,
+    /// Where the teeth of each piece stand that was looked at.
+    bases: Vec<Bases>,
+    pub(super) torque_balance_residual: f64,
+    pub(super) capacity: Option<TorqueCapacity>,
+    pub(super) loaded_teeth: Option<TeethInMesh>,
+    pub(super) rotation_rad: Extremes,
+    pub(super) stiffness_nmm_per_rad: Extremes,
+}
+
+/// Where the teeth of a piece stand: those near a lobe at its end, all others at its start, so that nothing cancels near an axis.
+struct Bases {
+    piece: Piece,
+    near_lobe: usize,
+    sin: Vec<f64>,
+    cos: Vec<f64>,
+    /// How far the phase moves in a lap.
+    phase_rad: f64,
+}
+
+impl Bases {
+    fn new(mesh: &Mesh, piece: Piece) -> Self {
+        let is_near_lobe = |position: &Position| position.phase_sin < position.phase_cos;
+        let at_start = |place| piece.position(mesh, place, piece.start);
+        let near_lobe = (1..=piece.places).take_while(|&place| is_near_lobe(&at_start(place))).count();
+        let positions = (1..=piece.places).zip(0..).map(|(place, index)| {
+            if index < near_lobe { piece.position(mesh, place, piece.end) } else { at_start(place) }
+        });
+        let (sin, cos) = positions.map(|position| (position.phase_sin, position.phase_cos)).unzip();
+        let phase_rad = mesh.spacing_deg().to_radians();
+        Self { piece, near_lobe, sin, cos, phase_rad }
+    }
+
+    /// Positions of all teeth at some moments, by moment and then tooth.
+    #[inline(always)]
+    fn place(&self, fractions: &[f64], tile: &mut Tile<'_>) {
+        let (teeth, near) = (self.sin.len(), self.near_lobe);
+        tile.count = fractions.len() * teeth;
+        for (row, fraction) in fractions.iter().enumerate() {
+            let (back_sin, back_cos) = ((self.piece.end - fraction) * self.phase_rad).sin_cos();
+            let (on_sin, on_cos) = ((fraction - self.piece.start) * self.phase_rad).sin_cos();
+            let at = row * teeth..(row + 1) * teeth;
+            let (sin, cos) = (&mut tile.sin[at.clone()], &mut tile.cos[at]);
+            for i in 0..teeth {
+                let (turn_sin, turn_cos) = if i < near { (back_sin, back_cos) } else { (-on_sin, on_cos) };
+                // What rounding puts beyond an axis stands on it.
+                sin[i] = (self.sin[i] * turn_cos + self.cos[i] * turn_sin).max(0.0);
+                cos[i] = (self.cos[i] * turn_cos - self.sin[i] * turn_sin).max(0.0);
+            }
+        }
+        let rest = tile.count..tile.count.next_multiple_of(LANES);
+        tile.sin[rest.clone()].fill(FRAC_1_SQRT_2);
+        tile.cos[rest].fill(FRAC_1_SQRT_2);
+    }
+}
+
+impl<'a> FastLook<'a> {
+    /// In an arena of the size's doubles.
+    pub(super) fn new(
+        kernel: &'a Kernel,
+        loaded: &'a LoadedDrive<'a>,
+        size: &TileSize,
+        arena: &'a mut [f64],
+        stop: &'a dyn Stop,
+    ) -> Self {
+        Self {
+            kernel,
+            loaded,
+            stop,
+            mesh: *loaded.mesh(),
+            rows: size.rows(),
+            tile: Tile::new(arena, size, 0.0),
+            balance: TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm()),
+            bases: Vec::new(),
+            torque_balance_residual: 0.0,
+            capacity: None,
+            loaded_teeth: None,
+            rotation_rad: Extremes::NONE,
+            stiffness_nmm_per_rad: Extremes::NONE,
+        }
+    }
+
+    /// Works out the loads of a tile of moments; false where the plain path is needed.
+    #[inline(always)]
+    fn work_out<V: Simd>(&mut self, bases: usize, fractions: &[f64], seen: &mut Seen) -> bool {
+        let (kernel, loaded, tile) = (self.kernel, self.loaded, &mut self.tile);
+        self.bases[bases].place(fractions, tile);
+        if !kernel.unit_loads::<PeakSink>(tile) {
+            return false;
+        }
+        let teeth = seen.teeth;
+        let mut has_limits = false;
+        match &kernel.law {
+            Law::Linear(_) => Kernel::scale(loaded, teeth, tile),
+            Law::Sharing(sharing) => {
+                if !Kernel::share::<V>(sharing, loaded, teeth, tile) {
+                    return false;
+                }
+                if sharing.has_gaps() {
+                    (0..fractions.len()).for_each(|row| seen.push_pressed(tile.work.pressed_rad(row, teeth)));
+                }
+                if let Some(allowable_mpa) = &kernel.allowable_mpa {
+                    let Some(limit) = Kernel::limit::<V>(sharing, allowable_mpa, teeth, tile) else { return false };
+                    has_limits = true;
+                    let capacity = limit.capacity(loaded, fractions[limit.row] * self.mesh.sweep_period_deg());
+                    self.capacity = least(self.capacity, capacity);
+                }
+                Kernel::scale_shared(loaded, teeth, tile);
+            }
+        }
+        self.torque_balance_residual =
+            Kernel::residual(&self.balance, fractions.len(), tile, self.torque_balance_residual);
+        for (row, &fraction) in fractions.iter().enumerate() {
+            let at = row * teeth..(row + 1) * teeth;
+            let (rotation_rad, stiffness) = (tile.row_rotation_rad[row], tile.row_stiffness[row]);
+            let values = seen.push(fraction);
+            let (scale, root) = (&tile.scale[at.clone()], &tile.scale_root[at.clone()]);
+            for (index, contact) in [Contact::WaveGenerator, Contact::Ring, Contact::Carrier].into_iter().enumerate() {
+                let (force, stress) = (&tile.force.get(contact)[at.clone()], &tile.stress.get(contact)[at.clone()]);
+                let forces = &mut values[index * teeth..(index + 1) * teeth];
+                for i in 0..teeth {
+                    forces[i] = force[i] * scale[i];
+                }
+                let stresses = &mut values[(index + 3) * teeth..(index + 4) * teeth];
+                for i in 0..teeth {
+                    stresses[i] = stress[i] * root[i];
+                }
+            }
+            let per_capacity = if has_limits { 1.0 / (loaded.zones() * tile.work.limits_nmm()[row]) } else { 0.0 };
+            let totals = [rotation_rad, 1.0 / rotation_rad, stiffness, 1.0 / stiffness, per_capacity];
+            values[LOADS * teeth..].copy_from_slice(&totals);
+            let loaded = values[..teeth].iter().filter(|&&force| force > 0.0).count() as u64;
+            let TeethInMesh { min, max } = self.loaded_teeth.unwrap_or(TeethInMesh { min: loaded, max: loaded });
+            self.loaded_teeth = Some(TeethInMesh { min: min.min(loaded), max: max.max(loaded) });
+            self.rotation_rad = self.rotation_rad.with(rotation_rad);
+            self.stiffness_nmm_per_rad = self.stiffness_nmm_per_rad.with(stiffness);
+        }
+        true
+    }
+}
+
+impl Look for FastLook<'_> {
+    fn has_gaps(&self) -> bool {
+        matches!(&self.kernel.law, Law::Sharing(sharing) if sharing.has_gaps())
+    }
+
+    fn is_linear(&self) -> bool {
+        match &self.kernel.law {
+            Law::Linear(_) => true,
+            Law::Sharing(sharing) => sharing.is_linear(),
+        }
+    }
+
+    fn is_in_proportion(&self) -> bool {
+        match &self.kernel.law {
+            Law::Linear(_) => true,
+            Law::Sharing(sharing) => sharing.is_in_proportion(),
+        }
+    }
+
+    fn teeth_at_each_place(&self) -> u64 {
+        1
+    }
+
+    fn look(&mut self, fractions: &[f64], seen: &mut Seen) -> Result<bool, SolveError> {
+        let bases = self.bases.iter().position(|bases| bases.piece == seen.piece).unwrap_or_else(|| {
+            self.bases.push(Bases::new(&self.mesh, seen.piece));
+            self.bases.len() - 1
+        });
+        for fractions in fractions.chunks(self.rows) {
+            if self.stop.stopped() {
+                return Err(SolveError::Stopped);
+            }
+            if !pulp::Arch::new().dispatch(Looking { look: self, bases, fractions, seen }) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// A look as `pulp` wants it, as [`super::Vectorised`].
+struct Looking<'l, 'a> {
+    look: &'l mut FastLook<'a>,
+    bases: usize,
+    fractions: &'l [f64],
+    seen: &'l mut Seen,
+}
+
+impl pulp::WithSimd for Looking<'_, '_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn with_simd<V: Simd>(self, _: V) -> bool {
+        self.look.work_out::<V>(self.bases, self.fractions, self.seen)
+    }
+}

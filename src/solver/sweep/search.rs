@@ -1,0 +1,819 @@
+//! Where the extremes of a sweep stand (docs/theory.md section 9, *True extremes*).
+//!
+//! A lap is cut where a tooth enters. In between, every load of every tooth and every total of them all is a smooth curve over the input
+//! angle, with gaps between two changes of the teeth that carry. A few moments show where the curves may be largest: polynomials through six of
+//! them say how high one may stand between two, and how far they are to be trusted. Only what may still exceed the largest value that was seen is
+//! looked at again, all quantities together.
+
+use std::cell::OnceCell;
+use std::ops::Range;
+
+use crate::SolveError;
+use crate::mesh::Mesh;
+use crate::position::Position;
+use crate::root::NotConverged;
+use crate::sweep::points::Tolerance;
+
+/// Quantities of a tooth that have peaks: three forces, three stresses.
+pub(crate) const LOADS: usize = 6;
+
+/// Quantities of all teeth together: wind-up and torsional stiffness with their reciprocals, because their least values are wanted too, and the
+/// reciprocal of the torque that the allowable stress admits, or nothing where there is none.
+pub(crate) const TOTALS: usize = 5;
+
+pub(crate) const QUANTITIES: usize = LOADS + TOTALS;
+
+/// Intervals that a piece starts with.
+const FIRST_INTERVALS: u32 = 16;
+
+/// Pieces shorter than this part of a lap are looked at from both ends alone.
+const SHORTEST_PIECE: f64 = 1e-12;
+
+/// Moments that a curve is judged by.
+const NODES: usize = 6;
+
+/// Rounds at most: halving alone comes down to the last digit of a fraction in as many.
+const MAX_ROUNDS: u32 = 60;
+
+/// What rounding may leave uncertain of a quantity where the rounds are over.
+const OPEN: f64 = 1e-10;
+
+/// A stretch that bends by more than this part of a quantity's largest value may hide more than its ends show.
+const COARSE_BEND: f64 = 1e-2;
+
+/// How many times its bend such a stretch is allowed to rise above its ends.
+const COARSE_MARGIN: f64 = 8.0;
+
+/// The same of any other: a parabola rises by a quarter of it, two lines that meet in a corner by no more than all of it.
+const MARGIN: f64 = 1.0;
+
+/// Torsional stiffness and its reciprocal.
+const STIFFNESSES: [usize; 2] = [LOADS + 2, LOADS + 3];
+
+/// The reciprocal of the capacity. Where the tooth that is limited changes, or a tooth begins to carry under the limit, its curve has a corner, which no
+/// polynomial knows of: it is judged by its second differences alone.
+const CAPACITY: usize = LOADS + TOTALS - 1;
+
+/// How many times its last term a polynomial may be off, the term before it counted for an eighth because one alone may vanish: of a smooth curve, and of
+/// one that begins or ends by a power or a logarithm.
+const OFF_SMOOTH: f64 = 4.0;
+const OFF_BY_POWERS: f64 = 32.0;
+const OF_TERM_BEFORE: f64 = 0.125;
+
+/// A stretch beside a change of the teeth that carry, no longer than this part of a lap: there the stiffness runs from one end to the other, for that of
+/// the tooth in question grows from nothing, and under a power law without end at first.
+const SHORT: f64 = 1e-3;
+
+/// Rounds after which every stretch in doubt is cut into four: what is still in doubt has a corner.
+const SMOOTH_ROUNDS: u32 = 8;
+
+/// Newton's steps to the summit of a polynomial, which need not be exact: it is looked at, and judged again.
+const SUMMIT_STEPS: u32 = 4;
+
+/// A polynomial that is surer than this part of the largest value says where its summit is; another stretch is cut into four.
+const SURE: f64 = 1e-3;
+
+/// Where a stretch is looked at of which no polynomial tells enough; beside an end of a run the nearer to it the denser, for there the slope of a power or a
+/// logarithm may turn within any distance.
+const QUARTERS: [f64; 3] = [0.25, 0.5, 0.75];
+const TOWARDS_START: [f64; 3] = [1.0 / 64.0, 1.0 / 16.0, 0.25];
+
+/// A stretch of a lap in which no tooth enters; teeth stand at the places from 1 on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Piece {
+    /// Laps before; none where all laps are alike.
+    pub(crate) lap: u64,
+    /// Shares of the lap that have passed.
+    pub(crate) start: f64,
+    pub(crate) end: f64,
+    /// Places in mesh.
+    pub(crate) places: u64,
+    /// Whether the last of them stands where the flank ends, at the start.
+    pub(crate) starts_with_entry: bool,
+}
+
+impl Piece {
+    /// Those of a lap.
+    pub(crate) fn of(mesh: &Mesh, lap: u64) -> impl Iterator<Item = Self> {
+        let (places, entry) = (mesh.whole_spacings(), mesh.entry_fraction());
+        let is_whole = mesh.spacings_are_whole();
+        let first =
+            Self { lap, start: 0.0, end: if is_whole { 1.0 } else { entry }, places, starts_with_entry: is_whole };
+        let rest = Self { lap, start: entry, end: 1.0, places: places + 1, starts_with_entry: true };
+        std::iter::once(first).chain((!is_whole).then_some(rest))
+    }
+
+    /// The position at a place.
+    pub(crate) fn position(&self, mesh: &Mesh, place: u64, fraction: f64) -> Position {
+        if self.starts_with_entry && place == self.places && fraction <= self.start {
+            mesh.flank_limit().position
+        } else {
+            mesh.position_between(place, fraction)
+        }
+    }
+}
+
+/// What is seen of a piece.
+#[derive(Debug)]
+pub(crate) struct Seen {
+    pub(crate) piece: Piece,
+    /// Teeth in it, those at one place after another.
+    pub(crate) teeth: usize,
+    /// Shares of the lap that have passed, in the order in which they were looked at.
+    pub(crate) fractions: Vec<f64>,
+    /// Of each moment the loads, by quantity and then tooth, and the totals.
+    values: Vec<f64>,
+    /// Of each moment how far every tooth is pressed, less than nothing where a gap is open; nothing without gaps.
+    pressed: Vec<f64>,
+    /// The moments in the order of their fractions.
+    order: Vec<usize>,
+    /// Of each moment, whether the stretch up to the next one hides nothing any more.
+    is_settled: Vec<bool>,
+    /// Where to look next.
+    wanted: Vec<f64>,
+}
+
+impl Seen {
+    fn new(piece: Piece, teeth: usize) -> Self {
+        let intervals = if piece.end - piece.start < SHORTEST_PIECE { 1 } else { FIRST_INTERVALS };
+        let share = |interval| f64::from(interval) / f64::from(intervals);
+        let inside = (1..intervals).map(|interval| piece.start + share(interval) * (piece.end - piece.start));
+        let wanted = std::iter::once(piece.start).chain(inside).chain([piece.end]).collect();
+        Self {
+            piece,
+            teeth,
+            fractions: Vec::new(),
+            values: Vec::new(),
+            pressed: Vec::new(),
+            order: Vec::new(),
+            is_settled: Vec::new(),
+            wanted,
+        }
+    }
+
+    const fn stride(&self) -> usize {
+        LOADS * self.teeth + TOTALS
+    }
+
+    /// Room for the values of one more moment.
+    pub(crate) fn push(&mut self, fraction: f64) -> &mut [f64] {
+        self.fractions.push(fraction);
+        self.is_settled.push(false);
+        let (start, stride) = (self.values.len(), self.stride());
+        self.values.resize(start + stride, 0.0);
+        &mut self.values[start..]
+    }
+
+    /// How far the teeth of the moment pushed last are pressed.
+    pub(crate) fn push_pressed(&mut self, pressed: impl Iterator<Item = f64>) {
+        self.pressed.extend(pressed);
+    }
+
+    /// The values of a moment.
+    pub(crate) fn values(&self, moment: usize) -> &[f64] {
+        &self.values[moment * self.stride()..][..self.stride()]
+    }
+
+    /// A load of a tooth at a moment.
+    pub(crate) fn load(&self, moment: usize, quantity: usize, tooth: usize) -> f64 {
+        self.values(moment)[quantity * self.teeth + tooth]
+    }
+
+    /// Where the curves of a quantity stand among a moment's values: one for each tooth, of a total one.
+    const fn curves(&self, quantity: usize) -> Range<usize> {
+        if quantity < LOADS {
+            quantity * self.teeth..(quantity + 1) * self.teeth
+        } else {
+            let at = LOADS * self.teeth + quantity - LOADS;
+            at..at + 1
+        }
+    }
+
+    fn value(&self, moment: usize, curve: usize) -> f64 {
+        self.values[moment * self.stride() + curve]
+    }
+
+    fn pressed(&self, moment: usize) -> &[f64] {
+        &self.pressed[moment * self.teeth..][..self.teeth]
+    }
+
+    /// The first tooth that carries at one of two moments alone. A tooth without an arm is closed by no rotation, and tells nothing.
+    fn tooth_changed(&self, one: usize, other: usize) -> Option<usize> {
+        if self.pressed.is_empty() {
+            return None;
+        }
+        self.pressed(one)
+            .iter()
+            .zip(self.pressed(other))
+            .position(|(one, other)| (*one > 0.0) != (*other > 0.0) && one.is_finite() && other.is_finite())
+    }
+
+    /// Sorts in the moments that are new.
+    fn put_in_order(&mut self) {
+        let fractions = &self.fractions;
+        self.order.extend(self.order.len()..fractions.len());
+        self.order.sort_by(|&one, &other| fractions[one].total_cmp(&fractions[other]));
+    }
+}
+
+/// Whoever works out moments.
+pub(crate) trait Look {
+    /// Whether teeth begin and cease to carry between their entry and their exit.
+    fn has_gaps(&self) -> bool;
+
+    /// Whether forces are in proportion to what teeth are pressed by: then every curve is smooth up to its ends.
+    fn is_linear(&self) -> bool;
+
+    /// Whether the stiffness is in proportion to the rotation's reciprocal, and so has its extremes with it.
+    fn is_in_proportion(&self) -> bool;
+
+    /// How many teeth are told apart at each place.
+    fn teeth_at_each_place(&self) -> u64;
+
+    /// Appends moments of a piece; false where this way cannot tell.
+    ///
+    /// # Errors
+    /// Why there is no answer.
+    fn look(&mut self, fractions: &[f64], seen: &mut Seen) -> Result<bool, SolveError>;
+}
+
+/// The largest value of a quantity.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Best {
+    pub(crate) value: f64,
+    /// Which of the pieces, and which of its moments.
+    pub(crate) piece: usize,
+    pub(crate) moment: usize,
+    /// Of a load.
+    pub(crate) tooth: usize,
+}
+
+/// What was found.
+#[derive(Debug, Default)]
+pub(crate) struct Found {
+    pub(crate) seen: Vec<Seen>,
+    pub(crate) best: [Best; QUANTITIES],
+}
+
+struct Search {
+    tolerance: Tolerance,
+    /// How true straight lines between the moments have to be, over the largest values; nothing where only these are wanted.
+    lines: Option<f64>,
+    is_sought: [bool; QUANTITIES],
+    seen: Vec<Seen>,
+    best: [Best; QUANTITIES],
+    states: u64,
+}
+
+/// Looks for the largest value of every quantity; nothing where this way of looking cannot tell.
+///
+/// # Errors
+/// Those of looking; [`SolveError::TooManyStates`] beyond the tolerance's limit.
+pub(crate) fn search(
+    look: &mut impl Look,
+    pieces: impl Iterator<Item = Piece>,
+    tolerance: Tolerance,
+    lines: Option<f64>,
+) -> Result<Option<Found>, SolveError> {
+    let teeth = |piece: &Piece| usize::try_from(piece.places * look.teeth_at_each_place()).unwrap_or(usize::MAX);
+    let mut is_sought = [true; QUANTITIES];
+    if look.is_in_proportion() {
+        STIFFNESSES.iter().for_each(|&quantity| is_sought[quantity] = false);
+    }
+    let seen = pieces.map(|piece| Seen::new(piece, teeth(&piece))).collect();
+    let mut search = Search { tolerance, lines, is_sought, seen, best: [Best::default(); QUANTITIES], states: 0 };
+    let mut excess = 0.0;
+    for round in 0..MAX_ROUNDS {
+        if !search.look(look)? {
+            return Ok(None);
+        }
+        excess = search.want(round, look.has_gaps(), look.is_linear());
+        if search.seen.iter().all(|seen| seen.wanted.is_empty()) {
+            return Ok(Some(Found { seen: search.seen, best: search.best }));
+        }
+    }
+    // What is left is more than rounding only where curves are no curves.
+    if excess > tolerance.relative().max(OPEN) {
+        return Err(NotConverged { what: "extremes of a sweep", iterations: MAX_ROUNDS, bracket_width: excess }.into());
+    }
+    Ok(Some(Found { seen: search.seen, best: search.best }))
+}
+
+impl Search {
+    /// Looks where it is wanted.
+    fn look(&mut self, look: &mut impl Look) -> Result<bool, SolveError> {
+        for (piece, seen) in self.seen.iter_mut().enumerate() {
+            let wanted = std::mem::take(&mut seen.wanted);
+            if wanted.is_empty() {
+                continue;
+            }
+            self.states += (wanted.len() * seen.teeth) as u64;
+            let limit = self.tolerance.max_states();
+            if self.states > limit {
+                return Err(SolveError::TooManyStates { limit });
+            }
+            let first = seen.fractions.len();
+            if !look.look(&wanted, seen)? {
+                return Ok(false);
+            }
+            seen.put_in_order();
+            for moment in first..seen.fractions.len() {
+                for (quantity, best) in self.best.iter_mut().enumerate() {
+                    let curves = seen.curves(quantity);
+                    let values = &seen.values(moment)[curves];
+                    let most = values.iter().fold(0.0_f64, |most, &value| most.max(value));
+                    if most > best.value {
+                        let tooth = values.iter().position(|&value| value >= most).unwrap_or(0);
+                        *best = Best { value: most, piece, moment, tooth };
+                    }
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    /// Notes where to look next; what a quantity may still rise by, relative.
+    fn want(&mut self, round: u32, has_gaps: bool, is_linear: bool) -> f64 {
+        let relative = self.tolerance.relative();
+        let nearest = (1e-3 * relative).max(16.0 * f64::EPSILON);
+        let judge = Judge {
+            best: std::array::from_fn(|quantity| self.best[quantity].value),
+            relative,
+            nearest,
+            is_late: round >= SMOOTH_ROUNDS,
+            is_linear,
+            lines: self.lines,
+            is_sought: self.is_sought,
+        };
+        let mut most = 0.0_f64;
+        for seen in &mut self.seen {
+            if has_gaps {
+                judge.close_in_on_changes(seen, round);
+            }
+            most = most.max(judge.want(seen));
+            seen.wanted.sort_by(f64::total_cmp);
+            seen.wanted.dedup_by(|one, other| (*one - *other).abs() <= f64::EPSILON);
+        }
+        most
+    }
+}
+
+/// What is wanted of the stretches between moments.
+struct Judge {
+    best: [f64; QUANTITIES],
+    relative: f64,
+    /// Stretches as short as this part of a lap hide nothing.
+    nearest: f64,
+    is_late: bool,
+    is_linear: bool,
+    lines: Option<f64>,
+    is_sought: [bool; QUANTITIES],
+}
+
+impl Judge {
+    /// Closes in on the instants at which the teeth that carry change: on the first tooth of each, by the line through the two moments beside
+    /// it on one side, on which it carries, or does not, throughout.
+    fn close_in_on_changes(&self, seen: &mut Seen, round: u32) {
+        for at in 1..seen.order.len() {
+            let (one, other) = (seen.order[at - 1], seen.order[at]);
+            let Some(tooth) = seen.tooth_changed(one, other) else { continue };
+            let (low, high) = (seen.fractions[one], seen.fractions[other]);
+            if !self.change_matters(seen, one, other) {
+                continue;
+            }
+            let pressed = |moment: usize| (seen.fractions[moment], seen.pressed(moment)[tooth]);
+            let (one_pressed, other_pressed) = (pressed(one), pressed(other));
+            let is_low_nearer = one_pressed.1.abs() < other_pressed.1.abs();
+            let (near, beyond) = if is_low_nearer {
+                (one_pressed, at.checked_sub(2).map(|before| (seen.order[before], one)))
+            } else {
+                (other_pressed, seen.order.get(at + 1).map(|&after| (after, other)))
+            };
+            let beyond =
+                beyond.filter(|&(far, near)| seen.tooth_changed(far, near).is_none()).map(|(far, _)| pressed(far));
+            let middle = 0.5 * (low + high);
+            let by_line = |(x, y): (f64, f64), (from, to): (f64, f64)| x - y * (x - from) / (y - to);
+            let chord = by_line(one_pressed, other_pressed);
+            let root = match beyond.map(|beyond| by_line(near, beyond)) {
+                Some(root) if root > low && root < high => root,
+                _ => chord,
+            };
+            // Every third time halves, so that no corner keeps the lines from it.
+            let root = if round % 3 == 2 || !root.is_finite() { middle } else { root };
+            let step = (0.25 * self.nearest).min(0.25 * (high - low));
+            seen.wanted.push(root.clamp(low + step, high - step));
+        }
+    }
+
+    /// Whether two moments beside a change are far enough apart for a value between them to matter.
+    fn change_matters(&self, seen: &Seen, one: usize, other: usize) -> bool {
+        let width = seen.fractions[other] - seen.fractions[one];
+        if width <= 16.0 * f64::EPSILON {
+            return false;
+        }
+        if width > self.nearest {
+            return true;
+        }
+        // The stiffness may jump there.
+        (0..QUANTITIES).filter(|quantity| !STIFFNESSES.contains(quantity)).any(|quantity| {
+            let most = self.best[quantity];
+            seen.curves(quantity).any(|curve| {
+                let (one, other) = (seen.value(one, curve), seen.value(other, curve));
+                let rise = (one - other).abs();
+                rise > 0.125 * self.relative * most && one.max(other) + rise > most
+            })
+        })
+    }
+
+    /// Notes where a piece is to be looked at; what a quantity may still rise by, relative.
+    fn want(&self, seen: &mut Seen) -> f64 {
+        let mut candidates: [Option<Candidate>; QUANTITIES] = [None; QUANTITIES];
+        let (mut wanted, mut settled) = (std::mem::take(&mut seen.wanted), Vec::new());
+        let mut start = 0;
+        for end in 1..=seen.order.len() {
+            let goes_on = end < seen.order.len() && seen.tooth_changed(seen.order[end - 1], seen.order[end]).is_none();
+            if !goes_on {
+                let (is_first, is_last) = (start == 0, end == seen.order.len());
+                let run = Run { seen, moments: &seen.order[start..end], is_first, is_last };
+                self.judge(&run, &mut candidates, &mut wanted, &mut settled);
+                start = end;
+            }
+        }
+        let mut most = 0.0_f64;
+        for (candidate, best) in candidates.iter().zip(self.best) {
+            let Some(Candidate { bound, cuts, ends: [low, high] }) = *candidate else { continue };
+            most = most.max(bound / best - 1.0);
+            wanted.extend(cuts.map(|cut| low + cut * (high - low)));
+        }
+        settled.into_iter().for_each(|moment: usize| seen.is_settled[moment] = true);
+        seen.wanted = wanted;
+        most
+    }
+
+    /// The stretches of a run, each against what was seen so far.
+    fn judge(
+        &self,
+        run: &Run<'_>,
+        candidates: &mut [Option<Candidate>; QUANTITIES],
+        wanted: &mut Vec<f64>,
+        settled: &mut Vec<usize>,
+    ) {
+        let seen = run.seen;
+        let count = run.moments.len();
+        if count < 2 || run.fraction(count - 1) - run.fraction(0) <= self.nearest {
+            return;
+        }
+        if count < NODES {
+            // Too few to be judged by.
+            let cuts: &[f64] = if count < 3 { &[0.25, 0.5, 0.75] } else { &[0.5] };
+            for [low, high] in (1..count).map(|at| [run.fraction(at - 1), run.fraction(at)]) {
+                if high - low > self.nearest {
+                    wanted.extend(cuts.iter().map(|cut| low + cut * (high - low)));
+                }
+            }
+            return;
+        }
+        for at in 0..count - 1 {
+            let moment = run.moments[at];
+            let ends = [run.fraction(at), run.fraction(at + 1)];
+            if seen.is_settled[moment] || ends[1] - ends[0] <= self.nearest {
+                continue;
+            }
+            let bends = Bends::new(run, at);
+            let nodes = OnceCell::new();
+            let may_leave_by_powers = !self.is_linear && (at < 2 || at + 3 >= count);
+            let off = if may_leave_by_powers { OFF_BY_POWERS } else { OFF_SMOOTH };
+            let towards_end = match (at == 0, at + 2 == count) {
+                _ if self.is_linear => None,
+                (true, _) => Some(TOWARDS_START),
+                (_, true) => Some(TOWARDS_START.map(|cut| 1.0 - cut)),
+                _ => None,
+            };
+            let is_beside_change =
+                (at == 0 && !run.is_first || at + 2 == count && !run.is_last) && ends[1] - ends[0] <= SHORT;
+            let (mut is_settled, mut bends_too_much) = (true, false);
+            for quantity in (0..QUANTITIES).filter(|&quantity| self.is_sought[quantity] && self.best[quantity] > 0.0) {
+                if is_beside_change && STIFFNESSES.contains(&quantity) {
+                    continue;
+                }
+                let best = self.best[quantity];
+                let (limit, coarse) = (best * (1.0 + 0.25 * self.relative), COARSE_BEND * best);
+                let margin = bends.margin(seen.curves(quantity), coarse);
+                bends_too_much |= self.lines.is_some_and(|lines| margin.bend > lines * best);
+                if margin.bound <= limit {
+                    continue;
+                }
+                for curve in seen.curves(quantity) {
+                    let of_curve = bends.margin(curve..curve + 1, coarse).bound;
+                    if of_curve <= limit {
+                        continue;
+                    }
+                    let (bound, cuts) = match towards_end {
+                        Some(cuts) => (of_curve, cuts),
+                        None if quantity == CAPACITY => (of_curve, QUARTERS),
+                        None => match nodes.get_or_init(|| Nodes::of(run, at)) {
+                            None => (f64::INFINITY, QUARTERS),
+                            Some(nodes) => match nodes.summit(seen, curve, off) {
+                                Summit { bound, .. } if bound <= limit => continue,
+                                Summit { bound, error, .. } if error > SURE * best || self.is_late => (bound, QUARTERS),
+                                Summit { bound, top, at, .. } => {
+                                    let is_seen = top <= best * (1.0 + 0.125 * self.relative);
+                                    (bound, [if is_seen { 0.5 } else { at.clamp(1e-3, 1.0 - 1e-3) }; 3])
+                                }
+                            },
+                        },
+                    };
+                    is_settled = false;
+                    let most = &mut candidates[quantity];
+                    if most.is_none_or(|most| bound > most.bound) {
+                        *most = Some(Candidate { bound, cuts, ends });
+                    }
+                }
+            }
+            if bends_too_much {
+                wanted.push(0.5 * (ends[0] + ends[1]));
+            } else if is_settled {
+                settled.push(moment);
+            }
+        }
+    }
+}
+
+/// What a quantity may still rise to on a stretch.
+#[derive(Clone, Copy)]
+struct Candidate {
+    bound: f64,
+    /// Where to look, from 0 to 1 along the stretch.
+    cuts: [f64; 3],
+    ends: [f64; 2],
+}
+
+/// Moments one after another at which the same teeth carry.
+struct Run<'a> {
+    seen: &'a Seen,
+    moments: &'a [usize],
+    /// Whether the piece begins or ends with it, and not a change of these teeth.
+    is_first: bool,
+    is_last: bool,
+}
+
+impl Run<'_> {
+    fn fraction(&self, at: usize) -> f64 {
+        self.seen.fractions[self.moments[at]]
+    }
+}
+
+/// The second differences at both ends of a stretch, from the moments beside it; at an end of the run both are of the moment next to it.
+struct Bends<'a> {
+    ends: [&'a [f64]; 2],
+    beside: [[&'a [f64]; 3]; 2],
+    /// Of three moments, that make of their values the bend of this stretch.
+    weights: [[f64; 3]; 2],
+}
+
+/// The most of some curves on a stretch.
+struct Margin {
+    /// How much one bends: a parabola rises above its ends by a quarter of this.
+    bend: f64,
+    /// What it may rise to.
+    bound: f64,
+}
+
+impl<'a> Bends<'a> {
+    /// Of a run of three moments or more.
+    fn new(run: &Run<'a>, at: usize) -> Self {
+        let last = run.moments.len() - 3;
+        let starts = [at.saturating_sub(1).min(last), at.min(last)];
+        let width = run.fraction(at + 1) - run.fraction(at);
+        let is_at_end = at == 0 || at == last + 1;
+        let weights = starts.map(|start| {
+            let [x, y, z] = [0, 1, 2].map(|step| run.fraction(start + step));
+            // Of a smooth curve by its curvature, of two lines by what their slopes differ by, of which one end tells a part alone.
+            let scale = (width * width / (z - x)).max(if is_at_end { width } else { 0.5 * width });
+            let (before, after) = (scale / (y - x), scale / (z - y));
+            [before, -(before + after), after]
+        });
+        let values = |at: usize| run.seen.values(run.moments[at]);
+        Self {
+            ends: [values(at), values(at + 1)],
+            beside: starts.map(|start| [values(start), values(start + 1), values(start + 2)]),
+            weights,
+        }
+    }
+
+    fn margin(&self, curves: Range<usize>, coarse: f64) -> Margin {
+        let count = curves.len();
+        let [[a, b, c], [d, e, f]] = self.weights;
+        let of = |values: &'a [f64]| &values[curves.clone()][..count];
+        let [[x, y, z], [u, v, w]] = self.beside.map(|beside| beside.map(of));
+        let [low, high] = self.ends.map(of);
+        let mut most = Margin { bend: 0.0, bound: 0.0 };
+        for i in 0..count {
+            let one = (a * x[i] + b * y[i] + c * z[i]).abs();
+            let other = (d * u[i] + e * v[i] + f * w[i]).abs();
+            let bend = if one > other { one } else { other };
+            let end = if low[i] > high[i] { low[i] } else { high[i] };
+            let bound = end + bend * if bend > coarse { COARSE_MARGIN } else { MARGIN };
+            most.bend = if bend > most.bend { bend } else { most.bend };
+            most.bound = if bound > most.bound { bound } else { most.bound };
+        }
+        most
+    }
+}
+
+/// Moments that a curve is judged by on a stretch, counted in its length: its ends at 0 and 1, and those beside it from the nearest on.
+struct Nodes {
+    moments: [usize; NODES],
+    places: [f64; NODES],
+    /// Of the distance of each node from the one so many before it.
+    reciprocals: [[f64; NODES]; NODES],
+}
+
+/// The highest place of a curve on a stretch, by the polynomial through its nodes.
+struct Summit {
+    /// How high it is.
+    top: f64,
+    /// Where it is, from 0 to 1.
+    at: f64,
+    /// How far the polynomial may be off.
+    error: f64,
+    /// What the curve does not rise above.
+    bound: f64,
+}
+
+impl Nodes {
+    /// Those of a run; nothing where there are too few. Nodes nearer to each other than a quarter of the stretch would only show rounding.
+    fn of(run: &Run<'_>, at: usize) -> Option<Self> {
+        const APART: f64 = 0.25;
+        let origin = run.fraction(at);
+        let width = run.fraction(at + 1) - origin;
+        let place = |at: usize| (run.fraction(at) - origin) / width;
+        let mut nodes =
+            Self { moments: [run.moments[at]; NODES], places: [0.0; NODES], reciprocals: [[0.0; NODES]; NODES] };
+        (nodes.moments[1], nodes.places[1]) = (run.moments[at + 1], 1.0);
+        let (mut low, mut high) = (0.0, 1.0);
+        let mut before = (0..at).rev().map(|at| (at, place(at))).peekable();
+        let mut after = (at + 2..run.moments.len()).map(|at| (at, place(at))).peekable();
+        for node in 2..NODES {
+            while before.next_if(|&(_, place)| place > low - APART).is_some() {}
+            while after.next_if(|&(_, place)| place < high + APART).is_some() {}
+            let is_before_nearer = match (before.peek(), after.peek()) {
+                (None, None) => return None,
+                (Some(_), None) => true,
+                (None, Some(_)) => false,
+                (Some((_, before)), Some((_, after))) => -before < after - 1.0,
+            };
+            let (at, place) = if is_before_nearer { before.next()? } else { after.next()? };
+            if is_before_nearer {
+                low = place
+            } else {
+                high = place
+            }
+            (nodes.moments[node], nodes.places[node]) = (run.moments[at], place);
+        }
+        for order in 1..NODES {
+            for node in order..NODES {
+                nodes.reciprocals[order][node] = 1.0 / (nodes.places[node] - nodes.places[node - order]);
+            }
+        }
+        Some(nodes)
+    }
+
+    /// Of a curve off which the polynomial may be so many times its last term.
+    fn summit(&self, seen: &Seen, curve: usize, off: f64) -> Summit {
+        let u = &self.places;
+        let values = self.moments.map(|moment| seen.value(moment, curve));
+        // Newton's divided differences.
+        let mut c = values;
+        for order in 1..NODES {
+            for node in (order..NODES).rev() {
+                c[node] = (c[node] - c[node - 1]) * self.reciprocals[order][node];
+            }
+        }
+        // What the last two terms come to in the middle.
+        let fourth = c[4].abs() * 0.25 * ((0.5 - u[2]) * (0.5 - u[3])).abs();
+        let fifth = c[5].abs() * 0.25 * ((0.5 - u[2]) * (0.5 - u[3]) * (0.5 - u[4])).abs();
+        let error = off * fifth.max(OF_TERM_BEFORE * fourth);
+        // In powers of the place.
+        let mut a = [0.0; NODES];
+        a[0] = c[NODES - 1];
+        for node in (0..NODES - 1).rev() {
+            for power in (1..NODES).rev() {
+                a[power] = a[power - 1] - u[node] * a[power];
+            }
+            a[0] = c[node] - u[node] * a[0];
+        }
+        let value = |x: f64| a[0] + x * (a[1] + x * (a[2] + x * (a[3] + x * (a[4] + x * a[5]))));
+        let slope = |x: f64| a[1] + x * (2.0 * a[2] + x * (3.0 * a[3] + x * (4.0 * a[4] + x * 5.0 * a[5])));
+        let bend = |x: f64| 2.0 * a[2] + x * (6.0 * a[3] + x * (12.0 * a[4] + x * 20.0 * a[5]));
+        let higher = values[0].max(values[1]);
+        // What the error may make of the slope: nodes stand a quarter apart at least.
+        let slope_error = 8.0 * error;
+        let slopes = [0.0, 0.5, 1.0].map(slope);
+        let is_steep =
+            slopes.iter().all(|&slope| slope > slope_error) || slopes.iter().all(|&slope| slope < -slope_error);
+        if is_steep {
+            return Summit { top: higher, at: 0.5, error, bound: higher };
+        }
+        let (mut top, mut at, mut from_end) = (higher, 0.5_f64, 0.0);
+        if slopes[0] > 0.0 && slopes[2] < 0.0 {
+            let (mut low, mut high) = (0.0, 1.0);
+            for _ in 0..SUMMIT_STEPS {
+                let found = slope(at);
+                if found > 0.0 {
+                    low = at
+                } else {
+                    high = at
+                }
+                let newton = at - found / bend(at);
+                // Where it has arrived it stands on an end.
+                at = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
+            }
+            top = higher.max(value(at));
+            from_end = at.min(1.0 - at);
+        }
+        // At its nodes the polynomial is right: a slope that is off by so much makes it wrong at the summit by no more than the way from the nearer
+        // end, and moves the summit of a curve that is bent downwards throughout by so little.
+        let least_bend = [0.0, 0.5, 1.0].map(|x| -bend(x)).into_iter().fold(f64::INFINITY, f64::min);
+        let above =
+            if least_bend > 0.0 { error.min(slope_error * (0.5 * slope_error / least_bend + from_end)) } else { error };
+        Summit { top, at, error, bound: top + above }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A curve over a lap of sixteen intervals, as the wind-up of one tooth.
+    fn seen_of(curve: impl Fn(f64) -> f64) -> Seen {
+        let piece = Piece { lap: 0, start: 0.0, end: 1.0, places: 1, starts_with_entry: false };
+        let mut seen = Seen::new(piece, 1);
+        for fraction in std::mem::take(&mut seen.wanted) {
+            seen.push(fraction)[0] = curve(fraction);
+        }
+        seen.put_in_order();
+        seen
+    }
+
+    /// That on every stretch what the curve is said to stay below is not below its largest value there; how far it is above at most.
+    fn assert_bounded(curve: impl Fn(f64) -> f64, off: Option<f64>) -> f64 {
+        let seen = seen_of(&curve);
+        let run = Run { seen: &seen, moments: &seen.order, is_first: true, is_last: true };
+        let mut above = 0.0_f64;
+        for at in 0..16_u32 {
+            let stretch = at as usize;
+            let dense = (0..=1000).map(|step| curve((f64::from(at) + f64::from(step) * 1e-3) / 16.0));
+            let most = dense.fold(0.0_f64, f64::max);
+            if let Some(off) = off {
+                let bound = Nodes::of(&run, stretch).expect("seventeen moments").summit(&seen, 0, off).bound;
+                assert!(bound >= most * (1.0 - 1e-14), "{bound} is below {most} on stretch {at}");
+                above = above.max(bound - most);
+            }
+            let margin = Bends::new(&run, stretch).margin(0..1, f64::INFINITY).bound;
+            assert!(margin >= most * (1.0 - 1e-14), "{margin} is below {most} on stretch {at}");
+        }
+        above
+    }
+
+    #[test]
+    fn smooth_curves_stay_below_their_bounds_which_are_near() {
+        for step in 0..50 {
+            let summit = f64::from(step) * 0.02;
+            let above = assert_bounded(|x| 1.0 + (1.5 * (x - summit)).cos(), Some(OFF_SMOOTH));
+            assert!(above < 1e-5, "{above:e}");
+        }
+    }
+
+    #[test]
+    fn curves_that_begin_with_a_power_stay_below_their_bounds() {
+        for step in 0..50 {
+            let summit = f64::from(step) * 0.002;
+            for power in [2.11, 2.5] {
+                assert_bounded(|x| 2.0 + (x - summit).cos() + 0.05 * x.powf(power) - 0.05 * x, Some(OFF_BY_POWERS));
+            }
+        }
+    }
+
+    #[test]
+    fn curves_with_a_corner_anywhere_stay_below_their_bounds() {
+        for step in 0..400 {
+            let corner = f64::from(step) * 0.002_47;
+            for (before, after) in [(1.0, 1.0), (0.1, 3.0), (2.0, 0.2)] {
+                assert_bounded(|x| 10.0 - if x < corner { before } else { after } * (x - corner).abs(), None);
+            }
+        }
+    }
+
+    #[test]
+    fn the_summit_of_a_polynomial_is_found_wherever_it_stands() {
+        for step in 1..200 {
+            let summit = f64::from(step) * 0.005;
+            let seen = seen_of(|x| 3.0 - (x - summit) * (x - summit));
+            let run = Run { seen: &seen, moments: &seen.order, is_first: true, is_last: true };
+            let found =
+                (0..16).map(|at| Nodes::of(&run, at).expect("seventeen moments").summit(&seen, 0, OFF_SMOOTH).top);
+            assert!((found.fold(0.0_f64, f64::max) - 3.0).abs() < 1e-13, "at {summit}");
+        }
+    }
+}

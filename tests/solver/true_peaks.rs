@@ -1,0 +1,235 @@
+//! True peaks alone, no column kept: what they promise, against dense samples, the sweep to a tolerance and the reference, and what they cost.
+
+use proptest::prelude::*;
+use toothwave_solver::Compatibility::{Projection, VirtualWork};
+use toothwave_solver::mesh::Mesh;
+use toothwave_solver::sweep::{Points, SweepPeaks, peaks, sweep_plain};
+use toothwave_solver::{Contact, ContactLaw, DriveParameters, LoadCase, LoadParameters, Never, PerContact, SolveError};
+
+use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, everywhere, load};
+use crate::reference::{Worst, number};
+use crate::tolerances::{designs, of_many_teeth};
+
+const MAX_STATES: u64 = 10_000_000;
+
+const JOHNSON: ContactLaw =
+    ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
+
+fn of(parameters: &DriveParameters, load: &LoadParameters, points: Points) -> Result<SweepPeaks, SolveError> {
+    peaks(&drive(parameters), &LoadCase::new(load).unwrap(), points, &Never)
+}
+
+fn to(parameters: &DriveParameters, load: &LoadParameters, tolerance: f64) -> SweepPeaks {
+    of(parameters, load, Points::tolerance(tolerance, MAX_STATES).unwrap())
+        .unwrap_or_else(|error| panic!("{error} of {parameters:?} {load:?}"))
+}
+
+/// Everything that has a largest value, by name; of what has a least value too, its reciprocal.
+fn extremes(peaks: &SweepPeaks) -> Vec<(&'static str, f64)> {
+    let mut extremes = Vec::new();
+    for (_, contact) in peaks.contacts.iter() {
+        extremes.extend([("force", contact.force_n.value), ("stress", contact.stress_mpa.value)]);
+    }
+    let (wind_up, stiffness) = (peaks.wind_up_deg, peaks.torsional_stiffness_nm_per_rad);
+    extremes.extend([
+        ("wind-up", wind_up.largest),
+        ("least wind-up", 1.0 / wind_up.least),
+        ("stiffness", stiffness.largest),
+        ("least stiffness", 1.0 / stiffness.least),
+    ]);
+    extremes.extend(peaks.torque_capacity.map(|capacity| ("capacity", 1.0 / capacity.input_torque_nm)));
+    extremes
+}
+
+fn by_every_law() -> Vec<(DriveParameters, LoadParameters)> {
+    let mut all = designs();
+    let by_work: Vec<_> = all
+        .iter()
+        .filter(|(_, load)| load.law == ContactLaw::Linear && load.compatibility == VirtualWork)
+        .copied()
+        .collect();
+    all.extend(by_work.into_iter().map(|(parameters, load)| (parameters, LoadParameters { law: JOHNSON, ..load })));
+    all
+}
+
+#[test]
+fn no_dense_sweep_shows_more_than_true_peaks_by_more_than_their_tolerance() {
+    for (parameters, load) in by_every_law() {
+        let Ok(dense) = of(&parameters, &load, Points::samples(20_000).unwrap()) else { continue };
+        for tolerance in [1e-1, 1e-3, 1e-6, 1e-9, 1e-12] {
+            let found = to(&parameters, &load, tolerance);
+            for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
+                // Rounding alone parts the two by some units of the last digit.
+                let missing = 1.0 - found / dense;
+                assert!(
+                    missing <= tolerance.max(1e-11),
+                    "{name}: {missing:e} of {tolerance:e}, {:?} {load:?} {parameters:?}",
+                    load.law
+                );
+            }
+            assert!(found.torque_balance_residual < 1e-12);
+            assert!(
+                found.loaded_teeth.min <= dense.loaded_teeth.min && found.loaded_teeth.max >= dense.loaded_teeth.max,
+                "{:?} {:?} {load:?} {parameters:?}",
+                found.loaded_teeth,
+                dense.loaded_teeth
+            );
+        }
+    }
+}
+
+#[test]
+fn a_hundred_thousand_samples_show_no_more_and_hardly_less_than_true_peaks() {
+    for (parameters, load) in by_every_law().into_iter().step_by(7) {
+        let Ok(dense) = of(&parameters, &load, Points::samples(100_000).unwrap()) else { continue };
+        let found = to(&parameters, &load, 1e-9);
+        for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
+            assert!(found >= dense * (1.0 - 1e-9), "{name}: {found} {dense}");
+            // Loads, and with gaps the stiffness too, jump at some instant that samples miss by one interval.
+            let is_stiffness = name.ends_with("stiffness");
+            assert!(is_stiffness || found <= dense * (1.0 + 1e-3), "{name}: {found} {dense} {load:?} {parameters:?}");
+        }
+    }
+}
+
+/// A tooth that begins to carry under Johnson's law gives at first as if it were not there, and the loads of the others rise a little longer: here for
+/// 5e-5 degrees, by 1.6e-8.
+#[test]
+fn a_peak_just_after_another_tooth_begins_to_carry_is_found() {
+    let clearance_um = PerContact { wave_generator: 0.0, ring: 3.0, carrier: 25.0 };
+    let load = LoadParameters { law: JOHNSON, clearance_um, ..load(1.0, VirtualWork) };
+    let dense = of(&PAPER_5_1, &load, Points::samples(2_000_000).unwrap()).unwrap();
+    let found = to(&PAPER_5_1, &load, 1e-10);
+    for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
+        assert!(found >= dense * (1.0 - 1e-10), "{name}: {:e}", 1.0 - found / dense);
+    }
+}
+
+#[test]
+fn true_peaks_are_those_of_the_sweep_to_a_tolerance() {
+    for (parameters, load) in by_every_law() {
+        let case = LoadCase::new(&load).unwrap();
+        let points = Points::tolerance(1e-10, MAX_STATES).unwrap();
+        let Ok(swept) = sweep_plain(&drive(&parameters), &case, points, &Never) else { continue };
+        let swept = SweepPeaks::from(&swept);
+        let found = to(&parameters, &load, 1e-10);
+        for ((name, found), (_, swept)) in extremes(&found).into_iter().zip(extremes(&swept)) {
+            let off = (found / swept - 1.0).abs();
+            assert!(off <= 1e-9, "{name}: {off:e} {load:?} {parameters:?}");
+        }
+        for (contact, peaks) in found.contacts.iter() {
+            let expected = swept.contacts.get(contact);
+            let off = (peaks.half_width_mm / expected.half_width_mm - 1.0).abs();
+            assert!(off <= 1e-4, "{contact:?}: {off:e} {load:?} {parameters:?}");
+        }
+        if let Some((found, swept)) = found.torque_capacity.zip(swept.torque_capacity) {
+            let off = (found.output_torque_nm / swept.output_torque_nm - 1.0).abs();
+            assert!(off <= 1e-9, "capacity {off:e}");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 600, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_samples_of_any_drive_under_any_law_show_more_than_true_peaks(
+        parameters in any_swept_drive(),
+        gaps in prop::option::of(prop::array::uniform3(-1.0_f64..2.0)),
+        law in prop::sample::select(vec![ContactLaw::Linear, ContactLaw::Palmgren, JOHNSON]),
+        torque_exponent in -1.0_f64..2.0,
+        tolerance in prop::sample::select(vec![1e-1, 1e-2, 1e-4]),
+    ) {
+        let mut load = load(10.0_f64.powf(torque_exponent), VirtualWork);
+        load.law = law;
+        let [wave_generator, ring, carrier] = gaps.map_or([0.0; 3], |gaps| gaps.map(|exponent| 10.0_f64.powf(exponent)));
+        load.clearance_um = PerContact { wave_generator, ring, carrier };
+        load.allowable_stress_mpa = Some(everywhere(1500.0));
+        let Ok(dense) = of(&parameters, &load, Points::samples(1500).unwrap()) else { return Ok(()) };
+        let found = of(&parameters, &load, Points::tolerance(tolerance, MAX_STATES).unwrap());
+        let Ok(found) = found else { return Ok(()) };
+        for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
+            prop_assert!(found >= (1.0 - tolerance.max(1e-11)) * dense, "{}: {:e} of {:e} {:?}", name, 1.0 - found / dense, tolerance, load);
+        }
+    }
+}
+
+#[test]
+fn true_peaks_are_those_of_the_reference() {
+    let mut worst = Worst::default();
+    for case in crate::extremes::cases("extremes") {
+        let (name, points) = (case.name(), case.points());
+        let Points::Tolerance(tolerance) = points else { panic!("{name}") };
+        let found = peaks(&case.drive(), &case.load(), points, &Never).unwrap();
+        let (expected, condition) = (&case.0["expected"]["peaks"], &case.0["condition"]["peaks"]);
+        for (contact, word) in
+            [(Contact::WaveGenerator, "wave_generator"), (Contact::Ring, "ring"), (Contact::Carrier, "carrier")]
+        {
+            let peaks = PerContact::get(&found.contacts, contact);
+            for (kind, found) in [("force_n", peaks.force_n.value), ("stress_mpa", peaks.stress_mpa.value)] {
+                let value = number(&expected[word][kind]["value"]).unwrap();
+                let rounding = condition[word][kind]["value"].as_f64().unwrap_or(0.0);
+                worst.see(kind, &name, (found - value).abs(), tolerance.relative() * value + rounding);
+            }
+        }
+    }
+    worst.assert_all_within();
+}
+
+// --- What they cost
+
+/// The fewest states with which they are found.
+fn states_worked_out(parameters: &DriveParameters, load: &LoadParameters, tolerance: f64) -> u64 {
+    let is_enough = |max_states| match of(parameters, load, Points::tolerance(tolerance, max_states).unwrap()) {
+        Ok(_) => true,
+        Err(SolveError::TooManyStates { .. }) => false,
+        Err(error) => panic!("{error}"),
+    };
+    let (mut few, mut enough) = (0, MAX_STATES);
+    while enough - few > 1 {
+        let middle = few.midpoint(enough);
+        if is_enough(middle) { enough = middle } else { few = middle }
+    }
+    enough
+}
+
+#[test]
+fn true_peaks_take_some_hundred_states_of_the_papers_cases_and_at_the_threshold_of_undercut() {
+    let threshold = DriveParameters { tooth_radius_mm: 6.749_189_868_666_484 * (1.0 + 1e-6), ..PAPER_5_1 };
+    let with_gaps = |law| {
+        let clearance_um = PerContact { wave_generator: 0.0, ring: 10.0, carrier: 2.0 };
+        LoadParameters { law, clearance_um, ..load(20.0, VirtualWork) }
+    };
+    let without = |law| LoadParameters { law, ..load(20.0, VirtualWork) };
+    let linear = load(20.0, Projection);
+    for (name, parameters, load, most) in [
+        ("5.1 linear", PAPER_5_1, linear, 200),
+        ("5.1 johnson", PAPER_5_1, without(JOHNSON), 260),
+        ("5.1 palmgren", PAPER_5_1, without(ContactLaw::Palmgren), 260),
+        ("5.1 linear, gaps", PAPER_5_1, with_gaps(ContactLaw::Linear), 420),
+        ("5.1 johnson, gaps", PAPER_5_1, with_gaps(JOHNSON), 760),
+        ("5.2 linear", PAPER_5_2, linear, 170),
+        ("5.2 johnson", PAPER_5_2, without(JOHNSON), 230),
+        ("threshold", threshold, linear, 350),
+    ] {
+        let states = states_worked_out(&parameters, &load, 1e-9);
+        println!("{name}: {states} states");
+        assert!(states <= most, "{name}: {states} states");
+    }
+}
+
+#[test]
+fn true_peaks_cost_as_much_as_there_are_teeth() {
+    for of_critical in [0.7, 1.5] {
+        for teeth in [28, 200, 1000, 10_000] {
+            let parameters = of_many_teeth(teeth, of_critical);
+            let in_mesh = Mesh::new(&drive(&parameters)).teeth_in_mesh().max;
+            let states = states_worked_out(&parameters, &load(20.0, Projection), 1e-6);
+            println!(
+                "{teeth} teeth, {of_critical} of the critical radius: {} times the teeth in mesh",
+                states / in_mesh
+            );
+            assert!(states < 40 * in_mesh, "{states} for {in_mesh} teeth in mesh");
+        }
+    }
+}
