@@ -214,13 +214,14 @@ enum Shape {
 }
 
 impl Shape {
-    /// With bounds, over all positions, of how far the contact points on cam and ring are off the position, as tangents.
-    fn new(cam: &Cam, r: f64) -> (Self, PerContact<f64>) {
+    /// With bounds, over all positions, of how far the contact points on cam and ring are off the position, as tangents; of a kind
+    /// that has no columns yet nothing: it goes the plain way.
+    fn new(cam: &Cam, r: f64) -> Option<(Self, PerContact<f64>)> {
         // On the ring by sin β ≤ 1, from the least distance of a centre.
         let bounds =
             |cam: f64, least_center: f64| PerContact { wave_generator: cam, ring: r / least_center, carrier: 0.0 };
         let off_path = |steepest: f64, least_center: f64| bounds(r * steepest / (least_center - r), least_center);
-        match cam {
+        Some(match cam {
             Cam::Ellipse(cam) => {
                 let shape = EllipseShape::new(cam, r);
                 let EllipseShape { a, b, difference_of_squares, .. } = shape;
@@ -242,7 +243,7 @@ impl Shape {
                 let steepest = e * cam.lobe_count() / (mean - e);
                 (Self::HarmonicPath(HarmonicPathCenters::new(cam, r)), off_path(steepest, mean - e))
             }
-        }
+        })
     }
 }
 
@@ -420,7 +421,7 @@ impl Kernel {
             return None;
         }
         let r = drive.parameters().tooth_radius_mm;
-        let (shape, ratios) = Shape::new(drive.flank().locus().cam(), r);
+        let (shape, ratios) = Shape::new(drive.flank().locus().cam(), r)?;
         Some(Self {
             shape,
             r,

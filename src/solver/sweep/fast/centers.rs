@@ -191,7 +191,8 @@ impl Centers for HarmonicCenters {
                 let slope = above * square - (tan * lever + e * u * u * cos[i]);
                 let step = value / slope;
                 lanes.tan[i] = tan - step;
-                largest[i] = step.abs() - LAST_STEP * lanes.tan[i];
+                // Lanes beyond the last tooth may stand anywhere.
+                largest[i] = step.abs() - LAST_STEP * lanes.tan[i].abs();
             }
             phases = self.phases(&of_lobe, &lanes.tan);
             is_found = largest.iter().all(|&beyond| beyond <= 0.0);
