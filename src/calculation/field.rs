@@ -46,6 +46,8 @@ pub enum FieldCode {
     OutOfRange,
     /// A list that has neither no entry nor one for each item.
     WrongLength,
+    /// A quantity that nothing free changes, as an objective or beyond its limit.
+    Unaffected,
     /// The semi-major axis does not exceed the semi-minor one.
     CamNotElongated,
     /// The wave generator is too small for its stroke.

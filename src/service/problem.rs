@@ -162,7 +162,7 @@ impl ProblemCode {
             Self::BodyTooLarge => "The body is too large",
             Self::UnsupportedMediaType => "The body is not sent as plain JSON",
             Self::MisdirectedRequest => "Nobody is called so here",
-            Self::InvalidDocument => "The document is no design document",
+            Self::InvalidDocument => "The document has another form than is read here",
             Self::ImpossibleDesign => "Values that no design can have",
             Self::NoToothInMesh => "At some input angle no tooth carries load",
             Self::ComplianceNotPositive => "The projection form has no solution",

@@ -44,6 +44,20 @@ pub(crate) fn index_of(quantity: &'static Quantity, quantities: &mut Vec<&'stati
     })
 }
 
+/// The quantities of these names, each of which may stand there once.
+pub(crate) fn all_named(names: &[String]) -> Result<Vec<&'static Quantity>, NoAnswer> {
+    let mut quantities = Vec::new();
+    for (index, name) in names.iter().enumerate() {
+        let at = format!("/quantities/{index}");
+        let quantity = named(name, &at)?;
+        if quantities.contains(&quantity) {
+            return Err(fault(&at, FieldCode::ConflictingFields, format!("`{name}` is asked for already")));
+        }
+        quantities.push(quantity);
+    }
+    Ok(quantities)
+}
+
 /// The quantity of this name, which stands at this place of the study's document.
 pub(crate) fn named(name: &str, at: &str) -> Result<&'static Quantity, NoAnswer> {
     Quantity::named(name).ok_or_else(|| {

@@ -116,6 +116,10 @@ impl Axis {
                 }
                 (0..count(all)).map(|step| Value::Number(min + f64::from(step))).collect()
             }
+            (Domain::Real { min, max } | Domain::Whole { min, max }, Some(steps)) if min >= max && steps > 1.0 => {
+                let detail = format!("the range holds one value, {min:?}, and not {steps:?}");
+                return Err(beyond(&format!("{at}/steps"), FieldCode::OutOfRange, detail, steps, 1.0));
+            }
             (Domain::Real { min, max } | Domain::Whole { min, max }, Some(steps)) => {
                 let intervals = (steps - 1.0).max(1.0);
                 let at_step = |step: u32| {

@@ -585,7 +585,59 @@ const fn pressure_velocity(name: &'static str, meaning: &'static str, source: So
     needing(Needs::FrictionAndSpeed, of_sweep(name, "MPa m/s", meaning, source, of))
 }
 
+/// Where a design says the numbers of teeth and lobes.
+const COUNTS: [&str; 4] =
+    ["/drive/wave_generator/kind", "/drive/wave_generator/lobes", "/drive/teeth/count", "/drive/ring/teeth"];
+
 impl Quantity {
+    /// The places of a design that it may depend on: what stands elsewhere does not change it.
+    pub(crate) fn depends_on(&self) -> &'static [&'static str] {
+        match (self.name, self.needs) {
+            ("transmission_ratio" | "transmission_ratio_carrier_fixed", _) => &COUNTS,
+            ("tooth_width_mm", _) => &["/drive/teeth"],
+            ("outer_diameter_mm", _) => &["/drive", "/parts/ring"],
+            ("input_torque_nm" | "output_torque_nm", _) => &["/load", COUNTS[0], COUNTS[1], COUNTS[2], COUNTS[3]],
+            (_, Needs::Drive) => &["/drive"],
+            // All but how things are drawn.
+            (_, Needs::Load | Needs::AllowableStress | Needs::Friction | Needs::FrictionAndSpeed) => &[
+                "/drive",
+                "/materials",
+                "/load",
+                "/model",
+                "/modification",
+                "/deviations",
+                "/friction",
+                "/parts",
+                "/sweep",
+            ],
+        }
+    }
+
+    /// What it is at least, whatever the drive.
+    pub(crate) fn least(&self) -> f64 {
+        const NEVER_BELOW_ZERO: [&str; 12] = [
+            "outer_diameter_mm",
+            "ring_root_radius_mm",
+            "ring_tip_radius_mm",
+            "tooth_width_mm",
+            "coincidence_degree",
+            "teeth_in_mesh_min",
+            "period_deg",
+            "peak_",
+            "half_width_",
+            "loaded_teeth_min",
+            "loss_ratio",
+            "pressure_velocity_",
+        ];
+        if NEVER_BELOW_ZERO.iter().any(|name| self.name.starts_with(name)) { 0.0 } else { f64::NEG_INFINITY }
+    }
+
+    /// What it is at most, whatever the drive.
+    pub(crate) fn most(&self) -> f64 {
+        let is_efficiency = self.name.starts_with("efficiency_") && self.name != "efficiency_error";
+        if is_efficiency { 1.0 } else { f64::INFINITY }
+    }
+
     /// The quantity of this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         QUANTITIES.iter().find(|quantity| quantity.name == name)

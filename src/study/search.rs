@@ -7,8 +7,9 @@ use toothwave_calculation::design::Design;
 use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::json::{Tree, path};
 use toothwave_calculation::no_answer::NoAnswer;
-use toothwave_solver::Stop;
+use toothwave_calculation::question;
 use toothwave_solver::parts::RIM;
+use toothwave_solver::{Never, Parameter, Stop};
 use utoipa::ToSchema;
 
 use crate::ask::{beyond, escaped, fault, index_of, named, whole};
@@ -18,6 +19,7 @@ use crate::limit::{Bound, Limit, limits};
 use crate::map::asked;
 use crate::optimise::{Judged, Optimiser, Plan, Point, merged};
 use crate::quantity::{Needs, Quantity};
+use crate::random::Stream;
 use crate::rows::{GapAnswer, ReasonAnswer, RefusalNoted, note};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Domain, Template, Value, Variable};
@@ -43,6 +45,7 @@ const SAMPLES: f64 = 16.0;
 /// Objectives at most.
 const MOST_OBJECTIVES: usize = 4;
 
+const OUTER_RADIUS: &str = "/parts/ring/outer_radius_mm";
 const KIND: &str = "/drive/wave_generator/kind";
 const TOOTH_COUNT: &str = "/drive/teeth/count";
 
@@ -194,6 +197,49 @@ impl Search {
         self.islands * (8 * numbers * points) as u64
     }
 
+    /// That what is free changes every objective, and every quantity that is beyond its limit else.
+    pub(crate) fn require_that_free_fields_matter(
+        &self,
+        template: &Template,
+        quantities: &[&'static Quantity],
+        limits: &question::Limits,
+    ) -> Result<(), NoAnswer> {
+        if !template.varies_within(&[""]) {
+            let detail = "nothing is free: each range and each choice holds one value only";
+            return Err(fault("/free", FieldCode::Unaffected, detail));
+        }
+        let is_drawn = |tree: &Tree| tree.at(&path(OUTER_RADIUS).unwrap_or_default()).is_some();
+        let is_drawn = template.examples().all(is_drawn) && !template.is_varied(OUTER_RADIUS);
+        let is_affected = |quantity: &Quantity| {
+            !(quantity.name == "outer_diameter_mm" && is_drawn) && template.varies_within(quantity.depends_on())
+        };
+        for (index, objective) in self.objectives.iter().enumerate() {
+            let quantity = quantities[objective.quantity];
+            if !is_affected(quantity) {
+                let detail = format!("nothing that is free changes `{}`", quantity.name);
+                return Err(fault(&format!("/objectives/{index}/quantity"), FieldCode::Unaffected, detail));
+            }
+        }
+        let is_settled = |quantity: &Quantity| quantity.needs == Needs::Drive && !is_affected(quantity);
+        let settled = self.limits.iter().filter(|limit| is_settled(quantities[limit.quantity]));
+        for limit in settled {
+            let quantity = quantities[limit.quantity];
+            if let Some(value) = some_value(quantity, template, limits)
+                && limit.violation(value) > 0.0
+            {
+                let end = match limit.bound {
+                    Bound::Min => "/min",
+                    Bound::Max => "/max",
+                    Bound::Is => "",
+                };
+                let at = format!("/require/{}{end}", escaped(quantity.name));
+                let detail = format!("nothing that is free changes `{}`: it is {value:?}", quantity.name);
+                return Err(beyond(&at, FieldCode::Unaffected, detail, limit.limit, value));
+            }
+        }
+        Ok(())
+    }
+
     fn judged(&self, values: &[f64]) -> Judged {
         let objective = |objective: &Objective| match objective.goal {
             Goal::Min => values[objective.quantity],
@@ -204,6 +250,22 @@ impl Search {
             violations: self.limits.iter().map(|limit| limit.violation(values[limit.quantity])).collect(),
         }
     }
+}
+
+/// What a quantity of the drive alone is in some variant, if one of a few can be.
+fn some_value(quantity: &'static Quantity, template: &Template, limits: &question::Limits) -> Option<f64> {
+    const TRIES: u64 = 64;
+    let evaluator = Evaluator::new(vec![quantity], *limits);
+    let mut template = template.clone();
+    (0..TRIES).find_map(|stream| {
+        let mut stream = Stream::new(0, stream);
+        let place: Vec<_> = template.variables().iter().map(|_| stream.share()).collect();
+        let values = variable_values(&template, &place);
+        match evaluator.outcome(template.filled(&values), &Never) {
+            Ok(Outcome::Answered(values)) => values.first().copied(),
+            Ok(Outcome::Refused(_)) | Err(Stopped) => None,
+        }
+    })
 }
 
 fn objectives(document: &SearchDocument, quantities: &mut Vec<&'static Quantity>) -> Result<Vec<Objective>, NoAnswer> {
@@ -278,12 +340,26 @@ fn from_envelope(
         let Some(diameter_mm) = range("outer_diameter_mm").1 else {
             return Err(missing("limit `outer_diameter_mm` from above"));
         };
-        if diameter_mm <= 0.0 {
-            let detail = format!("must be above zero, not {diameter_mm:?}");
-            return Err(beyond("/require/outer_diameter_mm/max", FieldCode::OutOfRange, detail, diameter_mm, 0.0));
-        }
         // As drawn, a rim included.
         let root_mm = 0.5 * diameter_mm / RIM;
+        let range = Parameter::ToothRadius.range();
+        for &(_, least, largest) in &lengths {
+            let (smallest_mm, largest_mm) = (least * root_mm, largest * root_mm);
+            if let (Some(limit_mm), Some(_)) =
+                (range.limit_exceeded_by(smallest_mm), range.limit_exceeded_by(largest_mm))
+            {
+                let scale = if limit_mm > smallest_mm { largest } else { least };
+                let limit_mm = 2.0 * RIM * limit_mm / scale;
+                let detail = format!("no drive of {diameter_mm:?} mm has lengths within their ranges");
+                return Err(beyond(
+                    "/require/outer_diameter_mm/max",
+                    FieldCode::OutOfRange,
+                    detail,
+                    diameter_mm,
+                    limit_mm,
+                ));
+            }
+        }
         free.extend(lengths.into_iter().map(|(pointer, least, largest)| {
             let range = FreeDocument { min: Some(least * root_mm), max: Some(largest * root_mm), one_of: None };
             (pointer.to_owned(), range)

@@ -15,17 +15,17 @@ use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::Stop;
 
 use crate::answer::StudyAnswer;
-use crate::ask::{beyond, fault, index_of, named};
+use crate::ask::{all_named, beyond, fault};
 use crate::document::StudyDocument;
 use crate::evaluate::{Evaluator, Stopped};
 use crate::limit;
 use crate::map::{Map, MapAnswer};
 use crate::quantity::{Needs, QUANTITIES, Quantity};
-use crate::rows::{CHUNK_VARIANTS, GapAnswer, RowsPart, RowsWork};
+use crate::rows::{CHUNK_VARIANTS, GapAnswer, Rows, RowsPart, RowsWork};
 use crate::search::{Island, IslandPart, Search, SearchAnswer};
 use crate::sensitivity::{Sensitivity, SensitivityAnswer};
 use crate::tolerance::{Tolerance, ToleranceAnswer};
-use crate::variant::Template;
+use crate::variant::{Domain, Template};
 
 /// What studies are computed at most.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -109,6 +109,7 @@ impl Study {
             }
             StudyDocument::Search(document) => {
                 let (search, template, quantities) = Search::new(document)?;
+                search.require_that_free_fields_matter(&template, &quantities, &limits.calculation)?;
                 let variants = search.evaluations();
                 Self::checked(id, Kind::Search(Box::new(search)), template, quantities, variants, limits)
             }
@@ -116,20 +117,19 @@ impl Study {
                 let (sensitivity, template) = Sensitivity::new(document)?;
                 let quantities = asked_quantities(&document.quantities, &template)?;
                 let variants = sensitivity.variants();
-                Self::checked(id, Kind::Sensitivity(sensitivity), template, quantities, variants, limits)
+                let kind = Kind::Sensitivity(sensitivity);
+                Self::checked(id, kind, template, quantities, variants, limits)?.with_possible_base(limits)
             }
             StudyDocument::Tolerance(document) => {
-                let mut quantities = Vec::new();
-                for (index, name) in document.quantities.iter().enumerate() {
-                    index_of(named(name, &format!("/quantities/{index}"))?, &mut quantities);
-                }
+                let mut quantities = all_named(&document.quantities)?;
                 let bounds = limit::limits(&document.require, &mut quantities)?;
                 let (tolerance, template) = Tolerance::new(document, bounds)?;
                 if quantities.is_empty() {
                     quantities = asked_quantities(&[], &template)?;
                 }
                 let variants = tolerance.variants();
-                Self::checked(id, Kind::Tolerance(tolerance), template, quantities, variants, limits)
+                let kind = Kind::Tolerance(tolerance);
+                Self::checked(id, kind, template, quantities, variants, limits)?.with_possible_base(limits)
             }
         }
     }
@@ -145,6 +145,9 @@ impl Study {
         for example in template.examples() {
             require_what_quantities_need(&quantities, example)?;
             require_possible_base(&quantities, &template, example, &limits.calculation)?;
+        }
+        if matches!(kind, Kind::Map(_) | Kind::Search(_)) {
+            require_possible_ranges(&quantities, &template, &limits.calculation)?;
         }
         let evaluator = Evaluator::new(quantities, limits.calculation);
         let study = Self { id, kind, template, evaluator, variants, chunk_variants: CHUNK_VARIANTS };
@@ -167,6 +170,31 @@ impl Study {
             return Err(refused);
         }
         Ok(study)
+    }
+
+    /// The same study, of deviations from a design that can be, by whose nature it can deviate so.
+    fn with_possible_base(self, limits: &Limits) -> Result<Self, NoAnswer> {
+        let mut template = self.template.clone();
+        let mut refused = |rows: &dyn Rows, variant: u64| {
+            let document = rows.document(&mut template, variant);
+            check(&self.evaluator.quantities, document, &limits.calculation).err()
+        };
+        let found = match &self.kind {
+            Kind::Map(_) | Kind::Search(_) => None,
+            Kind::Sensitivity(sensitivity) => refused(sensitivity, 0).map(|refused| (refused, "/base")),
+            Kind::Tolerance(tolerance) => match refused(tolerance, 0) {
+                Some(refused) => Some((refused, "/base")),
+                // That one drive cannot be is its own fault, but not that no drive of this model takes deviations.
+                None => refused(tolerance, 1).filter(is_of_every_draw).map(|refused| (refused, "")),
+            },
+        };
+        let Some((mut refused, place)) = found else { return Ok(self) };
+        for error in &mut refused.errors {
+            let stands = format!("{place}{}", error.pointer);
+            refused.detail = refused.detail.replacen(&error.pointer, &stands, 1);
+            error.pointer = stands;
+        }
+        Err(refused)
     }
 
     /// What tells it from every other one: a hash of what is asked, of the build and of the machine's arithmetic.
@@ -251,14 +279,7 @@ fn asked_quantities(names: &[String], template: &Template) -> Result<Vec<&'stati
         };
         return Ok(QUANTITIES.iter().filter(is_had).collect());
     }
-    let mut quantities: Vec<&'static Quantity> = Vec::new();
-    for (index, name) in names.iter().enumerate() {
-        let quantity = named(name, &format!("/quantities/{index}"))?;
-        if !quantities.contains(&quantity) {
-            quantities.push(quantity);
-        }
-    }
-    Ok(quantities)
+    all_named(names)
 }
 
 fn at<'a>(tree: &'a Tree, place: &[&str]) -> Option<&'a Tree> {
@@ -311,6 +332,51 @@ fn require_what_quantities_need(quantities: &[&'static Quantity], tree: &Tree) -
     Ok(())
 }
 
+/// Whatever is known to be wrong with a document before it is computed.
+fn check(quantities: &[&'static Quantity], document: &Tree, limits: &question::Limits) -> Result<(), NoAnswer> {
+    let design = document.read::<Design>()?.normalised();
+    if quantities.iter().all(|quantity| quantity.needs == Needs::Drive) {
+        CoincidenceDegree.check(&design, limits).map(|_| ())
+    } else {
+        Sweep.check(&design, limits).map(|_| ())
+    }
+}
+
+/// Whether no draw of deviations can be asked, whatever their amounts.
+fn is_of_every_draw(refused: &NoAnswer) -> bool {
+    refused.code == NoAnswerCode::TooManyStates
+        || refused.errors.iter().any(|error| error.code == FieldCode::ConflictingFields)
+}
+
+/// That of every range of a free number some lies within what its field may be.
+fn require_possible_ranges(
+    quantities: &[&'static Quantity],
+    template: &Template,
+    limits: &question::Limits,
+) -> Result<(), NoAnswer> {
+    for (index, variable) in template.variables().iter().enumerate() {
+        let (Domain::Real { min, max } | Domain::Whole { min, max }) = variable.domain else { continue };
+        if OF_THE_DRIVE.contains(&variable.pointer.as_str()) {
+            continue;
+        }
+        // Nothing of it where its largest value is too small, or its least too large.
+        for (end, value, is_below) in [("max", max, true), ("min", min, false)] {
+            let Some(example) = template.example_at(index, value) else { continue };
+            let errors = check(quantities, &example, limits).err().map_or_else(Vec::new, |refused| refused.errors);
+            let is_outside = |error: &&FieldError| {
+                error.pointer == variable.pointer
+                    && error.code == FieldCode::OutOfRange
+                    && error.limit.is_some_and(|limit| (value < limit) == is_below)
+            };
+            if let Some(FieldError { detail, limit, .. }) = errors.iter().find(is_outside) {
+                let at = format!("{}/{end}", template.blamed(&variable.pointer));
+                return Err(beyond(&at, FieldCode::OutOfRange, detail, value, limit.unwrap_or(value)));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// That a document can be asked at all: a fault of its form is one whatever the values, and so is a number of the base outside its range.
 fn require_possible_base(
     quantities: &[&'static Quantity],
@@ -318,13 +384,7 @@ fn require_possible_base(
     example: &Tree,
     limits: &question::Limits,
 ) -> Result<(), NoAnswer> {
-    let design = example.read::<Design>()?.normalised();
-    let checked = if quantities.iter().all(|quantity| quantity.needs == Needs::Drive) {
-        CoincidenceDegree.check(&design, limits).map(|_| ())
-    } else {
-        Sweep.check(&design, limits).map(|_| ())
-    };
-    let Err(mut refused) = checked else { return Ok(()) };
+    let Err(mut refused) = check(quantities, example, limits) else { return Ok(()) };
     if refused.code != NoAnswerCode::InvalidDocument {
         refused.errors.retain(|error| is_of_base(template, example, error));
         let Some(error) = refused.errors.first() else { return Ok(()) };
@@ -338,15 +398,29 @@ fn require_possible_base(
     Err(refused)
 }
 
-/// Whether a value is outside its range that every variant has.
+/// Where the relief may begin, the rest of the drive says.
+const OF_THE_DRIVE: [&str; 1] = ["/modification/ring_tip_relief/start_deg"];
+
+/// Whether every variant has a fault: a value outside its range, or values that do not go together.
 fn is_of_base(template: &Template, example: &Tree, error: &FieldError) -> bool {
-    // Where the relief may begin, the rest of the drive says.
-    const OF_THE_DRIVE: [&str; 1] = ["/modification/ring_tip_relief/start_deg"];
     let stands = path(&error.pointer).and_then(|path| example.at(&path));
-    error.code == FieldCode::OutOfRange
-        && matches!(stands, Some(Tree::Number(_)))
-        && !template.is_varied(&error.pointer)
-        && !OF_THE_DRIVE.contains(&error.pointer.as_str())
+    match error.code {
+        FieldCode::OutOfRange => {
+            matches!(stands, Some(Tree::Number(_)))
+                && !template.is_varied(&error.pointer)
+                && !OF_THE_DRIVE.contains(&error.pointer.as_str())
+        }
+        FieldCode::CamNotElongated => !template.varies_within(&["/drive/wave_generator"]),
+        FieldCode::InstalledNoDivisor | FieldCode::GrooveTooTight | FieldCode::FlatTooLong => {
+            !template.varies_within(&["/drive/teeth"])
+        }
+        FieldCode::CamTooSmall
+        | FieldCode::ToothDifference
+        | FieldCode::TeethTouch
+        | FieldCode::NoCarrierAnnulus
+        | FieldCode::BoreLeavesNoFlank => !template.varies_within(&["/drive"]),
+        _ => false,
+    }
 }
 
 /// A chunk as it is worked on, a variant at a time: it may be laid aside between any two of them.

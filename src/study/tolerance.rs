@@ -15,7 +15,7 @@ use crate::random::Stream;
 use crate::rank::{QuantileAnswer, ShareAnswer, quantile, share};
 use crate::rows::{GapAnswer, ReasonAnswer, Rows, RowsPart};
 use crate::table::{Cell, Column, Content, Table};
-use crate::variant::{Asked, Template, Value};
+use crate::variant::{Asked, Domain, Template, Value, Variable};
 
 /// Drives in which one kind of deviation stands alone, for each kind.
 const ALONE: u64 = 1000;
@@ -125,6 +125,11 @@ impl Tolerance {
             kinds.push(Kind { name: pointer.clone(), distribution, place: Place::Number { value: *value } });
         }
         let mut template = Template::new(base, &free, "inputs")?;
+        let counts = template.variables().iter().find(|variable| matches!(variable.domain, Domain::Whole { .. }));
+        if let Some(Variable { pointer, .. }) = counts {
+            let detail = "a whole number does not deviate";
+            return Err(fault(&format!("/inputs/{}", escaped(pointer)), FieldCode::WrongType, detail));
+        }
         // It was read just so.
         let items = match template.examples().next() {
             Some(example) => Items::of(&example.read::<Design>()?),
@@ -133,6 +138,14 @@ impl Tolerance {
         for (name, distribution) in &document.deviations {
             let at = format!("/deviations/{}", escaped(name));
             let path = vec!["deviations".to_owned(), name.clone()];
+            if base.at(&path).is_some() {
+                let detail = "the study draws these: leave them out of the base";
+                return Err(fault(
+                    &format!("/base/deviations/{}", escaped(name)),
+                    FieldCode::ConflictingFields,
+                    detail,
+                ));
+            }
             let place = match name.as_str() {
                 "tooth_radius_um" | "slot_angle_arcsec" | "slot_wall_um" => Place::Items { path, count: items.slots },
                 "ring_space_um" | "ring_space_angle_arcsec" => Place::Items { path, count: items.ring_spaces },

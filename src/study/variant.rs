@@ -87,6 +87,12 @@ impl Template {
                 let detail = format!("`{pointer}` is no JSON pointer into a design document: one begins with `/`");
                 return Err(fault(&at(pointer), FieldCode::UnknownField, detail));
             };
+            let is_below = |(other, _): &&(String, Asked)| is_within(other, pointer) && other != pointer;
+            let has_fields = matches!(base.at(&path), Some(Tree::Object(_) | Tree::Array(_)));
+            if has_fields || free.iter().any(|other| is_below(&other)) {
+                let detail = format!("`{pointer}` is no value but holds fields: name one of these");
+                return Err(fault(&at(pointer), FieldCode::WrongType, detail));
+            }
             let (domain, choices) = match asked {
                 Asked::Range { min, max } => (Domain::Real { min: *min, max: *max }, Vec::new()),
                 Asked::OneOf(choices) => (Domain::OneOf(choices.len()), choices.clone()),
@@ -101,6 +107,10 @@ impl Template {
                     return Err(fault(&format!("{}/one_of", at(pointer)), FieldCode::OutOfRange, detail));
                 }
                 _ => {}
+            }
+            if let Some(twice) = (1..choices.len()).find(|&index| choices[..index].contains(&choices[index])) {
+                let detail = "it is one of the choices already";
+                return Err(fault(&format!("{}/one_of/{twice}", at(pointer)), FieldCode::ConflictingFields, detail));
             }
             variables.push(Variable { pointer: pointer.clone(), path, domain, choices });
         }
@@ -151,6 +161,16 @@ impl Template {
         let derives = self.forms.iter().any(|form| form.derives_ring_teeth);
         self.variables.iter().any(|variable| variable.pointer == pointer)
             || derives && path(pointer).is_some_and(|path| path == RING_TEETH)
+    }
+
+    /// Whether variants may differ in what stands at any of these places or within it.
+    pub(crate) fn varies_within(&self, places: &[&str]) -> bool {
+        let varies = |variable: &&Variable| match variable.domain {
+            Domain::Real { min, max } | Domain::Whole { min, max } => min < max,
+            Domain::OneOf(count) => count > 1,
+        };
+        let is_there = |variable: &Variable| places.iter().any(|place| is_within(&variable.pointer, place));
+        self.variables.iter().filter(varies).any(is_there)
     }
 
     /// The variables that the form takes to which these values lead, one for each variable.
@@ -232,6 +252,13 @@ impl Template {
         self.forms.iter().map(|form| &form.tree)
     }
 
+    /// A document in which a free number has a value, and everything else some value.
+    pub(crate) fn example_at(&self, index: usize, value: f64) -> Option<Tree> {
+        let mut tree = self.forms.iter().find(|form| form.takes[index])?.tree.clone();
+        tree.set(&self.variables[index].path, Tree::Number(value));
+        Some(tree)
+    }
+
     /// Puts the same value at a place in every form.
     pub(crate) fn set(&mut self, place: &[String], value: &Tree) {
         for form in &mut self.forms {
@@ -245,6 +272,11 @@ impl Template {
             form.tree.remove(place);
         }
     }
+}
+
+/// Whether a pointer leads to a place or to what it holds.
+fn is_within(pointer: &str, place: &str) -> bool {
+    pointer.strip_prefix(place).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
 }
 
 impl Form {

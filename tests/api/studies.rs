@@ -162,6 +162,12 @@ async fn what_cannot_be_is_said_at_the_field() {
         let (at, found, _) = begun(&service, &document).await.faulty_field();
         assert_eq!((at.as_str(), found.as_str()), (pointer, code));
     }
+    let search = json!({
+        "study": "search", "base": shortest(), "free": { "/drive/teeth/radius_mm": { "min": 4.0, "max": 5.0 } },
+        "objectives": [{ "quantity": "transmission_ratio", "goal": "max" }]
+    });
+    let (at, found, _) = begun(&service, &search).await.faulty_field();
+    assert_eq!((at.as_str(), found.as_str()), ("/objectives/0/quantity", "unaffected"));
     begun(&service, &json!("map")).await.refused(422, "invalid_document");
     service.post_text("/v1/studies", "{").await.refused(400, "malformed_json");
 }

@@ -83,7 +83,7 @@ class Object(OfDrive):
         self.drive.ToothWidth = 20
         self.document.recompute()
         self.assertAlmostEqual(self.document.Teeth.Shape.BoundBox.ZMax, 20)
-        self.assertEqual((self.cell("A1"), self.cell("A2")), ("Problem", "The document is no design document"))
+        self.assertEqual((self.cell("A1"), self.cell("A2")), ("Problem", "The document has another form than is read here"))
         self.assertTrue(self.cell("A3").startswith("/load: forces need a load"))
         self.assertNotIn("Invalid", self.drive.State)
 

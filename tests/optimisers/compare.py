@@ -1,4 +1,5 @@
-"""Hypervolume over evaluations: the search's own optimiser, NSGA-II of heuropt after a Sobol scan, NSGA-II of pymoo.
+"""Hypervolume over evaluations: the search's own optimiser in its islands, NSGA-II of heuropt after a Sobol scan in as many islands and in one
+population, NSGA-II of pymoo.
 
 Counted is whatever an optimiser has found so far, not only its last population. The hypervolume lies between the front and a corner that is
 fixed below; it is told as a share of that of all fronts together.
@@ -29,7 +30,12 @@ PROBLEMS = {
     "osy": (6, 6, 25_000, (0.0, 80.0)),
     "welded-beam": (4, 4, 25_000, (40.0, 0.016)),
 }
-NAMES = {"own": "differential evolution (own)", "heuropt": "NSGA-II, heuropt, after Sobol", "pymoo": "NSGA-II, pymoo"}
+NAMES = {
+    "own": "the search's, in islands",
+    "heuropt-islands": "NSGA-II of heuropt after Sobol, in islands",
+    "heuropt": "the same, one population",
+    "pymoo": "NSGA-II of pymoo, one population",
+}
 TITLES = {"drive": "ratio 20, 200 N·m, 120 mm", "osy": "OSY", "welded-beam": "welded beam"}
 
 
@@ -125,6 +131,10 @@ def main():
         results[name] = {"corner": corner, "hypervolume_of_all": best, "evaluations": checkpoints, "seeds": list(SEEDS), "shares": {}}
         for which, runs in courses.items():
             shares = runs / best
+            # Islands that ran one after the other have no course in common.
+            if which == "heuropt-islands":
+                results[name]["shares"][which] = [[round(float(run[-1]), 5)] for run in shares]
+                continue
             results[name]["shares"][which] = [[round(float(share), 5) for share in run] for run in shares]
             median = np.median(shares, axis=0)
             line = axis.plot(checkpoints, 1.0 - median, label=NAMES[which])[0]
@@ -141,6 +151,9 @@ def main():
         for at in (result["evaluations"].index(int(0.2 * PROBLEMS[name][2])), -1):
             cells = []
             for which in NAMES:
+                if at != -1 and which == "heuropt-islands":
+                    cells.append("")
+                    continue
                 shares = [run[at] for run in result["shares"][which]]
                 cells.append(f"{np.median(shares):.4f} ({min(shares):.4f} to {max(shares):.4f})")
             lines.append(f"| {TITLES[name]}, {result['evaluations'][at]} | " + " | ".join(cells) + " |")

@@ -275,3 +275,31 @@ fn what_cannot_be_drawn_is_said_at_its_field() {
     let unknown = with(&nothing, "/deviations", json!({ "colour": { "distribution": "uniform", "limit": 1.0 } }));
     assert_eq!(faulty(&unknown), ("/deviations/colour".into(), "unknown_field".into()));
 }
+
+/// Each was carried out, to a yield of nothing.
+#[test]
+fn deviations_of_a_drive_that_cannot_be_or_cannot_have_them_are_refused_before_they_are_drawn() {
+    let spaces = json!({ "ring_space_um": { "distribution": "normal", "sigma": 3.0, "limit": 9.0 } });
+    let drawn = json!({ "study": "tolerance", "base": paper(), "deviations": spaces, "quantities": ["peak_stress_ring_mpa"], "samples": 10 });
+    let mut taking = drawn.clone();
+    taking["base"].as_object_mut().unwrap().remove("model");
+    let moved = json!({ "study": "sensitivity", "base": paper(), "quantities": ["slot_wall_mm"] });
+    let count = json!({ "/drive/teeth/count": { "distribution": "uniform", "limit": 1.0 } });
+    for (document, at, code) in [
+        // The paper's model takes no deviations.
+        (drawn.clone(), "/deviations", "conflicting_fields"),
+        (with(&taking, "/base/drive/teeth/radius_mm", json!(9.0)), "/base/drive/teeth/radius_mm", "teeth_touch"),
+        (with(&moved, "/base/drive/teeth/radius_mm", json!(9.0)), "/base/drive/teeth/radius_mm", "teeth_touch"),
+        (
+            with(&taking, "/base/deviations", json!({ "ring_space_um": [1.0] })),
+            "/base/deviations/ring_space_um",
+            "conflicting_fields",
+        ),
+        (with(&taking, "/inputs", count), "/inputs/~1drive~1teeth~1count", "wrong_type"),
+        (with(&taking, "/quantities", json!(["undercut", "undercut"])), "/quantities/1", "conflicting_fields"),
+        (with(&moved, "/quantities", json!(["undercut", "undercut"])), "/quantities/1", "conflicting_fields"),
+    ] {
+        assert_eq!(faulty(&document), (at.to_owned(), code.to_owned()), "{document}");
+    }
+    crate::asking::study(&taking).unwrap_or_else(|refused| panic!("{refused}"));
+}

@@ -151,3 +151,46 @@ fn of_a_duty_losses_are_those_of_its_sweep_over_all_points() {
     let study = json!({ "study": "map", "base": base, "over": over, "quantities": ["power_loss_w"] });
     assert_eq!(faulty(&study), ("/base/friction".into(), "missing_field".into()));
 }
+
+/// Each was carried out: a column twice, a line twice, or a whole map of drives that cannot be.
+#[test]
+fn a_map_of_which_nothing_can_be_is_refused_before_it_runs() {
+    let radius = |over: Value| map(json!({ "/drive/teeth/radius_mm": over }), json!(["undercut"]));
+    let steps = || radius(json!({ "min": 3.0, "max": 7.0, "steps": 5 }));
+    let of_torque = |base: Value| {
+        let over = json!({ "/load/input_torque_nm": { "min": 10.0, "max": 20.0, "steps": 2 } });
+        json!({ "study": "map", "base": base, "over": over, "quantities": ["peak_force_n"] })
+    };
+    let over = "/over/~1drive~1teeth~1radius_mm";
+    for (document, at, code) in [
+        (
+            with(&steps(), "/quantities", json!(["undercut", "period_deg", "undercut"])),
+            "/quantities/2".to_owned(),
+            "conflicting_fields",
+        ),
+        (radius(json!({ "one_of": [3.0, 3.0] })), format!("{over}/one_of/1"), "conflicting_fields"),
+        (radius(json!({ "min": 4.0, "max": 4.0, "steps": 5 })), format!("{over}/steps"), "out_of_range"),
+        (radius(json!({ "min": -2.0, "max": -1.0, "steps": 3 })), format!("{over}/max"), "out_of_range"),
+        (
+            with(&steps(), "/base/drive/wave_generator/semi_minor_mm", json!(60.0)),
+            "/base/drive/wave_generator/semi_major_mm".to_owned(),
+            "cam_not_elongated",
+        ),
+        (
+            of_torque(with(&paper(), "/drive/teeth/installed", json!(5))),
+            "/base/drive/teeth/installed".to_owned(),
+            "installed_no_divisor",
+        ),
+        (
+            of_torque(with(&paper(), "/drive/teeth/radius_mm", json!(9.0))),
+            "/base/drive/teeth/radius_mm".to_owned(),
+            "teeth_touch",
+        ),
+    ] {
+        assert_eq!(faulty(&document), (at, code.to_owned()), "{document}");
+    }
+    // A single value may be asked for, and teeth that touch at some radii are what a map is for.
+    assert_eq!(numbers(&answer(&radius(json!({ "min": 4.0, "max": 4.0, "steps": 1 })))["possible"]["variant"]), [0.0]);
+    let some = answer(&with(&steps(), "/base/drive/teeth/radius_mm", json!(9.0)));
+    assert_eq!(numbers(&some["possible"]["variant"]).len(), 5);
+}

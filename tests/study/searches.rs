@@ -377,3 +377,126 @@ fn what_cannot_be_searched_is_said_at_its_field() {
         assert_eq!(faulty(&with(&search(), pointer, value)), (at.to_owned(), code.to_owned()), "{pointer}");
     }
 }
+
+/// Each was carried out, to an empty front or to one design that nothing had led to.
+#[test]
+fn a_search_that_nothing_free_can_answer_is_refused_before_it_runs() {
+    let radius = "/free/~1drive~1teeth~1radius_mm";
+    let only = |pointer: &str, range: Value| with(&search(), "/free", json!({ pointer: range }));
+    let requiring = |name: &str, required: Value| with(&search(), "/require", json!({ name: required }));
+    let drawn = with(
+        &requiring("outer_diameter_mm", json!({ "max": 150.0 })),
+        "/base/parts",
+        json!({ "ring": { "outer_radius_mm": 90.0 } }),
+    );
+    let of_friction = with(
+        &requiring("efficiency_ring_fixed", json!({ "min": 1.2 })),
+        "/base/friction",
+        json!({ "wave_generator": { "kind": "plain", "coefficient": 0.05 }, "ring": { "coefficient": 0.05 }, "carrier": { "coefficient": 0.05 } }),
+    );
+    let of_ring = with(&requirements(), "/base/drive", json!({ "ring": { "teeth": 38 } }));
+    let mut others = Vec::new();
+    for (document, at, code) in [
+        (
+            with(&search(), "/objectives/1/quantity", json!("transmission_ratio")),
+            "/objectives/1/quantity",
+            "unaffected",
+        ),
+        (with(&search(), "/objectives/1/quantity", json!("input_torque_nm")), "/objectives/1/quantity", "unaffected"),
+        (
+            only("/profile/chord_tolerance_mm", json!({ "min": 0.001, "max": 0.01 })),
+            "/objectives/0/quantity",
+            "unaffected",
+        ),
+        (only("/sweep/samples", json!({ "min": 10, "max": 20 })), "/objectives/0/quantity", "unaffected"),
+        (only("/drive/teeth/radius_mm", json!({ "min": 4.0, "max": 4.0 })), "/free", "unaffected"),
+        (only("/drive/teeth/radius_mm", json!({ "one_of": [4.0] })), "/free", "unaffected"),
+        (requiring("transmission_ratio", json!({ "min": 20.0 })), "/require/transmission_ratio/min", "unaffected"),
+        (requiring("transmission_ratio", json!({ "max": 10.0 })), "/require/transmission_ratio/max", "unaffected"),
+        (drawn, "/require/outer_diameter_mm/max", "unaffected"),
+        (
+            with(&of_ring, "/require/transmission_ratio", json!({ "min": 29.5, "max": 30.5 })),
+            "/require/transmission_ratio/min",
+            "unaffected",
+        ),
+        (of_friction, "/require/efficiency_ring_fixed/min", "out_of_range"),
+        (requiring("peak_stress_mpa", json!({ "max": -1.0 })), "/require/peak_stress_mpa/max", "out_of_range"),
+        (
+            with(&requirements(), "/require/outer_diameter_mm", json!({ "max": 1e-9 })),
+            "/require/outer_diameter_mm/max",
+            "out_of_range",
+        ),
+        (
+            with(&search(), radius, json!({ "min": -2.0, "max": -1.0 })),
+            "/free/~1drive~1teeth~1radius_mm/max",
+            "out_of_range",
+        ),
+        (
+            with(&search(), radius, json!({ "min": 2e6, "max": 3e6 })),
+            "/free/~1drive~1teeth~1radius_mm/min",
+            "out_of_range",
+        ),
+        (
+            with(&search(), radius, json!({ "one_of": [4.0, 5.0, 4.0] })),
+            "/free/~1drive~1teeth~1radius_mm/one_of/2",
+            "conflicting_fields",
+        ),
+        (only("/drive/teeth", json!({ "min": 4.0, "max": 5.0 })), "/free/~1drive~1teeth", "wrong_type"),
+    ] {
+        let found = faulty(&document);
+        if found != (at.to_owned(), code.to_owned()) {
+            others.push(format!("{at}: {found:?}"));
+        }
+    }
+    assert!(others.is_empty(), "{}", others.join("\n"));
+    // What is kept whatever is free is no fault, nor a range of which a part can be.
+    for document in [
+        requiring("transmission_ratio", json!({ "min": 13.0 })),
+        with(&search(), radius, json!({ "min": -2.0, "max": 5.0 })),
+    ] {
+        crate::asking::study(&document).unwrap_or_else(|refused| panic!("{refused}"));
+    }
+}
+
+/// What a quantity is said to depend on is all that changes it: every other number of a document leaves it as it is.
+#[test]
+fn what_a_quantity_is_not_said_to_depend_on_leaves_it_as_it_is() {
+    let base = json!({
+        "drive": { "wave_generator": { "semi_major_mm": 58.0, "semi_minor_mm": 56.0 }, "teeth": { "count": 28, "radius_mm": 5.0, "width_mm": 15.0 }, "ring": { "teeth": 26 } },
+        "load": { "input_torque_nm": 20.0, "input_speed_rpm": 1000.0, "allowable_stress_mpa": 1500.0 },
+        "materials": { "ring": { "youngs_modulus_gpa": 210.0, "poissons_ratio": 0.3 } },
+        "model": { "clearance": { "ring_um": 5.0 } },
+        "modification": { "slot_wall_um": 1.0 },
+        "friction": { "wave_generator": { "kind": "plain", "coefficient": 0.05 }, "ring": { "coefficient": 0.05 }, "carrier": { "coefficient": 0.05 } },
+        "parts": { "ring": { "clearance_um": 5.0 } },
+        "profile": { "chord_tolerance_mm": 0.001 },
+        "sweep": { "samples": 16 }
+    });
+    for pointer in [
+        "/drive/wave_generator/semi_minor_mm",
+        "/drive/teeth/radius_mm",
+        "/drive/teeth/width_mm",
+        "/load/input_torque_nm",
+        "/load/allowable_stress_mpa",
+        "/materials/ring/youngs_modulus_gpa",
+        "/model/clearance/ring_um",
+        "/modification/slot_wall_um",
+        "/friction/ring/coefficient",
+        "/parts/ring/clearance_um",
+        "/profile/chord_tolerance_mm",
+    ] {
+        let sensitivity = json!({ "study": "sensitivity", "base": base, "inputs": { pointer: { "relative": 0.01 } } });
+        for quantity in answer(&sensitivity)["quantities"].as_array().unwrap() {
+            let name = quantity["quantity"].as_str().unwrap();
+            let changes = quantity["inputs"].as_array().unwrap().iter().any(|input| number(&input["change"]) != 0.0);
+            let search = json!({
+                "study": "search", "base": base, "evaluations": 100, "free": { pointer: { "min": 1e-3, "max": 2e-3 } },
+                "objectives": [{ "quantity": name, "goal": "min" }]
+            });
+            let refused = crate::asking::study(&search).err().and_then(|refused| refused.errors.into_iter().next());
+            let is_unaffected =
+                refused.is_some_and(|error| toothwave_calculation::json::word(&error.code) == "unaffected");
+            assert!(!(changes && is_unaffected), "{pointer} changes {name}");
+        }
+    }
+}

@@ -115,6 +115,7 @@ export const GROUPS = [
     title: 'What it may bear',
     pointer: `${ROOT}/bears`,
     open: true,
+    hint: 'A Hertz stress, without a factor of safety: bearing steel and case-hardened steel bear 1500 MPa (ISO 281, ISO 6336-5), alloy steel of 300 HV some 770.',
     fields: [
       number('allowable_stress_mpa', 'Allowable contact stress', 'σ', 'MPa', { likely: 1500, step: 50 }),
       ...CONTACTS.map(({ key, name }) => number(`allowable_${key}_mpa`, `Lower at the ${name.toLowerCase()}`, '', 'MPa', { optional: () => 'no lower', step: 50 })),

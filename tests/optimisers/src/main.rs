@@ -1,5 +1,5 @@
 //! Optimisers side by side: `optimisers evaluate PROBLEM` answers points of the unit cube, one a line, for others to optimise;
-//! `optimisers own|heuropt PROBLEM EVALUATIONS SEED` optimises itself. Whatever keeps all limits is printed with the number of its evaluation.
+//! `optimisers own|heuropt|heuropt-islands PROBLEM EVALUATIONS SEED` optimises itself. Whatever keeps all limits is printed with the number of its evaluation.
 
 use std::io::{self, BufRead as _, Write as _};
 use std::sync::Mutex;
@@ -180,10 +180,16 @@ impl Counter {
     }
 }
 
+/// As many islands as a search of so many evaluations has.
+const fn islands(evaluations: u64) -> u64 {
+    let islands = evaluations / 6250;
+    if islands > 1 { islands } else { 1 }
+}
+
 /// The islands of a search, a point of each in turn.
 fn own(counter: &Counter, evaluations: u64, seed: u64) {
     let benchmark = counter.benchmark;
-    let islands = (evaluations / 6250).max(1);
+    let islands = islands(evaluations);
     let each = evaluations / islands;
     let island = |island: u64| {
         let plan = Plan {
@@ -292,7 +298,15 @@ fn main() -> io::Result<()> {
         ["heuropt", problem, evaluations, seed] => {
             nsga2_after_sobol(&counter(problem), number(evaluations), number(seed));
         }
-        _ => panic!("optimisers evaluate PROBLEM, or own|heuropt PROBLEM EVALUATIONS SEED"),
+        // One after the other, each with a seed of its own: what they come to at the end tells, and not their course.
+        ["heuropt-islands", problem, evaluations, seed] => {
+            let (counter, evaluations, seed) = (counter(problem), number(evaluations), number(seed));
+            let islands = islands(evaluations);
+            for island in 0..islands {
+                nsga2_after_sobol(&counter, evaluations / islands, 1000 * seed + island);
+            }
+        }
+        _ => panic!("optimisers evaluate PROBLEM, or own|heuropt|heuropt-islands PROBLEM EVALUATIONS SEED"),
     }
     Ok(())
 }
