@@ -512,7 +512,7 @@ async fn the_pieces_that_a_body_arrives_in_are_let_go_as_they_arrive() {
 // --- Studies that are made to be read slowly, to fill the memory, or to break the stack
 
 /// A map of the shortest design with something changed.
-fn map_over(base: &Value, over: Value) -> Question {
+fn map_over(base: &Value, over: &Value) -> Question {
     let quantities = ["coincidence_degree"];
     let study = json!({ "study": "map", "base": base, "over": over, "quantities": quantities });
     Question::post("/v1/studies", study.to_string())
@@ -524,7 +524,7 @@ async fn a_pointer_deeper_than_any_document_is_no_pointer() {
     let deep = "/a".repeat(25_000);
     for pointer in [deep.clone(), format!("/drive/teeth{deep}"), "/a".repeat(129)] {
         for values in [json!({ "min": 1, "max": 2, "steps": 2 }), json!({ "one_of": ["x"] })] {
-            let problem = service.ask(&map_over(&shortest(), json!({ (pointer.as_str()): values }))).await;
+            let problem = service.ask(&map_over(&shortest(), &json!({ (pointer.as_str()): values }))).await;
             let problem = problem.refused(422, "invalid_document");
             assert_eq!(problem["errors"][0]["code"], "unknown_field");
         }
@@ -544,7 +544,7 @@ fn the_values_of_a_map_are_counted_before_they_are_made() {
         .flatten()
         .map(|pointer| (pointer, json!({ "min": 0, "max": 1, "steps": 1_000_000 })))
         .collect();
-    ask_at(process.address, &map_over(&base, over.into())).refused(422, "too_many_variants");
+    ask_at(process.address, &map_over(&base, &over.into())).refused(422, "too_many_variants");
     let most = most_resident_mib(&process);
     assert!(most < 400, "56 million values took {most} MiB");
 }
@@ -556,7 +556,7 @@ async fn of_fields_that_no_kind_has_few_are_left_out_before_one_is_refused() {
     let teeth = base["drive"]["teeth"].as_object_mut().unwrap();
     teeth.extend((0..4000).map(|field| (format!("a{field}"), json!(1))));
     let shapes = vec!["cylinder"; 256];
-    let answer = Service::new().ask(&map_over(&base, json!({ "/drive/teeth/shape": { "one_of": shapes } }))).await;
+    let answer = Service::new().ask(&map_over(&base, &json!({ "/drive/teeth/shape": { "one_of": shapes } }))).await;
     let problem = answer.refused(422, "invalid_document");
     assert_eq!(problem["errors"][0]["code"], "unknown_field");
 }
@@ -567,7 +567,8 @@ async fn the_documents_of_all_choices_may_not_take_more_than_their_bound() {
     let base = with(&shortest(), "/drive/teeth/count", json!(teeth));
     let base = with(&base, "/deviations", json!({ "tooth_radius_um": vec![0; teeth] }));
     let choices: Vec<_> = (0..250).map(|step| 4.0 + 1e-3 * f64::from(step)).collect();
-    let answer = Service::new().ask(&map_over(&base, json!({ "/drive/teeth/radius_mm": { "one_of": choices } }))).await;
+    let answer =
+        Service::new().ask(&map_over(&base, &json!({ "/drive/teeth/radius_mm": { "one_of": choices } }))).await;
     let problem = answer.refused(422, "invalid_document");
     assert_eq!(problem["errors"][0]["pointer"], "/over");
 }
@@ -582,7 +583,7 @@ async fn what_is_kept_of_a_study_counts_with_what_is_asked() {
         let choices: Vec<_> = (0..200).map(|step| 4.0 + 1e-3 * f64::from(step)).collect();
         let base = with(&shortest(), "/load/input_torque_nm", json!(torque_nm));
         let asked =
-            map_over(&base, json!({ "/drive/teeth/radius_mm": { "one_of": choices } })).with("prefer", "wait=600");
+            map_over(&base, &json!({ "/drive/teeth/radius_mm": { "one_of": choices } })).with("prefer", "wait=600");
         let study = service.ask(&asked).await.found();
         places.push(format!("/v1/studies/{}", study["id"].as_str().unwrap()));
     }
@@ -607,7 +608,7 @@ async fn studies_are_read_one_at_a_time_beside_all_else() {
         pool.run_aside(tokio::time::Instant::now() + Duration::from_secs(600), job).await
     });
     has_begun.await.unwrap();
-    let asked = map_over(&shortest(), json!({ "/drive/teeth/radius_mm": { "one_of": [4.0] } }));
+    let asked = map_over(&shortest(), &json!({ "/drive/teeth/radius_mm": { "one_of": [4.0] } }));
     service.ask(&asked).await.refused(503, "deadline_exceeded");
     assert_eq!(service.ask(&live()).await.status, 200);
     release.send(()).unwrap();
