@@ -144,6 +144,10 @@ impl Mesh {
     }
 
     /// `U`.
+    pub(crate) const fn lobe_count(&self) -> u32 {
+        self.lobes
+    }
+
     fn lobes(&self) -> u64 {
         u64::from(self.lobes)
     }
@@ -316,6 +320,11 @@ impl Mesh {
     /// Steps of a whole turn, for a sweep of so many samples.
     pub(crate) const fn steps(&self, samples: Samples) -> u64 {
         samples.0 * self.installed
+    }
+
+    /// How far the phase `Uψ/2` of every tooth moves from one sample to the next.
+    pub(crate) fn phase_step_rad(&self, samples: Samples) -> f64 {
+        0.5 * f64::from(self.lobes) * (2.0 * PI / self.steps(samples) as f64)
     }
 
     /// The position of a tooth at a sample, where it stands between the lobe and the valley behind it; where zones are alike.

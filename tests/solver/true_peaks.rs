@@ -7,6 +7,7 @@ use toothwave_solver::sweep::{Points, SweepPeaks, peaks, sweep_plain};
 use toothwave_solver::{Contact, ContactLaw, DriveParameters, LoadCase, LoadParameters, Never, PerContact, SolveError};
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, everywhere, load};
+use crate::fast::any_drive_of_other_kinds;
 use crate::reference::{Worst, number};
 use crate::tolerances::{designs, of_many_teeth};
 
@@ -134,7 +135,7 @@ proptest! {
 
     #[test]
     fn no_samples_of_any_drive_under_any_law_show_more_than_true_peaks(
-        parameters in any_swept_drive(),
+        parameters in prop_oneof![2 => any_swept_drive(), 1 => any_drive_of_other_kinds()],
         gaps in prop::option::of(prop::array::uniform3(-1.0_f64..2.0)),
         law in prop::sample::select(vec![ContactLaw::Linear, ContactLaw::Palmgren, JOHNSON]),
         torque_exponent in -1.0_f64..2.0,

@@ -36,6 +36,25 @@ impl Harmonic {
         (u - 1.0) * (u + 1.0)
     }
 
+    /// Whether it is the circle off the axis.
+    pub(crate) const fn is_circle(&self) -> bool {
+        self.lobes == 1
+    }
+
+    pub(crate) const fn lobes(&self) -> u32 {
+        self.lobes
+    }
+
+    /// `R0`.
+    pub(crate) const fn mean_radius_mm(&self) -> f64 {
+        self.mean_radius_mm
+    }
+
+    /// `e`.
+    pub(crate) const fn amplitude_mm(&self) -> f64 {
+        self.amplitude_mm
+    }
+
     fn lobe_count(&self) -> f64 {
         f64::from(self.lobes)
     }

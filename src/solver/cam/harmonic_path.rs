@@ -42,7 +42,12 @@ impl HarmonicPath {
         self.mean_radius_mm / (u * u + 1.0)
     }
 
-    fn lobe_count(&self) -> f64 {
+    /// `R`.
+    pub(crate) const fn mean_radius_mm(&self) -> f64 {
+        self.mean_radius_mm
+    }
+
+    pub(crate) fn lobe_count(&self) -> f64 {
         f64::from(self.lobes)
     }
 

@@ -15,6 +15,7 @@
 //! Vectors are four doubles wide where the machine has AVX2, which is found out when the program runs (`pulp`). Eight, with AVX-512, were
 //! 5 % slower on the Xeon that this was measured on.
 
+mod centers;
 mod lanes;
 mod moments;
 mod sharing;
@@ -26,7 +27,7 @@ use std::iter::zip;
 
 use pulp::Simd;
 
-use crate::cam::Cam;
+use crate::cam::{Cam, Ellipse};
 use crate::contact::PerContact;
 use crate::load_sharing::{Compatibility, LoadedDrive};
 use crate::mesh::{Mesh, Samples, TeethInMesh};
@@ -37,6 +38,7 @@ use crate::sweep::points::{Points, Tolerance};
 use crate::sweep::search::{Best, Found, Piece, search};
 use crate::tooth::LineLaw;
 use crate::{SolveError, Stop};
+use centers::{CenterLanes, Centers, EccentricCenters, HarmonicCenters, HarmonicPathCenters};
 use lanes::{LANES, arctangent_terms, arctangents, repeat_each};
 use moments::FastLook;
 use sharing::{Limit, Shared, Sharing, Teeth, Work};
@@ -49,8 +51,7 @@ const MAX_STEPS: u32 = 8;
 /// A relative step this small is the last: the next one would be of its cube, less than the last digit.
 const LAST_STEP: f64 = 5e-6;
 
-/// The sweep and its capacity, given an allowable stress, or nothing where the plain path has to make it: for laws, gaps and wave generators that are
-/// not known here, and for drives beyond the caps.
+/// The sweep and its capacity, given an allowable stress, or nothing where the plain path has to make it: for laws and gaps that are not known here, and for drives beyond the caps.
 ///
 /// # Errors
 /// As [`columns::finished`].
@@ -190,21 +191,113 @@ impl<K: Sink> pulp::WithSimd for Vectorised<'_, K> {
 
 /// The constants of a drive under a load.
 struct Kernel {
-    a: f64,
-    b: f64,
+    shape: Shape,
     r: f64,
     ring_teeth_per_wave: f64,
     teeth_per_wave: f64,
-    difference_of_squares: f64,
     law: Law,
     /// `E*/(π L1)` of each contact.
     hertz: PerContact<f64>,
     /// Terms of the arctangent for the angle on the cam and on the ring.
     cam_terms: usize,
     ring_terms: usize,
-    guess: Guess,
     /// The stress that a torque capacity is asked for, where it does not follow from the peaks.
     allowable_mpa: Option<PerContact<f64>>,
+}
+
+/// What says where the teeth's centres are.
+enum Shape {
+    Ellipse(EllipseShape),
+    Eccentric(EccentricCenters),
+    Harmonic(HarmonicCenters),
+    HarmonicPath(HarmonicPathCenters),
+}
+
+impl Shape {
+    /// With bounds, over all positions, of how far the contact points on cam and ring are off the position, as tangents; of a kind
+    /// that has no columns yet nothing: it goes the plain way.
+    fn new(cam: &Cam, r: f64) -> Option<(Self, PerContact<f64>)> {
+        // On the ring by sin β ≤ 1, from the least distance of a centre.
+        let bounds =
+            |cam: f64, least_center: f64| PerContact { wave_generator: cam, ring: r / least_center, carrier: 0.0 };
+        let off_path = |steepest: f64, least_center: f64| bounds(r * steepest / (least_center - r), least_center);
+        Some(match cam {
+            Cam::Ellipse(cam) => {
+                let shape = EllipseShape::new(cam, r);
+                let EllipseShape { a, b, difference_of_squares, .. } = shape;
+                // By the inequality of the means.
+                let ratio = difference_of_squares * r * a / (2.0 * a * b * ((b * b + r * b) * (a * a + r * b)).sqrt());
+                (Self::Ellipse(shape), bounds(ratio, b + r))
+            }
+            Cam::Harmonic(cam) => {
+                let (path, e) = (cam.mean_radius_mm() + r, cam.amplitude_mm());
+                let shape = if cam.is_circle() {
+                    Self::Eccentric(EccentricCenters::new(cam, r))
+                } else {
+                    Self::Harmonic(HarmonicCenters::new(cam, r))
+                };
+                (shape, off_path(e * f64::from(cam.lobes()) / (path - e), path - e))
+            }
+            Cam::HarmonicPath(cam) => {
+                let (mean, e) = (cam.mean_radius_mm(), cam.amplitude_mm());
+                let steepest = e * cam.lobe_count() / (mean - e);
+                (Self::HarmonicPath(HarmonicPathCenters::new(cam, r)), off_path(steepest, mean - e))
+            }
+        })
+    }
+}
+
+/// The ellipse, of which the support is looked for.
+struct EllipseShape {
+    a: f64,
+    b: f64,
+    r: f64,
+    difference_of_squares: f64,
+    guess: Guess,
+}
+
+impl EllipseShape {
+    fn new(cam: &Ellipse, r: f64) -> Self {
+        let (a, b) = (cam.semi_major_mm(), cam.semi_minor_mm());
+        Self { a, b, r, difference_of_squares: cam.difference_of_squares_mm2(), guess: Guess::new(a, b, r) }
+    }
+
+    /// The support h: the root in [b, a] of sin² (a² + rh)² (h² - b²) - cos² (b² + rh)² (a² - h²), by Halley's method, whose one division
+    /// does what takes Newton's two. Nothing where that is too slow.
+    #[inline(always)]
+    fn supports(&self, sin: &[f64; LANES], cos: &[f64; LANES]) -> Option<[f64; LANES]> {
+        let Self { a, b, r, .. } = *self;
+        let (a2, b2) = (a * a, b * b);
+        let mut support = [0.0; LANES];
+        for i in 0..LANES {
+            let guess = self.guess.at(sin[i], cos[i]);
+            support[i] = if guess > b { guess } else { b };
+        }
+        for _ in 0..MAX_STEPS {
+            let mut largest = [0.0; LANES];
+            for i in 0..LANES {
+                let h = support[i];
+                let (major, minor) = (sin[i] * (a2 + r * h), cos[i] * (b2 + r * h));
+                let (major_slope, minor_slope) = (r * sin[i], r * cos[i]);
+                let (above_b, below_a) = ((h - b) * (h + b), (a - h) * (a + h));
+                let value = major * major * above_b - minor * minor * below_a;
+                // Half the first and half the second derivative.
+                let (major_part, minor_part) = (major_slope * above_b, minor_slope * below_a);
+                let slope = major * (major_part + major * h) + minor * (minor * h - minor_part);
+                let bend = major * (major + 4.0 * h * major_slope)
+                    + major_slope * major_part
+                    + minor * (minor + 4.0 * h * minor_slope)
+                    - minor_slope * minor_part;
+                let step = 2.0 * value * slope / (4.0 * slope * slope - value * bend);
+                support[i] = h - step;
+                largest[i] = step.abs() - LAST_STEP * h;
+            }
+            if largest.iter().all(|&beyond| beyond <= 0.0) {
+                return Some(support);
+            }
+        }
+        None
+    }
 }
 
 /// What a sweep comes to beside what its sink holds.
@@ -323,28 +416,21 @@ impl Kernel {
             Law::Sharing(sharing) => sharing.is_in_proportion(),
         };
         let drive = loaded.drive();
-        // The formulas are those of an ellipse, and one zone stands for both.
-        let Cam::Ellipse(cam) = drive.flank().locus().cam() else { return None };
+        // One zone stands for all.
         if !loaded.mesh().zones_are_alike() {
             return None;
         }
-        let (a, b, r) = (cam.semi_major_mm(), cam.semi_minor_mm(), drive.parameters().tooth_radius_mm);
-        let difference_of_squares = cam.difference_of_squares_mm2();
-        // Bounds of the two ratios over all positions: the first by the inequality of the means, the second by sin β ≤ 1.
-        let cam_ratio = difference_of_squares * r * a / (2.0 * a * b * ((b * b + r * b) * (a * a + r * b)).sqrt());
-        let ring_ratio = r / (b + r);
+        let r = drive.parameters().tooth_radius_mm;
+        let (shape, ratios) = Shape::new(drive.flank().locus().cam(), r)?;
         Some(Self {
-            a,
-            b,
+            shape,
             r,
             ring_teeth_per_wave: drive.flank().teeth_per_wave(),
             teeth_per_wave: drive.teeth_per_wave(),
-            difference_of_squares,
             law,
             hertz: PerContact::of(|contact| loaded.hertz(contact).modulus_per_width_mpa_per_mm()),
-            cam_terms: arctangent_terms(cam_ratio)?,
-            ring_terms: arctangent_terms(ring_ratio)?,
-            guess: Guess::new(a, b, r),
+            cam_terms: arctangent_terms(ratios.wave_generator)?,
+            ring_terms: arctangent_terms(ratios.ring)?,
             allowable_mpa: allowable_mpa.filter(|_| !is_in_proportion),
         })
     }
@@ -378,7 +464,7 @@ impl Kernel {
         let with_work = matches!(self.law, Law::Sharing(_));
         let size = TileSize::of(&mesh, samples, K::COLUMNS, with_work);
         let mut arena = vec![0.0; size.doubles()];
-        let mut tile = Tile::new(&mut arena, &size, 2.0 * PI / mesh.steps(samples) as f64);
+        let mut tile = Tile::new(&mut arena, &size, mesh.phase_step_rad(samples));
         let balance = TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm());
         let mut filled = Filled { torque_balance_residual: 0.0, capacity: None };
         let mut first = 0;
@@ -426,19 +512,31 @@ impl Kernel {
     /// Geometry of all states of a tile, and their forces and stresses for one unit; false where a support takes too many steps.
     #[inline(always)]
     fn unit_loads<K: Sink>(&self, tile: &mut Tile<'_>) -> bool {
-        (0..tile.count.div_ceil(LANES)).all(|chunk| match &self.law {
-            Law::Linear(compliance) => self.unit_states::<K>(*compliance, tile, chunk),
-            Law::Sharing(_) => self.unit_states::<K>(Newton, tile, chunk),
-        })
+        match &self.law {
+            Law::Linear(compliance) => self.loads_of::<K>(*compliance, tile),
+            Law::Sharing(_) => self.loads_of::<K>(Newton, tile),
+        }
+    }
+
+    #[inline(always)]
+    fn loads_of<K: Sink>(&self, unit: impl Unit, tile: &mut Tile<'_>) -> bool {
+        let mut chunks = 0..tile.count.div_ceil(LANES);
+        match &self.shape {
+            Shape::Ellipse(ellipse) => chunks.all(|chunk| self.on_ellipse::<K>(ellipse, unit, tile, chunk)),
+            Shape::Eccentric(centers) => chunks.all(|chunk| self.on_path::<K>(centers, unit, tile, chunk)),
+            Shape::Harmonic(centers) => chunks.all(|chunk| self.on_path::<K>(centers, unit, tile, chunk)),
+            Shape::HarmonicPath(centers) => chunks.all(|chunk| self.on_path::<K>(centers, unit, tile, chunk)),
+        }
     }
 
     /// Geometry of a stretch of states, and their forces and stresses for one unit; false where the support takes too many steps.
     #[inline(always)]
-    fn unit_states<K: Sink>(&self, unit: impl Unit, tile: &mut Tile<'_>, chunk: usize) -> bool {
+    fn on_ellipse<K: Sink>(&self, ellipse: &EllipseShape, unit: impl Unit, tile: &mut Tile<'_>, chunk: usize) -> bool {
         let sin = &tile.sin.as_chunks::<LANES>().0[chunk];
         let cos = &tile.cos.as_chunks::<LANES>().0[chunk];
-        let Some(support) = self.supports(sin, cos) else { return false };
-        let Self { a, b, r, ring_teeth_per_wave: k, difference_of_squares, .. } = *self;
+        let Some(support) = ellipse.supports(sin, cos) else { return false };
+        let EllipseShape { a, b, r, difference_of_squares, .. } = *ellipse;
+        let k = self.ring_teeth_per_wave;
         let cam_force = &mut tile.force.wave_generator.as_chunks_mut::<LANES>().0[chunk];
         let ring_force = &mut tile.force.ring.as_chunks_mut::<LANES>().0[chunk];
         let carrier_force = &mut tile.force.carrier.as_chunks_mut::<LANES>().0[chunk];
@@ -510,59 +608,102 @@ impl Kernel {
             ring_torque[i] = force_k * (d * k * lever * per_e);
             carrier_torque[i] = force_s * d;
         }
-        if !K::COLUMNS {
-            return true;
+        if K::COLUMNS {
+            self.place(tile, chunk, center_radius, cam_ratio, ring_ratio);
         }
-        let from_minor = &tile.from_minor_rad.as_chunks::<LANES>().0[chunk];
+        true
+    }
+
+    /// The same for wave generators that tell where the centres are: `cos γ = 1/V`, `V² = 1 + T²`, and `cos β = 1/W`, `W² = 1 + k²T²`.
+    #[inline(always)]
+    fn on_path<K: Sink>(&self, centers: &impl Centers, unit: impl Unit, tile: &mut Tile<'_>, chunk: usize) -> bool {
+        let sin = &tile.sin.as_chunks::<LANES>().0[chunk];
+        let cos = &tile.cos.as_chunks::<LANES>().0[chunk];
+        let Some(CenterLanes { radius_mm, tan, tan_derivative, cam_curvature_per_mm }) = centers.at(sin, cos) else {
+            return false;
+        };
+        let Self { r, ring_teeth_per_wave: k, .. } = *self;
+        let cam_force = &mut tile.force.wave_generator.as_chunks_mut::<LANES>().0[chunk];
+        let ring_force = &mut tile.force.ring.as_chunks_mut::<LANES>().0[chunk];
+        let carrier_force = &mut tile.force.carrier.as_chunks_mut::<LANES>().0[chunk];
+        let cam_stress = &mut tile.stress.wave_generator.as_chunks_mut::<LANES>().0[chunk];
+        let ring_stress = &mut tile.stress.ring.as_chunks_mut::<LANES>().0[chunk];
+        let carrier_stress = &mut tile.stress.carrier.as_chunks_mut::<LANES>().0[chunk];
+        let cam_torque = &mut tile.torque.wave_generator.as_chunks_mut::<LANES>().0[chunk];
+        let ring_torque = &mut tile.torque.ring.as_chunks_mut::<LANES>().0[chunk];
+        let carrier_torque = &mut tile.torque.carrier.as_chunks_mut::<LANES>().0[chunk];
+
+        let mut cam_ratio = [0.0; LANES];
+        let mut ring_ratio = [0.0; LANES];
+        let tooth_curvature = 1.0 / r;
+        let (ring_hertz, carrier_hertz) = (self.hertz.ring * tooth_curvature, self.hertz.carrier * tooth_curvature);
+        for i in 0..LANES {
+            let (d, tan) = (radius_mm[i], tan[i]);
+            let (ring_tan, v2) = (k * tan, 1.0 + tan * tan);
+            let w2 = 1.0 + ring_tan * ring_tan;
+            let (v, w) = (v2.sqrt(), w2.sqrt());
+            let cos_gamma = 1.0 / v;
+            let above = d * cos_gamma;
+            let lever = above * tan;
+            let (above2, lever2) = (above * above, lever * lever);
+            // The regularity 1 + rκ is this over d W³.
+            let flat = d * (w * w2);
+            let regular = flat + r * (w2 + k * k * tan_derivative[i]);
+            let least = f64::EPSILON * flat;
+            let regular = if regular > least { regular } else { least };
+            let denominator = unit.denominator(above2, lever2);
+            let all = 1.0 / (denominator * regular);
+            let (per_denominator, per_regular) = (all * regular, all * denominator);
+            let force_h = unit.load(lever, per_denominator) * (d * d);
+            let force_k = force_h * (w * cos_gamma);
+            let force_s = force_h * (tan * cos_gamma) * self.teeth_per_wave;
+            cam_force[i] = force_h;
+            ring_force[i] = force_k;
+            carrier_force[i] = force_s;
+            let curvature = tooth_curvature + cam_curvature_per_mm[i];
+            cam_stress[i] = (force_h * (curvature * self.hertz.wave_generator)).sqrt();
+            ring_stress[i] = (force_k * (flat * per_regular) * ring_hertz).sqrt();
+            carrier_stress[i] = (force_s * carrier_hertz).sqrt();
+            cam_torque[i] = force_h * lever;
+            // F_K sin β, with F_K cos β = F_H cos γ.
+            ring_torque[i] = force_h * (cos_gamma * ring_tan) * d;
+            carrier_torque[i] = force_s * d;
+            if K::COLUMNS {
+                // Tangents of the angles that the contact points are off the position.
+                let (cam_below, ring_below) = (d * v - r, d * w + r);
+                let all = r * tan / (cam_below * ring_below);
+                cam_ratio[i] = all * ring_below;
+                ring_ratio[i] = k * all * cam_below;
+            }
+        }
+        if K::COLUMNS {
+            self.place(tile, chunk, radius_mm, cam_ratio, ring_ratio);
+        }
+        true
+    }
+
+    /// Notes where centres and contact points are, these by tangents of the angles by which they are off the position.
+    #[inline(always)]
+    fn place(
+        &self,
+        tile: &mut Tile<'_>,
+        chunk: usize,
+        center_radius: [f64; LANES],
+        mut cam_ratio: [f64; LANES],
+        mut ring_ratio: [f64; LANES],
+    ) {
+        let from_valley = &tile.from_valley_rad.as_chunks::<LANES>().0[chunk];
         let center_radius_mm = &mut tile.center_radius_mm.as_chunks_mut::<LANES>().0[chunk];
         let cam_angle_deg = &mut tile.wave_generator_angle_deg.as_chunks_mut::<LANES>().0[chunk];
         let ring_angle_deg = &mut tile.ring_angle_deg.as_chunks_mut::<LANES>().0[chunk];
         *center_radius_mm = center_radius;
         arctangents(&mut cam_ratio, self.cam_terms);
         arctangents(&mut ring_ratio, self.ring_terms);
-        let (to_degrees, per_k) = (180.0 / PI, 1.0 / k);
+        let (to_degrees, per_k) = (180.0 / PI, 1.0 / self.ring_teeth_per_wave);
         for i in 0..LANES {
-            cam_angle_deg[i] = (from_minor[i] + cam_ratio[i]) * to_degrees;
-            ring_angle_deg[i] = (from_minor[i] * per_k - ring_ratio[i]) * to_degrees;
+            cam_angle_deg[i] = (from_valley[i] + cam_ratio[i]) * to_degrees;
+            ring_angle_deg[i] = (from_valley[i] * per_k - ring_ratio[i]) * to_degrees;
         }
-        true
-    }
-
-    /// The support h: the root in [b, a] of sin² (a² + rh)² (h² - b²) - cos² (b² + rh)² (a² - h²), by Halley's method, whose one division
-    /// does what takes Newton's two. Nothing where that is too slow.
-    #[inline(always)]
-    fn supports(&self, sin: &[f64; LANES], cos: &[f64; LANES]) -> Option<[f64; LANES]> {
-        let Self { a, b, r, .. } = *self;
-        let (a2, b2) = (a * a, b * b);
-        let mut support = [0.0; LANES];
-        for i in 0..LANES {
-            let guess = self.guess.at(sin[i], cos[i]);
-            support[i] = if guess > b { guess } else { b };
-        }
-        for _ in 0..MAX_STEPS {
-            let mut largest = [0.0; LANES];
-            for i in 0..LANES {
-                let h = support[i];
-                let (major, minor) = (sin[i] * (a2 + r * h), cos[i] * (b2 + r * h));
-                let (major_slope, minor_slope) = (r * sin[i], r * cos[i]);
-                let (above_b, below_a) = ((h - b) * (h + b), (a - h) * (a + h));
-                let value = major * major * above_b - minor * minor * below_a;
-                // Half the first and half the second derivative.
-                let (major_part, minor_part) = (major_slope * above_b, minor_slope * below_a);
-                let slope = major * (major_part + major * h) + minor * (minor * h - minor_part);
-                let bend = major * (major + 4.0 * h * major_slope)
-                    + major_slope * major_part
-                    + minor * (minor + 4.0 * h * minor_slope)
-                    - minor_slope * minor_part;
-                let step = 2.0 * value * slope / (4.0 * slope * slope - value * bend);
-                support[i] = h - step;
-                largest[i] = step.abs() - LAST_STEP * h;
-            }
-            if largest.iter().all(|&beyond| beyond <= 0.0) {
-                return Some(support);
-            }
-        }
-        None
     }
 
     /// Turns the wave generator at each input angle of a tile until the unit loads of its teeth balance the torque.

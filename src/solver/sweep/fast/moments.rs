@@ -53,7 +53,7 @@ impl Bases {
             if index < near_lobe { piece.position(mesh, place, piece.end) } else { at_start(place) }
         });
         let (sin, cos) = positions.map(|position| (position.phase_sin, position.phase_cos)).unzip();
-        let phase_rad = mesh.spacing_deg().to_radians();
+        let phase_rad = 0.5 * f64::from(mesh.lobe_count()) * mesh.spacing_deg().to_radians();
         Self { piece, near_lobe, sin, cos, phase_rad }
     }
 

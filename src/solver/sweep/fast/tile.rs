@@ -1,6 +1,6 @@
 //! Tiles: the columns of the states of a few input angles, small enough to stay in the first-level cache, and where their teeth stand.
 
-use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use std::iter::zip;
 use std::ops::Range;
 
@@ -61,9 +61,11 @@ pub(super) struct Run {
     /// Samples of a tile: equally many, but for the last.
     pub(super) rows: usize,
     mesh: Mesh,
+    /// Of the phase.
     step_rad: f64,
     /// Steps of a whole turn.
     steps: f64,
+    lobes: f64,
 }
 
 impl Run {
@@ -73,7 +75,16 @@ impl Run {
         let teeth = whole(*mesh.teeth_at(first, of).end());
         let count = whole(samples.end - samples.start);
         let rows = count.div_ceil(count.div_ceil((TILE / teeth).max(1)));
-        Self { samples, of, teeth, rows, mesh: *mesh, step_rad: 2.0 * PI / steps, steps }
+        Self {
+            samples,
+            of,
+            teeth,
+            rows,
+            mesh: *mesh,
+            step_rad: mesh.phase_step_rad(of),
+            steps,
+            lobes: f64::from(mesh.lobe_count()),
+        }
     }
 
     /// Lays the pattern of its tiles.
@@ -119,12 +130,14 @@ impl Run {
             cos[i] = pattern_cos[i] * turn_cos + pattern_sin[i] * turn_sin;
         }
         if !tile.position_deg.is_empty() {
-            let (position_deg, from_minor_rad) = (&mut tile.position_deg[..len], &mut tile.from_minor_rad[..len]);
-            let (steps, quarter_step_rad) = (self.steps, FRAC_PI_2 / self.steps);
+            let (position_deg, from_valley_rad) = (&mut tile.position_deg[..len], &mut tile.from_valley_rad[..len]);
+            let Self { steps, lobes, .. } = *self;
+            // π/U - ψ.
+            let valley_step_rad = PI / lobes / steps;
             for i in 0..len {
                 let step = pattern_step[i] - passed;
                 position_deg[i] = 360.0 * step / steps;
-                from_minor_rad[i] = (steps - 4.0 * step) * quarter_step_rad;
+                from_valley_rad[i] = (steps - 2.0 * lobes * step) * valley_step_rad;
             }
         }
         (tile.passed, tile.steps) = (passed, self.steps);
@@ -201,7 +214,7 @@ pub(super) struct Tile<'a> {
     pub(super) pattern_step: &'a mut [f64],
     pub(super) sin: &'a mut [f64],
     pub(super) cos: &'a mut [f64],
-    pub(super) from_minor_rad: &'a mut [f64],
+    pub(super) from_valley_rad: &'a mut [f64],
     pub(super) input_angle_deg: &'a mut [f64],
     pub(super) position_deg: &'a mut [f64],
     pub(super) center_radius_mm: &'a mut [f64],
@@ -245,7 +258,7 @@ impl<'a> Tile<'a> {
         let row_stiffness = slice(rows);
         let work = if with_work { Work::new(&mut slice, len, rows) } else { Work::new(&mut slice, 0, 0) };
         let of_columns = if with_columns { len } else { 0 };
-        let (from_minor_rad, position_deg) = (slice(of_columns), slice(of_columns));
+        let (from_valley_rad, position_deg) = (slice(of_columns), slice(of_columns));
         let (input_angle_deg, center_radius_mm) = (slice(of_columns), slice(of_columns));
         let (wave_generator_angle_deg, ring_angle_deg) = (slice(of_columns), slice(of_columns));
         let mut column = || slice(len);
@@ -265,7 +278,7 @@ impl<'a> Tile<'a> {
             pattern_step: column(),
             sin: column(),
             cos: column(),
-            from_minor_rad,
+            from_valley_rad,
             input_angle_deg,
             position_deg,
             center_radius_mm,

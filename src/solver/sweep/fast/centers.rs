@@ -1,0 +1,220 @@
+//! Wave generators other than ellipses: mesh and load follow from `d`, `T` and `T_ψ` of the teeth's centres alone (docs/theory.md sections 2.9 and 3).
+
+use super::lanes::LANES;
+use crate::cam::{Harmonic, HarmonicPath};
+
+/// Newton's steps towards a normal at most. A drive that needs more goes the plain way.
+const MAX_STEPS: u32 = 8;
+
+/// A relative step this small is the last: the next one would be of its square.
+const LAST_STEP: f64 = 1e-9;
+
+/// Where the centres of a stretch of teeth stand.
+pub(super) struct CenterLanes {
+    /// `d`.
+    pub(super) radius_mm: [f64; LANES],
+    /// `T = tan γ`.
+    pub(super) tan: [f64; LANES],
+    /// `T_ψ`.
+    pub(super) tan_derivative: [f64; LANES],
+    /// `1/ρ_H`.
+    pub(super) cam_curvature_per_mm: [f64; LANES],
+}
+
+impl CenterLanes {
+    #[inline(always)]
+    fn new() -> Self {
+        Self {
+            radius_mm: [0.0; LANES],
+            tan: [0.0; LANES],
+            tan_derivative: [0.0; LANES],
+            cam_curvature_per_mm: [0.0; LANES],
+        }
+    }
+}
+
+/// What tells the centres from the sines and the cosines of the phases `Uψ/2`.
+pub(super) trait Centers {
+    /// Nothing where that takes too many steps.
+    fn at(&self, sin: &[f64; LANES], cos: &[f64; LANES]) -> Option<CenterLanes>;
+}
+
+/// The circle of radius `R0` about a point e beside the axis: the centres run on the circle of radius `P0 = R0 + r` about it.
+pub(super) struct EccentricCenters {
+    path_mm: f64,
+    eccentricity_mm: f64,
+    curvature_per_mm: f64,
+}
+
+impl EccentricCenters {
+    /// Of the harmonic support with one lobe.
+    pub(super) fn new(cam: &Harmonic, tooth_radius_mm: f64) -> Self {
+        Self {
+            path_mm: cam.mean_radius_mm() + tooth_radius_mm,
+            eccentricity_mm: cam.amplitude_mm(),
+            curvature_per_mm: 1.0 / cam.mean_radius_mm(),
+        }
+    }
+}
+
+impl Centers for EccentricCenters {
+    /// With `w = √(P0² - e² sin²ψ)`, the centre's distance from that point along the position: `d = w + e cos ψ`, `T = e sin ψ/w`,
+    /// `T_ψ = e cos ψ P0²/w³`.
+    #[inline(always)]
+    fn at(&self, sin: &[f64; LANES], cos: &[f64; LANES]) -> Option<CenterLanes> {
+        let Self { path_mm, eccentricity_mm: e, curvature_per_mm } = *self;
+        let mut lanes = CenterLanes::new();
+        for i in 0..LANES {
+            let (along, across) = (e * (cos[i] * cos[i] - sin[i] * sin[i]), e * (2.0 * (sin[i] * cos[i])));
+            let w = ((path_mm - across) * (path_mm + across)).sqrt();
+            let per_w = 1.0 / w;
+            let path = path_mm * per_w;
+            lanes.radius_mm[i] = w + along;
+            lanes.tan[i] = across * per_w;
+            lanes.tan_derivative[i] = along * per_w * (path * path);
+            lanes.cam_curvature_per_mm[i] = curvature_per_mm;
+        }
+        Some(lanes)
+    }
+}
+
+/// The path `d = R + e cos Uψ`.
+pub(super) struct HarmonicPathCenters {
+    mean_radius_mm: f64,
+    /// `e`, `eU` and `eU²`.
+    amplitude_mm: f64,
+    slope_mm: f64,
+    bend_mm: f64,
+    tooth_radius_mm: f64,
+}
+
+impl HarmonicPathCenters {
+    pub(super) fn new(cam: &HarmonicPath, tooth_radius_mm: f64) -> Self {
+        let (amplitude_mm, u) = (cam.amplitude_mm(), cam.lobe_count());
+        Self {
+            mean_radius_mm: cam.mean_radius_mm(),
+            amplitude_mm,
+            slope_mm: amplitude_mm * u,
+            bend_mm: amplitude_mm * u * u,
+            tooth_radius_mm,
+        }
+    }
+}
+
+impl Centers for HarmonicPathCenters {
+    /// `T = eU sin(Uψ)/d`, `T_ψ = eU² cos(Uψ)/d + T²`, and the path's curvature `κ_C = (1 + T² + T_ψ)/(d (1 + T²)^1.5)`, of which the two parts make
+    /// `1/ρ_H = κ_C/(1 - rκ_C)` too.
+    #[inline(always)]
+    fn at(&self, sin: &[f64; LANES], cos: &[f64; LANES]) -> Option<CenterLanes> {
+        let Self { mean_radius_mm, amplitude_mm, slope_mm, bend_mm, tooth_radius_mm } = *self;
+        let mut lanes = CenterLanes::new();
+        for i in 0..LANES {
+            let (cos_of_lobe, sin_of_lobe) = (cos[i] * cos[i] - sin[i] * sin[i], 2.0 * (sin[i] * cos[i]));
+            let radius_mm = mean_radius_mm + amplitude_mm * cos_of_lobe;
+            let per_radius = 1.0 / radius_mm;
+            let tan = slope_mm * sin_of_lobe * per_radius;
+            let tan_derivative = bend_mm * cos_of_lobe * per_radius + tan * tan;
+            let square = 1.0 + tan * tan;
+            let (above, below) = (square + tan_derivative, radius_mm * (square * square.sqrt()));
+            lanes.radius_mm[i] = radius_mm;
+            lanes.tan[i] = tan;
+            lanes.tan_derivative[i] = tan_derivative;
+            lanes.cam_curvature_per_mm[i] = above / (below - tooth_radius_mm * above);
+        }
+        Some(lanes)
+    }
+}
+
+/// The support `h = R0 + e cos Uφ` with two lobes or more, of which the normal `φ = ψ + γ` is looked for.
+pub(super) struct HarmonicCenters {
+    lobes: u32,
+    mean_radius_mm: f64,
+    amplitude_mm: f64,
+    tooth_radius_mm: f64,
+}
+
+impl HarmonicCenters {
+    pub(super) fn new(cam: &Harmonic, tooth_radius_mm: f64) -> Self {
+        Self {
+            lobes: cam.lobes(),
+            mean_radius_mm: cam.mean_radius_mm(),
+            amplitude_mm: cam.amplitude_mm(),
+            tooth_radius_mm,
+        }
+    }
+
+    /// `sin Uφ` and `cos Uφ`, from those of `Uψ` and from `tan γ`: `cos γ + i sin γ` to the power of U.
+    #[inline(always)]
+    fn phases(&self, of_lobe: &[[f64; LANES]; 2], tan: &[f64; LANES]) -> [[f64; LANES]; 2] {
+        let (mut cos_gamma, mut sin_gamma) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            cos_gamma[i] = 1.0 / (1.0 + tan[i] * tan[i]).sqrt();
+            sin_gamma[i] = tan[i] * cos_gamma[i];
+        }
+        let [mut sin, mut cos] = *of_lobe;
+        for _ in 0..self.lobes {
+            for i in 0..LANES {
+                let (s, c) = (sin[i], cos[i]);
+                sin[i] = s * cos_gamma[i] + c * sin_gamma[i];
+                cos[i] = c * cos_gamma[i] - s * sin_gamma[i];
+            }
+        }
+        [sin, cos]
+    }
+}
+
+impl Centers for HarmonicCenters {
+    /// Newton's method for `T (P0 + e cos Uφ) = eU sin Uφ`; then `ρ_H = R0 - e(U² - 1) cos Uφ` and `T_ψ = (1 + T²)(T h' - h'')/(r + ρ_H)`.
+    #[inline(always)]
+    fn at(&self, sin: &[f64; LANES], cos: &[f64; LANES]) -> Option<CenterLanes> {
+        let Self { mean_radius_mm, amplitude_mm: e, tooth_radius_mm: r, .. } = *self;
+        let u = f64::from(self.lobes);
+        let path_mm = mean_radius_mm + r;
+        let (mut of_lobe_sin, mut of_lobe_cos) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            of_lobe_sin[i] = 2.0 * (sin[i] * cos[i]);
+            of_lobe_cos[i] = cos[i] * cos[i] - sin[i] * sin[i];
+        }
+        let of_lobe = [of_lobe_sin, of_lobe_cos];
+        let mut lanes = CenterLanes::new();
+        let mut is_found = false;
+        // The first step is from γ = 0.
+        let mut phases = of_lobe;
+        for _ in 0..MAX_STEPS {
+            let mut largest = [0.0; LANES];
+            let [sin, cos] = &phases;
+            for i in 0..LANES {
+                let (tan, above, lever) = (lanes.tan[i], path_mm + e * cos[i], e * u * sin[i]);
+                let square = 1.0 + tan * tan;
+                // Both sides times what their difference's derivative is divided by.
+                let value = (tan * above - lever) * square;
+                let slope = above * square - (tan * lever + e * u * u * cos[i]);
+                let step = value / slope;
+                lanes.tan[i] = tan - step;
+                // Lanes beyond the last tooth may stand anywhere.
+                largest[i] = step.abs() - LAST_STEP * lanes.tan[i].abs();
+            }
+            phases = self.phases(&of_lobe, &lanes.tan);
+            is_found = largest.iter().all(|&beyond| beyond <= 0.0);
+            if is_found {
+                break;
+            }
+        }
+        if !is_found {
+            return None;
+        }
+        let [sin, cos] = &phases;
+        for i in 0..LANES {
+            let (lever, along) = (e * u * sin[i], e * cos[i]);
+            let above = path_mm + along;
+            let tan = lever / above;
+            let curvature_radius_mm = mean_radius_mm - (u * u - 1.0) * along;
+            let all = 1.0 / (curvature_radius_mm * (r + curvature_radius_mm));
+            lanes.radius_mm[i] = (above * above + lever * lever).sqrt();
+            lanes.tan[i] = tan;
+            lanes.tan_derivative[i] = (1.0 + tan * tan) * (tan * lever + u * u * along) * (all * curvature_radius_mm);
+            lanes.cam_curvature_per_mm[i] = all * (r + curvature_radius_mm);
+        }
+        Some(lanes)
+    }
+}
