@@ -152,6 +152,17 @@ impl Tree {
         if rest.is_empty() { Some(fields.remove(index).1) } else { fields[index].1.remove(rest) }
     }
 
+    /// About what the tree takes in memory.
+    pub fn bytes(&self) -> usize {
+        let below: usize = match self {
+            Self::Null | Self::Bool(_) | Self::Number(_) => 0,
+            Self::Text(text) => text.len(),
+            Self::Array(items) => items.iter().map(Self::bytes).sum(),
+            Self::Object(fields) => fields.iter().map(|(name, value)| FIELD_BYTES + name.len() + value.bytes()).sum(),
+        };
+        size_of::<Self>() + below
+    }
+
     /// The same with the fields of every object by name, so that equal trees are equal bytes.
     pub fn sorted(mut self) -> Self {
         match &mut self {
@@ -185,9 +196,18 @@ impl Serialize for Tree {
     }
 }
 
-/// The names that a JSON pointer (RFC 6901) goes through; none where it is no pointer.
+/// What a field's name takes beside its letters: the string itself, and what its allocation costs.
+const FIELD_BYTES: usize = size_of::<String>() + 16;
+
+/// As deep as JSON is read: what walks through a tree does so level by level on its stack.
+const MOST_LEVELS: usize = 128;
+
+/// The names that a JSON pointer (RFC 6901) goes through; none where it is no pointer, or leads deeper than any document is.
 pub fn path(pointer: &str) -> Option<Vec<String>> {
     let names = pointer.strip_prefix('/')?.split('/');
+    if names.clone().nth(MOST_LEVELS).is_some() {
+        return None;
+    }
     Some(names.map(|name| name.replace("~1", "/").replace("~0", "~")).collect())
 }
 

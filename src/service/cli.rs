@@ -259,7 +259,7 @@ fn run_service(settings: &Settings) -> Result<(), Failure> {
     // A solve beyond its bound must not hold up the exit.
     runtime.shutdown_background();
     log::flush();
-    result.map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", settings.listen)).into())
+    Ok(result?)
 }
 
 /// The database that the settings name: a file would be one process's alone.

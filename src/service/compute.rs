@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use metrics::{counter, histogram};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tracing::Span;
@@ -29,6 +29,8 @@ pub struct Pool {
     turns: Arc<Semaphore>,
     /// One for each batch that runs.
     batches: Arc<Semaphore>,
+    /// One: for what is neither a solve nor short.
+    aside: Arc<Semaphore>,
     /// Cancelled when the service stops and has no time left.
     closed: CancellationToken,
     limits: Limits,
@@ -67,6 +69,7 @@ impl Pool {
             places: Arc::new(Semaphore::new(limits.max_concurrent_solves + limits.max_queued_solves)),
             turns: Arc::new(Semaphore::new(limits.max_concurrent_solves)),
             batches: Arc::new(Semaphore::new(limits.max_concurrent_batches)),
+            aside: Arc::new(Semaphore::new(1)),
             closed: CancellationToken::new(),
             limits,
         }
@@ -171,6 +174,29 @@ impl Pool {
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
         self.within(self.deadline(), self.run_holding(turn, Thread::Blocking, job)).await
+    }
+
+    /// Runs what is no solve, and may yet take too long for the executor, on a thread of its own, one at a time: it waits for no solve.
+    ///
+    /// # Errors
+    /// `deadline_exceeded` when the time is over, `internal_error` where the job panicked, and whatever it returns.
+    pub async fn run_aside<T: Send + 'static>(
+        &self,
+        deadline: Instant,
+        job: impl FnOnce() -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let running = async {
+            let turn = Arc::clone(&self.aside).acquire_owned().await.map_err(|error| Problem::internal(&error))?;
+            let (tell, told) = oneshot::channel();
+            let work = move || {
+                let _held = turn;
+                // Whoever asked may have left.
+                let _ = tell.send(caught(job));
+            };
+            std::thread::Builder::new().name("aside".into()).spawn(work).map_err(|error| Problem::internal(&error))?;
+            told.await.unwrap_or_else(|error| Err(Problem::internal(&error)))
+        };
+        self.within(deadline, running).await
     }
 
     async fn run_holding<T: Send + 'static>(

@@ -10,7 +10,7 @@ use toothwave_store::NewStudy;
 use toothwave_study::{Limits, Part, Study, Work};
 
 use crate::compute::{Pool, SLICE};
-use crate::problem::Problem;
+use crate::problem::{Problem, ProblemCode};
 
 /// What a chunk should take: long against what it costs to claim and to keep one, short against what a worker's end loses.
 const CHUNK: Duration = Duration::from_secs(1);
@@ -89,11 +89,29 @@ pub async fn freeze(
     })
 }
 
-/// The study that was frozen.
+impl NotHere {
+    /// The problem of whoever asks for the study by its id.
+    pub fn told(&self, id: &str) -> Problem {
+        match self {
+            Self::Unreadable(_) => Problem::internal(self),
+            // The same question is another study here.
+            Self::OtherBuild { .. } | Self::OtherArithmetic | Self::OtherBits => {
+                Problem::new(ProblemCode::NotFound, format!("no study `{id}` is known here: {self}; ask for it again"))
+            }
+        }
+    }
+}
+
+/// The study that was frozen, or why it is none here.
 ///
 /// # Errors
-/// Where it is another build's or another kind of processor's.
-pub fn thaw(frozen: &NewStudy) -> Result<Arc<Study>, NotHere> {
+/// Where reading it takes too long.
+pub async fn thaw(pool: &Pool, frozen: &NewStudy) -> Result<Result<Arc<Study>, NotHere>, Problem> {
+    let frozen = frozen.clone();
+    pool.run_aside(pool.deadline(), move || Ok(thawed(&frozen))).await
+}
+
+fn thawed(frozen: &NewStudy) -> Result<Arc<Study>, NotHere> {
     if frozen.build != BUILD {
         return Err(NotHere::OtherBuild { theirs: frozen.build.clone() });
     }

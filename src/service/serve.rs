@@ -68,7 +68,9 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>) -> io::Result
         None if settings.replicas == 1 => Keeping::Memory,
         _ => Keeping::Nowhere,
     };
-    let listener = TcpListener::bind(settings.listen).await?;
+    let listener = TcpListener::bind(settings.listen)
+        .await
+        .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", settings.listen)))?;
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
     let mut hang_up = signal(SignalKind::hangup())?;
     let mut told_to_stop = async || {

@@ -104,6 +104,7 @@ pub struct Kept {
     /// Of a stored study: whether somebody looks how it stands while it runs, and one look at a time.
     is_followed: AtomicBool,
     looking: tokio::sync::Mutex<()>,
+    kept_bytes: u64,
     _room: Reserved,
 }
 
@@ -164,7 +165,9 @@ impl Kept {
 
     /// What it has come to.
     pub fn answer(&self) -> StudyAnswer {
-        self.gathered.lock().answer()
+        // Of a large study that takes long, and whoever adds to it must not wait meanwhile.
+        let gathered = self.gathered.lock().clone();
+        gathered.answer()
     }
 
     /// About what it takes to keep what it comes to.
@@ -194,6 +197,7 @@ impl Kept {
         Arc::new(Self {
             id: study.id().to_string(),
             gathered: Mutex::new(Gathered::new(&study)),
+            kept_bytes: study.kept_bytes(),
             study,
             looked_at: AtomicU64::new(0),
             impossible: AtomicU64::new(0),
@@ -334,10 +338,10 @@ impl Studies {
         let kept = match known {
             Some(kept) => kept,
             None => {
-                let study = frozen::thaw(frozen).map_err(|reason| Problem::internal(&reason))?;
+                let study = frozen::thaw(&self.pool, frozen).await?.map_err(|reason| reason.told(&frozen.id))?;
                 let mut all = self.kept.lock();
                 all.retain(|kept| kept.id != frozen.id);
-                let reserved = self.make_room(&mut all, study.stored_bytes())?;
+                let reserved = self.make_room(&mut all, study.kept_bytes())?;
                 let kept = Kept::new(study, reserved);
                 all.push_back(Arc::clone(&kept));
                 kept
@@ -416,7 +420,7 @@ impl Studies {
         let kept = match known {
             Some(kept) => kept,
             None => {
-                let reserved = self.make_room(&mut all, study.stored_bytes())?;
+                let reserved = self.make_room(&mut all, study.kept_bytes())?;
                 let kept = Kept::new(Arc::new(study), reserved);
                 all.push_back(Arc::clone(&kept));
                 kept
@@ -430,7 +434,7 @@ impl Studies {
     /// Room for what a study comes to: the oldest that do not run are forgotten for it.
     fn make_room(&self, all: &mut VecDeque<Arc<Kept>>, bytes: u64) -> Result<Reserved, Problem> {
         loop {
-            let stored: u64 = all.iter().map(|kept| kept.stored_bytes()).sum();
+            let stored: u64 = all.iter().map(|kept| kept.kept_bytes).sum();
             let reserved = if stored + bytes > self.limits.max_study_bytes {
                 let detail = format!(
                     "the study takes {bytes} bytes: with those that run more than the {} of `max_study_bytes`; try again when one of them is done",

@@ -161,7 +161,7 @@ impl Workers {
 
     async fn admitted(&self, task: &Waiting) -> Result<Option<Known>, Problem> {
         let Some(standing) = self.store.find(&task.id).await? else { return Ok(None) };
-        let study = match frozen::thaw(&standing.study) {
+        let study = match frozen::thaw(&self.pool, &standing.study).await? {
             Ok(study) => study,
             Err(reason) => return Ok(Some(Err(reason))),
         };

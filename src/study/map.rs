@@ -24,7 +24,43 @@ pub(crate) struct Map {
 #[derive(Debug, Clone)]
 struct Axis {
     variable: Variable,
-    values: Vec<Value>,
+    values: Values,
+}
+
+/// The values of an axis, each made when it is wanted: there may be a million on every one of hundreds of axes before anybody has counted
+/// their combinations.
+#[derive(Debug, Clone, Copy)]
+enum Values {
+    /// A choice of so many.
+    Choices(u32),
+    /// So many whole numbers, one after the other.
+    Whole { min: f64, count: u32 },
+    /// So many values, equally far apart, both ends among them.
+    Steps { min: f64, max: f64, steps: u32 },
+}
+
+impl Values {
+    const fn count(&self) -> u32 {
+        match *self {
+            Self::Choices(count) | Self::Whole { count, .. } | Self::Steps { steps: count, .. } => count,
+        }
+    }
+
+    fn at(&self, index: u32) -> Value {
+        match *self {
+            Self::Choices(_) => Value::Choice(index as usize),
+            Self::Whole { min, .. } => Value::Number(min + f64::from(index)),
+            Self::Steps { min, max, steps } => {
+                let share = f64::from(index) / (f64::from(steps) - 1.0).max(1.0);
+                // Both ends are met exactly.
+                Value::Number(if index + 1 == steps && index > 0 { max } else { min + share * (max - min) })
+            }
+        }
+    }
+
+    fn all(&self) -> impl Iterator<Item = Value> {
+        (0..self.count()).map(|index| self.at(index))
+    }
 }
 
 /// What `min` and `max` or `one_of` say.
@@ -62,7 +98,7 @@ impl Map {
 
     /// Variants of the grid; none where there are more than can be counted.
     pub(crate) fn variants(&self) -> Option<u64> {
-        self.axes.iter().try_fold(1_u64, |product, axis| product.checked_mul(axis.values.len() as u64))
+        self.axes.iter().try_fold(1_u64, |product, axis| product.checked_mul(u64::from(axis.values.count())))
     }
 
     fn values(&self, mut variant: u64) -> Vec<Value> {
@@ -71,9 +107,9 @@ impl Map {
             .iter()
             .rev()
             .map(|axis| {
-                let count = axis.values.len() as u64;
+                let count = u64::from(axis.values.count());
                 // Below the number of the axis' values.
-                let value = axis.values[usize::try_from(variant % count).unwrap_or_default()];
+                let value = axis.values.at(u32::try_from(variant % count).unwrap_or_default());
                 variant /= count;
                 value
             })
@@ -100,7 +136,8 @@ impl Axis {
                 let detail = "`steps` are of a range, and `one_of` names the values";
                 return Err(fault(&at, FieldCode::ConflictingFields, detail));
             }
-            (Domain::OneOf(count), None) => (0..*count).map(Value::Choice).collect(),
+            // As many as one document names.
+            (Domain::OneOf(count), None) => Values::Choices(u32::try_from(*count).unwrap_or(u32::MAX)),
             (Domain::Real { .. }, None) => {
                 return Err(fault(
                     &at,
@@ -114,34 +151,32 @@ impl Axis {
                     let detail = format!("the range has {all:?} whole numbers, more than {MOST_STEPS:?}");
                     return Err(beyond(&at, FieldCode::OutOfRange, detail, all, MOST_STEPS));
                 }
-                (0..count(all)).map(|step| Value::Number(min + f64::from(step))).collect()
+                Values::Whole { min: *min, count: count(all) }
             }
             (Domain::Real { min, max } | Domain::Whole { min, max }, Some(steps)) if min >= max && steps > 1.0 => {
                 let detail = format!("the range holds one value, {min:?}, and not {steps:?}");
                 return Err(beyond(&format!("{at}/steps"), FieldCode::OutOfRange, detail, steps, 1.0));
             }
             (Domain::Real { min, max } | Domain::Whole { min, max }, Some(steps)) => {
-                let intervals = (steps - 1.0).max(1.0);
-                let at_step = |step: u32| {
-                    let share = f64::from(step) / intervals;
-                    // Both ends are met exactly.
-                    if step + 1 == count(steps) && step > 0 { *max } else { min + share * (max - min) }
+                let values = Values::Steps { min: *min, max: *max, steps: count(steps) };
+                let fraction = |value| match value {
+                    Value::Number(number) => Some(number).filter(|number| number.fract() != 0.0),
+                    Value::Choice(_) => None,
                 };
-                let values: Vec<f64> = (0..count(steps)).map(at_step).collect();
                 if matches!(variable.domain, Domain::Whole { .. })
-                    && let Some(value) = values.iter().find(|value| value.fract() != 0.0)
+                    && let Some(value) = values.all().find_map(fraction)
                 {
                     let detail = format!("a whole number is wanted here, and these steps come to {value:?}");
                     return Err(fault(&format!("{at}/steps"), FieldCode::WrongType, detail));
                 }
-                values.into_iter().map(Value::Number).collect()
+                values
             }
         };
         Ok(Self { variable: variable.clone(), values })
     }
 
     fn answer(&self) -> AxisAnswer {
-        let trees: Vec<_> = self.values.iter().map(|&value| self.variable.spelled(value)).collect();
+        let trees: Vec<_> = self.values.all().map(|value| self.variable.spelled(value)).collect();
         let numbers: Option<Vec<_>> = trees
             .iter()
             .map(|tree| match tree {

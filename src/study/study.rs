@@ -160,10 +160,10 @@ impl Study {
             return Err(refused);
         }
         #[expect(clippy::cast_precision_loss, reason = "told, not computed with")]
-        if study.stored_bytes() > limits.max_study_bytes {
-            let (bytes, limit) = (study.stored_bytes(), limits.max_study_bytes);
+        if study.kept_bytes() > limits.max_study_bytes {
+            let (bytes, limit) = (study.kept_bytes(), limits.max_study_bytes);
             let detail = format!(
-                "what the study comes to takes {bytes} bytes, more than the {limit} of `max_study_bytes`: ask for fewer variants or quantities"
+                "the study with what it comes to takes {bytes} bytes, more than the {limit} of `max_study_bytes`: ask for fewer variants or quantities"
             );
             let mut refused = beyond("", FieldCode::TooManyVariants, detail, bytes as f64, limit as f64);
             refused.code = NoAnswerCode::TooManyVariants;
@@ -257,6 +257,11 @@ impl Study {
             }
         };
         OVERHEAD.saturating_add(bytes)
+    }
+
+    /// About what it takes to keep it with what it comes to.
+    pub fn kept_bytes(&self) -> u64 {
+        self.stored_bytes().saturating_add(self.template.bytes() as u64)
     }
 }
 
@@ -497,10 +502,11 @@ impl Work {
 }
 
 /// The parts of a study, in whatever order they come.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Gathered {
     study: Arc<Study>,
-    parts: Vec<Option<Part>>,
+    /// Shared with whoever makes an answer of them meanwhile.
+    parts: Vec<Option<Arc<Part>>>,
     missing: u64,
     variants: u64,
     refused: u64,
@@ -526,7 +532,7 @@ impl Gathered {
             self.missing -= 1;
             self.variants += part.variants();
             self.refused += part.refused();
-            *place = Some(part);
+            *place = Some(Arc::new(part));
         }
     }
 
@@ -580,7 +586,7 @@ impl Gathered {
         match &study.kind {
             Kind::Map(map) => StudyAnswer::Map(MapAnswer::new(map, evaluator, self.rows(), is_complete)),
             Kind::Search(search) => {
-                let islands = self.parts.iter().flatten().filter_map(|part| match part {
+                let islands = self.parts.iter().flatten().filter_map(|part| match &**part {
                     Part::Island(island) => Some(island),
                     Part::Rows(_) => None,
                 });
@@ -601,7 +607,7 @@ impl Gathered {
     fn rows(&self) -> RowsPart {
         let mut rows = RowsPart::new(self.study.evaluator.quantities.len());
         for part in self.parts.iter().flatten() {
-            if let Part::Rows(part) = part {
+            if let Part::Rows(part) = &**part {
                 rows.append(part);
             }
         }

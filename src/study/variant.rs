@@ -10,6 +10,13 @@ use crate::ask::{beyond, escaped, fault};
 /// Combinations of choices at most: each is a document of its own, which is kept.
 const MOST_FORMS: usize = 256;
 
+/// What all of them may take together: some three hundred thousand numbers.
+const MOST_FORMS_BYTES: usize = 8 << 20;
+
+/// Fields that a form may leave out because only other kinds, shapes or laws have them: each is found by reading the whole form again, and
+/// all that there are have fewer.
+const MOST_LEFT_OUT: usize = 64;
+
 const RING_TEETH: [&str; 3] = ["drive", "ring", "teeth"];
 
 /// The values that a free field may have.
@@ -84,7 +91,9 @@ impl Template {
         let mut variables = Vec::new();
         for (pointer, asked) in free {
             let Some(path) = path(pointer) else {
-                let detail = format!("`{pointer}` is no JSON pointer into a design document: one begins with `/`");
+                let detail = format!(
+                    "`{pointer}` is no JSON pointer into a design document: one begins with `/`, and none leads deeper than 128 levels"
+                );
                 return Err(fault(&at(pointer), FieldCode::UnknownField, detail));
             };
             let is_below = |(other, _): &&(String, Asked)| is_within(other, pointer) && other != pointer;
@@ -121,6 +130,13 @@ impl Template {
             let detail = format!("the choices have more than {MOST_FORMS} combinations");
             return Err(fault(&format!("/{list}"), FieldCode::OutOfRange, detail));
         };
+        let bytes = combinations.saturating_mul(template.form_bytes(base));
+        if combinations > 1 && bytes > MOST_FORMS_BYTES {
+            let detail = format!(
+                "each of the {combinations} combinations of choices is a document of its own: of this base they take {bytes} bytes, more than {MOST_FORMS_BYTES}"
+            );
+            return Err(fault(&format!("/{list}"), FieldCode::OutOfRange, detail));
+        }
         for combination in 0..combinations {
             let form = template.form(base, combination).map_err(|mut found| {
                 if found.code == FieldCode::MissingField {
@@ -183,6 +199,23 @@ impl Template {
         &self.variables
     }
 
+    /// What a form takes at most: the base, and whatever is put into it.
+    fn form_bytes(&self, base: &Tree) -> usize {
+        /// Of an object that is made for a name on the way, beside the name.
+        const LEVEL_BYTES: usize = 96;
+        let put_in = |variable: &Variable| {
+            let on_the_way: usize = variable.path.iter().map(|name| LEVEL_BYTES + name.len()).sum();
+            on_the_way + variable.choices.iter().map(Tree::bytes).max().unwrap_or_default()
+        };
+        base.bytes() + self.variables.iter().map(put_in).sum::<usize>()
+    }
+
+    /// About what the template takes in memory.
+    pub(crate) fn bytes(&self) -> usize {
+        let choices = self.variables.iter().flat_map(|variable| &variable.choices);
+        choices.chain(self.examples()).map(Tree::bytes).sum()
+    }
+
     /// The document of a combination of choices, in which everything else stands at some value.
     fn form(&self, base: &Tree, combination: usize) -> Result<Form, Fault> {
         let mut form = Form {
@@ -203,6 +236,7 @@ impl Template {
             };
             form.tree.set(&variable.path, value);
         }
+        let mut left_out = 0;
         loop {
             form.derive();
             let Err(found) = form.tree.read::<Design>() else { return Ok(form) };
@@ -211,8 +245,10 @@ impl Template {
                 let parent = variable.pointer.rsplit_once('/').map_or("", |(parent, _)| parent);
                 found.pointer.strip_prefix(parent).is_some_and(|rest| rest.starts_with('/'))
             });
-            let place = path(&found.pointer).filter(|_| found.code == FieldCode::UnknownField && is_of_choice);
+            let is_left_out = left_out < MOST_LEFT_OUT && found.code == FieldCode::UnknownField && is_of_choice;
+            let place = path(&found.pointer).filter(|_| is_left_out);
             let Some(place) = place else { return Err(found) };
+            left_out += 1;
             if form.tree.remove(&place).is_none() {
                 return Err(found);
             }

@@ -4,10 +4,12 @@ use std::fs::File;
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 use std::process::{Command, Stdio};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Barrier};
 use std::time::Duration;
 
+use axum::body::{Body, Bytes};
+use axum::http::Request;
 use serde_json::{Value, json};
 use toothwave::keys::new_key;
 
@@ -477,6 +479,140 @@ async fn an_answers_room_is_taken_while_it_is_made_and_given_back() {
     drop(unread);
     assert_eq!(service.app.room.taken_bytes(), 0);
     service.ask(&large(901)).await.found();
+}
+
+/// Pieces of one byte, each of which says when it is let go.
+#[tokio::test]
+async fn the_pieces_that_a_body_arrives_in_are_let_go_as_they_arrive() {
+    struct Piece(Arc<AtomicUsize>);
+    impl AsRef<[u8]> for Piece {
+        fn as_ref(&self) -> &[u8] {
+            b" "
+        }
+    }
+    impl Drop for Piece {
+        fn drop(&mut self) {
+            self.0.fetch_sub(1, Ordering::Relaxed);
+        }
+    }
+    let (held, most) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicUsize::new(0)));
+    let (pieces, seen) = (Arc::clone(&held), Arc::clone(&most));
+    let pieces = (0..10_000).map(move |_| {
+        seen.fetch_max(pieces.fetch_add(1, Ordering::Relaxed) + 1, Ordering::Relaxed);
+        Ok::<_, std::io::Error>(Bytes::from_owner(Piece(Arc::clone(&pieces))))
+    });
+    for path in ["/v1/sweep", "/v1/studies"] {
+        let body = Body::from_stream(futures_util::stream::iter(pieces.clone()));
+        let request = Request::post(path).header("content-type", "application/json").body(body).unwrap();
+        Service::new().send(request).await.refused(400, "malformed_json");
+        assert!(most.load(Ordering::Relaxed) <= 2, "{path}: {most:?} at once");
+    }
+}
+
+// --- Studies that are made to be read slowly, to fill the memory, or to break the stack
+
+/// A map of the shortest design with something changed.
+fn map_over(base: &Value, over: &Value) -> Question {
+    let quantities = ["coincidence_degree"];
+    let study = json!({ "study": "map", "base": base, "over": over, "quantities": quantities });
+    Question::post("/v1/studies", study.to_string())
+}
+
+#[tokio::test]
+async fn a_pointer_deeper_than_any_document_is_no_pointer() {
+    let service = Service::new();
+    let deep = "/a".repeat(25_000);
+    for pointer in [deep.clone(), format!("/drive/teeth{deep}"), "/a".repeat(129)] {
+        for values in [json!({ "min": 1, "max": 2, "steps": 2 }), json!({ "one_of": ["x"] })] {
+            let problem = service.ask(&map_over(&shortest(), &json!({ (pointer.as_str()): values }))).await;
+            let problem = problem.refused(422, "invalid_document");
+            assert_eq!(problem["errors"][0]["code"], "unknown_field");
+        }
+    }
+}
+
+#[test]
+fn the_values_of_a_map_are_counted_before_they_are_made() {
+    let process = Process::started(&["serve"]);
+    let deviations: Vec<u32> = vec![0; 28];
+    let base =
+        with(&shortest(), "/deviations", json!({ "tooth_radius_um": deviations, "slot_angle_arcsec": deviations }));
+    let pointers = ["tooth_radius_um", "slot_angle_arcsec"]
+        .map(|name| (0..28).map(move |item| format!("/deviations/{name}/{item}")));
+    let over: serde_json::Map<_, _> = pointers
+        .into_iter()
+        .flatten()
+        .map(|pointer| (pointer, json!({ "min": 0, "max": 1, "steps": 1_000_000 })))
+        .collect();
+    ask_at(process.address, &map_over(&base, &over.into())).refused(422, "too_many_variants");
+    let most = most_resident_mib(&process);
+    assert!(most < 400, "56 million values took {most} MiB");
+}
+
+/// Each field that is left out costs another reading of the whole document, for each of 256 combinations of choices.
+#[tokio::test]
+async fn of_fields_that_no_kind_has_few_are_left_out_before_one_is_refused() {
+    let mut base = shortest();
+    let teeth = base["drive"]["teeth"].as_object_mut().unwrap();
+    teeth.extend((0..4000).map(|field| (format!("a{field}"), json!(1))));
+    let shapes = vec!["cylinder"; 256];
+    let answer = Service::new().ask(&map_over(&base, &json!({ "/drive/teeth/shape": { "one_of": shapes } }))).await;
+    let problem = answer.refused(422, "invalid_document");
+    assert_eq!(problem["errors"][0]["code"], "unknown_field");
+}
+
+#[tokio::test]
+async fn the_documents_of_all_choices_may_not_take_more_than_their_bound() {
+    let teeth = 2000;
+    let base = with(&shortest(), "/drive/teeth/count", json!(teeth));
+    let base = with(&base, "/deviations", json!({ "tooth_radius_um": vec![0; teeth] }));
+    let choices: Vec<_> = (0..250).map(|step| 4.0 + 1e-3 * f64::from(step)).collect();
+    let answer =
+        Service::new().ask(&map_over(&base, &json!({ "/drive/teeth/radius_mm": { "one_of": choices } }))).await;
+    let problem = answer.refused(422, "invalid_document");
+    assert_eq!(problem["errors"][0]["pointer"], "/over");
+}
+
+#[tokio::test]
+async fn what_is_kept_of_a_study_counts_with_what_is_asked() {
+    let limits = toothwave::config::Limits { max_study_bytes: 550_000, ..crate::asking::LIMITS };
+    let service = Service::within(limits);
+    let mut places = Vec::new();
+    // Of 200 designs each, of a kilobyte, and little that comes of them.
+    for torque_nm in [1, 2, 3] {
+        let choices: Vec<_> = (0..200).map(|step| 4.0 + 1e-3 * f64::from(step)).collect();
+        let base = with(&shortest(), "/load/input_torque_nm", json!(torque_nm));
+        let asked =
+            map_over(&base, &json!({ "/drive/teeth/radius_mm": { "one_of": choices } })).with("prefer", "wait=600");
+        let study = service.ask(&asked).await.found();
+        places.push(format!("/v1/studies/{}", study["id"].as_str().unwrap()));
+    }
+    service.get(&places[0]).await.refused(404, "not_found");
+    assert_eq!(service.get(&places[2]).await.status, 200);
+}
+
+/// To read one may take long, and neither health nor solves are to wait for it.
+#[tokio::test]
+async fn studies_are_read_one_at_a_time_beside_all_else() {
+    let service = Service::within(toothwave::config::Limits { deadline_ms: 5, ..crate::asking::LIMITS });
+    let (release, released) = std::sync::mpsc::channel::<()>();
+    let (begun, has_begun) = tokio::sync::oneshot::channel();
+    let pool = service.app.pool.clone();
+    let reading = tokio::spawn(async move {
+        let job = move || {
+            begun.send(()).unwrap();
+            // Dropped or told so: both mean that it is over.
+            let _ = released.recv();
+            Ok(())
+        };
+        pool.run_aside(tokio::time::Instant::now() + Duration::from_secs(600), job).await
+    });
+    has_begun.await.unwrap();
+    let asked = map_over(&shortest(), &json!({ "/drive/teeth/radius_mm": { "one_of": [4.0] } }));
+    service.ask(&asked).await.refused(503, "deadline_exceeded");
+    assert_eq!(service.ask(&live()).await.status, 200);
+    release.send(()).unwrap();
+    reading.await.unwrap().unwrap();
 }
 
 // --- Time and joining

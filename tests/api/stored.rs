@@ -225,6 +225,11 @@ async fn a_study_of_another_build_or_of_other_bits_is_left_to_others() {
         let standing = keeper.store.find(id).await.unwrap().unwrap();
         assert_eq!((standing.done, standing.is_running()), (0, true), "{id}");
     }
+    // Whoever has kept the id of one is told so.
+    for id in ["of-another-build", "of-another-processor"] {
+        let problem = keeper.service.get(&format!("/v1/studies/{id}")).await.refused(404, "not_found");
+        assert!(problem["detail"].as_str().unwrap().contains("another"), "{problem}");
+    }
     keeper.end().await;
 }
 

@@ -366,13 +366,13 @@ struct Lines {
 }
 
 impl Lines {
-    fn new(body: Body, limits: &Limits) -> Self {
+    fn new(body: Body, max_line_bytes: usize, patience: Duration) -> Self {
         Self {
             body: body.into_data_stream(),
             buffer: BytesMut::new(),
             searched_bytes: 0,
-            max_line_bytes: limits.max_body_bytes,
-            patience: Duration::from_millis(limits.header_timeout_ms),
+            max_line_bytes,
+            patience,
             waited: Duration::ZERO,
             arrived_bytes: 0,
             broken: None,
@@ -387,7 +387,8 @@ impl Lines {
             let unsearched = &self.buffer[self.searched_bytes..];
             if let Some(end) = unsearched.iter().position(|&byte| byte == b'\n') {
                 let end = std::mem::take(&mut self.searched_bytes) + end;
-                let line = self.buffer.split_to(end + 1).freeze().slice(..end);
+                let line = self.buffer.split_to(end + 1);
+                let line = &line[..end];
                 if std::mem::take(&mut self.is_skipping) {
                     continue;
                 }
@@ -395,7 +396,8 @@ impl Lines {
                     return Some(Err(self.too_long()));
                 }
                 if !line.trim_ascii().is_empty() {
-                    return Some(Ok(line));
+                    // By itself: it may wait long, and must not hold all that was received with it.
+                    return Some(Ok(Bytes::copy_from_slice(line)));
                 }
                 continue;
             }
@@ -409,8 +411,8 @@ impl Lines {
             }
             if self.is_over {
                 self.searched_bytes = 0;
-                let rest = self.buffer.split().freeze();
-                return (!rest.trim_ascii().is_empty()).then_some(Ok(rest));
+                let rest = self.buffer.split();
+                return (!rest.trim_ascii().is_empty()).then(|| Ok(Bytes::copy_from_slice(&rest)));
             }
             self.receive().await;
         }
@@ -638,7 +640,8 @@ fn begin(app: &App, query: Result<Query<BatchQuery>, QueryRejection>, request: R
     // Lines that wait, and of each chunk that is worked on its short answers; a long one has room of its own.
     let held_bytes = AHEAD_BYTES + app.limits.max_concurrent_solves * SLICE_BYTES;
     let room = app.room.reserve(held_bytes as u64)?;
-    let lines = Lines::new(request.into_body(), &app.limits);
+    let patience = Duration::from_millis(app.limits.header_timeout_ms);
+    let lines = Lines::new(request.into_body(), app.limits.max_body_bytes, patience);
     // Bounded by bytes.
     let (to, from) = mpsc::unbounded_channel();
     let end = End::new(Mutex::new(BatchEnd { asked: 0, answered: 0, problem: None }));
@@ -654,4 +657,28 @@ fn begin(app: &App, query: Result<Query<BatchQuery>, QueryRejection>, request: R
     response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(NDJSON));
     response.headers_mut().insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
     Ok(response)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use axum::body::Body;
+
+    use super::Lines;
+
+    /// A line of two bytes among blank ones of sixty thousand.
+    #[tokio::test]
+    async fn a_line_that_waits_holds_no_more_than_itself() {
+        let text = format!("{}\n{{}}\n{}\n[]", " ".repeat(60_000), " ".repeat(60_000));
+        let mut lines = Lines::new(Body::from(text), 65_536, Duration::MAX);
+        let mut read = Vec::new();
+        while let Some(line) = lines.next().await {
+            read.push(line.expect("a line"));
+        }
+        assert_eq!(read, ["{}", "[]"]);
+        for line in read {
+            assert!(line.try_into_mut().expect("its bytes are its own").capacity() <= 2);
+        }
+    }
 }

@@ -1,7 +1,6 @@
 //! The endpoints: one file each, with its handler and what the API document says of it. What they share, the walk of a request from
 //! document to bytes, stands here.
 
-use std::error::Error as _;
 use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,9 +11,10 @@ use axum::extract::Request;
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use bytes::BytesMut;
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use http_body_util::LengthLimitError;
+use futures_util::StreamExt as _;
 use toothwave_calculation::design::Design;
 use toothwave_calculation::forms::{Format, Forms};
 use toothwave_calculation::key::Key;
@@ -176,16 +176,24 @@ async fn read_body(
     if let Some(length) = announced.filter(|&length| length > limit as u64) {
         return Err(too_large(&format!("{length} bytes, ")));
     }
-    let reading = axum::body::to_bytes(body, limit);
-    let arrived = tokio::time::timeout_at(deadline, reading).await;
-    let arrived = arrived.map_err(|_| {
+    let mut pieces = body.into_data_stream();
+    // One piece of its own, and those that arrive are let go: they may be of a byte each, and hold the whole buffer that they were read into.
+    let mut whole = BytesMut::new();
+    let reading = async {
+        while let Some(piece) = pieces.next().await {
+            let piece = piece.map_err(|error| broken_body(&error))?;
+            if piece.len() > limit - whole.len() {
+                return Err(too_large(""));
+            }
+            whole.extend_from_slice(&piece);
+        }
+        Ok(())
+    };
+    tokio::time::timeout_at(deadline, reading).await.unwrap_or_else(|_| {
         let detail = format!("the body did not arrive within {} ms", limits.deadline_ms);
-        Problem::new(ProblemCode::RequestTimeout, detail)
+        Err(Problem::new(ProblemCode::RequestTimeout, detail))
     })?;
-    arrived.map_err(|error| match error.source() {
-        Some(cause) if cause.is::<LengthLimitError>() => too_large(""),
-        _ => broken_body(&error),
-    })
+    Ok(whole.freeze())
 }
 
 /// The problem of a body that does not end as it should.

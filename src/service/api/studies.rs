@@ -215,7 +215,10 @@ async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Respons
     negotiation::require_json(&headers)?;
     let representation = Representation::negotiate(&headers, std::iter::empty())?;
     let body = read_body(&headers, body, &app.limits, deadline).await?;
-    let kept = app.studies.begin(Study::read(&body, &app.limits.of_studies())?, &body).await?;
+    // Its choices stand for hundreds of designs, so that a document of 64 KB may take long to be read.
+    let (question, limits) = (body.clone(), app.limits.of_studies());
+    let study = app.pool.run_aside(deadline, move || Ok(Study::read(&question, &limits)?)).await?;
+    let kept = app.studies.begin(study, &body).await?;
     let wait = wait_wanted(&headers);
     if let Some(wait) = wait {
         let wait_until = deadline.min(tokio::time::Instant::now() + wait);
