@@ -549,13 +549,13 @@ fn the_values_of_a_map_are_counted_before_they_are_made() {
     assert!(most < 400, "56 million values took {most} MiB");
 }
 
-/// Each field that is left out costs another reading of the whole document, for each of 256 combinations of choices.
+/// Each field that is left out costs another reading of the whole document, for each combination of choices.
 #[tokio::test]
 async fn of_fields_that_no_kind_has_few_are_left_out_before_one_is_refused() {
     let mut base = shortest();
     let teeth = base["drive"]["teeth"].as_object_mut().unwrap();
     teeth.extend((0..4000).map(|field| (format!("a{field}"), json!(1))));
-    let shapes = vec!["cylinder"; 256];
+    let shapes = ["cylinder", "ball", "flat_sided"];
     let answer = Service::new().ask(&map_over(&base, &json!({ "/drive/teeth/shape": { "one_of": shapes } }))).await;
     let problem = answer.refused(422, "invalid_document");
     assert_eq!(problem["errors"][0]["code"], "unknown_field");
