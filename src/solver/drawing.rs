@@ -10,7 +10,7 @@ use crate::drive::{Draft, Drive, DriveError};
 use crate::findings::{self, Finding};
 use crate::gaps::RAD_PER_ARCSEC;
 use crate::parts::{CarrierPart, PartsParameters, RingPart, ToothPart, WaveGeneratorPart};
-use crate::profile::{Polyline, SampledCurve, cam_half_lobe, cam_outline, direction};
+use crate::profile::{Density, Polyline, SampledCurve, cam_half_lobe, cam_outline, direction};
 use crate::root::NotConverged;
 use crate::spline;
 use crate::tooth_space::HalfSpace;
@@ -30,9 +30,13 @@ pub enum Subject {
 /// within 10 nm.
 pub const SPLINE_SHARE_OF_CHORD: f64 = 0.01;
 
-/// Chord tolerance of the points that polynomials are laid through and held against, as a share of the drawing's: where a tip bends
-/// most, points that only just carry chords do not tell what the curve does between them.
-const DENSE_SHARE_OF_CHORD: f64 = 0.1;
+/// Points for each chord of the drawing that polynomials are laid through and held against: where a tip bends most, points that only just carry chords
+/// do not tell what the curve does between them.
+const POINTS_PER_CHORD: u32 = 4;
+
+const fn dense(tolerance_mm: f64) -> Density {
+    Density { tolerance_mm, points_per_chord: POINTS_PER_CHORD }
+}
 
 /// A closed path. Each edge starts at the very point where the one before ends, the first where the last ends.
 #[derive(Debug, Clone, PartialEq)]
@@ -285,13 +289,13 @@ impl Drawing {
     fn ring_section(&self, ring: &RingPart, stop: &dyn Stop) -> Result<Section, SolveError> {
         let teeth = self.drive.parameters().ring_teeth.unsigned_abs();
         let chord_tolerance_mm = self.parameters.chord_tolerance_mm;
-        let mut half = ring.space.half(chord_tolerance_mm, stop)?;
+        let mut half = ring.space.half(Density::of_chords(chord_tolerance_mm), stop)?;
         let chords: usize = half.pieces.iter().map(|piece| piece.points.len() - 1).sum();
         self.require_points(2 * chords as u64 * teeth)?;
         let tip_rad = PI / teeth as f64;
         let tip = ring.space.tip();
-        let mut dense = ring.space.half(DENSE_SHARE_OF_CHORD * chord_tolerance_mm, stop)?;
-        for half in [&mut half, &mut dense] {
+        let mut dense_half = ring.space.half(dense(chord_tolerance_mm), stop)?;
+        for half in [&mut half, &mut dense_half] {
             if !tip.has_land
                 && let Some(end) = half.pieces.last_mut().and_then(|piece| piece.points.last_mut())
             {
@@ -303,7 +307,7 @@ impl Drawing {
             Some(end) if tip.has_land => 2.0 * (tip_rad - end.y.atan2(end.x)),
             _ => 0.0,
         };
-        let space = tooth_space(half, dense, chord_tolerance_mm);
+        let space = tooth_space(half, dense_half, chord_tolerance_mm);
         let start = space.first().map(Edge::start).unwrap_or_default();
         let turned = |copy: u64| Rotation2::new(2.0 * PI * ((copy % teeth) as f64 / teeth as f64));
         let mut edges = Vec::new();
@@ -325,15 +329,14 @@ impl Drawing {
     /// The wave generator: a curve from each lobe to each valley and on.
     fn cam_section(&self, cam: &WaveGeneratorPart, stop: &dyn Stop) -> Result<Section, SolveError> {
         let (locus, lobes) = (self.drive.flank().locus(), self.drive.lobes());
-        let half_lobe = |tolerance_mm: f64| cam_half_lobe(locus, cam.set_back_mm, tolerance_mm, stop);
+        let half_lobe = |density| cam_half_lobe(locus, cam.set_back_mm, density, stop);
         let tolerance_mm = self.parameters.chord_tolerance_mm;
-        let points = half_lobe(tolerance_mm)?.points;
+        let points = half_lobe(Density::of_chords(tolerance_mm))?.points;
         let half = points.len() - 1;
         self.require_points(u64::from(2 * lobes) * half as u64)?;
         let whole = cam_outline(&points, lobes);
         // The poles likewise, each polygon's last one the next one's first, so that they start and end in the outline's very points.
-        let dense = half_lobe(DENSE_SHARE_OF_CHORD * tolerance_mm)?;
-        let polygons = spline::polygons(&dense, SPLINE_SHARE_OF_CHORD * tolerance_mm);
+        let polygons = spline::polygons(&half_lobe(dense(tolerance_mm))?, SPLINE_SHARE_OF_CHORD * tolerance_mm);
         let degrees: Vec<_> = polygons.iter().map(|polygon| polygon.len() - 1).collect();
         let poles = polygons.iter().flat_map(|polygon| &polygon[1..]);
         let whole_polygon = cam_outline(&points[..1].iter().chain(poles).copied().collect(), lobes);

@@ -53,6 +53,22 @@ pub(crate) struct CurvePoint {
     pub(crate) tangent: Unit<Vector2<f64>>,
 }
 
+/// How densely a curve is sampled.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Density {
+    /// How true its chords are.
+    pub(crate) tolerance_mm: f64,
+    /// Points for each of these chords, so that a denser sample has so many times the points and never more.
+    pub(crate) points_per_chord: u32,
+}
+
+impl Density {
+    /// The ends of the chords alone.
+    pub(crate) const fn of_chords(tolerance_mm: f64) -> Self {
+        Self { tolerance_mm, points_per_chord: 1 }
+    }
+}
+
 /// A sampled curve with its direction at each point.
 pub(crate) struct SampledCurve {
     pub(crate) points: Polyline,
@@ -73,7 +89,8 @@ pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &dyn Stop) 
     let ring_teeth = drive.parameters().ring_teeth.unsigned_abs();
     let flank = ring_half_tooth(drive, parameters.chord_tolerance_mm, stop)?;
     let path = path_half_tooth(drive, parameters.chord_tolerance_mm, stop)?;
-    let half_lobe = cam_half_lobe(drive.flank().locus(), 0.0, parameters.chord_tolerance_mm, stop)?.points;
+    let half_lobe =
+        cam_half_lobe(drive.flank().locus(), 0.0, Density::of_chords(parameters.chord_tolerance_mm), stop)?.points;
 
     let copies = match parameters.extent {
         Extent::Tooth => 1,
@@ -93,7 +110,7 @@ pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &dyn Stop) 
 
 /// The ring from the middle of its tooth space to its tooth's symmetry line, land of a bored tip included.
 fn ring_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &dyn Stop) -> Result<Polyline, SolveError> {
-    let mut points = flank_curve(drive.flank(), drive.flank_limit(), tolerance_mm, stop)?.points;
+    let mut points = flank_curve(drive.flank(), drive.flank_limit(), Density::of_chords(tolerance_mm), stop)?.points;
     let tip_rad = PI / drive.parameters().ring_teeth as f64;
     match drive.flank_limit().end {
         FlankEnd::RegularTip | FlankEnd::Undercut => {
@@ -121,11 +138,11 @@ fn ring_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &dyn Stop) -> Result<
 pub(crate) fn flank_curve(
     flank: &RingFlank,
     limit: &FlankLimit,
-    tolerance_mm: f64,
+    density: Density,
     stop: &dyn Stop,
 ) -> Result<SampledCurve, SolveError> {
     let lobes = flank.locus().lobes();
-    sampled(Position::lobe(lobes), limit.position, lobes, tolerance_mm, stop, |position| {
+    sampled(Position::lobe(lobes), limit.position, lobes, density, stop, |position| {
         let tooth = flank.locus().at(position)?;
         let point = flank.at(&tooth);
         Ok(CurvePoint { point: flank.point(&tooth, &point), tangent: flank.tangent(&tooth, &point) })
@@ -136,7 +153,8 @@ pub(crate) fn flank_curve(
 fn path_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &dyn Stop) -> Result<Polyline, SolveError> {
     let flank = drive.flank();
     let lobes = drive.lobes();
-    let mut points = sampled(Position::lobe(lobes), Position::valley(lobes), lobes, tolerance_mm, stop, |position| {
+    let density = Density::of_chords(tolerance_mm);
+    let mut points = sampled(Position::lobe(lobes), Position::valley(lobes), lobes, density, stop, |position| {
         let tooth = flank.locus().at(position)?;
         let point = flank.at(&tooth);
         let angle_rad = position.from_lobe_rad / flank.teeth_per_wave();
@@ -154,11 +172,11 @@ fn path_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &dyn Stop) -> Result<
 pub(crate) fn cam_half_lobe(
     locus: &Locus,
     clearance_mm: f64,
-    tolerance_mm: f64,
+    density: Density,
     stop: &dyn Stop,
 ) -> Result<SampledCurve, SolveError> {
     let lobes = locus.lobes();
-    let mut curve = sampled(Position::lobe(lobes), Position::valley(lobes), lobes, tolerance_mm, stop, |place| {
+    let mut curve = sampled(Position::lobe(lobes), Position::valley(lobes), lobes, density, stop, |place| {
         let CamPoint { point, tangent } = locus.cam_outline(clearance_mm, place)?;
         Ok(CurvePoint { point, tangent })
     })?;
@@ -218,7 +236,7 @@ pub(crate) fn sampled(
     start: Position,
     end: Position,
     lobes: u32,
-    tolerance_mm: f64,
+    Density { tolerance_mm, points_per_chord }: Density,
     stop: &dyn Stop,
     curve: impl Fn(Position) -> Result<CurvePoint, NotConverged>,
 ) -> Result<SampledCurve, SolveError> {
@@ -242,6 +260,10 @@ pub(crate) fn sampled(
         while let Some(to) = pending.pop() {
             let (x, to_point, depth) = to;
             if chord_deviation_mm(&from.1, &to_point) <= tolerance_mm || depth == MAX_DEPTH {
+                for step in 1..points_per_chord {
+                    let share = f64::from(step) / f64::from(points_per_chord);
+                    curve_points.push(at(from.0 + share * (x - from.0))?);
+                }
                 curve_points.push(to_point);
                 from = (x, to_point);
             } else {

@@ -5,7 +5,7 @@ use nalgebra::{Point2, Unit, Vector2};
 use crate::drive::{Drive, DriveError};
 use crate::gaps::{MM_PER_UM, Modification, RAD_PER_ARCSEC, TipRelief};
 use crate::position::{Position, half_lobe_rad};
-use crate::profile::{CurvePoint, SampledCurve, flank_curve, sampled};
+use crate::profile::{CurvePoint, Density, SampledCurve, flank_curve, sampled};
 use crate::ring::{FlankEnd, RingFlank, RingTooth};
 use crate::root::{NotConverged, bracketed};
 use crate::violation::{Modified, Violation};
@@ -143,17 +143,17 @@ impl ToothSpace {
         }
     }
 
-    /// Its half, chords true to a tolerance.
-    pub(crate) fn half(&self, tolerance_mm: f64, stop: &dyn Stop) -> Result<HalfSpace, SolveError> {
+    /// Its half.
+    pub(crate) fn half(&self, density: Density, stop: &dyn Stop) -> Result<HalfSpace, SolveError> {
         let Some(ShapedSpace { flank, start, end, .. }) = &self.shaped else {
-            let pieces = vec![flank_curve(&self.set_back.flank, &self.set_back.limit, tolerance_mm, stop)?];
+            let pieces = vec![flank_curve(&self.set_back.flank, &self.set_back.limit, density, stop)?];
             return Ok(HalfSpace { root_arc_rad: 0.0, is_smooth_at_root: true, pieces });
         };
         let lobes = flank.flank.locus().lobes();
         let mut pieces = Vec::new();
         let mut piece = |from: Position, to: Position, is_relieved: bool| {
             let curve = |place| flank.at(place, is_relieved).map(|at| at.curve_point());
-            pieces.push(sampled(from, to, lobes, tolerance_mm, stop, curve)?);
+            pieces.push(sampled(from, to, lobes, density, stop, curve)?);
             Ok::<_, SolveError>(())
         };
         let relieved_from = flank.relief.map(|relief| Position::from_lobe(relief.start_rad, lobes));
