@@ -176,7 +176,8 @@ impl Optimiser {
     fn offspring(&mut self) -> Vec<f64> {
         let target = self.stream.below(self.population.len());
         self.parent = Some(target);
-        if self.stream.share() < 0.5 { self.crossed() } else { self.differed(target) }
+        // Past a limit there are few steps, and those of the population are the more varied ones.
+        if self.looked_past().is_none() && self.stream.share() < 0.5 { self.crossed() } else { self.differed(target) }
     }
 
     /// Where a step begins.
