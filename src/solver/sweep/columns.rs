@@ -380,10 +380,10 @@ pub(crate) fn finished(
     }
     check("torque balance", torque_balance_residual)?;
     // Light loads across wide gaps keep fewer digits: the answer says how few.
-    let of_rounding = ROUNDINGS * f64::EPSILON * input_angles.amplification(loaded);
-    if period_closure_residual.is_nan() || period_closure_residual > of_rounding {
-        check("period closure", period_closure_residual)?;
-    }
+    check("period closure", period_closure_residual).or_else(|inconsistent| {
+        let of_rounding = ROUNDINGS * f64::EPSILON * input_angles.amplification(loaded);
+        if period_closure_residual <= of_rounding { Ok(()) } else { Err(inconsistent) }
+    })?;
     let mesh = *loaded.mesh();
     Ok(Sweep { mesh, states, input_angles, peaks, torque_capacity, torque_balance_residual, period_closure_residual })
 }

@@ -30,10 +30,8 @@ use pulp::Simd;
 use crate::cam::{Cam, Ellipse};
 use crate::contact::PerContact;
 use crate::load_sharing::{Compatibility, LoadedDrive};
-use crate::mesh::{Mesh, Samples, TeethInMesh};
-use crate::sweep::columns::{
-    self, ContactPeaks, Extremes, Peak, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity, worse,
-};
+use crate::mesh::{Mesh, Samples};
+use crate::sweep::columns::{self, ContactPeaks, Peak, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity, worse};
 use crate::sweep::points::{Points, Tolerance};
 use crate::sweep::search::{Best, Found, Piece, search};
 use crate::tooth::LineLaw;
@@ -43,7 +41,7 @@ use lanes::{LANES, arctangent_terms, arctangents, repeat_each};
 use moments::FastLook;
 use sharing::{Limit, Shared, Sharing, Teeth, Work};
 use sinks::{ColumnSink, PeakSink, Sink};
-use tile::{Run, Tile, TileSize, whole};
+use tile::{Run, Tile, TileLanes, TileSize, whole};
 
 /// Steps towards the support at most. A drive that needs more goes the plain way.
 const MAX_STEPS: u32 = 8;
@@ -143,20 +141,8 @@ pub(crate) fn true_peaks(
         let force_n = seen[hardest.piece].load(hardest.moment, force, hardest.tooth);
         ContactPeaks::of_line(peak(best[force]), peak(hardest), force_n, drive.tooth_width_mm())
     });
-    let of_output = 1e-3 * drive.teeth_per_wave() * drive.teeth_per_wave();
-    let Extremes { least, largest } = look.rotation_rad;
-    let stiffness = look.stiffness_nmm_per_rad;
-    Ok(Some(SweepPeaks {
-        contacts,
-        wind_up_deg: Extremes { least: least.to_degrees(), largest: largest.to_degrees() },
-        torsional_stiffness_nm_per_rad: Extremes {
-            least: of_output * stiffness.least,
-            largest: of_output * stiffness.largest,
-        },
-        loaded_teeth: look.loaded_teeth.unwrap_or(TeethInMesh { min: 0, max: 0 }),
-        torque_capacity: look.capacity.or_else(|| in_proportion(loaded, allowable_mpa, &contacts)),
-        torque_balance_residual: look.torque_balance_residual,
-    }))
+    let torque_capacity = look.capacity.or_else(|| in_proportion(loaded, allowable_mpa, &contacts));
+    Ok(Some(look.angles.peaks(contacts, torque_capacity, look.torque_balance_residual)))
 }
 
 /// The capacity where all loads are in proportion (docs/theory.md section 4.7): that of the stress nearest to what is allowed.
@@ -480,21 +466,10 @@ impl Kernel {
                 if !self.unit_loads::<K>(&mut tile) {
                     return Ok(None);
                 }
-                match &self.law {
-                    Law::Linear(_) => Self::scale(loaded, run.teeth, &mut tile),
-                    Law::Sharing(sharing) => {
-                        if !Self::share::<V>(sharing, loaded, run.teeth, &mut tile) {
-                            return Ok(None);
-                        }
-                        if let Some(allowable_mpa) = &self.allowable_mpa {
-                            let Some(limit) = Self::limit::<V>(sharing, allowable_mpa, run.teeth, &mut tile) else {
-                                return Ok(None);
-                            };
-                            let limit_deg = mesh.input_angle_deg(start + limit.row as u64, samples);
-                            filled.capacity = least(filled.capacity, limit.capacity(loaded, limit_deg));
-                        }
-                        Self::scale_shared(loaded, run.teeth, &mut tile);
-                    }
+                let Some(limit) = self.loads::<V>(loaded, run.teeth, &mut tile, |_, _| ()) else { return Ok(None) };
+                if let Some(limit) = limit {
+                    let limit_deg = mesh.input_angle_deg(start + limit.row as u64, samples);
+                    filled.capacity = least(filled.capacity, limit.capacity(loaded, limit_deg));
                 }
                 let rows = tile.count / run.teeth;
                 filled.torque_balance_residual =
@@ -532,20 +507,10 @@ impl Kernel {
     /// Geometry of a stretch of states, and their forces and stresses for one unit; false where the support takes too many steps.
     #[inline(always)]
     fn on_ellipse<K: Sink>(&self, ellipse: &EllipseShape, unit: impl Unit, tile: &mut Tile<'_>, chunk: usize) -> bool {
-        let sin = &tile.sin.as_chunks::<LANES>().0[chunk];
-        let cos = &tile.cos.as_chunks::<LANES>().0[chunk];
+        let TileLanes { sin, cos, force, stress, torque } = tile.lanes(chunk);
         let Some(support) = ellipse.supports(sin, cos) else { return false };
         let EllipseShape { a, b, r, difference_of_squares, .. } = *ellipse;
         let k = self.ring_teeth_per_wave;
-        let cam_force = &mut tile.force.wave_generator.as_chunks_mut::<LANES>().0[chunk];
-        let ring_force = &mut tile.force.ring.as_chunks_mut::<LANES>().0[chunk];
-        let carrier_force = &mut tile.force.carrier.as_chunks_mut::<LANES>().0[chunk];
-        let cam_stress = &mut tile.stress.wave_generator.as_chunks_mut::<LANES>().0[chunk];
-        let ring_stress = &mut tile.stress.ring.as_chunks_mut::<LANES>().0[chunk];
-        let carrier_stress = &mut tile.stress.carrier.as_chunks_mut::<LANES>().0[chunk];
-        let cam_torque = &mut tile.torque.wave_generator.as_chunks_mut::<LANES>().0[chunk];
-        let ring_torque = &mut tile.torque.ring.as_chunks_mut::<LANES>().0[chunk];
-        let carrier_torque = &mut tile.torque.carrier.as_chunks_mut::<LANES>().0[chunk];
 
         let mut center_radius = [0.0; LANES];
         let mut cam_ratio = [0.0; LANES];
@@ -597,16 +562,16 @@ impl Kernel {
             let load = unit.load(lever, per_denominator);
             let (force_h, force_k, force_s) = (load * d2, load * de, load * lever * d * self.teeth_per_wave);
             center_radius[i] = d;
-            cam_force[i] = force_h;
-            ring_force[i] = force_k;
-            carrier_force[i] = force_s;
+            force.wave_generator[i] = force_h;
+            force.ring[i] = force_k;
+            force.carrier[i] = force_s;
             let cam_curvature = tooth_curvature + cube * per_squares;
-            cam_stress[i] = (force_h * (cam_curvature * self.hertz.wave_generator)).sqrt();
-            ring_stress[i] = (force_k * (e3_d * per_regular) * ring_hertz).sqrt();
-            carrier_stress[i] = (force_s * carrier_hertz).sqrt();
-            cam_torque[i] = force_h * lever;
-            ring_torque[i] = force_k * (d * k * lever * per_e);
-            carrier_torque[i] = force_s * d;
+            stress.wave_generator[i] = (force_h * (cam_curvature * self.hertz.wave_generator)).sqrt();
+            stress.ring[i] = (force_k * (e3_d * per_regular) * ring_hertz).sqrt();
+            stress.carrier[i] = (force_s * carrier_hertz).sqrt();
+            torque.wave_generator[i] = force_h * lever;
+            torque.ring[i] = force_k * (d * k * lever * per_e);
+            torque.carrier[i] = force_s * d;
         }
         if K::COLUMNS {
             self.place(tile, chunk, center_radius, cam_ratio, ring_ratio);
@@ -617,21 +582,11 @@ impl Kernel {
     /// The same for wave generators that tell where the centres are: `cos γ = 1/V`, `V² = 1 + T²`, and `cos β = 1/W`, `W² = 1 + k²T²`.
     #[inline(always)]
     fn on_path<K: Sink>(&self, centers: &impl Centers, unit: impl Unit, tile: &mut Tile<'_>, chunk: usize) -> bool {
-        let sin = &tile.sin.as_chunks::<LANES>().0[chunk];
-        let cos = &tile.cos.as_chunks::<LANES>().0[chunk];
+        let TileLanes { sin, cos, force, stress, torque } = tile.lanes(chunk);
         let Some(CenterLanes { radius_mm, tan, tan_derivative, cam_curvature_per_mm }) = centers.at(sin, cos) else {
             return false;
         };
         let Self { r, ring_teeth_per_wave: k, .. } = *self;
-        let cam_force = &mut tile.force.wave_generator.as_chunks_mut::<LANES>().0[chunk];
-        let ring_force = &mut tile.force.ring.as_chunks_mut::<LANES>().0[chunk];
-        let carrier_force = &mut tile.force.carrier.as_chunks_mut::<LANES>().0[chunk];
-        let cam_stress = &mut tile.stress.wave_generator.as_chunks_mut::<LANES>().0[chunk];
-        let ring_stress = &mut tile.stress.ring.as_chunks_mut::<LANES>().0[chunk];
-        let carrier_stress = &mut tile.stress.carrier.as_chunks_mut::<LANES>().0[chunk];
-        let cam_torque = &mut tile.torque.wave_generator.as_chunks_mut::<LANES>().0[chunk];
-        let ring_torque = &mut tile.torque.ring.as_chunks_mut::<LANES>().0[chunk];
-        let carrier_torque = &mut tile.torque.carrier.as_chunks_mut::<LANES>().0[chunk];
 
         let mut cam_ratio = [0.0; LANES];
         let mut ring_ratio = [0.0; LANES];
@@ -657,17 +612,17 @@ impl Kernel {
             let force_h = unit.load(lever, per_denominator) * (d * d);
             let force_k = force_h * (w * cos_gamma);
             let force_s = force_h * (tan * cos_gamma) * self.teeth_per_wave;
-            cam_force[i] = force_h;
-            ring_force[i] = force_k;
-            carrier_force[i] = force_s;
+            force.wave_generator[i] = force_h;
+            force.ring[i] = force_k;
+            force.carrier[i] = force_s;
             let curvature = tooth_curvature + cam_curvature_per_mm[i];
-            cam_stress[i] = (force_h * (curvature * self.hertz.wave_generator)).sqrt();
-            ring_stress[i] = (force_k * (flat * per_regular) * ring_hertz).sqrt();
-            carrier_stress[i] = (force_s * carrier_hertz).sqrt();
-            cam_torque[i] = force_h * lever;
+            stress.wave_generator[i] = (force_h * (curvature * self.hertz.wave_generator)).sqrt();
+            stress.ring[i] = (force_k * (flat * per_regular) * ring_hertz).sqrt();
+            stress.carrier[i] = (force_s * carrier_hertz).sqrt();
+            torque.wave_generator[i] = force_h * lever;
             // F_K sin β, with F_K cos β = F_H cos γ.
-            ring_torque[i] = force_h * (cos_gamma * ring_tan) * d;
-            carrier_torque[i] = force_s * d;
+            torque.ring[i] = force_h * (cos_gamma * ring_tan) * d;
+            torque.carrier[i] = force_s * d;
             if K::COLUMNS {
                 // Tangents of the angles that the contact points are off the position.
                 let (cam_below, ring_below) = (d * v - r, d * w + r);
@@ -704,6 +659,32 @@ impl Kernel {
             cam_angle_deg[i] = (from_valley[i] + cam_ratio[i]) * to_degrees;
             ring_angle_deg[i] = (from_valley[i] * per_k - ring_ratio[i]) * to_degrees;
         }
+    }
+
+    /// Loads of a tile from its unit loads, and what limits them; nothing where it takes the plain path. Where more than a rotation is looked for, `shared`
+    /// is told of what sharing has come to before the limit is looked for in its place.
+    #[inline(always)]
+    fn loads<V: Simd>(
+        &self,
+        loaded: &LoadedDrive<'_>,
+        teeth: usize,
+        tile: &mut Tile<'_>,
+        shared: impl FnOnce(&Sharing, &Work<'_>),
+    ) -> Option<Option<Limit>> {
+        let Law::Sharing(sharing) = &self.law else {
+            Self::scale(loaded, teeth, tile);
+            return Some(None);
+        };
+        if !Self::share::<V>(sharing, loaded, teeth, tile) {
+            return None;
+        }
+        shared(sharing, &tile.work);
+        let limit = match &self.allowable_mpa {
+            Some(allowable_mpa) => Some(Self::limit::<V>(sharing, allowable_mpa, teeth, tile)?),
+            None => None,
+        };
+        Self::scale_shared(loaded, teeth, tile);
+        Some(limit)
     }
 
     /// Turns the wave generator at each input angle of a tile until the unit loads of its teeth balance the torque.

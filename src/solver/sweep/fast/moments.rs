@@ -5,14 +5,14 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use pulp::Simd;
 
 use super::lanes::LANES;
-use super::sinks::PeakSink;
+use super::sinks::{AngleExtremes, PeakSink};
 use super::tile::{Tile, TileSize};
 use super::{Kernel, Law, least};
 use crate::contact::Contact;
 use crate::load_sharing::LoadedDrive;
-use crate::mesh::{Mesh, TeethInMesh};
+use crate::mesh::Mesh;
 use crate::position::Position;
-use crate::sweep::columns::{Extremes, TorqueBalance, TorqueCapacity};
+use crate::sweep::columns::{TorqueBalance, TorqueCapacity};
 use crate::sweep::search::{LOADS, Look, Piece, Seen};
 use crate::{SolveError, Stop};
 
@@ -29,9 +29,7 @@ pub(super) struct FastLook<'a> {
     bases: Vec<Bases>,
     pub(super) torque_balance_residual: f64,
     pub(super) capacity: Option<TorqueCapacity>,
-    pub(super) loaded_teeth: Option<TeethInMesh>,
-    pub(super) rotation_rad: Extremes,
-    pub(super) stiffness_nmm_per_rad: Extremes,
+    pub(super) angles: AngleExtremes,
 }
 
 /// Where the teeth of a piece stand: those near a lobe at its end, all others at its start, so that nothing cancels near an axis.
@@ -100,9 +98,7 @@ impl<'a> FastLook<'a> {
             bases: Vec::new(),
             torque_balance_residual: 0.0,
             capacity: None,
-            loaded_teeth: None,
-            rotation_rad: Extremes::NONE,
-            stiffness_nmm_per_rad: Extremes::NONE,
+            angles: AngleExtremes::NONE,
         }
     }
 
@@ -115,25 +111,17 @@ impl<'a> FastLook<'a> {
             return false;
         }
         let teeth = seen.teeth;
-        let mut has_limits = false;
-        match &kernel.law {
-            Law::Linear(_) => Kernel::scale(loaded, teeth, tile),
-            Law::Sharing(sharing) => {
-                if !Kernel::share::<V>(sharing, loaded, teeth, tile) {
-                    return false;
-                }
-                if sharing.has_gaps() {
-                    (0..fractions.len()).for_each(|row| seen.push_pressed(tile.work.pressed_rad(row, teeth)));
-                }
-                if let Some(allowable_mpa) = &kernel.allowable_mpa {
-                    let Some(limit) = Kernel::limit::<V>(sharing, allowable_mpa, teeth, tile) else { return false };
-                    has_limits = true;
-                    let capacity = limit.capacity(loaded, fractions[limit.row] * self.mesh.sweep_period_deg());
-                    self.capacity = least(self.capacity, capacity);
-                }
-                Kernel::scale_shared(loaded, teeth, tile);
+        let limit = kernel.loads::<V>(loaded, teeth, tile, |sharing, work| {
+            if sharing.has_gaps() {
+                (0..fractions.len()).for_each(|row| seen.push_pressed(work.pressed_rad(row, teeth)));
             }
+        });
+        let Some(limit) = limit else { return false };
+        if let Some(limit) = &limit {
+            let capacity = limit.capacity(loaded, fractions[limit.row] * self.mesh.sweep_period_deg());
+            self.capacity = least(self.capacity, capacity);
         }
+        self.angles.take(loaded.drive(), tile, fractions.len());
         self.torque_balance_residual =
             Kernel::residual(&self.balance, fractions.len(), tile, self.torque_balance_residual);
         for (row, &fraction) in fractions.iter().enumerate() {
@@ -152,14 +140,9 @@ impl<'a> FastLook<'a> {
                     stresses[i] = stress[i] * root[i];
                 }
             }
-            let per_capacity = if has_limits { 1.0 / (loaded.zones() * tile.work.limits_nmm()[row]) } else { 0.0 };
+            let per_capacity = if limit.is_some() { 1.0 / (loaded.zones() * tile.work.limits_nmm()[row]) } else { 0.0 };
             let totals = [rotation_rad, 1.0 / rotation_rad, stiffness, 1.0 / stiffness, per_capacity];
             values[LOADS * teeth..].copy_from_slice(&totals);
-            let loaded = values[..teeth].iter().filter(|&&force| force > 0.0).count() as u64;
-            let TeethInMesh { min, max } = self.loaded_teeth.unwrap_or(TeethInMesh { min: loaded, max: loaded });
-            self.loaded_teeth = Some(TeethInMesh { min: min.min(loaded), max: max.max(loaded) });
-            self.rotation_rad = self.rotation_rad.with(rotation_rad);
-            self.stiffness_nmm_per_rad = self.stiffness_nmm_per_rad.with(stiffness);
         }
         true
     }

@@ -7,7 +7,9 @@ use super::tile::{Tile, whole};
 use crate::contact::{Contact, PerContact};
 use crate::drive::Drive;
 use crate::mesh::{Mesh, Samples, TeethInMesh};
-use crate::sweep::columns::{Columns, ContactPeaks, Extremes, InputAngles, Peak, PeakAt, States, SweepPeaks};
+use crate::sweep::columns::{
+    Columns, ContactPeaks, Extremes, InputAngles, Peak, PeakAt, States, SweepPeaks, TorqueCapacity,
+};
 
 /// Whoever takes tiles, in order.
 pub(super) trait Sink {
@@ -109,13 +111,54 @@ impl RunningPeak {
     }
 }
 
+/// What all teeth together come to at the input angles so far.
+pub(super) struct AngleExtremes {
+    wind_up_deg: Extremes,
+    torsional_stiffness_nm_per_rad: Extremes,
+    loaded_teeth: Option<TeethInMesh>,
+}
+
+impl AngleExtremes {
+    pub(super) const NONE: Self =
+        Self { wind_up_deg: Extremes::NONE, torsional_stiffness_nm_per_rad: Extremes::NONE, loaded_teeth: None };
+
+    /// Those of a tile, too.
+    #[inline(always)]
+    pub(super) fn take(&mut self, drive: &Drive, tile: &Tile<'_>, rows: usize) {
+        let torque_ratio = drive.teeth_per_wave();
+        for row in 0..rows {
+            self.wind_up_deg = self.wind_up_deg.with(tile.row_rotation_rad[row].to_degrees());
+            let stiffness = 1e-3 * tile.row_stiffness[row] * torque_ratio * torque_ratio;
+            self.torsional_stiffness_nm_per_rad = self.torsional_stiffness_nm_per_rad.with(stiffness);
+            let loaded = tile.row_loaded[row] as u64;
+            let TeethInMesh { min, max } = self.loaded_teeth.unwrap_or(TeethInMesh { min: loaded, max: loaded });
+            self.loaded_teeth = Some(TeethInMesh { min: min.min(loaded), max: max.max(loaded) });
+        }
+    }
+
+    /// With what each contact comes to.
+    pub(super) fn peaks(
+        self,
+        contacts: PerContact<ContactPeaks>,
+        torque_capacity: Option<TorqueCapacity>,
+        torque_balance_residual: f64,
+    ) -> SweepPeaks {
+        SweepPeaks {
+            contacts,
+            wind_up_deg: self.wind_up_deg,
+            torsional_stiffness_nm_per_rad: self.torsional_stiffness_nm_per_rad,
+            loaded_teeth: self.loaded_teeth.unwrap_or(TeethInMesh { min: 0, max: 0 }),
+            torque_capacity,
+            torque_balance_residual,
+        }
+    }
+}
+
 /// Peaks alone.
 pub(super) struct PeakSink {
     /// Of force and stress.
     peaks: PerContact<[PlacedPeak; 2]>,
-    wind_up_deg: Extremes,
-    torsional_stiffness_nm_per_rad: Extremes,
-    loaded_teeth: Option<TeethInMesh>,
+    angles: AngleExtremes,
 }
 
 /// The largest value so far, and the state where it stands.
@@ -136,12 +179,7 @@ impl PlacedPeak {
 
 impl Default for PeakSink {
     fn default() -> Self {
-        Self {
-            peaks: PerContact::default(),
-            wind_up_deg: Extremes::NONE,
-            torsional_stiffness_nm_per_rad: Extremes::NONE,
-            loaded_teeth: None,
-        }
+        Self { peaks: PerContact::default(), angles: AngleExtremes::NONE }
     }
 }
 
@@ -152,14 +190,7 @@ impl PeakSink {
             let [force, stress] = self.peaks.get(contact);
             ContactPeaks::of_line(force.peak(), stress.peak(), stress.force_n, width_mm)
         });
-        SweepPeaks {
-            contacts,
-            wind_up_deg: self.wind_up_deg,
-            torsional_stiffness_nm_per_rad: self.torsional_stiffness_nm_per_rad,
-            loaded_teeth: self.loaded_teeth.unwrap_or(TeethInMesh { min: 0, max: 0 }),
-            torque_capacity: None,
-            torque_balance_residual,
-        }
+        self.angles.peaks(contacts, None, torque_balance_residual)
     }
 }
 
@@ -169,15 +200,7 @@ impl Sink for PeakSink {
     #[inline(always)]
     fn take(&mut self, drive: &Drive, tile: &mut Tile<'_>, teeth: usize) {
         let (count, rows) = (tile.count, tile.count / teeth);
-        let torque_ratio = drive.teeth_per_wave();
-        for row in 0..rows {
-            self.wind_up_deg = self.wind_up_deg.with(tile.row_rotation_rad[row].to_degrees());
-            let stiffness = 1e-3 * tile.row_stiffness[row] * torque_ratio * torque_ratio;
-            self.torsional_stiffness_nm_per_rad = self.torsional_stiffness_nm_per_rad.with(stiffness);
-            let loaded = tile.row_loaded[row] as u64;
-            let TeethInMesh { min, max } = self.loaded_teeth.unwrap_or(TeethInMesh { min: loaded, max: loaded });
-            self.loaded_teeth = Some(TeethInMesh { min: min.min(loaded), max: max.max(loaded) });
-        }
+        self.angles.take(drive, tile, rows);
         for contact in CONTACTS {
             scale(tile.force.get_mut(contact), tile.scale, count);
             scale(tile.stress.get_mut(contact), tile.scale_root, count);

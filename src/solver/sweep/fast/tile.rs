@@ -242,6 +242,15 @@ pub(super) struct Tile<'a> {
     pub(super) row_residual: &'a mut [f64],
 }
 
+/// A stretch of a tile: where its states stand, and room for their loads.
+pub(super) struct TileLanes<'t> {
+    pub(super) sin: &'t [f64; LANES],
+    pub(super) cos: &'t [f64; LANES],
+    pub(super) force: PerContact<&'t mut [f64; LANES]>,
+    pub(super) stress: PerContact<&'t mut [f64; LANES]>,
+    pub(super) torque: PerContact<&'t mut [f64; LANES]>,
+}
+
 impl<'a> Tile<'a> {
     pub(super) fn new(arena: &'a mut [f64], size: &TileSize, step_rad: f64) -> Self {
         let &TileSize { len, rows, teeth, with_columns, with_work } = size;
@@ -297,6 +306,26 @@ impl<'a> Tile<'a> {
             row_stiffness,
             row_loaded: Vec::with_capacity(rows),
             row_residual,
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn lanes(&mut self, chunk: usize) -> TileLanes<'_> {
+        #[inline(always)]
+        fn at<'t>(columns: &'t mut PerContact<&mut [f64]>, chunk: usize) -> PerContact<&'t mut [f64; LANES]> {
+            let PerContact { wave_generator, ring, carrier } = columns;
+            PerContact {
+                wave_generator: &mut wave_generator.as_chunks_mut().0[chunk],
+                ring: &mut ring.as_chunks_mut().0[chunk],
+                carrier: &mut carrier.as_chunks_mut().0[chunk],
+            }
+        }
+        TileLanes {
+            sin: &self.sin.as_chunks().0[chunk],
+            cos: &self.cos.as_chunks().0[chunk],
+            force: at(&mut self.force, chunk),
+            stress: at(&mut self.stress, chunk),
+            torque: at(&mut self.torque, chunk),
         }
     }
 
