@@ -88,13 +88,13 @@ impl Evaluator {
         let ring_outer_radius_mm = ring_outer_radius_mm(&design, drive);
         if !self.takes_losses && !self.takes_radial_forces {
             let peaks = checked.peaks(stop)?;
-            let loaded = Loaded { load: checked.load(), peaks, losses: None, radial_forces: None };
+            let loaded = Loaded { checked: &checked, peaks, losses: None, radial_forces: None };
             return self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) });
         }
         let sweep = checked.solve(stop)?;
         let losses = if self.takes_losses { checked.loss_totals(&sweep, stop)? } else { None };
         let radial_forces = if self.takes_radial_forces { RadialForces::of(drive, &sweep, stop)? } else { None };
-        let loaded = Loaded { load: checked.load(), peaks: (&sweep).into(), losses, radial_forces };
+        let loaded = Loaded { checked: &checked, peaks: (&sweep).into(), losses, radial_forces };
         self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) })
     }
 

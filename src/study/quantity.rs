@@ -1,13 +1,14 @@
 //! What can be asked of a variant: each quantity once, with its unit, its meaning and where it comes from.
 
 use serde::Serialize;
+use toothwave_calculation::sweep::CheckedSweep;
 use toothwave_calculation::sweep::losses::{LossTotalsAnswer, PressureVelocityAnswer};
 use toothwave_calculation::sweep::peak::PeakAnswer;
 use toothwave_solver::losses::period::RadialForces;
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::root::NotConverged;
 use toothwave_solver::sweep::{ContactPeaks, SweepPeaks};
-use toothwave_solver::{Contact, Drive, LoadCase};
+use toothwave_solver::{Contact, Drive};
 use utoipa::ToSchema;
 
 /// Where a quantity comes from.
@@ -114,7 +115,7 @@ pub(crate) struct Variant<'a> {
 /// A variant under its load.
 #[derive(Debug)]
 pub(crate) struct Loaded<'a> {
-    pub(crate) load: &'a LoadCase,
+    pub(crate) checked: &'a CheckedSweep,
     pub(crate) peaks: SweepPeaks,
     /// Over all points of a duty; the rest is of its hardest.
     pub(crate) losses: Option<LossTotalsAnswer>,
@@ -229,7 +230,7 @@ pub(crate) const TRANSMISSION_RATIO: &str = "transmission_ratio";
 pub(crate) const OUTER_DIAMETER_MM: &str = "outer_diameter_mm";
 
 /// All quantities, in the order in which they are listed.
-pub static QUANTITIES: [Quantity; 59] = [
+pub static QUANTITIES: [Quantity; 60] = [
     of_drive(
         TRANSMISSION_RATIO,
         "",
@@ -393,14 +394,14 @@ pub static QUANTITIES: [Quantity; 59] = [
         },
     ),
     of_sweep("input_torque_nm", "N·m", "Torque at the wave generator.", sweep("/load/input_torque_nm"), |variant| {
-        Ok(variant.loaded(|loaded| loaded.load.input_torque_nm(variant.drive)))
+        Ok(variant.loaded(|loaded| loaded.checked.load().input_torque_nm(variant.drive)))
     }).depending_on(&TORQUE),
     of_sweep(
         "output_torque_nm",
         "N·m",
         "Torque at the carrier, ring fixed, losses neglected.",
         sweep("/load/output_torque_nm"),
-        |variant| Ok(variant.loaded(|loaded| loaded.load.output_torque_nm(variant.drive))),
+        |variant| Ok(variant.loaded(|loaded| loaded.checked.load().output_torque_nm(variant.drive))),
     )
     .depending_on(&TORQUE),
     of_sweep(
@@ -543,6 +544,14 @@ pub static QUANTITIES: [Quantity; 59] = [
         |variant| Ok(variant.loaded(|loaded| loaded.radial_forces.as_ref().map_or(0.0, |forces| most(&forces.force_n)))),
     )
     .taking(Takes::RadialForces),
+    of_sweep(
+        "carrier_finger_share",
+        "",
+        "What a finger of the carrier gives way over what a tooth does at its contacts; 0 where no estimate tells. Above a fifth a finding speaks of it.",
+        Source::Definition("the `share` of the finger as it is held among `/series_compliance_estimates` of the sweep, 0 where it is left out"),
+        |variant| Ok(variant.loaded(|loaded| loaded.checked.finger_share(&loaded.peaks.contacts).unwrap_or(0.0))),
+    )
+    .not_below_zero(),
     of_capacity(
         "torque_capacity_input_nm",
         "The largest torque at the wave generator under which no contact exceeds the allowable stress.",
