@@ -224,26 +224,6 @@ test('from ratio, torque and space follow drives that keep every limit, and one 
   assert.deepEqual(geometry.findings.filter(({ severity }) => severity === 'warning'), []);
 });
 
-test('the smallest drive for what the page begins with is one to build: no finding speaks of it, and every drawing of it can be had', async () => {
-  const page = await bed.open();
-  await find(page);
-  assert.match(await page.textContent('#find .drive-card h3'), /^Drive 1$/);
-  assert.match(await page.textContent('#find .drive-card'), /At its limits: .*torque capacity, output at least 200/, 'what holds the smallest one back');
-  await page.click('#find button:has-text("Open as design")');
-  await settled(page);
-  const { geometry, sweep } = await bed.server.answers(await designOf(page));
-  assert.deepEqual([...geometry.findings, ...sweep.findings].map(({ code }) => code), []);
-  assert.ok(geometry.carrier.radial_space_mm >= 3);
-  assert.ok(sweep.series_compliance_estimates.find(({ backing }) => backing === 'finger_at_both_ends').share <= 0.2);
-  assert.ok(sweep.torque_capacity.output_torque_nm >= 200);
-  for (const part of ['assembly', 'ring', 'wave-generator', 'carrier', 'tooth']) {
-    for (const format of ['dxf', 'step', 'svg']) {
-      const [download] = await Promise.all([page.waitForEvent('download'), page.click(`[data-file="${part}.${format}"]`)]);
-      assert.ok((await readFile(await download.path())).length > 500, `${part}.${format}`);
-    }
-  }
-});
-
 test('the reasons why others fell are counted', async () => {
   const page = await bed.open();
   await find(page);
