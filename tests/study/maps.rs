@@ -194,3 +194,26 @@ fn a_map_of_which_nothing_can_be_is_refused_before_it_runs() {
     let some = answer(&with(&steps(), "/base/drive/teeth/radius_mm", json!(9.0)));
     assert_eq!(numbers(&some["possible"]["variant"]).len(), 5);
 }
+
+#[test]
+fn what_fingers_give_way_is_what_the_sweep_estimates_as_they_are_held() {
+    let over = json!({ "/drive/teeth/radius_mm": { "one_of": [5.0] } });
+    let johnson = json!({ "compatibility": "virtual_work", "stiffness": { "law": "johnson" } });
+    let mut shares = Vec::new();
+    for fingers in ["held_at_both_ends", "held_at_one_end"] {
+        let base =
+            with(&with(&paper(), "/model", johnson.clone()), "/parts", json!({ "carrier": { "fingers": fingers } }));
+        let study = with(&map(over.clone(), json!(["carrier_finger_share"])), "/base", base.clone());
+        let share = numbers(&answer(&study)["possible"]["quantities"]["carrier_finger_share"])[0];
+        let sweep = Sweep.ask(base.to_string().as_bytes(), &CALCULATION, &Never).unwrap();
+        let estimates = serde_json::to_value(&sweep.series_compliance_estimates).unwrap();
+        let of_finger = |estimate: &&Value| estimate["contact"] == "carrier" && estimate["is_as_held"] == true;
+        let estimate = estimates.as_array().unwrap().iter().find(of_finger).unwrap();
+        assert_eq!(Some(share), estimate["share"].as_f64());
+        shares.push(share);
+    }
+    assert!(shares[0] > 0.0 && shares[1] > 10.0 * shares[0], "{shares:?}");
+    // The linear law, whose own error is as large, has none.
+    let linear = answer(&map(over, json!(["carrier_finger_share"])));
+    assert_eq!(numbers(&linear["possible"]["quantities"]["carrier_finger_share"]), [0.0]);
+}
