@@ -34,10 +34,6 @@ pub const SPLINE_SHARE_OF_CHORD: f64 = 0.01;
 /// do not tell what the curve does between them.
 const POINTS_PER_CHORD: u32 = 4;
 
-const fn dense(tolerance_mm: f64) -> Density {
-    Density { tolerance_mm, points_per_chord: POINTS_PER_CHORD }
-}
-
 /// A closed path. Each edge starts at the very point where the one before ends, the first where the last ends.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outline {
@@ -120,11 +116,15 @@ impl Edge {
         }
     }
 
-    /// A curve as it is drawn, sampled to the chord tolerance and densely.
-    fn curve(drawn: SampledCurve, dense: &SampledCurve, chord_tolerance_mm: f64) -> Self {
-        let polynomials = spline::polygons(dense, SPLINE_SHARE_OF_CHORD * chord_tolerance_mm);
-        let SampledCurve { points, tangents } = drawn;
-        Self::Curve { points, start_tangent: tangents[0], end_tangent: tangents[tangents.len() - 1], polynomials }
+    /// A curve that has [`POINTS_PER_CHORD`].
+    fn curve(sampled: &SampledCurve, chord_tolerance_mm: f64) -> Self {
+        let SampledCurve { points, tangents } = sampled;
+        Self::Curve {
+            points: ends_of_chords(points),
+            start_tangent: tangents[0],
+            end_tangent: tangents[tangents.len() - 1],
+            polynomials: spline::polygons(sampled, SPLINE_SHARE_OF_CHORD * chord_tolerance_mm),
+        }
     }
 
     /// Lets a curve end at the very point where the next edge starts.
@@ -288,26 +288,22 @@ impl Drawing {
     /// The ring: a circle outside, inside its tooth spaces, from tip to tip each, with the lands between that bored or turned flanks leave.
     fn ring_section(&self, ring: &RingPart, stop: &dyn Stop) -> Result<Section, SolveError> {
         let teeth = self.drive.parameters().ring_teeth.unsigned_abs();
-        let chord_tolerance_mm = self.parameters.chord_tolerance_mm;
-        let mut half = ring.space.half(Density::of_chords(chord_tolerance_mm), stop)?;
-        let chords: usize = half.pieces.iter().map(|piece| piece.points.len() - 1).sum();
+        let mut half = ring.space.half(self.density(), stop)?;
+        let chords: usize = half.pieces.iter().map(|piece| chords(&piece.points)).sum();
         self.require_points(2 * chords as u64 * teeth)?;
         let tip_rad = PI / teeth as f64;
         let tip = ring.space.tip();
-        let mut dense_half = ring.space.half(dense(chord_tolerance_mm), stop)?;
-        for half in [&mut half, &mut dense_half] {
-            if !tip.has_land
-                && let Some(end) = half.pieces.last_mut().and_then(|piece| piece.points.last_mut())
-            {
-                // Both flanks end on the symmetry line; there the tip is a point, or regular.
-                *end = Point2::from(tip.radius_mm * Vector2::new(tip_rad.cos(), tip_rad.sin()));
-            }
+        if !tip.has_land
+            && let Some(end) = half.pieces.last_mut().and_then(|piece| piece.points.last_mut())
+        {
+            // Both flanks end on the symmetry line; there the tip is a point, or regular.
+            *end = Point2::from(tip.radius_mm * Vector2::new(tip_rad.cos(), tip_rad.sin()));
         }
         let land_rad = match half.pieces.last().and_then(|piece| piece.points.last()) {
             Some(end) if tip.has_land => 2.0 * (tip_rad - end.y.atan2(end.x)),
             _ => 0.0,
         };
-        let space = tooth_space(half, dense_half, chord_tolerance_mm);
+        let space = tooth_space(half, self.parameters.chord_tolerance_mm);
         let start = space.first().map(Edge::start).unwrap_or_default();
         let turned = |copy: u64| Rotation2::new(2.0 * PI * ((copy % teeth) as f64 / teeth as f64));
         let mut edges = Vec::new();
@@ -329,14 +325,13 @@ impl Drawing {
     /// The wave generator: a curve from each lobe to each valley and on.
     fn cam_section(&self, cam: &WaveGeneratorPart, stop: &dyn Stop) -> Result<Section, SolveError> {
         let (locus, lobes) = (self.drive.flank().locus(), self.drive.lobes());
-        let half_lobe = |density| cam_half_lobe(locus, cam.set_back_mm, density, stop);
-        let tolerance_mm = self.parameters.chord_tolerance_mm;
-        let points = half_lobe(Density::of_chords(tolerance_mm))?.points;
-        let half = points.len() - 1;
+        let half_lobe = cam_half_lobe(locus, cam.set_back_mm, self.density(), stop)?;
+        let half = chords(&half_lobe.points);
         self.require_points(u64::from(2 * lobes) * half as u64)?;
+        let points = ends_of_chords(&half_lobe.points);
         let whole = cam_outline(&points, lobes);
         // The poles likewise, each polygon's last one the next one's first, so that they start and end in the outline's very points.
-        let polygons = spline::polygons(&half_lobe(dense(tolerance_mm))?, SPLINE_SHARE_OF_CHORD * tolerance_mm);
+        let polygons = spline::polygons(&half_lobe, SPLINE_SHARE_OF_CHORD * self.parameters.chord_tolerance_mm);
         let degrees: Vec<_> = polygons.iter().map(|polygon| polygon.len() - 1).collect();
         let poles = polygons.iter().flat_map(|polygon| &polygon[1..]);
         let whole_polygon = cam_outline(&points[..1].iter().chain(poles).copied().collect(), lobes);
@@ -414,18 +409,29 @@ impl Drawing {
         })
     }
 
+    const fn density(&self) -> Density {
+        Density { tolerance_mm: self.parameters.chord_tolerance_mm, points_per_chord: POINTS_PER_CHORD }
+    }
+
     fn require_points(&self, points: u64) -> Result<(), SolveError> {
         let limit = self.parameters.max_points;
         if points > limit { Err(SolveError::TooManyPoints { points, limit }) } else { Ok(()) }
     }
 }
 
+/// Chords of a curve that has [`POINTS_PER_CHORD`].
+const fn chords(points: &Polyline) -> usize {
+    (points.len() - 1) / POINTS_PER_CHORD as usize
+}
+
+fn ends_of_chords(points: &Polyline) -> Polyline {
+    points.iter().step_by(POINTS_PER_CHORD as usize).copied().collect()
+}
+
 /// A tooth space of the ring, its middle along x, from tip to tip.
-fn tooth_space(half: HalfSpace, dense: HalfSpace, chord_tolerance_mm: f64) -> Vec<Edge> {
+fn tooth_space(half: HalfSpace, chord_tolerance_mm: f64) -> Vec<Edge> {
     let root_arc_rad = half.root_arc_rad;
-    let mut edges: Vec<_> = (flanks(half).into_iter().zip(flanks(dense)))
-        .map(|(drawn, dense)| Edge::curve(drawn, &dense, chord_tolerance_mm))
-        .collect();
+    let mut edges: Vec<_> = flanks(half).iter().map(|flank| Edge::curve(flank, chord_tolerance_mm)).collect();
     if root_arc_rad > 0.0 {
         let middle = edges.len() / 2;
         let (start, end) = (edges[middle - 1].end(), edges[middle].start());
