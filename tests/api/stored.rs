@@ -196,10 +196,10 @@ async fn a_study_that_another_forgets_while_it_begins_is_no_fault_of_the_service
     let file = File::new();
     let keeper = Keeper::of(&file, LIMITS, false).await;
     let study = keeper.ask(&map(5)).await.json();
-    let delete = Question::of("DELETE", &place(&study));
+    let (again, delete) = (map(5), Question::of("DELETE", &place(&study)));
     for _ in 0..30 {
         let (begun, one, other) =
-            tokio::join!(keeper.ask(&map(5)), keeper.service.ask(&delete), keeper.service.ask(&delete));
+            tokio::join!(keeper.ask(&again), keeper.service.ask(&delete), keeper.service.ask(&delete));
         assert!(matches!(begun.status, 200 | 202), "{}", begun.text());
         assert!([one, other].iter().all(|deleted| matches!(deleted.status, 204 | 404)));
     }
