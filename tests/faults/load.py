@@ -5,7 +5,11 @@ import collections
 import hashlib
 import itertools
 import json
+import pathlib
+import pickle
 import random
+import subprocess
+import sys
 import time
 
 # What a client does when its connection is cut: it tries again, once, after this.
@@ -108,14 +112,16 @@ class Body:
 
 
 class Work:
-    """One kind of request: a path and documents, the same one or always another."""
+    """One kind of request: a path, and documents to be posted there, the same one or always another; or a path alone."""
 
-    def __init__(self, host, path, document, *, headers=(), fresh=False, slowly=False):
+    def __init__(self, host, path, document=None, *, headers=(), fresh=False, slowly=False):
         self.host, self.path, self.document, self.headers = host, path, document, headers
         self.fresh, self.slowly = fresh, slowly
         self.digest = None
 
     def request(self):
+        if self.document is None:
+            return f"GET {self.path} HTTP/1.1\r\nHost: {self.host}\r\n\r\n".encode()
         document = dict(self.document)
         if self.fresh:
             # Nobody asked for this torque before: it must be solved.
@@ -201,6 +207,38 @@ async def send(host, port, works, rate, until, *, leaves=False, panics=False):
         await asyncio.wait(tasks)
     client.close()
     return tally
+
+
+class Apart:
+    """A load in a process of its own, whose times do not wait for what another load does."""
+
+    def __init__(self, *load):
+        command = [sys.executable, "-c", "import load; load.apart()"]
+        here = pathlib.Path(__file__).parent
+        self.process = subprocess.Popen(command, cwd=here, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        pickle.dump(load, self.process.stdin)
+        self.process.stdin.flush()
+
+    async def end(self):
+        """What became of its requests."""
+        answer, _ = await asyncio.to_thread(self.process.communicate)
+        return pickle.loads(answer)
+
+
+def apart():
+    """What an `Apart` runs: `send` until nobody holds its input any more."""
+
+    async def until_told(*load):
+        loop, is_over = asyncio.get_running_loop(), asyncio.Event()
+
+        def told():
+            loop.remove_reader(sys.stdin)
+            is_over.set()
+
+        loop.add_reader(sys.stdin, told)
+        return await send(*load, is_over.is_set)
+
+    pickle.dump(asyncio.run(until_told(*pickle.load(sys.stdin.buffer))), sys.stdout.buffer)
 
 
 async def hold(host, port, work, count, seconds):
