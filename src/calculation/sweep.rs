@@ -8,7 +8,8 @@ use toothwave_solver::losses::{Friction, Mechanism, period};
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self as solver, Points};
 use toothwave_solver::{
-    Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, findings, model_error as error_of_model,
+    Contact, Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, findings,
+    model_error as error_of_model,
 };
 
 use crate::design::{BearingRating, Design, Duty, DutyPoint, PartsDocument};
@@ -64,6 +65,14 @@ impl CheckedSweep {
     /// The same, of which wear and the life of a bearing are not asked.
     pub fn without_wear(self) -> Self {
         Self { wear_rate_mm3_per_nm: None, bearing_rating: None, ..self }
+    }
+
+    /// What a finger of the carrier, as it is held, adds to a tooth's approach at its contacts at the peaks of the load, over that; nothing where
+    /// no estimate tells.
+    pub fn finger_share(&self, peaks: &PerContact<solver::ContactPeaks>) -> Option<f64> {
+        let shares = Shares::of(&self.drive, self.load(), &self.backings, peaks)?.shares;
+        let of_finger = shares.into_iter().find(|(estimate, _)| estimate.backing.contact() == Contact::Carrier);
+        of_finger.map(|(_, share)| share)
     }
 
     /// What friction takes over all points of a duty, as the answer has it, given the sweep of the hardest; nothing without friction.

@@ -339,6 +339,11 @@ impl<'a> LoadedDrive<'a> {
         Self { zones, ..self }
     }
 
+    /// The same with one tooth at each place of one zone, which stands for all that carry alike; where items are alike ([`Mesh::as_one_zone`]).
+    pub(crate) fn as_one_zone(&self) -> Self {
+        Self { mesh: self.mesh.as_one_zone(), zones: self.mesh.teeth_at_each_place(), ..*self }
+    }
+
     /// What a sum over the teeth that are listed is multiplied by, to be that over all.
     pub(crate) const fn zones(&self) -> f64 {
         self.zones

@@ -82,6 +82,6 @@ impl Locus {
         } else {
             Position::from_lobe(folded.min(pitch_rad - folded), lobes)
         };
-        Ok(self.at(position)?.center_radius_mm)
+        self.cam.kind().center_radius_mm(self.tooth_radius_mm, position)
     }
 }

@@ -60,6 +60,13 @@ pub struct TeethInMesh {
     pub max: u64,
 }
 
+impl TeethInMesh {
+    /// The same of so many at each place.
+    pub(crate) const fn times(self, at_each_place: u64) -> Self {
+        Self { min: at_each_place * self.min, max: at_each_place * self.max }
+    }
+}
+
 /// Where a tooth is among the items of the parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Place {
@@ -207,7 +214,7 @@ impl Mesh {
         let at_each_place = self.listed_at_each_place();
         let min = self.whole_spacings();
         let max = min + u64::from(!self.spacings_are_whole());
-        TeethInMesh { min: at_each_place * min, max: at_each_place * max }
+        TeethInMesh { min, max }.times(at_each_place)
     }
 
     /// Whether at every input angle a tooth has a lever arm: `ψ_e > 2π g/(U Z'_G)`.
@@ -346,6 +353,17 @@ impl Mesh {
     /// How many spacings the engagement spans, `ε/g`.
     pub const fn engaged_spacings(&self) -> f64 {
         self.engaged_spacings
+    }
+
+    /// All places as those of one zone that has so many slots more, a period of which is a lap: what unlike zones look like over each other, items
+    /// being alike. Of zones that are alike it is the same mesh.
+    pub(crate) fn as_one_zone(&self) -> Self {
+        Self { installed: self.places(), ring_teeth: self.ring_teeth * self.laps(), ..*self }
+    }
+
+    /// The places of a sweep's samples within a lap, which come again in each: so many of equal intervals.
+    pub(crate) fn samples_of_lap(&self, samples: Samples) -> Samples {
+        Samples(samples.0 / greatest_common_divisor(samples.0, self.laps()))
     }
 
     /// The position at a place when a fraction of a lap has passed: `place - fraction` spacings from the lobe. Both are exact, so the

@@ -14,7 +14,7 @@ use toothwave_solver::parts::RIM;
 use toothwave_solver::{Drive, SolveError, Stop};
 use utoipa::ToSchema;
 
-use crate::quantity::{Loaded, Needs, Quantity, Variant};
+use crate::quantity::{Loaded, Quantity, Takes, Variant};
 
 /// Why a variant has no answer.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
@@ -49,16 +49,22 @@ pub struct Stopped;
 #[derive(Debug, Clone)]
 pub(crate) struct Evaluator {
     pub(crate) quantities: Vec<&'static Quantity>,
-    needs: Needs,
-    needs_radial_force: bool,
+    takes_sweep: bool,
+    takes_losses: bool,
+    takes_radial_forces: bool,
     limits: Limits,
 }
 
 impl Evaluator {
     pub(crate) fn new(quantities: Vec<&'static Quantity>, limits: Limits) -> Self {
-        let needs = quantities.iter().map(|quantity| quantity.needs).max().unwrap_or(Needs::Drive);
-        let needs_radial_force = quantities.iter().any(|quantity| quantity.name == "radial_force_max_n");
-        Self { quantities, needs, needs_radial_force, limits }
+        let takes = |takes| quantities.iter().any(|quantity| quantity.takes == takes);
+        Self {
+            takes_sweep: quantities.iter().any(|quantity| quantity.takes != Takes::Drive),
+            takes_losses: takes(Takes::Losses),
+            takes_radial_forces: takes(Takes::RadialForces),
+            quantities,
+            limits,
+        }
     }
 
     /// What becomes of a document; a panic is an outcome too.
@@ -72,7 +78,7 @@ impl Evaluator {
 
     fn answer(&self, document: &Tree, stop: &dyn Stop) -> Result<Vec<f64>, NoAnswer> {
         let design = document.read::<Design>()?.normalised();
-        if self.needs == Needs::Drive {
+        if !self.takes_sweep {
             let drive = CoincidenceDegree.check(&design, &self.limits)?;
             let ring_outer_radius_mm = ring_outer_radius_mm(&design, &drive);
             return self.values(&Variant { drive: &drive, ring_outer_radius_mm, loaded: None });
@@ -80,15 +86,15 @@ impl Evaluator {
         let checked = Sweep.check(&design, &self.limits)?.without_wear();
         let drive = checked.drive();
         let ring_outer_radius_mm = ring_outer_radius_mm(&design, drive);
-        if self.needs < Needs::Friction && !self.needs_radial_force {
+        if !self.takes_losses && !self.takes_radial_forces {
             let peaks = checked.peaks(stop)?;
-            let loaded = Loaded { load: checked.load(), peaks, losses: None, radial_forces: None };
+            let loaded = Loaded { checked: &checked, peaks, losses: None, radial_forces: None };
             return self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) });
         }
         let sweep = checked.solve(stop)?;
-        let losses = if self.needs >= Needs::Friction { checked.loss_totals(&sweep, stop)? } else { None };
-        let radial_forces = if self.needs_radial_force { RadialForces::of(drive, &sweep, stop)? } else { None };
-        let loaded = Loaded { load: checked.load(), peaks: (&sweep).into(), losses, radial_forces };
+        let losses = if self.takes_losses { checked.loss_totals(&sweep, stop)? } else { None };
+        let radial_forces = if self.takes_radial_forces { RadialForces::of(drive, &sweep, stop)? } else { None };
+        let loaded = Loaded { checked: &checked, peaks: (&sweep).into(), losses, radial_forces };
         self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) })
     }
 

@@ -81,13 +81,13 @@ pub(crate) fn limits(
                 let detail = format!("the range is empty: {min:?} is above {max:?}");
                 return Err(beyond(&format!("{at}/min"), FieldCode::OutOfRange, detail, *min, *max));
             }
-            (RequireDocument::Range(RangeDocument { min: Some(min), .. }), false) if *min > quantity.most() => {
-                let most = quantity.most();
+            (RequireDocument::Range(RangeDocument { min: Some(min), .. }), false) if *min > quantity.most => {
+                let most = quantity.most;
                 let detail = format!("no drive has a `{name}` of {min:?} or more: it is {most:?} at most");
                 return Err(beyond(&format!("{at}/min"), FieldCode::OutOfRange, detail, *min, most));
             }
-            (RequireDocument::Range(RangeDocument { max: Some(max), .. }), false) if *max < quantity.least() => {
-                let least = quantity.least();
+            (RequireDocument::Range(RangeDocument { max: Some(max), .. }), false) if *max < quantity.least => {
+                let least = quantity.least;
                 let detail = format!("allow values above zero: no drive has a `{name}` of {max:?} or less");
                 return Err(beyond(&format!("{at}/max"), FieldCode::OutOfRange, detail, *max, least));
             }

@@ -1,13 +1,14 @@
 //! What can be asked of a variant: each quantity once, with its unit, its meaning and where it comes from.
 
 use serde::Serialize;
+use toothwave_calculation::sweep::CheckedSweep;
 use toothwave_calculation::sweep::losses::{LossTotalsAnswer, PressureVelocityAnswer};
 use toothwave_calculation::sweep::peak::PeakAnswer;
 use toothwave_solver::losses::period::RadialForces;
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::root::NotConverged;
 use toothwave_solver::sweep::{ContactPeaks, SweepPeaks};
-use toothwave_solver::{Contact, Drive, LoadCase};
+use toothwave_solver::{Contact, Drive};
 use utoipa::ToSchema;
 
 /// Where a quantity comes from.
@@ -41,6 +42,19 @@ pub enum Needs {
     FrictionAndSpeed,
 }
 
+/// What a quantity is worked out from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Takes {
+    /// The drive.
+    Drive,
+    /// The peaks of a sweep.
+    Peaks,
+    /// What the teeth push the wave generator aside with, state by state.
+    RadialForces,
+    /// What friction takes, state by state.
+    Losses,
+}
+
 /// What works a quantity out.
 type Of = fn(&Variant<'_>) -> Result<f64, NotConverged>;
 
@@ -59,6 +73,25 @@ pub struct Quantity {
     pub needs: Needs,
     /// Where it comes from.
     pub source: Source,
+    /// The places of a design that it may depend on: what stands elsewhere does not change it.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub(crate) depends_on: &'static [&'static str],
+    /// A place of a design that says it alone, where anything stands there.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub(crate) said_by: Option<&'static str>,
+    /// What it is at least, whatever the drive.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub(crate) least: f64,
+    /// What it is at most, whatever the drive.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub(crate) most: f64,
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub(crate) takes: Takes,
     #[serde(skip)]
     #[schema(ignore)]
     of: Of,
@@ -82,7 +115,7 @@ pub(crate) struct Variant<'a> {
 /// A variant under its load.
 #[derive(Debug)]
 pub(crate) struct Loaded<'a> {
-    pub(crate) load: &'a LoadCase,
+    pub(crate) checked: &'a CheckedSweep,
     pub(crate) peaks: SweepPeaks,
     /// Over all points of a duty; the rest is of its hardest.
     pub(crate) losses: Option<LossTotalsAnswer>,
@@ -123,20 +156,61 @@ fn most(column: &[f64]) -> f64 {
     column.iter().copied().fold(f64::NEG_INFINITY, f64::max)
 }
 
-const fn of_drive(name: &'static str, unit: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
-    Quantity { name, unit, meaning, is_flag: false, needs: Needs::Drive, source, of }
-}
+/// Where a design says the numbers of teeth and lobes.
+const COUNTS: [&str; 4] =
+    ["/drive/wave_generator/kind", "/drive/wave_generator/lobes", "/drive/teeth/count", "/drive/ring/teeth"];
 
-const fn of_sweep(name: &'static str, unit: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
-    Quantity { name, unit, meaning, is_flag: false, needs: Needs::Load, source, of }
+/// Where it says what carries which load.
+const TORQUE: [&str; 5] = ["/load", COUNTS[0], COUNTS[1], COUNTS[2], COUNTS[3]];
+
+/// All but how things are drawn.
+const MECHANICS: [&str; 9] =
+    ["/drive", "/materials", "/load", "/model", "/modification", "/deviations", "/friction", "/parts", "/sweep"];
+
+const fn of_drive(name: &'static str, unit: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
+    Quantity {
+        name,
+        unit,
+        meaning,
+        is_flag: false,
+        needs: Needs::Drive,
+        source,
+        depends_on: &["/drive"],
+        said_by: None,
+        least: f64::NEG_INFINITY,
+        most: f64::INFINITY,
+        takes: Takes::Drive,
+        of,
+    }
 }
 
 const fn flag(name: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
-    Quantity { name, unit: "", meaning, is_flag: true, needs: Needs::Drive, source, of }
+    Quantity { is_flag: true, ..of_drive(name, "", meaning, source, of) }
 }
 
-const fn needing(needs: Needs, quantity: Quantity) -> Quantity {
-    Quantity { needs, ..quantity }
+const fn of_sweep(name: &'static str, unit: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
+    let (needs, takes) = (Needs::Load, Takes::Peaks);
+    Quantity { needs, depends_on: &MECHANICS, takes, ..of_drive(name, unit, meaning, source, of) }
+}
+
+const fn of_capacity(name: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
+    Quantity { needs: Needs::AllowableStress, ..of_sweep(name, "N·m", meaning, source, of) }
+}
+
+const fn of_losses(name: &'static str, unit: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
+    Quantity { needs: Needs::Friction, takes: Takes::Losses, ..of_sweep(name, unit, meaning, source, of) }
+}
+
+const fn loss_ratio(name: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
+    of_losses(name, "", meaning, source, of).not_below_zero()
+}
+
+const fn efficiency(name: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
+    Quantity { most: 1.0, ..of_losses(name, "", meaning, source, of) }
+}
+
+const fn pressure_velocity(name: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
+    of_losses(name, "MPa m/s", meaning, source, of).at_speed().not_below_zero()
 }
 
 const fn geometry(pointer: &'static str) -> Source {
@@ -151,41 +225,51 @@ const fn sweep(pointer: &'static str) -> Source {
     Source::Answer { path: "/v1/sweep", pointer }
 }
 
+/// Whoever knows no more than these two knows how large the parts may be, and how many teeth they have.
+pub(crate) const TRANSMISSION_RATIO: &str = "transmission_ratio";
+pub(crate) const OUTER_DIAMETER_MM: &str = "outer_diameter_mm";
+
 /// All quantities, in the order in which they are listed.
-pub static QUANTITIES: [Quantity; 59] = [
+pub static QUANTITIES: [Quantity; 60] = [
     of_drive(
-        "transmission_ratio",
+        TRANSMISSION_RATIO,
         "",
         "Input speed over carrier speed, ring fixed; below zero where they turn against each other.",
         geometry("/transmission_ratio"),
         |variant| Ok(variant.drive.transmission_ratio()),
-    ),
+    )
+    .depending_on(&COUNTS),
     of_drive(
         "transmission_ratio_carrier_fixed",
         "",
         "Input speed over ring speed, carrier fixed.",
         geometry("/transmission_ratio_carrier_fixed"),
         |variant| Ok(variant.drive.transmission_ratio_carrier_fixed()),
-    ),
+    )
+    .depending_on(&COUNTS),
     of_drive(
-        "outer_diameter_mm",
+        OUTER_DIAMETER_MM,
         "mm",
         "Diameter of the whole drive.",
         Source::Definition(
             "twice the ring's outer radius: `parts.ring.outer_radius_mm`, or where that is left out 1.2 times the root radius with `parts.ring.clearance_um`, the ring's `modification` apart",
         ),
         |variant| Ok(2.0 * variant.ring_outer_radius_mm),
-    ),
+    )
+    .not_below_zero()
+    .depending_on(&["/drive", "/parts/ring"])
+    .said_by("/parts/ring/outer_radius_mm"),
     of_drive(
         "ring_root_radius_mm",
         "mm",
         "Radius of the ring in the middle of a tooth space.",
         geometry("/ring/root_radius_mm"),
         |variant| Ok(variant.drive.root_radius_mm()),
-    ),
+    )
+    .not_below_zero(),
     of_drive("ring_tip_radius_mm", "mm", "Radius of the ring's tips.", geometry("/ring/tip_radius_mm"), |variant| {
         Ok(variant.drive.tip_radius_mm())
-    }),
+    }).not_below_zero(),
     of_drive(
         "ring_tooth_height_mm",
         "mm",
@@ -199,7 +283,9 @@ pub static QUANTITIES: [Quantity; 59] = [
         "Extent of a tooth along the axis.",
         Source::Definition("`drive.teeth.width_mm`; a ball's diameter"),
         |variant| Ok(variant.drive.tooth_width_mm()),
-    ),
+    )
+    .not_below_zero()
+    .depending_on(&["/drive/teeth"]),
     flag(
         "undercut",
         "Whether the ring's tips are cut away by their own envelope.",
@@ -212,7 +298,8 @@ pub static QUANTITIES: [Quantity; 59] = [
         "Contact ratio over all meshing zones.",
         mesh("/coincidence_degree"),
         |variant| Ok(Mesh::new(variant.drive).coincidence_degree()),
-    ),
+    )
+    .not_below_zero(),
     of_drive(
         "teeth_in_mesh_min",
         "",
@@ -220,7 +307,8 @@ pub static QUANTITIES: [Quantity; 59] = [
         mesh("/teeth_in_mesh_per_zone/min"),
         #[expect(clippy::cast_precision_loss, reason = "a count of teeth")]
         |variant| Ok(Mesh::new(variant.drive).teeth_in_mesh().min as f64),
-    ),
+    )
+    .not_below_zero(),
     of_drive(
         "engagement_start_deg",
         "deg",
@@ -234,7 +322,8 @@ pub static QUANTITIES: [Quantity; 59] = [
         "The input angle after which the load pattern repeats.",
         mesh("/period_deg"),
         |variant| Ok(Mesh::new(variant.drive).period_deg()),
-    ),
+    )
+    .not_below_zero(),
     of_drive(
         "ring_pressure_angle_max_deg",
         "deg",
@@ -305,92 +394,104 @@ pub static QUANTITIES: [Quantity; 59] = [
         },
     ),
     of_sweep("input_torque_nm", "N·m", "Torque at the wave generator.", sweep("/load/input_torque_nm"), |variant| {
-        Ok(variant.loaded(|loaded| loaded.load.input_torque_nm(variant.drive)))
-    }),
+        Ok(variant.loaded(|loaded| loaded.checked.load().input_torque_nm(variant.drive)))
+    }).depending_on(&TORQUE),
     of_sweep(
         "output_torque_nm",
         "N·m",
         "Torque at the carrier, ring fixed, losses neglected.",
         sweep("/load/output_torque_nm"),
-        |variant| Ok(variant.loaded(|loaded| loaded.load.output_torque_nm(variant.drive))),
-    ),
+        |variant| Ok(variant.loaded(|loaded| loaded.checked.load().output_torque_nm(variant.drive))),
+    )
+    .depending_on(&TORQUE),
     of_sweep(
         "peak_force_wave_generator_n",
         "N",
         "Largest force between tooth and wave generator.",
         sweep("/peaks/wave_generator/force_n/value"),
         |variant| Ok(variant.peaks(Contact::WaveGenerator, |peaks| peaks.force_n.value)),
-    ),
+    )
+    .not_below_zero(),
     of_sweep(
         "peak_force_ring_n",
         "N",
         "Largest force between tooth and ring.",
         sweep("/peaks/ring/force_n/value"),
         |variant| Ok(variant.peaks(Contact::Ring, |peaks| peaks.force_n.value)),
-    ),
+    )
+    .not_below_zero(),
     of_sweep(
         "peak_force_carrier_n",
         "N",
         "Largest force between tooth and carrier.",
         sweep("/peaks/carrier/force_n/value"),
         |variant| Ok(variant.peaks(Contact::Carrier, |peaks| peaks.force_n.value)),
-    ),
+    )
+    .not_below_zero(),
     of_sweep(
         "peak_stress_wave_generator_mpa",
         "MPa",
         "Largest contact stress between tooth and wave generator.",
         sweep("/peaks/wave_generator/stress_mpa/value"),
         |variant| Ok(variant.peaks(Contact::WaveGenerator, |peaks| peaks.stress_mpa.value)),
-    ),
+    )
+    .not_below_zero(),
     of_sweep(
         "peak_stress_ring_mpa",
         "MPa",
         "Largest contact stress between tooth and ring.",
         sweep("/peaks/ring/stress_mpa/value"),
         |variant| Ok(variant.peaks(Contact::Ring, |peaks| peaks.stress_mpa.value)),
-    ),
+    )
+    .not_below_zero(),
     of_sweep(
         "peak_stress_carrier_mpa",
         "MPa",
         "Largest contact stress between tooth and carrier.",
         sweep("/peaks/carrier/stress_mpa/value"),
         |variant| Ok(variant.peaks(Contact::Carrier, |peaks| peaks.stress_mpa.value)),
-    ),
+    )
+    .not_below_zero(),
     of_sweep(
         "peak_stress_mpa",
         "MPa",
         "Largest contact stress of all.",
         Source::Definition("the largest of the three contacts' peak stresses"),
         |variant| Ok(variant.greatest(|peaks| peaks.stress_mpa.value)),
-    ),
+    )
+    .not_below_zero(),
     of_sweep(
         "peak_force_n",
         "N",
         "Largest contact force of all.",
         Source::Definition("the largest of the three contacts' peak forces"),
         |variant| Ok(variant.greatest(|peaks| peaks.force_n.value)),
-    ),
+    )
+    .not_below_zero(),
     of_sweep(
         "half_width_wave_generator_mm",
         "mm",
         "Half the width of the wave generator's contact under its peak stress.",
         sweep("/peaks/wave_generator/half_width_mm"),
         |variant| Ok(variant.peaks(Contact::WaveGenerator, |peaks| peaks.half_width_mm)),
-    ),
+    )
+    .not_below_zero(),
     of_sweep(
         "half_width_ring_mm",
         "mm",
         "Half the width of the ring's contact under its peak stress.",
         sweep("/peaks/ring/half_width_mm"),
         |variant| Ok(variant.peaks(Contact::Ring, |peaks| peaks.half_width_mm)),
-    ),
+    )
+    .not_below_zero(),
     of_sweep(
         "half_width_carrier_mm",
         "mm",
         "Half the width of the carrier's contact under its peak stress.",
         sweep("/peaks/carrier/half_width_mm"),
         |variant| Ok(variant.peaks(Contact::Carrier, |peaks| peaks.half_width_mm)),
-    ),
+    )
+    .not_below_zero(),
     of_sweep(
         "loaded_teeth_min",
         "",
@@ -398,7 +499,8 @@ pub static QUANTITIES: [Quantity; 59] = [
         sweep("/loaded_teeth_per_zone/min"),
         #[expect(clippy::cast_precision_loss, reason = "a count of teeth")]
         |variant| Ok(variant.loaded(|loaded| loaded.peaks.loaded_teeth.min as f64)),
-    ),
+    )
+    .not_below_zero(),
     of_sweep(
         "wind_up_min_deg",
         "deg",
@@ -440,123 +542,111 @@ pub static QUANTITIES: [Quantity; 59] = [
         "What the teeth push the wave generator aside with at most; 0 where lobes balance each other.",
         Source::Definition("the largest of `/radial_force_n/value` of the sweep, 0 where it is left out"),
         |variant| Ok(variant.loaded(|loaded| loaded.radial_forces.as_ref().map_or(0.0, |forces| most(&forces.force_n)))),
+    )
+    .taking(Takes::RadialForces),
+    of_sweep(
+        "carrier_finger_share",
+        "",
+        "What a finger of the carrier gives way over what a tooth does at its contacts; 0 where no estimate tells. Above a fifth a finding speaks of it.",
+        Source::Definition("the `share` of the finger as it is held among `/series_compliance_estimates` of the sweep, 0 where it is left out"),
+        |variant| Ok(variant.loaded(|loaded| loaded.checked.finger_share(&loaded.peaks.contacts).unwrap_or(0.0))),
+    )
+    .not_below_zero(),
+    of_capacity(
+        "torque_capacity_input_nm",
+        "The largest torque at the wave generator under which no contact exceeds the allowable stress.",
+        sweep("/torque_capacity/input_torque_nm"),
+        |variant| Ok(variant.capacity(|input_nm, _| input_nm)),
     ),
-    needing(
-        Needs::AllowableStress,
-        of_sweep(
-            "torque_capacity_input_nm",
-            "N·m",
-            "The largest torque at the wave generator under which no contact exceeds the allowable stress.",
-            sweep("/torque_capacity/input_torque_nm"),
-            |variant| Ok(variant.capacity(|input_nm, _| input_nm)),
-        ),
+    of_capacity(
+        "torque_capacity_output_nm",
+        "The same at the carrier.",
+        sweep("/torque_capacity/output_torque_nm"),
+        |variant| Ok(variant.capacity(|_, output_nm| output_nm)),
     ),
-    needing(
-        Needs::AllowableStress,
-        of_sweep(
-            "torque_capacity_output_nm",
-            "N·m",
-            "The same at the carrier.",
-            sweep("/torque_capacity/output_torque_nm"),
-            |variant| Ok(variant.capacity(|_, output_nm| output_nm)),
-        ),
+    loss_ratio(
+        "loss_ratio",
+        "Mean power lost over the input torque times the speed of wave generator against carrier.",
+        sweep("/losses/loss_ratio"),
+        |variant| Ok(variant.losses(|losses| losses.loss_ratio)),
     ),
-    needing(
-        Needs::Friction,
-        of_sweep(
-            "loss_ratio",
-            "",
-            "Mean power lost over the input torque times the speed of wave generator against carrier.",
-            sweep("/losses/loss_ratio"),
-            |variant| Ok(variant.losses(|losses| losses.loss_ratio)),
-        ),
-    ),
-    loss_at(
+    loss_ratio(
         "loss_ratio_wave_generator",
         "The part of it that is lost between teeth and wave generator.",
         sweep("/losses/loss_ratio_by_place/wave_generator"),
         |variant| Ok(variant.losses(|losses| losses.loss_ratio_by_place.wave_generator)),
     ),
-    loss_at(
+    loss_ratio(
         "loss_ratio_ring",
         "The part of it that is lost between teeth and ring.",
         sweep("/losses/loss_ratio_by_place/ring"),
         |variant| Ok(variant.losses(|losses| losses.loss_ratio_by_place.ring)),
     ),
-    loss_at(
+    loss_ratio(
         "loss_ratio_carrier",
         "The part of it that is lost between teeth and carrier.",
         sweep("/losses/loss_ratio_by_place/carrier"),
         |variant| Ok(variant.losses(|losses| losses.loss_ratio_by_place.carrier)),
     ),
-    loss_at(
+    loss_ratio(
         "loss_ratio_bearing",
         "The part of it that is lost in the bearing.",
         sweep("/losses/loss_ratio_by_place/bearing"),
         |variant| Ok(variant.losses(|losses| losses.loss_ratio_by_place.bearing)),
     ),
-    loss_at(
+    efficiency(
         "efficiency_ring_fixed",
         "Efficiency where the wave generator drives the carrier.",
         sweep("/losses/efficiency/ring_fixed"),
         |variant| Ok(variant.losses(|losses| losses.efficiency.ring_fixed)),
     ),
-    loss_at(
+    efficiency(
         "efficiency_carrier_fixed",
         "Efficiency where the wave generator drives the ring.",
         sweep("/losses/efficiency/carrier_fixed"),
         |variant| Ok(variant.losses(|losses| losses.efficiency.carrier_fixed)),
     ),
-    loss_at(
+    efficiency(
         "efficiency_wave_generator_fixed",
         "Efficiency where the ring drives the carrier.",
         sweep("/losses/efficiency/wave_generator_fixed"),
         |variant| Ok(variant.losses(|losses| losses.efficiency.wave_generator_fixed)),
     ),
-    loss_at(
+    efficiency(
         "efficiency_ring_fixed_back_driven",
         "Efficiency where the carrier drives the wave generator; at or below 0 the drive locks itself.",
         sweep("/losses/efficiency/ring_fixed_back_driven"),
         |variant| Ok(variant.losses(|losses| losses.efficiency.ring_fixed_back_driven)),
     ),
-    loss_at(
+    efficiency(
         "efficiency_carrier_fixed_back_driven",
         "Efficiency where the ring drives the wave generator.",
         sweep("/losses/efficiency/carrier_fixed_back_driven"),
         |variant| Ok(variant.losses(|losses| losses.efficiency.carrier_fixed_back_driven)),
     ),
-    loss_at(
+    efficiency(
         "efficiency_wave_generator_fixed_back_driven",
         "Efficiency where the carrier drives the ring.",
         sweep("/losses/efficiency/wave_generator_fixed_back_driven"),
         |variant| Ok(variant.losses(|losses| losses.efficiency.wave_generator_fixed_back_driven)),
     ),
-    needing(
-        Needs::Friction,
-        of_sweep(
-            "efficiency_error",
-            "",
-            "The largest error of the efficiency that was measured at such losses.",
-            sweep("/losses/efficiency_error"),
-            |variant| Ok(variant.losses(|losses| losses.efficiency_error)),
-        ),
+    of_losses(
+        "efficiency_error",
+        "",
+        "The largest error of the efficiency that was measured at such losses.",
+        sweep("/losses/efficiency_error"),
+        |variant| Ok(variant.losses(|losses| losses.efficiency_error)),
     ),
-    needing(
-        Needs::Friction,
-        of_sweep(
-            "required_input_torque_nm",
-            "N·m",
-            "The torque that the wave generator really needs, ring fixed.",
-            sweep("/losses/required_input_torque_nm"),
-            |variant| Ok(variant.losses(|losses| losses.required_input_torque_nm)),
-        ),
+    of_losses(
+        "required_input_torque_nm",
+        "N·m",
+        "The torque that the wave generator really needs, ring fixed.",
+        sweep("/losses/required_input_torque_nm"),
+        |variant| Ok(variant.losses(|losses| losses.required_input_torque_nm)),
     ),
-    needing(
-        Needs::FrictionAndSpeed,
-        of_sweep("power_loss_w", "W", "Mean power lost, ring fixed.", sweep("/losses/power_loss_w"), |variant| {
-            Ok(variant.losses(|losses| losses.power_loss_w.unwrap_or(f64::NAN)))
-        }),
-    ),
+    of_losses("power_loss_w", "W", "Mean power lost, ring fixed.", sweep("/losses/power_loss_w"), |variant| {
+        Ok(variant.losses(|losses| losses.power_loss_w.unwrap_or(f64::NAN)))
+    }).at_speed(),
     pressure_velocity(
         "pressure_velocity_wave_generator_mpa_m_per_s",
         "Largest contact stress times slip at the wave generator.",
@@ -577,65 +667,25 @@ pub static QUANTITIES: [Quantity; 59] = [
     ),
 ];
 
-const fn loss_at(name: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
-    needing(Needs::Friction, of_sweep(name, "", meaning, source, of))
-}
-
-const fn pressure_velocity(name: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
-    needing(Needs::FrictionAndSpeed, of_sweep(name, "MPa m/s", meaning, source, of))
-}
-
-/// Where a design says the numbers of teeth and lobes.
-const COUNTS: [&str; 4] =
-    ["/drive/wave_generator/kind", "/drive/wave_generator/lobes", "/drive/teeth/count", "/drive/ring/teeth"];
-
 impl Quantity {
-    /// The places of a design that it may depend on: what stands elsewhere does not change it.
-    pub(crate) fn depends_on(&self) -> &'static [&'static str] {
-        match (self.name, self.needs) {
-            ("transmission_ratio" | "transmission_ratio_carrier_fixed", _) => &COUNTS,
-            ("tooth_width_mm", _) => &["/drive/teeth"],
-            ("outer_diameter_mm", _) => &["/drive", "/parts/ring"],
-            ("input_torque_nm" | "output_torque_nm", _) => &["/load", COUNTS[0], COUNTS[1], COUNTS[2], COUNTS[3]],
-            (_, Needs::Drive) => &["/drive"],
-            // All but how things are drawn.
-            (_, Needs::Load | Needs::AllowableStress | Needs::Friction | Needs::FrictionAndSpeed) => &[
-                "/drive",
-                "/materials",
-                "/load",
-                "/model",
-                "/modification",
-                "/deviations",
-                "/friction",
-                "/parts",
-                "/sweep",
-            ],
-        }
+    const fn not_below_zero(self) -> Self {
+        Self { least: 0.0, ..self }
     }
 
-    /// What it is at least, whatever the drive.
-    pub(crate) fn least(&self) -> f64 {
-        const NEVER_BELOW_ZERO: [&str; 12] = [
-            "outer_diameter_mm",
-            "ring_root_radius_mm",
-            "ring_tip_radius_mm",
-            "tooth_width_mm",
-            "coincidence_degree",
-            "teeth_in_mesh_min",
-            "period_deg",
-            "peak_",
-            "half_width_",
-            "loaded_teeth_min",
-            "loss_ratio",
-            "pressure_velocity_",
-        ];
-        if NEVER_BELOW_ZERO.iter().any(|name| self.name.starts_with(name)) { 0.0 } else { f64::NEG_INFINITY }
+    const fn depending_on(self, depends_on: &'static [&'static str]) -> Self {
+        Self { depends_on, ..self }
     }
 
-    /// What it is at most, whatever the drive.
-    pub(crate) fn most(&self) -> f64 {
-        let is_efficiency = self.name.starts_with("efficiency_") && self.name != "efficiency_error";
-        if is_efficiency { 1.0 } else { f64::INFINITY }
+    const fn said_by(self, place: &'static str) -> Self {
+        Self { said_by: Some(place), ..self }
+    }
+
+    const fn taking(self, takes: Takes) -> Self {
+        Self { takes, ..self }
+    }
+
+    const fn at_speed(self) -> Self {
+        Self { needs: Needs::FrictionAndSpeed, ..self }
     }
 
     /// The quantity of this name.

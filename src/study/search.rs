@@ -18,7 +18,7 @@ use crate::evaluate::{Evaluator, Outcome, Stopped};
 use crate::limit::{Bound, Limit, limits};
 use crate::map::asked;
 use crate::optimise::{Judged, Optimiser, Plan, Point, merged};
-use crate::quantity::{Needs, Quantity};
+use crate::quantity::{Needs, OUTER_DIAMETER_MM, Quantity, TRANSMISSION_RATIO};
 use crate::random::Stream;
 use crate::rows::{GapAnswer, ReasonAnswer, RefusalNoted, note};
 use crate::table::{Cell, Column, Content, Table};
@@ -45,7 +45,6 @@ const SAMPLES: f64 = 16.0;
 /// Objectives at most.
 const MOST_OBJECTIVES: usize = 4;
 
-const OUTER_RADIUS: &str = "/parts/ring/outer_radius_mm";
 const KIND: &str = "/drive/wave_generator/kind";
 const TOOTH_COUNT: &str = "/drive/teeth/count";
 
@@ -208,11 +207,12 @@ impl Search {
             let detail = "nothing is free: each range and each choice holds one value only";
             return Err(fault("/free", FieldCode::Unaffected, detail));
         }
-        let is_drawn = |tree: &Tree| tree.at(&path(OUTER_RADIUS).unwrap_or_default()).is_some();
-        let is_drawn = template.examples().all(is_drawn) && !template.is_varied(OUTER_RADIUS);
-        let is_affected = |quantity: &Quantity| {
-            !(quantity.name == "outer_diameter_mm" && is_drawn) && template.varies_within(quantity.depends_on())
+        let is_said = |place: &str| {
+            let stands = |tree: &Tree| tree.at(&path(place).unwrap_or_default()).is_some();
+            template.examples().all(stands) && !template.is_varied(place)
         };
+        let is_affected =
+            |quantity: &Quantity| !quantity.said_by.is_some_and(is_said) && template.varies_within(quantity.depends_on);
         for (index, objective) in self.objectives.iter().enumerate() {
             let quantity = quantities[objective.quantity];
             if !is_affected(quantity) {
@@ -318,7 +318,7 @@ fn from_envelope(
             let count = ring_teeth + lobes;
             base.set(&path(TOOTH_COUNT).unwrap_or_default(), Tree::Number(count));
         } else {
-            let (Some(least_ratio), Some(largest_ratio)) = range("transmission_ratio") else {
+            let (Some(least_ratio), Some(largest_ratio)) = range(TRANSMISSION_RATIO) else {
                 return Err(missing("limit `transmission_ratio` from both sides"));
             };
             let (min, max) = ((lobes * least_ratio).ceil(), (lobes * largest_ratio).floor());
@@ -337,7 +337,7 @@ fn from_envelope(
     let lengths = lengths_over_root_radius(base);
     let lengths: Vec<_> = lengths.into_iter().filter(|(pointer, ..)| is_missing(base, pointer)).collect();
     if !lengths.is_empty() {
-        let Some(diameter_mm) = range("outer_diameter_mm").1 else {
+        let Some(diameter_mm) = range(OUTER_DIAMETER_MM).1 else {
             return Err(missing("limit `outer_diameter_mm` from above"));
         };
         // As drawn, a rim included.

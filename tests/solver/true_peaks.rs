@@ -10,7 +10,7 @@ use toothwave_solver::{
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, everywhere, load};
-use crate::fast::any_drive_of_other_kinds;
+use crate::fast::{any_drive_of_other_kinds, any_drive_of_unlike_zones};
 use crate::reference::{Worst, number};
 use crate::tolerances::{designs, of_many_teeth};
 
@@ -205,12 +205,39 @@ fn true_peaks_are_those_of_the_sweep_to_a_tolerance() {
     }
 }
 
+#[test]
+fn true_peaks_of_unlike_zones_are_those_of_all_their_teeth() {
+    for (installed, lobes) in [(29, 2), (31, 3), (33, 6)] {
+        let wave_generator = WaveGenerator::HarmonicPath { lobes, mean_path_radius_mm: 60.0, amplitude_mm: 0.8 };
+        let parameters = DriveParameters {
+            wave_generator,
+            teeth: installed,
+            installed,
+            ring_teeth: installed - lobes,
+            tooth_radius_mm: 4.0,
+            ..PAPER_5_1
+        };
+        for law in [ContactLaw::Linear, ContactLaw::Palmgren, JOHNSON] {
+            let allowable_stress_mpa = Some(everywhere(1500.0));
+            let load = LoadParameters { law, allowable_stress_mpa, ..load(20.0, VirtualWork) };
+            let points = Points::tolerance(1e-10, MAX_STATES).unwrap();
+            let swept = sweep_plain(&drive(&parameters), &LoadCase::new(&load).unwrap(), points, &Never).unwrap();
+            let (swept, found) = (SweepPeaks::from(&swept), to(&parameters, &load, 1e-10));
+            for ((name, found), (_, swept)) in extremes(&found).into_iter().zip(extremes(&swept)) {
+                let off = (found / swept - 1.0).abs();
+                assert!(off <= 1e-9, "{name}: {off:e} {law:?} {parameters:?}");
+            }
+            assert_eq!(found.loaded_teeth, swept.loaded_teeth);
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 600, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn no_samples_of_any_drive_under_any_law_show_more_than_true_peaks(
-        parameters in prop_oneof![2 => any_swept_drive(), 1 => any_drive_of_other_kinds()],
+        parameters in prop_oneof![2 => any_swept_drive(), 1 => any_drive_of_other_kinds(), 1 => any_drive_of_unlike_zones()],
         gaps in prop::option::of(prop::array::uniform3(-1.0_f64..2.0)),
         law in prop::sample::select(vec![ContactLaw::Linear, ContactLaw::Palmgren, JOHNSON]),
         torque_exponent in -1.0_f64..2.0,

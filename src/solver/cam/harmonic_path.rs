@@ -69,6 +69,12 @@ impl HarmonicPath {
     fn valley_mm(&self) -> f64 {
         self.mean_radius_mm - self.amplitude_mm
     }
+
+    /// `cos Uψ`.
+    fn cos_of_lobe(position: &Position) -> f64 {
+        let (cos, sin) = (position.phase_cos, position.phase_sin);
+        cos * cos - sin * sin
+    }
 }
 
 impl Kind for HarmonicPath {
@@ -81,7 +87,7 @@ impl Kind for HarmonicPath {
     fn tooth(&self, tooth_radius_mm: f64, position: Position) -> Result<ToothCenter, NotConverged> {
         let (u, e) = (self.lobe_count(), self.amplitude_mm);
         let (cos, sin) = (position.phase_cos, position.phase_sin);
-        let cos_of_lobe = cos * cos - sin * sin;
+        let cos_of_lobe = Self::cos_of_lobe(&position);
         let center_radius_mm = self.mean_radius_mm + e * cos_of_lobe;
         let t = 2.0 * e * u * (sin * cos) / center_radius_mm;
         let derivative = e * u * u * cos_of_lobe / center_radius_mm + t * t;
@@ -99,6 +105,10 @@ impl Kind for HarmonicPath {
             tan_pressure_angle: t,
             tan_pressure_angle_derivative: derivative,
         })
+    }
+
+    fn center_radius_mm(&self, _: f64, position: Position) -> Result<f64, NotConverged> {
+        Ok(self.mean_radius_mm + self.amplitude_mm * Self::cos_of_lobe(&position))
     }
 
     /// `cos Uψ = -e/R`.

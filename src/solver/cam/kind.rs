@@ -101,6 +101,11 @@ pub(crate) trait Kind {
     /// The tooth whose centre stands at `position`.
     fn tooth(&self, tooth_radius_mm: f64, position: Position) -> Result<ToothCenter, NotConverged>;
 
+    /// `d` alone.
+    fn center_radius_mm(&self, tooth_radius_mm: f64, position: Position) -> Result<f64, NotConverged> {
+        Ok(self.tooth(tooth_radius_mm, position)?.center_radius_mm)
+    }
+
     /// The tooth with the largest pressure angle, where `dT/dψ = 0`.
     fn steepest(&self, tooth_radius_mm: f64) -> Result<ToothCenter, NotConverged>;
 

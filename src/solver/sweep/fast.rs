@@ -446,7 +446,7 @@ impl Kernel {
         stop: &dyn Stop,
         sink: &mut K,
     ) -> Result<Option<Filled>, SolveError> {
-        let mesh = Mesh::new(loaded.drive());
+        let mesh = *loaded.mesh();
         let with_work = matches!(self.law, Law::Sharing(_));
         let size = TileSize::of(&mesh, samples, K::COLUMNS, with_work);
         let mut arena = vec![0.0; size.doubles()];

@@ -59,19 +59,21 @@ pub fn sweep_with_deviations(
     plain::sweep(&loaded, load, points, Looking::Fast, stop)
 }
 
-/// What the sweep over one period comes to, without its states: the same peaks, in less time. That the period closes is not looked at.
+/// What the sweep over one period comes to, without its states: the same peaks, in less time. That the period closes is not looked at. Where zones
+/// are unlike they are looked at over each other, and what the states would show in one lap after the other is told of the first.
 ///
 /// # Errors
 /// As [`sweep`].
 pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<SweepPeaks, SolveError> {
     let loaded = LoadedDrive::new(drive, load)?;
+    let (mesh, one_zone) = (loaded.mesh(), loaded.as_one_zone());
     let allowable_mpa = load.parameters().allowable_stress_mpa;
     let peaks = match points {
-        Points::Samples(samples) => fast::peaks(&loaded, samples, allowable_mpa, stop)?,
-        Points::Tolerance(tolerance) => fast::true_peaks(&loaded, tolerance, allowable_mpa, stop)?,
+        Points::Samples(samples) => fast::peaks(&one_zone, mesh.samples_of_lap(samples), allowable_mpa, stop)?,
+        Points::Tolerance(tolerance) => fast::true_peaks(&one_zone, tolerance, allowable_mpa, stop)?,
     };
     match peaks {
-        Some(peaks) => Ok(peaks),
+        Some(peaks) => Ok(SweepPeaks { loaded_teeth: peaks.loaded_teeth.times(mesh.listed_at_each_place()), ..peaks }),
         None => plain::sweep(&loaded, load, points, Looking::Fast, stop).map(|sweep| SweepPeaks::from(&sweep)),
     }
 }
