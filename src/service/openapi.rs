@@ -14,6 +14,7 @@ pub(crate) fn for_generators(document: &mut Value) {
             *media = json!({ "schema": reference("Problem") });
         }
         parameter_that_is_never_null(object);
+        no_null_by_default(object);
     });
     join_variants(document);
     name_variants(document);
@@ -56,6 +57,17 @@ fn parameter_that_is_never_null(object: &mut Map<String, Value>) {
             *kind = one.clone();
         }
     }
+}
+
+/// Of a field that may be left out but not be null, null is no default, though utoipa writes it: generators refuse it, or send it.
+fn no_null_by_default(schema: &mut Map<String, Value>) {
+    if schema.get("default") == Some(&Value::Null) && !may_be_null(schema) {
+        schema.remove("default");
+    }
+}
+
+fn may_be_null(schema: &Map<String, Value>) -> bool {
+    schema.get("type").and_then(Value::as_array).is_some_and(|types| types.iter().any(|name| name == "null"))
 }
 
 /// Every choice between objects that a field of one word tells apart: each becomes a schema of its own, and the word a discriminator.
