@@ -9,7 +9,7 @@ use toothwave_solver::findings::{
 use toothwave_solver::{Drive, Finding, SolveError, ToothShape, WaveGenerator};
 use utoipa::ToSchema;
 
-use crate::field::contact_name;
+use crate::field::{contact_name, pointer};
 use crate::no_answer::NoAnswer;
 
 /// What a designer should be told about a drive that can exist; docs/findings.md has the formula behind each code.
@@ -103,24 +103,14 @@ const TIP_RADIUS: &str = "/drive/ring/tip_radius_mm";
 const WIDTH: &str = "/drive/teeth/width_mm";
 const LOAD: &str = "/load";
 
-/// The fields that shape a wave generator.
-const fn shape_of(wave_generator: &WaveGenerator) -> [&'static str; 2] {
-    const AMPLITUDE: &str = "/drive/wave_generator/amplitude_mm";
-    match wave_generator {
-        WaveGenerator::Ellipse { .. } => ["/drive/wave_generator/semi_major_mm", "/drive/wave_generator/semi_minor_mm"],
-        WaveGenerator::Eccentric { .. } => ["/drive/wave_generator/radius_mm", "/drive/wave_generator/eccentricity_mm"],
-        WaveGenerator::Harmonic { .. } => ["/drive/wave_generator/mean_radius_mm", AMPLITUDE],
-        WaveGenerator::HarmonicPath { .. } => ["/drive/wave_generator/mean_path_radius_mm", AMPLITUDE],
-    }
-}
-
 impl FindingAnswer {
     /// A finding about this drive, which names fields that its document has.
     pub(crate) fn new(finding: &Finding, drive: &Drive) -> Self {
         use FindingCode as Code;
         use Severity::{Info, Warning};
         let parameters = drive.parameters();
-        let [size, stroke] = shape_of(&parameters.wave_generator);
+        let shaping = parameters.wave_generator.size_and_shape().map(pointer);
+        let [size, shape] = [0, 1].map(|at| shaping[at].as_str());
         let (lobe, rounder) = match parameters.wave_generator {
             WaveGenerator::Ellipse { .. } => ("the major axis", "the ellipse rounder"),
             _ => ("the middle of a lobe", "the wave generator's stroke smaller"),
@@ -144,7 +134,7 @@ impl FindingAnswer {
             Finding::Undercut { tooth_radius_mm, critical_tooth_radius_mm, engagement_start_deg, is_bored_away } => new(
                 Code::Undercut,
                 if is_bored_away { Info } else { Warning },
-                &[RADIUS, size, stroke],
+                &[RADIUS, size, shape],
                 tooth_radius_mm,
                 critical_tooth_radius_mm,
                 "mm",
@@ -207,7 +197,7 @@ impl FindingAnswer {
             Finding::ToothBeyondCarrier { edge, center_radius_mm, limit_mm } => new(
                 Code::ToothBeyondCarrier,
                 Warning,
-                &[size, stroke, RADIUS],
+                &[size, shape, RADIUS],
                 center_radius_mm,
                 limit_mm,
                 "mm",
@@ -220,7 +210,7 @@ impl FindingAnswer {
             Finding::SteepRingFlank { pressure_angle_deg } => new(
                 Code::SteepRingFlank,
                 Warning,
-                &[size, stroke, "/drive/ring/teeth"],
+                &[size, shape, "/drive/ring/teeth"],
                 pressure_angle_deg,
                 STEEP_FLANK_DEG,
                 "deg",

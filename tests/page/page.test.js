@@ -560,10 +560,19 @@ test('accuracy: a fixed law has rows of its own, and they bring back the stiffne
   await assertShows(back);
 });
 
-/** Presses a file's button and gives the file: `{ name, bytes }`. */
-async function downloaded(file, press = () => page.click(`[data-file="${file}"]`)) {
-  const [download] = await Promise.all([page.waitForEvent('download'), press()]);
-  return { name: download.suggestedFilename(), bytes: await readFile(await download.path()) };
+/** Presses a file's button and gives the file: `{ name, bytes }`. The browser was seen to tell of none, for no reason that was found;
+ *  where the page neither waits nor tells of a problem the button is pressed once more, and the output says so. */
+async function downloaded(file, press = () => page.click(`[data-file="${file}"]`), isAgain = false) {
+  try {
+    const [download] = await Promise.all([page.waitForEvent('download', { timeout: 60_000 }), press()]);
+    return { name: download.suggestedFilename(), bytes: await readFile(await download.path()) };
+  } catch (error) {
+    const words = await page.textContent('#drawings-state');
+    const isIdle = /^(Downloaded .*)?$/.test(words);
+    if (isAgain || !isIdle) throw new Error(`${file}: no download; the page says: ${words || 'nothing'}`, { cause: error });
+    console.log(`${file}: no download, and the page says: ${words || 'nothing'}. Pressed again.`);
+    return downloaded(file, press, true);
+  }
 }
 
 /** Parts that differ from their defaults in every value. */

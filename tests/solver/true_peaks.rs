@@ -4,7 +4,9 @@ use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::sweep::{Points, SweepPeaks, peaks, sweep_plain};
-use toothwave_solver::{Contact, ContactLaw, DriveParameters, LoadCase, LoadParameters, Never, PerContact, SolveError};
+use toothwave_solver::{
+    Contact, ContactLaw, DriveParameters, LoadCase, LoadParameters, Never, PerContact, SolveError, WaveGenerator,
+};
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, everywhere, load};
 use crate::fast::any_drive_of_other_kinds;
@@ -103,6 +105,49 @@ fn a_peak_just_after_another_tooth_begins_to_carry_is_found() {
     let found = to(&PAPER_5_1, &load, 1e-10);
     for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
         assert!(found >= dense * (1.0 - 1e-10), "{name}: {:e}", 1.0 - found / dense);
+    }
+}
+
+/// On a wave generator that is nearly round many teeth carry, and one that stands in the valley has no arm: no rotation closes its gap there, and it begins
+/// to carry when it has left it.
+#[test]
+fn a_stiffness_that_jumps_after_a_tooth_has_left_the_valley_is_found() {
+    let flat = |lobes: i64, mean_radius_mm, amplitude_mm, tooth_radius_mm| DriveParameters {
+        wave_generator: WaveGenerator::Harmonic { lobes, mean_radius_mm, amplitude_mm },
+        teeth: 6 * lobes,
+        installed: 6 * lobes,
+        ring_teeth: 5 * lobes,
+        tooth_radius_mm,
+        ..PAPER_5_1
+    };
+    let loaded = |torque_nm, law, [wave_generator, ring, carrier]: [f64; 3]| LoadParameters {
+        law,
+        clearance_um: PerContact { wave_generator, ring, carrier },
+        ..load(torque_nm, VirtualWork)
+    };
+    for (parameters, load) in [
+        (
+            flat(4, 47.565_194_500_284_01, 0.003_439_658_958_553_44, 2.434_805_499_715_990_3),
+            loaded(3.202_971_128_566_237_4, ContactLaw::Linear, [1.0; 3]),
+        ),
+        (
+            flat(5, 45.409_634_696_981_115, 0.023_505_506_526_250_96, 4.590_365_303_018_881),
+            loaded(53.824_163_969_028_376, ContactLaw::Linear, [1.0, 1.394_998_939_278_116_1, 1.0]),
+        ),
+        (
+            flat(5, 48.813_657_711_757_64, 0.168_761_858_990_047_5, 1.186_342_288_242_358_2),
+            loaded(
+                0.233_982_407_572_720_54,
+                ContactLaw::Palmgren,
+                [96.819_935_967_029_65, 20.189_567_715_500_807, 1.0],
+            ),
+        ),
+    ] {
+        let dense = of(&parameters, &load, Points::samples(1500).unwrap()).unwrap();
+        let found = to(&parameters, &load, 1e-4);
+        for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
+            assert!(found >= dense * (1.0 - 1e-4), "{name}: {:e} {parameters:?}", 1.0 - found / dense);
+        }
     }
 }
 

@@ -2,9 +2,10 @@
 
 use nalgebra::{Point2, Unit, Vector2};
 
-use crate::cam::kind::{CamContact, CamPoint, Kind, ToothCenter};
+use crate::cam::kind::{CamContact, CamPoint, Given, Kind, ToothCenter};
 use crate::position::Position;
 use crate::root::{NotConverged, ValueAndSlope, bracketed, newton_in_bracket};
+use crate::violation::Parameter;
 
 /// An ellipse about the axis, `a > b`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +24,19 @@ struct Normal {
 impl Ellipse {
     pub(super) const fn new(semi_major_mm: f64, semi_minor_mm: f64) -> Self {
         Self { semi_major_mm, semi_minor_mm }
+    }
+
+    pub(super) const fn given(semi_major_mm: f64, semi_minor_mm: f64) -> Given {
+        let size = (Parameter::SemiMajor, semi_major_mm);
+        Given {
+            lobes: 2,
+            are_lobes_given: false,
+            size,
+            shape: (Parameter::SemiMinor, semi_minor_mm),
+            stroke: size,
+            mean_radius_mm: 0.5 * (semi_major_mm + semi_minor_mm),
+            is_path: false,
+        }
     }
 
     /// `a`.

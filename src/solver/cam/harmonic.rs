@@ -1,9 +1,10 @@
 //! The support function `h = R0 + e cos Uφ`; with one lobe exactly the circle of radius R0 about a point e beside the axis
 //! (docs/theory.md section 2.9).
 
-use crate::cam::kind::{CamContact, Kind, ToothCenter};
+use crate::cam::kind::{CamContact, Given, Kind, ToothCenter};
 use crate::position::{Position, half_lobe_rad};
 use crate::root::{NotConverged, ValueAndSlope, newton_in_bracket};
+use crate::violation::Parameter;
 
 /// A cam with a harmonic support function.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +24,26 @@ struct NormalPhase {
 impl Harmonic {
     pub(super) const fn new(lobes: u32, mean_radius_mm: f64, amplitude_mm: f64) -> Self {
         Self { lobes, mean_radius_mm, amplitude_mm }
+    }
+
+    pub(super) const fn given(lobes: i64, mean_radius_mm: f64, amplitude_mm: f64) -> Given {
+        let stroke = (Parameter::Amplitude, amplitude_mm);
+        Given {
+            lobes,
+            are_lobes_given: true,
+            size: (Parameter::MeanRadius, mean_radius_mm),
+            shape: stroke,
+            stroke,
+            mean_radius_mm,
+            is_path: false,
+        }
+    }
+
+    /// The circle off the axis, as such.
+    pub(super) const fn eccentric(radius_mm: f64, eccentricity_mm: f64) -> Given {
+        let stroke = (Parameter::Eccentricity, eccentricity_mm);
+        let size = (Parameter::EccentricRadius, radius_mm);
+        Given { are_lobes_given: false, size, shape: stroke, stroke, ..Self::given(1, radius_mm, eccentricity_mm) }
     }
 
     /// What R0 has to exceed: e, for the axis to be inside, and `e(U² - 1)`, for the lobe to be round.

@@ -1,9 +1,10 @@
 //! The cam that moves the centres along `d = R + e cos Uψ`: explicit in the position, and hollow in its valleys where the stroke is large
 //! (docs/theory.md section 2.9).
 
-use crate::cam::kind::{CamContact, Kind, ToothCenter};
+use crate::cam::kind::{CamContact, Given, Kind, ToothCenter};
 use crate::position::Position;
 use crate::root::NotConverged;
+use crate::violation::Parameter;
 
 /// A cam with a harmonic path of the centres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,6 +17,19 @@ pub struct HarmonicPath {
 impl HarmonicPath {
     pub(super) const fn new(lobes: u32, mean_radius_mm: f64, amplitude_mm: f64) -> Self {
         Self { lobes, mean_radius_mm, amplitude_mm }
+    }
+
+    pub(super) const fn given(lobes: i64, mean_radius_mm: f64, amplitude_mm: f64) -> Given {
+        let stroke = (Parameter::Amplitude, amplitude_mm);
+        Given {
+            lobes,
+            are_lobes_given: true,
+            size: (Parameter::MeanPathRadius, mean_radius_mm),
+            shape: stroke,
+            stroke,
+            mean_radius_mm,
+            is_path: true,
+        }
     }
 
     /// What R has to exceed: `r + e`, for the valley to lie outside the axis; and with two lobes or more the larger root of

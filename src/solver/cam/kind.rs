@@ -4,6 +4,23 @@ use nalgebra::{Point2, Unit, Vector2};
 
 use crate::position::Position;
 use crate::root::NotConverged;
+use crate::violation::Parameter;
+
+/// What a designer gives for a wave generator, as each kind tells it in its own file.
+pub(super) struct Given {
+    pub(super) lobes: i64,
+    /// Whether the lobes are given, or those that the kind has.
+    pub(super) are_lobes_given: bool,
+    /// What says how large the cam is.
+    pub(super) size: (Parameter, f64),
+    /// What says how far it is from round.
+    pub(super) shape: (Parameter, f64),
+    /// What says how far the teeth are moved.
+    pub(super) stroke: (Parameter, f64),
+    /// Of the cam, or of the path of the teeth's centres.
+    pub(super) mean_radius_mm: f64,
+    pub(super) is_path: bool,
+}
 
 /// The cam where a tooth touches it.
 #[derive(Debug, Clone, Copy, PartialEq)]

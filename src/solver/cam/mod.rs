@@ -1,7 +1,7 @@
 //! Wave generators, one file a kind (docs/theory.md section 2).
 //!
-//! A further kind is a file that implements `Kind` (`kind.rs`), a line of [`Cam`] with its arm in `Cam::kind`, and a line of [`WaveGenerator`]
-//! that says what a designer gives for it.
+//! A further kind is a file that implements `Kind` (`kind.rs`) and says what is given for it, a line of [`Cam`] with its arm in `Cam::kind`, and
+//! a line of [`WaveGenerator`] with its arms in `WaveGenerator::given` and `WaveGenerator::cam`.
 
 mod ellipse;
 mod harmonic;
@@ -14,8 +14,8 @@ pub use ellipse::Ellipse;
 pub use harmonic::Harmonic;
 pub use harmonic_path::HarmonicPath;
 pub(crate) use kind::CamPoint;
-use kind::Kind;
 pub use kind::{CamContact, ToothCenter};
+use kind::{Given, Kind};
 
 /// What describes a wave generator, not yet checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,50 +77,45 @@ impl Cam {
 }
 
 impl WaveGenerator {
+    const fn given(&self) -> Given {
+        match *self {
+            Self::Ellipse { semi_major_mm, semi_minor_mm } => Ellipse::given(semi_major_mm, semi_minor_mm),
+            Self::Eccentric { radius_mm, eccentricity_mm } => Harmonic::eccentric(radius_mm, eccentricity_mm),
+            Self::Harmonic { lobes, mean_radius_mm, amplitude_mm } => {
+                Harmonic::given(lobes, mean_radius_mm, amplitude_mm)
+            }
+            Self::HarmonicPath { lobes, mean_path_radius_mm, amplitude_mm } => {
+                HarmonicPath::given(lobes, mean_path_radius_mm, amplitude_mm)
+            }
+        }
+    }
+
     /// `U`, as given.
     pub const fn lobes(&self) -> i64 {
-        match *self {
-            Self::Eccentric { .. } => 1,
-            Self::Ellipse { .. } => 2,
-            Self::Harmonic { lobes, .. } | Self::HarmonicPath { lobes, .. } => lobes,
-        }
+        self.given().lobes
     }
 
     /// What is given, each with the range that it has to lie in.
     pub fn parameters(&self) -> Vec<(Parameter, f64)> {
-        match *self {
-            Self::Ellipse { semi_major_mm, semi_minor_mm } => {
-                vec![(Parameter::SemiMajor, semi_major_mm), (Parameter::SemiMinor, semi_minor_mm)]
-            }
-            Self::Eccentric { radius_mm, eccentricity_mm } => {
-                vec![(Parameter::EccentricRadius, radius_mm), (Parameter::Eccentricity, eccentricity_mm)]
-            }
-            Self::Harmonic { lobes, mean_radius_mm, amplitude_mm } => vec![
-                (Parameter::Lobes, lobes as f64),
-                (Parameter::MeanRadius, mean_radius_mm),
-                (Parameter::Amplitude, amplitude_mm),
-            ],
-            Self::HarmonicPath { lobes, mean_path_radius_mm, amplitude_mm } => vec![
-                (Parameter::Lobes, lobes as f64),
-                (Parameter::MeanPathRadius, mean_path_radius_mm),
-                (Parameter::Amplitude, amplitude_mm),
-            ],
-        }
+        let Given { lobes, are_lobes_given, size, shape, .. } = self.given();
+        are_lobes_given.then_some((Parameter::Lobes, lobes as f64)).into_iter().chain([size, shape]).collect()
+    }
+
+    /// What says how large the cam is, and how far it is from round.
+    pub const fn size_and_shape(&self) -> [Parameter; 2] {
+        let Given { size, shape, .. } = self.given();
+        [size.0, shape.0]
     }
 
     /// Whether the cam is another one under teeth of another radius, because it is their path that is given.
     pub(crate) const fn follows_from_teeth(&self) -> bool {
-        matches!(self, Self::HarmonicPath { .. })
+        self.given().is_path
     }
 
     /// `R_race`: speed of a race along the cam over its turning (docs/theory.md section 10.2).
     pub fn race_radius_mm(&self, tooth_radius_mm: f64) -> f64 {
-        match *self {
-            Self::Ellipse { semi_major_mm, semi_minor_mm } => 0.5 * (semi_major_mm + semi_minor_mm),
-            Self::Eccentric { radius_mm, .. } => radius_mm,
-            Self::Harmonic { mean_radius_mm, .. } => mean_radius_mm,
-            Self::HarmonicPath { mean_path_radius_mm, .. } => mean_path_radius_mm - tooth_radius_mm,
-        }
+        let Given { mean_radius_mm, is_path, .. } = self.given();
+        if is_path { mean_radius_mm - tooth_radius_mm } else { mean_radius_mm }
     }
 
     /// Whether the cam is a circle off the axis: an eccentric, or a harmonic support with one lobe.
@@ -128,25 +123,9 @@ impl WaveGenerator {
         matches!(self, Self::Eccentric { .. } | Self::Harmonic { lobes: 1, .. })
     }
 
-    /// The parameter that says how large the cam is.
-    const fn size_parameter(&self) -> Parameter {
-        match self {
-            Self::Ellipse { .. } => Parameter::SemiMajor,
-            Self::Eccentric { .. } => Parameter::EccentricRadius,
-            Self::Harmonic { .. } => Parameter::MeanRadius,
-            Self::HarmonicPath { .. } => Parameter::MeanPathRadius,
-        }
-    }
-
     /// What says how far the teeth are moved: of an ellipse, whose other axis is held, the semi-major axis.
     pub(crate) const fn stroke(&self) -> (Parameter, f64) {
-        match *self {
-            Self::Ellipse { semi_major_mm, .. } => (Parameter::SemiMajor, semi_major_mm),
-            Self::Eccentric { eccentricity_mm, .. } => (Parameter::Eccentricity, eccentricity_mm),
-            Self::Harmonic { amplitude_mm, .. } | Self::HarmonicPath { amplitude_mm, .. } => {
-                (Parameter::Amplitude, amplitude_mm)
-            }
-        }
+        self.given().stroke
     }
 
     /// The cam under teeth of this radius, every parameter being in its range.
@@ -181,7 +160,8 @@ impl WaveGenerator {
         if radius_mm > least_mm {
             Ok(())
         } else {
-            Err(Violation::CamTooSmall { parameter: self.size_parameter(), radius_mm, least_mm })
+            let [parameter, _] = self.size_and_shape();
+            Err(Violation::CamTooSmall { parameter, radius_mm, least_mm })
         }
     }
 }

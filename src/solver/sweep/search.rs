@@ -38,6 +38,9 @@ const MAX_ROUNDS: u32 = 60;
 /// What rounding may leave uncertain of a quantity where the rounds are over.
 const OPEN: f64 = 1e-10;
 
+/// A tooth that closes within this part of the rotation has no gap.
+const CLOSED: f64 = 1e-12;
+
 /// A stretch that bends by more than this part of a quantity's largest value may hide more than its ends show.
 const COARSE_BEND: f64 = 1e-2;
 
@@ -197,15 +200,23 @@ impl Seen {
         &self.pressed[moment * self.teeth..][..self.teeth]
     }
 
-    /// The first tooth that carries at one of two moments alone. A tooth without an arm is closed by no rotation, and tells nothing.
+    /// The first tooth that carries at one of two moments alone.
     fn tooth_changed(&self, one: usize, other: usize) -> Option<usize> {
         if self.pressed.is_empty() {
             return None;
         }
-        self.pressed(one)
-            .iter()
-            .zip(self.pressed(other))
-            .position(|(one, other)| (*one > 0.0) != (*other > 0.0) && one.is_finite() && other.is_finite())
+        let (one_rad, other_rad) = (self.rotation_rad(one), self.rotation_rad(other));
+        self.pressed(one).iter().zip(self.pressed(other)).position(|(&one, &other)| {
+            // A tooth without an arm is closed by no rotation, as it is beside that place if it has a gap; one that has none carries there.
+            let has_gap = |pressed: f64, rotation_rad: f64| rotation_rad - pressed > CLOSED * rotation_rad;
+            (one > 0.0) != (other > 0.0)
+                && (one.is_finite() || has_gap(other, other_rad))
+                && (other.is_finite() || has_gap(one, one_rad))
+        })
+    }
+
+    fn rotation_rad(&self, moment: usize) -> f64 {
+        self.value(moment, LOADS * self.teeth)
     }
 
     /// Sorts in the moments that are new.

@@ -7,7 +7,7 @@
 
 #include "DriveApi.h"
 #include "HttpClientImpl.h"
-#include "StudyMap.h"
+#include "StudySearch.h"
 
 using namespace org::openapitools::client::api;
 using namespace org::openapitools::client::model;
