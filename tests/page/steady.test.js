@@ -110,10 +110,10 @@ test('at four sizes no key figure’s name and no empty field’s word is cut', 
   const design = await bed.server.example('paper-5.1');
   design.model = { compatibility: 'virtual_work', stiffness: { law: 'johnson' } };
   design.friction = { wave_generator: { kind: 'plain', coefficient: 0.05 }, ring: { coefficient: 0.05 }, carrier: { coefficient: 0.05 } };
+  const page = await bed.open();
+  await setDocument(page, design);
   for (const [width, height] of [[320, 640], [768, 1024], [1366, 900], [1920, 1080]]) {
-    await bed.page?.context().close();
-    const page = await bed.open({ viewport: { width, height } });
-    await setDocument(page, design);
+    await page.setViewportSize({ width, height });
     const cut = await page.evaluate(() => {
       for (const details of document.querySelectorAll('#form details')) details.open = true;
       const pen = document.createElement('canvas').getContext('2d');
