@@ -185,8 +185,21 @@ pub fn run() -> ExitCode {
 
 /// Says what went wrong, where anybody listens: standard error may be full or closed.
 fn complain(what: &dyn std::fmt::Display, status: ExitCode) -> ExitCode {
-    let _ = writeln!(io::stderr(), "toothwave: {what}");
+    let _ = writeln!(io::stderr(), "toothwave: {}", printable(&what.to_string()));
     status
+}
+
+/// A text without what a terminal obeys: it may name fields of a document that somebody else wrote.
+fn printable(text: &str) -> String {
+    let mut printable = String::with_capacity(text.len());
+    for character in text.chars() {
+        if character.is_control() && character != '\n' {
+            printable.extend(character.escape_default());
+        } else {
+            printable.push(character);
+        }
+    }
+    printable
 }
 
 /// Says what is wrong with the command line. It names the first fault alone; of the settings in the environment, by which containers are

@@ -50,7 +50,7 @@ pub enum NotHere {
     Unreadable(String),
 }
 
-/// A study with all that is frozen with it when it is first kept.
+/// A study in the chunks that it is computed in, and all that is frozen with it when it is first kept.
 ///
 /// # Errors
 /// Where the canary has no turn, or the service stops.
@@ -60,7 +60,7 @@ pub async fn freeze(
     document: &[u8],
     limits: &question::Limits,
     time: Duration,
-) -> Result<NewStudy, Problem> {
+) -> Result<(Arc<Study>, NewStudy), Problem> {
     let study = Arc::new(study);
     let canary = sung(pool, Canary::new(&study, MOST_OF_A_CANARY, Some(CANARY))).await?;
     let canary_variants = canary.sung.max(1);
@@ -72,7 +72,7 @@ pub async fn freeze(
     let study = Arc::into_inner(study).ok_or_else(|| Problem::internal(&"a canary goes on after its end"))?;
     let study = study.in_chunks_of(wanted.min(part_variants).max(1));
     let a_chunk = a_variant.saturating_mul(u32::try_from(study.chunk_variants()).unwrap_or(u32::MAX));
-    Ok(NewStudy {
+    let frozen = NewStudy {
         id,
         kind: study.kind().into(),
         build: BUILD.into(),
@@ -86,7 +86,8 @@ pub async fn freeze(
         canary,
         lease: a_chunk.saturating_mul(CHUNKS_OF_A_LEASE).max(LEAST_LEASE),
         time,
-    })
+    };
+    Ok((Arc::new(study), frozen))
 }
 
 impl NotHere {

@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-/// Bytes of memory that the process may use: the machine's, or less where its control group or one around it has less.
+/// Bytes of memory that the process may use: the machine's, or less where its control group or one around it has less, or the process
+/// itself is held to less (`ulimit -v`, `ulimit -d`).
 pub fn memory_bytes() -> Option<u64> {
     memory_bytes_below(Path::new("/"))
 }
@@ -31,7 +32,12 @@ fn memory_bytes_below(root: &Path) -> Option<u64> {
         let limit = |group: &Path| read(&Path::new(tree).join(group).join(file))?.trim().parse::<u64>().ok();
         around.filter_map(limit).collect()
     });
-    limits.chain(machine_bytes).min()
+    let of_process = read(Path::new("proc/self/limits")).unwrap_or_default();
+    let soft = |line: &str| {
+        let values = ["Max address space", "Max data size"].iter().find_map(|name| line.strip_prefix(name))?;
+        values.split_whitespace().next()?.parse::<u64>().ok()
+    };
+    limits.chain(of_process.lines().filter_map(soft)).chain(machine_bytes).min()
 }
 
 #[cfg(test)]
@@ -68,5 +74,22 @@ mod tests {
         let first = ("proc/self/cgroup", "5:cpu,cpuacct:/\n4:memory:/docker/1\n");
         let limit = ("sys/fs/cgroup/memory/memory.limit_in_bytes", "268435456\n");
         assert_eq!(with("first-version", &[MACHINE, first, limit]), Some(256 << 20));
+    }
+
+    #[test]
+    fn what_the_process_is_held_to_counts_as_well() {
+        let limits = |data: &str, space: &str| {
+            let head = "Limit                     Soft Limit           Hard Limit           Units     \n";
+            format!(
+                "{head}Max data size             {data}            unlimited            bytes     \nMax address space         {space}            unlimited            bytes     \n"
+            )
+        };
+        for (name, data, space, expected) in [
+            ("free", "unlimited", "unlimited", 16 << 30),
+            ("space", "unlimited", "1073741824", 1 << 30),
+            ("data", "536870912", "1073741824", 512 << 20),
+        ] {
+            assert_eq!(with(name, &[MACHINE, ("proc/self/limits", &limits(data, space))]), Some(expected));
+        }
     }
 }

@@ -14,7 +14,9 @@ pub(crate) fn for_generators(document: &mut Value) {
             *media = json!({ "schema": reference("Problem") });
         }
         parameter_that_is_never_null(object);
+        no_null_by_default(object);
     });
+    default_words_beside_their_words(document);
     join_variants(document);
     name_variants(document);
 }
@@ -56,6 +58,35 @@ fn parameter_that_is_never_null(object: &mut Map<String, Value>) {
             *kind = one.clone();
         }
     }
+}
+
+/// Of a field that may be left out but not be null, null is no default, though utoipa writes it: generators refuse it, or send it.
+fn no_null_by_default(schema: &mut Map<String, Value>) {
+    if schema.get("default") == Some(&Value::Null) && !may_be_null(schema) {
+        schema.remove("default");
+    }
+}
+
+/// A default that is one of several words stands with these words, not beside the reference to them, of which a generator for C++ makes no value.
+fn default_words_beside_their_words(document: &mut Value) {
+    let mut moved = Vec::new();
+    for_each_object(document, &mut |object| {
+        if let Some(path) =
+            object.get("$ref").and_then(Value::as_str).map(|path| path.trim_start_matches('#').to_owned())
+            && object.get("default").is_some_and(Value::is_string)
+        {
+            moved.extend(object.remove("default").map(|word| (path, word)));
+        }
+    });
+    for (path, word) in moved {
+        if let Some(words) = document.pointer_mut(&path) {
+            words["default"] = word;
+        }
+    }
+}
+
+fn may_be_null(schema: &Map<String, Value>) -> bool {
+    schema.get("type").and_then(Value::as_array).is_some_and(|types| types.iter().any(|name| name == "null"))
 }
 
 /// Every choice between objects that a field of one word tells apart: each becomes a schema of its own, and the word a discriminator.

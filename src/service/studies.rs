@@ -83,8 +83,10 @@ pub struct Studies {
     changed: watch::Sender<()>,
     /// The store in numbers, as it was last seen.
     figures: Mutex<Option<Figures>>,
-    /// The oldest first.
+    /// The oldest first. Whoever changes whether a study of this list runs holds it.
     kept: Mutex<VecDeque<Arc<Kept>>>,
+    /// Held while a stored study begins: as many as are counted run, and no more.
+    beginning: tokio::sync::Mutex<()>,
     /// Cancelled when the service stops: nobody waits for a study any more.
     closing: CancellationToken,
 }
@@ -193,6 +195,13 @@ impl Kept {
         self.state.send_replace(Standing { state, problem });
     }
 
+    /// Stops what runs in this process.
+    fn cancel(&self) {
+        let run = self.cancelled.lock();
+        run.cancel();
+        self.stand(StudyState::Cancelled, None);
+    }
+
     fn new(study: Arc<Study>, room: Reserved) -> Arc<Self> {
         Arc::new(Self {
             id: study.id().to_string(),
@@ -292,6 +301,7 @@ impl Studies {
             changed: watch::Sender::default(),
             figures: Mutex::default(),
             kept: Mutex::default(),
+            beginning: tokio::sync::Mutex::default(),
             closing: CancellationToken::new(),
         }
     }
@@ -327,33 +337,53 @@ impl Studies {
             self.kept.lock().retain(|kept| kept.id != id);
             return Ok(None);
         };
-        self.view(store, &stored).await.map(Some)
+        let kept = self.kept_here(&stored).await?;
+        self.see(store, &kept).await?;
+        Ok(Some(kept))
     }
 
-    /// A stored study as it is seen from here.
-    async fn view(&self, store: &Store, stored: &Stored) -> Result<Arc<Kept>, Problem> {
+    /// A stored study as it is kept here.
+    ///
+    /// # Errors
+    /// Where there is no room for what it comes to, or this is not the build or the processor that it was asked of.
+    async fn kept_here(&self, stored: &Stored) -> Result<Arc<Kept>, Problem> {
         let frozen = &stored.study;
         let is_this = |kept: &&Arc<Kept>| kept.id == frozen.id && kept.study.chunk_variants() == frozen.chunk_variants;
         let known = self.kept.lock().iter().find(is_this).cloned();
-        let kept = match known {
-            Some(kept) => kept,
-            None => {
-                let study = frozen::thaw(&self.pool, frozen).await?.map_err(|reason| reason.told(&frozen.id))?;
-                let mut all = self.kept.lock();
-                all.retain(|kept| kept.id != frozen.id);
-                let reserved = self.make_room(&mut all, study.kept_bytes())?;
-                let kept = Kept::new(study, reserved);
-                all.push_back(Arc::clone(&kept));
-                kept
-            }
-        };
+        if let Some(kept) = known {
+            return Ok(kept);
+        }
+        let study = frozen::thaw(&self.pool, frozen).await?.map_err(|reason| reason.told(&frozen.id))?;
+        let mut all = self.kept.lock();
+        let reserved = self.make_room(&mut all, &study)?;
+        let kept = Self::keep(&mut all, study, reserved);
+        let (state, problem) = state_of(stored);
+        kept.stand(state, problem);
+        Ok(kept)
+    }
+
+    /// Keeps a study in the place of any other with its id.
+    fn keep(all: &mut VecDeque<Arc<Kept>>, study: Arc<Study>, room: Reserved) -> Arc<Kept> {
+        let kept = Kept::new(study, room);
+        all.retain(|other| other.id != kept.id);
+        all.push_back(Arc::clone(&kept));
+        kept
+    }
+
+    /// Keeps a study no longer. Another of its id, asked for meanwhile, stays.
+    fn let_go(all: &mut VecDeque<Arc<Kept>>, kept: &Arc<Kept>) {
+        all.retain(|other| !Arc::ptr_eq(other, kept));
+    }
+
+    /// Looks how a stored study stands, and on while it runs.
+    async fn see(&self, store: &Store, kept: &Arc<Kept>) -> Result<(), Problem> {
         kept.look(store).await?;
         if kept.is_running() && !kept.is_followed.load(Ordering::SeqCst) {
-            let (followed, store) = (Arc::clone(&kept), store.clone());
+            let (followed, store) = (Arc::clone(kept), store.clone());
             let (changed, closing) = (self.changed.clone(), self.closing.clone());
             tokio::spawn(async move { followed.follow(&store, &changed, &closing).await });
         }
-        Ok(kept)
+        Ok(())
     }
 
     /// The study, which runs from now on if it is not done: one that is kept goes on where it was.
@@ -374,25 +404,51 @@ impl Studies {
 
     async fn begin_there(&self, store: &Store, study: Study, document: &[u8]) -> Result<Arc<Kept>, Problem> {
         let id = study.id().to_string();
-        let time = Duration::from_secs(self.limits.study_deadline_ms.div_ceil(1000));
-        match store.find(&id).await? {
-            Some(stored) if stored.is_running() || stored.is_done() => store.touch(&id).await?,
-            found => {
-                if store.running().await? >= self.limits.max_concurrent_studies as u64 {
-                    return Err(self.too_many_studies());
-                }
-                if found.is_some() {
-                    store.resume(&id, time).await?;
-                } else {
-                    let limits = self.limits.of_calculation();
-                    store.create(&frozen::freeze(&self.pool, study, document, &limits, time).await?).await?;
-                }
-                self.changed.send_replace(());
-            }
+        let is_there = |stored: &Stored| stored.is_running() || stored.is_done();
+        let mut stored = store.find(&id).await?;
+        let mut turn = None;
+        if !stored.as_ref().is_some_and(is_there) {
+            turn = Some(self.beginning.lock().await);
+            // Another may have begun it meanwhile.
+            stored = store.find(&id).await?;
         }
-        let stored =
-            store.find(&id).await?.ok_or_else(|| Problem::internal(&"a study was forgotten while it began"))?;
-        self.view(store, &stored).await
+        let kept = match stored {
+            Some(stored) if is_there(&stored) => {
+                store.touch(&id).await?;
+                self.kept_here(&stored).await?
+            }
+            Some(stored) => {
+                self.require_one_more(store).await?;
+                // First: what is refused must not run.
+                let kept = self.kept_here(&stored).await?;
+                store.resume(&id, self.time()).await?;
+                kept
+            }
+            None => {
+                self.require_one_more(store).await?;
+                let room = self.make_room(&mut self.kept.lock(), &study)?;
+                let (study, frozen) =
+                    frozen::freeze(&self.pool, study, document, &self.limits.of_calculation(), self.time()).await?;
+                store.create(&frozen).await?;
+                Self::keep(&mut self.kept.lock(), study, room)
+            }
+        };
+        if turn.is_some() {
+            self.changed.send_replace(());
+        }
+        self.see(store, &kept).await?;
+        Ok(kept)
+    }
+
+    /// That one more study may run.
+    async fn require_one_more(&self, store: &Store) -> Result<(), Problem> {
+        let is_full = store.running().await? >= self.limits.max_concurrent_studies as u64;
+        if is_full { Err(self.too_many_studies()) } else { Ok(()) }
+    }
+
+    /// Time that a study gets, to the second.
+    const fn time(&self) -> Duration {
+        Duration::from_secs(self.limits.study_deadline_ms.div_ceil(1000))
     }
 
     fn too_many_studies(&self) -> Problem {
@@ -420,19 +476,19 @@ impl Studies {
         let kept = match known {
             Some(kept) => kept,
             None => {
-                let reserved = self.make_room(&mut all, study.kept_bytes())?;
-                let kept = Kept::new(Arc::new(study), reserved);
-                all.push_back(Arc::clone(&kept));
-                kept
+                let reserved = self.make_room(&mut all, &study)?;
+                Self::keep(&mut all, Arc::new(study), reserved)
             }
         };
-        drop(all);
+        // Under the lock: nobody else lets it run as well, or forgets it meanwhile.
         self.run(&kept);
         Ok(kept)
     }
 
-    /// Room for what a study comes to: the oldest that do not run are forgotten for it.
-    fn make_room(&self, all: &mut VecDeque<Arc<Kept>>, bytes: u64) -> Result<Reserved, Problem> {
+    /// Room for what a study comes to: any other with its id is forgotten for it, and then the oldest that do not run.
+    fn make_room(&self, all: &mut VecDeque<Arc<Kept>>, study: &Study) -> Result<Reserved, Problem> {
+        let (id, bytes) = (study.id().to_string(), study.kept_bytes());
+        all.retain(|other| other.id != id);
         loop {
             let stored: u64 = all.iter().map(|kept| kept.kept_bytes).sum();
             let reserved = if stored + bytes > self.limits.max_study_bytes {
@@ -457,18 +513,24 @@ impl Studies {
     /// # Errors
     /// Where the store does not answer.
     pub async fn cancel_or_forget(&self, kept: &Arc<Kept>) -> Result<(), Problem> {
-        let is_running = kept.is_running();
         if let Keeping::Store { store, .. } = &self.keeping {
-            if is_running { store.cancel(&kept.id).await? } else { store.forget(&kept.id).await? }
+            if kept.is_running() {
+                store.cancel(&kept.id).await?;
+                kept.stand(StudyState::Cancelled, None);
+            } else {
+                store.forget(&kept.id).await?;
+                Self::let_go(&mut self.kept.lock(), kept);
+            }
+            // Workers learn it at once where they are here.
+            self.changed.send_replace(());
+            return Ok(());
         }
-        if is_running {
-            kept.cancelled.lock().cancel();
-            kept.stand(StudyState::Cancelled, None);
+        let mut all = self.kept.lock();
+        if kept.is_running() {
+            kept.cancel()
         } else {
-            self.kept.lock().retain(|other| other.id != kept.id);
+            Self::let_go(&mut all, kept)
         }
-        // Workers learn it at once where they are here.
-        self.changed.send_replace(());
         Ok(())
     }
 
@@ -585,6 +647,11 @@ impl Studies {
                 () = cancelled.cancelled() => return,
                 ended = tokio::time::timeout_at(deadline, chunks) => ended,
             };
+            // Who is cancelled in this moment says nothing more: it may run again.
+            let _held = kept.cancelled.lock();
+            if cancelled.is_cancelled() {
+                return;
+            }
             match ended {
                 Ok(Ok(())) => kept.stand(StudyState::Done, None),
                 Ok(Err(problem)) => kept.stand(StudyState::Failed, Some(problem)),

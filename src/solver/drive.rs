@@ -1,6 +1,6 @@
 //! A drive whose parameters were checked once, so that nothing below doubts its input.
 
-use std::f64::consts::{PI, SQRT_2};
+use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 
 use crate::cam::{Cam, Ellipse, ToothCenter, WaveGenerator};
 use crate::contact::PerContact;
@@ -448,17 +448,15 @@ impl Neighbours {
     }
 
     /// Least distance of two neighbouring centres on their path (docs/theory.md section 7): around an ellipse of those either side of the
-    /// minor axis, and of two teeth alone those on it.
+    /// minor axis; of two teeth or three, which are more than a right angle apart, of those either side of the major axis, since these are
+    /// nearer to the minor one.
     fn least_center_distance_mm(&self) -> Result<f64, NotConverged> {
         if !matches!(self.locus.cam(), Cam::Ellipse(_)) {
             return self.least_scanned_distance_mm();
         }
-        let lobes = self.locus.lobes();
-        if self.installed == 2 {
-            return Ok(2.0 * self.locus.at(Position::valley(lobes))?.center_radius_mm);
-        }
         let half_rad = self.half_spacing_rad();
-        Ok(2.0 * half_rad.sin() * self.locus.at(Position::from_valley(half_rad, lobes))?.center_radius_mm)
+        let nearest = Position::from_valley(half_rad.min(FRAC_PI_2 - half_rad), self.locus.lobes());
+        Ok(2.0 * half_rad.sin() * self.locus.at(nearest)?.center_radius_mm)
     }
 
     /// The same around any cam: over the middle of the pair a scan,
@@ -498,9 +496,9 @@ impl Neighbours {
     /// the path itself is given it is the same for all radii, and what the centres leave is half their least distance.
     fn touching_radius_mm(&self, center_distance_mm: f64) -> Result<f64, NotConverged> {
         match self.locus.cam() {
-            Cam::Ellipse(cam) => return self.touching_radius_of_ellipse_mm(cam),
+            Cam::Ellipse(cam) if self.installed > 3 => return self.touching_radius_of_ellipse_mm(cam),
             Cam::HarmonicPath(_) => return Ok(0.5 * center_distance_mm),
-            Cam::Harmonic(_) => {}
+            Cam::Ellipse(_) | Cam::Harmonic(_) => {}
         }
         let free_mm = 0.5 * self.surely_free_radius_mm();
         let at = |exponent: f64| Self { locus: Locus::new(*self.locus.cam(), free_mm * exponent.exp()), ..*self };
@@ -513,7 +511,7 @@ impl Neighbours {
         Ok(at(exponent).locus.tooth_radius_mm())
     }
 
-    /// Of an ellipse the radius at which the two teeth either side of the minor axis touch it, and so each other. There are four teeth or more.
+    /// Of an ellipse the radius at which the two teeth either side of the minor axis touch it, and so each other, of four teeth or more.
     ///
     /// Their centres then stand at `(r, r cot μ)`, μ half the spacing, and on the path of section 2.2: with `a² cos φ/h = r (1 - cos φ)` and
     /// `b² sin φ/h = r (cot μ - sin φ)` the normal's angle is the one root of `a² cos φ (cot μ - sin φ) = b² sin φ (1 - cos φ)`, beyond 45°.

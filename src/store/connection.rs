@@ -113,6 +113,14 @@ impl Store {
                     .idle_timeout(None)
                     .max_lifetime(None)
                     .acquire_timeout(PATIENCE)
+                    // Whoever had it may have failed, or left, in the middle of a transaction. Where none was begun there is nothing to be
+                    // undone, which is an error of no interest.
+                    .after_release(|connection, _| {
+                        Box::pin(async move {
+                            drop(sqlx::query("ROLLBACK").execute(connection).await);
+                            Ok(true)
+                        })
+                    })
                     .connect_with(options)
                     .await
                     .map_err(|error| in_use(error, address))?;
@@ -148,28 +156,23 @@ impl Store {
         &self.address
     }
 
-    /// What is done with a connection, within the patience that one has with a silent server. What a connection was left in the middle of
-    /// cannot be known, so it is closed.
+    /// What is done with a connection, within the patience that one has with a silent server. What a connection was left in the middle of,
+    /// by an error or by whoever waits no longer, is undone: that of a file by its pool, a server's by closing it.
     pub(crate) async fn with<T>(
         &self,
         patience: Duration,
         job: impl AsyncFnOnce(&mut Connection) -> Result<T, StoreError>,
     ) -> Result<T, StoreError> {
-        let mut connection = within(patience, async {
+        let connection = within(patience, async {
             Ok(match &self.database {
                 Database::File { pool, .. } => Connection::File(pool.acquire().await?),
                 Database::Server { pool, .. } => Connection::Server(pool.acquire().await?),
             })
         })
         .await?;
-        let done = within(patience, job(&mut connection)).await;
-        if done.is_err() {
-            match &mut connection {
-                Connection::Server(connection) => connection.close_on_drop(),
-                // The only one. Where nothing was begun there is nothing to be undone, which is an error of no interest.
-                Connection::File(connection) => drop(sqlx::query("ROLLBACK").execute(&mut **connection).await),
-            }
-        }
+        let mut borrowed = Borrowed { connection, is_at_rest: false };
+        let done = within(patience, job(&mut borrowed.connection)).await;
+        borrowed.is_at_rest = done.is_ok();
         done
     }
 
@@ -181,6 +184,20 @@ impl Store {
                 pool.close().await;
                 leases.close().await;
             }
+        }
+    }
+}
+
+/// A connection that is not given back in the middle of anything.
+struct Borrowed {
+    connection: Connection,
+    is_at_rest: bool,
+}
+
+impl Drop for Borrowed {
+    fn drop(&mut self) {
+        if let (Connection::Server(connection), false) = (&mut self.connection, self.is_at_rest) {
+            connection.close_on_drop();
         }
     }
 }

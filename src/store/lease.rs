@@ -62,8 +62,14 @@ impl Store {
         let Some((chunk, held)) = claimed else { return Ok(Claim::None) };
         // From here on dropping the lease sets the chunk free.
         let lease = Lease { store: self.clone(), study: study.to_owned(), chunk, held };
-        if self.note_attempt(study, chunk).await? {
-            return Ok(Claim::Chunk(lease));
+        match self.note_attempt(study, chunk).await {
+            Ok(true) => return Ok(Claim::Chunk(lease)),
+            Ok(false) => {}
+            // The study was forgotten in this moment.
+            Err(StoreError::Failed(sqlx::Error::Database(error))) if error.is_foreign_key_violation() => {
+                return Ok(Claim::None);
+            }
+            Err(error) => return Err(error),
         }
         lease.give_up().await?;
         Ok(Claim::Gap(chunk))

@@ -231,7 +231,16 @@ impl Store {
     /// # Errors
     /// As [`Self::create`].
     pub async fn forget(&self, id: &str) -> Result<(), StoreError> {
-        self.once("DELETE FROM studies WHERE id = $1", id).await
+        self.with(LONG_PATIENCE, async |connection| {
+            require_schema(connection).await?;
+            begin(connection).await?;
+            // Its chunks first: for one that is in work its worker is waited for, who must not wait for the study meanwhile.
+            for text in ["DELETE FROM chunks WHERE study = $1", "DELETE FROM studies WHERE id = $1"] {
+                on!(connection, inner => sqlx::query(text).bind(id).execute(inner).await.map(|_| ()))?;
+            }
+            commit(connection).await
+        })
+        .await
     }
 
     /// A statement about one study.

@@ -260,3 +260,14 @@ fn health_is_not_well_where_nothing_listens_or_something_else_does() {
     assert!(!run(&["health", "--address", &address], b"").status.success());
     answering.join().unwrap();
 }
+
+/// Who checks somebody else's document reads what is wrong with it, and is not shown what that one likes.
+#[test]
+fn what_a_document_holds_for_a_terminal_is_spelled_out() {
+    let document = r#"{ "drive": { "\u001b[2J\u009b31m\u0007good\n": 1 } }"#;
+    let output = run(&["sweep", "-"], document.as_bytes());
+    assert!(!output.status.success());
+    let said = stderr(&output);
+    assert!(said.trim_end().chars().all(|character| !character.is_control() || character == '\n'), "{said:?}");
+    assert!(said.contains(r"\u{1b}[2J\u{9b}31m\u{7}good"), "{said:?}");
+}

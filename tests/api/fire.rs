@@ -106,7 +106,7 @@ fn idle(address: SocketAddr) -> TcpStream {
     stream
 }
 
-fn with_files(limit: &str, arguments: &[&str]) -> Process {
+fn held_to(limit: &str, arguments: &[&str]) -> Process {
     let mut command = Command::new("sh");
     command.args(["-c", &format!("ulimit {limit}; exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_toothwave")]);
     Process::of(command.args(arguments).args(["--log", "off"]), Stdio::null())
@@ -114,7 +114,7 @@ fn with_files(limit: &str, arguments: &[&str]) -> Process {
 
 #[test]
 fn where_the_process_may_open_few_files_it_admits_fewer_connections_and_refuses_the_others_at_once() {
-    let process = with_files("-n 200", &["serve"]);
+    let process = held_to("-n 200", &["serve"]);
     let limits = ask_at(process.address, &Question::of("GET", "/v1/limits")).found();
     assert_eq!(limits["max_connections"], 200 - 128);
     // More than there are files.
@@ -128,9 +128,17 @@ fn where_the_process_may_open_few_files_it_admits_fewer_connections_and_refuses_
 
 #[test]
 fn a_limit_of_files_that_the_process_may_raise_itself_is_raised() {
-    let process = with_files("-S -n 100", &["serve"]);
+    let process = held_to("-S -n 100", &["serve"]);
     let limits = ask_at(process.address, &Question::of("GET", "/v1/limits")).found();
     assert_eq!(limits["max_connections"], 1024);
+}
+
+#[test]
+fn what_a_process_may_not_take_of_the_memory_is_not_shared_out() {
+    let process = held_to("-v 1000000", &["serve"]);
+    let limits = ask_at(process.address, &Question::of("GET", "/v1/limits")).found();
+    assert_eq!(limits["max_unread_bytes"], 512_000_000);
+    assert_eq!(limits["cache_max_bytes"], 128_000_000);
 }
 
 #[test]

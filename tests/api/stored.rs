@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use futures_util::future::join_all;
 use serde_json::{Value, json};
 use tokio::task::JoinHandle;
 use toothwave::config::Limits;
@@ -161,6 +162,47 @@ async fn more_stored_studies_than_may_run_are_refused() {
     assert_eq!(keeper.ask(&map(5)).await.status, 202);
     assert_eq!(keeper.ask(&map(5)).await.status, 202, "it runs already");
     keeper.ask(&map(6)).await.refused(503, "queue_full");
+    keeper.end().await;
+}
+
+#[tokio::test]
+async fn no_more_stored_studies_run_than_may_however_many_are_asked_for_at_once() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, Limits { max_concurrent_studies: 2, ..LIMITS }, false).await;
+    let studies: Vec<_> = (5..15).map(map).collect();
+    let answers = join_all(studies.iter().map(|study| keeper.ask(study))).await;
+    let (begun, refused): (Vec<_>, Vec<_>) = answers.iter().partition(|answer| answer.status == 202);
+    assert_eq!(begun.len(), 2);
+    for answer in refused {
+        answer.refused(503, "queue_full");
+    }
+    assert_eq!(keeper.store.running().await.unwrap(), 2);
+    keeper.end().await;
+}
+
+#[tokio::test]
+async fn a_stored_study_that_finds_no_room_does_not_run() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, Limits { max_study_bytes: 30_000, ..LIMITS }, false).await;
+    assert_eq!(keeper.ask(&map(5)).await.status, 202);
+    keeper.ask(&map(6)).await.refused(503, "queue_full");
+    assert_eq!(keeper.store.running().await.unwrap(), 1);
+    assert_eq!(keeper.store.figures().await.unwrap().studies, 1);
+    keeper.end().await;
+}
+
+#[tokio::test]
+async fn a_study_that_another_forgets_while_it_begins_is_no_fault_of_the_service() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    let study = keeper.ask(&map(5)).await.json();
+    let (again, delete) = (map(5), Question::of("DELETE", &place(&study)));
+    for _ in 0..30 {
+        let (begun, one, other) =
+            tokio::join!(keeper.ask(&again), keeper.service.ask(&delete), keeper.service.ask(&delete));
+        assert!(matches!(begun.status, 200 | 202), "{}", begun.text());
+        assert!([one, other].iter().all(|deleted| matches!(deleted.status, 204 | 404)));
+    }
     keeper.end().await;
 }
 

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use toothwave::config::Limits;
 
-use crate::asking::{Answer, LIMITS, Occupied, Question, Service};
+use crate::asking::{Answer, LIMITS, Occupied, Question, Service, until};
 use crate::designs::{every_number, shortest, spelled_out, undercut, with};
 
 const WAIT: &str = "wait=600";
@@ -97,6 +97,47 @@ async fn a_cancelled_study_keeps_what_it_has_and_goes_on_when_it_is_asked_for_ag
     assert_eq!(deleted(&service, &place(&study)).await, 204);
     service.get(&place(&study)).await.refused(404, "not_found");
     assert_eq!(deleted(&service, &place(&study)).await, 404);
+}
+
+#[tokio::test]
+async fn who_lets_go_of_a_study_lets_go_of_none_that_was_asked_for_since() {
+    let service = Service::within(Limits { max_concurrent_solves: 1, ..LIMITS });
+    let occupied = Occupied::by_one(&service.app.pool).await;
+    let study = begun(&service, &map(&shortest(), 5)).await.json();
+    let studies = &service.app.studies;
+    let found = studies.find(study["id"].as_str().unwrap()).await.unwrap().unwrap();
+    // Cancelled, forgotten, asked for again; and then comes one more who had found the first.
+    studies.cancel_or_forget(&found).await.unwrap();
+    studies.cancel_or_forget(&found).await.unwrap();
+    assert_eq!(begun(&service, &map(&shortest(), 5)).await.status, 202);
+    studies.cancel_or_forget(&found).await.unwrap();
+    assert_eq!(service.get(&place(&study)).await.found()["state"], "running");
+    occupied.end().await;
+}
+
+/// What runs and is not kept could be cancelled by nobody, and would count nowhere.
+#[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+async fn however_many_ask_for_a_study_and_cancel_it_at_once_none_runs_that_is_not_kept() {
+    let service = Service::new();
+    let study = begun(&service, &long()).await.json();
+    let clients = (0..16).map(|client| {
+        let (service, place) = (service.clone(), place(&study));
+        tokio::spawn(async move {
+            for turn in 0..60 {
+                if (client + turn) % 2 == 0 {
+                    let answer = begun(&service, &long()).await;
+                    assert!(matches!(answer.status, 200 | 202), "{}", answer.text());
+                } else {
+                    assert!(matches!(deleted(&service, &place).await, 204 | 404));
+                }
+            }
+        })
+    });
+    for client in clients.collect::<Vec<_>>() {
+        client.await.unwrap();
+    }
+    while deleted(&service, &place(&study)).await != 404 {}
+    until("nothing runs", || service.app.pool.running() == 0).await;
 }
 
 #[tokio::test]

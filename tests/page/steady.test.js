@@ -106,6 +106,49 @@ test('the tools are one stop, and arrows move among them', async () => {
   assert.equal(await page.locator('#tools [tabindex="0"]').count(), 1);
 });
 
+test('at four sizes no key figure’s name and no empty field’s word is cut', async () => {
+  const design = await bed.server.example('paper-5.1');
+  design.model = { compatibility: 'virtual_work', stiffness: { law: 'johnson' } };
+  design.friction = { wave_generator: { kind: 'plain', coefficient: 0.05 }, ring: { coefficient: 0.05 }, carrier: { coefficient: 0.05 } };
+  const page = await bed.open();
+  await setDocument(page, design);
+  for (const [width, height] of [[320, 640], [768, 1024], [1366, 900], [1920, 1080]]) {
+    await page.setViewportSize({ width, height });
+    const cut = await page.evaluate(() => {
+      for (const details of document.querySelectorAll('#form details')) details.open = true;
+      const pen = document.createElement('canvas').getContext('2d');
+      const isCut = (input) => {
+        const { fontFamily, paddingLeft, paddingRight } = getComputedStyle(input);
+        pen.font = `${getComputedStyle(input, '::placeholder').fontSize} ${fontFamily}`;
+        return pen.measureText(input.placeholder).width > input.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight);
+      };
+      const names = [...document.querySelectorAll('.tile dt > span')].filter((name) => name.checkVisibility());
+      const empty = [...document.querySelectorAll('#form .entry input:placeholder-shown')].filter((input) => input.checkVisibility() && input.placeholder.trim());
+      return {
+        seen: [names.length, empty.length > 10],
+        names: names.filter((name) => name.scrollWidth > name.clientWidth).map((name) => name.textContent),
+        words: empty.filter(isCut).map((input) => input.placeholder),
+      };
+    });
+    assert.deepEqual(cut, { seen: [7, true], names: [], words: [] }, `${width} px`);
+  }
+});
+
+test('on a small screen ready designs take one row, and views and tools one on a wide screen', async () => {
+  const heightOf = (selector) => bed.page.$eval(selector, (element) => element.getBoundingClientRect().height);
+  await bed.open({ viewport: { width: 320, height: 640 } });
+  assert.ok((await heightOf('#examples')) < 60);
+  // The last one comes into sight with the focus.
+  await bed.page.focus('#examples button');
+  await bed.page.keyboard.press('End');
+  const { x, width } = await bed.page.locator('#examples button').last().boundingBox();
+  assert.ok(x >= 0 && x + width <= 320, `from ${x}, ${width} wide`);
+  await bed.page.context().close();
+  await bed.open();
+  const [views, tools] = await Promise.all(['#views', '#tools'].map((selector) => bed.page.locator(selector).boundingBox()));
+  assert.ok(Math.abs(views.y + views.height / 2 - tools.y - tools.height / 2) < 12, `${views.y}, ${tools.y}`);
+});
+
 test('at 320 px nothing is wider than the screen, and every target is 24 px', async () => {
   const page = await bed.open({ viewport: { width: 320, height: 640 } });
   await page.click('#keep');

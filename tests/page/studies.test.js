@@ -100,6 +100,30 @@ test('at 320 px no view is wider than the screen, and none has a fault of access
   }
 });
 
+test('at 320 px the axes of a study are named in full and have two numbers each, and a choice stands beside its mark', async () => {
+  const page = await bed.open({ viewport: { width: 320, height: 900 } });
+  await show(page, 'tolerance');
+  await onlyDeviates(page, 'Width of all teeth');
+  await done(page, 'tolerance', 'tbody tr');
+  const axes = await page.$$eval('#tolerance .chart-svg', (charts) =>
+    charts.map((chart) => {
+      const { left, right } = chart.getBoundingClientRect();
+      const isOut = (text) => text.getBoundingClientRect().left < left - 1 || text.getBoundingClientRect().right > right + 1;
+      return {
+        cut: [...chart.querySelectorAll('.axis-label')].filter(isOut).map(({ textContent }) => textContent),
+        numbers: ['middle', 'end'].map((anchor) => chart.querySelectorAll(`.ticks [text-anchor='${anchor}']`).length >= 2),
+      };
+    }),
+  );
+  assert.deepEqual(axes, [1, 2].map(() => ({ cut: [], numbers: [true, true] })));
+  await show(page, 'find');
+  const rows = await page.$$eval('#find .flag', (flags) =>
+    flags.filter((flag) => flag.checkVisibility()).map((flag) => [flag.querySelector('label').textContent, flag.querySelector('label').getBoundingClientRect().top < flag.querySelector('input').getBoundingClientRect().bottom]),
+  );
+  assert.deepEqual(rows.filter(([, isBeside]) => !isBeside), []);
+  assert.ok(rows.length > 8, `${rows.length}`);
+});
+
 test('a curve’s numbers are those of the sweep, and can be taken into the design', async () => {
   const page = await bed.open();
   await show(page, 'explore');

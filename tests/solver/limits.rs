@@ -69,6 +69,33 @@ fn neighbouring_teeth_may_not_touch() {
     assert!(straddling > 14.0);
 }
 
+#[test]
+fn of_three_teeth_around_an_ellipse_those_either_side_of_its_major_axis_are_nearest() {
+    // A third of a turn apart, they stand nearer to the minor axis than the pair that straddles it.
+    let p = DriveParameters {
+        wave_generator: ellipse(58.0, 50.0),
+        teeth: 12,
+        installed: 3,
+        tooth_radius_mm: 5.0,
+        ring_teeth: 10,
+        ..PAPER_5_1
+    };
+    let fitting = drive(&p);
+    let at = |turn: f64| {
+        // The ellipse is its own mirror image about both axes.
+        let (sin, cos) = (2.0 * std::f64::consts::PI * turn).sin_cos();
+        let tooth = fitting.flank().locus().at(Position::from_lobe(sin.abs().atan2(cos.abs()), 2)).unwrap();
+        (tooth.center_radius_mm * cos, tooth.center_radius_mm * sin)
+    };
+    let distance = |turn: f64| {
+        let ((x, y), (x2, y2)) = (at(turn), at(turn + 1.0 / 3.0));
+        (x - x2).hypot(y - y2)
+    };
+    let least = (0..3600).map(|i| distance(f64::from(i) / 3600.0)).fold(f64::INFINITY, f64::min);
+    let told = fitting.least_center_distance_mm().unwrap();
+    assert!((told - least).abs() < 1e-12 * least, "{told} is not {least}");
+}
+
 /// The radius above which teeth touch, of which a drive with teeth of such a radius is told.
 fn touching_radius_mm(parameters: &DriveParameters) -> f64 {
     let found = violations(parameters);
@@ -108,6 +135,9 @@ fn touching_drives() -> Vec<DriveParameters> {
         of(1e5, 0.1, 100, 100, 5e5),
         of(1e5, 99_999.9, 10_000, 10_000, 1e6),
         of(1e-3, 9e-4, 30, 30, 1e6),
+        of(58.0, 56.0, 6, 3, 1e3),
+        of(13.0, 10.0, 6, 3, 75.0),
+        of(1e5, 0.1, 9, 3, 1e6),
     ]
 }
 

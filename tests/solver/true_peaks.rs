@@ -5,7 +5,8 @@ use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::sweep::{Points, SweepPeaks, peaks, sweep_plain};
 use toothwave_solver::{
-    Contact, ContactLaw, DriveParameters, LoadCase, LoadParameters, Never, PerContact, SolveError, WaveGenerator,
+    Contact, ContactLaw, DriveParameters, LoadCase, LoadParameters, Never, PerContact, SolveError, ToothShape,
+    WaveGenerator,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, everywhere, load};
@@ -149,6 +150,35 @@ fn a_stiffness_that_jumps_after_a_tooth_has_left_the_valley_is_found() {
             assert!(found >= dense * (1.0 - 1e-4), "{name}: {:e} {parameters:?}", 1.0 - found / dense);
         }
     }
+}
+
+/// Where corners bend both ways within two stretches their second differences take each other away.
+#[test]
+fn a_capacity_between_two_corners_is_found() {
+    let parameters = DriveParameters {
+        wave_generator: WaveGenerator::Harmonic {
+            lobes: 5,
+            mean_radius_mm: 45.003_137_212_920_79,
+            amplitude_mm: 0.023_981_016_962_778_66,
+        },
+        teeth: 40,
+        installed: 20,
+        ring_teeth: 35,
+        tooth_radius_mm: 4.996_862_787_079_209,
+        tooth: ToothShape::Cylinder { width_mm: 10.0 },
+        tip_radius_mm: None,
+    };
+    let clearance_um = PerContact {
+        wave_generator: 2.464_927_512_857_069,
+        ring: 0.915_820_933_752_716_1,
+        carrier: 0.901_299_260_170_476_2,
+    };
+    let allowable_stress_mpa = Some(everywhere(1500.0));
+    let load = LoadParameters { clearance_um, allowable_stress_mpa, ..load(1.135_355_178_771_830_8, VirtualWork) };
+    let capacity_nm = |points| of(&parameters, &load, points).unwrap().torque_capacity.unwrap().output_torque_nm;
+    let dense_nm = capacity_nm(Points::samples(600).unwrap());
+    let found_nm = capacity_nm(Points::tolerance(1e-4, MAX_STATES).unwrap());
+    assert!(found_nm <= dense_nm * (1.0 + 1e-4), "{found_nm} {dense_nm}");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::task::Poll;
 use std::time::Duration;
 
 use toothwave_store::{Address, AddressError, Claim, Gap, Lease, MOST_ATTEMPTS, NewStudy, Store, StoreError};
@@ -271,4 +272,63 @@ fn an_address_holds_no_password_and_shows_none() {
         ("postgres://db:5433/studies".into(), "postgres://db:5433/studies".into())
     );
     assert!(!Address::new("/var/lib/toothwave/studies.sqlite", None).unwrap().is_shared());
+}
+
+/// Polls a future so often at most; whether it came to an end.
+async fn polled(future: impl Future, times: usize) -> bool {
+    let mut future = std::pin::pin!(future);
+    let mut polls = 0;
+    std::future::poll_fn(|context| {
+        if polls == times {
+            return Poll::Ready(false);
+        }
+        polls += 1;
+        future.as_mut().poll(context).map(|_| true)
+    })
+    .await
+}
+
+/// As a client does that asks for a study and goes away: wherever that leaves a connection, nobody else finds it there.
+#[tokio::test]
+async fn whoever_leaves_in_the_middle_of_anything_leaves_no_transaction_open() {
+    with_each_store(async |store| {
+        let mut times = 1;
+        loop {
+            // So many that it is left among them.
+            let (left, other) = (study(&format!("left-{times}"), 50_000), study(&format!("other-{times}"), 3));
+            let is_whole = polled(store.create(&left), times).await;
+            store.cancel("none").await.unwrap();
+            for study in [&other, &left] {
+                store.create(study).await.unwrap();
+                let waiting = store.waiting().await.unwrap();
+                assert!(waiting.iter().any(|waiting| waiting.id == study.id), "{times}: {}", study.id);
+                store.forget(&study.id).await.unwrap();
+            }
+            if is_whole {
+                break;
+            }
+            times += 1;
+        }
+        assert!(times > 1, "it was never left in the middle");
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn a_study_that_is_forgotten_while_its_chunk_is_claimed_has_none_and_holds_nobody_up() {
+    with_each_store(async |store| {
+        for round in 0..20 {
+            let study = study(&format!("gone-{round}"), 3);
+            store.create(&study).await.unwrap();
+            let worked = async {
+                if let Claim::Chunk(mut lease) = store.claim(&study.id, LEASE).await.unwrap() {
+                    keep(&mut lease).await;
+                }
+            };
+            let ((), forgotten) = tokio::join!(worked, store.forget(&study.id));
+            forgotten.unwrap();
+            assert_eq!(store.find(&study.id).await.unwrap(), None);
+        }
+    })
+    .await;
 }

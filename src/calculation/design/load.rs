@@ -267,7 +267,7 @@ pub struct CompliancesDocument {
 union! {
     /// The contact law.
     pub enum StiffnessDocument as "Stiffness" by "law" read "by:law" {
-        /// k = π L1 E*/2 at each contact.
+        /// k = (π/2) L1 E* at each contact.
         Linear(LinearDocument) = "linear",
         /// Given stiffnesses.
         Fixed(FixedDocument) = "fixed",
@@ -280,7 +280,7 @@ union! {
     }
 }
 
-/// k = π L1 E*/2 at each contact: several times too stiff, but the paper's.
+/// k = (π/2) L1 E* at each contact: several times too stiff, but the paper's.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct LinearDocument {}

@@ -199,9 +199,10 @@ fn no_store(mut response: Response) -> Response {
 }
 
 async fn kept(app: &App, id: Result<Path<String>, PathRejection>) -> Result<Arc<Kept>, Problem> {
-    // An id that is no text is no study's either.
+    // An id that is no text is no study's either, and PostgreSQL takes no text with a zero in it.
     let id = id.map(|Path(id)| id).unwrap_or_default();
-    app.studies.find(&id).await?.ok_or_else(|| {
+    let found = if id.contains('\0') { None } else { app.studies.find(&id).await? };
+    found.ok_or_else(|| {
         let detail =
             format!("no study `{id}` is kept: it was never asked for here, or was forgotten; ask for it again");
         Problem::new(ProblemCode::NotFound, detail)

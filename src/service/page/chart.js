@@ -7,11 +7,23 @@ const TOP = 26;
 const RIGHT = 14;
 const BOTTOM = 42;
 const LEFT = 62;
+const LABEL_EDGE = 4;
+/** Measures words before they are drawn. */
+const pen = document.createElement('canvas').getContext('2d');
 
-/** Round numbers between two, at most so many. */
+/** Round numbers between two: at most so many, but two at least, without which there is no scale. */
 export function ticks(min, max, most) {
-  const raw = (max - min) / Math.max(1, most);
-  if (!(raw > 0)) return [min];
+  for (let count = Math.max(1, most); count < 30; count += 1) {
+    const found = roundNumbers(min, max, count);
+    const stride = Math.ceil(found.length / (Math.max(2, most) + 1));
+    if (found.length >= 2) return found.filter((_, index) => index % stride === 0);
+  }
+  return [min];
+}
+
+function roundNumbers(min, max, most) {
+  const raw = (max - min) / most;
+  if (!(raw > 0)) return [];
   const power = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 5, 10].map((digit) => digit * power).find((candidate) => candidate >= raw * 0.999);
   const found = [];
@@ -34,6 +46,16 @@ export function spread(values, room = 0.06) {
   return { min: min - half, max: max + half };
 }
 
+/** The name of an axis around a place, or as near to it as it has room, and narrower where it has none. */
+function axisLabel(text, center, y, width) {
+  const room = width - 2 * LABEL_EDGE;
+  pen.font = `600 12px ${getComputedStyle(document.body).fontFamily}`;
+  const length = pen.measureText(text).width;
+  const shown = Math.min(length, room);
+  const x = Math.min(Math.max(LABEL_EDGE, center - shown / 2), width - LABEL_EDGE - shown);
+  return svg('text', { x, y, class: 'axis-label', ...(length > room && { textLength: room, lengthAdjust: 'spacingAndGlyphs' }) }, text);
+}
+
 /** Empty axes: `{ root, plot, x(value), y(value), box, valueAt(px, py) }`. An axis is `{ min, max, label, labels }`, where `labels` name places
  *  from 0 on instead of numbers. */
 export function axes(width, height, xAxis, yAxis) {
@@ -54,10 +76,7 @@ export function axes(width, height, xAxis, yAxis) {
     grid.append(svg('line', { x1: box.left, x2: box.right, y1: y(value), y2: y(value) }));
     words.append(svg('text', { x: box.left - 7, y: y(value) + 4, 'text-anchor': 'end' }, text));
   }
-  words.append(
-    svg('text', { x: (box.left + box.right) / 2, y: height - 6, 'text-anchor': 'middle', class: 'axis-label' }, xAxis.label),
-    svg('text', { x: 4, y: 15, class: 'axis-label' }, yAxis.label),
-  );
+  words.append(axisLabel(xAxis.label, (box.left + box.right) / 2, height - 6, width), axisLabel(yAxis.label, 0, 15, width));
   const plot = svg('g', {});
   const root = svg('svg', { viewBox: `0 0 ${width} ${height}`, width, height, class: 'chart-svg', 'aria-hidden': 'true' }, grid, plot, words);
   const valueAt = (px, py) => ({

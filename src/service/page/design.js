@@ -120,7 +120,7 @@ const groove = (contact, label) =>
 
 /** How far below a contact its body stands still. */
 const depth = (contact, label) =>
-  number(`/model/stiffness/depth_mm/${contact}`, label, '', 'mm', { optional: (design) => `tooth radius ${at(design, '/drive/teeth/radius_mm') ?? ''}`.trim(), step: 0.5 });
+  number(`/model/stiffness/depth_mm/${contact}`, label, '', 'mm', { optional: (design) => `r = ${at(design, '/drive/teeth/radius_mm') ?? ''}`, step: 0.5 });
 
 const stiffness = (contact, label, symbol) => number(`/model/stiffness/${contact}_n_per_mm`, label, symbol, 'N/mm', { start: 500000, likely: 500000 });
 
@@ -265,7 +265,7 @@ export const GROUPS = [
         slider: 0.01,
         optional: (_, answers) => {
           const radius = answers.geometry?.ring.tip_radius_mm;
-          return radius === undefined ? 'natural' : `natural ${radius.toFixed(1)}`;
+          return radius === undefined ? 'natural' : `natural ${Number(radius.toPrecision(3))}`;
         },
       }),
     ],

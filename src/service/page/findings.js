@@ -54,7 +54,7 @@ const KINDS = {
     title: 'Hollow wave generator',
     tests: 'The amplitude of the path against the largest that leaves the wave generator convex.',
     basis: ['exact', 'The limit is geometry.'],
-    why: 'A solid wave generator turns as calculated; the ring of a bearing could not follow it.',
+    why: 'A solid wave generator turns as calculated; the ring of a bearing spans the hollow and moves the teeth otherwise.',
   },
   flat_cuts_the_contact: {
     title: 'Flats cut the contact',
@@ -110,14 +110,14 @@ const KINDS = {
     tests: 'The peak contact stress over a period against the one that the contact may have.',
     basis: ['as given', 'The limit is the allowable stress of this design.'],
     why: 'The torque capacity is the torque at which the first contact reaches its own.',
-    change: 'Stress grows with the square root of the torque.',
+    change: 'Stress grows about with the square root of the torque, that of balls with its cube root.',
   },
   stress_above_fatigue_limit: {
     title: 'Stress above the fatigue limit',
     tests: 'The peak contact stress over a period against the fatigue limit of bearing steel.',
     basis: ['ISO 281:2007', 'The limit is that of ISO 281:2007 for rolling bearings of common high-quality steel.'],
     why: 'Above it, hardened bearing steel has to be expected to fatigue in the end, softer steel earlier; below it nothing is proven.',
-    change: 'Stress grows with the square root of the torque.',
+    change: 'Stress grows about with the square root of the torque, that of balls with its cube root.',
   },
   linear_law_too_stiff: {
     title: 'Linear law is too stiff',

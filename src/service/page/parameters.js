@@ -38,7 +38,7 @@ export function wordsOf(pointer) {
   if (field) return { label: fullLabel(field), unit: field.unit ?? '' };
   const parts = pointer.split('/').slice(2);
   const [, name, ending] = /^(.*?)(_mm|_um|_deg|_arcsec|_nm|_mpa|_gpa|_rpm)?$/.exec(parts.at(-1));
-  const unit = { _mm: 'mm', _um: 'µm', _deg: '°', _arcsec: '″', _nm: 'N·m', _mpa: 'MPa', _gpa: 'GPa', _rpm: 'rpm' }[ending] ?? '';
+  const unit = { _mm: 'mm', _um: 'µm', _deg: '°', _arcsec: '″', _nm: 'N·m', _mpa: 'MPa', _gpa: 'GPa', _rpm: '1/min' }[ending] ?? '';
   const words = [...parts.slice(0, -1), name].join(', ').replaceAll('_', ' ');
   return { label: words[0].toUpperCase() + words.slice(1), unit };
 }

@@ -99,7 +99,7 @@ export const GROUPS = [
       number('ratio', 'Ratio, ring fixed', 'i_HG', '', { whole: true, likely: 20 }),
       number('ratio_max', 'Ratio, up to', '', '', { whole: true, optional: () => 'just that' }),
       number('output_torque_nm', 'Output torque', 'M_G', 'N·m', { likely: 200 }),
-      number('input_speed_rpm', 'Input speed', '', 'rpm', { optional: () => 'not asked', step: 100 }),
+      number('input_speed_rpm', 'Input speed', 'n', '1/min', { optional: () => 'not asked', step: 100 }),
     ],
   },
   {

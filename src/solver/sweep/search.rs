@@ -508,7 +508,9 @@ impl Judge {
                     continue;
                 }
                 let best = self.best[quantity];
-                let (limit, coarse) = (best * (1.0 + 0.25 * self.relative), COARSE_BEND * best);
+                let limit = best * (1.0 + 0.25 * self.relative);
+                // Corners that bend both ways hide each other.
+                let coarse = if quantity == CAPACITY { 0.0 } else { COARSE_BEND * best };
                 let margin = bends.margin(seen.curves(quantity), coarse);
                 bends_too_much |= self.lines.is_some_and(|lines| margin.bend > lines * best);
                 if margin.bound <= limit {
