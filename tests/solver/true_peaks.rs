@@ -9,7 +9,7 @@ use toothwave_solver::{
     WaveGenerator,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, everywhere, load};
+use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, ellipse, everywhere, load};
 use crate::fast::{any_drive_of_other_kinds, any_drive_of_unlike_zones};
 use crate::reference::{Worst, number};
 use crate::tolerances::{designs, of_many_teeth};
@@ -179,6 +179,37 @@ fn a_capacity_between_two_corners_is_found() {
     let dense_nm = capacity_nm(Points::samples(600).unwrap());
     let found_nm = capacity_nm(Points::tolerance(1e-4, MAX_STATES).unwrap());
     assert!(found_nm <= dense_nm * (1.0 + 1e-4), "{found_nm} {dense_nm}");
+}
+
+/// Next to no torque across a gap of 100 mm: what bends the capacity's curve is rounding, and what bends the loads' as well where the wave generator is
+/// nearly round.
+#[test]
+fn extremes_that_rounding_alone_bends_are_found() {
+    let cylinder = |width_mm| ToothShape::Cylinder { width_mm };
+    let of_major = |semi_major_mm, semi_minor_mm, teeth, installed, tooth_radius_mm, width_mm| DriveParameters {
+        wave_generator: ellipse(semi_major_mm, semi_minor_mm),
+        teeth,
+        installed,
+        ring_teeth: teeth - 2,
+        tooth_radius_mm,
+        tooth: cylinder(width_mm),
+        tip_radius_mm: None,
+    };
+    let bored = DriveParameters {
+        tip_radius_mm: Some(8.670_603_836_436_415),
+        ..of_major(8.25, 8.247_236_535_126_948, 16, 16, 0.211_651_139_303_286_08, 15.0)
+    };
+    let clearance_um = PerContact { wave_generator: 0.001, ring: 1e5, carrier: 10.0 };
+    let allowable_stress_mpa = Some(everywhere(10.0));
+    let nearly_round = LoadParameters { clearance_um, allowable_stress_mpa, ..load(1e-5, VirtualWork) };
+    let deep = of_major(43.75, 43.214_846_885_415_65, 24, 12, 5.385_253_723_998_935, 1e5);
+    let clearance_um = PerContact { wave_generator: 1e5, ring: 0.0, carrier: 0.0 };
+    let allowable_stress_mpa = Some(everywhere(0.1));
+    let weak =
+        LoadParameters { law: ContactLaw::Palmgren, clearance_um, allowable_stress_mpa, ..load(1e-9, Projection) };
+    for (parameters, load) in [(bored, nearly_round), (deep, weak)] {
+        assert!(to(&parameters, &load, 1e-10).torque_capacity.is_some());
+    }
 }
 
 #[test]

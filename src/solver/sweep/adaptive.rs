@@ -166,6 +166,10 @@ impl Look for PlainLook<'_> {
         self.is_linear
     }
 
+    fn input_torque_nmm(&self) -> f64 {
+        self.loaded.input_torque_nmm()
+    }
+
     fn teeth_at_each_place(&self) -> u64 {
         if self.mesh.tells_items_apart() { self.mesh.listed_at_each_place() } else { 1 }
     }

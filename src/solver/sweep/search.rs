@@ -38,11 +38,17 @@ const MAX_ROUNDS: u32 = 60;
 /// What rounding may leave uncertain of a quantity where the rounds are over.
 const OPEN: f64 = 1e-10;
 
+/// How many roundings a bend is of, each as often as [`COARSE_MARGIN`] counts it.
+const ROUNDINGS: f64 = 1024.0;
+
 /// A tooth that closes within this part of the rotation has no gap.
 const CLOSED: f64 = 1e-12;
 
 /// A stretch that bends by more than this part of a quantity's largest value may hide more than its ends show.
 const COARSE_BEND: f64 = 1e-2;
+
+/// The same of the capacity alone, whose corners hide each other where they bend both ways; what bends less may be rounding.
+const COARSE_CORNER: f64 = 1e-6;
 
 /// How many times its bend such a stretch is allowed to rise above its ends.
 const COARSE_MARGIN: f64 = 8.0;
@@ -238,6 +244,9 @@ pub(crate) trait Look {
     /// Whether the stiffness is in proportion to the rotation's reciprocal, and so has its extremes with it.
     fn is_in_proportion(&self) -> bool;
 
+    /// `M0` in N·mm.
+    fn input_torque_nmm(&self) -> f64;
+
     /// How many teeth are told apart at each place.
     fn teeth_at_each_place(&self) -> u64;
 
@@ -304,13 +313,21 @@ pub(crate) fn search(
         }
     }
     // What is left is more than rounding only where curves are no curves.
-    if excess > tolerance.relative().max(OPEN) {
+    if excess > tolerance.relative().max(OPEN).max(search.rounding(look.input_torque_nmm())) {
         return Err(NotConverged { what: "extremes of a sweep", iterations: MAX_ROUNDS, bracket_width: excess }.into());
     }
     Ok(Some(Found { seen: search.seen, best: search.best }))
 }
 
 impl Search {
+    /// What rounding of closing angles may make of the loads, and of a bend that is counted several times: amplified by `Δφ K/M`, M what is given or
+    /// what is allowed.
+    fn rounding(&self, input_torque_nmm: f64) -> f64 {
+        let [rotation_rad, stiffness_nmm_per_rad] = [LOADS, STIFFNESSES[0]].map(|quantity| self.best[quantity].value);
+        let per_torque = self.best[CAPACITY].value.max(1.0 / input_torque_nmm);
+        ROUNDINGS * f64::EPSILON * (rotation_rad * stiffness_nmm_per_rad * per_torque)
+    }
+
     /// Looks where it is wanted.
     fn look(&mut self, look: &mut impl Look) -> Result<bool, SolveError> {
         for (piece, seen) in self.seen.iter_mut().enumerate() {
@@ -509,8 +526,7 @@ impl Judge {
                 }
                 let best = self.best[quantity];
                 let limit = best * (1.0 + 0.25 * self.relative);
-                // Corners that bend both ways hide each other.
-                let coarse = if quantity == CAPACITY { 0.0 } else { COARSE_BEND * best };
+                let coarse = if quantity == CAPACITY { COARSE_CORNER * best } else { COARSE_BEND * best };
                 let margin = bends.margin(seen.curves(quantity), coarse);
                 bends_too_much |= self.lines.is_some_and(|lines| margin.bend > lines * best);
                 if margin.bound <= limit {

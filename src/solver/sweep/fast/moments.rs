@@ -167,6 +167,10 @@ impl Look for FastLook<'_> {
         }
     }
 
+    fn input_torque_nmm(&self) -> f64 {
+        self.loaded.input_torque_nmm()
+    }
+
     fn teeth_at_each_place(&self) -> u64 {
         1
     }
