@@ -30,8 +30,9 @@ test('of several searches the drives remain that no other beats, in the order of
 test('what fell to a limit is summed over searches, and close to it are those of the front within a hundredth', () => {
   const limits = (fell) => [{ quantity: 'size', bound: 'max', limit: 100, fell, fell_alone: 1, binds: 0 }];
   const answers = [search([drive(99.5, 5), drive(50, 3)], { limits: limits(4) }), search([drive(40, 1)], { limits: limits(3) })];
-  const { limits: [limit], scan } = together(answers.map((answer, index) => ({ label: String(index), answer })), GOALS);
+  const { front, limits: [limit], scan } = together(answers.map((answer, index) => ({ label: String(index), answer })), GOALS);
   assert.deepEqual([limit.fell, limit.fell_alone, limit.binds], [7, 2, 1]);
+  assert.deepEqual(front.map(({ heldBy }) => heldBy.length), [0, 0, 1], 'each drive tells what holds it back');
   assert.deepEqual([scan.variants, scan.impossible], [20, 4]);
 });
 

@@ -248,6 +248,26 @@ test('from ratio, torque and space follow drives that keep every limit, and one 
   assert.deepEqual(geometry.findings.filter(({ severity }) => severity === 'warning'), []);
 });
 
+test('the smallest drive for what the page begins with is one to build: no finding speaks of it, and every drawing of it can be had', async () => {
+  const page = await bed.open();
+  await find(page);
+  assert.match(await page.textContent('#find .drive-card h3'), /^Drive 1$/);
+  assert.match(await page.textContent('#find .drive-card'), /At its limits: .*torque capacity, output at least 200/, 'what holds the smallest one back');
+  await page.click('#find button:has-text("Open as design")');
+  await settled(page);
+  const { geometry, sweep } = await bed.server.answers(await designOf(page));
+  assert.deepEqual([...geometry.findings, ...sweep.findings].map(({ code }) => code), []);
+  assert.ok(geometry.carrier.radial_space_mm >= 3);
+  assert.ok(sweep.series_compliance_estimates.find(({ backing }) => backing === 'finger_at_both_ends').share <= 0.2);
+  assert.ok(sweep.torque_capacity.output_torque_nm >= 200);
+  for (const part of ['assembly', 'ring', 'wave-generator', 'carrier', 'tooth']) {
+    for (const format of ['dxf', 'step', 'svg']) {
+      const [download] = await Promise.all([page.waitForEvent('download'), page.click(`[data-file="${part}.${format}"]`)]);
+      assert.ok((await readFile(await download.path())).length > 500, `${part}.${format}`);
+    }
+  }
+});
+
 test('the reasons why others fell are counted', async () => {
   const page = await bed.open();
   await find(page);
@@ -266,6 +286,8 @@ test('two drives are compared at one scale, and open as design and reference', a
   assert.match(await page.textContent('#comparison-title'), /Drive 1, and…/);
   await checks.nth(4).check();
   assert.equal(await page.textContent('#comparison-title'), 'Drive 1 and drive 5');
+  // Pictures are drawn when they are seen.
+  await page.locator('#find .pair').scrollIntoViewIfNeeded();
   const viewBoxes = () => page.$$eval('#find .pair svg', (pictures) => pictures.map((picture) => picture.getAttribute('viewBox')));
   await page.waitForFunction(() => document.querySelectorAll('#find .pair svg').length === 2);
   const [one, other] = await viewBoxes();
@@ -279,13 +301,13 @@ test('two drives are compared at one scale, and open as design and reference', a
 
 test('where nothing is possible the least change that would do is offered, and does', async () => {
   const page = await bed.open();
-  await find(page, { outer_diameter_mm: 40 });
+  await find(page, { outer_diameter_mm: 60 });
   assert.equal(await page.textContent('#find .headline'), 'No drive keeps every limit.');
   assert.match(await page.textContent('#find .study-state'), /One of these would do, all other limits kept:.*instead of.*The nearest miss: /);
   const change = page.locator('#find .miss li', { hasText: 'Outer diameter' }).locator('button').first();
   await change.click();
   await found(page);
-  assert.ok(Number(await page.inputValue(field('/find/outer_diameter_mm'))) > 40);
+  assert.ok(Number(await page.inputValue(field('/find/outer_diameter_mm'))) > 60);
 });
 
 test('a search can be cancelled, and says so', async () => {

@@ -6,6 +6,7 @@ import { at } from './design.js';
 import { html, oncePerFrame, setText, svg } from './dom.js';
 import { difference } from './format.js';
 import { picture } from './picture.js';
+import { limitInWords } from './reasons.js';
 import { inputDifferences } from './report.js';
 
 const HEIGHT = 340;
@@ -171,6 +172,7 @@ export class Front {
       this.cardPicture,
       html('h3', {}, found.name),
       html('p', { class: 'none' }, found.label),
+      html('p', {}, found.heldBy.length > 0 ? `At its limits: ${found.heldBy.map((limit) => limitInWords(limit, this.quantities, { isWithin: true })).join('; ')}.` : 'No limit holds it back: what counts does.'),
       html(
         'div',
         { class: 'actions' },

@@ -23,8 +23,8 @@ function beats(one, other, goals) {
   return gains.every((gain) => gain >= 0) && gains.some((gain) => gain > 0);
 }
 
-/** What several searches for the same goals come to together: the drives that none beats, in the order of the first goal; each limit with
- *  what fell to it in all of them; and of each search that has nothing, the least change that would do. `answers` are `{ label, answer }`. */
+/** What several searches for the same goals come to together: the drives that none beats, in the order of the first goal, each with the limits
+ *  that it is close to; each limit with what fell to it in all of them; and of each search that has nothing, the least change that would do. `answers` are `{ label, answer }`. */
 export function together(answers, goals) {
   const all = answers.flatMap(({ label, answer }, search) => answer.front.map((found) => ({ ...found, label, search })));
   const sense = goals[0]?.goal === 'max' ? -1 : 1;
@@ -49,7 +49,8 @@ export function together(answers, goals) {
       scan.reasons.set(key, sum);
     }
   }
-  for (const limit of limits.values()) limit.binds = front.filter(({ quantities }) => isClose(limit, quantities[limit.quantity])).length;
+  for (const found of front) found.heldBy = [...limits.values()].filter((limit) => isClose(limit, found.quantities[limit.quantity]));
+  for (const limit of limits.values()) limit.binds = front.filter(({ heldBy }) => heldBy.includes(limit)).length;
   const without = answers.filter(({ answer }) => answer.front.length === 0);
   return {
     front,

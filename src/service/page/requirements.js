@@ -16,6 +16,10 @@ const RIM = 1.2;
 
 /** Below this share of a slot's width a finding warns of the wall between slots; steeper flanks than this angle it warns of too. */
 const LEAST_WALL = 0.25;
+/** A finding speaks of fingers that give way by more than this share of what a tooth does at its contacts. */
+const SOFTEST_FINGER = 0.2;
+/** A rule of thumb: lower carriers are sheets. */
+const LEAST_CARRIER_MM = 3;
 const STEEPEST_DEG = 70;
 const LEAST_IN_MESH = 2;
 
@@ -82,6 +86,8 @@ export const FIRST = {
     width_mm: 30,
     allowable_stress_mpa: 1500,
     wall: LEAST_WALL,
+    carrier_space_mm: LEAST_CARRIER_MM,
+    fingers: SOFTEST_FINGER,
     friction: 0.05,
     wave_generators: { harmonic_two: true, ellipse: true, eccentric: true },
     shapes: { cylinder: true },
@@ -125,10 +131,12 @@ export const GROUPS = [
     title: 'Buildable',
     pointer: `${ROOT}/build`,
     open: true,
-    hint: 'Teeth that do not touch, inside a carrier, on flanks that are not too steep: always asked.',
+    hint: 'Teeth that do not touch, inside a carrier, on flanks that are not too steep: always asked. What fingers give way is estimated for cylinders, held at both ends.',
     fields: [
       flag('undercut', 'Undercut ring tips are allowed'),
       number('wall', 'Wall between slots, over their width', '', '', { optional: () => 'not asked', step: 0.05 }),
+      number('carrier_space_mm', 'Height of the carrier between wave generator and ring', '', 'mm', { optional: () => 'not asked', step: 0.5 }),
+      number('fingers', 'Its fingers may give way, over what a tooth does', '', '', { optional: () => 'not asked', step: 0.05 }),
       number('efficiency', 'Least efficiency', 'η', '', { optional: () => 'not asked', step: 0.01 }),
       number('friction', 'Coefficient of friction', 'μ', '', { likely: 0.05, step: 0.01 }),
     ],
@@ -168,6 +176,8 @@ const FIELDS = {
   torque_capacity_output_nm: 'output_torque_nm',
   undercut: 'undercut',
   slot_wall_over_slot_width: 'wall',
+  carrier_radial_space_mm: 'carrier_space_mm',
+  carrier_finger_share: 'fingers',
   efficiency_ring_fixed: 'efficiency',
   peak_stress_wave_generator_mpa: 'allowable_wave_generator_mpa',
   peak_stress_ring_mpa: 'allowable_ring_mpa',
@@ -181,18 +191,21 @@ export const goalsOf = (requirements) => GOALS.filter(({ name }) => asked(requir
 
 const range = ([min, max]) => ({ min, max });
 
-function required(requirements) {
+function required(requirements, shape) {
   const stresses = CONTACTS.flatMap(({ key }) => {
     const allowable = asked(requirements, `allowable_${key}_mpa`);
     return allowable === undefined ? [] : [[`peak_stress_${key}_mpa`, { max: allowable }]];
   });
-  const [wall, efficiency, width] = ['wall', 'efficiency', 'width_mm'].map((name) => asked(requirements, name));
+  const [wall, efficiency, width, space, fingers] = ['wall', 'efficiency', 'width_mm', 'carrier_space_mm', 'fingers'].map((name) => asked(requirements, name));
   return {
     outer_diameter_mm: { max: asked(requirements, 'outer_diameter_mm') },
     torque_capacity_output_nm: { min: asked(requirements, 'output_torque_nm') },
     tooth_width_mm: { max: width },
     ...(asked(requirements, 'undercut') ? {} : { undercut: false }),
     ...(wall === undefined ? {} : { slot_wall_over_slot_width: { min: wall } }),
+    ...(space === undefined ? {} : { carrier_radial_space_mm: { min: space } }),
+    // Of other teeth no estimate tells.
+    ...(fingers === undefined || shape.name !== 'cylinder' ? {} : { carrier_finger_share: { max: fingers } }),
     ...(efficiency === undefined ? {} : { efficiency_ring_fixed: { min: efficiency } }),
     ...Object.fromEntries(stresses),
     teeth_in_mesh_min: { min: LEAST_IN_MESH },
@@ -261,7 +274,7 @@ export function searchesOf(requirements) {
         model: shape.model,
         ...(rubs ? { friction: { wave_generator: { kind: 'plain', coefficient }, ring: { coefficient }, carrier: { coefficient } } } : {}),
       };
-      searches.push({ label, question: { study: 'search', base, free: ranges, require: required(requirements), objectives: goals, evaluations: EVALUATIONS[asked(requirements, 'effort')] } });
+      searches.push({ label, question: { study: 'search', base, free: ranges, require: required(requirements, shape), objectives: goals, evaluations: EVALUATIONS[asked(requirements, 'effort')] } });
     }
   }
   return searches;
