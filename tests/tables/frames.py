@@ -1,6 +1,6 @@
 """From a sweep of a million states to a data frame, by each of its forms: bytes, the service's time, and the program's.
 
-    frames.py URL        with pandas and pyarrow installed (PyPI), pyarrow 26 and pandas 3 when docs/operations.md was written
+    frames.py URL        with pandas and pyarrow installed (PyPI)
 """
 
 import gzip
