@@ -64,20 +64,31 @@ pub(crate) fn any_drive_of_other_kinds() -> impl Strategy<Value = DriveParameter
                 (false, 1) => WaveGenerator::Eccentric { radius_mm: mean_radius_mm, eccentricity_mm: amplitude_mm },
                 (false, _) => WaveGenerator::Harmonic { lobes, mean_radius_mm, amplitude_mm },
             };
-            let root_mm = 50.0 + amplitude_mm + tooth_radius_mm;
-            let parameters = DriveParameters {
-                wave_generator,
-                teeth,
-                installed,
-                tooth_radius_mm,
-                tooth: ToothShape::Cylinder { width_mm: 10.0 },
-                ring_teeth: if more { teeth + lobes } else { teeth - lobes },
-                tip_radius_mm: bore.map(|share| root_mm - share * 2.0 * amplitude_mm),
-            };
-            let possible = Drive::new(&parameters).ok()?;
-            Mesh::new(&possible).always_carries().then_some(parameters)
+            let ring_teeth = if more { teeth + lobes } else { teeth - lobes };
+            carrying(wave_generator, [teeth, installed, ring_teeth], [tooth_radius_mm, amplitude_mm], bore)
         },
     )
+}
+
+/// A drive with centres around 50 mm that exists and has a lever arm at every input angle; `bore` is how much of its stroke it takes from the ring's teeth.
+fn carrying(
+    wave_generator: WaveGenerator,
+    [teeth, installed, ring_teeth]: [i64; 3],
+    [tooth_radius_mm, amplitude_mm]: [f64; 2],
+    bore: Option<f64>,
+) -> Option<DriveParameters> {
+    let root_mm = 50.0 + amplitude_mm + tooth_radius_mm;
+    let parameters = DriveParameters {
+        wave_generator,
+        teeth,
+        installed,
+        tooth_radius_mm,
+        tooth: ToothShape::Cylinder { width_mm: 10.0 },
+        ring_teeth,
+        tip_radius_mm: bore.map(|share| root_mm - share * 2.0 * amplitude_mm),
+    };
+    let possible = Drive::new(&parameters).ok()?;
+    Mesh::new(&possible).always_carries().then_some(parameters)
 }
 
 /// Wave generators of all kinds with as many slots as make their zones unlike.
@@ -100,18 +111,8 @@ pub(crate) fn any_drive_of_unlike_zones() -> impl Strategy<Value = DriveParamete
                 1 => WaveGenerator::Harmonic { lobes, mean_radius_mm, amplitude_mm },
                 _ => WaveGenerator::HarmonicPath { lobes, mean_path_radius_mm: 50.0, amplitude_mm },
             };
-            let root_mm = 50.0 + amplitude_mm + tooth_radius_mm;
-            let parameters = DriveParameters {
-                wave_generator,
-                teeth,
-                installed,
-                tooth_radius_mm,
-                tooth: ToothShape::Cylinder { width_mm: 10.0 },
-                ring_teeth: if more { teeth + lobes } else { teeth - lobes },
-                tip_radius_mm: bore.map(|share| root_mm - share * 2.0 * amplitude_mm),
-            };
-            let possible = Drive::new(&parameters).ok()?;
-            Mesh::new(&possible).always_carries().then_some(parameters)
+            let ring_teeth = if more { teeth + lobes } else { teeth - lobes };
+            carrying(wave_generator, [teeth, installed, ring_teeth], [tooth_radius_mm, amplitude_mm], bore)
         },
     )
 }
