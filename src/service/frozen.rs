@@ -67,6 +67,8 @@ pub async fn freeze(
     let a_variant = canary.busy / u32::try_from(canary_variants).unwrap_or(u32::MAX);
     let part_variants = MOST_OF_A_PART / (study.stored_bytes() / study.variants().max(1)).max(1);
     let wanted = u64::try_from(CHUNK.as_nanos() / a_variant.as_nanos().max(1)).unwrap_or(u64::MAX);
+    #[cfg(feature = "fault-injection")]
+    let wanted = crate::injected::chunk_variants().unwrap_or(wanted);
     let id = study.id().to_string();
     let canary = canary.hash();
     let study = Arc::into_inner(study).ok_or_else(|| Problem::internal(&"a canary goes on after its end"))?;

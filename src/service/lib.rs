@@ -11,6 +11,8 @@ pub mod compute;
 pub mod config;
 pub mod examples;
 pub mod frozen;
+#[cfg(feature = "fault-injection")]
+mod injected;
 pub mod keys;
 pub mod log;
 pub mod machine;

@@ -30,8 +30,11 @@ use crate::worker::{Sliced, Workers, slice};
 /// Between two looks at how a stored study stands.
 const LOOK: Duration = Duration::from_secs(1);
 
-/// Looks at a study take a share of the database's time, however many chunks it has: a tenth at most.
+/// Looks take a share of the database's time, however many chunks there are: a tenth at most.
 const LOOKS_SHARE: u32 = 10;
+
+/// But what took so long that the next look would be later than this was the database being away.
+const LONGEST_PAUSE: Duration = Duration::from_secs(10);
 
 /// Between two looks at the whole store in numbers.
 const COUNT: Duration = Duration::from_secs(5);
@@ -249,7 +252,7 @@ impl Kept {
                 if let Err(error) = self.look(store).await {
                     tracing::warn!(study = self.id, %error, "how a study stands is not known");
                 }
-                pause = LOOK.max(LOOKS_SHARE * started.elapsed());
+                pause = pause_after(started.elapsed(), LOOK);
             }
             self.is_followed.store(false, Ordering::SeqCst);
             // It may have been asked for again in this moment, by one who believed that it is followed.
@@ -258,6 +261,11 @@ impl Kept {
             }
         }
     }
+}
+
+/// Between a look that took so long and the next one.
+fn pause_after(look: Duration, least: Duration) -> Duration {
+    (LOOKS_SHARE * look).clamp(least, LONGEST_PAUSE)
 }
 
 /// How a stored study stands, in the words of the service.
@@ -594,7 +602,7 @@ impl Studies {
                 if let Ok(figures) = store.figures().await {
                     *self.figures.lock() = Some(figures);
                 }
-                pause = COUNT.max(LOOKS_SHARE * started.elapsed());
+                pause = pause_after(started.elapsed(), COUNT);
             }
         };
         let forget = async {
@@ -681,5 +689,17 @@ async fn run_chunk(pool: &Pool, kept: &Arc<Kept>, chunk: u64) -> Result<(), Prob
         }
         kept.state.send_modify(|_| {});
         work = rest;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn looks_take_a_tenth_of_the_time_and_follow_soon_on_a_database_that_was_away() {
+        assert_eq!(pause_after(Duration::from_millis(3), LOOK), LOOK);
+        assert_eq!(pause_after(Duration::from_millis(400), LOOK), Duration::from_secs(4));
+        assert_eq!(pause_after(Duration::from_secs(8), LOOK), LONGEST_PAUSE);
     }
 }

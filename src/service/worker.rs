@@ -17,6 +17,8 @@ use toothwave_study::{Part, Study, Work};
 
 use crate::compute::{Pool, SLICE};
 use crate::frozen::{self, NotHere};
+#[cfg(feature = "fault-injection")]
+use crate::injected;
 use crate::problem::Problem;
 
 /// Between two looks at what there is to do, and at what was cancelled.
@@ -251,6 +253,17 @@ impl Workers {
 /// What a chunk comes to, and the time that it was computed for.
 async fn run_chunk(pool: &Pool, study: &Arc<Study>, chunk: u64) -> Result<(Part, Duration), Problem> {
     let mut work = Work::new(study, chunk);
+    #[cfg(feature = "fault-injection")]
+    {
+        injected::poison(chunk);
+        if let Some(time) = injected::slow() {
+            tokio::time::sleep(time).await;
+        }
+        if let Some(time) = injected::asleep() {
+            tokio::time::sleep(time).await;
+            return Ok((work.finish(), time));
+        }
+    }
     let mut busy = Duration::ZERO;
     loop {
         let started = Instant::now();
