@@ -1,7 +1,7 @@
 //! Variants in rows: what maps, sensitivities and tolerances have in common. Each variant follows from its number alone.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use serde::{Deserialize, Serialize};
 use toothwave_calculation::json::Tree;
@@ -89,6 +89,64 @@ impl RowsPart {
             .collect();
         self.refused.extend_from_slice(&other.refused);
         self.reasons.extend(other.reasons.iter().map(|&reason| renumbered[reason as usize]));
+    }
+}
+
+/// The rows of a study that have come, in the order of their variants and as they came: of many there is no room for a copy.
+#[derive(Debug)]
+pub(crate) struct RowsParts<'a>(pub(crate) Vec<&'a RowsPart>);
+
+impl RowsParts<'_> {
+    /// All of them in one.
+    pub(crate) fn joined(&self, quantities: usize) -> RowsPart {
+        let mut rows = RowsPart::new(quantities);
+        let (answered, refused): (Vec<_>, Vec<_>) =
+            self.0.iter().map(|part| (part.answered.len(), part.refused.len())).unzip();
+        let (answered, refused) = (answered.iter().sum(), refused.iter().sum());
+        rows.answered.reserve_exact(answered);
+        rows.columns.iter_mut().for_each(|column| column.reserve_exact(answered));
+        rows.refused.reserve_exact(refused);
+        rows.reasons.reserve_exact(refused);
+        for part in &self.0 {
+            rows.append(part);
+        }
+        rows
+    }
+
+    /// The rows of these variants: each part with those that it has of them.
+    pub(crate) fn within(&self, variants: RangeInclusive<u64>) -> impl Iterator<Item = (&RowsPart, Range<usize>)> {
+        self.0.iter().map(move |part| {
+            let first = part.answered.partition_point(|variant| variant < variants.start());
+            (*part, first..part.answered.partition_point(|variant| variant <= variants.end()))
+        })
+    }
+
+    /// A quantity's values in these variants.
+    pub(crate) fn values(&self, quantity: usize, variants: RangeInclusive<u64>) -> Vec<f64> {
+        let mut values = Vec::with_capacity(self.within(variants.clone()).map(|(_, rows)| rows.len()).sum());
+        for (part, rows) in self.within(variants) {
+            values.extend_from_slice(&part.columns[quantity][rows]);
+        }
+        values
+    }
+
+    /// Why those of these variants that have no quantities have none.
+    pub(crate) fn reasons(&self, variants: RangeInclusive<u64>) -> impl Iterator<Item = &Reason> {
+        self.0.iter().flat_map(move |part| {
+            let first = part.refused.partition_point(|variant| variant < variants.start());
+            let reasons = &part.reasons[first..part.refused.partition_point(|variant| variant <= variants.end())];
+            reasons.iter().map(|&reason| &part.refusals[reason as usize].reason)
+        })
+    }
+
+    /// Every reason with how many variants have it.
+    pub(crate) fn refusals(&self) -> Vec<RefusalNoted> {
+        let mut refusals = Vec::new();
+        for noted in self.0.iter().flat_map(|part| &part.refusals) {
+            let refusal = Refusal { reason: noted.reason.clone(), detail: noted.detail.clone() };
+            note(&mut refusals, noted.first, noted.count, refusal);
+        }
+        refusals
     }
 }
 

@@ -21,7 +21,7 @@ use crate::evaluate::{Evaluator, Stopped};
 use crate::limit;
 use crate::map::{Map, MapAnswer};
 use crate::quantity::{Needs, QUANTITIES, Quantity};
-use crate::rows::{CHUNK_VARIANTS, GapAnswer, Rows, RowsPart, RowsWork};
+use crate::rows::{CHUNK_VARIANTS, GapAnswer, Rows, RowsPart, RowsParts, RowsWork};
 use crate::search::{Island, IslandPart, Search, SearchAnswer};
 use crate::sensitivity::{Sensitivity, SensitivityAnswer};
 use crate::tolerance::{Tolerance, ToleranceAnswer};
@@ -584,7 +584,10 @@ impl Gathered {
         let study = &*self.study;
         let (evaluator, is_complete) = (&study.evaluator, self.is_complete());
         match &study.kind {
-            Kind::Map(map) => StudyAnswer::Map(MapAnswer::new(map, evaluator, self.rows(), is_complete)),
+            Kind::Map(map) => {
+                let rows = self.rows().joined(evaluator.quantities.len());
+                StudyAnswer::Map(MapAnswer::new(map, evaluator, rows, is_complete))
+            }
             Kind::Search(search) => {
                 let islands = self.parts.iter().flatten().filter_map(|part| match &**part {
                     Part::Island(island) => Some(island),
@@ -594,7 +597,8 @@ impl Gathered {
                 StudyAnswer::Search(Box::new(answer))
             }
             Kind::Sensitivity(sensitivity) => {
-                let answer = SensitivityAnswer::new(sensitivity, evaluator, &self.rows(), is_complete);
+                let rows = self.rows().joined(evaluator.quantities.len());
+                let answer = SensitivityAnswer::new(sensitivity, evaluator, &rows, is_complete);
                 StudyAnswer::Sensitivity(answer)
             }
             Kind::Tolerance(tolerance) => {
@@ -603,14 +607,12 @@ impl Gathered {
         }
     }
 
-    /// All rows that have come, in the order of their variants.
-    fn rows(&self) -> RowsPart {
-        let mut rows = RowsPart::new(self.study.evaluator.quantities.len());
-        for part in self.parts.iter().flatten() {
-            if let Part::Rows(part) = &**part {
-                rows.append(part);
-            }
-        }
-        rows
+    /// All rows that have come.
+    fn rows(&self) -> RowsParts<'_> {
+        let rows = self.parts.iter().flatten().filter_map(|part| match &**part {
+            Part::Rows(rows) => Some(rows),
+            Part::Island(_) => None,
+        });
+        RowsParts(rows.collect())
     }
 }

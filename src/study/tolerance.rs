@@ -13,7 +13,7 @@ use crate::evaluate::Evaluator;
 use crate::limit::{Bound, Limit};
 use crate::random::Stream;
 use crate::rank::{QuantileAnswer, ShareAnswer, quantile, share};
-use crate::rows::{GapAnswer, ReasonAnswer, Rows, RowsPart};
+use crate::rows::{GapAnswer, ReasonAnswer, Rows, RowsPart, RowsParts};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Domain, Template, Value, Variable};
 
@@ -387,40 +387,35 @@ impl HistogramAnswer {
 }
 
 impl ToleranceAnswer {
-    pub(crate) fn new(tolerance: &Tolerance, evaluator: &Evaluator, rows: &RowsPart, is_complete: bool) -> Self {
+    pub(crate) fn new(tolerance: &Tolerance, evaluator: &Evaluator, rows: &RowsParts<'_>, is_complete: bool) -> Self {
         let samples = 1..=tolerance.samples;
-        // Rows stand in the order of their variants.
-        let rows_of = |variants: std::ops::RangeInclusive<u64>| {
-            rows.answered.partition_point(|variant| variant < variants.start())
-                ..rows.answered.partition_point(|variant| variant <= variants.end())
-        };
-        let sampled = rows_of(samples.clone());
-        let refused = rows.refused.iter().zip(&rows.reasons).filter(|(variant, _)| samples.contains(*variant));
-        let is_interference =
-            |reason: u32| rows.refusals.get(reason as usize).is_some_and(|noted| noted.reason.code == "interference");
         let (mut interference, mut impossible) = (0, 0);
-        for (_, &reason) in refused {
-            if is_interference(reason) { interference += 1 } else { impossible += 1 }
+        for reason in rows.reasons(samples.clone()) {
+            if reason.code == "interference" { interference += 1 } else { impossible += 1 }
         }
-        let fails = |limit: &Limit, row: usize| limit.violation(rows.columns[limit.quantity][row]) > 0.0;
-        let good =
-            sampled.clone().filter(|&row| !tolerance.limits.iter().any(|limit| fails(limit, row))).count() as u64;
-        let looked_at = sampled.len() as u64 + interference + impossible;
+        let fails =
+            |limit: &Limit, part: &RowsPart, row: usize| limit.violation(part.columns[limit.quantity][row]) > 0.0;
+        let sampled = || rows.within(samples.clone()).flat_map(|(part, rows)| rows.map(move |row| (part, row)));
+        let is_good = |&(part, row): &(&RowsPart, usize)| !tolerance.limits.iter().any(|limit| fails(limit, part, row));
+        let good = sampled().filter(is_good).count() as u64;
+        let answered: usize = rows.within(samples.clone()).map(|(_, rows)| rows.len()).sum();
+        let looked_at = answered as u64 + interference + impossible;
         let limits = tolerance.limits.iter().map(|limit| ToleranceLimitAnswer {
             quantity: evaluator.quantities[limit.quantity].name,
             bound: limit.bound,
             limit: limit.limit,
-            failed: sampled.clone().filter(|&row| fails(limit, row)).count() as u64,
+            failed: sampled().filter(|&(part, row)| fails(limit, part, row)).count() as u64,
         });
         let alone = tolerance.alone();
-        let quantities = evaluator.quantities.iter().zip(&rows.columns).filter(|_| !sampled.is_empty());
-        let quantities = quantities.map(|(quantity, column)| {
-            let mut sorted = column[sampled.clone()].to_vec();
+        let quantities = evaluator.quantities.iter().enumerate().filter(|_| answered > 0);
+        let quantities = quantities.map(|(column, quantity)| {
+            let mut sorted = rows.values(column, samples.clone());
             let Spread { mean, standard_deviation } = spread(&sorted);
-            sorted.sort_by(f64::total_cmp);
+            // Equal ones have equal bits.
+            sorted.sort_unstable_by(f64::total_cmp);
             let kinds = (0..).zip(&tolerance.kinds).filter(|_| alone > 0).map(|(index, kind)| {
                 let first = 1 + tolerance.samples + index * alone;
-                let Spread { standard_deviation, .. } = spread(&column[rows_of(first..=first + alone - 1)]);
+                let Spread { standard_deviation, .. } = spread(&rows.values(column, first..=first + alone - 1));
                 ContributorAnswer { deviation: kind.name.clone(), standard_deviation, share: 0.0 }
             });
             let mut contributors: Vec<_> = kinds.collect();
@@ -431,7 +426,7 @@ impl ToleranceAnswer {
             contributors.sort_by(|one, other| other.standard_deviation.total_cmp(&one.standard_deviation));
             ToleranceQuantityAnswer {
                 quantity: quantity.name,
-                nominal: (rows.answered.first() == Some(&0)).then(|| column[0]),
+                nominal: rows.values(column, 0..=0).first().copied(),
                 mean,
                 standard_deviation,
                 least: sorted.first().copied().unwrap_or_default(),
@@ -449,7 +444,7 @@ impl ToleranceAnswer {
             samples: looked_at,
             interference,
             impossible,
-            reasons: rows.refusals.iter().map(ReasonAnswer::from).collect(),
+            reasons: rows.refusals().iter().map(ReasonAnswer::from).collect(),
             yield_share: if tolerance.limits.is_empty() { None } else { share(good, looked_at) },
             limits: limits.collect(),
             quantities: quantities.collect(),
