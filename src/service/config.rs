@@ -106,7 +106,7 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_STUDIES", value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(..=MOST_SOLVES))]
     pub max_concurrent_studies: u32,
 
-    /// Milliseconds after which a study breaks off
+    /// Milliseconds after which a study that this process computes breaks off; those on PostgreSQL go on until they are cancelled
     #[arg(long, env = "TOOTHWAVE_STUDY_DEADLINE_MS", value_name = "MS", default_value_t = 3_600_000)]
     pub study_deadline_ms: u64,
 
@@ -253,7 +253,7 @@ pub struct Limits {
     pub max_study_bytes: u64,
     /// Studies that may run at once.
     pub max_concurrent_studies: usize,
-    /// Milliseconds after which a study breaks off.
+    /// Milliseconds after which a study that this process computes breaks off; one that a database shares goes on until it is cancelled.
     pub study_deadline_ms: u64,
     /// Connections that may be open at once.
     pub max_connections: usize,

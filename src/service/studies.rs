@@ -16,6 +16,7 @@ use serde::Serialize;
 use tokio::sync::watch;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
+use toothwave_calculation::BUILD;
 use toothwave_store::{Figures, Standing as Stored, Store, StoreError};
 use toothwave_study::{Gathered, Study, StudyAnswer, Work};
 use utoipa::ToSchema;
@@ -41,6 +42,9 @@ const COUNT: Duration = Duration::from_secs(5);
 
 /// Between two times that old studies are forgotten.
 const EXPIRE: Duration = Duration::from_secs(60);
+
+/// What a study gets that many processes share: nobody waits for it, and whoever wants its end cancels it.
+const ENDLESS: Duration = Duration::from_secs(100 * 365 * 86_400);
 
 /// Of what is read of a store at once.
 const READ_BYTES: u64 = 16 << 20;
@@ -429,14 +433,15 @@ impl Studies {
                 self.require_one_more(store).await?;
                 // First: what is refused must not run.
                 let kept = self.kept_here(&stored).await?;
-                store.resume(&id, self.time()).await?;
+                store.resume(&id, self.time(store)).await?;
                 kept
             }
             None => {
                 self.require_one_more(store).await?;
                 let room = self.make_room(&mut self.kept.lock(), &study)?;
                 let (study, frozen) =
-                    frozen::freeze(&self.pool, study, document, &self.limits.of_calculation(), self.time()).await?;
+                    frozen::freeze(&self.pool, study, document, &self.limits.of_calculation(), self.time(store))
+                        .await?;
                 store.create(&frozen).await?;
                 Self::keep(&mut self.kept.lock(), study, room)
             }
@@ -448,15 +453,19 @@ impl Studies {
         Ok(kept)
     }
 
-    /// That one more study may run.
+    /// That one more study may run. Those of other builds wait for other workers, perhaps for ever.
     async fn require_one_more(&self, store: &Store) -> Result<(), Problem> {
-        let is_full = store.running().await? >= self.limits.max_concurrent_studies as u64;
-        if is_full { Err(self.too_many_studies()) } else { Ok(()) }
+        let of_this_build = store.waiting().await?.iter().filter(|waiting| waiting.build == BUILD).count();
+        if of_this_build >= self.limits.max_concurrent_studies { Err(self.too_many_studies()) } else { Ok(()) }
     }
 
     /// Time that a study gets, to the second.
-    const fn time(&self) -> Duration {
-        Duration::from_secs(self.limits.study_deadline_ms.div_ceil(1000))
+    const fn time(&self, store: &Store) -> Duration {
+        if store.address().is_shared() {
+            ENDLESS
+        } else {
+            Duration::from_secs(self.limits.study_deadline_ms.div_ceil(1000))
+        }
     }
 
     fn too_many_studies(&self) -> Problem {

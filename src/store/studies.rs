@@ -253,7 +253,7 @@ impl Store {
         .await
     }
 
-    /// Forgets the studies that nobody has asked for in this time, but for those that run; returns how many.
+    /// Forgets the studies that nobody has asked for in this time, but for those that somebody computed in it; returns how many.
     ///
     /// # Errors
     /// As [`Self::create`].
@@ -261,7 +261,8 @@ impl Store {
         self.with(LONG_PATIENCE, async |connection| {
             require_schema(connection).await?;
             let text = "DELETE FROM studies WHERE asked_at_s <= unixepoch() - $1
-                AND (is_cancelled OR ends_at_s <= unixepoch() OR NOT EXISTS (SELECT 1 FROM chunks WHERE study = id))";
+                AND (is_cancelled OR ends_at_s <= unixepoch() OR NOT EXISTS (SELECT 1 FROM chunks WHERE study = id)
+                    OR NOT EXISTS (SELECT 1 FROM attempts WHERE study = id AND began_at_s > unixepoch() - $1))";
             let unasked_for_s = stored(unasked_for.as_secs());
             let gone = on!(connection, inner => {
                 sqlx::query(text).bind(unasked_for_s).execute(inner).await.map(|done| done.rows_affected())
@@ -305,14 +306,6 @@ impl Store {
             Ok(Some(Standing { study, is_cancelled, done, looked_at, refused, gaps: gaps.collect() }))
         })
         .await
-    }
-
-    /// Studies that run.
-    ///
-    /// # Errors
-    /// As [`Self::create`].
-    pub async fn running(&self) -> Result<u64, StoreError> {
-        Ok(self.waiting().await?.len() as u64)
     }
 
     /// The studies that wait for workers, the oldest first.

@@ -176,7 +176,7 @@ async fn no_more_stored_studies_run_than_may_however_many_are_asked_for_at_once(
     for answer in refused {
         answer.refused(503, "queue_full");
     }
-    assert_eq!(keeper.store.running().await.unwrap(), 2);
+    assert_eq!(keeper.store.waiting().await.unwrap().len(), 2);
     keeper.end().await;
 }
 
@@ -260,7 +260,11 @@ async fn a_study_of_another_build_or_of_other_bits_is_left_to_others() {
         store.create(&other).await.unwrap();
     }
     keeper.end().await;
-    let keeper = Keeper::of(&file, Limits { max_concurrent_studies: 10, ..LIMITS }, true).await;
+    // Of the three that wait two are of this build: one more may run of three, though not of two.
+    let keeper = Keeper::of(&file, Limits { max_concurrent_studies: 2, ..LIMITS }, false).await;
+    keeper.ask(&map(6)).await.refused(503, "queue_full");
+    keeper.end().await;
+    let keeper = Keeper::of(&file, Limits { max_concurrent_studies: 3, ..LIMITS }, true).await;
     // Once this one is done, the workers have looked at those as well.
     assert_eq!(keeper.wait_for(&map(6)).await["state"], "done");
     for id in ["of-another-build", "of-another-processor", &frozen.id] {

@@ -128,6 +128,21 @@ class Postgres:
         place = ("-h", self.folder, "-p", self.port, "-U", "toothwave", "-d", database)
         return run(PROGRAMS / "psql", "-qAtX", "-v", "ON_ERROR_STOP=1", *place, "-c", statement)
 
+    @contextlib.contextmanager
+    def holding(self, statements, database="studies"):
+        """A session that has said this, and stays open."""
+        command = [PROGRAMS / "psql", "-qAtX", "-h", self.folder, "-p", str(self.port), "-U", "toothwave", "-d", database]
+        session = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        session.stdin.write(f"{statements};\nSELECT 'said';\n")
+        session.stdin.flush()
+        while "said" not in session.stdout.readline():
+            pass
+        try:
+            yield
+        finally:
+            session.stdin.close()
+            session.wait()
+
     def address(self, database="studies", host="localhost", port=None, query="?sslmode=disable"):
         return f"postgres://toothwave@{host}:{port or self.port}/{database}{query}"
 

@@ -217,6 +217,22 @@ async fn a_study_whose_time_is_over_does_not_run_and_expires_once_nobody_asks() 
     .await;
 }
 
+/// Its build's workers may all be gone, and it has no other end.
+#[tokio::test]
+async fn a_study_that_nobody_asks_for_and_nobody_computes_expires_though_it_waits_for_workers() {
+    with_each_store(async |store| {
+        let study = study("alone", 2);
+        store.create(&study).await.unwrap();
+        let lease = claimed(&store, &study).await;
+        assert_eq!(store.expire(Duration::from_secs(60)).await.unwrap(), 0);
+        assert!(store.find(&study.id).await.unwrap().is_some());
+        lease.give_back().await.unwrap();
+        assert!(store.expire(Duration::ZERO).await.unwrap() >= 1);
+        assert_eq!(store.find(&study.id).await.unwrap(), None);
+    })
+    .await;
+}
+
 #[tokio::test]
 async fn what_was_kept_in_a_file_is_there_after_its_process() {
     let file = File::new();
