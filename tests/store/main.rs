@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::task::Poll;
 use std::time::Duration;
 
+use tokio::sync::RwLock;
 use toothwave_store::{Address, AddressError, Claim, Gap, Lease, MOST_ATTEMPTS, NewStudy, Store, StoreError};
 
 const LEASE: Duration = Duration::from_secs(60);
@@ -57,10 +58,29 @@ fn study(id: &str, chunks: u64) -> NewStudy {
     }
 }
 
+/// The tests share the server: what forgets studies of any name has it to itself.
+static SERVER: RwLock<()> = RwLock::const_new(());
+
 /// Does the same with a file and with a server.
 async fn with_each_store(job: impl AsyncFn(Store)) {
+    with_a_file(&job).await;
+    let _others = SERVER.read().await;
+    with_the_server(&job).await;
+}
+
+/// The same, while no other test uses the server.
+async fn alone_with_each_store(job: impl AsyncFn(Store)) {
+    with_a_file(&job).await;
+    let _nobody = SERVER.write().await;
+    with_the_server(&job).await;
+}
+
+async fn with_a_file(job: &impl AsyncFn(Store)) {
     let file = File::new();
     job(Store::open(&file.address()).await.unwrap()).await;
+}
+
+async fn with_the_server(job: &impl AsyncFn(Store)) {
     if let Some(address) = server() {
         let store = Store::open(&address).await.unwrap();
         store.migrate().await.unwrap();
@@ -205,7 +225,7 @@ async fn a_cancelled_study_waits_for_nobody_until_it_is_asked_for_again() {
 
 #[tokio::test]
 async fn a_study_whose_time_is_over_does_not_run_and_expires_once_nobody_asks() {
-    with_each_store(async |store| {
+    alone_with_each_store(async |store| {
         let study = NewStudy { time: Duration::ZERO, ..study("late", 2) };
         store.create(&study).await.unwrap();
         let standing = store.find(&study.id).await.unwrap().unwrap();
@@ -220,7 +240,7 @@ async fn a_study_whose_time_is_over_does_not_run_and_expires_once_nobody_asks() 
 /// Its build's workers may all be gone, and it has no other end.
 #[tokio::test]
 async fn a_study_that_nobody_asks_for_and_nobody_computes_expires_though_it_waits_for_workers() {
-    with_each_store(async |store| {
+    alone_with_each_store(async |store| {
         let study = study("alone", 2);
         store.create(&study).await.unwrap();
         let lease = claimed(&store, &study).await;
@@ -259,6 +279,7 @@ async fn a_file_serves_one_process() {
 #[tokio::test]
 async fn two_workers_share_a_server_and_a_lost_lease_is_somebody_elses() {
     let Some(address) = server() else { return };
+    let _others = SERVER.read().await;
     let (one, other) = (Store::open(&address).await.unwrap(), Store::open(&address).await.unwrap());
     one.migrate().await.unwrap();
     let study = study("two", 1);
