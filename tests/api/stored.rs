@@ -186,7 +186,7 @@ async fn a_stored_study_that_finds_no_room_does_not_run() {
     let keeper = Keeper::of(&file, Limits { max_study_bytes: 30_000, ..LIMITS }, false).await;
     assert_eq!(keeper.ask(&map(5)).await.status, 202);
     keeper.ask(&map(6)).await.refused(503, "queue_full");
-    assert_eq!(keeper.store.running().await.unwrap(), 1);
+    assert_eq!(keeper.store.waiting().await.unwrap().len(), 1);
     assert_eq!(keeper.store.figures().await.unwrap().studies, 1);
     keeper.end().await;
 }
