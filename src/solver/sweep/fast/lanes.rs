@@ -40,7 +40,7 @@ const EXPONENTIAL: [f64; 14] = {
 
 /// `ab + c`, rounded once where vectors can do that.
 #[inline(always)]
-fn fused<V: Simd>(a: f64, b: f64, c: f64) -> f64 {
+pub(super) fn fused<V: Simd>(a: f64, b: f64, c: f64) -> f64 {
     if V::IS_SCALAR { a * b + c } else { a.mul_add(b, c) }
 }
 
@@ -93,6 +93,29 @@ fn exp<V: Simd>(x: f64) -> f64 {
 #[inline(always)]
 pub(super) fn power<V: Simd>(x: f64, exponent: f64) -> f64 {
     exp::<V>(exponent * ln::<V>(x))
+}
+
+/// `1/∛x` in the bits of a double, 1.5 % off at most: bits count exponent and mantissa on a scale that is straight from each power of two to the next.
+#[inline(always)]
+fn inverse_cube_root_roughly(x: f64) -> f64 {
+    /// What makes the error alike above and below.
+    const BALANCE: f64 = 0.068;
+    const PER_EXPONENT: f64 = (1_u64 << 40) as f64;
+    let straight = f64::from_bits((x.to_bits() >> 12) | WHOLE.to_bits()) - WHOLE;
+    let root = (4.0 / 3.0 * 1023.0 - BALANCE) * PER_EXPONENT - straight * (1.0 / 3.0);
+    f64::from_bits((root + WHOLE).to_bits() << 12)
+}
+
+/// `∛x` of a number that is not negative, to four units of the last digit: the series of `(1 - ε)^(-1/3)`, twice, from an inverse root that is off by ε in its cube.
+#[inline(always)]
+pub(super) fn cube_root<V: Simd>(x: f64) -> f64 {
+    let mut inverse = inverse_cube_root_roughly(x);
+    for _ in 0..2 {
+        let off = 1.0 - x * inverse * (inverse * inverse);
+        let series = fused::<V>(off, fused::<V>(off, 14.0 / 81.0, 2.0 / 9.0), 1.0 / 3.0);
+        inverse = fused::<V>(inverse * off, series, inverse);
+    }
+    x * (inverse * inverse)
 }
 
 /// How many terms of `atan q = q (1 - q²/3 + q⁴/5 - …)` reach the last digit for `0 ≤ q ≤ largest`.
@@ -162,12 +185,14 @@ pub(super) fn repeat_each(values: &[f64], times: usize, repeated: &mut [f64]) {
 mod tests {
     use super::*;
 
-    fn assert_to_two_units<V: Simd>() {
+    fn assert_to_a_few_units<V: Simd>() {
         let close = |found: f64, expected: f64| (found - expected).abs() <= 2.0 * f64::EPSILON * expected.abs();
         let mut x = 1e-300;
         while x < 1e300 {
             assert!(close(ln::<V>(x), x.ln()), "ln {x}");
             assert!((ln_roughly(x) - x.ln()).abs() < 0.031, "ln {x}");
+            let (root, expected) = (cube_root::<V>(x), x.cbrt());
+            assert!((root - expected).abs() <= 4.0 * f64::EPSILON * expected, "cube root of {x}: {root}");
             x *= 1.003_7;
         }
         for step in -100_000..100_000 {
@@ -177,14 +202,15 @@ mod tests {
             assert!(close(exp::<V>(x), x.exp()), "exp {x}");
         }
         assert!(exp::<V>(-1e6) < 1e-300);
+        assert_eq!(cube_root::<V>(0.0), 0.0);
     }
 
     #[test]
-    fn logarithms_and_exponentials_are_right_to_two_units_of_the_last_digit_on_any_machine() {
-        assert_to_two_units::<pulp::Scalar>();
+    fn logarithms_exponentials_and_cube_roots_are_right_to_a_few_units_of_the_last_digit_on_any_machine() {
+        assert_to_a_few_units::<pulp::Scalar>();
         #[cfg(target_arch = "x86_64")]
-        assert_to_two_units::<pulp::x86::V3>();
+        assert_to_a_few_units::<pulp::x86::V3>();
         #[cfg(target_arch = "aarch64")]
-        assert_to_two_units::<pulp::aarch64::Neon>();
+        assert_to_a_few_units::<pulp::aarch64::Neon>();
     }
 }
