@@ -398,7 +398,7 @@ proptest! {
 }
 
 /// Of balls in grooves of any closeness or none, and of flats of any length that the drive's teeth can have; the shape by itself where they can have none.
-fn any_other_teeth() -> impl Strategy<Value = OtherTeeth> {
+pub(crate) fn any_other_teeth() -> impl Strategy<Value = OtherTeeth> {
     let wider = || prop::option::of((-3.0_f64..1.0).prop_map(|exponent| 1.0 + 10.0_f64.powf(exponent)));
     prop_oneof![
         (wider(), wider(), wider()).prop_map(|(wave_generator, ring, carrier)| OtherTeeth::Balls(PerContact {
@@ -411,7 +411,7 @@ fn any_other_teeth() -> impl Strategy<Value = OtherTeeth> {
 }
 
 #[derive(Debug, Clone, Copy)]
-enum OtherTeeth {
+pub(crate) enum OtherTeeth {
     /// Of grooves the radius over the ball's.
     Balls(PerContact<Option<f64>>),
     /// Length of the flat over the longest that the ring's contacts leave.
@@ -419,7 +419,7 @@ enum OtherTeeth {
 }
 
 impl OtherTeeth {
-    fn of(self, parameters: &DriveParameters) -> DriveParameters {
+    pub(crate) fn of(self, parameters: &DriveParameters) -> DriveParameters {
         let r = parameters.tooth_radius_mm;
         let tooth = match self {
             Self::Balls(wider) => ToothShape::Ball {

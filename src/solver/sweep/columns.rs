@@ -145,16 +145,18 @@ impl ContactPeaks {
             Pressure::Ellipse(ellipse) => {
                 let half_width_mm = ellipse.half_width_mm(force_n);
                 let half_length_mm = ellipse.half_length_mm(force_n);
-                // Of the two bodies the one where it is larger.
-                let shears = [materials.teeth, *materials.partner(contact)].map(|material| {
-                    let ShearBelow { share, depth } = ellipse.shear_below(material.poissons_ratio);
+                let shear = |poissons_ratio: f64| {
+                    let ShearBelow { share, depth } = ellipse.shear_below(poissons_ratio);
                     PeakShear {
                         stress_mpa: share * self.stress_mpa.value,
                         depth_mm: depth * half_width_mm.min(half_length_mm),
                     }
-                });
-                let [one, other] = shears;
-                let shear = if other.stress_mpa > one.stress_mpa { other } else { one };
+                };
+                // Of the two bodies the one where it is larger.
+                let [tooth, partner] = [&materials.teeth, materials.partner(contact)].map(|body| body.poissons_ratio);
+                let (of_tooth, are_alike) = (shear(tooth), partner.to_bits() == tooth.to_bits());
+                let of_partner = if are_alike { of_tooth } else { shear(partner) };
+                let shear = if of_partner.stress_mpa > of_tooth.stress_mpa { of_partner } else { of_tooth };
                 Self { half_width_mm, half_length_mm: Some(half_length_mm), shear: Some(shear), ..self }
             }
         }

@@ -559,13 +559,19 @@ impl Kernel {
 
     #[inline(always)]
     fn loads_of<K: Sink>(&self, unit: impl Unit, tile: &mut Tile<'_>) -> bool {
-        let mut chunks = 0..tile.count.div_ceil(LANES);
-        match &self.shape {
-            Shape::Ellipse(ellipse) => chunks.all(|chunk| self.on_ellipse::<K>(ellipse, unit, tile, chunk)),
-            Shape::Eccentric(centers) => chunks.all(|chunk| self.on_path::<K>(centers, unit, tile, chunk)),
-            Shape::Harmonic(centers) => chunks.all(|chunk| self.on_path::<K>(centers, unit, tile, chunk)),
-            Shape::HarmonicPath(centers) => chunks.all(|chunk| self.on_path::<K>(centers, unit, tile, chunk)),
+        // No iterator's method, which would not be compiled for the vectors that this is.
+        for chunk in 0..tile.count.div_ceil(LANES) {
+            let are_found = match &self.shape {
+                Shape::Ellipse(ellipse) => self.on_ellipse::<K>(ellipse, unit, tile, chunk),
+                Shape::Eccentric(centers) => self.on_path::<K>(centers, unit, tile, chunk),
+                Shape::Harmonic(centers) => self.on_path::<K>(centers, unit, tile, chunk),
+                Shape::HarmonicPath(centers) => self.on_path::<K>(centers, unit, tile, chunk),
+            };
+            if !are_found {
+                return false;
+            }
         }
+        true
     }
 
     /// Geometry of a stretch of states, and their forces and stresses for one unit; false where the support takes too many steps.

@@ -71,13 +71,16 @@ enum Law {
 pub(crate) enum ToothLaw {
     /// `δ = F/k`, what stands behind the contact included.
     Linear { compliance_mm_per_n: PerContact<f64> },
-    /// `δ = q F^p`, alike at all three.
-    Power { exponent: f64, coefficient: f64 },
+    /// Palmgren's `δ = q F^0.9`, alike at all three.
+    Palmgren { coefficient: f64 },
     /// Johnson's line, and what stands behind it.
     Johnson { law: PerContact<JohnsonLine>, series_compliance_mm_per_n: PerContact<f64> },
     /// Hertz's ellipses.
     Hertz,
 }
+
+/// `p` of Palmgren's law.
+pub(crate) const PALMGREN_EXPONENT: f64 = 0.9;
 
 /// The powers of the stresses that forces go with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -249,7 +252,9 @@ fn law_of(
             let stiffness = 0.5 * PI * size.width_mm * materials.contact_modulus_mpa(contact);
             Law::Linear { compliance_mm_per_n: 1.0 / stiffness }
         }
-        ContactLaw::Palmgren => Law::Power { exponent: 0.9, coefficient: 3.84e-5 / size.width_mm.powf(0.8) },
+        ContactLaw::Palmgren => {
+            Law::Power { exponent: PALMGREN_EXPONENT, coefficient: 3.84e-5 / size.width_mm.powf(0.8) }
+        }
         ContactLaw::Johnson { depth_mm } => {
             Law::Johnson(JohnsonLine::new(materials, contact, size.radius_mm, size.width_mm, *depth_mm.get(contact)))
         }
@@ -338,8 +343,8 @@ impl Contacts {
                     },
                 })
             }
-            (&Law::Power { exponent, coefficient }, Law::Power { .. }, Law::Power { .. }) if is_alone => {
-                Some(ToothLaw::Power { exponent, coefficient })
+            (&Law::Power { coefficient, .. }, Law::Power { .. }, Law::Power { .. }) if is_alone => {
+                Some(ToothLaw::Palmgren { coefficient })
             }
             (&Law::Johnson(wave_generator), &Law::Johnson(ring), carrier @ (Law::Johnson(_) | Law::Flat)) => {
                 let carrier = if let Law::Johnson(line) = carrier { *line } else { JohnsonLine::NONE };

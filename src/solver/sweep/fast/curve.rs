@@ -42,11 +42,17 @@ impl<const COUNT: usize> Curves<COUNT> {
             places.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), at| (at.min(least), at.max(most)));
         let middle = 0.5 * (least + most);
         let half_length = (0.5 + WIDENED) * (most - least) + LEAST_HALF_LENGTH * middle.abs().min(1.0);
-        let at = |node: f64| functions(middle + half_length * node);
         let mut intervals = FIRST_TERMS;
+        let mut values: Vec<[f64; COUNT]> = Vec::new();
         while intervals <= MOST_TERMS {
-            let nodes = (0..=intervals).map(|node| (PI * node as f64 / intervals as f64).cos());
-            let coefficients = coefficients(&nodes.map(at).collect::<Option<Vec<_>>>()?);
+            // Every second node is one of those before.
+            values = (0..=intervals)
+                .map(|node| match values.get(node / 2).filter(|_| node % 2 == 0) {
+                    Some(known) => Some(*known),
+                    None => functions(middle + half_length * (PI * node as f64 / intervals as f64).cos()),
+                })
+                .collect::<Option<_>>()?;
+            let coefficients = coefficients(&values);
             if let Some(terms) = terms_needed(&coefficients) {
                 let coefficients = coefficients[..terms].to_vec();
                 return Some(Self { middle, half_length, coefficients });

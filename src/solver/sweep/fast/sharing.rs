@@ -6,13 +6,13 @@
 
 use pulp::Simd;
 
-use super::lanes::{LANES, cube_root, largest, ln, ln_roughly, power, repeat_each};
+use super::lanes::{LANES, cube_root, inverse_tenth_root, largest, ln, ln_roughly, ninth_root, repeat_each};
 use crate::contact::{Contact, PerContact};
 use crate::load_sharing::{Compatibility, LoadedDrive};
 use crate::tooth::StressExponents;
-use crate::tooth::ToothLaw;
 use crate::tooth::line::{JohnsonLine, WIDEST_SHARE};
 use crate::tooth::point::EllipticContact;
+use crate::tooth::{PALMGREN_EXPONENT, ToothLaw};
 
 /// Rounds of a search at most; a tile that needs more goes the plain way.
 const MAX_ROUNDS: u32 = 60;
@@ -416,19 +416,16 @@ impl Power for Linear {
     }
 }
 
-/// Palmgren's law.
+/// Palmgren's law, `p = 9/10`.
 pub(super) struct Palmgren {
-    exponent: f64,
     coefficient: f64,
     weights: Weights,
 }
 
-impl Palmgren {
-    /// `x^exponent`, nothing being next to nothing.
-    #[inline(always)]
-    fn raised<V: Simd>(x: f64, exponent: f64) -> f64 {
-        power::<V>(if x > NOTHING { x } else { NOTHING }, exponent)
-    }
+/// The same number, or next to nothing where it is nothing or less: roots are of positive ones.
+#[inline(always)]
+fn positive(x: f64) -> f64 {
+    if x > NOTHING { x } else { NOTHING }
 }
 
 impl Power for Palmgren {
@@ -436,37 +433,38 @@ impl Power for Palmgren {
 
     #[inline(always)]
     fn exponent(&self) -> f64 {
-        self.exponent
+        PALMGREN_EXPONENT
     }
 
     #[inline(always)]
     fn power<V: Simd>(&self, x: f64) -> f64 {
-        Self::raised::<V>(x, self.exponent)
+        x * inverse_tenth_root::<V>(positive(x))
     }
 
     #[inline(always)]
     fn inverse<V: Simd>(&self, x: f64) -> f64 {
-        Self::raised::<V>(x, 1.0 / self.exponent)
+        x * ninth_root::<V>(positive(x))
     }
 
     #[inline(always)]
     fn inverse_over_x<V: Simd>(&self, x: f64) -> f64 {
-        Self::raised::<V>(x, 1.0 / self.exponent - 1.0)
+        ninth_root::<V>(positive(x))
     }
 
+    /// With `F_K/F_H` to the power 1.9 by virtual work and -0.1 by projection, and `F_S/F_H` to the power 1.9.
     #[inline(always)]
     fn units<V: Simd>(&self, teeth: &Teeth<'_>, _: &[f64], unit: &mut [f64]) {
         let len = teeth.len;
         let unit = &mut unit[..len];
         let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
-        let Self { exponent, coefficient, weights } = self;
+        let Self { coefficient, weights } = self;
         let of_carrier = coefficient * weights.carrier;
-        let ring_exponent = exponent + weights.ring_exponent;
         for i in 0..len {
             let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
-            let of_ring = coefficient * along * power::<V>(ring[i], ring_exponent);
-            let c = coefficient + of_ring + of_carrier * Self::raised::<V>(carrier[i], exponent + 1.0);
-            unit[i] = if arm[i] > 0.0 { self.inverse::<V>(arm[i] / c) } else { 0.0 };
+            let squared = if weights.ring_exponent > 0.0 { ring[i] * ring[i] } else { 1.0 };
+            let of_ring = coefficient * along * squared * inverse_tenth_root::<V>(ring[i]);
+            let power = carrier[i] * carrier[i] * inverse_tenth_root::<V>(positive(carrier[i]));
+            unit[i] = self.inverse::<V>(arm[i] / (coefficient + of_ring + of_carrier * power));
         }
     }
 }
@@ -539,8 +537,8 @@ impl Sharing {
             ToothLaw::Linear { compliance_mm_per_n } => {
                 Self::Linear(PowerLaw { power: Linear { compliance_mm_per_n, weights }, gaps })
             }
-            ToothLaw::Power { exponent, coefficient } => {
-                Self::Palmgren(PowerLaw { power: Palmgren { exponent, coefficient, weights }, gaps })
+            ToothLaw::Palmgren { coefficient } => {
+                Self::Palmgren(PowerLaw { power: Palmgren { coefficient, weights }, gaps })
             }
             ToothLaw::Hertz => Self::Hertz(PowerLaw { power: Hertz, gaps }),
             ToothLaw::Johnson { law, series_compliance_mm_per_n: series } => {
