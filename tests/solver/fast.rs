@@ -9,7 +9,7 @@ use toothwave_solver::{
     ToothShape, WaveGenerator,
 };
 
-use crate::drives::{PAPER_5_1, any_swept_drive, drive, ellipse, everywhere, load, swept};
+use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, ellipse, everywhere, load, swept};
 
 /// How far two ways to the same number may be apart, over what its terms came to.
 const ROUNDING: f64 = 1e-12;
@@ -458,6 +458,31 @@ proptest! {
             ..load(10.0_f64.powf(torque_exponent), Compatibility::VirtualWork)
         };
         assert_both_paths_agree(&parameters, &load, samples);
+    }
+}
+
+#[test]
+fn balls_take_the_fast_path_on_undercut_flanks_too_and_on_any_wave_generator() {
+    let ball = ToothShape::Ball { groove_radius_mm: PerContact::default() };
+    let on = |wave_generator: WaveGenerator| DriveParameters {
+        wave_generator,
+        ring_teeth: 28 - wave_generator.lobes(),
+        ..PAPER_5_1
+    };
+    let load = LoadParameters { law: ContactLaw::Hertz, ..load(3.0, Compatibility::VirtualWork) };
+    let case = LoadCase::new(&load).unwrap();
+    for parameters in [
+        PAPER_5_2,
+        // A thousandth beyond the threshold of undercut.
+        DriveParameters { tooth_radius_mm: 6.756, ..PAPER_5_1 },
+        on(WaveGenerator::Eccentric { radius_mm: 57.0, eccentricity_mm: 1.0 }),
+        on(WaveGenerator::Harmonic { lobes: 7, mean_radius_mm: 57.0, amplitude_mm: 0.3 }),
+        on(WaveGenerator::HarmonicPath { lobes: 2, mean_path_radius_mm: 62.0, amplitude_mm: 1.0 }),
+    ] {
+        let parameters = DriveParameters { tooth: ball, ..parameters };
+        assert_both_paths_agree(&parameters, &load, 50);
+        let plain = sweep_plain(&drive(&parameters), &case, Points::samples(50).unwrap(), &Never).unwrap();
+        assert_ne!(swept(&parameters, &load, 50).states.stress_mpa, plain.states.stress_mpa, "{parameters:?}");
     }
 }
 
