@@ -21,11 +21,6 @@ struct Normal {
     sin: f64,
 }
 
-/// `√(x² + y²)` where no square can overflow, and one that vanishes does not matter: a third of the time of `hypot`.
-fn length(x: f64, y: f64) -> f64 {
-    (x * x + y * y).sqrt()
-}
-
 impl Ellipse {
     pub(super) const fn new(semi_major_mm: f64, semi_minor_mm: f64) -> Self {
         Self { semi_major_mm, semi_minor_mm }
@@ -60,7 +55,7 @@ impl Ellipse {
     }
 
     fn support_mm(&self, normal: Normal) -> f64 {
-        length(self.semi_major_mm * normal.cos, self.semi_minor_mm * normal.sin)
+        (self.semi_major_mm * normal.cos).hypot(self.semi_minor_mm * normal.sin)
     }
 
     /// Radius of curvature `ρ_H = h + h'' = a²b²/h³`: for an ellipse the sum has this closed form without cancellation.
@@ -83,7 +78,7 @@ impl Ellipse {
         let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
         let cos = position.phase_cos * (b * b + r * support_mm);
         let sin = position.phase_sin * (a * a + r * support_mm);
-        let length = length(cos, sin);
+        let length = cos.hypot(sin);
         Normal { cos: cos / length, sin: sin / length }
     }
 
@@ -115,7 +110,7 @@ impl Kind for Ellipse {
     fn tooth(&self, tooth_radius_mm: f64, position: Position) -> Result<ToothCenter, NotConverged> {
         let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
         let Position { phase_cos: cos, phase_sin: sin, .. } = position;
-        let guess = length(a * cos, b * sin);
+        let guess = (a * cos).hypot(b * sin);
         let support_mm = newton_in_bracket("support of the cam at a tooth", b, a, guess, |h| {
             let major = sin * (a * a + r * h);
             let minor = cos * (b * b + r * h);
