@@ -142,7 +142,7 @@ mod tests {
     fn assert_right<V: Simd>() {
         for (least, most) in [(0.3, 0.3), (0.1, 0.2), (-2.0, 3.0), (-3.0, 5.0)] {
             let functions = |x: f64| [(0.25 * x).exp(), 1.0 / (x * x + 10.0)];
-            let curves = Curves::around([least, most].into_iter(), |x| Some(functions(x))).unwrap();
+            let curves = Curves::around([least, most].into_iter(), |x| Some(functions(x))).expect("smooth curves");
             for stretch in 0..16 {
                 let at = std::array::from_fn(|i| least + (most - least) * (stretch * LANES + i) as f64 / 1023.0);
                 let (found, farthest) = curves.at::<V>(&at, LANES);
@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn a_place_beyond_the_range_is_told_of_unless_no_tooth_stands_there() {
-        let curves = Curves::around([1.0, 2.0].into_iter(), |x| Some([x])).unwrap();
+        let curves = Curves::around([1.0, 2.0].into_iter(), |x| Some([x])).expect("a straight line");
         let mut at = [1.5; LANES];
         at[7] = 2.5;
         assert!(curves.at::<pulp::Scalar>(&at, LANES).1 > 1.0);
