@@ -53,11 +53,12 @@ await take('find-a-drive', { viewport: { width: 1366, height: 1000 } }, async (p
   await page.click('.find button[type=submit]');
   await page.waitForFunction(() => document.querySelector('#find .study-progress').hidden && document.querySelector('#find .headline')?.textContent);
   await page.locator('#find .drives-scroll tbody button').nth(3).click();
-  await page.waitForFunction(() => document.querySelector('#find .drive-card svg'));
+  // Pictures are drawn when they are seen, and the click has scrolled to its row.
   await page.evaluate(() => {
     document.activeElement.blur();
     scrollTo(0, 0);
   });
+  await page.waitForFunction(() => document.querySelector('#find .drive-card svg'));
 });
 
 await take('explore', { viewport: { width: 1366, height: 1000 }, colorScheme: 'dark' }, async (page) => {
