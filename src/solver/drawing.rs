@@ -410,7 +410,11 @@ impl Drawing {
     }
 
     const fn density(&self) -> Density {
-        Density { tolerance_mm: self.parameters.chord_tolerance_mm, points_per_chord: POINTS_PER_CHORD }
+        Density {
+            tolerance_mm: self.parameters.chord_tolerance_mm,
+            points_per_chord: POINTS_PER_CHORD,
+            max_chords: self.parameters.max_points,
+        }
     }
 
     fn require_points(&self, points: u64) -> Result<(), SolveError> {

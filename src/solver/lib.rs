@@ -139,9 +139,9 @@ pub enum SolveError {
         center_radius_mm: f64,
     },
     /// More points than asked for at most.
-    #[error("the profiles need {points} points at this chord tolerance, more than the {limit} allowed")]
+    #[error("the profiles need {points} points or more at this chord tolerance, beyond the {limit} allowed")]
     TooManyPoints {
-        /// Points that the profiles need.
+        /// Points that the profiles need, or as many of them as were counted.
         points: u64,
         /// The limit that was given.
         limit: u64,

@@ -60,12 +60,14 @@ pub(crate) struct Density {
     pub(crate) tolerance_mm: f64,
     /// Points for each of these chords, so that a denser sample has so many times the points and never more.
     pub(crate) points_per_chord: u32,
+    /// How many chords are given up at: what a whole outline may have, its curves may have each.
+    pub(crate) max_chords: u64,
 }
 
 impl Density {
     /// The ends of the chords alone.
-    pub(crate) const fn of_chords(tolerance_mm: f64) -> Self {
-        Self { tolerance_mm, points_per_chord: 1 }
+    const fn of_chords(parameters: &ProfileParameters) -> Self {
+        Self { tolerance_mm: parameters.chord_tolerance_mm, points_per_chord: 1, max_chords: parameters.max_points }
     }
 }
 
@@ -87,10 +89,10 @@ const MAX_DEPTH: u32 = 40;
 /// [`SolveError::TooManyPoints`], [`SolveError::Stopped`], and [`SolveError::NotConverged`] from the geometry.
 pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &dyn Stop) -> Result<Profiles, SolveError> {
     let ring_teeth = drive.parameters().ring_teeth.unsigned_abs();
-    let flank = ring_half_tooth(drive, parameters.chord_tolerance_mm, stop)?;
-    let path = path_half_tooth(drive, parameters.chord_tolerance_mm, stop)?;
-    let half_lobe =
-        cam_half_lobe(drive.flank().locus(), 0.0, Density::of_chords(parameters.chord_tolerance_mm), stop)?.points;
+    let density = Density::of_chords(parameters);
+    let flank = ring_half_tooth(drive, density, stop)?;
+    let path = path_half_tooth(drive, density, stop)?;
+    let half_lobe = cam_half_lobe(drive.flank().locus(), 0.0, density, stop)?.points;
 
     let copies = match parameters.extent {
         Extent::Tooth => 1,
@@ -109,8 +111,8 @@ pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &dyn Stop) 
 }
 
 /// The ring from the middle of its tooth space to its tooth's symmetry line, land of a bored tip included.
-fn ring_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &dyn Stop) -> Result<Polyline, SolveError> {
-    let mut points = flank_curve(drive.flank(), drive.flank_limit(), Density::of_chords(tolerance_mm), stop)?.points;
+fn ring_half_tooth(drive: &Drive, density: Density, stop: &dyn Stop) -> Result<Polyline, SolveError> {
+    let mut points = flank_curve(drive.flank(), drive.flank_limit(), density, stop)?.points;
     let tip_rad = PI / drive.parameters().ring_teeth as f64;
     match drive.flank_limit().end {
         FlankEnd::RegularTip | FlankEnd::Undercut => {
@@ -121,7 +123,7 @@ fn ring_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &dyn Stop) -> Result<
             let start_rad = points.last().map_or(0.0, |point| point.y.atan2(point.x));
             let land_rad = tip_rad - start_rad;
             // A chord over the angle 4 asin(√(t/2R)) is t away from its arc.
-            let step_rad = 4.0 * (0.5 * tolerance_mm / radius_mm).min(1.0).sqrt().asin();
+            let step_rad = 4.0 * (0.5 * density.tolerance_mm / radius_mm).min(1.0).sqrt().asin();
             let steps = (land_rad / step_rad).ceil().max(1.0);
             let mut step = 1.0;
             while step < steps {
@@ -150,10 +152,9 @@ pub(crate) fn flank_curve(
 }
 
 /// The path of a tooth's centre from the middle of the tooth space to the symmetry line of the ring's tooth.
-fn path_half_tooth(drive: &Drive, tolerance_mm: f64, stop: &dyn Stop) -> Result<Polyline, SolveError> {
+fn path_half_tooth(drive: &Drive, density: Density, stop: &dyn Stop) -> Result<Polyline, SolveError> {
     let flank = drive.flank();
     let lobes = drive.lobes();
-    let density = Density::of_chords(tolerance_mm);
     let mut points = sampled(Position::lobe(lobes), Position::valley(lobes), lobes, density, stop, |position| {
         let tooth = flank.locus().at(position)?;
         let point = flank.at(&tooth);
@@ -236,7 +237,7 @@ pub(crate) fn sampled(
     start: Position,
     end: Position,
     lobes: u32,
-    Density { tolerance_mm, points_per_chord }: Density,
+    Density { tolerance_mm, points_per_chord, max_chords }: Density,
     stop: &dyn Stop,
     curve: impl Fn(Position) -> Result<CurvePoint, NotConverged>,
 ) -> Result<SampledCurve, SolveError> {
@@ -254,6 +255,7 @@ pub(crate) fn sampled(
     let span = start.from_valley_rad - end.from_valley_rad;
     let mut from = (start.from_valley_rad, curve(start)?);
     let mut curve_points = vec![from.1];
+    let mut chords = 0;
     for piece in 1..=PIECES {
         let x = start.from_valley_rad - span * (f64::from(piece) / f64::from(PIECES));
         let mut pending = vec![(x.max(end.from_valley_rad), at(x)?, 0)];
@@ -266,6 +268,10 @@ pub(crate) fn sampled(
                 }
                 curve_points.push(to_point);
                 from = (x, to_point);
+                chords += 1;
+                if chords > max_chords {
+                    return Err(SolveError::TooManyPoints { points: chords, limit: max_chords });
+                }
             } else {
                 if stop.stopped() {
                     return Err(SolveError::Stopped);

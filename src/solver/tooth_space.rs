@@ -81,6 +81,9 @@ struct ShapedPoint {
 /// Places at which a shaped flank is looked at for its end, over half a lobe: far more than it has bends.
 const PLACES: u32 = 720;
 
+/// What rounding may add to a radius.
+const ROUNDED: f64 = 1.0 + 1e-12;
+
 /// What may end a shaped flank; a regular tip does where it has become a cusp.
 const ENDS: [FlankEnd; 3] = [FlankEnd::Undercut, FlankEnd::Bore, FlankEnd::RegularTip];
 
@@ -110,7 +113,13 @@ impl ToothSpace {
         match shaped.space(bore_mm)? {
             Some(shaped) => Ok(Self { set_back, shaped: Some(shaped) }),
             None => {
-                let (modified, value) = modification.greatest_of_ring();
+                let unrelieved = ShapedFlank { relief: None, ..shaped };
+                let (modified, value) = match modification.ring_tip_relief {
+                    Some(relief) if unrelieved.space(bore_mm)?.is_some() => {
+                        (Modified::TipReliefAmount, relief.amount_um)
+                    }
+                    _ => modification.greatest_of_ring(),
+                };
                 Err(leaves_nothing(modified, value, None))
             }
         }
@@ -292,7 +301,11 @@ impl ShapedFlank {
                 FlankEnd::RegularTip => at.speed_mm,
             })
         };
-        let is_flank = |at: &ShapedPoint| at.distance_mm > 0.0 && at.radius_mm > 0.0 && at.radius_mm.is_finite();
+        // A relief goes on by its power where the flank outlasts the drive's own, and may leave the ring there.
+        let relief_mm = self.relief.map_or(0.0, |relief| relief.amount_mm.max(0.0));
+        let most_mm = self.flank.root_radius_mm() + self.path_shift_mm + self.profile_shift_mm + relief_mm;
+        let is_flank =
+            |at: &ShapedPoint| at.distance_mm > 0.0 && at.radius_mm > 0.0 && at.radius_mm <= ROUNDED * most_mm;
         if !is_flank(&relieved(start)?) {
             return Ok(None);
         }

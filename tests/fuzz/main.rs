@@ -1,9 +1,10 @@
 //! Whatever the document, there is an answer in numbers or a reason: no panic, no number that is none, no endless loop.
 //!
-//! `cargo test` replays the committed corpus and tries some more at random beside it; `cargo bolero test NAME -p toothwave-calculation`
-//! hands the same targets to a coverage-guided fuzzer.
+//! `cargo test` replays the committed corpus and tries some more at random beside it, the same ones again with `PROPTEST_RNG_SEED`;
+//! `cargo bolero test NAME -p toothwave-calculation` hands the same targets to a coverage-guided fuzzer.
 #![allow(clippy::unwrap_used, reason = "a fuzz target fails by panicking")]
 
+use proptest::prelude::*;
 use serde_json::{Value, json};
 use toothwave_calculation::accuracy::Accuracy;
 use toothwave_calculation::coincidence_degree::CoincidenceDegree;
@@ -69,6 +70,13 @@ fn assert_text_is_answered(text: &[u8]) {
 #[test]
 fn any_text() {
     bolero::check!().with_iterations(3_000).for_each(assert_text_is_answered);
+}
+
+/// Bytes drawn at random, as often as asked for.
+fn drawn<const BYTES: usize>(cases: u32, test: impl Fn(&[u8; BYTES])) {
+    let config = ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() };
+    let bytes = prop::collection::vec(any::<u8>(), BYTES);
+    proptest!(config, |(bytes in bytes)| test(&bytes.try_into().unwrap()));
 }
 
 /// A length between the ends of its range, most often an ordinary one.
@@ -170,9 +178,9 @@ fn document(bytes: &[u8; 20]) -> Value {
 
 #[test]
 fn any_drive() {
-    bolero::check!().with_type::<[u8; 20]>().with_iterations(1_000).for_each(|bytes| {
-        assert_text_is_answered(document(bytes).to_string().as_bytes());
-    });
+    let is_answered = |bytes: &[u8; 20]| assert_text_is_answered(document(bytes).to_string().as_bytes());
+    bolero::check!().with_type().with_iterations(0).for_each(is_answered);
+    drawn(1_000, is_answered);
 }
 
 /// A number of either sign, most often none, of a size from all over its range.
@@ -320,9 +328,9 @@ fn deviations(list: u8, of_parts: &[u8], entries: &[u8], items: [i64; 3], size_u
 
 #[test]
 fn any_member_of_the_family() {
-    bolero::check!().with_type::<[u8; 48]>().with_iterations(600).for_each(|bytes| {
-        assert_text_is_answered(relative(bytes).to_string().as_bytes());
-    });
+    let is_answered = |bytes: &[u8; 48]| assert_text_is_answered(relative(bytes).to_string().as_bytes());
+    bolero::check!().with_type().with_iterations(0).for_each(is_answered);
+    drawn(600, is_answered);
 }
 
 /// Documents of this kind would test nothing if none of them were possible.
@@ -376,12 +384,8 @@ fn most_kinds_shapes_and_laws_are_among_those_that_have_an_answer() {
 
 #[test]
 fn any_accuracy() {
-    bolero::check!().with_type::<[u8; 20]>().with_iterations(8).for_each(|bytes| {
-        let text = document(bytes).to_string();
-        assert_answered(Accuracy, &Design::read(text.as_bytes()).unwrap());
-    });
-    bolero::check!().with_type::<[u8; 48]>().with_iterations(8).for_each(|bytes| {
-        let text = relative(bytes).to_string();
-        assert_answered(Accuracy, &Design::read(text.as_bytes()).unwrap());
-    });
+    let is_answered =
+        |document: Value| assert_answered(Accuracy, &Design::read(document.to_string().as_bytes()).unwrap());
+    drawn(8, |bytes: &[u8; 20]| is_answered(document(bytes)));
+    drawn(8, |bytes: &[u8; 48]| is_answered(relative(bytes)));
 }

@@ -10,10 +10,11 @@ use toothwave_solver::mesh::Place;
 use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::violation::Modified;
 use toothwave_solver::{
-    Drive, DriveParameters, Modification, Never, Parameter, Part, PerContact, Position, Violation, WaveGenerator,
+    Drive, DriveParameters, Modification, Never, Parameter, Part, PerContact, Position, ToothShape, Violation,
+    WaveGenerator,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive};
+use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, ellipse};
 
 const NONE: Modification = Modification::NONE;
 const ARCSEC: f64 = PI / 648_000.0;
@@ -459,6 +460,34 @@ fn a_modification_that_leaves_no_outline_is_refused_with_the_number_at_fault() {
         matches!(found[..], [Violation::ModificationLeavesNothing { limit: Some(limit), .. }] if (limit - least_um).abs() < 1e-9),
         "{found:?}"
     );
+}
+
+/// Nearly round and bored, the flank ends where its height hardly changes; turned a little, it goes on to the valley, where a relief of the 52nd power has long
+/// left the ring.
+#[test]
+fn a_relief_that_rises_out_of_its_space_is_refused() {
+    let p = DriveParameters {
+        wave_generator: ellipse(34.253_525_011_805_64, 34.246_474_988_194_36),
+        teeth: 28,
+        installed: 28,
+        ring_teeth: 26,
+        tooth_radius_mm: 2.963_218_370_144_663,
+        tooth: ToothShape::Cylinder { width_mm: 13.0 },
+        tip_radius_mm: Some(40.179_190_655_762_48),
+    };
+    let drawn = |power| {
+        let relief = TipRelief { amount_um: 0.003, start_deg: 15.53, power };
+        let modification =
+            Modification { ring_rotation_arcsec: -10.0, ring_tip_relief: Some(relief), ..Modification::default() };
+        let parameters = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 1_000_000, input_angle_deg: 0.0 };
+        let subject = Subject::Part(Part::Ring);
+        Drawing::new(&Draft::new(&p).unwrap(), subject, &parts(modification), &parameters)
+    };
+    let modified = Modified::TipReliefAmount;
+    let leaves_nothing = Violation::ModificationLeavesNothing { modified, value: 0.003, limit: None };
+    assert_eq!(drawn(52.1).map(|_| ()), Err(DriveError::Impossible(vec![leaves_nothing])));
+    let gentle = drawn(2.0).expect("a relief of the second power stays within the ring");
+    assert!(gentle.bodies(&Never).is_ok());
 }
 
 /// Bézier's polygons of all curves.

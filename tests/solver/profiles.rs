@@ -2,11 +2,12 @@
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use nalgebra::{Point2, Rotation2};
 use proptest::prelude::*;
 use toothwave_solver::profile::{Extent, Polyline, ProfileParameters, Profiles, profiles};
-use toothwave_solver::{DriveParameters, Never, SolveError};
+use toothwave_solver::{DriveParameters, Never, SolveError, Stop};
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, drive, semi_axes_mm};
 
@@ -115,6 +116,28 @@ fn a_profile_of_too_many_points_is_refused_with_their_number() {
     let request = ProfileParameters { chord_tolerance_mm: 1e-3, extent: Extent::Full, max_points: 1000 };
     let refused = profiles(&drive(&PAPER_5_1), &request, &Never).unwrap_err();
     assert!(matches!(refused, SolveError::TooManyPoints { points, limit: 1000 } if points > 1000));
+}
+
+/// Counts how often it is asked; each halving of a chord asks once.
+#[derive(Default)]
+struct Halvings(AtomicU64);
+
+impl Stop for Halvings {
+    fn stopped(&self) -> bool {
+        self.0.fetch_add(1, Ordering::Relaxed);
+        false
+    }
+}
+
+#[test]
+fn a_profile_of_far_too_many_points_is_given_up_before_it_is_whole() {
+    let halvings = Halvings::default();
+    let request = ProfileParameters { chord_tolerance_mm: 1e-13, extent: Extent::Tooth, max_points: 1000 };
+    let refused = profiles(&drive(&PAPER_5_1), &request, &halvings).unwrap_err();
+    assert!(matches!(refused, SolveError::TooManyPoints { points: 1001, limit: 1000 }), "{refused:?}");
+    // A chord takes a halving, and the last one some more on the way down to it.
+    let halvings = halvings.0.into_inner();
+    assert!(halvings < 1100, "{halvings}");
 }
 
 #[test]

@@ -5,8 +5,8 @@ use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::sweep::{Points, SweepPeaks, peaks, sweep_plain};
 use toothwave_solver::{
-    Contact, ContactLaw, DriveParameters, LoadCase, LoadParameters, Never, PerContact, SolveError, ToothShape,
-    WaveGenerator,
+    Contact, ContactLaw, DriveParameters, LoadCase, LoadParameters, Modification, Never, PerContact, SolveError,
+    ToothShape, WaveGenerator,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, ellipse, everywhere, load};
@@ -210,6 +210,48 @@ fn extremes_that_rounding_alone_bends_are_found() {
     for (parameters, load) in [(bored, nearly_round), (deep, weak)] {
         assert!(to(&parameters, &load, 1e-10).torque_capacity.is_some());
     }
+}
+
+/// Stiff contacts under next to no torque: each tooth carries alone, and hands over within a hundred-millionth of the period. Beside that instant the one that
+/// carries is hardly pressed, and the one that does not stands open by thousands of times as much.
+#[test]
+fn a_load_that_changes_hands_at_once_is_closed_in_on() {
+    let parameters = DriveParameters {
+        wave_generator: WaveGenerator::HarmonicPath {
+            lobes: 3,
+            mean_path_radius_mm: 45.25,
+            amplitude_mm: 0.085_850_649_182_247_9,
+        },
+        teeth: 32,
+        installed: 16,
+        ring_teeth: 29,
+        tooth_radius_mm: 3.004_970_900_807_117,
+        tooth: ToothShape::Ball {
+            groove_radius_mm: PerContact { ring: Some(3.102_255_557_894_772), ..PerContact::default() },
+        },
+        tip_radius_mm: None,
+    };
+    let modification = Modification {
+        ring_equidistant_um: 3.004_970_900_807_117_5,
+        ring_path_shift_um: -0.300_497_090_080_711_74,
+        ring_profile_shift_um: -0.030_049_709_008_071_177,
+        ring_rotation_arcsec: 100.0,
+        slot_wall_um: -0.300_497_090_080_711_74,
+        carrier_rotation_arcsec: -10.0,
+        tooth_radius_um: 0.030_049_709_008_071_177,
+        ..Modification::default()
+    };
+    let stiffness_n_per_mm = PerContact { wave_generator: 1e12, ring: 1e13, carrier: 1e12 };
+    let allowable_stress_mpa = Some(everywhere(1500.0));
+    let law = ContactLaw::Fixed(stiffness_n_per_mm);
+    let load = LoadParameters { law, modification, allowable_stress_mpa, ..load(1e-3, VirtualWork) };
+    let case = LoadCase::new(&load).unwrap();
+    let capacity_nm = |points| {
+        sweep_plain(&drive(&parameters), &case, points, &Never).unwrap().torque_capacity.unwrap().input_torque_nm
+    };
+    let found_nm = capacity_nm(Points::tolerance(1e-8, MAX_STATES).unwrap());
+    let dense_nm = capacity_nm(Points::samples(20_000).unwrap());
+    assert!(found_nm <= dense_nm * (1.0 + 1e-8), "{found_nm} {dense_nm}");
 }
 
 #[test]

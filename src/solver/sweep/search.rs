@@ -410,26 +410,23 @@ impl Judge {
                 continue;
             }
             let pressed = |moment: usize| (seen.fractions[moment], seen.pressed(moment)[tooth]);
-            let (one_pressed, other_pressed) = (pressed(one), pressed(other));
-            let is_low_nearer = one_pressed.1.abs() < other_pressed.1.abs();
-            let (near, beyond) = if is_low_nearer {
-                (one_pressed, at.checked_sub(2).map(|before| (seen.order[before], one)))
-            } else {
-                (other_pressed, seen.order.get(at + 1).map(|&after| (after, other)))
-            };
-            let beyond =
-                beyond.filter(|&(far, near)| seen.tooth_changed(far, near).is_none()).map(|(far, _)| pressed(far));
-            let middle = 0.5 * (low + high);
             let by_line = |(x, y): (f64, f64), (from, to): (f64, f64)| x - y * (x - from) / (y - to);
-            let chord = by_line(one_pressed, other_pressed);
-            let root = match beyond.map(|beyond| by_line(near, beyond)) {
-                Some(root) if root > low && root < high => root,
-                _ => chord,
+            let from_side = |near: usize, beyond: Option<usize>| {
+                let far = beyond.filter(|&far| seen.tooth_changed(far, near).is_none())?;
+                Some(by_line(pressed(near), pressed(far))).filter(|&root| root > low && root < high)
             };
-            // Every third time halves, so that no corner keeps the lines from it.
-            let root = if round % 3 == 2 || !root.is_finite() { middle } else { root };
+            let before = from_side(one, at.checked_sub(2).map(|before| seen.order[before]));
+            let after = from_side(other, seen.order.get(at + 1).copied());
+            let is_low_nearer = pressed(one).1.abs() < pressed(other).1.abs();
+            let by_side = if is_low_nearer { before.or(after) } else { after.or(before) };
+            let root = by_side.unwrap_or_else(|| by_line(pressed(one), pressed(other)));
+            let root = Some(root).filter(|root| root.is_finite());
+            // Every third time halves, and at last every time, so that no corner keeps the lines from it.
+            let halves = self.is_late || round % 3 == 2 || root.is_none();
+            seen.wanted.extend(halves.then_some(0.5 * (low + high)));
             let step = (0.25 * self.nearest).min(0.25 * (high - low));
-            seen.wanted.push(root.clamp(low + step, high - step));
+            seen.wanted
+                .extend(root.filter(|_| self.is_late || !halves).map(|root| root.clamp(low + step, high - step)));
         }
     }
 
