@@ -148,18 +148,18 @@ fn boundary(drive: &Drive, pitch_mm: f64) -> Result<(Vec<Element>, Vec<Force>), 
         elements.extend(points.windows(2).map(|ends| Element::new(ends[0], ends[1], false)));
     };
     // The piece's ends stay apart.
-    let beside = SPACES_BESIDE.min(ring_teeth.saturating_sub(2) / 2) as i32;
-    for space in (-beside..=beside).rev() {
-        let turn = Rotation2::new(2.0 * half_pitch_rad * f64::from(space));
+    let pressed_space = SPACES_BESIDE.min(ring_teeth.saturating_sub(2) / 2);
+    for space in (0..=2 * pressed_space).rev() {
+        let turn = Rotation2::new(2.0 * half_pitch_rad * (space as f64 - pressed_space as f64));
         let stride = |is_fine: bool| if is_fine { 1 } else { STRIDE };
         // Backwards about the axis, so that the material is on the left.
-        let forward: Vec<_> = half.iter().step_by(stride(space == 0)).collect();
-        let backward: Vec<_> = half.iter().step_by(stride(space == 1)).collect();
+        let forward: Vec<_> = half.iter().step_by(stride(space == pressed_space)).collect();
+        let backward: Vec<_> = half.iter().step_by(stride(space == pressed_space + 1)).collect();
         let land = has_land.then_some(tip);
         let first = land.into_iter().chain(forward.iter().rev().map(|point| **point));
         let second = backward.iter().map(|point| mirrored(point)).chain(land.as_ref().map(mirrored));
         let points: Vec<_> = first.chain(second).map(|point| turn * point).collect();
-        if space == 0 {
+        if space == pressed_space {
             let flank = &points[usize::from(has_land)..][..KNOTS + 1];
             pressed.extend(flank.windows(2).map(|ends| {
                 let Element { middle, outward, .. } = Element::new(ends[0], ends[1], false);
@@ -311,5 +311,21 @@ impl Solid {
             solved.fixed_view::<2, 1>(2 * element, force).dot(inward)
         };
         Ok(forces.iter().enumerate().map(of_force).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sine over half a wave has no bend at its ends, as the spline has none.
+    #[test]
+    fn a_spline_bends_as_the_curve_whose_points_it_goes_through() {
+        let x: [f64; KNOTS] = std::array::from_fn(|knot| knot as f64 / (KNOTS - 1) as f64);
+        let x = x.map(|x| x * (0.5 + 0.5 * x));
+        let bends = spline_bends(&x, &x.map(|x| (PI * x).sin()));
+        for (x, bend) in x.into_iter().zip(bends) {
+            assert!((bend + PI * PI * (PI * x).sin()).abs() < 0.05, "{bend} at {x}");
+        }
     }
 }

@@ -122,7 +122,7 @@ fn every_ring_bends_by_a_finite_amount() {
         tooth_radius_mm: 1.0,
         ..PAPER_5_1
     };
-    let few = [3, 4, 5, 6, 7, 40].map(|teeth| eccentric(teeth));
+    let few = [3, 4, 5, 6, 7, 40].map(eccentric);
     for parameters in few.into_iter().chain([PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED]) {
         let drive = drive(&parameters);
         let at = beyond_root(&drive, &Material::STEEL);
