@@ -321,7 +321,7 @@ impl<'a> Model<'a> {
         let p = self.load.parameters();
         let error = difference(&found.peaks, &self.reference);
         let case = model_error::case_of(self.drive, &self.load, self.deviations);
-        let measured = model_error::measured(p.compatibility, &p.law, case);
+        let measured = model_error::measured(p, case);
         let expected_model_error = measured.map(|measured| measured.force.largest());
         Ok(WayAnswer {
             compatibility: p.compatibility.into(),

@@ -225,6 +225,7 @@ impl Design {
             compatibility,
             law: self.contact_law(),
             series_compliance_mm_per_n: (&self.model.series_compliance_mm_per_n).into(),
+            ring_teeth_bend: self.model.ring_teeth_bend,
             modification: (&self.modification).into(),
             carrier: self.carrier_of_flats(),
             clearance_um: self.model.clearance.as_ref().map_or_else(PerContact::default, |clearance| PerContact {

@@ -48,6 +48,7 @@ pub mod parts;
 pub mod position;
 pub mod profile;
 pub mod ring;
+pub mod ring_bending;
 pub mod root;
 mod spline;
 pub mod springs;

@@ -8,6 +8,7 @@ use crate::mesh::{Mesh, Place};
 use crate::parts::CarrierRadii;
 use crate::position::Position;
 use crate::ring::{FlankPoint, RingFlank, RingTooth};
+use crate::ring_bending::RingBending;
 use crate::root::NotConverged;
 use crate::springs::{Gap, Rotation, Spring, Springs, WindUp};
 use crate::tooth::line::{WIDEST_SHARE, least_length_mm};
@@ -46,6 +47,9 @@ pub struct LoadParameters {
     pub law: ContactLaw,
     /// What stands behind each contact and gives way too, under any law, with `VirtualWork` alone.
     pub series_compliance_mm_per_n: PerContact<f64>,
+    /// Whether the ring's teeth bend, the more the nearer to their tips they are pressed, with `VirtualWork` alone; otherwise no place of the flank
+    /// gives way more than another.
+    pub ring_teeth_bend: bool,
     /// Gap along the normal of each contact, in µm.
     pub clearance_um: PerContact<f64>,
     /// Parts made otherwise than conjugate, with `VirtualWork` alone.
@@ -88,7 +92,8 @@ impl LoadParameters {
         let law = (!self.law.is_of_projection()).then_some(Parameter::Law);
         let series = self.series_compliance_mm_per_n.iter().filter(|&(_, &compliance)| compliance > 0.0);
         let series = series.map(|(contact, _)| Parameter::SeriesCompliance(contact));
-        law.into_iter().chain(series).chain(self.modification.first())
+        let bending = self.ring_teeth_bend.then_some(Parameter::RingTeethBend);
+        law.into_iter().chain(series).chain(bending).chain(self.modification.first())
     }
 
     fn clearance_violations_in(&self, sense: f64, ring: &RingTooth) -> Result<Vec<Violation>, NotConverged> {
@@ -254,6 +259,7 @@ pub struct LoadedDrive<'a> {
     input_torque_nmm: f64,
     law: ContactLaw,
     contacts: Contacts,
+    ring_bending: Option<RingBending>,
     gaps: Gaps<'a>,
 }
 
@@ -308,6 +314,7 @@ impl<'a> LoadedDrive<'a> {
             input_torque_nmm: 1e3 * load.input_torque_nm(drive),
             law: p.law,
             contacts,
+            ring_bending: if p.ring_teeth_bend { Some(RingBending::new(drive, &p.materials.ring)?) } else { None },
             gaps: Gaps::new(drive, &p.clearance_um, p.modification, deviations),
         };
         let mut violations = p.clearance_violations_in(drive.sense(), drive.ring_tooth())?;
@@ -369,9 +376,9 @@ impl<'a> LoadedDrive<'a> {
         matches!(self.line_law(), Some(LineLaw::Linear { .. })) && self.gaps.is_nil()
     }
 
-    /// The law of cylinders, for whoever works in columns.
+    /// The law of cylinders, for whoever works in columns; none where it is another one at each position.
     pub(crate) fn line_law(&self) -> Option<LineLaw> {
-        self.contacts.line_law()
+        self.contacts.line_law().filter(|_| self.ring_bending.is_none())
     }
 
     /// The gap at each contact where it is the same for every tooth and position.
@@ -442,7 +449,9 @@ impl<'a> LoadedDrive<'a> {
                 }
             })
         };
-        let approach = self.contacts.approach(&places);
+        let bending =
+            self.ring_bending.map_or(0.0, |ring| ring.compliance_mm_per_n(flank_curve.point(&center, &flank)));
+        let approach = self.contacts.approach(&places, bending);
         if self.compatibility == Compatibility::Projection {
             let compliance_mm_per_n = approach.least_part_mm();
             if compliance_mm_per_n <= 0.0 {

@@ -6,7 +6,7 @@ use crate::contact::{ContactLaw, Material};
 use crate::drive::{Drive, ToothShape};
 use crate::findings::{SOFT_BACKING_SHARE, widest_half_widths_mm};
 use crate::gaps::Deviations;
-use crate::load_sharing::{Compatibility, LoadCase};
+use crate::load_sharing::{Compatibility, LoadCase, LoadParameters};
 use crate::ring::FlankEnd;
 use crate::root::NotConverged;
 use crate::sweep::Sweep;
@@ -165,12 +165,19 @@ pub struct ModelError {
     pub beyond: Vec<Beyond>,
 }
 
-/// What was measured of a form of compatibility with a law; nothing of laws that were not held against finite elements.
-pub fn measured(compatibility: Compatibility, law: &ContactLaw, case: Case) -> Option<Measured> {
+/// What was measured of a form of compatibility with a law, the ring's teeth standing or bending; nothing of laws that were not held against finite elements.
+pub fn measured(load: &LoadParameters, case: Case) -> Option<Measured> {
     use Compatibility::{Projection, VirtualWork};
     // Force, stress and wind-up, in per cent, for natural tips without and with gaps, then for pointed ones. With a gap at pointed tips an
     // earlier calculation of case 5.2, at another angle, went further in two forces: to 9 and to 53.
-    let [natural, natural_gaps, pointed, pointed_gaps] = match (compatibility, law) {
+    let [natural, natural_gaps, pointed, pointed_gaps] = match (load.compatibility, &load.law) {
+        (VirtualWork, ContactLaw::Johnson { .. }) if load.ring_teeth_bend => [
+            [(-1, 0), (-2, 1), (-1, 1)],
+            [(-1, 1), (-5, 3), (-1, 1)],
+            [(-1, 0), (-2, 1), (0, 1)],
+            [(-4, -1), (-5, 0), (-1, 0)],
+        ],
+        _ if load.ring_teeth_bend => return None,
         (VirtualWork, ContactLaw::Johnson { .. }) => [
             [(-1, 1), (-2, 2), (-2, 0)],
             [(-1, 1), (-5, 3), (-1, 0)],
@@ -233,7 +240,7 @@ pub fn of(
     parts: Option<(&Support, &Shares)>,
 ) -> Result<ModelError, NotConverged> {
     let p = load.parameters();
-    let measured = measured(p.compatibility, &p.law, case_of(drive, load, deviations));
+    let measured = measured(p, case_of(drive, load, deviations));
     let own = p.materials.teeth;
     let is_alike =
         |material: &Material| (material.compliance_per_mpa() / own.compliance_per_mpa() - 1.0).abs() <= ALIKE;

@@ -49,6 +49,8 @@ pub enum Parameter {
     Stiffness(Contact),
     /// The contact law.
     Law,
+    /// Whether the ring's teeth bend.
+    RingTeethBend,
     /// Depth of the body at a contact, mm.
     Depth(Contact),
     /// Compliance of what stands behind a contact, mm/N.
@@ -259,7 +261,7 @@ impl Parameter {
             // As soft as the least stiffness, and nothing.
             Self::SeriesCompliance(_) => Range::closed(0.0, 1e3, "mm/N"),
             // A choice and lists, which have no number.
-            Self::Law | Self::Deviations | Self::DeviationList(_) => {
+            Self::Law | Self::RingTeethBend | Self::Deviations | Self::DeviationList(_) => {
                 Range::closed(f64::NEG_INFINITY, f64::INFINITY, "")
             }
             Self::Clearance(_) | Self::PartClearance(_) | Self::RunoutAmount(_) => Range::closed(0.0, 1e6, "µm"),

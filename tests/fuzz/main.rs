@@ -261,6 +261,9 @@ fn relative(bytes: &[u8; 48]) -> Value {
         let compliance = |place: usize| 10.0_f64.powi(-i32::from(series) % 13) * [1.0, 10.0, 100.0][place];
         model["series_compliance_mm_per_n"] = by_contact(grooves >> 5, &compliance);
     }
+    if series % 8 == 1 {
+        model["ring_teeth_bend"] = json!(true);
+    }
     if gap % 2 == 0 {
         // Most often enough for what is too full.
         let clearance = |_| 1e3 * r * 10.0_f64.powi(-i32::from(gap % 9));

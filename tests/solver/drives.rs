@@ -63,6 +63,7 @@ pub(crate) fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParamete
         compatibility,
         law: ContactLaw::Linear,
         series_compliance_mm_per_n: PerContact::default(),
+        ring_teeth_bend: false,
         clearance_um: PerContact::default(),
         modification: Modification::default(),
         carrier: CarrierRadii::default(),

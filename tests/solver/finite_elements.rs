@@ -122,10 +122,9 @@ impl Case {
         }
     }
 
-    fn errors(&self, compatibility: Compatibility, law: ContactLaw) -> Errors {
+    fn errors_under(&self, load: &LoadParameters) -> Errors {
         let (drive, _) = self.drive_and_torque_nm();
-        let load = self.load(compatibility, law);
-        let sweep = swept(&drive, &load, INTERVALS);
+        let sweep = swept(&drive, load, INTERVALS);
         let here = |angle_deg: f64| (angle_deg - self.input_angle_deg).abs() < 1e-5;
         let of_model = |tooth: &Tooth| {
             let states = &sweep.states;
@@ -211,7 +210,8 @@ fn the_default_model_agrees_with_elastic_bodies() {
     let cases = results().cases;
     assert_eq!(cases.len(), 20);
     for case in cases {
-        let Errors { peak, worst_tooth, stress, wind_up, .. } = case.errors(VirtualWork, case.johnson());
+        let Errors { peak, worst_tooth, stress, wind_up, .. } =
+            case.errors_under(&case.load(VirtualWork, case.johnson()));
         let allowed = case.allowed();
         let name = case.name();
         println!(
@@ -228,17 +228,36 @@ fn the_default_model_agrees_with_elastic_bodies() {
     }
 }
 
+/// Without gaps all that the model left out of case 5.2 was that its ring's teeth bend; with them the wave generator moves on besides, under its teeth.
+#[test]
+fn with_ring_teeth_that_bend_the_default_model_agrees_within_one_per_cent_where_there_are_no_gaps() {
+    for case in results().cases {
+        let load = LoadParameters { ring_teeth_bend: true, ..case.load(VirtualWork, case.johnson()) };
+        let Errors { peak, worst_tooth, wind_up, .. } = case.errors_under(&load);
+        let [peak_to, worst_to] = match (case.drive.as_str(), LoadCase::new(&load).unwrap().has_gaps()) {
+            ("5.2", true) => [0.037, 0.082],
+            (_, true) => [0.006, 0.018],
+            (_, false) => [0.006, 0.007],
+        };
+        let name = case.name();
+        assert!(peak.abs() < peak_to, "{name}: peak force {:+.2} %", percent(peak));
+        assert!(worst_tooth < worst_to, "{name}: worst tooth {:.2} %", percent(worst_tooth));
+        assert!(wind_up.abs() < 0.008, "{name}: wind-up {:+.2} %", percent(wind_up));
+    }
+}
+
 /// What is told of a model is what was found of it: the ranges hold every error, and go no further than another calculation went.
 #[test]
 fn each_model_errs_as_much_as_it_says_that_it_does() {
     let cases = results().cases;
     let mut wrong = Vec::new();
-    for (compatibility, law) in [
-        (VirtualWork, None),
-        (VirtualWork, Some(ContactLaw::Palmgren)),
-        (VirtualWork, Some(ContactLaw::Linear)),
-        (Projection, Some(ContactLaw::Palmgren)),
-        (Projection, Some(ContactLaw::Linear)),
+    for (compatibility, law, ring_teeth_bend) in [
+        (VirtualWork, None, false),
+        (VirtualWork, None, true),
+        (VirtualWork, Some(ContactLaw::Palmgren), false),
+        (VirtualWork, Some(ContactLaw::Linear), false),
+        (Projection, Some(ContactLaw::Palmgren), false),
+        (Projection, Some(ContactLaw::Linear), false),
     ] {
         for (has_pointed_tips, has_gaps) in [(false, false), (false, true), (true, false), (true, true)] {
             let wanted = model_error::Case { has_gaps, has_pointed_tips };
@@ -247,12 +266,13 @@ fn each_model_errs_as_much_as_it_says_that_it_does() {
             for case in &cases {
                 let law = law.unwrap_or_else(|| case.johnson());
                 let drive = Drive::new(&case.drive_and_torque_nm().0).unwrap();
-                let load = LoadCase::new(&case.load(compatibility, law)).unwrap();
-                if model_error::case_of(&drive, &load, &Deviations::default()) != wanted {
+                let load = LoadParameters { ring_teeth_bend, ..case.load(compatibility, law) };
+                let checked = LoadCase::new(&load).unwrap();
+                if model_error::case_of(&drive, &checked, &Deviations::default()) != wanted {
                     continue;
                 }
-                told = model_error::measured(compatibility, &law, wanted);
-                let Errors { force, stress, wind_up, .. } = case.errors(compatibility, law);
+                told = model_error::measured(&load, wanted);
+                let Errors { force, stress, wind_up, .. } = case.errors_under(&load);
                 for (range, errors) in found.iter_mut().zip([&force[..], &stress[..], &[wind_up][..]]) {
                     for &error in errors {
                         *range = (range.0.min(error), range.1.max(error));
@@ -264,7 +284,9 @@ fn each_model_errs_as_much_as_it_says_that_it_does() {
             for (what, ErrorRange { low, high }, (least, largest)) in
                 [("force", force, found[0]), ("stress", stress, found[1]), ("wind-up", wind_up, found[2])]
             {
-                let named = format!("{compatibility:?}, {law:?}, {wanted:?}: {what} {least:+.4} to {largest:+.4}");
+                let bend = if ring_teeth_bend { " and teeth that bend" } else { "" };
+                let named =
+                    format!("{compatibility:?}, {law:?}{bend}, {wanted:?}: {what} {least:+.4} to {largest:+.4}");
                 let is_held = low <= least && largest <= high;
                 if !is_held || low < least - 0.015 || high > largest + 0.045 {
                     wrong.push(format!("{named}, told {low:+} to {high:+}"));

@@ -20,6 +20,7 @@ mod parts;
 mod profiles;
 mod properties;
 mod reference;
+mod ring_bending;
 mod springs;
 mod tolerances;
 mod true_peaks;

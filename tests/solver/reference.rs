@@ -106,6 +106,7 @@ impl Case {
                     carrier: fixed("carrier_n_per_mm"),
                 }),
             },
+            ring_teeth_bend: false,
             series_compliance_mm_per_n: per_contact(|contact| {
                 document["model"]["series_compliance_mm_per_n"][contact].as_f64().unwrap_or(0.0)
             }),

@@ -217,6 +217,11 @@ pub struct ModelDocument {
     /// What stands behind each contact and gives way too, with `virtual_work` alone.
     #[serde(default)]
     pub series_compliance_mm_per_n: CompliancesDocument,
+    /// Whether the ring's teeth bend, the more the nearer to their tips they are pressed, with `virtual_work` alone. It matters where tips are pointed or
+    /// bored, and takes a sweep some milliseconds.
+    #[serde(default)]
+    #[schema(default = false)]
+    pub ring_teeth_bend: bool,
     /// Gaps at the contacts; left out, there are none.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
@@ -350,7 +355,7 @@ encoded! {
     struct LoadDocument { input_torque_nm, output_torque_nm, allowable_stress_mpa, input_speed_rpm, duty }
     struct DutyPointDocument { input_torque_nm, output_torque_nm, input_speed_rpm, share_of_time }
     struct StressByContactDocument { wave_generator, ring, carrier }
-    struct ModelDocument { compatibility, stiffness, series_compliance_mm_per_n, clearance }
+    struct ModelDocument { compatibility, stiffness, series_compliance_mm_per_n, ring_teeth_bend, clearance }
     struct ClearanceDocument { wave_generator_um, ring_um, carrier_um }
     struct CompliancesDocument { wave_generator, ring, carrier }
     struct LinearDocument {}

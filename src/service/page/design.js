@@ -383,7 +383,10 @@ export const GROUPS = [
     pointer: '/model/series_compliance_mm_per_n',
     hint: 'Beside the contacts themselves, such as a bearing under the cam. Only virtual work takes it.',
     summary: (design) => (Object.values(at(design, '/model/series_compliance_mm_per_n') ?? {}).some((value) => value) ? 'given' : 'nothing'),
-    fields: [compliance('wave_generator', 'Compliance, wave generator'), compliance('ring', 'Compliance, ring'), compliance('carrier', 'Compliance, carrier')],
+    fields: [
+      compliance('wave_generator', 'Compliance, wave generator'), compliance('ring', 'Compliance, ring'), compliance('carrier', 'Compliance, carrier'),
+      flag('/model/ring_teeth_bend', 'The ring’s teeth bend, the more the nearer to their tips'),
+    ],
   },
   {
     title: 'Materials',

@@ -289,9 +289,9 @@ impl Contacts {
         }))
     }
 
-    /// `ξ = Σ w δ` of a tooth over `F_H`.
-    pub(crate) fn approach(&self, places: &PerContact<Place>) -> Approach {
-        let mut linear_mm_per_n = 0.0;
+    /// `ξ = Σ w δ` of a tooth over `F_H`, where the ring gives way by so much more than at its root.
+    pub(crate) fn approach(&self, places: &PerContact<Place>, ring_bending_mm_per_n: f64) -> Approach {
+        let mut linear_mm_per_n = places.ring.weight * (ring_bending_mm_per_n * places.ring.force_ratio);
         let mut power: Option<(f64, f64)> = None;
         let mut growth_mm_per_n = 0.0;
         // The contact that first reaches the width at which Johnson's law ends sets the force that logarithms count from: so all are positive.

@@ -101,6 +101,7 @@ fn drive(place: &[f64]) -> Option<Judged> {
         compatibility: Compatibility::Projection,
         law: ContactLaw::Linear,
         series_compliance_mm_per_n: PerContact::default(),
+        ring_teeth_bend: false,
         clearance_um: PerContact::default(),
         modification: Modification::default(),
         carrier: CarrierRadii::default(),
