@@ -6,7 +6,7 @@ use serde::Serialize;
 use toothwave_solver::findings::{
     self, Edge, FATIGUE_LIMIT_STRESS_MPA, SOFT_BACKING_SHARE, STEEP_FLANK_DEG, STEEP_FOR_PROJECTION_DEG, Wall,
 };
-use toothwave_solver::{Drive, Finding, SolveError, ToothShape, WaveGenerator};
+use toothwave_solver::{Drive, Finding, Parameter, SolveError, ToothShape, WaveGenerator};
 use utoipa::ToSchema;
 
 use crate::field::{contact_name, pointer};
@@ -67,6 +67,10 @@ pub enum FindingCode {
     HollowWaveGenerator,
     /// The teeth's flats end their arcs before the steepest contact.
     FlatCutsTheContact,
+    /// A ball's contact is longer than its groove is wide.
+    ContactBeyondGroove,
+    /// A groove that balls run in is not drawn.
+    GrooveNotDrawn,
     /// `projection` where the ring's flank is steep: forces come out too large.
     ProjectionOnSteepFlank,
     /// `projection` with a gap, which it does not weigh by the work done.
@@ -236,6 +240,32 @@ impl FindingAnswer {
                 "mm",
                 "the flats end a tooth's arcs before its steepest contact with the ring: there it would ride on an edge".into(),
                 "make the flats shorter",
+            ),
+            Finding::ContactBeyondGroove { contact, half_length_mm, limit_mm } => new(
+                Code::ContactBeyondGroove,
+                Warning,
+                &[&pointer(Parameter::GrooveRadius(contact)), LOAD],
+                half_length_mm,
+                limit_mm,
+                "mm",
+                format!(
+                    "the contact at the {} reaches along the axis beyond the edges of a groove half as deep as the ball's radius: it would ride on them",
+                    contact_name(contact).replace('_', " ")
+                ),
+                "make the groove's radius larger, which shortens the contact, or lower the torque",
+            ),
+            Finding::GrooveNotDrawn { contact, groove_radius_mm, ball_radius_mm } => new(
+                Code::GrooveNotDrawn,
+                Info,
+                &[&pointer(Parameter::GrooveRadius(contact))],
+                groove_radius_mm,
+                ball_radius_mm,
+                "mm",
+                format!(
+                    "the groove of the {} is not drawn: the outline is that in the middle of the width, along which the groove runs",
+                    contact_name(contact).replace('_', " ")
+                ),
+                "sweep a circle of the groove's radius along the outline in CAD, its lowest point on the outline",
             ),
             Finding::LinearLawTooStiff { linear_um, palmgren_um } => new(
                 Code::LinearLawTooStiff,

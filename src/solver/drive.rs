@@ -290,16 +290,15 @@ impl Draft {
             violations.extend(violation);
             violation.is_none()
         };
-        let mut are_in_range = |parameters: Vec<(Parameter, f64)>| {
-            parameters.into_iter().fold(true, |all, (parameter, value)| is_in_range(parameter, value) && all)
+        let mut are_in_range = |parameters: &[(Parameter, f64)]| {
+            parameters.iter().fold(true, |all, &(parameter, value)| is_in_range(parameter, value) && all)
         };
-        let wave_generator = are_in_range(p.wave_generator.parameters()).then_some(p.wave_generator);
-        let teeth = are_in_range(vec![(Parameter::ToothCount, p.teeth as f64)]).then_some(p.teeth);
-        let installed = are_in_range(vec![(Parameter::InstalledTeeth, p.installed as f64)]).then_some(p.installed);
-        let tooth_radius_mm =
-            are_in_range(vec![(Parameter::ToothRadius, p.tooth_radius_mm)]).then_some(p.tooth_radius_mm);
-        are_in_range(p.tooth.parameters());
-        let ring_teeth = are_in_range(vec![(Parameter::RingTeeth, p.ring_teeth as f64)]).then_some(p.ring_teeth);
+        let wave_generator = are_in_range(&p.wave_generator.parameters()).then_some(p.wave_generator);
+        let teeth = are_in_range(&[(Parameter::ToothCount, p.teeth as f64)]).then_some(p.teeth);
+        let installed = are_in_range(&[(Parameter::InstalledTeeth, p.installed as f64)]).then_some(p.installed);
+        let tooth_radius_mm = are_in_range(&[(Parameter::ToothRadius, p.tooth_radius_mm)]).then_some(p.tooth_radius_mm);
+        are_in_range(&p.tooth.parameters());
+        let ring_teeth = are_in_range(&[(Parameter::RingTeeth, p.ring_teeth as f64)]).then_some(p.ring_teeth);
         let mut bore_is_possible = p.tip_radius_mm.is_none_or(|bore| is_in_range(Parameter::TipRadius, bore));
 
         // A cam of which the path is given follows from the teeth; every other one is what it is without them.
@@ -525,7 +524,7 @@ impl Neighbours {
         // In the logarithm of tan φ, which reaches from 1 to some (a/b)² cot μ.
         let direction = |logarithm: f64| {
             let tan = logarithm.exp();
-            let cos = 1.0 / tan.hypot(1.0);
+            let cos = 1.0 / (1.0 + tan * tan).sqrt();
             (cos, tan * cos)
         };
         let condition = |logarithm: f64| {
@@ -536,6 +535,7 @@ impl Neighbours {
         let most = (2.0 * (beyond_one + 1.0) / flattening_squared).ln() + 1.0;
         let logarithm = bracketed("radius at which teeth touch", -1.0, condition(-1.0)?, most, condition)?;
         let (cos, sin) = direction(logarithm);
-        Ok(a * (a / (a * cos).hypot(b * sin)) * cos * (1.0 + cos) / (sin * sin))
+        let support_mm = (a * cos).hypot(b * sin);
+        Ok(a * (a / support_mm) * cos * (1.0 + cos) / (sin * sin))
     }
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::backing::{Backing, Estimate, Shares};
-use crate::cam::Cam;
+use crate::cam::Hollow;
 use crate::contact::{Contact, ContactLaw, Material, Materials, PerContact, half_width_mm};
 use crate::drive::{Drive, ToothShape};
 use crate::load_sharing::{Compatibility, LoadCase};
@@ -43,6 +43,9 @@ pub const UNCERTAIN_EFFICIENCY: f64 = 0.05;
 /// A part behind a contact that adds more than this to what a tooth gives way at its contacts is reported: the wind-up is then a sixth too small, as much
 /// as elastic bodies in a housing were found to add together (docs/validation.md).
 pub const SOFT_BACKING_SHARE: f64 = 0.2;
+
+/// A ball's groove, of whose depth the document says nothing, is taken to be this share of the ball's radius deep: a rule of thumb.
+pub const GROOVE_DEPTH_SHARE_OF_BALL: f64 = 0.5;
 
 const STEEL: Material = Material::STEEL;
 
@@ -133,6 +136,24 @@ pub enum Finding {
         flat_length_mm: f64,
         /// The longest flat that leaves the contact whole, `2r cos β`.
         limit_mm: f64,
+    },
+    /// A ball's contact, where its stress peaks, is longer than its groove is wide.
+    ContactBeyondGroove {
+        /// Where.
+        contact: Contact,
+        /// Half the contact's length along the axis.
+        half_length_mm: f64,
+        /// Half the groove's width at its edges.
+        limit_mm: f64,
+    },
+    /// A groove that balls run in is not drawn: the outline is that in the middle of the width.
+    GrooveNotDrawn {
+        /// Where.
+        contact: Contact,
+        /// `r_g`.
+        groove_radius_mm: f64,
+        /// `r`.
+        ball_radius_mm: f64,
     },
     /// The linear law where approaches matter: it is several times too stiff.
     LinearLawTooStiff {
@@ -312,11 +333,8 @@ pub fn of_drive(drive: &Drive) -> Result<Vec<Finding>, NotConverged> {
     if pressure_angle_deg > STEEP_FLANK_DEG {
         findings.push(Finding::SteepRingFlank { pressure_angle_deg });
     }
-    if let Cam::HarmonicPath(cam) = flank.locus().cam()
-        && cam.amplitude_mm() > cam.greatest_convex_amplitude_mm()
-    {
-        let limit_mm = cam.greatest_convex_amplitude_mm();
-        findings.push(Finding::HollowWaveGenerator { amplitude_mm: cam.amplitude_mm(), limit_mm });
+    if let Some(Hollow { amplitude_mm, limit_mm }) = flank.locus().cam().kind().hollow() {
+        findings.push(Finding::HollowWaveGenerator { amplitude_mm, limit_mm });
     }
     if let ToothShape::FlatSided { flat_length_mm, .. } = p.tooth {
         // The arcs that the flats leave reach as far as the contact with the ring: w/2 ≥ r sin β, that is, l ≤ 2r cos β.
@@ -388,6 +406,7 @@ pub fn of_friction(mechanism: &Mechanism, friction: &Friction, loss_ratio: f64) 
 pub(crate) fn of_ring(drive: &Drive, ring: &RingPart) -> Vec<Finding> {
     let flank = ring.space.set_back_flank();
     let mut findings = thin_wall(drive, Wall::RingRim, ring.outer_radius_mm - ring.space.root_radius_mm());
+    findings.extend(groove_not_drawn(drive, Contact::Ring));
     if ring.space.is_undercut_by_distance()
         && !drive.flank().is_undercut()
         && let Some(critical_distance_mm) = flank.critical_distance_mm()
@@ -400,7 +419,8 @@ pub(crate) fn of_ring(drive: &Drive, ring: &RingPart) -> Vec<Finding> {
 /// The findings about the wave generator as it is made; a solid cam has no wall.
 pub(crate) fn of_wave_generator(drive: &Drive, cam: &WaveGeneratorPart) -> Vec<Finding> {
     let wall_mm = |bore_mm: f64| drive.flank().locus().cam_inner_radius_mm() - cam.set_back_mm - bore_mm;
-    cam.bore_radius_mm.map_or_else(Vec::new, |bore_mm| thin_wall(drive, Wall::Cam, wall_mm(bore_mm)))
+    let thin = cam.bore_radius_mm.map_or_else(Vec::new, |bore_mm| thin_wall(drive, Wall::Cam, wall_mm(bore_mm)));
+    thin.into_iter().chain(groove_not_drawn(drive, Contact::WaveGenerator)).collect()
 }
 
 /// The findings about the carrier as it is made: whether its walls reach as far as the teeth's centres go.
@@ -439,7 +459,29 @@ pub(crate) fn of_carrier(drive: &Drive, carrier: &CarrierPart) -> Result<Vec<Fin
             is_loaded: true,
         });
     }
+    findings.extend(groove_not_drawn(drive, Contact::Carrier));
     Ok(findings)
+}
+
+/// `r_g`, where teeth are balls and this contact has a groove for them.
+const fn groove_radius_mm(drive: &Drive, contact: Contact) -> Option<f64> {
+    match &drive.parameters().tooth {
+        ToothShape::Ball { groove_radius_mm } => *groove_radius_mm.get(contact),
+        ToothShape::Cylinder { .. } | ToothShape::FlatSided { .. } => None,
+    }
+}
+
+/// The finding, where there is a groove: outlines are drawn without it.
+fn groove_not_drawn(drive: &Drive, contact: Contact) -> Option<Finding> {
+    let ball_radius_mm = drive.parameters().tooth_radius_mm;
+    let finding = |groove_radius_mm| Finding::GrooveNotDrawn { contact, groove_radius_mm, ball_radius_mm };
+    groove_radius_mm(drive, contact).map(finding)
+}
+
+/// Half the width at its edges of a groove of the radius `r_g` that is `t` deep, `√(t (2r_g - t))`, at most the ball's radius.
+fn groove_half_width_mm(groove_radius_mm: f64, ball_radius_mm: f64) -> f64 {
+    let depth_mm = GROOVE_DEPTH_SHARE_OF_BALL * ball_radius_mm;
+    (depth_mm * (2.0 * groove_radius_mm - depth_mm)).sqrt().min(ball_radius_mm)
 }
 
 /// The finding, where a wall is thinner than the share of a slot's width that a wall between slots should have too.
@@ -483,6 +525,16 @@ pub fn of_contacts(
                     contact_modulus_gpa: 1e-3 * contact_mpa,
                     steel_gpa: 1e-3 * steel_mpa,
                 });
+            }
+        }
+    }
+    for (contact, peaks) in peaks.iter() {
+        if let Some(half_length_mm) = peaks.half_length_mm
+            && let Some(groove_radius_mm) = groove_radius_mm(drive, contact)
+        {
+            let limit_mm = groove_half_width_mm(groove_radius_mm, drive.parameters().tooth_radius_mm);
+            if half_length_mm > limit_mm {
+                findings.push(Finding::ContactBeyondGroove { contact, half_length_mm, limit_mm });
             }
         }
     }

@@ -12,7 +12,7 @@ use crate::ring_bending::RingBending;
 use crate::root::NotConverged;
 use crate::springs::{Gap, Rotation, Spring, Springs, WindUp};
 use crate::tooth::line::{WIDEST_SHARE, least_length_mm};
-use crate::tooth::{Contacts, LineLaw, Pressure, ToothContact, ToothSize};
+use crate::tooth::{BallContact, Contacts, Flat, Pressure, ToothContact, ToothLaw, ToothSize};
 use crate::violation::{Parameter, Violation};
 use crate::{SolveError, tooth};
 
@@ -371,14 +371,36 @@ impl<'a> LoadedDrive<'a> {
         self.compatibility
     }
 
-    /// Whether the law is linear and no contact has a gap: where unit loads only have to be scaled.
+    /// Whether the law is linear, alike everywhere, and no contact has a gap: where unit loads only have to be scaled.
     pub(crate) fn is_linear(&self) -> bool {
-        matches!(self.line_law(), Some(LineLaw::Linear { .. })) && self.gaps.is_nil()
+        matches!(self.tooth_law(), Some(ToothLaw::Linear { .. })) && self.flat().is_none() && self.gaps.is_nil()
     }
 
-    /// The law of cylinders, for whoever works in columns; none where it is another one at each position.
-    pub(crate) fn line_law(&self) -> Option<LineLaw> {
-        self.contacts.line_law().filter(|_| self.ring_bending.is_none())
+    /// The law, for whoever works in columns; none where it is another one at each position.
+    pub(crate) fn tooth_law(&self) -> Option<ToothLaw> {
+        self.contacts.tooth_law().filter(|_| self.ring_bending.is_none())
+    }
+
+    /// A contact of balls, for whoever works in columns.
+    pub(crate) fn ball(&self, contact: Contact) -> Option<BallContact> {
+        self.contacts.ball(contact)
+    }
+
+    /// The flat of flat-sided teeth, for whoever works in columns.
+    pub(crate) fn flat(&self) -> Option<Flat> {
+        self.contacts.flat()
+    }
+
+    /// The centre of a tooth, and the curvature of each of its contacts in the plane of motion, at a position.
+    ///
+    /// # Errors
+    /// [`NotConverged`] from the path.
+    pub(crate) fn center_and_curvatures(
+        &self,
+        position: Position,
+    ) -> Result<(ToothCenter, PerContact<f64>), NotConverged> {
+        let center = self.drive.flank().locus().at(position)?;
+        Ok((center, self.curvature_per_mm(&center, &self.drive.flank().at(&center))))
     }
 
     /// The gap at each contact where it is the same for every tooth and position.

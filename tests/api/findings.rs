@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::asking::{ENDPOINTS, Service};
 use crate::codes::{codes_of, finding_codes, words};
-use crate::designs::{bored, of_the_paper, shortest, spelled_out, undercut, with};
+use crate::designs::{bored, of_the_paper, shortest, spelled_out, undercut, with, without};
 
 /// The findings of an endpoint, each well formed.
 async fn findings_at(path: &str, document: &Value) -> Vec<Value> {
@@ -442,6 +442,60 @@ async fn fingers_held_at_one_end_and_a_free_rim_are_warnings_with_their_estimate
     }
 }
 
+/// Balls of 3 mm around an eccentric circle, in grooves of this radius everywhere.
+fn grooved(groove_radius_mm: f64) -> Value {
+    let grooves = json!({ "wave_generator": groove_radius_mm, "ring": groove_radius_mm, "carrier": groove_radius_mm });
+    let teeth = json!({ "shape": "ball", "count": 16, "radius_mm": 3.0, "groove_radius_mm": grooves });
+    let cam = json!({ "kind": "eccentric", "radius_mm": 30.0, "eccentricity_mm": 1.0 });
+    json!({ "drive": { "wave_generator": cam, "teeth": teeth, "ring": { "teeth": 17 } }, "load": { "input_torque_nm": 0.3 } })
+}
+
+/// Contacts of 14 mm were answered in grooves for balls of 6 mm, without a word.
+#[tokio::test]
+async fn a_contact_that_is_longer_than_its_groove_is_wide_is_a_warning_at_each_that_is() {
+    let document = grooved(3.001);
+    let peaks = Service::new().post("/v1/sweep", &document).await.found()["peaks"].clone();
+    let half_length_mm = |contact: &str| peaks[contact]["half_length_mm"].as_f64().unwrap();
+    // The edges of a groove that is t deep: a chord of its circle.
+    let (groove_mm, depth_mm) = (3.001_f64, 1.5_f64);
+    let edge_mm = (groove_mm * groove_mm - (groove_mm - depth_mm) * (groove_mm - depth_mm)).sqrt();
+    let mut told = findings(&document).await;
+    told.retain(|finding| finding["code"] == "contact_beyond_groove");
+    // The slots hold a ball as closely, but with less force.
+    assert!(half_length_mm("carrier") < edge_mm && told.len() == 2, "{told:?}");
+    for (finding, contact) in told.iter().zip(["wave_generator", "ring"]) {
+        assert_numbers(finding, half_length_mm(contact), edge_mm, "mm");
+        let groove = format!("/drive/teeth/groove_radius_mm/{contact}");
+        assert_eq!((&finding["severity"], &finding["pointers"]), (&json!("warning"), &json!([groove, "/load"])));
+    }
+    for kept in [grooved(3.01), with(&grooved(3.001), "/load/input_torque_nm", json!(0.1))] {
+        assert!(!codes_of(&findings(&kept).await).contains(&"contact_beyond_groove".to_owned()));
+    }
+}
+
+/// Of balls' grooves drawings have the path alone: a part that is made as drawn has none.
+#[tokio::test]
+async fn each_groove_that_a_drawing_leaves_out_is_information() {
+    let document = grooved(3.1);
+    for (part, contacts) in [
+        ("ring", vec!["ring"]),
+        ("wave-generator", vec!["wave_generator"]),
+        ("carrier", vec!["carrier"]),
+        ("tooth", vec![]),
+        ("assembly", vec!["ring", "carrier", "wave_generator"]),
+    ] {
+        let mut told = findings_at(&format!("/v1/drawings/{part}"), &document).await;
+        told.retain(|finding| finding["code"] == "groove_not_drawn");
+        assert_eq!(told.len(), contacts.len(), "{part}: {told:?}");
+        for (finding, contact) in told.iter().zip(contacts) {
+            assert_numbers(finding, 3.1, 3.0, "mm");
+            let groove = format!("/drive/teeth/groove_radius_mm/{contact}");
+            assert_eq!((&finding["severity"], &finding["pointers"]), (&json!("info"), &json!([groove])));
+        }
+    }
+    assert!(findings_of_parts(&without(&document, "/drive/teeth/groove_radius_mm")).await.is_empty());
+}
+
 #[tokio::test]
 async fn every_kind_of_finding_can_be_met_over_http() {
     let bore_without_effect = with(&shortest(), "/drive/ring/tip_radius_mm", json!(60.0));
@@ -474,7 +528,8 @@ async fn every_kind_of_finding_can_be_met_over_http() {
         all.extend(findings(&document).await);
     }
     all.extend(findings(&held(json!({ "ring": { "rim": "free" } }))).await);
-    for document in [undercut(), thin_walls(), cleared(9000.0)] {
+    all.extend(findings(&grooved(3.001)).await);
+    for document in [undercut(), thin_walls(), cleared(9000.0), grooved(3.1)] {
         all.extend(findings_of_parts(&document).await);
     }
     assert_eq!(codes_of(&all), words(&finding_codes()));

@@ -16,7 +16,7 @@ use crate::designs::{self, bored, eccentric, every_number, fixed, shortest, spel
 /// The document as it is committed.
 pub(crate) const COMMITTED: &str = include_str!("../../openapi/openapi.json");
 
-fn document() -> &'static Value {
+pub(crate) fn document() -> &'static Value {
     static DOCUMENT: LazyLock<Value> =
         LazyLock::new(|| serde_json::from_str(toothwave::router::openapi_json()).unwrap());
     &DOCUMENT

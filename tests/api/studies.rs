@@ -5,6 +5,7 @@ use toothwave::config::Limits;
 
 use crate::asking::{Answer, LIMITS, Occupied, Question, Service, until};
 use crate::designs::{every_number, shortest, spelled_out, undercut, with};
+use crate::openapi::document;
 
 const WAIT: &str = "wait=600";
 
@@ -211,6 +212,36 @@ async fn what_cannot_be_is_said_at_the_field() {
     assert_eq!((at.as_str(), found.as_str()), ("/objectives/0/quantity", "unaffected"));
     begun(&service, &json!("map")).await.refused(422, "invalid_document");
     service.post_text("/v1/studies", "{").await.refused(400, "malformed_json");
+}
+
+/// A kind whose fields the search did not know was searched with nothing of it free, or refused as if something were missing.
+#[tokio::test]
+async fn of_every_kind_of_wave_generator_and_tooth_in_the_api_document_all_lengths_are_free_in_a_search() {
+    let service = Service::new();
+    let schemas = &document()["components"]["schemas"];
+    // Not free are the counts, and grooves, which a ball need not have.
+    let apart = ["kind", "shape", "lobes", "count", "installed", "groove_radius_mm"];
+    for (union, place) in [("WaveGenerator", "/drive/wave_generator"), ("Teeth", "/drive/teeth")] {
+        let discriminator = &schemas[union]["discriminator"];
+        let tag = discriminator["propertyName"].as_str().unwrap();
+        for (word, reference) in discriminator["mapping"].as_object().unwrap() {
+            let name = reference.as_str().unwrap().rsplit('/').next().unwrap();
+            let fields = schemas[name]["properties"].as_object().unwrap().keys();
+            let lengths = fields.filter(|field| !apart.contains(&field.as_str()));
+            let base = with(&json!({ "drive": {}, "load": { "output_torque_nm": 20.0 } }), place, json!({ tag: word }));
+            let found = waited_for(&service, &json!({
+                "study": "search", "evaluations": 200, "base": base,
+                "require": { "transmission_ratio": { "min": 19.5, "max": 20.5 }, "outer_diameter_mm": { "max": 120.0 } },
+                "objectives": [{ "quantity": "outer_diameter_mm", "goal": "min" }]
+            }))
+            .await;
+            let free = found["result"]["free"].as_array().unwrap();
+            for field in lengths {
+                let pointer = json!(format!("{place}/{field}"));
+                assert!(free.iter().any(|free| free["pointer"] == pointer), "{word}: {pointer} is not free: {free:?}");
+            }
+        }
+    }
 }
 
 #[tokio::test]

@@ -298,3 +298,129 @@ test('a document with kinds spelled out opens as it is, in the form and in a lin
   page = await bed.open({ address });
   assert.deepEqual((await answered(page)).design, design);
 });
+
+/** Values that a design may have, by pointer, each with the schema that it has; a list is one value. */
+function* valuesOf(schemas, schema, pointer = '') {
+  if (schema.$ref) yield* valuesOf(schemas, schemas[schema.$ref.split('/').at(-1)], pointer);
+  else if (schema.oneOf ?? schema.allOf) for (const option of schema.oneOf ?? schema.allOf) yield* valuesOf(schemas, option, pointer);
+  else if (schema.properties) for (const [name, inner] of Object.entries(schema.properties)) yield* valuesOf(schemas, inner, `${pointer}/${name}`);
+  else if (schema.type !== 'null') yield { pointer, schema };
+}
+
+// What has no field on the page, and why; it stands in the JSON.
+const NOT_IN_THE_FORM = {
+  '/accuracy/requested_error': 'chosen where accuracy is measured',
+  '/assembly/input_angle_deg': 'turned in the picture',
+  ...Object.fromEntries(['wave_generator', 'ring', 'carrier'].map((contact) => [`/load/allowable_stress_mpa/${contact}`, 'one for all has a field'])),
+  ...Object.fromEntries(
+    ['tooth_radius_um', 'slot_angle_arcsec', 'slot_wall_um', 'ring_space_um', 'ring_space_angle_arcsec', 'wave_generator_lobe_um'].map((list) => [`/deviations/${list}`, 'a list, measured and not typed']),
+  ),
+};
+
+test('whatever a design may say has a field, or a reason why it has none, and there is no field of which the service knows nothing', async () => {
+  const page = await bed.open();
+  const { schemas } = (await (await fetch(`${bed.server.origin}/openapi.json`)).json()).components;
+  const known = new Set([...valuesOf(schemas, schemas.Design)].map(({ pointer }) => pointer));
+  const shown = await page.evaluate(async () => {
+    const { GROUPS, fieldsOf } = await import('/page/design.js');
+    return GROUPS.flatMap(fieldsOf).map(({ pointer, tag, kind, starts }) => ({ pointer: tag ? `${pointer}/${tag}` : pointer, isValue: kind !== 'oneOf' && starts === undefined && !pointer.startsWith('/ratio') }));
+  });
+  const fields = new Set(shown.filter(({ isValue }) => isValue).map(({ pointer }) => pointer));
+  assert.deepEqual([...known].filter((pointer) => !fields.has(pointer) && !(pointer in NOT_IN_THE_FORM)), []);
+  assert.deepEqual([...fields].filter((pointer) => !known.has(pointer)), []);
+  assert.deepEqual(Object.keys(NOT_IN_THE_FORM).filter((pointer) => !known.has(pointer) || fields.has(pointer)), []);
+});
+
+test('every kind that the service has can be chosen, and has the fields that it has there', async () => {
+  const page = await bed.open();
+  const { schemas } = (await (await fetch(`${bed.server.origin}/openapi.json`)).json()).components;
+  const variants = await page.evaluate(async () => {
+    const { GROUPS, fieldsOf } = await import('/page/design.js');
+    const options = ({ options, pointer }) => Object.fromEntries(options.filter(({ value }) => value !== 'none').map(({ value, fields }) => [value, fields.map((field) => field.pointer).filter((inner) => inner.startsWith(`${pointer}/`))]));
+    return Object.fromEntries(GROUPS.flatMap(fieldsOf).filter(({ kind }) => kind === 'variant').map((field) => [field.pointer, options(field)]));
+  });
+  for (const [union, place, common] of [
+    ['WaveGenerator', WAVE_GENERATOR, []],
+    ['Teeth', TEETH, ['count', 'installed', 'radius_mm']],
+    ['Stiffness', LAW, []],
+    ['WaveGeneratorFriction', '/friction/wave_generator', []],
+  ]) {
+    const { mapping, propertyName } = schemas[union].discriminator;
+    assert.deepEqual(Object.keys(variants[place]).toSorted(), Object.keys(mapping).toSorted());
+    for (const [word, reference] of Object.entries(mapping)) {
+      const own = [...valuesOf(schemas, { $ref: reference }, place)].map(({ pointer }) => pointer);
+      // On a race that does not rub nothing depends on its coefficient.
+      const unshown = word === 'rolling' ? ['coefficient'] : [];
+      const expected = own.filter((pointer) => ![propertyName, ...common, ...unshown].includes(pointer.slice(place.length + 1)));
+      assert.deepEqual(variants[place][word].toSorted(), expected.toSorted(), `${union} ${word}`);
+    }
+  }
+});
+
+test('modification is typed in the form: each number moves the answer, and virtual work, which it wants, is chosen with it', async () => {
+  const page = await bed.open();
+  await page.evaluate(() => document.querySelectorAll('#form details').forEach((group) => (group.open = true)));
+  await enter(page, '/model/clearance/ring_um', 20);
+  // A turned part is lost motion alone: the wind-up has it, no force.
+  await page.check(field('/sweep/wind_up'));
+  await enter(page, '/modification/ring_equidistant_um', 4);
+  let found = await answered(page);
+  assert.deepEqual(found.design.model, { compatibility: 'virtual_work', stiffness: { law: 'linear' }, clearance: { ring_um: 20 } }, 'the law stays');
+  for (const name of ['ring_path_shift_um', 'ring_profile_shift_um', 'ring_rotation_arcsec', 'wave_generator_equidistant_um', 'slot_wall_um', 'carrier_rotation_arcsec', 'tooth_radius_um']) {
+    const before = found.sweep;
+    await enter(page, `/modification/${name}`, 2);
+    found = await answered(page);
+    assert.equal(found.design.modification[name], 2);
+    assert.notDeepEqual(found.sweep, before, name);
+  }
+  await page.check(field('/modification/ring_tip_relief'));
+  await settled(page);
+  const relieved = await answered(page);
+  assert.deepEqual(relieved.design.modification.ring_tip_relief, { amount_um: 5, start_deg: 60, power: 2 });
+  // With these gaps no tooth carries beyond 60°.
+  await enter(page, '/modification/ring_tip_relief/start_deg', 20);
+  assert.notDeepEqual((await answered(page)).sweep.states.force_ring_n, found.sweep.states.force_ring_n);
+  await page.uncheck(field('/modification/ring_tip_relief'));
+  await settled(page);
+  assert.ok(await page.isHidden(field('/modification/ring_tip_relief/power')));
+  assert.deepEqual((await designOf(page)).modification, found.design.modification);
+  // A tooth that is too full is told in the service's words.
+  await enter(page, '/modification/tooth_radius_um', -400);
+  assert.match(await page.textContent('#impossible'), /too full|less than nothing|run into/i);
+});
+
+test('parts off the axis are typed in the form, and lists in the JSON are told', async () => {
+  const page = await bed.open();
+  await page.evaluate(() => document.querySelectorAll('#form details').forEach((group) => (group.open = true)));
+  await enter(page, '/model/clearance/ring_um', 20);
+  await enter(page, '/deviations/ring_runout/amount_um', 3);
+  await enter(page, '/deviations/ring_runout/angle_deg', 40);
+  const found = await answered(page);
+  assert.deepEqual(found.design.deviations, { ring_runout: { amount_um: 3, angle_deg: 40 } });
+  assert.ok(found.sweep.sweep_period_deg > found.sweep.period_deg);
+  await setDocument(page, { ...found.design, deviations: { wave_generator_lobe_um: [0, 2] } });
+  assert.match(await page.locator('#form summary', { hasText: 'Parts off the axis' }).textContent(), /1 list in the JSON/);
+});
+
+test('where parts are made otherwise than nominal, the picture says that it is not of these, and leads to the drawings, which are', async () => {
+  const page = await bed.open();
+  const told = page.locator('#legend .nominal');
+  assert.ok(await told.isHidden());
+  await choose(page, 'balls');
+  assert.ok(await told.isHidden());
+  const { drive, load } = await designOf(page);
+  const made = { drive, load, model: { clearance: { ring_um: 20 } }, modification: { ring_equidistant_um: 10 } };
+  await setDocument(page, made);
+  assert.equal(await told.textContent(), 'The picture is the nominal drive. The modification, of micrometres, is in the drawings, true to size.');
+  // As it says: the picture's outline is the unmodified one's, the drawing's is not.
+  const ring = async (design) => (await bed.server.ask('/v1/drawings/ring', design)).bodies[0].holes[0];
+  const outline = await page.getAttribute('#whole .part-ring', 'd');
+  assert.notDeepEqual(await ring(made), await ring({ ...made, modification: {} }));
+  await setDocument(page, { ...made, modification: {} });
+  assert.equal(await page.getAttribute('#whole .part-ring', 'd'), outline);
+  assert.ok(await told.isHidden());
+  await setDocument(page, { ...made, parts: { ring: { clearance_um: 10 } }, deviations: { ring_runout: { amount_um: 2 } } });
+  assert.equal(await told.textContent(), 'The picture is the nominal drive. The modification and clearances, of micrometres, are in the drawings, true to size. The deviations are in the numbers alone.');
+  await told.locator('button').click();
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'drawings-title');
+});

@@ -1064,7 +1064,7 @@ test('the theme is chosen and remembered', async () => {
 });
 
 /** Findings about parts as drawn come with the drawings, not with the sweep that the page reports. */
-const OF_DRAWINGS = ['tooth_leaves_slot', 'thin_wall_as_made', 'clearance_undercuts_ring'];
+const OF_DRAWINGS = ['groove_not_drawn', 'tooth_leaves_slot', 'thin_wall_as_made', 'clearance_undercuts_ring'];
 
 /** Designs with much to report, which together have every finding of a sweep. */
 const NO_STEEL = { wave_generator: { youngs_modulus_gpa: 70 }, ring: { youngs_modulus_gpa: 120 }, carrier: { youngs_modulus_gpa: 110 } };
@@ -1106,6 +1106,15 @@ const OTHER_REPORTS = {
     load: { input_torque_nm: 20 },
   },
   flat_cuts_the_contact: { drive: { ...CASE_5_1, teeth: { ...CASE_5_1.teeth, shape: 'flat_sided', flat_length_mm: 9.7 } }, load: { input_torque_nm: 20 }, model: VIRTUAL_WORK },
+  // In grooves that hold them as closely as this the contacts are nearly as long as the balls are wide.
+  contact_beyond_groove: {
+    drive: {
+      wave_generator: { kind: 'eccentric', radius_mm: 30, eccentricity_mm: 1 },
+      teeth: { shape: 'ball', count: 16, radius_mm: 3, groove_radius_mm: { wave_generator: 3.0001, ring: 3.0001, carrier: 3.0001 } },
+      ring: { teeth: 17 },
+    },
+    load: { input_torque_nm: 3 },
+  },
   projection_on_steep_flank: {
     drive: { wave_generator: { semi_major_mm: 50.7, semi_minor_mm: 49.3 }, teeth: { count: 80, installed: 40, radius_mm: 1.5, width_mm: 15 }, ring: { teeth: 78 } },
     load: { input_torque_nm: 3 },

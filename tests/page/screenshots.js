@@ -1,4 +1,5 @@
 // The pictures in docs/screenshots: both of the paper's cases in light, dark and narrow, case 5.1 made to undercut, a search and a map.
+// Of all of them, or of those that are named: tests/page/run screenshots [NAME...]
 
 import { mkdir } from 'node:fs/promises';
 import { Server, choose, enter, launch, notes, open, settled } from './harness.js';
@@ -6,6 +7,9 @@ import { Server, choose, enter, launch, notes, open, settled } from './harness.j
 const FOLDER = new URL('../../docs/screenshots/', import.meta.url).pathname;
 const WIDE = { viewport: { width: 1366, height: 1120 } };
 const NARROW = { viewport: { width: 400, height: 1500 } };
+
+/** A study may take minutes on a machine that has much else to do. */
+const PATIENCE = { timeout: 900_000 };
 
 await mkdir(FOLDER, { recursive: true });
 const server = await Server.start();
@@ -18,7 +22,10 @@ async function showPeak(page) {
   await settled(page);
 }
 
+const wanted = process.argv.slice(2);
+
 async function take(name, options, prepare) {
+  if (wanted.length > 0 && !wanted.includes(name)) return;
   const page = await open(browser, server, options);
   await prepare(page);
   await page.screenshot({ path: `${FOLDER}${name}.png` });
@@ -51,13 +58,14 @@ await take('find-a-drive', { viewport: { width: 1366, height: 1000 } }, async (p
   await page.click('#views [data-view="find"]');
   await page.selectOption('#field-find-effort', 'quick');
   await page.click('.find button[type=submit]');
-  await page.waitForFunction(() => document.querySelector('#find .study-progress').hidden && document.querySelector('#find .headline')?.textContent);
+  await page.waitForFunction(() => document.querySelector('#find .study-progress').hidden && document.querySelector('#find .headline')?.textContent, undefined, PATIENCE);
   await page.locator('#find .drives-scroll tbody button').nth(3).click();
-  await page.waitForFunction(() => document.querySelector('#find .drive-card svg'));
+  // Pictures are drawn when they are seen, and the click has scrolled to its row.
   await page.evaluate(() => {
     document.activeElement.blur();
     scrollTo(0, 0);
   });
+  await page.waitForFunction(() => document.querySelector('#find .drive-card svg'));
 });
 
 await take('explore', { viewport: { width: 1366, height: 1000 }, colorScheme: 'dark' }, async (page) => {
@@ -67,7 +75,7 @@ await take('explore', { viewport: { width: 1366, height: 1000 }, colorScheme: 'd
   await rows.nth(2).locator('select').selectOption('/drive/wave_generator/semi_major_mm');
   await rows.nth(0).locator('select').nth(1).selectOption('fine');
   await page.click('#explore button:has-text("Look")');
-  await page.waitForFunction(() => document.querySelector('#explore .study-progress').hidden && document.querySelector('#explore .heat'));
+  await page.waitForFunction(() => document.querySelector('#explore .study-progress').hidden && document.querySelector('#explore .heat'), undefined, PATIENCE);
 });
 
 await browser.close();

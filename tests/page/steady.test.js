@@ -110,10 +110,12 @@ test('at four sizes no key figure’s name and no empty field’s word is cut', 
   const design = await bed.server.example('paper-5.1');
   design.model = { compatibility: 'virtual_work', stiffness: { law: 'johnson' } };
   design.friction = { wave_generator: { kind: 'plain', coefficient: 0.05 }, ring: { coefficient: 0.05 }, carrier: { coefficient: 0.05 } };
+  // A natural tip radius that takes three digits and a point.
+  const roller = { ...(await bed.server.example('eccentric-roller')), friction: design.friction };
   const page = await bed.open();
-  await setDocument(page, design);
-  for (const [width, height] of [[320, 640], [768, 1024], [1366, 900], [1920, 1080]]) {
+  for (const [shown, width, height] of [design, roller].flatMap((shown) => [[shown, 320, 640], [shown, 768, 1024], [shown, 1366, 900], [shown, 1920, 1080]])) {
     await page.setViewportSize({ width, height });
+    if (width === 320) await setDocument(page, shown);
     const cut = await page.evaluate(() => {
       for (const details of document.querySelectorAll('#form details')) details.open = true;
       const pen = document.createElement('canvas').getContext('2d');

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 import { readFile } from 'node:fs/promises';
 import { after, afterEach, before, test } from 'node:test';
-import { designOf, enter, field, notes, settled, testBed } from './harness.js';
+import { choose, designOf, enter, field, notes, settled, testBed } from './harness.js';
 
 const AXE = createRequire(import.meta.url).resolve('axe-core/axe.min.js');
 const RADIUS = '/drive/teeth/radius_mm';
@@ -268,6 +268,18 @@ test('the smallest drive for what the page begins with is one to build: no findi
   }
 });
 
+test('what is known of a drive fills the room beside its picture, and follows it on a narrow screen', async () => {
+  const page = await bed.open();
+  await find(page);
+  const box = (selector) => page.locator(`#find ${selector}`).boundingBox();
+  const [chart, figures, card] = await Promise.all(['.drive-chart', '.drive-figures', '.drive-card'].map(box));
+  assert.ok(figures.y - (chart.y + chart.height) < 20 && figures.x + figures.width <= card.x, JSON.stringify({ chart, figures, card }));
+  assert.match(await page.textContent('#find .drive-figures h3'), /^Drive 1 in figures$/);
+  await page.setViewportSize({ width: 768, height: 1024 });
+  const [narrow, below] = await Promise.all(['.drive-card', '.drive-figures'].map(box));
+  assert.ok(below.y >= narrow.y + narrow.height);
+});
+
 test('the reasons why others fell are counted', async () => {
   const page = await bed.open();
   await find(page);
@@ -384,6 +396,19 @@ test('tolerances tell spread, yield and what matters most', async () => {
   await page.waitForFunction(() => /of the drives are good/.test(document.querySelector('#tolerance .headline').textContent));
   const good = numberIn(await page.textContent('#tolerance .headline'));
   assert.ok(good > 40 && good < 60, `${good} % lie below the middle`);
+});
+
+test('drives that differ by a thousandth are told apart, however small the quantity is', async () => {
+  const page = await bed.open();
+  await choose(page, 'harmonic-three-lobes');
+  await show(page, 'tolerance');
+  await onlyDeviates(page, 'Width of all teeth');
+  await page.locator('#tolerance .ask-row').first().locator('select').first().selectOption('transmission_error_peak_to_peak_deg');
+  await page.waitForFunction(() => /Transmission error.*Width of all teeth/s.test(document.querySelector('#tolerance .tolerance-tables').textContent));
+  const shares = page.locator('#tolerance .tolerance-tables table').first().locator('tbody tr', { hasText: /^[\d.]+.%/ });
+  const values = await shares.locator('td:first-of-type').allTextContents();
+  assert.ok(values.length > 5 && values.every((text) => /·10⁻/.test(text)), values.join(', '));
+  assert.equal(new Set(values).size, values.length, values.join(', '));
 });
 
 test('deviations of single parts want virtual work and gaps, and say so', async () => {

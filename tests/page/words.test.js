@@ -76,6 +76,16 @@ test('a comparison shows the inputs that differ', async () => {
   assert.equal(await page.textContent('#inputs'), '');
 });
 
+test('on a small screen a comparison keeps its labels legible, and scrolls in its own box', async () => {
+  const page = await bed.open({ viewport: { width: 768, height: 1024 } });
+  await page.click('#keep');
+  await enter(page, '/load/input_torque_nm', 3);
+  const lines = await page.$$eval('#table.comparing tbody tr:not([hidden]) th[scope=row]', (labels) => labels.map((label) => ({ text: label.textContent, lines: label.clientHeight / parseFloat(getComputedStyle(label).lineHeight) })));
+  assert.ok(lines.length > 20);
+  assert.deepEqual(lines.filter((label) => label.lines > 3.5), []);
+  assert.equal(await page.evaluate(() => document.documentElement.scrollWidth), 768);
+});
+
 test('j is the wave generator’s angle alone', async () => {
   const page = await bed.open();
   await choose(page, 'paper-5.1');

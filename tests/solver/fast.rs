@@ -9,7 +9,7 @@ use toothwave_solver::{
     ToothShape, WaveGenerator,
 };
 
-use crate::drives::{PAPER_5_1, any_swept_drive, drive, ellipse, everywhere, load, swept};
+use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, ellipse, everywhere, load, swept};
 
 /// How far two ways to the same number may be apart, over what its terms came to.
 const ROUNDING: f64 = 1e-12;
@@ -235,8 +235,22 @@ fn assert_both_paths_agree(parameters: &DriveParameters, load: &LoadParameters, 
             assert_eq!(fast.states.position_deg[at], peak.position_deg);
         }
         if peaks.stress_mpa.position_deg == expected.stress_mpa.position_deg {
-            let off = (peaks.half_width_mm / expected.half_width_mm - 1.0).abs();
-            assert!(off <= ROUNDING * amplified, "{contact:?}: half-width of {parameters:?}");
+            let assert_near = |what: &str, found: f64, expected: f64| {
+                let off = (found / expected - 1.0).abs();
+                assert!(off <= ROUNDING * amplified, "{contact:?}: {what} of {parameters:?}");
+            };
+            assert_near("half-width", peaks.half_width_mm, expected.half_width_mm);
+            assert_eq!(peaks.half_length_mm.is_some(), expected.half_length_mm.is_some());
+            if let Some((found, expected)) = peaks.half_length_mm.zip(expected.half_length_mm) {
+                assert_near("half-length", found, expected);
+            }
+            assert_eq!(peaks.shear.is_some(), expected.shear.is_some());
+            if let Some((found, expected)) = peaks.shear.zip(expected.shear) {
+                assert_near("shear", found.stress_mpa, expected.stress_mpa);
+                // The depth of a largest value is known to half the digits.
+                let off = (found.depth_mm / expected.depth_mm - 1.0).abs();
+                assert!(off <= 1e-7 * amplified.max(1.0), "{contact:?}: depth of shear of {parameters:?}");
+            }
         }
     }
     for sweep in [fast, plain] {
@@ -380,6 +394,129 @@ proptest! {
             ..load(10.0_f64.powf(torque_exponent), compatibility)
         };
         assert_both_paths_agree(&parameters, &load, samples);
+    }
+}
+
+/// Of balls in grooves of any closeness or none, and of flats of any length that the drive's teeth can have; the shape by itself where they can have none.
+pub(crate) fn any_other_teeth() -> impl Strategy<Value = OtherTeeth> {
+    let wider = || prop::option::of((-3.0_f64..1.0).prop_map(|exponent| 1.0 + 10.0_f64.powf(exponent)));
+    prop_oneof![
+        (wider(), wider(), wider()).prop_map(|(wave_generator, ring, carrier)| OtherTeeth::Balls(PerContact {
+            wave_generator,
+            ring,
+            carrier
+        })),
+        (0.05_f64..0.99).prop_map(OtherTeeth::Flats),
+    ]
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum OtherTeeth {
+    /// Of grooves the radius over the ball's.
+    Balls(PerContact<Option<f64>>),
+    /// Length of the flat over the longest that the ring's contacts leave.
+    Flats(f64),
+}
+
+impl OtherTeeth {
+    pub(crate) fn of(self, parameters: &DriveParameters) -> DriveParameters {
+        let r = parameters.tooth_radius_mm;
+        let tooth = match self {
+            Self::Balls(wider) => ToothShape::Ball {
+                groove_radius_mm: PerContact::of(|contact| wider.get(contact).map(|wider| wider * r)),
+            },
+            Self::Flats(share) => {
+                let steepest = drive(parameters).largest_pressure_angle_deg().unwrap().to_radians();
+                ToothShape::FlatSided { width_mm: 10.0, flat_length_mm: share * 2.0 * r * steepest.cos() }
+            }
+        };
+        let shaped = DriveParameters { tooth, ..*parameters };
+        if Drive::new(&shaped).is_ok() { shaped } else { *parameters }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn the_fast_path_agrees_with_the_plain_one_for_balls_and_flat_sided_teeth(
+        parameters in prop_oneof![any_swept_drive(), any_elliptic_drive(), any_drive_of_other_kinds()],
+        teeth in any_other_teeth(),
+        law in any_law(),
+        torque_exponent in -3.0_f64..2.0,
+        gaps in prop::option::of(prop::array::uniform3(prop_oneof![Just(0.0), (-4.0_f64..2.0).prop_map(|exponent| 10.0_f64.powf(exponent))])),
+        allowable_stress_mpa in prop::option::of(prop::array::uniform3((1.0_f64..5.0).prop_map(|exponent| 10.0_f64.powf(exponent)))),
+        samples in any_samples(),
+    ) {
+        let parameters = teeth.of(&parameters);
+        let [wave_generator, ring, carrier] = gaps.unwrap_or_default();
+        let is_ball = matches!(parameters.tooth, ToothShape::Ball { .. });
+        let load = LoadParameters {
+            law: if is_ball { ContactLaw::Hertz } else { law },
+            clearance_um: PerContact { wave_generator, ring, carrier },
+            allowable_stress_mpa: allowable_stress_mpa.map(|[wave_generator, ring, carrier]| PerContact { wave_generator, ring, carrier }),
+            ..load(10.0_f64.powf(torque_exponent), Compatibility::VirtualWork)
+        };
+        assert_both_paths_agree(&parameters, &load, samples);
+    }
+}
+
+#[test]
+fn balls_take_the_fast_path_on_undercut_flanks_too_and_on_any_wave_generator() {
+    let ball = ToothShape::Ball { groove_radius_mm: PerContact::default() };
+    let on = |wave_generator: WaveGenerator| DriveParameters {
+        wave_generator,
+        ring_teeth: 28 - wave_generator.lobes(),
+        ..PAPER_5_1
+    };
+    let load = LoadParameters { law: ContactLaw::Hertz, ..load(3.0, Compatibility::VirtualWork) };
+    let case = LoadCase::new(&load).unwrap();
+    for parameters in [
+        PAPER_5_2,
+        // A thousandth beyond the threshold of undercut.
+        DriveParameters { tooth_radius_mm: 6.756, ..PAPER_5_1 },
+        on(WaveGenerator::Eccentric { radius_mm: 57.0, eccentricity_mm: 1.0 }),
+        on(WaveGenerator::Harmonic { lobes: 7, mean_radius_mm: 57.0, amplitude_mm: 0.3 }),
+        on(WaveGenerator::HarmonicPath { lobes: 2, mean_path_radius_mm: 62.0, amplitude_mm: 1.0 }),
+    ] {
+        let parameters = DriveParameters { tooth: ball, ..parameters };
+        assert_both_paths_agree(&parameters, &load, 50);
+        let plain = sweep_plain(&drive(&parameters), &case, Points::samples(50).unwrap(), &Never).unwrap();
+        assert_ne!(swept(&parameters, &load, 50).states.stress_mpa, plain.states.stress_mpa, "{parameters:?}");
+    }
+}
+
+#[test]
+fn balls_and_flat_sided_teeth_take_the_fast_path() {
+    let groove_radius_mm = PerContact { wave_generator: Some(5.3), ring: Some(5.2), carrier: None };
+    let ball = ToothShape::Ball { groove_radius_mm };
+    let flat = |flat_length_mm| ToothShape::FlatSided { width_mm: 15.0, flat_length_mm };
+    let fixed = ContactLaw::Fixed(everywhere(4e5));
+    for (tooth, law) in [
+        (ball, ContactLaw::Hertz),
+        (flat(4.0), ContactLaw::Linear),
+        (flat(4.0), JOHNSON),
+        (flat(4.0), fixed),
+        // The carrier ends before the flat does.
+        (flat(5.5), JOHNSON),
+    ] {
+        let parameters = DriveParameters { tooth, ..PAPER_5_1 };
+        for gap_um in [0.0, 1.0] {
+            for allowable_stress_mpa in [None, Some(everywhere(900.0))] {
+                let clearance_um = everywhere(gap_um);
+                let load = LoadParameters {
+                    law,
+                    clearance_um,
+                    allowable_stress_mpa,
+                    ..load(20.0, Compatibility::VirtualWork)
+                };
+                assert_both_paths_agree(&parameters, &load, 50);
+                let case = LoadCase::new(&load).unwrap();
+                let plain = sweep_plain(&drive(&parameters), &case, Points::samples(50).unwrap(), &Never).unwrap();
+                let fast = swept(&parameters, &load, 50);
+                assert_ne!(fast.states.stress_mpa, plain.states.stress_mpa, "{tooth:?} {law:?} {gap_um}");
+            }
+        }
     }
 }
 

@@ -16,7 +16,8 @@ const whole = (pointer, label, symbol, more) => ({ kind: 'number', whole: true, 
 const choice = (pointer, label, options, more) => ({ kind: 'choice', pointer, label, options, ...more });
 /** A choice that need not be made: left out, the document says nothing. */
 const unlessSaid = (pointer, label, options) => choice(pointer, label, [{ value: '', label: 'not said' }, ...options]);
-const flag = (pointer, label) => ({ kind: 'flag', pointer, label });
+/** What a document says with `true`, or, where it `starts` with an object, by having that object. */
+const flag = (pointer, label, more) => ({ kind: 'flag', pointer, label, ...more });
 const variant = (pointer, tag, label, options, more) => ({ kind: 'variant', pointer, tag, label, options, ...more });
 
 /** A gap at a contact; without any, the document has no clearance at all. */
@@ -144,6 +145,34 @@ function withFriction(design) {
 /** A duty has speeds of its own, and is swept at equal intervals. */
 const withDuty = (design) =>
   at(design, '/load/duty') === undefined ? design : changed(changed(design, '/load/input_speed_rpm', undefined), '/sweep/tolerance', undefined);
+
+/** Parts otherwise than nominal go with virtual work alone; the law that was meant stays. */
+function withVirtualWork(design) {
+  if (compatibilityOf(design) !== 'projection') return design;
+  return changed(changed(design, '/model/stiffness/law', lawOf(design)), '/model/compatibility', 'virtual_work');
+}
+
+const modified = (key, label, more) => number(`/modification/${key}`, label, '', 'µm', { optional: () => '0', step: 1, adjust: withVirtualWork, ...more });
+const turned = (part, label) => modified(`${part}_rotation_arcsec`, label, { unit: '″' });
+
+const RELIEF = '/modification/ring_tip_relief';
+const hasRelief = (design) => at(design, RELIEF) !== undefined;
+/** It begins within the mesh, whatever the number of lobes. */
+const reliefOf = (_, { geometry }) => ({ amount_um: 5, start_deg: Math.floor((2 / 3) * (geometry?.engagement.start_deg ?? 90)), power: 2 });
+
+/** A part off the axis. */
+const runout = (part, label) => [
+  number(`/deviations/${part}_runout/amount_um`, label, '', 'µm', { optional: () => '0', step: 1, adjust: withVirtualWork }),
+  number(`/deviations/${part}_runout/angle_deg`, 'in the direction', '', 'deg', { of: label, optional: () => '0', step: 5, adjust: withVirtualWork }),
+];
+
+const isGiven = (value) => (typeof value === 'object' && value !== null ? Object.values(value).some(isGiven) : Boolean(value));
+
+/** What makes the parts of a design other than the nominal ones: `{ drawn, undrawn }`, as a drawing has it or none. */
+export const madeOtherwise = ({ modification, parts, deviations }) => ({
+  drawn: [isGiven(modification) && 'modification', Object.values(parts ?? {}).some((part) => isGiven(part?.clearance_um)) && 'clearances'].filter(Boolean),
+  undrawn: isGiven(deviations),
+});
 
 const RUBBING = number('/friction/wave_generator/coefficient', 'Friction, teeth on the cam', 'μ_H', '', { slider: WIDE, likely: 0.05, start: USUAL_FRICTION.coefficient, step: 0.005 });
 const BEARING = [
@@ -389,6 +418,37 @@ export const GROUPS = [
     ],
   },
   {
+    title: 'Modification',
+    pointer: '/modification',
+    hint: 'On purpose, and of all teeth alike: what is above 0 opens a gap, what is below 0 has to find one in the model’s gaps. Only virtual work takes it.',
+    summary: (design) => (isGiven(at(design, '/modification')) ? 'given' : 'none'),
+    fields: [
+      modified('ring_equidistant_um', 'Ring set back'),
+      modified('ring_path_shift_um', 'Ring’s path outward'),
+      modified('ring_profile_shift_um', 'Ring’s profile outward'),
+      turned('ring', 'Ring’s flanks turned away'),
+      flag(RELIEF, 'Tip relief of the ring', { starts: reliefOf, adjust: withVirtualWork }),
+      number(`${RELIEF}/amount_um`, 'Relief at the tip', 'C', 'µm', { of: 'Tip relief', when: hasRelief, likely: 5, step: 1 }),
+      number(`${RELIEF}/start_deg`, 'from the position', 'ψ_t', 'deg', { of: 'Tip relief', when: hasRelief, likely: 60, step: 1 }),
+      number(`${RELIEF}/power`, 'to the power', 'n', '', { of: 'Tip relief', when: hasRelief, likely: 2, step: 0.5 }),
+      modified('wave_generator_equidistant_um', 'Wave generator set back'),
+      modified('slot_wall_um', 'Slot walls set back'),
+      turned('carrier', 'Carrier turned away'),
+      modified('tooth_radius_um', 'Teeth thinner in radius'),
+    ],
+  },
+  {
+    title: 'Parts off the axis',
+    pointer: '/deviations',
+    hint: 'Directions are fixed in the part, from a lobe, a tooth space, a slot. What single teeth, slots, spaces and lobes were measured to deviate by are lists, which stand in the JSON.',
+    summary: (design) => {
+      const lists = Object.values(at(design, '/deviations') ?? {}).filter((value) => Array.isArray(value) && value.length > 0).length;
+      const own = isGiven(at(design, '/deviations')) ? 'given' : 'none';
+      return lists > 0 ? `${lists} list${lists > 1 ? 's' : ''} in the JSON` : own;
+    },
+    fields: [...runout('wave_generator', 'Runout of the wave generator'), ...runout('ring', 'Runout of the ring'), ...runout('carrier', 'Runout of the carrier')],
+  },
+  {
     title: 'Materials',
     pointer: '/materials',
     summary: (design) => {
@@ -485,6 +545,9 @@ export function fieldsOf(group) {
   for (const part of group.parts ?? [group]) part.fields.forEach(add);
   return [...found.values()];
 }
+
+/** Whether a document says what a flag stands for. */
+export const isOn = ({ pointer, starts }, design) => (starts ? typeof at(design, pointer) === 'object' && at(design, pointer) !== null : at(design, pointer) === true);
 
 /** The kind of a variant that a document has: the implied or first one where it has no tag, undefined where it has another. */
 export function kindOf({ pointer, tag, options, otherwise }, design) {

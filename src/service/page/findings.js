@@ -62,6 +62,18 @@ const KINDS = {
     basis: ['exact', 'The limit is geometry, without the width of the contact itself.'],
     why: 'Beyond that place a tooth would touch the ring with the edge of its flat.',
   },
+  contact_beyond_groove: {
+    title: 'Contact longer than its groove',
+    tests: 'Half the length of a ball’s contact, where its stress peaks, against half the width at its edges of a groove half as deep as the ball’s radius.',
+    basis: RULE_OF_THUMB,
+    why: 'On an edge the stress is many times that of the ellipse, which then is not there. The document does not say how deep a groove is: of a shallower one the limit is less.',
+  },
+  groove_not_drawn: {
+    title: 'Groove not drawn',
+    tests: 'Whether a part has a groove for balls.',
+    basis: ['exact', 'Drawings have the outline in the middle of the width alone, which is the bottom of the groove.'],
+    why: 'A part that is made as it is drawn has a straight wall there, on which the stress is larger than calculated.',
+  },
   johnson_beyond_half_width: {
     title: 'Contact wide for Johnson’s law',
     tests: 'Half the width of a contact against a tenth of the tooth’s radius or of the depth, whichever is less.',

@@ -1,6 +1,6 @@
 // The form, built from the field table in design.js, with problems and findings at the fields that they point at.
 
-import { GROUPS, at, changed, fieldsOf, fullLabel, isSame, keptBy, kindOf } from './design.js';
+import { GROUPS, at, changed, fieldsOf, fullLabel, isOn, isSame, keptBy, kindOf } from './design.js';
 import { linesOf, linesRead } from './lines.js';
 import { html, setChildren, setText, symbol } from './dom.js';
 import { explanation, sentence, titleOf } from './findings.js';
@@ -178,7 +178,8 @@ export class Form {
     const id = idOf(field.pointer, 'field');
     const input = html('input', { id, type: 'checkbox', 'aria-describedby': idOf(field.pointer, 'notes') });
     input.addEventListener('change', () => {
-      this.#edit(field.pointer, input.checked || undefined);
+      const started = field.starts?.(this.#design, this.#answers) ?? true;
+      this.#edit(field.pointer, input.checked ? started : undefined, field.adjust);
       this.#onEnd();
     });
     const element = html('div', { class: 'field flag' }, input, html('label', { for: id }, field.label));
@@ -351,7 +352,7 @@ export class Form {
       return;
     }
     if (field.kind === 'flag') {
-      input.checked = at(design, field.pointer) === true;
+      input.checked = isOn(field, design);
       return;
     }
     if (field.kind === 'lines') {

@@ -6,13 +6,13 @@ const SUPERSCRIPTS = '⁰¹²³⁴⁵⁶⁷⁸⁹';
 
 export const DASH = '–';
 
-export function number(value, significant = 5) {
+export function number(value, significant = 5, scientific = Math.min(significant, 3)) {
   if (!Number.isFinite(value)) return DASH;
   if (value === 0) return '0';
   const sign = value < 0 ? MINUS : '';
   const size = Math.abs(value);
   if (size < 1e-3 || size >= 1e7) {
-    const [digits, exponent] = size.toExponential(Math.min(significant, 3) - 1).split('e');
+    const [digits, exponent] = size.toExponential(scientific - 1).split('e');
     const raised = [...String(Math.abs(Number(exponent)))].map((digit) => SUPERSCRIPTS[digit]).join('');
     return `${sign}${Number(digits)}·10${Number(exponent) < 0 ? '⁻' : ''}${raised}`;
   }

@@ -41,6 +41,7 @@ export class Front {
     this.chart = html('div', { class: 'study-chart', role: 'img', 'aria-label': 'The drives by two of their figures; the table below has them too' });
     this.key = html('ul', { class: 'key marks-key' });
     this.card = html('div', { class: 'drive-card' });
+    this.figures = html('div', { class: 'drive-figures' });
     this.table = html('table', { class: 'drives' });
     this.more = html('button', { type: 'button', class: 'link', onclick: () => this.#showAll() });
     this.comparison = html('section', { class: 'panel', 'aria-labelledby': 'comparison-title', hidden: true });
@@ -48,7 +49,7 @@ export class Front {
       'section',
       { class: 'panel', 'aria-labelledby': 'front-title', hidden: true },
       html('header', {}, this.title, html('div', { class: 'ask-row' }, this.xChoice.element, this.yChoice.element)),
-      html('div', { class: 'front' }, html('div', {}, this.chart, this.key), this.card),
+      html('div', { class: 'front' }, html('div', { class: 'drive-chart' }, this.chart, this.key), this.card, this.figures),
       html('div', { class: 'scroll drives-scroll', tabindex: '0', role: 'region', 'aria-label': 'Table of drives' }, this.table),
       this.more,
     );
@@ -179,8 +180,8 @@ export class Front {
         html('button', { type: 'button', class: 'primary', onclick: () => this.onOpen(found) }, 'Open as design'),
         html('button', { type: 'button', 'aria-pressed': String(isCompared), onclick: () => this.#toggle(index) }, 'Compare'),
       ),
-      html('dl', { class: 'figures' }, figures),
     );
+    this.figures.replaceChildren(html('h3', {}, `${found.name} in figures`), html('dl', { class: 'figures' }, figures));
     this.#mark();
   }
 

@@ -81,6 +81,10 @@ const mechanism = new Mechanism(
       turnTo(deg);
     },
     onSelect: select,
+    onDrawings() {
+      byId('drawings-title').scrollIntoView({ block: 'start' });
+      byId('drawings-title').focus({ preventScroll: true });
+    },
   },
 );
 

@@ -211,8 +211,8 @@ export class Mechanism {
   #motion;
   #shown;
 
-  /** `onTurn(deg)` while the drawing is dragged, `onSelect(tooth)` when a tooth is clicked. */
-  constructor({ whole, detail, legend }, { onTurn, onSelect }) {
+  /** `onTurn(deg)` while the drawing is dragged, `onSelect(tooth)` when a tooth is clicked, `onDrawings()` for the parts as they are made. */
+  constructor({ whole, detail, legend }, { onTurn, onSelect, onDrawings }) {
     this.wholeSvg = whole;
     this.detailSvg = detail;
     this.wholeFlip = svg('g', { transform: 'scale(1 -1)' }, this.#whole.world);
@@ -220,13 +220,13 @@ export class Mechanism {
     whole.append(this.wholeFlip);
     detail.append(this.detailFlip);
     this.legend = legend;
-    this.#buildLegend();
+    this.#buildLegend(onDrawings);
     this.zoom = 1;
     this.outermost = 0;
     this.#listen(onTurn, onSelect);
   }
 
-  #buildLegend() {
+  #buildLegend(onDrawings) {
     this.mostColour = html('span', { class: 'number' });
     this.colouringName = html('span', {}, 'Tooth’s highest contact stress: 0 ');
     this.chosenColouring = html(
@@ -243,7 +243,9 @@ export class Mechanism {
       html('ul', { class: 'key' }, contacts, html('li', {}, html('span', { class: 'swatch zone', 'aria-hidden': 'true' }), 'Meshing zones'), this.ghostItem),
       html('p', { class: 'scale' }, this.chosenColouring, this.colouringName, html('span', { class: 'ramp', 'aria-hidden': 'true' }), ' ', this.mostColour),
       html('p', { class: 'scale' }, 'Longest arrow, over the whole period: ', this.mostForce),
+      (this.nominal = html('p', { class: 'nominal', hidden: true })),
     );
+    this.toDrawings = html('button', { type: 'button', class: 'link', onclick: onDrawings }, 'drawings');
   }
 
   /** Takes a new drive; the places follow with the next `render`. */
@@ -278,7 +280,17 @@ export class Mechanism {
     this.most.rubbing = Math.max(...rubbing.map((peak) => peak.value), 0) || 1;
     this.rubs = rubbing.length > 0;
     this.#showColouring();
+    this.#showNominal(motion.madeOtherwise);
     setText(this.mostForce, peaks ? withUnit(number(this.most.force, 4), 'N') : '–');
+  }
+
+  /** The picture is the nominal drive's: on its scale micrometres are less than a pixel. Where parts are made otherwise it says so. */
+  #showNominal({ drawn, undrawn }) {
+    this.nominal.hidden = drawn.length === 0 && !undrawn;
+    const words = ['The picture is the nominal drive.'];
+    if (drawn.length > 0) words.push(` The ${drawn.join(' and ')}, of micrometres, ${drawn[0].endsWith('s') || drawn.length > 1 ? 'are' : 'is'} in the `, this.toDrawings, ', true to size.');
+    if (undrawn) words.push(' The deviations are in the numbers alone.');
+    this.nominal.replaceChildren(...words);
   }
 
   /** What teeth are coloured by: stress, unless pressure times velocity is known and chosen. */

@@ -4,6 +4,8 @@
 //
 // Frame: the ring's, x along the middle of a tooth space; angles in degrees, counter-clockwise.
 
+import { madeOtherwise } from './design.js';
+
 const RAD = Math.PI / 180;
 
 export const CONTACTS = [
@@ -80,6 +82,7 @@ export class Motion {
     this.toSlotWallMm = Math.sqrt(this.toothRadius ** 2 - this.halfFlatMm ** 2);
     this.geometry = geometry;
     this.sweep = sweep;
+    this.madeOtherwise = madeOtherwise(design);
     this.rubbingScale = rubbingScale(design, sweep);
     this.period = geometry.period_deg;
     this.ratio = geometry.transmission_ratio;

@@ -69,11 +69,11 @@ export class Quantities {
     );
   }
 
-  /** A value with its unit. */
-  shown(name, value, significant = 4) {
+  /** A value with its unit; `scientific` digits where it is written with a power of ten. */
+  shown(name, value, significant = 4, scientific = undefined) {
     const { unit, is_flag: isFlag } = this.get(name);
     if (isFlag) return value ? 'yes' : 'no';
-    return withUnit(number(value, significant), unit);
+    return withUnit(number(value, significant, scientific), unit);
   }
 
   /** The label with the unit, as an axis or a column has it. */

@@ -1,7 +1,7 @@
 // What only paper shows: the design as a table, with its name, date and address, and the findings as another. The rest of the
 // report is the page itself.
 
-import { GROUPS, at, fieldsOf, fullLabel, kindOf } from './design.js';
+import { GROUPS, at, fieldsOf, fullLabel, isOn, kindOf } from './design.js';
 import { html } from './dom.js';
 import { basisOf, contactOf, kindOf as kindOfFinding, meaningOf, readable, sentence } from './findings.js';
 import { DASH, number, withUnit } from './format.js';
@@ -13,7 +13,7 @@ function shownValue(field, design) {
   // What has one kind alone is not told apart by it.
   if (field.kind === 'variant') return field.options.length > 1 ? labelled(kindOf(field, design)) : undefined;
   if (field.kind === 'choice') return labelled(value ?? field.otherwise?.(design) ?? field.options[0].value);
-  if (field.kind === 'flag') return value === true ? 'yes' : undefined;
+  if (field.kind === 'flag') return isOn(field, design) ? 'yes' : undefined;
   if (field.kind === 'oneOf' || field.derived) return undefined;
   if (field.kind === 'lines') return value && linesOf(field, value).map((line) => line.split('  ').map((number, index) => withUnit(number, field.columns[index].unit)).join(', ')).join('; ');
   const shown = value ?? field.preset;

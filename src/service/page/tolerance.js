@@ -124,21 +124,31 @@ export class Tolerance extends StudyView {
       interference > 0 && `${number(interference, 9)} of ${number(samples, 9)} cannot be put together${2 * interference > samples ? '; gaps in the model give their parts room' : ''}.`,
       impossible > 0 && `${number(impossible, 9)} have no answer.`,
     ].filter(Boolean);
-    setText(this.value, parts.length > 0 ? parts.join(' ') : of ? `Of ${number(samples, 9)} drives nearly all lie between ${this.quantities.shown(name, of.quantiles[0].value)} and ${this.quantities.shown(name, of.quantiles.at(-1).value)}.` : '');
+    setText(this.value, parts.length > 0 ? parts.join(' ') : of ? `Of ${number(samples, 9)} drives nearly all lie between ${this.#level(of.quantiles[0].value)} and ${this.#level(of.quantiles.at(-1).value)}.` : '');
     this.#showTables();
     this.#draw();
   }
 
+  /** A value of the quantity with digits enough to tell drives of this spread apart. */
+  #level(value) {
+    const { of, name } = this.#result;
+    const spread = of.quantiles.at(-1).value - of.quantiles[0].value;
+    const size = Math.max(...of.quantiles.map((quantile) => Math.abs(quantile.value)));
+    const apart = spread > 0 ? Math.ceil(Math.log10(size / spread)) + 2 : 0;
+    return this.quantities.shown(name, value, Math.min(9, Math.max(5, apart)), Math.min(9, Math.max(3, apart)));
+  }
+
   #showTables() {
     const { answer, of, name } = this.#result;
+    const level = (value) => (value === undefined ? '–' : this.#level(value));
     const shown = (value) => (value === undefined ? '–' : this.quantities.shown(name, value, 5));
     const table = (title, head, rows) =>
       html('div', {}, html('h3', {}, title), html('div', { class: 'scroll', tabindex: '0', role: 'region', 'aria-label': title }, html('table', { class: 'drives' }, html('thead', {}, html('tr', {}, head.map((text, index) => html('th', { scope: 'col', class: index > 0 && 'numeric' }, text)))), html('tbody', {}, rows))));
     const row = (title, ...cells) => html('tr', {}, html('th', { scope: 'row' }, title), cells.map((text) => html('td', { class: 'numeric number' }, text)));
     const tables = [];
     if (of) {
-      const rows = of.quantiles.map(({ share, value, low, high }) => row(`${number(100 * share, 4)}\u202f%`, shown(value), low === undefined && high === undefined ? 'too few drives' : `${shown(low)} to ${shown(high)}`));
-      tables.push(table('So many drives lie below', ['Share', this.quantities.get(name).label, '95\u202f% confidence'], [...rows, row('Without deviations', shown(of.nominal), ''), row('Mean, standard deviation', shown(of.mean), shown(of.standard_deviation))]));
+      const rows = of.quantiles.map(({ share, value, low, high }) => row(`${number(100 * share, 4)}\u202f%`, level(value), low === undefined && high === undefined ? 'too few drives' : `${level(low)} to ${level(high)}`));
+      tables.push(table('So many drives lie below', ['Share', this.quantities.get(name).label, '95\u202f% confidence'], [...rows, row('Without deviations', level(of.nominal), ''), row('Mean, standard deviation', level(of.mean), shown(of.standard_deviation))]));
       const kinds = new Map([...DEVIATIONS, ...INPUTS].map(({ name: kind, label }) => [kind, label]));
       const contributors = of.contributors.map(({ deviation, share, standard_deviation: deviates }) => {
         const line = row(kinds.get(deviation) ?? wordsOf(deviation).label, `${number(100 * share, 3)}\u202f%`, shown(deviates));

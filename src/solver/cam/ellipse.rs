@@ -2,7 +2,7 @@
 
 use nalgebra::{Point2, Unit, Vector2};
 
-use crate::cam::kind::{CamContact, CamPoint, Given, Kind, ToothCenter};
+use crate::cam::kind::{CamContact, CamPoint, Given, Hollow, Kind, ToothCenter};
 use crate::position::Position;
 use crate::root::{NotConverged, ValueAndSlope, bracketed, newton_in_bracket};
 use crate::violation::Parameter;
@@ -181,6 +181,11 @@ impl Kind for Ellipse {
     fn tip_bend(&self, tooth_radius_mm: f64, ring_teeth_per_lobe: f64) -> f64 {
         let (a, b, k) = (self.semi_major_mm, self.semi_minor_mm, ring_teeth_per_lobe);
         k * k * self.difference_of_squares_mm2() / (a * a + b * tooth_radius_mm)
+    }
+
+    /// An ellipse is convex.
+    fn hollow(&self) -> Option<Hollow> {
+        None
     }
 
     /// The lower root of `2b r² + (b² + 2a² - k²(a² - b²)) r + a²b = 0`; none where the roots are not real.

@@ -1,7 +1,7 @@
 //! The support function `h = R0 + e cos Uφ`; with one lobe exactly the circle of radius R0 about a point e beside the axis
 //! (docs/theory.md section 2.9).
 
-use crate::cam::kind::{CamContact, Given, Kind, ToothCenter};
+use crate::cam::kind::{CamContact, Given, Hollow, Kind, ToothCenter};
 use crate::position::{Position, half_lobe_rad};
 use crate::root::{NotConverged, ValueAndSlope, newton_in_bracket};
 use crate::violation::Parameter;
@@ -219,6 +219,11 @@ impl Kind for Harmonic {
         let ring_teeth = ring_teeth_per_lobe * self.lobe_count();
         let curvature_radius_mm = self.mean_radius_mm + self.amplitude_mm * Self::bluntness(self.lobes);
         self.amplitude_mm * ring_teeth * ring_teeth / (curvature_radius_mm + tooth_radius_mm)
+    }
+
+    /// A cam with a support function is convex.
+    fn hollow(&self) -> Option<Hollow> {
+        None
     }
 
     /// The lower root of `2r² + (A + 2B - eZ_K²) r + AB = 0`, `A = R0 - e`, `B = R0 + e(U² - 1)`; none where the roots are not real.

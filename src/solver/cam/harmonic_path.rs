@@ -1,7 +1,7 @@
 //! The cam that moves the centres along `d = R + e cos Uψ`: explicit in the position, and hollow in its valleys where the stroke is large
 //! (docs/theory.md section 2.9).
 
-use crate::cam::kind::{CamContact, Given, Kind, ToothCenter};
+use crate::cam::kind::{CamContact, Given, Hollow, Kind, ToothCenter};
 use crate::position::Position;
 use crate::root::NotConverged;
 use crate::violation::Parameter;
@@ -51,7 +51,7 @@ impl HarmonicPath {
     }
 
     /// `R/(U² + 1)`: beyond it the cam is hollow in its valleys.
-    pub fn greatest_convex_amplitude_mm(&self) -> f64 {
+    fn greatest_convex_amplitude_mm(&self) -> f64 {
         let u = self.lobe_count();
         self.mean_radius_mm / (u * u + 1.0)
     }
@@ -161,6 +161,11 @@ impl Kind for HarmonicPath {
     fn tip_bend(&self, _: f64, ring_teeth_per_lobe: f64) -> f64 {
         let ring_teeth = ring_teeth_per_lobe * self.lobe_count();
         self.amplitude_mm * ring_teeth * ring_teeth / self.valley_mm()
+    }
+
+    fn hollow(&self) -> Option<Hollow> {
+        let limit_mm = self.greatest_convex_amplitude_mm();
+        (self.amplitude_mm > limit_mm).then_some(Hollow { amplitude_mm: self.amplitude_mm, limit_mm })
     }
 
     /// `(R - e)²/(eZ_K² - (R - e))`, the path held as it is.

@@ -90,6 +90,15 @@ impl ToothCenter {
     }
 }
 
+/// Valleys that are hollow.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Hollow {
+    /// The cam's amplitude.
+    pub(crate) amplitude_mm: f64,
+    /// The amplitude up to which it would be convex.
+    pub(crate) limit_mm: f64,
+}
+
 /// What a kind of wave generator answers, for teeth of the radius `r`.
 ///
 /// Mesh and load follow from [`Kind::tooth`] alone. The rest are closed forms: of lengths, because differences of them decide what fits,
@@ -129,6 +138,9 @@ pub(crate) trait Kind {
 
     /// The least tooth radius that undercuts the ring; none where no radius does.
     fn critical_tooth_radius_mm(&self, ring_teeth_per_lobe: f64) -> Option<f64>;
+
+    /// Whether its valleys are hollow. A kind that never is says so: there is no default that a new kind could forget.
+    fn hollow(&self) -> Option<Hollow>;
 
     /// The radius up to which neighbouring teeth are apart for sure, `sin` being that of half the angle between them: no centre comes
     /// nearer to the axis than `d_v`, and `d_v sin > r` is enough.

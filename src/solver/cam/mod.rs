@@ -13,8 +13,8 @@ use crate::violation::{Parameter, Violation};
 pub use ellipse::Ellipse;
 pub use harmonic::Harmonic;
 pub use harmonic_path::HarmonicPath;
-pub(crate) use kind::CamPoint;
 pub use kind::{CamContact, ToothCenter};
+pub(crate) use kind::{CamPoint, Hollow};
 use kind::{Given, Kind};
 
 /// What describes a wave generator, not yet checked.

@@ -1,12 +1,14 @@
 //! What a sweep returns: columns of states and input angles, peaks, capacity, and the checks that it has to pass.
 
 use crate::SolveError;
-use crate::contact::{Contact, PerContact, SHEAR_DEPTH, SHEAR_SHARE, half_width_mm};
+use crate::contact::{Contact, Materials, PerContact, SHEAR_DEPTH, SHEAR_SHARE, half_width_mm};
 use crate::drive::Drive;
 use crate::load_sharing::LoadedDrive;
 use crate::mesh::{Mesh, TeethInMesh};
 use crate::springs::WindUp;
 use crate::sweep::points::Points;
+use crate::tooth::point::ShearBelow;
+use crate::tooth::{Pressure, StressExponents};
 
 /// Forces that miss a torque by more than this share of it, or a period that fails to close by more than this share of a peak, are wrong: some
 /// ten thousand times what rounding does to the worst design that is known.
@@ -128,6 +130,39 @@ impl ContactPeaks {
     }
 }
 
+impl ContactPeaks {
+    /// Those of a line with what is the own of a contact of this pressure, which bears `force_n` where its stress has its peak.
+    pub(crate) fn of_pressure(
+        self,
+        pressure: &Pressure,
+        force_n: f64,
+        materials: &Materials,
+        contact: Contact,
+    ) -> Self {
+        match pressure {
+            Pressure::Line { .. } => self,
+            Pressure::Flat(flat) => Self { half_width_mm: 0.5 * flat.length_mm(), shear: None, ..self },
+            Pressure::Ellipse(ellipse) => {
+                let half_width_mm = ellipse.half_width_mm(force_n);
+                let half_length_mm = ellipse.half_length_mm(force_n);
+                let shear = |poissons_ratio: f64| {
+                    let ShearBelow { share, depth } = ellipse.shear_below(poissons_ratio);
+                    PeakShear {
+                        stress_mpa: share * self.stress_mpa.value,
+                        depth_mm: depth * half_width_mm.min(half_length_mm),
+                    }
+                };
+                // Of the two bodies the one where it is larger.
+                let [tooth, partner] = [&materials.teeth, materials.partner(contact)].map(|body| body.poissons_ratio);
+                let (of_tooth, are_alike) = (shear(tooth), partner.to_bits() == tooth.to_bits());
+                let of_partner = if are_alike { of_tooth } else { shear(partner) };
+                let shear = if of_partner.stress_mpa > of_tooth.stress_mpa { of_partner } else { of_tooth };
+                Self { half_width_mm, half_length_mm: Some(half_length_mm), shear: Some(shear), ..self }
+            }
+        }
+    }
+}
+
 /// The largest shear stress below a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PeakShear {
@@ -151,14 +186,17 @@ pub struct TorqueCapacity {
 }
 
 impl TorqueCapacity {
-    /// Where all loads are in proportion, `M0 min (σ_a/σ)²` of line contacts.
+    /// Where all loads are in proportion: of line contacts `M0 min (σ_a/σ)²`.
     pub(crate) fn in_proportion(
         drive: &Drive,
         input_torque_nm: f64,
         allowable_mpa: &PerContact<f64>,
         peaks: &PerContact<ContactPeaks>,
+        stress_exponents: StressExponents,
     ) -> Self {
-        let share_of = |contact| allowable_mpa.get(contact) / peaks.get(contact).stress_mpa.value;
+        let share_of = |contact| {
+            stress_exponents.raised_at(contact, allowable_mpa.get(contact) / peaks.get(contact).stress_mpa.value)
+        };
         let (contact, share) = [Contact::Ring, Contact::Carrier]
             .map(|contact| (contact, share_of(contact)))
             .into_iter()
@@ -166,7 +204,7 @@ impl TorqueCapacity {
                 if other.1 < least.1 { other } else { least }
             });
         let peak = peaks.get(contact).stress_mpa;
-        let input_torque_nm = input_torque_nm * (share * share);
+        let input_torque_nm = input_torque_nm * share;
         let output_torque_nm = input_torque_nm * drive.teeth_per_wave();
         Self { input_torque_nm, output_torque_nm, contact, input_angle_deg: peak.input_angle_deg }
     }

@@ -16,8 +16,10 @@
 //! 5 % slower on the Xeon that this was measured on.
 
 mod centers;
+mod curve;
 mod lanes;
 mod moments;
+mod pressures;
 mod sharing;
 mod sinks;
 mod tile;
@@ -28,17 +30,19 @@ use std::iter::zip;
 use pulp::Simd;
 
 use crate::cam::{Cam, Ellipse};
-use crate::contact::PerContact;
-use crate::load_sharing::{Compatibility, LoadedDrive};
+use crate::contact::{Contact, PerContact};
+use crate::load_sharing::{Compatibility, LoadCase, LoadedDrive};
 use crate::mesh::{Mesh, Samples};
+use crate::position::Position;
 use crate::sweep::columns::{self, ContactPeaks, Peak, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity, worse};
 use crate::sweep::points::{Points, Tolerance};
 use crate::sweep::search::{Best, Found, Piece, search};
-use crate::tooth::LineLaw;
+use crate::tooth::ToothLaw;
 use crate::{SolveError, Stop};
 use centers::{CenterLanes, Centers, EccentricCenters, HarmonicCenters, HarmonicPathCenters};
-use lanes::{LANES, arctangent_terms, arctangents, repeat_each};
+use lanes::{LANES, arctangent_terms, arctangents, cube_root, repeat_each};
 use moments::FastLook;
+use pressures::Pressures;
 use sharing::{Limit, Shared, Sharing, Teeth, Work};
 use sinks::{ColumnSink, PeakSink, Sink};
 use tile::{Run, Tile, TileLanes, TileSize, whole};
@@ -56,9 +60,10 @@ const LAST_STEP: f64 = 5e-6;
 pub(crate) fn sweep(
     loaded: &LoadedDrive<'_>,
     samples: Samples,
-    allowable_mpa: Option<PerContact<f64>>,
+    load: &LoadCase,
     stop: &dyn Stop,
 ) -> Result<Option<Sweep>, SolveError> {
+    let allowable_mpa = load.parameters().allowable_stress_mpa;
     let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
     let mesh = Mesh::new(loaded.drive());
     let mut sink = ColumnSink::new(&mesh, samples);
@@ -67,7 +72,8 @@ pub(crate) fn sweep(
     };
     let columns = sink.columns(&mesh, samples, torque_balance_residual);
     let mut sweep = columns::finished(loaded, Points::Samples(samples), columns, None)?;
-    sweep.torque_capacity = capacity.or_else(|| in_proportion(loaded, allowable_mpa, &sweep.peaks));
+    sweep.torque_capacity = capacity.or_else(|| kernel.in_proportion(loaded, allowable_mpa, &sweep.peaks));
+    kernel.complete(loaded, load, &mut sweep.peaks)?;
     Ok(Some(sweep))
 }
 
@@ -78,9 +84,10 @@ pub(crate) fn sweep(
 pub(crate) fn peaks(
     loaded: &LoadedDrive<'_>,
     samples: Samples,
-    allowable_mpa: Option<PerContact<f64>>,
+    load: &LoadCase,
     stop: &dyn Stop,
 ) -> Result<Option<SweepPeaks>, SolveError> {
+    let allowable_mpa = load.parameters().allowable_stress_mpa;
     let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
     let mut sink = PeakSink::default();
     let Some(Filled { torque_balance_residual, capacity }) = kernel.fill(loaded, samples, stop, &mut sink)? else {
@@ -88,7 +95,8 @@ pub(crate) fn peaks(
     };
     columns::check("torque balance", torque_balance_residual)?;
     let mut peaks = sink.peaks(loaded.drive(), torque_balance_residual);
-    peaks.torque_capacity = capacity.or_else(|| in_proportion(loaded, allowable_mpa, &peaks.contacts));
+    peaks.torque_capacity = capacity.or_else(|| kernel.in_proportion(loaded, allowable_mpa, &peaks.contacts));
+    kernel.complete(loaded, load, &mut peaks.contacts)?;
     Ok(Some(peaks))
 }
 
@@ -117,9 +125,10 @@ pub(crate) fn moments(
 pub(crate) fn true_peaks(
     loaded: &LoadedDrive<'_>,
     tolerance: Tolerance,
-    allowable_mpa: Option<PerContact<f64>>,
+    load: &LoadCase,
     stop: &dyn Stop,
 ) -> Result<Option<SweepPeaks>, SolveError> {
+    let allowable_mpa = load.parameters().allowable_stress_mpa;
     let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
     let mesh = *loaded.mesh();
     let size = kernel.tile_size(loaded);
@@ -135,25 +144,15 @@ pub(crate) fn true_peaks(
         let position = seen.piece.position(&mesh, tooth as u64 + 1, fraction);
         Peak { value, input_angle_deg: fraction * mesh.period_deg(), position_deg: position.from_lobe_deg() }
     };
-    let contacts = PerContact::of(|contact| {
+    let mut contacts = PerContact::of(|contact| {
         let force = contact as usize;
         let hardest: Best = best[force + 3];
         let force_n = seen[hardest.piece].load(hardest.moment, force, hardest.tooth);
         ContactPeaks::of_line(peak(best[force]), peak(hardest), force_n, drive.tooth_width_mm())
     });
-    let torque_capacity = look.capacity.or_else(|| in_proportion(loaded, allowable_mpa, &contacts));
+    let torque_capacity = look.capacity.or_else(|| kernel.in_proportion(loaded, allowable_mpa, &contacts));
+    kernel.complete(loaded, load, &mut contacts)?;
     Ok(Some(look.angles.peaks(contacts, torque_capacity, look.torque_balance_residual)))
-}
-
-/// The capacity where all loads are in proportion (docs/theory.md section 4.7): that of the stress nearest to what is allowed.
-fn in_proportion(
-    loaded: &LoadedDrive<'_>,
-    allowable_mpa: Option<PerContact<f64>>,
-    peaks: &PerContact<ContactPeaks>,
-) -> Option<TorqueCapacity> {
-    let input_torque_nm = 1e-3 * loaded.input_torque_nmm();
-    allowable_mpa
-        .map(|allowable_mpa| TorqueCapacity::in_proportion(loaded.drive(), input_torque_nm, &allowable_mpa, peaks))
 }
 
 /// The sweep as `pulp` wants it: compiled once for each instruction set, the best one of this machine picked when the program runs. Whatever
@@ -182,6 +181,7 @@ struct Kernel {
     ring_teeth_per_wave: f64,
     teeth_per_wave: f64,
     law: Law,
+    pressures: Pressures,
     /// `E*/(π L1)` of each contact.
     hertz: PerContact<f64>,
     /// Terms of the arctangent for the angle on the cam and on the ring.
@@ -307,6 +307,12 @@ trait Unit: Copy {
 
     /// `F_H` over `d²`, with the reciprocal of that denominator.
     fn load(self, lever: f64, per_denominator: f64) -> f64;
+
+    /// What stands where stresses do: `√(F Σ E*/(π L1))` of a line whose relative curvature is Σ.
+    #[inline(always)]
+    fn stress(self, force: f64, curvature: f64, hertz: f64) -> f64 {
+        (force * curvature * hertz).sqrt()
+    }
 }
 
 impl Unit for Compliance {
@@ -334,6 +340,27 @@ impl Unit for Newton {
     #[inline(always)]
     fn load(self, _: f64, per_denominator: f64) -> f64 {
         per_denominator
+    }
+}
+
+/// 1 N at the wave generator of a tooth whose contacts are no lines: in the place of stresses it leaves curvatures.
+#[derive(Clone, Copy)]
+struct NewtonOnBall;
+
+impl Unit for NewtonOnBall {
+    #[inline(always)]
+    fn denominator(self, above2: f64, lever2: f64) -> f64 {
+        Newton.denominator(above2, lever2)
+    }
+
+    #[inline(always)]
+    fn load(self, lever: f64, per_denominator: f64) -> f64 {
+        Newton.load(lever, per_denominator)
+    }
+
+    #[inline(always)]
+    fn stress(self, _: f64, curvature: f64, hertz: f64) -> f64 {
+        curvature * hertz
     }
 }
 
@@ -391,8 +418,8 @@ impl Guess {
 
 impl Kernel {
     fn new(loaded: &LoadedDrive<'_>, allowable_mpa: Option<PerContact<f64>>) -> Option<Self> {
-        let law = match loaded.line_law()? {
-            LineLaw::Linear { compliance_mm_per_n } if loaded.is_linear() => {
+        let law = match loaded.tooth_law()? {
+            ToothLaw::Linear { compliance_mm_per_n } if loaded.is_linear() => {
                 Law::Linear(Compliance::new(&compliance_mm_per_n, loaded))
             }
             _ => Law::Sharing(Sharing::new(loaded)?),
@@ -406,6 +433,7 @@ impl Kernel {
         if !loaded.mesh().zones_are_alike() {
             return None;
         }
+        let pressures = Pressures::new(loaded)?;
         let r = drive.parameters().tooth_radius_mm;
         let (shape, ratios) = Shape::new(drive.flank().locus().cam(), r)?;
         Some(Self {
@@ -414,11 +442,45 @@ impl Kernel {
             ring_teeth_per_wave: drive.flank().teeth_per_wave(),
             teeth_per_wave: drive.teeth_per_wave(),
             law,
-            hertz: PerContact::of(|contact| loaded.hertz(contact).modulus_per_width_mpa_per_mm()),
+            hertz: pressures.hertz(loaded),
+            pressures,
             cam_terms: arctangent_terms(ratios.wave_generator)?,
             ring_terms: arctangent_terms(ratios.ring)?,
             allowable_mpa: allowable_mpa.filter(|_| !is_in_proportion),
         })
+    }
+
+    /// The capacity where all loads are in proportion (docs/theory.md section 4.7): that of the stress nearest to what is allowed.
+    fn in_proportion(
+        &self,
+        loaded: &LoadedDrive<'_>,
+        allowable_mpa: Option<PerContact<f64>>,
+        peaks: &PerContact<ContactPeaks>,
+    ) -> Option<TorqueCapacity> {
+        let (exponents, input_torque_nm) = (self.pressures.stress_exponents(), 1e-3 * loaded.input_torque_nmm());
+        allowable_mpa.map(|allowable_mpa| {
+            TorqueCapacity::in_proportion(loaded.drive(), input_torque_nm, &allowable_mpa, peaks, exponents)
+        })
+    }
+
+    /// Adds to peaks what a contact that is no line has of its own.
+    fn complete(
+        &self,
+        loaded: &LoadedDrive<'_>,
+        load: &LoadCase,
+        peaks: &mut PerContact<ContactPeaks>,
+    ) -> Result<(), SolveError> {
+        if !matches!(self.pressures, Pressures::Lines) {
+            let lobes = loaded.drive().lobes();
+            for contact in [Contact::WaveGenerator, Contact::Ring, Contact::Carrier] {
+                let peak = peaks.get_mut(contact);
+                let tooth = loaded.tooth(Position::from_lobe(peak.stress_mpa.position_deg.to_radians(), lobes))?;
+                let pressure = tooth.pressure.get(contact);
+                let force_n = pressure.force_n(peak.stress_mpa.value);
+                *peak = peak.of_pressure(pressure, force_n, &load.parameters().materials, contact);
+            }
+        }
+        Ok(())
     }
 
     /// Of tiles of input angles anywhere.
@@ -450,7 +512,7 @@ impl Kernel {
         let with_work = matches!(self.law, Law::Sharing(_));
         let size = TileSize::of(&mesh, samples, K::COLUMNS, with_work);
         let mut arena = vec![0.0; size.doubles()];
-        let mut tile = Tile::new(&mut arena, &size, mesh.phase_step_rad(samples));
+        let mut tile = Tile::new(&mut arena, &size, mesh.phase_step_rad(samples), self.pressures.stress_exponents());
         let balance = TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm());
         let mut filled = Filled { torque_balance_residual: 0.0, capacity: None };
         let mut first = 0;
@@ -463,7 +525,7 @@ impl Kernel {
                 }
                 let tile_samples = start..run.samples.end.min(start + run.rows as u64);
                 run.place(tile_samples.clone(), &mut tile);
-                if !self.unit_loads::<K>(&mut tile) {
+                if !self.unit_loads::<V, K>(&mut tile) {
                     return Ok(None);
                 }
                 let Some(limit) = self.loads::<V>(loaded, run.teeth, &mut tile, |_, _| ()) else { return Ok(None) };
@@ -486,22 +548,30 @@ impl Kernel {
 
     /// Geometry of all states of a tile, and their forces and stresses for one unit; false where a support takes too many steps.
     #[inline(always)]
-    fn unit_loads<K: Sink>(&self, tile: &mut Tile<'_>) -> bool {
-        match &self.law {
-            Law::Linear(compliance) => self.loads_of::<K>(*compliance, tile),
-            Law::Sharing(_) => self.loads_of::<K>(Newton, tile),
-        }
+    fn unit_loads<V: Simd, K: Sink>(&self, tile: &mut Tile<'_>) -> bool {
+        let are_found = match (&self.law, &self.pressures) {
+            (Law::Linear(compliance), _) => self.loads_of::<K>(*compliance, tile),
+            (Law::Sharing(_), Pressures::Ellipses(_)) => self.loads_of::<K>(NewtonOnBall, tile),
+            (Law::Sharing(_), _) => self.loads_of::<K>(Newton, tile),
+        };
+        are_found && self.pressures.finish::<V>(tile)
     }
 
     #[inline(always)]
     fn loads_of<K: Sink>(&self, unit: impl Unit, tile: &mut Tile<'_>) -> bool {
-        let mut chunks = 0..tile.count.div_ceil(LANES);
-        match &self.shape {
-            Shape::Ellipse(ellipse) => chunks.all(|chunk| self.on_ellipse::<K>(ellipse, unit, tile, chunk)),
-            Shape::Eccentric(centers) => chunks.all(|chunk| self.on_path::<K>(centers, unit, tile, chunk)),
-            Shape::Harmonic(centers) => chunks.all(|chunk| self.on_path::<K>(centers, unit, tile, chunk)),
-            Shape::HarmonicPath(centers) => chunks.all(|chunk| self.on_path::<K>(centers, unit, tile, chunk)),
+        // No iterator's method, which would not be compiled for the vectors that this is.
+        for chunk in 0..tile.count.div_ceil(LANES) {
+            let are_found = match &self.shape {
+                Shape::Ellipse(ellipse) => self.on_ellipse::<K>(ellipse, unit, tile, chunk),
+                Shape::Eccentric(centers) => self.on_path::<K>(centers, unit, tile, chunk),
+                Shape::Harmonic(centers) => self.on_path::<K>(centers, unit, tile, chunk),
+                Shape::HarmonicPath(centers) => self.on_path::<K>(centers, unit, tile, chunk),
+            };
+            if !are_found {
+                return false;
+            }
         }
+        true
     }
 
     /// Geometry of a stretch of states, and their forces and stresses for one unit; false where the support takes too many steps.
@@ -566,15 +636,16 @@ impl Kernel {
             force.ring[i] = force_k;
             force.carrier[i] = force_s;
             let cam_curvature = tooth_curvature + cube * per_squares;
-            stress.wave_generator[i] = (force_h * (cam_curvature * self.hertz.wave_generator)).sqrt();
-            stress.ring[i] = (force_k * (e3_d * per_regular) * ring_hertz).sqrt();
-            stress.carrier[i] = (force_s * carrier_hertz).sqrt();
+            stress.wave_generator[i] = unit.stress(force_h, cam_curvature * self.hertz.wave_generator, 1.0);
+            stress.ring[i] = unit.stress(force_k, e3_d * per_regular, ring_hertz);
+            stress.carrier[i] = unit.stress(force_s, 1.0, carrier_hertz);
             torque.wave_generator[i] = force_h * lever;
             torque.ring[i] = force_k * (d * k * lever * per_e);
             torque.carrier[i] = force_s * d;
         }
+        tile.center_radius_mm.as_chunks_mut::<LANES>().0[chunk] = center_radius;
         if K::COLUMNS {
-            self.place(tile, chunk, center_radius, cam_ratio, ring_ratio);
+            self.place(tile, chunk, cam_ratio, ring_ratio);
         }
         true
     }
@@ -616,9 +687,9 @@ impl Kernel {
             force.ring[i] = force_k;
             force.carrier[i] = force_s;
             let curvature = tooth_curvature + cam_curvature_per_mm[i];
-            stress.wave_generator[i] = (force_h * (curvature * self.hertz.wave_generator)).sqrt();
-            stress.ring[i] = (force_k * (flat * per_regular) * ring_hertz).sqrt();
-            stress.carrier[i] = (force_s * carrier_hertz).sqrt();
+            stress.wave_generator[i] = unit.stress(force_h, curvature * self.hertz.wave_generator, 1.0);
+            stress.ring[i] = unit.stress(force_k, flat * per_regular, ring_hertz);
+            stress.carrier[i] = unit.stress(force_s, 1.0, carrier_hertz);
             torque.wave_generator[i] = force_h * lever;
             // F_K sin β, with F_K cos β = F_H cos γ.
             torque.ring[i] = force_h * (cos_gamma * ring_tan) * d;
@@ -631,27 +702,19 @@ impl Kernel {
                 ring_ratio[i] = k * all * cam_below;
             }
         }
+        tile.center_radius_mm.as_chunks_mut::<LANES>().0[chunk] = radius_mm;
         if K::COLUMNS {
-            self.place(tile, chunk, radius_mm, cam_ratio, ring_ratio);
+            self.place(tile, chunk, cam_ratio, ring_ratio);
         }
         true
     }
 
-    /// Notes where centres and contact points are, these by tangents of the angles by which they are off the position.
+    /// Notes where contact points are, by tangents of the angles by which they are off the position.
     #[inline(always)]
-    fn place(
-        &self,
-        tile: &mut Tile<'_>,
-        chunk: usize,
-        center_radius: [f64; LANES],
-        mut cam_ratio: [f64; LANES],
-        mut ring_ratio: [f64; LANES],
-    ) {
+    fn place(&self, tile: &mut Tile<'_>, chunk: usize, mut cam_ratio: [f64; LANES], mut ring_ratio: [f64; LANES]) {
         let from_valley = &tile.from_valley_rad.as_chunks::<LANES>().0[chunk];
-        let center_radius_mm = &mut tile.center_radius_mm.as_chunks_mut::<LANES>().0[chunk];
         let cam_angle_deg = &mut tile.wave_generator_angle_deg.as_chunks_mut::<LANES>().0[chunk];
         let ring_angle_deg = &mut tile.ring_angle_deg.as_chunks_mut::<LANES>().0[chunk];
-        *center_radius_mm = center_radius;
         arctangents(&mut cam_ratio, self.cam_terms);
         arctangents(&mut ring_ratio, self.ring_terms);
         let (to_degrees, per_k) = (180.0 / PI, 1.0 / self.ring_teeth_per_wave);
@@ -675,15 +738,15 @@ impl Kernel {
             Self::scale(loaded, teeth, tile);
             return Some(None);
         };
-        if !Self::share::<V>(sharing, loaded, teeth, tile) {
+        if !self.share::<V>(sharing, loaded, teeth, tile) {
             return None;
         }
         shared(sharing, &tile.work);
         let limit = match &self.allowable_mpa {
-            Some(allowable_mpa) => Some(Self::limit::<V>(sharing, allowable_mpa, teeth, tile)?),
+            Some(allowable_mpa) => Some(self.limit::<V>(sharing, allowable_mpa, teeth, tile)?),
             None => None,
         };
-        Self::scale_shared(loaded, teeth, tile);
+        self.scale_shared::<V>(loaded, teeth, tile);
         Some(limit)
     }
 
@@ -716,7 +779,7 @@ impl Kernel {
 
     /// The teeth of a tile under 1 N, what sharing works on, and what comes of it.
     #[inline(always)]
-    fn teeth_of<'t, 'a>(count: usize, tile: &'t mut Tile<'a>) -> (Teeth<'t>, &'t mut Work<'a>, Shared<'t>) {
+    fn teeth_of<'t, 'a>(&self, count: usize, tile: &'t mut Tile<'a>) -> (Teeth<'t>, &'t mut Work<'a>, Shared<'t>) {
         let teeth = Teeth {
             count,
             rows: tile.count / count,
@@ -727,6 +790,7 @@ impl Kernel {
             cam_stress: tile.stress.wave_generator,
             ring_stress: tile.stress.ring,
             carrier_stress: tile.stress.carrier,
+            stress_exponents: self.pressures.stress_exponents(),
         };
         let shared = Shared { force: tile.scale, rotation_rad: tile.row_rotation_rad, stiffness: tile.row_stiffness };
         (teeth, &mut tile.work, shared)
@@ -734,34 +798,36 @@ impl Kernel {
 
     /// Lets the teeth of each input angle share the load; false where it takes the plain path.
     #[inline(always)]
-    fn share<V: Simd>(sharing: &Sharing, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) -> bool {
-        let (teeth, work, mut shared) = Self::teeth_of(count, tile);
+    fn share<V: Simd>(&self, sharing: &Sharing, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) -> bool {
+        let (teeth, work, mut shared) = self.teeth_of(count, tile);
         sharing.share::<V>(loaded.input_torque_nmm() / loaded.zones(), &teeth, work, &mut shared)
     }
 
     /// What limits the teeth once they share the load; nothing where it takes the plain path.
     #[inline(always)]
     fn limit<V: Simd>(
+        &self,
         sharing: &Sharing,
         allowable_mpa: &PerContact<f64>,
         count: usize,
         tile: &mut Tile<'_>,
     ) -> Option<Limit> {
         let per_allowable = PerContact::of(|contact| 1.0 / allowable_mpa.get(contact));
-        let (teeth, work, _) = Self::teeth_of(count, tile);
+        let (teeth, work, _) = self.teeth_of(count, tile);
         sharing.limit::<V>(&per_allowable, &teeth, work)
     }
 
     /// Torques, stiffness and what carries, once the load is shared.
     #[inline(always)]
-    fn scale_shared(loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) {
+    fn scale_shared<V: Simd>(&self, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) {
         let (zones, rows) = (loaded.zones(), tile.count / count);
         let len = tile.count.next_multiple_of(LANES);
         let (scale, root) = (&tile.scale[..len], &mut tile.scale_root[..len]);
         let cam = &mut tile.torque.wave_generator[..len];
         let (ring, carrier) = (&mut tile.torque.ring[..len], &mut tile.torque.carrier[..len]);
+        let are_balls = matches!(self.pressures, Pressures::Ellipses(_));
         for i in 0..len {
-            root[i] = scale[i].sqrt();
+            root[i] = if are_balls { cube_root::<V>(scale[i]) } else { scale[i].sqrt() };
             let scale = zones * scale[i];
             cam[i] *= scale;
             ring[i] *= scale;

@@ -31,7 +31,7 @@ pub use unloaded::unloaded_wind_up_deg;
 pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<Sweep, SolveError> {
     let loaded = LoadedDrive::new(drive, load)?;
     if let Points::Samples(samples) = points
-        && let Some(sweep) = fast::sweep(&loaded, samples, load.parameters().allowable_stress_mpa, stop)?
+        && let Some(sweep) = fast::sweep(&loaded, samples, load, stop)?
     {
         return Ok(sweep);
     }
@@ -67,10 +67,9 @@ pub fn sweep_with_deviations(
 pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<SweepPeaks, SolveError> {
     let loaded = LoadedDrive::new(drive, load)?;
     let (mesh, one_zone) = (loaded.mesh(), loaded.as_one_zone());
-    let allowable_mpa = load.parameters().allowable_stress_mpa;
     let peaks = match points {
-        Points::Samples(samples) => fast::peaks(&one_zone, mesh.samples_of_lap(samples), allowable_mpa, stop)?,
-        Points::Tolerance(tolerance) => fast::true_peaks(&one_zone, tolerance, allowable_mpa, stop)?,
+        Points::Samples(samples) => fast::peaks(&one_zone, mesh.samples_of_lap(samples), load, stop)?,
+        Points::Tolerance(tolerance) => fast::true_peaks(&one_zone, tolerance, load, stop)?,
     };
     match peaks {
         Some(peaks) => Ok(SweepPeaks { loaded_teeth: peaks.loaded_teeth.times(mesh.listed_at_each_place()), ..peaks }),

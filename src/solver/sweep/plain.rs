@@ -1,18 +1,16 @@
 //! A sweep state by state: what the fast path is held against, and what is left where it does not reach.
 
-use crate::contact::{Contact, Materials, PerContact};
+use crate::contact::{Materials, PerContact};
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
 use crate::mesh::PlacedTooth;
 use crate::root::NotConverged;
 use crate::springs::WindUp;
 use crate::sweep::adaptive::{self, Looking};
 use crate::sweep::columns::{
-    Columns, ContactPeaks, InputAngles, PeakAt, PeakShear, States, Sweep, TorqueBalance, TorqueCapacity, finished,
-    worse,
+    Columns, InputAngles, PeakAt, States, Sweep, TorqueBalance, TorqueCapacity, finished, worse,
 };
 use crate::sweep::points::Points;
 use crate::tooth::Pressure;
-use crate::tooth::point::ShearBelow;
 use crate::{SolveError, Stop};
 
 /// The pressure that has the largest stress of a contact so far.
@@ -88,31 +86,6 @@ struct Growing<'a> {
     lists_lobes: bool,
     teeth: Vec<ToothState>,
     hardest: PerContact<Option<Hardest>>,
-}
-
-impl Hardest {
-    /// The peaks of a line with what is another contact's own.
-    fn complete(&self, peaks: ContactPeaks, materials: &Materials, contact: Contact) -> ContactPeaks {
-        match &self.pressure {
-            Pressure::Line { .. } => peaks,
-            Pressure::Flat(flat) => ContactPeaks { half_width_mm: 0.5 * flat.length_mm(), shear: None, ..peaks },
-            Pressure::Ellipse(ellipse) => {
-                let half_width_mm = ellipse.half_width_mm(self.force_n);
-                let half_length_mm = ellipse.half_length_mm(self.force_n);
-                // Of the two bodies the one where it is larger.
-                let shears = [materials.teeth, *materials.partner(contact)].map(|material| {
-                    let ShearBelow { share, depth } = ellipse.shear_below(material.poissons_ratio);
-                    PeakShear {
-                        stress_mpa: share * self.stress_mpa,
-                        depth_mm: depth * half_width_mm.min(half_length_mm),
-                    }
-                });
-                let [one, other] = shears;
-                let shear = if other.stress_mpa > one.stress_mpa { other } else { one };
-                ContactPeaks { half_width_mm, half_length_mm: Some(half_length_mm), shear: Some(shear), ..peaks }
-            }
-        }
-    }
 }
 
 impl<'a> Growing<'a> {
@@ -212,7 +185,9 @@ impl<'a> Growing<'a> {
         let columns = Columns { states, input_angles, peaks, torque_balance_residual };
         let mut sweep = finished(loaded, points, columns, torque_capacity)?;
         sweep.peaks = PerContact::of(|contact| match hardest.get(contact) {
-            Some(hardest) => hardest.complete(*sweep.peaks.get(contact), materials, contact),
+            Some(Hardest { force_n, pressure, .. }) => {
+                sweep.peaks.get(contact).of_pressure(pressure, *force_n, materials, contact)
+            }
             None => *sweep.peaks.get(contact),
         });
         Ok(sweep)

@@ -498,13 +498,19 @@ impl Judge {
             }
             return;
         }
+        let mut coarse = vec![0.0; seen.stride()];
+        for (quantity, best) in self.best.iter().enumerate() {
+            let share = if quantity == CAPACITY { COARSE_CORNER } else { COARSE_BEND };
+            coarse[seen.curves(quantity)].fill(share * best);
+        }
+        let (mut curve_bends, mut curve_bounds) = (coarse.clone(), coarse.clone());
         for at in 0..count - 1 {
             let moment = run.moments[at];
             let ends = [run.fraction(at), run.fraction(at + 1)];
             if seen.is_settled[moment] || ends[1] - ends[0] <= self.nearest {
                 continue;
             }
-            let bends = Bends::new(run, at);
+            Bends::new(run, at).margins(&coarse, &mut curve_bends, &mut curve_bounds);
             let nodes = OnceCell::new();
             let may_leave_by_powers = !self.is_linear && (at < 2 || at + 3 >= count);
             let off = if may_leave_by_powers { OFF_BY_POWERS } else { OFF_SMOOTH };
@@ -523,14 +529,11 @@ impl Judge {
                 }
                 let best = self.best[quantity];
                 let limit = best * (1.0 + 0.25 * self.relative);
-                let coarse = if quantity == CAPACITY { COARSE_CORNER * best } else { COARSE_BEND * best };
-                let margin = bends.margin(seen.curves(quantity), coarse);
-                bends_too_much |= self.lines.is_some_and(|lines| margin.bend > lines * best);
-                if margin.bound <= limit {
-                    continue;
-                }
-                for curve in seen.curves(quantity) {
-                    let of_curve = bends.margin(curve..curve + 1, coarse).bound;
+                let curves = seen.curves(quantity);
+                bends_too_much |=
+                    self.lines.is_some_and(|lines| curve_bends[curves.clone()].iter().any(|&bend| bend > lines * best));
+                for curve in curves {
+                    let of_curve = curve_bounds[curve];
                     if of_curve <= limit {
                         continue;
                     }
@@ -597,14 +600,6 @@ struct Bends<'a> {
     weights: [[f64; 3]; 2],
 }
 
-/// The most of some curves on a stretch.
-struct Margin {
-    /// How much one bends: a parabola rises above its ends by a quarter of this.
-    bend: f64,
-    /// What it may rise to.
-    bound: f64,
-}
-
 impl<'a> Bends<'a> {
     /// Of a run of three moments or more.
     fn new(run: &Run<'a>, at: usize) -> Self {
@@ -627,23 +622,22 @@ impl<'a> Bends<'a> {
         }
     }
 
-    fn margin(&self, curves: Range<usize>, coarse: f64) -> Margin {
-        let count = curves.len();
+    /// How much each curve bends, where a parabola rises above its ends by a quarter of that, and what it may rise to. `coarse` is given by curve.
+    fn margins(&self, coarse: &[f64], bends: &mut [f64], bounds: &mut [f64]) {
+        let count = coarse.len();
         let [[a, b, c], [d, e, f]] = self.weights;
-        let of = |values: &'a [f64]| &values[curves.clone()][..count];
+        let of = |values: &'a [f64]| &values[..count];
         let [[x, y, z], [u, v, w]] = self.beside.map(|beside| beside.map(of));
         let [low, high] = self.ends.map(of);
-        let mut most = Margin { bend: 0.0, bound: 0.0 };
+        let (bends, bounds) = (&mut bends[..count], &mut bounds[..count]);
         for i in 0..count {
             let one = (a * x[i] + b * y[i] + c * z[i]).abs();
             let other = (d * u[i] + e * v[i] + f * w[i]).abs();
             let bend = if one > other { one } else { other };
             let end = if low[i] > high[i] { low[i] } else { high[i] };
-            let bound = end + bend * if bend > coarse { COARSE_MARGIN } else { MARGIN };
-            most.bend = if bend > most.bend { bend } else { most.bend };
-            most.bound = if bound > most.bound { bound } else { most.bound };
+            bends[i] = bend;
+            bounds[i] = end + bend * if bend > coarse[i] { COARSE_MARGIN } else { MARGIN };
         }
-        most
     }
 }
 
@@ -796,7 +790,9 @@ mod tests {
                 assert!(bound >= most * (1.0 - 1e-14), "{bound} is below {most} on stretch {at}");
                 above = above.max(bound - most);
             }
-            let margin = Bends::new(&run, stretch).margin(0..1, f64::INFINITY).bound;
+            let (mut bends, mut bounds) = ([0.0], [0.0]);
+            Bends::new(&run, stretch).margins(&[f64::INFINITY], &mut bends, &mut bounds);
+            let [margin] = bounds;
             assert!(margin >= most * (1.0 - 1e-14), "{margin} is below {most} on stretch {at}");
         }
         above

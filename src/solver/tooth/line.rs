@@ -38,6 +38,9 @@ pub(crate) fn least_length_mm(depth_mm: &PerContact<Option<f64>>, contact: Conta
 }
 
 impl JohnsonLine {
+    /// Of a contact that gives way in another way.
+    pub(crate) const NONE: Self = Self { compliance_mm_per_n: 0.0, growth_mm_per_n: 0.0, length_mm: 0.0 };
+
     /// Of a contact between a tooth of this radius and width and a body whose point at `depth_mm` does not move.
     pub(crate) fn new(
         materials: &Materials,

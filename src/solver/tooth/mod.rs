@@ -66,15 +66,105 @@ enum Law {
     Flat,
 }
 
-/// The law of the three contacts of a cylinder.
+/// The law of the three contacts of a tooth, for whoever works in columns.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum LineLaw {
+pub(crate) enum ToothLaw {
     /// `δ = F/k`, what stands behind the contact included.
     Linear { compliance_mm_per_n: PerContact<f64> },
-    /// `δ = q F^p`, alike at all three.
-    Power { exponent: f64, coefficient: f64 },
+    /// Palmgren's `δ = q F^0.9`, alike at all three.
+    Palmgren { coefficient: f64 },
     /// Johnson's line, and what stands behind it.
     Johnson { law: PerContact<JohnsonLine>, series_compliance_mm_per_n: PerContact<f64> },
+    /// Hertz's ellipses.
+    Hertz,
+}
+
+/// `p` of Palmgren's law.
+pub(crate) const PALMGREN_EXPONENT: f64 = 0.9;
+
+/// The powers of the stresses that forces go with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum StressExponents {
+    /// 2 at all three contacts.
+    Lines,
+    /// 3.
+    Ellipses,
+    /// 2 at wave generator and ring, 1 at the carrier.
+    LinesAndFlat,
+}
+
+impl StressExponents {
+    /// Whether all three are.
+    #[inline(always)]
+    pub(crate) const fn are_alike(self) -> bool {
+        !matches!(self, Self::LinesAndFlat)
+    }
+
+    /// Whether that of one of them is 1.
+    #[inline(always)]
+    pub(crate) const fn is_one_at(self, contact: Contact) -> bool {
+        matches!((self, contact), (Self::LinesAndFlat, Contact::Carrier))
+    }
+
+    /// By how much a force is more where the stress at wave generator or ring is more by a factor.
+    #[inline(always)]
+    pub(crate) fn raised(self, factor: f64) -> f64 {
+        match self {
+            Self::Lines | Self::LinesAndFlat => factor * factor,
+            Self::Ellipses => factor * factor * factor,
+        }
+    }
+
+    /// The same at any contact.
+    #[inline(always)]
+    pub(crate) fn raised_at(self, contact: Contact, factor: f64) -> f64 {
+        if self.is_one_at(contact) { factor } else { self.raised(factor) }
+    }
+}
+
+/// A contact of a ball, whose curvature in the plane of motion the place decides.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct BallContact {
+    axial_per_mm: f64,
+    modulus_mpa: f64,
+}
+
+impl BallContact {
+    /// Where the curvatures in the plane of motion sum to `curvature_per_mm`.
+    pub(crate) fn at(&self, curvature_per_mm: f64) -> Result<EllipticContact, NotConverged> {
+        EllipticContact::new(curvature_per_mm, self.axial_per_mm, self.modulus_mpa)
+    }
+}
+
+/// A flat on the wall of its slot, wherever the tooth stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Flat {
+    length_mm: f64,
+    width_mm: f64,
+    carrier_inner_radius_mm: f64,
+    carrier_outer_radius_mm: f64,
+    modulus_mpa: f64,
+    /// Whether it gives way by its own law.
+    pub(crate) has_own_law: bool,
+}
+
+impl Flat {
+    /// The length that is borne where the tooth's centre is `center_radius_mm` from the axis; nothing or less where the flat has left the carrier.
+    pub(crate) fn borne_mm(&self, center_radius_mm: f64) -> f64 {
+        let inner_mm = (center_radius_mm - 0.5 * self.length_mm).max(self.carrier_inner_radius_mm);
+        let outer_mm = (center_radius_mm + 0.5 * self.length_mm).min(self.carrier_outer_radius_mm);
+        outer_mm - inner_mm
+    }
+
+    /// The contact over so much of its length.
+    pub(crate) const fn over(&self, borne_mm: f64) -> FlatContact {
+        FlatContact::new(borne_mm, self.width_mm)
+    }
+
+    /// How far it gives way under 1 N over so much of its length.
+    pub(crate) fn compliance_mm_per_n(&self, borne_mm: f64) -> f64 {
+        self.over(borne_mm).compliance_mm_per_n(self.modulus_mpa)
+    }
 }
 
 /// What the pressure of a contact at a place follows from.
@@ -162,7 +252,9 @@ fn law_of(
             let stiffness = 0.5 * PI * size.width_mm * materials.contact_modulus_mpa(contact);
             Law::Linear { compliance_mm_per_n: 1.0 / stiffness }
         }
-        ContactLaw::Palmgren => Law::Power { exponent: 0.9, coefficient: 3.84e-5 / size.width_mm.powf(0.8) },
+        ContactLaw::Palmgren => {
+            Law::Power { exponent: PALMGREN_EXPONENT, coefficient: 3.84e-5 / size.width_mm.powf(0.8) }
+        }
         ContactLaw::Johnson { depth_mm } => {
             Law::Johnson(JohnsonLine::new(materials, contact, size.radius_mm, size.width_mm, *depth_mm.get(contact)))
         }
@@ -226,36 +318,68 @@ impl Contacts {
         self.hertz.get(contact)
     }
 
-    /// The law of cylinders, for whoever works in columns; none of other shapes, nor where laws of two kinds add up at a tooth.
-    pub(crate) fn line_law(&self) -> Option<LineLaw> {
-        if self.shape != ToothContact::Cylinder {
-            return None;
-        }
+    /// The law for whoever works in columns; none where laws of two kinds add up at a tooth. Of a flat that gives way by its own law there is only what
+    /// stands behind it.
+    pub(crate) fn tooth_law(&self) -> Option<ToothLaw> {
         let series = &self.series_compliance_mm_per_n;
+        let is_alone = series.iter().all(|(_, &compliance)| compliance == 0.0);
         let PerContact { wave_generator, ring, carrier } = &self.law;
         match (wave_generator, ring, carrier) {
+            _ if matches!(self.shape, ToothContact::Ball { .. }) => {
+                (is_alone && *wave_generator == Law::Ellipse).then_some(ToothLaw::Hertz)
+            }
             (
                 Law::Linear { compliance_mm_per_n: wave_generator },
                 Law::Linear { compliance_mm_per_n: ring },
-                Law::Linear { compliance_mm_per_n: carrier },
-            ) => Some(LineLaw::Linear {
-                compliance_mm_per_n: PerContact {
-                    wave_generator: wave_generator + series.wave_generator,
-                    ring: ring + series.ring,
-                    carrier: carrier + series.carrier,
-                },
-            }),
-            (&Law::Power { exponent, coefficient }, Law::Power { .. }, Law::Power { .. })
-                if series.iter().all(|(_, &compliance)| compliance == 0.0) =>
-            {
-                Some(LineLaw::Power { exponent, coefficient })
+                carrier @ (Law::Linear { .. } | Law::Flat),
+            ) => {
+                let carrier =
+                    if let Law::Linear { compliance_mm_per_n } = carrier { *compliance_mm_per_n } else { 0.0 };
+                Some(ToothLaw::Linear {
+                    compliance_mm_per_n: PerContact {
+                        wave_generator: wave_generator + series.wave_generator,
+                        ring: ring + series.ring,
+                        carrier: carrier + series.carrier,
+                    },
+                })
             }
-            (&Law::Johnson(wave_generator), &Law::Johnson(ring), &Law::Johnson(carrier)) => Some(LineLaw::Johnson {
-                law: PerContact { wave_generator, ring, carrier },
-                series_compliance_mm_per_n: *series,
-            }),
+            (&Law::Power { coefficient, .. }, Law::Power { .. }, Law::Power { .. }) if is_alone => {
+                Some(ToothLaw::Palmgren { coefficient })
+            }
+            (&Law::Johnson(wave_generator), &Law::Johnson(ring), carrier @ (Law::Johnson(_) | Law::Flat)) => {
+                let carrier = if let Law::Johnson(line) = carrier { *line } else { JohnsonLine::NONE };
+                Some(ToothLaw::Johnson {
+                    law: PerContact { wave_generator, ring, carrier },
+                    series_compliance_mm_per_n: *series,
+                })
+            }
             _ => None,
         }
+    }
+
+    /// A contact of balls.
+    pub(crate) fn ball(&self, contact: Contact) -> Option<BallContact> {
+        let ToothContact::Ball { groove_radius_mm } = &self.shape else { return None };
+        let r = self.tooth_radius_mm;
+        // 1/r - 1/r_g without the difference of near numbers.
+        let axial_per_mm = groove_radius_mm.get(contact).map_or(1.0 / r, |groove| (groove - r) / groove / r);
+        Some(BallContact { axial_per_mm, modulus_mpa: *self.modulus_mpa.get(contact) })
+    }
+
+    /// The flat of flat-sided teeth.
+    pub(crate) fn flat(&self) -> Option<Flat> {
+        let ToothContact::FlatSided { flat_length_mm, carrier_inner_radius_mm, carrier_outer_radius_mm } = self.shape
+        else {
+            return None;
+        };
+        Some(Flat {
+            length_mm: flat_length_mm,
+            width_mm: self.tooth_width_mm,
+            carrier_inner_radius_mm,
+            carrier_outer_radius_mm,
+            modulus_mpa: self.modulus_mpa.carrier,
+            has_own_law: self.law.carrier == Law::Flat,
+        })
     }
 
     /// What pressure a contact has where the curvatures in the plane of motion sum to `curvature_per_mm` and the tooth's centre is
@@ -266,27 +390,14 @@ impl Contacts {
         curvature_per_mm: f64,
         center_radius_mm: f64,
     ) -> Result<Option<Pressure>, NotConverged> {
-        let line = Pressure::Line { hertz: *self.hertz.get(contact), curvature_per_mm };
-        Ok(Some(match &self.shape {
-            ToothContact::Cylinder => line,
-            ToothContact::Ball { groove_radius_mm } => {
-                let r = self.tooth_radius_mm;
-                // 1/r - 1/r_g without the difference of near numbers.
-                let axial_per_mm = groove_radius_mm.get(contact).map_or(1.0 / r, |groove| (groove - r) / groove / r);
-                Pressure::Ellipse(EllipticContact::new(curvature_per_mm, axial_per_mm, *self.modulus_mpa.get(contact))?)
-            }
-            ToothContact::FlatSided { flat_length_mm, carrier_inner_radius_mm, carrier_outer_radius_mm } => {
-                if contact != Contact::Carrier {
-                    return Ok(Some(line));
-                }
-                let inner_mm = (center_radius_mm - 0.5 * flat_length_mm).max(*carrier_inner_radius_mm);
-                let outer_mm = (center_radius_mm + 0.5 * flat_length_mm).min(*carrier_outer_radius_mm);
-                if outer_mm <= inner_mm {
-                    return Ok(None);
-                }
-                Pressure::Flat(FlatContact::new(outer_mm - inner_mm, self.tooth_width_mm))
-            }
-        }))
+        if let Some(ball) = self.ball(contact) {
+            return Ok(Some(Pressure::Ellipse(ball.at(curvature_per_mm)?)));
+        }
+        if let Some(flat) = self.flat().filter(|_| contact == Contact::Carrier) {
+            let borne_mm = flat.borne_mm(center_radius_mm);
+            return Ok((borne_mm > 0.0).then(|| Pressure::Flat(flat.over(borne_mm))));
+        }
+        Ok(Some(Pressure::Line { hertz: *self.hertz.get(contact), curvature_per_mm }))
     }
 
     /// `ξ = Σ w δ` of a tooth over `F_H`, where the ring gives way by so much more than at its root.

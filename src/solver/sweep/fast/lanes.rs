@@ -27,20 +27,9 @@ const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 const ARTANH: [f64; 9] =
     [1.0 / 3.0, 0.2, 1.0 / 7.0, 1.0 / 9.0, 1.0 / 11.0, 1.0 / 13.0, 1.0 / 15.0, 1.0 / 17.0, 1.0 / 19.0];
 
-/// Those of `e^x`, as many as reach the last digit for `|x| ≤ ln 2/2`.
-const EXPONENTIAL: [f64; 14] = {
-    let mut coefficients = [1.0; 14];
-    let mut term = 1;
-    while term < 14 {
-        coefficients[term] = coefficients[term - 1] / term as f64;
-        term += 1;
-    }
-    coefficients
-};
-
 /// `ab + c`, rounded once where vectors can do that.
 #[inline(always)]
-fn fused<V: Simd>(a: f64, b: f64, c: f64) -> f64 {
+pub(super) fn fused<V: Simd>(a: f64, b: f64, c: f64) -> f64 {
     if V::IS_SCALAR { a * b + c } else { a.mul_add(b, c) }
 }
 
@@ -72,27 +61,52 @@ pub(super) fn ln_roughly(x: f64) -> f64 {
     (straight / (1_u64 << 40) as f64 - (1023.0 - HALF_BULGE)) * std::f64::consts::LN_2
 }
 
-/// `e^x` for `|x| ≤ 700`, and what is next to nothing below that, to two units of the last digit.
+/// `x^(-1/N)` of a normal positive number, to two units of the last digit, without a division: the bits of a double count exponent and mantissa on a scale that is
+/// straight from each power of two to the next, and a place on it goes to a guess y; then `1/(1 - ε)^(1/N)` by its series, `ε = 1 - x y^N`, as often as it takes.
 #[inline(always)]
-fn exp<V: Simd>(x: f64) -> f64 {
-    /// 1.5 · 2^52: a sum with it is rounded to a whole number, which stands in its last bits.
-    const ROUND: f64 = 1.5 * WHOLE;
-    let x = if x > -700.0 { x } else { -700.0 };
-    let shifted = x * std::f64::consts::LOG2_E + ROUND;
-    let exponent = shifted - ROUND;
-    let rest = (x - exponent * LN_2_HIGH) - exponent * LN_2_LOW;
-    let mut sum = 0.0;
-    for coefficient in EXPONENTIAL.iter().rev() {
-        sum = fused::<V>(sum, rest, *coefficient);
+fn inverse_root<V: Simd, const N: u32>(x: f64) -> f64 {
+    const PER_EXPONENT: f64 = (1_u64 << 40) as f64;
+    // What makes ε alike above and below: 10 % at first for N = 3, then 5e-5 and 7e-16; 29 % for N = 10, then 3e-3, 2e-11 and 2e-15.
+    let (balance, rounds) = if N == 3 { (0.068, 2) } else { (0.058, 3) };
+    let share = 1.0 / f64::from(N);
+    let (second, third) = (0.5 * share * (1.0 + share), share * (1.0 + share) * (2.0 + share) / 6.0);
+    let straight = f64::from_bits((x.to_bits() >> 12) | WHOLE.to_bits()) - WHOLE;
+    let root = ((1.0 + share) * 1023.0 - balance) * PER_EXPONENT - straight * share;
+    let mut inverse = f64::from_bits((root + WHOLE).to_bits() << 12);
+    for _ in 0..rounds {
+        let square = inverse * inverse;
+        let fourth = square * square;
+        let off = 1.0
+            - match N {
+                3 => (x * inverse) * square,
+                9 => (x * fourth) * (fourth * inverse),
+                _ => (x * (fourth * inverse)) * (fourth * inverse),
+            };
+        let series = fused::<V>(off, fused::<V>(off, third, second), share);
+        inverse = fused::<V>(inverse * off, series, inverse);
     }
-    let power = f64::from_bits((shifted.to_bits() << 52).wrapping_add(1.0_f64.to_bits()));
-    sum * power
+    inverse
 }
 
-/// `x^p` of a normal positive number, where that lies within e^±700.
+/// `∛x` of a number that is not negative.
 #[inline(always)]
-pub(super) fn power<V: Simd>(x: f64, exponent: f64) -> f64 {
-    exp::<V>(exponent * ln::<V>(x))
+pub(super) fn cube_root<V: Simd>(x: f64) -> f64 {
+    let inverse = inverse_root::<V, 3>(x);
+    x * (inverse * inverse)
+}
+
+/// `x^(1/9)` of a normal positive number.
+#[inline(always)]
+pub(super) fn ninth_root<V: Simd>(x: f64) -> f64 {
+    let inverse = inverse_root::<V, 9>(x);
+    let square = inverse * inverse;
+    x * ((square * square) * (square * square))
+}
+
+/// `x^(-1/10)` of a normal positive number.
+#[inline(always)]
+pub(super) fn inverse_tenth_root<V: Simd>(x: f64) -> f64 {
+    inverse_root::<V, 10>(x)
 }
 
 /// How many terms of `atan q = q (1 - q²/3 + q⁴/5 - …)` reach the last digit for `0 ≤ q ≤ largest`.
@@ -140,7 +154,13 @@ pub(super) fn largest(values: &[f64]) -> f64 {
             most[i] = if stretch[i] > most[i] { stretch[i] } else { most[i] };
         }
     }
-    most.iter().chain(rest).fold(0.0, |most, &value| if value > most { value } else { most })
+    let mut largest = 0.0;
+    for values in [most.as_slice(), rest] {
+        for &value in values {
+            largest = if value > largest { value } else { largest };
+        }
+    }
+    largest
 }
 
 /// Each value so many times in a row, the last one up to the end of its stretch too. Whole vectors are written, and what is too much is overwritten by
@@ -162,29 +182,40 @@ pub(super) fn repeat_each(values: &[f64], times: usize, repeated: &mut [f64]) {
 mod tests {
     use super::*;
 
-    fn assert_to_two_units<V: Simd>() {
+    fn assert_to_a_few_units<V: Simd>() {
         let close = |found: f64, expected: f64| (found - expected).abs() <= 2.0 * f64::EPSILON * expected.abs();
         let mut x = 1e-300;
         while x < 1e300 {
             assert!(close(ln::<V>(x), x.ln()), "ln {x}");
             assert!((ln_roughly(x) - x.ln()).abs() < 0.031, "ln {x}");
+            let roots = [
+                (cube_root::<V>(x), x.cbrt()),
+                (ninth_root::<V>(x), x.cbrt().cbrt()),
+                (inverse_tenth_root::<V>(x), (-0.1 * x.ln()).exp()),
+            ];
+            for (root, expected) in roots {
+                assert!((root - expected).abs() <= 100.0 * f64::EPSILON * expected, "a root of {x}: {root}");
+            }
             x *= 1.003_7;
         }
         for step in -100_000..100_000 {
             let x = 1.0 + f64::from(step) * 9e-6;
             assert!(close(ln::<V>(x), x.ln()), "ln {x}");
-            let x = f64::from(step) * 6.9e-3;
-            assert!(close(exp::<V>(x), x.exp()), "exp {x}");
+            // Roots of powers of ten, to 10 units of the last digit: by powers, since no library has them all.
+            let (cube, ninth, tenth) = (x.powi(3), x.powi(9), x.powi(10));
+            for root in [cube_root::<V>(cube), ninth_root::<V>(ninth), 1.0 / inverse_tenth_root::<V>(tenth)] {
+                assert!((root - x).abs() <= 10.0 * f64::EPSILON * x, "{root} is not {x}");
+            }
         }
-        assert!(exp::<V>(-1e6) < 1e-300);
+        assert_eq!(cube_root::<V>(0.0).to_bits(), 0);
     }
 
     #[test]
-    fn logarithms_and_exponentials_are_right_to_two_units_of_the_last_digit_on_any_machine() {
-        assert_to_two_units::<pulp::Scalar>();
+    fn logarithms_and_roots_are_right_to_a_few_units_of_the_last_digit_on_any_machine() {
+        assert_to_a_few_units::<pulp::Scalar>();
         #[cfg(target_arch = "x86_64")]
-        assert_to_two_units::<pulp::x86::V3>();
+        assert_to_a_few_units::<pulp::x86::V3>();
         #[cfg(target_arch = "aarch64")]
-        assert_to_two_units::<pulp::aarch64::Neon>();
+        assert_to_a_few_units::<pulp::aarch64::Neon>();
     }
 }

@@ -93,7 +93,7 @@ impl<'a> FastLook<'a> {
             stop,
             mesh: *loaded.mesh(),
             rows: size.rows(),
-            tile: Tile::new(arena, size, 0.0),
+            tile: Tile::new(arena, size, 0.0, kernel.pressures.stress_exponents()),
             balance: TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm()),
             bases: Vec::new(),
             torque_balance_residual: 0.0,
@@ -107,7 +107,7 @@ impl<'a> FastLook<'a> {
     fn work_out<V: Simd>(&mut self, bases: usize, fractions: &[f64], seen: &mut Seen) -> bool {
         let (kernel, loaded, tile) = (self.kernel, self.loaded, &mut self.tile);
         self.bases[bases].place(fractions, tile);
-        if !kernel.unit_loads::<PeakSink>(tile) {
+        if !kernel.unit_loads::<V, PeakSink>(tile) {
             return false;
         }
         let teeth = seen.teeth;
@@ -128,13 +128,14 @@ impl<'a> FastLook<'a> {
             let at = row * teeth..(row + 1) * teeth;
             let (rotation_rad, stiffness) = (tile.row_rotation_rad[row], tile.row_stiffness[row]);
             let values = seen.push(fraction);
-            let (scale, root) = (&tile.scale[at.clone()], &tile.scale_root[at.clone()]);
+            let scale = &tile.scale[at.clone()];
             for (index, contact) in [Contact::WaveGenerator, Contact::Ring, Contact::Carrier].into_iter().enumerate() {
                 let (force, stress) = (&tile.force.get(contact)[at.clone()], &tile.stress.get(contact)[at.clone()]);
                 let forces = &mut values[index * teeth..(index + 1) * teeth];
                 for i in 0..teeth {
                     forces[i] = force[i] * scale[i];
                 }
+                let root = &tile.stress_scale(contact)[at.clone()];
                 let stresses = &mut values[(index + 3) * teeth..(index + 4) * teeth];
                 for i in 0..teeth {
                     stresses[i] = stress[i] * root[i];

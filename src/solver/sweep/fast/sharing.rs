@@ -6,11 +6,13 @@
 
 use pulp::Simd;
 
-use super::lanes::{LANES, largest, ln, ln_roughly, power, repeat_each};
+use super::lanes::{LANES, cube_root, inverse_tenth_root, largest, ln, ln_roughly, ninth_root, repeat_each};
 use crate::contact::{Contact, PerContact};
 use crate::load_sharing::{Compatibility, LoadedDrive};
-use crate::tooth::LineLaw;
+use crate::tooth::StressExponents;
 use crate::tooth::line::{JohnsonLine, WIDEST_SHARE};
+use crate::tooth::point::EllipticContact;
+use crate::tooth::{PALMGREN_EXPONENT, ToothLaw};
 
 /// Rounds of a search at most; a tile that needs more goes the plain way.
 const MAX_ROUNDS: u32 = 60;
@@ -24,6 +26,9 @@ const OPEN_TORQUE: f64 = 8.0 * f64::EPSILON;
 
 /// In place of nothing, where a logarithm is asked for: no contact knows a ratio or a force like this.
 const NOTHING: f64 = 1e-150;
+
+/// The force under which a flat would be too wide for Johnson's law, of which it knows nothing.
+const NEVER_TOO_WIDE_N: f64 = 1e100;
 
 /// The teeth of a tile under 1 N at the wave generator, by input angle and then tooth.
 pub(super) struct Teeth<'a> {
@@ -45,6 +50,8 @@ pub(super) struct Teeth<'a> {
     pub(super) ring_stress: &'a [f64],
     /// Stress at the carrier.
     pub(super) carrier_stress: &'a [f64],
+    /// The powers of the stresses that forces go with.
+    pub(super) stress_exponents: StressExponents,
 }
 
 /// The least torque of a tile under which a contact reaches a stress.
@@ -69,6 +76,8 @@ pub(super) struct Shared<'a> {
 
 /// Columns to work in.
 pub(super) struct Work<'a> {
+    /// What the place of each tooth decides of its law: c of balls, the compliance of a flat.
+    pub(super) given: &'a mut [f64],
     /// Of a power law the force at the rotation 1; of Johnson's `A`.
     unit: &'a mut [f64],
     /// `B` of Johnson's law.
@@ -103,13 +112,14 @@ pub(super) struct Work<'a> {
 
 impl<'a> Work<'a> {
     /// Columns of states.
-    pub(super) const COLUMNS: usize = 12;
+    pub(super) const COLUMNS: usize = 13;
     /// Columns of input angles.
     pub(super) const ROWS: usize = 3;
 
     /// From slices of any length.
     pub(super) fn new(slice: &mut impl FnMut(usize) -> &'a mut [f64], column: usize, rows: usize) -> Self {
         Self {
+            given: slice(column),
             unit: slice(column),
             growth: slice(column),
             closing: slice(column),
@@ -244,19 +254,24 @@ fn press<const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>) {
     }
 }
 
-/// The force at which the first contact of each tooth reaches its allowable stress, lines of contact all: `(σ_a/σ)²` of the stress under 1 N.
+/// The force at which the first contact of each tooth reaches its allowable stress: for lines of contact `(σ_a/σ)²` of the stress under 1 N.
 #[inline(always)]
 fn forces_at_stress(per_allowable: &PerContact<f64>, teeth: &Teeth<'_>, force: &mut [f64]) {
     let len = teeth.len;
+    let exponents = teeth.stress_exponents;
     let (cam, ring) = (&teeth.cam_stress[..len], &teeth.ring_stress[..len]);
     let (carrier, force) = (&teeth.carrier_stress[..len], &mut force[..len]);
     for i in 0..len {
         let (cam, ring) = (cam[i] * per_allowable.wave_generator, ring[i] * per_allowable.ring);
         let carrier = carrier[i] * per_allowable.carrier;
         let most = if ring > cam { ring } else { cam };
-        let most = if carrier > most { carrier } else { most };
-        let share = 1.0 / most;
-        force[i] = share * share;
+        if exponents.are_alike() {
+            let most = if carrier > most { carrier } else { most };
+            force[i] = exponents.raised(1.0 / most);
+        } else {
+            let (at_lines, at_flat) = (exponents.raised(1.0 / most), 1.0 / carrier);
+            force[i] = if at_flat < at_lines { at_flat } else { at_lines };
+        }
     }
 }
 
@@ -291,11 +306,14 @@ fn least_torque(
     work: &mut Work<'_>,
     force: &[f64],
 ) -> Option<Limit> {
-    // Of the allowable stress under 1 N.
-    let shares = |i: usize| PerContact {
-        wave_generator: teeth.cam_stress[i] * per_allowable.wave_generator,
-        ring: teeth.ring_stress[i] * per_allowable.ring,
-        carrier: teeth.carrier_stress[i] * per_allowable.carrier,
+    // Of the force at the allowable stress, 1 N.
+    let shares = |i: usize| {
+        let exponents = teeth.stress_exponents;
+        PerContact {
+            wave_generator: exponents.raised(teeth.cam_stress[i] * per_allowable.wave_generator),
+            ring: exponents.raised(teeth.ring_stress[i] * per_allowable.ring),
+            carrier: exponents.raised_at(Contact::Carrier, teeth.carrier_stress[i] * per_allowable.carrier),
+        }
     };
     let mut least: Option<Limit> = None;
     for row in 0..teeth.rows {
@@ -306,11 +324,11 @@ fn least_torque(
         }
         work.row_limit[row] = torque_nmm;
         if least.as_ref().is_none_or(|least| torque_nmm < least.torque_nmm) {
-            let stress = |&i: &usize| {
+            let share = |&i: &usize| {
                 let PerContact { wave_generator, ring, carrier } = shares(i);
-                wave_generator.max(ring).max(carrier) * if work.pressed[i] > 0.0 { force[i].sqrt() } else { 0.0 }
+                wave_generator.max(ring).max(carrier) * if work.pressed[i] > 0.0 { force[i] } else { 0.0 }
             };
-            let at_limit = at.clone().max_by(|one, other| stress(one).total_cmp(&stress(other)))?;
+            let at_limit = at.clone().max_by(|one, other| share(one).total_cmp(&share(other)))?;
             let PerContact { wave_generator, ring, carrier } = shares(at_limit);
             let contact = if carrier > wave_generator.max(ring) {
                 Contact::Carrier
@@ -325,12 +343,167 @@ fn least_torque(
     least.filter(|least| least.torque_nmm.is_finite())
 }
 
-/// `ξ = c F^p`, a linear law with gaps among them.
-pub(super) struct PowerLaw {
-    exponent: f64,
-    coefficient: PerContact<f64>,
-    weights: Weights,
+/// `ξ = c F^p`.
+pub(super) struct PowerLaw<P> {
+    power: P,
     gaps: Option<Gaps>,
+}
+
+/// What a power law does to a column.
+pub(super) trait Power {
+    /// Whether p is 1.
+    const IS_LINEAR: bool;
+
+    /// `p`.
+    fn exponent(&self) -> f64;
+
+    /// `x^p`, x not negative.
+    fn power<V: Simd>(&self, x: f64) -> f64;
+
+    /// `x^(1/p)`.
+    fn inverse<V: Simd>(&self, x: f64) -> f64;
+
+    /// `x^(1/p - 1)`.
+    fn inverse_over_x<V: Simd>(&self, x: f64) -> f64;
+
+    /// The force at the rotation 1, `(|h'|/c)^(1/p)`, with `c = Σ w q (F_c/F_H)^p`, of which something may stand in a column.
+    fn units<V: Simd>(&self, teeth: &Teeth<'_>, given: &[f64], unit: &mut [f64]);
+}
+
+/// A linear law with gaps, or of teeth that have flats: their compliance is given.
+pub(super) struct Linear {
+    compliance_mm_per_n: PerContact<f64>,
+    weights: Weights,
+}
+
+impl Power for Linear {
+    const IS_LINEAR: bool = true;
+
+    #[inline(always)]
+    fn exponent(&self) -> f64 {
+        1.0
+    }
+
+    #[inline(always)]
+    fn power<V: Simd>(&self, x: f64) -> f64 {
+        x
+    }
+
+    #[inline(always)]
+    fn inverse<V: Simd>(&self, x: f64) -> f64 {
+        x
+    }
+
+    #[inline(always)]
+    fn inverse_over_x<V: Simd>(&self, _: f64) -> f64 {
+        1.0
+    }
+
+    #[inline(always)]
+    fn units<V: Simd>(&self, teeth: &Teeth<'_>, given: &[f64], unit: &mut [f64]) {
+        let len = teeth.len;
+        let (unit, given) = (&mut unit[..len], &given[..len]);
+        let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
+        let Self { compliance_mm_per_n: compliance, weights } = self;
+        for i in 0..len {
+            let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
+            let ring = if weights.ring_exponent > 0.0 { ring[i] * ring[i] } else { 1.0 };
+            let of_ring = compliance.ring * along * ring;
+            let of_carrier = (compliance.carrier + given[i]) * weights.carrier;
+            let c = compliance.wave_generator + of_ring + of_carrier * (carrier[i] * carrier[i]);
+            unit[i] = arm[i] / c;
+        }
+    }
+}
+
+/// Palmgren's law, `p = 9/10`.
+pub(super) struct Palmgren {
+    coefficient: f64,
+    weights: Weights,
+}
+
+/// The same number, or next to nothing where it is nothing or less: roots are of positive ones.
+#[inline(always)]
+fn positive(x: f64) -> f64 {
+    if x > NOTHING { x } else { NOTHING }
+}
+
+impl Power for Palmgren {
+    const IS_LINEAR: bool = false;
+
+    #[inline(always)]
+    fn exponent(&self) -> f64 {
+        PALMGREN_EXPONENT
+    }
+
+    #[inline(always)]
+    fn power<V: Simd>(&self, x: f64) -> f64 {
+        x * inverse_tenth_root::<V>(positive(x))
+    }
+
+    #[inline(always)]
+    fn inverse<V: Simd>(&self, x: f64) -> f64 {
+        x * ninth_root::<V>(positive(x))
+    }
+
+    #[inline(always)]
+    fn inverse_over_x<V: Simd>(&self, x: f64) -> f64 {
+        ninth_root::<V>(positive(x))
+    }
+
+    /// With `F_K/F_H` to the power 1.9 by virtual work and -0.1 by projection, and `F_S/F_H` to the power 1.9.
+    #[inline(always)]
+    fn units<V: Simd>(&self, teeth: &Teeth<'_>, _: &[f64], unit: &mut [f64]) {
+        let len = teeth.len;
+        let unit = &mut unit[..len];
+        let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
+        let Self { coefficient, weights } = self;
+        let of_carrier = coefficient * weights.carrier;
+        for i in 0..len {
+            let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
+            let squared = if weights.ring_exponent > 0.0 { ring[i] * ring[i] } else { 1.0 };
+            let of_ring = coefficient * along * squared * inverse_tenth_root::<V>(ring[i]);
+            let power = carrier[i] * carrier[i] * inverse_tenth_root::<V>(positive(carrier[i]));
+            unit[i] = self.inverse::<V>(arm[i] / (coefficient + of_ring + of_carrier * power));
+        }
+    }
+}
+
+/// Hertz's law of balls: its coefficient changes with the place, and c is given.
+pub(super) struct Hertz;
+
+impl Power for Hertz {
+    const IS_LINEAR: bool = false;
+
+    #[inline(always)]
+    fn exponent(&self) -> f64 {
+        EllipticContact::EXPONENT
+    }
+
+    #[inline(always)]
+    fn power<V: Simd>(&self, x: f64) -> f64 {
+        let root = cube_root::<V>(x);
+        root * root
+    }
+
+    #[inline(always)]
+    fn inverse<V: Simd>(&self, x: f64) -> f64 {
+        x * x.sqrt()
+    }
+
+    #[inline(always)]
+    fn inverse_over_x<V: Simd>(&self, x: f64) -> f64 {
+        x.sqrt()
+    }
+
+    #[inline(always)]
+    fn units<V: Simd>(&self, teeth: &Teeth<'_>, given: &[f64], unit: &mut [f64]) {
+        let len = teeth.len;
+        let (arm, given, unit) = (&teeth.arm[..len], &given[..len], &mut unit[..len]);
+        for i in 0..len {
+            unit[i] = self.inverse::<V>(arm[i] / given[i]);
+        }
+    }
 }
 
 /// `ξ = F (A - B ln F)`, Johnson's, with virtual work.
@@ -347,7 +520,9 @@ pub(super) struct LogarithmicLaw {
 
 /// How unit loads become loads.
 pub(super) enum Sharing {
-    Power(PowerLaw),
+    Linear(PowerLaw<Linear>),
+    Palmgren(PowerLaw<Palmgren>),
+    Hertz(PowerLaw<Hertz>),
     Logarithmic(LogarithmicLaw),
 }
 
@@ -358,14 +533,15 @@ impl Sharing {
         let gap_mm = *loaded.uniform_gap_mm()?;
         let has_gaps = gap_mm.iter().any(|(_, &gap_mm)| gap_mm > 0.0);
         let gaps = has_gaps.then_some(Gaps { gap_mm, weights });
-        Some(match loaded.line_law()? {
-            LineLaw::Linear { compliance_mm_per_n } => {
-                Self::Power(PowerLaw { exponent: 1.0, coefficient: compliance_mm_per_n, weights, gaps })
+        Some(match loaded.tooth_law()? {
+            ToothLaw::Linear { compliance_mm_per_n } => {
+                Self::Linear(PowerLaw { power: Linear { compliance_mm_per_n, weights }, gaps })
             }
-            LineLaw::Power { exponent, coefficient } => {
-                Self::Power(PowerLaw { exponent, coefficient: PerContact::of(|_| coefficient), weights, gaps })
+            ToothLaw::Palmgren { coefficient } => {
+                Self::Palmgren(PowerLaw { power: Palmgren { coefficient, weights }, gaps })
             }
-            LineLaw::Johnson { law, series_compliance_mm_per_n: series } => {
+            ToothLaw::Hertz => Self::Hertz(PowerLaw { power: Hertz, gaps }),
+            ToothLaw::Johnson { law, series_compliance_mm_per_n: series } => {
                 let tooth_radius_mm = loaded.drive().parameters().tooth_radius_mm;
                 let reference = |contact| {
                     let JohnsonLine { growth_mm_per_n, length_mm, .. } = *law.get(contact);
@@ -375,7 +551,8 @@ impl Sharing {
                         Contact::WaveGenerator | Contact::Ring => {
                             of_curvature / loaded.hertz(contact).modulus_per_width_mpa_per_mm()
                         }
-                        Contact::Carrier => of_curvature / tooth_radius_mm,
+                        Contact::Carrier if growth_mm_per_n > 0.0 => of_curvature / tooth_radius_mm,
+                        Contact::Carrier => NEVER_TOO_WIDE_N,
                     }
                 };
                 Self::Logarithmic(LogarithmicLaw {
@@ -398,7 +575,9 @@ impl Sharing {
         shared: &mut Shared<'_>,
     ) -> bool {
         match self {
-            Self::Power(law) => law.share::<V>(torque_nmm, teeth, work, shared),
+            Self::Linear(law) => law.share::<V>(torque_nmm, teeth, work, shared),
+            Self::Palmgren(law) => law.share::<V>(torque_nmm, teeth, work, shared),
+            Self::Hertz(law) => law.share::<V>(torque_nmm, teeth, work, shared),
             Self::Logarithmic(law @ LogarithmicLaw { gaps: None, .. }) => {
                 law.share::<V, false>(torque_nmm, teeth, work, shared)
             }
@@ -411,19 +590,21 @@ impl Sharing {
     /// Whether teeth begin and cease to carry between their entry and their exit.
     pub(super) const fn has_gaps(&self) -> bool {
         match self {
-            Self::Power(law) => law.gaps.is_some(),
+            Self::Linear(law) => law.gaps.is_some(),
+            Self::Palmgren(law) => law.gaps.is_some(),
+            Self::Hertz(law) => law.gaps.is_some(),
             Self::Logarithmic(law) => law.gaps.is_some(),
         }
     }
 
     /// Whether forces are in proportion to what teeth are pressed by.
-    pub(super) fn is_linear(&self) -> bool {
-        matches!(self, Self::Power(law) if law.exponent >= 1.0)
+    pub(super) const fn is_linear(&self) -> bool {
+        matches!(self, Self::Linear(_))
     }
 
     /// Whether all loads are in proportion, whatever the torque.
     pub(super) const fn is_in_proportion(&self) -> bool {
-        matches!(self, Self::Power(PowerLaw { gaps: None, .. }))
+        !matches!(self, Self::Logarithmic(_)) && !self.has_gaps()
     }
 
     /// The least torque of the tile, of one zone, under which a contact reaches a stress, once the load is shared; nothing where it is not found, or
@@ -436,13 +617,15 @@ impl Sharing {
         work: &mut Work<'_>,
     ) -> Option<Limit> {
         match self {
-            Self::Power(law) => law.limit::<V>(per_allowable, teeth, work),
+            Self::Linear(law) => law.limit::<V>(per_allowable, teeth, work),
+            Self::Palmgren(law) => law.limit::<V>(per_allowable, teeth, work),
+            Self::Hertz(law) => law.limit::<V>(per_allowable, teeth, work),
             Self::Logarithmic(law) => law.limit::<V>(per_allowable, teeth, work),
         }
     }
 }
 
-impl PowerLaw {
+impl<P: Power> PowerLaw<P> {
     #[inline(always)]
     fn limit<V: Simd>(&self, per_allowable: &PerContact<f64>, teeth: &Teeth<'_>, work: &mut Work<'_>) -> Option<Limit> {
         let len = teeth.len;
@@ -451,9 +634,7 @@ impl PowerLaw {
             let (force, unit, arm) = (&work.limit[..len], &work.unit[..len], &teeth.arm[..len]);
             let pressed = &mut work.pressed[..len];
             for i in 0..len {
-                let share = force[i] / if arm[i] > 0.0 { unit[i] } else { 1.0 };
-                let by_power = power::<V>(share, self.exponent);
-                let by_law = if self.exponent < 1.0 { by_power } else { share };
+                let by_law = self.power.power::<V>(force[i] / if arm[i] > 0.0 { unit[i] } else { 1.0 });
                 pressed[i] = if arm[i] > 0.0 { by_law } else { f64::INFINITY };
             }
         }
@@ -462,11 +643,8 @@ impl PowerLaw {
         }
         let limit = std::mem::take(&mut work.limit);
         let (pressed, unit, force) = (&work.pressed[..len], &work.unit[..len], &mut limit[..len]);
-        let inverse = 1.0 / self.exponent;
         for i in 0..len {
-            let safe = if pressed[i] > NOTHING { pressed[i] } else { NOTHING };
-            let by_power = power::<V>(safe, inverse);
-            let by_law = if self.exponent < 1.0 { by_power } else { pressed[i] };
+            let by_law = self.power.inverse::<V>(pressed[i]);
             force[i] = if pressed[i] > 0.0 { unit[i] * by_law } else { 0.0 };
         }
         let least = least_torque(per_allowable, teeth, work, limit);
@@ -474,40 +652,9 @@ impl PowerLaw {
         least
     }
 
-    /// The force at the rotation 1, `(|h'|/c)^(1/p)`, with `c = Σ w q (F_c/F_H)^p`.
-    #[inline(always)]
-    fn units<V: Simd>(&self, teeth: &Teeth<'_>, unit: &mut [f64]) {
-        let len = teeth.len;
-        let unit = &mut unit[..len];
-        let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
-        let Self { exponent, coefficient, weights, .. } = self;
-        let of_carrier = coefficient.carrier * weights.carrier;
-        let (ring_exponent, carrier_exponent) = (exponent + weights.ring_exponent, exponent + 1.0);
-        if *exponent < 1.0 {
-            let inverse = 1.0 / exponent;
-            for i in 0..len {
-                let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
-                let of_ring = coefficient.ring * along * power::<V>(ring[i], ring_exponent);
-                let carrier = if carrier[i] > NOTHING { carrier[i] } else { NOTHING };
-                let c = coefficient.wave_generator + of_ring + of_carrier * power::<V>(carrier, carrier_exponent);
-                let share = arm[i] / c;
-                let share = if share > NOTHING { share } else { NOTHING };
-                unit[i] = if arm[i] > 0.0 { power::<V>(share, inverse) } else { 0.0 };
-            }
-        } else {
-            for i in 0..len {
-                let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
-                let ring = if weights.ring_exponent > 0.0 { ring[i] * ring[i] } else { 1.0 };
-                let of_ring = coefficient.ring * along * ring;
-                let c = coefficient.wave_generator + of_ring + of_carrier * (carrier[i] * carrier[i]);
-                unit[i] = arm[i] / c;
-            }
-        }
-    }
-
     #[inline(always)]
     fn share<V: Simd>(&self, torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
-        self.units::<V>(teeth, work.unit);
+        self.power.units::<V>(teeth, work.given, work.unit);
         match &self.gaps {
             None => {
                 self.share_in_proportion::<V>(torque_nmm, teeth, work, shared);
@@ -515,10 +662,10 @@ impl PowerLaw {
             }
             Some(gaps) => {
                 gaps.close(teeth, work.closing);
-                if self.exponent < 1.0 {
-                    self.share_beyond_gaps::<V>(torque_nmm, teeth, work, shared)
-                } else {
+                if P::IS_LINEAR {
                     share_linearly(torque_nmm, teeth, work, shared)
+                } else {
+                    self.share_beyond_gaps::<V>(torque_nmm, teeth, work, shared)
                 }
             }
         }
@@ -541,9 +688,9 @@ impl PowerLaw {
                 of_unit += arm[i] * unit[i];
             }
             let share = torque_nmm / of_unit;
-            let rotation_rad = if self.exponent < 1.0 { power::<V>(share, self.exponent) } else { share };
+            let rotation_rad = self.power.power::<V>(share);
             shared.rotation_rad[row] = rotation_rad;
-            shared.stiffness[row] = torque_nmm / (self.exponent * rotation_rad);
+            shared.stiffness[row] = torque_nmm / (self.power.exponent() * rotation_rad);
             for (force, unit) in shared.force[at].iter_mut().zip(unit) {
                 *force = unit * share;
             }
@@ -559,7 +706,7 @@ impl PowerLaw {
         work: &mut Work<'_>,
         shared: &mut Shared<'_>,
     ) -> bool {
-        let (count, inverse) = (teeth.count, 1.0 / self.exponent);
+        let (count, inverse) = (teeth.count, 1.0 / self.power.exponent());
         for row in 0..teeth.rows {
             let at = row * count..(row + 1) * count;
             let (arm, unit) = (&teeth.arm[at.clone()], &work.unit[at.clone()]);
@@ -567,7 +714,7 @@ impl PowerLaw {
             for i in 0..count {
                 of_unit += arm[i] * unit[i];
             }
-            let alone = power::<V>(torque_nmm / of_unit, self.exponent);
+            let alone = self.power.power::<V>(torque_nmm / of_unit);
             let Some((last, excess)) = start_above(alone, |i| arm[i] * unit[i], &work.closing[at]) else {
                 return false;
             };
@@ -631,12 +778,11 @@ impl PowerLaw {
         let (unit, closing, excess, last) =
             (&work.unit[..len], &work.closing[..len], &work.excess[..len], &work.last[..len]);
         let (pressed, slope) = (&mut work.pressed[..len], &mut work.slope[..len]);
-        let bend = 1.0 / self.exponent - 1.0;
         for i in 0..len {
             let x = excess[i] + (last[i] - closing[i]);
             pressed[i] = x;
-            let safe = if x > NOTHING { x } else { NOTHING };
-            slope[i] = if x > 0.0 { unit[i] * power::<V>(safe, bend) } else { 0.0 };
+            let over_x = self.power.inverse_over_x::<V>(x);
+            slope[i] = if x > 0.0 { unit[i] * over_x } else { 0.0 };
         }
     }
 }
@@ -689,6 +835,7 @@ impl LogarithmicLaw {
         let len = teeth.len;
         let (ring, carrier) = (&teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
         let (cam_stress, ring_stress) = (&teeth.cam_stress[..len], &teeth.ring_stress[..len]);
+        let given = &work.given[..len];
         let (a, b, reach) = (&mut work.unit[..len], &mut work.growth[..len], &mut work.reach[..len]);
         let compliance = PerContact::of(|contact| typical_n * self.compliance.get(contact));
         let growth = PerContact::of(|contact| typical_n * self.growth.get(contact));
@@ -703,7 +850,7 @@ impl LogarithmicLaw {
             let (ring2, carrier2) = (ring[i] * ring[i], carrier[i] * carrier[i]);
             a[i] = (compliance.wave_generator + growth.wave_generator * of_cam)
                 + ring2 * (compliance.ring + growth.ring * of_ring)
-                + carrier2 * (compliance.carrier + growth.carrier * of_carrier);
+                + carrier2 * (compliance.carrier + growth.carrier * of_carrier + typical_n * given[i]);
             b[i] = growth.wave_generator + ring2 * growth.ring + carrier2 * growth.carrier;
             let least = if of_ring < of_cam { of_ring } else { of_cam };
             reach[i] = if of_carrier < least { of_carrier } else { least };

@@ -75,8 +75,8 @@ impl Sink for ColumnSink {
         states.center_radius_mm.extend_from_slice(&tile.center_radius_mm[..count]);
         states.wave_generator_angle_deg.extend_from_slice(&tile.wave_generator_angle_deg[..count]);
         states.ring_angle_deg.extend_from_slice(&tile.ring_angle_deg[..count]);
-        let (scale, root) = (&tile.scale[..count], &tile.scale_root[..count]);
         for contact in CONTACTS {
+            let (scale, root) = (&tile.scale[..count], &tile.stress_scale(contact)[..count]);
             let [force, stress] = self.peaks.get_mut(contact);
             force.append(states.force_n.get_mut(contact), tile.force.get(contact), scale);
             stress.append(states.stress_mpa.get_mut(contact), tile.stress.get(contact), root);
@@ -203,7 +203,8 @@ impl Sink for PeakSink {
         self.angles.take(drive, tile, rows);
         for contact in CONTACTS {
             scale(tile.force.get_mut(contact), tile.scale, count);
-            scale(tile.stress.get_mut(contact), tile.scale_root, count);
+            let is_one = tile.stress_exponents.is_one_at(contact);
+            scale(tile.stress.get_mut(contact), if is_one { tile.scale } else { tile.scale_root }, count);
             for (peak, is_stress) in self.peaks.get_mut(contact).iter_mut().zip([false, true]) {
                 let column = if is_stress { tile.stress.get(contact) } else { tile.force.get(contact) };
                 let value = largest(&column[..count]);

@@ -6,9 +6,10 @@ use std::ops::Range;
 
 use super::lanes::{LANES, VECTOR};
 use super::sharing::Work;
-use crate::contact::PerContact;
+use crate::contact::{Contact, PerContact};
 use crate::mesh::{Mesh, Samples};
 use crate::position::Position;
+use crate::tooth::StressExponents;
 
 /// States of a tile, where one input angle has no more: its columns stay in the first-level cache.
 const TILE: usize = 128;
@@ -189,7 +190,7 @@ impl TileSize {
     /// What all slices of a tile take together.
     pub(super) const fn doubles(&self) -> usize {
         let (of_columns, of_work) = (self.with_columns as usize, self.with_work as usize);
-        (16 + 6 * of_columns + Work::COLUMNS * of_work) * self.len
+        (17 + 5 * of_columns + Work::COLUMNS * of_work) * self.len
             + (8 + Work::ROWS * of_work) * self.rows
             + 2 * self.teeth
     }
@@ -222,13 +223,14 @@ pub(super) struct Tile<'a> {
     pub(super) ring_angle_deg: &'a mut [f64],
     /// Over `scale`.
     pub(super) force: PerContact<&'a mut [f64]>,
-    /// Over the root of `scale`.
+    /// Over the root of `scale`: the square root of lines, the cube root of balls; over `scale` itself at a flat.
     pub(super) stress: PerContact<&'a mut [f64]>,
     /// Of the forces over `scale`.
     pub(super) torque: PerContact<&'a mut [f64]>,
     /// What makes loads of unit loads: `Δφ`, or `F_H` of each tooth.
     pub(super) scale: &'a mut [f64],
     pub(super) scale_root: &'a mut [f64],
+    pub(super) stress_exponents: StressExponents,
     /// For laws that are not linear.
     pub(super) work: Work<'a>,
     // By input angle.
@@ -252,7 +254,7 @@ pub(super) struct TileLanes<'t> {
 }
 
 impl<'a> Tile<'a> {
-    pub(super) fn new(arena: &'a mut [f64], size: &TileSize, step_rad: f64) -> Self {
+    pub(super) fn new(arena: &'a mut [f64], size: &TileSize, step_rad: f64, stress_exponents: StressExponents) -> Self {
         let &TileSize { len, rows, teeth, with_columns, with_work } = size;
         let mut rest = arena;
         let mut slice = |len| {
@@ -268,7 +270,7 @@ impl<'a> Tile<'a> {
         let work = if with_work { Work::new(&mut slice, len, rows) } else { Work::new(&mut slice, 0, 0) };
         let of_columns = if with_columns { len } else { 0 };
         let (from_valley_rad, position_deg) = (slice(of_columns), slice(of_columns));
-        let (input_angle_deg, center_radius_mm) = (slice(of_columns), slice(of_columns));
+        let input_angle_deg = slice(of_columns);
         let (wave_generator_angle_deg, ring_angle_deg) = (slice(of_columns), slice(of_columns));
         let mut column = || slice(len);
         let (pattern_sin, pattern_cos) = (column(), column());
@@ -290,7 +292,7 @@ impl<'a> Tile<'a> {
             from_valley_rad,
             input_angle_deg,
             position_deg,
-            center_radius_mm,
+            center_radius_mm: column(),
             wave_generator_angle_deg,
             ring_angle_deg,
             force: PerContact::of(|_| column()),
@@ -298,6 +300,7 @@ impl<'a> Tile<'a> {
             torque: PerContact::of(|_| column()),
             scale: column(),
             scale_root: column(),
+            stress_exponents,
             work,
             row_torque,
             row_input_angle_deg,
@@ -327,6 +330,12 @@ impl<'a> Tile<'a> {
             stress: at(&mut self.stress, chunk),
             torque: at(&mut self.torque, chunk),
         }
+    }
+
+    /// What makes stresses of unit stresses.
+    #[inline(always)]
+    pub(super) const fn stress_scale(&self, contact: Contact) -> &[f64] {
+        if self.stress_exponents.is_one_at(contact) { self.scale } else { self.scale_root }
     }
 
     /// The position of a state.
