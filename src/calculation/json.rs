@@ -103,6 +103,12 @@ pub enum Tree {
     Object(Vec<(String, Self)>),
 }
 
+/// Which item of an array a name means: RFC 6901 knows neither a sign nor a leading zero, so that each item has one name.
+fn item(name: &str) -> Option<usize> {
+    let is_digits = name.bytes().all(|byte| byte.is_ascii_digit());
+    if is_digits && (name == "0" || !name.starts_with('0')) { name.parse().ok() } else { None }
+}
+
 impl Tree {
     /// What the tree holds.
     ///
@@ -116,7 +122,7 @@ impl Tree {
     pub fn at(&self, path: &[String]) -> Option<&Self> {
         path.iter().try_fold(self, |tree, name| match tree {
             Self::Object(fields) => fields.iter().find(|(key, _)| key == name).map(|(_, value)| value),
-            Self::Array(items) => items.get(name.parse::<usize>().ok()?),
+            Self::Array(items) => items.get(item(name)?),
             _ => None,
         })
     }
@@ -128,7 +134,7 @@ impl Tree {
             return;
         };
         if let Self::Array(items) = self
-            && let Some(item) = name.parse::<usize>().ok().and_then(|index| items.get_mut(index))
+            && let Some(item) = item(name).and_then(|index| items.get_mut(index))
         {
             item.set(rest, value);
             return;

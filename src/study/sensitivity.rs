@@ -8,7 +8,7 @@ use toothwave_calculation::json::{Tree, path};
 use toothwave_calculation::no_answer::NoAnswer;
 use utoipa::ToSchema;
 
-use crate::ask::{escaped, fault};
+use crate::ask::{beyond, escaped, fault};
 use crate::document::{InputDocument, SensitivityDocument};
 use crate::evaluate::Evaluator;
 use crate::rows::{GapAnswer, ReasonAnswer, Rows, RowsPart};
@@ -17,6 +17,9 @@ use crate::variant::{Asked, Domain, Template, Value};
 
 /// How far an input is moved where nothing is said, as a share of its value.
 const RELATIVE: f64 = 0.01;
+
+/// The least move of an input, as a share of its value: the rounding of a quantity is then some millionths of its change.
+const LEAST_RELATIVE: f64 = 1e-9;
 
 /// A quantity is called smooth where both one-sided differences agree to this share of them.
 const SMOOTH: f64 = 0.1;
@@ -88,15 +91,20 @@ impl Sensitivity {
     }
 }
 
-/// The numbers below a place that are not zero.
+/// The numbers below a place that are not zero. Of a duty without its shares of the time, none of which moves alone.
 fn numbers(tree: &Tree, at: &str, found: &mut BTreeMap<String, InputDocument>) {
     match tree {
         Tree::Number(number) if *number != 0.0 => {
             found.insert(at.to_owned(), InputDocument::default());
         }
         Tree::Object(fields) => {
-            for (name, tree) in fields {
+            for (name, tree) in fields.iter().filter(|(name, _)| name != "share_of_time") {
                 numbers(tree, &format!("{at}/{}", escaped(name)), found);
+            }
+        }
+        Tree::Array(items) => {
+            for (index, tree) in items.iter().enumerate() {
+                numbers(tree, &format!("{at}/{index}"), found);
             }
         }
         _ => {}
@@ -116,11 +124,23 @@ impl Input {
                 return Err(fault(&at, FieldCode::ConflictingFields, detail));
             }
             (Some(plus_minus), None) => plus_minus,
+            (None, Some(relative)) if relative > 1.0 => {
+                let detail = format!("an input is moved by its whole value at most, not by {relative:?} times it");
+                return Err(beyond(&format!("{at}/relative"), FieldCode::OutOfRange, detail, relative, 1.0));
+            }
             (None, relative) => relative.unwrap_or(RELATIVE) * value.abs(),
         };
         if plus_minus.is_nan() || plus_minus <= 0.0 {
             let detail = format!("an input is moved by more than zero, not by {plus_minus:?}: give `plus_minus`");
             return Err(fault(&at, FieldCode::OutOfRange, detail));
+        }
+        let least = LEAST_RELATIVE * value.abs();
+        if plus_minus < least {
+            let name = if input.relative.is_some() { "relative" } else { "plus_minus" };
+            let detail = format!(
+                "a move of {plus_minus:?} about {value:?} changes a quantity by no more than its rounding: choose {least:?} or more"
+            );
+            return Err(beyond(&format!("{at}/{name}"), FieldCode::OutOfRange, detail, plus_minus, least));
         }
         Ok(Self { pointer: pointer.into(), value: *value, plus_minus })
     }
@@ -187,7 +207,7 @@ pub struct SensitivityToInput {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub at_plus: Option<f64>,
-    /// The largest change either way.
+    /// The largest change either way; 0 where neither has an answer.
     pub change: f64,
     /// Change of the quantity over change of the input, between less and more; left out where one of them has no answer or they tell of a
     /// kink or a jump.

@@ -160,6 +160,10 @@ impl Template {
                 return Err(beyond(&format!("{}/min", at(&variable.pointer)), FieldCode::OutOfRange, detail, min, max));
             }
         }
+        // Until it was known which numbers are whole, any had to be: from here on each form is a variant of its own.
+        for form in &mut template.forms {
+            form.put_least(&template.variables);
+        }
         Ok(template)
     }
 
@@ -338,6 +342,16 @@ impl Form {
         if let (Some(lobes), Some(count)) = (lobes, number(&["drive", "teeth", "count"])) {
             self.tree.set(&RING_TEETH.map(String::from), Tree::Number(count - lobes));
         }
+    }
+
+    /// Puts the least value of every free number there.
+    fn put_least(&mut self, variables: &[Variable]) {
+        for (variable, _) in variables.iter().zip(&self.takes).filter(|(_, takes)| **takes) {
+            if let Domain::Real { min, .. } | Domain::Whole { min, .. } = variable.domain {
+                self.tree.set(&variable.path, Tree::Number(min));
+            }
+        }
+        self.derive();
     }
 
     /// The domain of a variable as this form reads it: a number between two whole ones is no whole number.

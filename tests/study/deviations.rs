@@ -64,6 +64,54 @@ fn a_count_has_differences_and_one_that_is_impossible_has_none() {
     assert_eq!(found["reasons"][0]["code"], "tooth_difference");
 }
 
+/// Of a duty too; its shares of the time add up to one, and none moves alone.
+#[test]
+fn left_out_inputs_are_the_torques_and_speeds_of_a_duty_too() {
+    let point =
+        |torque_nm: f64| json!({ "input_torque_nm": torque_nm, "input_speed_rpm": 1000.0, "share_of_time": 0.5 });
+    let base = with(&paper(), "/load", json!({ "duty": [point(20.0), point(10.0)] }));
+    let found = answer(&json!({ "study": "sensitivity", "base": base, "quantities": ["input_torque_nm"] }));
+    let inputs = &found["quantities"][0]["inputs"];
+    let of_load = |input: &&Value| input["pointer"].as_str().unwrap().starts_with("/load");
+    let of_load: Vec<_> = inputs.as_array().unwrap().iter().filter(of_load).map(|input| &input["pointer"]).collect();
+    let torque = named(inputs, "pointer", "/load/duty/0/input_torque_nm");
+    assert!((number(&torque["derivative"]) - 1.0).abs() < 1e-9, "the hardest point's torque is the load's");
+    assert_eq!(of_load.len(), 4, "{of_load:?}");
+}
+
+/// A step that rounding swallows would tell of a derivative of nothing, where case 5.1 has 39 MPa/mm.
+#[test]
+fn an_input_is_not_moved_by_less_than_its_quantities_can_tell() {
+    let pointer = "/drive/wave_generator/semi_major_mm";
+    let study = |input: Value| json!({ "study": "sensitivity", "base": paper(), "quantities": ["peak_stress_ring_mpa"], "inputs": { pointer: input } });
+    let at = |name: &str| (format!("/inputs/~1drive~1wave_generator~1semi_major_mm/{name}"), "out_of_range".to_owned());
+    assert_eq!(faulty(&study(json!({ "plus_minus": 1e-16 }))), at("plus_minus"));
+    assert_eq!(faulty(&study(json!({ "plus_minus": 5e-8 }))), at("plus_minus"));
+    assert_eq!(faulty(&study(json!({ "relative": 1e-10 }))), at("relative"));
+    assert_eq!(faulty(&study(json!({ "relative": 5.0 }))), at("relative"));
+    let derivative = |plus_minus: f64| {
+        number(&answer(&study(json!({ "plus_minus": plus_minus })))["quantities"][0]["inputs"][0]["derivative"])
+    };
+    assert!((derivative(6e-8) / derivative(1e-4) - 1.0).abs() < 1e-5, "{} {}", derivative(6e-8), derivative(1e-4));
+}
+
+/// The next whole number above the semi-minor axis is the semi-major one, and that cam would be round.
+#[test]
+fn a_length_between_two_whole_numbers_deviates_from_where_it_stands() {
+    let base = with(&paper(), "/drive/wave_generator", json!({ "semi_major_mm": 57.0, "semi_minor_mm": 56.5 }));
+    let pointer = "/drive/wave_generator/semi_minor_mm";
+    let study = json!({
+        "study": "tolerance", "base": base, "quantities": ["ring_tip_radius_mm"], "samples": 10,
+        "inputs": { pointer: { "distribution": "uniform", "limit": 0.005 } }
+    });
+    let found = answer(&study);
+    assert_eq!(found["impossible"], 0);
+    assert_eq!(number(&found["quantities"][0]["nominal"]), 66.5);
+    let over = json!({ pointer: { "min": 56.5, "max": 56.5, "steps": 1 } });
+    let found = answer(&json!({ "study": "map", "base": base, "over": over, "quantities": ["ring_tip_radius_mm"] }));
+    assert_eq!(found["possible"]["quantities"]["ring_tip_radius_mm"], json!([66.5]));
+}
+
 #[test]
 fn left_out_inputs_are_all_numbers_but_counts() {
     let found = answer(&json!({ "study": "sensitivity", "base": paper(), "quantities": ["outer_diameter_mm"] }));

@@ -119,6 +119,22 @@ fn what_cannot_be_mapped_is_said_at_its_field() {
     assert_eq!(faulty(&capacity), ("/base/load/allowable_stress_mpa".into(), "missing_field".into()));
 }
 
+/// RFC 6901 knows no `00` and no `+0`. Beside `0` such a name made two columns of one value, of which one was not in force.
+#[test]
+fn an_entry_of_a_list_has_one_name() {
+    let point = json!({ "input_torque_nm": 20.0, "input_speed_rpm": 500.0, "share_of_time": 1.0 });
+    let base = with(&paper(), "/load", json!({ "duty": [point] }));
+    let study = |name: &str| {
+        let pointer = format!("/load/duty/{name}/input_torque_nm");
+        let over = json!({ pointer: { "min": 5.0, "max": 6.0, "steps": 2 } });
+        with(&map(over, json!(["input_torque_nm"])), "/base", base.clone())
+    };
+    assert_eq!(numbers(&answer(&study("0"))["possible"]["quantities"]["input_torque_nm"]), [5.0, 6.0]);
+    for name in ["00", "+0", "1"] {
+        assert!(faulty(&study(name)).0.starts_with("/base/load/duty"), "{name}");
+    }
+}
+
 /// They were refused for want of a speed, which every point of a duty has.
 #[test]
 fn of_a_duty_losses_are_those_of_its_sweep_over_all_points() {
