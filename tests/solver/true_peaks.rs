@@ -254,6 +254,37 @@ fn a_load_that_changes_hands_at_once_is_closed_in_on() {
     assert!(found_nm <= dense_nm * (1.0 + 1e-8), "{found_nm} {dense_nm}");
 }
 
+/// A gap, one lobe and teeth softer than the parts: the capacity has more corners in a period than there are rounds for one after the other.
+#[test]
+fn many_corners_of_a_capacity_are_found_to_the_tightest_tolerance() {
+    let parameters = DriveParameters {
+        wave_generator: WaveGenerator::HarmonicPath { lobes: 1, mean_path_radius_mm: 9.89, amplitude_mm: 0.2413 },
+        teeth: 22,
+        installed: 22,
+        ring_teeth: 23,
+        tooth_radius_mm: 0.605_174_118_311_290_6,
+        tooth: ToothShape::Cylinder { width_mm: 1.3 },
+        tip_radius_mm: None,
+    };
+    let mut load = load(0.01, VirtualWork);
+    load.law = ContactLaw::Fixed(PerContact {
+        wave_generator: 1_742_088.996_738_245,
+        ring: 863_189.093_750_152_7,
+        carrier: 769_658.662_147_516_9,
+    });
+    load.materials.teeth.youngs_modulus_gpa = 70.0;
+    load.clearance_um.carrier = 0.6;
+    load.allowable_stress_mpa = Some(everywhere(900.0));
+    let case = LoadCase::new(&load).unwrap();
+    let capacity_nm = |points| {
+        let sweep = sweep_plain(&drive(&parameters), &case, points, &Never).unwrap();
+        sweep.torque_capacity.unwrap().input_torque_nm
+    };
+    let found_nm = capacity_nm(Points::tolerance(1e-10, MAX_STATES).unwrap());
+    let dense_nm = capacity_nm(Points::samples(20_000).unwrap());
+    assert!(found_nm <= dense_nm * (1.0 + 1e-10) && found_nm > dense_nm * (1.0 - 1e-4), "{found_nm} {dense_nm}");
+}
+
 #[test]
 fn true_peaks_are_those_of_the_sweep_to_a_tolerance() {
     for (parameters, load) in by_every_law() {

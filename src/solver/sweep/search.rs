@@ -73,8 +73,11 @@ const OF_TERM_BEFORE: f64 = 0.125;
 /// the tooth in question grows from nothing, and under a power law without end at first.
 const SHORT: f64 = 1e-3;
 
-/// Rounds after which every stretch in doubt is cut into four: what is still in doubt has a corner.
+/// Rounds after which a stretch in doubt is cut into four: what is still in doubt has a corner.
 const SMOOTH_ROUNDS: u32 = 8;
+
+/// How many of them are then cut in a round, for each quantity: a corner takes some seventeen rounds to be told from what stands beside it.
+const CORNERS_AT_ONCE: usize = 4;
 
 /// Newton's steps to the summit of a polynomial, which need not be exact: it is looked at, and judged again.
 const SUMMIT_STEPS: u32 = 4;
@@ -452,7 +455,7 @@ impl Judge {
 
     /// Notes where a piece is to be looked at; what a quantity may still rise by, relative.
     fn want(&self, seen: &mut Seen) -> f64 {
-        let mut candidates: [Option<Candidate>; QUANTITIES] = [None; QUANTITIES];
+        let mut candidates: [Vec<Candidate>; QUANTITIES] = Default::default();
         let (mut wanted, mut settled) = (std::mem::take(&mut seen.wanted), Vec::new());
         let mut start = 0;
         for end in 1..=seen.order.len() {
@@ -465,10 +468,13 @@ impl Judge {
             }
         }
         let mut most = 0.0_f64;
-        for (candidate, best) in candidates.iter().zip(self.best) {
-            let Some(Candidate { bound, cuts, ends: [low, high] }) = *candidate else { continue };
-            most = most.max(bound / best - 1.0);
-            wanted.extend(cuts.map(|cut| low + cut * (high - low)));
+        let at_once = if self.is_late { CORNERS_AT_ONCE } else { 1 };
+        for (candidates, best) in candidates.iter_mut().zip(self.best) {
+            candidates.sort_by(|one, other| other.bound.total_cmp(&one.bound));
+            most = candidates.first().map_or(most, |highest| most.max(highest.bound / best - 1.0));
+            for Candidate { cuts, ends: [low, high], .. } in candidates.iter().take(at_once) {
+                wanted.extend(cuts.map(|cut| low + cut * (high - low)));
+            }
         }
         settled.into_iter().for_each(|moment: usize| seen.is_settled[moment] = true);
         seen.wanted = wanted;
@@ -479,7 +485,7 @@ impl Judge {
     fn judge(
         &self,
         run: &Run<'_>,
-        candidates: &mut [Option<Candidate>; QUANTITIES],
+        candidates: &mut [Vec<Candidate>; QUANTITIES],
         wanted: &mut Vec<f64>,
         settled: &mut Vec<usize>,
     ) {
@@ -553,10 +559,7 @@ impl Judge {
                         },
                     };
                     is_settled = false;
-                    let most = &mut candidates[quantity];
-                    if most.is_none_or(|most| bound > most.bound) {
-                        *most = Some(Candidate { bound, cuts, ends });
-                    }
+                    candidates[quantity].push(Candidate { bound, cuts, ends });
                 }
             }
             if bends_too_much {
