@@ -220,7 +220,6 @@ pub struct ModelDocument {
     /// Whether the ring's teeth bend, the more the nearer to their tips they are pressed, with `virtual_work` alone. It matters where tips are pointed or
     /// bored, and takes a sweep some milliseconds.
     #[serde(default)]
-    #[schema(default = false)]
     pub ring_teeth_bend: bool,
     /// Gaps at the contacts; left out, there are none.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
