@@ -17,7 +17,7 @@ use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
 use parking_lot::Mutex;
 use rustix::process::{Resource, getrlimit, setrlimit};
-use tokio::net::{TcpListener, TcpStream};
+use tokio::net::{TcpListener, TcpSocket, TcpStream};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 use tokio::task::AbortHandle;
@@ -54,6 +54,17 @@ const OTHER_FILES: u64 = SIDE_CONNECTIONS as u64 + 64;
 /// After an error of the listener itself, such as too many open files.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
+/// Connections that may wait to be taken in: of a burst the system drops those beyond, and their clients try again after a second.
+const BACKLOG: u32 = 4096;
+
+fn listen_on(address: SocketAddr) -> io::Result<TcpListener> {
+    let socket = if address.is_ipv4() { TcpSocket::new_v4()? } else { TcpSocket::new_v6()? };
+    // As a service has it that is started again: connections of before may still be coming to their end.
+    socket.set_reuseaddr(true)?;
+    socket.bind(address)?;
+    socket.listen(BACKLOG)
+}
+
 /// Serves until a signal, then drains within the bound of the settings, or until a second signal.
 ///
 /// # Errors
@@ -68,8 +79,7 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>) -> io::Result
         None if settings.replicas == 1 => Keeping::Memory,
         _ => Keeping::Nowhere,
     };
-    let listener = TcpListener::bind(settings.listen)
-        .await
+    let listener = listen_on(settings.listen)
         .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", settings.listen)))?;
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
     let mut hang_up = signal(SignalKind::hangup())?;
