@@ -45,21 +45,15 @@ impl Store {
     /// # Errors
     /// Where the store does not answer.
     pub async fn claim(&self, study: &str, lease: Duration) -> Result<Claim, StoreError> {
-        let claimed = match &self.database {
-            Database::File { .. } => self.claim_here(study).await?,
-            Database::Server { leases, .. } => {
-                let mut connection = within(PATIENCE, async { Ok(leases.acquire().await?) }).await?;
-                match within(PATIENCE, claim_there(&mut connection, study, lease)).await {
-                    Ok(Some(chunk)) => Some((chunk, Held::There(Box::new(connection)))),
-                    Ok(None) => None,
-                    Err(error) => {
-                        connection.close_on_drop();
-                        return Err(error);
-                    }
-                }
+        let mut are_all_open = false;
+        let (chunk, held) = loop {
+            match self.claim_open(study, lease).await? {
+                Some(claimed) => break claimed,
+                None if are_all_open => return Ok(Claim::None),
+                // Another may have opened the last ones meanwhile: they are looked for once more.
+                None => are_all_open = !self.open_more(study).await?,
             }
         };
-        let Some((chunk, held)) = claimed else { return Ok(Claim::None) };
         // From here on dropping the lease sets the chunk free.
         let lease = Lease { store: self.clone(), study: study.to_owned(), chunk, held };
         match self.note_attempt(study, chunk).await {
@@ -73,6 +67,19 @@ impl Store {
         }
         lease.give_up().await?;
         Ok(Claim::Gap(chunk))
+    }
+
+    /// A chunk among those that are open.
+    async fn claim_open(&self, study: &str, lease: Duration) -> Result<Option<(u64, Held)>, StoreError> {
+        let Database::Server { leases, .. } = &self.database else { return self.claim_here(study).await };
+        let mut connection = within(PATIENCE, async { Ok(leases.acquire().await?) }).await?;
+        match within(PATIENCE, claim_there(&mut connection, study, lease)).await {
+            Ok(chunk) => Ok(chunk.map(|chunk| (chunk, Held::There(Box::new(connection))))),
+            Err(error) => {
+                connection.close_on_drop();
+                Err(error)
+            }
+        }
     }
 
     async fn claim_here(&self, study: &str) -> Result<Option<(u64, Held)>, StoreError> {

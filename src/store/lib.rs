@@ -24,6 +24,9 @@ pub use studies::{Figures, Gap, Kept, NewStudy, Standing, Waiting};
 /// Attempts without a result that make a chunk a gap.
 pub const MOST_ATTEMPTS: u64 = 3;
 
+/// Chunks of a study that are opened at once: more than are claimed in the time that it takes, and written in some milliseconds.
+const BATCH_CHUNKS: u64 = 256;
+
 /// What a single operation may take: a server that cannot be reached says nothing.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(15);
 

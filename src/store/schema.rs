@@ -7,7 +7,7 @@ use crate::{LONG_PATIENCE, PATIENCE, read, stored};
 pub const SCHEMA_VERSION: u64 = VERSIONS.len() as u64;
 
 /// What brings each version about from the one before. A version that was released is never changed.
-const VERSIONS: [&str; 1] = [VERSION_1];
+const VERSIONS: [&str; 2] = [VERSION_1, VERSION_2];
 
 /// Times are seconds since 1970 by the database's clock, so that those of the machines need not agree.
 const VERSION_1: &str = "
@@ -62,6 +62,12 @@ CREATE TABLE gaps (
 );
 ";
 
+/// Chunks stand in `chunks` a batch at a time: those below `opened` were written there. Of studies that are kept already all were.
+const VERSION_2: &str = "
+ALTER TABLE studies ADD COLUMN opened BIGINT NOT NULL DEFAULT 0;
+UPDATE studies SET opened = chunks;
+";
+
 /// What PostgreSQL needs to be spoken to as SQLite is, and to keep parts as they are: their numbers hardly compress.
 const SERVER_VERSION_1: &str = "
 CREATE FUNCTION unixepoch() RETURNS BIGINT LANGUAGE SQL VOLATILE
@@ -69,7 +75,7 @@ CREATE FUNCTION unixepoch() RETURNS BIGINT LANGUAGE SQL VOLATILE
 ALTER TABLE results ALTER COLUMN part SET STORAGE EXTERNAL;
 ";
 
-const SERVER_VERSIONS: [&str; VERSIONS.len()] = [SERVER_VERSION_1];
+const SERVER_VERSIONS: [&str; VERSIONS.len()] = [SERVER_VERSION_1, ""];
 
 /// Any number that means this to everybody who migrates the same database.
 const MIGRATION_LOCK: &str = "SELECT pg_advisory_xact_lock(7355608)";

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::connection::{Connection, Database, Store, StoreError, on};
 use crate::schema::require_schema;
-use crate::{LONG_PATIENCE, PATIENCE, read, stored};
+use crate::{BATCH_CHUNKS, LONG_PATIENCE, PATIENCE, read, stored};
 
 /// A study as it is first kept: all that follows from it is frozen with it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -132,21 +132,20 @@ const STUDY: &str = "SELECT id, kind, build, document, max_states, max_profile_p
 
 /// Those that wait for workers; of studies that are done no chunk is left.
 const WAITING: &str = "SELECT id, build FROM studies WHERE NOT is_cancelled AND ends_at_s > unixepoch()
-    AND EXISTS (SELECT 1 FROM chunks WHERE study = id) ORDER BY asked_at_s, id";
+    AND (opened < chunks OR EXISTS (SELECT 1 FROM chunks WHERE study = id)) ORDER BY asked_at_s, id";
 
 impl Store {
-    /// Keeps a study, with all its chunks to be computed; where it is kept already, nothing happens.
+    /// Keeps a study, of which no chunk is open yet; where it is kept already, nothing happens.
     ///
     /// # Errors
     /// Where the store does not answer, or has another schema.
     pub async fn create(&self, study: &NewStudy) -> Result<(), StoreError> {
         self.with(LONG_PATIENCE, async |connection| {
             require_schema(connection).await?;
-            begin(connection).await?;
             let time_s = stored(study.time.as_secs());
-            let is_new = on!(connection, inner => {
+            on!(connection, inner => {
                 sqlx::query(
-                    "INSERT INTO studies VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, FALSE, unixepoch(), unixepoch() + $13)
+                    "INSERT INTO studies VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, FALSE, unixepoch(), unixepoch() + $13, 0)
                         ON CONFLICT DO NOTHING",
                 )
                 .bind(&study.id)
@@ -164,23 +163,40 @@ impl Store {
                 .bind(time_s)
                 .execute(inner)
                 .await
-                .map(|done| done.rows_affected() == 1)
+                .map(|_| ())
             })?;
-            if is_new {
-                on!(connection, inner => {
-                    sqlx::query(
-                        "INSERT INTO chunks WITH RECURSIVE numbers (chunk) AS
-                            (SELECT CAST(0 AS BIGINT) UNION ALL SELECT chunk + 1 FROM numbers WHERE chunk + 1 < $2)
-                            SELECT $1, chunk FROM numbers WHERE chunk < $2",
-                    )
-                    .bind(&study.id)
-                    .bind(stored(study.chunks))
-                    .execute(inner)
-                    .await
-                    .map(|_| ())
-                })?;
+            Ok(())
+        })
+        .await
+    }
+
+    /// Opens the next chunks of a study, for whoever found none that is free; whether there may be some now.
+    ///
+    /// # Errors
+    /// Where the store does not answer.
+    pub(crate) async fn open_more(&self, id: &str) -> Result<bool, StoreError> {
+        self.with(PATIENCE, async |connection| {
+            let text = "SELECT opened FROM studies WHERE id = $1 AND opened < chunks AND NOT is_cancelled";
+            let opened: Option<i64> =
+                on!(connection, inner => sqlx::query_scalar(text).bind(id).fetch_optional(inner).await)?;
+            let Some(opened) = opened else { return Ok(false) };
+            begin(connection).await?;
+            // Of many who find none at once the first opens them, and the others find them open.
+            let text = "UPDATE studies SET opened = CASE WHEN chunks - opened > $3 THEN opened + $3 ELSE chunks END
+                WHERE id = $1 AND opened = $2";
+            let batch = stored(BATCH_CHUNKS);
+            let is_ours = on!(connection, inner => {
+                let done = sqlx::query(text).bind(id).bind(opened).bind(batch).execute(inner).await;
+                done.map(|done| done.rows_affected() == 1)
+            })?;
+            if is_ours {
+                let text = "INSERT INTO chunks WITH RECURSIVE numbers (chunk) AS
+                        (SELECT CAST($2 AS BIGINT) UNION ALL SELECT chunk + 1 FROM numbers WHERE chunk + 1 < $2 + $3)
+                        SELECT id, chunk FROM studies, numbers WHERE id = $1 AND chunk < opened";
+                on!(connection, inner => sqlx::query(text).bind(id).bind(opened).bind(batch).execute(inner).await.map(|_| ()))?;
             }
-            commit(connection).await
+            commit(connection).await?;
+            Ok(true)
         })
         .await
     }
@@ -234,8 +250,13 @@ impl Store {
         self.with(LONG_PATIENCE, async |connection| {
             require_schema(connection).await?;
             begin(connection).await?;
-            // Its chunks first: for one that is in work its worker is waited for, who must not wait for the study meanwhile.
-            for text in ["DELETE FROM chunks WHERE study = $1", "DELETE FROM studies WHERE id = $1"] {
+            // Its chunks first: for one that is in work its worker is waited for, who must not wait for the study meanwhile. Nor does
+            // anybody open more of them.
+            for text in [
+                "UPDATE studies SET opened = chunks WHERE id = $1",
+                "DELETE FROM chunks WHERE study = $1",
+                "DELETE FROM studies WHERE id = $1",
+            ] {
                 on!(connection, inner => sqlx::query(text).bind(id).execute(inner).await.map(|_| ()))?;
             }
             commit(connection).await
@@ -261,7 +282,7 @@ impl Store {
         self.with(LONG_PATIENCE, async |connection| {
             require_schema(connection).await?;
             let text = "DELETE FROM studies WHERE asked_at_s <= unixepoch() - $1
-                AND (is_cancelled OR ends_at_s <= unixepoch() OR NOT EXISTS (SELECT 1 FROM chunks WHERE study = id)
+                AND (is_cancelled OR ends_at_s <= unixepoch() OR (opened = chunks AND NOT EXISTS (SELECT 1 FROM chunks WHERE study = id))
                     OR NOT EXISTS (SELECT 1 FROM attempts WHERE study = id AND began_at_s > unixepoch() - $1))";
             let unasked_for_s = stored(unasked_for.as_secs());
             let gone = on!(connection, inner => {
@@ -378,7 +399,7 @@ impl Store {
             for (count, text) in counts.iter_mut().zip([
                 "SELECT COUNT(*) FROM studies",
                 "SELECT COUNT(*) FROM results",
-                "SELECT COUNT(*) FROM chunks",
+                "SELECT COUNT(*) + (SELECT CAST(COALESCE(SUM(chunks - opened), 0) AS BIGINT) FROM studies) FROM chunks",
                 "SELECT COUNT(*) FROM attempts",
                 "SELECT COUNT(*) FROM gaps",
             ]) {
@@ -387,7 +408,7 @@ impl Store {
             let running: Vec<i64> = on!(connection, inner => {
                 sqlx::query_scalar(
                     "SELECT CAST(unixepoch() - asked_at_s AS BIGINT) FROM studies WHERE NOT is_cancelled AND ends_at_s > unixepoch()
-                        AND EXISTS (SELECT 1 FROM chunks WHERE study = id)",
+                        AND (opened < chunks OR EXISTS (SELECT 1 FROM chunks WHERE study = id))",
                 )
                 .fetch_all(inner)
                 .await

@@ -215,8 +215,9 @@ class Stage:
     def migrate(self, environment):
         run(self.binary, "migrate", "--studies", self.studies, env=os.environ | environment)
 
-    def serve(self, name, **how):
-        service = Service(self.binary, name, self.studies, faults={"chunk_variants": CHUNK_VARIANTS}, **how)
+    def serve(self, name, chunk_variants=CHUNK_VARIANTS, **how):
+        faults = {"chunk_variants": chunk_variants} if chunk_variants else None
+        service = Service(self.binary, name, self.studies, faults=faults, **how)
         self.processes.append(service)
         return service
 

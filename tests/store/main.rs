@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::task::Poll;
 use std::time::Duration;
 
+use sqlx::{Connection as _, SqliteConnection};
 use tokio::sync::RwLock;
 use toothwave_store::{Address, AddressError, Claim, Gap, Lease, MOST_ATTEMPTS, NewStudy, Store, StoreError};
 
@@ -143,6 +144,87 @@ async fn a_chunk_is_in_one_pair_of_hands_and_its_result_is_kept_once() {
         store.forget(&study.id).await.unwrap();
     })
     .await;
+}
+
+/// More than are opened at once.
+const MANY_CHUNKS: u64 = 260;
+
+#[tokio::test]
+async fn of_many_chunks_each_is_claimed_once_in_their_order() {
+    with_each_store(async |store| {
+        let study = study("many", MANY_CHUNKS);
+        store.create(&study).await.unwrap();
+        for chunk in 0..MANY_CHUNKS {
+            let mut lease = claimed(&store, &study).await;
+            assert_eq!(lease.chunk(), chunk);
+            keep(&mut lease).await;
+        }
+        assert!(matches!(store.claim(&study.id, LEASE).await.unwrap(), Claim::None));
+        let standing = store.find(&study.id).await.unwrap().unwrap();
+        assert!(standing.is_done());
+        assert_eq!(standing.looked_at, study.variants);
+        store.forget(&study.id).await.unwrap();
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn all_chunks_of_a_study_wait_though_few_are_open_and_none_of_a_cancelled_one_is_opened() {
+    alone_with_each_store(async |store| {
+        let before = store.figures().await.unwrap();
+        let study = study("waits", MANY_CHUNKS);
+        store.create(&study).await.unwrap();
+        let figures = store.figures().await.unwrap();
+        assert_eq!((figures.waiting - before.waiting, figures.running - before.running), (MANY_CHUNKS, 1));
+        store.cancel(&study.id).await.unwrap();
+        assert!(matches!(store.claim(&study.id, LEASE).await.unwrap(), Claim::None));
+        store.resume(&study.id, LEASE).await.unwrap();
+        drop(claimed(&store, &study).await);
+        assert_eq!(store.figures().await.unwrap().waiting - before.waiting, MANY_CHUNKS);
+        store.forget(&study.id).await.unwrap();
+        assert_eq!(store.figures().await.unwrap().waiting, before.waiting);
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn two_who_find_no_open_chunk_at_once_open_each_once() {
+    with_each_store(async |store| {
+        for round in 0..20 {
+            let study = study(&format!("both-{round}"), 2);
+            store.create(&study).await.unwrap();
+            let (one, other) = tokio::join!(claimed(&store, &study), claimed(&store, &study));
+            assert_eq!(one.chunk() + other.chunk(), 1);
+            for lease in [one, other] {
+                lease.give_back().await.unwrap();
+            }
+            store.forget(&study.id).await.unwrap();
+        }
+    })
+    .await;
+}
+
+/// Whose chunks were all written when it was first kept.
+#[tokio::test]
+async fn a_study_of_the_first_schema_goes_on_where_it_was() {
+    let file = File::new();
+    let study = study("older", 3);
+    let store = Store::open(&file.address()).await.unwrap();
+    store.create(&study).await.unwrap();
+    keep(&mut claimed(&store, &study).await).await;
+    store.close().await;
+    let mut older = SqliteConnection::connect(&format!("sqlite:{}", file.0.display())).await.unwrap();
+    let changes = "ALTER TABLE studies DROP COLUMN opened; DELETE FROM schema_versions WHERE version = 2";
+    sqlx::raw_sql(changes).execute(&mut older).await.unwrap();
+    older.close().await.unwrap();
+    let store = Store::open(&file.address()).await.unwrap();
+    for chunk in 1..3 {
+        let mut lease = claimed(&store, &study).await;
+        assert_eq!(lease.chunk(), chunk);
+        keep(&mut lease).await;
+    }
+    assert!(matches!(store.claim(&study.id, LEASE).await.unwrap(), Claim::None));
+    assert!(store.find(&study.id).await.unwrap().unwrap().is_done());
 }
 
 #[tokio::test]
