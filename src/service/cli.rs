@@ -263,12 +263,13 @@ fn arguments() -> Vec<OsString> {
 
 fn run_service(settings: &Settings) -> Result<(), Failure> {
     let address = settings.store.address().map_err(Failure::BadInput)?;
+    let parts = settings.parts.of_service(address.as_ref()).map_err(Failure::BadInput)?;
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
     log::start(filter)?;
     // As many threads for solves as there are permits: with more of them each solve would wake another, whose memory is cold.
     let solves = settings.limits().max_concurrent_solves;
     let runtime = tokio::runtime::Builder::new_multi_thread().max_blocking_threads(solves).enable_all().build()?;
-    let result = runtime.block_on(serve::serve(settings, address.as_ref()));
+    let result = runtime.block_on(serve::serve(settings, address.as_ref(), parts));
     // A solve beyond its bound must not hold up the exit.
     runtime.shutdown_background();
     log::flush();
@@ -288,11 +289,12 @@ fn shared_database(settings: &StoreSettings) -> Result<Address, Failure> {
 
 fn run_worker(settings: &WorkerSettings) -> Result<(), Failure> {
     let address = shared_database(&settings.store)?;
+    let parts = settings.parts.parts().map_err(Failure::BadInput)?;
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
     log::start(filter)?;
     let solves = settings.limits().max_concurrent_solves;
     let runtime = tokio::runtime::Builder::new_multi_thread().max_blocking_threads(solves).enable_all().build()?;
-    let result = runtime.block_on(serve::serve_chunks(settings, &address));
+    let result = runtime.block_on(serve::serve_chunks(settings, &address, parts));
     runtime.shutdown_background();
     log::flush();
     Ok(result?)

@@ -1,5 +1,6 @@
 //! Where solves run: permits, a bounded queue, the deadline, cancellation; nothing else leaves the async executor.
 
+use std::io;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -31,6 +32,8 @@ pub struct Pool {
     batches: Arc<Semaphore>,
     /// One: for what is neither a solve nor short.
     aside: Arc<Semaphore>,
+    /// One: for what takes seconds, and is wanted all the same.
+    unhurried: Arc<Semaphore>,
     /// Cancelled when the service stops and has no time left.
     closed: CancellationToken,
     limits: Limits,
@@ -70,6 +73,7 @@ impl Pool {
             turns: Arc::new(Semaphore::new(limits.max_concurrent_solves)),
             batches: Arc::new(Semaphore::new(limits.max_concurrent_batches)),
             aside: Arc::new(Semaphore::new(1)),
+            unhurried: Arc::new(Semaphore::new(1)),
             closed: CancellationToken::new(),
             limits,
         }
@@ -99,7 +103,7 @@ impl Pool {
     ///
     /// # Errors
     /// `deadline_exceeded`, and whatever it comes to.
-    async fn within<T>(
+    pub async fn within<T>(
         &self,
         deadline: Instant,
         future: impl Future<Output = Result<T, Problem>>,
@@ -187,16 +191,32 @@ impl Pool {
     ) -> Result<T, Problem> {
         let running = async {
             let turn = Arc::clone(&self.aside).acquire_owned().await.map_err(|error| Problem::internal(&error))?;
-            let (tell, told) = oneshot::channel();
             let work = move || {
                 let _held = turn;
-                // Whoever asked may have left.
-                let _ = tell.send(caught(job));
+                caught(job)
             };
-            std::thread::Builder::new().name("aside".into()).spawn(work).map_err(|error| Problem::internal(&error))?;
-            told.await.unwrap_or_else(|error| Err(Problem::internal(&error)))
+            beside(work).await.unwrap_or_else(|error| Err(Problem::internal(&error)))
         };
         self.within(deadline, running).await
+    }
+
+    /// Runs what takes its time on a thread of its own, one at a time: it waits for no solve, no solve waits for it, and no deadline stops it.
+    ///
+    /// # Errors
+    /// `internal_error` where the job panicked, and whatever it returns.
+    pub async fn run_unhurried<T: Send + 'static>(
+        &self,
+        job: impl FnOnce() -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let turn = Arc::clone(&self.unhurried).acquire_owned().await.map_err(|error| Problem::internal(&error))?;
+        let work = move || {
+            let _held = turn;
+            caught(job)
+        };
+        tokio::select! {
+            done = beside(work) => done.unwrap_or_else(|error| Err(Problem::internal(&error))),
+            () = self.closed.cancelled() => Err(shutting_down()),
+        }
     }
 
     async fn run_holding<T: Send + 'static>(
@@ -245,6 +265,20 @@ impl Pool {
         );
         Problem::new(ProblemCode::DeadlineExceeded, detail)
     }
+}
+
+/// Runs a job on a thread of its own, whatever it waits for: nothing else waits with it. Where nobody waits for it any more it goes on.
+///
+/// # Errors
+/// Where no thread can be had, or the job panicked.
+pub async fn beside<T: Send + 'static>(job: impl FnOnce() -> T + Send + 'static) -> io::Result<T> {
+    let (tell, told) = oneshot::channel();
+    let work = move || {
+        // Whoever asked may have left.
+        let _ = tell.send(job());
+    };
+    std::thread::Builder::new().name("beside".into()).spawn(work)?;
+    told.await.map_err(io::Error::other)
 }
 
 /// Makes a panic of a job the problem of those who asked for it.

@@ -16,6 +16,7 @@ use utoipa::ToSchema;
 
 use crate::keys::Keys;
 use crate::machine;
+use crate::parts::Parts;
 
 /// Solves that may be allowed to run or to wait: more than any machine can, fewer than a semaphore can count.
 const MOST_SOLVES: i64 = 1_000_000;
@@ -114,6 +115,10 @@ pub struct Settings {
     #[command(flatten)]
     pub store: StoreSettings,
 
+    /// Where their rows are kept
+    #[command(flatten)]
+    pub parts: PartsSettings,
+
     /// Replicas of the service that answer in turn: of several, each refuses studies unless they share a PostgreSQL database
     #[arg(long, env = "TOOTHWAVE_REPLICAS", value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     pub replicas: u32,
@@ -164,6 +169,42 @@ pub struct StoreSettings {
     pub studies_password_file: Option<PathBuf>,
 }
 
+/// Where rows of studies are kept besides.
+#[derive(Debug, Clone, Args)]
+pub struct PartsSettings {
+    /// Folder in which the rows of stored studies that this process computes are kept besides, a Parquet file for each chunk [default: none]
+    #[arg(long, env = "TOOTHWAVE_STUDY_PARTS", value_name = "FOLDER")]
+    pub study_parts: Option<PathBuf>,
+}
+
+impl PartsSettings {
+    /// Where rows are kept, if anywhere.
+    ///
+    /// # Errors
+    /// Where there is no such folder.
+    pub fn parts(&self) -> Result<Option<Parts>, String> {
+        self.study_parts.as_deref().map(Parts::new).transpose().map_err(|error| error.to_string())
+    }
+
+    /// The same of a service that keeps its studies there.
+    ///
+    /// # Errors
+    /// Besides where it computes none that are kept.
+    pub fn of_service(&self, studies: Option<&Address>) -> Result<Option<Parts>, String> {
+        let parts = self.parts()?;
+        match studies {
+            None if parts.is_some() => {
+                Err("`--study-parts` is for studies that are kept: name a file for them by `--studies`".into())
+            }
+            Some(address) if address.is_shared() && parts.is_some() => {
+                Err("`--study-parts` is for those who compute: of studies on a database that is `toothwave worker`"
+                    .into())
+            }
+            _ => Ok(parts),
+        }
+    }
+}
+
 impl StoreSettings {
     /// Where studies are kept, if not in memory.
     ///
@@ -188,6 +229,10 @@ pub struct WorkerSettings {
     /// Where studies are kept
     #[command(flatten)]
     pub store: StoreSettings,
+
+    /// Where their rows are kept
+    #[command(flatten)]
+    pub parts: PartsSettings,
 
     /// Chunks that are computed at once [default: the cores that the process may use]
     #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_SOLVES", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_CHUNKS))]

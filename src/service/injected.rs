@@ -1,5 +1,7 @@
 //! What `tests/faults/studies` does to chunks, by failpoints; in builds with `fault-injection` alone.
 
+use std::fs::File;
+use std::io::{self, Write as _};
 use std::time::Duration;
 
 /// Variants of a chunk, where that is ordered: `chunk_variants=return(VARIANTS)`.
@@ -22,6 +24,15 @@ pub(crate) fn poison(chunk: u64) {
     if number("poison") == Some(chunk) {
         std::process::abort();
     }
+}
+
+/// Ends the process in the middle of this chunk's rows: `half_part=return(CHUNK)`.
+pub(crate) fn half_a_part(chunk: u64, file: &mut File, rows: &[u8]) -> io::Result<()> {
+    if number("half_part") == Some(chunk) {
+        file.write_all(&rows[..rows.len() / 2])?;
+        std::process::abort();
+    }
+    Ok(())
 }
 
 fn number(name: &str) -> Option<u64> {

@@ -19,6 +19,7 @@ pub mod machine;
 pub mod negotiation;
 pub mod observe;
 mod openapi;
+pub mod parts;
 pub mod problem;
 pub mod query;
 pub mod room;

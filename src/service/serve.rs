@@ -30,6 +30,7 @@ use crate::app::App;
 use crate::compute::Pool;
 use crate::config::{Limits, MAX_HEADER_BYTES, Settings, WorkerSettings};
 use crate::observe;
+use crate::parts::Parts;
 use crate::router::{self, Entry};
 use crate::socket::Socket;
 use crate::studies::Keeping;
@@ -69,12 +70,13 @@ fn listen_on(address: SocketAddr) -> io::Result<TcpListener> {
 ///
 /// # Errors
 /// Where the address cannot be listened on, or the process gets no signals.
-pub async fn serve(settings: &Settings, studies: Option<&Address>) -> io::Result<()> {
+pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option<Parts>) -> io::Result<()> {
     observe::install_recorder();
     let keeping = match studies {
         Some(address) if address.is_shared() || settings.replicas == 1 => Keeping::Store {
             store: Store::open(address).await.map_err(io::Error::other)?,
             expiry: Duration::from_secs(settings.study_expiry_s),
+            parts,
         },
         None if settings.replicas == 1 => Keeping::Memory,
         _ => Keeping::Nowhere,
@@ -157,7 +159,7 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>) -> io::Result
 ///
 /// # Errors
 /// Where the process gets no signals.
-pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address) -> io::Result<()> {
+pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: Option<Parts>) -> io::Result<()> {
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
     let mut told_to_stop = async || {
         tokio::select! {
@@ -171,7 +173,8 @@ pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address) -> io::R
     let patience = Duration::from_millis(settings.shutdown_ms);
     let slots = limits.max_concurrent_solves;
     tracing::info!(studies = %studies, slots, build = BUILD, "working");
-    let workers = Workers::new(store, Pool::new(limits), slots, watch::Sender::default(), stopping.clone(), patience);
+    let changed = watch::Sender::default();
+    let workers = Workers::new(store, parts, Pool::new(limits), slots, changed, stopping.clone(), patience);
     let stop = async {
         told_to_stop().await;
         tracing::info!("stopping: what is begun comes to its end");

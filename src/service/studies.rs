@@ -9,7 +9,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-use futures_util::{StreamExt as _, TryStreamExt as _, stream};
+use futures_util::future::{BoxFuture, Shared};
+use futures_util::{FutureExt as _, StreamExt as _, TryStreamExt as _, stream};
 use metrics::counter;
 use parking_lot::Mutex;
 use serde::Serialize;
@@ -17,16 +18,18 @@ use tokio::sync::watch;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use toothwave_calculation::BUILD;
-use toothwave_store::{Figures, Standing as Stored, Store, StoreError};
+use toothwave_store::{Figures, NewStudy, Standing as Stored, Store, StoreError};
 use toothwave_study::{Gathered, Study, StudyAnswer, Work};
+use tracing::Instrument as _;
 use utoipa::ToSchema;
 
 use crate::compute::Pool;
 use crate::config::Limits;
 use crate::frozen;
+use crate::parts::Parts;
 use crate::problem::{Problem, ProblemCode};
 use crate::room::{Reserved, Room};
-use crate::worker::{Sliced, Workers, slice};
+use crate::worker::{Sliced, Workers, milliseconds, slice};
 
 /// Between two looks at how a stored study stands.
 const LOOK: Duration = Duration::from_secs(1);
@@ -48,6 +51,12 @@ const ENDLESS: Duration = Duration::from_secs(100 * 365 * 86_400);
 
 /// Of what is read of a store at once.
 const READ_BYTES: u64 = 16 << 20;
+
+/// Rows of which an answer takes longer than some milliseconds.
+const LARGE_BYTES: u64 = 1 << 20;
+
+/// For so long an answer that was made while its study ran serves those who come back for it.
+const FRESH: Duration = Duration::from_secs(60);
 
 /// How a study stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
@@ -74,6 +83,8 @@ pub enum Keeping {
         store: Store,
         /// Since it was last asked for, until it is forgotten.
         expiry: Duration,
+        /// Where rows are kept besides, of chunks that are computed in this process.
+        parts: Option<Parts>,
     },
     /// Not at all: this is one of several replicas, and the others would know nothing of them.
     Nowhere,
@@ -113,9 +124,23 @@ pub struct Kept {
     /// Of a stored study: whether somebody looks how it stands while it runs, and one look at a time.
     is_followed: AtomicBool,
     looking: tokio::sync::Mutex<()>,
+    /// The last answer that was made apart, or is.
+    making: Mutex<Option<Making>>,
     kept_bytes: u64,
     _room: Reserved,
 }
+
+/// An answer that was made apart from the requests for it.
+#[derive(Debug)]
+struct Made {
+    answer: StudyAnswer,
+    /// Whether every chunk is in it.
+    is_whole: bool,
+    at: Instant,
+}
+
+/// All who ask meanwhile share it.
+type Making = Shared<BoxFuture<'static, Result<Arc<Made>, Problem>>>;
 
 /// How a study stands, and why it broke off.
 #[derive(Debug, Clone)]
@@ -221,8 +246,47 @@ impl Kept {
             cancelled: Mutex::default(),
             is_followed: AtomicBool::new(false),
             looking: tokio::sync::Mutex::default(),
+            making: Mutex::default(),
             _room: room,
         })
+    }
+
+    /// Whether its answer is made apart: that of a tolerance study is short, and its rows have to be sorted for it. That of a map is its rows.
+    fn is_made_apart(&self) -> bool {
+        self.study.kind() == "tolerance" && self.stored_bytes() >= LARGE_BYTES
+    }
+
+    /// Whether who asks now is served by an answer that is made, or was.
+    fn serves(&self, making: &Making) -> bool {
+        match making.peek() {
+            None => true,
+            Some(Ok(made)) => made.is_whole || (self.is_running() && made.at.elapsed() < FRESH),
+            Some(Err(_)) => false,
+        }
+    }
+
+    /// Reads what a stored study has come to since it was last read.
+    async fn gather(&self, store: &Store, pool: &Pool) -> Result<(), Problem> {
+        let missing: Vec<_> = self.gathered.lock().missing().collect();
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let done = store.chunks_done(&self.id).await?;
+        let wanted: Vec<_> = done.into_iter().filter(|chunk| missing.binary_search(chunk).is_ok()).collect();
+        let a_part_bytes = (self.stored_bytes() / self.study.chunks().max(1)).max(1);
+        let at_once = usize::try_from(READ_BYTES / a_part_bytes).unwrap_or(usize::MAX).max(1);
+        for chunks in wanted.chunk_by(|one, next| one + 1 == *next).flat_map(|run| run.chunks(at_once)) {
+            let last = chunks.last().unwrap_or(&chunks[0]);
+            let stored = store.parts(&self.id, chunks[0], *last).await?;
+            let decode = move |_: &AtomicBool| {
+                let decoded = stored.iter().map(|stored| Ok((stored.chunk, frozen::decoded(&stored.part)?)));
+                decoded.collect::<Result<Vec<_>, Problem>>()
+            };
+            let parts = pool.run_in_turn(decode).await?;
+            let mut gathered = self.gathered.lock();
+            parts.into_iter().for_each(|(chunk, part)| gathered.add(chunk, part));
+        }
+        Ok(())
     }
 
     /// Looks how a stored study stands; whether it is kept at all.
@@ -439,10 +503,15 @@ impl Studies {
             None => {
                 self.require_one_more(store).await?;
                 let room = self.make_room(&mut self.kept.lock(), &study)?;
-                let (study, frozen) =
-                    frozen::freeze(&self.pool, study, document, &self.limits.of_calculation(), self.time(store))
-                        .await?;
+                let started = Instant::now();
+                let limits = self.limits.of_calculation();
+                let freezing = frozen::freeze(&self.pool, study, document, &limits, self.time(store));
+                // Each of its slices has a deadline of its own, and waits its turn.
+                let (study, frozen) = self.pool.within(self.pool.deadline(), freezing).await?;
+                let canary_ms = milliseconds(started.elapsed());
+                let NewStudy { chunks, canary_variants, .. } = frozen;
                 store.create(&frozen).await?;
+                tracing::info!(study = frozen.id, chunks, canary_variants, canary_ms, "a study is kept");
                 Self::keep(&mut self.kept.lock(), study, room)
             }
         };
@@ -551,42 +620,60 @@ impl Studies {
         Ok(())
     }
 
-    /// Reads what a stored study has come to since it was last read.
+    /// What a study has come to, where that takes long to be made of its rows: made once for all who ask meanwhile, and apart from their
+    /// requests, so that it goes on when the time of one of them is over. The rows of other studies are gathered, and their answer is soon
+    /// made.
     ///
     /// # Errors
-    /// Where the store does not answer.
-    pub async fn gather(&self, kept: &Kept) -> Result<(), Problem> {
-        let Keeping::Store { store, .. } = &self.keeping else { return Ok(()) };
-        let missing: Vec<_> = kept.gathered.lock().missing().collect();
-        if missing.is_empty() {
-            return Ok(());
+    /// Where the store does not answer, there is no room, or the time is over.
+    pub async fn made_apart(&self, kept: &Arc<Kept>, deadline: Instant) -> Result<Option<StudyAnswer>, Problem> {
+        if !kept.is_made_apart() {
+            if let Keeping::Store { store, .. } = &self.keeping {
+                kept.gather(store, &self.pool).await?;
+            }
+            return Ok(None);
         }
-        let done = store.chunks_done(&kept.id).await?;
-        let wanted: Vec<_> = done.into_iter().filter(|chunk| missing.binary_search(chunk).is_ok()).collect();
-        let a_part_bytes = (kept.stored_bytes() / kept.study.chunks().max(1)).max(1);
-        let at_once = usize::try_from(READ_BYTES / a_part_bytes).unwrap_or(usize::MAX).max(1);
-        for chunks in wanted.chunk_by(|one, next| one + 1 == *next).flat_map(|run| run.chunks(at_once)) {
-            let [first, .., last] = *chunks else {
-                self.read(store, kept, chunks[0], chunks[0]).await?;
-                continue;
-            };
-            self.read(store, kept, first, last).await?;
-        }
-        Ok(())
+        let making = {
+            let mut making = kept.making.lock();
+            match &*making {
+                Some(making) if kept.serves(making) => making.clone(),
+                _ => making.insert(self.making(kept)).clone(),
+            }
+        };
+        let made = tokio::time::timeout_at(deadline, making).await.map_err(|_| {
+            let detail =
+                "the study's answer is still being made of its rows, which goes on; ask for it again in a moment";
+            Problem::new(ProblemCode::DeadlineExceeded, detail)
+        })??;
+        Ok(Some(made.answer.clone()))
     }
 
-    async fn read(&self, store: &Store, kept: &Kept, first: u64, last: u64) -> Result<(), Problem> {
-        for stored in store.parts(&kept.id, first, last).await? {
-            let part = frozen::decoded(&stored.part)?;
-            kept.gathered.lock().add(stored.chunk, part);
-        }
-        Ok(())
+    fn making(&self, kept: &Arc<Kept>) -> Making {
+        let (kept, pool, room) = (Arc::clone(kept), self.pool.clone(), self.room.clone());
+        let store = match &self.keeping {
+            Keeping::Store { store, .. } => Some(store.clone()),
+            Keeping::Memory | Keeping::Nowhere => None,
+        };
+        let made = async move {
+            if let Some(store) = &store {
+                kept.gather(store, &pool).await?;
+            }
+            let gathered = kept.gathered.lock().clone();
+            let make = move || {
+                let _held = room.reserve(kept.stored_bytes())?;
+                let (answer, is_whole) = (gathered.answer(), gathered.is_complete());
+                Ok(Arc::new(Made { answer, is_whole, at: Instant::now() }))
+            };
+            pool.run_unhurried(make).await
+        };
+        let made = tokio::spawn(made.in_current_span());
+        made.map(|joined| joined.unwrap_or_else(|error| Err(Problem::internal(&error)))).boxed().shared()
     }
 
     /// What a store is served by in this process, until it closes: the workers where it is a file, and whoever forgets old studies and
     /// counts.
     pub async fn serve_store(&self) {
-        let Keeping::Store { store, expiry } = &self.keeping else { return };
+        let Keeping::Store { store, expiry, parts } = &self.keeping else { return };
         let workers = async {
             if !store.address().is_shared() {
                 let slots = self.limits.max_concurrent_solves;
@@ -594,6 +681,7 @@ impl Studies {
                 let patience = Duration::ZERO;
                 Workers::new(
                     store.clone(),
+                    parts.clone(),
                     self.pool.clone(),
                     slots,
                     self.changed.clone(),

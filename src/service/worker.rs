@@ -1,10 +1,12 @@
 //! Workers: they take chunks of stored studies, one after the other, compute them and keep what they come to.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
+use std::error::Error;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+use bytes::Bytes;
 use futures_util::future::join_all;
 use metrics::counter;
 use parking_lot::Mutex;
@@ -12,13 +14,14 @@ use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 use toothwave_calculation::BUILD;
 use toothwave_calculation::no_answer::NoAnswer;
-use toothwave_store::{Claim, Lease, Store, StoreError, Waiting};
+use toothwave_store::{Claim, Lease, Store, Waiting};
 use toothwave_study::{Part, Study, Work};
 
 use crate::compute::{Pool, SLICE};
 use crate::frozen::{self, NotHere};
 #[cfg(feature = "fault-injection")]
 use crate::injected;
+use crate::parts::Parts;
 use crate::problem::Problem;
 
 /// Between two looks at what there is to do, and at what was cancelled.
@@ -32,6 +35,8 @@ const LONGEST_RETRY: Duration = Duration::from_secs(10);
 #[derive(Debug)]
 pub struct Workers {
     store: Store,
+    /// Where rows are kept besides.
+    parts: Option<Parts>,
     pool: Pool,
     /// Chunks that are computed side by side.
     slots: usize,
@@ -42,8 +47,26 @@ pub struct Workers {
     /// What a chunk that is in work then gets to come to its end.
     patience: Duration,
     known: tokio::sync::Mutex<HashMap<String, Known>>,
-    /// What was last said of the store.
-    trouble: Mutex<Option<String>>,
+    /// What was last said of each.
+    troubles: Mutex<BTreeMap<What, String>>,
+}
+
+/// What may be in trouble: on a full device the store is read and not written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum What {
+    Reading,
+    Writing,
+    Parts,
+}
+
+impl What {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Reading => "the studies' store",
+            Self::Writing => "what is written to the studies' store",
+            Self::Parts => "the folder of the studies' rows",
+        }
+    }
 }
 
 /// A study that this process computes, or why it does not.
@@ -56,13 +79,15 @@ impl Workers {
     /// Workers who have not begun yet.
     pub fn new(
         store: Store,
+        parts: Option<Parts>,
         pool: Pool,
         slots: usize,
         changed: watch::Sender<()>,
         stopping: CancellationToken,
         patience: Duration,
     ) -> Self {
-        Self { store, pool, slots, changed, stopping, patience, known: Default::default(), trouble: Mutex::default() }
+        let (known, troubles) = Default::default();
+        Self { store, parts, pool, slots, changed, stopping, patience, known, troubles }
     }
 
     /// Works until it is told to stop.
@@ -82,12 +107,12 @@ impl Workers {
         while !over.is_cancelled() {
             match self.store.waiting().await {
                 Ok(waiting) => {
-                    self.is_well();
+                    self.is_well(What::Reading);
                     self.known.lock().await.retain(|id, _| waiting.iter().any(|task| task.id == *id));
                     tell.send_replace(Arc::new(waiting));
                 }
                 // What was begun may go on: it is kept when the store is back.
-                Err(error) => self.is_in_trouble(&error),
+                Err(error) => self.is_in_trouble(What::Reading, &error),
             }
             tokio::select! {
                 () = tokio::time::sleep(PAUSE) => {}
@@ -120,7 +145,7 @@ impl Workers {
                         has_worked = true;
                     }
                     Ok(Claim::None) => {}
-                    Err(error) => self.is_in_trouble(&error),
+                    Err(error) => self.is_in_trouble(What::Writing, &error),
                 }
                 if has_worked {
                     turn = turn.wrapping_add(offset + 1);
@@ -167,7 +192,16 @@ impl Workers {
             Ok(study) => study,
             Err(reason) => return Ok(Some(Err(reason))),
         };
+        let started = Instant::now();
         let is_same = frozen::has_the_same_bits(&self.pool, &study, &standing.study).await?;
+        let canary_ms = milliseconds(started.elapsed());
+        tracing::info!(
+            study = task.id,
+            canary_variants = standing.study.canary_variants,
+            canary_ms,
+            is_same,
+            "a canary sang"
+        );
         Ok(Some(if is_same { Ok((study, standing.study.lease)) } else { Err(NotHere::OtherBits) }))
     }
 
@@ -180,7 +214,11 @@ impl Workers {
         };
         tokio::pin!(time_is_over);
         let computed = {
-            let running = run_chunk(&self.pool, study, chunk);
+            let running = async {
+                let (part, busy) = run_chunk(&self.pool, study, chunk).await?;
+                let (part, rows) = self.with_rows(study, part).await?;
+                Ok::<_, Problem>((part, rows, busy))
+            };
             tokio::pin!(running);
             loop {
                 tokio::select! {
@@ -194,7 +232,7 @@ impl Workers {
                 }
             }
         };
-        let (part, busy) = match computed {
+        let (part, mut rows, busy) = match computed {
             Some(Ok(computed)) => computed,
             Some(Err(problem)) => {
                 // The attempt stays noted: it may be the chunk's fault.
@@ -203,7 +241,7 @@ impl Workers {
             }
             None => {
                 if let Err(error) = lease.give_back().await {
-                    self.is_in_trouble(&error);
+                    self.is_in_trouble(What::Writing, &error);
                 }
                 return;
             }
@@ -217,37 +255,85 @@ impl Workers {
         };
         let mut retry = RETRY;
         // What is computed is not computed again because the store is away for a while.
-        while let Err(error) = lease.keep(&bytes, part.variants(), part.refused(), busy).await {
-            self.is_in_trouble(&error);
+        loop {
+            let kept = tokio::select! {
+                // First: what the store has a result of has its rows.
+                kept = self.keep_rows(study, chunk, &mut rows) => kept,
+                () = &mut time_is_over => break give_up(lease).await,
+            };
+            if kept {
+                match lease.keep(&bytes, part.variants(), part.refused(), busy).await {
+                    Ok(()) => {
+                        self.is_well(What::Writing);
+                        self.changed.send_replace(());
+                        break;
+                    }
+                    Err(error) => self.is_in_trouble(What::Writing, &error),
+                }
+            }
             tokio::select! {
                 () = tokio::time::sleep(retry) => {}
-                () = &mut time_is_over => {
-                    // Nobody answers: that it was begun stays noted.
-                    let _ = lease.give_back().await;
-                    return;
-                }
+                () = &mut time_is_over => break give_up(lease).await,
             }
             retry = (2 * retry).min(LONGEST_RETRY);
         }
-        self.is_well();
-        self.changed.send_replace(());
     }
 
-    /// Says what is wrong with the store, once.
-    fn is_in_trouble(&self, error: &StoreError) {
+    /// Keeps rows that are still to be kept; whether none are any more.
+    async fn keep_rows(&self, study: &Study, chunk: u64, rows: &mut Option<Bytes>) -> bool {
+        let (Some(parts), Some(text)) = (&self.parts, &*rows) else { return true };
+        match parts.keep(study, chunk, text.clone()).await {
+            Ok(()) => {
+                self.is_well(What::Parts);
+                *rows = None;
+                true
+            }
+            Err(error) => {
+                self.is_in_trouble(What::Parts, &error);
+                false
+            }
+        }
+    }
+
+    /// A part, and its rows where they are kept.
+    async fn with_rows(&self, study: &Arc<Study>, part: Part) -> Result<(Part, Option<Bytes>), Problem> {
+        if self.parts.is_none() || !study.has_rows() {
+            return Ok((part, None));
+        }
+        let study = Arc::clone(study);
+        let writing = move |_: &AtomicBool| {
+            let mut rows = Vec::new();
+            study.write_rows(&part, &mut rows).map_err(|error| Problem::internal(&error))?;
+            Ok((part, Some(rows.into())))
+        };
+        self.pool.run_in_turn(writing).await
+    }
+
+    /// Says what is wrong, once.
+    fn is_in_trouble(&self, what: What, error: &dyn Error) {
         let text = error.to_string();
-        let mut trouble = self.trouble.lock();
-        if trouble.as_ref() != Some(&text) {
-            tracing::warn!(error = text, "the studies' store is in trouble; tried again until it is well");
-            *trouble = Some(text);
+        let mut troubles = self.troubles.lock();
+        if troubles.get(&what) != Some(&text) {
+            tracing::warn!(error = text, "{} is in trouble; tried again until it is well", what.name());
+            troubles.insert(what, text);
         }
     }
 
-    fn is_well(&self) {
-        if self.trouble.lock().take().is_some() {
-            tracing::info!("the studies' store is well again");
+    fn is_well(&self, what: What) {
+        if self.troubles.lock().remove(&what).is_some() {
+            tracing::info!("{} is well again", what.name());
         }
     }
+}
+
+/// Gives a chunk back because the time is over. Where nobody answers, that it was begun stays noted.
+async fn give_up(lease: Lease) {
+    let _ = lease.give_back().await;
+}
+
+/// For the log.
+pub fn milliseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_millis()).unwrap_or(u64::MAX)
 }
 
 /// What a chunk comes to, and the time that it was computed for.

@@ -1,7 +1,10 @@
 //! Connections to either database, and what may go wrong with them.
 
 use std::collections::HashSet;
+use std::fs::OpenOptions;
 use std::future::Future;
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::Mutex;
 use std::time::Duration;
@@ -98,6 +101,7 @@ impl Store {
         let worker = worker_name().into();
         match address {
             Address::File(path) => {
+                make_private(path);
                 let options = SqliteConnectOptions::new()
                     .filename(path)
                     .create_if_missing(true)
@@ -208,6 +212,12 @@ pub(crate) async fn within<T>(
     future: impl Future<Output = Result<T, StoreError>>,
 ) -> Result<T, StoreError> {
     tokio::time::timeout(patience, future).await.unwrap_or(Err(StoreError::Silent))
+}
+
+/// A new file is its owner's alone, and so is what SQLite puts beside it: it holds designs. One that is there keeps the mode that it was
+/// given; where none can be made SQLite says why.
+fn make_private(path: &Path) {
+    let _ = OpenOptions::new().write(true).create_new(true).mode(0o600).open(path);
 }
 
 /// SQLite's word for a file that somebody else has.

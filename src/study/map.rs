@@ -1,7 +1,5 @@
 //! A map: quantities over a grid.
 
-use std::iter;
-
 use serde::Serialize;
 use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::json::Tree;
@@ -11,7 +9,7 @@ use utoipa::ToSchema;
 use crate::ask::{beyond, escaped, fault};
 use crate::document::{ChoiceDocument, MapDocument, OverDocument};
 use crate::evaluate::Evaluator;
-use crate::rows::{GapAnswer, ImpossibleAnswer, PossibleAnswer, ReasonAnswer, Rows, RowsPart};
+use crate::rows::{GapAnswer, ImpossibleAnswer, PossibleAnswer, ReasonAnswer, Rows, RowsPart, RowsView};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Domain, Template, Value, Variable};
 
@@ -25,6 +23,8 @@ pub(crate) struct Map {
 struct Axis {
     variable: Variable,
     values: Values,
+    /// Whether all its values are numbers.
+    is_number: bool,
 }
 
 /// The values of an axis, each made when it is wanted: there may be a million on every one of hundreds of axes before anybody has counted
@@ -172,20 +172,29 @@ impl Axis {
                 values
             }
         };
-        Ok(Self { variable: variable.clone(), values })
+        let is_number = match values {
+            Values::Choices(_) => values.all().all(|value| matches!(variable.spelled(value), Tree::Number(_))),
+            Values::Whole { .. } | Values::Steps { .. } => true,
+        };
+        Ok(Self { variable: variable.clone(), values, is_number })
     }
 
     fn answer(&self) -> AxisAnswer {
-        let trees: Vec<_> = self.values.all().map(|value| self.variable.spelled(value)).collect();
-        let numbers: Option<Vec<_>> = trees
-            .iter()
-            .map(|tree| match tree {
-                Tree::Number(number) => Some(*number),
-                _ => None,
-            })
-            .collect();
-        let choices = if numbers.is_some() { None } else { Some(trees.iter().map(spelled).collect()) };
-        AxisAnswer { pointer: self.variable.pointer.clone(), values: numbers, choices }
+        let cells = || self.values.all().map(|value| self.cell(value));
+        let number = |cell| if let Cell::Number(number) = cell { Some(number) } else { None };
+        let (values, choices) = if self.is_number {
+            (Some(cells().filter_map(number).collect()), None)
+        } else {
+            (None, Some(cells().map(|cell| cell.text()).collect()))
+        };
+        AxisAnswer { pointer: self.variable.pointer.clone(), values, choices }
+    }
+
+    fn cell(&self, value: Value) -> Cell {
+        match self.variable.spelled(value) {
+            Tree::Number(number) if self.is_number => Cell::Number(number),
+            other => Cell::Word(spelled(&other)),
+        }
     }
 }
 
@@ -200,6 +209,15 @@ fn spelled(tree: &Tree) -> String {
 impl Rows for Map {
     fn document<'t>(&self, template: &'t mut Template, variant: u64) -> &'t Tree {
         template.filled(&self.values(variant))
+    }
+
+    fn places(&self) -> Vec<Column> {
+        let kind = |axis: &Axis| if axis.is_number { Content::Number } else { Content::Word };
+        self.axes.iter().map(|axis| Column::new(axis.variable.pointer.as_str(), kind(axis))).collect()
+    }
+
+    fn place(&self, variant: u64) -> Vec<Cell> {
+        self.axes.iter().zip(self.values(variant)).map(|(axis, value)| axis.cell(value)).collect()
     }
 }
 
@@ -272,36 +290,15 @@ impl MapAnswer {
             let kind = if axis.values.is_some() { Content::Number } else { Content::Word };
             Column::new(axis.pointer.as_str(), kind)
         };
-        let mut columns = vec![Column::new("variant", Content::Count)];
-        columns.extend(self.over.iter().map(axis));
-        columns.extend(self.quantities.iter().map(|name| Column::new(*name, Content::Number)));
-        columns.push(Column::new("reason", Content::Word));
-        let (mut possible, mut impossible) = (0, 0);
-        let rows = iter::from_fn(move || {
-            let (answered, refused) = (self.possible.variant.get(possible), self.impossible.variant.get(impossible));
-            let is_answered = match (answered, refused) {
-                (None, None) => return None,
-                (Some(answered), Some(refused)) => answered < refused,
-                (answered, None) => answered.is_some(),
-                (None, Some(_)) => false,
-            };
-            let variant = if is_answered { answered } else { refused }.copied().unwrap_or_default();
-            let mut row = vec![Cell::Count(variant)];
-            row.extend(self.places(variant));
-            row.extend(self.quantities.iter().map(|name| {
-                let value = is_answered.then(|| self.possible.quantities.get(name)?.get(possible)).flatten();
-                Cell::from(value.copied())
-            }));
-            let reason = (!is_answered).then(|| self.reasons.get(*self.impossible.reason.get(impossible)? as usize));
-            row.push(reason.flatten().map_or(Cell::Empty, |reason| Cell::Word(reason.code.clone())));
-            if is_answered {
-                possible += 1
-            } else {
-                impossible += 1
-            }
-            Some(row)
-        });
-        Table { columns, rows: Box::new(rows) }
+        let column = |&name: &&'static str| Some((name, self.possible.quantities.get(name)?.as_slice()));
+        let view = RowsView {
+            answered: &self.possible.variant,
+            columns: self.quantities.iter().filter_map(column).collect(),
+            refused: &self.impossible.variant,
+            reasons: &self.impossible.reason,
+            codes: self.reasons.iter().map(|reason| reason.code.as_str()).collect(),
+        };
+        view.table(self.over.iter().map(axis).collect(), |variant| self.places(variant))
     }
 
     fn places(&self, mut variant: u64) -> Vec<Cell> {

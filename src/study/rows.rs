@@ -1,6 +1,7 @@
 //! Variants in rows: what maps, sensitivities and tolerances have in common. Each variant follows from its number alone.
 
 use std::collections::BTreeMap;
+use std::iter;
 use std::ops::{Range, RangeInclusive};
 
 use serde::{Deserialize, Serialize};
@@ -9,6 +10,7 @@ use toothwave_solver::Stop;
 use utoipa::ToSchema;
 
 use crate::evaluate::{Evaluator, Outcome, Reason, Refusal, Stopped};
+use crate::table::{Cell, Column, Content, Table};
 use crate::variant::Template;
 
 /// Variants of a chunk: some tens of milliseconds of the cheapest ones, so that a study keeps several cores busy and progress is seen.
@@ -18,6 +20,12 @@ pub(crate) const CHUNK_VARIANTS: u64 = 4096;
 pub(crate) trait Rows {
     /// The document of a variant, put into the template.
     fn document<'t>(&self, template: &'t mut Template, variant: u64) -> &'t Tree;
+
+    /// The columns of a table that say what a variant is, beside its number.
+    fn places(&self) -> Vec<Column>;
+
+    /// What stands there.
+    fn place(&self, variant: u64) -> Vec<Cell>;
 }
 
 /// Rows of consecutive variants.
@@ -43,6 +51,54 @@ pub(crate) struct RefusalNoted {
     pub(crate) count: u64,
 }
 
+/// Rows as a table wants them, of a part or of an answer.
+#[derive(Debug)]
+pub(crate) struct RowsView<'a> {
+    pub(crate) answered: &'a [u64],
+    /// Each quantity by its name.
+    pub(crate) columns: Vec<(&'a str, &'a [f64])>,
+    pub(crate) refused: &'a [u64],
+    pub(crate) reasons: &'a [u32],
+    /// Of each reason.
+    pub(crate) codes: Vec<&'a str>,
+}
+
+impl<'a> RowsView<'a> {
+    /// A row a variant, in their order: its number, its place, its quantities or the code of its reason.
+    pub(crate) fn table(self, places: Vec<Column>, place: impl Fn(u64) -> Vec<Cell> + 'a) -> Table<'a> {
+        let mut columns = vec![Column::new("variant", Content::Count)];
+        columns.extend(places);
+        columns.extend(self.columns.iter().map(|(name, _)| Column::new(*name, Content::Number)));
+        columns.push(Column::new("reason", Content::Word));
+        let (mut possible, mut impossible) = (0, 0);
+        let rows = iter::from_fn(move || {
+            let (answered, refused) = (self.answered.get(possible), self.refused.get(impossible));
+            let is_answered = match (answered, refused) {
+                (None, None) => return None,
+                (Some(answered), Some(refused)) => answered < refused,
+                (answered, None) => answered.is_some(),
+                (None, Some(_)) => false,
+            };
+            let variant = if is_answered { answered } else { refused }.copied().unwrap_or_default();
+            let mut row = vec![Cell::Count(variant)];
+            row.extend(place(variant));
+            row.extend(self.columns.iter().map(|(_, values)| {
+                let value = is_answered.then(|| values.get(possible)).flatten();
+                Cell::from(value.copied())
+            }));
+            let code = (!is_answered).then(|| self.codes.get(*self.reasons.get(impossible)? as usize));
+            row.push(code.flatten().map_or(Cell::Empty, |code| Cell::Word((*code).into())));
+            if is_answered {
+                possible += 1
+            } else {
+                impossible += 1
+            }
+            Some(row)
+        });
+        Table { columns, rows: Box::new(rows) }
+    }
+}
+
 /// Rows as they are worked out.
 #[derive(Debug)]
 pub(crate) struct RowsWork {
@@ -55,6 +111,19 @@ pub(crate) struct RowsWork {
 impl RowsPart {
     pub(crate) fn new(quantities: usize) -> Self {
         Self { columns: vec![Vec::new(); quantities], ..Self::default() }
+    }
+
+    /// Its rows as a table.
+    pub(crate) fn table<'a>(&'a self, rows: &'a impl Rows, evaluator: &'a Evaluator) -> Table<'a> {
+        let names = evaluator.quantities.iter().map(|quantity| quantity.name);
+        let view = RowsView {
+            answered: &self.answered,
+            columns: names.zip(self.columns.iter().map(Vec::as_slice)).collect(),
+            refused: &self.refused,
+            reasons: &self.reasons,
+            codes: self.refusals.iter().map(|noted| noted.reason.code.as_str()).collect(),
+        };
+        view.table(rows.places(), |variant| rows.place(variant))
     }
 
     fn push(&mut self, variant: u64, outcome: Outcome) {

@@ -146,17 +146,29 @@ impl Input {
     }
 }
 
+impl Sensitivity {
+    /// The inputs' values of a variant.
+    fn values(&self, variant: u64) -> impl Iterator<Item = f64> {
+        let moved = variant.checked_sub(1).map(|moved| (moved / 2, moved % 2));
+        (0..).zip(&self.inputs).map(move |(index, input)| match moved {
+            Some((moved, 0)) if moved == index => input.value - input.plus_minus,
+            Some((moved, _)) if moved == index => input.value + input.plus_minus,
+            _ => input.value,
+        })
+    }
+}
+
 impl Rows for Sensitivity {
     fn document<'t>(&self, template: &'t mut Template, variant: u64) -> &'t Tree {
-        let moved = variant.checked_sub(1).map(|moved| (moved / 2, moved % 2));
-        let values = (0..).zip(&self.inputs).map(|(index, input)| {
-            Value::Number(match moved {
-                Some((moved, 0)) if moved == index => input.value - input.plus_minus,
-                Some((moved, _)) if moved == index => input.value + input.plus_minus,
-                _ => input.value,
-            })
-        });
-        template.filled(&values.collect::<Vec<_>>())
+        template.filled(&self.values(variant).map(Value::Number).collect::<Vec<_>>())
+    }
+
+    fn places(&self) -> Vec<Column> {
+        self.inputs.iter().map(|input| Column::new(input.pointer.as_str(), Content::Number)).collect()
+    }
+
+    fn place(&self, variant: u64) -> Vec<Cell> {
+        self.values(variant).map(Cell::Number).collect()
     }
 }
 

@@ -1,5 +1,6 @@
 //! The engine: a study is pure chunks, and a merge that does not depend on their order.
 
+use std::io::{self, Write};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -238,6 +239,27 @@ impl Study {
             Kind::Search(search) => search.evaluations().div_ceil(search.islands()),
             Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => self.chunk_variants,
         }
+    }
+
+    /// Whether its chunks come to rows, one a variant; an island of a search comes to designs.
+    pub const fn has_rows(&self) -> bool {
+        !matches!(self.kind, Kind::Search(_))
+    }
+
+    /// Writes the rows of a chunk as Apache Parquet, with the same bytes whoever does; of a map they have the columns of its result. Nothing
+    /// where there are none.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn write_rows(&self, part: &Part, writer: &mut dyn Write) -> io::Result<()> {
+        let Part::Rows(rows) = part else { return Ok(()) };
+        let table = match &self.kind {
+            Kind::Map(map) => rows.table(map, &self.evaluator),
+            Kind::Sensitivity(sensitivity) => rows.table(sensitivity, &self.evaluator),
+            Kind::Tolerance(tolerance) => rows.table(tolerance, &self.evaluator),
+            Kind::Search(_) => return Ok(()),
+        };
+        table.write_parquet(writer)
     }
 
     /// The variants of a chunk in rows.

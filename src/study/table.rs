@@ -58,7 +58,7 @@ impl From<Option<f64>> for Cell {
 }
 
 impl Cell {
-    fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         match self {
             Self::Empty => String::new(),
             Self::Count(count) => count.to_string(),

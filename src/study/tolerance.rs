@@ -176,6 +176,17 @@ impl Tolerance {
         1 + self.samples + self.alone() * self.kinds.len() as u64
     }
 
+    /// The stream of a kind of deviation in a variant: one of its own for each kind of each sample, so that what stands alone is what it was
+    /// among others. None where it does not deviate.
+    fn stream(&self, variant: u64, kind: usize) -> Option<Stream> {
+        let stream = |sample: u64| Stream::new(self.seed, (sample << 16) | kind as u64);
+        match self.drawn(variant) {
+            Drawn::All { sample } => Some(stream(sample)),
+            Drawn::Alone { sample, kind: alone } if alone == kind => Some(stream(sample)),
+            Drawn::Alone { .. } | Drawn::Nominal => None,
+        }
+    }
+
     /// The sample whose chance a variant has, and the kind that it keeps of it.
     fn drawn(&self, variant: u64) -> Drawn {
         match variant.checked_sub(1) {
@@ -242,19 +253,34 @@ impl Kind {
 
 impl Rows for Tolerance {
     fn document<'t>(&self, template: &'t mut Template, variant: u64) -> &'t Tree {
-        let drawn = self.drawn(variant);
         let mut numbers = Vec::new();
         for (index, kind) in self.kinds.iter().enumerate() {
-            // A stream of its own for each kind of each sample, so that what stands alone is what it was among others.
-            let stream = |sample: u64| Stream::new(self.seed, (sample << 16) | index as u64);
-            let mut stream = match drawn {
-                Drawn::All { sample } => Some(stream(sample)),
-                Drawn::Alone { sample, kind } if kind == index => Some(stream(sample)),
-                Drawn::Alone { .. } | Drawn::Nominal => None,
-            };
-            numbers.extend(kind.put(template, stream.as_mut()).map(Value::Number));
+            numbers.extend(kind.put(template, self.stream(variant, index).as_mut()).map(Value::Number));
         }
         template.filled(&numbers)
+    }
+
+    /// What deviates, and the inputs as they were drawn; what single items were drawn to be is too long for a row.
+    fn places(&self) -> Vec<Column> {
+        let inputs = self.kinds.iter().filter(|kind| matches!(kind.place, Place::Number { .. }));
+        let mut columns = vec![Column::new("deviates", Content::Word)];
+        columns.extend(inputs.map(|kind| Column::new(kind.name.as_str(), Content::Number)));
+        columns
+    }
+
+    fn place(&self, variant: u64) -> Vec<Cell> {
+        let deviates = match self.drawn(variant) {
+            Drawn::Nominal => "nothing",
+            Drawn::All { .. } => "everything",
+            Drawn::Alone { kind, .. } => &self.kinds[kind].name,
+        };
+        let mut cells = vec![Cell::Word(deviates.into())];
+        cells.extend(self.kinds.iter().enumerate().filter_map(|(index, kind)| {
+            let Place::Number { value } = kind.place else { return None };
+            let drawn = self.stream(variant, index).map_or(0.0, |mut stream| kind.distribution.draw(&mut stream));
+            Some(Cell::Number(value + drawn))
+        }));
+        cells
     }
 }
 

@@ -1,5 +1,6 @@
 //! Studies that are kept in a file, and by several replicas.
 
+use std::fs;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -8,6 +9,8 @@ use futures_util::future::join_all;
 use serde_json::{Value, json};
 use tokio::task::JoinHandle;
 use toothwave::config::Limits;
+use toothwave::parts::Parts;
+use toothwave::problem::ProblemCode;
 use toothwave::studies::Keeping;
 use toothwave_store::{Address, Claim, Figures, NewStudy, Store};
 
@@ -34,8 +37,25 @@ impl File {
 impl Drop for File {
     fn drop(&mut self) {
         for ending in ["", "-wal", "-shm"] {
-            let _ = std::fs::remove_file(format!("{}{ending}", self.0.display()));
+            let _ = fs::remove_file(format!("{}{ending}", self.0.display()));
         }
+    }
+}
+
+/// A folder of its own, gone with it.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new() -> Self {
+        let folder = Self(File::new().0.with_extension("parts"));
+        fs::create_dir(&folder.0).unwrap();
+        folder
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
     }
 }
 
@@ -48,8 +68,12 @@ pub(crate) struct Keeper {
 
 impl Keeper {
     pub(crate) async fn of(file: &File, limits: Limits, has_workers: bool) -> Self {
+        Self::with_parts(file, limits, has_workers, None).await
+    }
+
+    async fn with_parts(file: &File, limits: Limits, has_workers: bool, parts: Option<Parts>) -> Self {
         let store = file.store().await;
-        let service = Service::keeping(limits, Keeping::Store { store: store.clone(), expiry: EXPIRY });
+        let service = Service::keeping(limits, Keeping::Store { store: store.clone(), expiry: EXPIRY, parts });
         let app = std::sync::Arc::clone(&service.app);
         let workers = has_workers.then(|| tokio::spawn(async move { app.studies.serve_store().await }));
         Self { service, store, workers }
@@ -312,5 +336,99 @@ async fn the_service_knows_how_the_store_stands() {
     };
     let Figures { studies, running, done, waiting, attempts, gaps, .. } = figures;
     assert_eq!((studies, running, done, waiting, attempts, gaps), (1, 0, 1, 0, 1, 0));
+    keeper.end().await;
+}
+
+#[tokio::test]
+async fn the_rows_of_a_stored_study_are_a_parquet_file_a_chunk_besides() {
+    let (file, folder) = (File::new(), Folder::new());
+    let asked = Keeper::of(&file, LIMITS, false).await;
+    let id = asked.ask(&map(5)).await.json()["id"].as_str().unwrap().to_owned();
+    let frozen = asked.store.find(&id).await.unwrap().unwrap().study;
+    assert_eq!(frozen.chunks, 1);
+    asked.end().await;
+    // What a worker left behind that was killed in the middle.
+    let of_study = folder.0.join(format!("{id}-by-{}", frozen.chunk_variants));
+    fs::create_dir(&of_study).unwrap();
+    fs::write(of_study.join(".0000000000.begun"), vec![b'x'; 100_000]).unwrap();
+    let parts = Parts::new(&folder.0).unwrap();
+    let keeper = Keeper::with_parts(&file, LIMITS, true, Some(parts)).await;
+    let found = keeper.wait_for(&map(5)).await;
+    let result = Question::of("GET", &format!("{}/result", place(&found)));
+    let result = keeper.service.ask(&result.with("accept", "application/vnd.apache.parquet")).await;
+    let names: Vec<_> = fs::read_dir(&of_study).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(names, ["0000000000.parquet"]);
+    assert!(fs::read(of_study.join(&names[0])).unwrap() == result.body, "they have the bytes of the result");
+    // What a search comes to are designs.
+    keeper.wait_for(&search()).await;
+    assert_eq!(fs::read_dir(&folder.0).unwrap().count(), 1);
+    keeper.end().await;
+}
+
+#[test]
+fn rows_are_kept_in_a_folder_that_is_there() {
+    let folder = Folder::new();
+    let error = Parts::new(&folder.0.join("none")).unwrap_err();
+    assert!(error.to_string().contains("none"), "{error}");
+    let file = folder.0.join("file");
+    fs::write(&file, "").unwrap();
+    assert!(Parts::new(&file).unwrap_err().to_string().contains("no folder"));
+}
+
+/// A tolerance study whose answer is made apart.
+fn large() -> Value {
+    json!({
+        "study": "tolerance", "base": shortest(), "samples": 14_000,
+        "quantities": [
+            "transmission_ratio", "outer_diameter_mm", "slot_wall_mm", "ring_root_radius_mm", "ring_tip_radius_mm", "ring_tooth_height_mm",
+            "tooth_gap_min_mm", "coincidence_degree"
+        ],
+        "inputs": { "/drive/teeth/radius_mm": { "distribution": "normal", "sigma": 0.01, "limit": 0.03 } }
+    })
+}
+
+#[tokio::test]
+async fn the_answer_of_a_large_study_goes_on_being_made_when_the_time_of_who_asked_is_over() {
+    let (file, memory) = (File::new(), Service::new());
+    let question = Question::post("/v1/studies", large().to_string()).with("prefer", "wait=600");
+    let mut told = memory.ask(&question).await.found();
+    while told["state"] == "running" {
+        told = memory.ask(&question).await.json();
+    }
+    let keeper = Keeper::of(&file, LIMITS, true).await;
+    while keeper.ask(&large()).await.json()["state"] == "running" {}
+    keeper.end().await;
+    let replica = Keeper::of(&file, LIMITS, false).await;
+    let studies = &replica.service.app.studies;
+    let kept = studies.find(told["id"].as_str().unwrap()).await.unwrap().unwrap();
+    // Whose time is over at once: an answer that ended with its request would never be there.
+    let mut refused = 0;
+    let made = loop {
+        match studies.made_apart(&kept, tokio::time::Instant::now()).await {
+            Ok(made) => break made.unwrap(),
+            Err(problem) => {
+                assert_eq!(problem.code, ProblemCode::DeadlineExceeded);
+                refused += 1;
+                tokio::task::yield_now().await;
+            }
+        }
+    };
+    assert!(refused > 0);
+    let result = replica.service.get(&format!("{}/result", place(&told))).await.found();
+    assert_eq!(result, told["result"]);
+    assert_eq!(serde_json::to_value(made).unwrap(), result);
+    replica.end().await;
+}
+
+#[tokio::test]
+async fn an_id_with_a_zero_byte_is_no_studys() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    for service in [&keeper.service, &Service::new()] {
+        for (method, place) in [("GET", ""), ("GET", "/result"), ("GET", "/events"), ("DELETE", "")] {
+            let question = Question::of(method, &format!("/v1/studies/%00{place}"));
+            service.ask(&question).await.refused(404, "not_found");
+        }
+    }
     keeper.end().await;
 }

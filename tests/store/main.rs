@@ -1,6 +1,8 @@
 //! The store of studies: in a file, and on a PostgreSQL server where `TOOTHWAVE_TEST_POSTGRES` names an empty database.
 #![allow(clippy::unwrap_used, reason = "tests fail by panicking")]
 
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::task::Poll;
@@ -348,6 +350,22 @@ async fn what_was_kept_in_a_file_is_there_after_its_process() {
     let store = Store::open(&file.address()).await.unwrap();
     assert_eq!(store.chunks_done(&study.id).await.unwrap(), [0]);
     assert_eq!(claimed(&store, &study).await.chunk(), 1);
+}
+
+/// It holds designs.
+#[tokio::test]
+async fn a_new_file_is_its_owners_alone_and_one_that_is_there_keeps_its_mode() {
+    let mode = |path: &str| std::fs::metadata(path).unwrap().permissions().mode() & 0o777;
+    let file = File::new();
+    let path = file.0.display().to_string();
+    let store = Store::open(&file.address()).await.unwrap();
+    store.create(&study("mode", 1)).await.unwrap();
+    assert_eq!((mode(&path), mode(&format!("{path}-wal"))), (0o600, 0o600));
+    store.close().await;
+    std::fs::set_permissions(&path, Permissions::from_mode(0o640)).unwrap();
+    let store = Store::open(&file.address()).await.unwrap();
+    assert_eq!(mode(&path), 0o640);
+    store.close().await;
 }
 
 #[tokio::test]

@@ -126,9 +126,7 @@ pub async fn result(
     let answer = async {
         let kept = kept(&app, id).await?;
         let representation = Representation::negotiate(&headers, StudyAnswer::FORMS.iter().map(|(format, _)| *format))?;
-        app.studies.gather(&kept).await?;
-        let study = Arc::clone(&kept);
-        written_apart(&app, &kept, representation, move || study.answer()).await
+        written_apart(&app, &kept, representation, |answer| answer).await
     };
     no_store(answer.await.unwrap_or_else(IntoResponse::into_response))
 }
@@ -241,14 +239,9 @@ async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Respons
         let location = format!("/v1/studies/{}", kept.resource().id);
         (StatusCode::ACCEPTED, [(header::LOCATION, location)], Json(kept.resource())).into_response()
     } else {
-        app.studies.gather(&kept).await?;
-        let study = Arc::clone(&kept);
-        let resource = move || {
-            let mut resource = study.resource();
-            resource.result = Some(study.answer());
-            resource
-        };
-        written_apart(app, &kept, representation, resource).await?
+        let resource = kept.resource();
+        let with_result = move |answer| StudyResource { result: Some(answer), ..resource };
+        written_apart(app, &kept, representation, with_result).await?
     };
     if let Some(wait) = wait {
         let applied = format!("wait={}", wait.as_secs());
@@ -268,17 +261,20 @@ fn wait_wanted(headers: &HeaderMap) -> Option<Duration> {
     })
 }
 
-/// Writes an answer of a study on a thread of its own, taking room for it.
+/// Writes what a study has come to, in whatever that is told, on a thread of its own, taking room for it.
 async fn written_apart<A: Forms + Send>(
     app: &App,
-    kept: &Kept,
+    kept: &Arc<Kept>,
     representation: Representation,
-    answer: impl FnOnce() -> A + Send + 'static,
+    told: impl FnOnce(StudyAnswer) -> A + Send + 'static,
 ) -> Result<Response, Problem> {
-    let (room, columns_bytes) = (app.room.clone(), kept.stored_bytes());
+    let made = app.studies.made_apart(kept, app.pool.deadline()).await?;
+    let columns_bytes = if made.is_some() { 0 } else { kept.stored_bytes() };
+    let (room, study) = (app.room.clone(), Arc::clone(kept));
     let job = move |stop: &AtomicBool| {
         let reserved = room.reserve(columns_bytes)?;
-        written(answer(), representation, reserved, columns_bytes, Duration::ZERO, stop)
+        let answer = made.unwrap_or_else(|| study.answer());
+        written(told(answer), representation, reserved, columns_bytes, Duration::ZERO, stop)
     };
     let stored = app.pool.run(app.pool.deadline(), Thread::Blocking, job).await?;
     with_body(&app.room, stored, representation)
