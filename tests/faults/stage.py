@@ -221,8 +221,10 @@ class Stage:
         self.processes.append(service)
         return service
 
-    def work(self, name="worker-1", studies=None, slots=1, environment=None, **faults):
+    def work(self, name="worker-1", studies=None, slots=1, environment=None, parts=None, **faults):
         words = ["worker", "--studies", studies or self.studies, "--max-concurrent-solves", slots]
+        if parts:
+            words += ["--study-parts", parts]
         worker = Process(self.binary, name, *words, faults=faults, environment=environment)
         self.processes.append(worker)
         return worker
