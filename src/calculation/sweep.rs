@@ -240,10 +240,10 @@ impl Question for Sweep {
         /// They are solved and written in about 0.1 ms; with Palmgren's law and all that can be asked for in a quarter of a millisecond.
         const FEW_STATES: u64 = 400;
         let CheckedSweep { drive, deviations, friction, points, with_gaps, .. } = checked;
+        // The boundary elements of a tooth take longer than any short sweep.
+        let is_plain = !with_gaps && friction.is_none() && !checked.load().parameters().ring_teeth_bend;
         match points {
-            Points::Samples(samples) => {
-                !with_gaps && friction.is_none() && deviations.mesh(drive).state_count(*samples) <= FEW_STATES
-            }
+            Points::Samples(samples) => is_plain && deviations.mesh(drive).state_count(*samples) <= FEW_STATES,
             Points::Tolerance { .. } => false,
         }
     }

@@ -12,7 +12,7 @@ use toothwave_calculation::forms::Format;
 use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::key::Key;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
-use toothwave_calculation::question::Question;
+use toothwave_calculation::question::{Limits, Question};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::gaps::{Runout, TipRelief};
 use toothwave_solver::{Deviations, Modification, PerContact};
@@ -21,6 +21,28 @@ use crate::schema::{Chance, Schemas, leaves, objects};
 
 fn read(document: &Value) -> Result<Design, NoAnswer> {
     Design::read(document.to_string().as_bytes())
+}
+
+/// What is short is solved on the threads that everything else waits for: case 5.1 with nothing that takes longer.
+#[test]
+fn a_short_sweep_is_not_short_where_the_rings_teeth_bend() {
+    let mut document = json!({
+        "drive": {
+            "wave_generator": { "semi_major_mm": 58, "semi_minor_mm": 56 },
+            "teeth": { "count": 28, "radius_mm": 5, "width_mm": 15 },
+            "ring": { "teeth": 26 }
+        },
+        "load": { "input_torque_nm": 20 },
+        "model": { "ring_teeth_bend": false }
+    });
+    let limits = Limits { max_states: 1_000_000, max_profile_points: 1_000_000 };
+    let is_short = |document: &Value| {
+        let checked = Sweep.check(&read(document).expect("a document"), &limits).expect("a drive");
+        Sweep::is_short(&checked)
+    };
+    assert!(is_short(&document));
+    document["model"]["ring_teeth_bend"] = json!(true);
+    assert!(!is_short(&document));
 }
 
 /// The keys of all questions, one after the other.

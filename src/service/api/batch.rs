@@ -426,7 +426,8 @@ impl Lines {
         match arrived {
             Ok(Some(Ok(bytes))) => {
                 self.buffer.extend_from_slice(&bytes);
-                self.arrived_bytes += bytes.len() as u64;
+                // Blank lines ask nothing.
+                self.arrived_bytes += bytes.iter().filter(|byte| !byte.is_ascii_whitespace()).count() as u64;
                 if u128::from(self.arrived_bytes) >= self.least_bytes() {
                     (self.waited, self.arrived_bytes) = (Duration::ZERO, 0);
                 }
@@ -435,7 +436,7 @@ impl Lines {
             Ok(None) => self.is_over = true,
             Err(_) => {
                 let detail = format!(
-                    "within {} ms of waiting less than {} bytes of the batch arrived",
+                    "within {} ms of waiting less than {} bytes of the batch arrived, blank ones not counted",
                     self.patience.as_millis(),
                     self.least_bytes()
                 );
