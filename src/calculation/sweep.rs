@@ -252,6 +252,9 @@ impl Question for Sweep {
         let CheckedSweep { drive, duty, deviations, backings, friction, with_gaps, with_wind_up, .. } = checked;
         let load = checked.load();
         let sweep = checked.solve(stop)?;
+        // Of a million states each of what follows takes tens of milliseconds.
+        let go_on = || if stop.stopped() { Err(NoAnswer::stopped()) } else { Ok(()) };
+        go_on()?;
         let mesh = sweep.mesh;
         let mut findings = drive_findings(drive)?;
         let approaches_matter = *with_wind_up || load.has_gaps() || !deviations.is_nil();
@@ -262,7 +265,9 @@ impl Question for Sweep {
         let shares = Shares::of(drive, load, backings, &sweep.peaks);
         let of_backing = shares.as_ref().map_or_else(Vec::new, findings::of_backing);
         let parts = shares.as_ref().map(|shares| (backings.support(), shares));
+        go_on()?;
         let model_error = error_of_model::of(drive, load, deviations, &sweep, parts).map_err(SolveError::from)?;
+        go_on()?;
         let forces = period::RadialForces::of(drive, &sweep, stop)?;
         let mut of_friction = None;
         let mut losses = None;
@@ -287,6 +292,7 @@ impl Question for Sweep {
         } else {
             None
         };
+        go_on()?;
         let answer = SweepAnswer {
             solver_version: toothwave_solver::VERSION,
             build: crate::BUILD,
