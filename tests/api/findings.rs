@@ -567,6 +567,7 @@ async fn every_kind_of_finding_can_be_met_over_http() {
     }
     all.extend(findings(&held(json!({ "ring": { "rim": "free" } }))).await);
     all.extend(findings(&grooved(3.001)).await);
+    all.extend(findings(&on_a_bearing(3000.0, &json!({ "input_torque_nm": 2.0 }))).await);
     for document in [undercut(), thin_walls(), cleared(9000.0), grooved(3.1)] {
         all.extend(findings_of_parts(&document).await);
     }
