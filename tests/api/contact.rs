@@ -133,9 +133,8 @@ async fn a_capacity_within_johnsons_law_is_told_though_the_law_ends_before_a_str
     }
     // Where the law ends before any stress is reached there is no capacity, and the refusal says that it is about that, and under which torque.
     let sweep = json!({ "samples": 7 });
-    let refused =
-        service.post("/v1/sweep", &soft(json!({ "input_torque_nm": 0.01, "allowable_stress_mpa": 700.0 }), &sweep));
-    let problem = refused.await.refused(422, "impossible_design");
+    let beyond = soft(json!({ "input_torque_nm": 0.01, "allowable_stress_mpa": 700.0 }), &sweep);
+    let problem = service.post("/v1/sweep", &beyond).await.refused(422, "impossible_design");
     let detail = problem["detail"].as_str().unwrap();
     assert!(detail.starts_with("no torque capacity can be told"), "{detail}");
     assert!(detail.contains("`load.allowable_stress_mpa`"), "{detail}");
