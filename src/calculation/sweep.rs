@@ -23,7 +23,9 @@ use crate::question::{Limits, Question, checked_drive, checked_load, require_fin
 use crate::sweep::answer::{ChecksAnswer, LoadAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
 use crate::sweep::backing::EstimateAnswer;
 use crate::sweep::duty::{DutyAnswer, DutyPointAnswer};
-use crate::sweep::losses::{Cost, Costs, LossTotalsAnswer, LossesAnswer, RadialForceAnswer, RollsAnswer};
+use crate::sweep::losses::{
+    BearingLoaded, Cost, Costs, LossTotalsAnswer, LossesAnswer, RadialForceAnswer, RollsAnswer,
+};
 use crate::sweep::model_error::ModelErrorAnswer;
 
 pub mod answer;
@@ -269,7 +271,7 @@ impl Question for Sweep {
         let model_error = error_of_model::of(drive, load, deviations, &sweep, parts).map_err(SolveError::from)?;
         go_on()?;
         let forces = period::RadialForces::of(drive, &sweep, stop)?;
-        let mut of_friction = None;
+        let (mut of_friction, mut of_bearing) = (None, None);
         let mut losses = None;
         let mut points = duty.points.iter().map(|point| DutyPointAnswer::new(drive, point)).collect::<Vec<_>>();
         if let Some(friction) = friction {
@@ -281,10 +283,14 @@ impl Question for Sweep {
             }
             of_friction =
                 findings::of_friction(&Mechanism::of_sweep(drive, &sweep), friction, costs.total_loss_ratio());
+            of_bearing = costs
+                .bearing_load()
+                .and_then(|BearingLoaded { rating_n, load_n }| findings::of_bearing(rating_n, load_n));
             losses = Some(LossesAnswer::new(&costs, duty.hardest, &sweep, of_period)?);
         }
         let radial_force_n = forces.map(|forces| RadialForceAnswer::new(&sweep, forces)).transpose()?;
-        let of_model = of_half_widths.iter().chain(&of_friction).chain(&of_projection).chain(&of_backing);
+        let of_model =
+            of_half_widths.iter().chain(&of_friction).chain(&of_bearing).chain(&of_projection).chain(&of_backing);
         let of_sweep = of_wind_up.iter().chain(of_model).chain(&of_contacts);
         findings.extend(of_sweep.map(|finding| FindingAnswer::new(finding, drive)));
         let unloaded_wind_up_deg = if *with_wind_up && *with_gaps {
