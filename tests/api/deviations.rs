@@ -338,8 +338,7 @@ async fn where_zones_are_unlike_a_plots_curve_ends_at_each_jump() {
     assert_eq!(found["enters_under_load"], true);
     let question = Question::post("/v1/sweep", unlike.to_string()).with("accept", "image/svg+xml");
     let curves = points_of_curves(Service::new().ask(&question).await.text());
-    // ε spacings of the places, and so many jumps on a tooth's way.
-    let degree = found["coincidence_degree"].as_f64().unwrap();
-    let jumps = (1..).take_while(|&jumps| f64::from(jumps) <= degree).count();
+    // As many teeth come after a tooth while it meshes, at each of which it jumps.
+    let jumps = usize::try_from(found["teeth_in_mesh_per_zone"]["min"].as_u64().unwrap()).unwrap();
     assert_eq!(curves.iter().filter(|points| **points > 5).count(), 6 * (jumps + 1), "{curves:?}");
 }
