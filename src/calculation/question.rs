@@ -1,7 +1,8 @@
 //! The walk from a document to an answer, which all questions share.
 
+pub use toothwave_solver::Stop;
 use toothwave_solver::drive::Draft;
-use toothwave_solver::{LoadCase, Parameter, SolveError, Stop, Violation, model_error};
+use toothwave_solver::{LoadCase, Parameter, SolveError, Violation, model_error};
 
 use crate::design::Design;
 use crate::forms::Forms;

@@ -23,7 +23,8 @@ use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use crate::api::{
-    CACHE_STATUS, SERVER_TIMING, accuracy, batch, coincidence_degree, drawings, geometry, page, side, studies, sweep,
+    CACHE_STATUS, SERVER_TIMING, accuracy, batch, coincidence_degree, design, drawings, geometry, page, side, studies,
+    sweep,
 };
 use crate::app::App;
 use crate::keys::{self, Keys};
@@ -66,6 +67,7 @@ fn api() -> OpenApiRouter<Arc<App>> {
         .routes(routes!(geometry::geometry))
         .routes(routes!(coincidence_degree::coincidence_degree))
         .routes(routes!(sweep::sweep))
+        .routes(routes!(design::design))
         .routes(routes!(accuracy::accuracy))
         .routes(routes!(drawings::drawing))
         .routes(routes!(batch::batch))

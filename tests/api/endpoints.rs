@@ -132,6 +132,67 @@ async fn endpoints_do_not_answer_for_each_other() {
     assert_eq!(tags.len(), 3);
 }
 
+/// The names of the parts of `/v1/design`, and the endpoints that answer them by themselves.
+const PARTS: [(&str, &str); 3] =
+    [("geometry", "/v1/geometry"), ("coincidence_degree", "/v1/coincidence-degree"), ("sweep", "/v1/sweep")];
+
+#[tokio::test]
+async fn a_design_is_answered_as_a_whole_with_the_bytes_of_its_parts() {
+    let service = Service::new();
+    for document in [spelled_out(), service.get("/v1/examples/paper-5.2").await.json()] {
+        let whole = service.post("/v1/design", &document).await;
+        let mut expected = String::from("{");
+        for (name, path) in PARTS {
+            expected += &format!("\"{name}\":{},", service.post(path, &document).await.text());
+        }
+        assert_eq!(whole.text(), expected + "\"problems\":{}}");
+        assert!(service.post("/v1/design", &document).await.is_hit());
+    }
+}
+
+#[tokio::test]
+async fn where_a_part_of_a_design_has_no_answer_its_problem_stands_in_its_place() {
+    let service = Service::new();
+    let unloaded = without(&spelled_out(), "/load");
+    let touching = with(&spelled_out(), "/drive/teeth/radius_mm", json!(8.0));
+    let coarse = with(&spelled_out(), "/profile/chord_tolerance_mm", json!(-1.0));
+    for (document, missing) in [(unloaded, 1), (touching, 3), (coarse, 1)] {
+        let whole = service.post("/v1/design", &document).await;
+        assert_eq!(whole.status, 200, "{}", whole.text());
+        let whole = whole.json();
+        for (name, path) in PARTS {
+            let alone = service.post(path, &document).await;
+            let (there, absent) =
+                if alone.status == 200 { (&whole, &whole["problems"]) } else { (&whole["problems"], &whole) };
+            assert_eq!(there[name], alone.json(), "{name}");
+            assert!(absent.get(name).is_none(), "{name}");
+        }
+        assert_eq!(whole["problems"].as_object().unwrap().len(), missing);
+    }
+}
+
+#[tokio::test]
+async fn a_design_as_a_whole_depends_on_what_its_parts_depend_on() {
+    let first = etag("/v1/design", &spelled_out()).await;
+    for (pointer, value) in [
+        ("/profile/chord_tolerance_mm", json!(0.002)),
+        ("/drive/teeth/radius_mm", json!(5.1)),
+        ("/load/input_torque_nm", json!(21.0)),
+        ("/sweep/samples", json!(51)),
+    ] {
+        assert_ne!(etag("/v1/design", &with(&spelled_out(), pointer, value)).await, first, "{pointer}");
+    }
+    let drawn = with(&spelled_out(), "/parts", json!({ "teeth": { "clearance_um": 5.0 } }));
+    assert_eq!(etag("/v1/design", &drawn).await, first, "drawings alone read the clearance of the teeth");
+}
+
+#[tokio::test]
+async fn a_document_of_another_form_is_no_design_in_any_part() {
+    let document = with(&spelled_out(), "/load/torque", json!(20.0));
+    let (at, ..) = Service::new().post("/v1/design", &document).await.faulty_field();
+    assert_eq!(at, "/load/torque");
+}
+
 #[tokio::test]
 async fn a_sweep_says_the_load_at_both_shafts_and_whether_teeth_enter_under_it() {
     let service = Service::new();

@@ -186,7 +186,8 @@ fn every_path_and_every_status_that_it_can_have_is_described() {
     let mut expected: Vec<(&str, &str, &[&str])> =
         ENDPOINTS.iter().map(|&path| (described(path), "post", &solving[..])).collect();
     expected.extend([
-        ("/v1/batch", "post", &["200", "400", "415", "503"][..]),
+        ("/v1/design", "post", &solving[..]),
+        ("/v1/batch", "post", &["200", "400", "415", "503"]),
         // Measured for each answer, so there is nothing that a client could have already.
         ("/v1/accuracy", "post", &["200", "400", "406", "408", "413", "415", "422", "500", "503"]),
         ("/v1/studies", "post", &["200", "202", "400", "406", "408", "413", "415", "422", "500", "503"]),

@@ -18,11 +18,11 @@ async function freePort() {
 }
 
 export class Server {
-  static async start(port, settings = []) {
+  static async start(port, settings = [], binary = BINARY) {
     const server = new Server();
     server.port = port ?? (await freePort());
     server.origin = `http://127.0.0.1:${server.port}`;
-    server.process = spawn(BINARY, ['serve', '--listen', `127.0.0.1:${server.port}`, '--log', 'warn', ...settings], { stdio: 'ignore' });
+    server.process = spawn(binary, ['serve', '--listen', `127.0.0.1:${server.port}`, '--log', 'warn', ...settings], { stdio: 'ignore' });
     for (let attempt = 0; ; attempt += 1) {
       try {
         await fetch(`${server.origin}/health/ready`);

@@ -133,7 +133,7 @@ test('the newest design wins over slow answers to older ones', async () => {
   page = await open(browser, server);
   let aborted = 0;
   page.on('requestfailed', (request) => (aborted += request.failure().errorText.includes('ABORTED') ? 1 : 0));
-  await page.route('**/v1/sweep', async (route) => {
+  await page.route('**/v1/design', async (route) => {
     const { radius_mm: radius } = route.request().postDataJSON().drive.teeth;
     // Browser and service race: the older the design, the later its answer.
     await new Promise((resolve) => setTimeout(resolve, radius < 4.5 ? 0 : 3000));
@@ -143,7 +143,7 @@ test('the newest design wins over slow answers to older ones', async () => {
   await settled(page);
   await assertShows(await designOf(page));
   assert.ok(aborted > 0, 'stale requests are aborted');
-  await page.unroute('**/v1/sweep');
+  await page.unroute('**/v1/design');
 });
 
 test('an impossible drive shows its reasons at the fields, and nothing breaks', async () => {

@@ -34,6 +34,7 @@ use crate::room::{NoRoom, Reserved, Room, Sent};
 pub mod accuracy;
 pub mod batch;
 pub mod coincidence_degree;
+pub mod design;
 pub mod drawings;
 pub mod geometry;
 pub mod page;

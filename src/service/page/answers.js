@@ -7,7 +7,8 @@ import { drawable } from './states.js';
 const MOST_BYTES = 1 << 20;
 
 const READERS = {
-  sweep: (sweep) => drawable(sweep),
+  design: (design) => ({ ...design, ...(design.sweep && { sweep: drawable(design.sweep) }) }),
+  sweep: drawable,
   study: (study) => (study.result ? { ...study, result: drawableStudy(study.result) } : study),
   result: drawableStudy,
 };

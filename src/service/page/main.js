@@ -200,7 +200,8 @@ function showName() {
 let addressTimer;
 function addressLater() {
   clearTimeout(addressTimer);
-  addressTimer = setTimeout(writeAddress, ADDRESS_DELAY_MS);
+  // Browsers take long over an address: not while a slider is held.
+  addressTimer = setTimeout(() => (form.isHeld ? addressLater() : writeAddress()), ADDRESS_DELAY_MS);
 }
 
 function writeAddress() {

@@ -29,8 +29,6 @@ const isAlive = () =>
     () => false,
   );
 
-const ENDPOINTS = { geometry: 'v1/geometry', coincidence: 'v1/coincidence-degree', sweep: 'v1/sweep' };
-
 /** The service cannot be reached, or is too busy to answer. */
 class Unavailable extends Error {
   constructor(message, retryMs) {
@@ -75,18 +73,9 @@ function zonesOf({ drive }) {
 export async function evaluate(design, signal) {
   // The picture joins copies of one tooth, whatever extent the document asks for.
   const drawn = { ...design, profile: { ...design.profile, extent: 'tooth' } };
-  const names = Object.keys(ENDPOINTS);
-  const replies = await Promise.all(
-    names.map((name) => ask(ENDPOINTS[name], name === 'geometry' ? drawn : design, { signal, kind: name })),
-  );
-  const result = { design, answers: { zones: zonesOf(design) }, problems: [], solveMs: 0 };
-  names.forEach((name, index) => {
-    const { answer, problem, solveMs } = replies[index];
-    if (problem) result.problems.push(problem);
-    else result.answers[name] = answer;
-    result.solveMs += solveMs ?? 0;
-  });
-  return result;
+  const { answer, problem, solveMs } = await ask('v1/design', drawn, { signal, kind: 'design' });
+  const { geometry, coincidence_degree: coincidence, sweep, problems } = answer ?? { problems: { problem } };
+  return { design, answers: { zones: zonesOf(design), geometry, coincidence, sweep }, problems: Object.values(problems), solveMs: solveMs ?? 0 };
 }
 
 /** Documents that came or are under way, and how long the others are waited for. */
