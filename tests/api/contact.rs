@@ -210,9 +210,7 @@ async fn where_no_law_is_named_pointed_tips_bend_and_with_gaps_the_wave_generato
         let answer = service.post("/v1/sweep", &with(drive, "/model", model)).await.found();
         (answer["states"].clone(), answer["model_error"]["measured"]["case"].clone())
     };
-    let named = |bend: bool, moves: bool| {
-        json!({ "stiffness": { "law": "johnson" }, "ring_teeth_bend": bend, "wave_generator_moves": moves })
-    };
+    let named = |bend: bool, moves: bool| json!({ "stiffness": { "law": "johnson" }, "ring_teeth_bend": bend, "wave_generator_moves": moves });
     let gap = |mut model: Value| {
         model["clearance"] = json!({ "ring_um": 10.0 });
         model
