@@ -14,10 +14,10 @@ use crate::position::Position;
 use crate::ring::RingFlank;
 use crate::root::NotConverged;
 
-/// Elements of either flank of the ring's tooth that is pressed; every other flank is a single one. With 64 of them, 16 on
-/// every other flank and a space more on either side the compliance in case 5.2 is another one by 0.17 of the 21 units that the contact with the ring gives
-/// way by, in the last twentieth of the flank by 0.5.
-const FINE: usize = 14;
+/// Elements of either flank of the ring's tooth that is pressed; every other flank is a single one. With 64 of them, 16 on every other flank and a space
+/// more on either side the compliance in case 5.2 is another one by 0.13 of the 21 units that the contact with the ring gives way by, in the last twentieth
+/// of the flank by 0.4.
+const FINE: usize = 16;
 
 /// Tooth spaces on either side of the one whose flank is pressed, at most.
 const SPACES_BESIDE: u64 = 2;

@@ -101,6 +101,10 @@ impl Spring {
 
 /// The rotation that makes a way along `F_H` by an arm that declines, `Δφ |h'| - c Δφ²/2`; without end where the arm ends before.
 fn turned_rad(arm_mm: f64, arm_decline_mm_per_rad: f64, way_mm: f64) -> f64 {
+    // Also where there is no arm to begin with.
+    if way_mm == 0.0 {
+        return 0.0;
+    }
     let square_mm2 = arm_mm * arm_mm - 2.0 * arm_decline_mm_per_rad * way_mm;
     if square_mm2 < 0.0 && way_mm > 0.0 {
         return f64::INFINITY;
@@ -295,11 +299,17 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         const FARTHEST_RAD: f64 = 2.0 * PI;
         let lacking =
             |excess_rad: f64| Ok(self.torque_nmm(&Rotation { closing_rad, excess_rad })?.value / torque_nmm - 1.0);
-        let mut far_rad = self.most_excess_rad(closing_rad, torque_nmm)?.min(FARTHEST_RAD);
+        // Springs that have no arm to begin with have no guess either.
+        let guess_rad = self.most_excess_rad(closing_rad, torque_nmm)?;
+        let mut far_rad = if guess_rad > 0.0 { guess_rad.min(FARTHEST_RAD) } else { FARTHEST_RAD };
         let mut near = lacking(0.5 * far_rad)?;
         while near >= 0.0 && far_rad > 0.0 {
             far_rad *= 0.5;
             near = lacking(0.5 * far_rad)?;
+        }
+        if far_rad <= 0.0 {
+            // The last closing angle itself makes the torque, to the last digit.
+            return Ok(Some(0.0));
         }
         let mut far = lacking(far_rad)?;
         while far < 0.0 {

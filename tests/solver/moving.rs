@@ -204,6 +204,21 @@ fn a_tooth_in_the_valley_closes_its_gap_when_the_wave_generator_has_moved_on() {
     }
 }
 
+/// The gap of its slot vanishes with its arm: under a light load the wave generator that moves on presses that tooth alone. A search for its rotation once had no end.
+#[test]
+fn a_tooth_in_the_valley_carries_a_light_load_alone_where_only_slots_have_gaps() {
+    let drive = drive(&PAPER_5_1);
+    let clearance_um = PerContact { carrier: 1000.0, ..PerContact::default() };
+    let case = LoadCase::new(&LoadParameters { clearance_um, ..moving(1e-9) }).unwrap();
+    let loaded = LoadedDrive::new(&drive, &case).unwrap();
+    let (_, wind_up, forces) = shared(&loaded, 0);
+    assert_eq!(wind_up.rotation.closing_rad, 0.0);
+    assert_eq!(forces.iter().filter(|&&force_n| force_n > 0.0).count(), 1);
+    assert!(*forces.last().unwrap() > 0.0);
+    let sweep = sweep::sweep(&drive, &case, Points::samples(7).unwrap(), &Never).unwrap();
+    assert!(sweep.torque_balance_residual < 1e-12, "{:e}", sweep.torque_balance_residual);
+}
+
 #[test]
 fn gaps_wider_than_the_wave_generator_lifts_teeth_are_never_closed_and_that_is_said() {
     let drive = drive(&PAPER_5_2);
