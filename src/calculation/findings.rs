@@ -95,6 +95,8 @@ pub enum FindingCode {
     FrictionBeyondMeasured,
     /// Friction so large that an exact equilibrium may have quite another efficiency.
     EfficiencyUncertain,
+    /// A load on the wave generator's bearing beyond which the equation of its life does not hold.
+    BearingLoadAboveHalfRating,
     /// A stress above the one that the contact may have.
     StressAboveAllowable,
     /// A stress above the fatigue limit of bearing steel.
@@ -452,6 +454,16 @@ impl FindingAnswer {
                 "",
                 "friction alters the normal forces themselves, which losses to first order leave out: an exact equilibrium may have an efficiency that is off by as much as this".into(),
                 "let the teeth run on a bearing, or take the efficiency for a tendency",
+            ),
+            Finding::BearingLoadAboveHalfRating { load_n, limit_n } => new(
+                Code::BearingLoadAboveHalfRating,
+                Warning,
+                &["/friction/wave_generator/bearing_load_rating_n", LOAD],
+                load_n,
+                limit_n,
+                "N",
+                "the load on the bearing exceeds half its dynamic load rating, up to which the equation of its life holds (ISO 281:2007): it may last less long than calculated".into(),
+                "choose a bearing with a larger load rating, or lower the torque",
             ),
             Finding::StressAboveAllowable { contact, stress_mpa, allowable_mpa } => new(
                 Code::StressAboveAllowable,

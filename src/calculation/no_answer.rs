@@ -136,7 +136,13 @@ impl From<SolveError> for NoAnswer {
                     "{detail}: a part is too full there. Make `model.clearance` larger, or `modification` and `deviations` smaller"
                 ),
             ),
-            SolveError::JohnsonBeyondHalfWidth { .. } => Self::new(NoAnswerCode::ImpossibleDesign, detail),
+            SolveError::JohnsonBeyondHalfWidth { is_of_capacity: false, .. } => {
+                Self::new(NoAnswerCode::ImpossibleDesign, detail)
+            }
+            SolveError::JohnsonBeyondHalfWidth { is_of_capacity: true, .. } => Self::new(
+                NoAnswerCode::ImpossibleDesign,
+                format!("{detail}. Make `load.allowable_stress_mpa` smaller, or leave it out"),
+            ),
             SolveError::FlatOffCarrier { .. } => Self::new(
                 NoAnswerCode::ImpossibleDesign,
                 format!("{detail}. Make the flats longer, or the carrier wider by `parts.carrier`"),

@@ -23,7 +23,9 @@ use crate::question::{Limits, Question, checked_drive, checked_load, require_fin
 use crate::sweep::answer::{ChecksAnswer, LoadAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
 use crate::sweep::backing::EstimateAnswer;
 use crate::sweep::duty::{DutyAnswer, DutyPointAnswer};
-use crate::sweep::losses::{Cost, Costs, LossTotalsAnswer, LossesAnswer, RadialForceAnswer, RollsAnswer};
+use crate::sweep::losses::{
+    BearingLoaded, Cost, Costs, LossTotalsAnswer, LossesAnswer, RadialForceAnswer, RollsAnswer,
+};
 use crate::sweep::model_error::ModelErrorAnswer;
 
 pub mod answer;
@@ -240,10 +242,10 @@ impl Question for Sweep {
         /// They are solved and written in about 0.1 ms; with Palmgren's law and all that can be asked for in a quarter of a millisecond.
         const FEW_STATES: u64 = 400;
         let CheckedSweep { drive, deviations, friction, points, with_gaps, .. } = checked;
+        // The boundary elements of a tooth take longer than any short sweep.
+        let is_plain = !with_gaps && friction.is_none() && !checked.load().parameters().ring_teeth_bend;
         match points {
-            Points::Samples(samples) => {
-                !with_gaps && friction.is_none() && deviations.mesh(drive).state_count(*samples) <= FEW_STATES
-            }
+            Points::Samples(samples) => is_plain && deviations.mesh(drive).state_count(*samples) <= FEW_STATES,
             Points::Tolerance { .. } => false,
         }
     }
@@ -252,6 +254,9 @@ impl Question for Sweep {
         let CheckedSweep { drive, duty, deviations, backings, friction, with_gaps, with_wind_up, .. } = checked;
         let load = checked.load();
         let sweep = checked.solve(stop)?;
+        // Of a million states each of what follows takes tens of milliseconds.
+        let go_on = || if stop.stopped() { Err(NoAnswer::stopped()) } else { Ok(()) };
+        go_on()?;
         let mesh = sweep.mesh;
         let mut findings = drive_findings(drive)?;
         let approaches_matter = *with_wind_up || load.has_gaps() || !deviations.is_nil();
@@ -262,9 +267,11 @@ impl Question for Sweep {
         let shares = Shares::of(drive, load, backings, &sweep.peaks);
         let of_backing = shares.as_ref().map_or_else(Vec::new, findings::of_backing);
         let parts = shares.as_ref().map(|shares| (backings.support(), shares));
+        go_on()?;
         let model_error = error_of_model::of(drive, load, deviations, &sweep, parts).map_err(SolveError::from)?;
+        go_on()?;
         let forces = period::RadialForces::of(drive, &sweep, stop)?;
-        let mut of_friction = None;
+        let (mut of_friction, mut of_bearing) = (None, None);
         let mut losses = None;
         let mut points = duty.points.iter().map(|point| DutyPointAnswer::new(drive, point)).collect::<Vec<_>>();
         if let Some(friction) = friction {
@@ -276,10 +283,14 @@ impl Question for Sweep {
             }
             of_friction =
                 findings::of_friction(&Mechanism::of_sweep(drive, &sweep), friction, costs.total_loss_ratio());
+            of_bearing = costs
+                .bearing_load()
+                .and_then(|BearingLoaded { rating_n, load_n }| findings::of_bearing(rating_n, load_n));
             losses = Some(LossesAnswer::new(&costs, duty.hardest, &sweep, of_period)?);
         }
         let radial_force_n = forces.map(|forces| RadialForceAnswer::new(&sweep, forces)).transpose()?;
-        let of_model = of_half_widths.iter().chain(&of_friction).chain(&of_projection).chain(&of_backing);
+        let of_model =
+            of_half_widths.iter().chain(&of_friction).chain(&of_bearing).chain(&of_projection).chain(&of_backing);
         let of_sweep = of_wind_up.iter().chain(of_model).chain(&of_contacts);
         findings.extend(of_sweep.map(|finding| FindingAnswer::new(finding, drive)));
         let unloaded_wind_up_deg = if *with_wind_up && *with_gaps {
@@ -287,6 +298,7 @@ impl Question for Sweep {
         } else {
             None
         };
+        go_on()?;
         let answer = SweepAnswer {
             solver_version: toothwave_solver::VERSION,
             build: crate::BUILD,

@@ -117,6 +117,12 @@ fn require_type(headers: &HeaderMap, wanted: &str, fits: impl Fn(&MediaType<'_>)
     if !coding.is_empty() && !coding.eq_ignore_ascii_case("identity") {
         return unsupported(format!("the body is coded as `{coding}`, and no coding is read"));
     }
+    let coding = joined(headers, &header::TRANSFER_ENCODING);
+    if !coding.is_empty() && !coding.eq_ignore_ascii_case("chunked") {
+        return unsupported(format!(
+            "the body is sent in the transfer codings `{coding}`, and `chunked` alone is read"
+        ));
+    }
     let content_type = joined(headers, &header::CONTENT_TYPE);
     if MediaType::parse(&content_type).is_ok_and(|media_type| media_type.ty == names::APPLICATION && fits(&media_type))
     {

@@ -114,13 +114,17 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>) -> io::Result
         let app = Arc::clone(&app);
         async move { app.studies.serve_store().await }
     });
-    tokio::spawn(async move {
-        while hang_up.recv().await.is_some() {
-            if let Some(keys) = &keys {
-                keys.reload();
+    if let Some(keys) = keys {
+        // On a thread of its own: the file may be a pipe that nobody writes to, or stand on a device that is away.
+        let (tell, told) = std::sync::mpsc::sync_channel(1);
+        std::thread::spawn(move || told.iter().for_each(|()| keys.reload()));
+        tokio::spawn(async move {
+            while hang_up.recv().await.is_some() {
+                // Whoever is told already reads what stands there then.
+                let _ = tell.try_send(());
             }
-        }
-    });
+        });
+    }
     let notice = NOTICE.max(settings.lame_duck());
     let stopping = async {
         told_to_stop().await;
@@ -291,7 +295,7 @@ impl Server {
             asked.store(true, Ordering::Relaxed);
             request.map(Body::new)
         });
-        let left = stream.left();
+        let (left, closed) = (stream.left(), stream.closed());
         let connection = self.http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
         let connection = self.graceful.watch(connection);
         let closing = self.closing.clone();
@@ -307,7 +311,7 @@ impl Server {
             let _held = permit;
             tokio::select! {
                 // What goes wrong on a connection is its client's to know; the request, if there was one, is logged by itself.
-                _ = connection => {}
+                _ = connection => closed.await,
                 () = left => {}
                 () = never_asked => {}
             }
@@ -317,9 +321,14 @@ impl Server {
     /// Answers a connection beyond the last one: health and metrics as ever, all else with a refusal.
     fn serve_beside(&self, stream: Socket) {
         let service = MapRequest::new(self.side.clone(), |request: hyper::Request<Incoming>| request.map(Body::new));
+        let closed = stream.closed();
         let connection = self.side_http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
         let answered = tokio::spawn(async move {
-            let _ = tokio::time::timeout(REFUSAL, connection).await;
+            let to_its_end = async {
+                let _ = connection.await;
+                closed.await;
+            };
+            let _ = tokio::time::timeout(REFUSAL, to_its_end).await;
         });
         let mut connections = self.side_connections.lock();
         connections.push_back(answered.abort_handle());

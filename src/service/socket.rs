@@ -3,19 +3,32 @@
 use std::io::{self, IoSlice};
 use std::pin::Pin;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
 use tokio::io::{AsyncRead, AsyncWrite, Interest, ReadBuf};
 use tokio::net::TcpStream;
-use tokio::time::{Sleep, sleep};
+use tokio::time::{Instant, Sleep, sleep, timeout};
 
 /// What a client that is written to has to take at least, on the average over its patience: below it, it is taken for one that does not read.
 const LEAST_TAKEN_BYTES_PER_S: u64 = 8 << 10;
 
-/// Pause between two looks whether a client has left behind bytes that nobody has read yet.
+/// What tells that a client has closed its side. Where the system can tell that by itself, bytes that nobody has read yet, which make a
+/// connection readable all the time, are not waited for again and again.
+#[cfg(any(target_os = "linux", target_os = "android"))]
+const CLOSED: Interest = Interest::PRIORITY;
+#[cfg(not(any(target_os = "linux", target_os = "android")))]
+const CLOSED: Interest = Interest::READABLE;
+
+/// Pause between two looks, where it cannot; and what a client that has left is given for what is nearly answered.
 const LOOK: Duration = Duration::from_millis(10);
+
+/// After the last answer, who has sent nothing for so long sends nothing more.
+const SILENCE: Duration = Duration::from_secs(1);
+
+/// Of what a client still sends after the last answer, read at once.
+const PASSED_OVER_BYTES: usize = 1 << 14;
 
 static OPEN: AtomicUsize = AtomicUsize::new(0);
 static SENT_BYTES: AtomicU64 = AtomicU64::new(0);
@@ -30,10 +43,24 @@ pub fn sent_bytes() -> u64 {
     SENT_BYTES.load(Ordering::Relaxed)
 }
 
+/// A connection, counted while it is open.
+#[derive(Debug)]
+struct Stream {
+    tcp: TcpStream,
+    /// Whether all is written that will be.
+    is_shut: AtomicBool,
+}
+
+impl Drop for Stream {
+    fn drop(&mut self) {
+        OPEN.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
 /// A connection whose client has to take what it is sent.
 #[derive(Debug)]
 pub struct Socket {
-    stream: Arc<TcpStream>,
+    stream: Arc<Stream>,
     patience: Duration,
     /// Runs while the client has something to take.
     stalled: Option<Pin<Box<Sleep>>>,
@@ -46,7 +73,8 @@ impl Socket {
         // Without it small answers could wait for the client's acknowledgement of earlier ones.
         let _ = stream.set_nodelay(true);
         OPEN.fetch_add(1, Ordering::Relaxed);
-        Self { stream: Arc::new(stream), patience, stalled: None, taken_bytes: 0 }
+        let stream = Arc::new(Stream { tcp: stream, is_shut: AtomicBool::new(false) });
+        Self { stream, patience, stalled: None, taken_bytes: 0 }
     }
 
     /// Waits until the client has closed its side, or the connection is broken.
@@ -56,11 +84,35 @@ impl Socket {
     pub fn left(&self) -> impl Future<Output = ()> + Send + 'static {
         let stream = Arc::clone(&self.stream);
         async move {
-            while stream.ready(Interest::READABLE).await.is_ok_and(|ready| !ready.is_read_closed()) {
+            while stream.tcp.ready(CLOSED).await.is_ok_and(|ready| !ready.is_read_closed()) {
                 sleep(LOOK).await;
             }
             // What is nearly answered still goes out.
             sleep(LOOK).await;
+        }
+    }
+
+    /// Waits, where the last answer is written, until the client has closed its side, and passes over what it still sends: at most for its
+    /// patience, and while it sends anything.
+    ///
+    /// A client that sends all of a body before it reads gets its answer only so, where that came before the body's end: to close a
+    /// connection with unread bytes resets it, and the answer is lost (RFC 9112, section 9.6).
+    pub fn closed(&self) -> impl Future<Output = ()> + Send + 'static {
+        let (stream, patience) = (Arc::clone(&self.stream), self.patience);
+        async move {
+            if !stream.is_shut.load(Ordering::Relaxed) {
+                return;
+            }
+            let until = Instant::now() + patience;
+            let mut passed_over = vec![0; PASSED_OVER_BYTES];
+            while Instant::now() < until && matches!(timeout(SILENCE, stream.tcp.readable()).await, Ok(Ok(()))) {
+                match stream.tcp.try_read(&mut passed_over) {
+                    Ok(0) => return,
+                    Ok(_) => {}
+                    Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                    Err(_) => return,
+                }
+            }
         }
     }
 
@@ -71,8 +123,8 @@ impl Socket {
         write: impl Fn(&TcpStream) -> io::Result<usize>,
     ) -> Poll<io::Result<usize>> {
         loop {
-            let written = match self.stream.poll_write_ready(context) {
-                Poll::Ready(Ok(())) => write(&self.stream),
+            let written = match self.stream.tcp.poll_write_ready(context) {
+                Poll::Ready(Ok(())) => write(&self.stream.tcp),
                 Poll::Ready(Err(error)) => Err(error),
                 Poll::Pending => {
                     let stalled = self.stalled.get_or_insert_with(|| Box::pin(sleep(self.patience)));
@@ -98,17 +150,11 @@ impl Socket {
     }
 }
 
-impl Drop for Socket {
-    fn drop(&mut self) {
-        OPEN.fetch_sub(1, Ordering::Relaxed);
-    }
-}
-
 impl AsyncRead for Socket {
     fn poll_read(self: Pin<&mut Self>, context: &mut Context<'_>, buffer: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
         loop {
-            ready!(self.stream.poll_read_ready(context))?;
-            match self.stream.try_read(buffer.initialize_unfilled()) {
+            ready!(self.stream.tcp.poll_read_ready(context))?;
+            match self.stream.tcp.try_read(buffer.initialize_unfilled()) {
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
                 read => return Poll::Ready(read.map(|bytes| buffer.advance(bytes))),
             }
@@ -141,6 +187,7 @@ impl AsyncWrite for Socket {
     }
 
     fn poll_shutdown(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Poll::Ready(Ok(rustix::net::shutdown(&*self.stream, rustix::net::Shutdown::Write)?))
+        self.stream.is_shut.store(true, Ordering::Relaxed);
+        Poll::Ready(Ok(rustix::net::shutdown(&self.stream.tcp, rustix::net::Shutdown::Write)?))
     }
 }

@@ -44,6 +44,9 @@ pub const STEEP_FOR_PROJECTION_DEG: f64 = 30.0;
 /// An efficiency that may be further off than this is reported.
 pub const UNCERTAIN_EFFICIENCY: f64 = 0.05;
 
+/// Share of a bearing's dynamic load rating up to which the equation of its life holds (ISO 281:2007).
+pub const LIFE_HOLDS_TO_SHARE_OF_RATING: f64 = 0.5;
+
 /// A part behind a contact that adds more than this to what a tooth gives way at its contacts is reported: the wind-up is then a sixth too small, as much
 /// as elastic bodies in a housing were found to add together (docs/validation.md).
 pub const SOFT_BACKING_SHARE: f64 = 0.2;
@@ -260,6 +263,13 @@ pub enum Finding {
         /// What it is measured against.
         limit: f64,
     },
+    /// A load on the wave generator's bearing beyond which the equation of its life does not hold.
+    BearingLoadAboveHalfRating {
+        /// The mean load, of a duty that of the point where it is largest.
+        load_n: f64,
+        /// What it is measured against.
+        limit_n: f64,
+    },
     /// A stress above the one that the contact may have.
     StressAboveAllowable {
         /// Where.
@@ -411,6 +421,12 @@ pub fn of_friction(mechanism: &Mechanism, friction: &Friction, loss_ratio: f64) 
     }
     (efficiency > UNCERTAIN_EFFICIENCY)
         .then_some(Finding::EfficiencyUncertain { error: efficiency, limit: UNCERTAIN_EFFICIENCY })
+}
+
+/// That the load on a bearing of this rating goes beyond what the equation of its life holds for (docs/theory.md section 10.5).
+pub fn of_bearing(dynamic_load_rating_n: f64, load_n: f64) -> Option<Finding> {
+    let limit_n = LIFE_HOLDS_TO_SHARE_OF_RATING * dynamic_load_rating_n;
+    (load_n > limit_n).then_some(Finding::BearingLoadAboveHalfRating { load_n, limit_n })
 }
 
 /// The findings about the ring as it is made (docs/theory.md section 8).

@@ -104,7 +104,9 @@ pub enum SolveError {
     TurnedPastTeeth,
     /// Johnson's law where a contact is half as wide as the tooth's radius or the depth, or wider.
     #[error(
-        "half the contact's width at {} reaches {half_width_limit_mm} mm, half of the tooth's radius or of the depth, where Johnson's approach ends: at this input angle with an input torque of {input_torque_limit_nm} N·m, first on the tooth at {position_deg} deg", .contact.name()
+        "{of_capacity}half the contact's width at {} reaches {half_width_limit_mm} mm, half of the tooth's radius or of the depth, where Johnson's approach ends: at this input angle with an input torque of {input_torque_limit_nm} N·m, first on the tooth at {position_deg} deg",
+        .contact.name(),
+        of_capacity = if *.is_of_capacity { "no torque capacity can be told, as before any contact reaches its allowable stress " } else { "" }
     )]
     JohnsonBeyondHalfWidth {
         /// The contact that is first.
@@ -115,6 +117,8 @@ pub enum SolveError {
         half_width_limit_mm: f64,
         /// The input torque at which it does so, at the input angle looked at.
         input_torque_limit_nm: f64,
+        /// Whether it is the torque capacity that lies beyond, and not the load.
+        is_of_capacity: bool,
     },
     /// A part that is too full: before any load a tooth would be pressed already.
     #[error(

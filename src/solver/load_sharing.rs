@@ -275,6 +275,32 @@ pub struct TorqueLimit {
     pub input_torque_nmm: f64,
     /// The contact that reaches it first.
     pub contact: Contact,
+    /// Where Johnson's law ends before any stress is reached: the torque is that of its end then, and the limit lies beyond.
+    pub law_end: Option<LawEnd>,
+}
+
+/// Where Johnson's law ends for the teeth at one input angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LawEnd {
+    contact: Contact,
+    position_deg: f64,
+    half_width_limit_mm: f64,
+    input_torque_limit_nmm: f64,
+}
+
+impl LawEnd {
+    /// That a load, or a capacity, lies beyond.
+    pub(crate) fn error(self, is_of_capacity: bool) -> SolveError {
+        let Self { contact, position_deg, half_width_limit_mm, input_torque_limit_nmm } = self;
+        let input_torque_limit_nm = 1e-3 * input_torque_limit_nmm;
+        SolveError::JohnsonBeyondHalfWidth {
+            contact,
+            position_deg,
+            half_width_limit_mm,
+            input_torque_limit_nm,
+            is_of_capacity,
+        }
+    }
 }
 
 impl<'a> LoadedDrive<'a> {
@@ -579,7 +605,9 @@ impl<'a> LoadedDrive<'a> {
     /// [`SolveError::NoLeverArm`] where none of them can carry, [`SolveError::JohnsonBeyondHalfWidth`] where that law ends before.
     pub fn wind_up(&self, teeth: &[ToothState]) -> Result<WindUp, SolveError> {
         let wind_up = self.springs(teeth).wind_up(self.input_torque_nmm)?.ok_or_else(|| self.carries_nothing(teeth))?;
-        self.check_law(teeth, &wind_up.rotation)?;
+        if let Some(end) = self.law_end(teeth, &wind_up.rotation)? {
+            return Err(end.error(false));
+        }
         Ok(WindUp { lost_motion_rad: self.lost_motion_rad(), ..wind_up })
     }
 
@@ -601,8 +629,10 @@ impl<'a> LoadedDrive<'a> {
     ///
     /// Loads grow with `Δφ` and `Δφ` with the torque, so the first contact to reach its stress sets `Δφ`, and that the torque.
     ///
+    /// Where Johnson's law ends before, the torque of its end.
+    ///
     /// # Errors
-    /// As [`Self::wind_up`].
+    /// As [`Self::wind_up`], but for that end.
     pub fn torque_limit(
         &self,
         teeth: &[ToothState],
@@ -612,9 +642,12 @@ impl<'a> LoadedDrive<'a> {
             tooth.pressure.get(contact).force_n(*allowable_stress_mpa.get(contact)) / tooth.force_ratio.get(contact)
         });
         let FirstLimit { rotation, contact, .. } = limit.ok_or_else(|| self.carries_nothing(teeth))?;
-        self.check_law(teeth, &rotation)?;
+        if let Some(end) = self.law_end(teeth, &rotation)? {
+            let LawEnd { contact, input_torque_limit_nmm: input_torque_nmm, .. } = end;
+            return Ok(TorqueLimit { input_torque_nmm, contact, law_end: Some(end) });
+        }
         let input_torque_nmm = self.springs(teeth).torque_nmm(&rotation)?.value;
-        Ok(TorqueLimit { input_torque_nmm, contact })
+        Ok(TorqueLimit { input_torque_nmm, contact, law_end: None })
     }
 
     /// Of all teeth and contacts the one for which the rotation is least at which the tooth bears a certain `F_H`.
@@ -639,12 +672,12 @@ impl<'a> LoadedDrive<'a> {
         least.map(|(_, limit)| limit)
     }
 
-    /// That no contact is wider than Johnson's law allows.
-    fn check_law(&self, teeth: &[ToothState], rotation: &Rotation) -> Result<(), SolveError> {
-        let ContactLaw::Johnson { depth_mm } = &self.law else { return Ok(()) };
+    /// Where Johnson's law ends, if at this rotation some contact is wider than it allows.
+    fn law_end(&self, teeth: &[ToothState], rotation: &Rotation) -> Result<Option<LawEnd>, SolveError> {
+        let ContactLaw::Johnson { depth_mm } = &self.law else { return Ok(None) };
         let is_beyond = |tooth: &ToothState| tooth.spring.displacement_mm(rotation) >= tooth.spring.approach.limit_mm();
         if !teeth.iter().any(is_beyond) {
-            return Ok(());
+            return Ok(None);
         }
         let tooth_radius_mm = self.drive.parameters().tooth_radius_mm;
         let tooth_width_mm = self.drive.tooth_width_mm();
@@ -657,12 +690,12 @@ impl<'a> LoadedDrive<'a> {
             share * share / tooth.force_ratio.get(contact)
         });
         let FirstLimit { tooth, contact, rotation } = limit.ok_or_else(|| self.carries_nothing(teeth))?;
-        Err(SolveError::JohnsonBeyondHalfWidth {
+        Ok(Some(LawEnd {
             contact,
             position_deg: tooth.center.position.from_lobe_deg(),
             half_width_limit_mm: limit_mm(contact),
-            input_torque_limit_nm: 1e-3 * self.springs(teeth).torque_nmm(&rotation)?.value,
-        })
+            input_torque_limit_nmm: self.springs(teeth).torque_nmm(&rotation)?.value,
+        }))
     }
 }
 

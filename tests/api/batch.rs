@@ -293,13 +293,12 @@ async fn a_batch_that_breaks_off_ends_with_a_line_that_says_so() {
     assert_eq!(end["problem"]["code"], "broken_body");
 }
 
-/// Each drip comes within the patience, all of them together bring too little.
-#[tokio::test(start_paused = true)]
-async fn a_batch_that_drips_is_ended() {
+/// A document, and then this again and again, each time within the patience.
+async fn is_ended_that_drips(drip: &'static [u8]) {
     let service = Service::within(Limits { header_timeout_ms: 30_000, ..LIMITS });
     let drips = stream::unfold((), |()| async {
         tokio::time::sleep(std::time::Duration::from_secs(20)).await;
-        Some((Ok::<_, std::io::Error>(Bytes::from_static(b" ")), ()))
+        Some((Ok::<_, std::io::Error>(Bytes::from_static(drip)), ()))
     });
     let request = Request::post("/v1/batch")
         .header("content-type", "application/x-ndjson")
@@ -309,6 +308,17 @@ async fn a_batch_that_drips_is_ended() {
     let end: Value = serde_json::from_str(answer.text().lines().last().unwrap()).unwrap();
     assert_eq!((&end["asked"], &end["problem"]["code"]), (&json!(1), &json!("request_timeout")));
     assert_eq!(service.app.pool.batches(), 0);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_batch_that_drips_is_ended() {
+    is_ended_that_drips(b" ").await;
+}
+
+/// They would bring enough if they asked anything.
+#[tokio::test(start_paused = true)]
+async fn a_batch_of_blank_lines_without_end_is_ended() {
+    is_ended_that_drips(&[b'\n'; 10_000]).await;
 }
 
 /// Slower than a machine, faster than nothing: a document each few seconds.

@@ -109,7 +109,8 @@ pub(crate) fn finding_codes() -> Vec<FindingCode> {
         ThinWallAsMade => ClearanceUndercutsRing,
         ClearanceUndercutsRing => FrictionBeyondMeasured,
         FrictionBeyondMeasured => EfficiencyUncertain,
-        EfficiencyUncertain => StressAboveAllowable,
+        EfficiencyUncertain => BearingLoadAboveHalfRating,
+        BearingLoadAboveHalfRating => StressAboveAllowable,
         StressAboveAllowable => StressAboveFatigueLimit;
         StressAboveFatigueLimit)
 }

@@ -102,6 +102,49 @@ async fn at_its_capacity_the_limiting_contact_bears_just_the_allowable_stress() 
     }
 }
 
+/// Soft teeth in a soft ring: at some input angles Johnson's law ends before a contact reaches its stress, but under more torque than bears the others.
+#[tokio::test]
+async fn a_capacity_within_johnsons_law_is_told_though_the_law_ends_before_a_stress_at_other_input_angles() {
+    let material =
+        |gpa: f64, poissons_ratio: f64| json!({ "youngs_modulus_gpa": gpa, "poissons_ratio": poissons_ratio });
+    let soft = |load: Value, sweep: &Value| {
+        json!({
+            "drive": {
+                "wave_generator": { "kind": "eccentric", "radius_mm": 16.0, "eccentricity_mm": 0.424 },
+                "teeth": { "count": 22, "radius_mm": 0.474, "width_mm": 1.93 },
+                "ring": { "teeth": 21 }
+            },
+            "load": load,
+            "materials": {
+                "wave_generator": material(300.0, 0.225), "teeth": material(3.0, 0.274), "ring": material(3.0, 0.434)
+            },
+            "sweep": sweep
+        })
+    };
+    let service = Service::new();
+    for (sweep, tolerance) in [(json!({ "samples": 7 }), 1e-12), (json!({ "tolerance": 1e-6 }), 2e-6)] {
+        let asked = soft(json!({ "input_torque_nm": 0.01, "allowable_stress_mpa": 541.5 }), &sweep);
+        let capacity = service.post("/v1/sweep", &asked).await.found()["torque_capacity"].clone();
+        assert_eq!(capacity["limited_by"], "wave_generator");
+        let torque_nm = capacity["input_torque_nm"].as_f64().unwrap();
+        let there = service.post("/v1/sweep", &soft(json!({ "input_torque_nm": torque_nm }), &sweep)).await.found();
+        let stress_mpa = there["peaks"]["wave_generator"]["stress_mpa"]["value"].as_f64().unwrap();
+        assert!((stress_mpa / 541.5 - 1.0).abs() < tolerance, "{torque_nm} N·m, {stress_mpa} MPa");
+    }
+    // Where the law ends before any stress is reached there is no capacity, and the refusal says that it is about that, and under which torque.
+    let sweep = json!({ "samples": 7 });
+    let beyond = soft(json!({ "input_torque_nm": 0.01, "allowable_stress_mpa": 700.0 }), &sweep);
+    let problem = service.post("/v1/sweep", &beyond).await.refused(422, "impossible_design");
+    let detail = problem["detail"].as_str().unwrap();
+    assert!(detail.starts_with("no torque capacity can be told"), "{detail}");
+    assert!(detail.contains("`load.allowable_stress_mpa`"), "{detail}");
+    let (_, end) = detail.split_once("an input torque of ").unwrap();
+    let end_nm: f64 = end.split_once(' ').unwrap().0.parse().unwrap();
+    let load = |share: f64| soft(json!({ "input_torque_nm": share * end_nm }), &sweep);
+    service.post("/v1/sweep", &load(1.0 - 1e-9)).await.found();
+    service.post("/v1/sweep", &load(1.0 + 1e-9)).await.refused(422, "impossible_design");
+}
+
 #[tokio::test]
 async fn a_clearance_that_projection_would_turn_into_load_is_refused() {
     let more_ring_teeth = [("/drive/ring/teeth", json!(30)), ("/drive/teeth/radius_mm", json!(4.0))]

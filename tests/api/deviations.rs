@@ -297,4 +297,48 @@ async fn deviations_come_as_csv_text_and_plots_and_with_losses_too() {
     assert!(text.contains("input angle of the sweep            360.000000 deg"), "{text}");
     let svg = as_form("image/svg+xml").await;
     assert!(svg.contains("<svg") && !svg.contains("NaN"));
+    assert!(svg.contains("force, largest of all teeth, N"), "{svg}");
+}
+
+/// How many points each curve of a picture of plots has.
+fn points_of_curves(svg: &str) -> Vec<usize> {
+    let paths = svg.split("<path d=\"M ").skip(1).filter_map(|path| path.split_once('"'));
+    paths.map(|(path, _)| path.split(" L ").count()).collect()
+}
+
+#[tokio::test]
+async fn where_single_items_deviate_a_plot_has_one_load_for_each_place_the_largest_of_all_teeth() {
+    let document = with(&deviating(), "/sweep/samples", json!(5));
+    let states = swept(&document).await["states"].clone();
+    let mut places = numbers(&states["position_deg"]);
+    let stated = places.len();
+    places.sort_by(f64::total_cmp);
+    places.dedup_by(|one, other| (*one - *other).abs() < 1e-9);
+    assert!(places.len() * 10 < stated, "{} places of {stated} states", places.len());
+    let question = Question::post("/v1/sweep", document.to_string()).with("accept", "image/svg+xml");
+    assert_eq!(points_of_curves(Service::new().ask(&question).await.text()), [places.len(); 6]);
+    // Swept to a tolerance the teeth come by at places of their own: as many stretches of the pass.
+    let document = with(&with(&document, "/sweep", json!({ "tolerance": 1e-3 })), "/load/input_torque_nm", json!(5.0));
+    let question = Question::post("/v1/sweep", document.to_string()).with("accept", "image/svg+xml");
+    let curves = points_of_curves(Service::new().ask(&question).await.text());
+    assert!(curves.len() == 6 && curves.iter().all(|points| (100..=201).contains(points)), "{curves:?}");
+}
+
+#[tokio::test]
+async fn where_zones_are_unlike_a_plots_curve_ends_at_each_jump() {
+    // Case 5.2 with an odd number of teeth.
+    let unlike = json!({
+        "drive": {
+            "wave_generator": { "semi_major_mm": 50.7, "semi_minor_mm": 49.3 },
+            "teeth": { "count": 81, "installed": 27, "radius_mm": 1.5, "width_mm": 15.0 }, "ring": { "teeth": 79 }
+        },
+        "load": { "input_torque_nm": 3.0 }
+    });
+    let found = swept(&unlike).await;
+    assert_eq!(found["enters_under_load"], true);
+    let question = Question::post("/v1/sweep", unlike.to_string()).with("accept", "image/svg+xml");
+    let curves = points_of_curves(Service::new().ask(&question).await.text());
+    // ε spacings of the places, and so many jumps on a tooth's way.
+    let jumps = found["coincidence_degree"].as_f64().unwrap().floor() as usize;
+    assert_eq!(curves.iter().filter(|points| **points > 5).count(), 6 * (jumps + 1), "{curves:?}");
 }

@@ -349,6 +349,44 @@ async fn an_efficiency_that_may_be_far_off_is_information_with_its_error() {
     assert!(!codes_of(&findings(&rubbing(0.005)).await).contains(&"efficiency_uncertain".to_owned()));
 }
 
+/// An eccentric drive on a bearing of this rating.
+fn on_a_bearing(rating_n: f64, load: &Value) -> Value {
+    let contact = json!({ "coefficient": 0.02 });
+    let bearing = json!({
+        "kind": "rolling", "bearing_coefficient": 0.0015, "bearing_radius_mm": 25.0, "bearing_load_rating_n": rating_n
+    });
+    json!({
+        "drive": {
+            "wave_generator": { "kind": "eccentric", "radius_mm": 30.8, "eccentricity_mm": 1.2 },
+            "teeth": { "count": 18, "radius_mm": 2.5, "width_mm": 10.0 },
+            "ring": { "teeth": 19 }
+        },
+        "load": load,
+        "friction": { "wave_generator": bearing, "ring": contact, "carrier": contact }
+    })
+}
+
+#[tokio::test]
+async fn a_bearing_that_bears_more_than_half_its_rating_is_a_warning_as_its_life_is_promised_up_to_there() {
+    const CODE: &str = "bearing_load_above_half_rating";
+    let single = |torque_nm: f64| json!({ "input_torque_nm": torque_nm, "input_speed_rpm": 1500.0 });
+    let bearing = |found: &Value| found["losses"]["bearing"].clone();
+    let load_n =
+        bearing(&Service::new().post("/v1/sweep", &on_a_bearing(9000.0, &single(2.0))).await.found())["mean_load_n"]
+            .as_f64()
+            .unwrap();
+    let overloaded = finding(&on_a_bearing(1.999_999 * load_n, &single(2.0)), CODE).await;
+    assert_numbers(&overloaded, load_n, 0.999_999_5 * load_n, "N");
+    assert_eq!(overloaded["severity"], "warning");
+    assert!(!codes_of(&findings(&on_a_bearing(2.000_001 * load_n, &single(2.0))).await).contains(&CODE.to_owned()));
+    // A duty whose mean load is below half the rating, and one of whose points is not.
+    let point = |torque_nm: f64, share: f64| json!({ "input_torque_nm": torque_nm, "input_speed_rpm": 1500.0, "share_of_time": share });
+    let duty = on_a_bearing(1.9 * load_n, &json!({ "duty": [point(0.2, 0.9), point(2.0, 0.1)] }));
+    let mean_n = bearing(&Service::new().post("/v1/sweep", &duty).await.found())["mean_load_n"].as_f64().unwrap();
+    assert!(mean_n < 0.5 * load_n, "{mean_n} {load_n}");
+    assert_numbers(&finding(&duty, CODE).await, load_n, 0.95 * load_n, "N");
+}
+
 /// Case 5.1 with stresses that its contacts may have.
 fn limited(allowable: Value) -> Value {
     with(&shortest(), "/load/allowable_stress_mpa", allowable)
@@ -529,6 +567,7 @@ async fn every_kind_of_finding_can_be_met_over_http() {
     }
     all.extend(findings(&held(json!({ "ring": { "rim": "free" } }))).await);
     all.extend(findings(&grooved(3.001)).await);
+    all.extend(findings(&on_a_bearing(3000.0, &json!({ "input_torque_nm": 2.0 }))).await);
     for document in [undercut(), thin_walls(), cleared(9000.0), grooved(3.1)] {
         all.extend(findings_of_parts(&document).await);
     }

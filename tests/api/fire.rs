@@ -212,6 +212,45 @@ fn a_body_that_breaks_off_is_bad_and_not_large() {
     assert!(answer.starts_with("HTTP/1.1 400") && answer.contains("\"broken_body\""), "{answer}");
 }
 
+/// More than a connection holds by itself: whoever is answered at the head still has most of it to send.
+#[test]
+fn a_client_that_sends_its_whole_body_before_it_reads_learns_why_it_was_refused() {
+    let process = Process::started(&["serve"]);
+    let body = vec![b' '; 30_000_000];
+    for (path, status) in [("/v1/sweep", 413), ("/v1/studies", 413), ("/v1/batch?typo", 400), ("/nowhere", 404)] {
+        let mut stream = TcpStream::connect(process.address).unwrap();
+        let head = format!("POST {path} HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\n");
+        stream.write_all(format!("{head}content-length: {}\r\n\r\n", body.len()).as_bytes()).unwrap();
+        stream.write_all(&body).unwrap_or_else(|error| panic!("{path}: {error}"));
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap_or_else(|error| panic!("{path}: {error}"));
+        assert!(answer.starts_with(&format!("HTTP/1.1 {status}")), "{path}: {answer}");
+    }
+}
+
+#[test]
+fn a_body_in_a_transfer_coding_that_nobody_undoes_is_not_taken_for_plain() {
+    let process = Process::started(&["serve"]);
+    let document = shortest().to_string();
+    let status = |path: &str, coding: &str| {
+        let mut stream = TcpStream::connect(process.address).unwrap();
+        let media_type = if path == "/v1/batch" { "application/x-ndjson" } else { "application/json" };
+        let head =
+            format!("POST {path} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\ncontent-type: {media_type}");
+        let body = format!("{:x}\r\n{document}\r\n0\r\n\r\n", document.len());
+        stream.write_all(format!("{head}\r\ntransfer-encoding: {coding}\r\n\r\n{body}").as_bytes()).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        answer[9..12].to_owned()
+    };
+    for path in ["/v1/coincidence-degree", "/v1/batch"] {
+        assert_eq!(status(path, "chunked"), "200");
+        assert_eq!(status(path, "Chunked"), "200");
+        assert_eq!(status(path, "gzip, chunked"), "415");
+        assert_eq!(status(path, "chunked, chunked"), "415");
+    }
+}
+
 // --- Stopping
 
 /// A client that asks again and again on a connection that it keeps, and makes another one only when it was told that this one ends. Returns how
@@ -407,6 +446,27 @@ fn keys_are_read_again_when_the_process_is_told_so_and_a_file_that_is_wrong_chan
     std::fs::remove_file(&file).unwrap();
     process.signalled("-HUP");
     assert_eq!(status(&new), 200);
+}
+
+/// As one that a shell makes of a command's output.
+#[test]
+fn a_keys_file_that_has_become_a_pipe_nobody_writes_to_holds_nothing_up() {
+    let file = scratch("keys-pipe");
+    let (key, line) = new_key("one").unwrap();
+    std::fs::write(&file, line).unwrap();
+    let process = Process::started(&["serve", "--keys-file", file.to_str().unwrap()]);
+    std::fs::remove_file(&file).unwrap();
+    assert!(Command::new("mkfifo").arg(&file).status().unwrap().success());
+    for _ in 0..10 {
+        process.signalled("-HUP");
+        let limits = Question::of("GET", "/v1/limits").with("authorization", &format!("Bearer {key}"));
+        for _ in 0..10 {
+            assert_eq!(ask_at(process.address, &limits).status, 200);
+        }
+    }
+    process.signalled("-TERM");
+    assert_eq!(process.ended().code(), Some(0));
+    std::fs::remove_file(&file).unwrap();
 }
 
 #[test]

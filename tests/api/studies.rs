@@ -55,6 +55,16 @@ async fn who_waits_for_a_study_gets_its_result_with_it() {
     }
 }
 
+/// Seconds of three thousand years: as RFC 7240 has it, a number of any length.
+#[tokio::test]
+async fn who_would_wait_for_ever_waits_as_long_as_anybody() {
+    let service = Service::new();
+    let asked = Question::post("/v1/studies", map(&shortest(), 5).to_string());
+    let answer = service.ask(&asked.with("prefer", "wait=99999999999")).await;
+    assert!(!answer.header("preference-applied").is_empty());
+    assert_eq!(answer.found()["state"], "done");
+}
+
 #[tokio::test]
 async fn who_does_not_wait_is_told_where_the_study_stands_and_its_events_end_with_it() {
     let service = Service::new();

@@ -1,5 +1,7 @@
 //! A document as JSON, and as the key of its answers.
 
+use std::cell::Cell;
+
 use proptest::prelude::*;
 use serde_json::{Value, json};
 use toothwave_calculation::accuracy::Accuracy;
@@ -12,7 +14,7 @@ use toothwave_calculation::forms::Format;
 use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::key::Key;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
-use toothwave_calculation::question::Question;
+use toothwave_calculation::question::{Limits, Question, Stop};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::gaps::{Runout, TipRelief};
 use toothwave_solver::{Deviations, Modification, PerContact};
@@ -21,6 +23,65 @@ use crate::schema::{Chance, Schemas, leaves, objects};
 
 fn read(document: &Value) -> Result<Design, NoAnswer> {
     Design::read(document.to_string().as_bytes())
+}
+
+/// What is short is solved on the threads that everything else waits for: case 5.1 with nothing that takes longer.
+#[test]
+fn a_short_sweep_is_not_short_where_the_rings_teeth_bend() {
+    let mut document = json!({
+        "drive": {
+            "wave_generator": { "semi_major_mm": 58, "semi_minor_mm": 56 },
+            "teeth": { "count": 28, "radius_mm": 5, "width_mm": 15 },
+            "ring": { "teeth": 26 }
+        },
+        "load": { "input_torque_nm": 20 },
+        "model": { "ring_teeth_bend": false }
+    });
+    let limits = Limits { max_states: 1_000_000, max_profile_points: 1_000_000 };
+    let is_short = |document: &Value| {
+        let checked = Sweep.check(&read(document).expect("a document"), &limits).expect("a drive");
+        Sweep::is_short(&checked)
+    };
+    assert!(is_short(&document));
+    document["model"]["ring_teeth_bend"] = json!(true);
+    assert!(!is_short(&document));
+}
+
+/// Asked so often whether to go on, and then it is not to.
+struct StopsAfter {
+    asked: Cell<u32>,
+    times: u32,
+}
+
+impl Stop for StopsAfter {
+    fn stopped(&self) -> bool {
+        self.asked.set(self.asked.get() + 1);
+        self.asked.get() > self.times
+    }
+}
+
+#[test]
+fn a_sweep_is_stopped_behind_its_solve_too() {
+    let document = json!({
+        "drive": {
+            "wave_generator": { "semi_major_mm": 58, "semi_minor_mm": 56 },
+            "teeth": { "count": 28, "radius_mm": 5, "width_mm": 15 },
+            "ring": { "teeth": 26 }
+        },
+        "load": { "input_torque_nm": 20 }
+    });
+    let limits = Limits { max_states: 1_000_000, max_profile_points: 1_000_000 };
+    let checked = Sweep.check(&read(&document).expect("a document"), &limits).expect("a drive");
+    let never = StopsAfter { asked: Cell::new(0), times: u32::MAX };
+    checked.solve(&never).expect("a sweep");
+    let of_solve = never.asked.get();
+    Sweep::answer(&checked, &never).expect("an answer");
+    let of_answer = never.asked.get() - of_solve;
+    assert!(of_answer >= of_solve + 4, "{of_answer} and {of_solve}");
+    for times in of_solve..of_answer {
+        let stopped = Sweep::answer(&checked, &StopsAfter { asked: Cell::new(0), times });
+        assert_eq!(stopped.err().map(|error| error.code), Some(NoAnswerCode::Stopped), "after {times}");
+    }
 }
 
 /// The keys of all questions, one after the other.

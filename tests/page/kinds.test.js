@@ -35,7 +35,7 @@ const balance = (page, design, { geometry, sweep }) =>
       const motion = new Motion(asked.design, asked.geometry, asked.sweep);
       const worst = { force: 0, outline: 0, lobes: new Set() };
       const { states } = asked.sweep;
-      for (const angle of [...new Set(states.input_angle_deg)].flatMap((deg) => [deg, deg + 2 * motion.period])) {
+      for (const angle of [...new Set(states.input_angle_deg)].flatMap((deg) => [deg, deg + 2 * motion.pattern.deg])) {
         for (const { tooth, zone, center, contacts, force, positionDeg } of motion.loaded(angle)) {
           const sum = { x: 0, y: 0 };
           for (const [key, { x, y }] of Object.entries(contacts)) {

@@ -816,7 +816,7 @@ test('forces balance in the drawing: both contacts lie on the tooth, and one per
       }
     }
     const now = motion.loaded(3).map(({ tooth, force }) => [tooth, force.ring]);
-    const later = motion.loaded(3 + motion.period).map(({ tooth, force }) => [(tooth + 39) % 40, force.ring]);
+    const later = motion.loaded(3 + motion.pattern.deg).map(({ tooth, force }) => [(tooth + 39) % 40, force.ring]);
     const byTooth = (one, other) => one[0] - other[0];
     return { residual, reach, now: now.sort(byTooth), later: later.sort(byTooth) };
   });
@@ -1126,6 +1126,11 @@ const OTHER_REPORTS = {
   johnson_beyond_half_width: { drive: CASE_5_1, load: { input_torque_nm: 2000 } },
   friction_beyond_measured: { drive: CASE_5_1, load: { input_torque_nm: 20 }, friction: rubbing(0.2) },
   efficiency_uncertain: { drive: CASE_5_1, load: { input_torque_nm: 20 }, friction: rubbing(0.03) },
+  bearing_load_above_half_rating: {
+    drive: { wave_generator: { kind: 'eccentric', radius_mm: 30.8, eccentricity_mm: 1.2 }, teeth: { count: 18, radius_mm: 2.5, width_mm: 10 }, ring: { teeth: 19 } },
+    load: { input_torque_nm: 2 },
+    friction: { wave_generator: { kind: 'rolling', bearing_coefficient: 0.0015, bearing_radius_mm: 25, bearing_load_rating_n: 3000 }, ring: { coefficient: 0.02 }, carrier: { coefficient: 0.02 } },
+  },
   stress_above_allowable: { drive: CASE_5_1, load: { input_torque_nm: 20, allowable_stress_mpa: 500 } },
   wind_up_beyond_model: { drive: CASE_5_1, load: { input_torque_nm: 20 }, model: { ...VIRTUAL_WORK, clearance: { carrier_um: 1000 } } },
 };

@@ -24,7 +24,7 @@ test('between two states the loads are those that the service finds there', asyn
       const missing = [];
       states.tooth.forEach((tooth, row) => {
         const angle = states.input_angle_deg[row];
-        if (angle >= motion.period) return;
+        if (angle >= motion.pattern.deg) return;
         const found = motion.loaded(angle).find((loaded) => loaded.zone === 0 && loaded.tooth === tooth % motion.installed);
         if (!found) {
           missing.push([angle, tooth, states.position_deg[row]]);
@@ -41,6 +41,60 @@ test('between two states the loads are those that the service finds there', asyn
     // The step of 50 samples, held at a jump, is all that they are off by.
     assert.ok(worst.force < 0.012, `${name}: forces off by ${worst.force}`);
     assert.ok(worst.stress < 0.012, `${name}: stresses off by ${worst.stress}`);
+  }
+});
+
+test('where items deviate each tooth carries, in whatever turn, what the service finds for it', async () => {
+  const page = await bed.open();
+  const found = await page.evaluate(async () => {
+    const { Motion } = await import('/page/motion.js');
+    const { passOf } = await import('/page/pass.js');
+    const { read } = await import('/page/answers.js');
+    const ask = async (path, design) =>
+      read(await (await fetch(path, { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify(design) })).arrayBuffer(), path.slice(4));
+    const modulo = (value, base) => ((value % base) + base) % base;
+    const turned = (list, by) => list.map((_, index) => list[modulo(index + by, list.length)]);
+    const some = (count, step) => Array.from({ length: count }, (_, index) => 0.7 * ((step * index) % 7));
+    const drives = [
+      { wave_generator: { semi_major_mm: 58, semi_minor_mm: 56 }, teeth: { count: 28, radius_mm: 5, width_mm: 15 }, ring: { teeth: 26 } },
+      { wave_generator: { semi_major_mm: 40.6, semi_minor_mm: 39.4 }, teeth: { count: 30, installed: 10, radius_mm: 3, width_mm: 12 }, ring: { teeth: 32 } },
+      { wave_generator: { kind: 'harmonic', lobes: 3, mean_radius_mm: 48, amplitude_mm: 1 }, teeth: { count: 28, installed: 14, radius_mm: 3, width_mm: 12 }, ring: { teeth: 25 } },
+    ];
+    const report = [];
+    for (const drive of drives) {
+      const { count, installed = count } = drive.teeth;
+      const lobes = Math.abs(count - drive.ring.teeth);
+      for (const deviations of [{ tooth_radius_um: some(installed, 3) }, { ring_space_um: some(drive.ring.teeth, 5) }, { tooth_radius_um: some(installed, 3), wave_generator_lobe_um: some(lobes, 2) }]) {
+        const design = { drive, load: { input_torque_nm: 5 }, sweep: { samples: 4 }, deviations };
+        const sweep = await ask('/v1/sweep', design);
+        const motion = new Motion(design, await ask('/v1/geometry', design), sweep);
+        const periods = Math.round(sweep.sweep_period_deg / sweep.period_deg);
+        let [worst, teeth] = [0, 0];
+        for (const on of [1, periods - 1, periods, periods + 3, 2 * periods + 1, -1, -periods - 2]) {
+          // So many periods on each tooth stands where the one so many slots before it stood: as if all items had been told by other numbers.
+          const named = Object.entries(deviations).map(([name, list]) => [name, name.startsWith('wave') ? list : turned(list, name.startsWith('ring') ? (on * count) / installed : on)]);
+          const { states } = await ask('/v1/sweep', { ...design, deviations: Object.fromEntries(named) });
+          const angle = states.input_angle_deg.find((deg) => deg > 0);
+          const shown = motion.loaded(angle + on * sweep.period_deg + 1e-10);
+          states.input_angle_deg.forEach((deg, row) => {
+            if (deg !== angle) return;
+            const tooth = shown.find((loaded) => loaded.tooth === modulo(states.tooth[row] + on, installed) && loaded.zone === states.lobe[row]);
+            worst = Math.max(worst, Math.abs((tooth?.force.ring ?? 0) - states.force_ring_n[row]));
+            teeth += 1;
+          });
+        }
+        // The plots show the largest of all teeth.
+        const { force, stress } = passOf(design, sweep);
+        const short = ['wave_generator', 'ring', 'carrier'].map((key) => Math.max(sweep.peaks[key].force_n.value - Math.max(...force[key]), sweep.peaks[key].stress_mpa.value - Math.max(...stress[key])));
+        report.push({ worst, teeth, short: Math.max(...short) });
+      }
+    }
+    return report;
+  });
+  assert.equal(found.length, 9);
+  for (const { worst, teeth, short } of found) {
+    assert.ok(teeth > 20 && worst < 1e-6, `${worst} N off, of ${teeth} teeth`);
+    assert.ok(Math.abs(short) < 1e-9, `the plots end ${short} below the peaks`);
   }
 });
 

@@ -21,7 +21,7 @@ pub struct SweepAnswer {
     pub solver_version: &'static str,
     /// The build that computed it: equal builds on equal processors give equal bytes.
     pub build: &'static str,
-    /// Contact ratio ε, counted over both meshing zones.
+    /// Contact ratio ε, counted over all meshing zones.
     pub coincidence_degree: f64,
     /// The input angle after which the load pattern repeats, where no item deviates.
     pub period_deg: f64,
@@ -128,11 +128,11 @@ pub struct StatesAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub lobe: Option<Vec<u32>>,
-    /// Position ψ of the tooth, from the major axis.
+    /// Position ψ of the tooth, from the middle of its lobe: the major axis of an ellipse.
     pub position_deg: Vec<f64>,
     /// Distance of the tooth's centre from the axis.
     pub center_radius_mm: Vec<f64>,
-    /// φ_H: contact on the wave generator, from its minor axis.
+    /// φ_H: contact on the wave generator, from the valley before its lobe: the minor axis of an ellipse.
     pub wave_generator_angle_deg: Vec<f64>,
     /// φ_K: contact on the ring, from the ring's tooth tip.
     pub ring_angle_deg: Vec<f64>,

@@ -254,6 +254,12 @@ pub(super) struct Costs<'a> {
     pub(super) points: Vec<Cost>,
 }
 
+/// A bearing's dynamic load rating, and the largest of its points' mean loads.
+pub(super) struct BearingLoaded {
+    pub(super) rating_n: f64,
+    pub(super) load_n: f64,
+}
+
 impl Costs<'_> {
     /// A loss ratio over all points: by the powers without friction, since energies add.
     fn loss_ratio(&self, of: impl Fn(&LossRatio) -> f64) -> f64 {
@@ -321,6 +327,13 @@ impl Costs<'_> {
             ring: place(peaks.ring)?,
             carrier: place(peaks.carrier)?,
         })
+    }
+
+    /// What the bearing bears at the point where it bears most, of those at which it turns.
+    pub(super) fn bearing_load(&self) -> Option<BearingLoaded> {
+        let BearingRating { dynamic_load_rating_n: rating_n, .. } = self.bearing_rating?;
+        let loads_n = self.points.iter().filter_map(|point| Some(point.bearing?.mean_load_n));
+        loads_n.reduce(f64::max).map(|load_n| BearingLoaded { rating_n, load_n })
     }
 
     /// A point at which the bearing does not turn uses nothing of its life up.

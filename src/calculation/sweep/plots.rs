@@ -1,6 +1,7 @@
 //! A sweep's plots as SVG: force and stress of each contact over the place where it acts, as in the paper's figures 11 to 16.
 
 use std::io::{self, Write};
+use std::ops::Range;
 
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::{LinePlot, ScatterPlot};
@@ -17,15 +18,27 @@ const COLORS: [&str; 2] = ["#0072b2", "#d55e00"];
 /// More points than a line of a plot this wide can show.
 const MOST_POINTS: usize = 4000;
 
+/// Positions closer than this, in degrees, are one place.
+const SAME_DEG: f64 = 1e-9;
+
+/// Stretches of the pass, of each of which the largest load is drawn where items deviate.
+const MOST_STRETCHES: f64 = 200.0;
+
 /// One plot: what is drawn over what.
 struct Panel<'a> {
     title: String,
     x_label: &'static str,
-    y_label: &'static str,
+    y_label: String,
     color: &'static str,
     x: &'a [f64],
     y: &'a [f64],
     peak: &'a PeakAnswer,
+}
+
+/// A tooth's pass through the zone, from entry to root: all states by position, and pieces of the places where they stand, each a stretch of these states.
+struct Pass {
+    states: Vec<usize>,
+    pieces: Vec<Vec<Range<usize>>>,
 }
 
 /// Writes the plots.
@@ -34,13 +47,20 @@ struct Panel<'a> {
 /// Those of the writer.
 pub(super) fn write(sweep: &SweepAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let states = &sweep.states;
-    let pieces = pass(states, sweep.enters_under_load);
+    let pass = Pass::of(sweep);
     let (mut plots, mut layouts) = (Vec::new(), Vec::new());
     for panel in panels(sweep) {
-        let points = |piece: &Vec<usize>| piece.iter().map(|&i| (panel.x[i], panel.y[i])).collect::<Vec<_>>();
+        // The state with the largest load of those at a place.
+        let point = |place: &Range<usize>| {
+            let there = &pass.states[place.clone()];
+            let most = |at, &i: &usize| if panel.y[i] > panel.y[at] { i } else { at };
+            let at = there.iter().fold(there[0], most);
+            (panel.x[at], panel.y[at])
+        };
+        let points = |piece: &Vec<Range<usize>>| piece.iter().map(point).collect::<Vec<_>>();
         let line = |points| LinePlot::new().with_data::<f64, f64, Vec<_>>(points).with_color(panel.color);
         let mut drawn: Vec<_> =
-            pieces.iter().map(|piece| Plot::Line(line(points(piece)).with_stroke_width(1.5))).collect();
+            pass.pieces.iter().map(|piece| Plot::Line(line(points(piece)).with_stroke_width(1.5))).collect();
         let at_peak = (0..panel.y.len()).min_by(|&one, &other| {
             let away = |i: usize| {
                 (states.input_angle_deg[i] - panel.peak.input_angle_deg).abs()
@@ -81,10 +101,11 @@ fn own_ids(text: &str) -> String {
 
 fn panels(sweep: &SweepAnswer) -> Vec<Panel<'_>> {
     let SweepAnswer { states, peaks, .. } = sweep;
+    let most = if sweep.sweep_period_deg.is_some() { "largest of all teeth, " } else { "" };
     let contacts = [
         (
             "wave generator",
-            "φ_H from the minor axis, deg",
+            "φ_H from the valley, deg",
             &states.wave_generator_angle_deg,
             &peaks.wave_generator,
             &states.force_wave_generator_n,
@@ -113,7 +134,7 @@ fn panels(sweep: &SweepAnswer) -> Vec<Panel<'_>> {
     let forces = contacts.iter().map(|&(contact, x_label, x, peaks, force, _)| Panel {
         title: titled("Force", contact, &peaks.force_n, "N"),
         x_label,
-        y_label: "force, N",
+        y_label: format!("force, {most}N"),
         color: COLORS[0],
         x,
         y: force,
@@ -122,7 +143,7 @@ fn panels(sweep: &SweepAnswer) -> Vec<Panel<'_>> {
     let stresses = contacts.iter().map(|&(contact, x_label, x, peaks, _, stress)| Panel {
         title: titled("Stress", contact, &peaks.stress_mpa, "MPa"),
         x_label,
-        y_label: "stress, MPa",
+        y_label: format!("stress, {most}MPa"),
         color: COLORS[1],
         x,
         y: stress,
@@ -131,36 +152,76 @@ fn panels(sweep: &SweepAnswer) -> Vec<Panel<'_>> {
     forces.chain(stresses).collect()
 }
 
-/// A tooth's pass through the zone as pieces of states, from entry to root, put together from the teeth of one period as the
-/// paper does it (its figures 8 to 10). Where a tooth enters under load, the others' loads jump: there a piece ends.
-fn pass(states: &StatesAnswer, enters_under_load: bool) -> Vec<Vec<usize>> {
-    // States stand by input angle, then tooth; where an angle stands twice, the teeth start anew.
-    let is_new = |i: usize| {
-        i == 0 || states.tooth[i] <= states.tooth[i - 1] || states.input_angle_deg[i] > states.input_angle_deg[i - 1]
-    };
-    let starts: Vec<usize> = (0..states.tooth.len()).filter(|&i| is_new(i)).collect();
-    let frames: Vec<_> = starts.iter().zip(starts.iter().skip(1)).map(|(&from, &to)| from..to).collect();
-    let last = starts.last().map(|&from| from..states.tooth.len());
-    let mut points: Vec<(usize, bool)> = Vec::new();
-    // The last frame repeats the first, teeth renumbered; it only tells whether a tooth entered before it.
-    for (index, frame) in frames.iter().enumerate() {
-        let next = frames.get(index + 1).or(last.as_ref());
-        let newest = |frame: &std::ops::Range<usize>| frame.clone().map(|i| states.tooth[i]).max();
-        let tooth_enters = next.is_some_and(|next| newest(next) > newest(frame));
-        points.extend(frame.clone().map(|i| (i, tooth_enters && enters_under_load)));
-    }
-    points.sort_by(|&(one, _), &(other, _)| states.position_deg[other].total_cmp(&states.position_deg[one]));
-    let stride = points.len().div_ceil(MOST_POINTS).max(1);
-    let mut pieces = vec![Vec::new()];
-    for (index, (i, ends)) in points.iter().enumerate() {
-        let current = pieces.len() - 1;
-        if index % stride == 0 || *ends {
-            pieces[current].push(*i);
+impl Pass {
+    /// Put together from the teeth of one period as the paper does it (its figures 8 to 10). Where a tooth enters under load, the others' loads jump:
+    /// there a piece ends. Where items deviate each tooth has a course of its own, and one piece runs over the largest of them all.
+    fn of(sweep: &SweepAnswer) -> Self {
+        let SweepAnswer { states, enters_under_load, sweep_period_deg, .. } = sweep;
+        let items_deviate = sweep_period_deg.is_some();
+        // States stand by input angle, then tooth; where an angle stands twice, the teeth start anew.
+        let is_new = |i: usize| {
+            i == 0
+                || states.tooth[i] <= states.tooth[i - 1]
+                || states.input_angle_deg[i] > states.input_angle_deg[i - 1]
+        };
+        let starts: Vec<usize> = (0..states.tooth.len()).filter(|&i| is_new(i)).collect();
+        let frames: Vec<_> = starts.iter().zip(starts.iter().skip(1)).map(|(&from, &to)| from..to).collect();
+        let last = starts.last().map(|&from| from..states.tooth.len());
+        let mut points: Vec<(usize, bool)> = Vec::new();
+        // The last frame repeats the first; it only tells whether a tooth entered before it.
+        for (index, frame) in frames.iter().enumerate() {
+            let next = frames.get(index + 1).or(last.as_ref());
+            let enters = || next.is_some_and(|next| enters_loaded(states, frame.clone(), next.clone()));
+            let jumps = *enters_under_load && !items_deviate && enters();
+            points.extend(frame.clone().map(|i| (i, jumps)));
         }
-        if *ends {
-            pieces.push(Vec::new());
+        // Where an angle stands twice, what was before the jump comes first.
+        points.sort_by(|&(one, one_jumps), &(other, other_jumps)| {
+            states.position_deg[other].total_cmp(&states.position_deg[one]).then(other_jumps.cmp(&one_jumps))
+        });
+        let position_deg = |&(i, _): &(usize, bool)| states.position_deg[i];
+        let stretch_deg = match (points.first(), points.last()) {
+            (Some(first), Some(last)) if items_deviate => (position_deg(first) - position_deg(last)) / MOST_STRETCHES,
+            _ => 0.0,
+        };
+        let mut places: Vec<(Range<usize>, bool)> = Vec::new();
+        for (at, point) in points.iter().enumerate() {
+            match places.last_mut() {
+                Some((place, jumps))
+                    if *jumps == point.1
+                        && (position_deg(&points[at - 1]) - position_deg(point) <= SAME_DEG
+                            || position_deg(&points[place.start]) - position_deg(point) < stretch_deg) =>
+                {
+                    place.end = at + 1;
+                }
+                _ => places.push((at..at + 1, point.1)),
+            }
         }
+        let stride = places.len().div_ceil(MOST_POINTS).max(1);
+        let mut pieces = vec![Vec::new()];
+        for (index, (place, ends)) in places.into_iter().enumerate() {
+            let current = pieces.len() - 1;
+            if index % stride == 0 || ends {
+                pieces[current].push(place);
+            }
+            if ends {
+                pieces.push(Vec::new());
+            }
+        }
+        pieces.retain(|piece| !piece.is_empty());
+        Self { states: points.into_iter().map(|(i, _)| i).collect(), pieces }
     }
-    pieces.retain(|piece| !piece.is_empty());
-    pieces
+}
+
+/// Whether a tooth that carries comes to a lobe from one frame to the next. Teeth ascend in either; where zones are unlike they have the numbers of their
+/// slots, of which the one that enters need not be the largest.
+fn enters_loaded(states: &StatesAnswer, frame: Range<usize>, next: Range<usize>) -> bool {
+    let lobe = |i: usize| states.lobe.as_ref().map_or(0, |lobe| lobe[i]);
+    let is_loaded = |i: usize| states.loaded.as_ref().is_none_or(|loaded| loaded[i]);
+    let mut before = frame.peekable();
+    next.into_iter().any(|i| {
+        while before.next_if(|&j| states.tooth[j] < states.tooth[i]).is_some() {}
+        let was_there = before.peek().is_some_and(|&j| states.tooth[j] == states.tooth[i] && lobe(j) == lobe(i));
+        !was_there && is_loaded(i)
+    })
 }

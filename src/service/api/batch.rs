@@ -39,7 +39,7 @@ use toothwave_calculation::sweep::losses::LossTotalsAnswer;
 use toothwave_calculation::sweep::model_error::ModelErrorAnswer;
 use utoipa::ToSchema;
 
-use super::{Growing, broken_body, write_problem};
+use super::{Growing, Stoppable, broken_body, write_problem};
 use crate::app::App;
 use crate::compute::{self, Pool, SLICE};
 use crate::config::Limits;
@@ -212,7 +212,7 @@ fn whole_line<Q: Question>(
 ) -> Result<AnsweredLine, Problem> {
     let Solved { answer, columns_bytes, reserved } = solved(question, document, limits, room, stop)?;
     let buffer = Growing::new(reserved, columns_bytes, answer.expected_bytes())?;
-    line(index, &answer, buffer)
+    line(index, &answer, buffer, stop)
 }
 
 fn peaks_line(
@@ -242,7 +242,7 @@ fn peaks_line(
         checks: &sweep.checks,
         findings: &sweep.findings,
     };
-    line(index, &peaks, Growing::new(reserved, columns_bytes, 0)?)
+    line(index, &peaks, Growing::new(reserved, columns_bytes, 0)?, stop)
 }
 
 /// What a document comes to, and the memory that it takes.
@@ -273,12 +273,14 @@ fn solved<Q: Question>(
     answered
 }
 
-fn line<A: Serialize>(index: u64, answer: &A, mut buffer: Growing) -> Result<AnsweredLine, Problem> {
+fn line<A: Serialize>(index: u64, answer: &A, buffer: Growing, stop: &AtomicBool) -> Result<AnsweredLine, Problem> {
     let status = StatusCode::OK.as_u16();
     let line = BatchLine { index, status, answer: Some(answer), problem: None };
-    columns::write(&line, &mut buffer).and_then(|()| buffer.write_all(b"\n")).map_err(write_problem)?;
+    let mut writer = Stoppable::new(buffer, stop);
+    let written = columns::write(&line, &mut writer).and_then(|()| writer.write_all(b"\n"));
+    written.map_err(|error| write_problem(error, stop))?;
     count(status);
-    let Growing { bytes: text, mut reserved, .. } = buffer;
+    let Growing { bytes: text, mut reserved, .. } = writer.inner;
     reserved.hold_at_most(text.capacity() as u64);
     Ok(AnsweredLine { text, room: Some(reserved) })
 }
@@ -426,7 +428,8 @@ impl Lines {
         match arrived {
             Ok(Some(Ok(bytes))) => {
                 self.buffer.extend_from_slice(&bytes);
-                self.arrived_bytes += bytes.len() as u64;
+                // Blank lines ask nothing.
+                self.arrived_bytes += bytes.iter().filter(|byte| !byte.is_ascii_whitespace()).count() as u64;
                 if u128::from(self.arrived_bytes) >= self.least_bytes() {
                     (self.waited, self.arrived_bytes) = (Duration::ZERO, 0);
                 }
@@ -435,7 +438,7 @@ impl Lines {
             Ok(None) => self.is_over = true,
             Err(_) => {
                 let detail = format!(
-                    "within {} ms of waiting less than {} bytes of the batch arrived",
+                    "within {} ms of waiting less than {} bytes of the batch arrived, blank ones not counted",
                     self.patience.as_millis(),
                     self.least_bytes()
                 );
@@ -661,11 +664,25 @@ fn begin(app: &App, query: Result<Query<BatchQuery>, QueryRejection>, request: R
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::AtomicBool;
     use std::time::Duration;
 
     use axum::body::Body;
 
-    use super::Lines;
+    use super::{Growing, Lines, Room, line};
+    use crate::problem::ProblemCode;
+
+    /// Two megabytes of an answer that was computed in time.
+    #[test]
+    fn a_line_that_nobody_waits_for_is_not_written_to_its_end() {
+        let room = Room::new(1 << 30);
+        let written = |is_stopped| {
+            let buffer = Growing::new(room.reserve(0).expect("room"), 0, 0).expect("room");
+            line(0, &vec![0.5; 500_000], buffer, &AtomicBool::new(is_stopped))
+        };
+        assert!(written(false).is_ok_and(|line| line.text.ends_with(b"\n")));
+        assert_eq!(written(true).err().map(|problem| problem.code), Some(ProblemCode::DeadlineExceeded));
+    }
 
     /// A line of two bytes among blank ones of sixty thousand.
     #[tokio::test]

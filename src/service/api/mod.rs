@@ -256,13 +256,15 @@ fn written<A: Forms>(
             let held = Some(reserved.send(body.clone(), &sent));
             Ok(Stored { body, sent, held, solve, server_timing })
         }
-        Err(_) if stop.load(Ordering::Relaxed) => Err(NoAnswer::stopped().into()),
-        Err(error) => Err(write_problem(error)),
+        Err(error) => Err(write_problem(error, stop)),
     }
 }
 
 /// Why an answer could not be written into memory.
-fn write_problem(error: io::Error) -> Problem {
+fn write_problem(error: io::Error, stop: &AtomicBool) -> Problem {
+    if stop.load(Ordering::Relaxed) {
+        return NoAnswer::stopped().into();
+    }
     error.downcast::<NoRoom>().map_or_else(|error| Problem::internal(&error), Into::into)
 }
 

@@ -263,8 +263,10 @@ fn wait_wanted(headers: &HeaderMap) -> Option<Duration> {
     let preferences = headers.get_all(PREFER).iter().filter_map(|value| value.to_str().ok());
     preferences.flat_map(|list| list.split([',', ';'])).find_map(|preference| {
         let (name, value) = preference.split_once('=')?;
-        let seconds = value.trim().trim_matches('"').parse::<u32>().ok()?;
-        name.trim().eq_ignore_ascii_case("wait").then(|| Duration::from_secs(u64::from(seconds)))
+        let seconds = value.trim().trim_matches('"').parse::<u64>().ok()?;
+        // So long that nothing is waited for longer, so short that it can be added to any time.
+        let seconds = seconds.min(u64::from(u32::MAX));
+        name.trim().eq_ignore_ascii_case("wait").then(|| Duration::from_secs(seconds))
     })
 }
 

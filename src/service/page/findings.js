@@ -30,7 +30,7 @@ const KINDS = {
   },
   few_teeth_in_mesh: {
     title: 'Few teeth in mesh',
-    tests: 'The fewest teeth that carry load at once in a zone, at any input angle, against two.',
+    tests: 'The fewest teeth in mesh at once in a zone, or where zones are unlike in all of them together, at any input angle, against two.',
     basis: RULE_OF_THUMB,
   },
   thin_slot_wall: {
@@ -116,6 +116,12 @@ const KINDS = {
     tests: 'How far the efficiency with the ring fixed may be from that of an exact equilibrium, against five hundredths.',
     basis: ['measured', 'The error is the largest that was measured at such coefficients and such a loss; the limit is a rule of thumb.'],
     why: 'The loss is large either way: a wave generator on a bearing loses a fraction of it, and is known better.',
+  },
+  bearing_load_above_half_rating: {
+    title: 'Bearing loaded beyond its life’s equation',
+    tests: 'The mean load on the bearing that is the wave generator, of a duty at the point where it is largest, against half its dynamic load rating.',
+    basis: ['ISO 281:2007', 'The limit is that of ISO 281:2007, up to which its equation for the life holds.'],
+    why: 'Under more than that its parts give way for good, and it may last less long than calculated. A static load rating below half the dynamic one is a limit of its own, which nothing here knows.',
   },
   stress_above_allowable: {
     title: 'Stress above the allowable one',

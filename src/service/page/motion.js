@@ -15,7 +15,7 @@ export const CONTACTS = [
 ];
 
 /** The columns of a sweep's states, apart from angle and tooth number. */
-const LOADS = CONTACTS.flatMap(({ key }) => [`force_${key}_n`, `stress_${key}_mpa`, `rubbing_${key}`]);
+export const LOADS = CONTACTS.flatMap(({ key }) => [`force_${key}_n`, `stress_${key}_mpa`, `rubbing_${key}`]);
 const COLUMNS = ['position_deg', 'wave_generator_angle_deg', 'ring_angle_deg', ...LOADS];
 
 export const polar = (radius, deg) => ({ x: radius * Math.cos(deg * RAD), y: radius * Math.sin(deg * RAD) });
@@ -69,6 +69,26 @@ export const between = (column, one, other, share) => {
   return Math.sqrt(Math.max(0, one * one + share * (other * other - one * one)));
 };
 
+/** After what input angle the loads of a drive repeat, and so many slots and lobes on: `{ deg, slots, lobes }`. Without deviations that is the period, after
+ *  which each tooth stands where the one before it stood. Where single items deviate it is as much as the sweep goes over: what deviates then meets as it
+ *  did, be it on another lobe. */
+function patternOf({ drive: { teeth, ring }, deviations = {} }, { period_deg: periodDeg, transmission_ratio: ratio }, sweep, installed) {
+  const deg = sweep?.sweep_period_deg ?? periodDeg;
+  const periods = Math.round(deg / periodDeg);
+  const lobes = Math.abs(teeth.count - ring.teeth);
+  const deviates = (...names) => names.some((name) => [deviations[name]?.amount_um ?? deviations[name] ?? 0].flat().some((item) => item !== 0));
+  const ofTeeth = deviates('tooth_radius_um', 'slot_angle_arcsec', 'slot_wall_um', 'carrier_runout');
+  const ofRing = deviates('ring_space_um', 'ring_space_angle_arcsec', 'ring_runout');
+  const ofLobes = deviates('wave_generator_lobe_um', 'wave_generator_runout');
+  for (let on = 0; on < (ofLobes ? 1 : lobes); on += 1) {
+    const slots = periods - (on * installed) / lobes;
+    // The tooth in slot i, pushed by lobe u, stands in the space m i - s u of the ring.
+    const spaces = (slots * teeth.count) / installed + Math.sign(ratio) * on;
+    if (Number.isInteger(slots) && !(ofTeeth && slots % installed !== 0) && !(ofRing && spaces % ring.teeth !== 0)) return { deg, slots, lobes: -on };
+  }
+  return { deg, slots: periods, lobes: 0 };
+}
+
 export class Motion {
   constructor(design, geometry, sweep) {
     const { teeth, ring } = design.drive;
@@ -84,7 +104,7 @@ export class Motion {
     this.sweep = sweep;
     this.madeOtherwise = madeOtherwise(design);
     this.rubbingScale = rubbingScale(design, sweep);
-    this.period = geometry.period_deg;
+    this.pattern = patternOf(design, geometry, sweep, this.installed);
     this.ratio = geometry.transmission_ratio;
     this.frames = sweep ? framesOf(sweep.states) : [];
     const { x_mm: x, y_mm: y } = geometry.tooth_center_path;
@@ -149,25 +169,25 @@ export class Motion {
    *  alike, the states are those of one, and the others' teeth are copies. */
   loaded(inputDeg) {
     if (this.frames.length === 0) return [];
-    const periods = Math.floor(inputDeg / this.period);
-    const within = inputDeg - periods * this.period;
+    const { pattern } = this;
+    const patterns = Math.floor(inputDeg / pattern.deg);
+    const within = inputDeg - patterns * pattern.deg;
     const index = this.#frameAt(within);
     const [from, to] = [this.frames[index].angle, this.frames[index + 1].angle];
     const loaded = [];
     for (const row of this.#between(index, to > from ? Math.min(1, Math.max(0, (within - from) / (to - from))) : 0)) {
       if (!row.loaded) continue;
-      // One period on, each tooth stands where the one before it stood.
-      const zones = row.lobe === undefined ? Array(this.lobes).keys() : [row.lobe];
+      const zones = row.lobe === undefined ? Array(this.lobes).keys() : [modulo(row.lobe + patterns * pattern.lobes, this.lobes)];
       for (const zone of zones) {
         const isCopy = row.lobe === undefined && zone > 0;
-        const tooth = modulo(row.tooth + periods + (row.lobe === undefined ? (zone * this.installed) / this.lobes : 0), this.installed);
+        const tooth = modulo(row.tooth + patterns * pattern.slots + (row.lobe === undefined ? (zone * this.installed) / this.lobes : 0), this.installed);
         loaded.push({ ...this.#loadedTooth(tooth, zone, row, inputDeg), isCopy });
       }
     }
     return loaded.sort((one, other) => one.tooth - other.tooth);
   }
 
-  /** The last frame but one at most that does not stand behind an angle of the period. */
+  /** The last frame but one at most that does not stand behind an angle of the sweep. */
   #frameAt(angle) {
     let low = 0;
     let high = this.frames.length - 1;

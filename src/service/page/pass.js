@@ -1,7 +1,7 @@
 // One tooth's pass through the meshing zone, from where it enters to the root, put together from the samples of one period
 // as the paper does it (its figures 8 to 10): each loaded tooth stands for a part of the pass.
 
-import { CONTACTS, between, enteringBetween, framesOf, lobesOf, rubbingScale } from './motion.js';
+import { CONTACTS, LOADS, between, enteringBetween, framesOf, lobesOf, rubbingScale } from './motion.js';
 
 export const ABSCISSAE = [
   { key: 'input', label: 'Input angle', axis: 'input angle since the valley, Δj, deg', unit: 'deg', symbol: 'Δj' },
@@ -13,21 +13,30 @@ export const ABSCISSAE = [
 /** Positions closer than this are one and the same, on both sides of a jump. */
 const SAME_DEG = 1e-9;
 
+/** Stretches of the pass, of each of which the largest load is drawn where items deviate. */
+const MOST_STRETCHES = 200;
+
 const isSamePlace = (one, other) => one.breaksAfter === other.breaksAfter && Math.abs(one.row.position_deg - other.row.position_deg) <= SAME_DEG;
 
+/** The largest of each load of two teeth at one place. */
+const largestOf = (one, other) => ({ ...one, ...Object.fromEntries(LOADS.map((column) => [column, Math.max(one[column], other[column])])) });
+
 /** `{ x: { abscissa: [] }, force: { contact: [] }, stress: { contact: [] }, rubbing: { contact: [] }, position: [], breaks: Set of indices }`,
- *  `rubbing` being pressure times velocity where `rubs` says that it is known; a break at an
+ *  `rubbing` being pressure times velocity where `rubs` says that it is known; where items deviate each load is the largest of
+ *  all teeth that come by, and `isLargest` says so; a break at an
  *  index stands between that point and the one before it. */
 export function passOf(design, sweep) {
   const frames = framesOf(sweep.states);
   const rate = design.drive.teeth.count / design.drive.ring.teeth;
   const all = [];
+  // Where items deviate each tooth has a course of its own.
+  const isLargest = sweep.sweep_period_deg !== undefined;
   // The last sample repeats the first, teeth renumbered.
   for (let index = 0; index < frames.length - 1; index += 1) {
     const { angle, rows } = frames[index];
     // How far a tooth goes to the next frame.
     const step = (frames[index + 1].angle - angle) / rate;
-    const breaksAfter = enteringBetween(sweep, frames[index], frames[index + 1]) !== undefined;
+    const breaksAfter = !isLargest && enteringBetween(sweep, frames[index], frames[index + 1]) !== undefined;
     for (const row of rows.values()) all.push({ row, breaksAfter, step });
   }
   // Where an angle stands twice, what was before the jump comes first.
@@ -35,8 +44,15 @@ export function passOf(design, sweep) {
     const ahead = other.row.position_deg - one.row.position_deg;
     return Math.abs(ahead) > SAME_DEG ? ahead : other.breaksAfter - one.breaksAfter;
   });
-  // Where zones are unlike, teeth on several lobes come by the same place, and carry there the same.
-  const points = all.filter((point, index) => !(index > 0 && isSamePlace(all[index - 1], point)));
+  // Where zones are unlike, teeth on several lobes come by the same place, and carry there the same; where items deviate, each another load.
+  const stretch = isLargest ? (all[0].row.position_deg - all.at(-1).row.position_deg) / MOST_STRETCHES : 0;
+  const points = [];
+  all.forEach((point, index) => {
+    const last = points.at(-1);
+    const isSame = index > 0 && (isSamePlace(all[index - 1], point) || last.row.position_deg - point.row.position_deg < stretch);
+    if (!isSame) points.push({ ...point });
+    else if (isLargest) last.row = largestOf(last.row, point.row);
+  });
   const column = (name) => points.map(({ row }) => row[name]);
   const position = column('position_deg');
   const pass = {
@@ -52,6 +68,7 @@ export function passOf(design, sweep) {
     force: {},
     stress: {},
     rubbing: {},
+    isLargest,
     entersUnderLoad: sweep.enters_under_load,
     breaks: new Set(),
     peaks: {},

@@ -115,6 +115,8 @@ class Plot {
     const wasHidden = this.figure.hidden;
     this.figure.hidden = isKnown !== undefined && !isKnown(this.owner.pass);
     if (wasHidden && !this.figure.hidden) this.resize();
+    const { title, unit } = this.quantity;
+    setText(this.figure.querySelector('figcaption'), `${title}, ${unit}${this.owner.pass?.isLargest ? ', the largest of all teeth' : ''}`);
     this.chart.setData(this.data());
   }
 

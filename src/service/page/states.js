@@ -59,8 +59,8 @@ export function drawable(answer) {
   const frame = (index) => framesOf(part(states, starts[index], end(index)))[0];
   for (let index = 0; index < last; index += 1) {
     if (index % stride === 0 || peakAngles.has(states.input_angle_deg[starts[index]])) kept.add(index);
-    // Only where a tooth number appears that was not there can loads jump.
-    const isNewest = states.tooth[end(index + 1) - 1] > states.tooth[end(index) - 1];
+    // Only where a tooth number appears that was not there can loads jump; where zones are unlike it need not be the highest.
+    const isNewest = states.lobe !== undefined || states.tooth[end(index + 1) - 1] > states.tooth[end(index) - 1];
     if (isNewest && enteringBetween(sweep, frame(index), frame(index + 1))) kept.add(index).add(index + 1);
   }
   const rows = [...kept].sort((one, other) => one - other).flatMap((index) => Array.from({ length: end(index) - starts[index] }, (_, row) => starts[index] + row));

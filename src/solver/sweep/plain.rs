@@ -1,7 +1,7 @@
 //! A sweep state by state: what the fast path is held against, and what is left where it does not reach.
 
 use crate::contact::{Materials, PerContact};
-use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
+use crate::load_sharing::{LawEnd, LoadCase, LoadedDrive, ToothState};
 use crate::mesh::PlacedTooth;
 use crate::root::NotConverged;
 use crate::springs::WindUp;
@@ -81,6 +81,8 @@ struct Growing<'a> {
     states: States,
     input_angles: InputAngles,
     torque_capacity: Option<TorqueCapacity>,
+    /// Where the least of the limits is no stress but the end of Johnson's law.
+    law_end: Option<LawEnd>,
     balance: TorqueBalance,
     torque_balance_residual: f64,
     lists_lobes: bool,
@@ -96,6 +98,7 @@ impl<'a> Growing<'a> {
             states: States::default(),
             input_angles: InputAngles::default(),
             torque_capacity: None,
+            law_end: None,
             balance: TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm()),
             torque_balance_residual: 0.0,
             lists_lobes: !loaded.mesh().zones_are_alike(),
@@ -133,6 +136,7 @@ impl<'a> Growing<'a> {
                 let contact = limit.contact;
                 let capacity = TorqueCapacity { input_torque_nm, output_torque_nm, contact, input_angle_deg };
                 self.torque_capacity = Some(capacity);
+                self.law_end = limit.law_end;
             }
         }
         Ok(())
@@ -183,7 +187,11 @@ impl<'a> Growing<'a> {
     }
 
     fn finish(self, points: Points, materials: &Materials) -> Result<Sweep, SolveError> {
-        let Self { loaded, states, input_angles, torque_capacity, torque_balance_residual, hardest, .. } = self;
+        let Self { loaded, states, input_angles, torque_capacity, law_end, torque_balance_residual, hardest, .. } =
+            self;
+        if let Some(end) = law_end {
+            return Err(end.error(true));
+        }
         let peaks = PerContact::of(|contact| PeakAt {
             force: peak_at(states.force_n.get(contact)),
             stress: peak_at(states.stress_mpa.get(contact)),
