@@ -230,7 +230,15 @@ fn models(drive: &Drive, own: &LoadParameters) -> Vec<LoadParameters> {
     let mut models = vec![*own];
     for compatibility in [Compatibility::Projection, Compatibility::VirtualWork] {
         for &law in &laws {
-            let model = LoadParameters { compatibility, law, ..*own };
+            // Of the forms beside it only that with its own law is refined as it is.
+            let is_refined = compatibility == Compatibility::VirtualWork && law == own.law;
+            let model = LoadParameters {
+                compatibility,
+                law,
+                ring_teeth_bend: own.ring_teeth_bend && is_refined,
+                wave_generator_moves: own.wave_generator_moves && is_refined,
+                ..*own
+            };
             let is_possible = compatibility == Compatibility::VirtualWork || law.is_of_projection();
             if is_possible && !models.contains(&model) {
                 models.push(model);

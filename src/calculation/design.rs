@@ -11,8 +11,8 @@ use toothwave_solver::profile::{Extent, ProfileParameters};
 use toothwave_solver::sweep::Points;
 use toothwave_solver::violation::{OfDutyPoint, SHARES_TOLERANCE};
 use toothwave_solver::{
-    Compatibility, ContactLaw, DriveParameters, LoadParameters, Material, Materials, Parameter, PerContact, Torque,
-    Violation,
+    Compatibility, ContactLaw, Deviations, DriveParameters, LoadParameters, Material, Materials, Modification,
+    Parameter, PerContact, Torque, Violation,
 };
 use utoipa::ToSchema;
 
@@ -141,9 +141,21 @@ impl Design {
         if self.sweep.tolerance.is_none() {
             self.sweep.samples.get_or_insert(DEFAULT_SAMPLES);
         }
-        let by_default = self.law_by_default();
-        self.model.stiffness.get_or_insert(by_default);
+        if !self.is_model_by_default() {
+            let by_default = self.law_by_default();
+            self.model.stiffness.get_or_insert(by_default);
+            self.model.ring_teeth_bend.get_or_insert(false);
+            self.model.wave_generator_moves.get_or_insert(false);
+        }
         self
+    }
+
+    /// Whether the document leaves the model to what holds best, so that the drive decides what of it is refined. That of balls and of flat-sided teeth was not
+    /// held against elastic bodies.
+    fn is_model_by_default(&self) -> bool {
+        matches!(self.drive.teeth, TeethDocument::Cylinder(_))
+            && self.model.stiffness.is_none()
+            && self.model.compatibility == CompatibilityDocument::VirtualWork
     }
 
     /// The law of a document that names none: the one that holds best, and the paper's beside the paper's compatibility.
@@ -195,11 +207,11 @@ impl Design {
         violations.iter().filter_map(as_written).collect()
     }
 
-    /// The load's parameters.
+    /// The load's parameters, for a drive that has pointed or bored tips or not.
     ///
     /// # Errors
     /// A fault where the document has no load, or not exactly one torque.
-    pub fn load_parameters(&self) -> Result<LoadParameters, Fault> {
+    pub fn load_parameters(&self, has_pointed_tips: bool) -> Result<LoadParameters, Fault> {
         let load = self.load.as_ref().ok_or_else(|| {
             let detail = "forces need a load: give `load` an `input_torque_nm` or an `output_torque_nm`";
             Fault::of_field(FieldCode::MissingField, "load", detail.into())
@@ -214,6 +226,18 @@ impl Design {
             CompatibilityDocument::Projection => Compatibility::Projection,
             CompatibilityDocument::VirtualWork => Compatibility::VirtualWork,
         };
+        let modification = (&self.modification).into();
+        let clearance_um = self.model.clearance.as_ref().map_or_else(PerContact::default, |clearance| PerContact {
+            wave_generator: clearance.wave_generator_um,
+            ring: clearance.ring_um,
+            carrier: clearance.carrier_um,
+        });
+        let is_refined = self.is_model_by_default() && has_pointed_tips;
+        let has_gaps = || {
+            let deviations = Deviations::from(&self.deviations);
+            clearance_um != PerContact::default() || modification != Modification::NONE || !deviations.is_nil()
+        };
+        let moves_by_default = || is_refined && self.model.ring_teeth_bend.is_none() && has_gaps();
         Ok(LoadParameters {
             materials: Materials {
                 wave_generator: material(&self.materials.wave_generator),
@@ -225,14 +249,11 @@ impl Design {
             compatibility,
             law: self.contact_law(),
             series_compliance_mm_per_n: (&self.model.series_compliance_mm_per_n).into(),
-            ring_teeth_bend: self.model.ring_teeth_bend,
-            modification: (&self.modification).into(),
+            ring_teeth_bend: self.model.ring_teeth_bend.unwrap_or(is_refined),
+            wave_generator_moves: self.model.wave_generator_moves.unwrap_or_else(moves_by_default),
+            modification,
             carrier: self.carrier_of_flats(),
-            clearance_um: self.model.clearance.as_ref().map_or_else(PerContact::default, |clearance| PerContact {
-                wave_generator: clearance.wave_generator_um,
-                ring: clearance.ring_um,
-                carrier: clearance.carrier_um,
-            }),
+            clearance_um,
             allowable_stress_mpa: load.allowable_stress_mpa.map(Into::into),
         })
     }
@@ -350,7 +371,6 @@ impl Design {
     }
 
     fn contact_law(&self) -> ContactLaw {
-        // Only a document that was not normalised names none.
         self.model.stiffness.as_ref().map_or_else(|| (&self.law_by_default()).into(), Into::into)
     }
 

@@ -351,15 +351,23 @@ impl FindingAnswer {
                 ),
                 "lower the torque, widen the teeth, or take a stiffer material",
             ),
-            Finding::WindUpBeyondModel { wind_up_deg, limit_deg } => new(
+            Finding::WindUpBeyondModel { wind_up_deg, limit_deg, is_moving } => new(
                 Code::WindUpBeyondModel,
                 Warning,
                 &[LOAD, "/model"],
                 wind_up_deg,
                 limit_deg,
                 "deg",
-                "under the load the wave generator turns by more than a tenth of the period: the teeth then stand elsewhere than the model, which takes lever arms and directions from the drive without load, has them".into(),
-                "lower the torque, choose stiffer contacts, or close the clearances",
+                if is_moving {
+                    "under the load the wave generator turns by more than a quarter of a radian over the number of its lobes: the model follows it on under its teeth to second order alone, and directions are those of the drive without load".into()
+                } else {
+                    "under the load the wave generator turns by more than a tenth of the period: the teeth then stand elsewhere than the model, which takes lever arms and directions from the drive without load, has them".into()
+                },
+                if is_moving {
+                    "lower the torque, choose stiffer contacts, or close the clearances"
+                } else {
+                    "lower the torque, choose stiffer contacts, close the clearances, or let the wave generator move (`model.wave_generator_moves`)"
+                },
             ),
             Finding::ToothLeavesSlot { edge, center_radius_mm, wall_end_mm, is_loaded } => new(
                 Code::ToothLeavesSlot,

@@ -148,6 +148,10 @@ impl From<SolveError> for NoAnswer {
                 format!("{detail}. Make the flats longer, or the carrier wider by `parts.carrier`"),
             ),
             SolveError::NoLeverArm => Self::new(NoAnswerCode::NoToothInMesh, detail),
+            SolveError::TurnedPastTeeth => Self::new(
+                NoAnswerCode::ImpossibleDesign,
+                format!("{detail}. Lower the torque or close the gaps, or leave `model.wave_generator_moves` out"),
+            ),
             SolveError::TooManyPoints { points, limit } => {
                 let detail = format!("{detail} by `max_profile_points`; widen the chord tolerance");
                 let pointer = "/profile/chord_tolerance_mm";

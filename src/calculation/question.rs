@@ -2,7 +2,7 @@
 
 pub use toothwave_solver::Stop;
 use toothwave_solver::drive::Draft;
-use toothwave_solver::{LoadCase, Parameter, SolveError, Violation};
+use toothwave_solver::{LoadCase, Parameter, SolveError, Violation, model_error};
 
 use crate::design::Design;
 use crate::forms::Forms;
@@ -98,7 +98,8 @@ pub(crate) fn checked_load(
     draft: &Draft,
     violations: &mut Vec<Violation>,
 ) -> Result<Option<LoadCase>, NoAnswer> {
-    let parameters = design.load_parameters()?;
+    let has_pointed_tips = draft.drive().is_some_and(|drive| model_error::has_pointed_tips(&drive));
+    let parameters = design.load_parameters(has_pointed_tips)?;
     let duty = design.duty()?;
     // The torques of a duty have places of their own.
     let of_duty = |violation: &Violation| {

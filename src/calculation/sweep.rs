@@ -262,7 +262,7 @@ impl Question for Sweep {
         let approaches_matter = *with_wind_up || load.has_gaps() || !deviations.is_nil();
         let of_contacts = findings::of_contacts(drive, load, &sweep.peaks, approaches_matter);
         let of_half_widths = findings::of_half_widths(drive, load, &sweep.states);
-        let of_wind_up = findings::of_wind_up(drive, &sweep);
+        let of_wind_up = findings::of_wind_up(drive, load, &sweep);
         let of_projection = findings::of_projection(drive, load).map_err(SolveError::from)?;
         let shares = Shares::of(drive, load, backings, &sweep.peaks);
         let of_backing = shares.as_ref().map_or_else(Vec::new, findings::of_backing);

@@ -99,6 +99,9 @@ pub enum SolveError {
     /// None of the teeth at an input angle has a lever arm.
     #[error("none of the teeth in mesh has a lever arm, so no finite force carries the torque")]
     NoLeverArm,
+    /// The wave generator moves on under its teeth, past all of them, before they carry the torque.
+    #[error("the wave generator would turn past its teeth before gaps are closed and the torque is carried")]
+    TurnedPastTeeth,
     /// Johnson's law where a contact is half as wide as the tooth's radius or the depth, or wider.
     #[error(
         "{of_capacity}half the contact's width at {} reaches {half_width_limit_mm} mm, half of the tooth's radius or of the depth, where Johnson's approach ends: at this input angle with an input torque of {input_torque_limit_nm} N·m, first on the tooth at {position_deg} deg",

@@ -50,6 +50,9 @@ pub struct LoadParameters {
     /// Whether the ring's teeth bend, the more the nearer to their tips they are pressed, with `VirtualWork` alone; otherwise no place of the flank
     /// gives way more than another.
     pub ring_teeth_bend: bool,
+    /// Whether the wave generator moves on under its teeth as it winds up, with `VirtualWork` alone; otherwise its arms are those of the positions
+    /// without load.
+    pub wave_generator_moves: bool,
     /// Gap along the normal of each contact, in µm.
     pub clearance_um: PerContact<f64>,
     /// Parts made otherwise than conjugate, with `VirtualWork` alone.
@@ -93,7 +96,8 @@ impl LoadParameters {
         let series = self.series_compliance_mm_per_n.iter().filter(|&(_, &compliance)| compliance > 0.0);
         let series = series.map(|(contact, _)| Parameter::SeriesCompliance(contact));
         let bending = self.ring_teeth_bend.then_some(Parameter::RingTeethBend);
-        law.into_iter().chain(series).chain(bending).chain(self.modification.first())
+        let moves = self.wave_generator_moves.then_some(Parameter::WaveGeneratorMoves);
+        law.into_iter().chain(series).chain(bending).chain(moves).chain(self.modification.first())
     }
 
     fn clearance_violations_in(&self, sense: f64, ring: &RingTooth) -> Result<Vec<Violation>, NotConverged> {
@@ -260,6 +264,7 @@ pub struct LoadedDrive<'a> {
     law: ContactLaw,
     contacts: Contacts,
     ring_bending: Option<RingBending>,
+    wave_generator_moves: bool,
     gaps: Gaps<'a>,
 }
 
@@ -340,6 +345,7 @@ impl<'a> LoadedDrive<'a> {
             input_torque_nmm: 1e3 * load.input_torque_nm(drive),
             law: p.law,
             contacts,
+            wave_generator_moves: p.wave_generator_moves,
             ring_bending: if p.ring_teeth_bend { Some(RingBending::new(drive, &p.materials.ring)?) } else { None },
             gaps: Gaps::new(drive, &p.clearance_um, p.modification, deviations),
         };
@@ -404,7 +410,7 @@ impl<'a> LoadedDrive<'a> {
 
     /// The law, for whoever works in columns; none where it is another one at each position.
     pub(crate) fn tooth_law(&self) -> Option<ToothLaw> {
-        self.contacts.tooth_law().filter(|_| self.ring_bending.is_none())
+        self.contacts.tooth_law().filter(|_| self.ring_bending.is_none() && !self.wave_generator_moves)
     }
 
     /// A contact of balls, for whoever works in columns.
@@ -507,9 +513,19 @@ impl<'a> LoadedDrive<'a> {
                 return Err(SolveError::ComplianceNotPositive { position_deg, compliance_mm_per_n });
             }
         }
-        let spring = Spring::new(arm_mm, arm_mm, gap, approach);
+        let spring = Spring::new(arm_mm, self.arm_decline_mm_per_rad(&center), gap, approach);
         let pressure = PerContact::of(|contact| places.get(contact).pressure);
         Ok(ToothState { center, flank, force_ratio, curvature_per_mm, pressure, spring })
+    }
+
+    /// How much shorter the arm of a tooth becomes for each radian that the wave generator moves on under it: that of `d tan γ cos γ`, γ in the
+    /// cosine staying, by the position (docs/theory.md section 4.4).
+    fn arm_decline_mm_per_rad(&self, center: &ToothCenter) -> f64 {
+        if !self.wave_generator_moves {
+            return 0.0;
+        }
+        let &ToothCenter { tan_pressure_angle: t, tan_pressure_angle_derivative, center_radius_mm, .. } = center;
+        (tan_pressure_angle_derivative - t * t) * center_radius_mm / (1.0 + t * t).sqrt()
     }
 
     /// Relative curvature of each contact of a tooth in the plane of motion.
@@ -588,11 +604,20 @@ impl<'a> LoadedDrive<'a> {
     /// # Errors
     /// [`SolveError::NoLeverArm`] where none of them can carry, [`SolveError::JohnsonBeyondHalfWidth`] where that law ends before.
     pub fn wind_up(&self, teeth: &[ToothState]) -> Result<WindUp, SolveError> {
-        let wind_up = self.springs(teeth).wind_up(self.input_torque_nmm)?.ok_or(SolveError::NoLeverArm)?;
+        let wind_up = self.springs(teeth).wind_up(self.input_torque_nmm)?.ok_or_else(|| self.carries_nothing(teeth))?;
         if let Some(end) = self.law_end(teeth, &wind_up.rotation)? {
             return Err(end.error(false));
         }
         Ok(WindUp { lost_motion_rad: self.lost_motion_rad(), ..wind_up })
+    }
+
+    /// Why teeth carry no torque, or not so much of it.
+    fn carries_nothing(&self, teeth: &[ToothState]) -> SolveError {
+        if self.wave_generator_moves && teeth.iter().any(|tooth| tooth.spring.static_arm_mm > 0.0) {
+            SolveError::TurnedPastTeeth
+        } else {
+            SolveError::NoLeverArm
+        }
     }
 
     /// Lost motion that all teeth have alike: their closing angles leave it out.
@@ -616,7 +641,7 @@ impl<'a> LoadedDrive<'a> {
         let limit = Self::first_to_reach(teeth, |tooth, contact| {
             tooth.pressure.get(contact).force_n(*allowable_stress_mpa.get(contact)) / tooth.force_ratio.get(contact)
         });
-        let FirstLimit { rotation, contact, .. } = limit.ok_or(SolveError::NoLeverArm)?;
+        let FirstLimit { rotation, contact, .. } = limit.ok_or_else(|| self.carries_nothing(teeth))?;
         if let Some(end) = self.law_end(teeth, &rotation)? {
             let LawEnd { contact, input_torque_limit_nmm: input_torque_nmm, .. } = end;
             return Ok(TorqueLimit { input_torque_nmm, contact, law_end: Some(end) });
@@ -630,12 +655,14 @@ impl<'a> LoadedDrive<'a> {
         let first_rad = teeth.iter().map(|tooth| tooth.spring.closing_rad).fold(f64::INFINITY, f64::min);
         let mut least: Option<(f64, FirstLimit<'_>)> = None;
         for tooth in teeth {
-            let Spring { travel_arm_mm, closing_rad, ref approach, .. } = tooth.spring;
+            let spring = &tooth.spring;
+            let Spring { closing_rad, ref approach, .. } = *spring;
             for (contact, &ratio) in tooth.force_ratio.iter() {
-                if ratio > 0.0 && travel_arm_mm > 0.0 && closing_rad.is_finite() {
-                    let excess_rad = approach.approach_mm(limit_n(tooth, contact)) / travel_arm_mm;
+                if ratio > 0.0 && spring.can_carry() {
+                    let excess_rad = spring.excess_rad(approach.approach_mm(limit_n(tooth, contact)));
                     let from_first_rad = excess_rad + (closing_rad - first_rad);
-                    if least.as_ref().is_none_or(|(least_rad, _)| from_first_rad < *least_rad) {
+                    if excess_rad.is_finite() && least.as_ref().is_none_or(|(least_rad, _)| from_first_rad < *least_rad)
+                    {
                         let rotation = Rotation { closing_rad, excess_rad };
                         least = Some((from_first_rad, FirstLimit { tooth, contact, rotation }));
                     }
@@ -662,7 +689,7 @@ impl<'a> LoadedDrive<'a> {
             let share = limit_mm(contact) / half_width_mm(1.0, stress_mpa, tooth_width_mm);
             share * share / tooth.force_ratio.get(contact)
         });
-        let FirstLimit { tooth, contact, rotation } = limit.ok_or(SolveError::NoLeverArm)?;
+        let FirstLimit { tooth, contact, rotation } = limit.ok_or_else(|| self.carries_nothing(teeth))?;
         Ok(Some(LawEnd {
             contact,
             position_deg: tooth.center.position.from_lobe_deg(),

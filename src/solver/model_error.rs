@@ -170,14 +170,27 @@ pub fn measured(load: &LoadParameters, case: Case) -> Option<Measured> {
     use Compatibility::{Projection, VirtualWork};
     // Force, stress and wind-up, in per cent, for natural tips without and with gaps, then for pointed ones. With a gap at pointed tips an
     // earlier calculation of case 5.2, at another angle, went further in two forces: to 9 and to 53.
+    let refined = (load.ring_teeth_bend, load.wave_generator_moves);
     let [natural, natural_gaps, pointed, pointed_gaps] = match (load.compatibility, &load.law) {
-        (VirtualWork, ContactLaw::Johnson { .. }) if load.ring_teeth_bend => [
+        (VirtualWork, ContactLaw::Johnson { .. }) if refined == (true, true) => [
+            [(-1, 0), (-2, 1), (-1, 1)],
+            [(-1, 1), (-5, 3), (-1, 1)],
+            [(-1, 1), (-2, 1), (0, 1)],
+            [(-1, 2), (-3, 1), (0, 1)],
+        ],
+        (VirtualWork, ContactLaw::Johnson { .. }) if refined == (true, false) => [
             [(-1, 0), (-2, 1), (-1, 1)],
             [(-1, 1), (-5, 3), (-1, 1)],
             [(-1, 0), (-2, 1), (0, 1)],
             [(-4, -1), (-5, 0), (-1, 0)],
         ],
-        _ if load.ring_teeth_bend => return None,
+        (VirtualWork, ContactLaw::Johnson { .. }) if refined == (false, true) => [
+            [(-1, 1), (-2, 2), (-2, 0)],
+            [(-1, 1), (-5, 3), (-1, 0)],
+            [(-3, 8), (-2, 4), (-6, -3)],
+            [(-3, 9), (-4, 4), (-2, 0)],
+        ],
+        _ if refined != (false, false) => return None,
         (VirtualWork, ContactLaw::Johnson { .. }) => [
             [(-1, 1), (-2, 2), (-2, 0)],
             [(-1, 1), (-5, 3), (-1, 0)],
@@ -220,12 +233,14 @@ pub fn measured(load: &LoadParameters, case: Case) -> Option<Measured> {
     Some(Measured { case, force, stress, wind_up })
 }
 
+/// Whether the ring's tips are pointed or bored.
+pub fn has_pointed_tips(drive: &Drive) -> bool {
+    drive.flank_limit().end != FlankEnd::RegularTip
+}
+
 /// The case of a drive under a load.
 pub fn case_of(drive: &Drive, load: &LoadCase, deviations: &Deviations) -> Case {
-    Case {
-        has_gaps: load.has_gaps() || !deviations.is_nil(),
-        has_pointed_tips: drive.flank_limit().end != FlankEnd::RegularTip,
-    }
+    Case { has_gaps: load.has_gaps() || !deviations.is_nil(), has_pointed_tips: has_pointed_tips(drive) }
 }
 
 /// What is expected of the model for this drive, load and sweep, with parts that are held so and add these shares.
@@ -255,7 +270,7 @@ pub fn of(
         (drive.lobes() > LOBES_TO, Beyond::Lobes),
         (drive.sense() < 0.0, Beyond::RingWithMoreTeeth),
         (drive.largest_pressure_angle_deg()? > PRESSURE_ANGLE_TO_DEG, Beyond::PressureAngle),
-        (drive.flank_limit().end != FlankEnd::RegularTip, Beyond::EntryUnderLoad),
+        (has_pointed_tips(drive), Beyond::EntryUnderLoad),
         (!mates.into_iter().all(is_alike), Beyond::Materials),
         (p.clearance_um.iter().any(|(_, &gap_um)| gap_um > GAP_TO_UM), Beyond::Gap),
         (p.modification.first().is_some() || !deviations.is_nil(), Beyond::Modification),

@@ -14,11 +14,10 @@ use crate::position::Position;
 use crate::ring::RingFlank;
 use crate::root::NotConverged;
 
-/// Elements of either flank of the ring's tooth that is pressed.
+/// Elements of either flank of the ring's tooth that is pressed; every other flank is a single one. With 64 of them, 16 on every other flank and a space
+/// more on either side the compliance in case 5.2 is another one by 0.13 of the 21 units that the contact with the ring gives way by, in the last twentieth
+/// of the flank by 0.4.
 const FINE: usize = 16;
-
-/// So many of them are one on the flanks beside it.
-const STRIDE: usize = 4;
 
 /// Tooth spaces on either side of the one whose flank is pressed, at most.
 const SPACES_BESIDE: u64 = 2;
@@ -27,8 +26,8 @@ const SPACES_BESIDE: u64 = 2;
 const HELD_BEHIND: f64 = 1.0;
 
 /// Elements along each side of the piece of ring, and along the arc where it is held.
-const ALONG_SIDE: u32 = 4;
-const ALONG_ARC: u32 = 10;
+const ALONG_SIDE: u32 = 2;
+const ALONG_ARC: u32 = 8;
 
 /// Places of the force: the root and each element of the flank.
 const KNOTS: usize = FINE + 1;
@@ -72,16 +71,16 @@ impl RingBending {
     /// [`NotConverged`] from the flank.
     pub fn new(drive: &Drive, ring: &Material) -> Result<Self, NotConverged> {
         let pitch_mm = 2.0 * PI * drive.root_radius_mm() / drive.parameters().ring_teeth.unsigned_abs() as f64;
-        let (elements, pressed) = boundary(drive, pitch_mm)?;
-        let give = Solid { elements, poissons_ratio: ring.poissons_ratio }.further_than_half_plane(&pressed)?;
+        let piece = Piece::of(drive, pitch_mm)?;
+        let give = piece.further_than_half_plane(ring.poissons_ratio)?;
         let end = flank_point(drive.flank(), drive.flank_limit().position)?;
         // Towards the root: the compliance is a difference from the last.
         let root = give[KNOTS - 1];
         let per_width_mm_per_n = ring.compliance_per_mpa() / drive.tooth_width_mm();
         let mut ln_distance = [0.0; KNOTS];
         let mut compliance_mm_per_n = [0.0; KNOTS];
-        for knot in 0..KNOTS {
-            ln_distance[knot] = (pressed[knot].at * pitch_mm - end).norm().ln();
+        for (knot, element) in piece.pressed().iter().enumerate() {
+            ln_distance[knot] = (element.middle * pitch_mm - end).norm().ln();
             compliance_mm_per_n[knot] = per_width_mm_per_n * (give[knot] - root);
         }
         let bend = spline_bends(&ln_distance, &compliance_mm_per_n);
@@ -125,63 +124,105 @@ fn flank_point(flank: &RingFlank, position: Position) -> Result<Point2<f64>, Not
     Ok(flank.point(&tooth, &flank.at(&tooth)))
 }
 
-/// The boundary of a piece of the ring, in pitches, and where a tooth presses it: from the flank's end to the root, which is pressed in the middle of its space.
-fn boundary(drive: &Drive, pitch_mm: f64) -> Result<(Vec<Element>, Vec<Force>), NotConverged> {
-    let (flank, limit) = (drive.flank(), drive.flank_limit());
-    let (lobes, ring_teeth) = (drive.lobes(), drive.parameters().ring_teeth.unsigned_abs());
-    let mut half = Vec::with_capacity(FINE + 1);
-    for step in 0..FINE {
-        // The root's element reaches from one flank to the other; towards the end they become shorter.
-        let from_end = 1.0 - (step as f64 + 0.5) / (FINE as f64 + 0.5);
-        let position_rad = limit.position.from_lobe_rad * (1.0 - from_end * from_end);
-        half.push(flank_point(flank, Position::from_lobe(position_rad, lobes))? / pitch_mm);
-    }
-    half.push(flank_point(flank, limit.position)? / pitch_mm);
-    let half_pitch_rad = PI / ring_teeth as f64;
-    // The tip, where a land or nothing lies beyond the flank.
-    let tip = Point2::new(half_pitch_rad.cos(), half_pitch_rad.sin()) * (drive.tip_radius_mm() / pitch_mm);
-    let has_land = (tip - half[FINE]).norm() > 1e-9;
-    let mirrored = |point: &Point2<f64>| Point2::new(point.x, -point.y);
-    let mut elements = Vec::new();
-    let mut pressed = Vec::with_capacity(KNOTS);
-    let mut free = |points: &[Point2<f64>]| {
-        elements.extend(points.windows(2).map(|ends| Element::new(ends[0], ends[1], false)));
-    };
-    // The piece's ends stay apart.
-    let pressed_space = SPACES_BESIDE.min(ring_teeth.saturating_sub(2) / 2);
-    for space in (0..=2 * pressed_space).rev() {
-        let turn = Rotation2::new(2.0 * half_pitch_rad * (space as f64 - pressed_space as f64));
-        let stride = |is_fine: bool| if is_fine { 1 } else { STRIDE };
-        // Backwards about the axis, so that the material is on the left.
-        let forward: Vec<_> = half.iter().step_by(stride(space == pressed_space)).collect();
-        let backward: Vec<_> = half.iter().step_by(stride(space == pressed_space + 1)).collect();
-        let land = has_land.then_some(tip);
-        let first = land.into_iter().chain(forward.iter().rev().map(|point| **point));
-        let second = backward.iter().map(|point| mirrored(point)).chain(land.as_ref().map(mirrored));
-        let points: Vec<_> = first.chain(second).map(|point| turn * point).collect();
-        if space == pressed_space {
-            let flank = &points[usize::from(has_land)..][..KNOTS + 1];
-            pressed.extend(flank.windows(2).map(|ends| {
-                let Element { middle, outward, .. } = Element::new(ends[0], ends[1], false);
-                Force { at: middle, inward: -outward }
-            }));
+/// A piece of the ring, in pitches, as its boundary has it: teeth on either side of a tooth space, and where it is held.
+struct Piece {
+    elements: Vec<Element>,
+    /// The first of the [`KNOTS`] elements that a tooth presses, from the flank's end to the root, which is pressed in the middle of its space.
+    first_pressed: usize,
+}
+
+impl Piece {
+    fn of(drive: &Drive, pitch_mm: f64) -> Result<Self, NotConverged> {
+        let (flank, limit) = (drive.flank(), drive.flank_limit());
+        let (lobes, ring_teeth) = (drive.lobes(), drive.parameters().ring_teeth.unsigned_abs());
+        let mut fine = Vec::with_capacity(FINE + 1);
+        for step in 0..FINE {
+            // The root's element reaches from one flank to the other; towards the end they become shorter.
+            let from_end = 1.0 - (step as f64 + 0.5) / (FINE as f64 + 0.5);
+            let position_rad = limit.position.from_lobe_rad * (1.0 - from_end * from_end);
+            fine.push(flank_point(flank, Position::from_lobe(position_rad, lobes))? / pitch_mm);
         }
-        free(&points);
+        fine.push(flank_point(flank, limit.position)? / pitch_mm);
+        let coarse = [fine[0], fine[FINE]];
+        let half_pitch_rad = PI / ring_teeth as f64;
+        // The tip, where a land or nothing lies beyond the flank.
+        let tip = Point2::new(half_pitch_rad.cos(), half_pitch_rad.sin()) * (drive.tip_radius_mm() / pitch_mm);
+        let land = ((tip - fine[FINE]).norm() > 1e-9).then_some(tip);
+        let mirrored = |point: Point2<f64>| Point2::new(point.x, -point.y);
+        let mut elements = Vec::new();
+        let mut first_pressed = 0;
+        // The piece's ends stay apart.
+        let pressed_space = SPACES_BESIDE.min(ring_teeth.saturating_sub(2) / 2);
+        for space in (0..=2 * pressed_space).rev() {
+            let turn = Rotation2::new(2.0 * half_pitch_rad * (space as f64 - pressed_space as f64));
+            let points = |is_fine: bool| if is_fine { &fine[..] } else { &coarse[..] };
+            // Backwards about the axis, so that the material is on the left.
+            let forward = points(space == pressed_space).iter().rev().copied();
+            let backward = points(space == pressed_space + 1).iter().copied().map(mirrored);
+            let outline = land.into_iter().chain(forward).chain(backward).chain(land.map(mirrored));
+            let outline: Vec<_> = outline.map(|point| turn * point).collect();
+            if space == pressed_space {
+                first_pressed = elements.len() + usize::from(land.is_some());
+            }
+            elements.extend(outline.windows(2).map(|ends| Element::new(ends[0], ends[1], false)));
+        }
+        if let [first, .., last] = elements[..] {
+            elements.extend(held_around(last.end(), first.start(), drive.root_radius_mm() / pitch_mm + HELD_BEHIND));
+        }
+        Ok(Self { elements, first_pressed })
     }
-    if let [first, .., last] = elements[..] {
-        elements.extend(held_around(last.end(), first.start(), drive.root_radius_mm() / pitch_mm + HELD_BEHIND));
+
+    fn pressed(&self) -> &[Element] {
+        &self.elements[self.first_pressed..][..KNOTS]
     }
-    Ok((elements, pressed))
+
+    /// How much further than a half-plane the ring gives way under a force on each of the elements that are pressed; along the force, per unit of
+    /// `(1 - ν²)/E` for each unit of width, and but for the same number for all.
+    fn further_than_half_plane(&self, poissons_ratio: f64) -> Result<Vec<f64>, NotConverged> {
+        let count = self.elements.len();
+        let forces = self.pressed().iter().map(|element| Force { at: element.middle, inward: -element.outward });
+        let forces: Vec<_> = forces.collect();
+        let mut matrix = DMatrix::<f64>::zeros(2 * count, 2 * count);
+        // What has to be added to the half-plane: on free faces the opposite of its tractions, on held ones of its displacements.
+        let mut added = DMatrix::<f64>::zeros(2 * count, KNOTS);
+        let mut known = DMatrix::<f64>::zeros(2 * count, 2 * count);
+        for (column, element) in self.elements.iter().enumerate() {
+            for (force, of) in forces.iter().enumerate() {
+                // The face that bears the force bears no more than that.
+                if column != self.first_pressed + force {
+                    let [displacement, traction] = of.of_half_plane(element.middle, &element.outward, poissons_ratio);
+                    let wanted = if element.is_held { -displacement } else { -traction };
+                    added.fixed_view_mut::<2, 1>(2 * column, force).copy_from(&wanted);
+                }
+            }
+            for (row, at) in self.elements.iter().enumerate() {
+                let (by_traction, mut by_motion) = element.influence(at.middle, poissons_ratio);
+                if row == column {
+                    by_motion += 0.5 * Matrix2::identity();
+                }
+                let (of_unknown, of_known) =
+                    if element.is_held { (-by_traction, -by_motion) } else { (by_motion, by_traction) };
+                matrix.fixed_view_mut::<2, 2>(2 * row, 2 * column).copy_from(&of_unknown);
+                known.fixed_view_mut::<2, 2>(2 * row, 2 * column).copy_from(&of_known);
+            }
+        }
+        let singular =
+            NotConverged { what: "bending of the ring's teeth", iterations: 1, bracket_width: f64::INFINITY };
+        let solved = matrix.lu().solve(&(known * added)).ok_or(singular)?;
+        let along = |(force, of): (usize, &Force)| {
+            solved.fixed_view::<2, 1>(2 * (self.first_pressed + force), force).dot(&of.inward)
+        };
+        Ok(forces.iter().enumerate().map(along).collect())
+    }
 }
 
 /// Outward from where the inner boundary ends, along the arc and inward to where it starts.
 fn held_around(from: Point2<f64>, to: Point2<f64>, radius: f64) -> impl Iterator<Item = Element> {
     let on_arc = |angle_rad: f64| Point2::new(angle_rad.cos(), angle_rad.sin()) * radius;
     let [start_rad, end_rad] = [from, to].map(|point| point.y.atan2(point.x));
-    let steps = ALONG_ARC;
     let share = |step: u32, steps: u32| f64::from(step) / f64::from(steps);
     let outward = (0..ALONG_SIDE).map(move |step| from + (on_arc(start_rad) - from) * share(step, ALONG_SIDE));
-    let around = (0..steps).map(move |step| on_arc(start_rad + (end_rad - start_rad) * share(step, steps)));
+    let around = (0..ALONG_ARC).map(move |step| on_arc(start_rad + (end_rad - start_rad) * share(step, ALONG_ARC)));
     let inward = (0..=ALONG_SIDE).map(move |step| on_arc(end_rad) + (to - on_arc(end_rad)) * share(step, ALONG_SIDE));
     let points: Vec<_> = outward.chain(around).chain(inward).collect();
     (1..points.len()).map(move |end| Element::new(points[end - 1], points[end], true))
@@ -255,62 +296,6 @@ impl Force {
         let sideways = cos * across - sin * self.inward;
         let displacement = (radial * outwards + around * sideways) / PI;
         [displacement, outwards * (-2.0 * cos / (PI * distance) * outwards.dot(outward))]
-    }
-}
-
-/// A piece of an elastic body.
-struct Solid {
-    elements: Vec<Element>,
-    poissons_ratio: f64,
-}
-
-impl Solid {
-    /// How much further than a half-plane the body gives way under each force, which stands in the middle of one of its elements; along the force, per
-    /// unit of `(1 - ν²)/E` for each unit of width, and but for the same number for all.
-    fn further_than_half_plane(&self, forces: &[Force]) -> Result<Vec<f64>, NotConverged> {
-        let count = self.elements.len();
-        let mut matrix = DMatrix::<f64>::zeros(2 * count, 2 * count);
-        let mut right = DMatrix::<f64>::zeros(2 * count, forces.len());
-        // What has to be added to the half-plane: on free faces the opposite of its tractions, on held ones of its displacements.
-        let added: Vec<Vec<Vector2<f64>>> = self
-            .elements
-            .iter()
-            .map(|element| {
-                let added = forces.iter().map(|force| {
-                    // The face that bears the force bears no more than that.
-                    if element.middle == force.at {
-                        return Vector2::zeros();
-                    }
-                    let [displacement, traction] =
-                        force.of_half_plane(element.middle, &element.outward, self.poissons_ratio);
-                    if element.is_held { -displacement } else { -traction }
-                });
-                added.collect()
-            })
-            .collect();
-        for (row, at) in self.elements.iter().enumerate() {
-            for (column, element) in self.elements.iter().enumerate() {
-                let (by_traction, mut by_motion) = element.influence(at.middle, self.poissons_ratio);
-                if row == column {
-                    by_motion += 0.5 * Matrix2::identity();
-                }
-                let (unknown, known) =
-                    if element.is_held { (-by_traction, -by_motion) } else { (by_motion, by_traction) };
-                matrix.fixed_view_mut::<2, 2>(2 * row, 2 * column).copy_from(&unknown);
-                for (force, added) in added[column].iter().enumerate() {
-                    let mut sum = right.fixed_view_mut::<2, 1>(2 * row, force);
-                    sum += known * added;
-                }
-            }
-        }
-        let singular =
-            NotConverged { what: "bending of the ring's teeth", iterations: 1, bracket_width: f64::INFINITY };
-        let solved = matrix.lu().solve(&right).ok_or(singular)?;
-        let of_force = |(force, Force { at, inward }): (usize, &Force)| {
-            let element = self.elements.iter().position(|element| element.middle == *at).unwrap_or(0);
-            solved.fixed_view::<2, 1>(2 * element, force).dot(inward)
-        };
-        Ok(forces.iter().enumerate().map(of_force).collect())
     }
 }
 

@@ -51,6 +51,8 @@ pub enum Parameter {
     Law,
     /// Whether the ring's teeth bend.
     RingTeethBend,
+    /// Whether the wave generator moves on under its teeth.
+    WaveGeneratorMoves,
     /// Depth of the body at a contact, mm.
     Depth(Contact),
     /// Compliance of what stands behind a contact, mm/N.
@@ -261,7 +263,7 @@ impl Parameter {
             // As soft as the least stiffness, and nothing.
             Self::SeriesCompliance(_) => Range::closed(0.0, 1e3, "mm/N"),
             // A choice and lists, which have no number.
-            Self::Law | Self::RingTeethBend | Self::Deviations | Self::DeviationList(_) => {
+            Self::Law | Self::RingTeethBend | Self::WaveGeneratorMoves | Self::Deviations | Self::DeviationList(_) => {
                 Range::closed(f64::NEG_INFINITY, f64::INFINITY, "")
             }
             Self::Clearance(_) | Self::PartClearance(_) | Self::RunoutAmount(_) => Range::closed(0.0, 1e6, "µm"),

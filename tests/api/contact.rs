@@ -209,8 +209,14 @@ async fn a_sweep_says_how_far_its_model_is_off_elastic_bodies_and_whether_this_d
     let stiff = told(&shortest()).await;
     assert_eq!((&stiff["is_within"], &stiff["beyond"]), (&json!(true), &json!([])));
     assert_eq!(stiff["measured"]["force"], json!({ "low": -0.01, "high": 0.01 }));
-    let case =
-        json!({ "compatibility": "virtual_work", "law": "johnson", "has_gaps": false, "has_pointed_tips": false });
+    let case = json!({
+        "compatibility": "virtual_work",
+        "law": "johnson",
+        "ring_teeth_bend": false,
+        "wave_generator_moves": false,
+        "has_gaps": false,
+        "has_pointed_tips": false
+    });
     assert_eq!(stiff["measured"]["case"], case);
     // The paper's model errs by more, where a gap is given by far more.
     let paper = told(&spelled_out()).await;
@@ -221,6 +227,8 @@ async fn a_sweep_says_how_far_its_model_is_off_elastic_bodies_and_whether_this_d
     assert_eq!((&gap["is_within"], &gap["beyond"]), (&json!(false), &json!(["gap"])));
     let pointed = told(&undercut()).await;
     assert_eq!(pointed["measured"]["case"]["has_pointed_tips"], true);
+    assert_eq!(pointed["measured"]["case"]["ring_teeth_bend"], true);
+    assert_eq!(pointed["measured"]["force"], json!({ "low": -0.01, "high": 0.0 }));
     // Its carrier's fingers are a millimetre and a half high; the elastic bodies had none.
     assert_eq!(pointed["beyond"], json!(["entry_under_load", "soft_backing"]));
     assert_eq!(pointed["held"]["case"], "slender_fingers");
@@ -235,6 +243,37 @@ async fn a_sweep_says_how_far_its_model_is_off_elastic_bodies_and_whether_this_d
     assert_eq!(balls["beyond"][0], "law");
     assert_eq!(balls["beyond"][1], "tooth_shape");
     assert_eq!(stiff["range"]["lobes"], 2);
+}
+
+/// What is named is computed as it is named; what is not is refined where it matters, and says so.
+#[tokio::test]
+async fn where_no_law_is_named_pointed_tips_bend_and_with_gaps_the_wave_generator_moves() {
+    let service = Service::new();
+    let solved = async |drive: &Value, model: Value| {
+        let answer = service.post("/v1/sweep", &with(drive, "/model", model)).await.found();
+        (answer["states"].clone(), answer["model_error"]["measured"]["case"].clone())
+    };
+    let named = |bend: bool, moves: bool| json!({ "stiffness": { "law": "johnson" }, "ring_teeth_bend": bend, "wave_generator_moves": moves });
+    let gap = |mut model: Value| {
+        model["clearance"] = json!({ "ring_um": 10.0 });
+        model
+    };
+    let (pointed, natural) = (undercut(), shortest());
+    assert_eq!(solved(&pointed, json!({})).await, solved(&pointed, named(true, false)).await);
+    assert_eq!(solved(&pointed, gap(json!({}))).await, solved(&pointed, gap(named(true, true))).await);
+    assert_eq!(solved(&natural, json!({})).await, solved(&natural, named(false, false)).await);
+    assert_eq!(solved(&natural, gap(json!({}))).await, solved(&natural, gap(named(false, false))).await);
+    // A law that is named is as it was, and a choice that is made is kept.
+    let johnson = json!({ "stiffness": { "law": "johnson" } });
+    assert_eq!(solved(&pointed, gap(johnson)).await, solved(&pointed, gap(named(false, false))).await);
+    let stiff = json!({ "ring_teeth_bend": false });
+    assert_eq!(solved(&pointed, gap(stiff)).await, solved(&pointed, gap(named(false, false))).await);
+    assert_ne!(solved(&pointed, json!({})).await, solved(&pointed, named(false, false)).await);
+    assert_ne!(solved(&natural, gap(named(false, true))).await, solved(&natural, gap(json!({}))).await);
+    // Nothing of it was held against elastic bodies under another law, or beside projection.
+    let refused = json!({ "compatibility": "projection", "wave_generator_moves": true });
+    let problem = service.post("/v1/sweep", &with(&pointed, "/model", refused)).await.refused(422, "impossible_design");
+    assert_eq!(problem["errors"][0]["pointer"], "/model/wave_generator_moves");
 }
 
 /// Forces, stresses and what is kept of them follow the designer's carrier.

@@ -41,9 +41,9 @@ pub(crate) fn spelled_out() -> Value {
     })
 }
 
-/// The same with every default spelled out, the model's too.
+/// The same with every default spelled out, the model's too but for its law: left out, that is what holds best for the drive at hand.
 pub(crate) fn defaults_spelled_out() -> Value {
-    with(&spelled_out(), "/model", json!({ "compatibility": "virtual_work", "stiffness": { "law": "johnson" } }))
+    with(&spelled_out(), "/model", json!({ "compatibility": "virtual_work" }))
 }
 
 /// The paper's case 5.1 with nothing said that need not be said.

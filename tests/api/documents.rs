@@ -63,7 +63,8 @@ fn defaults() -> Vec<(&'static str, Value)> {
 #[tokio::test]
 async fn each_field_left_out_means_its_default() {
     let document = defaults_spelled_out();
-    let fields = defaults().into_iter().map(|(pointer, _)| pointer);
+    // A law that is left out is one that no name stands for: what holds best for the drive at hand.
+    let fields = defaults().into_iter().map(|(pointer, _)| pointer).filter(|&pointer| pointer != "/model/stiffness");
     let shortened = fields.map(|pointer| without(&document, pointer).to_string());
     assert_all_same(&document, shortened).await;
 }
@@ -115,8 +116,7 @@ async fn projection_takes_no_logarithmic_law_no_balls_law_and_no_series_complian
 
 #[tokio::test]
 async fn a_value_other_than_the_default_is_another_question_to_some_endpoint() {
-    // Beside a law that it does not take `projection` would be refused.
-    let document = without(&defaults_spelled_out(), "/model/stiffness");
+    let document = defaults_spelled_out();
     for (pointer, other) in defaults() {
         let service = Service::new();
         let mut changed = 0;

@@ -260,7 +260,7 @@ fn each_number_of_the_modification_reaches_the_solver_as_itself() {
         tooth_radius_um: 8.0,
         ring_tip_relief: Some(TipRelief { amount_um: 9.0, start_deg: 10.0, power: 11.0 }),
     };
-    assert_eq!(read(&document).unwrap().load_parameters().unwrap().modification, expected);
+    assert_eq!(read(&document).unwrap().load_parameters(false).unwrap().modification, expected);
 }
 
 #[test]

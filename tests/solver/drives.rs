@@ -64,6 +64,7 @@ pub(crate) fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParamete
         law: ContactLaw::Linear,
         series_compliance_mm_per_n: PerContact::default(),
         ring_teeth_bend: false,
+        wave_generator_moves: false,
         clearance_um: PerContact::default(),
         modification: Modification::default(),
         carrier: CarrierRadii::default(),

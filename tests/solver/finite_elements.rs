@@ -98,6 +98,10 @@ impl Case {
         }
     }
 
+    fn has_gaps(&self) -> bool {
+        self.ring_gap_um > 0.0 || self.slot_gap_um > 0.0
+    }
+
     fn drive_and_torque_nm(&self) -> (DriveParameters, f64) {
         match self.drive.as_str() {
             "5.1" => (PAPER_5_1, 20.0),
@@ -228,21 +232,25 @@ fn the_default_model_agrees_with_elastic_bodies() {
     }
 }
 
-/// Without gaps all that the model left out of case 5.2 was that its ring's teeth bend; with them the wave generator moves on besides, under its teeth.
+/// What the model left out of these bodies was that the ring's teeth bend, and that the wave generator moves on under its teeth, which matters with gaps.
 #[test]
-fn with_ring_teeth_that_bend_the_default_model_agrees_within_one_per_cent_where_there_are_no_gaps() {
+fn with_ring_teeth_that_bend_and_a_wave_generator_that_moves_the_model_agrees_within_a_half_per_cent() {
     for case in results().cases {
-        let load = LoadParameters { ring_teeth_bend: true, ..case.load(VirtualWork, case.johnson()) };
-        let Errors { peak, worst_tooth, wind_up, .. } = case.errors_under(&load);
-        let [peak_to, worst_to] = match (case.drive.as_str(), LoadCase::new(&load).unwrap().has_gaps()) {
-            ("5.2", true) => [0.037, 0.082],
-            (_, true) => [0.006, 0.018],
-            (_, false) => [0.006, 0.007],
-        };
-        let name = case.name();
-        assert!(peak.abs() < peak_to, "{name}: peak force {:+.2} %", percent(peak));
-        assert!(worst_tooth < worst_to, "{name}: worst tooth {:.2} %", percent(worst_tooth));
-        assert!(wind_up.abs() < 0.008, "{name}: wind-up {:+.2} %", percent(wind_up));
+        for wave_generator_moves in [false, true] {
+            let own = case.load(VirtualWork, case.johnson());
+            let load = LoadParameters { ring_teeth_bend: true, wave_generator_moves, ..own };
+            let Errors { peak, worst_tooth, wind_up, .. } = case.errors_under(&load);
+            let [peak_to, worst_to] = match (case.drive.as_str(), wave_generator_moves || !case.has_gaps()) {
+                (_, true) => [0.006, 0.012],
+                ("5.2", false) => [0.037, 0.082],
+                (_, false) => [0.006, 0.018],
+            };
+            let name = format!("{}, wave generator moves: {wave_generator_moves}", case.name());
+            println!("{name}: {:+.2} {:.2} {:+.2}", percent(peak), percent(worst_tooth), percent(wind_up));
+            assert!(peak.abs() < peak_to, "{name}: peak force {:+.2} %", percent(peak));
+            assert!(worst_tooth < worst_to, "{name}: worst tooth {:.2} %", percent(worst_tooth));
+            assert!(wind_up.abs() < 0.008, "{name}: wind-up {:+.2} %", percent(wind_up));
+        }
     }
 }
 
@@ -251,13 +259,15 @@ fn with_ring_teeth_that_bend_the_default_model_agrees_within_one_per_cent_where_
 fn each_model_errs_as_much_as_it_says_that_it_does() {
     let cases = results().cases;
     let mut wrong = Vec::new();
-    for (compatibility, law, ring_teeth_bend) in [
-        (VirtualWork, None, false),
-        (VirtualWork, None, true),
-        (VirtualWork, Some(ContactLaw::Palmgren), false),
-        (VirtualWork, Some(ContactLaw::Linear), false),
-        (Projection, Some(ContactLaw::Palmgren), false),
-        (Projection, Some(ContactLaw::Linear), false),
+    for (compatibility, law, ring_teeth_bend, wave_generator_moves) in [
+        (VirtualWork, None, false, false),
+        (VirtualWork, None, true, false),
+        (VirtualWork, None, true, true),
+        (VirtualWork, None, false, true),
+        (VirtualWork, Some(ContactLaw::Palmgren), false, false),
+        (VirtualWork, Some(ContactLaw::Linear), false, false),
+        (Projection, Some(ContactLaw::Palmgren), false, false),
+        (Projection, Some(ContactLaw::Linear), false, false),
     ] {
         for (has_pointed_tips, has_gaps) in [(false, false), (false, true), (true, false), (true, true)] {
             let wanted = model_error::Case { has_gaps, has_pointed_tips };
@@ -266,7 +276,7 @@ fn each_model_errs_as_much_as_it_says_that_it_does() {
             for case in &cases {
                 let law = law.unwrap_or_else(|| case.johnson());
                 let drive = Drive::new(&case.drive_and_torque_nm().0).unwrap();
-                let load = LoadParameters { ring_teeth_bend, ..case.load(compatibility, law) };
+                let load = LoadParameters { ring_teeth_bend, wave_generator_moves, ..case.load(compatibility, law) };
                 let checked = LoadCase::new(&load).unwrap();
                 if model_error::case_of(&drive, &checked, &Deviations::default()) != wanted {
                     continue;
@@ -284,9 +294,9 @@ fn each_model_errs_as_much_as_it_says_that_it_does() {
             for (what, ErrorRange { low, high }, (least, largest)) in
                 [("force", force, found[0]), ("stress", stress, found[1]), ("wind-up", wind_up, found[2])]
             {
-                let bend = if ring_teeth_bend { " and teeth that bend" } else { "" };
+                let refined = format!("bend {ring_teeth_bend}, moves {wave_generator_moves}");
                 let named =
-                    format!("{compatibility:?}, {law:?}{bend}, {wanted:?}: {what} {least:+.4} to {largest:+.4}");
+                    format!("{compatibility:?}, {law:?}, {refined}, {wanted:?}: {what} {least:+.4} to {largest:+.4}");
                 let is_held = low <= least && largest <= high;
                 if !is_held || low < least - 0.015 || high > largest + 0.045 {
                     wrong.push(format!("{named}, told {low:+} to {high:+}"));

@@ -14,6 +14,7 @@ mod laws;
 mod limits;
 mod losses;
 mod modified_parts;
+mod moving;
 mod oracles;
 mod paper;
 mod parts;

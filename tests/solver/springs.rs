@@ -165,8 +165,13 @@ fn a_gap_that_projection_would_turn_into_load_is_refused_by_the_crate_too() {
 fn a_tooth_of_next_to_no_arm_that_closes_first_takes_no_digits_from_the_others() {
     // It would have to turn by 1e9 rad to make the torque alone; beside it the next one is pressed by 1e-15 of what the first has turned.
     let approach = Approach::Linear { compliance_mm_per_n: 1e-6 };
-    let spring =
-        |arm_mm: f64, closing_rad| Spring { travel_arm_mm: arm_mm, static_arm_mm: arm_mm, closing_rad, approach };
+    let spring = |arm_mm: f64, closing_rad| Spring {
+        travel_arm_mm: arm_mm,
+        static_arm_mm: arm_mm,
+        arm_decline_mm_per_rad: 0.0,
+        closing_rad,
+        approach,
+    };
     let springs = [spring(1e-12, 0.0), spring(1.7, 1.1), spring(1.9, 2.3)];
     let wind_up = Springs::new(&springs, 2.0).wind_up(1e-9).unwrap().unwrap();
     let torque: f64 =
@@ -191,6 +196,7 @@ fn which_of_ten_thousand_teeth_carry_is_found_in_a_few_passes_over_them() {
         let spring = |i: u32| Spring {
             travel_arm_mm: 1.0,
             static_arm_mm: 1.0,
+            arm_decline_mm_per_rad: 0.0,
             // In no order, and all unlike.
             closing_rad: 1e-6 * f64::from(i * 7919 % count),
             approach: Approach::Power { exponent: 0.9, coefficient: 1e-6, compliance_mm_per_n: 0.0 },
@@ -224,7 +230,7 @@ fn any_approach() -> impl Strategy<Value = Approach> {
 prop_compose! {
     fn any_spring()(approach in any_approach(), arm in -6.0_f64..2.0, ratio in 0.7_f64..1.4, closing in prop::option::of(-9.0_f64..1.0)) -> Spring {
         let travel_arm_mm = 10.0_f64.powf(arm);
-        Spring { travel_arm_mm, static_arm_mm: ratio * travel_arm_mm, closing_rad: closing.map_or(0.0, |power| 10.0_f64.powf(power)), approach }
+        Spring { travel_arm_mm, static_arm_mm: ratio * travel_arm_mm, arm_decline_mm_per_rad: 0.0, closing_rad: closing.map_or(0.0, |power| 10.0_f64.powf(power)), approach }
     }
 }
 

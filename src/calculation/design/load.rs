@@ -217,10 +217,16 @@ pub struct ModelDocument {
     /// What stands behind each contact and gives way too, with `virtual_work` alone.
     #[serde(default)]
     pub series_compliance_mm_per_n: CompliancesDocument,
-    /// Whether the ring's teeth bend, the more the nearer to their tips they are pressed, with `virtual_work` alone. It matters where tips are pointed or
-    /// bored, and takes a sweep some milliseconds.
-    #[serde(default)]
-    pub ring_teeth_bend: bool,
+    /// Whether the ring's teeth bend, the more the nearer to their tips they are pressed, with `virtual_work` alone. Left out, those of cylinders do where
+    /// `stiffness` is left out too and the ring's tips are pointed or bored: elsewhere it hardly matters, and it takes time.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub ring_teeth_bend: Option<bool>,
+    /// Whether the wave generator moves on under its teeth as it winds up, with `virtual_work` alone; otherwise its arms are those of the positions without
+    /// load. Left out, it does where the ring's teeth bend because `ring_teeth_bend` is left out, and there are gaps.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub wave_generator_moves: Option<bool>,
     /// Gaps at the contacts; left out, there are none.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
@@ -354,7 +360,7 @@ encoded! {
     struct LoadDocument { input_torque_nm, output_torque_nm, allowable_stress_mpa, input_speed_rpm, duty }
     struct DutyPointDocument { input_torque_nm, output_torque_nm, input_speed_rpm, share_of_time }
     struct StressByContactDocument { wave_generator, ring, carrier }
-    struct ModelDocument { compatibility, stiffness, series_compliance_mm_per_n, ring_teeth_bend, clearance }
+    struct ModelDocument { compatibility, stiffness, series_compliance_mm_per_n, ring_teeth_bend, wave_generator_moves, clearance }
     struct ClearanceDocument { wave_generator_um, ring_um, carrier_um }
     struct CompliancesDocument { wave_generator, ring, carrier }
     struct LinearDocument {}

@@ -89,6 +89,10 @@ pub struct CaseAnswer {
     pub compatibility: CompatibilityDocument,
     /// The contact law.
     pub law: LawName,
+    /// Whether the ring's teeth bend.
+    pub ring_teeth_bend: bool,
+    /// Whether the wave generator moves on under its teeth.
+    pub wave_generator_moves: bool,
     /// Whether any contact has a gap.
     pub has_gaps: bool,
     /// Whether the ring's tips are pointed or bored, so that teeth enter under load.
@@ -179,6 +183,8 @@ impl ModelErrorAnswer {
             case: CaseAnswer {
                 compatibility: p.compatibility.into(),
                 law: p.law.into(),
+                ring_teeth_bend: p.ring_teeth_bend,
+                wave_generator_moves: p.wave_generator_moves,
                 has_gaps: case.has_gaps,
                 has_pointed_tips: case.has_pointed_tips,
             },
@@ -211,7 +217,7 @@ impl ModelErrorAnswer {
             format!("{:+.0} to {:+.0} %", 100.0 * low, 100.0 * high)
         };
         match &self.measured {
-            Some(MeasuredAnswer { force, stress, wind_up, .. }) => {
+            Some(MeasuredAnswer { case, force, stress, wind_up }) => {
                 writeln!(
                     writer,
                     "\nmodel against elastic bodies        force {}, stress {}",
@@ -219,6 +225,15 @@ impl ModelErrorAnswer {
                     percent(stress)
                 )?;
                 writeln!(writer, "wind-up of bodies that are held     {}", percent(wind_up))?;
+                let refined = match (case.ring_teeth_bend, case.wave_generator_moves) {
+                    (false, false) => None,
+                    (true, false) => Some("the ring's teeth bend"),
+                    (false, true) => Some("the wave generator moves on under its teeth"),
+                    (true, true) => Some("the ring's teeth bend, the wave generator moves on under its teeth"),
+                };
+                if let Some(refined) = refined {
+                    writeln!(writer, "refined                             {refined}")?;
+                }
             }
             None => writeln!(writer, "\nmodel against elastic bodies        not measured")?,
         }

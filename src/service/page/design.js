@@ -410,11 +410,12 @@ export const GROUPS = [
   {
     title: 'What gives way behind the contacts',
     pointer: '/model/series_compliance_mm_per_n',
-    hint: 'Beside the contacts themselves, such as a bearing under the cam. Only virtual work takes it.',
+    hint: 'Beside the contacts themselves, such as a bearing under the cam. Only virtual work takes it. Where neither a law nor this is chosen the ring’s teeth bend at pointed or bored tips, and with gaps the wave generator moves on there.',
     summary: (design) => (Object.values(at(design, '/model/series_compliance_mm_per_n') ?? {}).some((value) => value) ? 'given' : 'nothing'),
     fields: [
       compliance('wave_generator', 'Compliance, wave generator'), compliance('ring', 'Compliance, ring'), compliance('carrier', 'Compliance, carrier'),
       flag('/model/ring_teeth_bend', 'The ring’s teeth bend, the more the nearer to their tips'),
+      flag('/model/wave_generator_moves', 'The wave generator moves on under its teeth as it winds up'),
     ],
   },
   {

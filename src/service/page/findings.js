@@ -82,7 +82,7 @@ const KINDS = {
   },
   wind_up_beyond_model: {
     title: 'Wind-up beyond the model',
-    tests: 'The largest wind-up of the wave generator under the load against a tenth of the period.',
+    tests: 'The largest wind-up of the wave generator under the load against a tenth of the period; where it moves on under its teeth, against a quarter of a radian over the number of its lobes.',
     basis: RULE_OF_THUMB,
     why: 'Lever arms and directions are those of the drive without load; a wind-up of one period moves every tooth on by a whole spacing.',
     change: 'A torque that suits the drive, or clearances that do.',

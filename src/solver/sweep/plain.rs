@@ -171,9 +171,15 @@ impl<'a> Growing<'a> {
             states.stress_mpa.push(stress_mpa);
 
             let sin_ring = point.tan_pressure_angle * point.cos_pressure_angle;
-            torque_nmm.wave_generator += zones * force_n.wave_generator * center.cam_contact.lever_arm_mm;
-            torque_nmm.ring += zones * force_n.ring * sin_ring * center.center_radius_mm;
-            torque_nmm.carrier += zones * force_n.carrier * center.center_radius_mm;
+            // Where the wave generator moves on under a tooth, all three moments are counted at the arm that it comes to.
+            let arm_mm = center.cam_contact.lever_arm_mm;
+            let turned_mm = tooth.spring.turned_static_arm_mm(&wind_up.rotation) - arm_mm;
+            let moved_nmm = zones * force_n.wave_generator * turned_mm;
+            torque_nmm.wave_generator += zones * force_n.wave_generator * arm_mm + moved_nmm;
+            torque_nmm.ring +=
+                zones * force_n.ring * sin_ring * center.center_radius_mm + moved_nmm * flank.teeth_per_wave();
+            torque_nmm.carrier +=
+                zones * force_n.carrier * center.center_radius_mm + moved_nmm * self.loaded.drive().teeth_per_wave();
         }
         let residual = self.balance.residual(&torque_nmm);
         self.torque_balance_residual = worse(residual, self.torque_balance_residual);

@@ -102,6 +102,7 @@ fn drive(place: &[f64]) -> Option<Judged> {
         law: ContactLaw::Linear,
         series_compliance_mm_per_n: PerContact::default(),
         ring_teeth_bend: false,
+        wave_generator_moves: false,
         clearance_um: PerContact::default(),
         modification: Modification::default(),
         carrier: CarrierRadii::default(),

@@ -1,0 +1,282 @@
+//! The wave generator that moves on under its teeth as it winds up: against the path of the teeth's centres itself, and against a plain search for the rotation.
+
+use toothwave_solver::Compatibility::{Projection, VirtualWork};
+use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
+use toothwave_solver::mesh::Samples;
+use toothwave_solver::springs::{Rotation, Springs, WindUp};
+use toothwave_solver::sweep::{self, Points};
+use toothwave_solver::{
+    ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, Parameter, PerContact, Position, SolveError,
+    ToothShape, Torque, Violation, WaveGenerator,
+};
+
+use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, everywhere, load, swept};
+
+const JOHNSON: ContactLaw =
+    ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
+
+const ECCENTRIC: DriveParameters = DriveParameters {
+    wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
+    teeth: 20,
+    installed: 20,
+    tooth_radius_mm: 2.0,
+    tooth: ToothShape::Cylinder { width_mm: 12.0 },
+    ring_teeth: 19,
+    tip_radius_mm: None,
+};
+
+const THREE_LOBES: DriveParameters = DriveParameters {
+    wave_generator: WaveGenerator::HarmonicPath { lobes: 3, mean_path_radius_mm: 52.0, amplitude_mm: 1.0 },
+    teeth: 36,
+    installed: 36,
+    tooth_radius_mm: 2.5,
+    tooth: ToothShape::Cylinder { width_mm: 15.0 },
+    ring_teeth: 33,
+    tip_radius_mm: None,
+};
+
+fn moving(torque_nm: f64) -> LoadParameters {
+    LoadParameters { law: JOHNSON, wave_generator_moves: true, ..load(torque_nm, VirtualWork) }
+}
+
+fn at(drive: &Drive, position_rad: f64) -> toothwave_solver::cam::ToothCenter {
+    let folded = Position::from_lobe(position_rad.abs(), drive.lobes());
+    drive.flank().locus().at(folded).unwrap()
+}
+
+/// `d tan γ`, of which the sign turns with the side of the lobe.
+fn slope_mm(drive: &Drive, position_rad: f64) -> f64 {
+    let tooth = at(drive, position_rad);
+    position_rad.signum() * tooth.center_radius_mm * tooth.tan_pressure_angle
+}
+
+/// Halving the rotation leaves an eighth of what the third order misses.
+#[test]
+fn a_tooth_is_moved_as_far_as_the_path_of_its_centre_says_to_second_order() {
+    for parameters in [PAPER_5_1, PAPER_5_2, ECCENTRIC, THREE_LOBES] {
+        let drive = drive(&parameters);
+        let case = LoadCase::new(&moving(1.0)).unwrap();
+        let loaded = LoadedDrive::new(&drive, &case).unwrap();
+        let end_rad = drive.flank_limit().position.from_lobe_rad;
+        for share in [0.05, 0.2, 0.35, 0.8, 0.97] {
+            let position_rad = share * end_rad;
+            let tooth = loaded.tooth(Position::from_lobe(position_rad, drive.lobes())).unwrap();
+            let cos = 1.0 / tooth.center.tan_pressure_angle.hypot(1.0);
+            let missed_mm = |turned_rad: f64| {
+                let moved_mm = at(&drive, position_rad - turned_rad).center_radius_mm - tooth.center.center_radius_mm;
+                let rotation = Rotation { closing_rad: 0.0, excess_rad: turned_rad };
+                tooth.spring.displacement_mm(&rotation) - cos * moved_mm
+            };
+            let [whole, half] = [0.01, 0.005].map(missed_mm);
+            assert!((6.0..10.0).contains(&(whole / half)), "{parameters:?} at {share}: {whole:e}, {half:e}");
+        }
+    }
+}
+
+/// The teeth of one input angle, and what they carry.
+fn shared(loaded: &LoadedDrive<'_>, sample: u64) -> (Vec<ToothState>, WindUp, Vec<f64>) {
+    let samples = Samples::new(7).unwrap();
+    let placed = loaded.mesh().placed_at(sample, samples);
+    let teeth: Vec<_> = placed.map(|placed| loaded.tooth(placed.position).unwrap()).collect();
+    let wind_up = loaded.wind_up(&teeth).unwrap();
+    let forces = teeth.iter().map(|tooth| loaded.forces_n(tooth, &wind_up).unwrap().wave_generator).collect();
+    (teeth, wind_up, forces)
+}
+
+/// Arms and their decline by differences of the path of centres, the rotation by halving.
+#[test]
+fn loads_are_those_at_which_the_moved_arms_make_the_torque() {
+    let fixed = ContactLaw::Fixed(PerContact { wave_generator: 4e5, ring: 3e5, carrier: 5e5 });
+    let gaps = [PerContact::default(), PerContact { ring: 10.0, ..PerContact::default() }, everywhere(4.0)];
+    for (parameters, torque_nm) in
+        [(PAPER_5_1, 20.0), (PAPER_5_2, 3.0), (PAPER_5_2_BORED, 1e-4), (ECCENTRIC, 5.0), (THREE_LOBES, 30.0)]
+    {
+        let drive = drive(&parameters);
+        for law in [JOHNSON, ContactLaw::Palmgren, fixed] {
+            for clearance_um in gaps {
+                let case = LoadCase::new(&LoadParameters { law, clearance_um, ..moving(torque_nm) }).unwrap();
+                let loaded = LoadedDrive::new(&drive, &case).unwrap();
+                let (teeth, wind_up, forces) = shared(&loaded, 3);
+                let turned = |tooth: &ToothState, turned_rad: f64| {
+                    let psi = tooth.center.position.from_lobe_rad;
+                    let cos = 1.0 / tooth.center.tan_pressure_angle.hypot(1.0);
+                    let decline = (slope_mm(&drive, psi + 1e-5) - slope_mm(&drive, psi - 1e-5)) / 2e-5;
+                    let way_mm = cos * (slope_mm(&drive, psi) * turned_rad - 0.5 * decline * turned_rad * turned_rad);
+                    let gap_mm: f64 =
+                        tooth.force_ratio.iter().map(|(at, ratio)| 1e-3 * ratio * clearance_um.get(at)).sum();
+                    let pressed_mm = way_mm - gap_mm;
+                    let force_n =
+                        if pressed_mm > 0.0 { tooth.spring.approach.force(pressed_mm).unwrap().force_n } else { 0.0 };
+                    (force_n, cos * (slope_mm(&drive, psi) - decline * turned_rad))
+                };
+                let torque_nmm = |turned_rad: f64| -> f64 {
+                    let of_each = teeth.iter().map(|tooth| turned(tooth, turned_rad));
+                    f64::from(drive.lobes()) * of_each.map(|(force_n, arm_mm)| force_n * arm_mm).sum::<f64>()
+                };
+                let (mut low, mut high) = (0.0, 0.05);
+                for _ in 0..200 {
+                    let middle = 0.5 * (low + high);
+                    if torque_nmm(middle) < 1e3 * torque_nm { low = middle } else { high = middle }
+                }
+                let peak_n = forces.iter().copied().fold(0.0, f64::max);
+                let name = format!("{parameters:?} {law:?} {clearance_um:?}");
+                assert!(
+                    (wind_up.rotation_rad() / high - 1.0).abs() < 1e-8,
+                    "{name}: {} {high}",
+                    wind_up.rotation_rad()
+                );
+                for (tooth, force_n) in teeth.iter().zip(&forces) {
+                    let expected_n = turned(tooth, high).0;
+                    // A light load across wide gaps has lost some digits to the differences.
+                    assert!((force_n - expected_n).abs() < 1e-4 * peak_n, "{name}: {force_n} N, {expected_n} N");
+                }
+                // The torque's derivative is the stiffness.
+                let rise = torque_nmm(high * (1.0 + 1e-5)) - torque_nmm(high * (1.0 - 1e-5));
+                let stiffness = rise / (2e-5 * high);
+                if torque_nm > 1.0 {
+                    assert!((wind_up.stiffness_nmm_per_rad / stiffness - 1.0).abs() < 1e-3, "{name}: {stiffness}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_light_load_without_gaps_moves_nothing() {
+    for parameters in [PAPER_5_1, PAPER_5_2, ECCENTRIC, THREE_LOBES] {
+        let still = swept(&parameters, &LoadParameters { wave_generator_moves: false, ..moving(1e-10) }, 12);
+        let moved = swept(&parameters, &moving(1e-10), 12);
+        let peak_n = still.peaks.wave_generator.force_n.value;
+        for (one, other) in still.states.force_n.wave_generator.iter().zip(&moved.states.force_n.wave_generator) {
+            assert!((one - other).abs() < 1e-9 * peak_n, "{one} {other}");
+        }
+        assert!(moved.torque_balance_residual < 1e-13, "{:e}", moved.torque_balance_residual);
+    }
+}
+
+/// A tooth that the wave generator has moved past is pushed on by what is left of its way, the other way round, until that is nothing: no load jumps.
+#[test]
+fn a_tooth_that_has_been_passed_is_let_go_little_by_little() {
+    let drive = drive(&PAPER_5_1);
+    let case = LoadCase::new(&moving(20.0)).unwrap();
+    let loaded = LoadedDrive::new(&drive, &case).unwrap();
+    let (_, wind_up, forces) = shared(&loaded, 3);
+    let turned_rad = wind_up.rotation_rad();
+    let peak_n = forces.iter().copied().fold(0.0, f64::max);
+    let at = |share: f64| {
+        let tooth = loaded.tooth(Position::from_lobe(share * turned_rad, 2)).unwrap();
+        (
+            loaded.forces_n(&tooth, &wind_up).unwrap().wave_generator,
+            tooth.spring.turned_static_arm_mm(&wind_up.rotation),
+        )
+    };
+    let (before, on_lobe, passed, left) = (at(1.5), at(1.0), at(0.75), at(0.45));
+    assert!(before.0 > on_lobe.0 && on_lobe.0 > passed.0 && passed.0 > 0.0 && left.0 == 0.0);
+    assert!(before.1 > 0.0 && on_lobe.1.abs() < 1e-3 * before.1 && passed.1 < 0.0);
+    assert!(on_lobe.0 < 0.01 * peak_n, "{} of {peak_n}", on_lobe.0);
+}
+
+/// In the valley a tooth has no arm, but the wave generator that moves on lifts it there too: by half its curvature times the square of what it turns.
+#[test]
+fn a_tooth_in_the_valley_closes_its_gap_when_the_wave_generator_has_moved_on() {
+    for (parameters, lobes) in [(PAPER_5_1, 2), (ECCENTRIC, 1), (THREE_LOBES, 3)] {
+        let drive = drive(&parameters);
+        let clearance_um = PerContact { ring: 10.0, ..PerContact::default() };
+        let case = LoadCase::new(&LoadParameters { clearance_um, ..moving(20.0) }).unwrap();
+        let loaded = LoadedDrive::new(&drive, &case).unwrap();
+        let tooth = loaded.tooth(Position::valley(lobes)).unwrap();
+        let lifted_mm = |turned_rad: f64| {
+            let valley_rad = std::f64::consts::PI / f64::from(lobes);
+            at(&drive, valley_rad - turned_rad).center_radius_mm - tooth.center.center_radius_mm
+        };
+        let closing_rad = tooth.spring.closing_rad;
+        assert!((lifted_mm(closing_rad) / 0.01 - 1.0).abs() < 0.02, "{closing_rad}: {}", lifted_mm(closing_rad));
+        let further = Rotation { closing_rad, excess_rad: 0.5 * closing_rad };
+        assert!(tooth.spring.force_n(&further).unwrap() > 0.0);
+        assert!(tooth.spring.turned_static_arm_mm(&further) > 0.0);
+        // Beside one that has an arm it carries its part.
+        let lifted = loaded.tooth(Position::from_lobe(1.0 / f64::from(lobes), lobes)).unwrap();
+        let both = [lifted, tooth];
+        let springs = Springs::new(&both, f64::from(lobes));
+        let torque_nmm = springs.torque_nmm(&further).unwrap().value;
+        let found = springs.wind_up(torque_nmm).unwrap().unwrap();
+        assert!((found.rotation.rad() / further.rad() - 1.0).abs() < 1e-12);
+    }
+}
+
+/// The gap of its slot vanishes with its arm: under a light load the wave generator that moves on presses that tooth alone. A search for its rotation once had no end.
+#[test]
+fn a_tooth_in_the_valley_carries_a_light_load_alone_where_only_slots_have_gaps() {
+    let drive = drive(&PAPER_5_1);
+    let clearance_um = PerContact { carrier: 1000.0, ..PerContact::default() };
+    let case = LoadCase::new(&LoadParameters { clearance_um, ..moving(1e-9) }).unwrap();
+    let loaded = LoadedDrive::new(&drive, &case).unwrap();
+    let (_, wind_up, forces) = shared(&loaded, 0);
+    assert_eq!(wind_up.rotation.closing_rad, 0.0);
+    assert_eq!(forces.iter().filter(|&&force_n| force_n > 0.0).count(), 1);
+    assert!(*forces.last().unwrap() > 0.0);
+    let sweep = sweep::sweep(&drive, &case, Points::samples(7).unwrap(), &Never).unwrap();
+    assert!(sweep.torque_balance_residual < 1e-12, "{:e}", sweep.torque_balance_residual);
+}
+
+#[test]
+fn gaps_wider_than_the_wave_generator_lifts_teeth_are_never_closed_and_that_is_said() {
+    let drive = drive(&PAPER_5_2);
+    let allowable_stress_mpa = Some(everywhere(1500.0));
+    for clearance_um in [everywhere(0.0), PerContact { ring: 1000.0, ..PerContact::default() }] {
+        for torque_nm in [3.0, 1e5] {
+            if clearance_um.ring == 0.0 && torque_nm < 10.0 {
+                continue;
+            }
+            let law = ContactLaw::Palmgren;
+            let case = LoadCase::new(&LoadParameters { law, clearance_um, allowable_stress_mpa, ..moving(torque_nm) })
+                .unwrap();
+            let found = sweep::sweep(&drive, &case, Points::samples(4).unwrap(), &Never);
+            assert_eq!(found.map(|sweep| sweep.peaks), Err(SolveError::TurnedPastTeeth), "{torque_nm} N·m");
+        }
+    }
+}
+
+#[test]
+fn under_the_torque_capacity_the_largest_stress_is_the_allowable_one() {
+    for parameters in [PAPER_5_1, PAPER_5_2, ECCENTRIC] {
+        for ring_um in [0.0, 10.0] {
+            let clearance_um = PerContact { ring: ring_um, ..PerContact::default() };
+            let allowable_stress_mpa = Some(everywhere(1200.0));
+            let asked = LoadParameters { clearance_um, allowable_stress_mpa, ..moving(3.0) };
+            let capacity = swept(&parameters, &asked, 24).torque_capacity.unwrap();
+            let torque = Torque::Input(capacity.input_torque_nm);
+            let loaded = swept(&parameters, &LoadParameters { torque, ..asked }, 24);
+            let largest_mpa = loaded.peaks.iter().map(|(_, peaks)| peaks.stress_mpa.value).fold(0.0, f64::max);
+            assert!((largest_mpa / 1200.0 - 1.0).abs() < 1e-10, "{parameters:?} {ring_um}: {largest_mpa}");
+        }
+    }
+}
+
+#[test]
+fn a_sweep_to_a_tolerance_finds_what_no_dense_one_exceeds() {
+    for (parameters, torque_nm) in [(PAPER_5_1, 20.0), (PAPER_5_2, 3.0), (THREE_LOBES, 30.0)] {
+        for ring_um in [0.0, 10.0] {
+            let clearance_um = PerContact { ring: ring_um, ..PerContact::default() };
+            let case = LoadCase::new(&LoadParameters { clearance_um, ..moving(torque_nm) }).unwrap();
+            let drive = drive(&parameters);
+            let of = |points| sweep::sweep(&drive, &case, points, &Never).unwrap();
+            let dense = of(Points::samples(2000).unwrap());
+            let found = of(Points::tolerance(1e-6, 1_000_000).unwrap());
+            assert!(found.torque_balance_residual < 1e-12);
+            for ((contact, dense), (_, found)) in dense.peaks.iter().zip(found.peaks.iter()) {
+                assert!(dense.force_n.value < found.force_n.value * (1.0 + 1e-6), "{contact:?} of {parameters:?}");
+                assert!(
+                    dense.stress_mpa.value < found.stress_mpa.value * (1.0 + 1e-6),
+                    "{contact:?} of {parameters:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn projection_takes_no_wave_generator_that_moves() {
+    let refused = LoadCase::new(&LoadParameters { wave_generator_moves: true, ..load(3.0, Projection) });
+    assert_eq!(refused, Err(vec![Violation::NeedsVirtualWork { parameter: Parameter::WaveGeneratorMoves }]));
+}
