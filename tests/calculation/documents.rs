@@ -232,12 +232,23 @@ fn what_is_left_out_has_the_key_of_its_default() {
     long["drive"]["teeth"]["installed"] = json!(28.0);
     long["drive"]["ring"]["tip_radius_mm"] = json!(null);
     long["materials"] = json!({ "teeth": { "poissons_ratio": 0.3 } });
-    long["model"] = json!({ "compatibility": "virtual_work", "stiffness": { "law": "johnson", "depth_mm": {} } });
+    long["model"] = json!({ "compatibility": "virtual_work" });
     long["sweep"] = json!({ "samples": 50, "wind_up": false });
     long["modification"] = json!({ "slot_wall_um": 0.0, "tooth_radius_um": -0.0 });
     long["parts"] = json!({ "ring": { "clearance_um": -0.0 } });
     long["assembly"] = json!({ "input_angle_deg": -0.0 });
     assert_eq!(keys(&read(&short).unwrap()), keys(&read(&long).unwrap()));
+    // A law that is named is that law and no more; left out, it is what holds best for the drive.
+    let mut named = short.clone();
+    named["model"] = json!({ "stiffness": { "law": "johnson" } });
+    long["model"] = json!({
+        "compatibility": "virtual_work",
+        "stiffness": { "law": "johnson", "depth_mm": {} },
+        "ring_teeth_bend": false,
+        "wave_generator_moves": false
+    });
+    assert_eq!(keys(&read(&named).unwrap()), keys(&read(&long).unwrap()));
+    assert_ne!(keys(&read(&named).unwrap()), keys(&read(&short).unwrap()));
 }
 
 #[test]
