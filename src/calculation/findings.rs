@@ -366,7 +366,7 @@ impl FindingAnswer {
                 if is_moving {
                     "lower the torque, choose stiffer contacts, or close the clearances"
                 } else {
-                    "lower the torque, choose stiffer contacts, close the clearances, or let the wave generator move (`model.wave_generator_moves`)"
+                    "lower the torque, close the clearances, or let the wave generator move"
                 },
             ),
             Finding::ToothLeavesSlot { edge, center_radius_mm, wall_end_mm, is_loaded } => new(
