@@ -1,17 +1,17 @@
 //! Where solves run: permits, a bounded queue, the deadline, cancellation; nothing else leaves the async executor.
 
-use std::io;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use metrics::{counter, histogram};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tracing::Span;
 
+use crate::beside::beside;
 use crate::config::Limits;
 use crate::problem::{Problem, ProblemCode};
 
@@ -265,20 +265,6 @@ impl Pool {
         );
         Problem::new(ProblemCode::DeadlineExceeded, detail)
     }
-}
-
-/// Runs a job on a thread of its own, whatever it waits for: nothing else waits with it. Where nobody waits for it any more it goes on.
-///
-/// # Errors
-/// Where no thread can be had, or the job panicked.
-pub async fn beside<T: Send + 'static>(job: impl FnOnce() -> T + Send + 'static) -> io::Result<T> {
-    let (tell, told) = oneshot::channel();
-    let work = move || {
-        // Whoever asked may have left.
-        let _ = tell.send(job());
-    };
-    std::thread::Builder::new().name("beside".into()).spawn(work)?;
-    told.await.map_err(io::Error::other)
 }
 
 /// Makes a panic of a job the problem of those who asked for it.

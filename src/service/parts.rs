@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use bytes::Bytes;
 use toothwave_study::Study;
 
-use crate::compute;
+use crate::beside::beside;
 
 /// Where rows are kept.
 #[derive(Debug, Clone)]
@@ -42,7 +42,7 @@ impl Parts {
         // A study that was forgotten and asked for again may have other chunks, of which none may stand among these.
         let folder = self.folder.join(format!("{}-by-{}", study.id(), study.chunk_variants()));
         // A folder elsewhere may never answer.
-        compute::beside(move || write(&folder, chunk, &rows)).await?
+        beside(move || write(&folder, chunk, &rows)).await?
     }
 }
 
