@@ -38,6 +38,8 @@ pub(super) struct Teeth<'a> {
     pub(super) rows: usize,
     /// States, with those that fill the last stretch.
     pub(super) len: usize,
+    /// `d`.
+    pub(super) center_radius_mm: &'a [f64],
     /// `|h'|`.
     pub(super) arm: &'a [f64],
     /// `F_K/F_H`.
@@ -83,7 +85,7 @@ pub(super) struct Work<'a> {
     /// `B` of Johnson's law.
     growth: &'a mut [f64],
     /// Rotation at which the gaps of a tooth are closed.
-    closing: &'a mut [f64],
+    pub(super) closing: &'a mut [f64],
     /// Rotation beyond that; nothing or less where a gap is open.
     pressed: &'a mut [f64],
     /// `dF_H/dΔφ` of the tangent.
@@ -145,6 +147,12 @@ impl<'a> Work<'a> {
         self.closing[row * count..(row + 1) * count].iter().map(move |closing| excess + (last - closing))
     }
 
+    /// Room for what the loads of a tile make of its torques, once nothing is searched for any more.
+    #[inline(always)]
+    pub(super) fn torques(&mut self, len: usize) -> [&mut [f64]; 3] {
+        [&mut self.slope[..len], &mut self.offset[..len], &mut self.secant[..len]]
+    }
+
     /// What the last search for a limit found, by input angle: the torque of one zone.
     pub(super) const fn limits_nmm(&self) -> &[f64] {
         self.row_limit
@@ -154,15 +162,15 @@ impl<'a> Work<'a> {
 /// What an approach at each contact adds along `F_H` ([`Compatibility`]): 1 at the wave generator, `along_ring (F_K/F_H)^±1` at the ring,
 /// `carrier F_S/F_H` at the carrier.
 #[derive(Clone, Copy)]
-struct Weights {
-    ring_exponent: f64,
+pub(super) struct Weights {
+    pub(super) ring_exponent: f64,
     /// `along_ring = 1 - this (F_S/F_H)²`.
-    ring_decline: f64,
-    carrier: f64,
+    pub(super) ring_decline: f64,
+    pub(super) carrier: f64,
 }
 
 impl Weights {
-    fn new(loaded: &LoadedDrive<'_>) -> Self {
+    pub(super) fn new(loaded: &LoadedDrive<'_>) -> Self {
         match loaded.compatibility() {
             Compatibility::VirtualWork => Self { ring_exponent: 1.0, ring_decline: 0.0, carrier: 1.0 },
             // cos(γ + sβ) and s sin γ, with sin γ = F_S/F_H over Z_G/U.
@@ -172,32 +180,6 @@ impl Weights {
                 let ring_decline = (1.0 + s * drive.flank().teeth_per_wave()) / (ratio * ratio);
                 Self { ring_exponent: -1.0, ring_decline, carrier: s / ratio }
             }
-        }
-    }
-}
-
-/// Gaps that are the same at all teeth.
-#[derive(Clone, Copy)]
-struct Gaps {
-    gap_mm: PerContact<f64>,
-    weights: Weights,
-}
-
-impl Gaps {
-    /// `g/|h'|`, without end where there is no arm.
-    #[inline(always)]
-    fn close(&self, teeth: &Teeth<'_>, closing: &mut [f64]) {
-        let len = teeth.len;
-        let closing = &mut closing[..len];
-        let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
-        let Self { gap_mm, weights } = self;
-        for i in 0..len {
-            let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
-            let ring = if weights.ring_exponent > 0.0 { ring[i] } else { 1.0 / ring[i] };
-            let carrier = weights.carrier * carrier[i];
-            let gap = gap_mm.wave_generator + gap_mm.ring * (along * ring) + gap_mm.carrier * carrier;
-            let gap = if gap > 0.0 { gap } else { 0.0 };
-            closing[i] = if arm[i] > 0.0 { gap / arm[i] } else { f64::INFINITY };
         }
     }
 }
@@ -346,7 +328,7 @@ fn least_torque(
 /// `ξ = c F^p`.
 pub(super) struct PowerLaw<P> {
     power: P,
-    gaps: Option<Gaps>,
+    has_gaps: bool,
 }
 
 /// What a power law does to a column.
@@ -515,7 +497,7 @@ pub(super) struct LogarithmicLaw {
     /// Force under which half a contact's width is the length that its law counts from: over the square of the stress under 1 N at wave generator and
     /// ring, where the ratio of forces is to be counted in still; by itself at the carrier.
     reference: PerContact<f64>,
-    gaps: Option<Gaps>,
+    has_gaps: bool,
 }
 
 /// How unit loads become loads.
@@ -527,20 +509,18 @@ pub(super) enum Sharing {
 }
 
 impl Sharing {
-    /// Of a drive under a load; nothing where its law or its gaps are other ones.
+    /// Of a drive under a load; nothing where its law is another one.
     pub(super) fn new(loaded: &LoadedDrive<'_>) -> Option<Self> {
         let weights = Weights::new(loaded);
-        let gap_mm = *loaded.uniform_gap_mm()?;
-        let has_gaps = gap_mm.iter().any(|(_, &gap_mm)| gap_mm > 0.0);
-        let gaps = has_gaps.then_some(Gaps { gap_mm, weights });
+        let has_gaps = !loaded.gaps().is_nil();
         Some(match loaded.tooth_law()? {
             ToothLaw::Linear { compliance_mm_per_n } => {
-                Self::Linear(PowerLaw { power: Linear { compliance_mm_per_n, weights }, gaps })
+                Self::Linear(PowerLaw { power: Linear { compliance_mm_per_n, weights }, has_gaps })
             }
             ToothLaw::Palmgren { coefficient } => {
-                Self::Palmgren(PowerLaw { power: Palmgren { coefficient, weights }, gaps })
+                Self::Palmgren(PowerLaw { power: Palmgren { coefficient, weights }, has_gaps })
             }
-            ToothLaw::Hertz => Self::Hertz(PowerLaw { power: Hertz, gaps }),
+            ToothLaw::Hertz => Self::Hertz(PowerLaw { power: Hertz, has_gaps }),
             ToothLaw::Johnson { law, series_compliance_mm_per_n: series } => {
                 let tooth_radius_mm = loaded.drive().parameters().tooth_radius_mm;
                 let reference = |contact| {
@@ -559,13 +539,24 @@ impl Sharing {
                     compliance: PerContact::of(|contact| law.get(contact).compliance_mm_per_n + series.get(contact)),
                     growth: PerContact::of(|contact| law.get(contact).growth_mm_per_n),
                     reference: PerContact::of(reference),
-                    gaps,
+                    has_gaps,
                 })
             }
         })
     }
 
-    /// Forces that make a torque together, that of one zone; false where they are not found, or where the law ends.
+    /// What the places of a tile decide of the law, whatever the gaps.
+    #[inline(always)]
+    pub(super) fn prepare<V: Simd>(&self, torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) {
+        match self {
+            Self::Linear(law) => law.power.units::<V>(teeth, work.given, work.unit),
+            Self::Palmgren(law) => law.power.units::<V>(teeth, work.given, work.unit),
+            Self::Hertz(law) => law.power.units::<V>(teeth, work.given, work.unit),
+            Self::Logarithmic(law) => law.coefficients::<V>(torque_nmm, teeth, work),
+        }
+    }
+
+    /// Forces that make a torque together, that of one zone, beyond the gaps of which the closing angles stand in `work`; false where they are not found, or where the law ends.
     #[inline(always)]
     pub(super) fn share<V: Simd>(
         &self,
@@ -578,10 +569,8 @@ impl Sharing {
             Self::Linear(law) => law.share::<V>(torque_nmm, teeth, work, shared),
             Self::Palmgren(law) => law.share::<V>(torque_nmm, teeth, work, shared),
             Self::Hertz(law) => law.share::<V>(torque_nmm, teeth, work, shared),
-            Self::Logarithmic(law @ LogarithmicLaw { gaps: None, .. }) => {
-                law.share::<V, false>(torque_nmm, teeth, work, shared)
-            }
-            Self::Logarithmic(law) => law.share::<V, true>(torque_nmm, teeth, work, shared),
+            Self::Logarithmic(law) if law.has_gaps => LogarithmicLaw::share::<V, true>(torque_nmm, teeth, work, shared),
+            Self::Logarithmic(_) => LogarithmicLaw::share::<V, false>(torque_nmm, teeth, work, shared),
         }
     }
 }
@@ -590,10 +579,10 @@ impl Sharing {
     /// Whether teeth begin and cease to carry between their entry and their exit.
     pub(super) const fn has_gaps(&self) -> bool {
         match self {
-            Self::Linear(law) => law.gaps.is_some(),
-            Self::Palmgren(law) => law.gaps.is_some(),
-            Self::Hertz(law) => law.gaps.is_some(),
-            Self::Logarithmic(law) => law.gaps.is_some(),
+            Self::Linear(law) => law.has_gaps,
+            Self::Palmgren(law) => law.has_gaps,
+            Self::Hertz(law) => law.has_gaps,
+            Self::Logarithmic(law) => law.has_gaps,
         }
     }
 
@@ -654,20 +643,13 @@ impl<P: Power> PowerLaw<P> {
 
     #[inline(always)]
     fn share<V: Simd>(&self, torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
-        self.power.units::<V>(teeth, work.given, work.unit);
-        match &self.gaps {
-            None => {
-                self.share_in_proportion::<V>(torque_nmm, teeth, work, shared);
-                true
-            }
-            Some(gaps) => {
-                gaps.close(teeth, work.closing);
-                if P::IS_LINEAR {
-                    share_linearly(torque_nmm, teeth, work, shared)
-                } else {
-                    self.share_beyond_gaps::<V>(torque_nmm, teeth, work, shared)
-                }
-            }
+        if !self.has_gaps {
+            self.share_in_proportion::<V>(torque_nmm, teeth, work, shared);
+            true
+        } else if P::IS_LINEAR {
+            share_linearly(torque_nmm, teeth, work, shared)
+        } else {
+            self.share_beyond_gaps::<V>(torque_nmm, teeth, work, shared)
         }
     }
 
@@ -829,10 +811,12 @@ fn least_margin() -> f64 {
 }
 
 impl LogarithmicLaw {
-    /// `A`, `B` and the reach of each tooth, forces counted in `typical_n`.
+    /// `A`, `B` and the reach of each tooth, forces counted in one near to them all, so that no logarithm is large.
     #[inline(always)]
-    fn coefficients<V: Simd>(&self, typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) {
+    fn coefficients<V: Simd>(&self, torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) {
         let len = teeth.len;
+        let typical_n = torque_nmm / teeth.arm[..teeth.count].iter().sum::<f64>();
+        work.typical_n = typical_n;
         let (ring, carrier) = (&teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
         let (cam_stress, ring_stress) = (&teeth.cam_stress[..len], &teeth.ring_stress[..len]);
         let given = &work.given[..len];
@@ -912,7 +896,7 @@ impl LogarithmicLaw {
     fn limit<V: Simd>(&self, per_allowable: &PerContact<f64>, teeth: &Teeth<'_>, work: &mut Work<'_>) -> Option<Limit> {
         let len = teeth.len;
         let typical_n = work.typical_n;
-        if self.gaps.is_none() {
+        if !self.has_gaps {
             work.closing[..len].fill(0.0);
         }
         // Lent out: a tile that ends here goes the plain way, and takes the sweep with it.
@@ -954,21 +938,13 @@ impl LogarithmicLaw {
     /// tangents make the torque. A round costs one logarithm a state.
     #[inline(always)]
     fn share<V: Simd, const GAPS: bool>(
-        &self,
         torque_nmm: f64,
         teeth: &Teeth<'_>,
         work: &mut Work<'_>,
         shared: &mut Shared<'_>,
     ) -> bool {
-        let count = teeth.count;
-        // Forces are counted in one near to them all, so that no logarithm is large.
-        let typical_n = torque_nmm / teeth.arm[..count].iter().sum::<f64>();
-        work.typical_n = typical_n;
+        let (count, typical_n) = (teeth.count, work.typical_n);
         let torque = torque_nmm / typical_n;
-        self.coefficients::<V>(typical_n, teeth, work);
-        if let Some(gaps) = &self.gaps {
-            gaps.close(teeth, work.closing);
-        }
         if !Self::start::<GAPS>(torque, teeth, work, shared.force) {
             return false;
         }
