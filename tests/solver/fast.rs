@@ -513,6 +513,29 @@ fn balls_take_the_fast_path_on_undercut_flanks_too_and_on_any_wave_generator() {
 }
 
 #[test]
+fn palmgrens_law_takes_the_fast_path_before_what_gives_way_behind_it_too() {
+    let parts = PerContact { wave_generator: 1e-6, ring: 0.0, carrier: 3e-6 };
+    for series_compliance_mm_per_n in [parts, everywhere(1e-9), everywhere(1e-3)] {
+        for (gap_um, torque_nm) in [(0.0, 20.0), (3.0, 20.0), (3.0, 1e-3)] {
+            for allowable_stress_mpa in [None, Some(everywhere(900.0))] {
+                let load = LoadParameters {
+                    law: ContactLaw::Palmgren,
+                    clearance_um: everywhere(gap_um),
+                    series_compliance_mm_per_n,
+                    allowable_stress_mpa,
+                    ..load(torque_nm, Compatibility::VirtualWork)
+                };
+                assert_both_paths_agree(&PAPER_5_1, &load, 50);
+                let case = LoadCase::new(&load).unwrap();
+                let plain = sweep_plain(&drive(&PAPER_5_1), &case, Points::samples(50).unwrap(), &Never).unwrap();
+                let fast = swept(&PAPER_5_1, &load, 50);
+                assert_ne!(fast.states.stress_mpa, plain.states.stress_mpa, "{load:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn balls_and_flat_sided_teeth_take_the_fast_path() {
     let groove_radius_mm = PerContact { wave_generator: Some(5.3), ring: Some(5.2), carrier: None };
     let ball = ToothShape::Ball { groove_radius_mm };
@@ -521,6 +544,7 @@ fn balls_and_flat_sided_teeth_take_the_fast_path() {
     for (tooth, law) in [
         (ball, ContactLaw::Hertz),
         (flat(4.0), ContactLaw::Linear),
+        (flat(4.0), ContactLaw::Palmgren),
         (flat(4.0), JOHNSON),
         (flat(4.0), fixed),
         // The carrier ends before the flat does.
