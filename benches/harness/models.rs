@@ -127,6 +127,7 @@ fn rows() -> Vec<Row> {
         row("balls", Columns, balls, hertz, "40"),
         row("balls, gaps", Columns, balls, with_gaps(hertz), ""),
         row("flat-sided teeth, `linear`", Columns, flats, by_work, ""),
+        row("flat-sided teeth, `palmgren`", Columns, flats, palmgren, ""),
         row("flat-sided teeth, `johnson`", Columns, flats, johnson, ""),
         row("`linear`, tip relief", Columns, drive, relieved(by_work), "25"),
         row("`johnson`, tip relief", Columns, drive, relieved(johnson), "70"),

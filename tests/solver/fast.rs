@@ -808,6 +808,46 @@ fn the_fast_path_is_taken_where_single_items_deviate_wherever_the_laps_of_a_swee
 }
 
 #[test]
+fn where_single_items_deviate_and_where_zones_are_unlike_a_tolerance_is_kept_by_either_way_of_looking() {
+    // Where they look differs in the last digits, but for the first sixteen intervals.
+    let mut looked_elsewhere = [0, 0];
+    for (parameters, seed) in drives_that_may_deviate().into_iter().zip(1..) {
+        let drive = drive(&parameters);
+        for (law, torque_nm) in [(ContactLaw::Palmgren, 20.0), (JOHNSON, 3.0)] {
+            let load = LoadParameters {
+                law,
+                clearance_um: everywhere(9.0),
+                allowable_stress_mpa: Some(everywhere(1500.0)),
+                ..load(torque_nm, Compatibility::VirtualWork)
+            };
+            let (case, points) = (LoadCase::new(&load).unwrap(), Points::tolerance(1e-6, 10_000_000).unwrap());
+            let lists = [true, false, true, false, false, true];
+            let deviating = Deviating { size: 2.0, lists, runouts: [false, false, true], seed }.of(&parameters);
+            for deviations in [Deviations::default(), deviating] {
+                let fast = sweep_with_deviations(&drive, &case, &deviations, points, &Never).unwrap();
+                let plain = sweep_plain_with_deviations(&drive, &case, &deviations, points, &Never).unwrap();
+                let is_elsewhere = fast.states.input_angle_deg != plain.states.input_angle_deg;
+                looked_elsewhere[usize::from(!deviations.is_nil())] += u32::from(is_elsewhere);
+                let [fast, plain] = [SweepPeaks::from(&fast), SweepPeaks::from(&plain)];
+                let assert_near = |what: &str, found: f64, expected: f64| {
+                    assert!((found / expected - 1.0).abs() < 2e-6, "{what}: {found} {expected} {parameters:?} {law:?}");
+                };
+                for (contact, found) in fast.contacts.iter() {
+                    let expected = plain.contacts.get(contact);
+                    assert_near("force", found.force_n.value, expected.force_n.value);
+                    assert_near("stress", found.stress_mpa.value, expected.stress_mpa.value);
+                }
+                assert_near("least wind-up", fast.wind_up_deg.least, plain.wind_up_deg.least);
+                assert_near("largest wind-up", fast.wind_up_deg.largest, plain.wind_up_deg.largest);
+                let capacity = |peaks: &SweepPeaks| peaks.torque_capacity.unwrap().input_torque_nm;
+                assert_near("capacity", capacity(&fast), capacity(&plain));
+            }
+        }
+    }
+    assert!(looked_elsewhere.into_iter().all(|cases| cases > 2), "{looked_elsewhere:?} of 10 each");
+}
+
+#[test]
 fn the_fast_path_is_taken_by_parts_made_otherwise_than_conjugate_and_by_unlike_zones() {
     let relief = TipRelief { amount_um: 5.0, start_deg: 20.0, power: 2.0 };
     for (parameters, law) in drives_that_may_deviate()

@@ -28,7 +28,7 @@ pub(super) struct FastLook<'a> {
     rows: usize,
     tile: Tile<'a>,
     balance: TorqueBalance,
-    /// Where the teeth of each piece stand that was looked at.
+    /// Where the teeth of each piece of a lap stand that was looked at.
     bases: Vec<Bases>,
     pub(super) torque_balance_residual: f64,
     pub(super) capacity: Option<TorqueCapacity>,
@@ -204,8 +204,10 @@ impl Look for FastLook<'_> {
     }
 
     fn look(&mut self, fractions: &[f64], seen: &mut Seen) -> Result<bool, SolveError> {
-        let bases = self.bases.iter().position(|bases| bases.piece == seen.piece).unwrap_or_else(|| {
-            self.bases.push(Bases::new(&self.mesh, self.layout, seen.piece));
+        // Teeth stand alike in every lap.
+        let piece = Piece { lap: 0, ..seen.piece };
+        let bases = self.bases.iter().position(|bases| bases.piece == piece).unwrap_or_else(|| {
+            self.bases.push(Bases::new(&self.mesh, self.layout, piece));
             self.bases.len() - 1
         });
         if self.kernel.tells_items_apart() {
