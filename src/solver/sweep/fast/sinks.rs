@@ -202,7 +202,7 @@ impl RunningPeak {
     #[inline(always)]
     fn see(&mut self, of_tile: &[f64], start: usize) {
         let value = largest(of_tile);
-        if value > self.value || value == self.value && start < self.start {
+        if value.total_cmp(&self.value).then(self.start.cmp(&start)).is_gt() {
             *self = Self { value, start };
         }
     }
