@@ -18,7 +18,7 @@ use toothwave_solver::{
     Parameter, PerContact, Position, SolveError, ToothShape, Violation, findings,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, drive, everywhere, load, swept};
+use crate::drives::{PAPER_5_1, PAPER_5_2, cases, drive, everywhere, load, swept};
 
 const R_DEEP: ContactLaw =
     ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
@@ -715,7 +715,7 @@ fn balls_take_hertz_or_fixed_and_no_other_tooth_takes_hertz() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 512, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(512))]
 
     #[test]
     fn a_stress_is_that_of_its_force_for_every_ellipse(one in -6.0_f64..3.0, other in -6.0_f64..3.0, power in -6.0_f64..6.0) {

@@ -14,7 +14,7 @@ use toothwave_solver::{
     Position, SolveError, ToothShape, Torque, Violation,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, ellipse, everywhere, load, swept};
+use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, cases, drive, ellipse, everywhere, load, swept};
 
 const STIFFNESS: PerContact<f64> = PerContact { wave_generator: 4.1e5, ring: 6.3e5, carrier: 2.2e5 };
 
@@ -235,7 +235,7 @@ prop_compose! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 4096, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(4096))]
 
     #[test]
     fn an_approach_is_undone_by_its_inverse(approach in any_approach(), power in -30.0_f64..18.0) {

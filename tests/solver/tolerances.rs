@@ -10,8 +10,8 @@ use toothwave_solver::{
 };
 
 use crate::drives::{
-    PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, any_swept_drive, drive, ellipse, everywhere, load, semi_axes_mm,
-    swept,
+    PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, any_swept_drive, cases, drive, ellipse, everywhere, load,
+    semi_axes_mm, swept,
 };
 
 /// More than any of these sweeps takes.
@@ -88,7 +88,7 @@ fn a_bore_that_ends_the_flank_whole_spacings_from_the_major_axis_is_swept_alike_
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(300))]
 
     #[test]
     fn bores_a_few_roundings_around_whole_spacings_are_swept_alike(parameters in any_drive(), share in 0.0_f64..1.0) {
@@ -260,7 +260,7 @@ fn a_finer_tolerance_moves_nothing_by_more_than_the_coarser_one_allows_at_corner
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(200))]
 
     #[test]
     fn a_tolerance_holds_on_any_drive_with_any_gap(
