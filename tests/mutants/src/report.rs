@@ -47,27 +47,37 @@ impl Counts {
         } += 1;
     }
 
-    /// The share caught of those tried that compile, at least, as some may be open; with what a sample leaves uncertain: Wilson's interval
-    /// of 95 %.
-    pub fn share(&self) -> String {
-        let caught = (self.caught + self.timeout) as f64;
-        let tried = caught + (self.missed + self.unreached + self.open) as f64;
-        if tried == 0.0 {
-            return format!("none tried of {}", self.not_tried);
+    /// Mutants caught and tried, of those that compile and are built in; those that stand open count as not caught.
+    fn caught_and_tried(&self) -> (usize, usize) {
+        let caught = self.caught + self.timeout;
+        (caught, caught + self.missed + self.unreached + self.open)
+    }
+
+    /// Wilson's interval of 95 % for the share caught, which a random sample leaves.
+    fn interval(&self) -> (f64, f64) {
+        let (caught, tried) = self.caught_and_tried();
+        if tried == 0 {
+            return (0.0, 1.0);
         }
-        let (share, z) = (caught / tried, 1.96);
+        let (tried, z) = (tried as f64, 1.96);
+        let share = caught as f64 / tried;
         let middle = (share + z * z / (2.0 * tried)) / (1.0 + z * z / tried);
         let half = z / (1.0 + z * z / tried) * (share * (1.0 - share) / tried + z * z / (4.0 * tried * tried)).sqrt();
-        let interval = if self.not_tried == 0 {
+        (middle - half, middle + half)
+    }
+
+    pub fn share(&self) -> String {
+        let (caught, tried) = self.caught_and_tried();
+        let percent = 100.0 * caught as f64 / tried as f64;
+        let interval = if self.not_tried == 0 || tried == 0 {
             String::new()
         } else {
-            format!(" ({:.1} to {:.1} %)", 100.0 * (middle - half), 100.0 * (middle + half))
+            let (least, most) = self.interval();
+            format!(", {:.1} to {:.1} % of all", 100.0 * least, 100.0 * most)
         };
         format!(
-            "caught: {caught} of {tried}, {:.1} %{interval}; {} open, {} not tried",
-            100.0 * share,
-            self.open,
-            self.not_tried
+            "caught: {caught} of {tried}, {percent:.1} %{interval}; {} open, {} not tried",
+            self.open, self.not_tried
         )
     }
 }
@@ -104,9 +114,10 @@ impl Report {
         self.silent().filter(|name| !known.contains(&without_line(name))).collect()
     }
 
-    /// Whether all mutants were tried: only then is one that it does not name news.
-    pub fn is_whole(&self) -> bool {
-        self.all.not_tried + self.all.open == 0
+    /// Whether surely fewer are caught than another report says.
+    pub fn is_below(&self, known: &Self) -> bool {
+        let (caught, tried) = known.all.caught_and_tried();
+        self.all.interval().1 < caught as f64 / tried as f64
     }
 
     fn silent(&self) -> impl Iterator<Item = &str> {
