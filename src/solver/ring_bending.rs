@@ -319,7 +319,7 @@ mod tests {
         let x: [f64; KNOTS] = std::array::from_fn(|knot| (1.0 + knot as f64).ln() + 0.1 * (knot % 3) as f64);
         let y: [f64; KNOTS] = std::array::from_fn(|knot| (2.5 * knot as f64).sin());
         let bends = spline_bends(&x, &y);
-        assert_eq!([bends[0], bends[KNOTS - 1]], [0.0, 0.0]);
+        assert!(bends[0].abs() <= 0.0 && bends[KNOTS - 1].abs() <= 0.0);
         for i in 1..KNOTS - 1 {
             let slope =
                 |to: usize| (y[to] - y[i]) / (x[to] - x[i]) - (x[to] - x[i]) * (2.0 * bends[i] + bends[to]) / 6.0;

@@ -298,6 +298,7 @@ fn johnsons_law_ends_where_a_contact_is_half_as_wide_as_the_tooth_and_says_at_wh
     let heavy = LoadCase::new(&johnson(1e6)).unwrap();
     let drive = drive(&PAPER_5_1);
     let refused = sweep::sweep(&drive, &heavy, Points::samples(4).unwrap(), &Never).unwrap_err();
+    assert!(refused.to_string().starts_with("half the contact's width at the ring reaches 2.5 mm"), "{refused}");
     let SolveError::JohnsonBeyondHalfWidth { contact, half_width_limit_mm, input_torque_limit_nm, .. } = refused else {
         panic!("{refused:?}")
     };

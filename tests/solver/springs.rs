@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
-use toothwave_solver::approach::Approach;
+use toothwave_solver::approach::{Approach, Logarithmic};
 use toothwave_solver::load_sharing::LoadedDrive;
 use toothwave_solver::springs::{Spring, Springs};
 use toothwave_solver::sweep::{self, Points};
@@ -231,6 +231,26 @@ prop_compose! {
     fn any_spring()(approach in any_approach(), arm in -6.0_f64..2.0, ratio in 0.7_f64..1.4, closing in prop::option::of(-9.0_f64..1.0)) -> Spring {
         let travel_arm_mm = 10.0_f64.powf(arm);
         Spring { travel_arm_mm, static_arm_mm: ratio * travel_arm_mm, arm_decline_mm_per_rad: 0.0, closing_rad: closing.map_or(0.0, |power| 10.0_f64.powf(power)), approach }
+    }
+}
+
+#[test]
+fn a_logarithmic_approach_is_undone_by_its_inverse_and_goes_on_along_its_tangent_beyond_its_limit() {
+    for (compliance, growth, reference_n) in
+        [(3e-6, 1e-6, 1e4), (0.0, 2e-6, 50.0), (1e-4, 1e-8, 1e9), (-1e-7, 1e-6, 1.0)]
+    {
+        let law = Approach::Logarithmic(Logarithmic::new(compliance, growth, reference_n));
+        let limit_n = Logarithmic::LIMIT * reference_n;
+        let formula = |force_n: f64| force_n * (compliance + growth * (reference_n / force_n).ln());
+        for share in [1e-9, 1e-3, 0.2, 0.9, 1.0 - 1e-9, 1.0 + 1e-9, 1.5, 7.0, 1e6] {
+            let force_n = share * limit_n;
+            let slope = compliance + growth * ((reference_n / limit_n).ln() - 1.0);
+            let expected = if share <= 1.0 { formula(force_n) } else { formula(limit_n) + (force_n - limit_n) * slope };
+            let approach_mm = law.approach_mm(force_n);
+            assert!((approach_mm / expected - 1.0).abs() < 1e-13, "{approach_mm:e} is not {expected:e} at {share}");
+            let found_n = law.force(approach_mm).unwrap().force_n;
+            assert!((found_n / force_n - 1.0).abs() < 1e-12, "{found_n:e} is not {force_n:e} at {share}");
+        }
     }
 }
 

@@ -189,7 +189,7 @@ impl Tree {
                 errors.push(message["message"].take());
             } else if message["manifest_path"]
                 .as_str()
-                .is_some_and(|path| Path::new(path).starts_with(&self.copy.join("src/solver")))
+                .is_some_and(|path| Path::new(path).starts_with(self.copy.join("src/solver")))
             {
                 program = message["executable"].as_str().map(PathBuf::from).or(program);
             }

@@ -1,4 +1,4 @@
-//! Tries the mutants that cargo-mutants lists, all built into one test program.
+//! Tries the mutants that cargo-mutants lists, a batch of them by chance built into one test program.
 //!
 //!     schemata LIST ROOT COPY TARGET RESULTS [--seconds N] [--again] [--known REPORT] [--report REPORT]
 //!
@@ -97,7 +97,7 @@ fn main() -> io::Result<ExitCode> {
         verdict.is_none_or(|verdict| verdict == Verdict::Open || again && verdict.is_silent())
     };
     let mut ask = |verdicts: &mut Vec<Option<Verdict>>, these: &[usize], stage: Stage| {
-        if these.is_empty() || stage != Stage::Units && is_over() {
+        if these.is_empty() || is_over() {
             return Ok(());
         }
         let program = tree.build(&mutants, these, stage)?;
@@ -113,10 +113,8 @@ fn main() -> io::Result<ExitCode> {
         let built: Vec<usize> = these.iter().copied().filter(|number| !program.left.contains_key(number)).collect();
         let (next, found) = (AtomicUsize::new(0), Mutex::new((verdicts, &mut keep)));
         at_once(threads, || {
-            while let Some(&number) =
-                built.get(next.fetch_add(1, Relaxed)).filter(|_| stage == Stage::Units || !is_over())
-            {
-                let (verdict, by) = tests.verdict(number, &mutants[number], stage == Stage::Quick)?;
+            while let Some(&number) = built.get(next.fetch_add(1, Relaxed)).filter(|_| !is_over()) {
+                let (verdict, by) = tests.verdict(number, &mutants[number], stage)?;
                 let (verdicts, keep) = &mut *found.lock().map_err(|_| io::Error::other("a thread panicked"))?;
                 keep(verdicts, number, verdict, by)?;
             }
@@ -134,13 +132,11 @@ fn main() -> io::Result<ExitCode> {
         if fresh.len() > FEW {
             ask(&mut verdicts, &fresh, Stage::Quick)?;
         }
-        let mut open = those(&|number| is_open(verdicts[number]));
+        // What only tests beside it may notice.
+        let beside = those(&|number| is_open(verdicts[number]) && with_units.contains(&mutants[number].file));
+        ask(&mut verdicts, &beside, Stage::Units)?;
+        let open = those(&|number| is_open(verdicts[number]));
         ask(&mut verdicts, &open, Stage::All)?;
-        // What only tests beside it may have noticed.
-        open.retain(|&number| {
-            verdicts[number].is_some_and(Verdict::is_silent) && with_units.contains(&mutants[number].file)
-        });
-        ask(&mut verdicts, &open, Stage::Units)?;
     }
 
     let report = Report::of(&mutants, &verdicts);

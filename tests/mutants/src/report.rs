@@ -53,26 +53,13 @@ impl Counts {
         (caught, caught + self.missed + self.unreached + self.open)
     }
 
-    /// Wilson's interval of 95 % for the share caught, which a random sample leaves.
-    fn interval(&self) -> (f64, f64) {
-        let (caught, tried) = self.caught_and_tried();
-        if tried == 0 {
-            return (0.0, 1.0);
-        }
-        let (tried, z) = (tried as f64, 1.96);
-        let share = caught as f64 / tried;
-        let middle = (share + z * z / (2.0 * tried)) / (1.0 + z * z / tried);
-        let half = z / (1.0 + z * z / tried) * (share * (1.0 - share) / tried + z * z / (4.0 * tried * tried)).sqrt();
-        (middle - half, middle + half)
-    }
-
     pub fn share(&self) -> String {
         let (caught, tried) = self.caught_and_tried();
         let percent = 100.0 * caught as f64 / tried as f64;
         let interval = if self.not_tried == 0 || tried == 0 {
             String::new()
         } else {
-            let (least, most) = self.interval();
+            let (least, most) = interval(caught, tried);
             format!(", {:.1} to {:.1} % of all", 100.0 * least, 100.0 * most)
         };
         format!(
@@ -114,10 +101,11 @@ impl Report {
         self.silent().filter(|name| !known.contains(&without_line(name))).collect()
     }
 
-    /// Whether surely fewer are caught than another report says.
+    /// Whether surely fewer are caught than another report says, even if all were that stand open.
     pub fn is_below(&self, known: &Self) -> bool {
-        let (caught, tried) = known.all.caught_and_tried();
-        self.all.interval().1 < caught as f64 / tried as f64
+        let ((caught, tried), (known_caught, known_tried)) =
+            (self.all.caught_and_tried(), known.all.caught_and_tried());
+        interval(caught + self.all.open, tried).1 < known_caught as f64 / known_tried as f64
     }
 
     fn silent(&self) -> impl Iterator<Item = &str> {
@@ -128,4 +116,16 @@ impl Report {
 /// File and change of a mutant's name, `FILE:LINE:COLUMN: CHANGE`.
 fn without_line(name: &str) -> Option<(&str, &str)> {
     Some((name.split(':').next()?, name.split_once(": ")?.1))
+}
+
+/// Wilson's interval of 95 % for the share caught, which a random sample leaves.
+fn interval(caught: usize, tried: usize) -> (f64, f64) {
+    if tried == 0 {
+        return (0.0, 1.0);
+    }
+    let (tried, z) = (tried as f64, 1.96);
+    let share = caught as f64 / tried;
+    let middle = (share + z * z / (2.0 * tried)) / (1.0 + z * z / tried);
+    let half = z / (1.0 + z * z / tried) * (share * (1.0 - share) / tried + z * z / (4.0 * tried * tried)).sqrt();
+    (middle - half, middle + half)
 }

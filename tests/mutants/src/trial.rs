@@ -11,7 +11,7 @@ use std::{fs, io};
 
 use serde::{Deserialize, Serialize};
 
-use crate::build::Program;
+use crate::build::{Program, Stage};
 use crate::mutant::Mutant;
 
 /// The signal that ends a process which has had its time.
@@ -41,7 +41,7 @@ pub enum Verdict {
     Missed,
     /// Missed, as no test comes by.
     Unreached,
-    /// No quick test notices; the others have not been asked.
+    /// No test that was asked notices; the others have not been.
     Open,
     Unviable,
     /// For cargo-mutants itself to try.
@@ -165,14 +165,16 @@ impl<'p> Tests<'p> {
         if passes { Ok(()) } else { Err(io::Error::other(format!("{} fails without a mutant", run.test))) }
     }
 
-    /// The verdict on a mutant that is built in, and the test that brought it: of the quick tests alone, or of all. Those are asked first that are likeliest to notice for their
+    /// The verdict on a mutant that is built in, and the test that brought it: of a stage; only after the last it is missed. Those are asked first that are likeliest to notice for their
     /// time, as far as this function and this file have shown.
-    pub fn verdict(&self, number: usize, mutant: &Mutant, quick: bool) -> io::Result<(Verdict, Option<String>)> {
+    pub fn verdict(&self, number: usize, mutant: &Mutant, stage: Stage) -> io::Result<(Verdict, Option<String>)> {
         let Some(site) = self.program.sites.iter().find(|site| site.mutants.contains(&number)) else {
             return Ok((Verdict::NotBuiltIn, None));
         };
         let chosen = site.first + site.mutants.iter().position(|&other| other == number).unwrap_or_default();
-        let Some(reaching) = self.reaching.get(&number) else { return Ok((Verdict::Unreached, None)) };
+        let Some(reaching) = self.reaching.get(&number) else {
+            return Ok((if stage == Stage::All { Verdict::Unreached } else { Verdict::Open }, None));
+        };
         let function = mutant.function();
         let promise = |record: &Record, run: &Run| {
             let (tried, noticed) = record.get(&mutant.file).copied().unwrap_or_default();
@@ -182,7 +184,7 @@ impl<'p> Tests<'p> {
         };
         let mut order: Vec<(usize, f64)> = {
             let records = locked(&self.records);
-            let reaching = reaching.iter().filter(|&&at| !quick || self.runs[at].seconds <= QUICK_S);
+            let reaching = reaching.iter().filter(|&&at| stage != Stage::Quick || self.runs[at].seconds <= QUICK_S);
             reaching.map(|&at| (at, promise(&records[at], &self.runs[at]))).collect()
         };
         order.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -201,7 +203,7 @@ impl<'p> Tests<'p> {
                 return Ok((verdict, Some(run.test.clone())));
             }
         }
-        Ok((if quick { Verdict::Open } else { Verdict::Missed }, None))
+        Ok((if stage == Stage::All { Verdict::Missed } else { Verdict::Open }, None))
     }
 
     /// One test in a process of its own, which gets only so much time and memory.
