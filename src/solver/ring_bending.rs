@@ -313,4 +313,17 @@ mod tests {
             assert!((bend + PI * PI * (PI * x).sin()).abs() < 0.05, "{bend} at {x}");
         }
     }
+
+    #[test]
+    fn a_spline_has_one_slope_on_either_side_of_its_points_and_no_bend_at_its_ends() {
+        let x: [f64; KNOTS] = std::array::from_fn(|knot| (1.0 + knot as f64).ln() + 0.1 * (knot % 3) as f64);
+        let y: [f64; KNOTS] = std::array::from_fn(|knot| (2.5 * knot as f64).sin());
+        let bends = spline_bends(&x, &y);
+        assert!(bends[0].abs() <= 0.0 && bends[KNOTS - 1].abs() <= 0.0);
+        for i in 1..KNOTS - 1 {
+            let slope =
+                |to: usize| (y[to] - y[i]) / (x[to] - x[i]) - (x[to] - x[i]) * (2.0 * bends[i] + bends[to]) / 6.0;
+            assert!((slope(i - 1) - slope(i + 1)).abs() < 1e-11, "{} and {}", slope(i - 1), slope(i + 1));
+        }
+    }
 }

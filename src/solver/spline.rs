@@ -89,9 +89,9 @@ impl<'a> MeasuredCurve<'a> {
         (self.lengths_mm[point] - self.lengths_mm[from]) / (self.lengths_mm[to] - self.lengths_mm[from])
     }
 
-    /// Bézier's polygon of the polynomial from one point to another: through some between, those that are nearest to Chebyshev's places.
-    fn polygon(&self, from: usize, to: usize, inner: usize) -> Polyline {
-        let SampledCurve { points, tangents } = self.curve;
+    /// Points that a polynomial from one point to another goes through: the ends, twice, and some between, those that are nearest to Chebyshev's
+    /// places.
+    fn through(&self, from: usize, to: usize, inner: usize) -> Vec<usize> {
         let inner = inner.min(to - from - 1);
         let mut through = vec![from, from];
         for i in 0..inner {
@@ -104,6 +104,13 @@ impl<'a> MeasuredCurve<'a> {
             through.push(if beyond > after && off(beyond - 1) < off(beyond) { beyond - 1 } else { beyond });
         }
         through.extend([to, to]);
+        through
+    }
+
+    /// Bézier's polygon of the polynomial from one point to another, through some between.
+    fn polygon(&self, from: usize, to: usize, inner: usize) -> Polyline {
+        let SampledCurve { points, tangents } = self.curve;
+        let through = self.through(from, to, inner);
         // Newton's divided differences; where an end stands twice, the derivative there.
         let length_mm = self.lengths_mm[to] - self.lengths_mm[from];
         let places: Vec<_> = through.iter().map(|&point| self.share(from, to, point)).collect();
@@ -157,4 +164,52 @@ fn at(polygon: &Polyline, share: f64) -> Point2<f64> {
         }
     }
     poles[0]
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Unit;
+
+    use super::*;
+
+    /// Points on a straight line at lengths that a function gives.
+    fn line(points: usize, at: impl Fn(f64) -> f64) -> SampledCurve {
+        let places = (0..points).map(|i| i as f64 / (points - 1) as f64);
+        SampledCurve {
+            points: places.map(|x| Point2::new(at(x), 0.0)).collect(),
+            tangents: vec![Unit::new_unchecked(Vector2::x()); points],
+        }
+    }
+
+    #[test]
+    fn a_polynomial_goes_through_the_points_that_are_nearest_to_chebyshevs_places() {
+        for at in [|x: f64| x, |x| x * x, f64::sqrt] {
+            let curve = line(1001, at);
+            for inner in 1..=INNER {
+                let through = MeasuredCurve::new(&curve).through(100, 900, inner);
+                assert_eq!(through[..2], [100, 100]);
+                assert_eq!(through[inner + 2..], [900, 900]);
+                let length = |point: usize| curve.points[point].x - curve.points[100].x;
+                for (i, &point) in through[2..inner + 2].iter().enumerate() {
+                    let angle_rad = PI * (i as f64 + 2.5) / (inner as f64 + 4.0);
+                    let wanted = length(900) * (0.5 - 0.5 * angle_rad.cos());
+                    let off = |point: usize| (length(point) - wanted).abs();
+                    let nearest = (101..900).min_by(|&one, &other| off(one).total_cmp(&off(other)));
+                    assert_eq!(Some(point), nearest, "{i} of {inner}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_polynomial_goes_through_all_points_where_there_are_hardly_enough() {
+        for at in [|x: f64| x, |x: f64| x.powi(8), |x: f64| x.powf(0.125)] {
+            let curve = line(8, at);
+            let measured = MeasuredCurve::new(&curve);
+            assert_eq!(measured.through(1, 7, INNER), [1, 1, 2, 3, 4, 5, 6, 7, 7]);
+            assert_eq!(measured.through(3, 6, INNER), [3, 3, 4, 5, 6, 6]);
+            assert_eq!(measured.through(3, 4, INNER), [3, 3, 4, 4]);
+            assert!(measured.through(0, 7, INNER).windows(2).skip(1).take(INNER).all(|pair| pair[0] < pair[1]));
+        }
+    }
 }

@@ -141,6 +141,16 @@ fn a_body_held_at_half_a_pitch_gives_way_alike_by_either_form() {
 
 /// What the estimate says of a tooth holds for the drive, but for the load that shifts to teeth which press their fingers less.
 #[test]
+fn a_finger_is_as_thick_as_the_walls_of_its_slots_are_apart_in_the_middle_of_its_height() {
+    let shares = shares(&PAPER_5_1, &johnson(20.0), AT_ONE_END).unwrap();
+    let found = shares.shares.iter().find(|(estimate, _)| estimate.backing == Backing::FingerAtOneEnd).unwrap().0;
+    // From 58.8 to 65.2 mm, where the middles of two slots are 2 · 62 sin(π/28) apart.
+    let beam = FingerBeam { length_mm: 15.0, thickness_mm: 124.0 * (PI / 28.0).sin() - 10.0, height_mm: 6.4 };
+    let expected = beam.compliance_mm_per_n(&Material::STEEL, Fingers::HeldAtOneEnd);
+    assert!((found.compliance_mm_per_n / expected - 1.0).abs() < 1e-12, "{} {expected}", found.compliance_mm_per_n);
+}
+
+#[test]
 fn fingers_held_at_one_end_double_the_wind_up_of_case_5_1_and_take_an_eighth_off_its_peak() {
     let plain = johnson(20.0);
     let of_fingers = shares(&PAPER_5_1, &plain, AT_ONE_END).unwrap();

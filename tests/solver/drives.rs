@@ -9,6 +9,13 @@ use toothwave_solver::{
     sweep::{self, Points, Sweep},
 };
 
+/// So many cases of a property, or fewer where `PROPTEST_CASES` says so; none is written down.
+pub(crate) fn cases(most: u32) -> ProptestConfig {
+    let asked = std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok());
+    let cases = asked.map_or(most, |asked: u32| asked.min(most));
+    ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
+}
+
 pub(crate) const fn ellipse(semi_major_mm: f64, semi_minor_mm: f64) -> WaveGenerator {
     WaveGenerator::Ellipse { semi_major_mm, semi_minor_mm }
 }

@@ -13,7 +13,7 @@ use toothwave_solver::{
     Never, PerContact, Position, ToothShape, WaveGenerator,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, ellipse, everywhere, load, swept};
+use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, cases, drive, ellipse, everywhere, load, swept};
 
 /// How far two ways to the same number may be apart, over what its terms came to.
 const ROUNDING: f64 = 1e-12;
@@ -344,7 +344,7 @@ fn any_samples() -> impl Strategy<Value = u64> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(256))]
 
     /// Over each other unlike zones are one: they were worked out tooth by tooth, thirty times as slowly.
     #[test]
@@ -366,7 +366,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(256))]
 
     #[test]
     fn the_fast_path_agrees_with_the_plain_one(
@@ -462,7 +462,7 @@ impl OtherTeeth {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(256))]
 
     #[test]
     fn the_fast_path_agrees_with_the_plain_one_for_balls_and_flat_sided_teeth(

@@ -308,6 +308,12 @@ fn each_model_errs_as_much_as_it_says_that_it_does() {
 }
 
 #[test]
+fn the_larger_error_of_a_range_is_the_one_farther_from_none_on_either_side() {
+    assert_eq!(ErrorRange { low: -0.05, high: 0.03 }.largest(), 0.05);
+    assert_eq!(ErrorRange { low: -0.01, high: 0.03 }.largest(), 0.03);
+}
+
+#[test]
 fn the_drives_that_were_calculated_lie_within_the_range_and_others_do_not() {
     for case in results().cases {
         let (parameters, _) = case.drive_and_torque_nm();

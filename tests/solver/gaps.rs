@@ -10,8 +10,9 @@ use toothwave_solver::mesh::{Mesh, Place, Samples};
 use toothwave_solver::tooth::ToothContact;
 use toothwave_solver::violation::{Listed, Modified};
 use toothwave_solver::{
-    Drive, DriveParameters, LoadCase, LoadParameters, Modification, Parameter, PerContact, Position, SolveError,
+    Drive, DriveParameters, LoadCase, LoadParameters, Modification, Never, Parameter, PerContact, Position, SolveError,
     Violation,
+    sweep::{self, Points},
 };
 
 use crate::drives::{PAPER_5_1, drive, ellipse, load, semi_axes_mm};
@@ -376,6 +377,19 @@ fn the_space_of_a_tooth_follows_from_its_slot_and_lobe() {
             }
         }
     }
+}
+
+/// A carrier turned by τ leaves room of `τ d` at every wall, some 11 µm here.
+#[test]
+fn a_turned_carrier_makes_room_for_walls_that_are_too_full() {
+    let swept = |slot_wall_um, carrier_rotation_arcsec| {
+        let modification = Modification { slot_wall_um, carrier_rotation_arcsec, ..Modification::default() };
+        let case = LoadCase::new(&LoadParameters { modification, ..load(20.0, VirtualWork) }).unwrap();
+        sweep::sweep(&drive(&PAPER_5_1), &case, Points::samples(10).unwrap(), &Never)
+    };
+    assert!(matches!(swept(-5.0, 0.0), Err(SolveError::Interference { .. })));
+    assert!(swept(-5.0, 40.0).is_ok());
+    assert!(matches!(swept(-15.0, 40.0), Err(SolveError::Interference { .. })));
 }
 
 #[test]

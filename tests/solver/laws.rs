@@ -18,7 +18,7 @@ use toothwave_solver::{
     Parameter, PerContact, Position, SolveError, ToothShape, Violation, findings,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, drive, everywhere, load, swept};
+use crate::drives::{PAPER_5_1, PAPER_5_2, cases, drive, everywhere, load, swept};
 
 const R_DEEP: ContactLaw =
     ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
@@ -298,6 +298,7 @@ fn johnsons_law_ends_where_a_contact_is_half_as_wide_as_the_tooth_and_says_at_wh
     let heavy = LoadCase::new(&johnson(1e6)).unwrap();
     let drive = drive(&PAPER_5_1);
     let refused = sweep::sweep(&drive, &heavy, Points::samples(4).unwrap(), &Never).unwrap_err();
+    assert!(refused.to_string().starts_with("half the contact's width at the ring reaches 2.5 mm"), "{refused}");
     let SolveError::JohnsonBeyondHalfWidth { contact, half_width_limit_mm, input_torque_limit_nm, .. } = refused else {
         panic!("{refused:?}")
     };
@@ -715,7 +716,7 @@ fn balls_take_hertz_or_fixed_and_no_other_tooth_takes_hertz() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 512, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(512))]
 
     #[test]
     fn a_stress_is_that_of_its_force_for_every_ellipse(one in -6.0_f64..3.0, other in -6.0_f64..3.0, power in -6.0_f64..6.0) {

@@ -2,8 +2,8 @@
 
 use toothwave_solver::drive::DriveError;
 use toothwave_solver::{
-    Compatibility, ContactLaw, Drive, DriveParameters, Finding, LoadCase, LoadParameters, Never, Parameter, PerContact,
-    Position, SolveError, ToothShape, Torque, Violation, WaveGenerator, findings,
+    Compatibility, Contact, ContactLaw, Drive, DriveParameters, Finding, LoadCase, LoadParameters, Modification, Never,
+    Parameter, PerContact, Position, SolveError, ToothShape, Torque, Violation, WaveGenerator, findings,
     mesh::{Mesh, Samples},
     sweep::{self, Points},
 };
@@ -244,6 +244,95 @@ fn a_number_of_teeth_that_cannot_be_comes_with_those_beside_it_that_can() {
     assert_eq!(beside(2, 2, 2), [(None, Some(4))]);
     assert_eq!(beside(10_000, 10_000, 10_000), [(Some(9_998), None)]);
     assert_eq!(beside(28, 28, 28), [(Some(26), Some(30))]);
+}
+
+#[test]
+fn of_the_numbers_beside_one_that_cannot_be_the_nearer_is_proposed_and_of_two_as_near_the_lower() {
+    let proposed = |teeth, installed, ring_teeth| {
+        let found = violations(&DriveParameters { teeth, installed, ring_teeth, ..PAPER_5_1 });
+        let nearest = found.iter().find_map(|violation| match violation {
+            Violation::ToothDifference { instead, ring_teeth, .. } => Some(instead.nearest_to(*ring_teeth)),
+            Violation::InstalledNoDivisor { instead, installed, .. } => Some(instead.nearest_to(*installed)),
+            _ => None,
+        });
+        nearest.unwrap()
+    };
+    assert_eq!(proposed(28, 8, 26), 7);
+    assert_eq!(proposed(28, 12, 26), 14);
+    assert_eq!(proposed(27, 8, 25), 9);
+    assert_eq!(proposed(27, 6, 25), 3);
+    assert_eq!(proposed(28, 56, 26), 28);
+    assert_eq!(proposed(28, 28, 28), 26);
+}
+
+#[test]
+fn a_wind_up_beyond_a_tenth_of_the_period_is_a_finding() {
+    let drive = drive(&PAPER_5_1);
+    // A carrier turned by τ takes up Z_G/U = 14 of it, and a light load nothing more.
+    let found = |carrier_rotation_arcsec| {
+        let modification = Modification { carrier_rotation_arcsec, ..Modification::default() };
+        let load = LoadParameters { modification, ..load(1e-9, Compatibility::VirtualWork) };
+        let sweep = swept(&PAPER_5_1, &load, 4);
+        findings::of_wind_up(&drive, &LoadCase::new(&load).unwrap(), &sweep)
+    };
+    assert_eq!(found(350.0), None);
+    let Some(Finding::WindUpBeyondModel { wind_up_deg, limit_deg, is_moving: false }) = found(360.0) else { panic!() };
+    assert!((wind_up_deg - 1.4).abs() < 1e-6 && (limit_deg - 36.0 / 26.0).abs() < 1e-14, "{wind_up_deg} {limit_deg}");
+}
+
+#[test]
+fn a_stress_above_what_is_allowed_at_its_contact_is_a_finding() {
+    let allowable = PerContact { wave_generator: 800.0, ring: 5000.0, carrier: 5000.0 };
+    let load = LoadParameters { allowable_stress_mpa: Some(allowable), ..load(20.0, Compatibility::Projection) };
+    let peaks = swept(&PAPER_5_1, &load, 10).peaks;
+    let found = findings::of_contacts(&drive(&PAPER_5_1), &LoadCase::new(&load).unwrap(), &peaks, false);
+    let (contact, stress_mpa) = (Contact::WaveGenerator, peaks.wave_generator.stress_mpa.value);
+    assert_eq!(found, [Finding::StressAboveAllowable { contact, stress_mpa, allowable_mpa: 800.0 }]);
+}
+
+/// A groove of the radius `r_g`, half a ball's radius t deep, is `2√(t (2r_g - t))` wide at its edges.
+#[test]
+fn a_contact_longer_than_its_groove_is_wide_is_a_finding() {
+    let groove_radius_mm = PerContact { wave_generator: Some(5.2), ring: None, carrier: None };
+    let parameters = DriveParameters { tooth: ToothShape::Ball { groove_radius_mm }, ..PAPER_5_1 };
+    let load = LoadParameters { law: ContactLaw::Hertz, ..load(1.0, Compatibility::VirtualWork) };
+    let mut peaks = swept(&parameters, &load, 4).peaks;
+    let mut found = |half_length_mm| {
+        peaks.wave_generator.half_length_mm = Some(half_length_mm);
+        findings::of_contacts(&drive(&parameters), &LoadCase::new(&load).unwrap(), &peaks, false)
+    };
+    let edge_mm = (2.5 * (10.4 - 2.5_f64)).sqrt();
+    let is_told = |found: &[Finding]| found.iter().any(|found| matches!(found, Finding::ContactBeyondGroove { .. }));
+    assert!(!is_told(&found(edge_mm - 1e-9)) && is_told(&found(edge_mm + 1e-9)));
+}
+
+/// Hertz and Palmgren of a steel cylinder at the wave generator, L1 = 15 mm, and the moduli of partners of another material.
+#[test]
+fn findings_about_contacts_have_the_numbers_of_their_formulas() {
+    let drive = drive(&PAPER_5_1);
+    let found = |load: &LoadParameters, approaches_matter| {
+        let peaks = swept(&PAPER_5_1, load, 10).peaks;
+        let force_n = peaks.wave_generator.force_n.value;
+        (findings::of_contacts(&drive, &LoadCase::new(load).unwrap(), &peaks, approaches_matter), force_n)
+    };
+    let near = |one: f64, other: f64| (one / other - 1.0).abs() < 1e-13;
+    let linear = load(20.0, Compatibility::Projection);
+    assert_eq!(found(&linear, false).0, []);
+    let (told, force_n) = found(&linear, true);
+    let [Finding::LinearLawTooStiff { linear_um, palmgren_um }] = told[..] else { panic!("{told:?}") };
+    let contact_modulus_mpa = 210e3 / (2.0 * (1.0 - 0.09));
+    assert!(near(linear_um, 1e3 * force_n / (std::f64::consts::FRAC_PI_2 * 15.0 * contact_modulus_mpa)), "{linear_um}");
+    assert!(near(palmgren_um, 1e3 * 3.84e-5 * force_n.powf(0.9) / 15_f64.powf(0.8)), "{palmgren_um}");
+
+    let mut palmgren = LoadParameters { law: ContactLaw::Palmgren, ..linear };
+    assert_eq!(found(&palmgren, true).0, []);
+    palmgren.materials.ring.youngs_modulus_gpa = 105.0;
+    let (told, _) = found(&palmgren, true);
+    let [Finding::PalmgrenBeyondSteel { contact: Contact::Ring, contact_modulus_gpa, steel_gpa }] = told[..] else {
+        panic!("{told:?}")
+    };
+    assert!(near(steel_gpa, 1e-3 * contact_modulus_mpa));
+    assert!(near(contact_modulus_gpa, 1.0 / (0.91 / 210.0 + 0.91 / 105.0)), "{contact_modulus_gpa}");
 }
 
 #[test]

@@ -24,7 +24,7 @@ use toothwave_solver::{
     SolveError, ToothShape, Violation, WaveGenerator,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, everywhere, load};
+use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, cases, drive, everywhere, load};
 use crate::reference::number;
 
 const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
@@ -437,7 +437,7 @@ fn lost_at(mechanism: &Mechanism, friction: &FrictionParameters, teeth: &[Loaded
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(96))]
 
     #[test]
     fn the_race_turns_as_fast_as_loses_least(

@@ -401,6 +401,28 @@ fn a_relief_of_nothing_draws_the_conjugate_ring() {
 }
 
 #[test]
+fn a_space_is_one_curve_where_it_is_smooth_at_its_root_and_where_its_relief_starts_another() {
+    let curves = |start_deg, power| {
+        let relief = TipRelief { start_deg, power, ..RELIEF };
+        let edges = space(&PAPER_5_1, Modification { ring_tip_relief: Some(relief), ..NONE });
+        assert!(edges.iter().all(|edge| matches!(edge, Edge::Curve { .. })), "{edges:?}");
+        edges.len()
+    };
+    assert_eq!([curves(20.0, 2.0), curves(20.0, 1.0), curves(20.0, 0.5)], [3, 3, 3]);
+    // A relief from the root on leaves it along the curve by a power above one, and bent otherwise.
+    assert_eq!([curves(0.0, 2.0), curves(0.0, 1.0), curves(0.0, 0.5)], [1, 2, 2]);
+}
+
+#[test]
+fn a_relief_lower_than_the_flank_leaves_the_rim_where_it_is() {
+    let outer = |modification| {
+        let ring = drawn(&PAPER_5_1, Subject::Part(Part::Ring), &parts(modification), 1e-2, 0.0).remove(0);
+        ring.section.outer
+    };
+    assert_eq!(outer(Modification { ring_tip_relief: Some(RELIEF), ..NONE }), outer(NONE));
+}
+
+#[test]
 fn a_modification_that_leaves_no_outline_is_refused_with_the_number_at_fault() {
     let refused = |p: &DriveParameters, part, modification| {
         let parameters = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 1_000_000, input_angle_deg: 0.0 };

@@ -9,7 +9,9 @@ use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
 use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::{ContactLaw, Drive, DriveParameters, LoadCase, PerContact, Position};
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, any_swept_drive, drive, load, semi_axes_mm};
+use crate::drives::{
+    PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, any_swept_drive, cases, drive, load, semi_axes_mm,
+};
 
 /// The directions of the three forces on a tooth, in its slot's frame: x outward, y in the sense of the input.
 ///
@@ -186,7 +188,7 @@ fn virtual_work_is_a_tooth_free_to_move_against_three_springs() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 128, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(128))]
 
     #[test]
     fn the_closed_form_agrees_with_dense_solves_on_any_drive(parameters in any_swept_drive()) {

@@ -33,6 +33,13 @@ fn case_5_1_has_the_known_peaks_by_virtual_work() {
 }
 
 #[test]
+fn case_5_1_in_fifty_intervals_has_seven_states_at_each_of_its_angles() {
+    let states = swept(&PAPER_5_1, &load(20.0, Projection), 50).states;
+    assert_eq!(states.len(), 51 * 7);
+    assert!(!states.is_empty());
+}
+
+#[test]
 fn case_5_1_has_no_undercut_and_seven_teeth_in_each_zone() {
     let drive = drive(&PAPER_5_1);
     assert_eq!(drive.flank_limit().end, FlankEnd::RegularTip);

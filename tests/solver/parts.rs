@@ -3,12 +3,12 @@
 use std::f64::consts::PI;
 
 use nalgebra::{Point2, Rotation2};
-use toothwave_solver::drawing::{Drawing, DrawingParameters, Edge, Outline, Subject};
+use toothwave_solver::drawing::{Drawing, DrawingParameters, Edge, Outline, Subject, widest_finger};
 use toothwave_solver::drive::Draft;
 use toothwave_solver::findings::{self, Edge as CarrierEdge, Wall};
 use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::ring::FlankEnd;
-use toothwave_solver::{Drive, DriveParameters, Finding, Never, Part};
+use toothwave_solver::{Drive, DriveParameters, Finding, Never, Part, ToothShape};
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, drive};
 
@@ -100,6 +100,40 @@ fn a_pointed_finger_ends_where_the_walls_of_its_two_slots_meet() {
     let from_next = Rotation2::new(-2.0 * PI / 28.0) * apex;
     assert!((from_next.y + 7.0).abs() < 1e-12, "{from_next}");
     assert!((apex.y.atan2(apex.x) - PI / 28.0).abs() < 1e-14);
+}
+
+#[test]
+fn the_widest_finger_fills_the_annulus_between_slots_as_wide_as_teeth() {
+    let finger = widest_finger(&drive(&PAPER_5_1)).unwrap();
+    let corners: Vec<_> = finger.iter().map(Edge::start).collect();
+    let ([inner, inner_next], [outer, outer_next]) = (on_both_walls(58.0, 5.0, 28), on_both_walls(66.0, 5.0, 28));
+    assert_eq!(corners.len(), 4);
+    for (found, expected) in corners.into_iter().zip([inner, outer, outer_next, inner_next]) {
+        assert!((found - expected).norm() < 1e-12 * 66.0, "{found} is not {expected}");
+    }
+}
+
+#[test]
+fn a_flat_sided_tooth_is_two_arcs_around_its_centre_joined_by_its_flats() {
+    let tooth = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 6.0 };
+    let p = DriveParameters { tooth, ..PAPER_5_1 };
+    let outline = edges(&p, Part::Teeth, &PartsParameters::default());
+    let [right @ Edge::Arc { .. }, upper @ Edge::Line { .. }, left @ Edge::Arc { .. }, lower @ Edge::Line { .. }] =
+        &outline[..]
+    else {
+        panic!("{outline:?}")
+    };
+    // Of the radius 5, with flats of the length 6: corners at (±3, ±4).
+    let corners = [(3.0, -4.0), (3.0, 4.0), (-3.0, 4.0), (-3.0, -4.0)].map(|(x, y)| Point2::new(x, y));
+    for (i, edge) in [right, upper, left, lower].into_iter().enumerate() {
+        assert!((edge.start() - corners[i]).norm() < 1e-14 * 5.0, "{edge:?}");
+        assert!((edge.end() - corners[(i + 1) % 4]).norm() < 1e-14 * 5.0, "{edge:?}");
+    }
+    for arc in [right, left] {
+        let &Edge::Arc { radius_mm, sweep_rad, .. } = arc else { panic!("{arc:?}") };
+        assert_eq!(radius_mm, 5.0);
+        assert!((sweep_rad - 2.0 * 4_f64.atan2(3.0)).abs() < 1e-14, "{sweep_rad}");
+    }
 }
 
 #[test]

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use toothwave_solver::profile::{Extent, Polyline, ProfileParameters, Profiles, profiles};
 use toothwave_solver::{DriveParameters, Never, SolveError, Stop};
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, drive, semi_axes_mm};
+use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, cases, drive, semi_axes_mm};
 
 fn sampled(parameters: &DriveParameters, chord_tolerance_mm: f64, extent: Extent) -> Profiles {
     let request = ProfileParameters { chord_tolerance_mm, extent, max_points: 10_000_000 };
@@ -49,7 +49,7 @@ fn every_chord_is_true_to_the_tolerance() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(96))]
 
     #[test]
     fn teeth_join_and_the_ring_closes(parameters in any_drive()) {

@@ -7,7 +7,7 @@ use toothwave_solver::sweep::Sweep;
 use toothwave_solver::{Compatibility, DriveParameters, ToothShape, Torque};
 
 use crate::drives::{
-    PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_swept_drive, drive, ellipse, load, semi_axes_mm, swept,
+    PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_swept_drive, cases, drive, ellipse, load, semi_axes_mm, swept,
 };
 
 fn any_compatibility() -> impl Strategy<Value = Compatibility> {
@@ -33,7 +33,7 @@ fn loads(sweep: &Sweep) -> Vec<(&Vec<f64>, f64)> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(256))]
 
     #[test]
     fn torques_at_input_ring_and_carrier_balance(parameters in any_swept_drive(), compatibility in any_compatibility()) {

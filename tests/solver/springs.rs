@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
-use toothwave_solver::approach::Approach;
+use toothwave_solver::approach::{Approach, Logarithmic};
 use toothwave_solver::load_sharing::LoadedDrive;
 use toothwave_solver::springs::{Spring, Springs};
 use toothwave_solver::sweep::{self, Points};
@@ -14,7 +14,7 @@ use toothwave_solver::{
     Position, SolveError, ToothShape, Torque, Violation,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, ellipse, everywhere, load, swept};
+use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, cases, drive, ellipse, everywhere, load, swept};
 
 const STIFFNESS: PerContact<f64> = PerContact { wave_generator: 4.1e5, ring: 6.3e5, carrier: 2.2e5 };
 
@@ -234,8 +234,28 @@ prop_compose! {
     }
 }
 
+#[test]
+fn a_logarithmic_approach_is_undone_by_its_inverse_and_goes_on_along_its_tangent_beyond_its_limit() {
+    for (compliance, growth, reference_n) in
+        [(3e-6, 1e-6, 1e4), (0.0, 2e-6, 50.0), (1e-4, 1e-8, 1e9), (-1e-7, 1e-6, 1.0)]
+    {
+        let law = Approach::Logarithmic(Logarithmic::new(compliance, growth, reference_n));
+        let limit_n = Logarithmic::LIMIT * reference_n;
+        let formula = |force_n: f64| force_n * (compliance + growth * (reference_n / force_n).ln());
+        for share in [1e-9, 1e-3, 0.2, 0.9, 1.0 - 1e-9, 1.0 + 1e-9, 1.5, 7.0, 1e6] {
+            let force_n = share * limit_n;
+            let slope = compliance + growth * ((reference_n / limit_n).ln() - 1.0);
+            let expected = if share <= 1.0 { formula(force_n) } else { formula(limit_n) + (force_n - limit_n) * slope };
+            let approach_mm = law.approach_mm(force_n);
+            assert!((approach_mm / expected - 1.0).abs() < 1e-13, "{approach_mm:e} is not {expected:e} at {share}");
+            let found_n = law.force(approach_mm).unwrap().force_n;
+            assert!((found_n / force_n - 1.0).abs() < 1e-12, "{found_n:e} is not {force_n:e} at {share}");
+        }
+    }
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 4096, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(4096))]
 
     #[test]
     fn an_approach_is_undone_by_its_inverse(approach in any_approach(), power in -30.0_f64..18.0) {

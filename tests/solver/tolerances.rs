@@ -7,11 +7,12 @@ use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{Peak, Points, Sweep, sweep};
 use toothwave_solver::{
     ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, PerContact, Position, SolveError, ToothShape,
+    WaveGenerator,
 };
 
 use crate::drives::{
-    PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, any_swept_drive, drive, ellipse, everywhere, load, semi_axes_mm,
-    swept,
+    PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, any_swept_drive, cases, drive, ellipse, everywhere, load,
+    semi_axes_mm, swept,
 };
 
 /// More than any of these sweeps takes.
@@ -25,6 +26,25 @@ fn swept_to(parameters: &DriveParameters, load: &LoadParameters, tolerance: f64)
 
 fn six_peaks(sweep: &Sweep) -> Vec<Peak> {
     sweep.peaks.iter().flat_map(|(_, peaks)| [peaks.force_n, peaks.stress_mpa]).collect()
+}
+
+/// Three lobes over 37 teeth take turns: of three laps that are alike one is worked out, and a lap's first moment is listed as the last of the one before.
+#[test]
+fn a_sweep_of_several_laps_is_refused_where_it_counts_one_state_more_than_allowed() {
+    let wave_generator = WaveGenerator::HarmonicPath { lobes: 3, mean_path_radius_mm: 52.0, amplitude_mm: 1.0 };
+    let p =
+        DriveParameters { wave_generator, teeth: 37, installed: 37, ring_teeth: 34, tooth_radius_mm: 2.5, ..PAPER_5_1 };
+    let load = load(20.0, VirtualWork);
+    let states = swept_to(&p, &load, 1e-3).states;
+    let of_first_moment = states.input_angle_deg.iter().filter(|&&angle_deg| angle_deg == 0.0).count();
+    let counted = (states.len() + 2 * of_first_moment) as u64;
+    let swept_within = |max_states| {
+        let points = Points::tolerance(1e-3, max_states).unwrap();
+        sweep(&drive(&p), &LoadCase::new(&load).unwrap(), points, &Never)
+    };
+    assert_eq!(swept_within(counted).unwrap().states.len(), states.len());
+    let refused = swept_within(counted - 1).unwrap_err();
+    assert!(matches!(refused, SolveError::TooManyStates { limit } if limit == counted - 1), "{refused:?}");
 }
 
 // --- Where a tooth enters
@@ -88,7 +108,7 @@ fn a_bore_that_ends_the_flank_whole_spacings_from_the_major_axis_is_swept_alike_
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(300))]
 
     #[test]
     fn bores_a_few_roundings_around_whole_spacings_are_swept_alike(parameters in any_drive(), share in 0.0_f64..1.0) {
@@ -260,7 +280,7 @@ fn a_finer_tolerance_moves_nothing_by_more_than_the_coarser_one_allows_at_corner
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(200))]
 
     #[test]
     fn a_tolerance_holds_on_any_drive_with_any_gap(

@@ -9,7 +9,7 @@ use toothwave_solver::{
     SolveError, ToothShape, WaveGenerator,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, drive, ellipse, everywhere, load};
+use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, cases, drive, ellipse, everywhere, load};
 use crate::fast::{OtherTeeth, any_drive_of_other_kinds, any_drive_of_unlike_zones, any_other_teeth};
 use crate::reference::{Worst, number};
 use crate::tolerances::{designs, of_many_teeth};
@@ -344,7 +344,7 @@ fn true_peaks_of_unlike_zones_are_those_of_all_their_teeth() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 600, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(600))]
 
     #[test]
     fn no_samples_of_any_drive_under_any_law_show_more_than_true_peaks(

@@ -830,6 +830,30 @@ mod tests {
         }
     }
 
+    /// What the polynomials through the first four, five and six of the nodes differ by in the middle, as Lagrange has them.
+    #[test]
+    fn a_polynomial_may_be_off_by_what_its_last_terms_come_to_in_the_middle() {
+        let curve = |x: f64| (40.0 * x).sin() + (7.0 * x).exp();
+        let seen = seen_of(curve);
+        let run = Run { seen: &seen, moments: &seen.order, is_first: true, is_last: true };
+        for at in 0..16 {
+            let nodes = Nodes::of(&run, at).expect("seventeen moments");
+            let through = |count: usize| -> f64 {
+                let of_node = |i: usize| {
+                    let others = (0..count).filter(|&j| j != i);
+                    let share: f64 =
+                        others.map(|j| (0.5 - nodes.places[j]) / (nodes.places[i] - nodes.places[j])).product();
+                    share * curve(seen.fractions[nodes.moments[i]])
+                };
+                (0..count).map(of_node).sum()
+            };
+            let [fourth, fifth] = [4, 5].map(|count| (through(count + 1) - through(count)).abs());
+            let expected = 3.0 * fifth.max(0.125 * fourth);
+            let found = nodes.summit(&seen, 0, 3.0).error;
+            assert!((found / expected - 1.0).abs() < 1e-9, "{found:e} is not {expected:e}");
+        }
+    }
+
     #[test]
     fn the_summit_of_a_polynomial_is_found_wherever_it_stands() {
         for step in 1..200 {

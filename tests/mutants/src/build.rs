@@ -13,12 +13,8 @@ use crate::schemata::{self, Built, Left};
 /// Errors are mended in rounds, as the compiler finds those of one kind only after those of another.
 const MOST_ROUNDS: usize = 40;
 
-/// Functions ten times as long as they were written: what the optimiser does to them beyond this takes it a quarter of an hour.
-const PROFILE: [&str; 3] = [
-    "profile.dev.debug=false",
-    "profile.dev.package.toothwave-solver.codegen-units=1",
-    "profile.dev.package.toothwave-solver.opt-level=1",
-];
+/// What is wrong in a mutant is no error to the compiler.
+const ALLOWED: &str = "#![allow(arithmetic_overflow, overflowing_literals, unconditional_panic)] ";
 
 /// What is compiled, and where.
 pub struct Tree {
@@ -26,6 +22,40 @@ pub struct Tree {
     pub root: PathBuf,
     /// A copy of it, whose sources get the mutants.
     pub copy: PathBuf,
+    /// Where libraries are compiled.
+    pub target: PathBuf,
+}
+
+/// Which tests are asked, and of how many mutants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// The quick ones of `tests/solver`, of a whole batch.
+    Quick,
+    /// All of these, of what the quick ones left open.
+    All,
+    /// Those beside what they are about.
+    Units,
+}
+
+impl Stage {
+    /// Of the workspace where that can be: its libraries have other features for the solver alone, and would be compiled anew.
+    fn targets(self) -> [&'static str; 3] {
+        match self {
+            Self::Quick | Self::All => ["--workspace", "--test", "solver"],
+            Self::Units => ["--package", "toothwave-solver", "--lib"],
+        }
+    }
+
+    /// With a whole batch functions are some times as long as they were written, and the optimiser would take longer than it saves. All else is compiled
+    /// as ever, so that it need not be compiled anew.
+    fn settings(self) -> &'static [&'static str] {
+        const SETTINGS: [&str; 3] = [
+            "--config=profile.dev.package.toothwave-solver.debug=false",
+            "--config=profile.dev.package.toothwave-solver.codegen-units=16",
+            "--config=profile.dev.package.toothwave-solver.opt-level=1",
+        ];
+        if self == Self::All { &SETTINGS[..2] } else { &SETTINGS }
+    }
 }
 
 /// The tests of the tree with the mutants that compile.
@@ -36,24 +66,21 @@ pub struct Program {
 }
 
 impl Tree {
-    /// Leaves mutants out until the rest compiles; those of `elsewhere` are built at another time.
-    pub fn build(
-        &self,
-        mutants: &[Mutant],
-        mut left: HashMap<usize, Left>,
-        elsewhere: &HashSet<usize>,
-    ) -> io::Result<Program> {
+    /// Builds those of a batch, and leaves mutants out until the rest compiles.
+    pub fn build(&self, mutants: &[Mutant], batch: &[usize], stage: Stage) -> io::Result<Program> {
         let library = "src/solver/lib.rs";
         // All sources, as those without mutants are compiled too.
         let sources = self.sources()?;
         let mut of_file: BTreeMap<&str, Vec<(usize, &Mutant)>> =
             sources.iter().map(|file| (file.as_str(), Vec::new())).collect();
-        for (number, mutant) in mutants.iter().enumerate() {
+        for &number in batch {
+            let mutant = &mutants[number];
             of_file.entry(&mutant.file).or_default().push((number, mutant));
         }
+        let mut left = HashMap::new();
         let mut constants = HashSet::new();
         for round in 1..=MOST_ROUNDS {
-            let without = left.keys().chain(elsewhere).copied().collect();
+            let without = left.keys().copied().collect();
             let mut files = HashMap::new();
             let mut first = 0;
             for (&file, mutants) in &of_file {
@@ -62,15 +89,18 @@ impl Tree {
                     schemata::of_file(&source, mutants, &without, &constants, first).map_err(io::Error::other)?;
                 first += mutants.len();
                 left.extend(schemata.left.iter().copied());
-                let chosen = if file == library { include_str!("chosen.rs") } else { "" };
-                write_if_changed(&self.copy.join(file), &(schemata.text.clone() + chosen))?;
+                // On the first line, so that lines stay as they are counted.
+                let (allowed, chosen) = if file == library { (ALLOWED, include_str!("chosen.rs")) } else { ("", "") };
+                write_if_changed(&self.copy.join(file), &(allowed.to_owned() + &schemata.text + chosen))?;
                 files.insert(file, schemata);
             }
-            let errors = self.cargo("check", &[])?.0;
+            let errors = self.cargo("check", stage, &[])?.0;
             if errors.is_empty() {
                 let sites = files.into_values().flat_map(|file| file.sites).collect();
-                let tests =
-                    self.cargo("test", &["--no-run"])?.1.ok_or_else(|| io::Error::other("the tests do not compile"))?;
+                let tests = self
+                    .cargo("test", stage, &["--no-run"])?
+                    .1
+                    .ok_or_else(|| io::Error::other("the tests do not compile"))?;
                 return Ok(Program { tests, sites, left });
             }
             let (mut lines, mut sites, mut names) = (BTreeSet::new(), BTreeSet::new(), 0);
@@ -139,14 +169,14 @@ impl Tree {
     }
 
     /// The errors, and the test program where one was made.
-    fn cargo(&self, command: &str, options: &[&str]) -> io::Result<(Vec<Value>, Option<PathBuf>)> {
+    fn cargo(&self, command: &str, stage: Stage, options: &[&str]) -> io::Result<(Vec<Value>, Option<PathBuf>)> {
         let output = Command::new("cargo")
-            .args([command, "--package", "toothwave-solver", "--test", "solver", "--message-format", "json"])
-            .args(PROFILE.iter().flat_map(|setting| ["--config", setting]))
+            .args([command, "--message-format", "json"])
+            .args(stage.targets())
+            .args(stage.settings())
             .args(options)
             .current_dir(&self.copy)
-            .env("RUSTFLAGS", "--cap-lints warn")
-            .env("CARGO_TARGET_DIR", self.copy.with_extension("target"))
+            .env("CARGO_TARGET_DIR", &self.target)
             .stderr(Stdio::inherit())
             .output()?;
         let messages =
@@ -157,7 +187,10 @@ impl Tree {
                 && message["message"]["spans"].as_array().is_some_and(|spans| !spans.is_empty())
             {
                 errors.push(message["message"].take());
-            } else if message["target"]["name"] == "solver" {
+            } else if message["manifest_path"]
+                .as_str()
+                .is_some_and(|path| Path::new(path).starts_with(self.copy.join("src/solver")))
+            {
                 program = message["executable"].as_str().map(PathBuf::from).or(program);
             }
         }

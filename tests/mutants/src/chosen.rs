@@ -37,7 +37,7 @@ pub mod mutants {
         if CHOSEN.load(Relaxed) != RECORDING {
             return CHOSEN.load(Relaxed);
         }
-        if !REACHED[first].swap(true, Relaxed) {
+        if !REACHED[first].load(Relaxed) && !REACHED[first].swap(true, Relaxed) {
             RECORD.get().unwrap().write_all(format!("{first}\n").as_bytes()).unwrap();
         }
         NONE

@@ -1,10 +1,10 @@
-//! Tries the mutants that cargo-mutants lists, all built into one test program.
+//! Tries the mutants that cargo-mutants lists, a batch of them by chance built into one test program.
 //!
-//!     schemata LIST ROOT COPY RESULTS [--seconds N] [--again] [--known REPORT] [--report REPORT]
+//!     schemata LIST ROOT COPY TARGET RESULTS [--seconds N] [--again] [--known REPORT] [--report REPORT]
 //!
-//! LIST is what `cargo mutants --list --json` writes, ROOT the tree, COPY one to change, RESULTS a file that keeps what was found: a run
+//! LIST is what `cargo mutants --list --json` writes, ROOT the tree, COPY one to change, TARGET where it is compiled, RESULTS a file that keeps what was found: a run
 //! that was broken off goes on from there, and mutants of files that have changed are tried anew; with --again also those that no test
-//! noticed. After N seconds no further mutant is tried. It fails where no test notices a mutant that a known report of all does not name.
+//! noticed. After N seconds no further mutant is tried. It fails where surely fewer are noticed than a known report says.
 
 mod build;
 mod mutant;
@@ -12,27 +12,37 @@ mod report;
 mod schemata;
 mod trial;
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{HashMap, HashSet};
 use std::fs::{self, File};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::thread;
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use crate::build::Tree;
+use crate::build::{Stage, Tree};
 use crate::mutant::Mutant;
 use crate::report::Report;
 use crate::schemata::Left;
 use crate::trial::{Tests, Verdict};
 
+/// So many are compiled together: with all of them a function is ten times as long as it was written, and the compiler's time grows
+/// faster than that.
+const BATCH: usize = 1500;
+
+/// Of so few all tests are asked at once.
+const FEW: usize = 200;
+
 /// A line of the results.
 #[derive(Debug, Serialize, Deserialize)]
 struct Outcome {
     mutant: String,
-    /// Of the text of its file: another text may have another mutant of the same name.
+    /// Of the text of its file without its tests: another text may have another mutant of the same name.
     file_hash: u64,
     verdict: Verdict,
     by: Option<String>,
@@ -40,22 +50,30 @@ struct Outcome {
 
 fn main() -> io::Result<ExitCode> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [list, root, copy, results, options @ ..] = arguments.as_slice() else {
-        eprintln!("usage: schemata LIST ROOT COPY RESULTS [--seconds N] [--again] [--known REPORT] [--report REPORT]");
+    let [list, root, copy, target, results, options @ ..] = arguments.as_slice() else {
+        eprintln!(
+            "usage: schemata LIST ROOT COPY TARGET RESULTS [--seconds N] [--again] [--known REPORT] [--report REPORT]"
+        );
         return Ok(ExitCode::from(2));
     };
     let option = |name: &str| options.iter().skip_while(|option| *option != name).nth(1);
     let seconds: Option<f64> =
         option("--seconds").map(|seconds| seconds.parse().map_err(io::Error::other)).transpose()?;
+    let threads = thread::available_parallelism()?.get();
     let started = Instant::now();
     let is_over = || seconds.is_some_and(|seconds| started.elapsed().as_secs_f64() > seconds);
     let mutants: Vec<Mutant> = serde_json::from_str(&fs::read_to_string(list)?)?;
     let (root, results) = (PathBuf::from(root), PathBuf::from(results));
 
-    let mut hashes = HashMap::new();
+    let (mut hashes, mut with_units) = (HashMap::new(), HashSet::new());
     for mutant in &mutants {
         if !hashes.contains_key(&mutant.file) {
-            hashes.insert(mutant.file.clone(), hash(&fs::read(root.join(&mutant.file))?));
+            let source = fs::read_to_string(root.join(&mutant.file))?;
+            let (code, units) = source.split_once("#[cfg(test)]").unwrap_or((&source, ""));
+            hashes.insert(mutant.file.clone(), hash(code.as_bytes()));
+            if !units.is_empty() {
+                with_units.insert(mutant.file.clone());
+            }
         }
     }
     let known = if results.exists() { fs::read_to_string(&results)? } else { String::new() };
@@ -72,54 +90,53 @@ fn main() -> io::Result<ExitCode> {
         file.write_all((serde_json::to_string(&outcome)? + "\n").as_bytes())
     };
 
-    let tree = Tree { root, copy: fs::canonicalize(copy)? };
+    let tree = Tree { root, copy: fs::canonicalize(copy)?, target: fs::canonicalize(target)? };
     let directory = tree.copy.join("src/solver");
     let again = options.iter().any(|option| option == "--again");
     let is_open = |verdict: Option<Verdict>| {
-        verdict.is_none_or(|verdict| match verdict {
-            Verdict::Open => true,
-            Verdict::Missed | Verdict::Unreached => again,
-            _ => false,
+        verdict.is_none_or(|verdict| verdict == Verdict::Open || again && verdict.is_silent())
+    };
+    let mut ask = |verdicts: &mut Vec<Option<Verdict>>, these: &[usize], stage: Stage| {
+        if these.is_empty() || is_over() {
+            return Ok(());
+        }
+        let program = tree.build(&mutants, these, stage)?;
+        for (&number, left) in &program.left {
+            let verdict = match left {
+                Left::Unviable => Verdict::Unviable,
+                Left::NotBuiltIn => Verdict::NotBuiltIn,
+            };
+            keep(verdicts, number, verdict, None)?;
+        }
+        let reached = fs::canonicalize(&results)?.with_extension(format!("{stage:?}"));
+        let tests = Tests::learn(&program, &directory, &reached, threads)?;
+        let built: Vec<usize> = these.iter().copied().filter(|number| !program.left.contains_key(number)).collect();
+        let (next, found) = (AtomicUsize::new(0), Mutex::new((verdicts, &mut keep)));
+        at_once(threads, || {
+            while let Some(&number) = built.get(next.fetch_add(1, Relaxed)).filter(|_| !is_over()) {
+                let (verdict, by) = tests.verdict(number, &mutants[number], stage)?;
+                let (verdicts, keep) = &mut *found.lock().map_err(|_| io::Error::other("a thread panicked"))?;
+                keep(verdicts, number, verdict, by)?;
+            }
+            Ok(())
         })
     };
-    let parts: BTreeSet<&str> = mutants.iter().map(part).collect();
-    for part in parts {
-        let (mut order, elsewhere): (Vec<usize>, Vec<usize>) =
-            (0..mutants.len()).partition(|&number| self::part(&mutants[number]) == part);
-        if is_over() || !order.iter().any(|&number| is_open(verdicts[number])) {
-            continue;
+    // In an order by chance, but the same each time: what is done when the time is over is a fair sample.
+    let mut order: Vec<usize> = (0..mutants.len()).collect();
+    order.sort_by_key(|&number| hash(mutants[number].name.as_bytes()));
+    for batch in order.chunks(BATCH) {
+        let those = |which: &dyn Fn(usize) -> bool| -> Vec<usize> {
+            batch.iter().copied().filter(|&number| which(number)).collect()
+        };
+        let fresh = those(&|number| verdicts[number].is_none());
+        if fresh.len() > FEW {
+            ask(&mut verdicts, &fresh, Stage::Quick)?;
         }
-        let left = verdicts.iter().enumerate().filter_map(|(number, verdict)| match verdict {
-            Some(Verdict::Unviable) => Some((number, Left::Unviable)),
-            Some(Verdict::NotBuiltIn) => Some((number, Left::NotBuiltIn)),
-            _ => None,
-        });
-        let program = tree.build(&mutants, left.collect(), &elsewhere.into_iter().collect())?;
-        for (&number, left) in &program.left {
-            if verdicts[number].is_none() {
-                keep(
-                    &mut verdicts,
-                    number,
-                    if *left == Left::Unviable { Verdict::Unviable } else { Verdict::NotBuiltIn },
-                    None,
-                )?;
-            }
-        }
-        let reached = fs::canonicalize(&results)?.with_extension(format!("{:x}.reached", hash(part.as_bytes())));
-        let mut tests = Tests::learn(&program, &directory, &reached)?;
-        // In an order by chance, but the same each time: what is done when the time is over is a fair sample.
-        order.retain(|&number| is_open(verdicts[number]));
-        order.sort_by_key(|&number| hash(mutants[number].name.as_bytes()));
-        for quick in [true, false] {
-            let now = |verdict| if quick { verdict != Some(Verdict::Open) } else { verdict == Some(Verdict::Open) };
-            for &number in order.iter().filter(|&&number| now(verdicts[number])).collect::<Vec<_>>() {
-                if is_over() {
-                    break;
-                }
-                let (verdict, by) = tests.verdict(number, &mutants[number], quick)?;
-                keep(&mut verdicts, number, verdict, by)?;
-            }
-        }
+        // What only tests beside it may notice.
+        let beside = those(&|number| is_open(verdicts[number]) && with_units.contains(&mutants[number].file));
+        ask(&mut verdicts, &beside, Stage::Units)?;
+        let open = those(&|number| is_open(verdicts[number]));
+        ask(&mut verdicts, &open, Stage::All)?;
     }
 
     let report = Report::of(&mutants, &verdicts);
@@ -129,17 +146,19 @@ fn main() -> io::Result<ExitCode> {
     }
     let known = option("--known").map(fs::read_to_string).transpose()?;
     let known: Option<Report> = known.map(|text| serde_json::from_str(&text)).transpose()?;
-    let new = report.new_beside(known.as_ref());
-    for name in &new {
+    for name in report.new_beside(known.as_ref()) {
         println!("missed: {name}");
     }
-    let is_news = known.as_ref().is_none_or(Report::is_whole);
-    Ok(if new.is_empty() || !is_news { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    let is_below = known.is_some_and(|known| report.is_below(&known));
+    Ok(if is_below { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-/// What is compiled together. The files of the fast path become one function: the compiler's time grows faster than this does.
-fn part(mutant: &Mutant) -> &str {
-    if mutant.file.starts_with("src/solver/sweep/fast") { &mutant.file } else { "" }
+/// The same work in each of so many threads.
+fn at_once(threads: usize, work: impl Fn() -> io::Result<()> + Sync) -> io::Result<()> {
+    thread::scope(|scope| {
+        let threads: Vec<_> = (0..threads).map(|_| scope.spawn(&work)).collect();
+        threads.into_iter().try_for_each(|thread| thread.join().map_err(|_| io::Error::other("a thread panicked"))?)
+    })
 }
 
 /// The same in each run.

@@ -13,6 +13,18 @@ pub struct Mutant {
     pub genre: Genre,
 }
 
+impl Mutant {
+    /// File and function, as its name has them: `FILE:LINE:COLUMN: replace FUNCTION -> …` or `… in FUNCTION`.
+    pub fn function(&self) -> String {
+        let change = self.name.split_once(": ").map_or("", |(_, change)| change);
+        let function = match change.rsplit_once(" in ") {
+            Some((_, function)) => function,
+            None => change.trim_start_matches("replace ").split(" -> ").next().unwrap_or_default(),
+        };
+        format!("{} {function}", self.file)
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize)]
 pub enum Genre {
     FnValue,

@@ -47,27 +47,24 @@ impl Counts {
         } += 1;
     }
 
-    /// The share caught of those tried that compile, at least, as some may be open; with what a sample leaves uncertain: Wilson's interval
-    /// of 95 %.
+    /// Mutants caught and tried, of those that compile and are built in; those that stand open count as not caught.
+    fn caught_and_tried(&self) -> (usize, usize) {
+        let caught = self.caught + self.timeout;
+        (caught, caught + self.missed + self.unreached + self.open)
+    }
+
     pub fn share(&self) -> String {
-        let caught = (self.caught + self.timeout) as f64;
-        let tried = caught + (self.missed + self.unreached + self.open) as f64;
-        if tried == 0.0 {
-            return format!("none tried of {}", self.not_tried);
-        }
-        let (share, z) = (caught / tried, 1.96);
-        let middle = (share + z * z / (2.0 * tried)) / (1.0 + z * z / tried);
-        let half = z / (1.0 + z * z / tried) * (share * (1.0 - share) / tried + z * z / (4.0 * tried * tried)).sqrt();
-        let interval = if self.not_tried == 0 {
+        let (caught, tried) = self.caught_and_tried();
+        let percent = 100.0 * caught as f64 / tried as f64;
+        let interval = if self.not_tried == 0 || tried == 0 {
             String::new()
         } else {
-            format!(" ({:.1} to {:.1} %)", 100.0 * (middle - half), 100.0 * (middle + half))
+            let (least, most) = interval(caught, tried);
+            format!(", {:.1} to {:.1} % of all", 100.0 * least, 100.0 * most)
         };
         format!(
-            "caught: {caught} of {tried}, {:.1} %{interval}; {} open, {} not tried",
-            100.0 * share,
-            self.open,
-            self.not_tried
+            "caught: {caught} of {tried}, {percent:.1} %{interval}; {} open, {} not tried",
+            self.open, self.not_tried
         )
     }
 }
@@ -104,9 +101,11 @@ impl Report {
         self.silent().filter(|name| !known.contains(&without_line(name))).collect()
     }
 
-    /// Whether all mutants were tried: only then is one that it does not name news.
-    pub fn is_whole(&self) -> bool {
-        self.all.not_tried + self.all.open == 0
+    /// Whether surely fewer are caught than another report says, even if all were that stand open.
+    pub fn is_below(&self, known: &Self) -> bool {
+        let ((caught, tried), (known_caught, known_tried)) =
+            (self.all.caught_and_tried(), known.all.caught_and_tried());
+        interval(caught + self.all.open, tried).1 < known_caught as f64 / known_tried as f64
     }
 
     fn silent(&self) -> impl Iterator<Item = &str> {
@@ -117,4 +116,16 @@ impl Report {
 /// File and change of a mutant's name, `FILE:LINE:COLUMN: CHANGE`.
 fn without_line(name: &str) -> Option<(&str, &str)> {
     Some((name.split(':').next()?, name.split_once(": ")?.1))
+}
+
+/// Wilson's interval of 95 % for the share caught, which a random sample leaves.
+fn interval(caught: usize, tried: usize) -> (f64, f64) {
+    if tried == 0 {
+        return (0.0, 1.0);
+    }
+    let (tried, z) = (tried as f64, 1.96);
+    let share = caught as f64 / tried;
+    let middle = (share + z * z / (2.0 * tried)) / (1.0 + z * z / tried);
+    let half = z / (1.0 + z * z / tried) * (share * (1.0 - share) / tried + z * z / (4.0 * tried * tried)).sqrt();
+    (middle - half, middle + half)
 }
