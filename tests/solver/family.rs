@@ -340,6 +340,23 @@ fn the_critical_radius_of_a_harmonic_cam_is_the_lower_root_of_its_quadratic() {
     assert!(undercut > 1, "{undercut}");
 }
 
+/// The digits of a bore are those of its distance from the tip or the root: near either the position keeps as many.
+#[test]
+fn a_bore_next_to_tip_or_root_of_a_harmonic_cams_ring_ends_the_flank_where_its_radius_is_reached() {
+    for (lobes, teeth) in [(1, 30), (2, 28), (3, 36), (5, 50)] {
+        let drive = drive(&of(harmonic(lobes, 57.0, 1.0), teeth, 2, teeth - lobes, 2.5));
+        let flank = drive.flank();
+        let half_lobe_rad = PI / lobes as f64;
+        for share in [1e-3, 0.01, 0.1, 0.4, 0.6, 0.9, 0.99, 0.999] {
+            let position = Position::from_lobe(share * half_lobe_rad, drive.lobes());
+            let tooth = flank.locus().at(position).unwrap();
+            let found = flank.position_at_radius(flank.radius_mm(&tooth, &flank.at(&tooth))).unwrap();
+            assert!((found.from_lobe_rad / position.from_lobe_rad - 1.0).abs() < 1e-5, "{lobes}, {share}");
+            assert!((found.from_valley_rad / position.from_valley_rad - 1.0).abs() < 1e-5, "{lobes}, {share}");
+        }
+    }
+}
+
 #[test]
 fn one_lobe_of_the_harmonic_cam_is_the_eccentric_circle_to_the_last_bit() {
     for (teeth, ring_teeth) in [(20, 21), (21, 20)] {
