@@ -320,6 +320,43 @@ fn the_critical_radius_parts_swept_circles_that_reach_the_tip_from_those_that_pa
     assert!(tried > 10, "{tried}");
 }
 
+/// The lower root of theory 2.9, and that an undercut drive has one below its own radius.
+#[test]
+fn the_critical_radius_of_a_harmonic_cam_is_the_lower_root_of_its_quadratic() {
+    let mut undercut = 0;
+    for (lobes, teeth, radius_mm, e) in [(1, 40, 57.0, 1.0), (2, 80, 57.0, 1.0), (3, 36, 48.0, 1.0), (4, 48, 60.0, 1.2)]
+    {
+        let p = of(harmonic(lobes, radius_mm, e), teeth, 2, teeth - lobes, 1.5);
+        let ring_teeth = (teeth - lobes) as f64;
+        let (a, b) = (radius_mm - e, radius_mm + e * (lobes * lobes - 1) as f64);
+        let linear = a + 2.0 * b - e * ring_teeth * ring_teeth;
+        let critical_mm = drive(&p).flank().critical_tooth_radius_mm();
+        assert_eq!(critical_mm.is_some(), linear <= -(8.0 * a * b).sqrt(), "{p:?}");
+        let Some(r) = critical_mm else { continue };
+        assert!((2.0 * r * r + linear * r + a * b).abs() < 1e-12 * a * b, "{r} of {p:?}");
+        assert!(4.0 * r < -linear, "{r} is the upper root of {p:?}");
+        undercut += 1;
+    }
+    assert!(undercut > 1, "{undercut}");
+}
+
+/// The digits of a bore are those of its distance from the tip or the root: near either the position keeps as many.
+#[test]
+fn a_bore_next_to_tip_or_root_of_a_harmonic_cams_ring_ends_the_flank_where_its_radius_is_reached() {
+    for (lobes, teeth) in [(1, 30), (2, 28), (3, 36), (5, 50)] {
+        let drive = drive(&of(harmonic(lobes, 57.0, 1.0), teeth, 2, teeth - lobes, 2.5));
+        let flank = drive.flank();
+        let half_lobe_rad = PI / lobes as f64;
+        for share in [1e-3, 0.01, 0.1, 0.4, 0.6, 0.9, 0.99, 0.999] {
+            let position = Position::from_lobe(share * half_lobe_rad, drive.lobes());
+            let tooth = flank.locus().at(position).unwrap();
+            let found = flank.position_at_radius(flank.radius_mm(&tooth, &flank.at(&tooth))).unwrap();
+            assert!((found.from_lobe_rad / position.from_lobe_rad - 1.0).abs() < 1e-5, "{lobes}, {share}");
+            assert!((found.from_valley_rad / position.from_valley_rad - 1.0).abs() < 1e-5, "{lobes}, {share}");
+        }
+    }
+}
+
 #[test]
 fn one_lobe_of_the_harmonic_cam_is_the_eccentric_circle_to_the_last_bit() {
     for (teeth, ring_teeth) in [(20, 21), (21, 20)] {

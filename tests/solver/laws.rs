@@ -594,6 +594,13 @@ fn flat_sided_teeth_share_the_load_with_any_law_of_cylinders() {
 
 /// They were borne by the default carrier, whatever radii the designer gave.
 #[test]
+fn a_flat_bears_half_its_length_on_either_side() {
+    let tooth = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 6.0 };
+    let peaks = swept(&DriveParameters { tooth, ..PAPER_5_1 }, &johnson(20.0), 4).peaks;
+    assert!((peaks.carrier.half_width_mm / 3.0 - 1.0).abs() < 1e-14);
+}
+
+#[test]
 fn flats_are_borne_by_the_carrier_that_is_given() {
     let flat_length_mm = 4.0;
     let parameters = DriveParameters { tooth: ToothShape::FlatSided { width_mm: 15.0, flat_length_mm }, ..PAPER_5_1 };

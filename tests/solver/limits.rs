@@ -1,6 +1,6 @@
 //! What cannot exist, and what must be said of what can.
 
-use toothwave_solver::drive::DriveError;
+use toothwave_solver::drive::{Draft, DriveError};
 use toothwave_solver::{
     Compatibility, Contact, ContactLaw, Drive, DriveParameters, Finding, LoadCase, LoadParameters, Modification, Never,
     Parameter, PerContact, Position, SolveError, ToothShape, Torque, Violation, WaveGenerator, findings,
@@ -263,6 +263,44 @@ fn of_the_numbers_beside_one_that_cannot_be_the_nearer_is_proposed_and_of_two_as
     assert_eq!(proposed(27, 6, 25), 3);
     assert_eq!(proposed(28, 56, 26), 28);
     assert_eq!(proposed(28, 28, 28), 26);
+}
+
+#[test]
+fn projection_on_a_steep_flank_is_a_finding() {
+    let load = LoadCase::new(&load(20.0, Compatibility::Projection)).unwrap();
+    let told = [PAPER_5_1, PAPER_5_2, DriveParameters { wave_generator: ellipse(58.0, 57.8), ..PAPER_5_1 }].map(|p| {
+        let drive = drive(&p);
+        let found = findings::of_projection(&drive, &load).unwrap();
+        let is_told = found.iter().any(|found| matches!(found, Finding::ProjectionOnSteepFlank { .. }));
+        assert_eq!(is_told, drive.largest_pressure_angle_deg().unwrap() > findings::STEEP_FOR_PROJECTION_DEG, "{p:?}");
+        is_told
+    });
+    assert!(told.contains(&true) && told.contains(&false), "{told:?}");
+}
+
+#[test]
+fn an_allowable_stress_out_of_range_is_told_once_where_the_contacts_share_it() {
+    let told = |wave_generator, ring, carrier| -> Vec<_> {
+        let allowable_stress_mpa = Some(PerContact { wave_generator, ring, carrier });
+        let load = LoadParameters { allowable_stress_mpa, ..load(20.0, Compatibility::Projection) };
+        let of_range = |violation: Violation| match violation {
+            Violation::OutOfRange { parameter, .. } => parameter,
+            other => panic!("{other:?}"),
+        };
+        LoadCase::new(&load).unwrap_err().into_iter().map(of_range).collect()
+    };
+    let at = Parameter::AllowableStressAt;
+    assert_eq!(told(-1.0, -1.0, -1.0), [Parameter::AllowableStress]);
+    assert_eq!(told(-1.0, -1.0, 900.0), [at(Contact::WaveGenerator), at(Contact::Ring)]);
+    assert_eq!(told(900.0, -1.0, -1.0), [at(Contact::Ring), at(Contact::Carrier)]);
+}
+
+#[test]
+fn a_draft_has_the_violations_for_which_the_drive_is_refused() {
+    for p in [DriveParameters { tooth_radius_mm: 7.2, ..PAPER_5_1 }, DriveParameters { ring_teeth: 27, ..PAPER_5_1 }] {
+        assert_eq!(Draft::new(&p).unwrap().violations(), violations(&p));
+    }
+    assert_eq!(Draft::new(&PAPER_5_1).unwrap().violations(), []);
 }
 
 #[test]

@@ -8,9 +8,11 @@ use toothwave_solver::drive::Draft;
 use toothwave_solver::findings::{self, Edge as CarrierEdge, Wall};
 use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::ring::FlankEnd;
-use toothwave_solver::{Drive, DriveParameters, Finding, Never, Part, ToothShape};
+use toothwave_solver::{
+    Drive, DriveParameters, Finding, Modification, Never, Part, Position, ToothShape, WaveGenerator,
+};
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, drive};
+use crate::drives::{PAPER_5_1, PAPER_5_2, drive, ellipse};
 
 /// The first closed path of a part's section.
 fn edges(parameters: &DriveParameters, part: Part, parts: &PartsParameters) -> Vec<Edge> {
@@ -100,6 +102,73 @@ fn a_pointed_finger_ends_where_the_walls_of_its_two_slots_meet() {
     let from_next = Rotation2::new(-2.0 * PI / 28.0) * apex;
     assert!((from_next.y + 7.0).abs() < 1e-12, "{from_next}");
     assert!((apex.y.atan2(apex.x) - PI / 28.0).abs() < 1e-14);
+}
+
+#[test]
+fn the_curves_of_a_wave_generator_start_and_end_across_the_radius_and_follow_each_other() {
+    for wave_generator in [
+        PAPER_5_1.wave_generator,
+        WaveGenerator::HarmonicPath { lobes: 3, mean_path_radius_mm: 63.0, amplitude_mm: 1.0 },
+        WaveGenerator::Eccentric { radius_mm: 57.0, eccentricity_mm: 1.0 },
+    ] {
+        let ring_teeth = 28 - wave_generator.lobes();
+        let p = DriveParameters { wave_generator, ring_teeth, ..PAPER_5_1 };
+        let outline = edges(&p, Part::WaveGenerator, &PartsParameters::default());
+        for (edge, next) in outline.iter().zip(outline.iter().cycle().skip(1)) {
+            let Edge::Curve { start_tangent, end_tangent, .. } = edge else { panic!("{edge:?}") };
+            for (point, tangent) in [(edge.start(), start_tangent), (edge.end(), end_tangent)] {
+                // Counter-clockwise.
+                let ahead = Rotation2::new(0.5 * PI) * (point.coords / point.coords.norm());
+                assert!((ahead - tangent.into_inner()).norm() < 1e-14, "{tangent:?} at {point}");
+            }
+            assert_eq!(edge.end(), next.start());
+        }
+    }
+}
+
+#[test]
+fn a_bore_leaves_some_of_the_wave_generator_as_it_is_made() {
+    let draft = Draft::new(&PAPER_5_1).unwrap();
+    // Of 56 mm across, a quarter of a millimetre clear of the teeth and set back by a half.
+    let modification = Modification { wave_generator_equidistant_um: 500.0, ..Modification::default() };
+    let is_possible = |bore_mm| {
+        let bore_radius_mm = Some(bore_mm);
+        let parts =
+            PartsParameters { bore_radius_mm, wave_generator_clearance_um: 250.0, modification, ..Default::default() };
+        parts.violations(Part::WaveGenerator, &draft).is_empty()
+    };
+    assert!(is_possible(55.249) && !is_possible(55.25) && !is_possible(56.0));
+}
+
+/// Set back by more its outline would have turned inside out where it is sharpest, or nothing would be left of it.
+#[test]
+fn a_wave_generators_greatest_clearance_is_its_least_radius_of_curvature_or_its_least_radius() {
+    for (wave_generator, least_mm) in [
+        (ellipse(58.0, 40.0), None),
+        (WaveGenerator::Harmonic { lobes: 3, mean_radius_mm: 57.0, amplitude_mm: 1.0 }, None),
+        (WaveGenerator::HarmonicPath { lobes: 3, mean_path_radius_mm: 63.0, amplitude_mm: 1.0 }, None),
+        (WaveGenerator::HarmonicPath { lobes: 1, mean_path_radius_mm: 63.0, amplitude_mm: 5.0 }, Some(53.0)),
+        (WaveGenerator::Eccentric { radius_mm: 57.0, eccentricity_mm: 1.0 }, Some(56.0)),
+    ] {
+        let lobes = wave_generator.lobes();
+        let p = DriveParameters { wave_generator, ring_teeth: 28 - lobes, ..PAPER_5_1 };
+        let draft = Draft::new(&p).unwrap();
+        let drive = draft.drive().unwrap_or_else(|| panic!("{p:?}: {:?}", draft.violations()));
+        let sharpest_mm = (0..=2000)
+            .map(|i| Position::from_lobe(PI / lobes as f64 * f64::from(i) / 2000.0, drive.lobes()))
+            .map(|position| 1.0 / drive.flank().locus().at(position).unwrap().cam_contact.curvature_per_mm)
+            .filter(|&radius_mm| radius_mm > 0.0)
+            .fold(f64::INFINITY, f64::min);
+        let expected_um = 1e3 * least_mm.unwrap_or(sharpest_mm);
+        let is_possible = |wave_generator_clearance_um| {
+            let parts = PartsParameters { wave_generator_clearance_um, ..PartsParameters::default() };
+            parts.violations(Part::WaveGenerator, &draft).is_empty()
+        };
+        assert!(
+            is_possible(expected_um * (1.0 - 1e-6)) && !is_possible(expected_um * (1.0 + 1e-6)),
+            "{p:?} {expected_um}"
+        );
+    }
 }
 
 #[test]

@@ -47,6 +47,14 @@ fn a_sweep_of_several_laps_is_refused_where_it_counts_one_state_more_than_allowe
     assert!(matches!(refused, SolveError::TooManyStates { limit } if limit == counted - 1), "{refused:?}");
 }
 
+/// A period of case 5.1 ends where its seventh tooth enters, and carries nothing yet.
+#[test]
+fn a_sweep_to_a_tolerance_lists_no_input_angle_twice_where_teeth_enter_at_a_regular_tip() {
+    let angles_deg = swept_to(&PAPER_5_1, &load(20.0, VirtualWork), 1e-3).input_angles.input_angle_deg;
+    assert!(angles_deg.windows(2).all(|pair| pair[0] < pair[1]));
+    assert_eq!([angles_deg[0], angles_deg[angles_deg.len() - 1]], [0.0, 360.0 / 26.0]);
+}
+
 // --- Where a tooth enters
 
 /// The bore that ends the flank of a drive at so many spacings from the major axis, but for rounding.

@@ -292,6 +292,20 @@ fn many_corners_of_a_capacity_are_found_to_the_tightest_tolerance() {
     assert!(found_nm <= dense_nm * (1.0 + 1e-12) && found_nm > dense_nm * (1.0 - 1e-4), "{found_nm} {dense_nm}");
 }
 
+/// `ψ_i = 2π i/Z'_G - j Z_K/Z_G`.
+#[test]
+fn the_tooth_of_a_true_peak_stands_where_its_input_angle_puts_it() {
+    for p in [PAPER_5_1, PAPER_5_2] {
+        for (_, peaks) in to(&p, &load(20.0, VirtualWork), 1e-4).contacts.iter() {
+            for peak in [peaks.force_n, peaks.stress_mpa] {
+                let at_start_deg = peak.position_deg + peak.input_angle_deg * p.ring_teeth as f64 / p.teeth as f64;
+                let tooth = at_start_deg * p.installed as f64 / 360.0;
+                assert!((tooth - tooth.round()).abs() < 1e-9, "{tooth} of {peak:?}");
+            }
+        }
+    }
+}
+
 #[test]
 fn true_peaks_are_those_of_the_sweep_to_a_tolerance() {
     for (parameters, load) in by_every_law() {

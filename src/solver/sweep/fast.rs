@@ -817,7 +817,7 @@ impl Kernel {
     /// Turns the wave generator at each input angle of a tile until the unit loads of its teeth balance the torque.
     #[inline(always)]
     fn scale(loaded: &LoadedDrive<'_>, teeth: usize, tile: &mut Tile<'_>) {
-        let rows = tile.sum_torques(teeth);
+        let rows = tile.sum_torques::<true>(teeth);
         let (input_nmm, zones) = (loaded.input_torque_nmm(), loaded.zones());
         let PerContact { wave_generator: cam, ring, carrier } = &mut tile.row_torque;
         let (cam, ring, carrier) = (&mut cam[..rows], &mut ring[..rows], &mut carrier[..rows]);
@@ -889,17 +889,25 @@ impl Kernel {
     /// Torques, stiffness and what carries, once the load is shared.
     #[inline(always)]
     fn scale_shared<V: Simd>(&self, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) {
-        let (zones, rows) = (loaded.zones(), tile.count / count);
+        let zones = loaded.zones();
         let len = tile.count.next_multiple_of(LANES);
         let (scale, root) = (&tile.scale[..len], &mut tile.scale_root[..len]);
         let are_balls = matches!(self.pressures, Pressures::Ellipses(_));
         for i in 0..len {
             root[i] = if are_balls { cube_root::<V>(scale[i]) } else { scale[i].sqrt() };
         }
-        tile.sum_scaled_torques(count, zones);
+        let rows = tile.sum_torques::<false>(count);
+        let PerContact { wave_generator: cam, ring, carrier } = &mut tile.row_torque;
+        let (cam, ring, carrier) = (&mut cam[..rows], &mut ring[..rows], &mut carrier[..rows]);
+        let (rotation_rad, stiffness) = (&mut tile.row_rotation_rad[..rows], &mut tile.row_stiffness[..rows]);
         let lost_motion_rad = self.gaps.as_ref().map_or(0.0, GapColumns::lost_motion_rad);
-        tile.row_rotation_rad[..rows].iter_mut().for_each(|rotation_rad| *rotation_rad += lost_motion_rad);
-        tile.row_stiffness[..rows].iter_mut().for_each(|stiffness| *stiffness *= zones);
+        for row in 0..rows {
+            cam[row] *= zones;
+            ring[row] *= zones;
+            carrier[row] *= zones;
+            stiffness[row] *= zones;
+            rotation_rad[row] += lost_motion_rad;
+        }
         tile.row_loaded.clear();
         let carrying = |row: &[f64]| row.iter().filter(|&&force| force > 0.0).count();
         tile.row_loaded.extend(tile.scale[..tile.count].chunks_exact(count).map(carrying));

@@ -26,7 +26,7 @@ impl Layout {
     }
 }
 
-/// Teeth that stand side by side in a tile as they do in the answer.
+/// Teeth of a zone that stand side by side in a tile as they do in the answer.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Listed {
     /// The first of them in a row of the tile.
@@ -52,6 +52,15 @@ pub(super) struct LapTeeth {
     runs: Vec<Neighbours>,
     /// In the order of the answer.
     pub(super) listed: Vec<Listed>,
+    /// The same, lobe or not.
+    pub(super) stretches: Vec<Stretch>,
+}
+
+/// Teeth of a row that stand side by side in the tile as they do in the answer.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stretch {
+    pub(super) at: usize,
+    pub(super) count: usize,
 }
 
 impl LapTeeth {
@@ -64,6 +73,13 @@ impl LapTeeth {
             let which = if layout.at_each_place > 1 { whole(teeth.lobe / apart) } else { 0 };
             Listed { at: which * places + layout.index(whole(teeth.first_place), places), teeth }
         }));
+        self.stretches.clear();
+        for listed in &self.listed {
+            match self.stretches.last_mut() {
+                Some(last) if last.at + last.count == listed.at => last.count += listed.count(),
+                _ => self.stretches.push(Stretch { at: listed.at, count: listed.count() }),
+            }
+        }
     }
 }
 

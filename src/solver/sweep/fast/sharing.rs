@@ -147,12 +147,6 @@ impl<'a> Work<'a> {
         self.closing[row * count..(row + 1) * count].iter().map(move |closing| excess + (last - closing))
     }
 
-    /// Room for what the loads of a tile make of its torques, once nothing is searched for any more.
-    #[inline(always)]
-    pub(super) fn torques(&mut self, len: usize) -> [&mut [f64]; 3] {
-        [&mut self.slope[..len], &mut self.offset[..len], &mut self.secant[..len]]
-    }
-
     /// What the last search for a limit found, by input angle: the torque of one zone.
     pub(super) const fn limits_nmm(&self) -> &[f64] {
         self.row_limit

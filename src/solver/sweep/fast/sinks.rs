@@ -4,11 +4,11 @@ use std::iter::zip;
 use std::ops::Range;
 
 use super::lanes::{largest, repeat_each};
-use super::laps::{LapTeeth, Laps, Listed};
+use super::laps::{LapTeeth, Laps, Listed, Stretch};
 use super::tile::{Tile, whole};
 use crate::contact::{Contact, PerContact};
 use crate::drive::Drive;
-use crate::mesh::TeethInMesh;
+use crate::mesh::{Place, TeethInMesh};
 use crate::sweep::columns::{
     Columns, ContactPeaks, Extremes, InputAngles, Peak, PeakAt, States, SweepPeaks, TorqueCapacity,
 };
@@ -79,18 +79,18 @@ impl<'a> ColumnSink<'a> {
         let start = laps.states_before(sample);
         let all = start..start + rows * listed;
         repeat_rows(&tile.row_input_angle_deg[..rows], listed, &mut states.input_angle_deg[all.clone()]);
-        for of_row in
-            states.tooth[all.clone()].chunks_exact_mut(listed).zip(states.lobe[all.clone()].chunks_exact_mut(listed))
-        {
-            let mut numbers = of_row.0.iter_mut().zip(of_row.1);
-            for run in &lap.listed {
-                let first = run.place(laps.mesh(), 0);
-                let number = u32::try_from(first.slot).unwrap_or(u32::MAX);
-                let lobe = u32::try_from(first.lobe).unwrap_or(u32::MAX);
-                for (number, place) in (number..).zip(numbers.by_ref().take(run.count())) {
-                    (*place.0, *place.1) = (number, lobe);
-                }
-            }
+        let mut at = start;
+        for run in &lap.listed {
+            let Place { slot, lobe, .. } = run.place(laps.mesh(), 0);
+            let of_run = at..at + run.count();
+            let numbers = u32::try_from(slot).unwrap_or(u32::MAX)..;
+            states.tooth[of_run.clone()].iter_mut().zip(numbers).for_each(|(tooth, number)| *tooth = number);
+            states.lobe[of_run.clone()].fill(u32::try_from(lobe).unwrap_or(u32::MAX));
+            at = of_run.end;
+        }
+        for row in all.clone().step_by(listed).skip(1) {
+            states.tooth.copy_within(start..start + listed, row);
+            states.lobe.copy_within(start..start + listed, row);
         }
         for (column, of_tile) in [
             (&mut states.position_deg, &tile.position_deg),
@@ -98,7 +98,7 @@ impl<'a> ColumnSink<'a> {
             (&mut states.wave_generator_angle_deg, &tile.wave_generator_angle_deg),
             (&mut states.ring_angle_deg, &tile.ring_angle_deg),
         ] {
-            for_each_run(&mut column[all.clone()], listed, teeth, lap, |column, at| {
+            for_each_stretch(&mut column[all.clone()], listed, teeth, lap, |column, at| {
                 column.copy_from_slice(&of_tile[at]);
             });
         }
@@ -108,7 +108,7 @@ impl<'a> ColumnSink<'a> {
                 (states.force_n.get_mut(contact), tile.force.get(contact), &*tile.scale, force),
                 (states.stress_mpa.get_mut(contact), tile.stress.get(contact), tile.stress_scale(contact), stress),
             ] {
-                for_each_run(&mut column[all.clone()], listed, teeth, lap, |column, at| {
+                for_each_stretch(&mut column[all.clone()], listed, teeth, lap, |column, at| {
                     for (value, (unit, factor)) in column.iter_mut().zip(zip(&unit[at.clone()], &factor[at])) {
                         *value = unit * factor;
                     }
@@ -119,20 +119,27 @@ impl<'a> ColumnSink<'a> {
     }
 }
 
-/// Each row of a column of teeth as they are listed, run by run, with where the run stands in the tile.
+/// Each stretch of a column of teeth as they are listed that stands in the tile as it does there, with where it does.
 #[inline(always)]
-fn for_each_run(
+fn for_each_stretch(
     column: &mut [f64],
     listed: usize,
     teeth: usize,
     lap: &LapTeeth,
     mut each: impl FnMut(&mut [f64], Range<usize>),
 ) {
+    if let [Stretch { at: 0, count }] = lap.stretches[..]
+        && count == teeth
+    {
+        let all = 0..column.len();
+        each(column, all);
+        return;
+    }
     for (row, mut column) in column.chunks_exact_mut(listed).enumerate() {
-        for run in &lap.listed {
-            let (of_run, rest) = column.split_at_mut(run.count());
-            let at = row * teeth + run.at;
-            each(of_run, at..at + run.count());
+        for stretch in &lap.stretches {
+            let (of_stretch, rest) = column.split_at_mut(stretch.count);
+            let at = row * teeth + stretch.at;
+            each(of_stretch, at..at + stretch.count);
             column = rest;
         }
     }

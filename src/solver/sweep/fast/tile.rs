@@ -399,51 +399,25 @@ impl<'a> Tile<'a> {
         360.0 * (self.pattern_step[state] - self.passed) / self.steps
     }
 
-    /// Torques of a unit rotation summed over the teeth at each input angle; how many of these there are.
+    /// Torques summed over the teeth at each input angle, of unit loads or of them all; how many of these there are.
     #[inline(always)]
-    pub(super) fn sum_torques(&mut self, teeth: usize) -> usize {
-        let PerContact { wave_generator, ring, carrier } = &self.torque;
-        sum_torques([wave_generator, ring, carrier], &mut self.row_torque, self.count, teeth)
-    }
-
-    /// The same of all loads, so many times.
-    #[inline(always)]
-    pub(super) fn sum_scaled_torques(&mut self, teeth: usize, times: f64) -> usize {
-        let len = self.count.next_multiple_of(LANES);
-        let scale = &self.scale[..len];
-        let (cam, ring) = (&self.torque.wave_generator[..len], &self.torque.ring[..len]);
-        let carrier = &self.torque.carrier[..len];
-        let scaled = self.work.torques(len);
-        for i in 0..len {
-            let scale = times * scale[i];
-            scaled[0][i] = cam[i] * scale;
-            scaled[1][i] = ring[i] * scale;
-            scaled[2][i] = carrier[i] * scale;
+    pub(super) fn sum_torques<const OF_UNIT_LOADS: bool>(&mut self, teeth: usize) -> usize {
+        let rows = self.count / teeth;
+        for row in 0..rows {
+            let at = row * teeth..(row + 1) * teeth;
+            let (cam, ring) = (&self.torque.wave_generator[at.clone()], &self.torque.ring[at.clone()]);
+            let (carrier, scale) = (&self.torque.carrier[at.clone()], &self.scale[at]);
+            let (mut of_cam, mut of_ring, mut of_carrier) = (0.0, 0.0, 0.0);
+            for i in 0..teeth {
+                let scale = if OF_UNIT_LOADS { 1.0 } else { scale[i] };
+                of_cam += cam[i] * scale;
+                of_ring += ring[i] * scale;
+                of_carrier += carrier[i] * scale;
+            }
+            self.row_torque.wave_generator[row] = of_cam;
+            self.row_torque.ring[row] = of_ring;
+            self.row_torque.carrier[row] = of_carrier;
         }
-        sum_torques(scaled.map(|scaled| &*scaled), &mut self.row_torque, self.count, teeth)
+        rows
     }
-}
-
-/// Torques summed over the teeth at each input angle; how many of these there are.
-#[inline(always)]
-fn sum_torques(
-    [cam, ring, carrier]: [&[f64]; 3],
-    row_torque: &mut PerContact<&mut [f64]>,
-    count: usize,
-    teeth: usize,
-) -> usize {
-    let rows = count / teeth;
-    for row in 0..rows {
-        let at = row * teeth..(row + 1) * teeth;
-        let (mut of_cam, mut of_ring, mut of_carrier) = (0.0, 0.0, 0.0);
-        for ((cam, ring), carrier) in zip(zip(&cam[at.clone()], &ring[at.clone()]), &carrier[at]) {
-            of_cam += cam;
-            of_ring += ring;
-            of_carrier += carrier;
-        }
-        row_torque.wave_generator[row] = of_cam;
-        row_torque.ring[row] = of_ring;
-        row_torque.carrier[row] = of_carrier;
-    }
-    rows
 }
