@@ -141,8 +141,11 @@ class SmoothCurve:
         return self.spline(length)
 
 
-def solve(case, turned_rad=None, engaged_rad=None):
-    """Forces and pressures of one zone, and its wind-up; `turned_rad` is how far the cam is meshed as already turned."""
+def solve(case, turned_rad=None, engaged_rad=None, reach_rad=0.0):
+    """Forces and pressures of one zone, and its wind-up; `turned_rad` is how far the cam is meshed as already turned.
+
+    The flank ends at `engaged_rad`, in a corner of the ring that teeth up to `reach_rad` farther on may be pressed against.
+    """
     drive = case.drive
     turned_rad = turned_rad or 0.0
     r, k = drive.radius_mm, drive.ring_teeth / drive.lobes
@@ -151,7 +154,7 @@ def solve(case, turned_rad=None, engaged_rad=None):
     teeth = []
     for i in range(-drive.installed, 2 * drive.installed):
         psi = 2 * np.pi * i / drive.installed - j * drive.ring_teeth / drive.count
-        if 1e-9 < psi <= end + 1e-12:
+        if 1e-9 < psi <= end + reach_rad + 1e-12:
             teeth.append((i, psi))
     # What the load will be about, for the width of the patches: all on three teeth.
     lever = max(abs(drive.support(drive.normal_at(p))[1]) for _, p in teeth)
@@ -161,8 +164,6 @@ def solve(case, turned_rad=None, engaged_rad=None):
     half, cells = 1.6 * b, 2 * int(round(16 * case.refinement))
     step = 2 * half / cells
     s = np.linspace(-half, half, cells + 1)
-    mass = weights_of(step, cells + 1)
-
     cam_curve = SmoothCurve(lambda phi: drive.offset_point(phi, 0.0), -0.35, np.pi / drive.lobes + 0.35)
     placed = []
     for i, psi in teeth:
@@ -176,6 +177,8 @@ def solve(case, turned_rad=None, engaged_rad=None):
         middle = psi + drive.sense * psi / k
         away = lambda p: np.hypot(*(drive.ring_point(middle, p) - center))
         near = minimize_scalar(away, bounds=(max(psi - 0.15, -0.5), min(psi + 0.15, end)), method="bounded", options={"xatol": 1e-11}).x
+        # A search within bounds stops a little before them.
+        near = end if reach_rad > 0.0 and end - near < 1e-6 else near
         ring_at = drive.ring_point(middle, near)
         placed.append(dict(number=i, psi=psi, center=center, phi=phi, ring_at=ring_at, near=near, middle=middle, slot=slot, forward=forward * drive.sense))
 
@@ -187,14 +190,15 @@ def solve(case, turned_rad=None, engaged_rad=None):
         n_ring = tooth["ring_at"] - tooth["center"]
         n_ring = n_ring / np.hypot(*n_ring)
         tooth["normals"] = [n_cam, n_ring, tooth["forward"]]
+        tooth["along"] = [s, s, s]
 
-    def on_tooth(tooth, normal):
+    def on_tooth(tooth, normal, s):
         angle = np.arctan2(normal[1], normal[0]) + s / r
         return tooth["center"] + r * np.column_stack([np.cos(angle), np.sin(angle)])
 
     # Cam.
     cam_centers = cam_curve.length_at(np.array([tooth["phi"] for tooth in placed]))
-    cam_nodes, cam_patches = outline_along(cam_curve.at, cam_curve.total, cam_centers, s, step)
+    cam_nodes, cam_patches = outline_along(cam_curve.at, cam_curve.total, cam_centers, [s] * len(placed), step)
     cam_patches = [Patch(nodes @ turn.T, -tooth["normals"][0]) for nodes, tooth in zip(cam_patches, placed)]
     back = [drive.offset_point(phi, -case.depth_mm) for phi in np.linspace(np.pi / drive.lobes + 0.35, -0.35, 200)]
     outline = np.vstack([cam_nodes, back]) @ turn.T
@@ -209,7 +213,10 @@ def solve(case, turned_rad=None, engaged_rad=None):
     flank = SmoothCurve(lambda p: turned_by(-first_middle, drive.ring_point(first_middle, -drive.sense * p)), -end, end)
     chain = Chain([(flank, first_middle + space * pitch) for space in range(number_of_spaces)])
     centers = [chain.length_at(round((tooth["middle"] - first_middle) / pitch), -drive.sense * tooth["near"]) for tooth in placed]
-    inner, patches = outline_along(chain.at, chain.total, centers, s, step)
+    if reach_rad > 0.0:
+        for tooth, center in zip(placed, centers):
+            tooth["along"][1] = up_to_corner(s, drive.sense * (center - chain.length_at(round((tooth["middle"] - first_middle) / pitch), -drive.sense * end)), drive.sense)
+    inner, patches = outline_along(chain.at, chain.total, centers, [tooth["along"][1] for tooth in placed], step)
     patches_ring = [Patch(nodes, -tooth["normals"][1]) for nodes, tooth in zip(patches, placed)]
     root = max(np.hypot(*inner.T))
     angles = np.linspace(first_middle + (number_of_spaces - 0.5) * pitch, first_middle - 0.5 * pitch, 200)
@@ -236,9 +243,10 @@ def solve(case, turned_rad=None, engaged_rad=None):
             flexibility[place(one, 1), place(other, 1)] += ring_part
         flexibility[place(one, 2), place(one, 2)] += wall.flexibility
     for index, tooth in enumerate(placed):
-        surfaces = [on_tooth(tooth, normal) for normal in tooth["normals"]]
+        surfaces = [on_tooth(tooth, *of_patch) for of_patch in zip(tooth["normals"], tooth["along"])]
+        masses = [weights_of(along) for along in tooth["along"]]
         partners = [cam_patches[index].nodes_mm, patches_ring[index].nodes_mm, None]
-        rim = disc_outline(tooth, s, step, r)
+        rim = disc_outline(tooth, r)
         body = Body(rim, E_MPA, NU, [Patch(surface, normal) for surface, normal in zip(surfaces, tooth["normals"])], None,
                     [(tooth["center"], 0), (tooth["center"], 1), (farthest(rim, tooth), 0)])
         for one in range(3):
@@ -260,12 +268,12 @@ def solve(case, turned_rad=None, engaged_rad=None):
                 if x_partner[0] > x_partner[-1]:
                     # Partner's nodes run the other way: match them node by node.
                     tooth.setdefault("reversed", set()).add(contact)
-            gaps[place(index, contact)] = mass @ gap
-            motions[place(index, contact), 2 * index : 2 * index + 2] = mass @ np.tile(normal, (nodes, 1))
+            gaps[place(index, contact)] = masses[contact] @ gap
+            motions[place(index, contact), 2 * index : 2 * index + 2] = masses[contact] @ np.tile(normal, (nodes, 1))
             if contact == 0:
                 lever = partner[:, 0] * -normal[1] - partner[:, 1] * -normal[0]
                 lever = lever[::-1] if 0 in tooth.get("reversed", ()) else lever
-                motions[place(index, 0), -1] = mass @ lever
+                motions[place(index, 0), -1] = masses[0] @ lever
     # Turn the partners' flexibilities round where their nodes run against the tooth's.
     for contact, body in ((0, cam), (1, ring)):
         block = np.zeros_like(flexibility)
@@ -282,10 +290,10 @@ def solve(case, turned_rad=None, engaged_rad=None):
     pressure, motion = solve_contact(flexibility, gaps, motions, loads)
     rows = []
     for index, tooth in enumerate(placed):
-        parts = [pressure[place(index, contact)] for contact in range(3)]
+        parts = [(pressure[place(index, contact)], weights_of(tooth["along"][contact])) for contact in range(3)]
         rows.append(dict(tooth=tooth["number"], position_deg=float(np.degrees(tooth["psi"])),
-                         force_n=[float((mass @ p).sum() * drive.width_mm) for p in parts], pressure_mpa=[largest_pressure(p, mass) for p in parts],
-                         reaches_edge=[bool(max(p[0], p[-1]) > 1e-3 * p.max() > 1e-6) for p in parts]))
+                         force_n=[float((mass @ p).sum() * drive.width_mm) for p, mass in parts], pressure_mpa=[largest_pressure(p, mass) for p, mass in parts],
+                         reaches_edge=[bool(max(p[0], p[-1]) > 1e-3 * p.max() > 1e-6) for p, _ in parts]))
     return dict(teeth=rows, wind_up_rad=turned_rad + float(motion[-1]), turned_rad=turned_rad)
 
 
@@ -313,41 +321,51 @@ def farthest(rim, tooth):
     return rim[np.argmax((rim - tooth["center"])[:, 1])]
 
 
-def outline_along(at, total, centers, s, step):
+def up_to_corner(s, room_mm, sense):
+    """The places of a patch that ends at a corner, on the side of lesser lengths if `sense` is positive: at the corner itself the denser the nearer to it."""
+    half, share = s[-1], np.linspace(0.0, 1.0, len(s))
+    if room_mm >= half:
+        return s
+    places = half * share**2 if room_mm <= 0.0 else -room_mm + (half + room_mm) * share
+    return places if sense > 0 else -places[::-1]
+
+
+def outline_along(at, total, centers, places, step):
     """Points along a curve with a patch around each centre, and the patches."""
     centers = np.asarray(centers)
     order = np.argsort(centers)
     lengths, last, patches = [0.0], 0.0, [None] * len(centers)
     fine_start = 0.5
     for index in order:
+        s = places[index]
         start, end = centers[index] + s[0], centers[index] + s[-1]
-        lengths.extend(graded(last, start, fine_start if last == 0.0 else step, step, 0.8))
+        lengths.extend(graded(last, start, fine_start if last == 0.0 else step, s[1] - s[0], 0.8))
         lengths.extend(centers[index] + s)
-        last = end
+        last, step = end, s[-1] - s[-2]
     lengths.extend(graded(last, total, step, 0.5, 0.8))
     lengths.append(total)
     lengths = np.array(lengths)
     assert (np.diff(lengths) > 0).all(), "patches overlap or leave the curve"
     for index in range(len(centers)):
-        patches[index] = at(centers[index] + s)
+        patches[index] = at(centers[index] + places[index])
     return at(lengths), patches
 
 
-def disc_outline(tooth, s, step, r):
+def disc_outline(tooth, r):
     angles = []
-    centers = sorted((np.arctan2(n[1], n[0]) % (2 * np.pi), n) for n in tooth["normals"])
-    for (a, _), (b, _) in zip(centers, centers[1:] + [(centers[0][0] + 2 * np.pi, None)]):
+    centers = sorted(((np.arctan2(n[1], n[0]) % (2 * np.pi), s) for n, s in zip(tooth["normals"], tooth["along"])), key=lambda of_patch: of_patch[0])
+    for (a, s), (b, t) in zip(centers, centers[1:] + [(centers[0][0] + 2 * np.pi, centers[0][1])]):
         angles.extend(a + s / r)
-        angles.extend(graded(a + s[-1] / r, b + s[0] / r, step / r, step / r, 0.6 / r if r > 2 else 0.25 / r))
+        angles.extend(graded(a + s[-1] / r, b + t[0] / r, (s[-1] - s[-2]) / r, (t[1] - t[0]) / r, 0.6 / r if r > 2 else 0.25 / r))
     angles = np.array(angles)
     return tooth["center"] + r * np.column_stack([np.cos(angles), np.sin(angles)])
 
 
-def settle(case, engaged_rad, first=0.0):
+def settle(case, engaged_rad, first=0.0, reach_rad=0.0):
     """Meshes the cam anew until it is meshed where the load turns it."""
     turned = first
     for _ in range(4):
-        result = solve(case, turned, engaged_rad)
+        result = solve(case, turned, engaged_rad, reach_rad)
         if abs(result["wind_up_rad"] - turned) < 0.02 * result["wind_up_rad"]:
             return result
         turned = result["wind_up_rad"]
@@ -360,10 +378,10 @@ def single_contact(radius_mm, force_n_per_mm, depth_mm, refinement=1.0):
     half = 1.6 * np.sqrt(4 * force_n_per_mm * radius_mm / (np.pi * modulus))
     cells = 2 * int(round(16 * refinement))
     s = np.linspace(-half, half, cells + 1)
-    step, mass = s[1] - s[0], weights_of(s[1] - s[0], cells + 1)
+    step, mass = s[1] - s[0], weights_of(s)
     wall = wall_block(s, step, depth_mm)
-    tooth = dict(normals=[np.array([0.0, -1.0]), np.array([0.0, 1.0])], center=np.zeros(2))
-    rim = disc_outline(tooth, s, step, radius_mm)
+    tooth = dict(normals=[np.array([0.0, -1.0]), np.array([0.0, 1.0])], along=[s, s], center=np.zeros(2))
+    rim = disc_outline(tooth, radius_mm)
     surfaces = [radius_mm * np.column_stack([np.cos(a + s / radius_mm), np.sin(a + s / radius_mm)]) for a in (-np.pi / 2, np.pi / 2)]
     disc = Body(rim, E_MPA, NU, [Patch(surface, normal) for surface, normal in zip(surfaces, tooth["normals"])], None,
                 [((0, 0), 0), ((0, 0), 1), ((radius_mm, 0), 1)])

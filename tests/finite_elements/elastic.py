@@ -15,7 +15,7 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 
 class Patch:
-    """A stretch of a surface around a point of contact, with equally spaced nodes by arc length."""
+    """A stretch of a surface around a point of contact, or up to a corner that is pressed, by its nodes."""
 
     def __init__(self, nodes_mm, normal):
         self.nodes_mm = np.asarray(nodes_mm)
@@ -120,10 +120,10 @@ def triangulated(outline_mm):
     return mesh, index
 
 
-def weights_of(step_mm, count):
-    """The integrals of products of linear pressures along a patch of equal steps."""
-    mass = np.zeros((count, count))
-    for i in range(count - 1):
+def weights_of(places_mm):
+    """The integrals of products of linear pressures along a patch with nodes at these lengths."""
+    mass = np.zeros((len(places_mm), len(places_mm)))
+    for i, step_mm in enumerate(np.diff(places_mm)):
         mass[i : i + 2, i : i + 2] += step_mm / 6 * np.array([[2.0, 1.0], [1.0, 2.0]])
     return mass
 

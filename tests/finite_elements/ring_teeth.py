@@ -27,7 +27,7 @@ def of_patch(body, patches, index, depth_mm):
     nodes = patches[index].nodes_mm
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(nodes, axis=0).T))])
     s -= s[-1] / 2
-    mass, half_mm = weights_of(s[1] - s[0], len(s)), s[-1] / 1.6
+    mass, half_mm = weights_of(s), s[-1] / 1.6
     hertz = np.sqrt(np.maximum(1 - (s / half_mm) ** 2, 0.0))
     hertz /= (mass @ hertz).sum()
     place = slice(index * len(s), (index + 1) * len(s))
