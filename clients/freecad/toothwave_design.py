@@ -146,6 +146,7 @@ def _model():
         yield Field(pointer, name, f"Compliance behind, {label.lower()}", group, 0.0, "mm/N", (0.0, 1e3), blank="none")
     yield Field("/model/ring_teeth_bend", "RingTeethBend", "Ring's teeth bend", group, False)
     yield Field("/model/wave_generator_moves", "WaveGeneratorMoves", "Wave generator moves on", group, False)
+    yield Field("/model/corner_contact", "CornerContact", "Teeth meet tips' corners", group, False)
     most, blank = 10**7, "50, or by the tolerance"
     yield Field("/sweep/samples", "Samples", "Input angles, intervals", group, 0, limits=(1, most), blank=blank)
     yield Field("/sweep/tolerance", "SweepTolerance", "or to a tolerance", group, 0.0, limits=(1e-12, 0.1), blank="left out")

@@ -237,6 +237,7 @@ fn models(drive: &Drive, own: &LoadParameters) -> Vec<LoadParameters> {
                 law,
                 ring_teeth_bend: own.ring_teeth_bend && is_refined,
                 wave_generator_moves: own.wave_generator_moves && is_refined,
+                corner_contact: own.corner_contact && compatibility == Compatibility::VirtualWork,
                 ..*own
             };
             let is_possible = compatibility == Compatibility::VirtualWork || law.is_of_projection();
@@ -296,7 +297,7 @@ impl<'a> Model<'a> {
 
     /// Tries every number of samples and every tolerance that the limit on states admits.
     fn measure(&self, ways: &mut Vec<WayAnswer>, stop: &dyn Stop) -> Result<(), SolveError> {
-        let mesh = self.deviations.mesh(self.drive);
+        let mesh = self.load.mesh(self.drive, self.deviations);
         // All of them lie within the ranges.
         let samples = SAMPLES.into_iter().filter_map(|samples| Samples::new(samples).ok());
         for samples in samples.filter(|&samples| mesh.state_count(samples) <= self.max_states) {

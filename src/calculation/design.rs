@@ -141,6 +141,7 @@ impl Design {
         if self.sweep.tolerance.is_none() {
             self.sweep.samples.get_or_insert(DEFAULT_SAMPLES);
         }
+        self.model.corner_contact = self.model.corner_contact.filter(|&is_chosen| is_chosen);
         if !self.is_model_by_default() {
             let by_default = self.law_by_default();
             self.model.stiffness.get_or_insert(by_default);
@@ -251,6 +252,7 @@ impl Design {
             series_compliance_mm_per_n: (&self.model.series_compliance_mm_per_n).into(),
             ring_teeth_bend: self.model.ring_teeth_bend.unwrap_or(is_refined),
             wave_generator_moves: self.model.wave_generator_moves.unwrap_or_else(moves_by_default),
+            corner_contact: self.model.corner_contact.unwrap_or(false),
             modification,
             carrier: self.carrier_of_flats(),
             clearance_um,

@@ -214,6 +214,7 @@ pub fn pointer(parameter: Parameter) -> String {
         Parameter::Law => "/model/stiffness/law".into(),
         Parameter::RingTeethBend => "/model/ring_teeth_bend".into(),
         Parameter::WaveGeneratorMoves => "/model/wave_generator_moves".into(),
+        Parameter::CornerContact => "/model/corner_contact".into(),
         Parameter::Depth(contact) => format!("/model/stiffness/depth_mm/{}", contact_name(contact)),
         Parameter::SeriesCompliance(contact) => {
             format!("/model/series_compliance_mm_per_n/{}", contact_name(contact))

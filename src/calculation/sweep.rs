@@ -190,7 +190,7 @@ impl Question for Sweep {
         let deviations = Deviations::from(&design.deviations);
         if let Points::Samples(samples) = points {
             let sweeps = design.duty()?.points.len() as u64;
-            let (states, limit) = (sweeps * deviations.mesh(&drive).state_count(samples), limits.max_states);
+            let (states, limit) = (sweeps * load.mesh(&drive, &deviations).state_count(samples), limits.max_states);
             if states > limit {
                 let of_duty = if sweeps > 1 { ", times the points of the duty" } else { "" };
                 let detail = format!(
@@ -232,7 +232,7 @@ impl Question for Sweep {
                 let sweeps = 1 + of(friction.is_some() && duty.points.len() > 1, 1);
                 let of_sweeps = sweeps * (STATE_BYTES + of(friction.is_some(), LOSSES_BYTES));
                 let of_wear = duty.points.len() as u64 * of(wear_rate_mm3_per_nm.is_some(), WEAR_BYTES);
-                (of_sweeps + of_wear) * checked.deviations.mesh(&checked.drive).state_count(samples)
+                (of_sweeps + of_wear) * checked.load().mesh(&checked.drive, &checked.deviations).state_count(samples)
             }
             Points::Tolerance { .. } => 0,
         }
@@ -242,8 +242,10 @@ impl Question for Sweep {
         /// They are solved and written in about 0.1 ms; with Palmgren's law and all that can be asked for in a quarter of a millisecond.
         const FEW_STATES: u64 = 400;
         let CheckedSweep { drive, deviations, friction, points, with_gaps, .. } = checked;
+        let load = checked.load();
         // The boundary elements of a tooth take longer than any short sweep.
-        let is_plain = !with_gaps && friction.is_none() && !checked.load().parameters().ring_teeth_bend;
+        let is_plain =
+            !with_gaps && friction.is_none() && !load.parameters().ring_teeth_bend && !load.presses_corners(drive);
         match points {
             Points::Samples(samples) => is_plain && deviations.mesh(drive).state_count(*samples) <= FEW_STATES,
             Points::Tolerance { .. } => false,
@@ -309,7 +311,7 @@ impl Question for Sweep {
                 input_torque_nm: load.input_torque_nm(drive),
                 output_torque_nm: load.output_torque_nm(drive),
             },
-            enters_under_load: drive.flank_limit().end != FlankEnd::RegularTip,
+            enters_under_load: drive.flank_limit().end != FlankEnd::RegularTip && !load.presses_corners(drive),
             peaks: sweep.peaks.into(),
             teeth_in_mesh_per_zone: mesh.teeth_in_mesh().into(),
             loaded_teeth_per_zone: sweep.loaded_teeth().into(),
@@ -328,7 +330,7 @@ impl Question for Sweep {
                 torque_balance_residual: sweep.torque_balance_residual,
                 period_closure_residual: sweep.period_closure_residual,
             },
-            states: StatesAnswer::new(sweep.states, *with_gaps),
+            states: StatesAnswer::new(sweep.states, *with_gaps || load.presses_corners(drive)),
             findings,
         };
         let states = &answer.states;

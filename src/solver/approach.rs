@@ -22,6 +22,19 @@ pub enum Approach {
     },
     /// `ξ = F (A + B ln(F_r/F))`.
     Logarithmic(Logarithmic),
+    /// The same of a tooth that a corner of the ring is pressed against.
+    Corner(Corner),
+}
+
+/// `ξ = F (A + B ln(F_r/F) + K ln(2/u - 1))`, `1/u = z + √(1 + z²)`, `z² = F_z/F`: u is how wide the contact with a corner is, over how wide one with a smooth
+/// surface would be. The last part is increasing and bent downwards as the others are (docs/theory.md section 4.4, `corner_contact`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Corner {
+    smooth: Logarithmic,
+    /// `K`.
+    growth_mm_per_n: f64,
+    /// `F_z`.
+    narrowing_n: f64,
 }
 
 /// `ξ = F (A + B ln(F_r/F))` up to the force at which the law ends. Beyond, it goes on along its tangent: no answer stands there, but
@@ -65,6 +78,11 @@ impl Logarithmic {
         self.compliance_mm_per_n + self.growth_mm_per_n * (-Self::LIMIT.ln() - 1.0)
     }
 
+    fn slope_mm_per_n(&self, force_n: f64) -> f64 {
+        let force_n = force_n.min(self.limit_n);
+        self.compliance_mm_per_n + self.growth_mm_per_n * ((self.reference_n / force_n).ln() - 1.0)
+    }
+
     fn approach_mm(&self, force_n: f64) -> f64 {
         if force_n > self.limit_n {
             return self.limit_mm + (force_n - self.limit_n) * self.limit_slope_mm_per_n();
@@ -105,6 +123,43 @@ impl Logarithmic {
     }
 }
 
+impl Corner {
+    /// That whose contact on a smooth surface gives way so.
+    pub(crate) const fn new(smooth: Logarithmic, growth_mm_per_n: f64, narrowing_n: f64) -> Self {
+        Self { smooth, growth_mm_per_n, narrowing_n }
+    }
+
+    /// `ξ` and `dξ/dF`.
+    fn approach(&self, force_n: f64) -> ValueAndSlope {
+        let z = (self.narrowing_n / force_n).sqrt();
+        let root = 1.0_f64.hypot(z);
+        let u = 1.0 / (z + root);
+        // 2/u - 1 without a difference of near numbers.
+        let ln = (2.0 * z + 2.0 * z * (z / (root + 1.0))).ln_1p();
+        ValueAndSlope {
+            value: self.smooth.approach_mm(force_n) + self.growth_mm_per_n * (force_n * ln),
+            slope: self.smooth.slope_mm_per_n(force_n) + self.growth_mm_per_n * (ln - z / root / (2.0 - u)),
+        }
+    }
+
+    fn approach_mm(&self, force_n: f64) -> f64 {
+        if force_n > 0.0 { self.approach(force_n).value } else { 0.0 }
+    }
+
+    fn force(&self, approach_mm: f64) -> Result<ForceAndExponent, NotConverged> {
+        /// The corner gives way a few dozen times as much as the smooth surface at most.
+        const LEAST_SHARE: f64 = 1e-3;
+        // The lighter the force, the more it moves: so much of a force that surely is lighter makes one that is still too light.
+        let light_n = LEAST_SHARE * self.smooth.force(approach_mm)?.force_n;
+        let start_n = light_n * (approach_mm / self.approach(light_n).value);
+        let force_n = newton_from_below("force at a corner", start_n, |force_n| {
+            let ValueAndSlope { value, slope } = self.approach(force_n);
+            ValueAndSlope { value: value - approach_mm, slope }
+        })?;
+        Ok(ForceAndExponent { force_n, exponent: force_n * self.approach(force_n).slope / approach_mm })
+    }
+}
+
 impl Approach {
     /// `ξ` under a force.
     pub fn approach_mm(&self, force_n: f64) -> f64 {
@@ -114,6 +169,7 @@ impl Approach {
                 coefficient * force_n.powf(*exponent) + compliance_mm_per_n * force_n
             }
             Self::Logarithmic(law) => law.approach_mm(force_n),
+            Self::Corner(law) => law.approach_mm(force_n),
         }
     }
 
@@ -148,14 +204,16 @@ impl Approach {
                 Ok(ForceAndExponent { force_n, exponent })
             }
             Self::Logarithmic(law) => law.force(approach_mm),
+            Self::Corner(law) => law.force(approach_mm),
         }
     }
 
     /// The approach at which the law ends; without end for most.
-    pub const fn limit_mm(&self) -> f64 {
+    pub fn limit_mm(&self) -> f64 {
         match self {
             Self::Linear { .. } | Self::Power { .. } => f64::INFINITY,
             Self::Logarithmic(law) => law.limit_mm,
+            Self::Corner(law) => law.approach_mm(law.smooth.limit_n),
         }
     }
 
@@ -166,7 +224,8 @@ impl Approach {
             Self::Power { coefficient, compliance_mm_per_n, .. } if compliance_mm_per_n >= 0.0 => coefficient,
             Self::Linear { compliance_mm_per_n }
             | Self::Power { compliance_mm_per_n, .. }
-            | Self::Logarithmic(Logarithmic { compliance_mm_per_n, .. }) => compliance_mm_per_n,
+            | Self::Logarithmic(Logarithmic { compliance_mm_per_n, .. })
+            | Self::Corner(Corner { smooth: Logarithmic { compliance_mm_per_n, .. }, .. }) => compliance_mm_per_n,
         }
     }
 
@@ -175,7 +234,7 @@ impl Approach {
         match *self {
             Self::Linear { .. } => Some(1.0),
             Self::Power { exponent, compliance_mm_per_n, .. } => (compliance_mm_per_n <= 0.0).then_some(exponent),
-            Self::Logarithmic(_) => None,
+            Self::Logarithmic(_) | Self::Corner(_) => None,
         }
     }
 }

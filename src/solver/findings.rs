@@ -593,7 +593,8 @@ pub fn of_contacts(
 pub(crate) fn widest_half_widths_mm(drive: &Drive, states: &States) -> impl Iterator<Item = (Contact, f64)> {
     let tooth_width_mm = drive.tooth_width_mm();
     states.force_n.iter().filter(|&(contact, _)| !is_flat(drive, contact)).map(move |(contact, forces_n)| {
-        let loaded = forces_n.iter().zip(states.stress_mpa.get(contact)).filter(|&(&force_n, _)| force_n > 0.0);
+        // A corner has no such width, and no stress is told of it.
+        let loaded = forces_n.iter().zip(states.stress_mpa.get(contact)).filter(|&(_, &stress_mpa)| stress_mpa > 0.0);
         let half_widths = loaded.map(|(&force_n, &stress_mpa)| half_width_mm(force_n, stress_mpa, tooth_width_mm));
         (contact, half_widths.fold(0.0, f64::max))
     })

@@ -338,6 +338,12 @@ impl<'a> Gaps<'a> {
         self.turned_at(place).lost_motion_rad(self.drive)
     }
 
+    /// How far flank and wall at one place are turned away together.
+    pub(crate) fn turned_at_rad(&self, place: &Place) -> f64 {
+        let (all, own) = (self.turned_alike(), self.turned_at(place));
+        all.ring_rad + own.ring_rad + all.carrier_rad + own.carrier_rad
+    }
+
     fn turned_alike(&self) -> Turned {
         let Modification { ring_rotation_arcsec, carrier_rotation_arcsec, .. } = &self.modification;
         Turned {
@@ -368,8 +374,8 @@ impl<'a> Gaps<'a> {
         let d = center.center_radius_mm;
         let (cos, sin) = (flank.cos_pressure_angle, flank.tan_pressure_angle * flank.cos_pressure_angle);
         // The angle δ of the contact on the ring against the tooth's centre line, as seen from the axis.
-        let r = self.drive.parameters().tooth_radius_mm;
-        let (along, across) = (d + r * cos, r * sin);
+        let to_ring_mm = flank.distance_mm;
+        let (along, across) = (d + to_ring_mm * cos, to_ring_mm * sin);
         let cos_to_profile = (along * cos + across * sin) / along.hypot(across);
         let thinner_mm = MM_PER_UM * m.tooth_radius_um;
         gap_mm.wave_generator += MM_PER_UM * m.wave_generator_equidistant_um + thinner_mm;
@@ -387,7 +393,8 @@ impl<'a> Gaps<'a> {
         let start_rad = start_deg.to_radians();
         let end_rad = self.drive.flank_limit().position.from_lobe_rad;
         let beyond_rad = center.position.from_lobe_rad - start_rad;
-        if beyond_rad > 0.0 { amount_um * (beyond_rad / (end_rad - start_rad)).powf(power) } else { 0.0 }
+        // A corner is as far back as the flank's end.
+        if beyond_rad > 0.0 { amount_um * (beyond_rad / (end_rad - start_rad)).min(1.0).powf(power) } else { 0.0 }
     }
 
     fn add_deviations(

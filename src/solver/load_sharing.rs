@@ -1,5 +1,7 @@
 //! Equilibrium of a tooth and compatibility of all of them at one input angle (docs/theory.md section 4).
 
+use std::f64::consts::PI;
+
 use crate::cam::ToothCenter;
 use crate::contact::{Contact, ContactLaw, HertzLine, Material, Materials, Part, PerContact, half_width_mm};
 use crate::drive::{Draft, Drive, DriveParameters, ToothShape};
@@ -7,12 +9,12 @@ use crate::gaps::{Deviations, Gaps, Modification};
 use crate::mesh::{Mesh, Place};
 use crate::parts::CarrierRadii;
 use crate::position::Position;
-use crate::ring::{FlankPoint, RingFlank, RingTooth};
+use crate::ring::{FlankEnd, FlankPoint, RingFlank, RingTooth, TipCorner};
 use crate::ring_bending::RingBending;
 use crate::root::NotConverged;
 use crate::springs::{Gap, Rotation, Spring, Springs, WindUp};
 use crate::tooth::line::{WIDEST_SHARE, least_length_mm};
-use crate::tooth::{BallContact, Contacts, Flat, Pressure, ToothContact, ToothLaw, ToothSize};
+use crate::tooth::{BallContact, Contacts, CornerContact, Flat, Pressure, ToothContact, ToothLaw, ToothSize};
 use crate::violation::{Parameter, Violation};
 use crate::{SolveError, tooth};
 
@@ -53,6 +55,9 @@ pub struct LoadParameters {
     /// Whether the wave generator moves on under its teeth as it winds up, with `VirtualWork` alone; otherwise its arms are those of the positions
     /// without load.
     pub wave_generator_moves: bool,
+    /// Whether teeth before a pointed or bored flank are pressed against its corner, with `VirtualWork` alone and cylinders; otherwise the ring is rigid where
+    /// the flank ends, and they carry from there on.
+    pub corner_contact: bool,
     /// Gap along the normal of each contact, in µm.
     pub clearance_um: PerContact<f64>,
     /// Parts made otherwise than conjugate, with `VirtualWork` alone.
@@ -97,7 +102,8 @@ impl LoadParameters {
         let series = series.map(|(contact, _)| Parameter::SeriesCompliance(contact));
         let bending = self.ring_teeth_bend.then_some(Parameter::RingTeethBend);
         let moves = self.wave_generator_moves.then_some(Parameter::WaveGeneratorMoves);
-        law.into_iter().chain(series).chain(bending).chain(moves).chain(self.modification.first())
+        let corner = self.corner_contact.then_some(Parameter::CornerContact);
+        law.into_iter().chain(series).chain(bending).chain(moves).chain(corner).chain(self.modification.first())
     }
 
     fn clearance_violations_in(&self, sense: f64, ring: &RingTooth) -> Result<Vec<Violation>, NotConverged> {
@@ -178,6 +184,18 @@ impl LoadCase {
         }
     }
 
+    /// Whether teeth of this drive are pressed against the corners of the ring's tips: cylinders where the flank ends in one.
+    pub fn presses_corners(&self, drive: &Drive) -> bool {
+        let is_ball = matches!(drive.parameters().tooth, ToothShape::Ball { .. });
+        self.0.corner_contact && !is_ball && drive.flank_limit().end != FlankEnd::RegularTip
+    }
+
+    /// The mesh of a drive with these deviations under the load.
+    pub fn mesh(&self, drive: &Drive, deviations: &Deviations) -> Mesh {
+        let mesh = deviations.mesh(drive);
+        if self.presses_corners(drive) { mesh.with_teeth_before_flank() } else { mesh }
+    }
+
     /// Whether any contact has a gap.
     pub fn has_gaps(&self) -> bool {
         self.0.clearance_um.iter().any(|(_, &gap)| gap > 0.0) || self.0.modification.first().is_some()
@@ -229,6 +247,19 @@ fn force_ratio(sense: f64, flank: &RingFlank, center: &ToothCenter) -> PerContac
     }
 }
 
+/// The same of a tooth before the flank: `F_K/F_H = cos γ/cos β`, `F_S/F_H = cos γ (tan β + s tan γ)`, β being the angle of the line to the corner. A tooth that is
+/// past the corner, or that its slot would have to pull, is none that can be pressed: nothing.
+fn force_ratio_at_corner(sense: f64, center: &ToothCenter, seen: &FlankPoint) -> Option<PerContact<f64>> {
+    let t = center.tan_pressure_angle;
+    let cos_cam = 1.0 / (1.0 + t * t).sqrt();
+    let carrier = cos_cam * (seen.tan_pressure_angle + sense * t);
+    (seen.tan_pressure_angle > 0.0 && carrier >= 0.0).then(|| PerContact {
+        wave_generator: 1.0,
+        ring: cos_cam / seen.cos_pressure_angle,
+        carrier,
+    })
+}
+
 /// A tooth at a position, with what the load makes of it per unit of `F_H`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToothState {
@@ -265,6 +296,9 @@ pub struct LoadedDrive<'a> {
     contacts: Contacts,
     ring_bending: Option<RingBending>,
     wave_generator_moves: bool,
+    tip_corner: Option<TipCorner>,
+    /// How much more the corner gives way for each unit of the logarithm by which a contact there is narrower, where the ring's teeth bend.
+    corner_growth_mm_per_n: f64,
     gaps: Gaps<'a>,
 }
 
@@ -344,7 +378,8 @@ impl<'a> LoadedDrive<'a> {
         let size = ToothSize { radius_mm: drive.parameters().tooth_radius_mm, width_mm: drive.tooth_width_mm() };
         let contacts = Contacts::new(shape, &p.law, &p.materials, size, &p.series_compliance_mm_per_n)
             .ok_or_else(|| SolveError::Impossible(vec![Violation::LawOfOtherTeeth]))?;
-        let mesh = deviations.map_or_else(|| Mesh::new(drive), |deviations| deviations.mesh(drive));
+        let mesh = load.mesh(drive, deviations.unwrap_or(&Deviations::default()));
+        let tip_corner = if load.presses_corners(drive) { TipCorner::of(drive.ring_tooth())? } else { None };
         let loaded = Self {
             drive,
             mesh,
@@ -354,6 +389,10 @@ impl<'a> LoadedDrive<'a> {
             law: p.law,
             contacts,
             wave_generator_moves: p.wave_generator_moves,
+            tip_corner,
+            corner_growth_mm_per_n: tip_corner.filter(|_| p.ring_teeth_bend).map_or(0.0, |corner| {
+                corner.bending_growth() * p.materials.ring.compliance_per_mpa() / (PI * drive.tooth_width_mm())
+            }),
             ring_bending: if p.ring_teeth_bend { Some(RingBending::new(drive, &p.materials.ring)?) } else { None },
             gaps: Gaps::new(drive, &p.clearance_um, p.modification, deviations),
         };
@@ -420,7 +459,18 @@ impl<'a> LoadedDrive<'a> {
 
     /// The law, for whoever works in columns; none where it is another one at each position.
     pub(crate) fn tooth_law(&self) -> Option<ToothLaw> {
-        self.contacts.tooth_law().filter(|_| self.ring_bending.is_none() && !self.wave_generator_moves)
+        let is_plain = self.ring_bending.is_none() && !self.wave_generator_moves && self.tip_corner.is_none();
+        self.contacts.tooth_law().filter(|_| is_plain)
+    }
+
+    /// Whether teeth are listed that may carry nothing because a gap is open.
+    pub(crate) fn has_gaps(&self) -> bool {
+        !self.gaps.is_nil() || self.tip_corner.is_some()
+    }
+
+    /// The corner that a tooth meets first, where it stands before the flank.
+    fn corner_at(&self, position: &Position) -> Option<&TipCorner> {
+        self.tip_corner.as_ref().filter(|corner| corner.is_before_flank(position))
     }
 
     /// A contact of balls, for whoever works in columns.
@@ -487,10 +537,16 @@ impl<'a> LoadedDrive<'a> {
     }
 
     fn state(&self, place: &Place, center: ToothCenter) -> Result<ToothState, SolveError> {
-        let flank_curve = self.drive.flank();
-        let flank = flank_curve.at(&center);
-        let force_ratio = force_ratio(self.drive.sense(), flank_curve, &center);
-        let weights = Weights::of(self.compatibility, self.drive.sense(), flank_curve, &center).0;
+        let (sense, flank_curve) = (self.drive.sense(), self.drive.flank());
+        let corner = self.corner_at(&center.position);
+        let flank = corner.map_or_else(|| flank_curve.at(&center), |corner| corner.seen_from(&center));
+        let at_corner = corner.and_then(|_| force_ratio_at_corner(sense, &center, &flank));
+        let can_be_pressed = corner.is_none() || at_corner.is_some();
+        let force_ratio = at_corner.unwrap_or_else(|| force_ratio(sense, flank_curve, &center));
+        let weights = match corner {
+            Some(_) => force_ratio,
+            None => Weights::of(self.compatibility, sense, flank_curve, &center).0,
+        };
         let curvature_per_mm = self.curvature_per_mm(&center, &flank);
         let places = PerContact::try_of(|contact| {
             Ok::<_, SolveError>(tooth::Place {
@@ -501,10 +557,16 @@ impl<'a> LoadedDrive<'a> {
         })?;
         // Without friction the way that the wave generator makes and the torque that it takes have one arm.
         let arm_mm = center.cam_contact.lever_arm_mm;
-        let gap = if self.gaps.is_nil() {
+        let gap = if self.gaps.is_nil() && corner.is_none() {
             None
+        } else if !can_be_pressed {
+            Some(Gap { along_mm: f64::INFINITY, lost_motion_rad: 0.0 })
         } else {
-            let gaps_mm = self.gaps.besides_turns(place, &center, &flank);
+            let mut gaps_mm = self.gaps.besides_turns(place, &center, &flank);
+            if let Some(corner) = corner {
+                gaps_mm.ring +=
+                    corner.gap_mm(&flank) + self.beyond_lost_motion_mm(place, &center, &flank) / weights.ring;
+            }
             let along_mm = weights.iter().fold(0.0, |sum, (contact, weight)| sum + weight * gaps_mm.get(contact));
             let lost_motion_rad = self.gaps.lost_motion_at_rad(place);
             Some(match self.compatibility {
@@ -547,6 +609,15 @@ impl<'a> LoadedDrive<'a> {
         (tan_pressure_angle_derivative - t * t) * center_radius_mm / (1.0 + t * t).sqrt()
     }
 
+    /// What a tooth before the flank loses by flanks and walls that are turned away, along `F_H` and beyond the lost motion that one on the flank would have: there
+    /// the ring's force has k times the arm of `F_H`, here another.
+    fn beyond_lost_motion_mm(&self, place: &Place, center: &ToothCenter, seen: &FlankPoint) -> f64 {
+        let t = center.tan_pressure_angle;
+        let ring_arm_mm = center.center_radius_mm * seen.tan_pressure_angle / (1.0 + t * t).sqrt();
+        let of_flank_mm = self.drive.flank().teeth_per_wave() * center.cam_contact.lever_arm_mm;
+        self.gaps.turned_at_rad(place) * (ring_arm_mm - of_flank_mm)
+    }
+
     /// Relative curvature of each contact of a tooth in the plane of motion.
     fn curvature_per_mm(&self, center: &ToothCenter, flank: &FlankPoint) -> PerContact<f64> {
         let r = self.drive.parameters().tooth_radius_mm;
@@ -559,6 +630,13 @@ impl<'a> LoadedDrive<'a> {
 
     /// What the pressure at a contact of a tooth follows from.
     fn pressure(&self, contact: Contact, center: &ToothCenter, curvature_per_mm: f64) -> Result<Pressure, SolveError> {
+        if let (Contact::Ring, Some(corner)) = (contact, self.corner_at(&center.position)) {
+            return Ok(Pressure::Corner(CornerContact {
+                curvature_per_mm,
+                angle_rad: corner.angle_off_flank_rad(center, &corner.seen_from(center)),
+                bending_growth_mm_per_n: self.corner_growth_mm_per_n,
+            }));
+        }
         let center_radius_mm = center.center_radius_mm;
         self.contacts.pressure(contact, curvature_per_mm, center_radius_mm)?.ok_or_else(|| {
             let position_deg = center.position.from_lobe_deg();
@@ -704,6 +782,9 @@ impl<'a> LoadedDrive<'a> {
         let limit = Self::first_to_reach(teeth, |tooth, contact| {
             // Under `F_r` the half-width is the whole length, and its square goes as the force.
             let pressure = tooth.pressure.get(contact);
+            if matches!(pressure, Pressure::Corner(_)) {
+                return f64::INFINITY;
+            }
             let stress_mpa = pressure.stress_mpa(1.0);
             let share = limit_mm(contact) / half_width_mm(1.0, stress_mpa, tooth_width_mm);
             share * share / tooth.force_ratio.get(contact)

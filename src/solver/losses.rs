@@ -58,6 +58,8 @@ pub struct LoadedTooth {
     pub cam_curvature_per_mm: f64,
     /// `1 + rκ` of the ring's flank.
     pub regularity: f64,
+    /// The corner of the ring's tip, against which a tooth is pressed that stands before the flank.
+    pub corner: Option<FlankPoint>,
     /// `F_H`, `F_K`, `F_S` without friction.
     pub force_n: PerContact<f64>,
 }
@@ -265,13 +267,20 @@ impl Mechanism {
         input_speed_rpm * (2.0 * PI / 60.0) * (f64::from(self.ring_teeth) / f64::from(self.teeth))
     }
 
-    /// The slips of a tooth that does not spin: `a_H = d/cos γ - r`, `a_K = s(d/cos β + r)/k`, `a_S = -s d tan β/k`.
+    /// The slips of a tooth that does not spin: `a_H = d/cos γ - r`, `a_K = s(d/cos β + r)/k`, at a corner `s(d tan γ sin β + (d cos β + ℓ)/k)`, and
+    /// `a_S = -s d tan β/k`.
     fn slip_without_spin_mm_per_rad(&self, tooth: &LoadedTooth) -> PerContact<f64> {
         let (k, s, r) = (self.ring_teeth_per_wave(), self.sense(), self.tooth_radius_mm);
         let (d, t) = (tooth.center_radius_mm, tooth.tan_pressure_angle);
+        let on_ring = match tooth.corner {
+            None => (d * secant(k * t) + r) / k,
+            Some(FlankPoint { distance_mm, tan_pressure_angle, cos_pressure_angle: cos, .. }) => {
+                d * t * tan_pressure_angle * cos + (d * cos + distance_mm) / k
+            }
+        };
         PerContact {
             wave_generator: d * secant(t) - r,
-            ring: s * (d * secant(k * t) + r) / k,
+            ring: s * on_ring,
             // tan β = k tan γ
             carrier: -s * d * t,
         }
@@ -362,6 +371,7 @@ impl LoadedTooth {
             tan_pressure_angle: center.tan_pressure_angle,
             cam_curvature_per_mm: center.cam_contact.curvature_per_mm,
             regularity: flank.regularity,
+            corner: None,
             force_n,
         }
     }

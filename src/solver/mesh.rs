@@ -45,8 +45,10 @@ pub struct Mesh {
     is_forward: bool,
     lobes: u32,
     limit: FlankLimit,
-    /// `ε/g`, rounded once: whoever asks when a tooth enters asks this number, and takes it as exact.
+    /// `ε/g`, rounded once: whoever asks when a tooth comes to the flank asks this number, and takes it as exact.
     engaged_spacings: f64,
+    /// The same up to where teeth are listed: as far, or to the valley.
+    listed_spacings: f64,
     /// Load periods after which single items meet again as they did; none where all items are alike.
     told_apart: Option<u64>,
 }
@@ -129,6 +131,7 @@ impl Mesh {
         let (installed, limit) = (whole(p.installed), *drive.flank_limit());
         let alike = greatest_common_divisor(u64::from(drive.lobes()), installed);
         let places = u64::from(drive.lobes()) / alike * installed;
+        let engaged_spacings = engaged_spacings(&limit, 0.5 * installed as f64 / alike as f64, places);
         Self {
             installed,
             removal: whole(p.teeth / p.installed),
@@ -136,7 +139,8 @@ impl Mesh {
             is_forward: p.teeth > p.ring_teeth,
             lobes: drive.lobes(),
             limit,
-            engaged_spacings: engaged_spacings(&limit, 0.5 * installed as f64 / alike as f64, places),
+            engaged_spacings,
+            listed_spacings: engaged_spacings,
             told_apart: None,
         }
     }
@@ -144,6 +148,16 @@ impl Mesh {
     /// The mesh of a drive in which single items deviate, which meet again as they did after so many load periods.
     pub(crate) fn of_items(drive: &Drive, load_periods: u64) -> Self {
         Self { told_apart: Some(load_periods), ..Self::new(drive) }
+    }
+
+    /// The same with the teeth before the flank listed too, up to the valley, as at a regular tip.
+    pub(crate) fn with_teeth_before_flank(self) -> Self {
+        Self { listed_spacings: 0.5 * self.installed as f64 / self.teeth_at_each_place(), ..self }
+    }
+
+    /// Whether teeth before the flank are listed.
+    pub(crate) fn lists_teeth_before_flank(&self) -> bool {
+        self.listed_spacings > self.engaged_spacings
     }
 
     /// Whether single items are told apart, since they deviate.
@@ -223,8 +237,8 @@ impl Mesh {
     /// How many teeth mesh: always as many as the engagement spans whole spacings, or at times one more at each place.
     pub fn teeth_in_mesh(&self) -> TeethInMesh {
         let at_each_place = self.listed_at_each_place();
-        let min = self.whole_spacings();
-        let max = min + u64::from(!self.spacings_are_whole());
+        let min = floor_of_product(self.engaged_spacings, 1);
+        let max = min + u64::from(self.engaged_spacings.fract() > 0.0);
         TeethInMesh { min, max }.times(at_each_place)
     }
 
@@ -233,24 +247,39 @@ impl Mesh {
         self.engaged_spacings > 1.0
     }
 
-    /// Whole spacings within the engagement: the places in mesh at j = 0.
+    /// Whole spacings within which teeth are listed: their places at j = 0.
     pub(crate) fn whole_spacings(&self) -> u64 {
-        floor_of_product(self.engaged_spacings, 1)
+        floor_of_product(self.listed_spacings, 1)
     }
 
-    /// Whether a tooth stands at the end of the flank at j = 0.
+    /// Whether a tooth stands at the last place where one is listed at j = 0.
     pub(crate) fn spacings_are_whole(&self) -> bool {
-        self.engaged_spacings.fract() == 0.0
+        self.listed_spacings.fract() == 0.0
     }
 
     /// The fraction of a lap that has passed when a tooth enters, above 0; 1 where that is at its end. Exact.
     pub(crate) fn entry_fraction(&self) -> f64 {
-        1.0 - self.engaged_spacings.fract()
+        1.0 - self.listed_spacings.fract()
     }
 
-    /// The largest whole p with `2π p/(N places) ≤ ψ_e`.
+    /// The place that comes to the flank within a lap, and the fraction that has passed then, above 0.
+    pub(crate) fn flank_fraction(&self) -> (u64, f64) {
+        (floor_of_product(self.engaged_spacings, 1) + 1, 1.0 - self.engaged_spacings.fract())
+    }
+
+    /// Where the last place is at which teeth are listed: the end of the flank, or the valley.
+    pub(crate) fn last_position(&self) -> Position {
+        if self.lists_teeth_before_flank() { Position::valley(self.lobes) } else { self.limit.position }
+    }
+
+    /// Whether loads jump where a tooth enters: at the end of a flank that is cut short, if none is listed before.
+    pub(crate) fn loads_jump_at_entry(&self) -> bool {
+        self.limit.end != FlankEnd::RegularTip && !self.lists_teeth_before_flank()
+    }
+
+    /// The largest whole p with `2π p/(N places) ≤ ψ_e`, or the same to the valley.
     pub fn last_step(&self, samples: Samples) -> u64 {
-        floor_of_product(self.engaged_spacings, samples.0)
+        floor_of_product(self.listed_spacings, samples.0)
     }
 
     /// States of a sweep: one for each of its input angles and teeth that are listed there.
@@ -274,7 +303,7 @@ impl Mesh {
 
     /// The largest q in mesh.
     fn last_listed_step(&self, samples: Samples) -> u64 {
-        floor_of_product(self.engaged_spacings, self.lobes_loaded_alike() * samples.0)
+        floor_of_product(self.listed_spacings, self.lobes_loaded_alike() * samples.0)
     }
 
     /// The teeth that are listed at sample `sample`, at most the last.

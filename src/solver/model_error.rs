@@ -171,6 +171,13 @@ pub fn measured(load: &LoadParameters, case: Case) -> Option<Measured> {
     // Force, stress and wind-up, in per cent, for natural tips without and with gaps, then for pointed ones. With a gap at pointed tips an
     // earlier calculation of case 5.2, at another angle, went further in two forces: to 9 and to 53.
     let refined = (load.ring_teeth_bend, load.wave_generator_moves);
+    if load.corner_contact && case.has_pointed_tips {
+        // Teeth at the tips themselves, and all that can be refined.
+        let is_measured = matches!(load.law, ContactLaw::Johnson { .. }) && refined == (true, true);
+        let of_case = if case.has_gaps { [(-2, 0), (-3, 1), (0, 1)] } else { [(-3, 0), (-4, 1), (-2, 1)] };
+        let [force, stress, wind_up] = of_case.map(|(low, high)| ErrorRange::percent(low, high));
+        return is_measured.then_some(Measured { case, force, stress, wind_up });
+    }
     let [natural, natural_gaps, pointed, pointed_gaps] = match (load.compatibility, &load.law) {
         (VirtualWork, ContactLaw::Johnson { .. }) if refined == (true, true) => [
             [(-1, 0), (-2, 1), (-1, 1)],
@@ -270,7 +277,7 @@ pub fn of(
         (drive.lobes() > LOBES_TO, Beyond::Lobes),
         (drive.sense() < 0.0, Beyond::RingWithMoreTeeth),
         (drive.largest_pressure_angle_deg()? > PRESSURE_ANGLE_TO_DEG, Beyond::PressureAngle),
-        (has_pointed_tips(drive), Beyond::EntryUnderLoad),
+        (has_pointed_tips(drive) && !p.corner_contact, Beyond::EntryUnderLoad),
         (!mates.into_iter().all(is_alike), Beyond::Materials),
         (p.clearance_um.iter().any(|(_, &gap_um)| gap_um > GAP_TO_UM), Beyond::Gap),
         (p.modification.first().is_some() || !deviations.is_nil(), Beyond::Modification),

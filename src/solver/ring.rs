@@ -1,6 +1,8 @@
 //! The ring's flank: the outer parallel curve of the centres' path at the tooth radius (docs/theory.md section 2), or, in a ring
 //! made with clearance, a little farther out.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Point2, Unit, Vector2};
 
 use crate::cam::ToothCenter;
@@ -16,9 +18,11 @@ pub struct RingFlank {
     distance_mm: f64,
 }
 
-/// The flank where a tooth touches it.
+/// Where a tooth touches the ring: its flank, or the corner that ends it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlankPoint {
+    /// Distance of the tooth's centre from it: that of the flank from the path of the centres, or more before a corner.
+    pub distance_mm: f64,
     /// `tan β = k T`, β the ring's pressure angle (its normal against the radius).
     pub tan_pressure_angle: f64,
     /// cos β.
@@ -98,6 +102,91 @@ impl RingTooth {
     }
 }
 
+/// The corner in which a pointed or bored flank ends, as teeth see it that have not come to the flank yet (docs/theory.md section 4.4, `corner_contact`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TipCorner {
+    flank: RingFlank,
+    limit: FlankLimit,
+    /// The flank at the corner.
+    flank_end: FlankPoint,
+    radius_mm: f64,
+    /// Angle of the corner from the symmetry line of the ring's tooth, about the axis: nothing of a pointed tip.
+    from_tip_rad: f64,
+}
+
+/// A tooth nearer to the flank's end than this is on the flank: nearer than what is turned in any answer, and farther than what two ways to the same
+/// place differ by, so that all of them tell alike.
+const AT_END_RAD: f64 = 1e-12;
+
+impl TipCorner {
+    /// That of a ring's tooth; none at a regular tip.
+    pub(crate) fn of(tooth: &RingTooth) -> Result<Option<Self>, NotConverged> {
+        let &RingTooth { flank, limit, .. } = tooth;
+        if limit.end == FlankEnd::RegularTip {
+            return Ok(None);
+        }
+        let center = flank.locus.at(limit.position)?;
+        let flank_end = flank.at(&center);
+        let from_tip_rad =
+            if limit.end == FlankEnd::Undercut { 0.0 } else { flank.angle_from_tip_rad(&center, &flank_end) };
+        let radius_mm = flank.radius_mm(&center, &flank_end);
+        Ok(Some(Self { flank, limit, flank_end, radius_mm, from_tip_rad }))
+    }
+
+    /// Whether a tooth stands before the flank, where it meets the corner first.
+    pub(crate) fn is_before_flank(&self, position: &Position) -> bool {
+        position.from_valley_rad < self.limit.position.from_valley_rad - AT_END_RAD
+    }
+
+    /// The place nearest to the flank that is still before it.
+    pub(crate) fn last_before_flank(limit: &FlankLimit) -> Position {
+        let Position { from_valley_rad, lobes, .. } = limit.position;
+        Position::from_valley((from_valley_rad - 2.0 * AT_END_RAD).max(0.0), lobes)
+    }
+
+    /// The corner as seen from a tooth before the flank: along the line from its centre.
+    pub(crate) fn seen_from(&self, tooth: &ToothCenter) -> FlankPoint {
+        let k = self.flank.teeth_per_wave;
+        let (sin, cos) = (tooth.position.from_valley_rad / k - self.from_tip_rad).sin_cos();
+        let (along_mm, across_mm) = (self.radius_mm * cos - tooth.center_radius_mm, self.radius_mm * sin);
+        let distance_mm = along_mm.hypot(across_mm);
+        FlankPoint {
+            // No tooth's circle reaches over the corner: what is missing is rounding.
+            distance_mm: distance_mm.max(self.flank.distance_mm),
+            tan_pressure_angle: across_mm / along_mm,
+            cos_pressure_angle: along_mm / distance_mm,
+            regularity: self.flank_end.regularity,
+        }
+    }
+
+    /// What a force on the flank moves the corner by more than it would move a wall, for each unit of the logarithm by which it is nearer to it and over
+    /// `(1 - ν²)/(π E L1)`: by the solution for a wedge that is pressed at its apex (docs/theory.md section 4.4, `corner_contact`).
+    pub(crate) fn bending_growth(&self) -> f64 {
+        let normal_rad = self.flank_end.tan_pressure_angle.atan();
+        // Half of the angle between the flank and its mirror image, or the land.
+        let half_rad = if self.limit.end == FlankEnd::Undercut {
+            0.5 * PI - (normal_rad - self.limit.position.from_valley_rad / self.flank.teeth_per_wave)
+        } else {
+            let to_tip_rad = self.limit.position.from_valley_rad / self.flank.teeth_per_wave;
+            0.5 * (PI - (normal_rad - (to_tip_rad - self.from_tip_rad)))
+        };
+        let (sin, cos) = half_rad.sin_cos();
+        PI * (sin * sin / (half_rad + sin * cos) + cos * cos / (half_rad - sin * cos)) - 2.0
+    }
+
+    /// What a tooth's circle keeps from the corner.
+    pub(crate) fn gap_mm(&self, seen: &FlankPoint) -> f64 {
+        seen.distance_mm - self.flank.distance_mm
+    }
+
+    /// By how much the line from a tooth's centre to the corner is turned against the flank's normal there.
+    pub(crate) fn angle_off_flank_rad(&self, tooth: &ToothCenter, seen: &FlankPoint) -> f64 {
+        let before_rad = self.limit.position.from_valley_rad - tooth.position.from_valley_rad;
+        let turned_rad = before_rad / self.flank.teeth_per_wave;
+        (self.flank_end.tan_pressure_angle.atan() - seen.tan_pressure_angle.atan() - turned_rad).max(0.0)
+    }
+}
+
 impl RingFlank {
     pub(crate) const fn new(locus: Locus, teeth_per_wave: f64) -> Self {
         Self { locus, teeth_per_wave, distance_mm: locus.tooth_radius_mm() }
@@ -149,12 +238,12 @@ impl RingFlank {
         // Positive wherever a tooth meshes; nearer to zero than its own rounding it is not known, and a curvature of
         // 1/0 or below would be neither.
         let regularity = regularity.max(f64::EPSILON);
-        FlankPoint { tan_pressure_angle, cos_pressure_angle, regularity }
+        FlankPoint { distance_mm: self.distance_mm, tan_pressure_angle, cos_pressure_angle, regularity }
     }
 
     /// Angle of the contact point from the tooth's centre line, seen from the axis: `atan(r sin β / (d + r cos β))`.
     pub fn lead_rad(&self, tooth: &ToothCenter, point: &FlankPoint) -> f64 {
-        let normal_mm = self.distance_mm * point.cos_pressure_angle;
+        let normal_mm = point.distance_mm * point.cos_pressure_angle;
         (normal_mm * point.tan_pressure_angle / (tooth.center_radius_mm + normal_mm)).atan()
     }
 
@@ -170,7 +259,7 @@ impl RingFlank {
 
     /// Distance `R` of the contact point from the axis.
     pub fn radius_mm(&self, tooth: &ToothCenter, point: &FlankPoint) -> f64 {
-        let normal_mm = self.distance_mm * point.cos_pressure_angle;
+        let normal_mm = point.distance_mm * point.cos_pressure_angle;
         (tooth.center_radius_mm + normal_mm).hypot(normal_mm * point.tan_pressure_angle)
     }
 

@@ -41,6 +41,7 @@ impl Spring {
     pub(crate) fn new(arm_mm: f64, arm_decline_mm_per_rad: f64, gap: Option<Gap>, approach: Approach) -> Self {
         let closing_rad = match gap {
             Some(_) if arm_mm <= 0.0 && arm_decline_mm_per_rad >= 0.0 => f64::INFINITY,
+            Some(Gap { along_mm: f64::INFINITY, .. }) => f64::INFINITY,
             Some(Gap { along_mm, lost_motion_rad }) if arm_decline_mm_per_rad == 0.0 => {
                 along_mm / arm_mm + lost_motion_rad
             }
@@ -260,7 +261,7 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
                 Approach::Power { coefficient, .. } => arm * (travel / coefficient).powf(1.0 / exponent),
                 Approach::Linear { compliance_mm_per_n } => arm * (travel / compliance_mm_per_n),
                 // Has no exponent.
-                Approach::Logarithmic(_) => 0.0,
+                Approach::Logarithmic(_) | Approach::Corner(_) => 0.0,
             }
         });
         let share = torque_nmm / (self.zones * torque_of_unit.sum::<f64>());

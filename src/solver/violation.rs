@@ -53,6 +53,8 @@ pub enum Parameter {
     RingTeethBend,
     /// Whether the wave generator moves on under its teeth.
     WaveGeneratorMoves,
+    /// Whether teeth are pressed against the corners of the ring's tips.
+    CornerContact,
     /// Depth of the body at a contact, mm.
     Depth(Contact),
     /// Compliance of what stands behind a contact, mm/N.
@@ -263,9 +265,12 @@ impl Parameter {
             // As soft as the least stiffness, and nothing.
             Self::SeriesCompliance(_) => Range::closed(0.0, 1e3, "mm/N"),
             // A choice and lists, which have no number.
-            Self::Law | Self::RingTeethBend | Self::WaveGeneratorMoves | Self::Deviations | Self::DeviationList(_) => {
-                Range::closed(f64::NEG_INFINITY, f64::INFINITY, "")
-            }
+            Self::Law
+            | Self::RingTeethBend
+            | Self::WaveGeneratorMoves
+            | Self::CornerContact
+            | Self::Deviations
+            | Self::DeviationList(_) => Range::closed(f64::NEG_INFINITY, f64::INFINITY, ""),
             Self::Clearance(_) | Self::PartClearance(_) | Self::RunoutAmount(_) => Range::closed(0.0, 1e6, "µm"),
             Self::RunoutAngle(_) => Range::closed(-360.0, 360.0, "deg"),
             Self::Deviation(Listed::SlotAngle | Listed::RingSpaceAngle, _) => Range::closed(-1e5, 1e5, "arcsec"),

@@ -214,6 +214,7 @@ async fn a_sweep_says_how_far_its_model_is_off_elastic_bodies_and_whether_this_d
         "law": "johnson",
         "ring_teeth_bend": false,
         "wave_generator_moves": false,
+        "corner_contact": false,
         "has_gaps": false,
         "has_pointed_tips": false
     });
@@ -274,6 +275,33 @@ async fn where_no_law_is_named_pointed_tips_bend_and_with_gaps_the_wave_generato
     let refused = json!({ "compatibility": "projection", "wave_generator_moves": true });
     let problem = service.post("/v1/sweep", &with(&pointed, "/model", refused)).await.refused(422, "impossible_design");
     assert_eq!(problem["errors"][0]["pointer"], "/model/wave_generator_moves");
+}
+
+/// Loads of teeth that meet the corner of a tip run on from nothing; the teeth are listed from the valley on, and say of no stress at the ring.
+#[tokio::test]
+async fn teeth_meet_the_corners_of_pointed_tips_where_that_is_chosen() {
+    let service = Service::new();
+    let sweep = async |model: Value| service.post("/v1/sweep", &with(&undercut(), "/model", model)).await.found();
+    let (rigid, pressed) = (sweep(json!({})).await, sweep(json!({ "corner_contact": true })).await);
+    assert_eq!((&rigid["enters_under_load"], &pressed["enters_under_load"]), (&json!(true), &json!(false)));
+    assert_eq!(rigid["coincidence_degree"], pressed["coincidence_degree"]);
+    let peak_n = |sweep: &Value| sweep["peaks"]["wave_generator"]["force_n"]["value"].as_f64().unwrap();
+    assert!(peak_n(&pressed) < 0.95 * peak_n(&rigid), "{} N, rigid {} N", peak_n(&pressed), peak_n(&rigid));
+    let states = &pressed["states"];
+    let column = |name: &str| states[name].as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect();
+    let (position_deg, force_n, stress_mpa): (Vec<_>, Vec<_>, Vec<_>) =
+        (column("position_deg"), column("force_ring_n"), column("stress_ring_mpa"));
+    let end_deg = rigid["states"]["position_deg"].as_array().unwrap().iter().map(|at| at.as_f64().unwrap());
+    let end_deg = end_deg.fold(0.0, f64::max);
+    let before: Vec<_> = (0..force_n.len()).filter(|&at| position_deg[at] > end_deg + 0.5).collect();
+    assert!(before.iter().any(|&at| force_n[at] > 0.0) && before.iter().any(|&at| force_n[at] == 0.0));
+    assert!(before.iter().all(|&at| stress_mpa[at] == 0.0));
+    assert_eq!(states["loaded"].as_array().unwrap().len(), force_n.len());
+    assert_eq!(sweep(json!({ "corner_contact": false })).await["states"], rigid["states"]);
+    let refused = json!({ "compatibility": "projection", "corner_contact": true });
+    let problem =
+        service.post("/v1/sweep", &with(&undercut(), "/model", refused)).await.refused(422, "impossible_design");
+    assert_eq!(problem["errors"][0]["pointer"], "/model/corner_contact");
 }
 
 /// Forces, stresses and what is kept of them follow the designer's carrier.

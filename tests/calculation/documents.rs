@@ -45,6 +45,8 @@ fn a_short_sweep_is_not_short_where_the_rings_teeth_bend() {
     assert!(is_short(&document));
     document["model"]["ring_teeth_bend"] = json!(true);
     assert!(!is_short(&document));
+    document["model"] = json!({ "corner_contact": true, "ring_teeth_bend": false });
+    assert!(is_short(&document), "natural tips have no corner");
 }
 
 /// Asked so often whether to go on, and then it is not to.
@@ -245,7 +247,8 @@ fn what_is_left_out_has_the_key_of_its_default() {
         "compatibility": "virtual_work",
         "stiffness": { "law": "johnson", "depth_mm": {} },
         "ring_teeth_bend": false,
-        "wave_generator_moves": false
+        "wave_generator_moves": false,
+        "corner_contact": false
     });
     assert_eq!(keys(&read(&named).unwrap()), keys(&read(&long).unwrap()));
     assert_ne!(keys(&read(&named).unwrap()), keys(&read(&short).unwrap()));

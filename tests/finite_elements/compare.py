@@ -32,6 +32,8 @@ COLOURS = {"wave_generator": "#1f6fb4", "ring": "#c2501d", "carrier": "#3d7f3a"}
 
 # What of the model is refined: nothing; the ring's teeth bend; and the wave generator moves on besides.
 REFINED = ({"ring_teeth_bend": False, "wave_generator_moves": False}, {"ring_teeth_bend": True, "wave_generator_moves": False}, {"ring_teeth_bend": True, "wave_generator_moves": True})
+# The same, and teeth that meet the corners of tips.
+AT_CORNERS = {**REFINED[-1], "corner_contact": True}
 
 
 def swept(program, case, refined=REFINED[0]):
@@ -83,6 +85,25 @@ def table(program, cases, refined):
               + " | ".join(share(stress) for stress in stresses) + f" | {wind_up_deg:.4f} | {share(wind_ups[at] / wind_up_deg - 1)} |")
 
 
+def corner_table(program, cases, refined):
+    """Of the tooth that is nearest to the flank's end besides."""
+    print("| ψ, ° | gap | its F_H, N | model | largest F_H, N | model | worst tooth | wind-up, ° | model |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    for case in sorted(cases, key=lambda case: (case["ring_gap_um"], -case["teeth"][-1]["position_deg"])):
+        rows, wind_ups = swept(program, case, refined)
+        at = min(wind_ups, key=lambda angle: abs(angle - case["input_angle_deg"]))
+        here = [row for row in rows if row["input_angle_deg"] == at]
+        # A tooth that is not listed carries nothing.
+        of_model = lambda deg: sum(row["force_wave_generator_n"] for row in here if abs(row["position_deg"] - deg) < 1e-3)
+        forces_n = {tooth["position_deg"]: tooth["force_n"][0] for tooth in case["teeth"]}
+        peak_n, last_deg = max(forces_n.values()), max(forces_n)
+        worst_n = max(abs(of_model(deg) - force_n) for deg, force_n in forces_n.items())
+        model_n = max(row["force_wave_generator_n"] for row in here)
+        wind_up_deg = case["wind_up_rad"] * 57.29577951308232
+        print(f"| {last_deg:.2f} | {gap_of(case)} | {forces_n[last_deg]:.1f} | {of_model(last_deg):.1f} | {peak_n:.1f} | {share(model_n / peak_n - 1)} | "
+              f"{100 * worst_n / peak_n:.1f} % | {wind_up_deg:.4f} | {share(wind_ups[at] / wind_up_deg - 1)} |")
+
+
 def plot(program, drive, cases):
     gaps = sorted({gap_of(case) for case in cases}, key=lambda gap: ("no gap", "ring", "slot").index("no gap" if gap == "no gap" else gap[-4:]))
     figure, panels = plt.subplots(1, len(gaps), figsize=(4.2 * len(gaps), 3.6), sharey=True, layout="constrained")
@@ -112,6 +133,11 @@ def main():
     for refined in REFINED:
         print(refined)
         table(program, cases, refined)
+        print()
+    corners = json.loads((HERE / "corners.json").read_text())["cases"]
+    for refined in (REFINED[-1], AT_CORNERS):
+        print(refined)
+        corner_table(program, corners, refined)
         print()
     for drive in DRIVES:
         plot(program, drive, [case for case in cases if case["drive"] == drive])

@@ -267,6 +267,9 @@ fn relative(bytes: &[u8; 48]) -> Value {
     if series % 8 == 3 {
         model["wave_generator_moves"] = json!(true);
     }
+    if series % 8 >= 6 {
+        model["corner_contact"] = json!(true);
+    }
     if gap % 2 == 0 {
         // Most often enough for what is too full.
         let clearance = |_| 1e3 * r * 10.0_f64.powi(-i32::from(gap % 9));

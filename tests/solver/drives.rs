@@ -72,6 +72,7 @@ pub(crate) fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParamete
         series_compliance_mm_per_n: PerContact::default(),
         ring_teeth_bend: false,
         wave_generator_moves: false,
+        corner_contact: false,
         clearance_um: PerContact::default(),
         modification: Modification::default(),
         carrier: CarrierRadii::default(),

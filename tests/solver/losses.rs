@@ -70,6 +70,7 @@ impl Case {
                 tan_pressure_angle: tooth["tan_pressure_angle"].as_f64().unwrap(),
                 cam_curvature_per_mm: tooth["cam_curvature_per_mm"].as_f64().unwrap(),
                 regularity: tooth["regularity"].as_f64().unwrap(),
+                corner: None,
                 force_n: per_contact(&tooth["force_n"]),
             })
             .collect()

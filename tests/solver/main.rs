@@ -3,6 +3,7 @@
 
 mod backing;
 mod contacts;
+mod corners;
 mod deviations;
 mod drives;
 mod extremes;

@@ -108,6 +108,7 @@ impl Case {
             },
             ring_teeth_bend: false,
             wave_generator_moves: false,
+            corner_contact: false,
             series_compliance_mm_per_n: per_contact(|contact| {
                 document["model"]["series_compliance_mm_per_n"][contact].as_f64().unwrap_or(0.0)
             }),

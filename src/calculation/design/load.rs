@@ -227,6 +227,11 @@ pub struct ModelDocument {
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub wave_generator_moves: Option<bool>,
+    /// Whether teeth that come to a pointed or bored tip are pressed against its corner before they come to the flank, as elastic ones are, with `virtual_work`
+    /// alone. They are listed then, up to the valley, and no stress of the ring is told of them. Left out, no teeth are; balls never.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub corner_contact: Option<bool>,
     /// Gaps at the contacts; left out, there are none.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
@@ -360,7 +365,7 @@ encoded! {
     struct LoadDocument { input_torque_nm, output_torque_nm, allowable_stress_mpa, input_speed_rpm, duty }
     struct DutyPointDocument { input_torque_nm, output_torque_nm, input_speed_rpm, share_of_time }
     struct StressByContactDocument { wave_generator, ring, carrier }
-    struct ModelDocument { compatibility, stiffness, series_compliance_mm_per_n, ring_teeth_bend, wave_generator_moves, clearance }
+    struct ModelDocument { compatibility, stiffness, series_compliance_mm_per_n, ring_teeth_bend, wave_generator_moves, corner_contact, clearance }
     struct ClearanceDocument { wave_generator_um, ring_um, carrier_um }
     struct CompliancesDocument { wave_generator, ring, carrier }
     struct LinearDocument {}

@@ -144,11 +144,11 @@ pub struct StatesAnswer {
     pub force_carrier_n: Vec<f64>,
     /// Hertz stress σ_H between tooth and wave generator.
     pub stress_wave_generator_mpa: Vec<f64>,
-    /// Hertz stress σ_K between tooth and ring.
+    /// Hertz stress σ_K between tooth and ring; 0 at a corner (`model.corner_contact`), of which none is told.
     pub stress_ring_mpa: Vec<f64>,
     /// Hertz stress σ_S between tooth and carrier.
     pub stress_carrier_mpa: Vec<f64>,
-    /// Whether the tooth carries load, given `model.clearance`.
+    /// Whether the tooth carries load, given `model.clearance` or `model.corner_contact`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub loaded: Option<Vec<bool>>,

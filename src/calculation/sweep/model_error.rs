@@ -93,6 +93,8 @@ pub struct CaseAnswer {
     pub ring_teeth_bend: bool,
     /// Whether the wave generator moves on under its teeth.
     pub wave_generator_moves: bool,
+    /// Whether teeth are pressed against the corners of pointed or bored tips.
+    pub corner_contact: bool,
     /// Whether any contact has a gap.
     pub has_gaps: bool,
     /// Whether the ring's tips are pointed or bored, so that teeth enter under load.
@@ -185,6 +187,7 @@ impl ModelErrorAnswer {
                 law: p.law.into(),
                 ring_teeth_bend: p.ring_teeth_bend,
                 wave_generator_moves: p.wave_generator_moves,
+                corner_contact: p.corner_contact,
                 has_gaps: case.has_gaps,
                 has_pointed_tips: case.has_pointed_tips,
             },
@@ -225,14 +228,14 @@ impl ModelErrorAnswer {
                     percent(stress)
                 )?;
                 writeln!(writer, "wind-up of bodies that are held     {}", percent(wind_up))?;
-                let refined = match (case.ring_teeth_bend, case.wave_generator_moves) {
-                    (false, false) => None,
-                    (true, false) => Some("the ring's teeth bend"),
-                    (false, true) => Some("the wave generator moves on under its teeth"),
-                    (true, true) => Some("the ring's teeth bend, the wave generator moves on under its teeth"),
-                };
-                if let Some(refined) = refined {
-                    writeln!(writer, "refined                             {refined}")?;
+                let refined = [
+                    (case.ring_teeth_bend, "the ring's teeth bend"),
+                    (case.wave_generator_moves, "the wave generator moves on under its teeth"),
+                    (case.corner_contact, "teeth meet the corners of tips"),
+                ];
+                let refined: Vec<_> = refined.into_iter().filter(|(is, _)| *is).map(|(_, words)| words).collect();
+                if !refined.is_empty() {
+                    writeln!(writer, "refined                             {}", refined.join(", "))?;
                 }
             }
             None => writeln!(writer, "\nmodel against elastic bodies        not measured")?,

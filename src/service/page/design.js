@@ -416,6 +416,7 @@ export const GROUPS = [
       compliance('wave_generator', 'Compliance, wave generator'), compliance('ring', 'Compliance, ring'), compliance('carrier', 'Compliance, carrier'),
       flag('/model/ring_teeth_bend', 'The ring’s teeth bend, the more the nearer to their tips'),
       flag('/model/wave_generator_moves', 'The wave generator moves on under its teeth as it winds up'),
+      flag('/model/corner_contact', 'Teeth meet the corners of pointed or bored tips before they come to the flank'),
     ],
   },
   {

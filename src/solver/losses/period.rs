@@ -9,7 +9,7 @@ use crate::losses::duty::{ColumnForTime, mean_at_each_place};
 use crate::losses::wear::WearParameters;
 use crate::losses::{AtInputAngle, Friction, LoadedTooth, Mechanism, ToothSlip, mean_over_period};
 use crate::position::{Position, half_lobe_rad};
-use crate::ring::FlankPoint;
+use crate::ring::{FlankPoint, TipCorner};
 use crate::root::NotConverged;
 use crate::sweep::{Peak, States, Sweep};
 use crate::{SolveError, Stop};
@@ -303,9 +303,10 @@ fn at_each_input_angle(
     mut each: impl FnMut(f64, &[ToothOfState]) -> Result<(), SolveError>,
 ) -> Result<(), SolveError> {
     let mut teeth = Vec::new();
+    let corner = TipCorner::of(drive.ring_tooth())?;
     for state in 0..states.len() {
         let next = state + 1;
-        teeth.push(tooth_of(drive, states, state)?);
+        teeth.push(tooth_of(drive, corner.as_ref(), states, state)?);
         let goes_on = next < states.len()
             && states.input_angle_deg[next].total_cmp(&states.input_angle_deg[state]).is_eq()
             && states.tooth[next] > states.tooth[state];
@@ -329,12 +330,21 @@ struct ToothOfState {
 }
 
 /// The tooth of a state. Its place is known in degrees, near the valley to some 1e-14 rad, where it bears next to nothing.
-fn tooth_of(drive: &Drive, states: &States, state: usize) -> Result<ToothOfState, NotConverged> {
+fn tooth_of(
+    drive: &Drive,
+    corner: Option<&TipCorner>,
+    states: &States,
+    state: usize,
+) -> Result<ToothOfState, NotConverged> {
     let lobes = drive.lobes();
     let from_lobe_rad = states.position_deg[state].to_radians().min(half_lobe_rad(lobes));
     let center = drive.flank().locus().at(Position::from_lobe(from_lobe_rad, lobes))?;
-    let flank = drive.flank().at(&center);
+    // Only where corners are pressed does a tooth stand before the flank.
+    let corner =
+        corner.filter(|corner| corner.is_before_flank(&center.position)).map(|corner| corner.seen_from(&center));
+    let flank = corner.unwrap_or_else(|| drive.flank().at(&center));
     let force_n = PerContact::of(|contact| states.force_n.get(contact)[state]);
-    let loaded = LoadedTooth::new(states.lobe.get(state).copied().unwrap_or_default(), &center, &flank, force_n);
+    let lobe = states.lobe.get(state).copied().unwrap_or_default();
+    let loaded = LoadedTooth { corner, ..LoadedTooth::new(lobe, &center, &flank, force_n) };
     Ok(ToothOfState { state, center, flank, loaded })
 }

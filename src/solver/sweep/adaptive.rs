@@ -5,10 +5,9 @@ use crate::contact::PerContact;
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
 use crate::mesh::{Mesh, PlacedTooth};
 use crate::position::Position;
-use crate::ring::FlankEnd;
 use crate::sweep::fast;
 use crate::sweep::points::Tolerance;
-use crate::sweep::search::{LOADS, Look, Piece, Seen, search};
+use crate::sweep::search::{AtPlace, LOADS, Look, Piece, Seen, search};
 use crate::{SolveError, Stop};
 
 /// How true straight lines between the input angles are at least, over each column's peak: a plot that looks smooth.
@@ -33,8 +32,8 @@ pub(crate) struct Moment {
     pub(crate) fraction: f64,
     first: u64,
     last: u64,
-    /// The place that stands exactly where the flank ends.
-    entering: Option<u64>,
+    /// The tooth that stands exactly where the flank ends, or where it enters.
+    exact: Option<AtPlace>,
 }
 
 impl Moment {
@@ -50,17 +49,15 @@ impl Moment {
     }
 
     fn position(&self, mesh: &Mesh, place: u64) -> Position {
-        if self.entering == Some(place) {
-            mesh.flank_limit().position
-        } else {
-            mesh.position_between(place, self.fraction)
-        }
+        self.exact
+            .filter(|at| at.place == place)
+            .map_or_else(|| mesh.position_between(place, self.fraction), |at| at.position)
     }
 
     /// Of a piece. A tooth that has reached the lobe has left.
-    fn of(&Piece { start, places, starts_with_entry, .. }: &Piece, fraction: f64) -> Self {
-        let entering = (starts_with_entry && fraction <= start).then_some(places);
-        Self { fraction, first: if fraction < 1.0 { 1 } else { 2 }, last: places, entering }
+    fn of(piece: &Piece, fraction: f64) -> Self {
+        let exact = piece.exactly_at(fraction).next();
+        Self { fraction, first: if fraction < 1.0 { 1 } else { 2 }, last: piece.places, exact }
     }
 }
 
@@ -94,7 +91,7 @@ pub(crate) fn moments(
         }
     };
     let mut by_lap = vec![Vec::new(); usize::try_from(laps).unwrap_or(usize::MAX)];
-    let loads_jump = mesh.flank_limit().end != FlankEnd::RegularTip;
+    let loads_jump = mesh.loads_jump_at_entry();
     for (moments, lap) in by_lap.iter_mut().zip(0..) {
         for Seen { piece, fractions, .. } in found.seen.iter().filter(|seen| seen.piece.lap == lap) {
             moments.extend(fractions.iter().map(|&fraction| Moment::of(piece, fraction)));
@@ -105,7 +102,8 @@ pub(crate) fn moments(
             if !loads_jump {
                 moments.retain(|moment| moment.fraction < 1.0);
             }
-            moments.push(Moment { fraction: 1.0, first: 2, last, entering: Some(last) });
+            let exact = Some(AtPlace { place: last, position: mesh.last_position() });
+            moments.push(Moment { fraction: 1.0, first: 2, last, exact });
         }
         moments.sort_by(|one, other| one.fraction.total_cmp(&other.fraction).then(one.last.cmp(&other.last)));
         moments.dedup();
@@ -132,7 +130,7 @@ impl<'a> PlainLook<'a> {
             loaded: if tells_items_apart { *loaded } else { loaded.with_zones(mesh.teeth_at_each_place()) },
             mesh,
             allowable_stress_mpa: load.parameters().allowable_stress_mpa,
-            has_gaps: load.has_gaps() || tells_items_apart,
+            has_gaps: loaded.has_gaps() || tells_items_apart,
             is_linear: loaded.is_linear(),
             stop,
         }

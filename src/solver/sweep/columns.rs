@@ -140,7 +140,7 @@ impl ContactPeaks {
         contact: Contact,
     ) -> Self {
         match pressure {
-            Pressure::Line { .. } => self,
+            Pressure::Line { .. } | Pressure::Corner(_) => self,
             Pressure::Flat(flat) => Self { half_width_mm: 0.5 * flat.length_mm(), shear: None, ..self },
             Pressure::Ellipse(ellipse) => {
                 let half_width_mm = ellipse.half_width_mm(force_n);

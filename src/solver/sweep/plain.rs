@@ -176,10 +176,16 @@ impl<'a> Growing<'a> {
             let turned_mm = tooth.spring.turned_static_arm_mm(&wind_up.rotation) - arm_mm;
             let moved_nmm = zones * force_n.wave_generator * turned_mm;
             torque_nmm.wave_generator += zones * force_n.wave_generator * arm_mm + moved_nmm;
-            torque_nmm.ring +=
-                zones * force_n.ring * sin_ring * center.center_radius_mm + moved_nmm * flank.teeth_per_wave();
-            torque_nmm.carrier +=
-                zones * force_n.carrier * center.center_radius_mm + moved_nmm * self.loaded.drive().teeth_per_wave();
+            let ring_nmm = zones * force_n.ring * sin_ring * center.center_radius_mm;
+            // What a corner takes more, or less, than a flank would, the carrier takes too.
+            let beyond_nmm = if matches!(tooth.pressure.ring, Pressure::Corner(_)) {
+                ring_nmm - zones * force_n.wave_generator * arm_mm * flank.teeth_per_wave()
+            } else {
+                0.0
+            };
+            torque_nmm.ring += ring_nmm - beyond_nmm + moved_nmm * flank.teeth_per_wave();
+            torque_nmm.carrier += zones * force_n.carrier * center.center_radius_mm - beyond_nmm
+                + moved_nmm * self.loaded.drive().teeth_per_wave();
         }
         let residual = self.balance.residual(&torque_nmm);
         self.torque_balance_residual = worse(residual, self.torque_balance_residual);

@@ -11,6 +11,7 @@ use std::ops::Range;
 use crate::SolveError;
 use crate::mesh::Mesh;
 use crate::position::Position;
+use crate::ring::TipCorner;
 use crate::root::NotConverged;
 use crate::sweep::points::Tolerance;
 
@@ -98,10 +99,19 @@ pub(crate) struct Piece {
     /// Shares of the lap that have passed.
     pub(crate) start: f64,
     pub(crate) end: f64,
-    /// Places in mesh.
+    /// Places where teeth are listed.
     pub(crate) places: u64,
-    /// Whether the last of them stands where the flank ends, at the start.
-    pub(crate) starts_with_entry: bool,
+    /// The tooth that stands where the flank ends, or where it enters, at the start.
+    pub(crate) at_start: Option<AtPlace>,
+    /// The tooth that stands just before the flank at the end.
+    pub(crate) at_end: Option<AtPlace>,
+}
+
+/// Where the tooth at a place stands, exactly.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct AtPlace {
+    pub(crate) place: u64,
+    pub(crate) position: Position,
 }
 
 impl Piece {
@@ -109,19 +119,42 @@ impl Piece {
     pub(crate) fn of(mesh: &Mesh, lap: u64) -> impl Iterator<Item = Self> {
         let (places, entry) = (mesh.whole_spacings(), mesh.entry_fraction());
         let is_whole = mesh.spacings_are_whole();
-        let first =
-            Self { lap, start: 0.0, end: if is_whole { 1.0 } else { entry }, places, starts_with_entry: is_whole };
-        let rest = Self { lap, start: entry, end: 1.0, places: places + 1, starts_with_entry: true };
-        std::iter::once(first).chain((!is_whole).then_some(rest))
+        let entering = |place| Some(AtPlace { place, position: mesh.last_position() });
+        let at_start = if is_whole { entering(places) } else { None };
+        let first = Self { lap, start: 0.0, end: if is_whole { 1.0 } else { entry }, places, at_start, at_end: None };
+        let rest =
+            Self { lap, start: entry, end: 1.0, places: places + 1, at_start: entering(places + 1), at_end: None };
+        let pieces = std::iter::once(first).chain((!is_whole).then_some(rest));
+        let mesh = *mesh;
+        pieces.flat_map(move |piece| piece.cut_where_a_tooth_comes_to_the_flank(&mesh))
+    }
+
+    /// Loads have a corner there, and the ring's stress begins.
+    fn cut_where_a_tooth_comes_to_the_flank(self, mesh: &Mesh) -> impl Iterator<Item = Self> + use<> {
+        let (place, fraction) = mesh.flank_fraction();
+        let (limit, is_cut) = (*mesh.flank_limit(), mesh.lists_teeth_before_flank());
+        let on_flank = Some(AtPlace { place, position: limit.position });
+        let before = Some(AtPlace { place, position: TipCorner::last_before_flank(&limit) });
+        if is_cut && fraction > self.start && fraction < self.end {
+            let [one, other] =
+                [Self { end: fraction, at_end: before, ..self }, Self { start: fraction, at_start: on_flank, ..self }];
+            [Some(one), Some(other)].into_iter().flatten()
+        } else {
+            [Some(self), None].into_iter().flatten()
+        }
     }
 
     /// The position at a place.
     pub(crate) fn position(&self, mesh: &Mesh, place: u64, fraction: f64) -> Position {
-        if self.starts_with_entry && place == self.places && fraction <= self.start {
-            mesh.flank_limit().position
-        } else {
-            mesh.position_between(place, fraction)
-        }
+        self.exactly_at(fraction)
+            .find(|at| at.place == place)
+            .map_or_else(|| mesh.position_between(place, fraction), |at| at.position)
+    }
+
+    /// The teeth whose positions are known exactly.
+    pub(crate) fn exactly_at(&self, fraction: f64) -> impl Iterator<Item = AtPlace> + use<> {
+        let at_start = self.at_start.filter(|_| fraction <= self.start);
+        at_start.into_iter().chain(self.at_end.filter(|_| fraction >= self.end))
     }
 }
 
@@ -770,7 +803,7 @@ mod tests {
 
     /// A curve over a lap of sixteen intervals, as the wind-up of one tooth.
     fn seen_of(curve: impl Fn(f64) -> f64) -> Seen {
-        let piece = Piece { lap: 0, start: 0.0, end: 1.0, places: 1, starts_with_entry: false };
+        let piece = Piece { lap: 0, start: 0.0, end: 1.0, places: 1, at_start: None, at_end: None };
         let mut seen = Seen::new(piece, 1);
         for fraction in std::mem::take(&mut seen.wanted) {
             seen.push(fraction)[0] = curve(fraction);

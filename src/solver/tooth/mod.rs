@@ -6,7 +6,7 @@ pub mod point;
 
 use std::f64::consts::PI;
 
-use crate::approach::{Approach, Logarithmic};
+use crate::approach::{Approach, Corner, Logarithmic};
 use crate::contact::{Contact, ContactLaw, HertzLine, Materials, PerContact};
 use crate::drive::{Drive, ToothShape};
 use crate::parts::CarrierRadii;
@@ -183,24 +183,39 @@ pub enum Pressure {
     Ellipse(EllipticContact),
     /// An even pressure.
     Flat(FlatContact),
+    /// That of a corner, of which nothing is told: as Hertz has it there is none, and it would have no end in a sharp one.
+    Corner(CornerContact),
+}
+
+/// A tooth against the corner that ends the ring's flank.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CornerContact {
+    /// Relative curvature of the tooth and the flank's end.
+    pub(crate) curvature_per_mm: f64,
+    /// By how much the contact is turned against the flank's normal there.
+    pub(crate) angle_rad: f64,
+    /// How much more the ring's tooth bends for each unit of the logarithm by which the contact is narrower.
+    pub(crate) bending_growth_mm_per_n: f64,
 }
 
 impl Pressure {
-    /// The largest pressure under a force; the mean one of a flat.
+    /// The largest pressure under a force; the mean one of a flat, none of a corner.
     pub fn stress_mpa(&self, force_n: f64) -> f64 {
         match self {
             Self::Line { hertz, curvature_per_mm } => hertz.stress_mpa(force_n, *curvature_per_mm),
             Self::Ellipse(ellipse) => ellipse.stress_mpa(force_n),
             Self::Flat(flat) => flat.stress_mpa(force_n),
+            Self::Corner(_) => 0.0,
         }
     }
 
     /// The pressure in the middle plane, summed along the plane of motion: of an ellipse `π a p/2`, a its half-width; elsewhere the force
-    /// over the width.
+    /// over the width. None of a corner, on which a tooth stays: it wears there as no flank does.
     pub fn line_load_n_per_mm(&self, force_n: f64, tooth_width_mm: f64) -> f64 {
         match self {
             Self::Line { .. } | Self::Flat(_) => force_n / tooth_width_mm,
             Self::Ellipse(ellipse) => 0.5 * PI * ellipse.half_width_mm(force_n) * ellipse.stress_mpa(force_n),
+            Self::Corner(_) => 0.0,
         }
     }
 
@@ -210,6 +225,7 @@ impl Pressure {
             Self::Line { hertz, curvature_per_mm } => hertz.force_n(stress_mpa, *curvature_per_mm),
             Self::Ellipse(ellipse) => ellipse.force_n(stress_mpa),
             Self::Flat(flat) => flat.force_n(stress_mpa),
+            Self::Corner(_) => f64::INFINITY,
         }
     }
 }
@@ -415,7 +431,10 @@ impl Contacts {
         let mut growth_mm_per_n = 0.0;
         // The contact that first reaches the width at which Johnson's law ends sets the force that logarithms count from: so all are positive.
         let johnson = PerContact::of(|contact| match (self.law.get(contact), &places.get(contact).pressure) {
-            (Law::Johnson(law), Pressure::Line { curvature_per_mm, .. }) => Some(law.at(*curvature_per_mm)),
+            (
+                Law::Johnson(law),
+                Pressure::Line { curvature_per_mm, .. } | Pressure::Corner(CornerContact { curvature_per_mm, .. }),
+            ) => Some(law.at(*curvature_per_mm)),
             _ => None,
         });
         let reference_n = places
@@ -450,7 +469,17 @@ impl Contacts {
             linear_mm_per_n += weight * (self.series_compliance_mm_per_n.get(contact) * ratio);
         }
         if growth_mm_per_n > 0.0 {
-            Approach::Logarithmic(Logarithmic::new(linear_mm_per_n, growth_mm_per_n, reference_n))
+            let smooth = Logarithmic::new(linear_mm_per_n, growth_mm_per_n, reference_n);
+            match (johnson.ring, &places.ring.pressure) {
+                (Some(law), Pressure::Corner(corner)) => {
+                    let Place { weight, force_ratio, .. } = places.ring;
+                    let growth_mm_per_n = 2.0 * law.growth_mm_per_n + corner.bending_growth_mm_per_n;
+                    let narrowing_n = corner.angle_rad * corner.angle_rad
+                        / (PI * PI * corner.curvature_per_mm * law.growth_mm_per_n * force_ratio);
+                    Approach::Corner(Corner::new(smooth, weight * force_ratio * growth_mm_per_n, narrowing_n))
+                }
+                _ => Approach::Logarithmic(smooth),
+            }
         } else if let Some((exponent, coefficient)) = power {
             Approach::Power { exponent, coefficient, compliance_mm_per_n: linear_mm_per_n }
         } else {

@@ -103,6 +103,7 @@ fn drive(place: &[f64]) -> Option<Judged> {
         series_compliance_mm_per_n: PerContact::default(),
         ring_teeth_bend: false,
         wave_generator_moves: false,
+        corner_contact: false,
         clearance_um: PerContact::default(),
         modification: Modification::default(),
         carrier: CarrierRadii::default(),

@@ -1,0 +1,482 @@
+//! Teeth against the corners of pointed and bored tips: against finite elements, against springs put up from the geometry alone, and what must hold of any load.
+
+use nalgebra::{Matrix2, Point2, Rotation2, Vector2};
+use proptest::prelude::*;
+use serde::Deserialize;
+use toothwave_solver::Compatibility::{Projection, VirtualWork};
+use toothwave_solver::gaps::{Deviations, Modification};
+use toothwave_solver::load_sharing::LoadedDrive;
+use toothwave_solver::losses::period::Losses;
+use toothwave_solver::losses::{Friction, FrictionParameters, WaveGeneratorFriction};
+use toothwave_solver::model_error;
+use toothwave_solver::sweep::{self, Points, States, Sweep};
+use toothwave_solver::{
+    ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, Parameter, PerContact, Position, SolveError,
+    ToothShape, Violation,
+};
+
+use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_swept_drive, drive, load, swept};
+
+#[derive(Deserialize)]
+struct Results {
+    convergence: Vec<Refinement>,
+    cases: Vec<Case>,
+}
+
+#[derive(Deserialize)]
+struct Refinement {
+    force_n: Vec<f64>,
+    wind_up_rad: f64,
+}
+
+#[derive(Deserialize)]
+struct Case {
+    input_angle_deg: f64,
+    ring_gap_um: f64,
+    depth_mm: f64,
+    teeth: Vec<Tooth>,
+    wind_up_rad: f64,
+}
+
+#[derive(Deserialize)]
+struct Tooth {
+    position_deg: f64,
+    force_n: [f64; 3],
+    pressure_mpa: [f64; 3],
+}
+
+impl Case {
+    /// The load, with all of the model refined that can be, and depths of bodies that are held where those of the case are.
+    fn refined(&self) -> LoadParameters {
+        LoadParameters {
+            law: ContactLaw::Johnson { depth_mm: PerContact::of(|_| Some(self.depth_mm)) },
+            clearance_um: PerContact { ring: self.ring_gap_um, ..PerContact::default() },
+            ring_teeth_bend: true,
+            wave_generator_moves: true,
+            ..pressed_corners(3.0)
+        }
+    }
+
+    fn wind_up_error(&self, sweep: &Sweep) -> f64 {
+        let is_here = |deg: &f64| (deg - self.input_angle_deg).abs() < 1e-9;
+        let at = sweep.input_angles.input_angle_deg.iter().position(is_here).unwrap();
+        sweep.input_angles.wind_up_deg[at].to_radians() / self.wind_up_rad - 1.0
+    }
+}
+
+fn results() -> Results {
+    serde_json::from_str(include_str!("../finite_elements/corners.json")).unwrap()
+}
+
+/// ψ_e of case 5.2.
+const FLANK_END_DEG: f64 = 43.607_599;
+
+const JOHNSON: ContactLaw =
+    ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
+
+fn pressed_corners(torque_nm: f64) -> LoadParameters {
+    LoadParameters { law: JOHNSON, corner_contact: true, ..load(torque_nm, VirtualWork) }
+}
+
+/// Of a sweep the states at an input angle.
+fn at_angle(states: &States, input_angle_deg: f64) -> Vec<usize> {
+    (0..states.len()).filter(|&at| (states.input_angle_deg[at] - input_angle_deg).abs() < 1e-9).collect()
+}
+
+#[test]
+fn finer_elements_find_the_same_force_at_a_corner() {
+    let [first, finest] = &results().convergence[..] else { panic!("two refinements") };
+    assert!((first.wind_up_rad / finest.wind_up_rad - 1.0).abs() < 1e-3);
+    let largest = finest.force_n.iter().copied().fold(0.0, f64::max);
+    for (first, finest) in first.force_n.iter().zip(&finest.force_n) {
+        assert!((first - finest).abs() < 1e-3 * largest, "{first} N, by finer elements {finest} N");
+    }
+}
+
+/// The model is refined in all that it can be. Nearest to the flank's end, on either side, its tooth carries too much: the compliance of the ring's teeth knows a contact
+/// of one width, and here the corner cuts off a part of it.
+#[test]
+fn teeth_at_a_pointed_tip_carry_what_elastic_ones_do() {
+    for case in results().cases {
+        let Case { input_angle_deg, ring_gap_um, ref teeth, .. } = case;
+        let refined = case.refined();
+        let errors = |load: &LoadParameters| {
+            let sweep = swept(&PAPER_5_2, load, 240);
+            let here = at_angle(&sweep.states, input_angle_deg);
+            let force_n = |position_deg: f64| {
+                let state = here.iter().find(|&&at| (sweep.states.position_deg[at] - position_deg).abs() < 1e-3);
+                state.map_or(0.0, |&at| sweep.states.force_n.wave_generator[at])
+            };
+            let largest_n = teeth.iter().map(|tooth| tooth.force_n[0]).fold(0.0, f64::max);
+            let of_model_n = here.iter().map(|&at| sweep.states.force_n.wave_generator[at]).fold(0.0, f64::max);
+            let misses = teeth.iter().map(|tooth| (force_n(tooth.position_deg) - tooth.force_n[0]).abs() / largest_n);
+            [of_model_n / largest_n - 1.0, misses.fold(0.0, f64::max), case.wind_up_error(&sweep)]
+        };
+        let before_deg = teeth.last().unwrap().position_deg - FLANK_END_DEG;
+        let [peak, worst, wind_up] = errors(&refined);
+        let name = format!("{before_deg:+.2} deg before the flank, {ring_gap_um} µm");
+        println!("{name}: {:+.2} {:.2} {:+.2}", 100.0 * peak, 100.0 * worst, 100.0 * wind_up);
+        let [peak_to, worst_to, wind_up_to] =
+            if before_deg.abs() < 0.8 { [0.028, 0.061, 0.018] } else { [0.016, 0.023, 0.008] };
+        assert!(peak.abs() < peak_to, "{name}: peak {:+.2} %", 100.0 * peak);
+        assert!(worst < worst_to, "{name}: worst tooth {:.2} %", 100.0 * worst);
+        assert!(wind_up.abs() < wind_up_to, "{name}: wind-up {:+.2} %", 100.0 * wind_up);
+        if before_deg > 0.0 {
+            let [peak, worst, _] = errors(&LoadParameters { corner_contact: false, ..refined });
+            println!("  rigid: {:+.2} {:.2}", 100.0 * peak, 100.0 * worst);
+            assert!(peak > 0.03 && worst > 0.13, "{name}: rigid tips {:+.2} %, {:.2} %", 100.0 * peak, 100.0 * worst);
+        }
+    }
+}
+
+/// As `model_error` tells of other models: the ranges hold the errors of the largest force of each contact, of the pressure there and of the wind-up, and go no further than
+/// they have to.
+#[test]
+fn the_model_says_how_far_it_is_off_at_pointed_tips() {
+    for has_gaps in [false, true] {
+        let mut found = [(f64::INFINITY, f64::NEG_INFINITY); 3];
+        let mut told = None;
+        for case in results().cases.iter().filter(|case| (case.ring_gap_um > 0.0) == has_gaps) {
+            let load = case.refined();
+            told = model_error::measured(&load, model_error::Case { has_gaps, has_pointed_tips: true });
+            let sweep = swept(&PAPER_5_2, &load, 240);
+            let here = at_angle(&sweep.states, case.input_angle_deg);
+            let mut note = |of: usize, error: f64| found[of] = (found[of].0.min(error), found[of].1.max(error));
+            for contact in 0..3 {
+                let column = |columns: &PerContact<Vec<f64>>, at: usize| {
+                    [columns.wave_generator[at], columns.ring[at], columns.carrier[at]][contact]
+                };
+                let by_force = |one: &&Tooth, other: &&Tooth| one.force_n[contact].total_cmp(&other.force_n[contact]);
+                let tooth = case.teeth.iter().max_by(by_force).unwrap();
+                let largest_n = here.iter().map(|&at| column(&sweep.states.force_n, at)).fold(0.0, f64::max);
+                note(0, largest_n / tooth.force_n[contact] - 1.0);
+                let is_it = |at: &&usize| (sweep.states.position_deg[**at] - tooth.position_deg).abs() < 1e-3;
+                let stress_mpa = column(&sweep.states.stress_mpa, *here.iter().find(is_it).unwrap());
+                note(1, stress_mpa / tooth.pressure_mpa[contact] - 1.0);
+            }
+            note(2, case.wind_up_error(&sweep));
+        }
+        let model_error::Measured { force, stress, wind_up, .. } = told.unwrap();
+        for (told, (least, largest)) in [force, stress, wind_up].into_iter().zip(found) {
+            println!("{has_gaps}: {least:+.4} to {largest:+.4}, told {told:?}");
+            assert!(told.low <= least && largest <= told.high, "{least:+.4} to {largest:+.4}, told {told:?}");
+            assert!(
+                told.low > least - 0.015 && told.high < largest + 0.015,
+                "{least:+.4} to {largest:+.4}, told {told:?}"
+            );
+        }
+        let unrefined = LoadParameters { ring_teeth_bend: false, ..results().cases[0].refined() };
+        assert!(model_error::measured(&unrefined, model_error::Case { has_gaps, has_pointed_tips: true }).is_none());
+    }
+}
+
+/// What a tooth does, from where its centre and the corner are: directions of its forces, and what its circle keeps from the corner, in the slot's frame.
+struct Seen {
+    to_cam: Vector2<f64>,
+    to_ring: Vector2<f64>,
+    to_wall: Vector2<f64>,
+    gap_mm: f64,
+}
+
+/// The corner from the flank's end, by angles alone, the ring turned away by an angle.
+fn seen(drive: &Drive, position_deg: f64, turned_away_rad: f64) -> Seen {
+    let (flank, lobes) = (drive.flank(), drive.lobes());
+    let end = flank.locus().at(drive.flank_limit().position).unwrap();
+    let corner = flank.point(&end, &flank.at(&end));
+    let tooth = flank.locus().at(Position::from_lobe(position_deg.to_radians(), lobes)).unwrap();
+    let k = flank.teeth_per_wave();
+    // In the ring's frame the tooth has gone back by ψ/k, s aside, from the middle of its space; the slot's frame is turned so, and turned over where s is -1.
+    let in_slot = Rotation2::new(turned_away_rad - position_deg.to_radians() / k) * corner;
+    let (sense, d) = (drive.sense(), tooth.center_radius_mm);
+    let way = Point2::new(in_slot.x, -sense * in_slot.y) - Point2::new(d, 0.0);
+    let gamma = tooth.tan_pressure_angle.atan();
+    Seen {
+        to_cam: Vector2::new(gamma.cos(), gamma.sin()),
+        to_ring: way.normalize(),
+        to_wall: Vector2::new(0.0, sense),
+        gap_mm: way.norm() - drive.parameters().tooth_radius_mm,
+    }
+}
+
+const STIFFNESS: PerContact<f64> = PerContact { wave_generator: 4e5, ring: 3e5, carrier: 5e5 };
+
+/// Each tooth before the flank is a point on three springs, pushed by the wave generator: two equations of equilibrium for the two ways that it can go.
+#[test]
+fn before_the_flank_a_tooth_is_a_point_on_three_springs_one_of_them_at_the_corner() {
+    let with_more = DriveParameters { ring_teeth: 82, ..PAPER_5_2 };
+    for (parameters, turned_arcsec) in [(PAPER_5_2, 0.0), (PAPER_5_2_BORED, 0.0), (with_more, 0.0), (PAPER_5_2, 0.2)] {
+        let gaps_mm = PerContact { wave_generator: 1e-4, ring: 2e-4, carrier: 3e-4 };
+        let fixed = LoadParameters {
+            law: ContactLaw::Fixed(STIFFNESS),
+            clearance_um: PerContact::of(|contact| 1e3 * gaps_mm.get(contact)),
+            modification: Modification { ring_rotation_arcsec: turned_arcsec, ..Modification::default() },
+            ..pressed_corners(3.0)
+        };
+        let (drive, sweep) = (drive(&parameters), swept(&parameters, &fixed, 40));
+        let turned_rad = f64::to_radians(turned_arcsec / 3600.0);
+        let (states, end_deg) = (&sweep.states, drive.flank_limit().position.from_lobe_deg());
+        let mut carrying = 0;
+        for at in (0..states.len()).filter(|&at| states.position_deg[at] > end_deg + 1e-9) {
+            let Seen { to_cam, to_ring, to_wall, gap_mm } = seen(&drive, states.position_deg[at], turned_rad);
+            let angle = sweep.input_angles.input_angle_deg.iter().position(|&deg| deg == states.input_angle_deg[at]);
+            let turned = sweep.input_angles.wind_up_deg[angle.unwrap()].to_radians();
+            let position = Position::from_lobe(states.position_deg[at].to_radians(), drive.lobes());
+            let arm_mm = drive.flank().locus().at(position).unwrap().cam_contact.lever_arm_mm;
+            // k_H (Δφ|h'| - g_H - u_H v) u_H = k_K (u_K v - g_K) u_K + k_S (u_S v - g_S) u_S
+            let stiffness = STIFFNESS.wave_generator * to_cam * to_cam.transpose()
+                + STIFFNESS.ring * to_ring * to_ring.transpose()
+                + STIFFNESS.carrier * to_wall * to_wall.transpose();
+            let right = STIFFNESS.wave_generator * (turned * arm_mm - gaps_mm.wave_generator) * to_cam
+                + STIFFNESS.ring * (gap_mm + gaps_mm.ring) * to_ring
+                + STIFFNESS.carrier * gaps_mm.carrier * to_wall;
+            let way = Matrix2::lu(stiffness).solve(&right).unwrap();
+            let expected_n = STIFFNESS.wave_generator * (turned * arm_mm - gaps_mm.wave_generator - to_cam.dot(&way));
+            let force_n = PerContact::of(|contact| states.force_n.get(contact)[at]);
+            let largest_n = sweep.peaks.wave_generator.force_n.value;
+            // A turn is a gap to first order in it, and turns the forces too.
+            let tolerance = 1e-9 + 100.0 * turned_rad;
+            if to_ring.y * -to_wall.y < 0.0 || to_ring.x < 0.0 {
+                continue;
+            }
+            assert!(
+                (force_n.wave_generator - expected_n.max(0.0)).abs() < tolerance * largest_n,
+                "{parameters:?} at {} deg: {} N, by springs {expected_n} N",
+                states.position_deg[at],
+                force_n.wave_generator
+            );
+            if force_n.wave_generator > 0.0 {
+                carrying += 1;
+                let balance = force_n.wave_generator * to_cam - force_n.ring * to_ring - force_n.carrier * to_wall;
+                assert!(balance.norm() < tolerance * largest_n, "{balance}");
+            }
+            assert_eq!(states.stress_mpa.ring[at], 0.0, "no pressure is told of a corner");
+        }
+        assert!(carrying > 10, "{carrying} states of teeth before the flank");
+    }
+}
+
+/// Without the option the same loads jump by half of the peak there.
+#[test]
+fn loads_run_on_through_the_flanks_end() {
+    for (bend, moves, gap_um) in [(false, false, 0.0), (true, false, 0.0), (true, true, 10.0)] {
+        let pressed = LoadParameters {
+            ring_teeth_bend: bend,
+            wave_generator_moves: moves,
+            clearance_um: PerContact { ring: gap_um, ..PerContact::default() },
+            ..pressed_corners(3.0)
+        };
+        for parameters in [PAPER_5_2, PAPER_5_2_BORED] {
+            let drive = drive(&parameters);
+            let load = LoadCase::new(&pressed).unwrap();
+            let loaded = LoadedDrive::new(&drive, &load).unwrap();
+            let end_rad = drive.flank_limit().position.from_lobe_rad;
+            let forces = |beside_rad: f64| {
+                let teeth: Vec<_> = [0.0, 0.16, 0.32, 0.48]
+                    .map(|back_rad| loaded.tooth(Position::from_lobe(end_rad + beside_rad - back_rad, 2)).unwrap())
+                    .into();
+                let wind_up = loaded.wind_up(&teeth).unwrap();
+                teeth.iter().map(|tooth| loaded.forces_n(tooth, &wind_up).unwrap().wave_generator).collect::<Vec<_>>()
+            };
+            for (on, before) in forces(-1e-9).iter().zip(forces(1e-9)) {
+                assert!((on - before).abs() <= 2e-7 * on, "{on} N on the flank, {before} N before it");
+            }
+            let rigid = LoadParameters { corner_contact: false, ..pressed };
+            let peaks = [&pressed, &rigid].map(|load| swept(&parameters, load, 400).peaks.wave_generator.force_n.value);
+            assert!(peaks[0] < 0.97 * peaks[1], "{peaks:?} N");
+        }
+    }
+}
+
+/// A contact that is α off the flank, of relative curvature Σ, is b wide where `α b + π Σ b²/4 = F/(L1 E*)`: of a blunt wedge, of Hertz's cylinder, and of both.
+#[test]
+fn a_narrower_contact_gives_way_by_the_logarithm_of_its_width() {
+    let (drive, load) = (drive(&PAPER_5_2), LoadCase::new(&pressed_corners(3.0)).unwrap());
+    let loaded = LoadedDrive::new(&drive, &load).unwrap();
+    let (flank, end) = (drive.flank(), drive.flank_limit().position);
+    let modulus_mpa = 0.5 * 210e3 / (1.0 - 0.3 * 0.3);
+    let growth_mm_per_n = 1.0 / (std::f64::consts::PI * 15.0 * modulus_mpa);
+    let at_end = flank.at(&flank.locus().at(end).unwrap());
+    for before_rad in [1e-4, 1e-3, 1e-2, 5e-2, 0.2] {
+        let tooth = loaded.tooth(Position::from_lobe(end.from_lobe_rad + before_rad, 2)).unwrap();
+        let to_corner = seen(&drive, tooth.center.position.from_lobe_deg(), 0.0).to_ring;
+        let angle_rad = at_end.tan_pressure_angle.atan() - (-to_corner.y / to_corner.x).atan() - before_rad / 39.0;
+        let curvature = tooth.curvature_per_mm.ring;
+        for cam_force_n in [1e-6, 1.0, 50.0, 400.0] {
+            let ring_n = cam_force_n * tooth.force_ratio.ring;
+            let square = 0.25 * std::f64::consts::PI * curvature;
+            let per_mm = ring_n / (15.0 * modulus_mpa);
+            let half_mm = 2.0 * per_mm / (angle_rad + (angle_rad * angle_rad + 4.0 * square * per_mm).sqrt());
+            let u = half_mm / (per_mm / square).sqrt();
+            // What the same contacts give way by if none is narrower, by Johnson (docs/theory.md 4.3).
+            let of_contact = |force_n: f64, curvature: f64| {
+                let half_mm = (4.0 * force_n / (std::f64::consts::PI * 15.0 * modulus_mpa * curvature)).sqrt();
+                0.5 * growth_mm_per_n
+                    * force_n
+                    * (2.0 * (6.0 / half_mm).ln() - 1.0 + 2.0 * (3.0 / half_mm).ln() - 0.3 / 0.7)
+            };
+            let smooth = PerContact::of(|contact| {
+                let ratio = tooth.force_ratio.get(contact);
+                ratio * of_contact(ratio * cam_force_n, *tooth.curvature_per_mm.get(contact))
+            });
+            let narrower_mm = tooth.force_ratio.ring * growth_mm_per_n * 2.0 * ring_n * (2.0 / u - 1.0).ln();
+            let expected_mm = smooth.wave_generator + smooth.ring + smooth.carrier + narrower_mm;
+            let found_mm = tooth.spring.approach.approach_mm(cam_force_n);
+            assert!((found_mm / expected_mm - 1.0).abs() < 1e-9, "{found_mm} mm, expected {expected_mm} mm");
+            let back_n = tooth.spring.approach.force(found_mm).unwrap();
+            assert!((back_n.force_n / cam_force_n - 1.0).abs() < 1e-12, "{back_n:?}");
+            let slope = tooth.spring.approach.approach_mm(cam_force_n * 1.000_01)
+                / tooth.spring.approach.approach_mm(cam_force_n * 0.999_99);
+            assert!((slope.ln() / 2e-5 - back_n.exponent).abs() < 1e-6, "{back_n:?}");
+        }
+    }
+}
+
+fn same_loads(one: &Sweep, other: &Sweep) -> bool {
+    one.states == other.states && one.peaks == other.peaks && one.torque_capacity == other.torque_capacity
+}
+
+#[test]
+fn natural_tips_and_balls_have_no_corner() {
+    let balls = DriveParameters { tooth: ToothShape::Ball { groove_radius_mm: PerContact::default() }, ..PAPER_5_2 };
+    for (parameters, law) in [(PAPER_5_1, JOHNSON), (balls, ContactLaw::Hertz)] {
+        let pressed = LoadParameters { law, ..pressed_corners(3.0) };
+        let without = LoadParameters { corner_contact: false, ..pressed };
+        assert!(same_loads(&swept(&parameters, &pressed, 12), &swept(&parameters, &without, 12)));
+    }
+}
+
+#[test]
+fn corners_need_virtual_work() {
+    let refused = LoadCase::new(&LoadParameters { corner_contact: true, ..load(3.0, Projection) });
+    assert_eq!(refused, Err(vec![Violation::NeedsVirtualWork { parameter: Parameter::CornerContact }]));
+}
+
+/// Every law, unlike zones, teeth with flats, a bored tip.
+#[test]
+fn a_sweep_to_a_tolerance_finds_the_peaks_of_very_many_intervals() {
+    let unlike = DriveParameters { teeth: 81, installed: 27, ring_teeth: 79, ..PAPER_5_2 };
+    let gaps = PerContact { ring: 4.0, ..PerContact::default() };
+    for (parameters, of) in [
+        (PAPER_5_2, pressed_corners(3.0)),
+        (PAPER_5_2_BORED, LoadParameters { law: ContactLaw::Linear, ..pressed_corners(3.0) }),
+        (unlike, LoadParameters { law: ContactLaw::Palmgren, clearance_um: gaps, ..pressed_corners(3.0) }),
+        (PAPER_5_2, LoadParameters { clearance_um: gaps, wave_generator_moves: true, ..pressed_corners(2.0) }),
+    ] {
+        let of = LoadParameters { allowable_stress_mpa: Some(PerContact::of(|_| 900.0)), ..of };
+        let (drive, load) = (drive(&parameters), LoadCase::new(&of).unwrap());
+        let dense = swept(&parameters, &of, 3000);
+        let found = sweep::sweep(&drive, &load, Points::tolerance(1e-6, 1_000_000).unwrap(), &Never).unwrap();
+        let near = |what: &str, found: f64, dense: f64| {
+            assert!(found > dense * (1.0 - 1e-6) && found < dense * 1.001, "{what}: {found}, of many {dense}");
+        };
+        for (contact, peaks) in found.peaks.iter() {
+            near(&format!("force at {contact:?}"), peaks.force_n.value, dense.peaks.get(contact).force_n.value);
+            near(&format!("stress at {contact:?}"), peaks.stress_mpa.value, dense.peaks.get(contact).stress_mpa.value);
+        }
+        let largest = |sweep: &Sweep| sweep.input_angles.wind_up_deg.iter().copied().fold(0.0, f64::max);
+        near("wind-up", largest(&found), largest(&dense));
+        let capacity = |sweep: &Sweep| 1.0 / sweep.torque_capacity.unwrap().input_torque_nm;
+        near("reciprocal of the capacity", capacity(&found), capacity(&dense));
+        // Where a tooth comes to the flank is looked at, and there the ring's stress begins.
+        let (states, end_deg) = (&found.states, drive.flank_limit().position.from_lobe_deg());
+        let stress_at_end = |is_told: bool| {
+            let is_it = |at: usize| {
+                (states.position_deg[at] - end_deg).abs() < 1e-9 && (states.stress_mpa.ring[at] > 0.0) == is_told
+            };
+            (0..states.len()).any(is_it)
+        };
+        assert!(stress_at_end(true) && stress_at_end(false));
+        let ring_peak_deg = found.peaks.ring.stress_mpa.position_deg;
+        assert!(ring_peak_deg <= end_deg + 1e-9, "{ring_peak_deg}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    /// Who is helped turns less far: of any drive, senses and bores of all kinds, and the sweep's own checks hold.
+    #[test]
+    fn teeth_at_corners_only_ever_help(parameters in any_swept_drive(), bends in any::<bool>(), ln_torque in -6.0_f64..6.0) {
+        let pressed = LoadParameters { ring_teeth_bend: bends, ..pressed_corners(10.0_f64.powf(ln_torque)) };
+        let rigid = LoadParameters { corner_contact: false, ..pressed };
+        let drive = drive(&parameters);
+        let sweeps = [pressed, rigid].map(|load| {
+            sweep::sweep(&drive, &LoadCase::new(&load).unwrap(), Points::samples(20).unwrap(), &Never)
+        });
+        // What bends too wide for Johnson's law is refused.
+        if let [Ok(pressed), Ok(rigid)] = sweeps {
+            prop_assert!(pressed.states.len() >= rigid.states.len());
+            prop_assert_eq!(pressed.mesh.coincidence_degree(), rigid.mesh.coincidence_degree());
+            for (pressed, rigid) in pressed.input_angles.wind_up_deg.iter().zip(&rigid.input_angles.wind_up_deg) {
+                prop_assert!(*pressed <= rigid * (1.0 + 1e-12), "{} deg, rigid {} deg", pressed, rigid);
+            }
+        } else {
+            let is_refused = |sweep: &Result<Sweep, SolveError>| {
+                matches!(sweep, Err(SolveError::JohnsonBeyondHalfWidth { .. }))
+            };
+            prop_assert!(is_refused(&sweeps[1]), "{:?}", sweeps[0].as_ref().err());
+        }
+    }
+}
+
+/// At the capacity, as the sweep there finds it, the largest stress is the allowable one.
+#[test]
+fn the_torque_that_corners_help_to_bear_makes_the_allowable_stress() {
+    let allowable = LoadParameters { allowable_stress_mpa: Some(PerContact::of(|_| 900.0)), ..pressed_corners(3.0) };
+    let capacity_nm = swept(&PAPER_5_2, &allowable, 60).torque_capacity.unwrap().input_torque_nm;
+    let peaks = swept(&PAPER_5_2, &pressed_corners(capacity_nm), 60).peaks;
+    let largest_mpa = peaks.iter().map(|(_, peaks)| peaks.stress_mpa.value).fold(0.0, f64::max);
+    assert!((largest_mpa / 900.0 - 1.0).abs() < 1e-9, "{largest_mpa} MPa");
+}
+
+/// Deviations list every tooth by itself; of nothing but a tooth that is thinner by nothing worth speaking of they change nothing.
+#[test]
+fn items_that_hardly_deviate_carry_what_alike_ones_do() {
+    let deviations = Deviations { tooth_radius_um: [vec![1e-9], vec![0.0; 39]].concat(), ..Deviations::default() };
+    let (drive, load) = (drive(&PAPER_5_2), LoadCase::new(&pressed_corners(3.0)).unwrap());
+    let points = Points::samples(12).unwrap();
+    let apart = sweep::sweep_with_deviations(&drive, &load, &deviations, points, &Never).unwrap();
+    let alike = sweep::sweep(&drive, &load, points, &Never).unwrap();
+    for (contact, peaks) in apart.peaks.iter() {
+        let expected_n = alike.peaks.get(contact).force_n.value;
+        assert!((peaks.force_n.value / expected_n - 1.0).abs() < 1e-5, "{contact:?}");
+    }
+}
+
+/// A tooth that cannot spin slips at the corner as its points and those of the ring move: by differences of where they are.
+#[test]
+fn a_tooth_slips_over_the_corner_as_the_points_of_both_move() {
+    let flats = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 0.5 };
+    for ring_teeth in [78, 82] {
+        let parameters = DriveParameters { tooth: flats, ring_teeth, ..PAPER_5_2 };
+        let pressed = LoadCase::new(&pressed_corners(3.0)).unwrap();
+        let (drive, sweep) = (drive(&parameters), swept(&parameters, pressed.parameters(), 12));
+        let friction = Friction::new(&FrictionParameters {
+            wave_generator: WaveGeneratorFriction::Plain { coefficient: 0.01 },
+            ring_coefficient: 0.01,
+            carrier_coefficient: 0.01,
+        })
+        .unwrap();
+        let losses = Losses::of(&drive, &sweep, &friction, &Never).unwrap();
+        let (states, end_deg) = (&sweep.states, drive.flank_limit().position.from_lobe_deg());
+        let (s, k) = (drive.sense(), drive.flank().teeth_per_wave());
+        for at in (0..states.len()).filter(|&at| states.position_deg[at] > end_deg && states.position_deg[at] < 85.0) {
+            let center_mm = |position_deg: f64| {
+                let position = Position::from_lobe(position_deg.to_radians(), 2);
+                drive.flank().locus().at(position).unwrap().center_radius_mm
+            };
+            // A radian of the wave generator against the carrier brings the tooth a radian nearer to the lobe, and turns the ring by -s/k.
+            let step_deg = 1e-4;
+            let lift = center_mm(states.position_deg[at] - step_deg) - center_mm(states.position_deg[at] + step_deg);
+            let outward = lift / (2.0 * step_deg).to_radians();
+            let Seen { to_ring, gap_mm, .. } = seen(&drive, states.position_deg[at], 0.0);
+            let d = center_mm(states.position_deg[at]);
+            let corner = Vector2::new(d, 0.0) + (1.5 + gap_mm) * to_ring;
+            let of_ring = -s / k * Vector2::new(-corner.y, corner.x);
+            let tangent = Vector2::new(-to_ring.y, to_ring.x);
+            let expected = (Vector2::new(outward, 0.0) - of_ring).dot(&tangent);
+            let found = losses.slip_mm_per_rad.ring[at];
+            assert!((found - expected).abs() < 1e-6, "{found} mm/rad at {}, {expected}", states.position_deg[at]);
+        }
+    }
+}
