@@ -87,7 +87,7 @@ impl CheckedSweep {
             Some(_) => period::RadialForces::of(&self.drive, hardest, stop)?,
             None => None,
         };
-        let losses = period::Losses::of(&self.drive, hardest, friction, stop)?;
+        let losses = period::Losses::of(&self.drive, self.load(), hardest, friction, stop)?;
         let costs = self.costs(friction, &Swept { sweep: hardest, forces: forces.as_ref() }, &losses, stop)?;
         Ok(Some(costs.totals(self.duty.hardest, &hardest.states)))
     }
@@ -275,7 +275,7 @@ impl Question for Sweep {
         let mut losses = None;
         let mut points = duty.points.iter().map(|point| DutyPointAnswer::new(drive, point)).collect::<Vec<_>>();
         if let Some(friction) = friction {
-            let of_period = period::Losses::of(drive, &sweep, friction, stop)?;
+            let of_period = period::Losses::of(drive, load, &sweep, friction, stop)?;
             let costs = checked.costs(friction, &Swept { sweep: &sweep, forces: forces.as_ref() }, &of_period, stop)?;
             for (point, cost) in points.iter_mut().zip(costs.of_points()) {
                 point.efficiency_ring_fixed = Some(cost.efficiency_ring_fixed);
@@ -373,7 +373,7 @@ impl CheckedSweep {
             }
             let sweep = self.solve_under(&point.load, stop)?;
             let forces = period::RadialForces::of(drive, &sweep, stop)?;
-            let losses = period::Losses::of(drive, &sweep, friction, stop)?;
+            let losses = period::Losses::of(drive, &point.load, &sweep, friction, stop)?;
             self.cost(point, friction, &Swept { sweep: &sweep, forces: forces.as_ref() }, &losses, stop)
         };
         let points = duty.points.iter().enumerate().map(of_point).collect::<Result<_, _>>()?;

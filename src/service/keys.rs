@@ -22,7 +22,14 @@ const KEY_BYTES: usize = 32;
 #[derive(Debug, Clone)]
 pub struct Keys {
     path: Arc<str>,
-    known: Arc<RwLock<Vec<Known>>>,
+    last: Arc<RwLock<Reading>>,
+}
+
+/// What a reading of the file found.
+#[derive(Debug)]
+struct Reading {
+    number: u64,
+    known: Vec<Known>,
 }
 
 /// A line of the file.
@@ -38,16 +45,33 @@ impl Keys {
     /// # Errors
     /// What is wrong with it.
     pub fn read(path: &str) -> Result<Self, String> {
-        let known = Arc::new(RwLock::new(known_in(path)?));
-        Ok(Self { path: path.into(), known })
+        Ok(Self::of(path, known_in(path)?))
     }
 
-    /// Reads the file again. One that is wrong leaves the keys as they were, and the log says so.
-    pub fn reload(&self) {
+    fn of(path: &str, known: Vec<Known>) -> Self {
+        Self { path: path.into(), last: Arc::new(RwLock::new(Reading { number: 0, known })) }
+    }
+
+    /// Begins to read the file again, for the `number`th time, on a thread of its own: it may be a pipe that nobody writes to, or stand on a
+    /// device that is away. A reading that never comes to its end holds up no later one.
+    pub fn reload(&self, number: u64) {
+        let keys = self.clone();
+        tracing::info!(path = %self.path, "reading the keys file again");
+        if let Err(error) = std::thread::Builder::new().name("keys".into()).spawn(move || keys.read_again(number)) {
+            tracing::error!(%error, "the keys stay as they were");
+        }
+    }
+
+    /// A file that is wrong leaves the keys as they were, and the log says so.
+    fn read_again(&self, number: u64) {
         match known_in(&self.path) {
             Ok(known) => {
-                tracing::info!(keys = known.len(), "the keys file was read again");
-                *self.known.write() = known;
+                let mut last = self.last.write();
+                // One that was begun later may have come to its end earlier.
+                if number > last.number {
+                    tracing::info!(keys = known.len(), "the keys file was read again");
+                    *last = Reading { number, known };
+                }
             }
             Err(error) => tracing::error!(path = %self.path, error, "the keys stay as they were"),
         }
@@ -67,14 +91,14 @@ impl Keys {
     /// # Errors
     /// What is wrong with it.
     pub fn parse(text: &str) -> Result<Self, String> {
-        Ok(Self { path: "".into(), known: Arc::new(RwLock::new(parse(text)?)) })
+        Ok(Self::of("", parse(text)?))
     }
 
     /// The name of a key that is one of them. Every hash is compared, each in constant time.
     fn name_of(&self, key: &str) -> Option<String> {
         let hash = blake3::hash(key.as_bytes());
-        let known = self.known.read();
-        let found = known.iter().fold(None, |found, known| if known.hash == hash { Some(known) } else { found });
+        let last = self.last.read();
+        let found = last.known.iter().fold(None, |found, known| if known.hash == hash { Some(known) } else { found });
         found.map(|known| known.name.clone())
     }
 }

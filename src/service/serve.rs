@@ -117,13 +117,12 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
         async move { app.studies.serve_store().await }
     });
     if let Some(keys) = keys {
-        // On a thread of its own: the file may be a pipe that nobody writes to, or stand on a device that is away.
-        let (tell, told) = std::sync::mpsc::sync_channel(1);
-        std::thread::spawn(move || told.iter().for_each(|()| keys.reload()));
         tokio::spawn(async move {
-            while hang_up.recv().await.is_some() {
-                // Whoever is told already reads what stands there then.
-                let _ = tell.try_send(());
+            for number in 1.. {
+                if hang_up.recv().await.is_none() {
+                    break;
+                }
+                keys.reload(number);
             }
         });
     }

@@ -212,25 +212,22 @@ impl Workers {
             self.stopping.cancelled().await;
             tokio::time::sleep(self.patience).await;
         };
-        tokio::pin!(time_is_over);
-        let computed = {
-            let running = async {
-                let (part, busy) = run_chunk(&self.pool, study, chunk).await?;
-                let (part, rows) = self.with_rows(study, part).await?;
-                Ok::<_, Problem>((part, rows, busy))
-            };
-            tokio::pin!(running);
-            loop {
-                tokio::select! {
-                    computed = &mut running => break Some(computed),
-                    () = &mut time_is_over => break None,
-                    _ = tasks.changed() => {
-                        if !tasks.borrow_and_update().iter().any(|task| task.id == id) {
-                            break None;
-                        }
-                    }
-                }
+        let is_over = async {
+            tokio::select! {
+                () = time_is_over => {}
+                // It was cancelled, or forgotten.
+                _ = tasks.wait_for(|waiting| waiting.iter().all(|task| task.id != id)) => {}
             }
+        };
+        tokio::pin!(is_over);
+        let running = async {
+            let (part, busy) = run_chunk(&self.pool, study, chunk).await?;
+            let (part, rows) = self.with_rows(study, part).await?;
+            Ok::<_, Problem>((part, rows, busy))
+        };
+        let computed = tokio::select! {
+            computed = running => Some(computed),
+            () = &mut is_over => None,
         };
         let (part, mut rows, busy) = match computed {
             Some(Ok(computed)) => computed,
@@ -259,7 +256,7 @@ impl Workers {
             let kept = tokio::select! {
                 // First: what the store has a result of has its rows.
                 kept = self.keep_rows(study, chunk, &mut rows) => kept,
-                () = &mut time_is_over => break give_up(lease).await,
+                () = &mut is_over => break give_up(lease).await,
             };
             if kept {
                 match lease.keep(&bytes, part.variants(), part.refused(), busy).await {
@@ -273,7 +270,7 @@ impl Workers {
             }
             tokio::select! {
                 () = tokio::time::sleep(retry) => {}
-                () = &mut time_is_over => break give_up(lease).await,
+                () = &mut is_over => break give_up(lease).await,
             }
             retry = (2 * retry).min(LONGEST_RETRY);
         }
@@ -326,7 +323,7 @@ impl Workers {
     }
 }
 
-/// Gives a chunk back because the time is over. Where nobody answers, that it was begun stays noted.
+/// Gives a chunk back that is not wanted, or because the time is over. Where nobody answers, that it was begun stays noted.
 async fn give_up(lease: Lease) {
     let _ = lease.give_back().await;
 }

@@ -170,7 +170,7 @@ impl Runout {
 }
 
 /// The entry of a list; zero beyond it.
-fn of(list: &[f64], index: u64) -> f64 {
+pub(crate) fn of(list: &[f64], index: u64) -> f64 {
     usize::try_from(index).ok().and_then(|index| list.get(index)).copied().unwrap_or_default()
 }
 
@@ -298,10 +298,22 @@ impl<'a> Gaps<'a> {
             && self.clearance_mm.iter().all(|(_, &gap_mm)| gap_mm == 0.0)
     }
 
-    /// The gap at each contact where it is the same for every tooth and position.
-    pub(crate) fn uniform_mm(&self) -> Option<&PerContact<f64>> {
-        let is_uniform = self.deviations.is_none() && self.modification.first().is_none();
-        is_uniform.then_some(&self.clearance_mm)
+    /// Whether they are the same for every tooth and position.
+    pub(crate) fn are_uniform(&self) -> bool {
+        self.deviations.is_none() && self.modification.first().is_none()
+    }
+
+    /// The clearance of each contact.
+    pub(crate) const fn clearance_mm(&self) -> &PerContact<f64> {
+        &self.clearance_mm
+    }
+
+    pub(crate) const fn modification(&self) -> &Modification {
+        &self.modification
+    }
+
+    pub(crate) const fn deviations(&self) -> Option<&'a Deviations> {
+        self.deviations
     }
 
     /// The gap at each contact of a tooth, along its normal; negative where a part is too full.

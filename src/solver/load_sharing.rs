@@ -313,6 +313,14 @@ impl<'a> LoadedDrive<'a> {
         Self::with_deviations(drive, load, &ToothContact::of(drive, load.parameters().carrier), None)
     }
 
+    /// The drive under the load, its parts deviating.
+    ///
+    /// # Errors
+    /// As [`Self::with_deviations`].
+    pub(crate) fn deviating(drive: &'a Drive, load: &LoadCase, deviations: &'a Deviations) -> Result<Self, SolveError> {
+        Self::with_deviations(drive, load, &ToothContact::of(drive, load.parameters().carrier), Some(deviations))
+    }
+
     /// The drive under the load, with teeth of another shape.
     ///
     /// # Errors
@@ -378,9 +386,11 @@ impl<'a> LoadedDrive<'a> {
         Self { zones, ..self }
     }
 
-    /// The same with one tooth at each place of one zone, which stands for all that carry alike; where items are alike ([`Mesh::as_one_zone`]).
+    /// The same over the places of one zone ([`Mesh::as_one_zone`]): with one tooth at each, which stands for all that carry alike, or, where items deviate,
+    /// with every one.
     pub(crate) fn as_one_zone(&self) -> Self {
-        Self { mesh: self.mesh.as_one_zone(), zones: self.mesh.teeth_at_each_place(), ..*self }
+        let zones = if self.mesh.tells_items_apart() { self.zones } else { self.mesh.teeth_at_each_place() };
+        Self { mesh: self.mesh.as_one_zone(), zones, ..*self }
     }
 
     /// What a sum over the teeth that are listed is multiplied by, to be that over all.
@@ -435,9 +445,18 @@ impl<'a> LoadedDrive<'a> {
         Ok((center, self.curvature_per_mm(&center, &self.drive.flank().at(&center))))
     }
 
-    /// The gap at each contact where it is the same for every tooth and position.
-    pub(crate) fn uniform_gap_mm(&self) -> Option<&PerContact<f64>> {
-        self.gaps.uniform_mm()
+    /// The gaps.
+    pub(crate) const fn gaps(&self) -> &Gaps<'a> {
+        &self.gaps
+    }
+
+    /// What the pressure at a contact of a tooth follows from, at a position.
+    ///
+    /// # Errors
+    /// As [`Self::tooth`], but for gaps.
+    pub(crate) fn pressure_at(&self, position: Position, contact: Contact) -> Result<Pressure, SolveError> {
+        let (center, curvature_per_mm) = self.center_and_curvatures(position)?;
+        self.pressure(contact, &center, *curvature_per_mm.get(contact))
     }
 
     /// Hertz stress of a contact.

@@ -129,7 +129,7 @@ pub struct Turning {
     pub work_nmm_per_rad: PerContact<f64>,
     /// What the bearing takes.
     pub bearing_work_nmm_per_rad: f64,
-    /// `M0`: the wave generator's torque without friction.
+    /// `M0` of these teeth where they stand: the wave generator's torque without friction, unless it moves on under its teeth.
     pub input_torque_nmm: f64,
 }
 

@@ -86,6 +86,17 @@ impl Place {
     }
 }
 
+/// Teeth in neighbouring slots on one lobe, their places so far apart as lobes divide the load period.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Neighbours {
+    /// The slot of the first, counted on over turns of the carrier.
+    pub(crate) first_slot: u64,
+    pub(crate) count: u64,
+    /// The place of the first.
+    pub(crate) first_place: u64,
+    pub(crate) lobe: u64,
+}
+
 /// A tooth in mesh at an input angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlacedTooth {
@@ -345,9 +356,14 @@ impl Mesh {
         Position::of_lobe(self.lobes() * (tooth * samples.0 - sample), self.steps(samples), self.lobes)
     }
 
-    /// How many times the pattern of places repeats in a sweep: `U/g` in each load period, once where zones are alike.
+    /// How many times the pattern of places repeats in a load period: `U/g`, once where zones are alike.
+    pub(crate) fn laps_of_load_period(&self) -> u64 {
+        self.lobes() / self.lobes_loaded_alike()
+    }
+
+    /// The same in a sweep.
     pub(crate) fn laps(&self) -> u64 {
-        self.lobes() / self.lobes_loaded_alike() * self.load_periods()
+        self.laps_of_load_period() * self.load_periods()
     }
 
     /// How many spacings the engagement spans, `ε/g`.
@@ -355,15 +371,20 @@ impl Mesh {
         self.engaged_spacings
     }
 
-    /// All places as those of one zone that has so many slots more, a period of which is a lap: what unlike zones look like over each other, items
-    /// being alike. Of zones that are alike it is the same mesh.
+    /// All places as those of one zone that has so many slots more, a period of which is a lap: what zones look like over each other, whatever deviates.
+    /// Of zones that are alike it is the same mesh.
     pub(crate) fn as_one_zone(&self) -> Self {
-        Self { installed: self.places(), ring_teeth: self.ring_teeth * self.laps(), ..*self }
+        Self {
+            installed: self.places(),
+            ring_teeth: self.ring_teeth * self.laps_of_load_period(),
+            told_apart: None,
+            ..*self
+        }
     }
 
     /// The places of a sweep's samples within a lap, which come again in each: so many of equal intervals.
     pub(crate) fn samples_of_lap(&self, samples: Samples) -> Samples {
-        Samples(samples.0 / greatest_common_divisor(samples.0, self.laps()))
+        Samples(samples.0 / greatest_common_divisor(samples.0, self.laps_of_load_period()))
     }
 
     /// The position at a place when a fraction of a lap has passed: `place - fraction` spacings from the lobe. Both are exact, so the
@@ -413,6 +434,34 @@ impl Mesh {
                 PlacedTooth { number, lobe, place, position, position_deg: position.from_lobe_deg() }
             })
         })
+    }
+
+    /// The teeth of each zone at the places from 1 on during a lap, in the order of [`Self::placed_at`], where the teeth of all zones are listed: runs of
+    /// neighbours in a zone, each cut where the slots begin anew.
+    pub(crate) fn list(&self, places: u64, lap: u64, runs: &mut Vec<Neighbours>) {
+        let (apart, pitch) = (self.laps_of_load_period(), self.installed / self.lobes_loaded_alike());
+        runs.clear();
+        let (mut end_of_turn, mut begins_anew) = (None, 0);
+        for lobe in 0..self.lobes() {
+            // `U i - g lap = g place + u Z'_G`, over g.
+            let zone = lap + lobe * pitch;
+            let (mut slot, end) = ((zone + 1).div_ceil(apart), (zone + places) / apart + 1);
+            while slot < end {
+                let turn = *end_of_turn.get_or_insert((slot / self.installed + 1) * self.installed);
+                let next = if slot < turn { end.min(turn) } else { end };
+                if slot >= turn && begins_anew == 0 {
+                    begins_anew = runs.len();
+                }
+                runs.push(Neighbours { first_slot: slot, count: next - slot, first_place: apart * slot - zone, lobe });
+                slot = next;
+            }
+        }
+        runs.rotate_left(begins_anew);
+    }
+
+    /// Where a tooth of such a run is among the items.
+    pub(crate) fn place_of(&self, run: &Neighbours, tooth: u64) -> Place {
+        self.place(run.first_slot + tooth, run.lobe)
     }
 
     /// The input angle of a sample, rounded once.

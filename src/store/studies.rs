@@ -113,7 +113,7 @@ pub struct Figures {
     pub running: u64,
     /// Chunks that have a result.
     pub done: u64,
-    /// Chunks that are still to be computed, those in work among them.
+    /// Chunks of studies that run that are still to be computed, those in work among them.
     pub waiting: u64,
     /// Chunks that somebody computes.
     pub in_work: u64,
@@ -399,7 +399,8 @@ impl Store {
             for (count, text) in counts.iter_mut().zip([
                 "SELECT COUNT(*) FROM studies",
                 "SELECT COUNT(*) FROM results",
-                "SELECT COUNT(*) + (SELECT CAST(COALESCE(SUM(chunks - opened), 0) AS BIGINT) FROM studies) FROM chunks",
+                "SELECT CAST(COALESCE(SUM(chunks - opened + (SELECT COUNT(*) FROM chunks WHERE study = id)), 0) AS BIGINT) FROM studies
+                    WHERE NOT is_cancelled AND ends_at_s > unixepoch()",
                 "SELECT COUNT(*) FROM attempts",
                 "SELECT COUNT(*) FROM gaps",
             ]) {

@@ -365,6 +365,28 @@ async fn the_rows_of_a_stored_study_are_a_parquet_file_a_chunk_besides() {
     keeper.end().await;
 }
 
+#[tokio::test]
+async fn a_cancelled_study_whose_rows_find_no_place_holds_up_no_other() {
+    let (file, folder) = (File::new(), Folder::new());
+    let asked = Keeper::of(&file, LIMITS, false).await;
+    let study = asked.ask(&map(5)).await.json();
+    let id = study["id"].as_str().unwrap();
+    let frozen = asked.store.find(id).await.unwrap().unwrap().study;
+    asked.end().await;
+    // No file can be given the name of a folder that is not empty.
+    let of_study = folder.0.join(format!("{id}-by-{}", frozen.chunk_variants));
+    fs::create_dir_all(of_study.join("0000000000.parquet/taken")).unwrap();
+    let one_slot = Limits { max_concurrent_solves: 1, deadline_ms: 60_000, ..LIMITS };
+    let keeper = Keeper::with_parts(&file, one_slot, true, Some(Parts::new(&folder.0).unwrap())).await;
+    while !of_study.join(".0000000000.begun").exists() {
+        tokio::task::yield_now().await;
+    }
+    let cancelled = keeper.service.ask(&Question::of("DELETE", &place(&study))).await;
+    assert_eq!(cancelled.status, 204);
+    assert_eq!(keeper.wait_for(&map(6)).await["state"], "done");
+    keeper.end().await;
+}
+
 #[test]
 fn rows_are_kept_in_a_folder_that_is_there() {
     let folder = Folder::new();

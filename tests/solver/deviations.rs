@@ -423,7 +423,8 @@ fn what_all_items_have_alike_is_a_modification() {
             ring_coefficient: 0.05,
             carrier_coefficient: 0.04,
         });
-        let lost = |sweep: &Sweep| Losses::of(&drive, sweep, friction.as_ref().unwrap(), &Never).unwrap().mean.total();
+        let load = LoadCase::new(&torque).unwrap();
+        let lost = |sweep| Losses::of(&drive, &load, sweep, friction.as_ref().unwrap(), &Never).unwrap().mean.total();
         assert!((lost(&told_apart) / lost(&alike) - 1.0).abs() < 1e-11);
     }
 }

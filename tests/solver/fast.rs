@@ -2,11 +2,15 @@
 
 use alloc_counter::count_alloc;
 use proptest::prelude::*;
+use toothwave_solver::gaps::{Runout, TipRelief};
 use toothwave_solver::mesh::Mesh;
-use toothwave_solver::sweep::{Points, Sweep, SweepPeaks, TorqueBalance, peaks, sweep, sweep_plain};
+use toothwave_solver::sweep::{
+    Points, Sweep, SweepPeaks, TorqueBalance, peaks, sweep, sweep_plain, sweep_plain_with_deviations,
+    sweep_with_deviations,
+};
 use toothwave_solver::{
-    Compatibility, Contact, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, PerContact, Position,
-    ToothShape, WaveGenerator,
+    Compatibility, Contact, ContactLaw, Deviations, Drive, DriveParameters, LoadCase, LoadParameters, Modification,
+    Never, PerContact, Position, ToothShape, WaveGenerator,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, cases, drive, ellipse, everywhere, load, swept};
@@ -157,8 +161,8 @@ fn amplification(drive: &Drive, position_deg: f64) -> f64 {
 }
 
 /// How much a relative error of a closing angle becomes in what is turned beyond it: `1 + Δφ K/M0`, K the stiffness, where there are gaps.
-fn amplification_by_gaps(drive: &Drive, load: &LoadCase, plain: &Sweep) -> f64 {
-    if !load.has_gaps() {
+fn amplification_by_gaps(drive: &Drive, load: &LoadCase, deviations: &Deviations, plain: &Sweep) -> f64 {
+    if !load.has_gaps() && deviations.is_nil() {
         return 1.0;
     }
     let output_nm = load.output_torque_nm(drive);
@@ -185,18 +189,37 @@ fn amplification_of_stiffness(plain: &Sweep) -> Vec<f64> {
 }
 
 fn assert_both_paths_agree(parameters: &DriveParameters, load: &LoadParameters, samples: u64) {
+    assert_both_paths_agree_on(parameters, load, &Deviations::default(), samples);
+}
+
+/// The same of parts that deviate.
+fn assert_both_paths_agree_on(
+    parameters: &DriveParameters,
+    load: &LoadParameters,
+    deviations: &Deviations,
+    samples: u64,
+) {
     let drive = drive(parameters);
     let load = LoadCase::new(load).unwrap();
     let points = Points::samples(samples).unwrap();
-    let answers = (sweep(&drive, &load, points, &Never), sweep_plain(&drive, &load, points, &Never));
+    let answers = if deviations.is_nil() {
+        (sweep(&drive, &load, points, &Never), sweep_plain(&drive, &load, points, &Never))
+    } else {
+        (
+            sweep_with_deviations(&drive, &load, deviations, points, &Never),
+            sweep_plain_with_deviations(&drive, &load, deviations, points, &Never),
+        )
+    };
     let (Ok(fast), Ok(plain)) = &answers else {
         // What has no answer has none by either way, for the same reason.
         assert_eq!(format!("{:?}", answers.0.map(|_| ())), format!("{:?}", answers.1.map(|_| ())));
         return;
     };
-    let by_gaps = amplification_by_gaps(&drive, &load, plain);
+    let by_gaps = amplification_by_gaps(&drive, &load, deviations, plain);
     let of_stiffness = if by_gaps > 1.0 { amplification_of_stiffness(plain) } else { Vec::new() };
+    assert_eq!(fast.mesh, plain.mesh);
     assert_eq!(fast.states.tooth, plain.states.tooth);
+    assert_eq!(fast.states.lobe, plain.states.lobe);
     assert_eq!(fast.input_angles.loaded_teeth, plain.input_angles.loaded_teeth);
     let position_deg = &plain.states.position_deg;
     for ((name, fast), (_, plain)) in columns(fast).into_iter().zip(columns(plain)) {
@@ -213,7 +236,7 @@ fn assert_both_paths_agree(parameters: &DriveParameters, load: &LoadParameters, 
             };
             let off = (fast - plain).abs();
             let allowed = ROUNDING * scale * amplified * by_gaps;
-            assert!(off <= allowed, "{name}: {fast} is not {plain} of {scale}, {parameters:?} {load:?}");
+            assert!(off <= allowed, "{name}: {fast} is not {plain} of {scale}, {parameters:?} {load:?} {deviations:?}");
         }
     }
     for (contact, peaks) in fast.peaks.iter() {
@@ -270,6 +293,9 @@ fn assert_both_paths_agree(parameters: &DriveParameters, load: &LoadParameters, 
         if by_gaps == 1.0 {
             assert!((stress_of(found.contact) / stress_of(expected.contact) - 1.0).abs() <= ROUNDING * amplified);
         }
+    }
+    if !deviations.is_nil() {
+        return;
     }
     let peaks = peaks(&drive, &load, points, &Never).unwrap();
     if Mesh::new(&drive).zones_are_alike() {
@@ -487,6 +513,29 @@ fn balls_take_the_fast_path_on_undercut_flanks_too_and_on_any_wave_generator() {
 }
 
 #[test]
+fn palmgrens_law_takes_the_fast_path_before_what_gives_way_behind_it_too() {
+    let parts = PerContact { wave_generator: 1e-6, ring: 0.0, carrier: 3e-6 };
+    for series_compliance_mm_per_n in [parts, everywhere(1e-9), everywhere(1e-3)] {
+        for (gap_um, torque_nm) in [(0.0, 20.0), (3.0, 20.0), (3.0, 1e-3)] {
+            for allowable_stress_mpa in [None, Some(everywhere(900.0))] {
+                let load = LoadParameters {
+                    law: ContactLaw::Palmgren,
+                    clearance_um: everywhere(gap_um),
+                    series_compliance_mm_per_n,
+                    allowable_stress_mpa,
+                    ..load(torque_nm, Compatibility::VirtualWork)
+                };
+                assert_both_paths_agree(&PAPER_5_1, &load, 50);
+                let case = LoadCase::new(&load).unwrap();
+                let plain = sweep_plain(&drive(&PAPER_5_1), &case, Points::samples(50).unwrap(), &Never).unwrap();
+                let fast = swept(&PAPER_5_1, &load, 50);
+                assert_ne!(fast.states.stress_mpa, plain.states.stress_mpa, "{load:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn balls_and_flat_sided_teeth_take_the_fast_path() {
     let groove_radius_mm = PerContact { wave_generator: Some(5.3), ring: Some(5.2), carrier: None };
     let ball = ToothShape::Ball { groove_radius_mm };
@@ -495,6 +544,7 @@ fn balls_and_flat_sided_teeth_take_the_fast_path() {
     for (tooth, law) in [
         (ball, ContactLaw::Hertz),
         (flat(4.0), ContactLaw::Linear),
+        (flat(4.0), ContactLaw::Palmgren),
         (flat(4.0), JOHNSON),
         (flat(4.0), fixed),
         // The carrier ends before the flat does.
@@ -531,6 +581,162 @@ fn any_law() -> impl Strategy<Value = ContactLaw> {
     ]
 }
 
+/// Parts made otherwise than conjugate, of the size of the first; too full where what covers them is not enough.
+fn any_modification() -> impl Strategy<Value = Modification> {
+    let part = || prop_oneof![Just(0.0), -1.0_f64..1.0];
+    let relief = (0.0_f64..1.0, prop_oneof![Just(1.0), Just(2.0), 0.1_f64..5.0]);
+    let start_deg = 0.0_f64..180.0;
+    ((-3.0_f64..1.5), prop::array::uniform8(part()), prop::option::of((relief, start_deg))).prop_map(
+        |(exponent, parts, relief)| {
+            let size = 10.0_f64.powf(exponent);
+            let [
+                ring_equidistant_um,
+                ring_path_shift_um,
+                ring_profile_shift_um,
+                ring_rotation_arcsec,
+                wave_generator_equidistant_um,
+                slot_wall_um,
+                carrier_rotation_arcsec,
+                tooth_radius_um,
+            ] = parts.map(|part| size * part);
+            let ring_tip_relief =
+                relief.map(|((share, power), start_deg)| TipRelief { amount_um: size * share, start_deg, power });
+            Modification {
+                ring_equidistant_um,
+                ring_path_shift_um,
+                ring_profile_shift_um,
+                ring_rotation_arcsec,
+                wave_generator_equidistant_um,
+                slot_wall_um,
+                carrier_rotation_arcsec,
+                tooth_radius_um,
+                ring_tip_relief,
+            }
+        },
+    )
+}
+
+/// With a tip relief that begins where the drive has a flank: so many turns, of which a flank has a part.
+fn begun_on_flank(modification: Modification, parameters: &DriveParameters) -> Modification {
+    let end_deg = drive(parameters).flank_limit().position.from_lobe_deg();
+    let ring_tip_relief = modification
+        .ring_tip_relief
+        .map(|relief| TipRelief { start_deg: relief.start_deg / 180.0 * 0.999 * end_deg, ..relief });
+    Modification { ring_tip_relief, ..modification }
+}
+
+/// Numbers for the items of a drive, which seem to be at random, of the kinds that are wanted.
+#[derive(Debug, Clone, Copy)]
+struct Deviating {
+    size: f64,
+    lists: [bool; 6],
+    runouts: [bool; 3],
+    seed: u64,
+}
+
+fn any_deviating() -> impl Strategy<Value = Deviating> {
+    let parts = (prop::array::uniform6(any::<bool>()), prop::array::uniform3(any::<bool>()));
+    (-3.0_f64..1.5, parts, any::<u64>()).prop_map(|(exponent, (lists, runouts), seed)| Deviating {
+        size: 10.0_f64.powf(exponent),
+        lists,
+        runouts,
+        seed,
+    })
+}
+
+impl Deviating {
+    fn of(self, parameters: &DriveParameters) -> Deviations {
+        let mut state = self.seed;
+        let mut random = move || {
+            // Knuth's linear congruence.
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        };
+        let [tooth_radius, slot_angle, slot_wall, ring_space, ring_space_angle, lobe] = self.lists;
+        let mut list = |is_wanted: bool, items: i64| -> Vec<f64> {
+            if is_wanted { (0..items).map(|_| self.size * random()).collect() } else { Vec::new() }
+        };
+        let (slots, spaces) = (parameters.installed, parameters.ring_teeth);
+        let runouts = self.runouts.map(|is_wanted| list(is_wanted, 2));
+        let runout = |of: &[f64]| match of {
+            [amount, angle] => Runout { amount_um: amount.abs(), angle_deg: 180.0 * angle / self.size },
+            _ => Runout::default(),
+        };
+        let [wave_generator, ring, carrier] = runouts;
+        Deviations {
+            tooth_radius_um: list(tooth_radius, slots),
+            slot_angle_arcsec: list(slot_angle, slots),
+            slot_wall_um: list(slot_wall, slots),
+            ring_space_um: list(ring_space, spaces),
+            ring_space_angle_arcsec: list(ring_space_angle, spaces),
+            wave_generator_lobe_um: list(lobe, parameters.wave_generator.lobes()),
+            runout: PerContact {
+                wave_generator: runout(&wave_generator),
+                ring: runout(&ring),
+                carrier: runout(&carrier),
+            },
+        }
+    }
+}
+
+/// States of a sweep that both ways are asked for at most.
+const MOST_STATES: u64 = 30_000;
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn the_fast_path_agrees_with_the_plain_one_on_parts_made_otherwise_than_conjugate(
+        parameters in prop_oneof![any_swept_drive(), any_elliptic_drive(), any_drive_of_other_kinds(), any_drive_of_unlike_zones()],
+        teeth in prop::option::of(any_other_teeth()),
+        law in any_law(),
+        torque_exponent in -2.0_f64..2.0,
+        modification in any_modification(),
+        clearance in prop::array::uniform3(prop_oneof![Just(0.0), (0.0_f64..2.0).prop_map(|exponent| 10.0_f64.powf(exponent))]),
+        allowable_stress_mpa in prop::option::of((2.0_f64..4.0).prop_map(|exponent| 10.0_f64.powf(exponent))),
+        samples in any_samples(),
+    ) {
+        let parameters = teeth.map_or(parameters, |teeth| teeth.of(&parameters));
+        let is_ball = matches!(parameters.tooth, ToothShape::Ball { .. });
+        let [wave_generator, ring, carrier] = clearance;
+        let load = LoadParameters {
+            law: if is_ball { ContactLaw::Hertz } else { law },
+            modification: begun_on_flank(modification, &parameters),
+            clearance_um: PerContact { wave_generator, ring, carrier },
+            allowable_stress_mpa: allowable_stress_mpa.map(everywhere),
+            ..load(10.0_f64.powf(torque_exponent), Compatibility::VirtualWork)
+        };
+        assert_both_paths_agree(&parameters, &load, samples);
+    }
+
+    #[test]
+    fn the_fast_path_agrees_with_the_plain_one_where_single_items_deviate(
+        parameters in prop_oneof![any_swept_drive(), any_elliptic_drive(), any_drive_of_other_kinds(), any_drive_of_unlike_zones()],
+        teeth in prop::option::of(any_other_teeth()),
+        law in any_law(),
+        torque_exponent in -2.0_f64..2.0,
+        (deviating, modification) in (any_deviating(), prop::option::of(any_modification())),
+        clearance_um in (0.0_f64..2.0).prop_map(|exponent| 10.0_f64.powf(exponent)),
+        allowable_stress_mpa in prop::option::of((2.0_f64..4.0).prop_map(|exponent| 10.0_f64.powf(exponent))),
+        samples in prop_oneof![1_u64..8, 40_u64..60],
+    ) {
+        let parameters = teeth.map_or(parameters, |teeth| teeth.of(&parameters));
+        let deviations = deviating.of(&parameters);
+        let mesh = deviations.mesh(&drive(&parameters));
+        let Ok(Points::Samples(of_period)) = Points::samples(samples) else { panic!("{samples}") };
+        prop_assume!(mesh.state_count(of_period) <= MOST_STATES);
+        let is_ball = matches!(parameters.tooth, ToothShape::Ball { .. });
+        let load = LoadParameters {
+            law: if is_ball { ContactLaw::Hertz } else { law },
+            modification: modification.map_or(Modification::NONE, |modification| begun_on_flank(modification, &parameters)),
+            clearance_um: everywhere(clearance_um),
+            allowable_stress_mpa: allowable_stress_mpa.map(everywhere),
+            ..load(10.0_f64.powf(torque_exponent), Compatibility::VirtualWork)
+        };
+        assert_both_paths_agree_on(&parameters, &load, &deviations, samples);
+    }
+}
+
 /// Johnson's law with its own depths.
 const JOHNSON: ContactLaw =
     ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
@@ -553,6 +759,125 @@ fn the_fast_path_is_taken_under_every_law_with_and_without_gaps() {
             });
             // The same numbers but for their last digits, which no two ways share throughout.
             assert_ne!(fast.states.stress_mpa, plain.states.stress_mpa, "{law:?} {gap_um}");
+        }
+    }
+}
+
+/// Drives of one lobe to four, zones alike and not.
+fn drives_that_may_deviate() -> Vec<DriveParameters> {
+    let of = |wave_generator: WaveGenerator, teeth, ring_teeth| DriveParameters {
+        wave_generator,
+        teeth,
+        installed: teeth,
+        ring_teeth,
+        ..PAPER_5_1
+    };
+    vec![
+        of(ellipse(58.0, 56.0), 14, 12),
+        of(ellipse(58.0, 56.6), 13, 15),
+        of(WaveGenerator::Eccentric { radius_mm: 58.0, eccentricity_mm: 1.0 }, 12, 11),
+        of(WaveGenerator::Harmonic { lobes: 3, mean_radius_mm: 60.0, amplitude_mm: 0.8 }, 16, 13),
+        of(WaveGenerator::HarmonicPath { lobes: 4, mean_path_radius_mm: 65.0, amplitude_mm: 0.4 }, 18, 22),
+    ]
+}
+
+#[test]
+fn the_fast_path_is_taken_where_single_items_deviate_wherever_the_laps_of_a_sweep_begin() {
+    let kinds = [
+        ([true, true, true, false, false, false], [false, false, true]),
+        ([false, false, false, true, true, false], [false, true, false]),
+        ([false, false, false, false, false, true], [true, false, false]),
+        ([true; 6], [true; 3]),
+    ];
+    let fixed = ContactLaw::Fixed(everywhere(4e5));
+    for (parameters, seed) in drives_that_may_deviate().into_iter().zip(1..) {
+        for ((lists, runouts), law) in kinds.into_iter().zip([fixed, ContactLaw::Palmgren, JOHNSON, fixed]) {
+            let deviations = Deviating { size: 2.0, lists, runouts, seed }.of(&parameters);
+            for samples in [1, 2, 3, 4, 5, 12] {
+                let clearance_um = everywhere(9.0);
+                let load = LoadParameters { law, clearance_um, ..load(20.0, Compatibility::VirtualWork) };
+                assert_both_paths_agree_on(&parameters, &load, &deviations, samples);
+                let (case, points) = (LoadCase::new(&load).unwrap(), Points::samples(samples).unwrap());
+                let drive = drive(&parameters);
+                let fast = sweep_with_deviations(&drive, &case, &deviations, points, &Never).unwrap();
+                let plain = sweep_plain_with_deviations(&drive, &case, &deviations, points, &Never).unwrap();
+                assert_ne!(fast.states.stress_mpa, plain.states.stress_mpa, "{parameters:?} {law:?} {samples}");
+            }
+        }
+    }
+}
+
+#[test]
+fn where_single_items_deviate_and_where_zones_are_unlike_a_tolerance_is_kept_by_either_way_of_looking() {
+    // Where they look differs in the last digits, but for the first sixteen intervals.
+    let mut looked_elsewhere = [0, 0];
+    for (parameters, seed) in drives_that_may_deviate().into_iter().zip(1..) {
+        let drive = drive(&parameters);
+        for (law, torque_nm) in [(ContactLaw::Palmgren, 20.0), (JOHNSON, 3.0)] {
+            let load = LoadParameters {
+                law,
+                clearance_um: everywhere(9.0),
+                allowable_stress_mpa: Some(everywhere(1500.0)),
+                ..load(torque_nm, Compatibility::VirtualWork)
+            };
+            let (case, points) = (LoadCase::new(&load).unwrap(), Points::tolerance(1e-6, 10_000_000).unwrap());
+            let lists = [true, false, true, false, false, true];
+            let deviating = Deviating { size: 2.0, lists, runouts: [false, false, true], seed }.of(&parameters);
+            for deviations in [Deviations::default(), deviating] {
+                let fast = sweep_with_deviations(&drive, &case, &deviations, points, &Never).unwrap();
+                let plain = sweep_plain_with_deviations(&drive, &case, &deviations, points, &Never).unwrap();
+                let is_elsewhere = fast.states.input_angle_deg != plain.states.input_angle_deg;
+                looked_elsewhere[usize::from(!deviations.is_nil())] += u32::from(is_elsewhere);
+                let [fast, plain] = [SweepPeaks::from(&fast), SweepPeaks::from(&plain)];
+                let assert_near = |what: &str, found: f64, expected: f64| {
+                    assert!((found / expected - 1.0).abs() < 2e-6, "{what}: {found} {expected} {parameters:?} {law:?}");
+                };
+                for (contact, found) in fast.contacts.iter() {
+                    let expected = plain.contacts.get(contact);
+                    assert_near("force", found.force_n.value, expected.force_n.value);
+                    assert_near("stress", found.stress_mpa.value, expected.stress_mpa.value);
+                }
+                assert_near("least wind-up", fast.wind_up_deg.least, plain.wind_up_deg.least);
+                assert_near("largest wind-up", fast.wind_up_deg.largest, plain.wind_up_deg.largest);
+                let capacity = |peaks: &SweepPeaks| peaks.torque_capacity.unwrap().input_torque_nm;
+                assert_near("capacity", capacity(&fast), capacity(&plain));
+            }
+        }
+    }
+    assert!(looked_elsewhere.into_iter().all(|cases| cases > 2), "{looked_elsewhere:?} of 10 each");
+}
+
+#[test]
+fn the_fast_path_is_taken_by_parts_made_otherwise_than_conjugate_and_by_unlike_zones() {
+    let relief = TipRelief { amount_um: 5.0, start_deg: 20.0, power: 2.0 };
+    for (parameters, law) in drives_that_may_deviate()
+        .into_iter()
+        .zip([ContactLaw::Linear, ContactLaw::Palmgren, JOHNSON].into_iter().cycle())
+    {
+        let unlike = !Mesh::new(&drive(&parameters)).zones_are_alike();
+        for modification in [
+            Modification::NONE,
+            Modification { ring_tip_relief: Some(relief), ..Modification::NONE },
+            Modification { ring_equidistant_um: 4.0, ring_path_shift_um: -3.0, ..Modification::NONE },
+            Modification { ring_profile_shift_um: 3.0, tooth_radius_um: 1.0, slot_wall_um: 2.0, ..Modification::NONE },
+            // Lost motion alone makes up for what the ring has too much of.
+            Modification { ring_rotation_arcsec: 200.0, ring_equidistant_um: -1.0, ..Modification::NONE },
+            Modification { carrier_rotation_arcsec: 9.0, wave_generator_equidistant_um: 1.0, ..Modification::NONE },
+        ] {
+            let load = LoadParameters { law, modification, ..load(20.0, Compatibility::VirtualWork) };
+            let case = LoadCase::new(&load).unwrap();
+            for samples in [50, 7] {
+                assert_both_paths_agree(&parameters, &load, samples);
+                let Ok(plain) = sweep_plain(&drive(&parameters), &case, Points::samples(samples).unwrap(), &Never)
+                else {
+                    assert!(modification.ring_equidistant_um < 0.0, "{modification:?}");
+                    continue;
+                };
+                if unlike || modification != Modification::NONE {
+                    let fast = swept(&parameters, &load, samples);
+                    assert_ne!(fast.states.stress_mpa, plain.states.stress_mpa, "{parameters:?} {modification:?}");
+                }
+            }
         }
     }
 }

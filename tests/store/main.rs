@@ -171,7 +171,7 @@ async fn of_many_chunks_each_is_claimed_once_in_their_order() {
 }
 
 #[tokio::test]
-async fn all_chunks_of_a_study_wait_though_few_are_open_and_none_of_a_cancelled_one_is_opened() {
+async fn all_chunks_of_a_study_wait_though_few_are_open_and_none_of_one_that_is_cancelled_or_late() {
     alone_with_each_store(async |store| {
         let before = store.figures().await.unwrap();
         let study = study("waits", MANY_CHUNKS);
@@ -180,6 +180,9 @@ async fn all_chunks_of_a_study_wait_though_few_are_open_and_none_of_a_cancelled_
         assert_eq!((figures.waiting - before.waiting, figures.running - before.running), (MANY_CHUNKS, 1));
         store.cancel(&study.id).await.unwrap();
         assert!(matches!(store.claim(&study.id, LEASE).await.unwrap(), Claim::None));
+        assert_eq!(store.figures().await.unwrap().waiting, before.waiting);
+        store.resume(&study.id, Duration::ZERO).await.unwrap();
+        assert_eq!(store.figures().await.unwrap().waiting, before.waiting);
         store.resume(&study.id, LEASE).await.unwrap();
         drop(claimed(&store, &study).await);
         assert_eq!(store.figures().await.unwrap().waiting - before.waiting, MANY_CHUNKS);

@@ -53,12 +53,20 @@ impl Mechanism {
 }
 
 impl Losses {
-    /// What friction does over a sweep of this drive.
+    /// What friction does over the sweep of this drive under this load.
     ///
     /// # Errors
     /// [`SolveError::NotConverged`] from the geometry, [`SolveError::Stopped`] when `stop` says so.
-    pub fn of(drive: &Drive, sweep: &Sweep, friction: &Friction, stop: &dyn Stop) -> Result<Self, SolveError> {
+    pub fn of(
+        drive: &Drive,
+        load: &LoadCase,
+        sweep: &Sweep,
+        friction: &Friction,
+        stop: &dyn Stop,
+    ) -> Result<Self, SolveError> {
         let mechanism = Mechanism::of_sweep(drive, sweep);
+        // Where the wave generator moves on under its teeth their arms are others than at the positions of the states.
+        let input_torque_nmm = 1e3 * load.input_torque_nm(drive);
         let states = &sweep.states;
         let column = || Vec::with_capacity(states.len());
         let mut slip_mm_per_rad = PerContact::of(|_| column());
@@ -68,7 +76,7 @@ impl Losses {
         at_each_input_angle(drive, states, stop, |input_angle_deg, teeth| {
             let teeth: Vec<_> = teeth.iter().map(|tooth| tooth.loaded).collect();
             let turning = mechanism.turning(friction, &teeth);
-            let over_torque = |work_nmm_per_rad: f64| work_nmm_per_rad / turning.input_torque_nmm;
+            let over_torque = |work_nmm_per_rad: f64| work_nmm_per_rad / input_torque_nmm;
             let ratio = LossRatio {
                 contacts: PerContact::of(|contact| over_torque(*turning.work_nmm_per_rad.get(contact))),
                 bearing: over_torque(turning.bearing_work_nmm_per_rad),

@@ -80,17 +80,17 @@ pub(crate) fn moments(
     let laps = if mesh.tells_items_apart() { mesh.laps() } else { 1 };
     let resolution = tolerance.relative().clamp(FINEST_RESOLUTION, COARSEST_RESOLUTION);
     let allowable_mpa = load.parameters().allowable_stress_mpa;
+    let pieces = || (0..laps).flat_map(|lap| Piece::of(&mesh, lap));
     let in_columns = match looking {
-        Looking::Fast => fast::moments(loaded, tolerance, resolution, allowable_mpa, stop)?,
+        Looking::Fast => fast::moments(loaded, pieces(), tolerance, resolution, allowable_mpa, stop)?,
         Looking::Plain => None,
     };
     let found = match in_columns {
         Some(found) => found,
         None => {
             let mut look = PlainLook::new(loaded, load, stop);
-            let pieces = (0..laps).flat_map(|lap| Piece::of(&mesh, lap));
             // This way tells of every moment.
-            search(&mut look, pieces, tolerance, Some(resolution))?.unwrap_or_default()
+            search(&mut look, pieces(), tolerance, Some(resolution))?.unwrap_or_default()
         }
     };
     let mut by_lap = vec![Vec::new(); usize::try_from(laps).unwrap_or(usize::MAX)];

@@ -321,6 +321,22 @@ impl States {
         }
     }
 
+    /// With the teeth of all zones, to be filled in.
+    pub(crate) fn of_zeros(count: usize) -> Self {
+        let column = || vec![0.0; count];
+        Self {
+            input_angle_deg: column(),
+            tooth: vec![0; count],
+            lobe: vec![0; count],
+            position_deg: column(),
+            center_radius_mm: column(),
+            wave_generator_angle_deg: column(),
+            ring_angle_deg: column(),
+            force_n: PerContact::of(|_| column()),
+            stress_mpa: PerContact::of(|_| column()),
+        }
+    }
+
     /// Number of states.
     pub fn len(&self) -> usize {
         self.tooth.len()
@@ -354,6 +370,24 @@ impl InputAngles {
         }
     }
 
+    /// To be filled in.
+    pub(crate) fn of_zeros(count: usize) -> Self {
+        let column = || vec![0.0; count];
+        Self {
+            input_angle_deg: column(),
+            wind_up_deg: column(),
+            torsional_stiffness_nm_per_rad: column(),
+            loaded_teeth: vec![0; count],
+        }
+    }
+
+    /// The stiffness at the output of `dM0/dΔφ`.
+    #[inline(always)]
+    pub(crate) fn of_output(drive: &Drive, stiffness_nmm_per_rad: f64) -> f64 {
+        let torque_ratio = drive.teeth_per_wave();
+        1e-3 * stiffness_nmm_per_rad * torque_ratio * torque_ratio
+    }
+
     /// Appends an input angle; the stiffness `dM0/dΔφ` becomes that of the output.
     pub(crate) fn push(&mut self, drive: &Drive, input_angle_deg: f64, wind_up: &WindUp, loaded_teeth: usize) {
         let stiffness = std::iter::once(wind_up.stiffness_nmm_per_rad);
@@ -370,10 +404,9 @@ impl InputAngles {
         stiffness_nmm_per_rad: impl Iterator<Item = f64>,
         loaded_teeth: impl Iterator<Item = usize>,
     ) {
-        let torque_ratio = drive.teeth_per_wave();
         self.input_angle_deg.extend_from_slice(input_angle_deg);
         self.wind_up_deg.extend(rotation_rad.iter().map(|rotation_rad| rotation_rad.to_degrees()));
-        let of_output = |stiffness| 1e-3 * stiffness * torque_ratio * torque_ratio;
+        let of_output = |stiffness| Self::of_output(drive, stiffness);
         self.torsional_stiffness_nm_per_rad.extend(stiffness_nmm_per_rad.map(of_output));
         self.loaded_teeth.extend(loaded_teeth.map(|teeth| u32::try_from(teeth).unwrap_or(u32::MAX)));
     }

@@ -17,7 +17,9 @@
 
 mod centers;
 mod curve;
+mod gaps;
 mod lanes;
+mod laps;
 mod moments;
 mod pressures;
 mod sharing;
@@ -40,7 +42,9 @@ use crate::sweep::search::{Best, Found, Piece, search};
 use crate::tooth::ToothLaw;
 use crate::{SolveError, Stop};
 use centers::{CenterLanes, Centers, EccentricCenters, HarmonicCenters, HarmonicPathCenters};
+use gaps::{GapColumns, GapWork};
 use lanes::{LANES, arctangent_terms, arctangents, cube_root, repeat_each};
+use laps::{LapTeeth, Laps, Layout};
 use moments::FastLook;
 use pressures::Pressures;
 use sharing::{Limit, Shared, Sharing, Teeth, Work};
@@ -53,7 +57,8 @@ const MAX_STEPS: u32 = 8;
 /// A relative step this small is the last: the next one would be of its cube, less than the last digit.
 const LAST_STEP: f64 = 5e-6;
 
-/// The sweep and its capacity, given an allowable stress, or nothing where the plain path has to make it: for laws and gaps that are not known here, and for drives beyond the caps.
+/// The sweep and its capacity, given an allowable stress, or nothing where the plain path has to make it: for laws that are not known here, where a part may be too
+/// full, and for drives beyond the caps.
 ///
 /// # Errors
 /// As [`columns::finished`].
@@ -64,20 +69,21 @@ pub(crate) fn sweep(
     stop: &dyn Stop,
 ) -> Result<Option<Sweep>, SolveError> {
     let allowable_mpa = load.parameters().allowable_stress_mpa;
-    let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
-    let mesh = Mesh::new(loaded.drive());
-    let mut sink = ColumnSink::new(&mesh, samples);
-    let Some(Filled { torque_balance_residual, capacity }) = kernel.fill(loaded, samples, stop, &mut sink)? else {
+    let one_zone = loaded.as_one_zone();
+    let Some(kernel) = Kernel::new(&one_zone, allowable_mpa) else { return Ok(None) };
+    let laps = Laps::new(loaded.mesh(), samples);
+    let mut sink = ColumnSink::new(&laps);
+    let Some(Filled { torque_balance_residual, capacity }) = kernel.fill(&one_zone, &laps, stop, &mut sink)? else {
         return Ok(None);
     };
-    let columns = sink.columns(&mesh, samples, torque_balance_residual);
+    let columns = sink.columns(torque_balance_residual);
     let mut sweep = columns::finished(loaded, Points::Samples(samples), columns, None)?;
     sweep.torque_capacity = capacity.or_else(|| kernel.in_proportion(loaded, allowable_mpa, &sweep.peaks));
     kernel.complete(loaded, load, &mut sweep.peaks)?;
     Ok(Some(sweep))
 }
 
-/// The peaks of the same sweep, no state kept; nothing where [`sweep`] has nothing.
+/// The peaks of the same sweep, no state kept, where zones are alike; nothing where [`sweep`] has nothing.
 ///
 /// # Errors
 /// As [`sweep`].
@@ -89,8 +95,8 @@ pub(crate) fn peaks(
 ) -> Result<Option<SweepPeaks>, SolveError> {
     let allowable_mpa = load.parameters().allowable_stress_mpa;
     let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
-    let mut sink = PeakSink::default();
-    let Some(Filled { torque_balance_residual, capacity }) = kernel.fill(loaded, samples, stop, &mut sink)? else {
+    let (laps, mut sink) = (Laps::new(loaded.mesh(), samples), PeakSink::default());
+    let Some(Filled { torque_balance_residual, capacity }) = kernel.fill(loaded, &laps, stop, &mut sink)? else {
         return Ok(None);
     };
     columns::check("torque balance", torque_balance_residual)?;
@@ -100,22 +106,25 @@ pub(crate) fn peaks(
     Ok(Some(peaks))
 }
 
-/// The moments of a sweep to a tolerance, between which straight lines are true to a resolution; nothing where [`sweep`] has nothing.
+/// The moments of a sweep to a tolerance over these pieces, between which straight lines are true to a resolution; nothing where [`sweep`] has nothing.
 ///
 /// # Errors
 /// As [`search()`].
 pub(crate) fn moments(
     loaded: &LoadedDrive<'_>,
+    pieces: impl Iterator<Item = Piece>,
     tolerance: Tolerance,
     resolution: f64,
     allowable_mpa: Option<PerContact<f64>>,
     stop: &dyn Stop,
 ) -> Result<Option<Found>, SolveError> {
-    let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
-    let size = kernel.tile_size(loaded);
+    let one_zone = loaded.as_one_zone();
+    let Some(kernel) = Kernel::new(&one_zone, allowable_mpa) else { return Ok(None) };
+    let layout = kernel.layout(loaded.mesh());
+    let size = kernel.tile_size(loaded.mesh(), layout);
     let mut arena = vec![0.0; size.doubles()];
-    let mut look = FastLook::new(&kernel, loaded, &size, &mut arena, stop);
-    search(&mut look, Piece::of(loaded.mesh(), 0), tolerance, Some(resolution))
+    let mut look = FastLook::new(&kernel, &one_zone, (*loaded.mesh(), layout), &size, &mut arena, stop);
+    search(&mut look, pieces, tolerance, Some(resolution))
 }
 
 /// The true peaks to a tolerance; nothing where [`sweep`] has nothing.
@@ -131,9 +140,9 @@ pub(crate) fn true_peaks(
     let allowable_mpa = load.parameters().allowable_stress_mpa;
     let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
     let mesh = *loaded.mesh();
-    let size = kernel.tile_size(loaded);
+    let size = kernel.tile_size(&mesh, Layout::PLAIN);
     let mut arena = vec![0.0; size.doubles()];
-    let mut look = FastLook::new(&kernel, loaded, &size, &mut arena, stop);
+    let mut look = FastLook::new(&kernel, loaded, (mesh, Layout::PLAIN), &size, &mut arena, stop);
     let Some(Found { seen, best }) = search(&mut look, Piece::of(&mesh, 0), tolerance, None)? else {
         return Ok(None);
     };
@@ -160,7 +169,7 @@ pub(crate) fn true_peaks(
 struct Vectorised<'a, K> {
     kernel: &'a Kernel,
     loaded: &'a LoadedDrive<'a>,
-    samples: Samples,
+    laps: &'a Laps,
     stop: &'a dyn Stop,
     sink: &'a mut K,
 }
@@ -170,7 +179,7 @@ impl<K: Sink> pulp::WithSimd for Vectorised<'_, K> {
 
     #[inline(always)]
     fn with_simd<V: Simd>(self, _: V) -> Self::Output {
-        self.kernel.sweep::<V, K>(self.loaded, self.samples, self.stop, self.sink)
+        self.kernel.sweep::<V, K>(self.loaded, self.laps, self.stop, self.sink)
     }
 }
 
@@ -181,6 +190,7 @@ struct Kernel {
     ring_teeth_per_wave: f64,
     teeth_per_wave: f64,
     law: Law,
+    gaps: Option<GapColumns>,
     pressures: Pressures,
     /// `E*/(π L1)` of each contact.
     hertz: PerContact<f64>,
@@ -429,10 +439,6 @@ impl Kernel {
             Law::Sharing(sharing) => sharing.is_in_proportion(),
         };
         let drive = loaded.drive();
-        // One zone stands for all.
-        if !loaded.mesh().zones_are_alike() {
-            return None;
-        }
         let pressures = Pressures::new(loaded)?;
         let r = drive.parameters().tooth_radius_mm;
         let (shape, ratios) = Shape::new(drive.flank().locus().cam(), r)?;
@@ -442,6 +448,7 @@ impl Kernel {
             ring_teeth_per_wave: drive.flank().teeth_per_wave(),
             teeth_per_wave: drive.teeth_per_wave(),
             law,
+            gaps: GapColumns::new(loaded),
             hertz: pressures.hertz(loaded),
             pressures,
             cam_terms: arctangent_terms(ratios.wave_generator)?,
@@ -474,74 +481,113 @@ impl Kernel {
             let lobes = loaded.drive().lobes();
             for contact in [Contact::WaveGenerator, Contact::Ring, Contact::Carrier] {
                 let peak = peaks.get_mut(contact);
-                let tooth = loaded.tooth(Position::from_lobe(peak.stress_mpa.position_deg.to_radians(), lobes))?;
-                let pressure = tooth.pressure.get(contact);
+                let position = Position::from_lobe(peak.stress_mpa.position_deg.to_radians(), lobes);
+                let pressure = loaded.pressure_at(position, contact)?;
                 let force_n = pressure.force_n(peak.stress_mpa.value);
-                *peak = peak.of_pressure(pressure, force_n, &load.parameters().materials, contact);
+                *peak = peak.of_pressure(&pressure, force_n, &load.parameters().materials, contact);
             }
         }
         Ok(())
     }
 
     /// Of tiles of input angles anywhere.
-    fn tile_size(&self, loaded: &LoadedDrive<'_>) -> TileSize {
-        let with_work = matches!(self.law, Law::Sharing(_));
-        TileSize::anywhere(whole(loaded.mesh().teeth_in_mesh().max), with_work)
+    fn tile_size(&self, mesh: &Mesh, layout: Layout) -> TileSize {
+        let places = mesh.teeth_in_mesh().max / mesh.listed_at_each_place();
+        self.with_room(TileSize::anywhere(layout.at_each_place * whole(places)))
+    }
+
+    /// With room for what its law takes.
+    fn with_room(&self, size: TileSize) -> TileSize {
+        let are_unlike = self.gaps.as_ref().is_some_and(GapColumns::are_unlike);
+        size.with(matches!(self.law, Law::Sharing(_)), are_unlike)
+    }
+
+    /// Whether the gaps are those of single items.
+    fn tells_items_apart(&self) -> bool {
+        self.gaps.as_ref().is_some_and(GapColumns::are_of_items)
+    }
+
+    /// How the teeth of a sweep lie in its tiles: where none is told apart, one at each place.
+    fn layout(&self, mesh: &Mesh) -> Layout {
+        let at_each_place = if self.tells_items_apart() { whole(mesh.lobes_loaded_alike()) } else { 1 };
+        let apart = if mesh.zones_are_alike() { 1 } else { whole(mesh.laps_of_load_period()) };
+        Layout { at_each_place, apart }
     }
 
     /// Fills the sink, by the best vectors of this machine; the worst residual of the torques, or nothing where the plain path is needed.
     fn fill(
         &self,
         loaded: &LoadedDrive<'_>,
-        samples: Samples,
+        laps: &Laps,
         stop: &dyn Stop,
         sink: &mut impl Sink,
     ) -> Result<Option<Filled>, SolveError> {
-        pulp::Arch::new().dispatch(Vectorised { kernel: self, loaded, samples, stop, sink })
+        pulp::Arch::new().dispatch(Vectorised { kernel: self, loaded, laps, stop, sink })
     }
 
+    /// Over the zones of a drive as one, whose positions come again in each lap.
     #[inline(always)]
     fn sweep<V: Simd, K: Sink>(
         &self,
         loaded: &LoadedDrive<'_>,
-        samples: Samples,
+        laps: &Laps,
         stop: &dyn Stop,
         sink: &mut K,
     ) -> Result<Option<Filled>, SolveError> {
-        let mesh = *loaded.mesh();
-        let with_work = matches!(self.law, Law::Sharing(_));
-        let size = TileSize::of(&mesh, samples, K::COLUMNS, with_work);
+        let (mesh, layout) = (*loaded.mesh(), self.layout(laps.mesh()));
+        let size = self.with_room(TileSize::of(&mesh, laps.of_lap, layout.at_each_place, K::COLUMNS));
         let mut arena = vec![0.0; size.doubles()];
-        let mut tile = Tile::new(&mut arena, &size, mesh.phase_step_rad(samples), self.pressures.stress_exponents());
+        let step_rad = laps.stride as f64 * mesh.phase_step_rad(laps.of_lap);
+        let mut tile = Tile::new(&mut arena, &size, step_rad, self.pressures.stress_exponents());
         let balance = TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm());
         let mut filled = Filled { torque_balance_residual: 0.0, capacity: None };
-        let mut first = 0;
-        while first < samples.count() {
-            let run = Run::from(first, samples, &mesh);
-            run.lay_pattern(&mut tile);
-            for start in run.samples.clone().step_by(run.rows) {
-                if stop.stopped() {
-                    return Err(SolveError::Stopped);
+        let mut lap_teeth = LapTeeth::default();
+        for residue in 0..laps.stride {
+            let mut first = residue;
+            while first < laps.of_lap.count() {
+                let run = Run::from(first, laps, &mesh, layout);
+                run.lay_pattern(&mut tile);
+                for start in run.starts() {
+                    run.place(start, &mut tile);
+                    if !self.unit_loads::<V, K>(&mut tile) || !self.prepare::<V>(loaded, run.teeth, &mut tile) {
+                        return Ok(None);
+                    }
+                    let mut is_shared = false;
+                    for lap in laps.with(start) {
+                        if stop.stopped() {
+                            return Err(SolveError::Stopped);
+                        }
+                        if laps.are_listed() {
+                            lap_teeth.list(laps.mesh(), layout, run.places(), lap);
+                        }
+                        if laps.is_end(lap) {
+                            tile.count = run.teeth;
+                        }
+                        let sample = laps.sample(lap, start);
+                        let rows = tile.count / run.teeth;
+                        if !is_shared {
+                            if !self.close(laps.mesh(), &lap_teeth, run.teeth, &mut tile) {
+                                return Ok(None);
+                            }
+                            let Some(limit) = self.loads::<V>(loaded, run.teeth, &mut tile, |_, _| ()) else {
+                                return Ok(None);
+                            };
+                            if let Some(limit) = limit {
+                                let limit_deg = laps.input_angle_deg(sample + limit.row as u64);
+                                filled.capacity = least(filled.capacity, limit.capacity(loaded, limit_deg));
+                            }
+                            filled.torque_balance_residual =
+                                Self::residual(&balance, rows, &mut tile, filled.torque_balance_residual);
+                            is_shared = !self.tells_items_apart();
+                        }
+                        for (angle_deg, sample) in zip(&mut tile.row_input_angle_deg[..rows], sample..) {
+                            *angle_deg = laps.input_angle_deg(sample);
+                        }
+                        sink.take(loaded.drive(), &mut tile, run.teeth, sample, &lap_teeth);
+                    }
                 }
-                let tile_samples = start..run.samples.end.min(start + run.rows as u64);
-                run.place(tile_samples.clone(), &mut tile);
-                if !self.unit_loads::<V, K>(&mut tile) {
-                    return Ok(None);
-                }
-                let Some(limit) = self.loads::<V>(loaded, run.teeth, &mut tile, |_, _| ()) else { return Ok(None) };
-                if let Some(limit) = limit {
-                    let limit_deg = mesh.input_angle_deg(start + limit.row as u64, samples);
-                    filled.capacity = least(filled.capacity, limit.capacity(loaded, limit_deg));
-                }
-                let rows = tile.count / run.teeth;
-                filled.torque_balance_residual =
-                    Self::residual(&balance, rows, &mut tile, filled.torque_balance_residual);
-                for (angle_deg, sample) in zip(&mut tile.row_input_angle_deg[..rows], tile_samples) {
-                    *angle_deg = mesh.input_angle_deg(sample, samples);
-                }
-                sink.take(loaded.drive(), &mut tile, run.teeth);
+                first = run.next();
             }
-            first = run.samples.end;
         }
         Ok(Some(filled))
     }
@@ -724,6 +770,24 @@ impl Kernel {
         }
     }
 
+    /// What the places of a tile decide of law and gaps; false where it takes the plain path.
+    #[inline(always)]
+    fn prepare<V: Simd>(&self, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) -> bool {
+        let Law::Sharing(sharing) = &self.law else { return true };
+        let (teeth, work, gap_work, _) = self.teeth_of(count, tile);
+        sharing.prepare::<V>(loaded.input_torque_nmm() / loaded.zones(), &teeth, work);
+        self.gaps.as_ref().is_none_or(|gaps| gaps.prepare(&teeth, gap_work, work.closing))
+    }
+
+    /// Closes the gaps of the teeth of a lap, where they are told apart; false where the tile takes the plain path.
+    #[inline(always)]
+    fn close(&self, mesh: &Mesh, lap_teeth: &LapTeeth, count: usize, tile: &mut Tile<'_>) -> bool {
+        let Some(gaps) = self.gaps.as_ref().filter(|gaps| gaps.are_of_items()) else { return true };
+        gaps.set_teeth(mesh, lap_teeth, &mut tile.gaps);
+        let (teeth, work, gap_work, _) = self.teeth_of(count, tile);
+        gaps.close_at_items(&teeth, gap_work, work.closing)
+    }
+
     /// Loads of a tile from its unit loads, and what limits them; nothing where it takes the plain path. Where more than a rotation is looked for, `shared`
     /// is told of what sharing has come to before the limit is looked for in its place.
     #[inline(always)]
@@ -753,7 +817,7 @@ impl Kernel {
     /// Turns the wave generator at each input angle of a tile until the unit loads of its teeth balance the torque.
     #[inline(always)]
     fn scale(loaded: &LoadedDrive<'_>, teeth: usize, tile: &mut Tile<'_>) {
-        let rows = tile.sum_torques(teeth);
+        let rows = tile.sum_torques::<true>(teeth);
         let (input_nmm, zones) = (loaded.input_torque_nmm(), loaded.zones());
         let PerContact { wave_generator: cam, ring, carrier } = &mut tile.row_torque;
         let (cam, ring, carrier) = (&mut cam[..rows], &mut ring[..rows], &mut carrier[..rows]);
@@ -769,8 +833,8 @@ impl Kernel {
             ring[row] *= scale;
             carrier[row] *= scale;
         }
-        // Only a tooth in the valley, the last one, has no lever arm and no load.
-        let lasts = tile.force.wave_generator[..tile.count].iter().skip(teeth - 1).step_by(teeth);
+        // Only a tooth in the valley, at the last place, has no lever arm and no load.
+        let lasts = tile.force.wave_generator[..tile.count].iter().skip(tile.last_place).step_by(teeth);
         tile.row_loaded.clear();
         tile.row_loaded.extend(lasts.map(|last| teeth - usize::from(*last <= 0.0)));
         repeat_each(rotation_rad, teeth, tile.scale);
@@ -779,11 +843,16 @@ impl Kernel {
 
     /// The teeth of a tile under 1 N, what sharing works on, and what comes of it.
     #[inline(always)]
-    fn teeth_of<'t, 'a>(&self, count: usize, tile: &'t mut Tile<'a>) -> (Teeth<'t>, &'t mut Work<'a>, Shared<'t>) {
+    fn teeth_of<'t, 'a>(
+        &self,
+        count: usize,
+        tile: &'t mut Tile<'a>,
+    ) -> (Teeth<'t>, &'t mut Work<'a>, &'t mut GapWork<'a>, Shared<'t>) {
         let teeth = Teeth {
             count,
             rows: tile.count / count,
             len: tile.count.next_multiple_of(LANES),
+            center_radius_mm: tile.center_radius_mm,
             arm: tile.torque.wave_generator,
             ring_ratio: tile.force.ring,
             carrier_ratio: tile.force.carrier,
@@ -793,13 +862,13 @@ impl Kernel {
             stress_exponents: self.pressures.stress_exponents(),
         };
         let shared = Shared { force: tile.scale, rotation_rad: tile.row_rotation_rad, stiffness: tile.row_stiffness };
-        (teeth, &mut tile.work, shared)
+        (teeth, &mut tile.work, &mut tile.gaps, shared)
     }
 
     /// Lets the teeth of each input angle share the load; false where it takes the plain path.
     #[inline(always)]
     fn share<V: Simd>(&self, sharing: &Sharing, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) -> bool {
-        let (teeth, work, mut shared) = self.teeth_of(count, tile);
+        let (teeth, work, _, mut shared) = self.teeth_of(count, tile);
         sharing.share::<V>(loaded.input_torque_nmm() / loaded.zones(), &teeth, work, &mut shared)
     }
 
@@ -813,28 +882,32 @@ impl Kernel {
         tile: &mut Tile<'_>,
     ) -> Option<Limit> {
         let per_allowable = PerContact::of(|contact| 1.0 / allowable_mpa.get(contact));
-        let (teeth, work, _) = self.teeth_of(count, tile);
+        let (teeth, work, _, _) = self.teeth_of(count, tile);
         sharing.limit::<V>(&per_allowable, &teeth, work)
     }
 
     /// Torques, stiffness and what carries, once the load is shared.
     #[inline(always)]
     fn scale_shared<V: Simd>(&self, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) {
-        let (zones, rows) = (loaded.zones(), tile.count / count);
+        let zones = loaded.zones();
         let len = tile.count.next_multiple_of(LANES);
         let (scale, root) = (&tile.scale[..len], &mut tile.scale_root[..len]);
-        let cam = &mut tile.torque.wave_generator[..len];
-        let (ring, carrier) = (&mut tile.torque.ring[..len], &mut tile.torque.carrier[..len]);
         let are_balls = matches!(self.pressures, Pressures::Ellipses(_));
         for i in 0..len {
             root[i] = if are_balls { cube_root::<V>(scale[i]) } else { scale[i].sqrt() };
-            let scale = zones * scale[i];
-            cam[i] *= scale;
-            ring[i] *= scale;
-            carrier[i] *= scale;
         }
-        tile.sum_torques(count);
-        tile.row_stiffness[..rows].iter_mut().for_each(|stiffness| *stiffness *= zones);
+        let rows = tile.sum_torques::<false>(count);
+        let PerContact { wave_generator: cam, ring, carrier } = &mut tile.row_torque;
+        let (cam, ring, carrier) = (&mut cam[..rows], &mut ring[..rows], &mut carrier[..rows]);
+        let (rotation_rad, stiffness) = (&mut tile.row_rotation_rad[..rows], &mut tile.row_stiffness[..rows]);
+        let lost_motion_rad = self.gaps.as_ref().map_or(0.0, GapColumns::lost_motion_rad);
+        for row in 0..rows {
+            cam[row] *= zones;
+            ring[row] *= zones;
+            carrier[row] *= zones;
+            stiffness[row] *= zones;
+            rotation_rad[row] += lost_motion_rad;
+        }
         tile.row_loaded.clear();
         let carrying = |row: &[f64]| row.iter().filter(|&&force| force > 0.0).count();
         tile.row_loaded.extend(tile.scale[..tile.count].chunks_exact(count).map(carrying));
@@ -860,7 +933,11 @@ impl Limit {
     }
 }
 
-/// The first of the least.
+/// The first of the least, whichever is found first.
 fn least(before: Option<TorqueCapacity>, capacity: TorqueCapacity) -> Option<TorqueCapacity> {
-    Some(before.filter(|before| before.input_torque_nm <= capacity.input_torque_nm).unwrap_or(capacity))
+    let is_first = |before: &TorqueCapacity| {
+        let order = before.input_torque_nm.total_cmp(&capacity.input_torque_nm);
+        order.then(before.input_angle_deg.total_cmp(&capacity.input_angle_deg)).is_le()
+    };
+    Some(before.filter(is_first).unwrap_or(capacity))
 }

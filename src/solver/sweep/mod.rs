@@ -11,7 +11,6 @@ mod unloaded;
 use crate::drive::Drive;
 use crate::gaps::Deviations;
 use crate::load_sharing::{LoadCase, LoadedDrive};
-use crate::tooth::ToothContact;
 use crate::{SolveError, Stop};
 use adaptive::Looking;
 
@@ -29,13 +28,16 @@ pub use unloaded::unloaded_wind_up_deg;
 /// [`SolveError::Inconsistent`] where the answer's own checks say that it is wrong,
 /// [`SolveError::Stopped`] when `stop` says so.
 pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<Sweep, SolveError> {
-    let loaded = LoadedDrive::new(drive, load)?;
+    swept(&LoadedDrive::new(drive, load)?, load, points, stop)
+}
+
+fn swept(loaded: &LoadedDrive<'_>, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<Sweep, SolveError> {
     if let Points::Samples(samples) = points
-        && let Some(sweep) = fast::sweep(&loaded, samples, load, stop)?
+        && let Some(sweep) = fast::sweep(loaded, samples, load, stop)?
     {
         return Ok(sweep);
     }
-    plain::sweep(&loaded, load, points, Looking::Fast, stop)
+    plain::sweep(loaded, load, points, Looking::Fast, stop)
 }
 
 /// The sweep of a drive of which single items deviate: by slot and lobe, over as many load periods as it takes until they meet again as they
@@ -54,9 +56,7 @@ pub fn sweep_with_deviations(
     if deviations.is_nil() && deviations.violations(drive.parameters()).is_empty() {
         return sweep(drive, load, points, stop);
     }
-    let shape = ToothContact::of(drive, load.parameters().carrier);
-    let loaded = LoadedDrive::with_deviations(drive, load, &shape, Some(deviations))?;
-    plain::sweep(&loaded, load, points, Looking::Fast, stop)
+    swept(&LoadedDrive::deviating(drive, load, deviations)?, load, points, stop)
 }
 
 /// What the sweep over one period comes to, without its states: the same peaks, in less time. That the period closes is not looked at. Where zones
@@ -83,4 +83,18 @@ pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) ->
 /// As [`sweep`].
 pub fn sweep_plain(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<Sweep, SolveError> {
     plain::sweep(&LoadedDrive::new(drive, load)?, load, points, Looking::Plain, stop)
+}
+
+/// The same of a drive of which single items deviate.
+///
+/// # Errors
+/// As [`sweep_with_deviations`].
+pub fn sweep_plain_with_deviations(
+    drive: &Drive,
+    load: &LoadCase,
+    deviations: &Deviations,
+    points: Points,
+    stop: &dyn Stop,
+) -> Result<Sweep, SolveError> {
+    plain::sweep(&LoadedDrive::deviating(drive, load, deviations)?, load, points, Looking::Plain, stop)
 }

@@ -7,7 +7,6 @@ use crate::gaps::Deviations;
 use crate::load_sharing::{LoadCase, LoadedDrive};
 use crate::position::{Position, half_lobe_rad};
 use crate::sweep::columns::{States, Sweep};
-use crate::tooth::ToothContact;
 use crate::{SolveError, Stop};
 
 /// `Δφ_0 = min θ_i` at each input angle of a sweep of this drive under this load with these deviations: the wind-up as the torque goes to
@@ -22,8 +21,7 @@ pub fn unloaded_wind_up_deg(
     sweep: &Sweep,
     stop: &dyn Stop,
 ) -> Result<Vec<f64>, SolveError> {
-    let shape = ToothContact::of(drive, load.parameters().carrier);
-    let loaded = LoadedDrive::with_deviations(drive, load, &shape, Some(deviations))?;
+    let loaded = LoadedDrive::deviating(drive, load, deviations)?;
     let states = &sweep.states;
     let (lobes, half_rad) = (drive.lobes(), half_lobe_rad(drive.lobes()));
     let closing_rad = |state: usize| {

@@ -73,6 +73,8 @@ pub(crate) enum ToothLaw {
     Linear { compliance_mm_per_n: PerContact<f64> },
     /// Palmgren's `δ = q F^0.9`, alike at all three.
     Palmgren { coefficient: f64 },
+    /// The same at wave generator and ring and, unless a flat lies there, at the carrier, and what gives way besides in proportion to the force.
+    PalmgrenAndLinear { coefficient: PerContact<f64>, compliance_mm_per_n: PerContact<f64> },
     /// Johnson's line, and what stands behind it.
     Johnson { law: PerContact<JohnsonLine>, series_compliance_mm_per_n: PerContact<f64> },
     /// Hertz's ellipses.
@@ -318,8 +320,7 @@ impl Contacts {
         self.hertz.get(contact)
     }
 
-    /// The law for whoever works in columns; none where laws of two kinds add up at a tooth. Of a flat that gives way by its own law there is only what
-    /// stands behind it.
+    /// The law for whoever works in columns; none where it has no columns. Of a flat that gives way by its own law there is only what stands behind it.
     pub(crate) fn tooth_law(&self) -> Option<ToothLaw> {
         let series = &self.series_compliance_mm_per_n;
         let is_alone = series.iter().all(|(_, &compliance)| compliance == 0.0);
@@ -345,6 +346,13 @@ impl Contacts {
             }
             (&Law::Power { coefficient, .. }, Law::Power { .. }, Law::Power { .. }) if is_alone => {
                 Some(ToothLaw::Palmgren { coefficient })
+            }
+            (&Law::Power { coefficient, .. }, Law::Power { .. }, carrier @ (Law::Power { .. } | Law::Flat)) => {
+                let at_carrier = if *carrier == Law::Flat { 0.0 } else { coefficient };
+                Some(ToothLaw::PalmgrenAndLinear {
+                    coefficient: PerContact { wave_generator: coefficient, ring: coefficient, carrier: at_carrier },
+                    compliance_mm_per_n: *series,
+                })
             }
             (&Law::Johnson(wave_generator), &Law::Johnson(ring), carrier @ (Law::Johnson(_) | Law::Flat)) => {
                 let carrier = if let Law::Johnson(line) = carrier { *line } else { JohnsonLine::NONE };

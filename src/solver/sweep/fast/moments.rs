@@ -5,13 +5,13 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use pulp::Simd;
 
 use super::lanes::LANES;
+use super::laps::{LapTeeth, Layout};
 use super::sinks::{AngleExtremes, PeakSink};
-use super::tile::{Tile, TileSize};
+use super::tile::{Tile, TileSize, whole};
 use super::{Kernel, Law, least};
 use crate::contact::Contact;
 use crate::load_sharing::LoadedDrive;
 use crate::mesh::Mesh;
-use crate::position::Position;
 use crate::sweep::columns::{TorqueBalance, TorqueCapacity};
 use crate::sweep::search::{LOADS, Look, Piece, Seen};
 use crate::{SolveError, Stop};
@@ -21,11 +21,14 @@ pub(super) struct FastLook<'a> {
     kernel: &'a Kernel,
     loaded: &'a LoadedDrive<'a>,
     stop: &'a dyn Stop,
+    /// That of the sweep.
     mesh: Mesh,
+    layout: Layout,
+    lap_teeth: LapTeeth,
     rows: usize,
     tile: Tile<'a>,
     balance: TorqueBalance,
-    /// Where the teeth of each piece stand that was looked at.
+    /// Where the teeth of each piece of a lap stand that was looked at.
     bases: Vec<Bases>,
     pub(super) torque_balance_residual: f64,
     pub(super) capacity: Option<TorqueCapacity>,
@@ -35,41 +38,59 @@ pub(super) struct FastLook<'a> {
 /// Where the teeth of a piece stand: those near a lobe at its end, all others at its start, so that nothing cancels near an axis.
 struct Bases {
     piece: Piece,
-    near_lobe: usize,
+    is_near_lobe: Vec<bool>,
+    last_place: usize,
     sin: Vec<f64>,
     cos: Vec<f64>,
-    /// How far the phase moves in a lap.
+    /// ψ, over the distance from one place to the next, where no part of a lap has passed.
+    place: Vec<f64>,
+    /// The distance of a place from the next, and how far the phase moves in a lap.
+    spacing_rad: f64,
     phase_rad: f64,
 }
 
 impl Bases {
-    fn new(mesh: &Mesh, piece: Piece) -> Self {
-        let is_near_lobe = |position: &Position| position.phase_sin < position.phase_cos;
-        let at_start = |place| piece.position(mesh, place, piece.start);
-        let near_lobe = (1..=piece.places).take_while(|&place| is_near_lobe(&at_start(place))).count();
-        let positions = (1..=piece.places).zip(0..).map(|(place, index)| {
-            if index < near_lobe { piece.position(mesh, place, piece.end) } else { at_start(place) }
-        });
-        let (sin, cos) = positions.map(|position| (position.phase_sin, position.phase_cos)).unzip();
-        let phase_rad = 0.5 * f64::from(mesh.lobe_count()) * mesh.spacing_deg().to_radians();
-        Self { piece, near_lobe, sin, cos, phase_rad }
+    fn new(mesh: &Mesh, layout: Layout, piece: Piece) -> Self {
+        let places = whole(piece.places);
+        let teeth = layout.at_each_place * places;
+        let (mut sin, mut cos) = (vec![0.0; teeth], vec![0.0; teeth]);
+        let (mut place_of, mut is_near_lobe) = (vec![0.0; teeth], vec![false; teeth]);
+        for place in 1..=piece.places {
+            let at_start = piece.position(mesh, place, piece.start);
+            let is_near = at_start.phase_sin < at_start.phase_cos;
+            let base = if is_near { piece.position(mesh, place, piece.end) } else { at_start };
+            for at in (layout.index(whole(place), places)..teeth).step_by(places) {
+                (sin[at], cos[at]) = (base.phase_sin, base.phase_cos);
+                (place_of[at], is_near_lobe[at]) = (place as f64, is_near);
+            }
+        }
+        let spacing_rad = mesh.spacing_deg().to_radians();
+        let phase_rad = 0.5 * f64::from(mesh.lobe_count()) * spacing_rad;
+        let last_place = layout.index(places, places);
+        Self { piece, is_near_lobe, last_place, sin, cos, place: place_of, spacing_rad, phase_rad }
     }
 
     /// Positions of all teeth at some moments, by moment and then tooth.
     #[inline(always)]
     fn place(&self, fractions: &[f64], tile: &mut Tile<'_>) {
-        let (teeth, near) = (self.sin.len(), self.near_lobe);
+        let teeth = self.sin.len();
         tile.count = fractions.len() * teeth;
+        tile.last_place = self.last_place;
         for (row, fraction) in fractions.iter().enumerate() {
             let (back_sin, back_cos) = ((self.piece.end - fraction) * self.phase_rad).sin_cos();
             let (on_sin, on_cos) = ((fraction - self.piece.start) * self.phase_rad).sin_cos();
             let at = row * teeth..(row + 1) * teeth;
-            let (sin, cos) = (&mut tile.sin[at.clone()], &mut tile.cos[at]);
+            let (sin, cos) = (&mut tile.sin[at.clone()], &mut tile.cos[at.clone()]);
             for i in 0..teeth {
-                let (turn_sin, turn_cos) = if i < near { (back_sin, back_cos) } else { (-on_sin, on_cos) };
+                let (turn_sin, turn_cos) = if self.is_near_lobe[i] { (back_sin, back_cos) } else { (-on_sin, on_cos) };
                 // What rounding puts beyond an axis stands on it.
                 sin[i] = (self.sin[i] * turn_cos + self.cos[i] * turn_sin).max(0.0);
                 cos[i] = (self.cos[i] * turn_cos - self.sin[i] * turn_sin).max(0.0);
+            }
+            if !tile.gaps.from_lobe_rad.is_empty() {
+                for (from_lobe_rad, place) in tile.gaps.from_lobe_rad[at].iter_mut().zip(&self.place) {
+                    *from_lobe_rad = (place - fraction) * self.spacing_rad;
+                }
             }
         }
         let rest = tile.count..tile.count.next_multiple_of(LANES);
@@ -79,10 +100,11 @@ impl Bases {
 }
 
 impl<'a> FastLook<'a> {
-    /// In an arena of the size's doubles.
+    /// In an arena of the size's doubles. The drive is loaded over one zone, as which the mesh is looked at.
     pub(super) fn new(
         kernel: &'a Kernel,
         loaded: &'a LoadedDrive<'a>,
+        (mesh, layout): (Mesh, Layout),
         size: &TileSize,
         arena: &'a mut [f64],
         stop: &'a dyn Stop,
@@ -91,7 +113,9 @@ impl<'a> FastLook<'a> {
             kernel,
             loaded,
             stop,
-            mesh: *loaded.mesh(),
+            mesh,
+            layout,
+            lap_teeth: LapTeeth::default(),
             rows: size.rows(),
             tile: Tile::new(arena, size, 0.0, kernel.pressures.stress_exponents()),
             balance: TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm()),
@@ -107,10 +131,13 @@ impl<'a> FastLook<'a> {
     fn work_out<V: Simd>(&mut self, bases: usize, fractions: &[f64], seen: &mut Seen) -> bool {
         let (kernel, loaded, tile) = (self.kernel, self.loaded, &mut self.tile);
         self.bases[bases].place(fractions, tile);
-        if !kernel.unit_loads::<V, PeakSink>(tile) {
+        let teeth = seen.teeth;
+        if !kernel.unit_loads::<V, PeakSink>(tile)
+            || !kernel.prepare::<V>(loaded, teeth, tile)
+            || !kernel.close(&self.mesh, &self.lap_teeth, teeth, tile)
+        {
             return false;
         }
-        let teeth = seen.teeth;
         let limit = kernel.loads::<V>(loaded, teeth, tile, |sharing, work| {
             if sharing.has_gaps() {
                 (0..fractions.len()).for_each(|row| seen.push_pressed(work.pressed_rad(row, teeth)));
@@ -173,14 +200,19 @@ impl Look for FastLook<'_> {
     }
 
     fn teeth_at_each_place(&self) -> u64 {
-        1
+        self.layout.at_each_place as u64
     }
 
     fn look(&mut self, fractions: &[f64], seen: &mut Seen) -> Result<bool, SolveError> {
-        let bases = self.bases.iter().position(|bases| bases.piece == seen.piece).unwrap_or_else(|| {
-            self.bases.push(Bases::new(&self.mesh, seen.piece));
+        // Teeth stand alike in every lap.
+        let piece = Piece { lap: 0, ..seen.piece };
+        let bases = self.bases.iter().position(|bases| bases.piece == piece).unwrap_or_else(|| {
+            self.bases.push(Bases::new(&self.mesh, self.layout, piece));
             self.bases.len() - 1
         });
+        if self.kernel.tells_items_apart() {
+            self.lap_teeth.list(&self.mesh, self.layout, whole(seen.piece.places), seen.piece.lap);
+        }
         for fractions in fractions.chunks(self.rows) {
             if self.stop.stopped() {
                 return Err(SolveError::Stopped);

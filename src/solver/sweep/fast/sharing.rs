@@ -38,6 +38,8 @@ pub(super) struct Teeth<'a> {
     pub(super) rows: usize,
     /// States, with those that fill the last stretch.
     pub(super) len: usize,
+    /// `d`.
+    pub(super) center_radius_mm: &'a [f64],
     /// `|h'|`.
     pub(super) arm: &'a [f64],
     /// `F_K/F_H`.
@@ -78,12 +80,12 @@ pub(super) struct Shared<'a> {
 pub(super) struct Work<'a> {
     /// What the place of each tooth decides of its law: c of balls, the compliance of a flat.
     pub(super) given: &'a mut [f64],
-    /// Of a power law the force at the rotation 1; of Johnson's `A`.
+    /// Of a power law the force at the rotation 1; of Johnson's `A`, of a power beside a linear part this part.
     unit: &'a mut [f64],
-    /// `B` of Johnson's law.
+    /// `B` of Johnson's law, the power's coefficient.
     growth: &'a mut [f64],
     /// Rotation at which the gaps of a tooth are closed.
-    closing: &'a mut [f64],
+    pub(super) closing: &'a mut [f64],
     /// Rotation beyond that; nothing or less where a gap is open.
     pressed: &'a mut [f64],
     /// `dF_H/dΔφ` of the tangent.
@@ -154,15 +156,15 @@ impl<'a> Work<'a> {
 /// What an approach at each contact adds along `F_H` ([`Compatibility`]): 1 at the wave generator, `along_ring (F_K/F_H)^±1` at the ring,
 /// `carrier F_S/F_H` at the carrier.
 #[derive(Clone, Copy)]
-struct Weights {
-    ring_exponent: f64,
+pub(super) struct Weights {
+    pub(super) ring_exponent: f64,
     /// `along_ring = 1 - this (F_S/F_H)²`.
-    ring_decline: f64,
-    carrier: f64,
+    pub(super) ring_decline: f64,
+    pub(super) carrier: f64,
 }
 
 impl Weights {
-    fn new(loaded: &LoadedDrive<'_>) -> Self {
+    pub(super) fn new(loaded: &LoadedDrive<'_>) -> Self {
         match loaded.compatibility() {
             Compatibility::VirtualWork => Self { ring_exponent: 1.0, ring_decline: 0.0, carrier: 1.0 },
             // cos(γ + sβ) and s sin γ, with sin γ = F_S/F_H over Z_G/U.
@@ -172,32 +174,6 @@ impl Weights {
                 let ring_decline = (1.0 + s * drive.flank().teeth_per_wave()) / (ratio * ratio);
                 Self { ring_exponent: -1.0, ring_decline, carrier: s / ratio }
             }
-        }
-    }
-}
-
-/// Gaps that are the same at all teeth.
-#[derive(Clone, Copy)]
-struct Gaps {
-    gap_mm: PerContact<f64>,
-    weights: Weights,
-}
-
-impl Gaps {
-    /// `g/|h'|`, without end where there is no arm.
-    #[inline(always)]
-    fn close(&self, teeth: &Teeth<'_>, closing: &mut [f64]) {
-        let len = teeth.len;
-        let closing = &mut closing[..len];
-        let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
-        let Self { gap_mm, weights } = self;
-        for i in 0..len {
-            let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
-            let ring = if weights.ring_exponent > 0.0 { ring[i] } else { 1.0 / ring[i] };
-            let carrier = weights.carrier * carrier[i];
-            let gap = gap_mm.wave_generator + gap_mm.ring * (along * ring) + gap_mm.carrier * carrier;
-            let gap = if gap > 0.0 { gap } else { 0.0 };
-            closing[i] = if arm[i] > 0.0 { gap / arm[i] } else { f64::INFINITY };
         }
     }
 }
@@ -346,7 +322,7 @@ fn least_torque(
 /// `ξ = c F^p`.
 pub(super) struct PowerLaw<P> {
     power: P,
-    gaps: Option<Gaps>,
+    has_gaps: bool,
 }
 
 /// What a power law does to a column.
@@ -506,8 +482,81 @@ impl Power for Hertz {
     }
 }
 
+/// A law that neither the forces nor the rotation follow from without the other.
+pub(super) struct NoPowerLaw<L> {
+    law: L,
+    has_gaps: bool,
+}
+
+/// What such a law does to a column, from two coefficients of each tooth.
+pub(super) trait TwoParts {
+    /// `-F d²ξ/dF²` over `ξ/F - dξ/dF`.
+    const BEND: f64;
+
+    /// The coefficients of each tooth, forces counted in `typical_n`, and the logarithm of the force at which the law has no meaning any more.
+    fn coefficients<V: Simd>(&self, typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>);
+
+    /// `dξ/dF` where the law has a meaning, and `ξ/F - dξ/dF`.
+    fn slope_and_rest<V: Simd>(a: f64, b: f64, force: f64) -> [f64; 2];
+
+    /// About `ξ/F`.
+    fn over_force_roughly<V: Simd>(a: f64, b: f64, force: f64) -> f64;
+
+    /// `ln F`, if the law ends somewhere.
+    fn ln_of<V: Simd>(force: f64) -> f64;
+}
+
+/// `ξ = c F^0.9 + e F`: Palmgren's law beside what gives way in proportion to the force.
+pub(super) struct PalmgrenAndLinear {
+    coefficient: PerContact<f64>,
+    compliance: PerContact<f64>,
+    weights: Weights,
+}
+
+impl TwoParts for PalmgrenAndLinear {
+    const BEND: f64 = PALMGREN_EXPONENT;
+
+    /// `e` and `c`.
+    #[inline(always)]
+    fn coefficients<V: Simd>(&self, typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) {
+        let len = teeth.len;
+        let (ring, carrier) = (&teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
+        let given = &work.given[..len];
+        let (e, c, reach) = (&mut work.unit[..len], &mut work.growth[..len], &mut work.reach[..len]);
+        let Self { coefficient, compliance, weights } = self;
+        let typical = typical_n * inverse_tenth_root::<V>(typical_n);
+        for i in 0..len {
+            let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
+            let squared = if weights.ring_exponent > 0.0 { ring[i] * ring[i] } else { 1.0 };
+            let (at_ring, at_carrier) = (along * squared, weights.carrier * (carrier[i] * carrier[i]));
+            let of_ring = coefficient.ring * at_ring * inverse_tenth_root::<V>(ring[i]);
+            let of_carrier = coefficient.carrier * at_carrier * inverse_tenth_root::<V>(positive(carrier[i]));
+            c[i] = typical * (coefficient.wave_generator + of_ring + of_carrier);
+            let of_carrier = at_carrier * (compliance.carrier + given[i]);
+            e[i] = typical_n * (compliance.wave_generator + at_ring * compliance.ring + of_carrier);
+            reach[i] = f64::INFINITY;
+        }
+    }
+
+    #[inline(always)]
+    fn slope_and_rest<V: Simd>(e: f64, c: f64, force: f64) -> [f64; 2] {
+        let power = c * inverse_tenth_root::<V>(force);
+        [e + PALMGREN_EXPONENT * power, (1.0 - PALMGREN_EXPONENT) * power]
+    }
+
+    #[inline(always)]
+    fn over_force_roughly<V: Simd>(e: f64, c: f64, force: f64) -> f64 {
+        e + c * inverse_tenth_root::<V>(force)
+    }
+
+    #[inline(always)]
+    fn ln_of<V: Simd>(_: f64) -> f64 {
+        0.0
+    }
+}
+
 /// `ξ = F (A - B ln F)`, Johnson's, with virtual work.
-pub(super) struct LogarithmicLaw {
+pub(super) struct Logarithm {
     /// `A` of each contact, what stands behind it included.
     compliance: PerContact<f64>,
     /// `B` of each contact.
@@ -515,7 +564,6 @@ pub(super) struct LogarithmicLaw {
     /// Force under which half a contact's width is the length that its law counts from: over the square of the stress under 1 N at wave generator and
     /// ring, where the ratio of forces is to be counted in still; by itself at the carrier.
     reference: PerContact<f64>,
-    gaps: Option<Gaps>,
 }
 
 /// How unit loads become loads.
@@ -523,24 +571,27 @@ pub(super) enum Sharing {
     Linear(PowerLaw<Linear>),
     Palmgren(PowerLaw<Palmgren>),
     Hertz(PowerLaw<Hertz>),
-    Logarithmic(LogarithmicLaw),
+    PalmgrenAndLinear(NoPowerLaw<PalmgrenAndLinear>),
+    Logarithmic(NoPowerLaw<Logarithm>),
 }
 
 impl Sharing {
-    /// Of a drive under a load; nothing where its law or its gaps are other ones.
+    /// Of a drive under a load; nothing where its law is another one.
     pub(super) fn new(loaded: &LoadedDrive<'_>) -> Option<Self> {
         let weights = Weights::new(loaded);
-        let gap_mm = *loaded.uniform_gap_mm()?;
-        let has_gaps = gap_mm.iter().any(|(_, &gap_mm)| gap_mm > 0.0);
-        let gaps = has_gaps.then_some(Gaps { gap_mm, weights });
+        let has_gaps = !loaded.gaps().is_nil();
         Some(match loaded.tooth_law()? {
             ToothLaw::Linear { compliance_mm_per_n } => {
-                Self::Linear(PowerLaw { power: Linear { compliance_mm_per_n, weights }, gaps })
+                Self::Linear(PowerLaw { power: Linear { compliance_mm_per_n, weights }, has_gaps })
             }
             ToothLaw::Palmgren { coefficient } => {
-                Self::Palmgren(PowerLaw { power: Palmgren { coefficient, weights }, gaps })
+                Self::Palmgren(PowerLaw { power: Palmgren { coefficient, weights }, has_gaps })
             }
-            ToothLaw::Hertz => Self::Hertz(PowerLaw { power: Hertz, gaps }),
+            ToothLaw::PalmgrenAndLinear { coefficient, compliance_mm_per_n: compliance } => {
+                let law = PalmgrenAndLinear { coefficient, compliance, weights };
+                Self::PalmgrenAndLinear(NoPowerLaw { law, has_gaps })
+            }
+            ToothLaw::Hertz => Self::Hertz(PowerLaw { power: Hertz, has_gaps }),
             ToothLaw::Johnson { law, series_compliance_mm_per_n: series } => {
                 let tooth_radius_mm = loaded.drive().parameters().tooth_radius_mm;
                 let reference = |contact| {
@@ -555,17 +606,29 @@ impl Sharing {
                         Contact::Carrier => NEVER_TOO_WIDE_N,
                     }
                 };
-                Self::Logarithmic(LogarithmicLaw {
+                let law = Logarithm {
                     compliance: PerContact::of(|contact| law.get(contact).compliance_mm_per_n + series.get(contact)),
                     growth: PerContact::of(|contact| law.get(contact).growth_mm_per_n),
                     reference: PerContact::of(reference),
-                    gaps,
-                })
+                };
+                Self::Logarithmic(NoPowerLaw { law, has_gaps })
             }
         })
     }
 
-    /// Forces that make a torque together, that of one zone; false where they are not found, or where the law ends.
+    /// What the places of a tile decide of the law, whatever the gaps.
+    #[inline(always)]
+    pub(super) fn prepare<V: Simd>(&self, torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) {
+        match self {
+            Self::Linear(law) => law.power.units::<V>(teeth, work.given, work.unit),
+            Self::Palmgren(law) => law.power.units::<V>(teeth, work.given, work.unit),
+            Self::Hertz(law) => law.power.units::<V>(teeth, work.given, work.unit),
+            Self::PalmgrenAndLinear(law) => law.prepare::<V>(torque_nmm, teeth, work),
+            Self::Logarithmic(law) => law.prepare::<V>(torque_nmm, teeth, work),
+        }
+    }
+
+    /// Forces that make a torque together, that of one zone, beyond the gaps of which the closing angles stand in `work`; false where they are not found, or where the law ends.
     #[inline(always)]
     pub(super) fn share<V: Simd>(
         &self,
@@ -578,10 +641,8 @@ impl Sharing {
             Self::Linear(law) => law.share::<V>(torque_nmm, teeth, work, shared),
             Self::Palmgren(law) => law.share::<V>(torque_nmm, teeth, work, shared),
             Self::Hertz(law) => law.share::<V>(torque_nmm, teeth, work, shared),
-            Self::Logarithmic(law @ LogarithmicLaw { gaps: None, .. }) => {
-                law.share::<V, false>(torque_nmm, teeth, work, shared)
-            }
-            Self::Logarithmic(law) => law.share::<V, true>(torque_nmm, teeth, work, shared),
+            Self::PalmgrenAndLinear(law) => law.share::<V>(torque_nmm, teeth, work, shared),
+            Self::Logarithmic(law) => law.share::<V>(torque_nmm, teeth, work, shared),
         }
     }
 }
@@ -590,10 +651,11 @@ impl Sharing {
     /// Whether teeth begin and cease to carry between their entry and their exit.
     pub(super) const fn has_gaps(&self) -> bool {
         match self {
-            Self::Linear(law) => law.gaps.is_some(),
-            Self::Palmgren(law) => law.gaps.is_some(),
-            Self::Hertz(law) => law.gaps.is_some(),
-            Self::Logarithmic(law) => law.gaps.is_some(),
+            Self::Linear(law) => law.has_gaps,
+            Self::Palmgren(law) => law.has_gaps,
+            Self::Hertz(law) => law.has_gaps,
+            Self::PalmgrenAndLinear(law) => law.has_gaps,
+            Self::Logarithmic(law) => law.has_gaps,
         }
     }
 
@@ -604,7 +666,7 @@ impl Sharing {
 
     /// Whether all loads are in proportion, whatever the torque.
     pub(super) const fn is_in_proportion(&self) -> bool {
-        !matches!(self, Self::Logarithmic(_)) && !self.has_gaps()
+        !matches!(self, Self::PalmgrenAndLinear(_) | Self::Logarithmic(_)) && !self.has_gaps()
     }
 
     /// The least torque of the tile, of one zone, under which a contact reaches a stress, once the load is shared; nothing where it is not found, or
@@ -620,6 +682,7 @@ impl Sharing {
             Self::Linear(law) => law.limit::<V>(per_allowable, teeth, work),
             Self::Palmgren(law) => law.limit::<V>(per_allowable, teeth, work),
             Self::Hertz(law) => law.limit::<V>(per_allowable, teeth, work),
+            Self::PalmgrenAndLinear(law) => law.limit::<V>(per_allowable, teeth, work),
             Self::Logarithmic(law) => law.limit::<V>(per_allowable, teeth, work),
         }
     }
@@ -654,20 +717,13 @@ impl<P: Power> PowerLaw<P> {
 
     #[inline(always)]
     fn share<V: Simd>(&self, torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
-        self.power.units::<V>(teeth, work.given, work.unit);
-        match &self.gaps {
-            None => {
-                self.share_in_proportion::<V>(torque_nmm, teeth, work, shared);
-                true
-            }
-            Some(gaps) => {
-                gaps.close(teeth, work.closing);
-                if P::IS_LINEAR {
-                    share_linearly(torque_nmm, teeth, work, shared)
-                } else {
-                    self.share_beyond_gaps::<V>(torque_nmm, teeth, work, shared)
-                }
-            }
+        if !self.has_gaps {
+            self.share_in_proportion::<V>(torque_nmm, teeth, work, shared);
+            true
+        } else if P::IS_LINEAR {
+            share_linearly(torque_nmm, teeth, work, shared)
+        } else {
+            self.share_beyond_gaps::<V>(torque_nmm, teeth, work, shared)
         }
     }
 
@@ -828,8 +884,10 @@ fn least_margin() -> f64 {
     1e-6 - 2.0 * WIDEST_SHARE.ln()
 }
 
-impl LogarithmicLaw {
-    /// `A`, `B` and the reach of each tooth, forces counted in `typical_n`.
+impl TwoParts for Logarithm {
+    const BEND: f64 = 1.0;
+
+    /// `A` and `B`.
     #[inline(always)]
     fn coefficients<V: Simd>(&self, typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) {
         let len = teeth.len;
@@ -857,16 +915,56 @@ impl LogarithmicLaw {
         }
     }
 
+    /// Where the law has a meaning its slope is more than a fifth of `B`.
+    #[inline(always)]
+    fn slope_and_rest<V: Simd>(a: f64, b: f64, force: f64) -> [f64; 2] {
+        let (beyond, least) = (a - b * ln::<V>(force) - b, 0.2 * b);
+        [if beyond > least { beyond } else { least }, b]
+    }
+
+    #[inline(always)]
+    fn over_force_roughly<V: Simd>(a: f64, b: f64, force: f64) -> f64 {
+        let (over_force, least) = (a - b * ln_roughly(force), 0.5 * b);
+        if over_force > least { over_force } else { least }
+    }
+
+    #[inline(always)]
+    fn ln_of<V: Simd>(force: f64) -> f64 {
+        ln::<V>(force)
+    }
+}
+
+impl<L: TwoParts> NoPowerLaw<L> {
+    /// The coefficients of each tooth, forces counted in one near to them all, so that no logarithm is large.
+    #[inline(always)]
+    fn prepare<V: Simd>(&self, torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) {
+        work.typical_n = torque_nmm / teeth.arm[..teeth.count].iter().sum::<f64>();
+        self.law.coefficients::<V>(work.typical_n, teeth, work);
+    }
+
+    #[inline(always)]
+    fn share<V: Simd>(&self, torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
+        if self.has_gaps {
+            Self::share_with::<V, true>(torque_nmm, teeth, work, shared)
+        } else {
+            Self::share_with::<V, false>(torque_nmm, teeth, work, shared)
+        }
+    }
+
     /// A force near the true one for each tooth, and the rotation that goes with them.
     #[inline(always)]
-    fn start<const GAPS: bool>(torque: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) -> bool {
+    fn start<V: Simd, const GAPS: bool>(
+        torque: f64,
+        teeth: &Teeth<'_>,
+        work: &mut Work<'_>,
+        force: &mut [f64],
+    ) -> bool {
         let (count, len) = (teeth.count, teeth.len);
         let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len]);
         // As if all forces were the typical one.
         let secant = &mut work.secant[..len];
         for i in 0..len {
-            let least = 0.5 * b[i];
-            secant[i] = arm[i] / if a[i] > least { a[i] } else { least };
+            secant[i] = arm[i] / L::over_force_roughly::<V>(a[i], b[i], 1.0);
         }
         for row in 0..teeth.rows {
             let at = row * count..(row + 1) * count;
@@ -884,13 +982,13 @@ impl LogarithmicLaw {
             };
         }
         press::<GAPS>(teeth, work);
-        Self::guess(teeth, work, force);
+        Self::guess::<V>(teeth, work, force);
         true
     }
 
     /// The forces near those that the teeth are pressed by.
     #[inline(always)]
-    fn guess(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) {
+    fn guess<V: Simd>(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) {
         let len = teeth.len;
         let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len]);
         let pressed = &work.pressed[..len];
@@ -898,11 +996,8 @@ impl LogarithmicLaw {
         for i in 0..len {
             // Of a tooth that is open as if it were not: it may turn out to carry.
             let pressed = if pressed[i] > 0.0 { pressed[i] } else { excess[i] };
-            let least = 0.5 * b[i];
-            let first = pressed * arm[i] / if a[i] > least { a[i] } else { least };
-            let first = if first > NOTHING { first } else { NOTHING };
-            let approach = a[i] - b[i] * ln_roughly(first);
-            let second = pressed * arm[i] / if approach > least { approach } else { least };
+            let first = pressed * arm[i] / L::over_force_roughly::<V>(a[i], b[i], 1.0);
+            let second = pressed * arm[i] / L::over_force_roughly::<V>(a[i], b[i], positive(first));
             force[i] = if second > NOTHING { second } else { NOTHING };
         }
     }
@@ -912,7 +1007,7 @@ impl LogarithmicLaw {
     fn limit<V: Simd>(&self, per_allowable: &PerContact<f64>, teeth: &Teeth<'_>, work: &mut Work<'_>) -> Option<Limit> {
         let len = teeth.len;
         let typical_n = work.typical_n;
-        if self.gaps.is_none() {
+        if !self.has_gaps {
             work.closing[..len].fill(0.0);
         }
         // Lent out: a tile that ends here goes the plain way, and takes the sweep with it.
@@ -925,17 +1020,17 @@ impl LogarithmicLaw {
             let least_margin = least_margin();
             for i in 0..len {
                 let force = force[i] * per_typical;
-                let ln = ln::<V>(force);
-                let approach = force * (a[i] - b[i] * ln);
+                let [slope, rest] = L::slope_and_rest::<V>(a[i], b[i], force);
+                let approach = force * (slope + rest);
                 // A tooth on which the law ends before is not the first to reach the stress, or it is seen below that the law has ended.
-                let is_within = arm[i] > 0.0 && reach[i] - ln > least_margin;
+                let is_within = arm[i] > 0.0 && reach[i] - L::ln_of::<V>(force) > least_margin;
                 pressed[i] = if is_within { approach / arm[i] } else { f64::INFINITY };
             }
         }
         if !turn_to_limit(teeth, work) {
             return None;
         }
-        Self::guess(teeth, work, limit);
+        Self::guess::<V>(teeth, work, limit);
         let mut is_done = false;
         for _ in 0..MAX_ROUNDS {
             Self::tangents::<V, true>(teeth, work, limit);
@@ -951,25 +1046,17 @@ impl LogarithmicLaw {
     }
 
     /// Newton's method for all forces and the rotations together: each force follows the tangent of its law, and the rotation is the one at which the
-    /// tangents make the torque. A round costs one logarithm a state.
+    /// tangents make the torque. A round costs one logarithm or root a state.
     #[inline(always)]
-    fn share<V: Simd, const GAPS: bool>(
-        &self,
+    fn share_with<V: Simd, const GAPS: bool>(
         torque_nmm: f64,
         teeth: &Teeth<'_>,
         work: &mut Work<'_>,
         shared: &mut Shared<'_>,
     ) -> bool {
-        let count = teeth.count;
-        // Forces are counted in one near to them all, so that no logarithm is large.
-        let typical_n = torque_nmm / teeth.arm[..count].iter().sum::<f64>();
-        work.typical_n = typical_n;
+        let (count, typical_n) = (teeth.count, work.typical_n);
         let torque = torque_nmm / typical_n;
-        self.coefficients::<V>(typical_n, teeth, work);
-        if let Some(gaps) = &self.gaps {
-            gaps.close(teeth, work.closing);
-        }
-        if !Self::start::<GAPS>(torque, teeth, work, shared.force) {
+        if !Self::start::<V, GAPS>(torque, teeth, work, shared.force) {
             return false;
         }
         for _ in 0..MAX_ROUNDS {
@@ -1018,19 +1105,15 @@ impl LogarithmicLaw {
         let (slope, offset) = (&mut work.slope[..len], &mut work.offset[..len]);
         let (secant, margin) = (&mut work.secant[..len], &mut work.margin[..len]);
         for i in 0..len {
-            let ln = ln::<V>(force[i]);
-            let at_force = a[i] - b[i] * ln;
-            // Where the law has a meaning its slope is more than this.
-            let (beyond, least) = (at_force - b[i], 0.2 * b[i]);
-            let beyond = if beyond > least { beyond } else { least };
-            let at_force = beyond + b[i];
+            let [beyond, rest] = L::slope_and_rest::<V>(a[i], b[i], force[i]);
+            let at_force = beyond + rest;
             let both = 1.0 / (at_force * beyond);
             let per_slope = both * at_force;
             let is_pressed = !GAPS || pressed[i] > 0.0;
             slope[i] = if is_pressed { arm[i] * per_slope } else { 0.0 };
-            offset[i] = if is_pressed { -(b[i] * force[i]) * per_slope } else { 0.0 };
+            offset[i] = if is_pressed { -(rest * force[i]) * per_slope } else { 0.0 };
             secant[i] = both * beyond;
-            margin[i] = reach[i] - ln;
+            margin[i] = reach[i] - L::ln_of::<V>(force[i]);
         }
     }
 
@@ -1075,7 +1158,7 @@ impl LogarithmicLaw {
         for row in 0..teeth.rows {
             let mut stiffness = 0.0;
             for i in row * count..(row + 1) * count {
-                stiffness += arm[i] * slope[i] * (1.0 - change[i]);
+                stiffness += arm[i] * slope[i] * (1.0 - L::BEND * change[i]);
             }
             shared.rotation_rad[row] = work.row_last[row] + work.row_excess[row];
             shared.stiffness[row] = typical_n * stiffness;

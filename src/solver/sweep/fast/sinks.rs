@@ -1,12 +1,14 @@
 //! What becomes of a tile: columns of all its states, or their peaks alone.
 
 use std::iter::zip;
+use std::ops::Range;
 
 use super::lanes::{largest, repeat_each};
+use super::laps::{LapTeeth, Laps, Listed, Stretch};
 use super::tile::{Tile, whole};
 use crate::contact::{Contact, PerContact};
 use crate::drive::Drive;
-use crate::mesh::{Mesh, Samples, TeethInMesh};
+use crate::mesh::{Place, TeethInMesh};
 use crate::sweep::columns::{
     Columns, ContactPeaks, Extremes, InputAngles, Peak, PeakAt, States, SweepPeaks, TorqueCapacity,
 };
@@ -16,30 +18,33 @@ pub(super) trait Sink {
     /// Whether it takes more of a state than its loads.
     const COLUMNS: bool;
 
-    /// A tile with so many teeth at each input angle.
-    fn take(&mut self, drive: &Drive, tile: &mut Tile<'_>, teeth: usize);
+    /// A tile with so many teeth at each input angle, of which the first is that of a sample; where the teeth of all zones are listed, with those of its lap.
+    fn take(&mut self, drive: &Drive, tile: &mut Tile<'_>, teeth: usize, sample: u64, listed: &LapTeeth);
 }
 
 /// All columns.
-pub(super) struct ColumnSink {
+pub(super) struct ColumnSink<'a> {
+    laps: &'a Laps,
     states: States,
     input_angles: InputAngles,
     /// Of force and stress.
     peaks: PerContact<[RunningPeak; 2]>,
 }
 
-impl ColumnSink {
-    pub(super) fn new(mesh: &Mesh, samples: Samples) -> Self {
-        Self {
-            states: States::with_capacity(whole(mesh.state_count(samples))),
-            input_angles: InputAngles::with_capacity(whole(samples.count() + 1)),
-            peaks: PerContact::default(),
-        }
+impl<'a> ColumnSink<'a> {
+    pub(super) fn new(laps: &'a Laps) -> Self {
+        let (states, samples) = (laps.state_count(), laps.sample_count());
+        let (states, input_angles) = if laps.are_listed() {
+            (States::of_zeros(states), InputAngles::of_zeros(samples))
+        } else {
+            (States::with_capacity(states), InputAngles::with_capacity(samples))
+        };
+        Self { laps, states, input_angles, peaks: PerContact::default() }
     }
 
-    /// The columns, with the last input angle, which repeats the first, every tooth one further.
-    pub(super) fn columns(self, mesh: &Mesh, samples: Samples, torque_balance_residual: f64) -> Columns {
-        let Self { mut states, mut input_angles, peaks } = self;
+    /// The columns; where one zone stands for all with the last input angle, which repeats the first, every tooth one further.
+    pub(super) fn columns(self, torque_balance_residual: f64) -> Columns {
+        let Self { laps, mut states, mut input_angles, peaks } = self;
         let peaks = PerContact::of(|contact| {
             let [force, stress] = peaks.get(contact);
             PeakAt {
@@ -47,18 +52,116 @@ impl ColumnSink {
                 stress: stress.find(states.stress_mpa.get(contact)),
             }
         });
-        let end_deg = mesh.input_angle_deg(samples.count(), samples);
-        states.repeat_first(mesh.teeth_at(0, samples).count(), end_deg);
-        input_angles.repeat_first(end_deg);
+        if !laps.are_listed() {
+            let end_deg = laps.input_angle_deg(laps.of_lap.count());
+            states.repeat_first(laps.mesh().teeth_at(0, laps.of_lap).count(), end_deg);
+            input_angles.repeat_first(end_deg);
+        }
         Columns { states, input_angles, peaks, torque_balance_residual }
+    }
+
+    /// Puts the teeth of all zones where they are listed.
+    #[inline(always)]
+    fn list(&mut self, drive: &Drive, tile: &Tile<'_>, teeth: usize, sample: u64, lap: &LapTeeth) {
+        let Self { laps, states, input_angles, peaks } = self;
+        let rows = tile.count / teeth;
+        let listed = lap.listed.iter().map(Listed::count).sum::<usize>();
+        let of_rows = whole(sample)..whole(sample) + rows;
+        input_angles.input_angle_deg[of_rows.clone()].copy_from_slice(&tile.row_input_angle_deg[..rows]);
+        for (row, at) in of_rows.enumerate() {
+            input_angles.wind_up_deg[at] = tile.row_rotation_rad[row].to_degrees();
+            let stiffness = InputAngles::of_output(drive, tile.row_stiffness[row]);
+            input_angles.torsional_stiffness_nm_per_rad[at] = stiffness;
+            // One that stands for all that carry alike is listed as often.
+            let loaded = tile.row_loaded[row] * listed / teeth;
+            input_angles.loaded_teeth[at] = u32::try_from(loaded).unwrap_or(u32::MAX);
+        }
+        let start = laps.states_before(sample);
+        let all = start..start + rows * listed;
+        repeat_rows(&tile.row_input_angle_deg[..rows], listed, &mut states.input_angle_deg[all.clone()]);
+        let mut at = start;
+        for run in &lap.listed {
+            let Place { slot, lobe, .. } = run.place(laps.mesh(), 0);
+            let of_run = at..at + run.count();
+            let numbers = u32::try_from(slot).unwrap_or(u32::MAX)..;
+            states.tooth[of_run.clone()].iter_mut().zip(numbers).for_each(|(tooth, number)| *tooth = number);
+            states.lobe[of_run.clone()].fill(u32::try_from(lobe).unwrap_or(u32::MAX));
+            at = of_run.end;
+        }
+        for row in all.clone().step_by(listed).skip(1) {
+            states.tooth.copy_within(start..start + listed, row);
+            states.lobe.copy_within(start..start + listed, row);
+        }
+        for (column, of_tile) in [
+            (&mut states.position_deg, &tile.position_deg),
+            (&mut states.center_radius_mm, &tile.center_radius_mm),
+            (&mut states.wave_generator_angle_deg, &tile.wave_generator_angle_deg),
+            (&mut states.ring_angle_deg, &tile.ring_angle_deg),
+        ] {
+            for_each_stretch(&mut column[all.clone()], listed, teeth, lap, |column, at| {
+                column.copy_from_slice(&of_tile[at]);
+            });
+        }
+        for contact in CONTACTS {
+            let [force, stress] = peaks.get_mut(contact);
+            for (column, unit, factor, peak) in [
+                (states.force_n.get_mut(contact), tile.force.get(contact), &*tile.scale, force),
+                (states.stress_mpa.get_mut(contact), tile.stress.get(contact), tile.stress_scale(contact), stress),
+            ] {
+                for_each_stretch(&mut column[all.clone()], listed, teeth, lap, |column, at| {
+                    for (value, (unit, factor)) in column.iter_mut().zip(zip(&unit[at.clone()], &factor[at])) {
+                        *value = unit * factor;
+                    }
+                });
+                peak.see(&column[all.clone()], start);
+            }
+        }
     }
 }
 
-impl Sink for ColumnSink {
+/// Each stretch of a column of teeth as they are listed that stands in the tile as it does there, with where it does.
+#[inline(always)]
+fn for_each_stretch(
+    column: &mut [f64],
+    listed: usize,
+    teeth: usize,
+    lap: &LapTeeth,
+    mut each: impl FnMut(&mut [f64], Range<usize>),
+) {
+    if let [Stretch { at: 0, count }] = lap.stretches[..]
+        && count == teeth
+    {
+        let all = 0..column.len();
+        each(column, all);
+        return;
+    }
+    for (row, mut column) in column.chunks_exact_mut(listed).enumerate() {
+        for stretch in &lap.stretches {
+            let (of_stretch, rest) = column.split_at_mut(stretch.count);
+            let at = row * teeth + stretch.at;
+            each(of_stretch, at..at + stretch.count);
+            column = rest;
+        }
+    }
+}
+
+/// The value of each row for every tooth in it.
+#[inline(always)]
+fn repeat_rows(values: &[f64], listed: usize, column: &mut [f64]) {
+    for (column, &value) in column.chunks_exact_mut(listed).zip(values) {
+        column.fill(value);
+    }
+}
+
+impl Sink for ColumnSink<'_> {
     const COLUMNS: bool = true;
 
     #[inline(always)]
-    fn take(&mut self, drive: &Drive, tile: &mut Tile<'_>, teeth: usize) {
+    fn take(&mut self, drive: &Drive, tile: &mut Tile<'_>, teeth: usize, sample: u64, listed: &LapTeeth) {
+        if self.laps.are_listed() {
+            self.list(drive, tile, teeth, sample, listed);
+            return;
+        }
         let (count, rows) = (tile.count, tile.count / teeth);
         self.input_angles.extend(
             drive,
@@ -99,8 +202,14 @@ impl RunningPeak {
     fn append(&mut self, column: &mut Vec<f64>, unit: &[f64], factor: &[f64]) {
         let start = column.len();
         column.extend(zip(unit, factor).map(|(unit, factor)| unit * factor));
-        let value = largest(&column[start..]);
-        if value > self.value {
+        self.see(&column[start..], start);
+    }
+
+    /// Looks at the states of a tile, of which the first is that of the column at `start`; of equal ones the first counts, whichever comes first.
+    #[inline(always)]
+    fn see(&mut self, of_tile: &[f64], start: usize) {
+        let value = largest(of_tile);
+        if value.total_cmp(&self.value).then(self.start.cmp(&start)).is_gt() {
             *self = Self { value, start };
         }
     }
@@ -198,7 +307,7 @@ impl Sink for PeakSink {
     const COLUMNS: bool = false;
 
     #[inline(always)]
-    fn take(&mut self, drive: &Drive, tile: &mut Tile<'_>, teeth: usize) {
+    fn take(&mut self, drive: &Drive, tile: &mut Tile<'_>, teeth: usize, _: u64, _: &LapTeeth) {
         let (count, rows) = (tile.count, tile.count / teeth);
         self.angles.take(drive, tile, rows);
         for contact in CONTACTS {

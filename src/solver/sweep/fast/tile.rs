@@ -2,9 +2,10 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use std::iter::zip;
-use std::ops::Range;
 
+use super::gaps::GapWork;
 use super::lanes::{LANES, VECTOR};
+use super::laps::{Laps, Layout};
 use super::sharing::Work;
 use crate::contact::{Contact, PerContact};
 use crate::mesh::{Mesh, Samples};
@@ -55,12 +56,17 @@ impl SineTable {
 /// the tile. The first and the last make a pattern that all tiles share, so that a tile takes the sine of a single angle. The teeth come
 /// nearer to the major axis, so only for the one next to it does such a sum cancel: it is counted from the end of the tile.
 pub(super) struct Run {
-    pub(super) samples: Range<u64>,
+    first: u64,
+    end: u64,
     /// Samples of the period.
     of: Samples,
+    /// How many of them a sample is from the next.
+    stride: u64,
+    places: usize,
     pub(super) teeth: usize,
+    layout: Layout,
     /// Samples of a tile: equally many, but for the last.
-    pub(super) rows: usize,
+    rows: usize,
     mesh: Mesh,
     /// Of the phase.
     step_rad: f64,
@@ -70,34 +76,60 @@ pub(super) struct Run {
 }
 
 impl Run {
-    pub(super) fn from(first: u64, of: Samples, mesh: &Mesh) -> Self {
-        let samples = first..mesh.same_teeth_until(first, of);
-        let steps = mesh.steps(of) as f64;
-        let teeth = whole(*mesh.teeth_at(first, of).end());
-        let count = whole(samples.end - samples.start);
+    /// Of the parts of a lap in which samples stand, from the first on.
+    pub(super) fn from(first: u64, laps: &Laps, mesh: &Mesh, layout: Layout) -> Self {
+        let (of, stride) = (laps.of_lap, laps.stride);
+        let end = mesh.same_teeth_until(first, of);
+        let places = whole(*mesh.teeth_at(first, of).end());
+        let teeth = layout.at_each_place * places;
+        let count = whole((end - first).div_ceil(stride));
         let rows = count.div_ceil(count.div_ceil((TILE / teeth).max(1)));
         Self {
-            samples,
+            first,
+            end,
             of,
+            stride,
+            places,
             teeth,
+            layout,
             rows,
             mesh: *mesh,
             step_rad: mesh.phase_step_rad(of),
-            steps,
+            steps: mesh.steps(of) as f64,
             lobes: f64::from(mesh.lobe_count()),
         }
+    }
+
+    /// The first samples of its tiles.
+    pub(super) fn starts(&self) -> impl Iterator<Item = u64> + use<> {
+        (self.first..self.end).step_by(whole(self.stride) * self.rows)
+    }
+
+    /// The first sample beyond it.
+    pub(super) const fn next(&self) -> u64 {
+        self.first + (self.end - self.first).div_ceil(self.stride) * self.stride
+    }
+
+    /// Teeth that are at one place after another.
+    pub(super) const fn places(&self) -> usize {
+        self.places
     }
 
     /// Lays the pattern of its tiles.
     #[inline(always)]
     pub(super) fn lay_pattern(&self, tile: &mut Tile<'_>) {
-        let Self { teeth, rows, .. } = *self;
+        let Self { teeth, rows, places, layout, .. } = *self;
         let (base_sin, base_cos) = (&mut tile.base_sin[..teeth], &mut tile.base_cos[..teeth]);
-        for (tooth, base) in zip(1.., zip(&mut *base_sin, &mut *base_cos)) {
+        let base_step = &mut tile.base_step[..teeth];
+        for place in 1..=places {
             let Position { phase_sin: sin, phase_cos: cos, .. } =
-                self.mesh.position_in_mesh(tooth, self.samples.start, self.of);
-            (*base.0, *base.1) = (sin, cos);
+                self.mesh.position_in_mesh(place as u64, self.first, self.of);
+            for at in (layout.index(place, places)..teeth).step_by(places) {
+                // Whole numbers below 2^53: exact.
+                (base_sin[at], base_cos[at], base_step[at]) = (sin, cos, place as f64 * self.of.count() as f64);
+            }
         }
+        tile.last_place = layout.index(places, places);
         tile.tooth.clear();
         let last_tooth = u32::try_from(teeth).unwrap_or(u32::MAX);
         for row in 0..rows {
@@ -105,24 +137,24 @@ impl Run {
             let (row_sin, row_cos) = (tile.row_sines.sin[row], tile.row_sines.cos[row]);
             let (sin, cos) = (&mut tile.pattern_sin[of_row.clone()], &mut tile.pattern_cos[of_row.clone()]);
             let step = &mut tile.pattern_step[of_row];
+            let passed = (row as u64 * self.stride) as f64;
             for i in 0..teeth {
                 sin[i] = base_sin[i] * row_cos - base_cos[i] * row_sin;
                 cos[i] = base_cos[i] * row_cos + base_sin[i] * row_sin;
-                // Whole numbers below 2^53: exact.
-                step[i] = (i + 1) as f64 * self.of.count() as f64 - row as f64;
+                step[i] = base_step[i] - passed;
             }
             tile.tooth.extend(1..=last_tooth);
         }
     }
 
-    /// Positions of all teeth at some samples, by sample and then tooth.
+    /// Positions of all teeth of the tile that begins with a sample, by sample and then tooth.
     #[inline(always)]
-    pub(super) fn place(&self, samples: Range<u64>, tile: &mut Tile<'_>) {
-        let rows = whole(samples.end - samples.start);
+    pub(super) fn place(&self, start: u64, tile: &mut Tile<'_>) {
+        let rows = self.rows.min(whole((self.end - start).div_ceil(self.stride)));
         tile.count = rows * self.teeth;
         let len = tile.count.next_multiple_of(LANES);
-        let passed = samples.start as f64;
-        let (turn_sin, turn_cos) = ((samples.start - self.samples.start) as f64 * self.step_rad).sin_cos();
+        let passed = start as f64;
+        let (turn_sin, turn_cos) = ((start - self.first) as f64 * self.step_rad).sin_cos();
         let (pattern_sin, pattern_cos) = (&tile.pattern_sin[..len], &tile.pattern_cos[..len]);
         let pattern_step = &tile.pattern_step[..len];
         let (sin, cos) = (&mut tile.sin[..len], &mut tile.cos[..len]);
@@ -130,9 +162,9 @@ impl Run {
             sin[i] = pattern_sin[i] * turn_cos - pattern_cos[i] * turn_sin;
             cos[i] = pattern_cos[i] * turn_cos + pattern_sin[i] * turn_sin;
         }
+        let Self { steps, lobes, .. } = *self;
         if !tile.position_deg.is_empty() {
             let (position_deg, from_valley_rad) = (&mut tile.position_deg[..len], &mut tile.from_valley_rad[..len]);
-            let Self { steps, lobes, .. } = *self;
             // π/U - ψ.
             let valley_step_rad = PI / lobes / steps;
             for i in 0..len {
@@ -141,13 +173,20 @@ impl Run {
                 from_valley_rad[i] = (steps - 2.0 * lobes * step) * valley_step_rad;
             }
         }
-        (tile.passed, tile.steps) = (passed, self.steps);
+        if !tile.gaps.from_lobe_rad.is_empty() {
+            for (from_lobe_rad, step) in zip(&mut tile.gaps.from_lobe_rad[..len], pattern_step) {
+                *from_lobe_rad = 2.0 * PI * ((step - passed) / steps);
+            }
+        }
+        (tile.passed, tile.steps) = (passed, steps);
         // The first tooth again, from where it will stand at the last sample.
-        let end = self.mesh.position_in_mesh(1, samples.end - 1, self.of);
+        let end = self.mesh.position_in_mesh(1, start + (rows as u64 - 1) * self.stride, self.of);
         for (row, to_end) in (0..rows).rev().enumerate() {
             let (row_sin, row_cos) = (tile.row_sines.sin[to_end], tile.row_sines.cos[to_end]);
-            sin[row * self.teeth] = end.phase_sin * row_cos + end.phase_cos * row_sin;
-            cos[row * self.teeth] = end.phase_cos * row_cos - end.phase_sin * row_sin;
+            for at in (row * self.teeth..(row + 1) * self.teeth).step_by(self.places) {
+                sin[at] = end.phase_sin * row_cos + end.phase_cos * row_sin;
+                cos[at] = end.phase_cos * row_cos - end.phase_sin * row_sin;
+            }
         }
     }
 }
@@ -164,22 +203,30 @@ pub(super) struct TileSize {
     with_columns: bool,
     /// Whether loads are more than unit loads times a number.
     with_work: bool,
+    /// Whether gaps are not the same at all teeth.
+    with_gaps: bool,
 }
 
 impl TileSize {
-    pub(super) fn of(mesh: &Mesh, samples: Samples, with_columns: bool, with_work: bool) -> Self {
-        let teeth_at = |sample| whole(*mesh.teeth_at(sample, samples).end());
+    pub(super) fn of(mesh: &Mesh, samples: Samples, at_each_place: usize, with_columns: bool) -> Self {
+        let teeth_at = |sample| at_each_place * whole(*mesh.teeth_at(sample, samples).end());
         let (least, most) = (teeth_at(0).max(1), teeth_at(samples.count() - 1));
-        let states = TILE.min(whole(mesh.state_count(samples))).max(most);
+        let states = TILE.min(at_each_place * whole(mesh.state_count(samples))).max(most);
         let rows = whole(samples.count()).min(TILE.div_ceil(least));
-        Self { len: states.next_multiple_of(LANES) + VECTOR, rows, teeth: most, with_columns, with_work }
+        let len = states.next_multiple_of(LANES) + VECTOR;
+        Self { len, rows, teeth: most, with_columns, with_work: false, with_gaps: false }
     }
 
     /// For input angles anywhere, with at most so many teeth, of which no more than the loads are wanted.
-    pub(super) fn anywhere(teeth: usize, with_work: bool) -> Self {
+    pub(super) fn anywhere(teeth: usize) -> Self {
         let rows = (TILE / teeth).max(1);
         let len = (rows * teeth).next_multiple_of(LANES) + VECTOR;
-        Self { len, rows, teeth, with_columns: false, with_work }
+        Self { len, rows, teeth, with_columns: false, with_work: false, with_gaps: false }
+    }
+
+    /// With room for what a law takes.
+    pub(super) const fn with(self, with_work: bool, with_gaps: bool) -> Self {
+        Self { with_work, with_gaps, ..self }
     }
 
     /// Input angles of a tile.
@@ -190,9 +237,10 @@ impl TileSize {
     /// What all slices of a tile take together.
     pub(super) const fn doubles(&self) -> usize {
         let (of_columns, of_work) = (self.with_columns as usize, self.with_work as usize);
-        (17 + 5 * of_columns + Work::COLUMNS * of_work) * self.len
+        let of_gaps = self.with_gaps as usize;
+        (17 + 5 * of_columns + Work::COLUMNS * of_work + GapWork::COLUMNS * of_gaps) * self.len
             + (8 + Work::ROWS * of_work) * self.rows
-            + 2 * self.teeth
+            + (3 + GapWork::ITEMS * of_gaps) * self.teeth
     }
 }
 
@@ -210,6 +258,9 @@ pub(super) struct Tile<'a> {
     // Of the teeth at the start of the run.
     pub(super) base_sin: &'a mut [f64],
     pub(super) base_cos: &'a mut [f64],
+    pub(super) base_step: &'a mut [f64],
+    /// Where the tooth that may stand in the valley is among them.
+    pub(super) last_place: usize,
     pub(super) pattern_sin: &'a mut [f64],
     pub(super) pattern_cos: &'a mut [f64],
     pub(super) pattern_step: &'a mut [f64],
@@ -233,6 +284,7 @@ pub(super) struct Tile<'a> {
     pub(super) stress_exponents: StressExponents,
     /// For laws that are not linear.
     pub(super) work: Work<'a>,
+    pub(super) gaps: GapWork<'a>,
     // By input angle.
     pub(super) row_torque: PerContact<&'a mut [f64]>,
     pub(super) row_input_angle_deg: &'a mut [f64],
@@ -255,19 +307,20 @@ pub(super) struct TileLanes<'t> {
 
 impl<'a> Tile<'a> {
     pub(super) fn new(arena: &'a mut [f64], size: &TileSize, step_rad: f64, stress_exponents: StressExponents) -> Self {
-        let &TileSize { len, rows, teeth, with_columns, with_work } = size;
+        let &TileSize { len, rows, teeth, with_columns, with_work, with_gaps } = size;
         let mut rest = arena;
         let mut slice = |len| {
             let (slice, others) = std::mem::take(&mut rest).split_at_mut(len);
             rest = others;
             slice
         };
-        let (base_sin, base_cos) = (slice(teeth), slice(teeth));
+        let (base_sin, base_cos, base_step) = (slice(teeth), slice(teeth), slice(teeth));
         let row_torque = PerContact::of(|_| slice(rows));
         let (row_input_angle_deg, row_residual) = (slice(rows), slice(rows));
         let (row_rotation_rad, row_rotation_root) = (slice(rows), slice(rows));
         let row_stiffness = slice(rows);
         let work = if with_work { Work::new(&mut slice, len, rows) } else { Work::new(&mut slice, 0, 0) };
+        let gaps = if with_gaps { GapWork::new(&mut slice, len, teeth) } else { GapWork::new(&mut slice, 0, 0) };
         let of_columns = if with_columns { len } else { 0 };
         let (from_valley_rad, position_deg) = (slice(of_columns), slice(of_columns));
         let input_angle_deg = slice(of_columns);
@@ -284,6 +337,8 @@ impl<'a> Tile<'a> {
             tooth: Vec::with_capacity(len),
             base_sin,
             base_cos,
+            base_step,
+            last_place: 0,
             pattern_sin,
             pattern_cos,
             pattern_step: column(),
@@ -302,6 +357,7 @@ impl<'a> Tile<'a> {
             scale_root: column(),
             stress_exponents,
             work,
+            gaps,
             row_torque,
             row_input_angle_deg,
             row_rotation_rad,
@@ -343,19 +399,20 @@ impl<'a> Tile<'a> {
         360.0 * (self.pattern_step[state] - self.passed) / self.steps
     }
 
-    /// Torques of a unit rotation summed over the teeth at each input angle; how many of these there are.
+    /// Torques summed over the teeth at each input angle, of unit loads or of them all; how many of these there are.
     #[inline(always)]
-    pub(super) fn sum_torques(&mut self, teeth: usize) -> usize {
+    pub(super) fn sum_torques<const OF_UNIT_LOADS: bool>(&mut self, teeth: usize) -> usize {
         let rows = self.count / teeth;
         for row in 0..rows {
             let at = row * teeth..(row + 1) * teeth;
             let (cam, ring) = (&self.torque.wave_generator[at.clone()], &self.torque.ring[at.clone()]);
-            let carrier = &self.torque.carrier[at];
+            let (carrier, scale) = (&self.torque.carrier[at.clone()], &self.scale[at]);
             let (mut of_cam, mut of_ring, mut of_carrier) = (0.0, 0.0, 0.0);
-            for ((cam, ring), carrier) in zip(zip(cam, ring), carrier) {
-                of_cam += cam;
-                of_ring += ring;
-                of_carrier += carrier;
+            for i in 0..teeth {
+                let scale = if OF_UNIT_LOADS { 1.0 } else { scale[i] };
+                of_cam += cam[i] * scale;
+                of_ring += ring[i] * scale;
+                of_carrier += carrier[i] * scale;
             }
             self.row_torque.wave_generator[row] = of_cam;
             self.row_torque.ring[row] = of_ring;

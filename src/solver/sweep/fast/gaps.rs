@@ -1,0 +1,425 @@
+//! Where gaps close, in columns (docs/theory.md sections 4.4 and 4.8): the formulas are those of [`crate::gaps`], parted into what the position decides and
+//! what the items have, so that positions that come again in every lap are worked out once.
+
+use std::f64::consts::PI;
+
+use super::laps::LapTeeth;
+use super::sharing::{Teeth, Weights};
+use super::tile::whole;
+use crate::contact::PerContact;
+use crate::gaps::{Deviations, Gaps, MM_PER_UM, Modification, RAD_PER_ARCSEC, TipRelief, of};
+use crate::load_sharing::LoadedDrive;
+use crate::mesh::{Mesh, Place};
+
+/// A total gap that is less than this part of all that it may be the sum of, and not nothing, may be below zero by the plain path's roundings, which decides there.
+const EDGE: f64 = 1e-12;
+
+/// The gaps of teeth.
+pub(super) enum GapColumns {
+    /// The same at all teeth.
+    Uniform { gap_mm: PerContact<f64>, weights: Weights },
+    /// By the position, and by the items that deviate; by virtual work.
+    Unlike(Box<UnlikeGaps>),
+}
+
+/// Columns that gaps are worked out in, empty where they are the same at all teeth.
+pub(super) struct GapWork<'a> {
+    /// ψ.
+    pub(super) from_lobe_rad: &'a mut [f64],
+    /// What the position decides of the total gap.
+    along: &'a mut [f64],
+    per_arm: &'a mut [f64],
+    /// Directions of the normals: of the wave generator's against the lobe, of the ring's against its space.
+    cam_cos: &'a mut [f64],
+    cam_sin: &'a mut [f64],
+    ring_cos: &'a mut [f64],
+    ring_sin: &'a mut [f64],
+    /// Of the teeth of a lap, by their places in a row.
+    items: [&'a mut [f64]; Item::COUNT],
+}
+
+/// What the items of a tooth have.
+struct Item {
+    /// Gaps, those of a runout over the direction's cosine and sine.
+    cam: [f64; 3],
+    ring: [f64; 3],
+    carrier: f64,
+    /// Turned away about the axis, as lost motion.
+    lost_motion_rad: f64,
+}
+
+impl Item {
+    const COUNT: usize = 8;
+}
+
+impl<'a> GapWork<'a> {
+    /// Columns of states.
+    pub(super) const COLUMNS: usize = 7;
+    /// Columns of the teeth at an input angle.
+    pub(super) const ITEMS: usize = Item::COUNT;
+
+    /// From slices of any length.
+    pub(super) fn new(slice: &mut impl FnMut(usize) -> &'a mut [f64], column: usize, teeth: usize) -> Self {
+        Self {
+            from_lobe_rad: slice(column),
+            along: slice(column),
+            per_arm: slice(column),
+            cam_cos: slice(column),
+            cam_sin: slice(column),
+            ring_cos: slice(column),
+            ring_sin: slice(column),
+            items: std::array::from_fn(|_| slice(teeth)),
+        }
+    }
+}
+
+/// Gaps that are not the same at all teeth.
+pub(super) struct UnlikeGaps {
+    clearance_mm: PerContact<f64>,
+    modification: Modification,
+    relief: Option<Relief>,
+    deviating: Option<Deviating>,
+    /// What all teeth have alike, which closing angles leave out.
+    lost_motion_rad: f64,
+    tooth_radius_mm: f64,
+    ring_teeth_per_wave: f64,
+    teeth_per_wave: f64,
+    /// Total gaps between nothing and this are the plain path's.
+    edge_mm: f64,
+}
+
+/// Tip relief.
+struct Relief {
+    amount_mm: f64,
+    start_rad: f64,
+    end_rad: f64,
+    power: f64,
+}
+
+/// What single items have.
+struct Deviating {
+    slots: Vec<Slot>,
+    spaces: Vec<Space>,
+    lobes: Vec<Lobe>,
+}
+
+#[derive(Clone, Copy)]
+struct Slot {
+    thinner_mm: f64,
+    carrier_mm: f64,
+    lost_motion_rad: f64,
+}
+
+#[derive(Clone, Copy)]
+struct Space {
+    ring_mm: [f64; 3],
+    lost_motion_rad: f64,
+}
+
+#[derive(Clone, Copy)]
+struct Lobe {
+    cam_mm: [f64; 3],
+}
+
+impl Deviating {
+    fn new(loaded: &LoadedDrive<'_>, deviations: &Deviations) -> Self {
+        let drive = loaded.drive();
+        let (p, s, lobes) = (drive.parameters(), drive.sense(), u64::from(drive.lobes()));
+        let (slots, spaces) = (p.installed.unsigned_abs(), p.ring_teeth.unsigned_abs());
+        let direction_rad =
+            |item: u64, of: u64, angle_deg: f64| 2.0 * PI * item as f64 / of as f64 - angle_deg.to_radians();
+        let runout = &deviations.runout;
+        let amount_mm = PerContact::of(|contact| MM_PER_UM * runout.get(contact).amount_um);
+        let slot = |slot| {
+            let thinner_mm = MM_PER_UM * of(&deviations.tooth_radius_um, slot);
+            let direction_rad = direction_rad(slot, slots, runout.carrier.angle_deg) + s * 0.5 * PI;
+            Slot {
+                thinner_mm,
+                carrier_mm: MM_PER_UM * of(&deviations.slot_wall_um, slot)
+                    + amount_mm.carrier * direction_rad.cos()
+                    + thinner_mm,
+                lost_motion_rad: drive.teeth_per_wave() * RAD_PER_ARCSEC * of(&deviations.slot_angle_arcsec, slot),
+            }
+        };
+        let space = |space| {
+            let (sin, cos) = direction_rad(space, spaces, runout.ring.angle_deg).sin_cos();
+            Space {
+                ring_mm: [
+                    MM_PER_UM * of(&deviations.ring_space_um, space),
+                    amount_mm.ring * cos,
+                    s * amount_mm.ring * sin,
+                ],
+                lost_motion_rad: drive.flank().teeth_per_wave()
+                    * RAD_PER_ARCSEC
+                    * of(&deviations.ring_space_angle_arcsec, space),
+            }
+        };
+        let lobe = |lobe| {
+            let (sin, cos) = direction_rad(lobe, lobes, runout.wave_generator.angle_deg).sin_cos();
+            Lobe {
+                cam_mm: [
+                    MM_PER_UM * of(&deviations.wave_generator_lobe_um, lobe),
+                    -amount_mm.wave_generator * cos,
+                    amount_mm.wave_generator * sin,
+                ],
+            }
+        };
+        Self {
+            slots: (0..slots).map(slot).collect(),
+            spaces: (0..spaces).map(space).collect(),
+            lobes: (0..lobes).map(lobe).collect(),
+        }
+    }
+
+    fn item(&self, &Place { slot, ring_space, lobe }: &Place) -> Item {
+        let (slot, space) = (self.slots[whole(slot)], self.spaces[whole(ring_space)]);
+        let Lobe { cam_mm: [cam, cam_cos, cam_sin] } = self.lobes[whole(lobe)];
+        let [ring, ring_cos, ring_sin] = space.ring_mm;
+        Item {
+            cam: [cam + slot.thinner_mm, cam_cos, cam_sin],
+            ring: [ring + slot.thinner_mm, ring_cos, ring_sin],
+            carrier: slot.carrier_mm,
+            lost_motion_rad: slot.lost_motion_rad + space.lost_motion_rad,
+        }
+    }
+
+    /// The most that they come to at a tooth, in mm, what is turned at this arm.
+    fn most_mm(&self, arm_mm: f64) -> f64 {
+        let sum = |parts: &[f64; 3]| parts.iter().map(|part| part.abs()).sum::<f64>();
+        let slots = self.slots.iter().map(|&Slot { thinner_mm, carrier_mm, lost_motion_rad }| {
+            thinner_mm.abs() + carrier_mm.abs() + lost_motion_rad.abs() * arm_mm
+        });
+        let spaces = self.spaces.iter().map(|space| sum(&space.ring_mm) + space.lost_motion_rad.abs() * arm_mm);
+        let lobes = self.lobes.iter().map(|lobe| sum(&lobe.cam_mm));
+        slots.fold(0.0, f64::max) + spaces.fold(0.0, f64::max) + lobes.fold(0.0, f64::max)
+    }
+}
+
+impl GapColumns {
+    /// Of a drive under a load; none where there is no gap.
+    pub(super) fn new(loaded: &LoadedDrive<'_>) -> Option<Self> {
+        let gaps = loaded.gaps();
+        if gaps.is_nil() {
+            None
+        } else if gaps.are_uniform() {
+            Some(Self::Uniform { gap_mm: *gaps.clearance_mm(), weights: Weights::new(loaded) })
+        } else {
+            Some(Self::Unlike(Box::new(UnlikeGaps::new(loaded, gaps))))
+        }
+    }
+
+    /// Whether they are those of single items.
+    pub(super) fn are_of_items(&self) -> bool {
+        matches!(self, Self::Unlike(unlike) if unlike.deviating.is_some())
+    }
+
+    /// Whether they are not the same at all teeth.
+    pub(super) const fn are_unlike(&self) -> bool {
+        matches!(self, Self::Unlike(_))
+    }
+
+    /// What all teeth have alike, which closing angles leave out.
+    pub(super) const fn lost_motion_rad(&self) -> f64 {
+        match self {
+            Self::Uniform { .. } => 0.0,
+            Self::Unlike(unlike) => unlike.lost_motion_rad,
+        }
+    }
+
+    /// What the places of a tile decide; false where it takes the plain path.
+    #[inline(always)]
+    pub(super) fn prepare(&self, teeth: &Teeth<'_>, gaps: &mut GapWork<'_>, closing: &mut [f64]) -> bool {
+        match self {
+            Self::Uniform { gap_mm, weights } => {
+                close_alike(gap_mm, weights, teeth, closing);
+                true
+            }
+            Self::Unlike(unlike) => {
+                unlike.prepare(teeth, gaps);
+                unlike.deviating.is_some() || unlike.close(teeth, gaps, closing)
+            }
+        }
+    }
+
+    /// Notes which teeth stand in a tile.
+    pub(super) fn set_teeth(&self, mesh: &Mesh, teeth: &LapTeeth, gaps: &mut GapWork<'_>) {
+        let Self::Unlike(unlike) = self else { return };
+        let Some(deviating) = &unlike.deviating else { return };
+        for listed in &teeth.listed {
+            for tooth in 0..listed.count() {
+                let Item { cam, ring, carrier, lost_motion_rad } = deviating.item(&listed.place(mesh, tooth));
+                let [cam, cam_cos, cam_sin] = cam;
+                let [ring, ring_cos, ring_sin] = ring;
+                let values = [cam, cam_cos, cam_sin, ring, ring_cos, ring_sin, carrier, lost_motion_rad];
+                gaps.items.iter_mut().zip(values).for_each(|(column, value)| column[listed.at + tooth] = value);
+            }
+        }
+    }
+
+    /// Where the gaps of these teeth close; false where the tile takes the plain path.
+    #[inline(always)]
+    pub(super) fn close_at_items(&self, teeth: &Teeth<'_>, gaps: &mut GapWork<'_>, closing: &mut [f64]) -> bool {
+        match self {
+            Self::Uniform { .. } => true,
+            Self::Unlike(unlike) => unlike.close_at_items(teeth, gaps, closing),
+        }
+    }
+}
+
+/// `g/|h'|`, without end where there is no arm.
+#[inline(always)]
+fn close_alike(gap_mm: &PerContact<f64>, weights: &Weights, teeth: &Teeth<'_>, closing: &mut [f64]) {
+    let len = teeth.len;
+    let closing = &mut closing[..len];
+    let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
+    for i in 0..len {
+        let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
+        let ring = if weights.ring_exponent > 0.0 { ring[i] } else { 1.0 / ring[i] };
+        let carrier = weights.carrier * carrier[i];
+        let gap = gap_mm.wave_generator + gap_mm.ring * (along * ring) + gap_mm.carrier * carrier;
+        let gap = if gap > 0.0 { gap } else { 0.0 };
+        closing[i] = if arm[i] > 0.0 { gap / arm[i] } else { f64::INFINITY };
+    }
+}
+
+impl UnlikeGaps {
+    fn new(loaded: &LoadedDrive<'_>, gaps: &Gaps<'_>) -> Self {
+        let drive = loaded.drive();
+        let (modification, clearance_mm) = (*gaps.modification(), *gaps.clearance_mm());
+        let deviating = gaps.deviations().map(|deviations| Deviating::new(loaded, deviations));
+        let relief = modification.ring_tip_relief.map(|TipRelief { amount_um, start_deg, power }| Relief {
+            amount_mm: MM_PER_UM * amount_um,
+            start_rad: start_deg.to_radians(),
+            end_rad: drive.flank_limit().position.from_lobe_rad,
+            power,
+        });
+        let lost_motion_rad = gaps.lost_motion_rad();
+        // No arm is longer than a centre's distance.
+        let arm_mm = drive.flank().locus().cam_outer_radius_mm() + drive.parameters().tooth_radius_mm;
+        let m = &modification;
+        let of_modification = [
+            m.ring_equidistant_um,
+            m.ring_path_shift_um,
+            m.ring_profile_shift_um,
+            m.wave_generator_equidistant_um,
+            m.slot_wall_um,
+            m.tooth_radius_um,
+            relief.as_ref().map_or(0.0, |relief| relief.amount_mm / MM_PER_UM),
+        ];
+        let most_mm = clearance_mm.iter().map(|(_, gap_mm)| gap_mm).sum::<f64>()
+            + MM_PER_UM * of_modification.iter().map(|gap_um| gap_um.abs()).sum::<f64>()
+            + lost_motion_rad.abs() * arm_mm
+            + deviating.as_ref().map_or(0.0, |deviating| deviating.most_mm(arm_mm));
+        Self {
+            clearance_mm,
+            modification,
+            relief,
+            deviating,
+            lost_motion_rad,
+            tooth_radius_mm: drive.parameters().tooth_radius_mm,
+            ring_teeth_per_wave: drive.flank().teeth_per_wave(),
+            teeth_per_wave: drive.teeth_per_wave(),
+            edge_mm: EDGE * most_mm,
+        }
+    }
+
+    /// Gaps and directions that the position decides. With `sin γ` from `F_S/F_H` and `cos β` from `F_K/F_H`, and `cos(β - δ)` of section 4.8 as
+    /// `(d cos β + r)/√(d² + 2dr cos β + r²)`.
+    #[inline(always)]
+    fn prepare(&self, teeth: &Teeth<'_>, gaps: &mut GapWork<'_>) {
+        let len = teeth.len;
+        let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
+        let (d, r, m) = (&teeth.center_radius_mm[..len], self.tooth_radius_mm, &self.modification);
+        let (along, per_arm) = (&mut gaps.along[..len], &mut gaps.per_arm[..len]);
+        let thinner_mm = MM_PER_UM * m.tooth_radius_um;
+        let of_cam = self.clearance_mm.wave_generator + MM_PER_UM * m.wave_generator_equidistant_um + thinner_mm;
+        let of_ring = self.clearance_mm.ring + MM_PER_UM * m.ring_equidistant_um + thinner_mm;
+        let of_carrier = self.clearance_mm.carrier + MM_PER_UM * m.slot_wall_um + thinner_mm;
+        let (path_shift, profile_shift) = (MM_PER_UM * m.ring_path_shift_um, MM_PER_UM * m.ring_profile_shift_um);
+        let (per_ratio, k) = (1.0 / self.teeth_per_wave, self.ring_teeth_per_wave);
+        let (cam_cos, cam_sin) = (&mut gaps.cam_cos[..len], &mut gaps.cam_sin[..len]);
+        let (ring_cos, ring_sin) = (&mut gaps.ring_cos[..len], &mut gaps.ring_sin[..len]);
+        for i in 0..len {
+            let sin_gamma = carrier[i] * per_ratio;
+            let cos_gamma = ((1.0 - sin_gamma) * (1.0 + sin_gamma)).sqrt();
+            let per_ring = 1.0 / ring[i];
+            let cos_beta = cos_gamma * per_ring;
+            let to_profile = (d[i] * cos_beta + r) / (d[i] * d[i] + r * (2.0 * (d[i] * cos_beta) + r)).sqrt();
+            let at_ring = of_ring + path_shift * cos_beta + profile_shift * to_profile;
+            along[i] = of_cam + ring[i] * at_ring + carrier[i] * of_carrier;
+            per_arm[i] = if arm[i] > 0.0 { 1.0 / arm[i] } else { f64::INFINITY };
+            (cam_cos[i], cam_sin[i]) = (cos_gamma, sin_gamma);
+            (ring_cos[i], ring_sin[i]) = (cos_beta, k * sin_gamma * per_ring);
+        }
+        let from_lobe_rad = &gaps.from_lobe_rad[..len];
+        if let Some(Relief { amount_mm, start_rad, end_rad, power }) = self.relief {
+            for i in 0..len {
+                let beyond_rad = from_lobe_rad[i] - start_rad;
+                if beyond_rad > 0.0 {
+                    along[i] += ring[i] * (amount_mm * (beyond_rad / (end_rad - start_rad)).powf(power));
+                }
+            }
+        }
+        if self.deviating.is_some() {
+            // Of ψ + γ and of ψ/k + β.
+            let turn = |cos: &mut f64, sin: &mut f64, by_rad: f64| {
+                let (by_sin, by_cos) = by_rad.sin_cos();
+                (*cos, *sin) = (*cos * by_cos - *sin * by_sin, *sin * by_cos + *cos * by_sin);
+            };
+            for i in 0..len {
+                turn(&mut cam_cos[i], &mut cam_sin[i], from_lobe_rad[i]);
+                turn(&mut ring_cos[i], &mut ring_sin[i], from_lobe_rad[i] / k);
+            }
+        }
+    }
+
+    /// `g/|h'|`, without end where there is no arm; false where a part may be too full.
+    #[inline(always)]
+    fn close(&self, teeth: &Teeth<'_>, gaps: &GapWork<'_>, closing: &mut [f64]) -> bool {
+        let count = teeth.rows * teeth.count;
+        let (along, per_arm, arm) = (&gaps.along[..count], &gaps.per_arm[..count], &teeth.arm[..count]);
+        let (closing, no_teeth) = closing[..teeth.len].split_at_mut(count);
+        let mut in_doubt = 0.0;
+        for i in 0..count {
+            let total = along[i] + self.lost_motion_rad * arm[i];
+            in_doubt = if self.is_in_doubt(total) { 1.0 } else { in_doubt };
+            closing[i] = if arm[i] > 0.0 { along[i] * per_arm[i] } else { f64::INFINITY };
+        }
+        no_teeth.fill(f64::INFINITY);
+        in_doubt == 0.0
+    }
+
+    /// The same with what the items have.
+    #[inline(always)]
+    fn close_at_items(&self, teeth: &Teeth<'_>, gaps: &GapWork<'_>, closing: &mut [f64]) -> bool {
+        let count = teeth.count;
+        let [cam, by_cam_cos, by_cam_sin, ring, by_ring_cos, by_ring_sin, carrier, lost_motion] =
+            gaps.items.each_ref().map(|item| &item[..count]);
+        closing[teeth.rows * count..teeth.len].fill(f64::INFINITY);
+        let mut in_doubt = 0.0;
+        for row in 0..teeth.rows {
+            let at = row * count..(row + 1) * count;
+            let (arm, ring_ratio) = (&teeth.arm[at.clone()], &teeth.ring_ratio[at.clone()]);
+            let carrier_ratio = &teeth.carrier_ratio[at.clone()];
+            let (along, per_arm) = (&gaps.along[at.clone()], &gaps.per_arm[at.clone()]);
+            let (cam_cos, cam_sin) = (&gaps.cam_cos[at.clone()], &gaps.cam_sin[at.clone()]);
+            let (ring_cos, ring_sin) = (&gaps.ring_cos[at.clone()], &gaps.ring_sin[at.clone()]);
+            let closing = &mut closing[at];
+            for i in 0..count {
+                let at_cam = cam[i] + by_cam_cos[i] * cam_cos[i] + by_cam_sin[i] * cam_sin[i];
+                let at_ring = ring[i] + by_ring_cos[i] * ring_cos[i] + by_ring_sin[i] * ring_sin[i];
+                let gap = along[i] + at_cam + ring_ratio[i] * at_ring + carrier_ratio[i] * carrier[i];
+                let total = gap + (lost_motion[i] + self.lost_motion_rad) * arm[i];
+                in_doubt = if self.is_in_doubt(total) { 1.0 } else { in_doubt };
+                closing[i] = if arm[i] > 0.0 { gap * per_arm[i] + lost_motion[i] } else { f64::INFINITY };
+            }
+        }
+        in_doubt == 0.0
+    }
+
+    /// Whether a total gap is below zero, or so near to it that roundings decide.
+    #[inline(always)]
+    fn is_in_doubt(&self, total_mm: f64) -> bool {
+        total_mm < self.edge_mm && total_mm != 0.0
+    }
+}
