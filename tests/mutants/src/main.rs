@@ -4,7 +4,7 @@
 //!
 //! LIST is what `cargo mutants --list --json` writes, ROOT the tree, COPY one to change, TARGET where it is compiled, RESULTS a file that keeps what was found: a run
 //! that was broken off goes on from there, and mutants of files that have changed are tried anew; with --again also those that no test
-//! noticed. After N seconds no further mutant is tried. It fails where surely fewer are noticed than a known report says.
+//! noticed. N seconds after the first was tried no further mutant is. It fails where surely fewer are noticed than a known report says.
 
 mod build;
 mod mutant;
@@ -18,8 +18,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::{Mutex, OnceLock};
 use std::thread;
 use std::time::Instant;
 
@@ -60,8 +60,10 @@ fn main() -> io::Result<ExitCode> {
     let seconds: Option<f64> =
         option("--seconds").map(|seconds| seconds.parse().map_err(io::Error::other)).transpose()?;
     let threads = thread::available_parallelism()?.get();
-    let started = Instant::now();
-    let is_over = || seconds.is_some_and(|seconds| started.elapsed().as_secs_f64() > seconds);
+    // What is compiled before does not count.
+    let started = OnceLock::<Instant>::new();
+    let is_over =
+        || seconds.zip(started.get()).is_some_and(|(seconds, started)| started.elapsed().as_secs_f64() > seconds);
     let mutants: Vec<Mutant> = serde_json::from_str(&fs::read_to_string(list)?)?;
     let (root, results) = (PathBuf::from(root), PathBuf::from(results));
 
@@ -111,6 +113,7 @@ fn main() -> io::Result<ExitCode> {
         let reached = fs::canonicalize(&results)?.with_extension(format!("{stage:?}"));
         let tests = Tests::learn(&program, &directory, &reached, threads)?;
         let built: Vec<usize> = these.iter().copied().filter(|number| !program.left.contains_key(number)).collect();
+        started.get_or_init(Instant::now);
         let (next, found) = (AtomicUsize::new(0), Mutex::new((verdicts, &mut keep)));
         at_once(threads, || {
             while let Some(&number) = built.get(next.fetch_add(1, Relaxed)).filter(|_| !is_over()) {
