@@ -84,7 +84,7 @@ impl CheckedSweep {
     pub fn loss_totals(&self, hardest: &solver::Sweep, stop: &dyn Stop) -> Result<Option<LossTotalsAnswer>, NoAnswer> {
         let Some(friction) = &self.friction else { return Ok(None) };
         let forces = match self.bearing_rating {
-            Some(_) => period::RadialForces::of(&self.drive, hardest, stop)?,
+            Some(_) => period::RadialForces::of(&self.drive, self.load(), hardest, stop)?,
             None => None,
         };
         let losses = period::Losses::of(&self.drive, self.load(), hardest, friction, stop)?;
@@ -272,7 +272,7 @@ impl Question for Sweep {
         go_on()?;
         let model_error = error_of_model::of(drive, load, deviations, &sweep, parts).map_err(SolveError::from)?;
         go_on()?;
-        let forces = period::RadialForces::of(drive, &sweep, stop)?;
+        let forces = period::RadialForces::of(drive, load, &sweep, stop)?;
         let (mut of_friction, mut of_bearing) = (None, None);
         let mut losses = None;
         let mut points = duty.points.iter().map(|point| DutyPointAnswer::new(drive, point)).collect::<Vec<_>>();
@@ -374,7 +374,7 @@ impl CheckedSweep {
                 return self.cost(point, friction, hardest, losses, stop);
             }
             let sweep = self.solve_under(&point.load, stop)?;
-            let forces = period::RadialForces::of(drive, &sweep, stop)?;
+            let forces = period::RadialForces::of(drive, &point.load, &sweep, stop)?;
             let losses = period::Losses::of(drive, &point.load, &sweep, friction, stop)?;
             self.cost(point, friction, &Swept { sweep: &sweep, forces: forces.as_ref() }, &losses, stop)
         };

@@ -541,9 +541,10 @@ fn unlike_teeth_push_the_wave_generator_aside_with_the_sum_of_their_forces() {
     for p in [of(ellipse(58.0, 56.0), 14, 14, 12, 5.0), of(ellipse(58.0, 56.0), 14, 14, 16, 5.0)] {
         let drive = drive(&p);
         let load = cleared(60.0, FIXED);
+        let case = LoadCase::new(&load).unwrap();
         let deviations = deviations(&p, ALL_KINDS[4], 3);
         let sweep = swept_with(&drive, &load, &deviations, Points::samples(2).unwrap()).unwrap();
-        let forces = RadialForces::of(&drive, &sweep, &Never).unwrap().unwrap();
+        let forces = RadialForces::of(&drive, &case, &sweep, &Never).unwrap().unwrap();
         for (angle, input_angle_deg) in sweep.input_angles.input_angle_deg.iter().enumerate() {
             let placed = placed_by_angles(&p, input_angle_deg.to_radians());
             let chains: Vec<_> = placed.into_iter().map(|tooth| chain(&p, &load, &deviations, tooth)).collect();
@@ -559,8 +560,8 @@ fn unlike_teeth_push_the_wave_generator_aside_with_the_sum_of_their_forces() {
             assert!(forces.force_n[angle] > 1e-3 * all);
         }
         // Where the zones are alike there is nothing.
-        let alike = sweep::sweep(&drive, &LoadCase::new(&load).unwrap(), Points::samples(2).unwrap(), &Never).unwrap();
-        assert_eq!(RadialForces::of(&drive, &alike, &Never).unwrap(), None);
+        let alike = sweep::sweep(&drive, &case, Points::samples(2).unwrap(), &Never).unwrap();
+        assert_eq!(RadialForces::of(&drive, &case, &alike, &Never).unwrap(), None);
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::cam::ToothCenter;
 use crate::contact::{Contact, PerContact};
 use crate::drive::Drive;
+use crate::gaps::Gaps;
 use crate::load_sharing::{LoadCase, LoadedDrive};
 use crate::losses::bearing::{LoadForRevolutions, RollingElement};
 use crate::losses::duty::{ColumnForTime, mean_at_each_place};
@@ -273,18 +274,26 @@ pub struct RadialForces {
 }
 
 impl RadialForces {
-    /// Those of a sweep of this drive; none where two lobes or more are loaded alike, so that they balance each other at any load.
+    /// Those of a sweep of this drive under this load; none where two lobes or more are loaded alike, so that they balance each other at any load.
     ///
     /// # Errors
     /// As [`Losses::of`].
-    pub fn of(drive: &Drive, sweep: &Sweep, stop: &dyn Stop) -> Result<Option<Self>, SolveError> {
+    pub fn of(drive: &Drive, load: &LoadCase, sweep: &Sweep, stop: &dyn Stop) -> Result<Option<Self>, SolveError> {
         let mechanism = Mechanism::of_sweep(drive, sweep);
         if mechanism.lobes_loaded_alike() > 1 {
             return Ok(None);
         }
+        let p = load.parameters();
+        let lost_motion_rad = Gaps::new(drive, &p.clearance_um, p.modification, None).lost_motion_rad();
         let mut forces = Self::default();
         at_each_input_angle(drive, &sweep.states, stop, |_, teeth| {
-            let teeth: Vec<_> = teeth.iter().map(|tooth| tooth.loaded).collect();
+            let mut teeth: Vec<_> = teeth.iter().map(|tooth| tooth.loaded).collect();
+            if p.wave_generator_moves {
+                let wind_up_rad = sweep.input_angles.wind_up_deg[forces.force_n.len()].to_radians();
+                for tooth in &mut teeth {
+                    *tooth = passed_by(drive, tooth, wind_up_rad - lost_motion_rad)?;
+                }
+            }
             let force_n = mechanism.radial_force_n(&teeth);
             forces.force_n.push(force_n.norm());
             forces.direction_deg.push(force_n.y.atan2(force_n.x).to_degrees());
@@ -292,6 +301,14 @@ impl RadialForces {
         })?;
         Ok(Some(forces))
     }
+}
+
+/// A tooth under which the wave generator has moved on, in the wave generator's frame: its force goes through the normal there.
+fn passed_by(drive: &Drive, tooth: &LoadedTooth, turned_rad: f64) -> Result<LoadedTooth, NotConverged> {
+    let position_rad = tooth.position_rad - turned_rad;
+    let from_lobe_rad = position_rad.abs().min(half_lobe_rad(drive.lobes()));
+    let center = drive.flank().locus().at(Position::from_lobe(from_lobe_rad, drive.lobes()))?;
+    Ok(LoadedTooth { position_rad, tan_pressure_angle: center.tan_pressure_angle.copysign(position_rad), ..*tooth })
 }
 
 /// Goes through the input angles of a sweep. Where a tooth enters an angle may stand twice, without the tooth and with it; by number the
