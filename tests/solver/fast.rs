@@ -683,7 +683,7 @@ impl Deviating {
 const MOST_STATES: u64 = 30_000;
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(256))]
 
     #[test]
     fn the_fast_path_agrees_with_the_plain_one_on_parts_made_otherwise_than_conjugate(
