@@ -457,7 +457,7 @@ fn a_tooth_slips_over_the_corner_as_the_points_of_both_move() {
             carrier_coefficient: 0.01,
         })
         .unwrap();
-        let losses = Losses::of(&drive, &sweep, &friction, &Never).unwrap();
+        let losses = Losses::of(&drive, &pressed, &sweep, &friction, &Never).unwrap();
         let (states, end_deg) = (&sweep.states, drive.flank_limit().position.from_lobe_deg());
         let (s, k) = (drive.sense(), drive.flank().teeth_per_wave());
         for at in (0..states.len()).filter(|&at| states.position_deg[at] > end_deg && states.position_deg[at] < 85.0) {
