@@ -2,11 +2,12 @@
 
 use std::io::{self, IoSlice};
 use std::pin::Pin;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Weak};
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
+use rustix::net::{RecvFlags, recv};
 use tokio::io::{AsyncRead, AsyncWrite, Interest, ReadBuf};
 use tokio::net::TcpStream;
 use tokio::time::{Instant, Sleep, sleep, timeout};
@@ -57,6 +58,18 @@ impl Drop for Stream {
     }
 }
 
+/// A connection as it is seen from elsewhere, which does not keep it open.
+#[derive(Debug)]
+pub struct Seen(Weak<Stream>);
+
+impl Seen {
+    /// Whether the client has said something that nobody has read yet.
+    pub fn has_unread(&self) -> bool {
+        let peek = |stream: Arc<Stream>| recv(&stream.tcp, &mut [0], RecvFlags::PEEK | RecvFlags::DONTWAIT);
+        matches!(self.0.upgrade().map(peek), Some(Ok((1.., _))))
+    }
+}
+
 /// A connection whose client has to take what it is sent.
 #[derive(Debug)]
 pub struct Socket {
@@ -75,6 +88,11 @@ impl Socket {
         OPEN.fetch_add(1, Ordering::Relaxed);
         let stream = Arc::new(Stream { tcp: stream, is_shut: AtomicBool::new(false) });
         Self { stream, patience, stalled: None, taken_bytes: 0 }
+    }
+
+    /// The connection as others may see it.
+    pub fn seen(&self) -> Seen {
+        Seen(Arc::downgrade(&self.stream))
     }
 
     /// Waits until the client has closed its side, or the connection is broken.
