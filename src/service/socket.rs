@@ -15,6 +15,11 @@ use tokio::time::{Instant, Sleep, sleep, timeout};
 /// What a client that is written to has to take at least, on the average over its patience: below it, it is taken for one that does not read.
 const LEAST_TAKEN_BYTES_PER_S: u64 = 8 << 10;
 
+/// Of what is handed to the system, so much waits to be sent at most. Left to itself it takes megabytes, and more only when a third of them is
+/// gone: a client that takes its answer slowly would for long look like one that takes nothing.
+#[cfg(any(target_os = "linux", target_os = "android"))]
+const UNSENT_BYTES: u32 = 1 << 18;
+
 /// What tells that a client has closed its side. Where the system can tell that by itself, bytes that nobody has read yet, which make a
 /// connection readable all the time, are not waited for again and again.
 #[cfg(any(target_os = "linux", target_os = "android"))]
@@ -85,6 +90,8 @@ impl Socket {
     pub fn new(stream: TcpStream, patience: Duration) -> Self {
         // Without it small answers could wait for the client's acknowledgement of earlier ones.
         let _ = stream.set_nodelay(true);
+        #[cfg(any(target_os = "linux", target_os = "android"))]
+        let _ = socket2::SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT_BYTES);
         OPEN.fetch_add(1, Ordering::Relaxed);
         let stream = Arc::new(Stream { tcp: stream, is_shut: AtomicBool::new(false) });
         Self { stream, patience, stalled: None, taken_bytes: 0 }

@@ -11,6 +11,7 @@ use std::time::Duration;
 use axum::body::{Body, Bytes};
 use axum::http::Request;
 use serde_json::{Value, json};
+use socket2::{Domain, Socket, Type};
 use toothwave::keys::new_key;
 
 use crate::asking::{Question, Service, ask_at};
@@ -179,7 +180,10 @@ fn probes_in_a_burst_of_silent_connections_beyond_the_last_one_are_answered() {
 fn a_client_that_takes_less_than_the_least_of_its_answer_is_left() {
     let process = Process::started(&["serve", "--header-timeout-ms", "200"]);
     let document = with(&shortest(), "/sweep", json!({ "samples": 50_000 })).to_string();
-    let mut stream = TcpStream::connect(process.address).unwrap();
+    let stream = Socket::new(Domain::IPV4, Type::STREAM, None).unwrap();
+    stream.set_recv_buffer_size(4096).unwrap();
+    stream.connect(&process.address.into()).unwrap();
+    let mut stream = TcpStream::from(stream);
     let head = format!(
         "POST /v1/sweep HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: {}\r\n\r\n",
         document.len()
@@ -191,7 +195,8 @@ fn a_client_that_takes_less_than_the_least_of_its_answer_is_left() {
     let mut rest = Vec::new();
     // Cut in any way.
     let _ = stream.read_to_end(&mut rest);
-    assert!(rest.len() < 70_000_000, "{}", rest.len());
+    // The system holds little of it back, so that the service sees what the client takes.
+    assert!(rest.len() < 1_000_000, "{}", rest.len());
 }
 
 // --- Leaving
