@@ -32,7 +32,7 @@ use crate::config::{Limits, MAX_HEADER_BYTES, Settings, WorkerSettings};
 use crate::observe;
 use crate::parts::Parts;
 use crate::router::{self, Entry};
-use crate::socket::Socket;
+use crate::socket::{Seen, Socket};
 use crate::studies::Keeping;
 use crate::worker::Workers;
 
@@ -45,8 +45,8 @@ const LAST_WORDS: Duration = Duration::from_millis(300);
 /// What a client beyond the last connection gets for all of its request and answer.
 const REFUSAL: Duration = Duration::from_secs(1);
 
-/// Connections beyond the last one that are open at once: of more the oldest is closed, so that a probe, which asks at once, is answered
-/// however many others come and say nothing.
+/// Connections beyond the last one that are open at once: of more the oldest is closed, but none whose request waits to be read, so that a
+/// probe, which asks at once, is answered however many others come and say nothing.
 const SIDE_CONNECTIONS: usize = 64;
 
 /// Files that are kept for all but admitted connections: those beyond the last one, the listener, what the runtime has, the keys file.
@@ -227,7 +227,7 @@ struct Server {
     side: Router,
     side_http: http1::Builder,
     /// The last of those, the oldest first.
-    side_connections: Mutex<VecDeque<AbortHandle>>,
+    side_connections: Mutex<VecDeque<(AbortHandle, Seen)>>,
     graceful: GracefulShutdown,
     /// Cancelled when the service stops.
     closing: CancellationToken,
@@ -323,7 +323,7 @@ impl Server {
     /// Answers a connection beyond the last one: health and metrics as ever, all else with a refusal.
     fn serve_beside(&self, stream: Socket) {
         let service = MapRequest::new(self.side.clone(), |request: hyper::Request<Incoming>| request.map(Body::new));
-        let closed = stream.closed();
+        let (closed, seen) = (stream.closed(), stream.seen());
         let connection = self.side_http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
         let answered = tokio::spawn(async move {
             let to_its_end = async {
@@ -333,11 +333,13 @@ impl Server {
             let _ = tokio::time::timeout(REFUSAL, to_its_end).await;
         });
         let mut connections = self.side_connections.lock();
-        connections.push_back(answered.abort_handle());
-        if connections.len() > SIDE_CONNECTIONS
-            && let Some(oldest) = connections.pop_front()
-        {
-            oldest.abort();
+        connections.push_back((answered.abort_handle(), seen));
+        if connections.len() > SIDE_CONNECTIONS {
+            // Of a burst, those that ask may not have had their turn yet.
+            let silent = connections.iter().position(|(_, seen)| !seen.has_unread());
+            if let Some((oldest, _)) = connections.remove(silent.unwrap_or(0)) {
+                oldest.abort();
+            }
         }
     }
 }

@@ -2,17 +2,23 @@
 
 use std::io::{self, IoSlice};
 use std::pin::Pin;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Weak};
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
+use rustix::net::{RecvFlags, recv};
 use tokio::io::{AsyncRead, AsyncWrite, Interest, ReadBuf};
 use tokio::net::TcpStream;
 use tokio::time::{Instant, Sleep, sleep, timeout};
 
 /// What a client that is written to has to take at least, on the average over its patience: below it, it is taken for one that does not read.
 const LEAST_TAKEN_BYTES_PER_S: u64 = 8 << 10;
+
+/// Of what is handed to the system, so much waits to be sent at most. Left to itself it takes megabytes, and more only when a third of them is
+/// gone: a client that takes its answer slowly would for long look like one that takes nothing.
+#[cfg(any(target_os = "linux", target_os = "android"))]
+const UNSENT_BYTES: u32 = 1 << 18;
 
 /// What tells that a client has closed its side. Where the system can tell that by itself, bytes that nobody has read yet, which make a
 /// connection readable all the time, are not waited for again and again.
@@ -57,6 +63,18 @@ impl Drop for Stream {
     }
 }
 
+/// A connection as it is seen from elsewhere, which does not keep it open.
+#[derive(Debug)]
+pub struct Seen(Weak<Stream>);
+
+impl Seen {
+    /// Whether the client has said something that nobody has read yet.
+    pub fn has_unread(&self) -> bool {
+        let peek = |stream: Arc<Stream>| recv(&stream.tcp, &mut [0], RecvFlags::PEEK | RecvFlags::DONTWAIT);
+        matches!(self.0.upgrade().map(peek), Some(Ok((1.., _))))
+    }
+}
+
 /// A connection whose client has to take what it is sent.
 #[derive(Debug)]
 pub struct Socket {
@@ -72,9 +90,16 @@ impl Socket {
     pub fn new(stream: TcpStream, patience: Duration) -> Self {
         // Without it small answers could wait for the client's acknowledgement of earlier ones.
         let _ = stream.set_nodelay(true);
+        #[cfg(any(target_os = "linux", target_os = "android"))]
+        let _ = socket2::SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT_BYTES);
         OPEN.fetch_add(1, Ordering::Relaxed);
         let stream = Arc::new(Stream { tcp: stream, is_shut: AtomicBool::new(false) });
         Self { stream, patience, stalled: None, taken_bytes: 0 }
+    }
+
+    /// The connection as others may see it.
+    pub fn seen(&self) -> Seen {
+        Seen(Arc::downgrade(&self.stream))
     }
 
     /// Waits until the client has closed its side, or the connection is broken.
