@@ -172,9 +172,10 @@ pub fn measured(load: &LoadParameters, case: Case) -> Option<Measured> {
     // earlier calculation of case 5.2, at another angle, went further in two forces: to 9 and to 53.
     let refined = (load.ring_teeth_bend, load.wave_generator_moves);
     if load.corner_contact && case.has_pointed_tips {
-        // Teeth at the tips themselves, and all that can be refined.
-        let is_measured = matches!(load.law, ContactLaw::Johnson { .. }) && refined == (true, true);
-        let of_case = if case.has_gaps { [(-2, 0), (-3, 1), (0, 1)] } else { [(-3, 0), (-4, 1), (-2, 1)] };
+        // Teeth at the tips themselves, and what is refined there by default.
+        let is_refined = load.ring_teeth_bend && (load.wave_generator_moves || !case.has_gaps);
+        let is_measured = matches!(load.law, ContactLaw::Johnson { .. }) && is_refined;
+        let of_case = if case.has_gaps { [(-2, 0), (-3, 1), (0, 1)] } else { [(-4, 0), (-4, 1), (-3, 1)] };
         let [force, stress, wind_up] = of_case.map(|(low, high)| ErrorRange::percent(low, high));
         return is_measured.then_some(Measured { case, force, stress, wind_up });
     }
