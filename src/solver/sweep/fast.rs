@@ -44,12 +44,12 @@ use crate::{SolveError, Stop};
 use centers::{CenterLanes, Centers, EccentricCenters, HarmonicCenters, HarmonicPathCenters};
 use gaps::{GapColumns, GapWork};
 use lanes::{LANES, arctangent_terms, arctangents, cube_root, repeat_each};
-use laps::{LapTeeth, Laps, Layout};
+use laps::{LapTeeth, Laps, Layout, whole};
 use moments::FastLook;
 use pressures::Pressures;
 use sharing::{Limit, Shared, Sharing, Teeth, Work};
 use sinks::{ColumnSink, PeakSink, Sink};
-use tile::{Run, Tile, TileLanes, TileSize, whole};
+use tile::{Run, Tile, TileLanes, TileSize};
 
 /// Steps towards the support at most. A drive that needs more goes the plain way.
 const MAX_STEPS: u32 = 8;

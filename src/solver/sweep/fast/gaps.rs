@@ -3,9 +3,8 @@
 
 use std::f64::consts::PI;
 
-use super::laps::LapTeeth;
+use super::laps::{LapTeeth, whole};
 use super::sharing::{Teeth, Weights};
-use super::tile::whole;
 use crate::contact::PerContact;
 use crate::gaps::{Deviations, Gaps, MM_PER_UM, Modification, RAD_PER_ARCSEC, TipRelief, of};
 use crate::load_sharing::LoadedDrive;

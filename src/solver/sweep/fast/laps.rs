@@ -2,7 +2,10 @@
 
 use crate::mesh::{Mesh, Neighbours, Place, Samples};
 
-use super::tile::whole;
+/// A count that memory can hold, as an index; the caller has bounded the sweep.
+pub(super) fn whole(count: u64) -> usize {
+    usize::try_from(count).unwrap_or(usize::MAX)
+}
 
 /// How the teeth at an input angle lie in a tile: all those at the places one after another, so many times. Of each time those first whose places are
 /// whole multiples of `apart` from the first: neighbours in a zone.

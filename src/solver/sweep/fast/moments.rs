@@ -5,9 +5,9 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use pulp::Simd;
 
 use super::lanes::LANES;
-use super::laps::{LapTeeth, Layout};
+use super::laps::{LapTeeth, Layout, whole};
 use super::sinks::{AngleExtremes, PeakSink};
-use super::tile::{Tile, TileSize, whole};
+use super::tile::{Tile, TileSize};
 use super::{Kernel, Law, least};
 use crate::contact::Contact;
 use crate::load_sharing::LoadedDrive;

@@ -4,8 +4,8 @@ use std::iter::zip;
 use std::ops::Range;
 
 use super::lanes::{largest, repeat_each};
-use super::laps::{LapTeeth, Laps, Listed, Stretch};
-use super::tile::{Tile, whole};
+use super::laps::{LapTeeth, Laps, Listed, Stretch, whole};
+use super::tile::Tile;
 use crate::contact::{Contact, PerContact};
 use crate::drive::Drive;
 use crate::mesh::{Place, TeethInMesh};

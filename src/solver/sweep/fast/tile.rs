@@ -5,7 +5,7 @@ use std::iter::zip;
 
 use super::gaps::GapWork;
 use super::lanes::{LANES, VECTOR};
-use super::laps::{Laps, Layout};
+use super::laps::{Laps, Layout, whole};
 use super::sharing::Work;
 use crate::contact::{Contact, PerContact};
 use crate::mesh::{Mesh, Samples};
@@ -14,11 +14,6 @@ use crate::tooth::StressExponents;
 
 /// States of a tile, where one input angle has no more: its columns stay in the first-level cache.
 const TILE: usize = 128;
-
-/// A count that memory can hold, as an index; the caller has bounded the sweep.
-pub(super) fn whole(count: u64) -> usize {
-    usize::try_from(count).unwrap_or(usize::MAX)
-}
 
 /// Sines and cosines of angles.
 pub(super) struct SineTable {
