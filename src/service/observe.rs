@@ -81,6 +81,18 @@ fn describe() {
     describe_counter!("toothwave_sent_bytes_total", "Bytes handed to the network.");
     describe_counter!("toothwave_log_lines_lost_total", "Lines of the log that nobody will read.");
     describe_gauge!("toothwave_build_info", "1; its labels say what runs.");
+    // A rate of what is not there yet misses the first one.
+    for name in ["toothwave_cancellations_total", "toothwave_study_variants_total"] {
+        counter!(name).increment(0);
+    }
+    for code in ProblemCode::REFUSALS {
+        refused(code).increment(0);
+    }
+}
+
+/// What counts the refusals of this code.
+fn refused(code: ProblemCode) -> Counter {
+    counter!("toothwave_refusals_total", "reason" => word(&code))
 }
 
 /// The metrics as text; levels are read at this moment.
@@ -373,8 +385,8 @@ pub fn problem_is_told(problem: &Problem) {
     if let Some(cause) = &problem.cause {
         tracing::error!(cause, "internal error");
     }
-    if problem.code.is_refusal() {
-        counter!("toothwave_refusals_total", "reason" => word(&problem.code)).increment(1);
+    if ProblemCode::REFUSALS.contains(&problem.code) {
+        refused(problem.code).increment(1);
     }
 }
 

@@ -181,21 +181,18 @@ impl ProblemCode {
         }
     }
 
-    /// Whether the service could answer but does not take it on now, or not for everybody.
-    pub const fn is_refusal(self) -> bool {
-        matches!(
-            self,
-            Self::Unauthorized
-                | Self::QueueFull
-                | Self::DeadlineExceeded
-                | Self::ShuttingDown
-                | Self::TooManyConnections
-                | Self::TooManyUnreadBytes
-                | Self::MisdirectedRequest
-                | Self::NoSharedStore
-                | Self::StoreUnavailable
-        )
-    }
+    /// Where the service could answer but does not take it on now, or not for everybody.
+    pub const REFUSALS: [Self; 9] = [
+        Self::Unauthorized,
+        Self::QueueFull,
+        Self::DeadlineExceeded,
+        Self::ShuttingDown,
+        Self::TooManyConnections,
+        Self::TooManyUnreadBytes,
+        Self::MisdirectedRequest,
+        Self::NoSharedStore,
+        Self::StoreUnavailable,
+    ];
 }
 
 impl From<NoAnswerCode> for ProblemCode {

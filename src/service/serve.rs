@@ -164,6 +164,8 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
 /// Where the process gets no signals.
 pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: Option<Parts>) -> io::Result<()> {
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
+    // It has no keys to read again, and who sends it to the service's processes means none to end.
+    let _hang_up = signal(SignalKind::hangup())?;
     let mut told_to_stop = async || {
         tokio::select! {
             _ = terminate.recv() => {}

@@ -800,6 +800,18 @@ fn another_arithmetic_has_other_tags() {
     assert!(usual.1 == masked.1 || usual.0 != masked.0, "{} for two texts", usual.0);
 }
 
+/// The first refusal would otherwise be no increase of anything.
+#[test]
+fn what_has_not_happened_yet_stands_in_the_metrics_as_zero() {
+    let process = Process::started(&["serve"]);
+    for series in ["toothwave_cancellations_total", "toothwave_study_variants_total"] {
+        assert_eq!(metric(process.address, series), 0.0);
+    }
+    for reason in ["unauthorized", "queue_full", "store_unavailable"] {
+        assert_eq!(metric(process.address, &format!("toothwave_refusals_total{{reason=\"{reason}\"}}")), 0.0);
+    }
+}
+
 #[tokio::test]
 async fn metrics_say_what_was_built() {
     toothwave::observe::install_recorder();
