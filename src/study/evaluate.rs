@@ -10,11 +10,12 @@ use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::question::{Limits, Question as _};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::losses::period::RadialForces;
-use toothwave_solver::parts::RIM;
+use toothwave_solver::parts::{LEAST_WALL, RIM};
+use toothwave_solver::violation::{Misfit, Violation};
 use toothwave_solver::{Drive, SolveError, Stop};
 use utoipa::ToSchema;
 
-use crate::quantity::{Loaded, Quantity, Takes, Variant};
+use crate::quantity::{Loaded, OUTER_DIAMETER_MM, Quantity, Takes, Variant};
 
 /// Why a variant has no answer.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
@@ -49,6 +50,7 @@ pub struct Stopped;
 #[derive(Debug, Clone)]
 pub(crate) struct Evaluator {
     pub(crate) quantities: Vec<&'static Quantity>,
+    takes_outer_diameter: bool,
     takes_sweep: bool,
     takes_losses: bool,
     takes_radial_forces: bool,
@@ -59,6 +61,7 @@ impl Evaluator {
     pub(crate) fn new(quantities: Vec<&'static Quantity>, limits: Limits) -> Self {
         let takes = |takes| quantities.iter().any(|quantity| quantity.takes == takes);
         Self {
+            takes_outer_diameter: quantities.iter().any(|quantity| quantity.name == OUTER_DIAMETER_MM),
             takes_sweep: quantities.iter().any(|quantity| quantity.takes != Takes::Drive),
             takes_losses: takes(Takes::Losses),
             takes_radial_forces: takes(Takes::RadialForces),
@@ -80,12 +83,12 @@ impl Evaluator {
         let design = document.read::<Design>()?.normalised();
         if !self.takes_sweep {
             let drive = CoincidenceDegree.check(&design, &self.limits)?;
-            let ring_outer_radius_mm = ring_outer_radius_mm(&design, &drive);
+            let ring_outer_radius_mm = self.ring_outer_radius_mm(&design, &drive)?;
             return self.values(&Variant { drive: &drive, ring_outer_radius_mm, loaded: None });
         }
         let checked = Sweep.check(&design, &self.limits)?.without_wear();
         let drive = checked.drive();
-        let ring_outer_radius_mm = ring_outer_radius_mm(&design, drive);
+        let ring_outer_radius_mm = self.ring_outer_radius_mm(&design, drive)?;
         if !self.takes_losses && !self.takes_radial_forces {
             let peaks = checked.peaks(stop)?;
             let loaded = Loaded { checked: &checked, peaks, losses: None, radial_forces: None };
@@ -99,6 +102,19 @@ impl Evaluator {
         self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) })
     }
 
+    /// As drawn (docs/theory.md section 8). A ring that is none has no outer diameter.
+    fn ring_outer_radius_mm(&self, design: &Design, drive: &Drive) -> Result<f64, NoAnswer> {
+        let parts = design.parts_parameters();
+        let root_radius_mm = drive.root_radius_mm() + 1e-3 * parts.ring_clearance_um;
+        let value = parts.ring_outer_radius_mm.unwrap_or(RIM * root_radius_mm);
+        let limit = root_radius_mm * (1.0 + LEAST_WALL);
+        if self.takes_outer_diameter && value <= limit {
+            let misfit = Misfit::RingWithoutRim;
+            return Err(NoAnswer::impossible(&[Violation::PartDoesNotFit { misfit, value, limit }]));
+        }
+        Ok(value)
+    }
+
     fn values(&self, variant: &Variant<'_>) -> Result<Vec<f64>, NoAnswer> {
         let value = |quantity: &&Quantity| match quantity.of(variant).map_err(SolveError::from) {
             Ok(value) if value.is_finite() => Ok(value),
@@ -107,12 +123,6 @@ impl Evaluator {
         };
         self.quantities.iter().map(value).collect()
     }
-}
-
-/// As drawn (docs/theory.md section 8).
-fn ring_outer_radius_mm(design: &Design, drive: &Drive) -> f64 {
-    let parts = design.parts_parameters();
-    parts.ring_outer_radius_mm.unwrap_or(RIM * (drive.root_radius_mm() + 1e-3 * parts.ring_clearance_um))
 }
 
 impl From<NoAnswer> for Refusal {

@@ -324,7 +324,7 @@ fn from_envelope(
             let (min, max) = ((lobes * least_ratio).ceil(), (lobes * largest_ratio).floor());
             if min.max(LEAST_COUNT) > max.min(LARGEST_COUNT) {
                 let detail = format!(
-                    "no number of teeth has such a ratio: it is their number, {LEAST_COUNT:?} to {LARGEST_COUNT:?}, over the lobes of the wave generator, here {lobes:?}"
+                    "no number of teeth has such a ratio beside a ring of fewer: it is their number, {LEAST_COUNT:?} to {LARGEST_COUNT:?}, over the lobes of the wave generator, here {lobes:?}"
                 );
                 let nearest = min.clamp(LEAST_COUNT, LARGEST_COUNT) / lobes;
                 return Err(beyond("/require/transmission_ratio", FieldCode::OutOfRange, detail, least_ratio, nearest));

@@ -48,6 +48,22 @@ fn impossible_variants_are_counted_under_their_reason_and_have_no_numbers() {
     assert_eq!((&reason["variants"], &reason["first_variant"]), (&json!(2), &json!(5)));
 }
 
+/// As its drawing is: the outer radius of a ring that has its root at 68 mm.
+#[test]
+fn a_ring_that_is_smaller_than_its_root_has_no_outer_diameter() {
+    let over = json!({ "/parts/ring/outer_radius_mm": { "min": 66.0, "max": 72.0, "steps": 4 } });
+    let found = answer(&map(over.clone(), json!(["outer_diameter_mm", "coincidence_degree"])));
+    assert_eq!(numbers(&found["possible"]["quantities"]["outer_diameter_mm"]), [140.0, 144.0]);
+    let reason = &found["reasons"][0];
+    assert_eq!(
+        (&reason["code"], &reason["pointer"]),
+        (&json!("ring_without_rim"), &json!("/parts/ring/outer_radius_mm"))
+    );
+    // As in answers without drawings, what nobody asks for is no reason.
+    let found = answer(&map(over, json!(["coincidence_degree"])));
+    assert_eq!(found["possible"]["variant"], json!([0, 1, 2, 3]));
+}
+
 #[test]
 fn every_whole_number_of_a_range_is_a_step_of_its_own() {
     let base = with(&paper(), "/drive/ring", json!({}));
