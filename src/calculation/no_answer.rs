@@ -150,7 +150,7 @@ impl From<SolveError> for NoAnswer {
             SolveError::NoLeverArm => Self::new(NoAnswerCode::NoToothInMesh, detail),
             SolveError::TurnedPastTeeth => Self::new(
                 NoAnswerCode::ImpossibleDesign,
-                format!("{detail}. Lower the torque or close the gaps, or leave `model.wave_generator_moves` out"),
+                format!("{detail}. Lower the torque or close the gaps, or make `model.wave_generator_moves` false"),
             ),
             SolveError::TooManyPoints { points, limit } => {
                 let detail = format!("{detail} by `max_profile_points`; widen the chord tolerance");

@@ -271,6 +271,11 @@ async fn where_no_law_is_named_pointed_tips_bend_and_with_gaps_the_wave_generato
     assert_eq!(solved(&pointed, gap(stiff)).await, solved(&pointed, gap(named(false, false))).await);
     assert_ne!(solved(&pointed, json!({})).await, solved(&pointed, named(false, false)).await);
     assert_ne!(solved(&natural, gap(named(false, true))).await, solved(&natural, gap(json!({}))).await);
+    // Who never asked for it is told how to do without.
+    let wide = |choice: Value| with(&with(&pointed, "/model", choice), "/model/clearance", json!({ "ring_um": 300.0 }));
+    let problem = service.post("/v1/sweep", &wide(json!({}))).await.refused(422, "impossible_design");
+    assert!(problem["detail"].as_str().unwrap().ends_with("or make `model.wave_generator_moves` false"), "{problem}");
+    service.post("/v1/sweep", &wide(json!({ "wave_generator_moves": false }))).await.found();
     // Nothing of it was held against elastic bodies under another law, or beside projection.
     let refused = json!({ "compatibility": "projection", "wave_generator_moves": true });
     let problem = service.post("/v1/sweep", &with(&pointed, "/model", refused)).await.refused(422, "impossible_design");
