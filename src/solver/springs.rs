@@ -46,10 +46,13 @@ impl Spring {
                 along_mm / arm_mm + lost_motion_rad
             }
             Some(Gap { along_mm, lost_motion_rad }) => {
-                turned_rad(arm_mm, arm_decline_mm_per_rad, along_mm + lost_motion_rad * arm_mm)
+                turned_rad(arm_mm, arm_decline_mm_per_rad, along_mm) + lost_motion_rad
             }
             None => 0.0,
         };
+        // Turned away flanks and walls let all that a tooth does come later. Its arm is what it is once that is made up for.
+        let lost_motion_rad = gap.map_or(0.0, |gap| gap.lost_motion_rad);
+        let arm_mm = arm_mm + arm_decline_mm_per_rad * lost_motion_rad;
         Self { travel_arm_mm: arm_mm, static_arm_mm: arm_mm, arm_decline_mm_per_rad, closing_rad, approach }
     }
 

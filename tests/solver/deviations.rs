@@ -376,16 +376,17 @@ fn what_deviates_by_nothing_is_swept_as_one_zone_that_stands_for_all() {
 
 #[test]
 fn what_all_items_have_alike_is_a_modification() {
-    for p in [PAPER_5_1, of(ellipse(58.0, 56.6), 13, 13, 15, 5.0), PAPER_5_2_BORED] {
+    let drives = [PAPER_5_1, of(ellipse(58.0, 56.6), 13, 13, 15, 5.0), PAPER_5_2_BORED];
+    for (p, moves) in drives.into_iter().flat_map(|p| [(p, false), (p, true)]) {
         let drive = drive(&p);
-        let torque = cleared(20.0, ContactLaw::Palmgren);
+        let torque = LoadParameters { wave_generator_moves: moves, ..cleared(20.0, ContactLaw::Palmgren) };
         let modified = LoadParameters {
             modification: Modification {
                 tooth_radius_um: 0.7,
                 slot_wall_um: 1.1,
                 carrier_rotation_arcsec: -3.0,
                 ring_equidistant_um: -0.6,
-                ring_rotation_arcsec: 5.0,
+                ring_rotation_arcsec: 60.0,
                 wave_generator_equidistant_um: 0.4,
                 ..Modification::default()
             },
@@ -397,7 +398,7 @@ fn what_all_items_have_alike_is_a_modification() {
             slot_wall_um: all(p.installed, 1.1),
             slot_angle_arcsec: all(p.installed, -3.0),
             ring_space_um: all(p.ring_teeth, -0.6),
-            ring_space_angle_arcsec: all(p.ring_teeth, 5.0),
+            ring_space_angle_arcsec: all(p.ring_teeth, 60.0),
             wave_generator_lobe_um: all(2, 0.4),
             ..Deviations::default()
         };
