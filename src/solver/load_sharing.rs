@@ -253,7 +253,9 @@ fn force_ratio_at_corner(sense: f64, center: &ToothCenter, seen: &FlankPoint) ->
     let t = center.tan_pressure_angle;
     let cos_cam = 1.0 / (1.0 + t * t).sqrt();
     let carrier = cos_cam * (seen.tan_pressure_angle + sense * t);
-    (seen.tan_pressure_angle > 0.0 && carrier >= 0.0).then(|| PerContact {
+    // Both: a tooth that stands farther out than the corner, and past it, has a positive tangent again.
+    let is_before = seen.tan_pressure_angle > 0.0 && seen.cos_pressure_angle > 0.0;
+    (is_before && carrier >= 0.0).then(|| PerContact {
         wave_generator: 1.0,
         ring: cos_cam / seen.cos_pressure_angle,
         carrier,
@@ -782,7 +784,8 @@ impl<'a> LoadedDrive<'a> {
         let limit = Self::first_to_reach(teeth, |tooth, contact| {
             // Under `F_r` the half-width is the whole length, and its square goes as the force.
             let pressure = tooth.pressure.get(contact);
-            if matches!(pressure, Pressure::Corner(_)) {
+            // The law is of contacts along a line.
+            if matches!(pressure, Pressure::Corner(_) | Pressure::Flat(_)) {
                 return f64::INFINITY;
             }
             let stress_mpa = pressure.stress_mpa(1.0);

@@ -12,7 +12,7 @@ use toothwave_solver::model_error;
 use toothwave_solver::sweep::{self, Points, States, Sweep};
 use toothwave_solver::{
     ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, Parameter, PerContact, Position, SolveError,
-    ToothShape, Violation,
+    ToothShape, Violation, WaveGenerator,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_swept_drive, drive, load, swept};
@@ -353,6 +353,44 @@ fn natural_tips_and_balls_have_no_corner() {
         let pressed = LoadParameters { law, ..pressed_corners(3.0) };
         let without = LoadParameters { corner_contact: false, ..pressed };
         assert!(same_loads(&swept(&parameters, &pressed, 12), &swept(&parameters, &without, 12)));
+    }
+}
+
+/// Such a tooth is behind the corner in both directions, and the tangent of the line between them is positive again.
+#[test]
+fn a_tooth_that_is_past_the_corner_and_farther_out_carries_nothing() {
+    let wide_lands = DriveParameters {
+        wave_generator: WaveGenerator::Eccentric { radius_mm: 36.0, eccentricity_mm: 0.1 },
+        teeth: 6,
+        installed: 6,
+        tooth_radius_mm: 1.3,
+        tooth: ToothShape::Cylinder { width_mm: 10.0 },
+        ring_teeth: 5,
+        tip_radius_mm: Some(38.6),
+    };
+    let two_lobes = DriveParameters {
+        wave_generator: WaveGenerator::Ellipse { semi_major_mm: 56.2, semi_minor_mm: 54.8 },
+        teeth: 5,
+        installed: 5,
+        tooth_radius_mm: 7.3,
+        ring_teeth: 3,
+        tip_radius_mm: Some(70.3),
+        ..wide_lands
+    };
+    for parameters in [wide_lands, two_lobes] {
+        let drive = drive(&parameters);
+        let states = swept(&parameters, &pressed_corners(0.01), 20).states;
+        let end_deg = drive.flank_limit().position.from_lobe_deg();
+        let loads = states.position_deg.iter().zip(&states.force_n.wave_generator);
+        let mut farther_out = 0;
+        for (&position_deg, &force_n) in loads.filter(|(position_deg, _)| **position_deg > end_deg) {
+            let Seen { to_ring, to_wall, .. } = seen(&drive, position_deg, 0.0);
+            if to_ring.x < 0.0 {
+                farther_out += 1;
+                assert!(to_ring.y * -to_wall.y < 0.0 && force_n == 0.0, "{force_n} N at {position_deg} deg");
+            }
+        }
+        assert!(farther_out > 0);
     }
 }
 

@@ -295,9 +295,15 @@ fn under_johnsons_law_too_any_torque_up_to_its_end_and_any_gap_is_balanced() {
 
 #[test]
 fn johnsons_law_ends_where_a_contact_is_half_as_wide_as_the_tooth_and_says_at_which_torque() {
+    let flats = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 4.0 };
+    for drive in [drive(&PAPER_5_1), drive(&DriveParameters { tooth: flats, ..PAPER_5_1 })] {
+        johnsons_law_ends_at_the_ring(&drive);
+    }
+}
+
+fn johnsons_law_ends_at_the_ring(drive: &Drive) {
     let heavy = LoadCase::new(&johnson(1e6)).unwrap();
-    let drive = drive(&PAPER_5_1);
-    let refused = sweep::sweep(&drive, &heavy, Points::samples(4).unwrap(), &Never).unwrap_err();
+    let refused = sweep::sweep(drive, &heavy, Points::samples(4).unwrap(), &Never).unwrap_err();
     assert!(refused.to_string().starts_with("half the contact's width at the ring reaches 2.5 mm"), "{refused}");
     let SolveError::JohnsonBeyondHalfWidth { contact, half_width_limit_mm, input_torque_limit_nm, .. } = refused else {
         panic!("{refused:?}")
@@ -306,8 +312,8 @@ fn johnsons_law_ends_where_a_contact_is_half_as_wide_as_the_tooth_and_says_at_wh
     // Just below the torque that it names the first input angle has an answer, with that half-width; just above it has none.
     let loaded = |torque_nm: f64| {
         let case = LoadCase::new(&johnson(torque_nm)).unwrap();
-        let loaded = LoadedDrive::new(&drive, &case).unwrap();
-        let mesh = Mesh::new(&drive);
+        let loaded = LoadedDrive::new(drive, &case).unwrap();
+        let mesh = Mesh::new(drive);
         let teeth: Vec<_> =
             mesh.placed_at(0, Samples::new(4).unwrap()).map(|placed| loaded.tooth(placed.position).unwrap()).collect();
         let wind_up = loaded.wind_up(&teeth)?;
@@ -322,7 +328,7 @@ fn johnsons_law_ends_where_a_contact_is_half_as_wide_as_the_tooth_and_says_at_wh
     assert!(loaded(input_torque_limit_nm * (1.0 + 1e-9)).is_err());
     // A capacity beyond is none.
     let parameters = LoadParameters { allowable_stress_mpa: Some(everywhere(1e6)), ..johnson(20.0) };
-    let refused = sweep::sweep(&drive, &LoadCase::new(&parameters).unwrap(), Points::samples(4).unwrap(), &Never);
+    let refused = sweep::sweep(drive, &LoadCase::new(&parameters).unwrap(), Points::samples(4).unwrap(), &Never);
     assert!(matches!(refused, Err(SolveError::JohnsonBeyondHalfWidth { .. })), "{refused:?}");
 }
 
