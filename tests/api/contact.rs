@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::asking::Service;
-use crate::designs::{shortest, spelled_out, undercut, with};
+use crate::designs::{bored, shortest, spelled_out, undercut, with};
 
 /// Case 5.1 by virtual work and Palmgren's law, with a gap at the ring's normal.
 fn palmgren(ring_um: f64) -> Value {
@@ -272,7 +272,7 @@ async fn where_no_law_is_named_pointed_tips_bend_and_with_gaps_the_wave_generato
     assert_ne!(solved(&pointed, json!({})).await, solved(&pointed, named(false, false)).await);
     assert_ne!(solved(&natural, gap(named(false, true))).await, solved(&natural, gap(json!({}))).await);
     // Who never asked for it is told how to do without.
-    let wide = |choice: Value| with(&with(&pointed, "/model", choice), "/model/clearance", json!({ "ring_um": 300.0 }));
+    let wide = |choice: Value| with(&with(&bored(), "/model", choice), "/model/clearance", json!({ "ring_um": 300.0 }));
     let problem = service.post("/v1/sweep", &wide(json!({}))).await.refused(422, "impossible_design");
     assert!(problem["detail"].as_str().unwrap().ends_with("or make `model.wave_generator_moves` false"), "{problem}");
     service.post("/v1/sweep", &wide(json!({ "wave_generator_moves": false }))).await.found();
