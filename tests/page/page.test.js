@@ -879,6 +879,17 @@ test('plots and mechanism are linked; peaks lead to their place', async () => {
   assert.match(await page.textContent('#tooth-state'), /ψ 70\.2°, σ up to 980 MPa/);
 });
 
+test('the loaded teeth stay marked in the plots when the window changes', async () => {
+  page = await open(browser, server);
+  await page.setViewportSize({ width: 1300, height: 900 });
+  await page.waitForFunction(() => document.querySelector('#charts .chart').clientWidth === document.querySelector('#charts .uplot').clientWidth);
+  await settled(page);
+  const areMarked = await page.$$eval('#charts figure:not([hidden]) .marks', (all) =>
+    all.map((canvas) => canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value !== 0)),
+  );
+  assert.deepEqual(areMarked, [true, true]);
+});
+
 test('a reference shows differences in tiles, table, plots and drawing', async () => {
   page = await open(browser, server);
   await page.click('#keep');

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
-import { choose, enter, field, notes, settled, setDocument, testBed } from './harness.js';
+import { choose, enter, field, notes, resultOf, settled, setDocument, testBed } from './harness.js';
 
 const RADIUS = '/drive/teeth/radius_mm';
 const SEMI_MINOR = '/drive/wave_generator/semi_minor_mm';
@@ -60,6 +60,29 @@ test('what a held slider passes is told at once in the line at the top, and at t
   await settled(page);
   assert.match(await page.textContent(notes(RADIUS)), /Undercut ring tips/);
   assert.match(await page.textContent('#findings'), /Undercut ring tips/);
+});
+
+test('the table of results waits while a slider is held, unless it is seen', async () => {
+  const page = await bed.open();
+  const gap = () => resultOf(page, 'Least gap between teeth');
+  const answered = async () => {
+    const design = await bed.server.example('paper-5.1');
+    design.drive.teeth.radius_mm = Number(await page.inputValue(field(RADIUS)));
+    return (await bed.server.ask('/v1/geometry', design)).teeth.gap_min_mm;
+  };
+  const before = await gap();
+  await dragged(page, RADIUS, [0.55]);
+  assert.equal(await gap(), before);
+  await page.locator('#table').scrollIntoViewIfNeeded();
+  const seen = await answered();
+  assert.notEqual(seen, before);
+  await page.waitForFunction((wanted) => [...document.querySelectorAll('#table data')].some(({ value }) => Number(value) === wanted), seen);
+  await page.evaluate(() => scrollTo(0, 0));
+  await page.mouse.up();
+  await dragged(page, RADIUS, [0.45]);
+  await page.mouse.up();
+  await settled(page);
+  assert.equal(await gap(), await answered());
 });
 
 test('an impossible design is told in a line of its own height, with all reasons under it on demand', async () => {

@@ -76,6 +76,7 @@ const ASSETS: &[Asset] = assets![
     "sensitivity.js" as SCRIPT,
     "service.js" as SCRIPT,
     "share.js" as SCRIPT,
+    "sight.js" as SCRIPT,
     "states.js" as SCRIPT,
     "studies.js" as SCRIPT,
     "study-view.js" as SCRIPT,

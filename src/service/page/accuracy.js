@@ -1,7 +1,7 @@
 // How wrong and how slow each choice of model and input angles is, as the service measures it for the design at hand.
 
 import { at, changed, compatibilityOf, isSame, lawOf } from './design.js';
-import { html, setText } from './dom.js';
+import { html, setAttributes, setProperties, setText } from './dom.js';
 import { fixed, number } from './format.js';
 import { ask } from './service.js';
 
@@ -69,7 +69,7 @@ export class Accuracy {
     if (this.wanted.options.length !== errors.length || !errors.includes(Number(this.wanted.value))) {
       this.wanted.replaceChildren(...errors.map((error) => html('option', { value: error }, number(error, 2))));
     }
-    this.wanted.value = String(value);
+    setProperties(this.wanted, { value: String(value) });
     this.#message = '';
     this.#show();
   }
@@ -139,7 +139,7 @@ export class Accuracy {
     this.panel.classList.toggle('outdated', isStale);
     setText(this.button, measured ? 'Measure again' : 'Measure');
     const own = choiceOf(this.#design);
-    for (const { way, button } of this.#rows) button.setAttribute('aria-pressed', String(isSameWay(way, own)));
+    for (const { way, button } of this.#rows) setAttributes(button, { 'aria-pressed': isSameWay(way, own) });
     setText(this.state, this.#message || (isStale ? 'Measured for another design; measure again for this one.' : measured ? this.#summary() : ''));
   }
 

@@ -2,7 +2,7 @@
 
 import { GROUPS, at, changed, fieldsOf, fullLabel, isOn, isSame, keptBy, kindOf } from './design.js';
 import { linesOf, linesRead } from './lines.js';
-import { html, setChildren, setText, symbol } from './dom.js';
+import { html, setAttributes, setChildren, setProperties, setText, symbol } from './dom.js';
 import { explanation, sentence, titleOf } from './findings.js';
 import { number, typed } from './format.js';
 import { term } from './terms.js';
@@ -329,9 +329,9 @@ export class Form {
   /** Shows the option that is chosen; what no design like this one can have is not offered. */
   #offer({ field, input }, chosen) {
     field.options.forEach(({ value, suits }, index) => {
-      input.options[index].hidden = value !== chosen && suits !== undefined && !suits(this.#design);
+      setProperties(input.options[index], { hidden: value !== chosen && suits !== undefined && !suits(this.#design) });
     });
-    input.value = chosen ?? '';
+    setProperties(input, { value: chosen ?? '' });
   }
 
   #showValue(entry, respan) {
@@ -341,14 +341,14 @@ export class Form {
       const kind = kindOf(field, design);
       this.#offer(entry, kind);
       const wanted = new Set(field.options.find(({ value }) => value === kind)?.fields.map(({ pointer }) => pointer));
-      for (const { pointer } of field.options.flatMap(({ fields }) => fields)) this.#fields.get(pointer).element.hidden = !wanted.has(pointer);
+      for (const { pointer } of field.options.flatMap(({ fields }) => fields)) setProperties(this.#fields.get(pointer).element, { hidden: !wanted.has(pointer) });
       return;
     }
     if (field.kind === 'oneOf') {
       const given = field.options.filter((option) => at(design, option.field.pointer) !== undefined);
       const shown = given.length > 0 ? given : [field.options.find(({ key }) => key === entry.chosen) ?? field.options[0]];
-      input.value = shown[0].key;
-      for (const option of field.options) this.#fields.get(option.field.pointer).element.hidden = !shown.includes(option);
+      setProperties(input, { value: shown[0].key });
+      for (const option of field.options) setProperties(this.#fields.get(option.field.pointer).element, { hidden: !shown.includes(option) });
       return;
     }
     if (field.kind === 'flag') {
@@ -358,29 +358,29 @@ export class Form {
     if (field.kind === 'lines') {
       const isTyping = document.activeElement === input;
       if (!isTyping) entry.fault = undefined;
-      if (!isTyping) input.value = linesOf(field, at(design, field.pointer)).join('\n');
+      if (!isTyping) setProperties(input, { value: linesOf(field, at(design, field.pointer)).join('\n') });
       return;
     }
     if (field.kind === 'choice') {
       this.#offer(entry, at(design, field.pointer) ?? field.otherwise?.(design) ?? field.options[0].value);
       return;
     }
-    if (field.when) entry.element.hidden = !field.when(design);
+    if (field.when) setProperties(entry.element, { hidden: !field.when(design) });
     const value = field.derived ? field.derived.read(this.#isOwn ? this.#answers : {}) : (at(design, field.pointer) ?? field.preset);
     const isTyping = document.activeElement === input;
     if (!isTyping) entry.fault = undefined;
     // What is being typed stays as it is spelled, as long as it means the value.
     const isShown = isTyping && (field.derived ? entry.isEdited : typed(input.value).value === (at(design, field.pointer) ?? undefined));
-    if (!isShown && entry.fault === undefined) input.value = typeof value === 'number' ? String(value) : '';
-    input.placeholder = field.optional?.(design, this.#answers) ?? field.preset ?? (field.derived ? '' : 'wanted');
+    if (!isShown && entry.fault === undefined) setProperties(input, { value: typeof value === 'number' ? String(value) : '' });
+    setProperties(input, { placeholder: String(field.optional?.(design, this.#answers) ?? field.preset ?? (field.derived ? '' : 'wanted')) });
     if (entry.slider) {
       const isGiven = typeof value === 'number' && value >= SPANNED.least && value <= SPANNED.most;
-      entry.slider.parentElement.hidden = !isGiven;
+      setProperties(entry.slider.parentElement, { hidden: !isGiven });
       if (!isGiven) return;
       const { min, max } = entry.slider;
       if (respan || entry.step === undefined || value < Number(min) || value > Number(max)) this.#span(entry, value);
-      else entry.slider.value = value;
-      entry.slider.setAttribute('aria-valuetext', `${value} ${field.unit}`);
+      else setProperties(entry.slider, { value: String(value) });
+      setAttributes(entry.slider, { 'aria-valuetext': `${value} ${field.unit}` });
     }
   }
 
@@ -392,7 +392,7 @@ export class Form {
     this.#findings = findings;
     for (const entry of this.#fields.values()) {
       const { field } = entry;
-      if (field.optional) entry.input.placeholder = field.optional(this.#design, answers);
+      if (field.optional) setProperties(entry.input, { placeholder: String(field.optional(this.#design, answers)) });
       if (field.derived) {
         entry.isEdited &&= entry.fault !== undefined;
         this.#showValue(entry, false);
@@ -405,7 +405,7 @@ export class Form {
   #showMark({ slider, mark, markText, field }, { value, text }) {
     setText(markText, value === undefined ? text : `${text} ${number(value, 4)} ${field.unit}`);
     const share = (value - Number(slider.min)) / (Number(slider.max) - Number(slider.min));
-    mark.hidden = !(share >= 0 && share <= 1);
+    setProperties(mark, { hidden: !(share >= 0 && share <= 1) });
     mark.style.setProperty('--at', share);
   }
 

@@ -4,7 +4,7 @@
 import * as access from './access.js';
 import { Accuracy } from './accuracy.js';
 import { changed, isSame } from './design.js';
-import { html, oncePerFrame, setChildren, setText } from './dom.js';
+import { html, oncePerFrame, setAttributes, setChildren, setProperties, setText } from './dom.js';
 import { Drawings } from './drawings.js';
 import { Explore } from './explore.js';
 import { Find } from './find.js';
@@ -23,6 +23,7 @@ import { Results } from './results.js';
 import { Sensitivity } from './sensitivity.js';
 import { Service, evaluate, getJson } from './service.js';
 import * as share from './share.js';
+import { Sight } from './sight.js';
 import { glossary, term } from './terms.js';
 import { Tolerance } from './tolerance.js';
 import { Toolbar } from './toolbar.js';
@@ -35,6 +36,8 @@ const PLAY_SPEED = 18;
 const ALIKE_DEG = 1e-6;
 const ADDRESS_DELAY_MS = 400;
 const ANNOUNCE_DELAY_MS = 700;
+/** Only a calculation longer than this is worth a sign. */
+const BUSY_DELAY_MS = 400;
 
 const byId = (id) => document.getElementById(id);
 
@@ -55,11 +58,10 @@ const state = {
   isPlaying: false,
 };
 let motion;
-let pass;
 let gesture;
 
 const history = new History();
-const service = new Service({ onResult, onAway, onBusy: (isBusy) => byId('key-figures').setAttribute('aria-busy', String(isBusy)), onSlow });
+const service = new Service({ onResult, onAway, onBusy, onSlow });
 
 const form = new Form(byId('form'), {
   onEdit(design, pointer) {
@@ -67,9 +69,10 @@ const form = new Form(byId('form'), {
   },
   onEnd() {
     gesture = undefined;
-    // What had to wait because it takes room.
+    // What had to wait because it takes room or was out of sight.
     showFindings();
     showComparison();
+    render();
   },
 });
 
@@ -114,6 +117,15 @@ const drawings = new Drawings(
   { list: byId('drawings-list'), state: byId('drawings-state') },
   { nameOf: fileName, onRefusal: showNotes, goTo: (pointer) => form.goTo(pointer), labelOf: (pointer) => form.labelOf(pointer) },
 );
+
+/** Parts that are far down the page. */
+const sight = {
+  plots: new Sight(byId('charts'), () => {
+    showPlots();
+    render();
+  }),
+  table: new Sight(byId('table'), () => showTable()),
+};
 
 // ---- the views
 
@@ -166,8 +178,8 @@ function replaceDesign(design, { origin, fromForm = false, respan = false, keeps
   drawings.setDesign(design);
   for (const study of Object.values(studies)) study.setDesign(design);
   service.request(design);
-  byId('undo').disabled = !history.canUndo;
-  byId('redo').disabled = !history.canRedo;
+  setProperties(byId('undo'), { disabled: !history.canUndo });
+  setProperties(byId('redo'), { disabled: !history.canRedo });
   showName();
   if (!keepsAddress) addressLater();
 }
@@ -194,7 +206,7 @@ function showName() {
   const name = nameOf(state.design);
   setText(byId('design-name'), name);
   document.title = `${name.split(':')[0]} – toothwave`;
-  for (const { button, design } of state.examples) button.setAttribute('aria-pressed', String(isSame(design, state.design)));
+  for (const { button, design } of state.examples) setAttributes(button, { 'aria-pressed': isSame(design, state.design) });
 }
 
 let addressTimer;
@@ -218,7 +230,6 @@ function onResult({ design, answers, problems, solveMs }) {
   if (isDrawn) {
     state.shown = { design, answers };
     motion = new Motion(design, answers.geometry, answers.sweep);
-    pass = answers.sweep && passOf(design, answers.sweep);
     if (state.selected >= motion.installed) state.selected = 0;
     mechanism.setMotion(motion);
     setText(byId('solved'), `Solver ${answers.geometry.solver_version}, solved in ${number(solveMs, 2)} ms`);
@@ -242,7 +253,7 @@ function showNotes() {
 /** In the line under the key figures, which is always there: what takes room of its own would push the page about. */
 function showReasons(isDrawn) {
   const banner = byId('impossible');
-  banner.hidden = state.reasons.length === 0;
+  setProperties(banner, { hidden: state.reasons.length === 0 });
   showStatus();
   if (banner.hidden) return;
   const [{ title }] = state.reasons;
@@ -260,15 +271,24 @@ function showReasons(isDrawn) {
 function showStatus() {
   const { findings, reasons } = state;
   const line = byId('status-findings');
-  line.hidden = reasons.length > 0;
+  setProperties(line, { hidden: reasons.length > 0 });
   const count = findings.length === 1 ? '1 finding' : `${findings.length} findings`;
   setText(line, findings.length === 0 ? 'No findings' : `${count}: ${findings.map(titleOf).join(', ')}`);
-  line.className = findings.some(({ severity }) => severity === 'warning') ? 'warning' : '';
+  setProperties(line, { className: findings.some(({ severity }) => severity === 'warning') ? 'warning' : '' });
+}
+
+let busyTimer;
+function onBusy(isBusy) {
+  const figures = byId('key-figures');
+  figures.setAttribute('aria-busy', String(isBusy));
+  clearTimeout(busyTimer);
+  if (isBusy) busyTimer = setTimeout(() => figures.classList.add('busy'), BUSY_DELAY_MS);
+  else figures.classList.remove('busy');
 }
 
 function onSlow(seconds) {
   const line = byId('slow');
-  line.hidden = seconds === undefined;
+  setProperties(line, { hidden: seconds === undefined });
   if (seconds !== undefined) setText(line, `Calculating for ${fixed(seconds, 0)} s; numbers are the last design’s.`);
 }
 
@@ -303,16 +323,31 @@ function showFindings() {
 
 function showComparison() {
   const { reference, shown } = state;
-  plots.setPasses(pass, reference?.pass);
+  if (shown) results.updateKeyFigures(shown.answers, reference?.answers, form.isHeld);
+  if (!form.isHeld || sight.plots.isSeen) showPlots();
+  if (!form.isHeld || sight.table.isSeen) showTable();
   mechanism.setReference(reference);
-  if (shown) results.update(shown.answers, reference?.answers, form.isHeld);
-  byId('comparing').hidden = !reference;
+  setProperties(byId('comparing'), { hidden: !reference });
   const differences = shown && reference ? inputDifferences(shown.design, reference.design) : [];
   showInputs(differences);
   if (!reference) return;
   setText(byId('reference-name'), reference.name);
   const text = differences.map(({ label, value, reference: other }) => `${label} ${other} → ${value}`).join(', ');
   setText(byId('differing'), differences.length > 0 ? `Inputs that differ: ${text}.` : 'All inputs are the same.');
+}
+
+/** The pass of a result, for the plots. */
+function passOfResult(result) {
+  if (!result?.answers.sweep) return undefined;
+  result.pass ??= passOf(result.design, result.answers.sweep);
+  return result.pass;
+}
+
+const showPlots = () => plots.setPasses(passOfResult(state.shown), passOfResult(state.reference));
+
+function showTable() {
+  const { shown, reference } = state;
+  if (shown) results.updateTable(shown.answers, reference?.answers, form.isHeld);
 }
 
 let shownInputs = '[]';
@@ -368,7 +403,7 @@ async function keepReference({ design, origin }, answers, { keepsAddress = false
     setText(byId('announcer'), 'The reference could not be calculated.');
     return;
   }
-  state.reference = { design, origin, name, answers: known, geometry: known.geometry, pass: known.sweep && passOf(design, known.sweep) };
+  state.reference = { design, origin, name, answers: known, geometry: known.geometry };
   showComparison();
   render();
   if (!keepsAddress) addressLater();
@@ -397,12 +432,12 @@ function swapReference() {
 const render = oncePerFrame(() => {
   if (!motion) return;
   const loaded = mechanism.render(state);
-  plots.drawTeeth(loaded, state.selected);
+  if (!(form.isHeld || state.isPlaying) || sight.plots.isSeen) plots.drawTeeth(loaded, state.selected);
   const inTurn = ((state.inputDeg % 360) + 360) % 360;
   const angle = byId('angle');
   if (Number(angle.value) !== Math.round(inTurn * 10) / 10) angle.value = inTurn;
   const carrierDeg = motion.carrierDeg(state.inputDeg) % 360;
-  angle.setAttribute('aria-valuetext', `${fixed(inTurn, 1)} degrees, carrier ${fixed(carrierDeg, 2)} degrees`);
+  setAttributes(angle, { 'aria-valuetext': `${fixed(inTurn, 1)} degrees, carrier ${fixed(carrierDeg, 2)} degrees` });
   const inputText = `${fixed(inTurn, 1)}°`;
   setText(byId('angle-input'), inputText);
   drawings.turnTo(state.inputDeg, inputText);

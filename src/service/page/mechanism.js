@@ -1,7 +1,7 @@
 // The drive drawn to scale, twice: whole, and one tooth enlarged with its slot upright. Every outline is a profile of the
 // geometry or a circle of the document; every place and force comes from `Motion`.
 
-import { html, setAttributes, setText, svg } from './dom.js';
+import { html, setAttributes, setProperties, setText, svg } from './dom.js';
 import { number, withUnit } from './format.js';
 import { CONTACTS, polar } from './motion.js';
 
@@ -10,8 +10,8 @@ const RING_BODY = 0.045;
 const LONGEST_ARROW = 0.09;
 const ARROW_HEAD = 0.016;
 
-/** Points of the whole ring are this share of its radius apart at least: less than a pixel, also in print. */
-const FINEST = 4000;
+/** Outlines of the whole drive are true to this share of its radius: a small part of a pixel, also in print. */
+const FINEST = 6000;
 
 /** Of more teeth than this the whole drive shows every second, every third and so on, with their slots and arrows: those between
  *  would fall on the same pixel. */
@@ -29,13 +29,40 @@ const xy = ({ x, y }) => `${x.toFixed(4)} ${y.toFixed(4)}`;
 
 const polyline = (list) => `M${list.map(xy).join('L')}`;
 
+/** A line that ends where it begins. */
+const closed = (list) => `${polyline(list.slice(0, -1))}Z`;
+
 const circle = (radius) =>
   `M${radius} 0A${radius} ${radius} 0 1 1 ${-radius} 0A${radius} ${radius} 0 1 1 ${radius} 0Z`;
 
-/** The ring's flanks over `count` tooth spaces from the `first` on, from the profile of one. Points nearer to each other than
- *  `spacing` are left out: in the whole drive they would fall on the same pixel. */
-function flanks(geometry, teeth, first, count, spacing) {
-  const tooth = points(geometry.ring.profile);
+/** Of a line's points those that keep it within a distance of the others, after Douglas and Peucker. */
+function thinned(line, distance) {
+  const kept = [];
+  const keep = (from, to) => {
+    const [{ x, y }, end] = [line[from], line[to]];
+    const [dx, dy] = [end.x - x, end.y - y];
+    const length = Math.hypot(dx, dy);
+    let [most, farthest] = [distance, undefined];
+    for (let index = from + 1; index < to; index += 1) {
+      const [px, py] = [line[index].x - x, line[index].y - y];
+      const away = length > 0 ? Math.abs(dx * py - dy * px) / length : Math.hypot(px, py);
+      if (away > most) [most, farthest] = [away, index];
+    }
+    if (farthest === undefined) kept.push(line[from]);
+    else {
+      keep(from, farthest);
+      keep(farthest, to);
+    }
+  };
+  keep(0, line.length - 1);
+  kept.push(line.at(-1));
+  return kept;
+}
+
+/** The ring's flanks over `count` tooth spaces from the `first` on, from the profile of one, true to a distance. */
+function flanks(geometry, teeth, first, count, distance) {
+  const profile = points(geometry.ring.profile);
+  const tooth = distance > 0 ? thinned(profile, distance) : profile;
   const all = [];
   let last = { x: Infinity, y: Infinity };
   for (let index = first; index < first + count; index += 1) {
@@ -43,7 +70,7 @@ function flanks(geometry, teeth, first, count, spacing) {
     const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
     for (const { x, y } of tooth) {
       const point = { x: cos * x - sin * y, y: sin * x + cos * y };
-      if (Math.abs(point.x - last.x) + Math.abs(point.y - last.y) < spacing) continue;
+      if (Math.abs(point.x - last.x) + Math.abs(point.y - last.y) < distance) continue;
       all.push(point);
       last = point;
     }
@@ -105,7 +132,7 @@ function arrow({ center, contacts, force }, key, lengthPerNewton, head) {
   return `M${xy(tail)}L${xy(tip)}M${xy(barb(1))}L${xy(tip)}L${xy(barb(-1))}`;
 }
 
-/** The outlines of a whole drive, its tooth spaces no finer than this share of its radius; of very many teeth every so many. */
+/** The outlines of a whole drive, true to this share of its radius; of very many teeth every so many. */
 export function outlinesOf(motion, finest = FINEST) {
   const { geometry, installed, toothRadius } = motion;
   const { start_deg: startDeg, end_deg: endDeg } = geometry.engagement;
@@ -116,7 +143,7 @@ export function outlinesOf(motion, finest = FINEST) {
   const outlines = {
     ring: `${circle(outer)}${polyline(flanks(geometry, motion.ringTeeth, 0, motion.ringTeeth, outer / finest))}Z`,
     carrier: carrierOutline(motion, 0, teeth, stride),
-    cam: `${polyline(cam.slice(0, -1))}Z`,
+    cam: closed(thinned(cam, outer / finest)),
     axis: camAxis(motion, cam[0].x),
     zones: lobeAngles(motion).map((deg) => arc(outer * 1.025, deg + endDeg, deg + startDeg)).join(''),
     teeth,
@@ -125,6 +152,9 @@ export function outlinesOf(motion, finest = FINEST) {
   };
   return { outer, stride, outlines };
 }
+
+/** Sets a length of an element as the number that it is: there are hundreds of teeth, and text of numbers takes long both ways. */
+const setLength = ({ baseVal }, value) => setProperties(baseVal, { value: Math.fround(value) });
 
 /** The parts as SVG elements, for one of the two views. */
 export class Body {
@@ -161,7 +191,10 @@ export class Body {
       this.circles.push(tooth);
       this.teeth.append(tooth);
     }
-    for (const tooth of this.circles) setAttributes(tooth, outlines.toothOutline ? { d: outlines.toothOutline } : { r: outlines.toothRadius });
+    for (const tooth of this.circles) {
+      if (outlines.toothOutline) setAttributes(tooth, { d: outlines.toothOutline });
+      else setLength(tooth.r, outlines.toothRadius);
+    }
   }
 
   /** Places cam, carrier, each `stride`th tooth from the `first` on, and arrows; `turns` are those of ring and carrier pieces. */
@@ -179,8 +212,12 @@ export class Body {
       const { x, y, deg } = motion.center(tooth, inputDeg);
       const state = byTooth.get(tooth);
       const share = state && Math.max(...Object.values(state[loaded.colouring.key])) / loaded.colouring.most;
-      const [left, top] = [x.toFixed(4), y.toFixed(4)];
-      setAttributes(element, { 'data-tooth': tooth, ...(element.tagName === 'path' ? { transform: `translate(${left} ${top}) rotate(${deg})` } : { cx: left, cy: top }) });
+      setAttributes(element, { 'data-tooth': tooth });
+      if (element.tagName === 'path') setAttributes(element, { transform: `translate(${xy({ x, y })}) rotate(${deg})` });
+      else {
+        setLength(element.cx, x);
+        setLength(element.cy, y);
+      }
       element.style.fill = state ? stressColor(share) : '';
       element.classList.toggle('selected', tooth === selected);
     });
@@ -266,6 +303,7 @@ export class Mechanism {
       ...whole,
       ring: isWhole ? `${circle(this.outer)}${polyline(near)}Z` : `${polyline(near)}L${back[0]}A${this.outer} ${this.outer} 0 0 0 ${back[1]}Z`,
       carrier: carrierOutline(motion, -Math.floor(this.shownTeeth / 2), this.shownTeeth),
+      cam: closed(points(geometry.wave_generator.profile)),
       track: polyline(points(geometry.tooth_center_path)),
       zones: '',
       teeth: this.shownTeeth,
@@ -286,7 +324,8 @@ export class Mechanism {
 
   /** The picture is the nominal drive's: on its scale micrometres are less than a pixel. Where parts are made otherwise it says so. */
   #showNominal({ drawn, undrawn }) {
-    this.nominal.hidden = drawn.length === 0 && !undrawn;
+    setProperties(this.nominal, { hidden: drawn.length === 0 && !undrawn });
+    if (this.nominal.hidden) return;
     const words = ['The picture is the nominal drive.'];
     if (drawn.length > 0) words.push(` The ${drawn.join(' and ')}, of micrometres, ${drawn[0].endsWith('s') || drawn.length > 1 ? 'are' : 'is'} in the `, this.toDrawings, ', true to size.');
     if (undrawn) words.push(' The deviations are in the numbers alone.');
@@ -304,7 +343,7 @@ export class Mechanism {
   }
 
   #showColouring() {
-    this.chosenColouring.hidden = !this.rubs;
+    setProperties(this.chosenColouring, { hidden: !this.rubs });
     const { key, name, unit } = COLOURINGS.find((candidate) => candidate.key === this.colouring);
     setText(this.colouringName, this.rubs ? ': 0 ' : `Tooth’s highest ${name[0].toLowerCase()}${name.slice(1)}: 0 `);
     setText(this.mostColour, this.#motion.sweep ? withUnit(number(this.most[key], 4), unit) : '–');
@@ -319,7 +358,7 @@ export class Mechanism {
       const { geometry, design } = reference;
       const { teeth } = design.drive.ring;
       outlines.ring = `${polyline(flanks(geometry, teeth, 0, teeth, geometry.ring.root_radius_mm / FINEST))}Z`;
-      outlines.cam = `${polyline(points(geometry.wave_generator.profile).slice(0, -1))}Z`;
+      outlines.cam = closed(points(geometry.wave_generator.profile));
     }
     for (const body of [this.#whole, this.#detail]) {
       setAttributes(body.ghostRing, { d: outlines.ring });

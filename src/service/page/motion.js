@@ -36,26 +36,42 @@ export function rubbingScale({ drive: { teeth, ring }, load }, sweep) {
 /** A tooth on a lobe: where zones are unlike, the same slot comes to the next lobe before long. */
 const keyOf = ({ tooth, lobe }) => `${tooth} ${lobe ?? 0}`;
 
-/** A sweep's states by input angle: `[{ angle, rows: Map(tooth and lobe → row) }]`. Where loads jump an angle may stand twice, without the
- *  tooth that enters and then with it; teeth ascend within a frame, so a lower one begins the next. */
-export function framesOf(states) {
-  const frames = [];
-  let lastTooth;
-  states.input_angle_deg.forEach((angle, index) => {
-    let frame = frames.at(-1);
-    if (frame?.angle !== angle || states.tooth[index] <= lastTooth) {
-      frame = { angle, rows: new Map() };
-      frames.push(frame);
-    }
+/** A sweep's states at one input angle, from row `start` to before `end`. */
+class Frame {
+  #states;
+  #rows;
+
+  constructor(states, start, end) {
+    this.#states = states;
+    Object.assign(this, { angle: states.input_angle_deg[start], start, end });
+  }
+
+  /** `Map(tooth and lobe → row)`, made when it is asked for: a picture needs that of two frames alone. */
+  get rows() {
+    this.#rows ??= new Map(Array.from({ length: this.end - this.start }, (_, index) => this.#row(this.start + index)).map((row) => [keyOf(row), row]));
+    return this.#rows;
+  }
+
+  #row(index) {
+    const states = this.#states;
     const row = { tooth: states.tooth[index], lobe: states.lobe?.[index], center_radius_mm: states.center_radius_mm[index] };
     // Without friction nothing rubs.
     for (const column of COLUMNS) row[column] = states[column] ? states[column][index] : 0;
     // Only a drive with clearance has teeth in mesh that carry nothing.
     row.loaded = states.loaded?.[index] ?? true;
-    frame.rows.set(keyOf(row), row);
-    lastTooth = row.tooth;
-  });
-  return frames;
+    return row;
+  }
+}
+
+/** A sweep's states by input angle. Where loads jump an angle may stand twice, without the tooth that enters and then with it; teeth ascend
+ *  within a frame, so a lower one begins the next. */
+export function framesOf(states) {
+  const { input_angle_deg: angles, tooth } = states;
+  const starts = [];
+  for (let row = 0; row < tooth.length; row += 1) {
+    if (row === 0 || angles[row] !== angles[row - 1] || tooth[row] <= tooth[row - 1]) starts.push(row);
+  }
+  return starts.map((start, index) => new Frame(states, start, starts[index + 1] ?? tooth.length));
 }
 
 /** The tooth that makes every force jump between two frames of a sweep, by entering under load. */

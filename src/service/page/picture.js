@@ -6,8 +6,8 @@ import { Body, outlinesOf } from './mechanism.js';
 import { Motion } from './motion.js';
 import { ask } from './service.js';
 
-/** Points of a small picture are this share of its radius apart. */
-const FINEST = 220;
+/** Outlines of a small picture are true to this share of its radius. */
+const FINEST = 1500;
 /** Answers that are kept, so that a drive in two places is asked for once. */
 const MOST_KEPT = 300;
 

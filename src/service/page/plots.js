@@ -2,7 +2,7 @@
 // ring, cam or slot. Jumps stay jumps, peaks are marked, loaded teeth ride along, and a reference is drawn dashed.
 
 import uPlot from './vendor/uplot.js';
-import { html, oncePerFrame, setText } from './dom.js';
+import { html, oncePerFrame, setProperties, setText } from './dom.js';
 import { difference, fixed, number } from './format.js';
 import { CONTACTS } from './motion.js';
 import { ABSCISSAE, abscissaAt, plotted, readAt } from './pass.js';
@@ -113,7 +113,7 @@ class Plot {
   update() {
     const { isKnown } = this.quantity;
     const wasHidden = this.figure.hidden;
-    this.figure.hidden = isKnown !== undefined && !isKnown(this.owner.pass);
+    setProperties(this.figure, { hidden: isKnown !== undefined && !isKnown(this.owner.pass) });
     if (wasHidden && !this.figure.hidden) this.resize();
     const { title, unit } = this.quantity;
     setText(this.figure.querySelector('figcaption'), `${title}, ${unit}${this.owner.pass?.isLargest ? ', the largest of all teeth' : ''}`);
@@ -127,8 +127,9 @@ class Plot {
   #fitMarks() {
     if (!this.chart) return;
     const { width, height } = this.chart.bbox;
-    this.marks.width = width;
-    this.marks.height = height;
+    Object.assign(this.marks, { width, height });
+    // A canvas that is given a size is empty.
+    this.drawTeeth(this.owner.teeth, this.owner.selected);
   }
 
   #listen() {
@@ -239,6 +240,8 @@ export class Plots {
   isPrinting = false;
   pass;
   reference;
+  teeth = [];
+  selected;
   #cursorX;
   #reading = new Map();
   #readingRows = new Map();
@@ -323,12 +326,13 @@ export class Plots {
   }
 
   setPasses(pass, reference) {
+    if (pass === this.pass && reference === this.reference) return;
     this.pass = pass;
     this.reference = reference;
     for (const plot of this.plots) plot.update();
   }
 
-  drawTeeth(teeth = [], selected) {
+  drawTeeth(teeth, selected) {
     this.teeth = teeth;
     this.selected = selected;
     for (const plot of this.plots) plot.drawTeeth(teeth, selected);
@@ -349,7 +353,7 @@ export class Plots {
   /** Under the cursor, or without one where the selected tooth stands. */
   #readOut() {
     const { pass, reference, abscissa } = this;
-    const tooth = this.teeth?.find((loaded) => loaded.tooth === this.selected);
+    const tooth = this.teeth.find((loaded) => loaded.tooth === this.selected);
     const hovers = this.#cursorX !== undefined;
     const x = hovers ? this.#cursorX : pass && tooth && abscissaAt(pass, abscissa, tooth.positionDeg);
     const reading = hovers ? pass && readAt(pass, abscissa, x) : tooth;
@@ -359,7 +363,7 @@ export class Plots {
     const place = x === undefined ? 'carries no load here' : `${symbol} = ${fixed(x, 2)} ${unit}`;
     setText(this.place, `${who}: ${place}${other ? '; differences are from the reference' : ''}`);
     for (const { key, isKnown } of QUANTITIES) {
-      this.#readingRows.get(key).hidden = isKnown !== undefined && !isKnown(pass);
+      setProperties(this.#readingRows.get(key), { hidden: isKnown !== undefined && !isKnown(pass) });
       for (const contact of CONTACTS) {
         const { value, delta } = this.#reading.get(`${key} ${contact.key}`);
         const now = reading?.[key][contact.key];

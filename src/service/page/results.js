@@ -1,6 +1,6 @@
 // What a designer decides by, as a table: each row is one entry here. A result that the service does not answer is not shown.
 
-import { html, setText, symbol } from './dom.js';
+import { html, setProperties, setText, symbol } from './dom.js';
 import { DASH, difference, number } from './format.js';
 import { CONTACTS } from './motion.js';
 import { term } from './terms.js';
@@ -339,34 +339,38 @@ export class Results {
     return difference === 'differs' ? `reference: ${entry.text(reference)}` : difference;
   }
 
-  /** Shows answers, and beside them those of a reference. What has no answer keeps its place but no number; `isHeld` says that no row may
-   *  go, because a slider is held. */
-  update(answers, reference, isHeld) {
+  /** Shows answers in the tiles and the table, and beside them those of a reference. What has no answer keeps its place but no number; `isHeld`
+   *  says that no tile or row may go, because a slider is held. */
+  updateKeyFigures(answers, reference, isHeld) {
+    for (const { entry, tile, value, note, scope } of this.#tiles) {
+      if (scope) setText(scope, scopeOf(entry, answers));
+      const shown = show(entry, answers);
+      // What a design need not ask for takes no room where it does not.
+      setProperties(tile, { hidden: Boolean(entry.isOptional) && !shown && (tile.hidden || !isHeld) });
+      setText(value, shown?.text ?? DASH);
+      if (shown) setProperties(value, { value: String(shown.value) });
+      setProperties(tile.dataset, { state: (shown && entry.state?.(answers)) ?? '' });
+      setText(note, shown ? this.#noteOf(entry, answers, reference) : '');
+    }
+  }
+
+  updateTable(answers, reference, isHeld) {
     this.table.classList.toggle('comparing', Boolean(reference));
     for (const { group, offer, heading } of this.#offers) {
       const isAnswered = (given) => given && group.rows[0].get(given) !== undefined;
-      offer.hidden = Boolean(isAnswered(answers));
+      setProperties(offer, { hidden: Boolean(isAnswered(answers)) });
       // Paper shows only what was asked for.
       heading.classList.toggle('unasked', !isAnswered(answers) && !isAnswered(reference));
     }
     for (const { group, told } of this.#told) setText(told, group.told(answers));
-    for (const { entry, scope } of [...this.#tiles, ...this.#cells]) if (scope) setText(scope, scopeOf(entry, answers));
-    for (const { entry, tile, value, note } of this.#tiles) {
-      const shown = show(entry, answers);
-      // What a design need not ask for takes no room where it does not.
-      tile.hidden = Boolean(entry.isOptional) && !shown && (tile.hidden || !isHeld);
-      setText(value, shown?.text ?? DASH);
-      if (shown) value.value = shown.value;
-      tile.dataset.state = (shown && entry.state?.(answers)) ?? '';
-      setText(note, shown ? this.#noteOf(entry, answers, reference) : '');
-    }
+    for (const { entry, scope } of this.#cells) if (scope) setText(scope, scopeOf(entry, answers));
     for (const cell of this.#cells) {
       const { entry, line, value, unit, reference: other, referenceUnit, delta, place } = cell;
       const shown = show(entry, answers);
       const otherShown = reference && show(entry, reference);
-      line.hidden = !shown && !otherShown && (line.hidden || !isHeld);
+      setProperties(line, { hidden: !shown && !otherShown && (line.hidden || !isHeld) });
       setText(value, shown?.text ?? DASH);
-      if (shown) value.value = shown.value;
+      if (shown) setProperties(value, { value: String(shown.value) });
       setText(other, otherShown?.text ?? DASH);
       if (unit) {
         setText(unit, shown ? entry.unit : '');
@@ -376,10 +380,10 @@ export class Results {
       cell.at = place && shown && entry.place(answers);
       if (cell.taken) {
         cell.answers = answers;
-        cell.taken.hidden = !shown;
+        setProperties(cell.taken, { hidden: !shown });
         if (shown) setText(cell.taken, entry.taken(answers).text);
       }
-      if (place) place.hidden = !cell.at;
+      if (place) setProperties(place, { hidden: !cell.at });
       if (cell.at) {
         setText(place, `j ${number(cell.at.input_angle_deg, 4)}°, ψ ${number(cell.at.position_deg, 4)}°`);
       }

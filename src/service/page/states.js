@@ -6,28 +6,17 @@ import { CONTACTS, enteringBetween, framesOf } from './motion.js';
 const MOST_STATES = 6000;
 
 /** Of each frame, how many teeth carry: `{ min, max }`, where the service tells them from those that only mesh. */
-function carrying({ loaded }, starts) {
+function carrying({ loaded }, frames) {
   if (!loaded) return undefined;
   let [min, max] = [Infinity, 0];
-  starts.forEach((start, index) => {
+  for (const { start, end } of frames) {
     let count = 0;
-    for (let row = start; row < (starts[index + 1] ?? loaded.length); row += 1) count += loaded[row] ? 1 : 0;
+    for (let row = start; row < end; row += 1) count += loaded[row] ? 1 : 0;
     min = Math.min(min, count);
     max = Math.max(max, count);
-  });
+  }
   return { min, max };
 }
-
-/** Where each frame begins, as `framesOf` parts them. */
-function startsOf({ input_angle_deg: angles, tooth }) {
-  const starts = [];
-  for (let row = 0; row < tooth.length; row += 1) {
-    if (row === 0 || angles[row] !== angles[row - 1] || tooth[row] <= tooth[row - 1]) starts.push(row);
-  }
-  return starts;
-}
-
-const part = (states, from, to) => Object.fromEntries(Object.entries(states).map(([name, column]) => [name, column.slice(from, to)]));
 
 /** The sweep whose states have, at each contact, the stress times the slip: pressure times velocity but for the speed. */
 function withRubbing(sweep) {
@@ -47,23 +36,22 @@ function withRubbing(sweep) {
 export function drawable(answer) {
   const sweep = withRubbing(answer);
   const { states, peaks } = sweep;
-  const starts = startsOf(states);
-  const whole = { ...sweep, carrying_teeth: carrying(states, starts) };
+  const frames = framesOf(states);
+  const whole = { ...sweep, carrying_teeth: carrying(states, frames) };
   const stride = Math.ceil(states.tooth.length / MOST_STATES);
   if (stride <= 1) return whole;
-  const last = starts.length - 1;
+  const last = frames.length - 1;
   const peakAngles = new Set(Object.values(peaks).flatMap(({ force_n: force, stress_mpa: stress }) => [force.input_angle_deg, stress.input_angle_deg]));
   for (const { input_angle_deg: angle } of Object.values(sweep.losses?.pressure_velocity_mpa_m_per_s ?? {})) peakAngles.add(angle);
   const kept = new Set([0, last]);
-  const end = (frame) => starts[frame + 1] ?? states.tooth.length;
-  const frame = (index) => framesOf(part(states, starts[index], end(index)))[0];
   for (let index = 0; index < last; index += 1) {
-    if (index % stride === 0 || peakAngles.has(states.input_angle_deg[starts[index]])) kept.add(index);
+    if (index % stride === 0 || peakAngles.has(frames[index].angle)) kept.add(index);
     // Only where a tooth number appears that was not there can loads jump; where zones are unlike it need not be the highest.
-    const isNewest = states.lobe !== undefined || states.tooth[end(index + 1) - 1] > states.tooth[end(index) - 1];
-    if (isNewest && enteringBetween(sweep, frame(index), frame(index + 1))) kept.add(index).add(index + 1);
+    const isNewest = states.lobe !== undefined || states.tooth[frames[index + 1].end - 1] > states.tooth[frames[index].end - 1];
+    if (isNewest && enteringBetween(sweep, frames[index], frames[index + 1])) kept.add(index).add(index + 1);
   }
-  const rows = [...kept].sort((one, other) => one - other).flatMap((index) => Array.from({ length: end(index) - starts[index] }, (_, row) => starts[index] + row));
+  const rowsOf = ({ start, end }) => Array.from({ length: end - start }, (_, row) => start + row);
+  const rows = [...kept].sort((one, other) => one - other).flatMap((index) => rowsOf(frames[index]));
   const thinned = Object.fromEntries(Object.entries(states).map(([name, column]) => [name, rows.map((row) => column[row])]));
   return { ...whole, states: thinned };
 }
