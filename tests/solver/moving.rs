@@ -306,7 +306,7 @@ fn soft_drives() -> Vec<(DriveParameters, f64)> {
         (state >> 11) as f64 / (1_u64 << 53) as f64
     };
     while drives.len() < 24 {
-        let teeth = 20 + (40.0 * random()) as i64;
+        let teeth = [20, 27, 34, 41, 50, 59][drives.len() % 6];
         let radius_mm = 5.0 + 30.0 * random();
         let parameters = DriveParameters {
             wave_generator: WaveGenerator::Eccentric {
