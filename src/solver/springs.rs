@@ -299,7 +299,7 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
     /// falls and no spring has a gap left to close; a summit before that is passed, as the wave generator then comes to springs that hold it again.
     fn summit(&self, end: &Rotation, enough_nmm: f64) -> Result<Summit, NotConverged> {
         /// Where a stretch is this short against the way up to it, its ends tell whether the torque rises: at the summit it differs by the square.
-        const SHORTEST: f64 = 1e-7;
+        const SHORTEST: f64 = 1e-9;
         let first_rad = self.first_closing_rad();
         let at = |excess_rad: f64| Rotation { closing_rad: first_rad, excess_rad };
         let closings_rad = self.iter().filter(|spring| spring.can_carry()).map(|spring| spring.closing_rad - first_rad);

@@ -382,7 +382,8 @@ fn a_higher_allowable_stress_never_makes_less_of_the_capacity_and_none_makes_mor
             assert!(limit.input_torque_nmm >= before_nmm * (1.0 - 1e-9), "{stress_mpa} MPa: {limit:?} {before_nmm}");
             assert!(limit.input_torque_nmm <= most_nmm * (1.0 + 1e-9), "{stress_mpa} MPa: {limit:?} {most_nmm}");
             if limit.turns_past_teeth {
-                assert!((limit.input_torque_nmm / most_nmm - 1.0).abs() < 1e-9, "{limit:?} {most_nmm}");
+                // Where the maximum is a corner, as a tooth is let go, its torque is off in proportion to its place.
+                assert!((limit.input_torque_nmm / most_nmm - 1.0).abs() < 1e-8, "{limit:?} {most_nmm}");
             }
             before_nmm = limit.input_torque_nmm;
         }
