@@ -551,13 +551,15 @@ impl SweepAnswer {
             }
         }
         if let Some(capacity) = &self.torque_capacity {
+            let limit = if capacity.turns_past_teeth {
+                "beyond it the wave generator turns past its teeth".to_owned()
+            } else {
+                format!("limited by {}", word(&capacity.limited_by))
+            };
             writeln!(
                 writer,
-                "\ntorque capacity, input and output   {:.6} and {:.6} N·m, limited by {} at {:.4} deg",
-                capacity.input_torque_nm,
-                capacity.output_torque_nm,
-                word(&capacity.limited_by),
-                capacity.input_angle_deg
+                "\ntorque capacity, input and output   {:.6} and {:.6} N·m, {limit} at {:.4} deg",
+                capacity.input_torque_nm, capacity.output_torque_nm, capacity.input_angle_deg
             )?;
         }
         if let Some(wind_up) = &self.wind_up {

@@ -309,8 +309,10 @@ pub struct LoadedDrive<'a> {
 pub struct TorqueLimit {
     /// The torque at the wave generator under which it is reached.
     pub input_torque_nmm: f64,
-    /// The contact that reaches it first.
+    /// The contact that reaches it first; the nearest to it where none does.
     pub contact: Contact,
+    /// Whether no contact reaches its stress under any torque that the teeth carry: under more the wave generator would turn past them.
+    pub turns_past_teeth: bool,
     /// Where Johnson's law ends before any stress is reached: the torque is that of its end then, and the limit lies beyond.
     pub law_end: Option<LawEnd>,
 }
@@ -728,7 +730,8 @@ impl<'a> LoadedDrive<'a> {
     ///
     /// Loads grow with `Δφ` and `Δφ` with the torque, so the first contact to reach its stress sets `Δφ`, and that the torque.
     ///
-    /// Where Johnson's law ends before, the torque of its end.
+    /// Where Johnson's law ends before, the torque of its end. Where the wave generator moves the torque may have been larger on the way, and then that is the
+    /// largest: all loads up to it are carried before any contact has reached its stress, and no larger one is until a contact has.
     ///
     /// # Errors
     /// As [`Self::wind_up`], but for that end.
@@ -740,13 +743,40 @@ impl<'a> LoadedDrive<'a> {
         let limit = Self::first_to_reach(teeth, |tooth, contact| {
             tooth.pressure.get(contact).force_n(*allowable_stress_mpa.get(contact)) / tooth.force_ratio.get(contact)
         });
-        let FirstLimit { rotation, contact, .. } = limit.ok_or_else(|| self.carries_nothing(teeth))?;
+        let summit = self.springs(teeth).summit_before(limit.as_ref().map(|limit| &limit.rotation))?;
+        let rotation = summit.map(|summit| summit.rotation).or(limit.as_ref().map(|limit| limit.rotation));
+        let rotation = rotation.ok_or_else(|| self.carries_nothing(teeth))?;
         if let Some(end) = self.law_end(teeth, &rotation)? {
             let LawEnd { contact, input_torque_limit_nmm: input_torque_nmm, .. } = end;
-            return Ok(TorqueLimit { input_torque_nmm, contact, law_end: Some(end) });
+            return Ok(TorqueLimit { input_torque_nmm, contact, turns_past_teeth: false, law_end: Some(end) });
         }
         let input_torque_nmm = self.springs(teeth).torque_nmm(&rotation)?.value;
-        Ok(TorqueLimit { input_torque_nmm, contact, law_end: None })
+        let contact = match limit {
+            Some(FirstLimit { contact, .. }) if summit.is_none() => contact,
+            _ => self.nearest_to_stress(teeth, &rotation, allowable_stress_mpa)?,
+        };
+        Ok(TorqueLimit { input_torque_nmm, contact, turns_past_teeth: summit.is_some(), law_end: None })
+    }
+
+    /// The contact whose stress at a rotation is the largest share of the one that it may have.
+    fn nearest_to_stress(
+        &self,
+        teeth: &[ToothState],
+        rotation: &Rotation,
+        allowable_stress_mpa: &PerContact<f64>,
+    ) -> Result<Contact, NotConverged> {
+        let mut nearest = (Contact::WaveGenerator, 0.0);
+        for tooth in teeth {
+            let cam_force_n = tooth.spring.force_n(rotation)?;
+            let force_n = PerContact::of(|contact| cam_force_n * tooth.force_ratio.get(contact));
+            for (contact, stress_mpa) in self.stress_mpa(tooth, &force_n).iter() {
+                let share = stress_mpa / allowable_stress_mpa.get(contact);
+                if share > nearest.1 {
+                    nearest = (contact, share);
+                }
+            }
+        }
+        Ok(nearest.0)
     }
 
     /// Of all teeth and contacts the one for which the rotation is least at which the tooth bears a certain `F_H`.

@@ -10,6 +10,9 @@ use crate::root::{NotConverged, ValueAndSlope, bracketed, newton_from_above};
 /// is none; and a law's logarithm and slope would leave the range of doubles.
 const NOTHING_MM: f64 = 1e-200;
 
+/// No search for a rotation has to go as far as this; a lobe is no wider than a turn.
+const FARTHEST_RAD: f64 = 2.0 * PI;
+
 /// A tooth as load sharing sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spring {
@@ -93,6 +96,25 @@ impl Spring {
         if displacement_mm > 0.0 { Ok(self.approach.force(displacement_mm)?.force_n) } else { Ok(0.0) }
     }
 
+    /// The force under a displacement, and its derivative.
+    fn force_and_stiffness(&self, displacement_mm: f64) -> Result<ValueAndSlope, NotConverged> {
+        if displacement_mm <= 0.0 {
+            return Ok(ValueAndSlope { value: 0.0, slope: 0.0 });
+        }
+        let force = self.approach.force(displacement_mm)?;
+        Ok(ValueAndSlope { value: force.force_n, slope: force.force_n / (displacement_mm * force.exponent) })
+    }
+
+    /// Whether the spring's torque surely grows all the way up to a rotation, or is none. Its slope `h'² dF_H/dξ - c F_H` is not below nothing where `h'² ≥ c ξ`, as the force grows
+    /// with the displacement faster than in proportion; and once that is less it stays so.
+    fn helps_up_to(&self, rotation: &Rotation) -> bool {
+        if !self.can_carry() || self.closing_rad - rotation.closing_rad >= rotation.excess_rad {
+            return true;
+        }
+        let (static_mm, travel_mm) = (self.turned_static_arm_mm(rotation), self.turned_travel_arm_mm(rotation));
+        static_mm > 0.0 && static_mm * travel_mm >= self.arm_decline_mm_per_rad * self.displacement_mm(rotation)
+    }
+
     const fn has_arms(&self) -> bool {
         self.travel_arm_mm > 0.0 && self.static_arm_mm > 0.0
     }
@@ -131,6 +153,15 @@ pub struct Rotation {
     pub closing_rad: f64,
     /// What is turned beyond that, not negative: so every tooth that carries is pressed by a sum of positive terms.
     pub excess_rad: f64,
+}
+
+/// Where the torque of springs whose arms decline is highest.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Summit {
+    pub(crate) rotation: Rotation,
+    pub(crate) torque_nmm: f64,
+    /// Whether it is where the looking ended, and the torque may still rise.
+    is_end: bool,
 }
 
 /// How far the wave generator turns under the load at one input angle, and how stiffly.
@@ -203,26 +234,149 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         if !self.iter().any(Spring::has_arms) {
             return Ok(None);
         }
-        let rotation = if self.iter().all(|spring| spring.closing_rad == 0.0) {
-            let excess_rad = match self.gapless_rad(torque_nmm) {
-                Some(excess_rad) => Some(excess_rad),
-                None => self.excess_rad(0.0, torque_nmm)?,
-            };
-            excess_rad.map(|excess_rad| Rotation { closing_rad: 0.0, excess_rad })
-        } else {
-            let mut order: Vec<&S> = self.springs.iter().filter(|spring| spring.as_ref().can_carry()).collect();
-            order.sort_by(|one, other| one.as_ref().closing_rad.total_cmp(&other.as_ref().closing_rad));
-            Springs::new(&order, self.zones).rotation_in_order(torque_nmm)?
-        };
+        let found = self.rotation(torque_nmm, None)?;
+        let rotation = if self.has_declining_arms() { self.first_rotation(torque_nmm, found)? } else { found };
         let Some(rotation) = rotation else { return Ok(None) };
         let stiffness_nmm_per_rad = self.torque_nmm(&rotation)?.slope;
         Ok(Some(WindUp { lost_motion_rad: 0.0, rotation, stiffness_nmm_per_rad }))
     }
 
+    /// A rotation that makes the torque, the only one where arms do not decline; up to a summit that makes it, the first.
+    fn rotation(&self, torque_nmm: f64, summit: Option<&Rotation>) -> Result<Option<Rotation>, NotConverged> {
+        if self.iter().all(|spring| spring.closing_rad == 0.0) {
+            let excess_rad = match self.gapless_rad(torque_nmm) {
+                Some(excess_rad) => Some(excess_rad),
+                None => self.excess_rad(0.0, torque_nmm, summit)?,
+            };
+            return Ok(excess_rad.map(|excess_rad| Rotation { closing_rad: 0.0, excess_rad }));
+        }
+        let closes = |spring: &&S| {
+            let spring = spring.as_ref();
+            spring.can_carry()
+                && summit.is_none_or(|summit| spring.closing_rad - summit.closing_rad <= summit.excess_rad)
+        };
+        let mut order: Vec<&S> = self.springs.iter().filter(closes).collect();
+        order.sort_by(|one, other| one.as_ref().closing_rad.total_cmp(&other.as_ref().closing_rad));
+        Springs::new(&order, self.zones).rotation_in_order(torque_nmm, summit)
+    }
+
+    /// The first rotation that makes the torque where arms decline, given one that does, if any was found: the torque need not rise up to there. Nothing
+    /// where no summit of the torque is as high.
+    fn first_rotation(&self, torque_nmm: f64, found: Option<Rotation>) -> Result<Option<Rotation>, NotConverged> {
+        let summit = match found {
+            Some(found) if self.iter().all(|spring| spring.helps_up_to(&found)) => return Ok(Some(found)),
+            Some(found) => self.summit(&found, torque_nmm)?,
+            None => self.summit(&self.farthest(), torque_nmm)?,
+        };
+        match found {
+            Some(found) if summit.is_end => Ok(Some(found)),
+            _ if summit.torque_nmm < torque_nmm => Ok(None),
+            // Of the summit's own torque rounding may leave none before it.
+            _ => Ok(self.rotation(torque_nmm, Some(&summit.rotation))?.or(Some(summit.rotation))),
+        }
+    }
+
+    /// The highest torque before a rotation, or at all where none is given, if it is more than what that rotation makes: none where arms do not decline.
+    ///
+    /// # Errors
+    /// [`NotConverged`] from a law's inverse.
+    pub(crate) fn summit_before(&self, end: Option<&Rotation>) -> Result<Option<Summit>, NotConverged> {
+        if !self.has_declining_arms() || end.is_some_and(|end| self.iter().all(|spring| spring.helps_up_to(end))) {
+            return Ok(None);
+        }
+        let summit = self.summit(end.unwrap_or(&self.farthest()), f64::INFINITY)?;
+        Ok((!summit.is_end && summit.torque_nmm > 0.0).then_some(summit))
+    }
+
+    /// Where the first spring closes.
+    fn first_closing_rad(&self) -> f64 {
+        let closings_rad = self.iter().filter(|spring| spring.can_carry()).map(|spring| spring.closing_rad);
+        closings_rad.reduce(f64::min).unwrap_or(0.0)
+    }
+
+    fn farthest(&self) -> Rotation {
+        Rotation { closing_rad: self.first_closing_rad(), excess_rad: FARTHEST_RAD }
+    }
+
+    /// The first summit of the torque over the rotation, on the way from none to `end`, that makes enough, or else the highest. The way is over where the torque
+    /// falls and no spring has a gap left to close; a summit before that is passed, as the wave generator then comes to springs that hold it again.
+    fn summit(&self, end: &Rotation, enough_nmm: f64) -> Result<Summit, NotConverged> {
+        /// Where a stretch is this short against the way up to it, its ends tell whether the torque rises: at the summit it differs by the square.
+        const SHORTEST: f64 = 1e-9;
+        let first_rad = self.first_closing_rad();
+        let at = |excess_rad: f64| Rotation { closing_rad: first_rad, excess_rad };
+        let closings_rad = self.iter().filter(|spring| spring.can_carry()).map(|spring| spring.closing_rad - first_rad);
+        let all_closed_rad = closings_rad.fold(0.0, f64::max);
+        let end_rad = end.excess_rad + (end.closing_rad - first_rad);
+        let mut summit = Summit { rotation: at(0.0), torque_nmm: 0.0, is_end: false };
+        let (mut near_rad, mut near_nmm, mut rises, mut step_rad) = (0.0, 0.0, true, end_rad);
+        while near_rad < end_rad {
+            let far_rad = end_rad.min(near_rad + step_rad);
+            let far_nmm = self.torque_nmm(&at(far_rad))?.value;
+            let is_short = step_rad <= SHORTEST * near_rad.max(SHORTEST * end_rad);
+            let trend = match self.trend(&at(near_rad), &at(far_rad))? {
+                None if is_short => Some(far_nmm >= near_nmm),
+                trend => trend,
+            };
+            let Some(goes_up) = trend else {
+                step_rad = 0.5 * (far_rad - near_rad);
+                continue;
+            };
+            if rises && !goes_up && near_nmm > summit.torque_nmm {
+                summit = Summit { rotation: at(near_rad), torque_nmm: near_nmm, is_end: false };
+                if near_nmm >= enough_nmm {
+                    return Ok(summit);
+                }
+            }
+            if !goes_up && near_rad >= all_closed_rad {
+                return Ok(summit);
+            }
+            (near_rad, near_nmm, rises, step_rad) = (far_rad, far_nmm, goes_up, 2.0 * step_rad);
+        }
+        let is_end = rises && near_nmm >= summit.torque_nmm;
+        Ok(if is_end { Summit { rotation: *end, torque_nmm: near_nmm, is_end } } else { summit })
+    }
+
+    /// Whether the torque surely rises all along a stretch of the rotation, or surely falls; nothing where it may do either.
+    ///
+    /// A spring's part `F_H |h'|` has the slope `h'² dF_H/dξ - c F_H`. As force and stiffness grow with the displacement, the least and the largest of that and of the
+    /// arm bound it.
+    fn trend(&self, near: &Rotation, far: &Rotation) -> Result<Option<bool>, NotConverged> {
+        let (mut least, mut most) = (0.0, 0.0);
+        for spring in self.iter().filter(|spring| spring.can_carry()) {
+            let ways_mm = [near, far].map(|rotation| spring.displacement_mm(rotation));
+            let arms_mm = [near, far].map(|rotation| spring.turned_static_arm_mm(rotation));
+            let squares_mm2 = [near, far]
+                .map(|rotation| spring.turned_static_arm_mm(rotation) * spring.turned_travel_arm_mm(rotation));
+            let is_passed = arms_mm[0] > 0.0 && arms_mm[1] < 0.0;
+            let decline_mm = spring.arm_decline_mm_per_rad;
+            let largest_mm = if is_passed {
+                let closing_arm_mm = spring.travel_arm_mm - decline_mm * spring.closing_rad;
+                closing_arm_mm * closing_arm_mm / (2.0 * decline_mm)
+            } else {
+                ways_mm[0].max(ways_mm[1])
+            };
+            let (lesser, larger) =
+                (spring.force_and_stiffness(ways_mm[0].min(ways_mm[1]))?, spring.force_and_stiffness(largest_mm)?);
+            let least_square_mm2 = if is_passed { 0.0 } else { squares_mm2[0].min(squares_mm2[1]) };
+            let declines = [decline_mm * lesser.value, decline_mm * larger.value];
+            let own_least = least_square_mm2 * lesser.slope - declines[0].max(declines[1]);
+            least += if spring.helps_up_to(far) { own_least.max(0.0) } else { own_least };
+            most += squares_mm2[0].max(squares_mm2[1]) * larger.slope - declines[0].min(declines[1]);
+        }
+        Ok(if least >= 0.0 {
+            Some(true)
+        } else if most < 0.0 {
+            Some(false)
+        } else {
+            None
+        })
+    }
+
     /// The rotation of springs that stand in the order in which they close. A spring carries if those before it make less than the torque when
-    /// it closes; since the torque grows with the rotation, halving finds the last one. (Where arms decline so much that it does not, halving still ends
-    /// between one that makes less and one that makes more.)
-    fn rotation_in_order(&self, torque_nmm: f64) -> Result<Option<Rotation>, NotConverged> {
+    /// it closes; since the torque grows with the rotation, or is less up to the one that is looked for and no less from there to the summit, halving finds the
+    /// last one. (Where no summit is known and arms decline so much that it does not, halving still ends between one that makes less and one that makes more.)
+    fn rotation_in_order(&self, torque_nmm: f64, summit: Option<&Rotation>) -> Result<Option<Rotation>, NotConverged> {
         if self.springs.is_empty() {
             return Ok(None);
         }
@@ -239,7 +393,7 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         }
         let closing_rad = self.springs[carrying - 1].as_ref().closing_rad;
         let carrying = Self { springs: &self.springs[..carrying], ..*self };
-        let excess_rad = carrying.excess_rad(closing_rad, torque_nmm)?;
+        let excess_rad = carrying.excess_rad(closing_rad, torque_nmm, summit)?;
         Ok(excess_rad.map(|excess_rad| Rotation { closing_rad, excess_rad }))
     }
 
@@ -275,9 +429,15 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
     ///
     /// Closed for a linear law. Otherwise Newton's method from above: each spring's force, and so the torque, is increasing and bent upwards in the
     /// excess, since its approach is bent downwards in the force. Where arms decline it may be bent either way.
-    fn excess_rad(&self, closing_rad: f64, torque_nmm: f64) -> Result<Option<f64>, NotConverged> {
+    fn excess_rad(
+        &self,
+        closing_rad: f64,
+        torque_nmm: f64,
+        summit: Option<&Rotation>,
+    ) -> Result<Option<f64>, NotConverged> {
         if self.has_declining_arms() {
-            return self.bracketed_excess_rad(closing_rad, torque_nmm);
+            let most_rad = summit.map_or(FARTHEST_RAD, |summit| summit.excess_rad + (summit.closing_rad - closing_rad));
+            return self.bracketed_excess_rad(closing_rad, torque_nmm, most_rad);
         }
         if self.common_exponent() == Some(1.0) {
             let (mut stiffness, mut torque_of_unit) = (0.0, 0.0);
@@ -297,15 +457,18 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
     }
 
     /// The same where arms decline: between the last of some places, each twice as far as the one before, that make less than the torque and the first
-    /// that does not. Nothing where none does: the wave generator turns past its teeth.
-    fn bracketed_excess_rad(&self, closing_rad: f64, torque_nmm: f64) -> Result<Option<f64>, NotConverged> {
-        /// Beyond the first guess no search has to go as far as this; a lobe is no wider than a turn.
-        const FARTHEST_RAD: f64 = 2.0 * PI;
+    /// that does not, none farther than the most. Nothing where none does.
+    fn bracketed_excess_rad(
+        &self,
+        closing_rad: f64,
+        torque_nmm: f64,
+        most_rad: f64,
+    ) -> Result<Option<f64>, NotConverged> {
         let lacking =
             |excess_rad: f64| Ok(self.torque_nmm(&Rotation { closing_rad, excess_rad })?.value / torque_nmm - 1.0);
         // Springs that have no arm to begin with have no guess either.
         let guess_rad = self.most_excess_rad(closing_rad, torque_nmm)?;
-        let mut far_rad = if guess_rad > 0.0 { guess_rad.min(FARTHEST_RAD) } else { FARTHEST_RAD };
+        let mut far_rad = if guess_rad > 0.0 { guess_rad.min(most_rad) } else { most_rad };
         let mut near = lacking(0.5 * far_rad)?;
         while near >= 0.0 && far_rad > 0.0 {
             far_rad *= 0.5;
@@ -315,15 +478,17 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
             // The last closing angle itself makes the torque, to the last digit.
             return Ok(Some(0.0));
         }
-        let mut far = lacking(far_rad)?;
+        let (mut near_rad, mut far) = (0.5 * far_rad, lacking(far_rad)?);
         while far < 0.0 {
-            (far_rad, near) = (2.0 * far_rad, far);
-            if far_rad > FARTHEST_RAD {
+            if far_rad >= most_rad {
                 return Ok(None);
             }
+            (near_rad, near) = (far_rad, far);
+            far_rad = most_rad.min(2.0 * far_rad);
             far = lacking(far_rad)?;
         }
-        let share = bracketed("rotation under the load", 0.5, near, 1.0, |share| lacking(share * far_rad))?;
+        let start = near_rad / far_rad;
+        let share = bracketed("rotation under the load", start, near, 1.0, |share| lacking(share * far_rad))?;
         Ok(Some(share * far_rad))
     }
 

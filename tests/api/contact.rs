@@ -102,6 +102,31 @@ async fn at_its_capacity_the_limiting_contact_bears_just_the_allowable_stress() 
     }
 }
 
+/// Soft teeth that the wave generator moves past before a contact reaches the higher stress.
+#[tokio::test]
+async fn a_capacity_that_no_contact_limits_says_so() {
+    let soft = json!({ "youngs_modulus_gpa": 3.5, "poissons_ratio": 0.4 });
+    let service = Service::new();
+    let mut torques_nm = Vec::new();
+    for (allowable_stress_mpa, turns_past_teeth) in [(100.0, None), (400.0, Some(&json!(true)))] {
+        let asked = json!({
+            "drive": {
+                "wave_generator": { "semi_major_mm": 50.7, "semi_minor_mm": 49.3 },
+                "teeth": { "count": 80, "installed": 40, "radius_mm": 1.5, "width_mm": 15.0 },
+                "ring": { "teeth": 78 }
+            },
+            "materials": { "wave_generator": soft, "teeth": soft, "ring": soft, "carrier": soft },
+            "load": { "input_torque_nm": 0.002, "allowable_stress_mpa": allowable_stress_mpa },
+            "model": { "clearance": { "ring_um": 10.0 } },
+            "sweep": { "samples": 20 }
+        });
+        let capacity = service.post("/v1/sweep", &asked).await.found()["torque_capacity"].clone();
+        assert_eq!(capacity.get("turns_past_teeth"), turns_past_teeth, "{capacity}");
+        torques_nm.push(capacity["input_torque_nm"].as_f64().unwrap());
+    }
+    assert!(torques_nm[0] < torques_nm[1], "{torques_nm:?}");
+}
+
 /// Soft teeth in a soft ring: at some input angles Johnson's law ends before a contact reaches its stress, but under more torque than bears the others.
 #[tokio::test]
 async fn a_capacity_within_johnsons_law_is_told_though_the_law_ends_before_a_stress_at_other_input_angles() {

@@ -1,13 +1,14 @@
 //! The wave generator that moves on under its teeth as it winds up: against the path of the teeth's centres itself, and against a plain search for the rotation.
 
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
+use toothwave_solver::gaps::TipRelief;
 use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
 use toothwave_solver::mesh::Samples;
 use toothwave_solver::springs::{Rotation, Springs, WindUp};
 use toothwave_solver::sweep::{self, Points};
 use toothwave_solver::{
-    ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, Parameter, PerContact, Position, SolveError,
-    ToothShape, Torque, Violation, WaveGenerator,
+    ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Modification, Never, Parameter,
+    PerContact, Position, SolveError, ToothShape, Torque, Violation, WaveGenerator,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, everywhere, load, swept};
@@ -251,6 +252,183 @@ fn under_the_torque_capacity_the_largest_stress_is_the_allowable_one() {
             assert!((largest_mpa / 1200.0 - 1.0).abs() < 1e-10, "{parameters:?} {ring_um}: {largest_mpa}");
         }
     }
+}
+
+/// Teeth so soft that the wave generator turns far beyond the first of them.
+const PLASTIC: Materials = {
+    let soft = Material { youngs_modulus_gpa: 3.5, poissons_ratio: 0.4 };
+    Materials { wave_generator: soft, teeth: soft, ring: soft, carrier: soft }
+};
+
+const FINE_ECCENTRIC: DriveParameters = DriveParameters {
+    wave_generator: WaveGenerator::Eccentric { radius_mm: 5.58, eccentricity_mm: 0.34 },
+    teeth: 41,
+    installed: 41,
+    tooth_radius_mm: 0.427,
+    tooth: ToothShape::Cylinder { width_mm: 0.885 },
+    ring_teeth: 40,
+    tip_radius_mm: None,
+};
+
+/// The rotation and the torque of the first maximum beyond which no tooth has a gap left to close, in small steps and then by thirds; none within a quarter of a lobe.
+fn first_maximum(teeth: &[ToothState], lobes: u32) -> Option<(f64, f64)> {
+    const STEPS: u32 = 1000;
+    let springs = Springs::new(teeth, f64::from(lobes));
+    let torque_nmm =
+        |turned_rad: f64| springs.torque_nmm(&Rotation { closing_rad: 0.0, excess_rad: turned_rad }).unwrap().value;
+    let closings_rad = teeth.iter().map(|tooth| tooth.spring.closing_rad).filter(|closing_rad| closing_rad.is_finite());
+    let last_rad = closings_rad.fold(0.0, f64::max);
+    let step_rad = 0.5 * std::f64::consts::PI / f64::from(lobes) / f64::from(STEPS);
+    let mut before_nmm = 0.0;
+    let mut falls = |&step: &u32| {
+        let turned_rad = f64::from(step) * step_rad;
+        let now_nmm = torque_nmm(turned_rad);
+        let falls = turned_rad - step_rad > last_rad && now_nmm < before_nmm;
+        before_nmm = now_nmm;
+        falls
+    };
+    let step = (1..STEPS).find(|step| falls(step))? - 1;
+    let (mut low, mut high) = (f64::from(step - 1) * step_rad, f64::from(step + 1) * step_rad);
+    for _ in 0..100 {
+        let third = (high - low) / 3.0;
+        if torque_nmm(low + third) < torque_nmm(high - third) { low += third } else { high -= third }
+    }
+    Some((low, torque_nmm(low)))
+}
+
+/// Soft drives with few teeth in mesh and with many, those of eccentrics with pointed tips.
+fn soft_drives() -> Vec<(DriveParameters, f64)> {
+    let mut drives = vec![(FINE_ECCENTRIC, 0.0), (PAPER_5_2, 0.0), (PAPER_5_2, 30.0), (PAPER_5_2_BORED, 10.0)];
+    // The same sequence each time.
+    let mut state = 7_u64;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    while drives.len() < 24 {
+        let teeth = [20, 27, 34, 41, 50, 59][drives.len() % 6];
+        let radius_mm = 5.0 + 30.0 * random();
+        let parameters = DriveParameters {
+            wave_generator: WaveGenerator::Eccentric {
+                radius_mm,
+                eccentricity_mm: radius_mm * (0.02 + 0.06 * random()),
+            },
+            teeth,
+            installed: teeth,
+            tooth_radius_mm: radius_mm * std::f64::consts::PI / teeth as f64 * (0.3 + 0.6 * random()),
+            tooth: ToothShape::Cylinder { width_mm: 0.2 * radius_mm },
+            ring_teeth: teeth - 1,
+            tip_radius_mm: None,
+        };
+        let ring_um = if random() < 0.5 { 0.0 } else { radius_mm * random() };
+        if Drive::new(&parameters).is_ok() {
+            drives.push((parameters, ring_um));
+        }
+    }
+    drives
+}
+
+/// Calls with the teeth of some input angles of soft drives, and the maximum of their torque.
+fn at_soft_teeth(mut look: impl FnMut(&LoadedDrive<'_>, &[ToothState], (f64, f64))) {
+    let mut looked = 0;
+    for (parameters, ring_um) in soft_drives() {
+        let drive = drive(&parameters);
+        for law in [ContactLaw::Linear, JOHNSON] {
+            let clearance_um = PerContact { ring: ring_um, ..PerContact::default() };
+            let asked = LoadParameters { law, materials: PLASTIC, clearance_um, ..moving(1e-6) };
+            let case = LoadCase::new(&asked).unwrap();
+            let Ok(loaded) = LoadedDrive::new(&drive, &case) else { continue };
+            for sample in [0, 2, 5] {
+                let placed = loaded.mesh().placed_at(sample, Samples::new(7).unwrap());
+                let teeth: Vec<_> = placed.map(|placed| loaded.tooth(placed.position).unwrap()).collect();
+                if let Some(maximum) = first_maximum(&teeth, drive.lobes()) {
+                    look(&loaded, &teeth, maximum);
+                    looked += 1;
+                }
+            }
+        }
+    }
+    assert!(looked > 30, "{looked}");
+}
+
+/// A search in steps of two once passed over the maximum, and found a rotation beyond it, or none below.
+#[test]
+fn every_torque_below_the_first_maximum_is_carried_before_it_and_none_above() {
+    at_soft_teeth(|loaded, teeth, (turned_rad, most_nmm)| {
+        let springs = Springs::new(teeth, f64::from(loaded.drive().lobes()));
+        for share in [1e-9, 0.1, 0.5, 0.9, 0.98, 0.995, 0.999_999] {
+            let found = springs.wind_up(share * most_nmm).unwrap();
+            let rotation = found.unwrap_or_else(|| panic!("{share} of {most_nmm} N·mm")).rotation;
+            assert!(rotation.rad() < turned_rad, "{share}: {} {turned_rad}", rotation.rad());
+            let torque_nmm = springs.torque_nmm(&rotation).unwrap().value;
+            assert!((torque_nmm / (share * most_nmm) - 1.0).abs() < 1e-9, "{share}: {torque_nmm} N·mm");
+        }
+        for share in [1.000_001, 1.03, 1.5, 10.0] {
+            assert_eq!(springs.wind_up(share * most_nmm).unwrap(), None, "{share} of {most_nmm} N·mm");
+        }
+    });
+}
+
+#[test]
+fn a_higher_allowable_stress_never_makes_less_of_the_capacity_and_none_makes_more_than_teeth_carry() {
+    at_soft_teeth(|loaded, teeth, (_, most_nmm)| {
+        let mut before_nmm = 0.0;
+        for exponent in 0..40 {
+            let stress_mpa = 10.0 * 1.2_f64.powi(exponent);
+            let limit = loaded.torque_limit(teeth, &everywhere(stress_mpa)).unwrap();
+            if limit.law_end.is_some() {
+                break;
+            }
+            assert!(limit.input_torque_nmm >= before_nmm * (1.0 - 1e-9), "{stress_mpa} MPa: {limit:?} {before_nmm}");
+            assert!(limit.input_torque_nmm <= most_nmm * (1.0 + 1e-9), "{stress_mpa} MPa: {limit:?} {most_nmm}");
+            if limit.turns_past_teeth {
+                // Where the maximum is a corner, as a tooth is let go, its torque is off in proportion to its place.
+                assert!((limit.input_torque_nmm / most_nmm - 1.0).abs() < 1e-8, "{limit:?} {most_nmm}");
+            }
+            before_nmm = limit.input_torque_nmm;
+        }
+    });
+}
+
+#[test]
+fn a_capacity_that_no_contact_limits_says_that_the_wave_generator_turns_past_its_teeth() {
+    let capacity = |parameters: &DriveParameters, ring_um: f64, stress_mpa: f64| {
+        let clearance_um = PerContact { ring: ring_um, ..PerContact::default() };
+        let allowable_stress_mpa = Some(everywhere(stress_mpa));
+        let asked = LoadParameters {
+            materials: PLASTIC,
+            ring_teeth_bend: true,
+            clearance_um,
+            allowable_stress_mpa,
+            ..moving(0.002)
+        };
+        swept(parameters, &asked, 20).torque_capacity.unwrap()
+    };
+    for ring_um in [10.0, 30.0] {
+        let capacities = [100.0, 200.0, 400.0].map(|stress_mpa| capacity(&PAPER_5_2, ring_um, stress_mpa));
+        let torques_nm = capacities.map(|capacity| capacity.input_torque_nm);
+        assert!(torques_nm.is_sorted(), "{torques_nm:?}");
+        assert_eq!(capacities.map(|capacity| capacity.turns_past_teeth), [false, false, true], "{torques_nm:?}");
+    }
+    // A load that is answered without an allowable stress was refused with this one, which no contact reaches.
+    assert!(capacity(&PAPER_5_2_BORED, 10.0, 300.0).turns_past_teeth);
+}
+
+/// Relief along all of the flank leaves the tooth nearest to the lobe to close first: the wave generator moves past it under next to nothing, and on to the others.
+#[test]
+fn the_wave_generator_moves_past_a_tooth_by_the_lobe_to_those_that_still_have_gaps() {
+    let ring_tip_relief = Some(TipRelief { amount_um: 200.0, start_deg: 0.0, power: 2.0 });
+    let modification = Modification { ring_tip_relief, ..Modification::default() };
+    let drive = drive(&PAPER_5_1);
+    let case = LoadCase::new(&LoadParameters { modification, ..moving(1.0) }).unwrap();
+    let loaded = LoadedDrive::new(&drive, &case).unwrap();
+    let teeth = [0.002, 0.4, 0.8].map(|position_rad| loaded.tooth(Position::from_lobe(position_rad, 2)).unwrap());
+    let springs = Springs::new(&teeth, 2.0);
+    let passed_rad = 2.0 * teeth[0].spring.travel_arm_mm / teeth[0].spring.arm_decline_mm_per_rad;
+    assert!(teeth[1].spring.closing_rad > passed_rad);
+    let found = springs.wind_up(1e3).unwrap().unwrap();
+    assert!(found.rotation.rad() > teeth[1].spring.closing_rad);
+    assert!((springs.torque_nmm(&found.rotation).unwrap().value / 1e3 - 1.0).abs() < 1e-12);
 }
 
 #[test]

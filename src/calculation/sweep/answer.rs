@@ -184,9 +184,13 @@ pub struct TorqueCapacityAnswer {
     pub input_torque_nm: f64,
     /// At the carrier.
     pub output_torque_nm: f64,
-    /// The contact that limits it.
+    /// The contact that limits it; where `turns_past_teeth`, the one that is nearest to its allowable stress.
     pub limited_by: ContactName,
-    /// The input angle where it does.
+    /// Whether no contact reaches its stress under any torque that the teeth carry: the wave generator moves on, and beyond this torque would turn past them.
+    /// Left out where it does not.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub turns_past_teeth: bool,
+    /// The input angle where it is so.
     pub input_angle_deg: f64,
 }
 
@@ -212,8 +216,8 @@ impl WindUpAnswer {
 
 impl From<TorqueCapacity> for TorqueCapacityAnswer {
     fn from(capacity: TorqueCapacity) -> Self {
-        let TorqueCapacity { input_torque_nm, output_torque_nm, contact, input_angle_deg } = capacity;
-        Self { input_torque_nm, output_torque_nm, limited_by: contact.into(), input_angle_deg }
+        let TorqueCapacity { input_torque_nm, output_torque_nm, contact, turns_past_teeth, input_angle_deg } = capacity;
+        Self { input_torque_nm, output_torque_nm, limited_by: contact.into(), turns_past_teeth, input_angle_deg }
     }
 }
 

@@ -211,7 +211,10 @@ export const GROUPS = [
       row('Input torque', 'M_0', 'N·m', ({ sweep }) => sweep?.torque_capacity?.input_torque_nm),
       row('Output torque', 'M_G', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm),
       row('Limited by', '', '', ({ sweep }) => sweep?.torque_capacity?.limited_by, {
-        text: ({ sweep }) => CONTACTS.find(({ key }) => key === sweep.torque_capacity.limited_by).name.toLowerCase(),
+        text: ({ sweep }) =>
+          sweep.torque_capacity.turns_past_teeth
+            ? 'turning past the teeth'
+            : CONTACTS.find(({ key }) => key === sweep.torque_capacity.limited_by).name.toLowerCase(),
       }),
       row('At the input angle', 'j', 'deg', ({ sweep }) => sweep?.torque_capacity?.input_angle_deg),
     ],

@@ -179,8 +179,10 @@ pub struct TorqueCapacity {
     pub input_torque_nm: f64,
     /// The same at the carrier.
     pub output_torque_nm: f64,
-    /// The contact that limits it.
+    /// The contact that limits it; the nearest to its allowable stress where none reaches it.
     pub contact: Contact,
+    /// Whether none does before the wave generator turns past its teeth.
+    pub turns_past_teeth: bool,
     /// The input angle where it does.
     pub input_angle_deg: f64,
 }
@@ -206,7 +208,8 @@ impl TorqueCapacity {
         let peak = peaks.get(contact).stress_mpa;
         let input_torque_nm = input_torque_nm * share;
         let output_torque_nm = input_torque_nm * drive.teeth_per_wave();
-        Self { input_torque_nm, output_torque_nm, contact, input_angle_deg: peak.input_angle_deg }
+        let input_angle_deg = peak.input_angle_deg;
+        Self { input_torque_nm, output_torque_nm, contact, turns_past_teeth: false, input_angle_deg }
     }
 }
 

@@ -1,7 +1,7 @@
 //! A sweep state by state: what the fast path is held against, and what is left where it does not reach.
 
 use crate::contact::{Materials, PerContact};
-use crate::load_sharing::{LawEnd, LoadCase, LoadedDrive, ToothState};
+use crate::load_sharing::{LawEnd, LoadCase, LoadedDrive, ToothState, TorqueLimit};
 use crate::mesh::PlacedTooth;
 use crate::root::NotConverged;
 use crate::springs::WindUp;
@@ -133,10 +133,15 @@ impl<'a> Growing<'a> {
             let input_torque_nm = 1e-3 * limit.input_torque_nmm;
             if self.torque_capacity.is_none_or(|capacity| input_torque_nm < capacity.input_torque_nm) {
                 let output_torque_nm = input_torque_nm * self.loaded.drive().teeth_per_wave();
-                let contact = limit.contact;
-                let capacity = TorqueCapacity { input_torque_nm, output_torque_nm, contact, input_angle_deg };
-                self.torque_capacity = Some(capacity);
-                self.law_end = limit.law_end;
+                let TorqueLimit { contact, turns_past_teeth, law_end, .. } = limit;
+                self.torque_capacity = Some(TorqueCapacity {
+                    input_torque_nm,
+                    output_torque_nm,
+                    contact,
+                    turns_past_teeth,
+                    input_angle_deg,
+                });
+                self.law_end = law_end;
             }
         }
         Ok(())
