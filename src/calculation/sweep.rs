@@ -255,7 +255,9 @@ impl Question for Sweep {
     fn answer(checked: &CheckedSweep, stop: &dyn Stop) -> Result<SweepAnswer, NoAnswer> {
         let CheckedSweep { drive, duty, deviations, backings, friction, with_gaps, with_wind_up, .. } = checked;
         let load = checked.load();
-        let sweep = checked.solve(stop)?;
+        let asks_without_load = *with_wind_up && *with_gaps;
+        let points = if asks_without_load { checked.points.also_without_load() } else { checked.points };
+        let sweep = solver::sweep_with_deviations(drive, load, deviations, points, stop)?;
         // Of a million states each of what follows takes tens of milliseconds.
         let go_on = || if stop.stopped() { Err(NoAnswer::stopped()) } else { Ok(()) };
         go_on()?;
@@ -295,7 +297,7 @@ impl Question for Sweep {
             of_half_widths.iter().chain(&of_friction).chain(&of_bearing).chain(&of_projection).chain(&of_backing);
         let of_sweep = of_wind_up.iter().chain(of_model).chain(&of_contacts);
         findings.extend(of_sweep.map(|finding| FindingAnswer::new(finding, drive)));
-        let unloaded_wind_up_deg = if *with_wind_up && *with_gaps {
+        let unloaded_wind_up_deg = if asks_without_load {
             Some(solver::unloaded_wind_up_deg(drive, load, deviations, &sweep, stop)?)
         } else {
             None

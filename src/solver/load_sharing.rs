@@ -713,7 +713,7 @@ impl<'a> LoadedDrive<'a> {
     }
 
     /// Why teeth carry no torque, or not so much of it.
-    fn carries_nothing(&self, teeth: &[ToothState]) -> SolveError {
+    pub(crate) fn carries_nothing(&self, teeth: &[ToothState]) -> SolveError {
         if self.wave_generator_moves && teeth.iter().any(|tooth| tooth.spring.static_arm_mm > 0.0) {
             SolveError::TurnedPastTeeth
         } else {

@@ -17,7 +17,7 @@ use toothwave_solver::{
 
 use crate::drives::{PAPER_5_1, PAPER_5_2_BORED, drive, ellipse, everywhere, load, swept};
 
-const FIXED: ContactLaw = ContactLaw::Fixed(PerContact { wave_generator: 3e5, ring: 5e5, carrier: 2e5 });
+pub(crate) const FIXED: ContactLaw = ContactLaw::Fixed(PerContact { wave_generator: 3e5, ring: 5e5, carrier: 2e5 });
 const ARCSEC: f64 = PI / 648_000.0;
 
 fn of(wave_generator: WaveGenerator, teeth: i64, installed: i64, ring_teeth: i64, radius_mm: f64) -> DriveParameters {
@@ -33,7 +33,7 @@ fn of(wave_generator: WaveGenerator, teeth: i64, installed: i64, ring_teeth: i64
 }
 
 /// One lobe and more, zones alike and not, both senses, every slot filled and every second; flanks that end at the tip, and before it.
-fn drives() -> Vec<DriveParameters> {
+pub(crate) fn drives() -> Vec<DriveParameters> {
     let harmonic =
         |lobes, mean_radius_mm, amplitude_mm| WaveGenerator::Harmonic { lobes, mean_radius_mm, amplitude_mm };
     vec![
@@ -61,13 +61,13 @@ fn random(seed: u64) -> impl FnMut() -> f64 {
 
 /// Which kinds of item deviate.
 #[derive(Debug, Clone, Copy)]
-struct Kinds {
-    slots: bool,
-    ring_spaces: bool,
-    lobes: bool,
+pub(crate) struct Kinds {
+    pub(crate) slots: bool,
+    pub(crate) ring_spaces: bool,
+    pub(crate) lobes: bool,
 }
 
-const ALL_KINDS: [Kinds; 7] = [
+pub(crate) const ALL_KINDS: [Kinds; 7] = [
     Kinds { slots: true, ring_spaces: false, lobes: false },
     Kinds { slots: false, ring_spaces: true, lobes: false },
     Kinds { slots: false, ring_spaces: false, lobes: true },
@@ -82,7 +82,7 @@ fn count(of: i64) -> usize {
 }
 
 /// Every deviation of the kinds, some micrometres large.
-fn deviations(p: &DriveParameters, kinds: Kinds, seed: u64) -> Deviations {
+pub(crate) fn deviations(p: &DriveParameters, kinds: Kinds, seed: u64) -> Deviations {
     let mut random = random(seed);
     let mut list = |is_wanted: bool, items: i64, size: f64| {
         if is_wanted { (0..items).map(|_| size * random()).collect() } else { Vec::new() }
@@ -107,7 +107,7 @@ fn deviations(p: &DriveParameters, kinds: Kinds, seed: u64) -> Deviations {
 }
 
 /// What covers them.
-fn cleared(torque_nm: f64, law: ContactLaw) -> LoadParameters {
+pub(crate) fn cleared(torque_nm: f64, law: ContactLaw) -> LoadParameters {
     LoadParameters {
         law,
         clearance_um: PerContact { wave_generator: 8.0, ring: 8.0, carrier: 8.0 },
@@ -115,7 +115,7 @@ fn cleared(torque_nm: f64, law: ContactLaw) -> LoadParameters {
     }
 }
 
-fn swept_with(
+pub(crate) fn swept_with(
     drive: &Drive,
     load: &LoadParameters,
     deviations: &Deviations,
@@ -243,6 +243,19 @@ fn chain(p: &DriveParameters, load: &LoadParameters, deviations: &Deviations, pl
     let clearance = [wave_generator, ring, carrier];
     let gap_mm = (0..3).map(|c| ratio[c] * (gaps_mm[c] + um * clearance[c])).sum();
     Chain { placed, arm_mm: d * gamma.sin(), gap_mm, ratio, normal_rad: in_cam }
+}
+
+/// How far the wave generator turns before the first of all teeth between lobe and flank has closed its gaps, when the input has turned.
+pub(crate) fn first_closing_rad(
+    p: &DriveParameters,
+    load: &LoadParameters,
+    deviations: &Deviations,
+    reach_rad: f64,
+    input_rad: f64,
+) -> f64 {
+    let placed = placed_by_angles(p, input_rad).into_iter().filter(|tooth| tooth.position_rad < reach_rad);
+    let chains = placed.map(|tooth| chain(p, load, deviations, tooth));
+    chains.map(|chain| chain.gap_mm / chain.arm_mm).fold(f64::INFINITY, f64::min)
 }
 
 /// `F_H` of each chain when the wave generator has turned by `rotation_rad`.

@@ -26,6 +26,7 @@ mod ring_bending;
 mod springs;
 mod tolerances;
 mod true_peaks;
+mod unloaded;
 
 /// Counts, thread by thread, for the tests that ask what a sweep takes.
 #[global_allocator]

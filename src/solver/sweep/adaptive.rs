@@ -8,6 +8,7 @@ use crate::position::Position;
 use crate::sweep::fast;
 use crate::sweep::points::Tolerance;
 use crate::sweep::search::{AtPlace, LOADS, Look, Piece, Seen, search};
+use crate::sweep::unloaded;
 use crate::{SolveError, Stop};
 
 /// How true straight lines between the input angles are at least, over each column's peak: a plot that looks smooth.
@@ -92,10 +93,17 @@ pub(crate) fn moments(
     };
     let mut by_lap = vec![Vec::new(); usize::try_from(laps).unwrap_or(usize::MAX)];
     let loads_jump = mesh.loads_jump_at_entry();
+    let without_load = if tolerance.looks_without_load() && loaded.has_gaps() {
+        unloaded::extremes(PlainLook::new(loaded, load, stop), pieces(), tolerance)?
+    } else {
+        Vec::new()
+    };
     for (moments, lap) in by_lap.iter_mut().zip(0..) {
         for Seen { piece, fractions, .. } in found.seen.iter().filter(|seen| seen.piece.lap == lap) {
             moments.extend(fractions.iter().map(|&fraction| Moment::of(piece, fraction)));
         }
+        let extremes = without_load.iter().filter(|(piece, _)| piece.lap == lap);
+        moments.extend(extremes.map(|(piece, fraction)| Moment::of(piece, *fraction)));
         if mesh.spacings_are_whole() {
             // As a lap begins with a tooth at the end of the flank, so it ends: at a regular tip, where it carries nothing, at the same instant.
             let last = mesh.whole_spacings() + 1;
@@ -112,7 +120,7 @@ pub(crate) fn moments(
 }
 
 /// Moments tooth by tooth.
-struct PlainLook<'a> {
+pub(crate) struct PlainLook<'a> {
     /// With one tooth at each place of the mesh, which stands for all that carry alike; where items deviate, with every tooth.
     loaded: LoadedDrive<'a>,
     mesh: Mesh,
@@ -136,8 +144,25 @@ impl<'a> PlainLook<'a> {
         }
     }
 
+    /// The drive, and how many teeth each that is looked at stands for.
+    pub(crate) const fn loaded(&self) -> &LoadedDrive<'a> {
+        &self.loaded
+    }
+
     /// The teeth of a piece, place by place.
-    fn teeth(&self, piece: &Piece, fraction: f64) -> Result<Vec<ToothState>, SolveError> {
+    ///
+    /// # Errors
+    /// Those of a tooth, with the input angle.
+    pub(crate) fn teeth(&self, piece: &Piece, fraction: f64) -> Result<Vec<ToothState>, SolveError> {
+        if self.stop.stopped() {
+            return Err(SolveError::Stopped);
+        }
+        let lap_deg = self.mesh.sweep_period_deg() / self.mesh.laps() as f64;
+        let input_angle_deg = (piece.lap as f64 + fraction) * lap_deg;
+        self.teeth_by_place(piece, fraction).map_err(|error| error.at_input_angle(input_angle_deg))
+    }
+
+    fn teeth_by_place(&self, piece: &Piece, fraction: f64) -> Result<Vec<ToothState>, SolveError> {
         let mesh = &self.mesh;
         if !mesh.tells_items_apart() {
             let places = 1..=piece.places;
@@ -174,13 +199,8 @@ impl Look for PlainLook<'_> {
 
     fn look(&mut self, fractions: &[f64], seen: &mut Seen) -> Result<bool, SolveError> {
         let piece = seen.piece;
-        let lap_deg = self.mesh.sweep_period_deg() / self.mesh.laps() as f64;
         for &fraction in fractions {
-            if self.stop.stopped() {
-                return Err(SolveError::Stopped);
-            }
-            let input_angle_deg = (piece.lap as f64 + fraction) * lap_deg;
-            let teeth = self.teeth(&piece, fraction).map_err(|error| error.at_input_angle(input_angle_deg))?;
+            let teeth = self.teeth(&piece, fraction)?;
             let wind_up = self.loaded.wind_up(&teeth)?;
             if self.has_gaps {
                 let rotation = wind_up.rotation;

@@ -31,7 +31,17 @@ impl Points {
 
     /// The same to the finest tolerance that there is.
     pub const fn finest(max_states: u64) -> Self {
-        Self::Tolerance(Tolerance { relative: Parameter::SweepTolerance.range().low, max_states })
+        let relative = Parameter::SweepTolerance.range().low;
+        Self::Tolerance(Tolerance { relative, max_states, looks_without_load: false })
+    }
+
+    /// The same, where a tolerance is given also with the input angles at which the wind-up without load is least and largest.
+    #[must_use]
+    pub const fn also_without_load(self) -> Self {
+        match self {
+            Self::Samples(_) => self,
+            Self::Tolerance(tolerance) => Self::Tolerance(Tolerance { looks_without_load: true, ..tolerance }),
+        }
     }
 }
 
@@ -39,11 +49,12 @@ impl Points {
 ///
 /// The relative tolerance holds for the largest value of every force and stress, for the least and the largest of wind-up and torsional
 /// stiffness and for the torque capacity; its root for the places where they stand and for half-widths; of the transmission error the
-/// tolerance times the wind-up.
+/// tolerance times the wind-up; the same without load, where it is looked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
     relative: f64,
     max_states: u64,
+    looks_without_load: bool,
 }
 
 impl Tolerance {
@@ -52,12 +63,19 @@ impl Tolerance {
     /// # Errors
     /// A tolerance out of its range.
     pub fn new(relative: f64, max_states: u64) -> Result<Self, Violation> {
-        Parameter::SweepTolerance.check(relative).map_or(Ok(Self { relative, max_states }), Err)
+        Parameter::SweepTolerance
+            .check(relative)
+            .map_or(Ok(Self { relative, max_states, looks_without_load: false }), Err)
     }
 
     /// The relative tolerance.
     pub const fn relative(&self) -> f64 {
         self.relative
+    }
+
+    /// Whether the extremes of the wind-up without load are looked for too.
+    pub(crate) const fn looks_without_load(&self) -> bool {
+        self.looks_without_load
     }
 
     /// Most states that may be worked out.

@@ -1,4 +1,5 @@
-//! How far the wave generator turns before the first tooth has closed its gaps: the wind-up without load (docs/theory.md section 4.8).
+//! How far the wave generator turns before the first tooth has closed its gaps: the wind-up without load (docs/theory.md section 4.8), and where it is
+//! least and largest (section 9).
 
 use std::ops::Range;
 
@@ -6,8 +7,15 @@ use crate::drive::Drive;
 use crate::gaps::Deviations;
 use crate::load_sharing::{LoadCase, LoadedDrive};
 use crate::position::{Position, half_lobe_rad};
+use crate::sweep::adaptive::PlainLook;
 use crate::sweep::columns::{States, Sweep};
+use crate::sweep::points::Tolerance;
+use crate::sweep::search::{LOADS, Look, Piece, Seen, TOTALS, search};
 use crate::{SolveError, Stop};
+
+/// What of a lap is left out at either end of a piece, over the tolerance, and at least.
+const MARGIN: f64 = 1e-3;
+const LEAST_MARGIN: f64 = 1e-12;
 
 /// `Δφ_0 = min θ_i` at each input angle of a sweep of this drive under this load with these deviations: the wind-up as the torque goes to
 /// nothing. Without gaps there is none.
@@ -55,4 +63,102 @@ fn by_input_angle(states: &States) -> impl Iterator<Item = Range<usize>> {
             && states.tooth[next] > states.tooth[next - 1];
         (!goes_on).then(|| std::mem::replace(&mut start, next)..next)
     })
+}
+
+/// The pieces and fractions at which the wind-up without load is least and largest. Beside their ends, which are looked at anyway: a tooth on the lobe or in the
+/// valley closes no gap, and one that stands next to it may.
+///
+/// # Errors
+/// As [`search()`].
+pub(crate) fn extremes(
+    teeth: PlainLook<'_>,
+    pieces: impl Iterator<Item = Piece>,
+    tolerance: Tolerance,
+) -> Result<Vec<(Piece, f64)>, SolveError> {
+    let margin = (MARGIN * tolerance.relative()).max(LEAST_MARGIN);
+    let within = |piece: Piece| Piece {
+        start: piece.start + margin,
+        end: piece.end - margin,
+        at_start: None,
+        at_end: None,
+        ..piece
+    };
+    let pieces: Vec<_> = pieces.map(within).filter(|piece| piece.start < piece.end).collect();
+    let mut look = UnloadedLook { teeth, scale_rad: 1.0 };
+    let Some(first) = pieces.first() else { return Ok(Vec::new()) };
+    let closing_rad = look.closing_rad(first, 0.5 * (first.start + first.end))?;
+    let first_rad = closing_rad.into_iter().fold(f64::INFINITY, f64::min);
+    if first_rad > 0.0 {
+        look.scale_rad = first_rad;
+    }
+    // This way tells of every moment.
+    let found = search(&mut look, pieces.into_iter(), tolerance, None)?.unwrap_or_default();
+    let sought = [EARLINESS, FIRST].map(|quantity| found.best[quantity]).into_iter();
+    // Where no gap is open there is no largest.
+    let sought = sought.filter(|best| best.value > 0.0);
+    Ok(sought.map(|best| (found.seen[best.piece].piece, found.seen[best.piece].fractions[best.moment])).collect())
+}
+
+/// Of each tooth how early it closes: a smooth curve, which is largest where the wind-up is least. It stands where a load does.
+const EARLINESS: usize = 0;
+
+/// The least of the closing angles: a curve with corners where another tooth becomes the first. It stands where the capacity does, which has them too.
+const FIRST: usize = LOADS + TOTALS - 1;
+
+/// Moments of the teeth without load.
+struct UnloadedLook<'a> {
+    teeth: PlainLook<'a>,
+    /// A closing angle to compare with.
+    scale_rad: f64,
+}
+
+impl UnloadedLook<'_> {
+    /// The closing angles of a piece, place by place.
+    fn closing_rad(&self, piece: &Piece, fraction: f64) -> Result<Vec<f64>, SolveError> {
+        let lost_motion_rad = self.teeth.loaded().lost_motion_rad();
+        let teeth = self.teeth.teeth(piece, fraction)?;
+        // A gap that lost motion makes up for may be closed to the last digits.
+        Ok(teeth.iter().map(|tooth| (lost_motion_rad + tooth.spring.closing_rad).max(0.0)).collect())
+    }
+}
+
+impl Look for UnloadedLook<'_> {
+    fn has_gaps(&self) -> bool {
+        // No curve changes with the teeth that carry.
+        false
+    }
+
+    fn is_linear(&self) -> bool {
+        // None leaves nothing by a power.
+        true
+    }
+
+    fn is_in_proportion(&self) -> bool {
+        false
+    }
+
+    fn input_torque_nmm(&self) -> f64 {
+        self.teeth.input_torque_nmm()
+    }
+
+    fn teeth_at_each_place(&self) -> u64 {
+        self.teeth.teeth_at_each_place()
+    }
+
+    fn look(&mut self, fractions: &[f64], seen: &mut Seen) -> Result<bool, SolveError> {
+        let (piece, count) = (seen.piece, seen.teeth);
+        for &fraction in fractions {
+            let closing_rad = self.closing_rad(&piece, fraction)?;
+            let first_rad = closing_rad.iter().copied().fold(f64::INFINITY, f64::min);
+            if first_rad == f64::INFINITY {
+                return Err(self.teeth.loaded().carries_nothing(&self.teeth.teeth(&piece, fraction)?));
+            }
+            let values = seen.push(fraction);
+            for (tooth, closing_rad) in closing_rad.into_iter().enumerate() {
+                values[EARLINESS * count + tooth] = self.scale_rad / (self.scale_rad + closing_rad);
+            }
+            values[LOADS * count + (FIRST - LOADS)] = first_rad;
+        }
+        Ok(true)
+    }
 }
