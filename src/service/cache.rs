@@ -286,11 +286,11 @@ mod tests {
         const BODY_BYTES: usize = 1 << 20;
         let cache = Cache::new(3 * BODY_BYTES as u64);
         let kept = Arc::new(());
-        for number in 0..20_u64 {
+        for number in 0..20 {
             let body = Bytes::from_owner(Counted(vec![0; BODY_BYTES], Arc::clone(&kept)));
             let server_timing = HeaderValue::from_static("");
             let stored = Stored { body, sent: Sent::default(), held: None, solve: Duration::ZERO, server_timing };
-            keep(&cache.answers, Key::new("sweep", &number, &(Format::Json, false)), &stored);
+            keep(&cache.answers, Key::new("sweep", &f64::from(number), &(Format::Json, false)), &stored);
             drop(stored);
             let bodies = Arc::strong_count(&kept) - 1;
             assert!(bodies * BODY_BYTES <= 3 * BODY_BYTES, "{bodies} bodies after {number}");
