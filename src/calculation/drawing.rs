@@ -5,7 +5,7 @@ use toothwave_solver::drive::{Draft, DriveError};
 use toothwave_solver::{SolveError, Stop};
 
 use crate::design::Design;
-use crate::drawing::answer::{BodyAnswer, DrawingAnswer, DrawnPart};
+use crate::drawing::answer::{BodyAnswer, DrawingAnswer, DrawnPart, EdgeAnswer, OutlineAnswer};
 use crate::findings::{FindingAnswer, drive_findings};
 use crate::forms::{Form, Format, Forms};
 use crate::key::{Encode, Key};
@@ -88,7 +88,41 @@ impl Question for Drawing {
     }
 }
 
+impl DrawingAnswer {
+    /// Points of all curves, and poles of the polynomials that solids have in their place.
+    fn points_and_poles(&self) -> (usize, usize) {
+        let outlines = self.bodies.iter().flat_map(|body| body.holes.iter().chain([&body.outer]));
+        let edges = outlines.flat_map(|outline| match outline {
+            OutlineAnswer::Circle { .. } => &[][..],
+            OutlineAnswer::Path { edges } => edges,
+        });
+        edges.fold((0, 0), |(points, poles), edge| match edge {
+            EdgeAnswer::Curve { x_mm, polynomials, .. } => {
+                (points + x_mm.len(), poles + polynomials.iter().map(Vec::len).sum::<usize>())
+            }
+            EdgeAnswer::Line { .. } | EdgeAnswer::Arc { .. } => (points, poles),
+        })
+    }
+}
+
 impl Forms for DrawingAnswer {
     const FORMS: &'static [(Format, Form<Self>)] =
         &[(Format::Svg, svg::write), (Format::Dxf, dxf::write), (Format::Step, step::write)];
+
+    fn expected_bytes(&self) -> usize {
+        // Two numbers of about 18 characters, each with its comma.
+        4096 + 40 * self.points_and_poles().0
+    }
+
+    fn held_bytes(&self, format: Format) -> u64 {
+        /// A point's coordinates.
+        const POINT_BYTES: u64 = 16;
+        /// A pole in its polygon, of which there are four or more.
+        const POLE_BYTES: u64 = 24;
+        /// The records of a pole at both ends of a prism, by their texts.
+        const RECORDS_BYTES: u64 = 320;
+        let (points, poles) = self.points_and_poles();
+        let of_records = if format == Format::Step { RECORDS_BYTES } else { 0 };
+        POINT_BYTES * points as u64 + (POLE_BYTES + of_records) * poles as u64
+    }
 }

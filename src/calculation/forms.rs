@@ -40,6 +40,11 @@ pub trait Forms: Serialize + Sized + 'static {
         4096
     }
 
+    /// About how many bytes the answer takes in memory, as far as they are many, with what writing it in a format takes beside the text.
+    fn held_bytes(&self, _format: Format) -> u64 {
+        0
+    }
+
     /// Writes the answer in one of its formats, or in JSON.
     ///
     /// # Errors

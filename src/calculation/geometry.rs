@@ -304,9 +304,24 @@ impl Question for Geometry {
 
 impl Forms for GeometryAnswer {
     const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Csv, Self::write_csv), (Format::Text, Self::write_text)];
+
+    fn expected_bytes(&self) -> usize {
+        // Two numbers of about 18 characters, each with its comma.
+        4096 + 40 * self.points()
+    }
+
+    fn held_bytes(&self, _format: Format) -> u64 {
+        // Its columns, and while they are made the points that they come from.
+        (2 * size_of::<[f64; 2]>() * self.points()) as u64
+    }
 }
 
 impl GeometryAnswer {
+    fn points(&self) -> usize {
+        let profiles = [&self.ring.profile, &self.wave_generator.profile, &self.tooth_center_path];
+        profiles.iter().map(|profile| profile.x_mm.len()).sum()
+    }
+
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
         let mut csv = csv::Writer::from_writer(writer);
         csv.write_record(["profile", "x_mm", "y_mm"]).map_err(csv_error)?;

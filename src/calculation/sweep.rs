@@ -461,6 +461,24 @@ impl Forms for SweepAnswer {
         let of_losses = if self.losses.is_some() { 80 } else { 0 };
         4096 + (220 + of_losses) * self.states.tooth.len()
     }
+
+    fn held_bytes(&self, format: Format) -> u64 {
+        let columns_bytes = self.columns().iter().map(|(_, column)| column.bytes()).sum();
+        // For plots the states are put in the order of their places: as much again.
+        if format == Format::Svg { 2 * columns_bytes } else { columns_bytes }
+    }
+}
+
+impl Column<'_> {
+    const fn bytes(&self) -> u64 {
+        let bytes = match self {
+            Self::Numbers(numbers) => size_of_val(*numbers),
+            Self::Counts(counts) => size_of_val(*counts),
+            Self::Flags(flags) => size_of_val(*flags),
+            Self::Rolls(rolls) => size_of_val(*rolls),
+        };
+        bytes as u64
+    }
 }
 
 impl SweepAnswer {

@@ -15,7 +15,7 @@ use tracing::Instrument;
 
 use crate::negotiation::Representation;
 use crate::problem::Problem;
-use crate::room::Sent;
+use crate::room::{SMALL_BYTES, Sent};
 
 /// The strong entity tag of a representation: its bytes follow from the key alone.
 pub fn etag(key: Key) -> String {
@@ -231,13 +231,22 @@ impl Cache {
         let task = async move {
             let outcome = wanted.run_until_cancelled(solve).await;
             if let Some(Ok(stored)) = &outcome {
-                answers.insert(key, Stored { held: None, ..stored.clone() });
+                keep(&answers, key, stored);
             }
             // Whoever finds no solve under way from here on finds the answer.
             drop(landing);
             teller.send_replace(outcome);
         };
         (flight, task)
+    }
+}
+
+/// Keeps an answer. The cache forgets what goes beyond its bound when it comes to that: of large ones at once, or it would hold some beyond it,
+/// which take no room any more.
+fn keep(answers: &moka::sync::Cache<Key, Stored>, key: Key, stored: &Stored) {
+    answers.insert(key, Stored { held: None, ..stored.clone() });
+    if stored.body.len() as u64 > SMALL_BYTES {
+        answers.run_pending_tasks();
     }
 }
 
@@ -248,4 +257,43 @@ pub struct CacheSize {
     pub bytes: u64,
     /// Entries.
     pub entries: u64,
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::time::Duration;
+
+    use axum::http::HeaderValue;
+    use bytes::Bytes;
+    use toothwave_calculation::forms::Format;
+    use toothwave_calculation::key::Key;
+
+    use super::{Cache, Stored, keep};
+    use crate::room::Sent;
+
+    /// Bytes that are told when they are let go.
+    struct Counted(Vec<u8>, #[expect(dead_code, reason = "it is counted")] Arc<()>);
+
+    impl AsRef<[u8]> for Counted {
+        fn as_ref(&self) -> &[u8] {
+            &self.0
+        }
+    }
+
+    #[test]
+    fn large_answers_beyond_the_bound_are_let_go_at_once() {
+        const BODY_BYTES: usize = 1 << 20;
+        let cache = Cache::new(3 * BODY_BYTES as u64);
+        let kept = Arc::new(());
+        for number in 0..20 {
+            let body = Bytes::from_owner(Counted(vec![0; BODY_BYTES], Arc::clone(&kept)));
+            let server_timing = HeaderValue::from_static("");
+            let stored = Stored { body, sent: Sent::default(), held: None, solve: Duration::ZERO, server_timing };
+            keep(&cache.answers, Key::new("sweep", &f64::from(number), &(Format::Json, false)), &stored);
+            drop(stored);
+            let bodies = Arc::strong_count(&kept) - 1;
+            assert!(bodies * BODY_BYTES <= 3 * BODY_BYTES, "{bodies} bodies after {number}");
+        }
+    }
 }

@@ -17,9 +17,23 @@ use utoipa::ToSchema;
 use crate::keys::Keys;
 use crate::machine;
 use crate::parts::Parts;
+use crate::room::SMALL_BYTES;
 
 /// Solves that may be allowed to run or to wait: more than any machine can, fewer than a semaphore can count.
 const MOST_SOLVES: i64 = 1_000_000;
+
+/// Of the memory this is nobody's: the process itself, what solves need beside their answers, what the kernel keeps for connections, and what the
+/// allocator cannot give back. Of a small memory three quarters at most.
+const HELD_BACK_BYTES: u64 = 64 << 20;
+
+/// Of the memory, for each solve that runs at once, by default.
+const MEMORY_PER_SOLVE_BYTES: u64 = 32 << 20;
+
+/// Of the memory, for each connection, by default: an eighth of it is what a connection may hold without taking room.
+const MEMORY_PER_CONNECTION_BYTES: u64 = 8 * SMALL_BYTES;
+
+/// By default.
+const MOST_CONNECTIONS: usize = 1024;
 
 /// Where the machine does not tell.
 const UNKNOWN_MEMORY_BYTES: u64 = 2 << 30;
@@ -70,7 +84,7 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_MAX_PROFILE_POINTS", value_name = "N")]
     pub max_profile_points: Option<u64>,
 
-    /// Solves that run at once [default: the cores that the process may use]
+    /// Solves that run at once [default: the cores that the process may use, or one for each 32 MiB of the memory]
     #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_SOLVES", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_SOLVES))]
     pub max_concurrent_solves: Option<u32>,
 
@@ -86,12 +100,12 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_DEADLINE_MS", value_name = "MS", default_value_t = 10_000)]
     pub deadline_ms: u64,
 
-    /// Most bytes of answers that the cache keeps [default: 256 MiB, or an eighth of the memory]
+    /// Most bytes of answers that the cache keeps [default: 256 MiB, or an eighth of the memory but for 64 MiB]
     #[arg(long, env = "TOOTHWAVE_CACHE_MAX_BYTES", value_name = "BYTES")]
     pub cache_max_bytes: Option<u64>,
 
     /// Most bytes of answers that nobody has read yet: being made, in batches, on their way; those up to 256 KiB not counted
-    /// [default: 512 MiB for each solve that runs at once, or half of the memory]
+    /// [default: 512 MiB for each solve that runs at once, or half of the memory but for 64 MiB]
     #[arg(long, env = "TOOTHWAVE_MAX_UNREAD_BYTES", value_name = "BYTES")]
     pub max_unread_bytes: Option<u64>,
 
@@ -127,9 +141,9 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_STUDY_EXPIRY_S", value_name = "S", default_value_t = 2_592_000)]
     pub study_expiry_s: u64,
 
-    /// Connections that may be open at once
-    #[arg(long, env = "TOOTHWAVE_MAX_CONNECTIONS", value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=MOST_SOLVES))]
-    pub max_connections: u32,
+    /// Connections that may be open at once [default: 1024, or one for each 2 MiB of the memory]
+    #[arg(long, env = "TOOTHWAVE_MAX_CONNECTIONS", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_SOLVES))]
+    pub max_connections: Option<u32>,
 
     /// Milliseconds in which a request's line and headers have to arrive, and after which a silent connection is closed
     #[arg(long, env = "TOOTHWAVE_HEADER_TIMEOUT_MS", value_name = "MS", default_value_t = 30_000, value_parser = clap::value_parser!(u64).range(1..))]
@@ -327,11 +341,20 @@ impl Limits {
 impl Settings {
     /// The limits among the settings.
     pub fn limits(&self) -> Limits {
-        let max_concurrent_solves = self.max_concurrent_solves.map_or_else(cores, |solves| solves as usize);
-        let memory_bytes = machine::memory_bytes().unwrap_or(UNKNOWN_MEMORY_BYTES);
+        self.limits_of(machine::memory_bytes().unwrap_or(UNKNOWN_MEMORY_BYTES), cores())
+    }
+
+    /// Those on a machine with so much memory and so many cores for the process.
+    fn limits_of(&self, memory_bytes: u64, cores: usize) -> Limits {
+        let that_fit = |each_bytes: u64| usize::try_from(memory_bytes / each_bytes).unwrap_or(usize::MAX).max(1);
+        let solves_that_fit = that_fit(MEMORY_PER_SOLVE_BYTES);
+        let max_concurrent_solves =
+            self.max_concurrent_solves.map_or_else(|| cores.min(solves_that_fit), |solves| solves as usize);
+        let connections_that_fit = that_fit(MEMORY_PER_CONNECTION_BYTES).min(MOST_CONNECTIONS);
+        let shared_bytes = memory_bytes.saturating_sub(HELD_BACK_BYTES).max(memory_bytes / 4);
         let max_unread_bytes = self
             .max_unread_bytes
-            .unwrap_or_else(|| (memory_bytes / 2).min(max_concurrent_solves as u64 * MOST_UNREAD_BYTES_PER_SOLVE));
+            .unwrap_or_else(|| (shared_bytes / 2).min(max_concurrent_solves as u64 * MOST_UNREAD_BYTES_PER_SOLVE));
         let with_room_for = |each_bytes: u64| MOST_OF_AN_ANSWER.min(max_unread_bytes / each_bytes).max(1);
         Limits {
             max_states: self.max_states.unwrap_or_else(|| with_room_for(STATE_BYTES)),
@@ -341,13 +364,13 @@ impl Settings {
             max_queued_solves: self.max_queued_solves as usize,
             max_concurrent_batches: self.max_concurrent_batches as usize,
             deadline_ms: self.deadline_ms,
-            cache_max_bytes: self.cache_max_bytes.unwrap_or_else(|| MOST_CACHE_BYTES.min(memory_bytes / 8)),
+            cache_max_bytes: self.cache_max_bytes.unwrap_or_else(|| MOST_CACHE_BYTES.min(shared_bytes / 8)),
             max_unread_bytes,
             max_study_variants: self.max_study_variants,
             max_study_bytes: self.max_study_bytes.unwrap_or_else(|| MOST_STUDY_BYTES.min(max_unread_bytes / 4)),
             max_concurrent_studies: self.max_concurrent_studies as usize,
             study_deadline_ms: self.study_deadline_ms,
-            max_connections: self.max_connections as usize,
+            max_connections: self.max_connections.map_or(connections_that_fit, |connections| connections as usize),
             max_header_bytes: MAX_HEADER_BYTES,
             header_timeout_ms: self.header_timeout_ms,
         }
@@ -384,4 +407,46 @@ fn origin(text: &str) -> Result<String, String> {
 
 fn log_filter(text: &str) -> Result<String, String> {
     EnvFilter::try_new(text).map(|_| text.into()).map_err(|error| format!("no log filter: {error}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::{SMALL_BYTES, Settings};
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        settings: Settings,
+    }
+
+    /// The process itself takes some 25 MiB, and half as much again goes to what is not counted.
+    #[test]
+    fn what_may_be_held_by_default_leaves_the_process_its_part_of_the_memory() {
+        let Line { settings } = Line::parse_from(["serve"]);
+        for memory_mib in [128, 200, 256, 512, 1024, 2048, 65_536] {
+            for cores in [1, 2, 16, 128] {
+                let memory_bytes = memory_mib << 20;
+                let limits = settings.limits_of(memory_bytes, cores);
+                let of_connections = limits.max_connections as u64 * SMALL_BYTES;
+                let held = limits.max_unread_bytes + limits.cache_max_bytes + of_connections;
+                assert!(held + (38 << 20) <= memory_bytes, "{memory_mib} MiB, {cores} cores: {held}");
+                assert!(limits.max_study_bytes < limits.max_unread_bytes);
+                assert!(limits.max_concurrent_solves as u64 * (32 << 20) <= memory_bytes);
+            }
+        }
+    }
+
+    #[test]
+    fn a_large_memory_is_used_as_far_as_its_cores_need_it() {
+        let Line { settings } = Line::parse_from(["serve"]);
+        let limits = settings.limits_of(16 << 30, 4);
+        assert_eq!(limits.max_unread_bytes, 2 << 30);
+        assert_eq!(limits.cache_max_bytes, 256 << 20);
+        assert_eq!(limits.max_concurrent_solves, 4);
+        assert_eq!(limits.max_connections, 1024);
+        assert_eq!(limits.max_states, 1_000_000);
+        assert_eq!(settings.limits_of(2 << 30, 4).max_unread_bytes, (2048 - 64) << 19);
+    }
 }

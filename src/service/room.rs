@@ -11,7 +11,7 @@ use crate::problem::{Problem, ProblemCode};
 
 /// Answers up to here need no room, so that slow readers of large ones stop nobody's ordinary work; the bound on connections bounds
 /// them too.
-const SMALL_BYTES: u64 = 1 << 18;
+pub const SMALL_BYTES: u64 = 1 << 18;
 
 /// Room for so many bytes.
 #[derive(Debug, Clone)]

@@ -138,8 +138,11 @@ fn a_limit_of_files_that_the_process_may_raise_itself_is_raised() {
 fn what_a_process_may_not_take_of_the_memory_is_not_shared_out() {
     let process = held_to("-v 1000000", &["serve"]);
     let limits = ask_at(process.address, &Question::of("GET", "/v1/limits")).found();
-    assert_eq!(limits["max_unread_bytes"], 512_000_000);
-    assert_eq!(limits["cache_max_bytes"], 128_000_000);
+    // But for 64 MiB, which are nobody's.
+    let shared_bytes = 1_024_000_000 - (64 << 20);
+    assert_eq!(limits["max_unread_bytes"], shared_bytes / 2);
+    assert_eq!(limits["cache_max_bytes"], shared_bytes / 8);
+    assert_eq!(limits["max_connections"], 1_024_000_000 / (2 << 20));
 }
 
 #[test]

@@ -28,7 +28,7 @@ use toothwave_calculation::coincidence_degree::TeethInMeshAnswer;
 use toothwave_calculation::columns;
 use toothwave_calculation::design::Design;
 use toothwave_calculation::findings::FindingAnswer;
-use toothwave_calculation::forms::Forms as _;
+use toothwave_calculation::forms::{Format, Forms as _};
 use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::question::{self, Question};
 use toothwave_calculation::sweep::Sweep;
@@ -211,7 +211,8 @@ fn whole_line<Q: Question>(
     stop: &AtomicBool,
 ) -> Result<AnsweredLine, Problem> {
     let Solved { answer, columns_bytes, reserved } = solved(question, document, limits, room, stop)?;
-    let buffer = Growing::new(reserved, columns_bytes, answer.expected_bytes())?;
+    let held_bytes = columns_bytes.max(answer.held_bytes(Format::Json));
+    let buffer = Growing::new(reserved, held_bytes, answer.expected_bytes())?;
     line(index, &answer, buffer, stop)
 }
 
@@ -242,7 +243,8 @@ fn peaks_line(
         checks: &sweep.checks,
         findings: &sweep.findings,
     };
-    line(index, &peaks, Growing::new(reserved, columns_bytes, 0)?, stop)
+    let held_bytes = columns_bytes.max(sweep.held_bytes(Format::Json));
+    line(index, &peaks, Growing::new(reserved, held_bytes, 0)?, stop)
 }
 
 /// What a document comes to, and the memory that it takes.

@@ -63,6 +63,11 @@ impl Forms for DesignAnswer {
         let of_geometry = self.geometry.as_ref().map_or(0, Forms::expected_bytes);
         4096 + of_geometry + self.sweep.as_ref().map_or(0, Forms::expected_bytes)
     }
+
+    fn held_bytes(&self, format: Format) -> u64 {
+        let of_geometry = self.geometry.as_ref().map_or(0, |geometry| geometry.held_bytes(format));
+        of_geometry + self.sweep.as_ref().map_or(0, |sweep| sweep.held_bytes(format))
+    }
 }
 
 /// What is asked.

@@ -236,7 +236,8 @@ fn written<A: Forms>(
 ) -> Result<Stored, Problem> {
     let is_long = is_long(format);
     let expected_bytes = if gzip || !is_long { 0 } else { answer.expected_bytes() };
-    let buffer = Growing::new(reserved, columns_bytes, expected_bytes)?;
+    let held_bytes = columns_bytes.max(answer.held_bytes(format));
+    let buffer = Growing::new(reserved, held_bytes, expected_bytes)?;
     let written = if gzip {
         // Before the encoder: of what compresses well little comes out of it for long.
         let mut writer = Stoppable::new(GzEncoder::new(buffer, Compression::fast()), stop);
@@ -314,22 +315,23 @@ struct Growing {
     bytes: Vec<u8>,
     reserved: Reserved,
     /// What the answer takes beside its bytes.
-    columns_bytes: u64,
+    held_bytes: u64,
 }
 
 impl Growing {
-    fn new(mut reserved: Reserved, columns_bytes: u64, expected_bytes: usize) -> Result<Self, NoRoom> {
-        // Where the question did not tell, the columns are about half of their text.
-        let columns_bytes = columns_bytes.max(expected_bytes as u64 / 2);
-        reserved.hold_at_least(columns_bytes + expected_bytes as u64)?;
-        Ok(Self { bytes: Vec::with_capacity(expected_bytes), reserved, columns_bytes })
+    fn new(mut reserved: Reserved, held_bytes: u64, expected_bytes: usize) -> Result<Self, NoRoom> {
+        reserved.hold_at_least(held_bytes + expected_bytes as u64)?;
+        Ok(Self { bytes: Vec::with_capacity(expected_bytes), reserved, held_bytes })
     }
 
     #[cold]
     fn grow(&mut self, bytes: usize) -> io::Result<()> {
-        let capacity = (2 * self.bytes.capacity()).max(self.bytes.len() + bytes);
-        self.reserved.hold_at_least(self.columns_bytes + capacity as u64).map_err(io::Error::other)?;
+        let before = self.bytes.capacity();
+        let capacity = (2 * before).max(self.bytes.len() + bytes);
+        // While the bytes are copied they are there twice.
+        self.reserved.hold_at_least(self.held_bytes + (before + capacity) as u64).map_err(io::Error::other)?;
         self.bytes.reserve_exact(capacity - self.bytes.len());
+        self.reserved.hold_at_most(self.held_bytes + capacity as u64);
         Ok(())
     }
 }
@@ -391,7 +393,65 @@ mod tests {
     use flate2::Compression;
     use flate2::write::GzEncoder;
 
-    use super::{LOOK_EVERY_BYTES, Stoppable};
+    use toothwave_calculation::design::Design;
+    use toothwave_calculation::drawing::Drawing;
+    use toothwave_calculation::drawing::answer::DrawnPart;
+    use toothwave_calculation::forms::Format;
+    use toothwave_calculation::geometry::Geometry;
+    use toothwave_calculation::question::{Limits, Question};
+    use toothwave_calculation::sweep::Sweep;
+
+    use super::{Growing, LOOK_EVERY_BYTES, Stoppable, solve};
+    use crate::negotiation::Representation;
+    use crate::problem::ProblemCode;
+    use crate::room::Room;
+
+    /// The bytes of an answer, where so much room is left.
+    fn solved<Q: Question>(question: &Q, format: Format, left_bytes: u64) -> Result<u64, ProblemCode> {
+        let document = include_str!("../../../examples/paper-5.1.json")
+            .replace("\"chord_tolerance_mm\": 0.001", "\"chord_tolerance_mm\": 1e-6")
+            .replace("\"samples\": 50", "\"tolerance\": 1e-9");
+        let limits = Limits { max_states: 1_000_000, max_profile_points: 1_000_000 };
+        let design = Design::read(document.as_bytes()).expect("a design");
+        let checked = question.check(&design, &limits).expect("a possible one");
+        let room = Room::new(1 << 30);
+        let _others = room.reserve((1 << 30) - left_bytes).expect("room");
+        let stored = solve::<Q>(&checked, Representation { format, gzip: false }, &room, &AtomicBool::new(false));
+        stored.map(|stored| stored.body.len() as u64).map_err(|problem| problem.code)
+    }
+
+    #[test]
+    fn an_answer_wants_room_for_itself_beside_its_text_where_the_question_did_not_tell_how_long_it_gets() {
+        let drawing = Drawing(DrawnPart::Assembly);
+        for (name, solved) in [
+            ("geometry", &(|left_bytes| solved(&Geometry, Format::Json, left_bytes)) as &dyn Fn(u64) -> _),
+            ("drawing", &|left_bytes| solved(&drawing, Format::Json, left_bytes)),
+            ("sweep to a tolerance", &|left_bytes| solved(&Sweep, Format::Json, left_bytes)),
+        ] {
+            let text_bytes = solved(1 << 30).unwrap_or_else(|code| panic!("{name}: {code:?}"));
+            assert_eq!(solved(text_bytes + text_bytes / 10), Err(ProblemCode::TooManyUnreadBytes), "{name}");
+        }
+    }
+
+    /// It has two texts for each pole of its curves, at the bottom and at the top, to know them again.
+    #[test]
+    fn a_drawing_as_step_wants_room_for_the_records_that_are_remembered() {
+        let drawing = Drawing(DrawnPart::Assembly);
+        let text_bytes = solved(&drawing, Format::Step, 1 << 30).expect("room");
+        assert_eq!(solved(&drawing, Format::Step, text_bytes), Err(ProblemCode::TooManyUnreadBytes));
+    }
+
+    #[test]
+    fn while_a_text_grows_it_wants_room_for_both_copies() {
+        let room = Room::new(1 << 30);
+        let mut growing = Growing::new(room.reserve(0).expect("room"), 0, 1 << 20).expect("room");
+        growing.write_all(&vec![0; 1 << 20]).expect("room");
+        let others = room.reserve((1 << 30) - (3 << 20) + 1).expect("room");
+        assert!(growing.write_all(&[0]).is_err());
+        drop(others);
+        growing.write_all(&[0]).expect("room");
+        assert_eq!(room.taken_bytes(), 2 << 20);
+    }
 
     /// Of a megabyte of zeros a kilobyte comes out of the encoder.
     #[test]
