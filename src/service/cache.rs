@@ -249,3 +249,55 @@ pub struct CacheSize {
     /// Entries.
     pub entries: u64,
 }
+
+#[cfg(test)]
+mod tests {
+    use std::future;
+    use std::time::Duration;
+
+    use axum::http::HeaderValue;
+    use bytes::Bytes;
+    use toothwave_calculation::key::Key;
+
+    use super::{Cache, Served, Stored};
+    use crate::negotiation::Representation;
+    use crate::problem::{Problem, ProblemCode};
+    use crate::room::Sent;
+
+    fn key(number: f64) -> Key {
+        Key::new("sweep", &number, &Representation::JSON)
+    }
+
+    fn stored() -> Stored {
+        Stored {
+            body: Bytes::from_static(b"{}"),
+            sent: Sent::default(),
+            held: Some(Bytes::from_static(b"{}")),
+            solve: Duration::ZERO,
+            server_timing: HeaderValue::from_static("solve;dur=0"),
+        }
+    }
+
+    #[tokio::test]
+    async fn a_solve_that_is_over_is_not_remembered_however_it_ended() {
+        let cache = Cache::new(1 << 20);
+        let solved = cache.solve_once(key(1.0), future::pending(), async { Ok(stored()) }).await;
+        assert!(solved.is_ok_and(|answer| answer.is_some_and(|(_, served)| served == Served::Miss)));
+        assert!(cache.flights.lock().is_empty());
+        let failed = cache.solve_once(key(2.0), future::pending(), async { Err(Problem::internal(&"a fault")) }).await;
+        assert_eq!(failed.err().map(|problem| problem.code), Some(ProblemCode::InternalError));
+        assert!(cache.flights.lock().is_empty());
+        let given_up = cache.solve_once(key(3.0), future::ready(()), future::pending()).await;
+        assert!(given_up.is_ok_and(|answer| answer.is_none()));
+        assert!(cache.flights.lock().is_empty());
+    }
+
+    /// Its room is of those who asked.
+    #[tokio::test]
+    async fn an_answer_that_is_kept_holds_no_room() {
+        let cache = Cache::new(1 << 20);
+        let solved = cache.solve_once(key(1.0), future::pending(), async { Ok(stored()) }).await;
+        assert!(solved.is_ok_and(|answer| answer.is_some_and(|(stored, _)| stored.held.is_some())));
+        assert!(cache.get(key(1.0)).is_some_and(|kept| kept.held.is_none()));
+    }
+}

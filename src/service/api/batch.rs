@@ -664,10 +664,12 @@ fn begin(app: &App, query: Result<Query<BatchQuery>, QueryRejection>, request: R
 
 #[cfg(test)]
 mod tests {
+    use std::io;
     use std::sync::atomic::AtomicBool;
     use std::time::Duration;
 
-    use axum::body::Body;
+    use axum::body::{Body, Bytes};
+    use futures_util::stream;
 
     use super::{Growing, Lines, Room, line};
     use crate::problem::ProblemCode;
@@ -697,5 +699,31 @@ mod tests {
         for line in read {
             assert!(line.try_into_mut().expect("its bytes are its own").capacity() <= 2);
         }
+    }
+    /// The lines of a body that arrives in these pieces, those of more than five bytes as what is wrong with them.
+    async fn read(pieces: &[&'static str]) -> Vec<Result<Bytes, ProblemCode>> {
+        let pieces: Vec<_> =
+            pieces.iter().map(|piece| Ok::<_, io::Error>(Bytes::from_static(piece.as_bytes()))).collect();
+        let mut lines = Lines::new(Body::from_stream(stream::iter(pieces)), 5, Duration::MAX);
+        let mut read = Vec::new();
+        while let Some(line) = lines.next().await {
+            read.push(line.map_err(|problem| problem.code));
+        }
+        read
+    }
+
+    #[tokio::test]
+    async fn a_line_as_long_as_may_be_is_read_and_one_a_byte_longer_is_not() {
+        let (whole, too_long) = (Ok(Bytes::from("12345")), Err(ProblemCode::BodyTooLarge));
+        let next = Ok(Bytes::from("[]"));
+        for pieces in [&["12345\n[]"][..], &["12345", "\n[]"], &["1", "2345", "\n", "[", "]"]] {
+            assert_eq!(read(pieces).await, [whole.clone(), next.clone()], "{pieces:?}");
+        }
+        for pieces in
+            [&["123456\n[]"][..], &["123456", "\n[]"], &["123", "456", "7\n[]"], &["123456", "7", "8\n", "[]"]]
+        {
+            assert_eq!(read(pieces).await, [too_long.clone(), next.clone()], "{pieces:?}");
+        }
+        assert_eq!((read(&["12345"]).await, read(&["123456"]).await), (vec![whole], vec![too_long]));
     }
 }
