@@ -259,7 +259,7 @@ mod tests {
     use bytes::Bytes;
     use toothwave_calculation::key::Key;
 
-    use super::{Cache, Served, Stored};
+    use super::{Cache, Served, Spelling, Stored};
     use crate::negotiation::Representation;
     use crate::problem::{Problem, ProblemCode};
     use crate::room::Sent;
@@ -290,6 +290,16 @@ mod tests {
         let given_up = cache.solve_once(key(3.0), future::ready(()), future::pending()).await;
         assert!(given_up.is_ok_and(|answer| answer.is_none()));
         assert!(cache.flights.lock().is_empty());
+    }
+
+    /// So that it is not read again.
+    #[test]
+    fn a_request_that_was_read_is_known_by_its_bytes() {
+        let cache = Cache::new(1 << 20);
+        let spelling = |body: &[u8]| Spelling::new("sweep", Representation::JSON, body);
+        assert!(cache.key(spelling(b"{}")).is_none());
+        cache.remember(spelling(b"{}"), key(1.0));
+        assert!(cache.key(spelling(b"{}")) == Some(key(1.0)) && cache.key(spelling(b"{ }")).is_none());
     }
 
     /// Its room is of those who asked.

@@ -330,7 +330,6 @@ impl Answers {
         other.end_part();
         self.end_part();
         self.parts.append(&mut other.parts);
-        self.bytes += other.bytes;
         self.lines += other.lines;
     }
 

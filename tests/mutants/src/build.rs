@@ -44,6 +44,8 @@ pub struct Crate {
     /// Whether tests wait for others: such a one fails by chance now and then, and may wait for what never comes. They have no properties,
     /// of which some cases might be asked first.
     pub waits: bool,
+    /// What a test may take: some mutants fill a vector for ever. Of what the service asks for much is never used.
+    pub most_memory_kib: u64,
 }
 
 const CRATES: [Crate; 2] = [
@@ -54,6 +56,7 @@ const CRATES: [Crate; 2] = [
         units: &["--package", "toothwave-solver", "--lib"],
         is_optimised: true,
         waits: false,
+        most_memory_kib: 3 << 20,
     },
     Crate {
         package: "toothwave",
@@ -62,6 +65,7 @@ const CRATES: [Crate; 2] = [
         units: &["--workspace", "--lib"],
         is_optimised: false,
         waits: true,
+        most_memory_kib: 32 << 20,
     },
 ];
 

@@ -31,9 +31,6 @@ const FIRST_CASES: &str = "16";
 const LONGER: f64 = 1.3;
 /// What the tests of a file have noticed counts as this many mutants of a function.
 const FILE_WEIGHT: f64 = 2.0;
-/// Some mutants fill a vector for ever.
-const MOST_MEMORY_KIB: u64 = 3 << 20;
-
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -233,7 +230,8 @@ impl<'p> Tests<'p> {
         let clock =
             if self.tree.of.waits { format!("timeout -s KILL {} ", seconds + LEAST_WAIT_S) } else { String::new() };
         let limits = format!(
-            "ulimit -t {seconds} -v {MOST_MEMORY_KIB} -c 0; exec {clock}\"$0\" --exact \"$1\" --test-threads 1"
+            "ulimit -t {seconds} -v {} -c 0; exec {clock}\"$0\" --exact \"$1\" --test-threads 1",
+            self.tree.of.most_memory_kib
         );
         Command::new("bash")
             .args(["-c", &limits])
