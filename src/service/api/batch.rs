@@ -664,14 +664,19 @@ fn begin(app: &App, query: Result<Query<BatchQuery>, QueryRejection>, request: R
 #[cfg(test)]
 mod tests {
     use std::io;
+    use std::sync::Arc;
     use std::sync::atomic::AtomicBool;
     use std::time::Duration;
 
     use axum::body::{Body, Bytes};
     use futures_util::stream;
+    use parking_lot::Mutex;
+    use serde_json::{Value, json};
+    use tokio::sync::Semaphore;
 
-    use super::{Growing, Lines, Room, line};
-    use crate::problem::ProblemCode;
+    use super::{Batch, BatchEndpoint, BatchQuery, Growing, Line, Lines, Pool, Room, SLICE_BYTES, Slice, line, work};
+    use crate::config::Limits;
+    use crate::problem::{Problem, ProblemCode};
 
     /// Two megabytes of an answer that was computed in time.
     #[test]
@@ -724,5 +729,63 @@ mod tests {
             assert_eq!(read(pieces).await, [too_long.clone(), next.clone()], "{pieces:?}");
         }
         assert_eq!((read(&["12345"]).await, read(&["123456"]).await), (vec![whole], vec![too_long]));
+    }
+
+    const LIMITS: Limits = Limits {
+        max_states: 1_000_000,
+        max_profile_points: 0,
+        max_body_bytes: 0,
+        max_concurrent_solves: 1,
+        max_queued_solves: 0,
+        max_concurrent_batches: 1,
+        deadline_ms: 0,
+        cache_max_bytes: 0,
+        max_unread_bytes: 0,
+        max_study_variants: 0,
+        max_study_bytes: 0,
+        max_concurrent_studies: 0,
+        study_deadline_ms: 0,
+        max_connections: 0,
+        max_header_bytes: 0,
+        header_timeout_ms: 0,
+    };
+
+    /// How many of three such lines one slice answers.
+    fn answered_in_a_slice(document: &Result<Bytes, Problem>) -> u64 {
+        let query = BatchQuery { endpoint: BatchEndpoint::Sweep, peaks_only: true };
+        let batch = Batch { pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
+        let ahead = Arc::new(Semaphore::new(3));
+        let waiting = (0..3).map(|index| Line {
+            index,
+            document: document.clone(),
+            _ahead: Arc::clone(&ahead).try_acquire_owned().expect("a permit"),
+        });
+        let slice = Mutex::new(Slice { waiting: waiting.collect(), ..Slice::default() });
+        work(&slice, &batch, &AtomicBool::new(false));
+        let slice = slice.into_inner();
+        assert_eq!(slice.answers.lines + slice.waiting.len() as u64, 3);
+        slice.answers.lines
+    }
+
+    /// Single requests wait for it.
+    #[test]
+    fn a_slice_that_has_had_its_time_begins_no_further_line() {
+        let mut document: Value =
+            serde_json::from_str(include_str!("../../../examples/paper-5.1.json")).expect("a document");
+        // 714 thousand states.
+        document["sweep"] = json!({ "samples": 100_000 });
+        assert_eq!(answered_in_a_slice(&Ok(document.to_string().into())), 1);
+    }
+
+    #[test]
+    fn a_slice_that_has_its_bytes_begins_no_further_line() {
+        let long = Problem::new(ProblemCode::BodyTooLarge, "x".repeat(SLICE_BYTES));
+        assert_eq!(answered_in_a_slice(&Err(long)), 1);
+    }
+
+    /// Unless it is held up for milliseconds, which it is not each time.
+    #[test]
+    fn a_slice_answers_short_lines_together() {
+        assert!((0..100).any(|_| answered_in_a_slice(&Ok(Bytes::from("{"))) == 3));
     }
 }
