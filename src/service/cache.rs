@@ -261,16 +261,65 @@ pub struct CacheSize {
 
 #[cfg(test)]
 mod tests {
+    use std::future;
     use std::sync::Arc;
     use std::time::Duration;
 
     use axum::http::HeaderValue;
     use bytes::Bytes;
-    use toothwave_calculation::forms::Format;
     use toothwave_calculation::key::Key;
 
-    use super::{Cache, Stored, keep};
+    use super::{Cache, Served, Spelling, Stored, keep};
+    use crate::negotiation::Representation;
+    use crate::problem::{Problem, ProblemCode};
     use crate::room::Sent;
+
+    fn key(number: f64) -> Key {
+        Key::new("sweep", &number, &Representation::JSON)
+    }
+
+    fn stored() -> Stored {
+        Stored {
+            body: Bytes::from_static(b"{}"),
+            sent: Sent::default(),
+            held: Some(Bytes::from_static(b"{}")),
+            solve: Duration::ZERO,
+            server_timing: HeaderValue::from_static("solve;dur=0"),
+        }
+    }
+
+    #[tokio::test]
+    async fn a_solve_that_is_over_is_not_remembered_however_it_ended() {
+        let cache = Cache::new(1 << 20);
+        let solved = cache.solve_once(key(1.0), future::pending(), async { Ok(stored()) }).await;
+        assert!(solved.is_ok_and(|answer| answer.is_some_and(|(_, served)| served == Served::Miss)));
+        assert!(cache.flights.lock().is_empty());
+        let failed = cache.solve_once(key(2.0), future::pending(), async { Err(Problem::internal(&"a fault")) }).await;
+        assert_eq!(failed.err().map(|problem| problem.code), Some(ProblemCode::InternalError));
+        assert!(cache.flights.lock().is_empty());
+        let given_up = cache.solve_once(key(3.0), future::ready(()), future::pending()).await;
+        assert!(given_up.is_ok_and(|answer| answer.is_none()));
+        assert!(cache.flights.lock().is_empty());
+    }
+
+    /// So that it is not read again.
+    #[test]
+    fn a_request_that_was_read_is_known_by_its_bytes() {
+        let cache = Cache::new(1 << 20);
+        let spelling = |body: &[u8]| Spelling::new("sweep", Representation::JSON, body);
+        assert!(cache.key(spelling(b"{}")).is_none());
+        cache.remember(spelling(b"{}"), key(1.0));
+        assert!(cache.key(spelling(b"{}")) == Some(key(1.0)) && cache.key(spelling(b"{ }")).is_none());
+    }
+
+    /// Its room is of those who asked.
+    #[tokio::test]
+    async fn an_answer_that_is_kept_holds_no_room() {
+        let cache = Cache::new(1 << 20);
+        let solved = cache.solve_once(key(1.0), future::pending(), async { Ok(stored()) }).await;
+        assert!(solved.is_ok_and(|answer| answer.is_some_and(|(stored, _)| stored.held.is_some())));
+        assert!(cache.get(key(1.0)).is_some_and(|kept| kept.held.is_none()));
+    }
 
     /// Bytes that are told when they are let go.
     struct Counted(Vec<u8>, #[expect(dead_code, reason = "it is counted")] Arc<()>);
@@ -290,7 +339,7 @@ mod tests {
             let body = Bytes::from_owner(Counted(vec![0; BODY_BYTES], Arc::clone(&kept)));
             let server_timing = HeaderValue::from_static("");
             let stored = Stored { body, sent: Sent::default(), held: None, solve: Duration::ZERO, server_timing };
-            keep(&cache.answers, Key::new("sweep", &f64::from(number), &(Format::Json, false)), &stored);
+            keep(&cache.answers, key(f64::from(number)), &stored);
             drop(stored);
             let bodies = Arc::strong_count(&kept) - 1;
             assert!(bodies * BODY_BYTES <= 3 * BODY_BYTES, "{bodies} bodies after {number}");

@@ -321,6 +321,14 @@ async fn a_batch_of_blank_lines_without_end_is_ended() {
     is_ended_that_drips(&[b'\n'; 10_000]).await;
 }
 
+/// Something of a line each time, and less than 32 bytes a second of it.
+#[tokio::test(start_paused = true)]
+async fn a_batch_whose_line_never_comes_to_its_end_is_ended() {
+    for drip in [&b"{"[..], &[b'{'; 600]] {
+        is_ended_that_drips(drip).await;
+    }
+}
+
 /// Slower than a machine, faster than nothing: a document each few seconds.
 #[tokio::test(start_paused = true)]
 async fn a_batch_that_is_sent_bit_by_bit_is_answered() {
@@ -347,4 +355,15 @@ async fn a_line_without_room_is_refused_in_its_place_and_the_others_are_answered
     assert!(codes[0].is_none() && codes[3].is_none(), "{codes:?}");
     assert!(codes[1..3].contains(&Some("too_many_unread_bytes")), "{codes:?}");
     assert_eq!(service.app.room.taken_bytes(), 0);
+}
+
+#[tokio::test]
+async fn a_batch_takes_8_mib_and_one_more_for_each_permit_while_it_lasts() {
+    for max_concurrent_solves in [1, 3] {
+        let service = Service::within(Limits { max_concurrent_solves, ..LIMITS });
+        let response = service.response(question("", variant(0).to_string()).request()).await;
+        assert_eq!(service.app.room.taken_bytes(), (8 + max_concurrent_solves as u64) << 20);
+        drop(response);
+        assert_eq!(service.app.room.taken_bytes(), 0);
+    }
 }

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use serde::Deserialize;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::gaps::{Deviations, Modification};
-use toothwave_solver::load_sharing::LoadedDrive;
+use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
 use toothwave_solver::losses::period::Losses;
 use toothwave_solver::losses::{Friction, FrictionParameters, WaveGeneratorFriction};
 use toothwave_solver::model_error;
@@ -339,6 +339,56 @@ fn a_narrower_contact_gives_way_by_the_logarithm_of_its_width() {
                 / tooth.spring.approach.approach_mm(cam_force_n * 0.999_99);
             assert!((slope.ln() / 2e-5 - back_n.exponent).abs() < 1e-6, "{back_n:?}");
         }
+    }
+}
+
+/// Pressed at right angles to one face an apex gives way by `π (sin²w/(w + sin w cos w) + cos²w/(w - sin w cos w))` of a logarithm, w half of the wedge's angle, where a
+/// wall has 2 (J. H. Michell, 1900). The angle is measured between the flank's tangent and the tooth's symmetry line, or the land.
+#[test]
+fn where_teeth_bend_a_corner_gives_way_as_the_apex_of_a_wedge() {
+    let compliance_mm_per_n = (1.0 - 0.3 * 0.3) / 210e3 / (std::f64::consts::PI * 15.0);
+    for parameters in [PAPER_5_2, PAPER_5_2_BORED] {
+        let drive = drive(&parameters);
+        let (flank, end) = (drive.flank(), drive.flank_limit().position);
+        let center = flank.locus().at(end).unwrap();
+        let at_end = flank.at(&center);
+        let (into_tooth, corner) =
+            (-flank.tangent(&center, &at_end).into_inner(), flank.point(&center, &at_end).coords);
+        let half_rad = if parameters.tip_radius_mm.is_some() {
+            0.5 * into_tooth.angle(&Vector2::new(-corner.y, corner.x))
+        } else {
+            let (sin, cos) = (std::f64::consts::PI / parameters.ring_teeth as f64).sin_cos();
+            into_tooth.angle(&Vector2::new(cos, sin))
+        };
+        let (sin, cos) = half_rad.sin_cos();
+        let of_wedge = sin * sin / (half_rad + sin * cos) + cos * cos / (half_rad - sin * cos);
+        let expected_mm_per_n = compliance_mm_per_n * (std::f64::consts::PI * of_wedge - 2.0);
+
+        let at_corner = Position::from_lobe(end.from_lobe_rad + 0.05, 2);
+        let tooth = |ring_teeth_bend| {
+            let load = LoadCase::new(&LoadParameters { ring_teeth_bend, ..pressed_corners(3.0) }).unwrap();
+            LoadedDrive::new(&drive, &load).unwrap().tooth(at_corner).unwrap()
+        };
+        let (bending, rigid) = (tooth(true), tooth(false));
+        let ratio = rigid.force_ratio.ring;
+        let to_corner = seen(&drive, at_corner.from_lobe_deg(), 0.0).to_ring;
+        let angle_rad = at_end.tan_pressure_angle.atan() - (-to_corner.y / to_corner.x).atan() - 0.05 / 39.0;
+        // Beside what bends in proportion to the force there is the logarithm of the contact's width.
+        let per_n = |cam_force_n: f64| {
+            let approach_mm = |tooth: &ToothState| tooth.spring.approach.approach_mm(cam_force_n);
+            (approach_mm(&bending) - approach_mm(&rigid)) / (cam_force_n * ratio * ratio)
+        };
+        let ln_width = |cam_force_n: f64| {
+            let square = 2.0 * rigid.curvature_per_mm.ring * compliance_mm_per_n * ratio * cam_force_n;
+            let z = angle_rad / std::f64::consts::PI / square.sqrt();
+            (2.0 * (z + (1.0 + z * z).sqrt()) - 1.0).ln()
+        };
+        let found_mm_per_n = (per_n(400.0) - per_n(4.0)) / (ln_width(400.0) - ln_width(4.0));
+        assert!(
+            (found_mm_per_n / expected_mm_per_n - 1.0).abs() < 1e-9,
+            "{found_mm_per_n} mm/N, of a wedge of {} deg {expected_mm_per_n} mm/N",
+            2.0 * half_rad.to_degrees()
+        );
     }
 }
 

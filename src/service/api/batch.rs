@@ -332,7 +332,6 @@ impl Answers {
         other.end_part();
         self.end_part();
         self.parts.append(&mut other.parts);
-        self.bytes += other.bytes;
         self.lines += other.lines;
     }
 
@@ -666,13 +665,20 @@ fn begin(app: &App, query: Result<Query<BatchQuery>, QueryRejection>, request: R
 
 #[cfg(test)]
 mod tests {
+    use std::io;
+    use std::sync::Arc;
     use std::sync::atomic::AtomicBool;
     use std::time::Duration;
 
-    use axum::body::Body;
+    use axum::body::{Body, Bytes};
+    use futures_util::stream;
+    use parking_lot::Mutex;
+    use serde_json::{Value, json};
+    use tokio::sync::Semaphore;
 
-    use super::{Growing, Lines, Room, line};
-    use crate::problem::ProblemCode;
+    use super::{Batch, BatchEndpoint, BatchQuery, Growing, Line, Lines, Pool, Room, SLICE_BYTES, Slice, line, work};
+    use crate::config::Limits;
+    use crate::problem::{Problem, ProblemCode};
 
     /// Two megabytes of an answer that was computed in time.
     #[test]
@@ -699,5 +705,89 @@ mod tests {
         for line in read {
             assert!(line.try_into_mut().expect("its bytes are its own").capacity() <= 2);
         }
+    }
+    /// The lines of a body that arrives in these pieces, those of more than five bytes as what is wrong with them.
+    async fn read(pieces: &[&'static str]) -> Vec<Result<Bytes, ProblemCode>> {
+        let pieces: Vec<_> =
+            pieces.iter().map(|piece| Ok::<_, io::Error>(Bytes::from_static(piece.as_bytes()))).collect();
+        let mut lines = Lines::new(Body::from_stream(stream::iter(pieces)), 5, Duration::MAX);
+        let mut read = Vec::new();
+        while let Some(line) = lines.next().await {
+            read.push(line.map_err(|problem| problem.code));
+        }
+        read
+    }
+
+    #[tokio::test]
+    async fn a_line_as_long_as_may_be_is_read_and_one_a_byte_longer_is_not() {
+        let (whole, too_long) = (Ok(Bytes::from("12345")), Err(ProblemCode::BodyTooLarge));
+        let next = Ok(Bytes::from("[]"));
+        for pieces in [&["12345\n[]"][..], &["12345", "\n[]"], &["1", "2345", "\n", "[", "]"]] {
+            assert_eq!(read(pieces).await, [whole.clone(), next.clone()], "{pieces:?}");
+        }
+        for pieces in
+            [&["123456\n[]"][..], &["123456", "\n[]"], &["123", "456", "7\n[]"], &["123456", "7", "8\n", "[]"]]
+        {
+            assert_eq!(read(pieces).await, [too_long.clone(), next.clone()], "{pieces:?}");
+        }
+        assert_eq!((read(&["12345"]).await, read(&["123456"]).await), (vec![whole], vec![too_long]));
+    }
+
+    const LIMITS: Limits = Limits {
+        max_states: 1_000_000,
+        max_profile_points: 0,
+        max_body_bytes: 0,
+        max_concurrent_solves: 1,
+        max_queued_solves: 0,
+        max_concurrent_batches: 1,
+        deadline_ms: 0,
+        cache_max_bytes: 0,
+        max_unread_bytes: 0,
+        max_study_variants: 0,
+        max_study_bytes: 0,
+        max_concurrent_studies: 0,
+        study_deadline_ms: 0,
+        max_connections: 0,
+        max_header_bytes: 0,
+        header_timeout_ms: 0,
+    };
+
+    /// How many of three such lines one slice answers.
+    fn answered_in_a_slice(document: &Result<Bytes, Problem>) -> u64 {
+        let query = BatchQuery { endpoint: BatchEndpoint::Sweep, peaks_only: true };
+        let batch = Batch { pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
+        let ahead = Arc::new(Semaphore::new(3));
+        let waiting = (0..3).map(|index| Line {
+            index,
+            document: document.clone(),
+            _ahead: Arc::clone(&ahead).try_acquire_owned().expect("a permit"),
+        });
+        let slice = Mutex::new(Slice { waiting: waiting.collect(), ..Slice::default() });
+        work(&slice, &batch, &AtomicBool::new(false));
+        let slice = slice.into_inner();
+        assert_eq!(slice.answers.lines + slice.waiting.len() as u64, 3);
+        slice.answers.lines
+    }
+
+    /// Single requests wait for it.
+    #[test]
+    fn a_slice_that_has_had_its_time_begins_no_further_line() {
+        let mut document: Value =
+            serde_json::from_str(include_str!("../../../examples/paper-5.1.json")).expect("a document");
+        // 714 thousand states.
+        document["sweep"] = json!({ "samples": 100_000 });
+        assert_eq!(answered_in_a_slice(&Ok(document.to_string().into())), 1);
+    }
+
+    #[test]
+    fn a_slice_that_has_its_bytes_begins_no_further_line() {
+        let long = Problem::new(ProblemCode::BodyTooLarge, "x".repeat(SLICE_BYTES));
+        assert_eq!(answered_in_a_slice(&Err(long)), 1);
+    }
+
+    /// Unless it is held up for milliseconds, which it is not each time.
+    #[test]
+    fn a_slice_answers_short_lines_together() {
+        assert!((0..100).any(|_| answered_in_a_slice(&Ok(Bytes::from("{"))) == 3));
     }
 }

@@ -18,6 +18,7 @@ const ALLOWED: &str = "#![allow(arithmetic_overflow, overflowing_literals, uncon
 
 /// What is compiled, and where.
 pub struct Tree {
+    pub of: &'static Crate,
     /// Where the sources come from.
     pub root: PathBuf,
     /// A copy of it, whose sources get the mutants.
@@ -26,35 +27,83 @@ pub struct Tree {
     pub target: PathBuf,
 }
 
+/// A crate whose mutants are tried, with its tests.
+#[derive(Debug)]
+pub struct Crate {
+    package: &'static str,
+    /// Where it stands, from the root.
+    pub directory: &'static str,
+    /// How its tests that stand apart are compiled: of the workspace where that can be, as libraries have other features for a crate alone,
+    /// and would be compiled anew.
+    apart: &'static [&'static str],
+    /// How those beside the code are: not of the workspace where all crates would be compiled anew for them.
+    units: &'static [&'static str],
+    /// Whether it is optimised even where the rest is not. With a whole batch functions are some times as long as they were written, and
+    /// the optimiser would take longer than it saves.
+    pub is_optimised: bool,
+    /// Whether tests wait for others: such a one fails by chance now and then, and may wait for what never comes. They have no properties,
+    /// of which some cases might be asked first.
+    pub waits: bool,
+    /// What a test may take: some mutants fill a vector for ever. Of what the service asks for much is never used.
+    pub most_memory_kib: u64,
+}
+
+const CRATES: [Crate; 2] = [
+    Crate {
+        package: "toothwave-solver",
+        directory: "src/solver",
+        apart: &["--workspace", "--test", "solver"],
+        units: &["--package", "toothwave-solver", "--lib"],
+        is_optimised: true,
+        waits: false,
+        most_memory_kib: 3 << 20,
+    },
+    Crate {
+        package: "toothwave",
+        directory: "src/service",
+        apart: &["--workspace", "--test", "api"],
+        units: &["--workspace", "--lib"],
+        is_optimised: false,
+        waits: true,
+        most_memory_kib: 32 << 20,
+    },
+];
+
+impl Crate {
+    /// The one that a file belongs to.
+    pub fn of(file: &str) -> Option<&'static Self> {
+        CRATES.iter().find(|of| Path::new(file).starts_with(of.directory))
+    }
+
+    fn targets(&self, stage: Stage) -> &[&str] {
+        if stage == Stage::Units { self.units } else { self.apart }
+    }
+
+    /// All else is compiled as ever, so that it need not be compiled anew.
+    fn settings(&self, stage: Stage) -> impl Iterator<Item = String> {
+        let level = (self.is_optimised && stage != Stage::All).then_some("opt-level=1");
+        let settings = ["debug=false", "codegen-units=16"].into_iter().chain(level);
+        settings.map(|setting| format!("--config=profile.dev.package.{}.{setting}", self.package))
+    }
+}
+
 /// Which tests are asked, and of how many mutants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// The quick ones of `tests/solver`, of a whole batch.
+    /// The quick ones of those that stand apart, of a whole batch.
     Quick,
     /// All of these, of what the quick ones left open.
     All,
     /// Those beside what they are about.
     Units,
+    /// All of those that stand apart and no others, in a program that is quickly made.
+    Brief,
 }
 
 impl Stage {
-    /// Of the workspace where that can be: its libraries have other features for the solver alone, and would be compiled anew.
-    fn targets(self) -> [&'static str; 3] {
-        match self {
-            Self::Quick | Self::All => ["--workspace", "--test", "solver"],
-            Self::Units => ["--package", "toothwave-solver", "--lib"],
-        }
-    }
-
-    /// With a whole batch functions are some times as long as they were written, and the optimiser would take longer than it saves. All else is compiled
-    /// as ever, so that it need not be compiled anew.
-    fn settings(self) -> &'static [&'static str] {
-        const SETTINGS: [&str; 3] = [
-            "--config=profile.dev.package.toothwave-solver.debug=false",
-            "--config=profile.dev.package.toothwave-solver.codegen-units=16",
-            "--config=profile.dev.package.toothwave-solver.opt-level=1",
-        ];
-        if self == Self::All { &SETTINGS[..2] } else { &SETTINGS }
+    /// Whether what no test has noticed after it is missed.
+    pub fn is_last(self) -> bool {
+        matches!(self, Self::All | Self::Brief)
     }
 }
 
@@ -68,7 +117,7 @@ pub struct Program {
 impl Tree {
     /// Builds those of a batch, and leaves mutants out until the rest compiles.
     pub fn build(&self, mutants: &[Mutant], batch: &[usize], stage: Stage) -> io::Result<Program> {
-        let library = "src/solver/lib.rs";
+        let library = format!("{}/lib.rs", self.of.directory);
         // All sources, as those without mutants are compiled too.
         let sources = self.sources()?;
         let mut of_file: BTreeMap<&str, Vec<(usize, &Mutant)>> =
@@ -94,13 +143,10 @@ impl Tree {
                 write_if_changed(&self.copy.join(file), &(allowed.to_owned() + &schemata.text + chosen))?;
                 files.insert(file, schemata);
             }
-            let errors = self.cargo("check", stage, &[])?.0;
+            let (errors, tests) = self.compile(stage)?;
             if errors.is_empty() {
                 let sites = files.into_values().flat_map(|file| file.sites).collect();
-                let tests = self
-                    .cargo("test", stage, &["--no-run"])?
-                    .1
-                    .ok_or_else(|| io::Error::other("the tests do not compile"))?;
+                let tests = tests.ok_or_else(|| io::Error::other("the tests do not compile"))?;
                 return Ok(Program { tests, sites, left });
             }
             let (mut lines, mut sites, mut names) = (BTreeSet::new(), BTreeSet::new(), 0);
@@ -149,9 +195,9 @@ impl Tree {
         Err(io::Error::other("the mutants still do not compile"))
     }
 
-    /// The solver's files, from the root.
+    /// The crate's files, from the root.
     fn sources(&self) -> io::Result<Vec<String>> {
-        let mut directories = vec!["src/solver".to_owned()];
+        let mut directories = vec![self.of.directory.to_owned()];
         let mut sources = Vec::new();
         while let Some(directory) = directories.pop() {
             fs::create_dir_all(self.copy.join(&directory))?;
@@ -169,12 +215,11 @@ impl Tree {
     }
 
     /// The errors, and the test program where one was made.
-    fn cargo(&self, command: &str, stage: Stage, options: &[&str]) -> io::Result<(Vec<Value>, Option<PathBuf>)> {
+    fn compile(&self, stage: Stage) -> io::Result<(Vec<Value>, Option<PathBuf>)> {
         let output = Command::new("cargo")
-            .args([command, "--message-format", "json"])
-            .args(stage.targets())
-            .args(stage.settings())
-            .args(options)
+            .args(["test", "--no-run", "--locked", "--message-format", "json"])
+            .args(self.of.targets(stage))
+            .args(self.of.settings(stage))
             .current_dir(&self.copy)
             .env("CARGO_TARGET_DIR", &self.target)
             .stderr(Stdio::inherit())
@@ -187,9 +232,10 @@ impl Tree {
                 && message["message"]["spans"].as_array().is_some_and(|spans| !spans.is_empty())
             {
                 errors.push(message["message"].take());
-            } else if message["manifest_path"]
-                .as_str()
-                .is_some_and(|path| Path::new(path).starts_with(self.copy.join("src/solver")))
+            } else if message["profile"]["test"] == true
+                && message["manifest_path"]
+                    .as_str()
+                    .is_some_and(|path| Path::new(path).starts_with(self.copy.join(self.of.directory)))
             {
                 program = message["executable"].as_str().map(PathBuf::from).or(program);
             }
@@ -206,7 +252,8 @@ fn wanted_constant(error: &Value) -> Option<String> {
     if error["code"]["code"] != "E0015" {
         return None;
     }
-    let path = error["message"].as_str()?.split('`').nth(1)?;
+    // Without the types that it is called for.
+    let path = error["message"].as_str()?.split('`').nth(1)?.split("::<").next()?;
     Some(path.rsplit("::").next()?.to_owned())
 }
 

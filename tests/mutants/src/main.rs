@@ -1,10 +1,11 @@
 //! Tries the mutants that cargo-mutants lists, a batch of them by chance built into one test program.
 //!
-//!     schemata LIST ROOT COPY TARGET RESULTS [--seconds N] [--again] [--known REPORT] [--report REPORT]
+//!     schemata LIST ROOT COPY TARGET RESULTS [--seconds N] [--again] [--brief N] [--known REPORT] [--report REPORT]
 //!
-//! LIST is what `cargo mutants --list --json` writes, ROOT the tree, COPY one to change, TARGET where it is compiled, RESULTS a file that keeps what was found: a run
+//! LIST is what `cargo mutants --list --json` writes of one crate, ROOT the tree, COPY one to change, TARGET where it is compiled, RESULTS a file that keeps what was found: a run
 //! that was broken off goes on from there, and mutants of files that have changed are tried anew; with --again also those that no test
-//! noticed. N seconds after the first was tried no further mutant is. It fails where surely fewer are noticed than a known report says.
+//! noticed. N seconds after the first was tried no further mutant is. With --brief N of them are tried, drawn by chance, and what tests beside the
+//! code alone may notice stays open. It fails where surely fewer are noticed than a known report says.
 
 mod build;
 mod mutant;
@@ -25,7 +26,7 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use crate::build::{Stage, Tree};
+use crate::build::{Crate, Stage, Tree};
 use crate::mutant::Mutant;
 use crate::report::Report;
 use crate::schemata::Left;
@@ -52,7 +53,7 @@ fn main() -> io::Result<ExitCode> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [list, root, copy, target, results, options @ ..] = arguments.as_slice() else {
         eprintln!(
-            "usage: schemata LIST ROOT COPY TARGET RESULTS [--seconds N] [--again] [--known REPORT] [--report REPORT]"
+            "usage: schemata LIST ROOT COPY TARGET RESULTS [--seconds N] [--again] [--brief N] [--known REPORT] [--report REPORT]"
         );
         return Ok(ExitCode::from(2));
     };
@@ -92,8 +93,9 @@ fn main() -> io::Result<ExitCode> {
         file.write_all((serde_json::to_string(&outcome)? + "\n").as_bytes())
     };
 
-    let tree = Tree { root, copy: fs::canonicalize(copy)?, target: fs::canonicalize(target)? };
-    let directory = tree.copy.join("src/solver");
+    let of = mutants.first().and_then(|mutant| Crate::of(&mutant.file));
+    let of = of.ok_or_else(|| io::Error::other(format!("{list} has no mutant of a crate that is known here")))?;
+    let tree = Tree { of, root, copy: fs::canonicalize(copy)?, target: fs::canonicalize(target)? };
     let again = options.iter().any(|option| option == "--again");
     let is_open = |verdict: Option<Verdict>| {
         verdict.is_none_or(|verdict| verdict == Verdict::Open || again && verdict.is_silent())
@@ -111,13 +113,16 @@ fn main() -> io::Result<ExitCode> {
             keep(verdicts, number, verdict, None)?;
         }
         let reached = fs::canonicalize(&results)?.with_extension(format!("{stage:?}"));
-        let tests = Tests::learn(&program, &directory, &reached, threads)?;
+        let tests = Tests::learn(&program, &tree, stage, &reached, threads)?;
         let built: Vec<usize> = these.iter().copied().filter(|number| !program.left.contains_key(number)).collect();
         started.get_or_init(Instant::now);
         let (next, found) = (AtomicUsize::new(0), Mutex::new((verdicts, &mut keep)));
         at_once(threads, || {
             while let Some(&number) = built.get(next.fetch_add(1, Relaxed)).filter(|_| !is_over()) {
-                let (verdict, by) = tests.verdict(number, &mutants[number], stage)?;
+                let (mut verdict, by) = tests.verdict(number, &mutants[number], stage)?;
+                if stage == Stage::Brief && verdict.is_silent() && with_units.contains(&mutants[number].file) {
+                    verdict = Verdict::Open;
+                }
                 let (verdicts, keep) = &mut *found.lock().map_err(|_| io::Error::other("a thread panicked"))?;
                 keep(verdicts, number, verdict, by)?;
             }
@@ -127,12 +132,20 @@ fn main() -> io::Result<ExitCode> {
     // In an order by chance, but the same each time: what is done when the time is over is a fair sample.
     let mut order: Vec<usize> = (0..mutants.len()).collect();
     order.sort_by_key(|&number| hash(mutants[number].name.as_bytes()));
+    let brief: Option<usize> = option("--brief").map(|most| most.parse().map_err(io::Error::other)).transpose()?;
+    if let Some(most) = brief {
+        order.truncate(most);
+    }
     for batch in order.chunks(BATCH) {
         let those = |which: &dyn Fn(usize) -> bool| -> Vec<usize> {
             batch.iter().copied().filter(|&number| which(number)).collect()
         };
         let fresh = those(&|number| verdicts[number].is_none());
-        if fresh.len() > FEW {
+        if brief.is_some() {
+            ask(&mut verdicts, &fresh, Stage::Brief)?;
+            continue;
+        }
+        if fresh.len() > FEW && of.is_optimised {
             ask(&mut verdicts, &fresh, Stage::Quick)?;
         }
         // What only tests beside it may notice.

@@ -11,16 +11,18 @@ use std::{fs, io};
 
 use serde::{Deserialize, Serialize};
 
-use crate::build::{Program, Stage};
+use crate::build::{Program, Stage, Tree};
 use crate::mutant::Mutant;
 
-/// The signal that ends a process which has had its time.
-const SIGXCPU: i32 = 24;
+/// The signals that end a process which has had its time, of the processor or by the clock.
+const TIME_IS_OVER: [i32; 2] = [24, 9];
 /// No test takes longer, not even while it is recorded where it comes by.
 const MOST_SECONDS: f64 = 300.0;
 /// A test that takes this many times as long as without a mutant, and some seconds, never ends.
 const PATIENCE: f64 = 5.0;
 const LEAST_PATIENCE_S: f64 = 2.0;
+/// And one that waits, some more by the clock.
+const LEAST_WAIT_S: f64 = 20.0;
 /// Runs that take longer than this are asked last, of what the quick ones left open.
 const QUICK_S: f64 = 0.8;
 /// Properties are asked about the first of their cases before all of them: few notice what these do not.
@@ -29,9 +31,6 @@ const FIRST_CASES: &str = "16";
 const LONGER: f64 = 1.3;
 /// What the tests of a file have noticed counts as this many mutants of a function.
 const FILE_WEIGHT: f64 = 2.0;
-/// Some mutants fill a vector for ever.
-const MOST_MEMORY_KIB: u64 = 3 << 20;
-
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -69,7 +68,7 @@ type Record = HashMap<String, (f64, f64)>;
 /// The tests of a program, and which of them come by which mutant.
 pub struct Tests<'p> {
     program: &'p Program,
-    directory: &'p Path,
+    tree: &'p Tree,
     runs: Vec<Run>,
     /// By file and by function.
     records: Mutex<Vec<Record>>,
@@ -86,14 +85,13 @@ struct Reach {
 impl<'p> Tests<'p> {
     /// Runs each test by itself to see how long it takes and where it comes by. All pass where no mutant is chosen. What a program's tests
     /// reach is kept in a file.
-    pub fn learn(program: &'p Program, directory: &'p Path, kept: &Path, threads: usize) -> io::Result<Self> {
+    pub fn learn(program: &'p Program, tree: &'p Tree, stage: Stage, kept: &Path, threads: usize) -> io::Result<Self> {
         let hash = crate::hash(&fs::read(&program.tests)?);
         let known = fs::read_to_string(kept).ok().and_then(|text| serde_json::from_str::<Reach>(&text).ok());
-        let mut tests =
-            Self { program, directory, runs: Vec::new(), records: Mutex::default(), reaching: BTreeMap::new() };
+        let mut tests = Self { program, tree, runs: Vec::new(), records: Mutex::default(), reaching: BTreeMap::new() };
         let reach = match known.filter(|reach| reach.of_program == hash) {
             Some(reach) => reach,
-            None => Reach { of_program: hash, runs: tests.all_runs(kept, threads)? },
+            None => Reach { of_program: hash, runs: tests.all_runs(stage, kept, threads)? },
         };
         fs::write(kept, serde_json::to_string(&reach)?)?;
 
@@ -117,7 +115,7 @@ impl<'p> Tests<'p> {
     }
 
     /// Each test with the first of its cases, and with all where it has more.
-    fn all_runs(&self, kept: &Path, threads: usize) -> io::Result<Vec<(Run, Vec<usize>)>> {
+    fn all_runs(&self, stage: Stage, kept: &Path, threads: usize) -> io::Result<Vec<(Run, Vec<usize>)>> {
         let list = Command::new(&self.program.tests).args(["--list", "--format", "terse"]).output()?;
         let list = String::from_utf8_lossy(&list.stdout);
         let names: Vec<&str> = list.lines().filter_map(|line| line.strip_suffix(": test")).collect();
@@ -125,8 +123,19 @@ impl<'p> Tests<'p> {
         let next = AtomicUsize::new(0);
         crate::at_once(threads, || {
             while let Some(name) = names.get(next.fetch_add(1, Relaxed)) {
+                let mut all = match self.recorded(name, true, kept) {
+                    // By chance, or within these bounds: it is not asked.
+                    Err(error) if self.tree.of.waits => {
+                        eprintln!("{error}");
+                        continue;
+                    }
+                    run => run?,
+                };
+                if self.tree.of.waits || stage == Stage::Brief {
+                    locked(&runs).push(all);
+                    continue;
+                }
                 let mut first = self.recorded(name, false, kept)?;
-                let mut all = self.recorded(name, true, kept)?;
                 let longer = all.0.seconds / first.0.seconds;
                 let started = Instant::now();
                 self.passes(&first.0)?;
@@ -173,7 +182,7 @@ impl<'p> Tests<'p> {
         };
         let chosen = site.first + site.mutants.iter().position(|&other| other == number).unwrap_or_default();
         let Some(reaching) = self.reaching.get(&number) else {
-            return Ok((if stage == Stage::All { Verdict::Unreached } else { Verdict::Open }, None));
+            return Ok((if stage.is_last() { Verdict::Unreached } else { Verdict::Open }, None));
         };
         let function = mutant.function();
         let promise = |record: &Record, run: &Run| {
@@ -190,7 +199,12 @@ impl<'p> Tests<'p> {
         order.sort_by(|a, b| b.1.total_cmp(&a.1));
         for (at, _) in order {
             let run = &self.runs[at];
-            let status = self.run(run, &[("MUTANT", &chosen.to_string())])?;
+            let chosen = chosen.to_string();
+            let mut status = self.run(run, &[("MUTANT", &chosen)])?;
+            if !status.success() && self.tree.of.waits {
+                // Not by chance.
+                status = self.run(run, &[("MUTANT", &chosen)])?;
+            }
             let noticed = if status.success() { 0.0 } else { 1.0 };
             for key in [&mutant.file, &function] {
                 let record = &mut locked(&self.records)[at];
@@ -199,23 +213,31 @@ impl<'p> Tests<'p> {
                 *all_noticed += noticed;
             }
             if !status.success() {
-                let verdict = if status.signal() == Some(SIGXCPU) { Verdict::Timeout } else { Verdict::Caught };
+                let verdict = if status.signal().is_some_and(|signal| TIME_IS_OVER.contains(&signal)) {
+                    Verdict::Timeout
+                } else {
+                    Verdict::Caught
+                };
                 return Ok((verdict, Some(run.test.clone())));
             }
         }
-        Ok((if stage == Stage::All { Verdict::Missed } else { Verdict::Open }, None))
+        Ok((if stage.is_last() { Verdict::Missed } else { Verdict::Open }, None))
     }
 
     /// One test in a process of its own, which gets only so much time and memory.
     fn run(&self, run: &Run, environment: &[(&str, &str)]) -> io::Result<ExitStatus> {
         let seconds = (run.seconds * PATIENCE + LEAST_PATIENCE_S).ceil();
-        let limits =
-            format!("ulimit -t {seconds} -v {MOST_MEMORY_KIB} -c 0; exec \"$0\" --exact \"$1\" --test-threads 1");
+        let clock =
+            if self.tree.of.waits { format!("timeout -s KILL {} ", seconds + LEAST_WAIT_S) } else { String::new() };
+        let limits = format!(
+            "ulimit -t {seconds} -v {} -c 0; exec {clock}\"$0\" --exact \"$1\" --test-threads 1",
+            self.tree.of.most_memory_kib
+        );
         Command::new("bash")
             .args(["-c", &limits])
             .arg(&self.program.tests)
             .arg(&run.test)
-            .current_dir(self.directory)
+            .current_dir(self.tree.copy.join(self.tree.of.directory))
             // The same cases for each mutant, and not made smaller where one fails.
             .envs([("PROPTEST_RNG_SEED", "1"), ("PROPTEST_MAX_SHRINK_ITERS", "0")])
             .envs((!run.has_all_cases).then_some(("PROPTEST_CASES", FIRST_CASES)))
