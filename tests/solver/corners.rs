@@ -485,6 +485,13 @@ fn a_sweep_to_a_tolerance_finds_the_peaks_of_very_many_intervals() {
             (0..states.len()).any(is_it)
         };
         assert!(stress_at_end(true) && stress_at_end(false));
+        // And no other tooth is moved for it.
+        let spacing_deg = 360.0 / parameters.installed as f64;
+        for at in 1..states.len() {
+            let apart_deg = states.position_deg[at] - states.position_deg[at - 1];
+            let is_next = states.input_angle_deg[at] == states.input_angle_deg[at - 1] && apart_deg > 0.0;
+            assert!(!is_next || (apart_deg - spacing_deg).abs() < 1e-9, "{apart_deg} deg apart");
+        }
         let ring_peak_deg = found.peaks.ring.stress_mpa.position_deg;
         assert!(ring_peak_deg <= end_deg + 1e-9, "{ring_peak_deg}");
     }
