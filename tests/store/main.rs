@@ -414,6 +414,15 @@ fn an_address_holds_no_password_and_shows_none() {
     assert!(!Address::new("/var/lib/toothwave/studies.sqlite", None).unwrap().is_shared());
 }
 
+/// SQLite keeps what is in these nowhere, or elsewhere than it is said.
+#[test]
+fn an_address_of_no_file_and_no_server_is_refused() {
+    for text in ["", ":memory:", "file:studies?mode=memory"] {
+        assert_eq!(Address::new(text, None).unwrap_err(), AddressError::NoFile(text.into()));
+    }
+    assert!(Address::new("./file:studies", None).is_ok());
+}
+
 /// Polls a future so often at most; whether it came to an end.
 async fn polled(future: impl Future, times: usize) -> bool {
     let mut future = std::pin::pin!(future);
