@@ -140,7 +140,7 @@ impl Store {
     /// # Errors
     /// Where the store does not answer, or has another schema.
     pub async fn create(&self, study: &NewStudy) -> Result<(), StoreError> {
-        self.with(LONG_PATIENCE, async |connection| {
+        self.with(PATIENCE, async |connection| {
             require_schema(connection).await?;
             let time_s = stored(study.time.as_secs());
             on!(connection, inner => {
@@ -206,7 +206,7 @@ impl Store {
     /// # Errors
     /// As [`Self::create`].
     pub async fn resume(&self, id: &str, time: Duration) -> Result<(), StoreError> {
-        self.with(LONG_PATIENCE, async |connection| {
+        self.with(PATIENCE, async |connection| {
             require_schema(connection).await?;
             begin(connection).await?;
             let time_s = stored(time.as_secs());
@@ -266,7 +266,7 @@ impl Store {
 
     /// A statement about one study.
     async fn once(&self, text: &'static str, id: &str) -> Result<(), StoreError> {
-        self.with(LONG_PATIENCE, async |connection| {
+        self.with(PATIENCE, async |connection| {
             require_schema(connection).await?;
             on!(connection, inner => sqlx::query(text).bind(id).execute(inner).await.map(|_| ()))?;
             Ok(())

@@ -9,7 +9,10 @@ use std::task::Poll;
 use std::time::Duration;
 
 use sqlx::{Connection as _, SqliteConnection};
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::net::TcpListener;
 use tokio::sync::RwLock;
+use tokio::time::Instant;
 use toothwave_store::{Address, AddressError, Claim, Gap, Lease, MOST_ATTEMPTS, NewStudy, Store, StoreError};
 
 const LEASE: Duration = Duration::from_secs(60);
@@ -398,6 +401,49 @@ async fn two_workers_share_a_server_and_a_lost_lease_is_somebody_elses() {
     assert!(standing.is_done());
     assert_eq!((standing.done, standing.looked_at), (1, 1));
     one.forget(&study.id).await.unwrap();
+}
+
+/// A server that lets everybody in and says nothing more.
+async fn mute() -> Address {
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let address = listener.local_addr().unwrap();
+    tokio::spawn(async move {
+        while let Ok((mut client, _)) = listener.accept().await {
+            tokio::spawn(async move {
+                let mut asked = [0; 1024];
+                assert!(client.read(&mut asked).await.unwrap() > 0);
+                // AuthenticationOk and ReadyForQuery (PostgreSQL, frontend/backend protocol).
+                client.write_all(b"R\0\0\0\x08\0\0\0\0Z\0\0\0\x05I").await.unwrap();
+                while client.read(&mut asked).await.is_ok_and(|bytes| bytes > 0) {}
+            });
+        }
+    });
+    Address::new(&format!("postgres://nobody@{address}/studies?sslmode=disable"), None).unwrap()
+}
+
+#[tokio::test(start_paused = true)]
+async fn nobody_waits_longer_for_a_silent_server_than_is_said() {
+    let store = Store::open(&mute().await).await.unwrap();
+    let study = study("unheard", 1);
+    let id = &study.id;
+    let began = Instant::now();
+    let answers = tokio::join!(
+        store.create(&study),
+        store.touch(id),
+        store.cancel(id),
+        store.resume(id, LEASE),
+        store.forget(id),
+        async { store.find(id).await.map(drop) },
+        async { store.waiting().await.map(drop) },
+        async { store.figures().await.map(drop) },
+    );
+    let said = "did not answer within 15 s";
+    assert!(began.elapsed() < Duration::from_secs(16), "{:?}", began.elapsed());
+    let answers: [_; 8] = answers.into();
+    for answer in answers {
+        let error = answer.unwrap_err();
+        assert!(matches!(error, StoreError::Silent(_)) && error.to_string().contains(said), "{error}");
+    }
 }
 
 #[test]
