@@ -58,6 +58,9 @@ const LARGE_BYTES: u64 = 1 << 20;
 /// What is known of stored studies besides their rows, at most: hundreds of the usual, or the few largest.
 const VIEWS_BYTES: u64 = 32 << 20;
 
+/// That a stored study was asked for is noted when it was not for this share of its expiry, so that who reads does not write each time.
+const NOTE_SHARE: u32 = 10;
+
 /// For so long an answer that was made while its study ran serves those who come back for it.
 const FRESH: Duration = Duration::from_secs(60);
 
@@ -127,6 +130,8 @@ pub struct Kept {
     impossible: AtomicU64,
     state: watch::Sender<Standing>,
     cancelled: Mutex<CancellationToken>,
+    /// Of a stored study: seconds since it was last asked for, as far as that was noted.
+    unasked_s: AtomicU64,
     /// Whether somebody looks how it stands while it runs, and one look at a time.
     is_followed: AtomicBool,
     looking: tokio::sync::Mutex<()>,
@@ -279,6 +284,7 @@ impl Kept {
             impossible: AtomicU64::new(0),
             state: watch::Sender::new(Standing { state: StudyState::Running, problem: None }),
             cancelled: Mutex::default(),
+            unasked_s: AtomicU64::new(0),
             is_followed: AtomicBool::new(false),
             looking: tokio::sync::Mutex::default(),
             making: Mutex::default(),
@@ -356,6 +362,7 @@ impl Kept {
         };
         self.looked_at.store(stored.looked_at, Ordering::Relaxed);
         self.impossible.store(stored.refused, Ordering::Relaxed);
+        self.unasked_s.store(stored.unasked.as_secs(), Ordering::Relaxed);
         *self.gaps.lock() = stored.gaps.iter().map(|gap| (gap.chunk, gap.attempts)).collect();
         let (state, problem) = state_of(&stored);
         self.stand(state, problem);
@@ -466,13 +473,13 @@ impl Studies {
         self.kept.lock().iter().find(|kept| kept.id == id).cloned()
     }
 
-    /// The study with this id, where it is kept.
+    /// The study with this id, where it is kept. Who asks for one keeps it from expiring.
     ///
     /// # Errors
     /// Where the store does not answer, or this is not the build or the processor that the study was asked of.
     pub async fn find(&self, id: &str) -> Result<Option<Arc<Kept>>, Problem> {
         let here = self.find_here(id);
-        let Keeping::Store { store, .. } = &self.keeping else { return Ok(here) };
+        let Keeping::Store { store, expiry, .. } = &self.keeping else { return Ok(here) };
         let kept = match here.filter(|kept| kept.is_followed.load(Ordering::SeqCst)) {
             Some(kept) => kept,
             None => {
@@ -485,6 +492,15 @@ impl Studies {
                 kept
             }
         };
+        let noted_after_s = (*expiry / NOTE_SHARE).as_secs();
+        if kept.unasked_s.load(Ordering::Relaxed) > noted_after_s {
+            // By one, and until it is next looked at: who reads must not wait for others' writes.
+            kept.unasked_s.store(0, Ordering::Relaxed);
+            // Nor is anybody refused who reads from a store that cannot be written.
+            if let Err(error) = store.touch(id).await {
+                tracing::warn!(study = id, %error, "that the study was asked for could not be noted");
+            }
+        }
         Ok(Some(kept))
     }
 
@@ -872,7 +888,7 @@ impl Studies {
         };
         let forget = async {
             while !self.paused(EXPIRE).await {
-                match store.expire(*expiry).await {
+                match store.expire(expiry.saturating_add(*expiry / NOTE_SHARE)).await {
                     Ok(0) => {}
                     Ok(studies) => tracing::info!(studies, "forgotten, because nobody has asked for them for long"),
                     Err(error) => tracing::warn!(%error, "old studies could not be forgotten"),

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use futures_util::future::join_all;
 use serde_json::{Value, json};
+use sqlx::{Connection as _, SqliteConnection};
 use tokio::task::JoinHandle;
 use toothwave::config::Limits;
 use toothwave::parts::Parts;
@@ -286,6 +287,33 @@ async fn of_stored_studies_a_result_alone_waits_until_others_are_read() {
     drop(reading);
     assert_eq!(keeper.service.get(&result).await.found()["is_complete"], false);
     keeper.end().await;
+}
+
+/// The file as it is when so much more time has passed since anything was asked or computed.
+async fn aged(file: &File, time: Duration) {
+    let mut later = SqliteConnection::connect(&format!("sqlite:{}", file.0.display())).await.unwrap();
+    for (table, column) in [("studies", "asked_at_s"), ("attempts", "began_at_s")] {
+        let text = format!("UPDATE {table} SET {column} = {column} - {}", time.as_secs());
+        sqlx::raw_sql(sqlx::AssertSqlSafe(text)).execute(&mut later).await.unwrap();
+    }
+    later.close().await.unwrap();
+}
+
+#[tokio::test]
+async fn who_reads_a_stored_study_in_whatever_way_keeps_it_from_expiring() {
+    for read in ["", "/result", "/events"] {
+        let file = File::new();
+        let keeper = Keeper::of(&file, LIMITS, true).await;
+        let (asked, left) = (keeper.wait_for(&map(5)).await, keeper.wait_for(&map(6)).await);
+        keeper.end().await;
+        aged(&file, 2 * EXPIRY).await;
+        let keeper = Keeper::of(&file, LIMITS, false).await;
+        assert_eq!(keeper.service.get(&format!("{}{read}", place(&asked))).await.status, 200);
+        assert_eq!(keeper.store.expire(EXPIRY).await.unwrap(), 1, "{read}");
+        assert_eq!(keeper.service.get(&place(&asked)).await.found()["state"], "done");
+        keeper.service.get(&place(&left)).await.refused(404, "not_found");
+        keeper.end().await;
+    }
 }
 
 /// Those that need a turn of computing for it wait for one; nobody waits for them.

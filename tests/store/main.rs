@@ -343,6 +343,50 @@ async fn a_study_that_nobody_asks_for_and_nobody_computes_expires_though_it_wait
     .await;
 }
 
+/// The file's store as it is when so many seconds more have passed since anybody asked.
+async fn unasked_for(file: &File, seconds: u64) -> Store {
+    let mut later = SqliteConnection::connect(&format!("sqlite:{}", file.0.display())).await.unwrap();
+    let text = format!("UPDATE studies SET asked_at_s = asked_at_s - {seconds}");
+    sqlx::raw_sql(sqlx::AssertSqlSafe(text)).execute(&mut later).await.unwrap();
+    later.close().await.unwrap();
+    Store::open(&file.address()).await.unwrap()
+}
+
+#[tokio::test]
+async fn a_study_that_was_computed_of_late_does_not_expire_however_it_ended() {
+    let file = File::new();
+    let (done, cancelled) = (study("done", 1), study("stopped", 2));
+    let store = Store::open(&file.address()).await.unwrap();
+    for study in [&done, &cancelled] {
+        store.create(study).await.unwrap();
+        keep(&mut claimed(&store, study).await).await;
+    }
+    store.cancel(&cancelled.id).await.unwrap();
+    store.close().await;
+    let store = unasked_for(&file, 1000).await;
+    assert_eq!(store.expire(Duration::from_secs(500)).await.unwrap(), 0);
+    assert!(store.find(&done.id).await.unwrap().unwrap().is_done());
+    assert!(store.find(&cancelled.id).await.unwrap().unwrap().is_cancelled);
+}
+
+#[tokio::test]
+async fn a_study_says_how_long_nobody_has_asked_for_it_and_one_that_is_asked_for_does_not_expire() {
+    let file = File::new();
+    let (asked, left) = (study("asked", 1), study("left", 1));
+    let store = Store::open(&file.address()).await.unwrap();
+    store.create(&asked).await.unwrap();
+    store.create(&left).await.unwrap();
+    store.close().await;
+    let store = unasked_for(&file, 1000).await;
+    let standing = store.find(&asked.id).await.unwrap().unwrap();
+    assert!((1000..1100).contains(&standing.unasked.as_secs()), "{:?}", standing.unasked);
+    store.touch(&asked.id).await.unwrap();
+    assert!(store.find(&asked.id).await.unwrap().unwrap().unasked < Duration::from_secs(100));
+    assert_eq!(store.expire(Duration::from_secs(500)).await.unwrap(), 1);
+    assert!(store.find(&asked.id).await.unwrap().is_some());
+    assert_eq!(store.find(&left.id).await.unwrap(), None);
+}
+
 #[tokio::test]
 async fn what_was_kept_in_a_file_is_there_after_its_process() {
     let file = File::new();
