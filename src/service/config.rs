@@ -113,7 +113,7 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_MAX_STUDY_VARIANTS", value_name = "N", default_value_t = 10_000_000)]
     pub max_study_variants: u64,
 
-    /// Most bytes that all studies which are kept come to; they count as unread [default: 256 MiB, or a quarter of max-unread-bytes]
+    /// Most bytes that all studies which are kept in memory come to, and of stored ones those whose results are being read; they count as unread [default: 256 MiB, or a quarter of max-unread-bytes]
     #[arg(long, env = "TOOTHWAVE_MAX_STUDY_BYTES", value_name = "BYTES")]
     pub max_study_bytes: Option<u64>,
 
@@ -308,7 +308,8 @@ pub struct Limits {
     pub max_unread_bytes: u64,
     /// Most variants of a study.
     pub max_study_variants: u64,
-    /// Most bytes that all studies which are kept come to; they are taken of `max_unread_bytes`.
+    /// Most bytes that all studies which are kept in memory come to, and of stored ones those whose results are being read; they are taken
+    /// of `max_unread_bytes`.
     pub max_study_bytes: u64,
     /// Studies that may run at once.
     pub max_concurrent_studies: usize,

@@ -4,6 +4,8 @@
 //! empty ones are passed over. Keys are random and long (`toothwave new-key`), so that a fast hash cannot be searched.
 
 use std::fmt::Write as _;
+use std::fs::File;
+use std::io::Read as _;
 use std::os::unix::fs::PermissionsExt as _;
 use std::sync::Arc;
 
@@ -14,6 +16,9 @@ use axum::response::{IntoResponse, Response};
 use parking_lot::RwLock;
 
 use crate::problem::{Problem, ProblemCode};
+
+/// Of a keys file, which may turn out to be something that never ends: tens of thousands of keys.
+const MOST_BYTES: u64 = 4 << 20;
 
 /// Random bytes of a new key.
 const KEY_BYTES: usize = 32;
@@ -104,7 +109,13 @@ impl Keys {
 }
 
 fn known_in(path: &str) -> Result<Vec<Known>, String> {
-    parse(&std::fs::read_to_string(path).map_err(|error| error.to_string())?)
+    let mut text = String::new();
+    let file = File::open(path).map_err(|error| error.to_string())?;
+    file.take(MOST_BYTES + 1).read_to_string(&mut text).map_err(|error| error.to_string())?;
+    if text.len() as u64 > MOST_BYTES {
+        return Err(format!("a keys file has at most {MOST_BYTES} bytes"));
+    }
+    parse(&text)
 }
 
 fn parse(text: &str) -> Result<Vec<Known>, String> {

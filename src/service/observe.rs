@@ -248,7 +248,9 @@ pub async fn observe(State(app): State<Arc<App>>, request: Request, next: Next) 
         key = tracing::field::Empty,
         traceparent = traceparent(request.headers())
     );
+    let mut unanswered = Unanswered { span: span.clone(), method, route: route.clone(), started, is_answered: false };
     let mut response = next.run(request).instrument(span.clone()).await;
+    unanswered.is_answered = true;
     let elapsed = started.elapsed();
     let problem = response.extensions().get::<Problem>().map(|problem| {
         span.in_scope(|| problem_is_told(problem));
@@ -283,6 +285,28 @@ pub async fn observe(State(app): State<Arc<App>>, request: Request, next: Next) 
         };
         Body::new(Observed { body, rest: Bytes::new(), completion })
     })
+}
+
+/// What is known of a request whose client may leave before there is an answer.
+struct Unanswered {
+    span: Span,
+    method: &'static str,
+    route: Option<MatchedPath>,
+    started: Instant,
+    is_answered: bool,
+}
+
+impl Drop for Unanswered {
+    fn drop(&mut self) {
+        if self.is_answered {
+            return;
+        }
+        let (method, route) = (self.method, self.route.as_ref().map_or("none", MatchedPath::as_str));
+        let completed_ms = 1e3 * self.started.elapsed().as_secs_f64();
+        self.span.in_scope(|| {
+            tracing::info!(method, route, completed_ms, sent_bytes = 0, is_whole = false, "request");
+        });
+    }
 }
 
 /// What is known of a request when the last of its answer is handed over, or will never be.

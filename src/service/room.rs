@@ -91,6 +91,12 @@ impl Room {
         Ok(reserved)
     }
 
+    /// Whether there is room for an answer of so many bytes once those have given back what they hold.
+    pub fn would_hold<'a>(&self, bytes: u64, given_back: impl IntoIterator<Item = &'a Reserved>) -> bool {
+        let given_back: u64 = given_back.into_iter().map(|reserved| u64::from(reserved.permits())).sum();
+        self.free.available_permits() as u64 + given_back >= u64::from(self.permits_for(bytes))
+    }
+
     /// An answer that is kept, taking room until it is dropped.
     ///
     /// # Errors

@@ -1,5 +1,5 @@
 //! Studies that run and that are kept: in memory, within the bound on unread answers, the oldest forgotten first; or in a store, of which
-//! this is then a view, likewise bounded.
+//! this is then a view. There the rows of a study are here only for who reads its result, likewise bounded.
 //!
 //! A study's chunks are worked on side by side, each in slices of a few milliseconds that wait for their turn behind single requests, as
 //! those of batches do. Those of a store are the workers', who are here where the store is a file, and elsewhere where it is a server.
@@ -18,7 +18,7 @@ use tokio::sync::watch;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use toothwave_calculation::BUILD;
-use toothwave_store::{Figures, NewStudy, Standing as Stored, Store, StoreError};
+use toothwave_store::{Figures, NewStudy, PATIENCE, Standing as Stored, Store, StoreError};
 use toothwave_study::{Gathered, Study, StudyAnswer, Work};
 use tracing::Instrument as _;
 use utoipa::ToSchema;
@@ -54,6 +54,12 @@ const READ_BYTES: u64 = 16 << 20;
 
 /// Rows of which an answer takes longer than some milliseconds.
 const LARGE_BYTES: u64 = 1 << 20;
+
+/// What is known of stored studies besides their rows, at most: hundreds of the usual, or the few largest.
+const VIEWS_BYTES: u64 = 32 << 20;
+
+/// That a stored study was asked for is noted when it was not for this share of its expiry, so that who reads does not write each time.
+const NOTE_SHARE: u32 = 10;
 
 /// For so long an answer that was made while its study ran serves those who come back for it.
 const FRESH: Duration = Duration::from_secs(60);
@@ -114,20 +120,66 @@ pub struct Studies {
 pub struct Kept {
     id: String,
     study: Arc<Study>,
-    gathered: Mutex<Gathered>,
+    /// Of a stored study none until its result is read, and none any more when another's needs the room.
+    rows: Mutex<Option<Arc<Rows>>>,
+    /// The chunks that will not come, each with how often it was tried.
+    gaps: Mutex<Vec<(u64, u64)>>,
     /// Variants looked at, those of chunks that are not over yet among them.
     looked_at: AtomicU64,
     /// Of those that the result holds, the ones without an answer.
     impossible: AtomicU64,
     state: watch::Sender<Standing>,
     cancelled: Mutex<CancellationToken>,
-    /// Of a stored study: whether somebody looks how it stands while it runs, and one look at a time.
+    /// Of a stored study: seconds since it was last asked for, as far as that was noted.
+    unasked_s: AtomicU64,
+    /// Whether somebody looks how it stands while it runs, and one look at a time.
     is_followed: AtomicBool,
     looking: tokio::sync::Mutex<()>,
     /// The last answer that was made apart, or is.
     making: Mutex<Option<Making>>,
-    kept_bytes: u64,
-    _room: Reserved,
+    /// What it takes besides its rows.
+    bytes: u64,
+    _room: Option<Reserved>,
+}
+
+/// What a study has come to, as far as it is here.
+#[derive(Debug)]
+pub struct Rows {
+    gathered: Mutex<Gathered>,
+    bytes: u64,
+    room: Reserved,
+}
+
+/// What a study has come to, for who tells it: as long as this is held its rows stay, and their room is taken.
+#[derive(Debug)]
+pub enum Reading {
+    /// An answer that is short.
+    Made(StudyAnswer),
+    /// The rows that it is to be made of.
+    Rows {
+        /// Them.
+        gathered: Gathered,
+        /// Who holds their room.
+        held: Arc<Rows>,
+    },
+}
+
+impl Reading {
+    /// About what the answer takes that is still to be made.
+    pub fn columns_bytes(&self) -> u64 {
+        match self {
+            Self::Made(_) => 0,
+            Self::Rows { gathered, .. } => gathered.study().stored_bytes(),
+        }
+    }
+
+    /// It.
+    pub fn answer(self) -> StudyAnswer {
+        match self {
+            Self::Made(answer) => answer,
+            Self::Rows { gathered, held: _held } => gathered.answer(),
+        }
+    }
 }
 
 /// An answer that was made apart from the requests for it.
@@ -197,18 +249,6 @@ impl Kept {
         }
     }
 
-    /// What it has come to.
-    pub fn answer(&self) -> StudyAnswer {
-        // Of a large study that takes long, and whoever adds to it must not wait meanwhile.
-        let gathered = self.gathered.lock().clone();
-        gathered.answer()
-    }
-
-    /// About what it takes to keep what it comes to.
-    pub fn stored_bytes(&self) -> u64 {
-        self.study.stored_bytes()
-    }
-
     /// Whether it runs.
     pub fn is_running(&self) -> bool {
         self.state.borrow().state == StudyState::Running
@@ -234,26 +274,45 @@ impl Kept {
         self.stand(StudyState::Cancelled, None);
     }
 
-    fn new(study: Arc<Study>, room: Reserved) -> Arc<Self> {
+    fn new(study: Arc<Study>, rows: Option<Arc<Rows>>, bytes: u64, room: Option<Reserved>) -> Arc<Self> {
         Arc::new(Self {
             id: study.id().to_string(),
-            gathered: Mutex::new(Gathered::new(&study)),
-            kept_bytes: study.kept_bytes(),
+            rows: Mutex::new(rows),
+            gaps: Mutex::default(),
             study,
             looked_at: AtomicU64::new(0),
             impossible: AtomicU64::new(0),
             state: watch::Sender::new(Standing { state: StudyState::Running, problem: None }),
             cancelled: Mutex::default(),
+            unasked_s: AtomicU64::new(0),
             is_followed: AtomicBool::new(false),
             looking: tokio::sync::Mutex::default(),
             making: Mutex::default(),
+            bytes,
             _room: room,
         })
     }
 
+    /// What it has come to, as far as it is here. Of a large study the answer takes long, and whoever adds to it must not wait meanwhile.
+    fn gathered(&self, rows: &Rows) -> Gathered {
+        let mut gathered = rows.gathered.lock().clone();
+        gathered.give_up(self.gaps.lock().iter().copied());
+        gathered
+    }
+
+    /// Looks at what it has come to, as far as that is here.
+    fn here<T: Default>(&self, look: impl FnOnce(&mut Gathered) -> T) -> T {
+        self.rows.lock().as_ref().map(|rows| look(&mut rows.gathered.lock())).unwrap_or_default()
+    }
+
+    /// Its rows, but where somebody reads them.
+    fn unread_rows(&self) -> Option<Arc<Rows>> {
+        self.rows.lock().as_ref().filter(|rows| Arc::strong_count(rows) == 1).cloned()
+    }
+
     /// Whether its answer is made apart: that of a tolerance study is short, and its rows have to be sorted for it. That of a map is its rows.
     fn is_made_apart(&self) -> bool {
-        self.study.kind() == "tolerance" && self.stored_bytes() >= LARGE_BYTES
+        self.study.kind() == "tolerance" && self.study.stored_bytes() >= LARGE_BYTES
     }
 
     /// Whether who asks now is served by an answer that is made, or was.
@@ -266,14 +325,14 @@ impl Kept {
     }
 
     /// Reads what a stored study has come to since it was last read.
-    async fn gather(&self, store: &Store, pool: &Pool) -> Result<(), Problem> {
-        let missing: Vec<_> = self.gathered.lock().missing().collect();
+    async fn gather(&self, rows: &Rows, store: &Store, pool: &Pool) -> Result<(), Problem> {
+        let missing: Vec<_> = rows.gathered.lock().missing().collect();
         if missing.is_empty() {
             return Ok(());
         }
         let done = store.chunks_done(&self.id).await?;
         let wanted: Vec<_> = done.into_iter().filter(|chunk| missing.binary_search(chunk).is_ok()).collect();
-        let a_part_bytes = (self.stored_bytes() / self.study.chunks().max(1)).max(1);
+        let a_part_bytes = (self.study.stored_bytes() / self.study.chunks().max(1)).max(1);
         let at_once = usize::try_from(READ_BYTES / a_part_bytes).unwrap_or(usize::MAX).max(1);
         for chunks in wanted.chunk_by(|one, next| one + 1 == *next).flat_map(|run| run.chunks(at_once)) {
             let last = chunks.last().unwrap_or(&chunks[0]);
@@ -283,7 +342,7 @@ impl Kept {
                 decoded.collect::<Result<Vec<_>, Problem>>()
             };
             let parts = pool.run_in_turn(decode).await?;
-            let mut gathered = self.gathered.lock();
+            let mut gathered = rows.gathered.lock();
             parts.into_iter().for_each(|(chunk, part)| gathered.add(chunk, part));
         }
         Ok(())
@@ -291,15 +350,20 @@ impl Kept {
 
     /// Looks how a stored study stands; whether it is kept at all.
     async fn look(&self, store: &Store) -> Result<bool, StoreError> {
-        // One at a time, so that what is seen last is what was last the case.
-        let _looking = self.looking.lock().await;
-        let Some(stored) = store.find(&self.id).await? else {
+        let looking = async {
+            // One at a time, so that what is seen last is what was last the case.
+            let held = self.looking.lock().await;
+            Ok::<_, StoreError>((held, store.find(&self.id).await?))
+        };
+        let (_held, found) = patiently(looking).await?;
+        let Some(stored) = found else {
             self.stand(StudyState::Cancelled, None);
             return Ok(false);
         };
         self.looked_at.store(stored.looked_at, Ordering::Relaxed);
         self.impossible.store(stored.refused, Ordering::Relaxed);
-        self.gathered.lock().give_up(stored.gaps.iter().map(|gap| (gap.chunk, gap.attempts)));
+        self.unasked_s.store(stored.unasked.as_secs(), Ordering::Relaxed);
+        *self.gaps.lock() = stored.gaps.iter().map(|gap| (gap.chunk, gap.attempts)).collect();
         let (state, problem) = state_of(&stored);
         self.stand(state, problem);
         Ok(true)
@@ -331,9 +395,19 @@ impl Kept {
     }
 }
 
+/// What comes of several things that are asked of a store, or of waiting for others who ask it, in the time that one of them may take.
+async fn patiently<T, E: From<StoreError>>(future: impl Future<Output = Result<T, E>>) -> Result<T, E> {
+    tokio::time::timeout(PATIENCE, future).await.unwrap_or_else(|_| Err(StoreError::Silent(PATIENCE).into()))
+}
+
 /// Between a look that took so long and the next one.
 fn pause_after(look: Duration, least: Duration) -> Duration {
     (LOOKS_SHARE * look).clamp(least, LONGEST_PAUSE)
+}
+
+/// Whether a stored study need not be begun.
+const fn is_there(stored: &Stored) -> bool {
+    stored.is_running() || stored.is_done()
 }
 
 /// How a stored study stands, in the words of the service.
@@ -399,29 +473,41 @@ impl Studies {
         self.kept.lock().iter().find(|kept| kept.id == id).cloned()
     }
 
-    /// The study with this id, where it is kept.
+    /// The study with this id, where it is kept. Who asks for one keeps it from expiring.
     ///
     /// # Errors
-    /// Where the store does not answer, or there is no room for what the study comes to.
+    /// Where the store does not answer, or this is not the build or the processor that the study was asked of.
     pub async fn find(&self, id: &str) -> Result<Option<Arc<Kept>>, Problem> {
         let here = self.find_here(id);
-        let Keeping::Store { store, .. } = &self.keeping else { return Ok(here) };
-        if let Some(kept) = here.filter(|kept| kept.is_followed.load(Ordering::SeqCst)) {
-            return Ok(Some(kept));
-        }
-        let Some(stored) = store.find(id).await? else {
-            self.kept.lock().retain(|kept| kept.id != id);
-            return Ok(None);
+        let Keeping::Store { store, expiry, .. } = &self.keeping else { return Ok(here) };
+        let kept = match here.filter(|kept| kept.is_followed.load(Ordering::SeqCst)) {
+            Some(kept) => kept,
+            None => {
+                let Some(stored) = store.find(id).await? else {
+                    self.kept.lock().retain(|kept| kept.id != id);
+                    return Ok(None);
+                };
+                let kept = self.kept_here(&stored).await?;
+                self.see(store, &kept).await?;
+                kept
+            }
         };
-        let kept = self.kept_here(&stored).await?;
-        self.see(store, &kept).await?;
+        let noted_after_s = (*expiry / NOTE_SHARE).as_secs();
+        if kept.unasked_s.load(Ordering::Relaxed) > noted_after_s {
+            // By one, and until it is next looked at: who reads must not wait for others' writes.
+            kept.unasked_s.store(0, Ordering::Relaxed);
+            // Nor is anybody refused who reads from a store that cannot be written.
+            if let Err(error) = store.touch(id).await {
+                tracing::warn!(study = id, %error, "that the study was asked for could not be noted");
+            }
+        }
         Ok(Some(kept))
     }
 
-    /// A stored study as it is kept here.
+    /// A stored study as it is kept here, without its rows.
     ///
     /// # Errors
-    /// Where there is no room for what it comes to, or this is not the build or the processor that it was asked of.
+    /// Where this is not the build or the processor that it was asked of.
     async fn kept_here(&self, stored: &Stored) -> Result<Arc<Kept>, Problem> {
         let frozen = &stored.study;
         let is_this = |kept: &&Arc<Kept>| kept.id == frozen.id && kept.study.chunk_variants() == frozen.chunk_variants;
@@ -430,18 +516,24 @@ impl Studies {
             return Ok(kept);
         }
         let study = frozen::thaw(&self.pool, frozen).await?.map_err(|reason| reason.told(&frozen.id))?;
-        let mut all = self.kept.lock();
-        let reserved = self.make_room(&mut all, &study)?;
-        let kept = Self::keep(&mut all, study, reserved);
+        let kept = self.keep_view(study);
         let (state, problem) = state_of(stored);
         kept.stand(state, problem);
         Ok(kept)
     }
 
-    /// Keeps a study in the place of any other with its id.
-    fn keep(all: &mut VecDeque<Arc<Kept>>, study: Arc<Study>, room: Reserved) -> Arc<Kept> {
-        let kept = Kept::new(study, room);
+    /// Keeps what is known of a stored study, in the place of any other with its id and of the oldest that do not run.
+    fn keep_view(&self, study: Arc<Study>) -> Arc<Kept> {
+        let bytes = study.kept_bytes() - study.stored_bytes();
+        // Where others have all the room, it is kept all the same: how many there are is bounded.
+        let kept = Kept::new(study, None, bytes, self.room.reserve(bytes).ok());
+        let mut all = self.kept.lock();
         all.retain(|other| other.id != kept.id);
+        while all.iter().map(|other| other.bytes).sum::<u64>() + bytes > VIEWS_BYTES
+            && let Some(oldest) = all.iter().position(|other| !other.is_running())
+        {
+            drop(all.remove(oldest));
+        }
         all.push_back(Arc::clone(&kept));
         kept
     }
@@ -466,11 +558,12 @@ impl Studies {
     ///
     /// # Errors
     /// `queue_full` where as many run as the service admits, `too_many_unread_bytes` where there is no room for what it comes to,
-    /// `no_shared_store` where nobody else would know of it, `store_unavailable` where the store does not answer.
-    pub async fn begin(&self, study: Study, document: &[u8]) -> Result<Arc<Kept>, Problem> {
+    /// `no_shared_store` where nobody else would know of it, `store_unavailable` where the store does not answer, `deadline_exceeded` where
+    /// its canary has no turn until then.
+    pub async fn begin(&self, study: Study, document: &[u8], deadline: Instant) -> Result<Arc<Kept>, Problem> {
         match &self.keeping {
             Keeping::Memory => self.begin_here(study),
-            Keeping::Store { store, .. } => self.begin_there(store, study, document).await,
+            Keeping::Store { store, .. } => self.begin_there(store, study, document, deadline).await,
             Keeping::Nowhere => {
                 let detail = "this is one of several replicas without a shared store, so the others would know nothing of the study: the setting `studies` names the PostgreSQL database that they share";
                 Err(Problem::new(ProblemCode::NoSharedStore, detail))
@@ -478,48 +571,76 @@ impl Studies {
         }
     }
 
-    async fn begin_there(&self, store: &Store, study: Study, document: &[u8]) -> Result<Arc<Kept>, Problem> {
+    async fn begin_there(
+        &self,
+        store: &Store,
+        study: Study,
+        document: &[u8],
+        deadline: Instant,
+    ) -> Result<Arc<Kept>, Problem> {
         let id = study.id().to_string();
-        let is_there = |stored: &Stored| stored.is_running() || stored.is_done();
-        let mut stored = store.find(&id).await?;
-        let mut turn = None;
-        if !stored.as_ref().is_some_and(is_there) {
-            turn = Some(self.beginning.lock().await);
-            // Another may have begun it meanwhile.
-            stored = store.find(&id).await?;
-        }
-        let kept = match stored {
-            Some(stored) if is_there(&stored) => {
-                store.touch(&id).await?;
-                self.kept_here(&stored).await?
+        let (mut asked, mut new) = (Some(study), None);
+        loop {
+            let stored = store.find(&id).await?;
+            let known = match &stored {
+                Some(stored) => Some(self.kept_here(stored).await?),
+                None => None,
+            };
+            let kept = match (stored, known) {
+                (Some(stored), Some(kept)) if is_there(&stored) => {
+                    store.touch(&id).await?;
+                    Some(kept)
+                }
+                (_, known) => {
+                    if known.is_none()
+                        && let Some(study) = asked.take()
+                    {
+                        // Whoever would be refused needs no canary.
+                        self.require_one_more(store).await?;
+                        let started = Instant::now();
+                        let limits = self.limits.of_calculation();
+                        let freezing = frozen::freeze(&self.pool, study, document, &limits, self.time(store));
+                        // Each of its slices has a deadline of its own, and waits its turn.
+                        let frozen = self.pool.within(deadline, freezing).await?;
+                        new = Some((frozen, milliseconds(started.elapsed())));
+                    }
+                    patiently(self.begin_in_turn(store, &id, known, new.as_ref())).await?
+                }
+            };
+            if let Some(kept) = kept {
+                self.see(store, &kept).await?;
+                return Ok(kept);
             }
-            Some(stored) => {
+        }
+    }
+
+    /// Lets a study run that is known, or is new, if it still stands as it did. Who has the turn waits for nothing but the store.
+    async fn begin_in_turn(
+        &self,
+        store: &Store,
+        id: &str,
+        known: Option<Arc<Kept>>,
+        new: Option<&((Arc<Study>, NewStudy), u64)>,
+    ) -> Result<Option<Arc<Kept>>, Problem> {
+        let _turn = self.beginning.lock().await;
+        let kept = match (store.find(id).await?, known, new) {
+            (Some(stored), Some(kept), _) if !is_there(&stored) => {
                 self.require_one_more(store).await?;
-                // First: what is refused must not run.
-                let kept = self.kept_here(&stored).await?;
-                store.resume(&id, self.time(store)).await?;
+                store.resume(id, self.time(store)).await?;
                 kept
             }
-            None => {
+            (None, None, Some(((study, frozen), canary_ms))) => {
                 self.require_one_more(store).await?;
-                let room = self.make_room(&mut self.kept.lock(), &study)?;
-                let started = Instant::now();
-                let limits = self.limits.of_calculation();
-                let freezing = frozen::freeze(&self.pool, study, document, &limits, self.time(store));
-                // Each of its slices has a deadline of its own, and waits its turn.
-                let (study, frozen) = self.pool.within(self.pool.deadline(), freezing).await?;
-                let canary_ms = milliseconds(started.elapsed());
+                store.create(frozen).await?;
                 let NewStudy { chunks, canary_variants, .. } = frozen;
-                store.create(&frozen).await?;
-                tracing::info!(study = frozen.id, chunks, canary_variants, canary_ms, "a study is kept");
-                Self::keep(&mut self.kept.lock(), study, room)
+                tracing::info!(study = id, chunks, canary_variants, canary_ms, "a study is kept");
+                self.keep_view(Arc::clone(study))
             }
+            // Another has begun, or forgotten, it meanwhile.
+            _ => return Ok(None),
         };
-        if turn.is_some() {
-            self.changed.send_replace(());
-        }
-        self.see(store, &kept).await?;
-        Ok(kept)
+        self.changed.send_replace(());
+        Ok(Some(kept))
     }
 
     /// That one more study may run. Those of other builds wait for other workers, perhaps for ever.
@@ -562,8 +683,11 @@ impl Studies {
         let kept = match known {
             Some(kept) => kept,
             None => {
-                let reserved = self.make_room(&mut all, &study)?;
-                Self::keep(&mut all, Arc::new(study), reserved)
+                let study = Arc::new(study);
+                let rows = self.new_rows(&mut all, &study, study.kept_bytes())?;
+                let kept = Kept::new(study, Some(rows), 0, None);
+                all.push_back(Arc::clone(&kept));
+                kept
             }
         };
         // Under the lock: nobody else lets it run as well, or forgets it meanwhile.
@@ -571,25 +695,73 @@ impl Studies {
         Ok(kept)
     }
 
-    /// Room for what a study comes to: any other with its id is forgotten for it, and then the oldest that do not run.
-    fn make_room(&self, all: &mut VecDeque<Arc<Kept>>, study: &Study) -> Result<Reserved, Problem> {
-        let (id, bytes) = (study.id().to_string(), study.kept_bytes());
-        all.retain(|other| other.id != id);
+    /// A place for what a study comes to, none of which is there yet. For it the oldest go, as many as it takes, and none where all of them
+    /// would be too few: in memory those that do not run are forgotten; of stored ones the rows can be read again.
+    fn new_rows(&self, all: &mut VecDeque<Arc<Kept>>, study: &Arc<Study>, bytes: u64) -> Result<Arc<Rows>, Problem> {
+        let is_stored = matches!(self.keeping, Keeping::Store { .. });
+        let most = self.limits.max_study_bytes;
+        let held: u64 = all.iter().filter_map(|kept| Some(kept.rows.lock().as_ref()?.bytes)).sum();
+        let mut going: Vec<(Arc<Kept>, Arc<Rows>)> = Vec::new();
+        let mut could_go = all
+            .iter()
+            .filter(|kept| is_stored || !kept.is_running())
+            .filter_map(|kept| Some((Arc::clone(kept), kept.unread_rows()?)));
         loop {
-            let stored: u64 = all.iter().map(|kept| kept.kept_bytes).sum();
-            let reserved = if stored + bytes > self.limits.max_study_bytes {
-                let detail = format!(
-                    "the study takes {bytes} bytes: with those that run more than the {} of `max_study_bytes`; try again when one of them is done",
-                    self.limits.max_study_bytes
-                );
-                Err(Problem::new(ProblemCode::QueueFull, detail))
-            } else {
-                self.room.reserve(bytes).map_err(Problem::from)
-            };
-            match (reserved, all.iter().position(|kept| !kept.is_running())) {
-                (Ok(reserved), _) => return Ok(reserved),
-                (Err(problem), None) => return Err(problem),
-                (Err(_), Some(oldest)) => drop(all.remove(oldest)),
+            let left = held - going.iter().map(|(_, rows)| rows.bytes).sum::<u64>();
+            // One that was admitted when the bound was larger has all of it.
+            let is_within = left + bytes.min(most) <= most;
+            if is_within && self.room.would_hold(bytes, going.iter().map(|(_, rows)| &rows.room)) {
+                break;
+            }
+            match could_go.next() {
+                Some(next) => going.push(next),
+                None if is_within => {
+                    going.clear();
+                    break;
+                }
+                None => return Err(self.no_room(bytes)),
+            }
+        }
+        drop(could_go);
+        for (kept, rows) in going {
+            *kept.rows.lock() = None;
+            if !is_stored {
+                Self::let_go(all, &kept);
+            }
+            drop(rows);
+        }
+        let room = self.room.reserve(bytes)?;
+        Ok(Arc::new(Rows { gathered: Mutex::new(Gathered::new(study)), bytes, room }))
+    }
+
+    fn no_room(&self, bytes: u64) -> Problem {
+        let most = self.limits.max_study_bytes;
+        let detail = if matches!(self.keeping, Keeping::Store { .. }) {
+            format!(
+                "the study's result takes {bytes} bytes: with those that are being read more than the {most} of `max_study_bytes`; try again in a moment"
+            )
+        } else {
+            format!(
+                "the study takes {bytes} bytes: with those that run, or are being read, more than the {most} of `max_study_bytes`; try again when one of them is done"
+            )
+        };
+        Problem::new(ProblemCode::QueueFull, detail)
+    }
+
+    /// Where a study has what it comes to, as far as it is here.
+    fn rows(&self, kept: &Kept) -> Result<Arc<Rows>, Problem> {
+        let mut all = self.kept.lock();
+        let here = kept.rows.lock().clone();
+        match (here, &self.keeping) {
+            (Some(rows), _) => Ok(rows),
+            (None, Keeping::Store { .. }) => {
+                let rows = self.new_rows(&mut all, &kept.study, kept.study.stored_bytes())?;
+                *kept.rows.lock() = Some(Arc::clone(&rows));
+                Ok(rows)
+            }
+            (None, Keeping::Memory | Keeping::Nowhere) => {
+                let detail = format!("the study `{}` was forgotten in this moment; ask for it again", kept.id);
+                Err(Problem::new(ProblemCode::NotFound, detail))
             }
         }
     }
@@ -620,24 +792,35 @@ impl Studies {
         Ok(())
     }
 
-    /// What a study has come to, where that takes long to be made of its rows: made once for all who ask meanwhile, and apart from their
-    /// requests, so that it goes on when the time of one of them is over. The rows of other studies are gathered, and their answer is soon
-    /// made.
+    /// What a study has come to, or the rows that its answer is soon made of.
     ///
     /// # Errors
     /// Where the store does not answer, there is no room, or the time is over.
+    pub async fn read(&self, kept: &Arc<Kept>, deadline: Instant) -> Result<Reading, Problem> {
+        if let Some(answer) = self.made_apart(kept, deadline).await? {
+            return Ok(Reading::Made(answer));
+        }
+        let held = self.rows(kept)?;
+        if let Keeping::Store { store, .. } = &self.keeping {
+            kept.gather(&held, store, &self.pool).await?;
+        }
+        Ok(Reading::Rows { gathered: kept.gathered(&held), held })
+    }
+
+    /// What a study has come to, where that takes long to be made of its rows: made once for all who ask meanwhile, and apart from their
+    /// requests, so that it goes on when the time of one of them is over.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
     pub async fn made_apart(&self, kept: &Arc<Kept>, deadline: Instant) -> Result<Option<StudyAnswer>, Problem> {
         if !kept.is_made_apart() {
-            if let Keeping::Store { store, .. } = &self.keeping {
-                kept.gather(store, &self.pool).await?;
-            }
             return Ok(None);
         }
         let making = {
             let mut making = kept.making.lock();
             match &*making {
                 Some(making) if kept.serves(making) => making.clone(),
-                _ => making.insert(self.making(kept)).clone(),
+                _ => making.insert(self.making(kept)?).clone(),
             }
         };
         let made = tokio::time::timeout_at(deadline, making).await.map_err(|_| {
@@ -648,7 +831,8 @@ impl Studies {
         Ok(Some(made.answer.clone()))
     }
 
-    fn making(&self, kept: &Arc<Kept>) -> Making {
+    fn making(&self, kept: &Arc<Kept>) -> Result<Making, Problem> {
+        let rows = self.rows(kept)?;
         let (kept, pool, room) = (Arc::clone(kept), self.pool.clone(), self.room.clone());
         let store = match &self.keeping {
             Keeping::Store { store, .. } => Some(store.clone()),
@@ -656,18 +840,18 @@ impl Studies {
         };
         let made = async move {
             if let Some(store) = &store {
-                kept.gather(store, &pool).await?;
+                kept.gather(&rows, store, &pool).await?;
             }
-            let gathered = kept.gathered.lock().clone();
+            let gathered = kept.gathered(&rows);
             let make = move || {
-                let _held = room.reserve(kept.stored_bytes())?;
+                let _held = (rows, room.reserve(kept.study.stored_bytes())?);
                 let (answer, is_whole) = (gathered.answer(), gathered.is_complete());
                 Ok(Arc::new(Made { answer, is_whole, at: Instant::now() }))
             };
             pool.run_unhurried(make).await
         };
         let made = tokio::spawn(made.in_current_span());
-        made.map(|joined| joined.unwrap_or_else(|error| Err(Problem::internal(&error)))).boxed().shared()
+        Ok(made.map(|joined| joined.unwrap_or_else(|error| Err(Problem::internal(&error)))).boxed().shared())
     }
 
     /// What a store is served by in this process, until it closes: the workers where it is a file, and whoever forgets old studies and
@@ -704,7 +888,7 @@ impl Studies {
         };
         let forget = async {
             while !self.paused(EXPIRE).await {
-                match store.expire(*expiry).await {
+                match store.expire(expiry.saturating_add(*expiry / NOTE_SHARE)).await {
                     Ok(0) => {}
                     Ok(studies) => tracing::info!(studies, "forgotten, because nobody has asked for them for long"),
                     Err(error) => tracing::warn!(%error, "old studies could not be forgotten"),
@@ -736,12 +920,12 @@ impl Studies {
     fn run(&self, kept: &Arc<Kept>) {
         let cancelled = CancellationToken::new();
         *kept.cancelled.lock() = cancelled.clone();
-        kept.looked_at.store(kept.gathered.lock().variants(), Ordering::Relaxed);
+        kept.looked_at.store(kept.here(|gathered| gathered.variants()), Ordering::Relaxed);
         kept.stand(StudyState::Running, None);
         let deadline = Instant::now() + Duration::from_millis(self.limits.study_deadline_ms);
         let (kept, pool, limits) = (Arc::clone(kept), self.pool.clone(), self.limits);
         tokio::spawn(async move {
-            let missing: Vec<_> = kept.gathered.lock().missing().collect();
+            let missing: Vec<_> = kept.here(|gathered| gathered.missing().collect());
             let chunks = stream::iter(missing)
                 .map(|chunk| run_chunk(&pool, &kept, chunk))
                 .buffer_unordered(limits.max_concurrent_solves)
@@ -777,10 +961,10 @@ async fn run_chunk(pool: &Pool, kept: &Arc<Kept>, chunk: u64) -> Result<(), Prob
         counter!("toothwave_study_variants_total").increment(variants);
         kept.looked_at.fetch_add(variants, Ordering::Relaxed);
         if is_over {
-            let mut gathered = kept.gathered.lock();
-            gathered.add(chunk, rest.finish());
-            kept.impossible.store(gathered.refused(), Ordering::Relaxed);
-            drop(gathered);
+            kept.here(|gathered| {
+                gathered.add(chunk, rest.finish());
+                kept.impossible.store(gathered.refused(), Ordering::Relaxed);
+            });
             kept.state.send_modify(|_| {});
             return Ok(());
         }

@@ -21,6 +21,9 @@ pub enum AddressError {
     /// Command lines and logs are read by others.
     #[error("an address holds no password: give it in a file, or in a variable of its own")]
     HoldsPassword,
+    /// SQLite would take it for a database that ends with the process, or for an address of its own.
+    #[error("{0:?} is no path of a file")]
+    NoFile(String),
     /// As the reader of addresses says.
     #[error("no address of a PostgreSQL database: {0}")]
     Unreadable(String),
@@ -30,10 +33,11 @@ impl Address {
     /// The address that a text means: `postgres://…`, or the path of a file.
     ///
     /// # Errors
-    /// Where it holds a password, which whoever lists processes could read, or is none.
+    /// Where it holds a password, which whoever lists processes could read, or is none, as the empty text is none.
     pub fn new(text: &str, password: Option<&str>) -> Result<Self, AddressError> {
         let Some(rest) = text.strip_prefix("postgres://").or_else(|| text.strip_prefix("postgresql://")) else {
-            return Ok(Self::File(text.into()));
+            let is_path = !text.is_empty() && text != ":memory:" && !text.starts_with("file:");
+            return if is_path { Ok(Self::File(text.into())) } else { Err(AddressError::NoFile(text.into())) };
         };
         let (place, query) = rest.split_once('?').unwrap_or((rest, ""));
         let user = place.split('/').next().and_then(|authority| authority.rsplit_once('@')).map(|(user, _)| user);

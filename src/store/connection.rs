@@ -68,8 +68,8 @@ pub enum StoreError {
     #[error("the studies' store fails: {0}")]
     Failed(#[from] sqlx::Error),
     /// It was silent for too long.
-    #[error("the studies' store did not answer within {} s", PATIENCE.as_secs())]
-    Silent,
+    #[error("the studies' store did not answer within {} s", .0.as_secs())]
+    Silent(Duration),
     /// The database has another schema than this build works with.
     #[error("the studies' store has schema {found}, and this build works with {}: {}", crate::SCHEMA_VERSION, if *found < crate::SCHEMA_VERSION { "`toothwave migrate` brings it there" } else { "a newer build is needed" })]
     OtherSchema {
@@ -160,24 +160,28 @@ impl Store {
         &self.address
     }
 
-    /// What is done with a connection, within the patience that one has with a silent server. What a connection was left in the middle of,
-    /// by an error or by whoever waits no longer, is undone: that of a file by its pool, a server's by closing it.
+    /// What is done with a connection, within the patience that one has for it, the wait for the connection included; but for that nobody
+    /// waits longer than one does for a silent server. What a connection was left in the middle of, by an error or by whoever waits no
+    /// longer, is undone: that of a file by its pool, a server's by closing it.
     pub(crate) async fn with<T>(
         &self,
         patience: Duration,
         job: impl AsyncFnOnce(&mut Connection) -> Result<T, StoreError>,
     ) -> Result<T, StoreError> {
-        let connection = within(patience, async {
-            Ok(match &self.database {
-                Database::File { pool, .. } => Connection::File(pool.acquire().await?),
-                Database::Server { pool, .. } => Connection::Server(pool.acquire().await?),
+        within(patience, async {
+            let connection = within(PATIENCE, async {
+                Ok(match &self.database {
+                    Database::File { pool, .. } => Connection::File(pool.acquire().await?),
+                    Database::Server { pool, .. } => Connection::Server(pool.acquire().await?),
+                })
             })
+            .await?;
+            let mut borrowed = Borrowed { connection, is_at_rest: false };
+            let done = job(&mut borrowed.connection).await;
+            borrowed.is_at_rest = done.is_ok();
+            done
         })
-        .await?;
-        let mut borrowed = Borrowed { connection, is_at_rest: false };
-        let done = within(patience, job(&mut borrowed.connection)).await;
-        borrowed.is_at_rest = done.is_ok();
-        done
+        .await
     }
 
     /// Closes all connections: a file is free for others then.
@@ -211,7 +215,7 @@ pub(crate) async fn within<T>(
     patience: Duration,
     future: impl Future<Output = Result<T, StoreError>>,
 ) -> Result<T, StoreError> {
-    tokio::time::timeout(patience, future).await.unwrap_or(Err(StoreError::Silent))
+    tokio::time::timeout(patience, future).await.unwrap_or(Err(StoreError::Silent(patience)))
 }
 
 /// A new file is its owner's alone, and so is what SQLite puts beside it: it holds designs. One that is there keeps the mode that it was

@@ -28,7 +28,7 @@ pub const MOST_ATTEMPTS: u64 = 3;
 const BATCH_CHUNKS: u64 = 256;
 
 /// What a single operation may take: a server that cannot be reached says nothing.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(15);
+pub const PATIENCE: Duration = Duration::from_secs(15);
 
 /// For what touches every chunk of a study, of which there may be a million.
 pub(crate) const LONG_PATIENCE: Duration = Duration::from_secs(120);

@@ -1,6 +1,6 @@
 //! The tables, in versions that follow each other.
 
-use crate::connection::{Connection, Store, StoreError, on};
+use crate::connection::{Connection, Store, StoreError, on, within};
 use crate::{LONG_PATIENCE, PATIENCE, read, stored};
 
 /// The version that this build works with.
@@ -123,9 +123,9 @@ impl Store {
     }
 }
 
-/// That this connection leads to the schema of this build.
+/// That this connection leads to the schema of this build: short, so that for whatever follows nobody waits long for a silent server.
 pub(crate) async fn require_schema(connection: &mut Connection) -> Result<(), StoreError> {
-    match version(connection).await {
+    match within(PATIENCE, version(connection)).await {
         Ok(found) if found == SCHEMA_VERSION => Ok(()),
         Ok(found) => Err(StoreError::OtherSchema { found }),
         // PostgreSQL's word for a table that is not there.

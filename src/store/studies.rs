@@ -62,6 +62,8 @@ pub struct Standing {
     pub refused: u64,
     /// Chunks without one.
     pub gaps: Vec<Gap>,
+    /// Since it was last asked for, as far as that was noted.
+    pub unasked: Duration,
 }
 
 impl Standing {
@@ -125,10 +127,11 @@ pub struct Figures {
     pub oldest: Duration,
 }
 
-type StudyRow = (String, String, String, String, i64, i64, i64, i64, i64, i64, String, i64, bool, i64);
+type StudyRow = (String, String, String, String, i64, i64, i64, i64, i64, i64, String, i64, bool, i64, i64);
 
 const STUDY: &str = "SELECT id, kind, build, document, max_states, max_profile_points, variants, chunk_variants, chunks, canary_variants,
-    canary, lease_ms, is_cancelled, CAST(ends_at_s - unixepoch() AS BIGINT) FROM studies WHERE id = $1";
+    canary, lease_ms, is_cancelled, CAST(ends_at_s - unixepoch() AS BIGINT), CAST(unixepoch() - asked_at_s AS BIGINT)
+    FROM studies WHERE id = $1";
 
 /// Those that wait for workers; of studies that are done no chunk is left.
 const WAITING: &str = "SELECT id, build FROM studies WHERE NOT is_cancelled AND ends_at_s > unixepoch()
@@ -140,7 +143,7 @@ impl Store {
     /// # Errors
     /// Where the store does not answer, or has another schema.
     pub async fn create(&self, study: &NewStudy) -> Result<(), StoreError> {
-        self.with(LONG_PATIENCE, async |connection| {
+        self.with(PATIENCE, async |connection| {
             require_schema(connection).await?;
             let time_s = stored(study.time.as_secs());
             on!(connection, inner => {
@@ -206,7 +209,7 @@ impl Store {
     /// # Errors
     /// As [`Self::create`].
     pub async fn resume(&self, id: &str, time: Duration) -> Result<(), StoreError> {
-        self.with(LONG_PATIENCE, async |connection| {
+        self.with(PATIENCE, async |connection| {
             require_schema(connection).await?;
             begin(connection).await?;
             let time_s = stored(time.as_secs());
@@ -266,7 +269,7 @@ impl Store {
 
     /// A statement about one study.
     async fn once(&self, text: &'static str, id: &str) -> Result<(), StoreError> {
-        self.with(LONG_PATIENCE, async |connection| {
+        self.with(PATIENCE, async |connection| {
             require_schema(connection).await?;
             on!(connection, inner => sqlx::query(text).bind(id).execute(inner).await.map(|_| ()))?;
             Ok(())
@@ -282,8 +285,7 @@ impl Store {
         self.with(LONG_PATIENCE, async |connection| {
             require_schema(connection).await?;
             let text = "DELETE FROM studies WHERE asked_at_s <= unixepoch() - $1
-                AND (is_cancelled OR ends_at_s <= unixepoch() OR (opened = chunks AND NOT EXISTS (SELECT 1 FROM chunks WHERE study = id))
-                    OR NOT EXISTS (SELECT 1 FROM attempts WHERE study = id AND began_at_s > unixepoch() - $1))";
+                AND NOT EXISTS (SELECT 1 FROM attempts WHERE study = id AND began_at_s > unixepoch() - $1)";
             let unasked_for_s = stored(unasked_for.as_secs());
             let gone = on!(connection, inner => {
                 sqlx::query(text).bind(unasked_for_s).execute(inner).await.map(|done| done.rows_affected())
@@ -322,9 +324,9 @@ impl Store {
                 .await
             })?;
             let gaps = gaps.into_iter().map(|(chunk, attempts)| Gap { chunk: read(chunk), attempts: read(attempts) });
-            let (study, is_cancelled) = study(row);
+            let (study, is_cancelled, unasked) = study(row);
             let (done, looked_at, refused) = (read(done), read(looked_at), read(refused));
-            Ok(Some(Standing { study, is_cancelled, done, looked_at, refused, gaps: gaps.collect() }))
+            Ok(Some(Standing { study, is_cancelled, done, looked_at, refused, gaps: gaps.collect(), unasked }))
         })
         .await
     }
@@ -444,9 +446,9 @@ pub(crate) async fn commit(connection: &mut Connection) -> Result<(), StoreError
     Ok(())
 }
 
-fn study(row: StudyRow) -> (NewStudy, bool) {
+fn study(row: StudyRow) -> (NewStudy, bool, Duration) {
     #[rustfmt::skip]
-    let (id, kind, build, document, max_states, max_profile_points, variants, chunk_variants, chunks, canary_variants, canary, lease_ms, is_cancelled, left_s) = row;
+    let (id, kind, build, document, max_states, max_profile_points, variants, chunk_variants, chunks, canary_variants, canary, lease_ms, is_cancelled, left_s, unasked_s) = row;
     let study = NewStudy {
         id,
         kind,
@@ -462,5 +464,5 @@ fn study(row: StudyRow) -> (NewStudy, bool) {
         lease: Duration::from_millis(read(lease_ms)),
         time: Duration::from_secs(read(left_s)),
     };
-    (study, is_cancelled)
+    (study, is_cancelled, Duration::from_secs(read(unasked_s)))
 }

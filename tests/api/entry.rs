@@ -51,6 +51,11 @@ fn a_keys_file_without_a_key_or_with_something_else_is_refused() {
 }
 
 #[test]
+fn a_keys_file_that_never_ends_is_refused() {
+    assert!(Keys::read("/dev/zero").unwrap_err().contains("at most"));
+}
+
+#[test]
 fn all_that_is_wrong_with_the_settings_is_said_at_once() {
     let output = Command::new(env!("CARGO_BIN_EXE_toothwave"))
         .args(["serve", "--listen", "127.0.0.1:0"])

@@ -456,6 +456,38 @@ fn a_requests_line_names_its_problem_its_key_its_caller_and_what_became_of_its_a
 }
 
 #[test]
+fn a_request_whose_client_leaves_before_its_answer_has_a_line_too() {
+    let log = scratch("leaver");
+    let process = Process::logging(&["serve"], File::create(&log).unwrap().into());
+    let over = json!({
+        "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.0, "steps": 1000 },
+        "/load/input_torque_nm": { "min": 10.0, "max": 20.0, "steps": 1000 }
+    });
+    let study =
+        json!({ "study": "map", "base": shortest(), "over": over, "quantities": ["peak_stress_ring_mpa"] }).to_string();
+    let mut client = TcpStream::connect(process.address).unwrap();
+    let head = "POST /v1/studies HTTP/1.1\r\nhost: localhost\r\nprefer: wait=600\r\nx-request-id: leaver\r\ncontent-type: application/json";
+    write!(client, "{head}\r\ncontent-length: {}\r\n\r\n{study}", study.len()).unwrap();
+    // It is waited for as soon as it runs.
+    let begun =
+        || ask_at(process.address, &Question::of("GET", "/metrics")).text().contains("toothwave_studies_running 1");
+    while !begun() {}
+    drop(client);
+    let has_line = || std::fs::read_to_string(&log).unwrap().lines().any(|line| line.contains("leaver"));
+    while !has_line() {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    process.signalled("-TERM");
+    assert_eq!(process.ended().code(), Some(0));
+    let requests = requests_in(&log);
+    let left: Vec<_> = requests.iter().filter(|line| line["span"]["id"] == "leaver").collect();
+    let [line] = left.as_slice() else { panic!("{left:?}") };
+    let fields = &line["fields"];
+    assert_eq!((&fields["method"], &fields["route"]), (&json!("POST"), &json!("/v1/studies")));
+    assert_eq!((&fields["status"], &fields["is_whole"]), (&Value::Null, &json!(false)));
+}
+
+#[test]
 fn keys_are_read_again_when_the_process_is_told_so_and_a_file_that_is_wrong_changes_nothing() {
     let file = scratch("keys");
     let ((old, old_line), (new, new_line)) = (new_key("old").unwrap(), new_key("new").unwrap());

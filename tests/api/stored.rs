@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use futures_util::future::join_all;
 use serde_json::{Value, json};
+use sqlx::{Connection as _, SqliteConnection};
 use tokio::task::JoinHandle;
 use toothwave::config::Limits;
 use toothwave::parts::Parts;
@@ -14,7 +15,7 @@ use toothwave::problem::ProblemCode;
 use toothwave::studies::Keeping;
 use toothwave_store::{Address, Claim, Figures, NewStudy, Store};
 
-use crate::asking::{Answer, LIMITS, Question, Service};
+use crate::asking::{Answer, LIMITS, Occupied, Question, Service};
 use crate::designs::shortest;
 
 const EXPIRY: Duration = Duration::from_secs(3600);
@@ -204,14 +205,139 @@ async fn no_more_stored_studies_run_than_may_however_many_are_asked_for_at_once(
     keeper.end().await;
 }
 
+/// All that is asked of a study but its result.
+async fn is_seen_and_deleted(service: &Service, study: &Value) {
+    let place = place(study);
+    assert_eq!(service.get(&place).await.found()["id"], study["id"]);
+    assert_eq!(service.ask(&Question::of("DELETE", &place)).await.status, 204);
+    let events = service.get(&format!("{place}/events")).await;
+    assert_eq!((events.status, events.text().starts_with("event: end")), (200, true));
+    assert_eq!(service.ask(&Question::of("DELETE", &place)).await.status, 204);
+    service.get(&place).await.refused(404, "not_found");
+}
+
+/// Each takes 17 kB with its result.
 #[tokio::test]
-async fn a_stored_study_that_finds_no_room_does_not_run() {
+async fn stored_studies_are_seen_read_and_deleted_from_every_replica_whatever_runs_and_whatever_it_takes() {
+    let file = File::new();
+    let limits = Limits { max_study_bytes: 30_000, ..LIMITS };
+    let keeper = Keeper::of(&file, limits, false).await;
+    let of_store = |store: &Store| Keeping::Store { store: store.clone(), expiry: EXPIRY, parts: None };
+    let replicas = [&keeper.service, &Service::keeping(limits, of_store(&keeper.store))];
+    let mut studies = Vec::new();
+    for (steps, replica) in (5..).zip([replicas[0], replicas[1], replicas[0]]) {
+        let answer = replica.ask(&Question::post("/v1/studies", map(steps).to_string())).await;
+        assert_eq!(answer.status, 202, "{}", answer.text());
+        studies.push(answer.json());
+    }
+    for (study, replica) in studies.iter().flat_map(|study| replicas.map(|replica| (study, replica))) {
+        assert_eq!(replica.get(&place(study)).await.found()["state"], "running");
+        let result = replica.get(&format!("{}/result", place(study))).await.found();
+        assert_eq!(result["is_complete"], false);
+    }
+    for (study, replica) in studies.iter().zip([replicas[1], replicas[0], replicas[1]]) {
+        is_seen_and_deleted(replica, study).await;
+    }
+    keeper.end().await;
+}
+
+#[tokio::test]
+async fn a_stored_study_outlives_limits_that_became_smaller() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, true).await;
+    let done = keeper.wait_for(&map(5)).await;
+    keeper.end().await;
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    let running = keeper.ask(&map(6)).await.json();
+    keeper.end().await;
+    let keeper = Keeper::of(&file, Limits { max_study_bytes: 1000, ..LIMITS }, false).await;
+    assert_eq!(keeper.service.get(&format!("{}/result", place(&done))).await.found(), done["result"]);
+    is_seen_and_deleted(&keeper.service, &running).await;
+    keeper.end().await;
+}
+
+#[tokio::test]
+async fn unread_answers_keep_nobody_from_seeing_a_stored_study_or_deleting_it() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    // Of which nothing needs to be computed: 336 kB.
+    let study = keeper.ask(&map(10_000)).await.json();
+    keeper.end().await;
+    let keeper = Keeper::of(&file, Limits { max_unread_bytes: 1_000_000, ..LIMITS }, false).await;
+    let _unread = keeper.service.app.room.reserve(900_000).unwrap();
+    keeper.service.get(&format!("{}/result", place(&study))).await.refused(503, "too_many_unread_bytes");
+    is_seen_and_deleted(&keeper.service, &study).await;
+    keeper.end().await;
+}
+
+/// One at a time has room.
+#[tokio::test]
+async fn of_stored_studies_a_result_alone_waits_until_others_are_read() {
     let file = File::new();
     let keeper = Keeper::of(&file, Limits { max_study_bytes: 30_000, ..LIMITS }, false).await;
-    assert_eq!(keeper.ask(&map(5)).await.status, 202);
-    keeper.ask(&map(6)).await.refused(503, "queue_full");
-    assert_eq!(keeper.store.waiting().await.unwrap().len(), 1);
-    assert_eq!(keeper.store.figures().await.unwrap().studies, 1);
+    let (one, other) = (keeper.ask(&map(5)).await.json(), keeper.ask(&map(6)).await.json());
+    let studies = &keeper.service.app.studies;
+    let kept = studies.find(one["id"].as_str().unwrap()).await.unwrap().unwrap();
+    let reading = studies.read(&kept, keeper.service.app.pool.deadline()).await.unwrap();
+    let result = format!("{}/result", place(&other));
+    let problem = keeper.service.get(&result).await.refused(503, "queue_full");
+    let detail = problem["detail"].as_str().unwrap();
+    assert!(detail.contains("being read") && detail.contains("max_study_bytes"), "{detail}");
+    assert_eq!(keeper.service.get(&place(&other)).await.found()["state"], "running");
+    drop(reading);
+    assert_eq!(keeper.service.get(&result).await.found()["is_complete"], false);
+    keeper.end().await;
+}
+
+/// The file as it is when so much more time has passed since anything was asked or computed.
+async fn aged(file: &File, time: Duration) {
+    let mut later = SqliteConnection::connect(&format!("sqlite:{}", file.0.display())).await.unwrap();
+    for (table, column) in [("studies", "asked_at_s"), ("attempts", "began_at_s")] {
+        let text = format!("UPDATE {table} SET {column} = {column} - {}", time.as_secs());
+        sqlx::raw_sql(sqlx::AssertSqlSafe(text)).execute(&mut later).await.unwrap();
+    }
+    later.close().await.unwrap();
+}
+
+#[tokio::test]
+async fn who_reads_a_stored_study_in_whatever_way_keeps_it_from_expiring() {
+    for read in ["", "/result", "/events"] {
+        let file = File::new();
+        let keeper = Keeper::of(&file, LIMITS, true).await;
+        let (asked, left) = (keeper.wait_for(&map(5)).await, keeper.wait_for(&map(6)).await);
+        keeper.end().await;
+        aged(&file, 2 * EXPIRY).await;
+        let keeper = Keeper::of(&file, LIMITS, false).await;
+        assert_eq!(keeper.service.get(&format!("{}{read}", place(&asked))).await.status, 200);
+        assert_eq!(keeper.store.expire(EXPIRY).await.unwrap(), 1, "{read}");
+        assert_eq!(keeper.service.get(&place(&asked)).await.found()["state"], "done");
+        keeper.service.get(&place(&left)).await.refused(404, "not_found");
+        keeper.end().await;
+    }
+}
+
+/// Those that need a turn of computing for it wait for one; nobody waits for them.
+#[tokio::test]
+async fn who_begins_a_stored_study_waits_for_no_other_that_begins() {
+    let file = File::new();
+    let limits = Limits { max_concurrent_solves: 1, deadline_ms: 10_000, ..LIMITS };
+    let keeper = Keeper::of(&file, limits, false).await;
+    let study = keeper.ask(&map(5)).await.json();
+    assert_eq!(keeper.service.ask(&Question::of("DELETE", &place(&study))).await.status, 204);
+    let occupied = Occupied::by_one(&keeper.service.app.pool).await;
+    let (waiting, again) = (map(6), map(5));
+    let waits = keeper.ask(&waiting);
+    let begins = async {
+        // The other is on its way, and waits for its canary's turn.
+        tokio::time::sleep(Duration::from_millis(300)).await;
+        keeper.ask(&again).await
+    };
+    tokio::select! {
+        biased;
+        begun = begins => assert_eq!(begun.status, 202, "{}", begun.text()),
+        refused = waits => panic!("it waited for one that was refused: {}", refused.text()),
+    }
+    drop(occupied);
     keeper.end().await;
 }
 

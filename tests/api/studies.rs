@@ -193,6 +193,42 @@ async fn more_studies_than_may_run_are_refused_and_the_oldest_that_is_done_makes
 }
 
 #[tokio::test]
+async fn a_study_that_is_refused_makes_none_forgotten() {
+    let service = Service::within(Limits { max_concurrent_solves: 1, max_study_bytes: 100_000, ..LIMITS });
+    let (one, other) =
+        (waited_for(&service, &map(&shortest(), 5)).await, waited_for(&service, &map(&shortest(), 6)).await);
+    let occupied = Occupied::by_one(&service.app.pool).await;
+    // 58 kB each: beside one that runs, which is never forgotten, no other has room whatever is.
+    let running = begun(&service, &map(&shortest(), 1300)).await.json();
+    assert_eq!(running["state"], "running");
+    begun(&service, &map(&shortest(), 1301)).await.refused(503, "queue_full");
+    for kept in [&one, &other] {
+        assert_eq!(service.get(&place(kept)).await.status, 200, "it was there before");
+    }
+    // For what is admitted as many go as it takes, and no more.
+    assert_eq!(begun(&service, &map(&shortest(), 7)).await.status, 202);
+    service.get(&place(&one)).await.refused(404, "not_found");
+    assert_eq!(service.get(&place(&other)).await.status, 200);
+    occupied.end().await;
+}
+
+#[tokio::test]
+async fn a_study_that_unread_answers_leave_no_room_makes_none_forgotten() {
+    let service = Service::within(Limits { max_concurrent_solves: 1, max_unread_bytes: 1_000_000, ..LIMITS });
+    let occupied = Occupied::by_one(&service.app.pool).await;
+    // 336 kB, of which nothing needs to be computed.
+    let kept = begun(&service, &map(&shortest(), 10_000)).await.json();
+    assert_eq!(deleted(&service, &place(&kept)).await, 204);
+    let unread = service.app.room.reserve(600_000).unwrap();
+    begun(&service, &map(&shortest(), 20_000)).await.refused(503, "too_many_unread_bytes");
+    assert_eq!(service.get(&place(&kept)).await.found()["state"], "cancelled");
+    drop(unread);
+    assert_eq!(begun(&service, &map(&shortest(), 25_000)).await.status, 202);
+    service.get(&place(&kept)).await.refused(404, "not_found");
+    occupied.end().await;
+}
+
+#[tokio::test]
 async fn a_study_beyond_its_time_says_so_and_goes_on_when_it_is_asked_for_again() {
     let service = Service::within(Limits { study_deadline_ms: 0, ..LIMITS });
     let found = waited_for(&service, &long()).await;

@@ -9,7 +9,10 @@ use std::task::Poll;
 use std::time::Duration;
 
 use sqlx::{Connection as _, SqliteConnection};
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::net::TcpListener;
 use tokio::sync::RwLock;
+use tokio::time::Instant;
 use toothwave_store::{Address, AddressError, Claim, Gap, Lease, MOST_ATTEMPTS, NewStudy, Store, StoreError};
 
 const LEASE: Duration = Duration::from_secs(60);
@@ -340,6 +343,50 @@ async fn a_study_that_nobody_asks_for_and_nobody_computes_expires_though_it_wait
     .await;
 }
 
+/// The file's store as it is when so many seconds more have passed since anybody asked.
+async fn unasked_for(file: &File, seconds: u64) -> Store {
+    let mut later = SqliteConnection::connect(&format!("sqlite:{}", file.0.display())).await.unwrap();
+    let text = format!("UPDATE studies SET asked_at_s = asked_at_s - {seconds}");
+    sqlx::raw_sql(sqlx::AssertSqlSafe(text)).execute(&mut later).await.unwrap();
+    later.close().await.unwrap();
+    Store::open(&file.address()).await.unwrap()
+}
+
+#[tokio::test]
+async fn a_study_that_was_computed_of_late_does_not_expire_however_it_ended() {
+    let file = File::new();
+    let (done, cancelled) = (study("done", 1), study("stopped", 2));
+    let store = Store::open(&file.address()).await.unwrap();
+    for study in [&done, &cancelled] {
+        store.create(study).await.unwrap();
+        keep(&mut claimed(&store, study).await).await;
+    }
+    store.cancel(&cancelled.id).await.unwrap();
+    store.close().await;
+    let store = unasked_for(&file, 1000).await;
+    assert_eq!(store.expire(Duration::from_secs(500)).await.unwrap(), 0);
+    assert!(store.find(&done.id).await.unwrap().unwrap().is_done());
+    assert!(store.find(&cancelled.id).await.unwrap().unwrap().is_cancelled);
+}
+
+#[tokio::test]
+async fn a_study_says_how_long_nobody_has_asked_for_it_and_one_that_is_asked_for_does_not_expire() {
+    let file = File::new();
+    let (asked, left) = (study("asked", 1), study("left", 1));
+    let store = Store::open(&file.address()).await.unwrap();
+    store.create(&asked).await.unwrap();
+    store.create(&left).await.unwrap();
+    store.close().await;
+    let store = unasked_for(&file, 1000).await;
+    let standing = store.find(&asked.id).await.unwrap().unwrap();
+    assert!((1000..1100).contains(&standing.unasked.as_secs()), "{:?}", standing.unasked);
+    store.touch(&asked.id).await.unwrap();
+    assert!(store.find(&asked.id).await.unwrap().unwrap().unasked < Duration::from_secs(100));
+    assert_eq!(store.expire(Duration::from_secs(500)).await.unwrap(), 1);
+    assert!(store.find(&asked.id).await.unwrap().is_some());
+    assert_eq!(store.find(&left.id).await.unwrap(), None);
+}
+
 #[tokio::test]
 async fn what_was_kept_in_a_file_is_there_after_its_process() {
     let file = File::new();
@@ -400,6 +447,49 @@ async fn two_workers_share_a_server_and_a_lost_lease_is_somebody_elses() {
     one.forget(&study.id).await.unwrap();
 }
 
+/// A server that lets everybody in and says nothing more.
+async fn mute() -> Address {
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let address = listener.local_addr().unwrap();
+    tokio::spawn(async move {
+        while let Ok((mut client, _)) = listener.accept().await {
+            tokio::spawn(async move {
+                let mut asked = [0; 1024];
+                assert!(client.read(&mut asked).await.unwrap() > 0);
+                // AuthenticationOk and ReadyForQuery (PostgreSQL, frontend/backend protocol).
+                client.write_all(b"R\0\0\0\x08\0\0\0\0Z\0\0\0\x05I").await.unwrap();
+                while client.read(&mut asked).await.is_ok_and(|bytes| bytes > 0) {}
+            });
+        }
+    });
+    Address::new(&format!("postgres://nobody@{address}/studies?sslmode=disable"), None).unwrap()
+}
+
+#[tokio::test(start_paused = true)]
+async fn nobody_waits_longer_for_a_silent_server_than_is_said() {
+    let store = Store::open(&mute().await).await.unwrap();
+    let study = study("unheard", 1);
+    let id = &study.id;
+    let began = Instant::now();
+    let answers = tokio::join!(
+        store.create(&study),
+        store.touch(id),
+        store.cancel(id),
+        store.resume(id, LEASE),
+        store.forget(id),
+        async { store.find(id).await.map(drop) },
+        async { store.waiting().await.map(drop) },
+        async { store.figures().await.map(drop) },
+    );
+    let said = "did not answer within 15 s";
+    assert!(began.elapsed() < Duration::from_secs(16), "{:?}", began.elapsed());
+    let answers: [_; 8] = answers.into();
+    for answer in answers {
+        let error = answer.unwrap_err();
+        assert!(matches!(error, StoreError::Silent(_)) && error.to_string().contains(said), "{error}");
+    }
+}
+
 #[test]
 fn an_address_holds_no_password_and_shows_none() {
     for text in ["postgres://me:secret@db/studies", "postgresql://db/studies?sslmode=require&password=secret"] {
@@ -412,6 +502,15 @@ fn an_address_holds_no_password_and_shows_none() {
         ("postgres://db:5433/studies".into(), "postgres://db:5433/studies".into())
     );
     assert!(!Address::new("/var/lib/toothwave/studies.sqlite", None).unwrap().is_shared());
+}
+
+/// SQLite keeps what is in these nowhere, or elsewhere than it is said.
+#[test]
+fn an_address_of_no_file_and_no_server_is_refused() {
+    for text in ["", ":memory:", "file:studies?mode=memory"] {
+        assert_eq!(Address::new(text, None).unwrap_err(), AddressError::NoFile(text.into()));
+    }
+    assert!(Address::new("./file:studies", None).is_ok());
 }
 
 /// Polls a future so often at most; whether it came to an end.

@@ -72,7 +72,8 @@ pub async fn begin(State(app): State<Arc<App>>, request: Request) -> Response {
     params(("id" = String, Path, description = "As the study's `id`.")),
     responses(
         (status = 200, description = "It.", body = StudyResource),
-        (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json")
+        (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
+        (status = 503, description = "The store of studies does not answer, or the study could not be looked at in time; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
     )
 )]
 pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
@@ -90,7 +91,8 @@ pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRej
     params(("id" = String, Path, description = "As the study's `id`.")),
     responses(
         (status = 204, description = "It does not run any more, or is forgotten."),
-        (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json")
+        (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
+        (status = 503, description = "The store of studies does not answer, or the study could not be looked at in time; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
     )
 )]
 pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
@@ -115,7 +117,7 @@ pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRe
         (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
         (status = 406, description = "No representation that the client accepts.", body = Problem, content_type = "application/problem+json"),
         (status = 500, description = "A fault of the service itself.", body = Problem, content_type = "application/problem+json"),
-        (status = 503, description = "The service is full, or the deadline stopped the computation; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
+        (status = 503, description = "The service is full, results that are being read leave this one no room, the deadline stopped the computation, or the store of studies does not answer; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
     )
 )]
 pub async fn result(
@@ -159,7 +161,8 @@ pub enum EventName {
     params(("id" = String, Path, description = "As the study's `id`.")),
     responses(
         (status = 200, description = "The events; they end when the study does.", body = StudyEvent, content_type = "text/event-stream"),
-        (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json")
+        (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
+        (status = 503, description = "The store of studies does not answer, or the study could not be looked at in time; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
     )
 )]
 pub async fn events(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
@@ -217,7 +220,7 @@ async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Respons
     // Its choices stand for hundreds of designs, so that a document of 64 KB may take long to be read.
     let (question, limits) = (body.clone(), app.limits.of_studies());
     let study = app.pool.run_aside(deadline, move || Ok(Study::read(&question, &limits)?)).await?;
-    let kept = app.studies.begin(study, &body).await?;
+    let kept = app.studies.begin(study, &body, deadline).await?;
     let wait = wait_wanted(&headers);
     if let Some(wait) = wait {
         let wait_until = deadline.min(tokio::time::Instant::now() + wait);
@@ -270,12 +273,11 @@ async fn written_apart<A: Forms + Send>(
     representation: Representation,
     told: impl FnOnce(StudyAnswer) -> A + Send + 'static,
 ) -> Result<Response, Problem> {
-    let made = app.studies.made_apart(kept, app.pool.deadline()).await?;
-    let columns_bytes = if made.is_some() { 0 } else { kept.stored_bytes() };
-    let (room, study) = (app.room.clone(), Arc::clone(kept));
+    let reading = app.studies.read(kept, app.pool.deadline()).await?;
+    let (room, columns_bytes) = (app.room.clone(), reading.columns_bytes());
     let job = move |stop: &AtomicBool| {
         let reserved = room.reserve(columns_bytes)?;
-        let answer = made.unwrap_or_else(|| study.answer());
+        let answer = reading.answer();
         written(told(answer), representation, reserved, columns_bytes, Duration::ZERO, stop)
     };
     let stored = app.pool.run(app.pool.deadline(), Thread::Blocking, job).await?;
