@@ -267,7 +267,8 @@ pub async fn observe(State(app): State<Arc<App>>, request: Request, next: Next) 
     }
     let elapsed_ms = 1e3 * elapsed.as_secs_f64();
     response.map(|body| {
-        let is_whole = body.is_end_stream();
+        // Of HEAD nobody asks for the body.
+        let is_whole = method == "HEAD" || body.is_end_stream();
         let sent_bytes = 0;
         let completion = Completion {
             span,

@@ -440,11 +440,14 @@ fn a_requests_line_names_its_problem_its_key_its_caller_and_what_became_of_its_a
     let refused = ask_at(process.address, &asked.clone().with("traceparent", traceparent));
     refused.refused(400, "malformed_json");
     ask_at(process.address, &asked.with("traceparent", "no trace"));
+    let mut connection = TcpStream::connect(process.address).unwrap();
+    connection.write_all(b"HEAD /health/live HTTP/1.1\r\nhost: 127.0.0.1\r\nconnection: close\r\n\r\n").unwrap();
+    connection.read_to_end(&mut Vec::new()).unwrap();
     process.signalled("-TERM");
     assert_eq!(process.ended().code(), Some(0));
     std::fs::remove_file(&file).unwrap();
     let requests = requests_in(&log);
-    let [first, second] = requests.as_slice() else { panic!("{requests:?}") };
+    let [first, second, head] = requests.as_slice() else { panic!("{requests:?}") };
     assert_eq!(first["fields"]["problem"], "malformed_json");
     assert_eq!(
         (&first["fields"]["sent_bytes"], &first["fields"]["is_whole"]),
@@ -453,6 +456,7 @@ fn a_requests_line_names_its_problem_its_key_its_caller_and_what_became_of_its_a
     assert!(first["fields"]["completed_ms"].as_f64() >= first["fields"]["elapsed_ms"].as_f64());
     assert_eq!((&first["span"]["key"], &first["span"]["traceparent"]), (&json!("drawing office"), &json!(traceparent)));
     assert_eq!(second["span"]["traceparent"], Value::Null);
+    assert_eq!((&head["fields"]["sent_bytes"], &head["fields"]["is_whole"]), (&json!(0), &json!(true)));
 }
 
 #[test]
