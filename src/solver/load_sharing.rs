@@ -545,7 +545,7 @@ impl<'a> LoadedDrive<'a> {
         let corner = self.corner_at(&center.position);
         let flank = corner.map_or_else(|| flank_curve.at(&center), |corner| corner.seen_from(&center));
         let at_corner = corner.and_then(|_| force_ratio_at_corner(sense, &center, &flank));
-        let can_be_pressed = corner.is_none() || at_corner.is_some();
+        let can_be_pressed = corner.is_none() || (at_corner.is_some() && !self.has_left_slot(&center));
         let force_ratio = at_corner.unwrap_or_else(|| force_ratio(sense, flank_curve, &center));
         let weights = match corner {
             Some(_) => force_ratio,
@@ -642,10 +642,18 @@ impl<'a> LoadedDrive<'a> {
             }));
         }
         let center_radius_mm = center.center_radius_mm;
-        self.contacts.pressure(contact, curvature_per_mm, center_radius_mm)?.ok_or_else(|| {
+        let pressure = self.contacts.pressure(contact, curvature_per_mm, center_radius_mm)?;
+        // Before the flank nothing presses such a tooth.
+        let unpressed = || self.corner_at(&center.position).and(self.flat()).map(|flat| Pressure::Flat(flat.whole()));
+        pressure.or_else(unpressed).ok_or_else(|| {
             let position_deg = center.position.from_lobe_deg();
             SolveError::FlatOffCarrier { position_deg, center_radius_mm }
         })
+    }
+
+    /// Whether a tooth's flat lies outside its slot's walls.
+    fn has_left_slot(&self, center: &ToothCenter) -> bool {
+        self.flat().is_some_and(|flat| flat.borne_mm(center.center_radius_mm) <= 0.0)
     }
 
     /// The pressure at the middle of each contact of a tooth, summed along its way over the part: what wears it (docs/theory.md

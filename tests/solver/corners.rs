@@ -444,6 +444,41 @@ fn a_tooth_that_is_past_the_corner_and_farther_out_carries_nothing() {
     }
 }
 
+/// A bore has taken so much of the flank, and gaps are so wide, that no tooth comes to it before others carry at their corners.
+#[test]
+fn where_corners_alone_carry_there_is_an_answer_without_stress_at_the_ring() {
+    let bored = DriveParameters { installed: 80, tip_radius_mm: Some(53.2), ..PAPER_5_2 };
+    let gaps = PerContact { ring: 50.0, ..PerContact::default() };
+    let load = LoadParameters {
+        clearance_um: gaps,
+        ring_teeth_bend: true,
+        wave_generator_moves: true,
+        ..pressed_corners(0.3)
+    };
+    let found = swept(&bored, &load, 50);
+    assert!(found.peaks.ring.force_n.value > 100.0);
+    assert_eq!(found.peaks.ring.stress_mpa.value, 0.0);
+    assert!(found.torque_balance_residual < 1e-12 && found.period_closure_residual < 1e-9);
+}
+
+#[test]
+fn flats_that_have_left_their_slots_before_the_flank_carry_nothing() {
+    let flats = DriveParameters {
+        wave_generator: WaveGenerator::Ellipse { semi_major_mm: 51.0, semi_minor_mm: 49.0 },
+        tooth: ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 0.8 },
+        ..PAPER_5_2
+    };
+    let cylinders = DriveParameters { tooth: ToothShape::Cylinder { width_mm: 15.0 }, ..flats };
+    let carrying = |parameters: &DriveParameters| {
+        let states = swept(parameters, &pressed_corners(3.0), 40).states;
+        let farthest = states.position_deg.iter().zip(&states.force_n.wave_generator);
+        let farthest = farthest.filter(|(_, force_n)| **force_n > 0.0).map(|(position_deg, _)| *position_deg);
+        farthest.fold(0.0, f64::max)
+    };
+    let (of_flats, of_cylinders) = (carrying(&flats), carrying(&cylinders));
+    assert!((of_flats - of_cylinders).abs() < 1.0 && of_flats > 37.0, "{of_flats}, with cylinders {of_cylinders} deg");
+}
+
 #[test]
 fn corners_need_virtual_work() {
     let refused = LoadCase::new(&LoadParameters { corner_contact: true, ..load(3.0, Projection) });

@@ -163,6 +163,11 @@ impl Flat {
         FlatContact::new(borne_mm, self.width_mm)
     }
 
+    /// The contact over all of its length.
+    pub(crate) const fn whole(&self) -> FlatContact {
+        self.over(self.length_mm)
+    }
+
     /// How far it gives way under 1 N over so much of its length.
     pub(crate) fn compliance_mm_per_n(&self, borne_mm: f64) -> f64 {
         self.over(borne_mm).compliance_mm_per_n(self.modulus_mpa)
