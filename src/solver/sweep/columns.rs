@@ -513,7 +513,10 @@ fn period_closure(
         let loads = loaded.loads(tooth, &wind_up)?;
         for ((contact, peaks), (force_n, stress_mpa)) in peaks.iter().zip(loads[..3].iter().zip(&loads[3..])) {
             // Where corners alone press the teeth there is no stress at the ring.
-            let off = |found: f64, anew: f64, peak: f64| if found == anew { 0.0 } else { (found - anew).abs() / peak };
+            let off = |found: f64, anew: f64, peak: f64| {
+                let off = (found - anew).abs();
+                if off > 0.0 { off / peak } else { off }
+            };
             let off_force = off(states.force_n.get(contact)[state], *force_n, peaks.force_n.value);
             let off_stress = off(states.stress_mpa.get(contact)[state], *stress_mpa, peaks.stress_mpa.value);
             residual = worse(off_stress, worse(off_force, residual));
