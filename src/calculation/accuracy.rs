@@ -173,6 +173,15 @@ impl Question for Accuracy {
         }
     }
 
+    fn working_bytes(checked: &CheckedAccuracy) -> u64 {
+        // Eleven columns of doubles and two of numbers, of the longest way that is tried.
+        const STATE_BYTES: u64 = 11 * 8 + 2 * 4;
+        let CheckedAccuracy { drive, load, deviations, max_states, .. } = checked;
+        let mesh = load.mesh(drive, deviations);
+        let counts = SAMPLES.iter().filter_map(|&samples| Some(mesh.state_count(Samples::new(samples).ok()?)));
+        STATE_BYTES * counts.filter(|count| count <= max_states).max().unwrap_or(*max_states)
+    }
+
     fn answer(checked: &CheckedAccuracy, stop: &dyn Stop) -> Result<AccuracyAnswer, NoAnswer> {
         let CheckedAccuracy { drive, load, deviations, requested_error, max_states } = checked;
         let own = *load.parameters();

@@ -37,8 +37,13 @@ pub trait Question: Send + 'static {
     /// Names the fields at fault.
     fn check(&self, design: &Design, limits: &Limits) -> Result<Self::Checked, NoAnswer>;
 
-    /// Bytes that the answer's columns of numbers take, as far as that is known before it is there.
+    /// Bytes that the answer's columns of numbers take, as far as that is known before it is there, or about.
     fn columns_bytes(_checked: &Self::Checked) -> u64 {
+        0
+    }
+
+    /// About how many bytes solving takes besides, and has let go when the answer is there.
+    fn working_bytes(_checked: &Self::Checked) -> u64 {
         0
     }
 

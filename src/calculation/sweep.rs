@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use toothwave_solver::backing::{Backings, Shares};
 use toothwave_solver::losses::wear::WearParameters;
 use toothwave_solver::losses::{Friction, Mechanism, period};
+use toothwave_solver::mesh::Samples;
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self as solver, Points};
 use toothwave_solver::{
@@ -54,6 +55,19 @@ pub struct CheckedSweep {
 }
 
 impl CheckedSweep {
+    /// States of the answer. Of a sweep to a tolerance nobody knows how many they will be: some sixty input angles are usual.
+    fn expected_states(&self) -> u64 {
+        const USUAL_SAMPLES: u64 = 64;
+        let mesh = self.load().mesh(&self.drive, &self.deviations);
+        match self.points {
+            Points::Samples(samples) => mesh.state_count(samples),
+            Points::Tolerance(tolerance) => {
+                let usual = Samples::new(USUAL_SAMPLES).map_or(u64::MAX, |samples| mesh.state_count(samples));
+                usual.min(tolerance.max_states())
+            }
+        }
+    }
+
     /// The drive.
     pub const fn drive(&self) -> &Drive {
         &self.drive
@@ -218,7 +232,7 @@ impl Question for Sweep {
     }
 
     fn columns_bytes(checked: &CheckedSweep) -> u64 {
-        // Eleven columns of doubles and two of numbers; of a sweep to a tolerance nobody knows how long they will be.
+        // Eleven columns of doubles and two of numbers.
         const STATE_BYTES: u64 = 11 * 8 + 2 * 4;
         // Three columns of slips and one of words.
         const LOSSES_BYTES: u64 = 3 * 8 + 2;
@@ -226,16 +240,11 @@ impl Question for Sweep {
         const WEAR_BYTES: u64 = 3 * 8;
         let CheckedSweep { duty, friction, wear_rate_mm3_per_nm, .. } = checked;
         let of = |is_asked, bytes| if is_asked { bytes } else { 0 };
-        match checked.points {
-            Points::Samples(samples) => {
-                // With friction every point is swept, one after the other beside the hardest.
-                let sweeps = 1 + of(friction.is_some() && duty.points.len() > 1, 1);
-                let of_sweeps = sweeps * (STATE_BYTES + of(friction.is_some(), LOSSES_BYTES));
-                let of_wear = duty.points.len() as u64 * of(wear_rate_mm3_per_nm.is_some(), WEAR_BYTES);
-                (of_sweeps + of_wear) * checked.load().mesh(&checked.drive, &checked.deviations).state_count(samples)
-            }
-            Points::Tolerance { .. } => 0,
-        }
+        // With friction every point is swept, one after the other beside the hardest.
+        let sweeps = 1 + of(friction.is_some() && duty.points.len() > 1, 1);
+        let of_sweeps = sweeps * (STATE_BYTES + of(friction.is_some(), LOSSES_BYTES));
+        let of_wear = duty.points.len() as u64 * of(wear_rate_mm3_per_nm.is_some(), WEAR_BYTES);
+        (of_sweeps + of_wear) * checked.expected_states()
     }
 
     fn is_short(checked: &CheckedSweep) -> bool {

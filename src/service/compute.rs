@@ -165,7 +165,7 @@ impl Pool {
         self.limits.max_concurrent_batches - self.batches.available_permits()
     }
 
-    /// Runs a slice of a batch when its turn comes, however long that takes; its deadline begins then.
+    /// Runs a slice of a batch or a study when its turn comes, however long that takes; its deadline begins when it runs.
     ///
     /// # Errors
     /// As [`Self::run`], but for `queue_full`.
@@ -177,7 +177,9 @@ impl Pool {
             turn = Arc::clone(&self.turns).acquire_owned() => turn,
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
-        self.within(self.deadline(), self.run_holding(turn, Thread::Blocking, job)).await
+        // Behind the single solves that came before: each may take as long as a slice.
+        let permit = self.permit().await?;
+        self.within(self.deadline(), self.run_permitted((turn, permit), Thread::Blocking, job)).await
     }
 
     /// Runs what is no solve, and may yet take too long for the executor, on a thread of its own, one at a time: it waits for no solve.
@@ -225,12 +227,25 @@ impl Pool {
         on: Thread,
         job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
-        let permit = tokio::select! {
-            permit = Arc::clone(&self.permits).acquire_owned() => permit,
-            () = self.closed.cancelled() => return Err(shutting_down()),
-        };
+        let permit = self.permit().await?;
+        self.run_permitted((place, permit), on, job).await
+    }
+
+    async fn permit(&self) -> Result<impl Send + 'static, Problem> {
+        tokio::select! {
+            permit = Arc::clone(&self.permits).acquire_owned() => Ok(permit),
+            () = self.closed.cancelled() => Err(shutting_down()),
+        }
+    }
+
+    async fn run_permitted<T: Send + 'static>(
+        &self,
+        held: impl Send + 'static,
+        on: Thread,
+        job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
         if on == Thread::Executor {
-            let _held = (place, permit);
+            let _held = held;
             return caught(|| job(&AtomicBool::new(false)));
         }
         let mut stop = StopOnDrop { signal: Arc::default(), is_over: false };
@@ -238,7 +253,7 @@ impl Pool {
         // spawn_blocking loses the span, and cannot be aborted: span, permit and place go along.
         let span = Span::current();
         let running = tokio::task::spawn_blocking(move || {
-            let _held = (place, permit);
+            let _held = held;
             span.in_scope(|| caught(|| job(&signal)))
         });
         let finished = tokio::select! {
@@ -280,4 +295,46 @@ fn shutting_down() -> Problem {
         ProblemCode::ShuttingDown,
         "the service is stopping, and had no time left for this computation; ask again",
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc;
+    use std::time::Duration;
+
+    use clap::Parser as _;
+
+    use super::{Pool, Thread};
+    use crate::config::Settings;
+    use crate::problem::Problem;
+
+    #[derive(clap::Parser)]
+    struct Line {
+        #[command(flatten)]
+        settings: Settings,
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_slice_that_waits_behind_others_for_longer_than_a_solve_may_take_still_runs() {
+        let Line { settings } = Line::parse_from(["serve", "--max-concurrent-solves", "1", "--deadline-ms", "1000"]);
+        let pool = Pool::new(settings.limits());
+        let (release, released) = mpsc::channel::<()>();
+        let other = pool.clone();
+        let held = tokio::spawn(async move {
+            let wait = move |_: &_| released.recv().map_err(|error| Problem::internal(&error));
+            other.run_while_wanted(Thread::Blocking, wait).await
+        });
+        while pool.running() == 0 {
+            tokio::task::yield_now().await;
+        }
+        let waiting = pool.clone();
+        let slice = tokio::spawn(async move { waiting.run_in_turn(|_| Ok(())).await });
+        while pool.turns.available_permits() > 0 {
+            tokio::task::yield_now().await;
+        }
+        tokio::time::advance(Duration::from_secs(10)).await;
+        assert!(release.send(()).is_ok());
+        assert!(held.await.is_ok_and(|done| done.is_ok()));
+        assert!(slice.await.is_ok_and(|done| done.is_ok()));
+    }
 }

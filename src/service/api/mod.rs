@@ -215,8 +215,9 @@ fn solve<Q: Question>(
     let columns_bytes = Q::columns_bytes(checked);
     let Representation { format, gzip } = representation;
     let text_bytes = if is_long(format) { columns_bytes * if gzip { 1 } else { 2 } } else { 0 };
-    let reserved = room.reserve(columns_bytes + text_bytes)?;
+    let mut reserved = room.reserve(columns_bytes + text_bytes + Q::working_bytes(checked))?;
     let answer = Q::answer(checked, stop)?;
+    reserved.hold_at_most(columns_bytes + text_bytes);
     written(answer, representation, reserved, columns_bytes, started.elapsed(), stop)
 }
 
@@ -393,6 +394,7 @@ mod tests {
     use flate2::Compression;
     use flate2::write::GzEncoder;
 
+    use toothwave_calculation::accuracy::Accuracy;
     use toothwave_calculation::design::Design;
     use toothwave_calculation::drawing::Drawing;
     use toothwave_calculation::drawing::answer::DrawnPart;
@@ -402,8 +404,9 @@ mod tests {
     use toothwave_calculation::sweep::Sweep;
 
     use super::{Growing, LOOK_EVERY_BYTES, Stoppable, solve};
+    use crate::cache::Stored;
     use crate::negotiation::Representation;
-    use crate::problem::ProblemCode;
+    use crate::problem::{Problem, ProblemCode};
     use crate::room::Room;
 
     /// The bytes of an answer, where so much room is left.
@@ -431,6 +434,25 @@ mod tests {
             let text_bytes = solved(1 << 30).unwrap_or_else(|code| panic!("{name}: {code:?}"));
             assert_eq!(solved(text_bytes + text_bytes / 10), Err(ProblemCode::TooManyUnreadBytes), "{name}");
         }
+    }
+
+    /// Whoever is told to stop at once does not come to solving.
+    #[test]
+    fn what_is_computed_without_a_number_of_states_takes_its_room_before() {
+        let document = r#"{ "drive": { "wave_generator": { "semi_major_mm": 1600, "semi_minor_mm": 1599 },
+            "teeth": { "count": 800, "radius_mm": 4, "width_mm": 15 }, "ring": { "teeth": 798 } },
+            "load": { "input_torque_nm": 20 }, "sweep": { "tolerance": 1e-6 } }"#;
+        let design = Design::read(document.as_bytes()).expect("a design");
+        let limits = Limits { max_states: 1_000_000, max_profile_points: 1_000_000 };
+        let room = Room::new(1 << 20);
+        let _others = room.reserve(1 << 19).expect("room");
+        let code = |solved: Result<_, Problem>| solved.map(|_: Stored| ()).map_err(|problem| problem.code);
+        let json = Representation::JSON;
+        let sweep = Sweep.check(&design, &limits).expect("a possible one");
+        let accuracy = Accuracy.check(&design, &limits).expect("a possible one");
+        let stop = AtomicBool::new(true);
+        assert_eq!(code(solve::<Sweep>(&sweep, json, &room, &stop)), Err(ProblemCode::TooManyUnreadBytes));
+        assert_eq!(code(solve::<Accuracy>(&accuracy, json, &room, &stop)), Err(ProblemCode::TooManyUnreadBytes));
     }
 
     /// It has two texts for each pole of its curves, at the bottom and at the top, to know them again.
