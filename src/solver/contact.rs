@@ -204,7 +204,8 @@ impl HertzLine {
 
 /// Half the width of a line contact, `2F/(π L1 σ)`.
 pub fn half_width_mm(force_n: f64, stress_mpa: f64, tooth_width_mm: f64) -> f64 {
-    2.0 * force_n / (PI * tooth_width_mm * stress_mpa)
+    // At a corner a force is borne of which no stress is told.
+    if stress_mpa > 0.0 { 2.0 * force_n / (PI * tooth_width_mm * stress_mpa) } else { 0.0 }
 }
 
 /// The largest shear stress below a line contact, over its largest pressure: `τ/σ = ζ - ζ²/√(1 + ζ²)` at the depth ζ in half-widths,
