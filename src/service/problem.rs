@@ -227,7 +227,7 @@ impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
         tracing::warn!(%error, "the studies' store fails");
         let detail = match error {
-            StoreError::OtherSchema { .. } => error.to_string(),
+            StoreError::OtherSchema { .. } | StoreError::InWork => error.to_string(),
             _ => "the studies' store does not answer as it should; try again in a moment".into(),
         };
         Self::new(ProblemCode::StoreUnavailable, detail)

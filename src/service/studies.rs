@@ -772,6 +772,8 @@ impl Studies {
     /// Where the store does not answer.
     pub async fn cancel_or_forget(&self, kept: &Arc<Kept>) -> Result<(), Problem> {
         if let Keeping::Store { store, .. } = &self.keeping {
+            // Another process may have cancelled it since.
+            kept.look(store).await?;
             if kept.is_running() {
                 store.cancel(&kept.id).await?;
                 kept.stand(StudyState::Cancelled, None);

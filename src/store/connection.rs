@@ -81,6 +81,9 @@ pub enum StoreError {
         "another process has the studies' file {0}: a file serves one process; several of them share a PostgreSQL database"
     )]
     InUse(String),
+    /// A worker has a chunk in its hands, and does not let go.
+    #[error("a worker computes a chunk of the study and does not let go of it; try again once its lease is over")]
+    InWork,
     /// A file knows no workers elsewhere.
     #[error("{0} is a file, which serves one process: workers share a PostgreSQL database")]
     NotShared(String),

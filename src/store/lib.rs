@@ -33,6 +33,12 @@ pub const PATIENCE: Duration = Duration::from_secs(15);
 /// For what touches every chunk of a study, of which there may be a million.
 pub(crate) const LONG_PATIENCE: Duration = Duration::from_secs(120);
 
+/// How long a study that is to be forgotten waits for those who compute it to let go. Who sees that it was cancelled does within a second or so.
+const LETTING_GO: Duration = Duration::from_secs(5);
+
+/// Between two tries of it.
+const LOOK_AGAIN: Duration = Duration::from_millis(250);
+
 /// A number as both databases keep it.
 pub(crate) fn stored(number: u64) -> i64 {
     i64::try_from(number).unwrap_or(i64::MAX)

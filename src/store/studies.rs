@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use tokio::time::Instant;
+
 use crate::connection::{Connection, Database, Store, StoreError, on};
 use crate::schema::require_schema;
-use crate::{BATCH_CHUNKS, LONG_PATIENCE, PATIENCE, read, stored};
+use crate::{BATCH_CHUNKS, LETTING_GO, LONG_PATIENCE, LOOK_AGAIN, PATIENCE, read, stored};
 
 /// A study as it is first kept: all that follows from it is frozen with it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -245,16 +247,29 @@ impl Store {
         self.once("UPDATE studies SET asked_at_s = unixepoch() WHERE id = $1", id).await
     }
 
-    /// Forgets a study with all that it has come to.
+    /// Forgets a study with all that it has come to. Workers that have chunks of it in their hands are waited for, some seconds, and not by
+    /// holding a connection: one that stands still keeps its chunk until its lease is over.
     ///
     /// # Errors
-    /// As [`Self::create`].
+    /// As [`Self::create`], and [`StoreError::InWork`].
     pub async fn forget(&self, id: &str) -> Result<(), StoreError> {
-        self.with(LONG_PATIENCE, async |connection| {
+        let began = Instant::now();
+        loop {
+            match self.forget_at_once(id).await {
+                Err(StoreError::InWork) if began.elapsed() < LETTING_GO => tokio::time::sleep(LOOK_AGAIN).await,
+                other => return other,
+            }
+        }
+    }
+
+    async fn forget_at_once(&self, id: &str) -> Result<(), StoreError> {
+        let forgotten = self.with(LONG_PATIENCE, async |connection| {
             require_schema(connection).await?;
             begin(connection).await?;
-            // Its chunks first: for one that is in work its worker is waited for, who must not wait for the study meanwhile. Nor does
-            // anybody open more of them.
+            if let Connection::Server(server) = &mut *connection {
+                sqlx::query("SET LOCAL lock_timeout = '10ms'").execute(&mut **server).await?;
+            }
+            // Its chunks first: whoever computes one must not wait for the study meanwhile. Nor does anybody open more of them.
             for text in [
                 "UPDATE studies SET opened = chunks WHERE id = $1",
                 "DELETE FROM chunks WHERE study = $1",
@@ -263,8 +278,14 @@ impl Store {
                 on!(connection, inner => sqlx::query(text).bind(id).execute(inner).await.map(|_| ()))?;
             }
             commit(connection).await
+        });
+        forgotten.await.map_err(|error| match &error {
+            // lock_not_available (PostgreSQL, appendix A).
+            StoreError::Failed(sqlx::Error::Database(refused)) if refused.code().as_deref() == Some("55P03") => {
+                StoreError::InWork
+            }
+            _ => error,
         })
-        .await
     }
 
     /// A statement about one study.

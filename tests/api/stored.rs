@@ -342,6 +342,17 @@ async fn who_begins_a_stored_study_waits_for_no_other_that_begins() {
 }
 
 #[tokio::test]
+async fn a_study_that_another_has_cancelled_is_forgotten_by_who_deletes_it_next() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    let study = keeper.ask(&map(5)).await.json();
+    keeper.store.cancel(study["id"].as_str().unwrap()).await.unwrap();
+    assert_eq!(keeper.service.ask(&Question::of("DELETE", &place(&study))).await.status, 204);
+    keeper.service.get(&place(&study)).await.refused(404, "not_found");
+    keeper.end().await;
+}
+
+#[tokio::test]
 async fn a_study_that_another_forgets_while_it_begins_is_no_fault_of_the_service() {
     let file = File::new();
     let keeper = Keeper::of(&file, LIMITS, false).await;

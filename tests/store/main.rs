@@ -513,6 +513,35 @@ fn an_address_of_no_file_and_no_server_is_refused() {
     assert!(Address::new("./file:studies", None).is_ok());
 }
 
+/// As one does that stands still.
+#[tokio::test]
+async fn a_worker_that_does_not_let_go_holds_up_whoever_forgets_its_study_and_nobody_else() {
+    let Some(address) = server() else { return };
+    let _others = SERVER.read().await;
+    let (service, worker) = (Store::open(&address).await.unwrap(), Store::open(&address).await.unwrap());
+    service.migrate().await.unwrap();
+    let study = study("still", 1);
+    service.create(&study).await.unwrap();
+    let lease = claimed(&worker, &study).await;
+    assert!(matches!(service.forget(&study.id).await, Err(StoreError::InWork)));
+    // More than there are connections.
+    let forgetting: Vec<_> = (0..20)
+        .map(|_| {
+            let (service, id) = (service.clone(), study.id.clone());
+            tokio::spawn(async move { service.forget(&id).await })
+        })
+        .collect();
+    for _ in 0..20 {
+        assert!(service.find(&study.id).await.unwrap().is_some());
+        tokio::task::yield_now().await;
+    }
+    lease.give_back().await.unwrap();
+    for forgotten in forgetting {
+        forgotten.await.unwrap().unwrap();
+    }
+    assert_eq!(service.find(&study.id).await.unwrap(), None);
+}
+
 /// Polls a future so often at most; whether it came to an end.
 async fn polled(future: impl Future, times: usize) -> bool {
     let mut future = std::pin::pin!(future);

@@ -92,7 +92,7 @@ pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRej
     responses(
         (status = 204, description = "It does not run any more, or is forgotten."),
         (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
-        (status = 503, description = "The store of studies does not answer, or the study could not be looked at in time; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
+        (status = 503, description = "The store of studies does not answer, the study could not be looked at in time, or a worker that stands still has a chunk of it in its hands; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
     )
 )]
 pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
