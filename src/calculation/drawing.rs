@@ -31,6 +31,12 @@ pub struct CheckedDrawing {
     input_angle_deg: Option<f64>,
 }
 
+/// A point's coordinates.
+const POINT_BYTES: u64 = 16;
+
+/// A pole in its polygon, of which there are four or more.
+const POLE_BYTES: u64 = 24;
+
 impl Question for Drawing {
     type Checked = CheckedDrawing;
     type Answer = DrawingAnswer;
@@ -67,6 +73,11 @@ impl Question for Drawing {
             chord_tolerance_mm: parameters.chord_tolerance_mm,
             input_angle_deg: (subject == DrawnPart::Assembly).then_some(parameters.input_angle_deg),
         })
+    }
+
+    fn working_bytes(checked: &CheckedDrawing) -> u64 {
+        // Of a solid's poles there are fewer than points.
+        (POINT_BYTES + POLE_BYTES) * checked.drawing.expected_points()
     }
 
     fn answer(checked: &CheckedDrawing, stop: &dyn Stop) -> Result<DrawingAnswer, NoAnswer> {
@@ -115,10 +126,6 @@ impl Forms for DrawingAnswer {
     }
 
     fn held_bytes(&self, format: Format) -> u64 {
-        /// A point's coordinates.
-        const POINT_BYTES: u64 = 16;
-        /// A pole in its polygon, of which there are four or more.
-        const POLE_BYTES: u64 = 24;
         /// The records of a pole at both ends of a prism, by their texts.
         const RECORDS_BYTES: u64 = 320;
         let (points, poles) = self.points_and_poles();

@@ -229,6 +229,9 @@ impl From<&Drive> for EngagementAnswer {
 #[derive(Debug)]
 pub struct Geometry;
 
+/// A point in its columns, and while they are made where they come from.
+const POINT_BYTES: u64 = 2 * size_of::<[f64; 2]>() as u64;
+
 impl Question for Geometry {
     type Checked = (Drive, ProfileParameters);
     type Answer = GeometryAnswer;
@@ -252,6 +255,10 @@ impl Question for Geometry {
                 Err(NoAnswer::impossible(&violations))
             }
         }
+    }
+
+    fn working_bytes((drive, profile): &Self::Checked) -> u64 {
+        POINT_BYTES * profile::expected_points(drive, profile)
     }
 
     fn answer((drive, profile): &Self::Checked, stop: &dyn Stop) -> Result<GeometryAnswer, NoAnswer> {
@@ -311,8 +318,7 @@ impl Forms for GeometryAnswer {
     }
 
     fn held_bytes(&self, _format: Format) -> u64 {
-        // Its columns, and while they are made the points that they come from.
-        (2 * size_of::<[f64; 2]>() * self.points()) as u64
+        POINT_BYTES * self.points() as u64
     }
 }
 

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::hash::{BuildHasher, RandomState};
 use std::pin::Pin;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, LazyLock, OnceLock};
 use std::task::{Context, Poll, ready};
 use std::time::{Duration, Instant};
@@ -248,6 +248,10 @@ pub async fn observe(State(app): State<Arc<App>>, request: Request, next: Next) 
         key = tracing::field::Empty,
         traceparent = traceparent(request.headers())
     );
+    let left_unread = Arc::new(AtomicBool::new(false));
+    let request = request.map(|body| {
+        if body.is_end_stream() { body } else { Body::new(Asked { body, left_unread: Arc::clone(&left_unread) }) }
+    });
     let mut unanswered = Unanswered { span: span.clone(), method, route: route.clone(), started, is_answered: false };
     let mut response = next.run(request).instrument(span.clone()).await;
     unanswered.is_answered = true;
@@ -262,7 +266,8 @@ pub async fn observe(State(app): State<Arc<App>>, request: Request, next: Next) 
     let solve_ms = provenance.map(|provenance| 1e3 * provenance.solve.as_secs_f64());
     let histogram = count(route.as_ref().map_or("none", MatchedPath::as_str), (method, status, cache), elapsed);
     complete(response.headers_mut(), id);
-    if !app.ready.load(Ordering::Relaxed) {
+    // A connection on which the rest of a body would come is not used again: who has sent the next request on it gets no answer to that.
+    if left_unread.load(Ordering::Relaxed) || !app.ready.load(Ordering::Relaxed) {
         response.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
     }
     let elapsed_ms = 1e3 * elapsed.as_secs_f64();
@@ -286,6 +291,40 @@ pub async fn observe(State(app): State<Arc<App>>, request: Request, next: Next) 
         };
         Body::new(Observed { body, rest: Bytes::new(), completion })
     })
+}
+
+/// A request's body, which tells when whoever answers does not want its end.
+struct Asked {
+    body: Body,
+    left_unread: Arc<AtomicBool>,
+}
+
+impl HttpBody for Asked {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        Pin::new(&mut self.body).poll_frame(context)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}
+
+impl Drop for Asked {
+    fn drop(&mut self) {
+        if !self.body.is_end_stream() {
+            self.left_unread.store(true, Ordering::Relaxed);
+        }
+    }
 }
 
 /// What is known of a request whose client may leave before there is an answer.

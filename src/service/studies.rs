@@ -18,7 +18,7 @@ use tokio::sync::watch;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use toothwave_calculation::BUILD;
-use toothwave_store::{Figures, NewStudy, PATIENCE, Standing as Stored, Store, StoreError};
+use toothwave_store::{Cut, Figures, NewStudy, PATIENCE, Standing as Stored, Store, StoreError};
 use toothwave_study::{Gathered, Study, StudyAnswer, Work};
 use tracing::Instrument as _;
 use utoipa::ToSchema;
@@ -324,19 +324,25 @@ impl Kept {
         }
     }
 
+    /// As it is cut, in the store.
+    fn cut(&self) -> Cut {
+        Cut { id: self.id.clone(), chunk_variants: self.study.chunk_variants() }
+    }
+
     /// Reads what a stored study has come to since it was last read.
     async fn gather(&self, rows: &Rows, store: &Store, pool: &Pool) -> Result<(), Problem> {
         let missing: Vec<_> = rows.gathered.lock().missing().collect();
         if missing.is_empty() {
             return Ok(());
         }
-        let done = store.chunks_done(&self.id).await?;
+        let cut = self.cut();
+        let done = store.chunks_done(&cut).await?;
         let wanted: Vec<_> = done.into_iter().filter(|chunk| missing.binary_search(chunk).is_ok()).collect();
         let a_part_bytes = (self.study.stored_bytes() / self.study.chunks().max(1)).max(1);
         let at_once = usize::try_from(READ_BYTES / a_part_bytes).unwrap_or(usize::MAX).max(1);
         for chunks in wanted.chunk_by(|one, next| one + 1 == *next).flat_map(|run| run.chunks(at_once)) {
             let last = chunks.last().unwrap_or(&chunks[0]);
-            let stored = store.parts(&self.id, chunks[0], *last).await?;
+            let stored = store.parts(&cut, chunks[0], *last).await?;
             let decode = move |_: &AtomicBool| {
                 let decoded = stored.iter().map(|stored| Ok((stored.chunk, frozen::decoded(&stored.part)?)));
                 decoded.collect::<Result<Vec<_>, Problem>>()
@@ -348,7 +354,7 @@ impl Kept {
         Ok(())
     }
 
-    /// Looks how a stored study stands; whether it is kept at all.
+    /// Looks how a stored study stands; whether it is kept at all. One that was forgotten and begun anew, in other chunks, is not this one.
     async fn look(&self, store: &Store) -> Result<bool, StoreError> {
         let looking = async {
             // One at a time, so that what is seen last is what was last the case.
@@ -356,7 +362,7 @@ impl Kept {
             Ok::<_, StoreError>((held, store.find(&self.id).await?))
         };
         let (_held, found) = patiently(looking).await?;
-        let Some(stored) = found else {
+        let Some(stored) = found.filter(|stored| stored.study.cut() == self.cut()) else {
             self.stand(StudyState::Cancelled, None);
             return Ok(false);
         };
@@ -510,8 +516,7 @@ impl Studies {
     /// Where this is not the build or the processor that it was asked of.
     async fn kept_here(&self, stored: &Stored) -> Result<Arc<Kept>, Problem> {
         let frozen = &stored.study;
-        let is_this = |kept: &&Arc<Kept>| kept.id == frozen.id && kept.study.chunk_variants() == frozen.chunk_variants;
-        let known = self.kept.lock().iter().find(is_this).cloned();
+        let known = self.kept.lock().iter().find(|kept| kept.cut() == frozen.cut()).cloned();
         if let Some(kept) = known {
             return Ok(kept);
         }
@@ -624,14 +629,17 @@ impl Studies {
     ) -> Result<Option<Arc<Kept>>, Problem> {
         let _turn = self.beginning.lock().await;
         let kept = match (store.find(id).await?, known, new) {
-            (Some(stored), Some(kept), _) if !is_there(&stored) => {
+            (Some(stored), Some(kept), _) if !is_there(&stored) && stored.study.cut() == kept.cut() => {
                 self.require_one_more(store).await?;
                 store.resume(id, self.time(store)).await?;
                 kept
             }
             (None, None, Some(((study, frozen), canary_ms))) => {
                 self.require_one_more(store).await?;
-                store.create(frozen).await?;
+                if !store.create(frozen).await? {
+                    // Another replica was first, whose chunks may be others.
+                    return Ok(None);
+                }
                 let NewStudy { chunks, canary_variants, .. } = frozen;
                 tracing::info!(study = id, chunks, canary_variants, canary_ms, "a study is kept");
                 self.keep_view(Arc::clone(study))
@@ -772,9 +780,10 @@ impl Studies {
     /// Where the store does not answer.
     pub async fn cancel_or_forget(&self, kept: &Arc<Kept>) -> Result<(), Problem> {
         if let Keeping::Store { store, .. } = &self.keeping {
-            // Another process may have cancelled it since.
-            kept.look(store).await?;
-            if kept.is_running() {
+            // Another process may have cancelled it since, or forgotten it.
+            if !kept.look(store).await? {
+                Self::let_go(&mut self.kept.lock(), kept);
+            } else if kept.is_running() {
                 store.cancel(&kept.id).await?;
                 kept.stand(StudyState::Cancelled, None);
             } else {

@@ -46,7 +46,7 @@ pub struct Workers {
     stopping: CancellationToken,
     /// What a chunk that is in work then gets to come to its end.
     patience: Duration,
-    known: tokio::sync::Mutex<HashMap<String, Known>>,
+    known: tokio::sync::Mutex<HashMap<Waiting, Known>>,
     /// What was last said of each.
     troubles: Mutex<BTreeMap<What, String>>,
 }
@@ -108,7 +108,7 @@ impl Workers {
             match self.store.waiting().await {
                 Ok(waiting) => {
                     self.is_well(What::Reading);
-                    self.known.lock().await.retain(|id, _| waiting.iter().any(|task| task.id == *id));
+                    self.known.lock().await.retain(|task, _| waiting.contains(task));
                     tell.send_replace(Arc::new(waiting));
                 }
                 // What was begun may go on: it is kept when the store is back.
@@ -134,13 +134,13 @@ impl Workers {
                 }
                 let task = &waiting[(turn + offset) % waiting.len()];
                 let Some((study, lease)) = self.study(task).await else { continue };
-                match self.store.claim(&task.id, lease).await {
+                match self.store.claim(&task.cut, lease).await {
                     Ok(Claim::Chunk(lease)) => {
-                        self.compute(&task.id, &study, lease, &mut tasks).await;
+                        self.compute(task, &study, lease, &mut tasks).await;
                         has_worked = true;
                     }
                     Ok(Claim::Gap(chunk)) => {
-                        tracing::warn!(study = task.id, chunk, "a chunk was given up: no attempt came to a result");
+                        tracing::warn!(study = task.cut.id, chunk, "a chunk was given up: no attempt came to a result");
                         self.changed.send_replace(());
                         has_worked = true;
                     }
@@ -164,7 +164,7 @@ impl Workers {
     /// The study, where this process computes it: of this build, with a canary of the same bits.
     async fn study(&self, task: &Waiting) -> Option<(Arc<Study>, Duration)> {
         let mut known = self.known.lock().await;
-        if let Some(known) = known.get(&task.id) {
+        if let Some(known) = known.get(task) {
             return known.clone().ok();
         }
         let found = if task.build == BUILD {
@@ -172,7 +172,7 @@ impl Workers {
                 Ok(found) => found?,
                 // Another time.
                 Err(problem) => {
-                    tracing::warn!(study = task.id, %problem, "a study could not be looked at");
+                    tracing::warn!(study = task.cut.id, %problem, "a study could not be looked at");
                     return None;
                 }
             }
@@ -180,14 +180,15 @@ impl Workers {
             Err(NotHere::OtherBuild { theirs: task.build.clone() })
         };
         if let Err(reason) = &found {
-            tracing::warn!(study = task.id, %reason, "a study is left to other workers");
+            tracing::warn!(study = task.cut.id, %reason, "a study is left to other workers");
         }
-        known.insert(task.id.clone(), found.clone());
+        known.insert(task.clone(), found.clone());
         found.ok()
     }
 
     async fn admitted(&self, task: &Waiting) -> Result<Option<Known>, Problem> {
-        let Some(standing) = self.store.find(&task.id).await? else { return Ok(None) };
+        let standing = self.store.find(&task.cut.id).await?.filter(|standing| standing.study.cut() == task.cut);
+        let Some(standing) = standing else { return Ok(None) };
         let study = match frozen::thaw(&self.pool, &standing.study).await? {
             Ok(study) => study,
             Err(reason) => return Ok(Some(Err(reason))),
@@ -196,7 +197,7 @@ impl Workers {
         let is_same = frozen::has_the_same_bits(&self.pool, &study, &standing.study).await?;
         let canary_ms = milliseconds(started.elapsed());
         tracing::info!(
-            study = task.id,
+            study = task.cut.id,
             canary_variants = standing.study.canary_variants,
             canary_ms,
             is_same,
@@ -206,8 +207,8 @@ impl Workers {
     }
 
     /// Computes a chunk and keeps what it comes to, unless it is not wanted any more.
-    async fn compute(&self, id: &str, study: &Arc<Study>, mut lease: Lease, tasks: &mut Tasks) {
-        let chunk = lease.chunk();
+    async fn compute(&self, task: &Waiting, study: &Arc<Study>, mut lease: Lease, tasks: &mut Tasks) {
+        let (id, chunk) = (&task.cut.id, lease.chunk());
         let time_is_over = async {
             self.stopping.cancelled().await;
             tokio::time::sleep(self.patience).await;
@@ -216,7 +217,7 @@ impl Workers {
             tokio::select! {
                 () = time_is_over => {}
                 // It was cancelled, or forgotten.
-                _ = tasks.wait_for(|waiting| waiting.iter().all(|task| task.id != id)) => {}
+                _ = tasks.wait_for(|waiting| !waiting.contains(task)) => {}
             }
         };
         tokio::pin!(is_over);

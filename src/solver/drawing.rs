@@ -10,7 +10,9 @@ use crate::drive::{Draft, Drive, DriveError};
 use crate::findings::{self, Finding};
 use crate::gaps::RAD_PER_ARCSEC;
 use crate::parts::{CarrierPart, PartsParameters, RingPart, ToothPart, WaveGeneratorPart};
-use crate::profile::{Density, Polyline, SampledCurve, cam_half_lobe, cam_outline, direction};
+use crate::profile::{
+    Density, Extent, Polyline, ProfileParameters, SampledCurve, cam_half_lobe, cam_outline, direction, expected_points,
+};
 use crate::root::NotConverged;
 use crate::spline;
 use crate::tooth_space::HalfSpace;
@@ -265,6 +267,16 @@ impl Drawing {
         };
         let findings: Vec<_> = self.parts.iter().map(of_part).collect::<Result<_, NotConverged>>()?;
         Ok(findings.concat())
+    }
+
+    /// About how many points its curves have: no fewer, and some times as many.
+    pub fn expected_points(&self) -> u64 {
+        let has_curves = |part: &MadePart| matches!(part, MadePart::Ring(_) | MadePart::WaveGenerator(_));
+        if !self.parts.iter().any(has_curves) {
+            return 0;
+        }
+        let DrawingParameters { chord_tolerance_mm, max_points, .. } = self.parameters;
+        expected_points(&self.drive, &ProfileParameters { chord_tolerance_mm, extent: Extent::Full, max_points })
     }
 
     /// Draws.

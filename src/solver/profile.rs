@@ -110,6 +110,31 @@ pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &dyn Stop) 
     })
 }
 
+/// About how many points the profiles have, [`ProfileParameters::max_points`] at most: no fewer than they do have, and some times as many.
+pub fn expected_points(drive: &Drive, parameters: &ProfileParameters) -> u64 {
+    let tolerance_mm = parameters.chord_tolerance_mm;
+    // Of a curve that turns by κ ds the height of a chord's tangents is c²κ/4, and halving leaves chords down to half as long as they may
+    // be: some ∫ √(κ/t) ds of them, by Cauchy and Schwarz no more than √(∫κ ds · L / t).
+    let chords = |turned_rad: f64, length_mm: f64| f64::from(PIECES) + (turned_rad * length_mm / tolerance_mm).sqrt();
+    let ring_teeth = drive.parameters().ring_teeth.unsigned_abs();
+    let lobes = f64::from(drive.lobes());
+    let (root_mm, height_mm) = (drive.root_radius_mm(), drive.root_radius_mm() - drive.tip_radius_mm());
+    // A half rises and falls in no more than its arc and its height; its slope comes from nothing and goes there again.
+    let half = |parts: f64| chords(PI + PI / parts, PI * root_mm / parts + height_mm);
+    let copies = match parameters.extent {
+        Extent::Tooth => 1.0,
+        Extent::Full => ring_teeth as f64,
+    };
+    let points = 2.0 * (2.0 * copies * half(ring_teeth as f64) + lobes * half(lobes));
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "whole enough, and saturating; not negative"
+    )]
+    let points = points as u64;
+    points.min(parameters.max_points)
+}
+
 /// The ring from the middle of its tooth space to its tooth's symmetry line, land of a bored tip included.
 fn ring_half_tooth(drive: &Drive, density: Density, stop: &dyn Stop) -> Result<Polyline, SolveError> {
     let mut points = flank_curve(drive.flank(), drive.flank_limit(), density, stop)?.points;

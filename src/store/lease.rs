@@ -5,8 +5,8 @@ use std::time::Duration;
 use sqlx::pool::PoolConnection;
 use sqlx::postgres::Postgres;
 
-use crate::connection::{ChunkName, Connection, Database, Store, StoreError, on, within};
-use crate::studies::{begin, commit};
+use crate::connection::{Connection, Database, Store, StoreError, on, within};
+use crate::studies::{Cut, begin, commit};
 use crate::{MOST_ATTEMPTS, PATIENCE, stored};
 
 /// What comes of asking for a chunk.
@@ -24,7 +24,7 @@ pub enum Claim {
 #[derive(Debug)]
 pub struct Lease {
     store: Store,
-    study: String,
+    cut: Cut,
     chunk: u64,
     held: Held,
 }
@@ -44,19 +44,19 @@ impl Store {
     ///
     /// # Errors
     /// Where the store does not answer.
-    pub async fn claim(&self, study: &str, lease: Duration) -> Result<Claim, StoreError> {
+    pub async fn claim(&self, cut: &Cut, lease: Duration) -> Result<Claim, StoreError> {
         let mut are_all_open = false;
         let (chunk, held) = loop {
-            match self.claim_open(study, lease).await? {
+            match self.claim_open(cut, lease).await? {
                 Some(claimed) => break claimed,
                 None if are_all_open => return Ok(Claim::None),
                 // Another may have opened the last ones meanwhile: they are looked for once more.
-                None => are_all_open = !self.open_more(study).await?,
+                None => are_all_open = !self.open_more(&cut.id).await?,
             }
         };
         // From here on dropping the lease sets the chunk free.
-        let lease = Lease { store: self.clone(), study: study.to_owned(), chunk, held };
-        match self.note_attempt(study, chunk).await {
+        let lease = Lease { store: self.clone(), cut: cut.clone(), chunk, held };
+        match self.note_attempt(&cut.id, chunk).await {
             Ok(true) => return Ok(Claim::Chunk(lease)),
             Ok(false) => {}
             // The study was forgotten in this moment.
@@ -70,10 +70,10 @@ impl Store {
     }
 
     /// A chunk among those that are open.
-    async fn claim_open(&self, study: &str, lease: Duration) -> Result<Option<(u64, Held)>, StoreError> {
-        let Database::Server { leases, .. } = &self.database else { return self.claim_here(study).await };
+    async fn claim_open(&self, cut: &Cut, lease: Duration) -> Result<Option<(u64, Held)>, StoreError> {
+        let Database::Server { leases, .. } = &self.database else { return self.claim_here(cut).await };
         let mut connection = within(PATIENCE, async { Ok(leases.acquire().await?) }).await?;
-        match within(PATIENCE, claim_there(&mut connection, study, lease)).await {
+        match within(PATIENCE, claim_there(&mut connection, cut, lease)).await {
             Ok(chunk) => Ok(chunk.map(|chunk| (chunk, Held::There(Box::new(connection))))),
             Err(error) => {
                 connection.close_on_drop();
@@ -82,16 +82,19 @@ impl Store {
         }
     }
 
-    async fn claim_here(&self, study: &str) -> Result<Option<(u64, Held)>, StoreError> {
+    async fn claim_here(&self, Cut { id, chunk_variants }: &Cut) -> Result<Option<(u64, Held)>, StoreError> {
         let Database::File { leased, .. } = &self.database else { return Ok(None) };
         self.with(PATIENCE, async |connection| {
             let limit = stored(leased.lock().map_or(0, |leased| leased.len() as u64) + 1);
-            let text = "SELECT chunk FROM chunks WHERE study = $1 ORDER BY chunk LIMIT $2";
-            let chunks: Vec<i64> =
-                on!(connection, inner => sqlx::query_scalar(text).bind(study).bind(limit).fetch_all(inner).await)?;
+            let text = "SELECT chunk FROM chunks WHERE study = $1 AND EXISTS (SELECT 1 FROM studies WHERE id = $1 AND chunk_variants = $2)
+                ORDER BY chunk LIMIT $3";
+            let chunk_variants = stored(*chunk_variants);
+            let chunks: Vec<i64> = on!(connection, inner => {
+                sqlx::query_scalar(text).bind(id).bind(chunk_variants).bind(limit).fetch_all(inner).await
+            })?;
             // The connection is held: nobody else claims meanwhile.
             let Ok(mut leased) = leased.lock() else { return Ok(None) };
-            let free = chunks.into_iter().map(crate::read).find(|&chunk| leased.insert((study.to_owned(), chunk)));
+            let free = chunks.into_iter().map(crate::read).find(|&chunk| leased.insert((id.clone(), chunk)));
             Ok(free.map(|chunk| (chunk, Held::Here)))
         })
         .await
@@ -121,16 +124,15 @@ impl Store {
 
 async fn claim_there(
     connection: &mut PoolConnection<Postgres>,
-    study: &str,
+    Cut { id, chunk_variants }: &Cut,
     lease: Duration,
 ) -> Result<Option<u64>, StoreError> {
     let lease_ms = lease.as_millis().to_string();
     sqlx::query("BEGIN").execute(&mut **connection).await?;
+    let text = "SELECT chunk FROM chunks WHERE study = $1 AND EXISTS (SELECT 1 FROM studies WHERE id = $1 AND chunk_variants = $2)
+        ORDER BY chunk LIMIT 1 FOR UPDATE OF chunks SKIP LOCKED";
     let chunk: Option<i64> =
-        sqlx::query_scalar("SELECT chunk FROM chunks WHERE study = $1 ORDER BY chunk LIMIT 1 FOR UPDATE SKIP LOCKED")
-            .bind(study)
-            .fetch_optional(&mut **connection)
-            .await?;
+        sqlx::query_scalar(text).bind(id).bind(stored(*chunk_variants)).fetch_optional(&mut **connection).await?;
     let Some(chunk) = chunk else {
         sqlx::query("ROLLBACK").execute(&mut **connection).await?;
         return Ok(None);
@@ -165,13 +167,13 @@ impl Lease {
     /// Where the store does not answer.
     pub async fn keep(&mut self, part: &[u8], variants: u64, refused: u64, busy: Duration) -> Result<(), StoreError> {
         let result = Outcome { part, variants, refused, busy };
-        let name = (self.study.clone(), self.chunk);
+        let (cut, chunk) = (self.cut.clone(), self.chunk);
         let worker = self.store.worker.to_string();
         match std::mem::replace(&mut self.held, Held::Lost) {
             Held::There(connection) => {
                 let mut connection = Connection::Server(*connection);
                 let kept = within(PATIENCE, async {
-                    write(&mut connection, &name, result, &worker, true).await?;
+                    write(&mut connection, &cut, chunk, result, &worker, true).await?;
                     commit(&mut connection).await
                 })
                 .await;
@@ -186,7 +188,7 @@ impl Lease {
                     .with(PATIENCE, async |connection| {
                         begin(connection).await?;
                         let is_ours = matches!(held, Held::Here);
-                        write(connection, &name, result, &worker, is_ours).await?;
+                        write(connection, &cut, chunk, result, &worker, is_ours).await?;
                         commit(connection).await
                     })
                     .await;
@@ -203,7 +205,7 @@ impl Lease {
     /// Where the store does not answer; the attempt then stays noted.
     pub async fn give_back(self) -> Result<(), StoreError> {
         let store = self.store.clone();
-        let (study, chunk, worker) = (self.study.clone(), stored(self.chunk), store.worker.to_string());
+        let (study, chunk, worker) = (self.cut.id.clone(), stored(self.chunk), store.worker.to_string());
         drop(self);
         let text = "DELETE FROM attempts WHERE study = $1 AND chunk = $2 AND worker = $3";
         store
@@ -216,12 +218,12 @@ impl Lease {
 
     /// Makes the chunk a gap.
     async fn give_up(mut self) -> Result<(), StoreError> {
-        let name = (self.study.clone(), self.chunk);
+        let (cut, chunk) = (self.cut.clone(), self.chunk);
         match std::mem::replace(&mut self.held, Held::Lost) {
             Held::There(connection) => {
                 let mut connection = Connection::Server(*connection);
                 let given_up = within(PATIENCE, async {
-                    make_gap(&mut connection, &name).await?;
+                    make_gap(&mut connection, &cut, chunk).await?;
                     commit(&mut connection).await
                 })
                 .await;
@@ -235,7 +237,7 @@ impl Lease {
                 self.store
                     .with(PATIENCE, async |connection| {
                         begin(connection).await?;
-                        make_gap(connection, &name).await?;
+                        make_gap(connection, &cut, chunk).await?;
                         commit(connection).await
                     })
                     .await
@@ -251,7 +253,7 @@ impl Drop for Lease {
                 if let Database::File { leased, .. } = &self.store.database
                     && let Ok(mut leased) = leased.lock()
                 {
-                    leased.remove(&(self.study.clone(), self.chunk));
+                    leased.remove(&(self.cut.id.clone(), self.chunk));
                 }
             }
             // The transaction ends with its session.
@@ -261,46 +263,56 @@ impl Drop for Lease {
     }
 }
 
-/// Writes a result. A chunk that another worker has in its hands by now is left to that one, who then finds the result there.
+/// Writes a result, if the study is still cut so. A chunk that another worker has in its hands by now is left to that one, who then finds the
+/// result there.
 async fn write(
     connection: &mut Connection,
-    (study, chunk): &ChunkName,
+    Cut { id, chunk_variants }: &Cut,
+    chunk: u64,
     result: Outcome<'_>,
     worker: &str,
     is_ours: bool,
 ) -> Result<(), StoreError> {
-    let chunk = stored(*chunk);
-    let text = "INSERT INTO results SELECT $1, $2, $3, $4, $5, $6, $7 WHERE EXISTS (SELECT 1 FROM studies WHERE id = $1) ON CONFLICT DO NOTHING";
+    let (chunk, chunk_variants) = (stored(chunk), stored(*chunk_variants));
+    let text = "INSERT INTO results SELECT $1, $2, $3, $4, $5, $6, $7
+        WHERE EXISTS (SELECT 1 FROM studies WHERE id = $1 AND chunk_variants = $8) ON CONFLICT DO NOTHING";
     let busy_us = stored(u64::try_from(result.busy.as_micros()).unwrap_or(u64::MAX));
     on!(connection, inner => {
         sqlx::query(text)
-            .bind(study)
+            .bind(id)
             .bind(chunk)
             .bind(result.part)
             .bind(stored(result.variants))
             .bind(stored(result.refused))
             .bind(busy_us)
             .bind(worker)
+            .bind(chunk_variants)
             .execute(inner)
             .await
             .map(|_| ())
     })?;
     let free = match connection {
         Connection::Server(_) if !is_ours => {
-            "DELETE FROM chunks WHERE (study, chunk) IN (SELECT study, chunk FROM chunks WHERE study = $1 AND chunk = $2 FOR UPDATE SKIP LOCKED)"
+            "DELETE FROM chunks WHERE (study, chunk) IN (SELECT study, chunk FROM chunks WHERE study = $1 AND chunk = $2
+                AND EXISTS (SELECT 1 FROM studies WHERE id = $1 AND chunk_variants = $3) FOR UPDATE OF chunks SKIP LOCKED)"
         }
-        _ => "DELETE FROM chunks WHERE study = $1 AND chunk = $2",
+        _ => FREE,
     };
-    on!(connection, inner => sqlx::query(free).bind(study).bind(chunk).execute(inner).await.map(|_| ()))?;
+    on!(connection, inner => sqlx::query(free).bind(id).bind(chunk).bind(chunk_variants).execute(inner).await.map(|_| ()))?;
     Ok(())
 }
 
-async fn make_gap(connection: &mut Connection, (study, chunk): &ChunkName) -> Result<(), StoreError> {
-    let chunk = stored(*chunk);
+/// A chunk waits no longer, if the study is still cut so.
+const FREE: &str = "DELETE FROM chunks WHERE study = $1 AND chunk = $2
+    AND EXISTS (SELECT 1 FROM studies WHERE id = $1 AND chunk_variants = $3)";
+
+async fn make_gap(connection: &mut Connection, Cut { id, chunk_variants }: &Cut, chunk: u64) -> Result<(), StoreError> {
+    let (chunk, chunk_variants) = (stored(chunk), stored(*chunk_variants));
     let gap = "INSERT INTO gaps SELECT $1, $2, (SELECT COUNT(*) FROM attempts WHERE study = $1 AND chunk = $2)
-        WHERE NOT EXISTS (SELECT 1 FROM results WHERE study = $1 AND chunk = $2) ON CONFLICT DO NOTHING";
-    for text in [gap, "DELETE FROM chunks WHERE study = $1 AND chunk = $2"] {
-        on!(connection, inner => sqlx::query(text).bind(study).bind(chunk).execute(inner).await.map(|_| ()))?;
+        WHERE NOT EXISTS (SELECT 1 FROM results WHERE study = $1 AND chunk = $2)
+            AND EXISTS (SELECT 1 FROM studies WHERE id = $1 AND chunk_variants = $3) ON CONFLICT DO NOTHING";
+    for text in [gap, FREE] {
+        on!(connection, inner => sqlx::query(text).bind(id).bind(chunk).bind(chunk_variants).execute(inner).await.map(|_| ()))?;
     }
     Ok(())
 }

@@ -19,7 +19,7 @@ pub use address::{Address, AddressError};
 pub use connection::{Store, StoreError};
 pub use lease::{Claim, Lease};
 pub use schema::SCHEMA_VERSION;
-pub use studies::{Figures, Gap, Kept, NewStudy, Standing, Waiting};
+pub use studies::{Cut, Figures, Gap, Kept, NewStudy, Standing, Waiting};
 
 /// Attempts without a result that make a chunk a gap.
 pub const MOST_ATTEMPTS: u64 = 3;

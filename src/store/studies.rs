@@ -40,6 +40,23 @@ pub struct NewStudy {
     pub time: Duration,
 }
 
+/// A study as it is cut into chunks. One that was forgotten and asked for anew may be cut otherwise: its chunks are others, of the same
+/// numbers.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct Cut {
+    /// The study's id.
+    pub id: String,
+    /// Variants of a chunk.
+    pub chunk_variants: u64,
+}
+
+impl NewStudy {
+    /// As it is cut.
+    pub fn cut(&self) -> Cut {
+        Cut { id: self.id.clone(), chunk_variants: self.chunk_variants }
+    }
+}
+
 /// A chunk that never came to a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Gap {
@@ -100,10 +117,10 @@ pub struct Kept {
 }
 
 /// A study that waits for workers.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Waiting {
-    /// Its id.
-    pub id: String,
+    /// Which.
+    pub cut: Cut,
     /// The build that it belongs to.
     pub build: String,
 }
@@ -136,19 +153,19 @@ const STUDY: &str = "SELECT id, kind, build, document, max_states, max_profile_p
     FROM studies WHERE id = $1";
 
 /// Those that wait for workers; of studies that are done no chunk is left.
-const WAITING: &str = "SELECT id, build FROM studies WHERE NOT is_cancelled AND ends_at_s > unixepoch()
+const WAITING: &str = "SELECT id, chunk_variants, build FROM studies WHERE NOT is_cancelled AND ends_at_s > unixepoch()
     AND (opened < chunks OR EXISTS (SELECT 1 FROM chunks WHERE study = id)) ORDER BY asked_at_s, id";
 
 impl Store {
-    /// Keeps a study, of which no chunk is open yet; where it is kept already, nothing happens.
+    /// Keeps a study, of which no chunk is open yet. Where it is kept already, perhaps in other chunks, nothing happens; whether it was not.
     ///
     /// # Errors
     /// Where the store does not answer, or has another schema.
-    pub async fn create(&self, study: &NewStudy) -> Result<(), StoreError> {
+    pub async fn create(&self, study: &NewStudy) -> Result<bool, StoreError> {
         self.with(PATIENCE, async |connection| {
             require_schema(connection).await?;
             let time_s = stored(study.time.as_secs());
-            on!(connection, inner => {
+            let is_new = on!(connection, inner => {
                 sqlx::query(
                     "INSERT INTO studies VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, FALSE, unixepoch(), unixepoch() + $13, 0)
                         ON CONFLICT DO NOTHING",
@@ -168,9 +185,9 @@ impl Store {
                 .bind(time_s)
                 .execute(inner)
                 .await
-                .map(|_| ())
+                .map(|done| done.rows_affected() == 1)
             })?;
-            Ok(())
+            Ok(is_new)
         })
         .await
     }
@@ -359,8 +376,11 @@ impl Store {
     pub async fn waiting(&self) -> Result<Vec<Waiting>, StoreError> {
         self.with(PATIENCE, async |connection| {
             require_schema(connection).await?;
-            let rows: Vec<(String, String)> = on!(connection, inner => sqlx::query_as(WAITING).fetch_all(inner).await)?;
-            Ok(rows.into_iter().map(|(id, build)| Waiting { id, build }).collect())
+            let rows: Vec<(String, i64, String)> =
+                on!(connection, inner => sqlx::query_as(WAITING).fetch_all(inner).await)?;
+            let waiting =
+                |(id, chunk_variants, build)| Waiting { cut: Cut { id, chunk_variants: read(chunk_variants) }, build };
+            Ok(rows.into_iter().map(waiting).collect())
         })
         .await
     }
@@ -369,10 +389,13 @@ impl Store {
     ///
     /// # Errors
     /// As [`Self::create`].
-    pub async fn chunks_done(&self, id: &str) -> Result<Vec<u64>, StoreError> {
+    pub async fn chunks_done(&self, Cut { id, chunk_variants }: &Cut) -> Result<Vec<u64>, StoreError> {
         self.with(PATIENCE, async |connection| {
-            let text = "SELECT chunk FROM results WHERE study = $1 ORDER BY chunk";
-            let rows: Vec<i64> = on!(connection, inner => sqlx::query_scalar(text).bind(id).fetch_all(inner).await)?;
+            let text = "SELECT chunk FROM results WHERE study = $1 AND EXISTS (SELECT 1 FROM studies WHERE id = $1 AND chunk_variants = $2)
+                ORDER BY chunk";
+            let rows: Vec<i64> = on!(connection, inner => {
+                sqlx::query_scalar(text).bind(id).bind(stored(*chunk_variants)).fetch_all(inner).await
+            })?;
             Ok(rows.into_iter().map(read).collect())
         })
         .await
@@ -382,11 +405,23 @@ impl Store {
     ///
     /// # Errors
     /// As [`Self::create`].
-    pub async fn parts(&self, id: &str, first: u64, last: u64) -> Result<Vec<Kept>, StoreError> {
+    pub async fn parts(
+        &self,
+        Cut { id, chunk_variants }: &Cut,
+        first: u64,
+        last: u64,
+    ) -> Result<Vec<Kept>, StoreError> {
         self.with(PATIENCE, async |connection| {
-            let text = "SELECT chunk, part FROM results WHERE study = $1 AND chunk BETWEEN $2 AND $3 ORDER BY chunk";
+            let text = "SELECT chunk, part FROM results WHERE study = $1 AND chunk BETWEEN $2 AND $3
+                AND EXISTS (SELECT 1 FROM studies WHERE id = $1 AND chunk_variants = $4) ORDER BY chunk";
             let rows: Vec<(i64, Vec<u8>)> = on!(connection, inner => {
-                sqlx::query_as(text).bind(id).bind(stored(first)).bind(stored(last)).fetch_all(inner).await
+                sqlx::query_as(text)
+                    .bind(id)
+                    .bind(stored(first))
+                    .bind(stored(last))
+                    .bind(stored(*chunk_variants))
+                    .fetch_all(inner)
+                    .await
             })?;
             Ok(rows.into_iter().map(|(chunk, part)| Kept { chunk: read(chunk), part }).collect())
         })

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use crate::asking::{LIMITS, Question, ask_at};
+use crate::asking::{Answer, LIMITS, Question, Service, ask_at};
 use crate::designs::{shortest, with};
 
 /// A running service that ends with the test.
@@ -237,4 +237,25 @@ fn a_body_larger_than_the_limit_is_refused_over_a_connection_too() {
     let question = Question::post("/v1/sweep", " ".repeat(LIMITS.max_body_bytes + 1));
     let problem = ask_at(process.address, &question).refused(413, "body_too_large");
     assert!(problem["detail"].as_str().unwrap().contains("65537"), "{problem}");
+}
+
+/// A connection on which the rest of a body may still come is closed: who has sent the next request on it already gets no answer to that.
+#[tokio::test]
+async fn who_is_answered_before_the_body_was_read_is_told_that_the_connection_closes() {
+    let service = Service::new();
+    let said = |answer: Answer| (answer.status, answer.header("connection").to_owned());
+    for (path, media_type, status) in [
+        ("/v1/nothing", "application/json", 404),
+        ("/v1/sweep", "text/plain", 415),
+        ("/v1/sweep?a=b", "application/json", 400),
+    ] {
+        assert_eq!(
+            said(service.ask(&Question::post_as(media_type, path, "{}")).await),
+            (status, "close".to_owned()),
+            "{path}"
+        );
+    }
+    // What was read to its end, or has none, is followed by others.
+    assert_eq!(said(service.ask(&Question::post("/v1/sweep", "{")).await), (400, String::new()));
+    assert_eq!(said(service.get("/v1/nothing").await), (404, String::new()));
 }

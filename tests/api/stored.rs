@@ -352,6 +352,41 @@ async fn a_study_that_another_has_cancelled_is_forgotten_by_who_deletes_it_next(
     keeper.end().await;
 }
 
+/// How many variants a chunk has hangs on how long the canary took.
+#[tokio::test]
+async fn a_study_that_another_forgot_and_began_anew_in_other_chunks_is_whole() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    let study = keeper.ask(&map(5)).await.json();
+    let first = keeper.store.find(study["id"].as_str().unwrap()).await.unwrap().unwrap().study;
+    keeper.store.forget(&first.id).await.unwrap();
+    assert!(first.chunk_variants >= 5 && first.chunks == 1);
+    let second = NewStudy { chunk_variants: 2, chunks: 3, ..first };
+    keeper.store.create(&second).await.unwrap();
+    let mut held = Vec::new();
+    for _ in 0..2 {
+        let Claim::Chunk(lease) = keeper.store.claim(&second.cut(), Duration::from_secs(60)).await.unwrap() else {
+            panic!()
+        };
+        held.push(lease);
+    }
+    held.remove(0).give_back().await.unwrap();
+    let app = std::sync::Arc::clone(&keeper.service.app);
+    let workers = tokio::spawn(async move { app.studies.serve_store().await });
+    while keeper.store.chunks_done(&second.cut()).await.unwrap() != [0, 2] {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    // Whoever followed the first one does not take its chunks for these.
+    let partial = keeper.service.get(&format!("{}/result", place(&study))).await.found();
+    assert_eq!(partial["is_complete"], false);
+    drop(held);
+    let question = Question::post("/v1/studies", map(5).to_string()).with("prefer", "wait=600");
+    let whole = Service::new().ask(&question).await.found();
+    assert_eq!(keeper.wait_for(&map(5)).await, whole);
+    keeper.service.app.studies.close();
+    workers.await.unwrap();
+}
+
 #[tokio::test]
 async fn a_study_that_another_forgets_while_it_begins_is_no_fault_of_the_service() {
     let file = File::new();
@@ -382,10 +417,10 @@ async fn a_chunk_that_never_came_to_a_result_is_named_and_tried_anew_when_it_is_
     let file = File::new();
     let keeper = Keeper::of(&file, LIMITS, false).await;
     let study = keeper.ask(&map(5)).await.json();
-    let id = study["id"].as_str().unwrap();
+    let cut = keeper.store.find(study["id"].as_str().unwrap()).await.unwrap().unwrap().study.cut();
     // As workers do who die at it.
     loop {
-        match keeper.store.claim(id, Duration::from_secs(60)).await.unwrap() {
+        match keeper.store.claim(&cut, Duration::from_secs(60)).await.unwrap() {
             Claim::Chunk(lease) => drop(lease),
             Claim::Gap(chunk) => break assert_eq!(chunk, 0),
             Claim::None => panic!("nobody waits"),

@@ -89,10 +89,10 @@ class Service(Process):
         except OSError:
             return False
 
-    def ask(self, method, path, document=None):
+    def ask(self, method, path, document=None, headers=None):
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
         try:
-            connection.request(method, path, document and json.dumps(document), {"Content-Type": "application/json"} if document else {})
+            connection.request(method, path, document and json.dumps(document), {"Content-Type": "application/json"} | (headers or {}))
             answer = connection.getresponse()
             return answer.status, answer.read()
         finally:

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use nalgebra::{Point2, Rotation2};
 use proptest::prelude::*;
-use toothwave_solver::profile::{Extent, Polyline, ProfileParameters, Profiles, profiles};
+use toothwave_solver::profile::{Extent, Polyline, ProfileParameters, Profiles, expected_points, profiles};
 use toothwave_solver::{DriveParameters, Never, SolveError, Stop};
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, cases, drive, semi_axes_mm};
@@ -50,6 +50,18 @@ fn every_chord_is_true_to_the_tolerance() {
 
 proptest! {
     #![proptest_config(cases(96))]
+
+    #[test]
+    fn a_profile_has_no_more_points_than_are_expected(parameters in any_drive(), tolerance in -6..0_i32, is_full in any::<bool>()) {
+        let extent = if is_full { Extent::Full } else { Extent::Tooth };
+        let chord_tolerance_mm = 10.0_f64.powi(tolerance) * parameters.tooth_radius_mm;
+        let drive = drive(&parameters);
+        let request = ProfileParameters { chord_tolerance_mm, extent, max_points: 100_000_000 };
+        let profiles = profiles(&drive, &request, &Never).unwrap();
+        let points: usize = [&profiles.ring, &profiles.tooth_center_path, &profiles.wave_generator].iter().map(|curve| curve.len()).sum();
+        let expected = expected_points(&drive, &request);
+        prop_assert!(expected >= points as u64 && expected < 12 * points as u64, "{expected}, not {points}");
+    }
 
     #[test]
     fn teeth_join_and_the_ring_closes(parameters in any_drive()) {

@@ -95,7 +95,7 @@ async fn with_the_server(job: &impl AsyncFn(Store)) {
 }
 
 async fn claimed(store: &Store, study: &NewStudy) -> Lease {
-    match store.claim(&study.id, LEASE).await.unwrap() {
+    match store.claim(&study.cut(), LEASE).await.unwrap() {
         Claim::Chunk(lease) => lease,
         other => panic!("{other:?}"),
     }
@@ -111,13 +111,15 @@ async fn a_study_is_kept_as_it_was_asked_and_once() {
     with_each_store(async |store| {
         let study = study("kept", 3);
         assert_eq!(store.find(&study.id).await.unwrap(), None);
-        store.create(&study).await.unwrap();
-        store.create(&NewStudy { document: "another".into(), ..study.clone() }).await.unwrap();
+        assert!(store.create(&study).await.unwrap());
+        assert!(!store.create(&NewStudy { document: "another".into(), ..study.clone() }).await.unwrap());
         let standing = store.find(&study.id).await.unwrap().unwrap();
         assert!(standing.study.time <= study.time && standing.study.time > study.time / 2);
         assert_eq!(NewStudy { time: study.time, ..standing.study.clone() }, study);
         assert!(standing.is_running() && !standing.is_done());
-        assert!(store.waiting().await.unwrap().iter().any(|waiting| waiting.id == study.id && waiting.build == "this"));
+        assert!(
+            store.waiting().await.unwrap().iter().any(|waiting| waiting.cut.id == study.id && waiting.build == "this")
+        );
         store.forget(&study.id).await.unwrap();
         assert_eq!(store.find(&study.id).await.unwrap(), None);
     })
@@ -131,7 +133,7 @@ async fn a_chunk_is_in_one_pair_of_hands_and_its_result_is_kept_once() {
         store.create(&study).await.unwrap();
         let mut leases = [claimed(&store, &study).await, claimed(&store, &study).await, claimed(&store, &study).await];
         assert_eq!(leases.each_ref().map(Lease::chunk), [0, 1, 2]);
-        assert!(matches!(store.claim(&study.id, LEASE).await.unwrap(), Claim::None));
+        assert!(matches!(store.claim(&study.cut(), LEASE).await.unwrap(), Claim::None));
         for lease in &mut leases {
             keep(lease).await;
         }
@@ -140,12 +142,12 @@ async fn a_chunk_is_in_one_pair_of_hands_and_its_result_is_kept_once() {
         let standing = store.find(&study.id).await.unwrap().unwrap();
         assert!(standing.is_done() && !standing.is_running());
         assert_eq!((standing.done, standing.looked_at, standing.refused), (3, 21, 3));
-        assert_eq!(store.chunks_done(&study.id).await.unwrap(), [0, 1, 2]);
-        for kept in store.parts(&study.id, 0, 2).await.unwrap() {
+        assert_eq!(store.chunks_done(&study.cut()).await.unwrap(), [0, 1, 2]);
+        for kept in store.parts(&study.cut(), 0, 2).await.unwrap() {
             assert_eq!(kept.part, kept.chunk.to_le_bytes());
         }
-        assert_eq!(store.parts(&study.id, 1, 1).await.unwrap().len(), 1);
-        assert!(matches!(store.claim(&study.id, LEASE).await.unwrap(), Claim::None));
+        assert_eq!(store.parts(&study.cut(), 1, 1).await.unwrap().len(), 1);
+        assert!(matches!(store.claim(&study.cut(), LEASE).await.unwrap(), Claim::None));
         store.forget(&study.id).await.unwrap();
     })
     .await;
@@ -164,7 +166,7 @@ async fn of_many_chunks_each_is_claimed_once_in_their_order() {
             assert_eq!(lease.chunk(), chunk);
             keep(&mut lease).await;
         }
-        assert!(matches!(store.claim(&study.id, LEASE).await.unwrap(), Claim::None));
+        assert!(matches!(store.claim(&study.cut(), LEASE).await.unwrap(), Claim::None));
         let standing = store.find(&study.id).await.unwrap().unwrap();
         assert!(standing.is_done());
         assert_eq!(standing.looked_at, study.variants);
@@ -182,7 +184,7 @@ async fn all_chunks_of_a_study_wait_though_few_are_open_and_none_of_one_that_is_
         let figures = store.figures().await.unwrap();
         assert_eq!((figures.waiting - before.waiting, figures.running - before.running), (MANY_CHUNKS, 1));
         store.cancel(&study.id).await.unwrap();
-        assert!(matches!(store.claim(&study.id, LEASE).await.unwrap(), Claim::None));
+        assert!(matches!(store.claim(&study.cut(), LEASE).await.unwrap(), Claim::None));
         assert_eq!(store.figures().await.unwrap().waiting, before.waiting);
         store.resume(&study.id, Duration::ZERO).await.unwrap();
         assert_eq!(store.figures().await.unwrap().waiting, before.waiting);
@@ -231,7 +233,7 @@ async fn a_study_of_the_first_schema_goes_on_where_it_was() {
         assert_eq!(lease.chunk(), chunk);
         keep(&mut lease).await;
     }
-    assert!(matches!(store.claim(&study.id, LEASE).await.unwrap(), Claim::None));
+    assert!(matches!(store.claim(&study.cut(), LEASE).await.unwrap(), Claim::None));
     assert!(store.find(&study.id).await.unwrap().unwrap().is_done());
 }
 
@@ -245,7 +247,7 @@ async fn a_lease_that_is_dropped_sets_its_chunk_free_and_three_of_them_make_it_a
             drop(lease);
         }
         let gap = loop {
-            match store.claim(&study.id, LEASE).await.unwrap() {
+            match store.claim(&study.cut(), LEASE).await.unwrap() {
                 Claim::Gap(chunk) => break chunk,
                 // The server has not seen the end of the session yet.
                 Claim::Chunk(lease) if lease.chunk() == 1 => lease.give_back().await.unwrap(),
@@ -273,7 +275,7 @@ async fn a_lease_that_is_dropped_sets_its_chunk_free_and_three_of_them_make_it_a
 /// The chunk, as soon as it is free.
 async fn free_again(store: &Store, study: &NewStudy, chunk: u64) -> Lease {
     loop {
-        match store.claim(&study.id, LEASE).await.unwrap() {
+        match store.claim(&study.cut(), LEASE).await.unwrap() {
             Claim::Chunk(lease) if lease.chunk() == chunk => return lease,
             Claim::Chunk(lease) => lease.give_back().await.unwrap(),
             other => assert!(matches!(other, Claim::None), "{other:?}"),
@@ -305,9 +307,9 @@ async fn a_cancelled_study_waits_for_nobody_until_it_is_asked_for_again() {
         store.cancel(&study.id).await.unwrap();
         let standing = store.find(&study.id).await.unwrap().unwrap();
         assert!(standing.is_cancelled && !standing.is_running() && standing.done == 1);
-        assert!(store.waiting().await.unwrap().iter().all(|waiting| waiting.id != study.id));
+        assert!(store.waiting().await.unwrap().iter().all(|waiting| waiting.cut.id != study.id));
         store.resume(&study.id, Duration::from_secs(60)).await.unwrap();
-        assert!(store.waiting().await.unwrap().iter().any(|waiting| waiting.id == study.id));
+        assert!(store.waiting().await.unwrap().iter().any(|waiting| waiting.cut.id == study.id));
         store.forget(&study.id).await.unwrap();
     })
     .await;
@@ -398,7 +400,7 @@ async fn what_was_kept_in_a_file_is_there_after_its_process() {
     store.close().await;
     drop(unfinished);
     let store = Store::open(&file.address()).await.unwrap();
-    assert_eq!(store.chunks_done(&study.id).await.unwrap(), [0]);
+    assert_eq!(store.chunks_done(&study.cut()).await.unwrap(), [0]);
     assert_eq!(claimed(&store, &study).await.chunk(), 1);
 }
 
@@ -434,7 +436,7 @@ async fn two_workers_share_a_server_and_a_lost_lease_is_somebody_elses() {
     one.migrate().await.unwrap();
     let study = study("two", 1);
     one.create(&study).await.unwrap();
-    let Claim::Chunk(mut silent) = one.claim(&study.id, Duration::from_millis(50)).await.unwrap() else { panic!() };
+    let Claim::Chunk(mut silent) = one.claim(&study.cut(), Duration::from_millis(50)).await.unwrap() else { panic!() };
     // Silent for longer than its session may be.
     let mut lease = free_again(&other, &study, 0).await;
     silent.keep(&[1], 1, 0, BUSY).await.unwrap_err();
@@ -472,7 +474,7 @@ async fn nobody_waits_longer_for_a_silent_server_than_is_said() {
     let id = &study.id;
     let began = Instant::now();
     let answers = tokio::join!(
-        store.create(&study),
+        async { store.create(&study).await.map(drop) },
         store.touch(id),
         store.cancel(id),
         store.resume(id, LEASE),
@@ -511,6 +513,38 @@ fn an_address_of_no_file_and_no_server_is_refused() {
         assert_eq!(Address::new(text, None).unwrap_err(), AddressError::NoFile(text.into()));
     }
     assert!(Address::new("./file:studies", None).is_ok());
+}
+
+/// Whoever computes the first one may learn late, or never, that it is gone.
+#[tokio::test]
+async fn a_chunk_of_a_study_that_was_begun_anew_and_cut_otherwise_is_none_of_its_chunks() {
+    with_each_store(async |store| {
+        let first = study("cut", 3);
+        store.create(&first).await.unwrap();
+        let mut lost = claimed(&store, &first).await;
+        // As when its lease is over: one that is held on a server keeps the study from being forgotten.
+        if store.address().is_shared() {
+            lost.keep(&[1], 7, 0, BUSY).await.unwrap();
+        }
+        store.forget(&first.id).await.unwrap();
+        let second = NewStudy { chunk_variants: 21, chunks: 1, ..first.clone() };
+        assert!(store.create(&second).await.unwrap());
+        lost.keep(&[1], 7, 0, BUSY).await.unwrap();
+        assert_eq!(store.find(&first.id).await.unwrap().unwrap().done, 0);
+        assert!(matches!(store.claim(&first.cut(), LEASE).await.unwrap(), Claim::None));
+        drop(lost);
+        let mut lease = claimed(&store, &second).await;
+        lease.keep(&[2], 21, 0, BUSY).await.unwrap();
+        assert!(store.find(&first.id).await.unwrap().unwrap().is_done());
+        // Nor does anybody read them who knows the first one.
+        assert_eq!(
+            (store.chunks_done(&first.cut()).await.unwrap(), store.parts(&first.cut(), 0, 0).await.unwrap()),
+            (vec![], vec![])
+        );
+        assert_eq!(store.chunks_done(&second.cut()).await.unwrap(), [0]);
+        store.forget(&first.id).await.unwrap();
+    })
+    .await;
 }
 
 /// As one does that stands still.
@@ -569,7 +603,7 @@ async fn whoever_leaves_in_the_middle_of_anything_leaves_no_transaction_open() {
             for study in [&other, &left] {
                 store.create(study).await.unwrap();
                 let waiting = store.waiting().await.unwrap();
-                assert!(waiting.iter().any(|waiting| waiting.id == study.id), "{times}: {}", study.id);
+                assert!(waiting.iter().any(|waiting| waiting.cut.id == study.id), "{times}: {}", study.id);
                 store.forget(&study.id).await.unwrap();
             }
             if is_whole {
@@ -589,7 +623,7 @@ async fn a_study_that_is_forgotten_while_its_chunk_is_claimed_has_none_and_holds
             let study = study(&format!("gone-{round}"), 3);
             store.create(&study).await.unwrap();
             let worked = async {
-                if let Claim::Chunk(mut lease) = store.claim(&study.id, LEASE).await.unwrap() {
+                if let Claim::Chunk(mut lease) = store.claim(&study.cut(), LEASE).await.unwrap() {
                     keep(&mut lease).await;
                 }
             };

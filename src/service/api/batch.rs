@@ -210,8 +210,7 @@ fn whole_line<Q: Question>(
     room: &Room,
     stop: &AtomicBool,
 ) -> Result<AnsweredLine, Problem> {
-    let Solved { answer, columns_bytes, reserved } = solved(question, document, limits, room, stop)?;
-    let held_bytes = columns_bytes.max(answer.held_bytes(Format::Json));
+    let Solved { answer, held_bytes, reserved } = solved(question, document, limits, room, stop)?;
     let buffer = Growing::new(reserved, held_bytes, answer.expected_bytes())?;
     line(index, &answer, buffer, stop)
 }
@@ -223,7 +222,7 @@ fn peaks_line(
     room: &Room,
     stop: &AtomicBool,
 ) -> Result<AnsweredLine, Problem> {
-    let Solved { answer: sweep, columns_bytes, reserved } = solved(&Sweep, document, limits, room, stop)?;
+    let Solved { answer: sweep, held_bytes, reserved } = solved(&Sweep, document, limits, room, stop)?;
     let peaks = PeaksOnly {
         solver_version: sweep.solver_version,
         build: sweep.build,
@@ -243,14 +242,13 @@ fn peaks_line(
         checks: &sweep.checks,
         findings: &sweep.findings,
     };
-    let held_bytes = columns_bytes.max(sweep.held_bytes(Format::Json));
     line(index, &peaks, Growing::new(reserved, held_bytes, 0)?, stop)
 }
 
 /// What a document comes to, and the memory that it takes.
 struct Solved<A> {
     answer: A,
-    columns_bytes: u64,
+    held_bytes: u64,
     reserved: Reserved,
 }
 
@@ -268,8 +266,11 @@ fn solved<Q: Question>(
         fail::fail_point!("solve");
         let checked = question.check(&Design::read(document)?, limits)?;
         let columns_bytes = Q::columns_bytes(&checked);
-        let reserved = room.reserve(columns_bytes)?;
-        Ok(Solved { answer: Q::answer(&checked, stop)?, columns_bytes, reserved })
+        let mut reserved = room.reserve(columns_bytes + Q::working_bytes(&checked))?;
+        let answer = Q::answer(&checked, stop)?;
+        let held_bytes = columns_bytes.max(answer.held_bytes(Format::Json));
+        reserved.hold_at_most(held_bytes);
+        Ok(Solved { answer, held_bytes, reserved })
     });
     histogram!("toothwave_solve_duration_seconds").record(started.elapsed());
     answered

@@ -110,6 +110,11 @@ impl Question for WholeDesign {
             + checked.sweep.as_ref().map_or(0, Sweep::columns_bytes)
     }
 
+    fn working_bytes(checked: &CheckedDesign) -> u64 {
+        checked.geometry.as_ref().map_or(0, Geometry::working_bytes)
+            + checked.sweep.as_ref().map_or(0, Sweep::working_bytes)
+    }
+
     fn answer(checked: &CheckedDesign, stop: &dyn Stop) -> Result<DesignAnswer, NoAnswer> {
         let mut problems = DesignProblems::default();
         Ok(DesignAnswer {

@@ -217,7 +217,7 @@ fn solve<Q: Question>(
     let text_bytes = if is_long(format) { columns_bytes * if gzip { 1 } else { 2 } } else { 0 };
     let mut reserved = room.reserve(columns_bytes + text_bytes + Q::working_bytes(checked))?;
     let answer = Q::answer(checked, stop)?;
-    reserved.hold_at_most(columns_bytes + text_bytes);
+    reserved.hold_at_most((columns_bytes + text_bytes).max(answer.held_bytes(format)));
     written(answer, representation, reserved, columns_bytes, started.elapsed(), stop)
 }
 
