@@ -453,6 +453,40 @@ fn a_sweep_to_a_tolerance_finds_what_no_dense_one_exceeds() {
     }
 }
 
+/// Without the tooth: the wave generator has moved on so far already that it presses the tooth in the valley.
+#[test]
+fn the_capacity_just_before_a_tooth_enters_a_regular_tip_is_seen_by_a_sweep_to_a_tolerance() {
+    let ellipse = WaveGenerator::Ellipse { semi_major_mm: 32.9442, semi_minor_mm: 31.7933 };
+    let parameters = DriveParameters {
+        wave_generator: ellipse,
+        teeth: 16,
+        installed: 16,
+        tooth_radius_mm: 2.7234,
+        tooth: ToothShape::Cylinder { width_mm: 13.25 },
+        ring_teeth: 18,
+        tip_radius_mm: None,
+    };
+    let drive = drive(&parameters);
+    let modification = Modification {
+        wave_generator_equidistant_um: 13.8,
+        ring_tip_relief: Some(TipRelief { amount_um: 15.4, start_deg: 35.1, power: 2.0 }),
+        ..Modification::default()
+    };
+    let case = LoadCase::new(&LoadParameters {
+        modification,
+        allowable_stress_mpa: Some(everywhere(20_000.0)),
+        ..moving(13.6)
+    });
+    let case = case.unwrap();
+    let capacity_nm =
+        |points: Points| sweep::sweep(&drive, &case, points, &Never).unwrap().torque_capacity.unwrap().input_torque_nm;
+    let dense_nm = capacity_nm(Points::samples(1000).unwrap());
+    for tolerance in [1e-3, 1e-4] {
+        let found_nm = capacity_nm(Points::tolerance(tolerance, 1_000_000).unwrap());
+        assert!(found_nm <= (1.0 + tolerance) * dense_nm, "{found_nm} to {tolerance}, {dense_nm}");
+    }
+}
+
 #[test]
 fn projection_takes_no_wave_generator_that_moves() {
     let refused = LoadCase::new(&LoadParameters { wave_generator_moves: true, ..load(3.0, Projection) });

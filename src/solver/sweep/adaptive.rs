@@ -92,7 +92,8 @@ pub(crate) fn moments(
         }
     };
     let mut by_lap = vec![Vec::new(); usize::try_from(laps).unwrap_or(usize::MAX)];
-    let loads_jump = mesh.loads_jump_at_entry();
+    // A wave generator that moves presses a tooth before it is lifted, as it is behind the valley then.
+    let loads_jump = mesh.loads_jump_at_entry() || load.parameters().wave_generator_moves;
     let without_load = if tolerance.looks_without_load() && loaded.has_gaps() {
         unloaded::extremes(PlainLook::new(loaded, load, stop), pieces(), tolerance)?
     } else {
