@@ -157,6 +157,11 @@ impl PartsParameters {
         let set_forward_um = -self.modification.wave_generator_equidistant_um - self.wave_generator_clearance_um;
         let annulus = Annulus::of_draft(draft);
         let outer_mm = checks.carrier_radii(self.carrier_radii(), draft.cam_outer_mm, annulus, set_forward_um);
+        if let (Some(outer_mm), Some(annulus), Some(tip_mm)) = (outer_mm, annulus, self.ring_tip_mm(draft))
+            && outer_mm < annulus.outer_mm
+        {
+            checks.below(Misfit::CarrierMeetsRing, outer_mm, tip_mm);
+        }
         if let (Some(clearance_mm), Some(half_width_mm)) = (clearance_mm, draft.slot_half_width_mm) {
             let (value, least_um) = (self.modification.slot_wall_um, -(half_width_mm + clearance_mm) / MM_PER_UM);
             checks.modification(value > least_um, Modified::SlotWall, value, least_um);
@@ -169,6 +174,15 @@ impl PartsParameters {
             let half_spacing_rad = PI / installed as f64;
             checks.above(Misfit::SlotsTakeCarrier, outer_mm, (wall_mm + clearance_mm) / half_spacing_rad.sin());
         }
+    }
+
+    /// Radius of the ring's tips as they are made, where a ring can be made so.
+    fn ring_tip_mm(&self, draft: &Draft) -> Option<f64> {
+        if !self.violations(Part::Ring, draft).is_empty() {
+            return None;
+        }
+        let clearance_mm = MM_PER_UM * self.ring_clearance_um;
+        Some(ToothSpace::new(&draft.drive()?, clearance_mm, &self.modification).ok()?.tip().radius_mm)
     }
 
     fn check_teeth(&self, draft: &Draft, checks: &mut Checks) {

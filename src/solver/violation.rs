@@ -379,7 +379,7 @@ pub enum Violation {
         /// `b`.
         semi_minor_mm: f64,
     },
-    /// A cam that is too small for its stroke: its lobes would have cusps, or the axis would lie outside.
+    /// A cam that is too small for its stroke: its lobes would have cusps, their flanks would meet, or the axis would lie outside.
     CamTooSmall {
         /// The radius that says how large it is.
         parameter: Parameter,
@@ -567,7 +567,7 @@ impl std::fmt::Display for Violation {
             ),
             Self::CamTooSmall { radius_mm, least_mm, .. } => write!(
                 f,
-                "a wave generator of {radius_mm:?} mm is too small for its stroke, its lobes would have cusps or its axis would lie outside: choose more than {least_mm:?} mm, or a smaller stroke"
+                "a wave generator of {radius_mm:?} mm is too small for its stroke, its lobes would have cusps, their flanks would meet, or its axis would lie outside: choose more than {least_mm:?} mm, or a smaller stroke"
             ),
             Self::ToothDifference { teeth, ring_teeth, lobes, instead } => {
                 let joint = if lobes == 1 { "1 tooth".to_owned() } else { format!("{lobes} teeth") };

@@ -689,6 +689,57 @@ fn violations(p: &DriveParameters) -> Vec<Violation> {
     }
 }
 
+/// Of a path that is given: all its centres are as far from all of the cam as a tooth is thick, or the cam is none.
+#[test]
+fn the_flanks_of_a_lobe_do_not_meet_however_large_the_stroke() {
+    let mut are_hollow = 0;
+    for lobes in [2, 3, 4, 7, 12] {
+        for tooth_radius_mm in [0.02, 0.1, 0.3, 0.6, 1.2] {
+            let of_radius = |radius_mm: f64| {
+                let p = of(harmonic_path(lobes, radius_mm, 10.0), 4 * lobes, 2, 3 * lobes, tooth_radius_mm);
+                let least_mm = violations(&p).iter().find_map(|violation| match violation {
+                    Violation::CamTooSmall { least_mm, .. } => Some(*least_mm),
+                    _ => None,
+                });
+                (p, least_mm)
+            };
+            let (_, least_mm) = of_radius(1e-3);
+            let least_mm = least_mm.unwrap();
+            for share in [0.98, 1.02] {
+                let (p, found) = of_radius(least_mm * share);
+                assert_eq!(found.is_some(), share < 1.0);
+                let half_rad = PI / lobes as f64;
+                let center = |psi: f64| {
+                    let d = center_radius_mm(&p, psi);
+                    (d * psi.cos(), d * psi.sin())
+                };
+                let centers: Vec<_> = (-20_000..20_000).map(|i| center(half_rad * f64::from(i) / 20_000.0)).collect();
+                // Finely in the valley, where large strokes are sharp.
+                let nearest_mm = (0..400)
+                    .map(|i| {
+                        let psi = half_rad * (1.0 - 0.97_f64.powi(i));
+                        let ((x, y), step) = (center(psi), 1e-7);
+                        let ((x1, y1), (x2, y2)) = (center(psi - step), center(psi + step));
+                        let along = (x2 - x1).hypot(y2 - y1);
+                        let foot = (x - tooth_radius_mm * (y2 - y1) / along, y + tooth_radius_mm * (x2 - x1) / along);
+                        centers.iter().map(|(x, y)| (x - foot.0).hypot(y - foot.1)).fold(f64::INFINITY, f64::min)
+                    })
+                    .fold(f64::INFINITY, f64::min);
+                let is_free = nearest_mm > tooth_radius_mm * (1.0 - 2e-5);
+                assert_eq!(is_free, found.is_none(), "{lobes}, {tooth_radius_mm}, {share}: {nearest_mm} of {p:?}");
+            }
+            are_hollow += i32::from(least_mm > 1.001 * least_of_round_mm(lobes, tooth_radius_mm));
+        }
+    }
+    assert!(are_hollow > 3, "{are_hollow} whose flanks meet before anything else is wrong");
+}
+
+/// By the two conditions at lobe and valley, of an amplitude of 10 mm.
+fn least_of_round_mm(lobes: i64, r: f64) -> f64 {
+    let u = lobes as f64;
+    (r + 10.0).max(0.5 * (r + (r * (r + 40.0 * u * u)).sqrt()) - 10.0)
+}
+
 #[test]
 fn a_cam_that_is_too_small_for_its_stroke_is_told_how_large_it_must_be() {
     for (wave_generator, parameter) in [

@@ -8,7 +8,7 @@ use toothwave_solver::drive::{Draft, DriveError};
 use toothwave_solver::gaps::{Gaps, TipRelief};
 use toothwave_solver::mesh::Place;
 use toothwave_solver::parts::PartsParameters;
-use toothwave_solver::violation::Modified;
+use toothwave_solver::violation::{Misfit, Modified};
 use toothwave_solver::{
     Drive, DriveParameters, Modification, Never, Parameter, Part, PerContact, Position, ToothShape, Violation,
     WaveGenerator,
@@ -392,6 +392,33 @@ fn an_equidistant_modification_draws_what_a_clearance_of_its_size_draws() {
             assert_eq!(draw(&clearance), draw(&parts(modification)), "{part:?}");
         }
     }
+}
+
+#[test]
+fn a_carrier_beyond_the_tips_of_a_ring_that_is_set_forward_meets_it() {
+    let forward = [
+        Modification { ring_equidistant_um: -30.0, ..NONE },
+        Modification { ring_path_shift_um: -30.0, ..NONE },
+        Modification { ring_profile_shift_um: -30.0, ..NONE },
+    ];
+    let draft = Draft::new(&PAPER_5_1).unwrap();
+    let of = |modification: Modification, outer_mm: f64, ring_clearance_um: f64| {
+        let carrier_outer_radius_mm = Some(outer_mm);
+        let parts = PartsParameters { carrier_outer_radius_mm, ring_clearance_um, ..parts(modification) };
+        parts.violations(Part::Carrier, &draft)
+    };
+    for modification in forward {
+        let found = of(modification, 65.99, 0.0);
+        let [Violation::PartDoesNotFit { misfit: Misfit::CarrierMeetsRing, value: 65.99, limit }] = found[..] else {
+            panic!("{found:?}")
+        };
+        assert!((limit - 65.97).abs() < 1e-9, "{limit} of {modification:?}");
+        assert_eq!(of(modification, limit - 1e-6, 0.0), []);
+        assert!(!of(modification, limit + 1e-6, 0.0).is_empty());
+        // A clearance sets it back, though no farther than it would be.
+        assert_eq!(of(modification, 65.99, 30.0), []);
+    }
+    assert_eq!(of(NONE, 65.99, 0.0), []);
 }
 
 #[test]

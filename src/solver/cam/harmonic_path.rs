@@ -1,9 +1,11 @@
 //! The cam that moves the centres along `d = R + e cos Uψ`: explicit in the position, and hollow in its valleys where the stroke is large
 //! (docs/theory.md section 2.9).
 
+use std::f64::consts::PI;
+
 use crate::cam::kind::{CamContact, Given, Hollow, Kind, ToothCenter};
 use crate::position::Position;
-use crate::root::NotConverged;
+use crate::root::{NotConverged, bracketed};
 use crate::violation::Parameter;
 
 /// A cam with a harmonic path of the centres.
@@ -33,8 +35,14 @@ impl HarmonicPath {
     }
 
     /// What R has to exceed: `r + e`, for the valley to lie outside the axis; and with two lobes or more the larger root of
-    /// `r(R + e + eU²) = (R + e)²`, for the lobe to be round. With one lobe `r < √(R² - e²)` at its sharpest place follows from the first.
-    pub(super) fn least_mean_radius_mm(lobes: u32, amplitude_mm: f64, tooth_radius_mm: f64) -> f64 {
+    /// `r(R + e + eU²) = (R + e)²`, for the lobe to be round. With one lobe `r < √(R² - e²)` at its sharpest place follows from the first. With
+    /// three or more the flanks of a lobe may meet all the same, where `R < 2e`.
+    pub(super) fn least_mean_radius_mm(
+        lobes: u32,
+        mean_radius_mm: f64,
+        amplitude_mm: f64,
+        tooth_radius_mm: f64,
+    ) -> f64 {
         let (e, r) = (amplitude_mm, tooth_radius_mm);
         let of_valley_mm = r + e;
         if lobes < 2 {
@@ -42,7 +50,54 @@ impl HarmonicPath {
         }
         let u = f64::from(lobes);
         let of_lobe_mm = 0.5 * (r + (r * (r + 4.0 * e * u * u)).sqrt()) - e;
-        of_valley_mm.max(of_lobe_mm)
+        let round_mm = of_valley_mm.max(of_lobe_mm);
+        let between_flanks_mm = |mean_radius_mm| Self::new(lobes, mean_radius_mm, e).least_normal_mm() - r;
+        let (from_mm, to_mm) = (round_mm, 2.0 * e);
+        let is_wide = mean_radius_mm >= to_mm || (mean_radius_mm > from_mm && between_flanks_mm(mean_radius_mm) > 0.0);
+        if lobes == 2 || from_mm >= to_mm || is_wide {
+            return round_mm;
+        }
+        let at_start_mm = between_flanks_mm(from_mm);
+        if at_start_mm >= 0.0 {
+            return round_mm;
+        }
+        let between_flanks_mm = |mean_radius_mm| Ok(between_flanks_mm(mean_radius_mm));
+        // From there on they never meet.
+        bracketed("least radius of the path", from_mm, at_start_mm, to_mm, between_flanks_mm).unwrap_or(to_mm)
+    }
+
+    /// The least of the path's normals `d sin ψ/sin(ψ + γ)` from a centre to its lobe's axis: so thick a tooth meets the other flank's there.
+    fn least_normal_mm(&self) -> f64 {
+        /// Of the phase from the valley; the least normal of a drive of `MAX_LOBES` stands within.
+        const FINEST_RAD: f64 = 1e-5;
+        const RATIO: f64 = 0.8;
+        let normal_mm = |valley_rad: f64| {
+            let (sin, cos) = valley_rad.sin_cos();
+            let center_radius_mm = self.mean_radius_mm - self.amplitude_mm * cos;
+            let falls_mm = self.amplitude_mm * self.lobe_count() * sin;
+            let (sin, cos) = ((PI - valley_rad) / self.lobe_count()).sin_cos();
+            let across_mm = center_radius_mm * sin;
+            let leaning_mm = across_mm + falls_mm * cos;
+            if leaning_mm > 0.0 { across_mm * center_radius_mm.hypot(falls_mm) / leaning_mm } else { f64::INFINITY }
+        };
+        let (mut least_mm, mut at_rad, mut rad) = (f64::INFINITY, PI, PI);
+        while rad > FINEST_RAD {
+            rad *= RATIO;
+            let found_mm = normal_mm(rad);
+            if found_mm < least_mm {
+                (least_mm, at_rad) = (found_mm, rad);
+            }
+        }
+        // Golden section between its neighbours.
+        const SHARE: f64 = 0.618_033_988_749_894_8;
+        let (mut low, mut high) = (at_rad * RATIO, (at_rad / RATIO).min(PI));
+        for _ in 0..40 {
+            let (one, other) = (high - SHARE * (high - low), low + SHARE * (high - low));
+            let (of_one, of_other) = (normal_mm(one), normal_mm(other));
+            least_mm = least_mm.min(of_one).min(of_other);
+            if of_one < of_other { high = other } else { low = one }
+        }
+        least_mm
     }
 
     /// `e`.

@@ -149,7 +149,8 @@ impl WaveGenerator {
                 Ok(Cam::Harmonic(Harmonic::new(lobes, radius, stroke)))
             }
             Self::HarmonicPath { mean_path_radius_mm, amplitude_mm, .. } => {
-                let least_mm = HarmonicPath::least_mean_radius_mm(lobes, amplitude_mm, tooth_radius_mm);
+                let least_mm =
+                    HarmonicPath::least_mean_radius_mm(lobes, mean_path_radius_mm, amplitude_mm, tooth_radius_mm);
                 self.wide_enough(mean_path_radius_mm, least_mm)?;
                 Ok(Cam::HarmonicPath(HarmonicPath::new(lobes, mean_path_radius_mm, amplitude_mm)))
             }
