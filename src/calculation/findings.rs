@@ -421,16 +421,27 @@ impl FindingAnswer {
                     Wall::Cam => "bore the wave generator less",
                 },
             ),
-            Finding::ClearanceUndercutsRing { distance_mm, critical_distance_mm } => new(
-                Code::ClearanceUndercutsRing,
-                Warning,
-                &["/parts/ring/clearance_um", RADIUS],
-                distance_mm,
-                critical_distance_mm,
-                "mm",
-                "the ring's clearance alone cuts away its tooth tips: the flank as drawn ends before the one that is computed with, so teeth enter later than the results say".into(),
-                "make the clearance smaller, or take it from the teeth's radius instead",
-            ),
+            Finding::ClearanceUndercutsRing { has_clearance, is_set_back, distance_mm, critical_distance_mm } => {
+                const CLEARANCE: &str = "/parts/ring/clearance_um";
+                const EQUIDISTANT: &str = "/modification/ring_equidistant_um";
+                let (pointers, what, less): (&[&str], _, _) = match (has_clearance, is_set_back) {
+                    (true, true) => (&[CLEARANCE, EQUIDISTANT, RADIUS], "clearance and its equidistant modification cut", "them"),
+                    (_, false) => (&[CLEARANCE, RADIUS], "clearance alone cuts", "the clearance"),
+                    (false, true) => (&[EQUIDISTANT, RADIUS], "equidistant modification alone cuts", "the modification"),
+                };
+                new(
+                    Code::ClearanceUndercutsRing,
+                    Warning,
+                    pointers,
+                    distance_mm,
+                    critical_distance_mm,
+                    "mm",
+                    format!(
+                        "the ring's {what} away its tooth tips: the flank as drawn ends before the one that is computed with, so teeth enter later than the results say"
+                    ),
+                    &format!("make {less} smaller, or take it from the teeth's radius instead"),
+                )
+            }
             Finding::FrictionBeyondMeasured { is_along_cam, coefficient, limit } => new(
                 Code::FrictionBeyondMeasured,
                 Warning,

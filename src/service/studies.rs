@@ -191,8 +191,13 @@ struct Made {
     at: Instant,
 }
 
-/// All who ask meanwhile share it.
-type Making = Shared<BoxFuture<'static, Result<Arc<Made>, Problem>>>;
+/// The same while it is made: all who ask meanwhile share it.
+#[derive(Debug, Clone)]
+struct Making {
+    made: Shared<BoxFuture<'static, Result<Arc<Made>, Problem>>>,
+    /// Whether the study still ran when it was begun: more may have come since than is in it.
+    is_of_running: bool,
+}
 
 /// How a study stands, and why it broke off.
 #[derive(Debug, Clone)]
@@ -317,8 +322,8 @@ impl Kept {
 
     /// Whether who asks now is served by an answer that is made, or was.
     fn serves(&self, making: &Making) -> bool {
-        match making.peek() {
-            None => true,
+        match making.made.peek() {
+            None => self.is_running() || !making.is_of_running,
             Some(Ok(made)) => made.is_whole || (self.is_running() && made.at.elapsed() < FRESH),
             Some(Err(_)) => false,
         }
@@ -834,7 +839,7 @@ impl Studies {
                 _ => making.insert(self.making(kept)?).clone(),
             }
         };
-        let made = tokio::time::timeout_at(deadline, making).await.map_err(|_| {
+        let made = tokio::time::timeout_at(deadline, making.made).await.map_err(|_| {
             let detail =
                 "the study's answer is still being made of its rows, which goes on; ask for it again in a moment";
             Problem::new(ProblemCode::DeadlineExceeded, detail)
@@ -844,6 +849,7 @@ impl Studies {
 
     fn making(&self, kept: &Arc<Kept>) -> Result<Making, Problem> {
         let rows = self.rows(kept)?;
+        let is_of_running = kept.is_running();
         let (kept, pool, room) = (Arc::clone(kept), self.pool.clone(), self.room.clone());
         let store = match &self.keeping {
             Keeping::Store { store, .. } => Some(store.clone()),
@@ -862,7 +868,8 @@ impl Studies {
             pool.run_unhurried(make).await
         };
         let made = tokio::spawn(made.in_current_span());
-        Ok(made.map(|joined| joined.unwrap_or_else(|error| Err(Problem::internal(&error)))).boxed().shared())
+        let made = made.map(|joined| joined.unwrap_or_else(|error| Err(Problem::internal(&error)))).boxed().shared();
+        Ok(Making { made, is_of_running })
     }
 
     /// What a store is served by in this process, until it closes: the workers where it is a file, and whoever forgets old studies and

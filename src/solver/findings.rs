@@ -240,9 +240,13 @@ pub enum Finding {
         /// What it is measured against.
         limit_mm: f64,
     },
-    /// The ring's flank is undercut only because its clearance sets it back.
+    /// The ring's flank is undercut only because it is set back.
     ClearanceUndercutsRing {
-        /// The flank's distance from the path of the teeth's centres, `r` and the clearance.
+        /// Whether by a clearance.
+        has_clearance: bool,
+        /// Whether by an equidistant modification.
+        is_set_back: bool,
+        /// The flank's distance from the path of the teeth's centres: `r`, the clearance and the modification.
         distance_mm: f64,
         /// The least one that undercuts.
         critical_distance_mm: f64,
@@ -438,7 +442,12 @@ pub(crate) fn of_ring(drive: &Drive, ring: &RingPart) -> Vec<Finding> {
         && !drive.flank().is_undercut()
         && let Some(critical_distance_mm) = flank.critical_distance_mm()
     {
-        findings.push(Finding::ClearanceUndercutsRing { distance_mm: flank.distance_mm(), critical_distance_mm });
+        findings.push(Finding::ClearanceUndercutsRing {
+            has_clearance: ring.has_clearance,
+            is_set_back: ring.is_set_back,
+            distance_mm: flank.distance_mm(),
+            critical_distance_mm,
+        });
     }
     findings
 }

@@ -240,6 +240,9 @@ impl Annulus {
 pub struct RingPart {
     pub(crate) space: ToothSpace,
     pub(crate) outer_radius_mm: f64,
+    pub(crate) has_clearance: bool,
+    /// Whether a modification sets its flank back evenly.
+    pub(crate) is_set_back: bool,
 }
 
 /// The wave generator as it is made.
@@ -274,7 +277,9 @@ impl RingPart {
         let outer_radius_mm = parameters.ring_outer_radius_mm.unwrap_or(RIM * root_radius_mm);
         let limit = root_radius_mm * (1.0 + LEAST_WALL);
         if outer_radius_mm > limit {
-            return Ok(Self { space, outer_radius_mm });
+            let has_clearance = parameters.ring_clearance_um > 0.0;
+            let is_set_back = parameters.modification.ring_equidistant_um > 0.0;
+            return Ok(Self { space, outer_radius_mm, has_clearance, is_set_back });
         }
         let misfit = Misfit::RingWithoutRim;
         Err(DriveError::Impossible(vec![Violation::PartDoesNotFit { misfit, value: outer_radius_mm, limit }]))

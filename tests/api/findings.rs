@@ -313,6 +313,21 @@ async fn a_clearance_that_itself_undercuts_the_ring_is_a_warning_with_the_distan
 }
 
 #[tokio::test]
+async fn what_sets_the_ring_back_until_it_is_undercut_is_pointed_at() {
+    let modified = |document: &Value| with(document, "/modification", json!({ "ring_equidistant_um": 3000 }));
+    let (clearance, equidistant, radius) =
+        ("/parts/ring/clearance_um", "/modification/ring_equidistant_um", "/drive/teeth/radius_mm");
+    for (document, pointers) in [
+        (cleared(3000.0), vec![clearance, radius]),
+        (modified(&cleared(0.0)), vec![equidistant, radius]),
+        (modified(&cleared(10.0)), vec![clearance, equidistant, radius]),
+    ] {
+        let findings = findings_of_parts(&document).await;
+        assert_eq!(findings[0]["pointers"], json!(pointers));
+    }
+}
+
+#[tokio::test]
 async fn parts_that_are_not_drawn_are_not_judged() {
     assert!(findings_at("/v1/drawings/tooth", &thin_walls()).await.is_empty());
     assert_eq!(findings_at("/v1/drawings/ring", &thin_walls()).await.len(), 1);

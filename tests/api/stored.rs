@@ -16,7 +16,7 @@ use toothwave::studies::Keeping;
 use toothwave_store::{Address, Claim, Figures, NewStudy, Store};
 
 use crate::asking::{Answer, LIMITS, Occupied, Question, Service};
-use crate::designs::shortest;
+use crate::designs::{shortest, with};
 
 const EXPIRY: Duration = Duration::from_secs(3600);
 
@@ -579,6 +579,32 @@ fn large() -> Value {
         ],
         "inputs": { "/drive/teeth/radius_mm": { "distribution": "normal", "sigma": 0.01, "limit": 0.03 } }
     })
+}
+
+#[tokio::test]
+async fn who_asks_for_a_study_that_is_over_gets_all_of_it_though_another_asked_while_it_ran() {
+    let service = Service::new();
+    let (studies, pool) = (&service.app.studies, service.app.pool.clone());
+    // Answers wait for this one to be made.
+    let (release, released) = std::sync::mpsc::channel::<()>();
+    let before = tokio::spawn(async move {
+        let waiting = move || Ok(released.recv().is_ok());
+        pool.run_unhurried(waiting).await
+    });
+    tokio::task::yield_now().await;
+    let study = with(&large(), "/samples", json!(100_000)).to_string();
+    let begun = service.ask(&Question::post("/v1/studies", study)).await.json();
+    assert_eq!(begun["state"], "running");
+    let kept = studies.find(begun["id"].as_str().unwrap()).await.unwrap().unwrap();
+    let refused = studies.made_apart(&kept, tokio::time::Instant::now()).await.unwrap_err();
+    assert_eq!(refused.code, ProblemCode::DeadlineExceeded);
+    while service.get(&place(&begun)).await.found()["state"] == "running" {
+        tokio::task::yield_now().await;
+    }
+    let an_hour = tokio::time::Instant::now() + EXPIRY;
+    let (made, ()) = tokio::join!(studies.made_apart(&kept, an_hour), async { release.send(()).unwrap() });
+    assert_eq!(serde_json::to_value(made.unwrap()).unwrap()["is_complete"], true);
+    assert!(before.await.unwrap().unwrap());
 }
 
 #[tokio::test]

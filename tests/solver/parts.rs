@@ -257,7 +257,7 @@ fn a_clearance_that_alone_undercuts_the_ring_is_told_with_the_distance_from_whic
     };
     assert_eq!(of(&p, 0.999 * most_um), []);
     let found = of(&p, 1.001 * most_um);
-    let [Finding::ClearanceUndercutsRing { distance_mm, critical_distance_mm }] = found[..] else {
+    let [Finding::ClearanceUndercutsRing { distance_mm, critical_distance_mm, .. }] = found[..] else {
         panic!("{found:?}")
     };
     assert!((distance_mm - (r + 1.001e-3 * most_um)).abs() < 1e-12);

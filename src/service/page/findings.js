@@ -100,10 +100,10 @@ const KINDS = {
     why: 'Forces and stresses are those of rigid parts.',
   },
   clearance_undercuts_ring: {
-    title: 'Clearance undercuts the ring',
-    tests: 'The drawn flank’s distance from the path of the teeth’s centres, the tooth radius and the ring’s clearance, against the one that undercuts.',
+    title: 'Set-back flank undercuts the ring',
+    tests: 'The drawn flank’s distance from the path of the teeth’s centres, the tooth radius and how far the flank is set back by clearance or modification, against the one that undercuts.',
     basis: GEOMETRY,
-    why: 'Results are those of the flank without clearance, which is longer.',
+    why: 'Results are those of the flank that is not set back, which is longer.',
   },
   friction_beyond_measured: {
     title: 'Friction beyond what was measured',
