@@ -392,8 +392,13 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
             }
         }
         let closing_rad = self.springs[carrying - 1].as_ref().closing_rad;
+        let next =
+            self.springs.get(carrying).map(|next| Rotation { closing_rad: next.as_ref().closing_rad, excess_rad: 0.0 });
         let carrying = Self { springs: &self.springs[..carrying], ..*self };
-        let excess_rad = carrying.excess_rad(closing_rad, torque_nmm, summit)?;
+        // By themselves these make the torque where the next one closes, and may make less beyond.
+        let end = next.as_ref().or(summit);
+        let excess_rad = carrying.excess_rad(closing_rad, torque_nmm, end)?;
+        let excess_rad = excess_rad.or_else(|| Some(next?.closing_rad - closing_rad));
         Ok(excess_rad.map(|excess_rad| Rotation { closing_rad, excess_rad }))
     }
 
@@ -433,10 +438,10 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         &self,
         closing_rad: f64,
         torque_nmm: f64,
-        summit: Option<&Rotation>,
+        end: Option<&Rotation>,
     ) -> Result<Option<f64>, NotConverged> {
         if self.has_declining_arms() {
-            let most_rad = summit.map_or(FARTHEST_RAD, |summit| summit.excess_rad + (summit.closing_rad - closing_rad));
+            let most_rad = end.map_or(FARTHEST_RAD, |end| end.excess_rad + (end.closing_rad - closing_rad));
             return self.bracketed_excess_rad(closing_rad, torque_nmm, most_rad);
         }
         if self.common_exponent() == Some(1.0) {

@@ -395,6 +395,29 @@ fn a_spring_that_closes_its_gap_while_the_torque_falls_carries_what_those_before
     assert!((both.torque_nmm(&rotation).unwrap().value / (1.5 * most_of_first_nmm) - 1.0).abs() < 1e-12);
 }
 
+/// The first one's torque is highest just beyond where the other closes. In search of less than that the whole way to the summit of both was once looked over at its ends, where
+/// the first alone makes less again, and what the summit makes was answered.
+#[test]
+fn a_torque_that_the_first_of_two_springs_makes_before_the_other_closes_is_carried_there() {
+    let spring = |arm_mm: f64, end_rad: f64, closing_rad: f64, compliance_mm_per_n: f64| Spring {
+        travel_arm_mm: arm_mm,
+        static_arm_mm: arm_mm,
+        arm_decline_mm_per_rad: arm_mm / end_rad,
+        closing_rad,
+        approach: Approach::Linear { compliance_mm_per_n },
+    };
+    let springs = [spring(16.0, 0.773, 0.0, 6.8e-6), spring(7.7, 1.162, 0.326, 1.7e-5)];
+    let both = Springs::new(&springs, 2.0);
+    let at_closing = both.torque_nmm(&Rotation { closing_rad: 0.326, excess_rad: 0.0 }).unwrap();
+    assert!(at_closing.slope > 0.0);
+    for share in [0.5, 0.9, 0.99, 0.999, 0.999_99] {
+        let rotation = both.wind_up(share * at_closing.value).unwrap().unwrap().rotation;
+        assert!(rotation.rad() < 0.326, "{share}: {rotation:?}");
+        let torque_nmm = both.torque_nmm(&rotation).unwrap().value;
+        assert!((torque_nmm / (share * at_closing.value) - 1.0).abs() < 1e-12, "{share}: {torque_nmm} N·mm");
+    }
+}
+
 /// Rounding of the closing angles, 1e7 times what is turned beyond them, is all that parts two ways to these loads: no reason for an internal error.
 #[test]
 fn next_to_no_torque_across_a_wide_gap_is_answered_with_the_digits_that_are_left() {
