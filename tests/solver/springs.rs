@@ -418,6 +418,25 @@ fn a_torque_that_the_first_of_two_springs_makes_before_the_other_closes_is_carri
     }
 }
 
+/// Both have closed their gaps when the first is passed. What the other would make farther on is on a branch that no load leads to.
+#[test]
+fn no_maximum_is_passed_at_which_all_gaps_are_closed() {
+    let spring = |end_rad: f64, compliance_mm_per_n: f64| Spring {
+        travel_arm_mm: 5.0,
+        static_arm_mm: 5.0,
+        arm_decline_mm_per_rad: 5.0 / end_rad,
+        closing_rad: 0.1,
+        approach: Approach::Linear { compliance_mm_per_n },
+    };
+    let springs = [spring(0.3, 1e-6), spring(6.0, 3e-5)];
+    let both = Springs::new(&springs, 2.0);
+    let torque_nmm = |rad: f64| both.torque_nmm(&Rotation { closing_rad: 0.1, excess_rad: rad - 0.1 }).unwrap().value;
+    let most_nmm = (100..300).map(|step| torque_nmm(1e-3 * f64::from(step))).fold(0.0, f64::max);
+    assert!(torque_nmm(0.35) < 0.5 * most_nmm && torque_nmm(2.5) > 1.5 * most_nmm);
+    assert!(both.wind_up(0.99 * most_nmm).unwrap().unwrap().rotation.rad() < 0.3);
+    assert_eq!(both.wind_up(1.01 * most_nmm).unwrap(), None);
+}
+
 /// Rounding of the closing angles, 1e7 times what is turned beyond them, is all that parts two ways to these loads: no reason for an internal error.
 #[test]
 fn next_to_no_torque_across_a_wide_gap_is_answered_with_the_digits_that_are_left() {
