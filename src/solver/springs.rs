@@ -298,8 +298,8 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         Rotation { closing_rad: self.first_closing_rad(), excess_rad: FARTHEST_RAD }
     }
 
-    /// The first summit of the torque over the rotation, on the way from none to `end`, that makes enough, or else the highest. The way is over where the torque
-    /// falls and no spring has a gap left to close; a summit before that is passed, as the wave generator then comes to springs that hold it again.
+    /// The first summit of the torque over the rotation, on the way from none to `end`, that makes enough, or else the highest. The way is over at a summit at which
+    /// no spring has a gap left to close; one before that is passed, as the wave generator then comes to springs that hold it again, if only once they are pressed.
     fn summit(&self, end: &Rotation, enough_nmm: f64) -> Result<Summit, NotConverged> {
         /// Where a stretch is this short against the way up to it, its ends tell whether the torque rises: at the summit it differs by the square.
         const SHORTEST: f64 = 1e-9;
@@ -310,15 +310,14 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         let end_rad = end.excess_rad + (end.closing_rad - first_rad);
         let mut summit = Summit { rotation: at(0.0), torque_nmm: 0.0, is_end: false };
         let (mut near_rad, mut near_nmm, mut rises, mut step_rad) = (0.0, 0.0, true, end_rad);
+        // By rounding, the shortest stretches at a minimum have summits of their own.
+        let mut surely_rises = true;
         while near_rad < end_rad {
             let far_rad = end_rad.min(near_rad + step_rad);
             let far_nmm = self.torque_nmm(&at(far_rad))?.value;
             let is_short = step_rad <= SHORTEST * near_rad.max(SHORTEST * end_rad);
-            let trend = match self.trend(&at(near_rad), &at(far_rad))? {
-                None if is_short => Some(far_nmm >= near_nmm),
-                trend => trend,
-            };
-            let Some(goes_up) = trend else {
+            let trend = self.trend(&at(near_rad), &at(far_rad))?;
+            let Some(goes_up) = trend.or_else(|| is_short.then_some(far_nmm >= near_nmm)) else {
                 step_rad = 0.5 * (far_rad - near_rad);
                 continue;
             };
@@ -328,9 +327,10 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
                     return Ok(summit);
                 }
             }
-            if !goes_up && near_rad >= all_closed_rad {
+            if surely_rises && trend == Some(false) && near_rad >= all_closed_rad {
                 return Ok(summit);
             }
+            surely_rises = trend.unwrap_or(surely_rises);
             (near_rad, near_nmm, rises, step_rad) = (far_rad, far_nmm, goes_up, 2.0 * step_rad);
         }
         let is_end = rises && near_nmm >= summit.torque_nmm;
@@ -392,8 +392,13 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
             }
         }
         let closing_rad = self.springs[carrying - 1].as_ref().closing_rad;
+        let next =
+            self.springs.get(carrying).map(|next| Rotation { closing_rad: next.as_ref().closing_rad, excess_rad: 0.0 });
         let carrying = Self { springs: &self.springs[..carrying], ..*self };
-        let excess_rad = carrying.excess_rad(closing_rad, torque_nmm, summit)?;
+        // By themselves these make the torque where the next one closes, and may make less beyond.
+        let end = next.as_ref().or(summit);
+        let excess_rad = carrying.excess_rad(closing_rad, torque_nmm, end)?;
+        let excess_rad = excess_rad.or_else(|| Some(next?.closing_rad - closing_rad));
         Ok(excess_rad.map(|excess_rad| Rotation { closing_rad, excess_rad }))
     }
 
@@ -433,10 +438,10 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         &self,
         closing_rad: f64,
         torque_nmm: f64,
-        summit: Option<&Rotation>,
+        end: Option<&Rotation>,
     ) -> Result<Option<f64>, NotConverged> {
         if self.has_declining_arms() {
-            let most_rad = summit.map_or(FARTHEST_RAD, |summit| summit.excess_rad + (summit.closing_rad - closing_rad));
+            let most_rad = end.map_or(FARTHEST_RAD, |end| end.excess_rad + (end.closing_rad - closing_rad));
             return self.bracketed_excess_rad(closing_rad, torque_nmm, most_rad);
         }
         if self.common_exponent() == Some(1.0) {

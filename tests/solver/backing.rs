@@ -12,7 +12,8 @@ use toothwave_solver::findings;
 use toothwave_solver::model_error::{self, Beyond, Held, HeldCase};
 use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::{
-    ContactLaw, Deviations, DriveParameters, Finding, LoadCase, LoadParameters, Material, PerContact, ToothShape,
+    Contact, ContactLaw, Deviations, DriveParameters, Finding, LoadCase, LoadParameters, Material, Materials,
+    PerContact, ToothShape,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, drive, load, swept};
@@ -161,6 +162,32 @@ fn a_housed_rim_is_a_strip_as_deep_as_the_rim_on_which_a_tooth_presses_at_every_
     let strip = HeldStrip { depth_mm: 20.0, pitch_mm: 2.0 * PI * 68.0 / 28.0, width_mm: 15.0 };
     let expected = strip.compliance_mm_per_n(&Material::STEEL, 5.0);
     assert!((found.compliance_mm_per_n / expected - 1.0).abs() < 1e-12, "{} {expected}", found.compliance_mm_per_n);
+}
+
+/// By Johnson's law for the teeth's own approach, each half of which is of its body's own elasticity.
+#[test]
+fn the_share_of_a_backing_is_its_part_of_what_a_tooth_gives_way_at_its_own_contacts() {
+    let bronze = Material { youngs_modulus_gpa: 110.0, poissons_ratio: 0.35 };
+    let steel = Material::STEEL;
+    let materials = Materials { wave_generator: steel, teeth: steel, ring: bronze, carrier: bronze };
+    let load = LoadParameters { materials, ..johnson(20.0) };
+    let peaks = swept(&PAPER_5_1, &load, 50).peaks;
+    let per_width = |body: &Material| (1.0 - body.poissons_ratio.powi(2)) / (1e3 * body.youngs_modulus_gpa * PI * 15.0);
+    let squared_ratio = |contact| (peaks.get(contact).force_n.value / peaks.wave_generator.force_n.value).powi(2);
+    let own = PerContact::of(|contact| {
+        let half_mm = peaks.get(contact).half_width_mm;
+        let partner = if contact == Contact::WaveGenerator { &steel } else { &bronze };
+        let nu = partner.poissons_ratio;
+        squared_ratio(contact)
+            * (per_width(&materials.teeth) * (2.0 * (20.0 / half_mm).ln() - 1.0)
+                + per_width(partner) * (2.0 * (10.0 / half_mm).ln() - nu / (1.0 - nu)))
+    });
+    let shares = shares(&PAPER_5_1, &load, AT_ONE_END).unwrap();
+    let (finger, share) =
+        shares.shares.iter().find(|(estimate, _)| estimate.backing == Backing::FingerAtOneEnd).unwrap();
+    let expected =
+        squared_ratio(Contact::Carrier) * finger.compliance_mm_per_n / (own.wave_generator + own.ring + own.carrier);
+    assert!((share / expected - 1.0).abs() < 1e-12, "{share}, expected {expected}");
 }
 
 /// What the estimate says of a tooth holds for the drive, but for the load that shifts to teeth which press their fingers less.

@@ -9,6 +9,7 @@ use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
 use toothwave_solver::losses::period::Losses;
 use toothwave_solver::losses::{Friction, FrictionParameters, WaveGeneratorFriction};
 use toothwave_solver::model_error;
+use toothwave_solver::parts::CarrierRadii;
 use toothwave_solver::sweep::{self, Points, States, Sweep};
 use toothwave_solver::{
     ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, Parameter, PerContact, Position, SolveError,
@@ -477,6 +478,38 @@ fn flats_that_have_left_their_slots_before_the_flank_carry_nothing() {
     };
     let (of_flats, of_cylinders) = (carrying(&flats), carrying(&cylinders));
     assert!((of_flats - of_cylinders).abs() < 1.0 && of_flats > 37.0, "{of_flats}, with cylinders {of_cylinders} deg");
+}
+
+/// However far the wave generator turns: a tooth that no wall holds has no force at a corner either.
+#[test]
+fn before_the_flank_a_flat_is_pressed_as_a_cylinder_is_until_it_has_left_its_slot() {
+    let flats = DriveParameters {
+        wave_generator: WaveGenerator::Ellipse { semi_major_mm: 51.0, semi_minor_mm: 49.0 },
+        tooth: ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 0.8 },
+        ..PAPER_5_2
+    };
+    let cylinders = DriveParameters { tooth: ToothShape::Cylinder { width_mm: 15.0 }, ..flats };
+    let inner_mm = 51.6;
+    let carrier = CarrierRadii { inner_mm: Some(inner_mm), outer_mm: None };
+    let case = LoadCase::new(&LoadParameters { carrier, ..pressed_corners(3.0) }).unwrap();
+    let drives = [drive(&flats), drive(&cylinders)];
+    let [flats, cylinders] = drives.each_ref().map(|drive| LoadedDrive::new(drive, &case).unwrap());
+    let end_deg = drives[0].flank_limit().position.from_lobe_deg();
+    let (mut held, mut left) = (0, 0);
+    for step in 1..=100 {
+        let position_deg = end_deg + f64::from(step) / 101.0 * (90.0 - end_deg);
+        let position = Position::from_lobe(position_deg.to_radians(), 2);
+        let [flat, cylinder] = [&flats, &cylinders].map(|loaded| loaded.tooth(position).unwrap());
+        let can_be_pressed = cylinder.spring.closing_rad.is_finite();
+        if flat.center.center_radius_mm + 0.4 > inner_mm {
+            held += u32::from(can_be_pressed);
+            assert_eq!(flat.spring.closing_rad, cylinder.spring.closing_rad, "{position_deg} deg");
+        } else {
+            left += u32::from(can_be_pressed);
+            assert_eq!(flat.spring.closing_rad, f64::INFINITY, "{position_deg} deg");
+        }
+    }
+    assert!(held > 5 && left > 5, "{held} held, {left} have left");
 }
 
 #[test]

@@ -570,6 +570,20 @@ fn balls_and_flat_sided_teeth_take_the_fast_path() {
     }
 }
 
+/// Their columns know Hertz's law alone.
+#[test]
+fn balls_of_other_laws_or_with_what_gives_way_behind_them_are_computed_as_in_the_plain_path() {
+    let ball = DriveParameters { tooth: ToothShape::Ball { groove_radius_mm: PerContact::default() }, ..PAPER_5_1 };
+    for (law, series_compliance_mm_per_n) in [
+        (ContactLaw::Hertz, everywhere(3e-6)),
+        (ContactLaw::Hertz, PerContact { ring: 1e-6, ..PerContact::default() }),
+        (ContactLaw::Fixed(everywhere(4e5)), PerContact::default()),
+    ] {
+        let load = LoadParameters { law, series_compliance_mm_per_n, ..load(20.0, Compatibility::VirtualWork) };
+        assert_both_paths_agree(&ball, &load, 50);
+    }
+}
+
 fn any_law() -> impl Strategy<Value = ContactLaw> {
     let depth = || prop::option::of(1.0_f64..50.0);
     prop_oneof![

@@ -477,6 +477,60 @@ fn a_ball_on_a_plane_approaches_as_the_closed_form_of_hertz_says() {
     assert!((below.share - 0.310).abs() < 5e-4 && (below.depth - 0.481).abs() < 1e-3, "{below:?}");
 }
 
+/// The complete elliptic integrals of both kinds, by the arithmetic-geometric mean, for a complementary modulus.
+fn elliptic_integrals(complement: f64) -> [f64; 2] {
+    let (mut a, mut b, mut weight, mut sum) = (1.0, complement, 0.5, 0.5 * (1.0 - complement) * (1.0 + complement));
+    for _ in 0..8 {
+        let c = 0.5 * (a - b);
+        (a, b) = (0.5 * (a + b), (a * b).sqrt());
+        weight *= 2.0;
+        sum += weight * c * c;
+    }
+    let first = 0.5 * PI / a;
+    [first, first * (1.0 - sum)]
+}
+
+#[test]
+fn the_half_axes_and_the_approach_of_any_ellipse_are_those_of_its_elliptic_integrals_to_the_last_digits() {
+    let (modulus_mpa, force_n) = (115e3, 100.0);
+    for exponent in 1..60 {
+        let (large, small) = (0.3, 0.3 * 10_f64.powf(-0.05 * f64::from(exponent)));
+        let ellipse = EllipticContact::new(large, small, modulus_mpa).unwrap();
+        let (short_mm, long_mm) = (ellipse.half_width_mm(force_n), ellipse.half_length_mm(force_n));
+        let ratio = short_mm / long_mm;
+        let [first, second] = elliptic_integrals(ratio);
+        let m = (1.0 - ratio) * (1.0 + ratio);
+        // Johnson, Contact Mechanics, section 4.2.
+        let curvatures = (second / (ratio * ratio) - first) / (first - second);
+        let cubed_mm3 = 3.0 * force_n * second / (PI * modulus_mpa * (large + small) * ratio * ratio);
+        let approach_mm = force_n.powf(2.0 / 3.0) * ellipse.coefficient();
+        let expected_mm = 1.5 * force_n * first / (PI * modulus_mpa * long_mm);
+        // Differences of integrals lose digits to a nearly round ellipse.
+        assert!((curvatures / (large / small) - 1.0).abs() < 1e-14 / m, "{ratio}: {curvatures}");
+        assert!((long_mm.powi(3) / cubed_mm3 - 1.0).abs() < 1e-14, "{ratio}: {long_mm} mm");
+        assert!((approach_mm / expected_mm - 1.0).abs() < 1e-14, "{ratio}: {approach_mm} mm");
+    }
+}
+
+/// Of two bodies that swap materials the contact stays what it is; the material of the lower Poisson's ratio is sheared more, whichever it is.
+#[test]
+fn the_shear_below_a_balls_contact_is_that_of_the_body_in_which_it_is_larger() {
+    let material = |poissons_ratio| Material { youngs_modulus_gpa: 200.0, poissons_ratio };
+    let ball = DriveParameters { tooth: ToothShape::Ball { groove_radius_mm: PerContact::default() }, ..PAPER_5_1 };
+    let peaks = |of_teeth, of_parts| {
+        let parts = material(of_parts);
+        let materials = Materials { wave_generator: parts, teeth: material(of_teeth), ring: parts, carrier: parts };
+        swept(&ball, &LoadParameters { materials, law: ContactLaw::Hertz, ..load(5.0, VirtualWork) }, 20).peaks
+    };
+    let (one, other, soft) = (peaks(0.2, 0.4), peaks(0.4, 0.2), peaks(0.4, 0.4));
+    for (contact, one) in one.iter() {
+        let [one, other, soft] = [one, other.get(contact), soft.get(contact)]
+            .map(|peaks| peaks.shear.unwrap().stress_mpa / peaks.stress_mpa.value);
+        assert!((one / other - 1.0).abs() < 1e-9, "{contact:?}: {one} {other}");
+        assert!(one > 1.01 * soft, "{contact:?}: {one} {soft}");
+    }
+}
+
 #[test]
 fn a_very_long_ellipse_is_sheared_like_a_line() {
     let long = EllipticContact::new(1.0, 1e-20, 1e5).unwrap();

@@ -431,6 +431,29 @@ fn the_wave_generator_moves_past_a_tooth_by_the_lobe_to_those_that_still_have_ga
     assert!((springs.torque_nmm(&found.rotation).unwrap().value / 1e3 - 1.0).abs() < 1e-12);
 }
 
+/// The capacity is the higher one, though the wave generator moves on to where the relieved tooth closes its gap.
+#[test]
+fn of_two_maxima_the_capacity_is_the_higher_one_also_where_that_comes_first() {
+    let ring_tip_relief = Some(TipRelief { amount_um: 2000.0, start_deg: 12.0, power: 1.0 });
+    let modification = Modification { ring_tip_relief, ..Modification::default() };
+    let drive = drive(&PAPER_5_1);
+    let case = LoadCase::new(&LoadParameters { modification, ..moving(1.0) }).unwrap();
+    let loaded = LoadedDrive::new(&drive, &case).unwrap();
+    let teeth = [0.2, 0.3].map(|position_rad| loaded.tooth(Position::from_lobe(position_rad, 2)).unwrap());
+    let springs = Springs::new(&teeth, 2.0);
+    let torque_nmm = |step: u32| {
+        let rotation = Rotation { closing_rad: 0.0, excess_rad: 1e-4 * f64::from(step) };
+        springs.torque_nmm(&rotation).unwrap().value
+    };
+    let maxima: Vec<_> = (1..4000)
+        .filter(|&step| torque_nmm(step) > torque_nmm(step - 1) && torque_nmm(step) >= torque_nmm(step + 1))
+        .map(torque_nmm)
+        .collect();
+    assert!(maxima.len() == 2 && maxima[0] > 1.1 * maxima[1], "{maxima:?}");
+    let limit = loaded.torque_limit(&teeth, &everywhere(1e9)).unwrap();
+    assert!(limit.turns_past_teeth && (limit.input_torque_nmm / maxima[0] - 1.0).abs() < 1e-4, "{limit:?} {maxima:?}");
+}
+
 #[test]
 fn a_sweep_to_a_tolerance_finds_what_no_dense_one_exceeds() {
     for (parameters, torque_nm) in [(PAPER_5_1, 20.0), (PAPER_5_2, 3.0), (THREE_LOBES, 30.0)] {

@@ -9,7 +9,7 @@ use toothwave_solver::findings::{self, Edge as CarrierEdge, Wall};
 use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::{
-    Drive, DriveParameters, Finding, Modification, Never, Part, Position, ToothShape, WaveGenerator,
+    Drive, DriveParameters, Finding, Modification, Never, Part, Position, SolveError, ToothShape, WaveGenerator,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, drive, ellipse};
@@ -324,5 +324,27 @@ fn a_tooth_leaves_a_slot_whose_walls_end_before_its_centre_does() {
         let [(found_edge, center_radius_mm, end_mm, is_loaded)] = found[..] else { panic!("{found:?}") };
         assert_eq!((found_edge, is_loaded), (edge, true));
         assert!((center_radius_mm - center_mm).abs() < 1e-9 && (end_mm - wall_end_mm(radius_mm)).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn an_outline_is_refused_where_it_has_one_chord_more_than_allowed() {
+    for (parameters, part) in [(PAPER_5_1, Part::Ring), (PAPER_5_2, Part::Ring), (PAPER_5_1, Part::WaveGenerator)] {
+        let chords = |edge: &Edge| match edge {
+            Edge::Curve { points, .. } => points.len() as u64 - 1,
+            Edge::Line { .. } | Edge::Arc { .. } => 0,
+        };
+        let count: u64 = edges(&parameters, part, &PartsParameters::default()).iter().map(chords).sum();
+        let of_most = |max_points| {
+            let drawing = DrawingParameters { chord_tolerance_mm: 1e-3, max_points, input_angle_deg: 0.0 };
+            let draft = Draft::new(&parameters).unwrap();
+            Drawing::new(&draft, Subject::Part(part), &PartsParameters::default(), &drawing).unwrap().bodies(&Never)
+        };
+        assert!(of_most(count).is_ok(), "{count} chords of {part:?}");
+        let refused = of_most(count - 1).unwrap_err();
+        assert!(
+            matches!(refused, SolveError::TooManyPoints { points, .. } if points == count),
+            "{refused:?}, not {count}, of {part:?}"
+        );
     }
 }

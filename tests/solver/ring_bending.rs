@@ -133,3 +133,17 @@ fn every_ring_bends_by_a_finite_amount() {
         }
     }
 }
+
+#[test]
+fn along_a_flank_what_bends_changes_without_a_jump() {
+    const STEPS: u32 = 4000;
+    for parameters in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED] {
+        let drive = drive(&parameters);
+        let at = beyond_root(&drive, &Material::STEEL);
+        let end_deg = drive.flank_limit().position.from_lobe_deg();
+        let values: Vec<_> = (0..=STEPS).map(|step| at(f64::from(step) / f64::from(STEPS) * end_deg)).collect();
+        let largest = values.iter().copied().fold(0.0, f64::max);
+        let bend = values.windows(3).map(|three| (three[0] - 2.0 * three[1] + three[2]).abs()).fold(0.0, f64::max);
+        assert!(bend < 1e-4 * largest, "{parameters:?}: {bend} of {largest}");
+    }
+}

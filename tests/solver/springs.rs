@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::approach::{Approach, Logarithmic};
 use toothwave_solver::load_sharing::LoadedDrive;
-use toothwave_solver::springs::{Spring, Springs};
+use toothwave_solver::springs::{Rotation, Spring, Springs};
 use toothwave_solver::sweep::{self, Points};
 use toothwave_solver::{
     Contact, ContactLaw, Deviations, DriveParameters, LoadCase, LoadParameters, Modification, Never, PerContact,
@@ -285,6 +285,156 @@ proptest! {
         let more = Springs::new(&springs, 2.0).wind_up(torque_nmm * (1.0 + 1e-6)).unwrap().unwrap();
         prop_assert!(more.rotation_rad() >= wind_up.rotation_rad());
     }
+}
+
+/// Springs of a few powers, whose arms decline to nothing somewhere within two radians.
+fn any_declining_spring() -> impl Strategy<Value = Spring> {
+    let exponent = prop::sample::select(vec![1.0, 0.9, 2.0 / 3.0, 0.5]);
+    let gap = prop::option::of(0.02_f64..0.5);
+    (exponent, -6.0_f64..-2.0, -1.0_f64..1.5, 0.05_f64..2.0, gap).prop_map(|(exponent, power, arm, end_rad, gap)| {
+        let (coefficient, travel_arm_mm) = (10.0_f64.powf(power), 10.0_f64.powf(arm));
+        let approach = if exponent == 1.0 {
+            Approach::Linear { compliance_mm_per_n: coefficient }
+        } else {
+            Approach::Power { exponent, coefficient, compliance_mm_per_n: 0.0 }
+        };
+        Spring {
+            travel_arm_mm,
+            static_arm_mm: travel_arm_mm,
+            arm_decline_mm_per_rad: travel_arm_mm / end_rad,
+            // Where its arm ends a tooth has not gone any farther.
+            closing_rad: gap.map_or(0.0, |gap| gap * end_rad),
+            approach,
+        }
+    })
+}
+
+/// The maxima of the torque up to that beyond which no spring has a gap left to close, in steps and then by thirds: rotations and torques.
+fn maxima(springs: &[Spring]) -> Vec<(f64, f64)> {
+    let all = Springs::new(springs, 2.0);
+    let at = |turned_rad: f64| Rotation { closing_rad: 0.0, excess_rad: turned_rad };
+    let torque_nmm = |turned_rad: f64| all.torque_nmm(&at(turned_rad)).unwrap().value;
+    let last_rad = springs.iter().map(|spring| spring.closing_rad).fold(0.0, f64::max);
+    let parts =
+        |from: u32, to: u32, part_rad: f64| (from..to).map(move |step| f64::from(step) / f64::from(STEPS) * part_rad);
+    let turned_rad: Vec<_> =
+        parts(0, STEPS, last_rad).chain(parts(0, STEPS, 2.0).map(|beyond_rad| last_rad + beyond_rad)).collect();
+    let torques_nmm: Vec<_> = turned_rad.iter().map(|&turned_rad| torque_nmm(turned_rad)).collect();
+    let mut maxima = Vec::new();
+    for (three_rad, three) in turned_rad.windows(3).zip(torques_nmm.windows(3)) {
+        if three[1] > three[0] && three[2] <= three[1] {
+            let (mut low, mut high) = (three_rad[0], three_rad[2]);
+            for _ in 0..80 {
+                let third = (high - low) / 3.0;
+                if torque_nmm(low + third) < torque_nmm(high - third) { low += third } else { high -= third }
+            }
+            maxima.push((low, torque_nmm(low)));
+            if low >= last_rad {
+                break;
+            }
+        }
+    }
+    maxima
+}
+
+/// Into so many the way up to the last gap is divided, and two radians beyond it.
+const STEPS: u32 = 4000;
+
+proptest! {
+    #![proptest_config(cases(512))]
+
+    #[test]
+    fn springs_whose_arms_decline_carry_a_torque_where_they_first_make_it_and_none_above_their_highest_maximum(
+        springs in prop::collection::vec(any_declining_spring(), 1..5),
+        share in 0.01_f64..1.0,
+    ) {
+        let all = Springs::new(&springs, 2.0);
+        let maxima = maxima(&springs);
+        let most_nmm = maxima.iter().map(|(_, torque_nmm)| *torque_nmm).fold(0.0, f64::max);
+        prop_assume!(most_nmm > 0.0);
+        for share in [share, 0.95, 0.999] {
+            let sought_nmm = share * most_nmm;
+            // Within rounding and steps of another maximum either may be found.
+            if maxima.iter().any(|(_, torque_nmm)| (torque_nmm / sought_nmm - 1.0).abs() < 1e-4) {
+                continue;
+            }
+            let (before_rad, _) = *maxima.iter().find(|(_, torque_nmm)| *torque_nmm > sought_nmm).unwrap();
+            let found = all.wind_up(sought_nmm).unwrap();
+            prop_assert!(found.is_some(), "{share} of {most_nmm} N·mm is not carried");
+            let rotation = found.unwrap().rotation;
+            prop_assert!(rotation.rad() < before_rad, "{} rad, the maximum at {before_rad} rad", rotation.rad());
+            let torque_nmm = all.torque_nmm(&rotation).unwrap().value;
+            prop_assert!((torque_nmm / sought_nmm - 1.0).abs() < 1e-9, "{torque_nmm} N·mm, {sought_nmm} sought");
+        }
+        for share in [1.001, 1.1, 3.0] {
+            prop_assert_eq!(all.wind_up(share * most_nmm).unwrap(), None, "{} of {} N·mm", share, most_nmm);
+        }
+    }
+}
+
+/// Where a gap closes, a spring of Hertz's ellipse holds nothing yet, and the torque of those before falls on. That once was the end, and the load refused.
+#[test]
+fn a_spring_that_closes_its_gap_while_the_torque_falls_carries_what_those_before_it_cannot() {
+    let spring = |arm_decline_mm_per_rad: f64, closing_rad: f64, approach: Approach| Spring {
+        travel_arm_mm: 1.0,
+        static_arm_mm: 1.0,
+        arm_decline_mm_per_rad,
+        closing_rad,
+        approach,
+    };
+    let ellipse = Approach::Power { exponent: 2.0 / 3.0, coefficient: 3e-5, compliance_mm_per_n: 0.0 };
+    let springs = [spring(2.5, 0.0, Approach::Linear { compliance_mm_per_n: 1.5e-5 }), spring(0.5, 0.25, ellipse)];
+    let first = Springs::new(&springs[..1], 2.0);
+    // Its arm's square is then a third of what it was, the way the rest of its whole.
+    let most_of_first_nmm = 2.0 * (2.0 / 3.0 * 0.2) / 1.5e-5 * (1.0_f64 / 3.0).sqrt();
+    assert!(first.wind_up(0.999 * most_of_first_nmm).unwrap().is_some());
+    assert_eq!(first.wind_up(1.001 * most_of_first_nmm).unwrap(), None);
+    let both = Springs::new(&springs, 2.0);
+    let rotation = both.wind_up(1.5 * most_of_first_nmm).unwrap().expect("a rotation").rotation;
+    assert!(rotation.rad() > 0.25 && rotation.rad() < 0.3, "{rotation:?}");
+    assert!((both.torque_nmm(&rotation).unwrap().value / (1.5 * most_of_first_nmm) - 1.0).abs() < 1e-12);
+}
+
+/// The first one's torque is highest just beyond where the other closes. In search of less than that the whole way to the summit of both was once looked over at its ends, where
+/// the first alone makes less again, and what the summit makes was answered.
+#[test]
+fn a_torque_that_the_first_of_two_springs_makes_before_the_other_closes_is_carried_there() {
+    let spring = |arm_mm: f64, end_rad: f64, closing_rad: f64, compliance_mm_per_n: f64| Spring {
+        travel_arm_mm: arm_mm,
+        static_arm_mm: arm_mm,
+        arm_decline_mm_per_rad: arm_mm / end_rad,
+        closing_rad,
+        approach: Approach::Linear { compliance_mm_per_n },
+    };
+    let springs = [spring(16.0, 0.773, 0.0, 6.8e-6), spring(7.7, 1.162, 0.326, 1.7e-5)];
+    let both = Springs::new(&springs, 2.0);
+    let at_closing = both.torque_nmm(&Rotation { closing_rad: 0.326, excess_rad: 0.0 }).unwrap();
+    assert!(at_closing.slope > 0.0);
+    for share in [0.5, 0.9, 0.99, 0.999, 0.999_99] {
+        let rotation = both.wind_up(share * at_closing.value).unwrap().unwrap().rotation;
+        assert!(rotation.rad() < 0.326, "{share}: {rotation:?}");
+        let torque_nmm = both.torque_nmm(&rotation).unwrap().value;
+        assert!((torque_nmm / (share * at_closing.value) - 1.0).abs() < 1e-12, "{share}: {torque_nmm} N·mm");
+    }
+}
+
+/// Both have closed their gaps when the first is passed. What the other would make farther on is on a branch that no load leads to.
+#[test]
+fn no_maximum_is_passed_at_which_all_gaps_are_closed() {
+    let spring = |end_rad: f64, compliance_mm_per_n: f64| Spring {
+        travel_arm_mm: 5.0,
+        static_arm_mm: 5.0,
+        arm_decline_mm_per_rad: 5.0 / end_rad,
+        closing_rad: 0.1,
+        approach: Approach::Linear { compliance_mm_per_n },
+    };
+    let springs = [spring(0.3, 1e-6), spring(6.0, 3e-5)];
+    let both = Springs::new(&springs, 2.0);
+    let torque_nmm = |rad: f64| both.torque_nmm(&Rotation { closing_rad: 0.1, excess_rad: rad - 0.1 }).unwrap().value;
+    let most_nmm = (100..300).map(|step| torque_nmm(1e-3 * f64::from(step))).fold(0.0, f64::max);
+    assert!(torque_nmm(0.35) < 0.5 * most_nmm && torque_nmm(2.5) > 1.5 * most_nmm);
+    assert!(both.wind_up(0.99 * most_nmm).unwrap().unwrap().rotation.rad() < 0.3);
+    assert_eq!(both.wind_up(1.01 * most_nmm).unwrap(), None);
 }
 
 /// Rounding of the closing angles, 1e7 times what is turned beyond them, is all that parts two ways to these loads: no reason for an internal error.

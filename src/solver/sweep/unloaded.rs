@@ -86,7 +86,7 @@ pub(crate) fn extremes(
     let pieces: Vec<_> = pieces.map(within).filter(|piece| piece.start < piece.end).collect();
     let mut look = UnloadedLook { teeth, scale_rad: 1.0 };
     let Some(first) = pieces.first() else { return Ok(Vec::new()) };
-    let closing_rad = look.closing_rad(first, 0.5 * (first.start + first.end))?;
+    let closing_rad = look.closing_rad(first, first.start.midpoint(first.end))?;
     let first_rad = closing_rad.into_iter().fold(f64::INFINITY, f64::min);
     if first_rad > 0.0 {
         look.scale_rad = first_rad;

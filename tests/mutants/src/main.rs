@@ -1,10 +1,10 @@
 //! Tries the mutants that cargo-mutants lists, a batch of them by chance built into one test program.
 //!
-//!     schemata LIST ROOT COPY TARGET RESULTS [--seconds N] [--again] [--brief N] [--known REPORT] [--report REPORT]
+//!     schemata LIST ROOT COPY TARGET RESULTS [--seconds N] [--draw NAME] [--again] [--brief N] [--known REPORT] [--report REPORT]
 //!
 //! LIST is what `cargo mutants --list --json` writes of one crate, ROOT the tree, COPY one to change, TARGET where it is compiled, RESULTS a file that keeps what was found: a run
 //! that was broken off goes on from there, and mutants of files that have changed are tried anew; with --again also those that no test
-//! noticed. N seconds after the first was tried no further mutant is. With --brief N of them are tried, drawn by chance, and what tests beside the
+//! noticed. N seconds after the first was tried no further mutant is; each name of a draw has an order by chance of its own. With --brief N of them are tried, drawn by chance, and what tests beside the
 //! code alone may notice stays open. It fails where surely fewer are noticed than a known report says.
 
 mod build;
@@ -32,9 +32,9 @@ use crate::report::Report;
 use crate::schemata::Left;
 use crate::trial::{Tests, Verdict};
 
-/// So many are compiled together: with all of them a function is ten times as long as it was written, and the compiler's time grows
-/// faster than that.
-const BATCH: usize = 1500;
+/// So many are compiled together, and asked of all tests before the next: with all of them a function is ten times as long as it was written, and the
+/// compiler's time grows faster than that.
+const BATCH: usize = 500;
 
 /// Of so few all tests are asked at once.
 const FEW: usize = 200;
@@ -53,7 +53,7 @@ fn main() -> io::Result<ExitCode> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [list, root, copy, target, results, options @ ..] = arguments.as_slice() else {
         eprintln!(
-            "usage: schemata LIST ROOT COPY TARGET RESULTS [--seconds N] [--again] [--brief N] [--known REPORT] [--report REPORT]"
+            "usage: schemata LIST ROOT COPY TARGET RESULTS [--seconds N] [--draw NAME] [--again] [--brief N] [--known REPORT] [--report REPORT]"
         );
         return Ok(ExitCode::from(2));
     };
@@ -129,9 +129,11 @@ fn main() -> io::Result<ExitCode> {
             Ok(())
         })
     };
-    // In an order by chance, but the same each time: what is done when the time is over is a fair sample.
+    // In an order by chance, but the same each time: what is done when the time is over is a fair sample. Once tests were written for what a
+    // sample left, only another draw is one of the code as it then is.
+    let draw = option("--draw").map_or("", String::as_str);
     let mut order: Vec<usize> = (0..mutants.len()).collect();
-    order.sort_by_key(|&number| hash(mutants[number].name.as_bytes()));
+    order.sort_by_key(|&number| hash((mutants[number].name.clone() + draw).as_bytes()));
     let brief: Option<usize> = option("--brief").map(|most| most.parse().map_err(io::Error::other)).transpose()?;
     if let Some(most) = brief {
         order.truncate(most);
