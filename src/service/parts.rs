@@ -1,6 +1,6 @@
 //! Rows of stored studies as Apache Parquet, in a folder of the team's own: a file for each chunk, which is whole or not there.
 //!
-//! A chunk's bytes follow from the study and the chunk's number. So it does no harm that two workers write the same file, one of whom was
+//! A chunk's bytes follow from the study, its chunks' size and the chunk's number. So it does no harm that two workers write the same file, one of whom was
 //! taken for dead, and what a dead one left behind is the beginning of what the next one writes.
 
 use std::fs::{self, File, OpenOptions};
