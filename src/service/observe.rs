@@ -250,7 +250,11 @@ pub async fn observe(State(app): State<Arc<App>>, request: Request, next: Next) 
     );
     let left_unread = Arc::new(AtomicBool::new(false));
     let request = request.map(|body| {
-        if body.is_end_stream() { body } else { Body::new(Asked { body, left_unread: Arc::clone(&left_unread) }) }
+        if body.is_end_stream() {
+            body
+        } else {
+            Body::new(Asked { body, is_over: false, left_unread: Arc::clone(&left_unread) })
+        }
     });
     let mut unanswered = Unanswered { span: span.clone(), method, route: route.clone(), started, is_answered: false };
     let mut response = next.run(request).instrument(span.clone()).await;
@@ -296,6 +300,8 @@ pub async fn observe(State(app): State<Arc<App>>, request: Request, next: Next) 
 /// A request's body, which tells when whoever answers does not want its end.
 struct Asked {
     body: Body,
+    /// One in chunks says so only by giving nothing more.
+    is_over: bool,
     left_unread: Arc<AtomicBool>,
 }
 
@@ -307,11 +313,13 @@ impl HttpBody for Asked {
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
     ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
-        Pin::new(&mut self.body).poll_frame(context)
+        let polled = Pin::new(&mut self.body).poll_frame(context);
+        self.is_over |= matches!(polled, Poll::Ready(None));
+        polled
     }
 
     fn is_end_stream(&self) -> bool {
-        self.body.is_end_stream()
+        self.is_over || self.body.is_end_stream()
     }
 
     fn size_hint(&self) -> SizeHint {
@@ -321,7 +329,7 @@ impl HttpBody for Asked {
 
 impl Drop for Asked {
     fn drop(&mut self) {
-        if !self.body.is_end_stream() {
+        if !self.is_end_stream() {
             self.left_unread.store(true, Ordering::Relaxed);
         }
     }

@@ -118,7 +118,9 @@ impl PartsParameters {
         if let (Some(outer_mm), Some(clearance_mm)) = (outer_mm, clearance_mm)
             && let (Some(a), Some(r)) = (draft.cam_outer_mm, draft.tooth_radius_mm)
         {
-            checks.above(Misfit::RingWithoutRim, outer_mm, (a + (r + (r + clearance_mm))) * (1.0 + LEAST_WALL));
+            let as_made_mm = self.ring_space(draft).map(|space| space.root_radius_mm());
+            let root_mm = as_made_mm.unwrap_or(a + (r + (r + clearance_mm)));
+            checks.above(Misfit::RingWithoutRim, outer_mm, root_mm * (1.0 + LEAST_WALL));
         }
         if let Some(drive) = draft.drive() {
             checks.0.extend(self.modification.violation_in(&drive));
@@ -157,10 +159,10 @@ impl PartsParameters {
         let set_forward_um = -self.modification.wave_generator_equidistant_um - self.wave_generator_clearance_um;
         let annulus = Annulus::of_draft(draft);
         let outer_mm = checks.carrier_radii(self.carrier_radii(), draft.cam_outer_mm, annulus, set_forward_um);
-        if let (Some(outer_mm), Some(annulus), Some(tip_mm)) = (outer_mm, annulus, self.ring_tip_mm(draft))
+        if let (Some(outer_mm), Some(annulus), Some(space)) = (outer_mm, annulus, self.ring_space(draft))
             && outer_mm < annulus.outer_mm
         {
-            checks.below(Misfit::CarrierMeetsRing, outer_mm, tip_mm);
+            checks.below(Misfit::CarrierMeetsRing, outer_mm, space.tip().radius_mm);
         }
         if let (Some(clearance_mm), Some(half_width_mm)) = (clearance_mm, draft.slot_half_width_mm) {
             let (value, least_um) = (self.modification.slot_wall_um, -(half_width_mm + clearance_mm) / MM_PER_UM);
@@ -176,13 +178,15 @@ impl PartsParameters {
         }
     }
 
-    /// Radius of the ring's tips as they are made, where a ring can be made so.
-    fn ring_tip_mm(&self, draft: &Draft) -> Option<f64> {
-        if !self.violations(Part::Ring, draft).is_empty() {
+    /// The ring's tooth space as it is made, where its numbers are in their ranges and leave one.
+    fn ring_space(&self, draft: &Draft) -> Option<ToothSpace> {
+        let of_ring = self.modification.parameters().into_iter().filter(|(modified, _)| modified.part() == Part::Ring);
+        let given = of_ring.map(|(modified, value)| (Parameter::Modification(modified), value));
+        let mut given = given.chain([(Parameter::PartClearance(Part::Ring), self.ring_clearance_um)]);
+        if given.any(|(parameter, value)| parameter.check(value).is_some()) {
             return None;
         }
-        let clearance_mm = MM_PER_UM * self.ring_clearance_um;
-        Some(ToothSpace::new(&draft.drive()?, clearance_mm, &self.modification).ok()?.tip().radius_mm)
+        ToothSpace::new(&draft.drive()?, MM_PER_UM * self.ring_clearance_um, &self.modification).ok()
     }
 
     fn check_teeth(&self, draft: &Draft, checks: &mut Checks) {

@@ -1,10 +1,14 @@
 //! The service as a process: started, asked, and told to stop.
 
+use std::convert::Infallible;
 use std::io::{BufRead as _, BufReader};
 use std::net::{SocketAddr, TcpListener};
 use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
+use axum::body::Body;
+use axum::http::Request;
+use futures_util::stream;
 use serde_json::{Value, json};
 
 use crate::asking::{Answer, LIMITS, Question, Service, ask_at};
@@ -258,4 +262,11 @@ async fn who_is_answered_before_the_body_was_read_is_told_that_the_connection_cl
     // What was read to its end, or has none, is followed by others.
     assert_eq!(said(service.ask(&Question::post("/v1/sweep", "{")).await), (400, String::new()));
     assert_eq!(said(service.get("/v1/nothing").await), (404, String::new()));
+    // Of one in chunks only its end tells that it is over.
+    for (path, status) in [("/v1/sweep", 400), ("/v1/nothing", 404)] {
+        let body = Body::from_stream(stream::iter([Ok::<_, Infallible>("{")]));
+        let request = Request::post(path).header("content-type", "application/json").body(body).unwrap();
+        let connection = if status == 404 { "close" } else { "" };
+        assert_eq!(said(service.send(request).await), (status, connection.to_owned()), "{path}");
+    }
 }
