@@ -156,6 +156,9 @@ const STUDY: &str = "SELECT id, kind, build, document, max_states, max_profile_p
 const WAITING: &str = "SELECT id, chunk_variants, build FROM studies WHERE NOT is_cancelled AND ends_at_s > unixepoch()
     AND (opened < chunks OR EXISTS (SELECT 1 FROM chunks WHERE study = id)) ORDER BY asked_at_s, id";
 
+/// PostgreSQL, appendix A.
+const LOCK_NOT_AVAILABLE: &str = "55P03";
+
 impl Store {
     /// Keeps a study, of which no chunk is open yet. Where it is kept already, perhaps in other chunks, nothing happens; whether it was not.
     ///
@@ -271,16 +274,18 @@ impl Store {
     /// As [`Self::create`], and [`StoreError::InWork`].
     pub async fn forget(&self, id: &str) -> Result<(), StoreError> {
         let began = Instant::now();
-        loop {
-            match self.forget_at_once(id).await {
-                Err(StoreError::InWork) if began.elapsed() < LETTING_GO => tokio::time::sleep(LOOK_AGAIN).await,
-                other => return other,
+        while !self.forget_at_once(id).await? {
+            if began.elapsed() >= LETTING_GO {
+                return Err(StoreError::InWork);
             }
+            tokio::time::sleep(LOOK_AGAIN).await;
         }
+        Ok(())
     }
 
-    async fn forget_at_once(&self, id: &str) -> Result<(), StoreError> {
-        let forgotten = self.with(LONG_PATIENCE, async |connection| {
+    /// Forgets a study of which no chunk is in work; whether that was so.
+    async fn forget_at_once(&self, id: &str) -> Result<bool, StoreError> {
+        self.with(LONG_PATIENCE, async |connection| {
             require_schema(connection).await?;
             begin(connection).await?;
             if let Connection::Server(server) = &mut *connection {
@@ -292,17 +297,19 @@ impl Store {
                 "DELETE FROM chunks WHERE study = $1",
                 "DELETE FROM studies WHERE id = $1",
             ] {
-                on!(connection, inner => sqlx::query(text).bind(id).execute(inner).await.map(|_| ()))?;
+                match on!(connection, inner => sqlx::query(text).bind(id).execute(inner).await.map(|_| ())) {
+                    Ok(()) => {}
+                    Err(sqlx::Error::Database(refused)) if refused.code().as_deref() == Some(LOCK_NOT_AVAILABLE) => {
+                        on!(connection, inner => sqlx::query("ROLLBACK").execute(inner).await.map(|_| ()))?;
+                        return Ok(false);
+                    }
+                    Err(error) => return Err(error.into()),
+                }
             }
-            commit(connection).await
-        });
-        forgotten.await.map_err(|error| match &error {
-            // lock_not_available (PostgreSQL, appendix A).
-            StoreError::Failed(sqlx::Error::Database(refused)) if refused.code().as_deref() == Some("55P03") => {
-                StoreError::InWork
-            }
-            _ => error,
+            commit(connection).await?;
+            Ok(true)
         })
+        .await
     }
 
     /// A statement about one study.
