@@ -16,6 +16,7 @@ use toothwave_solver::{
     ToothShape, Violation, WaveGenerator,
 };
 
+use crate::deviations::swept_with;
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_swept_drive, drive, load, swept};
 
 #[derive(Deserialize)]
@@ -478,6 +479,61 @@ fn flats_that_have_left_their_slots_before_the_flank_carry_nothing() {
     };
     let (of_flats, of_cylinders) = (carrying(&flats), carrying(&cylinders));
     assert!((of_flats - of_cylinders).abs() < 1.0 && of_flats > 37.0, "{of_flats}, with cylinders {of_cylinders} deg");
+}
+
+/// The more the corner is turned away the later it is met, by its own arm: to first order the way that a point makes which is turned about the axis.
+#[test]
+fn a_ring_that_is_turned_takes_its_corners_away_by_their_arm() {
+    let drive = drive(&PAPER_5_2);
+    let end_deg = drive.flank_limit().position.from_lobe_deg();
+    for beyond_deg in [0.1, 1.0, 4.0] {
+        let position_deg = end_deg + beyond_deg;
+        let way_mm = |arcsec: f64| {
+            let modification = Modification { ring_rotation_arcsec: arcsec, ..Modification::default() };
+            let case = LoadCase::new(&LoadParameters { modification, ..pressed_corners(3.0) }).unwrap();
+            let loaded = LoadedDrive::new(&drive, &case).unwrap();
+            let on_flank = loaded.tooth(Position::from_lobe(0.5, 2)).unwrap();
+            let lost_motion_rad = loaded.wind_up(&[on_flank]).unwrap().lost_motion_rad;
+            let tooth = loaded.tooth(Position::from_lobe(position_deg.to_radians(), 2)).unwrap();
+            let gap_mm = seen(&drive, position_deg, f64::to_radians(arcsec / 3600.0)).gap_mm;
+            ((lost_motion_rad + tooth.spring.closing_rad) * tooth.spring.travel_arm_mm, tooth.force_ratio.ring * gap_mm)
+        };
+        let (turned, as_it_is) = (way_mm(0.01), way_mm(0.0));
+        let (found_mm, expected_mm) = (turned.0 - as_it_is.0, turned.1 - as_it_is.1);
+        assert!((found_mm / expected_mm - 1.0).abs() < 1e-5, "{position_deg} deg: {found_mm} mm, {expected_mm} mm");
+    }
+}
+
+/// Whether all of ring and carrier are turned, or each of their spaces and slots by as much.
+#[test]
+fn what_is_turned_away_at_a_corner_adds_up_however_it_is_given() {
+    let drive = drive(&PAPER_5_2);
+    let (ring, carrier) = (3.0, 2.0);
+    let forces = |is_ring_whole: bool, is_carrier_whole: bool| {
+        let modification = Modification {
+            ring_rotation_arcsec: if is_ring_whole { ring } else { 0.0 },
+            carrier_rotation_arcsec: if is_carrier_whole { carrier } else { 0.0 },
+            ..Modification::default()
+        };
+        let each = |count: i64, arcsec: f64, is_whole: bool| {
+            if is_whole { Vec::new() } else { vec![arcsec; usize::try_from(count).unwrap()] }
+        };
+        let deviations = Deviations {
+            ring_space_angle_arcsec: each(PAPER_5_2.ring_teeth, ring, is_ring_whole),
+            slot_angle_arcsec: each(PAPER_5_2.installed, carrier, is_carrier_whole),
+            ..Deviations::default()
+        };
+        let load = LoadParameters { modification, ..pressed_corners(3.0) };
+        swept_with(&drive, &load, &deviations, Points::samples(20).unwrap()).unwrap().peaks.ring.force_n.value
+    };
+    let whole_n = forces(true, true);
+    for (is_ring_whole, is_carrier_whole) in [(true, false), (false, true), (false, false)] {
+        let found_n = forces(is_ring_whole, is_carrier_whole);
+        assert!(
+            (found_n / whole_n - 1.0).abs() < 1e-9,
+            "{is_ring_whole}, {is_carrier_whole}: {found_n} N, {whole_n} N"
+        );
+    }
 }
 
 /// However far the wave generator turns: a tooth that no wall holds has no force at a corner either.

@@ -12,7 +12,7 @@ use toothwave_solver::{
     Torque, WaveGenerator,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, load, swept};
+use crate::drives::{PAPER_5_1, PAPER_5_2, ellipse, load, swept};
 
 /// Each input angle of the cases is one of so many equal intervals of its drive's period.
 const INTERVALS: u64 = 240;
@@ -311,6 +311,24 @@ fn each_model_errs_as_much_as_it_says_that_it_does() {
 fn the_larger_error_of_a_range_is_the_one_farther_from_none_on_either_side() {
     assert_eq!(ErrorRange { low: -0.05, high: 0.03 }.largest(), 0.05);
     assert_eq!(ErrorRange { low: -0.01, high: 0.03 }.largest(), 0.03);
+}
+
+#[test]
+fn beyond_the_largest_pressure_angle_that_was_calculated_a_drive_is_told_to_be() {
+    let mut told = Vec::new();
+    for semi_minor_mm in [49.5, 49.3, 49.1, 48.9] {
+        let parameters = DriveParameters { wave_generator: ellipse(50.7, semi_minor_mm), ..PAPER_5_2 };
+        let drive = Drive::new(&parameters).unwrap();
+        let load =
+            LoadParameters { law: ContactLaw::Johnson { depth_mm: PerContact::default() }, ..load(3.0, VirtualWork) };
+        let sweep = swept(&parameters, &load, 20);
+        let case = LoadCase::new(&load).unwrap();
+        let error = model_error::of(&drive, &case, &Deviations::default(), &sweep, None).unwrap();
+        let is_beyond = drive.largest_pressure_angle_deg().unwrap() > model_error::PRESSURE_ANGLE_TO_DEG;
+        assert_eq!(error.beyond.contains(&Beyond::PressureAngle), is_beyond, "{semi_minor_mm}");
+        told.push(is_beyond);
+    }
+    assert!(told.contains(&true) && told.contains(&false), "{told:?}");
 }
 
 #[test]
