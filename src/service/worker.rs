@@ -229,6 +229,7 @@ impl Workers {
         let computed = tokio::select! {
             computed = running => Some(computed),
             () = &mut is_over => None,
+            _ = lease.renew() => None,
         };
         let (part, mut rows, busy) = match computed {
             Some(Ok(computed)) => computed,

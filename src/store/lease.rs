@@ -1,5 +1,6 @@
 //! A chunk in somebody's hands.
 
+use std::convert::Infallible;
 use std::time::Duration;
 
 use sqlx::pool::PoolConnection;
@@ -26,6 +27,8 @@ pub struct Lease {
     store: Store,
     cut: Cut,
     chunk: u64,
+    /// So long may its holder be silent.
+    silence: Duration,
     held: Held,
 }
 
@@ -55,7 +58,7 @@ impl Store {
             }
         };
         // From here on dropping the lease sets the chunk free.
-        let lease = Lease { store: self.clone(), cut: cut.clone(), chunk, held };
+        let lease = Lease { store: self.clone(), cut: cut.clone(), chunk, silence: lease, held };
         match self.note_attempt(&cut.id, chunk).await {
             Ok(true) => return Ok(Claim::Chunk(lease)),
             Ok(false) => {}
@@ -158,6 +161,20 @@ impl Lease {
     /// The chunk's number.
     pub const fn chunk(&self) -> u64 {
         self.chunk
+    }
+
+    /// Says that its holder is alive, three times in the time that it may be silent, for as long as this is polled: a chunk may take longer than
+    /// the canary let expect. Where the server has ended the lease all the same, or does not answer, there is no more to say.
+    pub async fn renew(&mut self) -> Infallible {
+        while let Held::There(connection) = &mut self.held {
+            tokio::time::sleep(self.silence / 3).await;
+            let said = within(PATIENCE, async { Ok(sqlx::query("SELECT 1").execute(&mut ***connection).await?) }).await;
+            if said.is_err() {
+                connection.close_on_drop();
+                self.held = Held::Lost;
+            }
+        }
+        std::future::pending().await
     }
 
     /// Keeps what the chunk came to. Whoever comes second changes nothing: the bits are the same. Where the lease was lost, or is lost with

@@ -449,6 +449,29 @@ async fn two_workers_share_a_server_and_a_lost_lease_is_somebody_elses() {
     one.forget(&study.id).await.unwrap();
 }
 
+#[tokio::test]
+async fn a_worker_that_lives_keeps_its_chunk_however_long_that_takes() {
+    let Some(address) = server() else { return };
+    let _others = SERVER.read().await;
+    let (worker, other) = (Store::open(&address).await.unwrap(), Store::open(&address).await.unwrap());
+    worker.migrate().await.unwrap();
+    let study = study("long", 1);
+    worker.create(&study).await.unwrap();
+    let silence = Duration::from_millis(1500);
+    let Claim::Chunk(mut lease) = worker.claim(&study.cut(), silence).await.unwrap() else { panic!() };
+    let computing = async {
+        tokio::time::sleep(3 * silence).await;
+        assert!(matches!(other.claim(&study.cut(), silence).await.unwrap(), Claim::None));
+    };
+    tokio::select! {
+        () = computing => {}
+        _ = lease.renew() => {}
+    }
+    lease.keep(&[1], 7, 0, BUSY).await.unwrap();
+    assert!(worker.find(&study.id).await.unwrap().unwrap().is_done());
+    worker.forget(&study.id).await.unwrap();
+}
+
 /// A server that lets everybody in and says nothing more.
 async fn mute() -> Address {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
