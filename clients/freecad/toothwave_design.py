@@ -6,6 +6,7 @@ from dataclasses import dataclass
 CONTACTS = (("wave_generator", "Wave generator"), ("ring", "Ring"), ("carrier", "Carrier"))
 PARTS = (CONTACTS[0], ("teeth", "Teeth"), *CONTACTS[1:])
 BY_DEFAULT = "default"  # a choice that the document leaves to the service
+FLAGS = {"yes": True, "no": False}
 LOBES = {"ellipse": 2, "eccentric": 1}  # of other kinds they are a field
 PROJECTED = ("linear", "palmgren", "fixed")  # the laws that `projection` takes
 
@@ -39,6 +40,7 @@ class Field:
     blank: str = ""  # what the default stands for, where it is no value of its own
     choices: tuple = ()
     shown: tuple = ()  # the name of a choice, and at which of its values the document has the field
+    is_flag: bool = False  # whether the choices stand for true and false, besides what is left to the service
     is_object: bool = False  # whether there is an object at the pointer, whose values are fields of their own
     held: tuple = ()  # of the limits what a property of FreeCAD holds, where it is less
 
@@ -144,8 +146,12 @@ def _model():
     for contact, label in CONTACTS:
         pointer, name = f"/model/series_compliance_mm_per_n/{contact}", f"{_named(label)}ComplianceMmPerN"
         yield Field(pointer, name, f"Compliance behind, {label.lower()}", group, 0.0, "mm/N", (0.0, 1e3), blank="none")
-    yield Field("/model/ring_teeth_bend", "RingTeethBend", "Ring's teeth bend", group, False)
-    yield Field("/model/wave_generator_moves", "WaveGeneratorMoves", "Wave generator moves on", group, False)
+    for key, name, label in (
+        ("ring_teeth_bend", "RingTeethBend", "Ring's teeth bend"),
+        ("wave_generator_moves", "WaveGeneratorMoves", "Wave generator moves on"),
+    ):
+        flags = (BY_DEFAULT, *FLAGS)
+        yield Field(f"/model/{key}", name, label, group, BY_DEFAULT, blank=free, choices=flags, is_flag=True)
     yield Field("/model/corner_contact", "CornerContact", "Teeth meet tips' corners", group, False)
     most, blank = 10**7, "50, or by the tolerance"
     yield Field("/sweep/samples", "Samples", "Input angles, intervals", group, 0, limits=(1, most), blank=blank)
@@ -257,7 +263,7 @@ def document_of(values):
             place = document
             for parent in parents:
                 place = place.setdefault(parent, {})
-            place[key] = {} if field.is_object else value
+            place[key] = {} if field.is_object else FLAGS[value] if field.is_flag else value
     _join(document, others_of(values[OTHER]))
     return document
 
@@ -307,6 +313,8 @@ def _value_of(field, value):
         return isinstance(value, dict)
     if value is None or not field.takes(value):
         return field.absent
+    if field.is_flag and isinstance(value, bool):
+        return next(choice for choice, flag in FLAGS.items() if flag is value)
     try:
         held = type(field.absent)(value)
     except (TypeError, ValueError):

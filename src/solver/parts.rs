@@ -73,7 +73,7 @@ impl CarrierRadii {
     ) -> Vec<Violation> {
         let mut checks = Checks(Vec::new());
         if self != Self::default() {
-            checks.carrier_radii(self, cam_outer_mm, annulus, set_forward_um);
+            checks.carrier_radii(self, cam_outer_mm, annulus, set_forward_um, f64::INFINITY);
         }
         checks.0
     }
@@ -158,12 +158,8 @@ impl PartsParameters {
         let clearance_mm = checks.clearance_mm(Part::Carrier, self.carrier_clearance_um);
         let set_forward_um = -self.modification.wave_generator_equidistant_um - self.wave_generator_clearance_um;
         let annulus = Annulus::of_draft(draft);
-        let outer_mm = checks.carrier_radii(self.carrier_radii(), draft.cam_outer_mm, annulus, set_forward_um);
-        if let (Some(outer_mm), Some(annulus), Some(space)) = (outer_mm, annulus, self.ring_space(draft))
-            && outer_mm < annulus.outer_mm
-        {
-            checks.below(Misfit::CarrierMeetsRing, outer_mm, space.tip().radius_mm);
-        }
+        let tip_mm = self.ring_space(draft).map_or(f64::INFINITY, |space| space.tip().radius_mm);
+        let outer_mm = checks.carrier_radii(self.carrier_radii(), draft.cam_outer_mm, annulus, set_forward_um, tip_mm);
         if let (Some(clearance_mm), Some(half_width_mm)) = (clearance_mm, draft.slot_half_width_mm) {
             let (value, least_um) = (self.modification.slot_wall_um, -(half_width_mm + clearance_mm) / MM_PER_UM);
             checks.modification(value > least_um, Modified::SlotWall, value, least_um);
@@ -353,13 +349,14 @@ impl Checks {
         }
     }
 
-    /// That the carrier's radii leave a wall between cam and ring tips, beside a cam that may be set forward; the outer one, where it is possible.
+    /// That the carrier's radii leave a wall between cam and ring tips, both of which may be set forward; the outer one, where it is possible.
     fn carrier_radii(
         &mut self,
         radii: CarrierRadii,
         cam_outer_mm: Option<f64>,
         annulus: Option<Annulus>,
         set_forward_um: f64,
+        made_tip_mm: f64,
     ) -> Option<f64> {
         let inner_mm = annulus.map(|annulus| annulus.carrier_inner_mm());
         let inner_mm = self.radius_mm(Parameter::CarrierInnerRadius, radii.inner_mm, inner_mm);
@@ -370,7 +367,7 @@ impl Checks {
         }
         if let Some(outer_mm) = outer_mm {
             if let Some(annulus) = annulus {
-                self.below(Misfit::CarrierMeetsRing, outer_mm, annulus.outer_mm);
+                self.below(Misfit::CarrierMeetsRing, outer_mm, annulus.outer_mm.min(made_tip_mm));
             }
             if let Some(inner_mm) = inner_mm {
                 self.above(Misfit::CarrierWithoutWall, outer_mm, inner_mm);

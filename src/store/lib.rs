@@ -27,8 +27,8 @@ pub const MOST_ATTEMPTS: u64 = 3;
 /// Chunks of a study that are opened at once: more than are claimed in the time that it takes, and written in some milliseconds.
 const BATCH_CHUNKS: u64 = 256;
 
-/// What a single operation may take: a server that cannot be reached says nothing.
-pub const PATIENCE: Duration = Duration::from_secs(15);
+/// What a single operation may take: a server that cannot be reached says nothing. Shorter than a proxy waits for an answer.
+pub const PATIENCE: Duration = Duration::from_secs(10);
 
 /// For what touches every chunk of a study, of which there may be a million.
 pub(crate) const LONG_PATIENCE: Duration = Duration::from_secs(120);

@@ -279,6 +279,10 @@ impl Store {
                 return Err(StoreError::InWork);
             }
             tokio::time::sleep(LOOK_AGAIN).await;
+            if self.find(id).await?.is_some_and(|standing| standing.is_running()) {
+                // Somebody wants it again.
+                break;
+            }
         }
         Ok(())
     }

@@ -506,8 +506,8 @@ async fn nobody_waits_longer_for_a_silent_server_than_is_said() {
         async { store.waiting().await.map(drop) },
         async { store.figures().await.map(drop) },
     );
-    let said = "did not answer within 15 s";
-    assert!(began.elapsed() < Duration::from_secs(16), "{:?}", began.elapsed());
+    let said = "did not answer within 10 s";
+    assert!(began.elapsed() < Duration::from_secs(11), "{:?}", began.elapsed());
     let answers: [_; 8] = answers.into();
     for answer in answers {
         let error = answer.unwrap_err();
@@ -570,6 +570,25 @@ async fn a_chunk_of_a_study_that_was_begun_anew_and_cut_otherwise_is_none_of_its
     .await;
 }
 
+#[tokio::test]
+async fn a_study_that_is_asked_for_again_while_it_is_to_be_forgotten_is_kept() {
+    let Some(address) = server() else { return };
+    let _others = SERVER.read().await;
+    let (service, worker) = (Store::open(&address).await.unwrap(), Store::open(&address).await.unwrap());
+    service.migrate().await.unwrap();
+    let study = study("wanted", 1);
+    service.create(&study).await.unwrap();
+    let lease = claimed(&worker, &study).await;
+    service.cancel(&study.id).await.unwrap();
+    let (forgotten, ()) = tokio::join!(service.forget(&study.id), async {
+        worker.resume(&study.id, LEASE).await.unwrap();
+    });
+    forgotten.unwrap();
+    lease.give_back().await.unwrap();
+    assert!(service.find(&study.id).await.unwrap().unwrap().is_running());
+    service.forget(&study.id).await.unwrap();
+}
+
 /// As one does that stands still.
 #[tokio::test]
 async fn a_worker_that_does_not_let_go_holds_up_whoever_forgets_its_study_and_nobody_else() {
@@ -580,6 +599,7 @@ async fn a_worker_that_does_not_let_go_holds_up_whoever_forgets_its_study_and_no
     let study = study("still", 1);
     service.create(&study).await.unwrap();
     let lease = claimed(&worker, &study).await;
+    service.cancel(&study.id).await.unwrap();
     assert!(matches!(service.forget(&study.id).await, Err(StoreError::InWork)));
     // More than there are connections.
     let forgetting: Vec<_> = (0..20)

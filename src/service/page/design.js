@@ -18,6 +18,9 @@ const choice = (pointer, label, options, more) => ({ kind: 'choice', pointer, la
 const unlessSaid = (pointer, label, options) => choice(pointer, label, [{ value: '', label: 'not said' }, ...options]);
 /** What a document says with `true`, or, where it `starts` with an object, by having that object. */
 const flag = (pointer, label, more) => ({ kind: 'flag', pointer, label, ...more });
+/** What the service decides by the drive unless the document does. */
+const unlessDecided = (pointer, label) =>
+  choice(pointer, label, [{ value: '', label: 'left to the service' }, { value: true, label: 'yes' }, { value: false, label: 'no' }]);
 const variant = (pointer, tag, label, options, more) => ({ kind: 'variant', pointer, tag, label, options, ...more });
 
 /** A gap at a contact; without any, the document has no clearance at all. */
@@ -414,8 +417,8 @@ export const GROUPS = [
     summary: (design) => (Object.values(at(design, '/model/series_compliance_mm_per_n') ?? {}).some((value) => value) ? 'given' : 'nothing'),
     fields: [
       compliance('wave_generator', 'Compliance, wave generator'), compliance('ring', 'Compliance, ring'), compliance('carrier', 'Compliance, carrier'),
-      flag('/model/ring_teeth_bend', 'The ring’s teeth bend, the more the nearer to their tips'),
-      flag('/model/wave_generator_moves', 'The wave generator moves on under its teeth as it winds up'),
+      unlessDecided('/model/ring_teeth_bend', 'The ring’s teeth bend, the more the nearer to their tips'),
+      unlessDecided('/model/wave_generator_moves', 'The wave generator moves on under its teeth as it winds up'),
       flag('/model/corner_contact', 'Teeth meet the corners of pointed or bored tips before they come to the flank'),
     ],
   },

@@ -126,7 +126,7 @@ export class Form {
   }
 
   #buildField(field) {
-    if (field.kind === 'choice') return this.#buildChoice(field, (value) => this.#edit(field.pointer, value || undefined, field.adjust));
+    if (field.kind === 'choice') return this.#buildChoice(field, (chosen) => this.#choose(field, chosen));
     if (field.kind === 'variant') return this.#buildVariant(field);
     if (field.kind === 'oneOf') return this.#buildOneOf(field);
     if (field.kind === 'flag') return this.#buildFlag(field);
@@ -137,6 +137,12 @@ export class Form {
   /** `adjust` changes what follows from it. */
   #edit(pointer, value, adjust = (design) => design) {
     this.#replace(adjust(changed(this.#design, pointer, value)), pointer);
+  }
+
+  /** The document's value may be none, or no text. */
+  #choose({ pointer, options, adjust }, chosen) {
+    const { value } = options.find((option) => String(option.value) === chosen);
+    this.#edit(pointer, value === '' ? undefined : value, adjust);
   }
 
   #replace(design, gesture) {
@@ -331,7 +337,7 @@ export class Form {
     field.options.forEach(({ value, suits }, index) => {
       setProperties(input.options[index], { hidden: value !== chosen && suits !== undefined && !suits(this.#design) });
     });
-    setProperties(input, { value: chosen ?? '' });
+    setProperties(input, { value: String(chosen ?? '') });
   }
 
   #showValue(entry, respan) {
