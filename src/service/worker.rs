@@ -259,6 +259,7 @@ impl Workers {
                 // First: what the store has a result of has its rows.
                 kept = self.keep_rows(study, chunk, &mut rows) => kept,
                 () = &mut is_over => break give_up(lease).await,
+                _ = lease.renew() => false,
             };
             if kept {
                 match lease.keep(&bytes, part.variants(), part.refused(), busy).await {
@@ -270,6 +271,7 @@ impl Workers {
                     Err(error) => self.is_in_trouble(What::Writing, &error),
                 }
             }
+            lease.say().await;
             tokio::select! {
                 () = tokio::time::sleep(retry) => {}
                 () = &mut is_over => break give_up(lease).await,

@@ -164,17 +164,22 @@ impl Lease {
     }
 
     /// Says that its holder is alive, three times in the time that it may be silent, for as long as this is polled: a chunk may take longer than
-    /// the canary let expect. Where the server has ended the lease all the same, or does not answer, there is no more to say.
+    /// the canary let expect.
     pub async fn renew(&mut self) -> Infallible {
-        while let Held::There(connection) = &mut self.held {
+        loop {
             tokio::time::sleep(self.silence / 3).await;
-            let said = within(PATIENCE, async { Ok(sqlx::query("SELECT 1").execute(&mut ***connection).await?) }).await;
-            if said.is_err() {
-                connection.close_on_drop();
-                self.held = Held::Lost;
-            }
+            self.say().await;
         }
-        std::future::pending().await
+    }
+
+    /// Says so once. Where the server has ended the lease all the same, or does not answer, there is no more to say.
+    pub async fn say(&mut self) {
+        let Held::There(connection) = &mut self.held else { return };
+        let said = within(PATIENCE, async { Ok(sqlx::query("SELECT 1").execute(&mut ***connection).await?) }).await;
+        if said.is_err() {
+            connection.close_on_drop();
+            self.held = Held::Lost;
+        }
     }
 
     /// Keeps what the chunk came to. Whoever comes second changes nothing: the bits are the same. Where the lease was lost, or is lost with

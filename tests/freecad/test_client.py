@@ -223,6 +223,15 @@ class Document(unittest.TestCase):
         self.assertNotIn("ring_tip_relief", document["modification"])
         self.assertEqual(toothwave_design.document_of(values), EVERYTHING)
 
+    def test_what_the_service_sets_by_itself_is_denied_where_the_document_denies_it(self):
+        for flag in ("ring_teeth_bend", "wave_generator_moves"):
+            for value in (True, False):
+                design = complete(example("paper-5.2")) | {"model": {flag: value}}
+                with self.subTest(flag, value=value):
+                    self.assertEqual(toothwave_design.document_of(toothwave_design.values_of(design))["model"], {flag: value})
+        silent = {name: part for name, part in complete(example("paper-5.2")).items() if name != "model"}
+        self.assertNotIn("model", toothwave_design.document_of(toothwave_design.values_of(silent)))
+
     def test_there_is_a_field_for_all_that_drawings_and_sweeps_read(self):
         known = {field.pointer for field in toothwave_design.FIELDS}
         missing = {pointer for pointer, _ in api_values()} - known

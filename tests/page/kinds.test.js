@@ -249,6 +249,28 @@ test('the peaks say how far to believe them', async () => {
   assert.equal((await told())[0], 'The model’s own error: not measured under this law.');
 });
 
+test('what the service sets by itself can be denied, and stands in the form as the document has it', async () => {
+  const page = await bed.open();
+  const { model: _, ...unnamed } = await bed.server.example('paper-5.2');
+  await setDocument(page, unnamed);
+  await page.click('summary:has-text("What gives way behind the contacts")');
+  const before = await answered(page);
+  const place = '/model/ring_teeth_bend';
+  assert.equal(await page.inputValue(field(place)), '');
+  await pick(page, place, 'false');
+  const denied = await answered(page);
+  assert.equal(denied.design.model.ring_teeth_bend, false);
+  assert.notEqual(denied.sweep.peaks.ring.force_n.value, before.sweep.peaks.ring.force_n.value);
+  await pick(page, place, 'true');
+  const named = await answered(page);
+  assert.equal(named.design.model.ring_teeth_bend, true);
+  assert.equal(named.sweep.peaks.ring.force_n.value, before.sweep.peaks.ring.force_n.value);
+  await pick(page, place, '');
+  assert.equal((await designOf(page)).model?.ring_teeth_bend, undefined);
+  await setDocument(page, { ...unnamed, model: { ring_teeth_bend: false } });
+  assert.equal(await page.inputValue(field(place)), 'false');
+});
+
 test('what gives way behind a contact moves the answer', async () => {
   const page = await bed.open();
   await pick(page, '/model/compatibility', 'virtual_work');

@@ -155,7 +155,7 @@ export class Form {
     const select = html(
       'select',
       { id, 'aria-describedby': idOf(field.pointer, 'notes') },
-      field.options.map(({ value, key, label }) => html('option', { value: value ?? key }, label)),
+      field.options.map(({ value, key, label }) => html('option', { value: String(value ?? key) }, label)),
     );
     select.addEventListener('change', () => {
       choose(select.value);
