@@ -504,10 +504,20 @@ fn a_ring_that_is_turned_takes_its_corners_away_by_their_arm() {
     }
 }
 
-/// Whether all of ring and carrier are turned, or each of their spaces and slots by as much.
+/// Whether all of ring and carrier are turned, or each of their spaces and slots by as much. Beyond its lost motion it is all one which of the two is turned away from the other.
 #[test]
 fn what_is_turned_away_at_a_corner_adds_up_however_it_is_given() {
     let drive = drive(&PAPER_5_2);
+    let closing_rad = |ring_rotation_arcsec: f64, carrier_rotation_arcsec: f64| {
+        let modification = Modification { ring_rotation_arcsec, carrier_rotation_arcsec, ..Modification::default() };
+        let case = LoadCase::new(&LoadParameters { modification, ..pressed_corners(3.0) }).unwrap();
+        let position_rad = drive.flank_limit().position.from_lobe_rad + 0.02;
+        let tooth = LoadedDrive::new(&drive, &case).unwrap().tooth(Position::from_lobe(position_rad, 2)).unwrap();
+        tooth.spring.closing_rad
+    };
+    let (of_ring_rad, of_carrier_rad) = (closing_rad(5.0, 0.0), closing_rad(0.0, 5.0));
+    assert!((of_ring_rad / of_carrier_rad - 1.0).abs() < 1e-12, "{of_ring_rad} {of_carrier_rad}");
+    assert!((of_ring_rad / closing_rad(0.0, 0.0) - 1.0).abs() > 1e-3);
     let (ring, carrier) = (3.0, 2.0);
     let forces = |is_ring_whole: bool, is_carrier_whole: bool| {
         let modification = Modification {
