@@ -59,7 +59,7 @@ impl Counts {
         let interval = if self.not_tried == 0 || tried == 0 {
             String::new()
         } else {
-            let (least, most) = interval(caught, tried);
+            let (least, most) = interval(caught, tried, NINETEEN_OF_TWENTY);
             format!(", {:.1} to {:.1} % of all", 100.0 * least, 100.0 * most)
         };
         format!(
@@ -105,7 +105,7 @@ impl Report {
     pub fn is_below(&self, known: &Self) -> bool {
         let ((caught, tried), (known_caught, known_tried)) =
             (self.all.caught_and_tried(), known.all.caught_and_tried());
-        interval(caught + self.all.open, tried).1 < known_caught as f64 / known_tried as f64
+        interval(caught + self.all.open, tried, ALL_BUT_ONE_IN_A_THOUSAND).1 < known_caught as f64 / known_tried as f64
     }
 
     fn silent(&self) -> impl Iterator<Item = &str> {
@@ -118,12 +118,17 @@ fn without_line(name: &str) -> Option<(&str, &str)> {
     Some((name.split(':').next()?, name.split_once(": ")?.1))
 }
 
-/// Wilson's interval of 95 % for the share caught, which a random sample leaves.
-fn interval(caught: usize, tried: usize) -> (f64, f64) {
+/// Standard deviations that hold so many samples.
+const NINETEEN_OF_TWENTY: f64 = 1.96;
+/// Whatever changes is judged by each commit anew: of twenty that are as good as ever one would fail.
+const ALL_BUT_ONE_IN_A_THOUSAND: f64 = 3.09;
+
+/// Wilson's interval for the share caught, which a random sample leaves.
+fn interval(caught: usize, tried: usize, z: f64) -> (f64, f64) {
     if tried == 0 {
         return (0.0, 1.0);
     }
-    let (tried, z) = (tried as f64, 1.96);
+    let tried = tried as f64;
     let share = caught as f64 / tried;
     let middle = (share + z * z / (2.0 * tried)) / (1.0 + z * z / tried);
     let half = z / (1.0 + z * z / tried) * (share * (1.0 - share) / tried + z * z / (4.0 * tried * tried)).sqrt();
