@@ -422,6 +422,30 @@ fn a_carrier_beyond_the_tips_of_a_ring_that_is_set_forward_meets_it() {
 }
 
 #[test]
+fn a_rim_begins_outside_the_root_of_the_ring_as_it_is_made() {
+    let of = |drive: &DriveParameters, modification: Modification, ring_clearance_um: f64| {
+        let parts = PartsParameters { ring_outer_radius_mm: Some(60.0), ring_clearance_um, ..parts(modification) };
+        let found = parts.violations(Part::Ring, &Draft::new(drive).unwrap());
+        let limit = found.iter().find_map(|violation| match violation {
+            Violation::PartDoesNotFit { misfit: Misfit::RingWithoutRim, value: 60.0, limit } => Some(*limit),
+            _ => None,
+        });
+        limit.unwrap_or_else(|| panic!("{found:?}"))
+    };
+    let set_back = Modification { ring_equidistant_um: 30.0, ..NONE };
+    // a + 2r, and what sets the flank back; a millionth of it is no rim yet.
+    for (modification, clearance_um, root_mm) in
+        [(NONE, 0.0, 68.0), (NONE, 20.0, 68.02), (set_back, 0.0, 68.03), (set_back, 20.0, 68.05)]
+    {
+        let limit = of(&PAPER_5_1, modification, clearance_um);
+        assert!((limit - root_mm * (1.0 + 1e-6)).abs() < 1e-9, "{limit}, not {root_mm}");
+    }
+    // Where the drive is none, as far as is known.
+    let impossible = DriveParameters { ring_teeth: 20, ..PAPER_5_1 };
+    assert!((of(&impossible, NONE, 20.0) - 68.02 * (1.0 + 1e-6)).abs() < 1e-9);
+}
+
+#[test]
 fn a_relief_of_nothing_draws_the_conjugate_ring() {
     let relief = Modification { ring_tip_relief: Some(TipRelief { amount_um: 0.0, ..RELIEF }), ..NONE };
     assert_eq!(space(&PAPER_5_1, relief), space(&PAPER_5_1, NONE));
