@@ -1,6 +1,7 @@
 //! Room for large answers that nobody has read yet: while they are made, while they wait in a batch, while they are on their way. However
 //! many are asked for, and however slowly they are read, they must not fill the memory.
 
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Weak};
 
 use bytes::Bytes;
@@ -18,7 +19,19 @@ pub const SMALL_BYTES: u64 = 1 << 18;
 pub struct Room {
     /// One permit for each KiB.
     free: Arc<Semaphore>,
+    /// Of these, the ones that are held for as long as studies are kept: for an answer that is alone all that is left is all the room.
+    kept: Arc<AtomicU32>,
     max_bytes: u64,
+}
+
+/// A part of the room that is held while nobody waits to read it.
+#[derive(Debug)]
+pub struct Kept(Reserved);
+
+impl Drop for Kept {
+    fn drop(&mut self) {
+        self.0.room.kept.fetch_sub(self.0.permits(), Ordering::Relaxed);
+    }
 }
 
 /// A part of the room, for one answer.
@@ -67,12 +80,12 @@ pub struct Sent(Arc<Mutex<Weak<OnItsWay>>>);
 impl Room {
     /// Room for at most `max_bytes` at once.
     pub fn new(max_bytes: u64) -> Self {
-        Self { free: Arc::new(Semaphore::new(permits(max_bytes) as usize)), max_bytes }
+        Self { free: Arc::new(Semaphore::new(permits(max_bytes) as usize)), kept: Arc::default(), max_bytes }
     }
 
     /// The same room for one who holds so many bytes of it already: all of it is what is left.
     pub fn beside(&self, held_bytes: u64) -> Self {
-        Self { free: Arc::clone(&self.free), max_bytes: self.max_bytes.saturating_sub(held_bytes) }
+        Self { max_bytes: self.max_bytes.saturating_sub(held_bytes), ..self.clone() }
     }
 
     /// Bytes that are taken now.
@@ -91,10 +104,25 @@ impl Room {
         Ok(reserved)
     }
 
-    /// Whether there is room for an answer of so many bytes once those have given back what they hold.
-    pub fn would_hold<'a>(&self, bytes: u64, given_back: impl IntoIterator<Item = &'a Reserved>) -> bool {
-        let given_back: u64 = given_back.into_iter().map(|reserved| u64::from(reserved.permits())).sum();
-        self.free.available_permits() as u64 + given_back >= u64::from(self.permits_for(bytes))
+    /// Room for what is kept: so many bytes, though they were all of it.
+    ///
+    /// # Errors
+    /// Where there is not so much left.
+    pub fn keep(&self, bytes: u64) -> Result<Kept, NoRoom> {
+        let mut reserved = Reserved { room: self.clone(), held: None };
+        reserved.hold_permits(self.permits_to_keep(bytes), bytes)?;
+        self.kept.fetch_add(reserved.permits(), Ordering::Relaxed);
+        Ok(Kept(reserved))
+    }
+
+    /// Whether so many bytes could be kept once those have given back what they hold.
+    pub fn could_keep<'a>(&self, bytes: u64, given_back: impl IntoIterator<Item = &'a Kept>) -> bool {
+        let given_back: u64 = given_back.into_iter().map(|kept| u64::from(kept.0.permits())).sum();
+        self.free.available_permits() as u64 + given_back >= u64::from(self.permits_to_keep(bytes))
+    }
+
+    fn permits_to_keep(&self, bytes: u64) -> u32 {
+        if bytes <= SMALL_BYTES { 0 } else { permits(bytes.min(self.max_bytes)) }
     }
 
     /// An answer that is kept, taking room until it is dropped.
@@ -113,7 +141,9 @@ impl Room {
     }
 
     fn permits_for(&self, bytes: u64) -> u32 {
-        if bytes <= SMALL_BYTES { 0 } else { permits(bytes.min(self.max_bytes)) }
+        let all = permits(self.max_bytes).saturating_sub(self.kept.load(Ordering::Relaxed));
+        // One at least: where all is kept none is left for an answer.
+        self.permits_to_keep(bytes).min(all.max(1))
     }
 }
 
@@ -127,7 +157,11 @@ impl Reserved {
     /// # Errors
     /// Where there is not so much left.
     pub fn hold_at_least(&mut self, bytes: u64) -> Result<(), NoRoom> {
-        let lacking = self.room.permits_for(bytes).saturating_sub(self.permits());
+        self.hold_permits(self.room.permits_for(bytes), bytes)
+    }
+
+    fn hold_permits(&mut self, wanted: u32, bytes: u64) -> Result<(), NoRoom> {
+        let lacking = wanted.saturating_sub(self.permits());
         if lacking == 0 {
             return Ok(());
         }

@@ -28,7 +28,7 @@ use crate::config::Limits;
 use crate::frozen;
 use crate::parts::Parts;
 use crate::problem::{Problem, ProblemCode};
-use crate::room::{Reserved, Room};
+use crate::room::{self, Room};
 use crate::worker::{Sliced, Workers, milliseconds, slice};
 
 /// Between two looks at how a stored study stands.
@@ -139,7 +139,7 @@ pub struct Kept {
     making: Mutex<Option<Making>>,
     /// What it takes besides its rows.
     bytes: u64,
-    _room: Option<Reserved>,
+    _room: Option<room::Kept>,
 }
 
 /// What a study has come to, as far as it is here.
@@ -147,7 +147,7 @@ pub struct Kept {
 pub struct Rows {
     gathered: Mutex<Gathered>,
     bytes: u64,
-    room: Reserved,
+    room: room::Kept,
 }
 
 /// What a study has come to, for who tells it: as long as this is held its rows stay, and their room is taken.
@@ -279,7 +279,7 @@ impl Kept {
         self.stand(StudyState::Cancelled, None);
     }
 
-    fn new(study: Arc<Study>, rows: Option<Arc<Rows>>, bytes: u64, room: Option<Reserved>) -> Arc<Self> {
+    fn new(study: Arc<Study>, rows: Option<Arc<Rows>>, bytes: u64, room: Option<room::Kept>) -> Arc<Self> {
         Arc::new(Self {
             id: study.id().to_string(),
             rows: Mutex::new(rows),
@@ -536,7 +536,7 @@ impl Studies {
     fn keep_view(&self, study: Arc<Study>) -> Arc<Kept> {
         let bytes = study.kept_bytes() - study.stored_bytes();
         // Where others have all the room, it is kept all the same: how many there are is bounded.
-        let kept = Kept::new(study, None, bytes, self.room.reserve(bytes).ok());
+        let kept = Kept::new(study, None, bytes, self.room.keep(bytes).ok());
         let mut all = self.kept.lock();
         all.retain(|other| other.id != kept.id);
         while all.iter().map(|other| other.bytes).sum::<u64>() + bytes > VIEWS_BYTES
@@ -723,7 +723,7 @@ impl Studies {
             let left = held - going.iter().map(|(_, rows)| rows.bytes).sum::<u64>();
             // One that was admitted when the bound was larger has all of it.
             let is_within = left + bytes.min(most) <= most;
-            if is_within && self.room.would_hold(bytes, going.iter().map(|(_, rows)| &rows.room)) {
+            if is_within && self.room.could_keep(bytes, going.iter().map(|(_, rows)| &rows.room)) {
                 break;
             }
             match could_go.next() {
@@ -743,7 +743,7 @@ impl Studies {
             }
             drop(rows);
         }
-        let room = self.room.reserve(bytes)?;
+        let room = self.room.keep(bytes)?;
         Ok(Arc::new(Rows { gathered: Mutex::new(Gathered::new(study)), bytes, room }))
     }
 

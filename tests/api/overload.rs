@@ -8,7 +8,7 @@ use toothwave::compute::{Pool, Thread};
 use toothwave::config::Limits;
 
 use crate::asking::{Answer, LIMITS, Listening, Occupied, Question, Service, ask_at, until};
-use crate::designs::{spelled_out, with};
+use crate::designs::{shortest, spelled_out, with};
 
 /// One solve at a time, and one that waits.
 const NARROW: Limits = Limits { max_concurrent_solves: 1, max_queued_solves: 1, ..LIMITS };
@@ -215,6 +215,26 @@ async fn answers_that_nobody_reads_leave_no_room_for_another_until_they_are_read
     service.ask(&large(500, 1)).await.found();
     drop(unread);
     service.ask(&large(500, 2)).await.found();
+}
+
+/// Of those that nobody waits to read: a study that is kept is none.
+#[tokio::test]
+async fn a_study_that_is_kept_leaves_its_own_result_and_others_the_room_that_is_left() {
+    let service = Service::within(Limits { max_unread_bytes: 2_000_000, max_study_bytes: 1_500_000, ..LIMITS });
+    let study = json!({
+        "study": "map", "base": shortest(), "over": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.0, "steps": 60_000 } },
+        "quantities": ["undercut"]
+    });
+    let question = Question::post("/v1/studies", study.to_string()).with("prefer", "wait=600");
+    let found = service.ask(&question).await.found();
+    assert!(service.app.room.taken_bytes() > 1_000_000);
+    let result = format!("/v1/studies/{}/result", found["id"].as_str().unwrap());
+    assert_eq!(service.get(&result).await.found(), found["result"]);
+    let unread = service.response(large(2000, 1).request()).await;
+    assert_eq!(unread.status(), 200);
+    service.ask(&large(2000, 2)).await.refused(503, "too_many_unread_bytes");
+    drop(unread);
+    service.ask(&large(2000, 2)).await.found();
 }
 
 #[tokio::test]

@@ -248,6 +248,24 @@ test('from ratio, torque and space follow drives that keep every limit, and one 
   assert.deepEqual(geometry.findings.filter(({ severity }) => severity === 'warning'), []);
 });
 
+test('the table of drives has a million as a million', async () => {
+  const page = await bed.open();
+  await show(page, 'find');
+  await page.check(field('/find/goals/stiff'));
+  await find(page);
+  const head = await page.$$eval('#find .drives-scroll thead th', (cells) => cells.map((cell) => cell.textContent));
+  const place = head.findIndex((text) => /stiffness/.test(text));
+  const cells = await page.$$eval('#find .drives-scroll tbody tr', (rows) => rows.map((row) => [...row.querySelectorAll('th, td')].map((cell) => cell.textContent)));
+  const unnamed = head.length - cells[0].length;
+  const stiffness = cells.map((row) => Number(row[place - unnamed].replaceAll('\u202f', '')));
+  assert.ok(Math.max(...stiffness) > 1e5 && Math.min(...stiffness) > 1e4, `${stiffness}`);
+  await page.click('#find button:has-text("Open as design")');
+  await settled(page);
+  const { sweep } = await bed.server.answers({ ...(await designOf(page)), sweep: { samples: 50, wind_up: true } });
+  const least = Math.min(...sweep.wind_up.torsional_stiffness_nm_per_rad);
+  assert.ok(Math.abs(stiffness[0] / least - 1) < 0.01, `${stiffness[0]}, not ${least}`);
+});
+
 test('the smallest drive for what the page begins with is one to build: no finding speaks of it, and every drawing of it can be had', async () => {
   const page = await bed.open();
   await find(page);

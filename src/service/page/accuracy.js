@@ -15,7 +15,7 @@ const modelName = ({ compatibility, law }) => `${COMPATIBILITIES[compatibility]}
 const pointsName = ({ samples, tolerance }) => (samples === undefined ? `to ${number(tolerance, 1)}` : `${samples} samples`);
 
 /** What of a design the measurement depends on. */
-const questionOf = ({ drive, materials, load, model, accuracy }) => ({ drive, materials, load, model, accuracy });
+const questionOf = ({ drive, materials, parts, load, model, modification, deviations, accuracy }) => ({ drive, materials, parts, load, model, modification, deviations, accuracy });
 
 /** The choice that a design makes. */
 function choiceOf(design) {

@@ -101,7 +101,7 @@ export class Front {
         html('th', { scope: 'row' }, name),
         html('td', {}, picture(found.design)),
         isMixed && html('td', {}, found.label),
-        goals.map((quantity) => html('td', { class: 'numeric number' }, this.quantities.shown(quantity, found.quantities[quantity]).split('\u202f')[0])),
+        goals.map((quantity) => html('td', { class: 'numeric number' }, this.quantities.bare(quantity, found.quantities[quantity]))),
         INPUTS.map(({ read }) => html('td', { class: 'numeric number' }, shortened(read(found.design)))),
         html('td', { class: 'numeric' }, check),
       );

@@ -36,8 +36,8 @@ const on = (kind, design) => changed(design, '/friction', frictionOn(kind, desig
 /** What of a design the comparison depends on. */
 const questionOf = (design) =>
   KINDS.map(({ kind }) => {
-    const { drive, materials, load, model, modification, sweep, friction } = on(kind, design);
-    return { drive, materials, load, model, modification, sweep, friction };
+    const { drive, materials, parts, load, model, modification, deviations, sweep, friction } = on(kind, design);
+    return { drive, materials, parts, load, model, modification, deviations, sweep, friction };
   });
 
 const percent = (share) => withUnit(number(100 * share, 3), '%');

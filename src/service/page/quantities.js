@@ -69,11 +69,16 @@ export class Quantities {
     );
   }
 
-  /** A value with its unit; `scientific` digits where it is written with a power of ten. */
-  shown(name, value, significant = 4, scientific = undefined) {
+  /** A value; `scientific` digits where it is written with a power of ten. */
+  bare(name, value, significant = 4, scientific = undefined) {
+    return this.get(name).is_flag ? (value ? 'yes' : 'no') : number(value, significant, scientific);
+  }
+
+  /** The same with its unit. */
+  shown(name, ...value) {
     const { unit, is_flag: isFlag } = this.get(name);
-    if (isFlag) return value ? 'yes' : 'no';
-    return withUnit(number(value, significant, scientific), unit);
+    const bare = this.bare(name, ...value);
+    return isFlag ? bare : withUnit(bare, unit);
   }
 
   /** The label with the unit, as an axis or a column has it. */
