@@ -148,7 +148,7 @@ impl FindingAnswer {
                     "the ring's tooth tips would be undercut, but the bore takes more away than undercut does".into()
                 } else {
                     format!(
-                        "the ring's tooth tips are cut away by their own envelope: teeth start to touch the flank only {engagement_start_deg:.4} deg from {lobe}, fewer of them mesh, and loads jump when one enters, unless corners carry before (`model.corner_contact`)"
+                        "the ring's tooth tips are cut away by their own envelope: teeth start to touch the flank only {engagement_start_deg:.4} deg from {lobe}, fewer of them mesh, and loads jump when one enters unless corners carry"
                     )
                 },
                 &format!("make the teeth thinner than the critical radius, or {rounder}"),
@@ -161,7 +161,7 @@ impl FindingAnswer {
                 natural_tip_radius_mm,
                 "mm",
                 format!(
-                    "the bore ends the flank before its natural tip: teeth start to touch it {engagement_start_deg:.4} deg from {lobe} and take load at once, so loads jump, unless corners carry before (`model.corner_contact`)"
+                    "the bore ends the flank before its natural tip: teeth start to touch it {engagement_start_deg:.4} deg from {lobe} and take load at once, so loads jump unless corners carry"
                 ),
                 "bore less, or not at all, where the jump matters",
             ),
