@@ -446,6 +446,41 @@ fn a_rim_begins_outside_the_root_of_the_ring_as_it_is_made() {
 }
 
 #[test]
+fn a_drawing_has_no_more_points_than_are_expected_and_one_without_curves_none() {
+    for p in [PAPER_5_1, PAPER_5_2, eccentric(), three_lobes()] {
+        for (subject, has_curves) in [
+            (Subject::Part(Part::Ring), true),
+            (Subject::Part(Part::WaveGenerator), true),
+            (Subject::Assembly, true),
+            (Subject::Part(Part::Carrier), false),
+            (Subject::Part(Part::Teeth), false),
+        ] {
+            for tolerance_mm in [1e-2, 1e-4] {
+                let parameters = DrawingParameters {
+                    chord_tolerance_mm: tolerance_mm,
+                    max_points: 10_000_000,
+                    input_angle_deg: 0.0,
+                };
+                let draft = Draft::new(&p).unwrap();
+                let drawing = Drawing::new(&draft, subject, &parts(NONE), &parameters).unwrap();
+                let bodies = drawing.bodies(&Never).unwrap();
+                let outlines = bodies.iter().flat_map(|body| body.section.holes.iter().chain([&body.section.outer]));
+                let points: usize = outlines
+                    .flat_map(|outline| if let Outline::Edges(edges) = outline { &edges[..] } else { &[] })
+                    .map(|edge| if let Edge::Curve { points, .. } = edge { points.len() } else { 0 })
+                    .sum();
+                assert_eq!(points > 0, has_curves);
+                let expected = drawing.expected_points();
+                assert!(
+                    expected >= points as u64 && (expected > 0) == has_curves,
+                    "{subject:?}: {expected}, not {points}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn a_relief_of_nothing_draws_the_conjugate_ring() {
     let relief = Modification { ring_tip_relief: Some(TipRelief { amount_um: 0.0, ..RELIEF }), ..NONE };
     assert_eq!(space(&PAPER_5_1, relief), space(&PAPER_5_1, NONE));
