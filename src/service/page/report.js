@@ -12,7 +12,11 @@ function shownValue(field, design) {
   const labelled = (wanted) => field.options.find((option) => option.value === wanted)?.label;
   // What has one kind alone is not told apart by it.
   if (field.kind === 'variant') return field.options.length > 1 ? labelled(kindOf(field, design)) : undefined;
-  if (field.kind === 'choice') return labelled(value ?? field.otherwise?.(design) ?? field.options[0].value);
+  if (field.kind === 'choice') {
+    const chosen = value ?? field.otherwise?.(design) ?? field.options[0].value;
+    // What is left to the service is no input.
+    return chosen === '' ? undefined : labelled(chosen);
+  }
   if (field.kind === 'flag') return isOn(field, design) ? 'yes' : undefined;
   if (field.kind === 'oneOf' || field.derived) return undefined;
   if (field.kind === 'lines') return value && linesOf(field, value).map((line) => line.split('  ').map((number, index) => withUnit(number, field.columns[index].unit)).join(', ')).join('; ');
