@@ -20,6 +20,7 @@ use crate::json::word;
 use crate::key::Encode;
 use crate::no_answer::{NoAnswer, NoAnswerCode};
 use crate::question::{Limits, Question, checked_drive, checked_load};
+use crate::sweep::STATE_BYTES;
 
 /// The sample counts that are tried.
 const SAMPLES: [u64; 9] = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
@@ -174,8 +175,7 @@ impl Question for Accuracy {
     }
 
     fn working_bytes(checked: &CheckedAccuracy) -> u64 {
-        // Eleven columns of doubles and two of numbers, of the longest way that is tried.
-        const STATE_BYTES: u64 = 11 * 8 + 2 * 4;
+        // Of the longest way that is tried.
         let CheckedAccuracy { drive, load, deviations, max_states, .. } = checked;
         let mesh = load.mesh(drive, deviations);
         let counts = SAMPLES.iter().filter_map(|&samples| Some(mesh.state_count(Samples::new(samples).ok()?)));

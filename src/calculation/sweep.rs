@@ -54,6 +54,9 @@ pub struct CheckedSweep {
     with_wind_up: bool,
 }
 
+/// Eleven columns of doubles and two of numbers.
+pub(crate) const STATE_BYTES: u64 = 11 * 8 + 2 * 4;
+
 impl CheckedSweep {
     /// States of the answer. Of a sweep to a tolerance nobody knows how many they will be: some sixty input angles are usual.
     fn expected_states(&self) -> u64 {
@@ -232,8 +235,6 @@ impl Question for Sweep {
     }
 
     fn columns_bytes(checked: &CheckedSweep) -> u64 {
-        // Eleven columns of doubles and two of numbers.
-        const STATE_BYTES: u64 = 11 * 8 + 2 * 4;
         // Three columns of slips and one of words.
         const LOSSES_BYTES: u64 = 3 * 8 + 2;
         // Three columns of depths, of each point of a duty.

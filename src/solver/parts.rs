@@ -273,16 +273,10 @@ pub struct ToothPart {
 impl RingPart {
     pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Result<Self, DriveError> {
         let space = ToothSpace::new(drive, MM_PER_UM * parameters.ring_clearance_um, &parameters.modification)?;
-        let root_radius_mm = space.root_radius_mm();
-        let outer_radius_mm = parameters.ring_outer_radius_mm.unwrap_or(RIM * root_radius_mm);
-        let limit = root_radius_mm * (1.0 + LEAST_WALL);
-        if outer_radius_mm > limit {
-            let has_clearance = parameters.ring_clearance_um > 0.0;
-            let is_set_back = parameters.modification.ring_equidistant_um > 0.0;
-            return Ok(Self { space, outer_radius_mm, has_clearance, is_set_back });
-        }
-        let misfit = Misfit::RingWithoutRim;
-        Err(DriveError::Impossible(vec![Violation::PartDoesNotFit { misfit, value: outer_radius_mm, limit }]))
+        let outer_radius_mm = parameters.ring_outer_radius_mm.unwrap_or(RIM * space.root_radius_mm());
+        let has_clearance = parameters.ring_clearance_um > 0.0;
+        let is_set_back = parameters.modification.ring_equidistant_um > 0.0;
+        Ok(Self { space, outer_radius_mm, has_clearance, is_set_back })
     }
 }
 
