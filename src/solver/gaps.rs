@@ -174,6 +174,13 @@ pub(crate) fn of(list: &[f64], index: u64) -> f64 {
     usize::try_from(index).ok().and_then(|index| list.get(index)).copied().unwrap_or_default()
 }
 
+/// The entry in the middle of a list by size; zero of none.
+fn middle(list: &[f64]) -> f64 {
+    let mut by_size = list.to_vec();
+    by_size.sort_by(f64::total_cmp);
+    by_size.get(list.len() / 2).copied().unwrap_or_default()
+}
+
 impl Modification {
     /// As conjugate parts are.
     pub const NONE: Self = Self {
@@ -263,15 +270,20 @@ pub struct Gaps<'a> {
 
 /// How far flanks and walls are turned away about the axis: lost motion alone (docs/theory.md section 4.8).
 #[derive(Debug, Clone, Copy, Default)]
-struct Turned {
+pub(crate) struct Turned {
     ring_rad: f64,
-    carrier_rad: f64,
+    pub(crate) carrier_rad: f64,
 }
 
 impl Turned {
     /// `kτ` of a ring, `(Z_G/U) τ` of a carrier.
-    fn lost_motion_rad(&self, drive: &Drive) -> f64 {
+    pub(crate) fn lost_motion_rad(&self, drive: &Drive) -> f64 {
         drive.flank().teeth_per_wave() * self.ring_rad + drive.teeth_per_wave() * self.carrier_rad
+    }
+
+    /// Of flank and wall together.
+    pub(crate) const fn rad(&self) -> f64 {
+        self.ring_rad + self.carrier_rad
     }
 }
 
@@ -333,18 +345,8 @@ impl<'a> Gaps<'a> {
         self.turned_alike().lost_motion_rad(self.drive)
     }
 
-    /// The same of what is turned at one place.
-    pub(crate) fn lost_motion_at_rad(&self, place: &Place) -> f64 {
-        self.turned_at(place).lost_motion_rad(self.drive)
-    }
-
-    /// How far flank and wall at one place are turned away together.
-    pub(crate) fn turned_at_rad(&self, place: &Place) -> f64 {
-        let (all, own) = (self.turned_alike(), self.turned_at(place));
-        all.ring_rad + own.ring_rad + all.carrier_rad + own.carrier_rad
-    }
-
-    fn turned_alike(&self) -> Turned {
+    /// What is turned at all places alike.
+    pub(crate) fn turned_alike(&self) -> Turned {
         let Modification { ring_rotation_arcsec, carrier_rotation_arcsec, .. } = &self.modification;
         Turned {
             ring_rad: RAD_PER_ARCSEC * ring_rotation_arcsec,
@@ -352,10 +354,19 @@ impl<'a> Gaps<'a> {
         }
     }
 
-    fn turned_at(&self, place: &Place) -> Turned {
+    /// What is turned at one place besides.
+    pub(crate) fn turned_at(&self, place: &Place) -> Turned {
         self.deviations.map_or_else(Turned::default, |deviations| Turned {
             ring_rad: RAD_PER_ARCSEC * of(&deviations.ring_space_angle_arcsec, place.ring_space),
             carrier_rad: RAD_PER_ARCSEC * of(&deviations.slot_angle_arcsec, place.slot),
+        })
+    }
+
+    /// What of the items that are turned those in the middle are turned by: nothing where most are not, and all of it where they are alike.
+    pub(crate) fn turned_in_the_middle(&self) -> Turned {
+        self.deviations.map_or_else(Turned::default, |deviations| Turned {
+            ring_rad: RAD_PER_ARCSEC * middle(&deviations.ring_space_angle_arcsec),
+            carrier_rad: RAD_PER_ARCSEC * middle(&deviations.slot_angle_arcsec),
         })
     }
 

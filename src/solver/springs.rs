@@ -29,33 +29,36 @@ pub struct Spring {
     pub approach: Approach,
 }
 
-/// What has to be closed before a tooth carries.
+/// What has to be closed before a tooth carries: the wave generator makes up for the lost motion, and then, by what is left of the arm, for the way.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Gap {
     /// Along `F_H`.
     pub(crate) along_mm: f64,
-    /// As a rotation of the wave generator, on top of it.
+    /// As a rotation of the wave generator.
     pub(crate) lost_motion_rad: f64,
+}
+
+impl Gap {
+    fn closing_rad(&self, arm_mm: f64, arm_decline_mm_per_rad: f64) -> f64 {
+        // Backwards, where lost motion of all teeth makes up for it, no farther than to where an arm that grows begins.
+        let begin_rad = |arm_mm: f64| {
+            if arm_decline_mm_per_rad < 0.0 { arm_mm / arm_decline_mm_per_rad } else { f64::NEG_INFINITY }
+        };
+        let lost_motion_rad = self.lost_motion_rad.max(begin_rad(arm_mm));
+        let arm_mm = (arm_mm - arm_decline_mm_per_rad * lost_motion_rad).max(0.0);
+        let has_ended = arm_mm == 0.0 && arm_decline_mm_per_rad >= 0.0;
+        if has_ended || self.along_mm == f64::INFINITY {
+            return f64::INFINITY;
+        }
+        turned_rad(arm_mm, arm_decline_mm_per_rad, self.along_mm).max(begin_rad(arm_mm)) + lost_motion_rad
+    }
 }
 
 impl Spring {
     /// A tooth with a gap, nothing where it has none, and the same arm in travel and statics. One without an arm never closes a gap: that of the slot
     /// vanishes with the arm, but no rotation brings the tooth there, unless it lends the tooth an arm. Nor does one whose arm ends before.
     pub(crate) fn new(arm_mm: f64, arm_decline_mm_per_rad: f64, gap: Option<Gap>, approach: Approach) -> Self {
-        let closing_rad = match gap {
-            Some(_) if arm_mm <= 0.0 && arm_decline_mm_per_rad >= 0.0 => f64::INFINITY,
-            Some(Gap { along_mm: f64::INFINITY, .. }) => f64::INFINITY,
-            Some(Gap { along_mm, lost_motion_rad }) if arm_decline_mm_per_rad == 0.0 => {
-                along_mm / arm_mm + lost_motion_rad
-            }
-            Some(Gap { along_mm, lost_motion_rad }) => {
-                turned_rad(arm_mm, arm_decline_mm_per_rad, along_mm) + lost_motion_rad
-            }
-            None => 0.0,
-        };
-        // Turned away flanks and walls let all that a tooth does come later. Its arm is what it is once that is made up for.
-        let lost_motion_rad = gap.map_or(0.0, |gap| gap.lost_motion_rad);
-        let arm_mm = arm_mm + arm_decline_mm_per_rad * lost_motion_rad;
+        let closing_rad = gap.map_or(0.0, |gap| gap.closing_rad(arm_mm, arm_decline_mm_per_rad));
         Self { travel_arm_mm: arm_mm, static_arm_mm: arm_mm, arm_decline_mm_per_rad, closing_rad, approach }
     }
 
@@ -135,7 +138,6 @@ fn turned_rad(arm_mm: f64, arm_decline_mm_per_rad: f64, way_mm: f64) -> f64 {
     if square_mm2 < 0.0 && way_mm > 0.0 {
         return f64::INFINITY;
     }
-    // Backwards, as to a gap below zero that lost motion makes up for, no further than to where the arm begins.
     2.0 * way_mm / (arm_mm + square_mm2.max(0.0).sqrt())
 }
 

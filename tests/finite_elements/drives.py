@@ -167,13 +167,15 @@ def solve(case, turned_rad=None, engaged_rad=None, reach_rad=0.0):
     cam_curve = SmoothCurve(lambda phi: drive.offset_point(phi, 0.0), -0.35, np.pi / drive.lobes + 0.35)
     placed = []
     for i, psi in teeth:
-        # The tooth in its slot, against the wall that it will be pressed on, outward until it meets the turned cam.
-        seen = psi - turned_rad
-        phi = drive.normal_at(seen)
-        d = drive.center_radius_mm(seen)
+        # The tooth against the wall that it will be pressed on, aside in its slot by the gap there, outward until it meets the turned cam.
         slot = np.array([np.cos(psi), np.sin(psi)])
         forward = np.array([-slot[1], slot[0]])
-        center = d * slot
+        aside_mm = 1e-3 * case.slot_gap_um
+        aside_rad = brentq(lambda a: drive.center_radius_mm(psi - turned_rad + drive.sense * a) * np.sin(a) - aside_mm, -1e-12, 0.1, xtol=1e-15) if aside_mm else 0.0
+        seen = psi - turned_rad + drive.sense * aside_rad
+        phi = drive.normal_at(seen)
+        d = drive.center_radius_mm(seen)
+        center = d * (np.cos(aside_rad) * slot + drive.sense * np.sin(aside_rad) * forward)
         middle = psi + drive.sense * psi / k
         away = lambda p: np.hypot(*(drive.ring_point(middle, p) - center))
         near = minimize_scalar(away, bounds=(max(psi - 0.15, -0.5), min(psi + 0.15, end)), method="bounded", options={"xatol": 1e-11}).x
@@ -257,7 +259,7 @@ def solve(case, turned_rad=None, engaged_rad=None, reach_rad=0.0):
             along = np.array([-normal[1], normal[0]])
             if contact == 2:
                 gap = surface @ normal
-                gap = (gap.max() - gap) + 1e-3 * case.slot_gap_um
+                gap = gap.max() - gap
             else:
                 # Both surfaces by the coordinate along the common tangent.
                 x_tooth, x_partner = surface @ along, partner @ along

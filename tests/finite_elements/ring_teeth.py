@@ -89,13 +89,16 @@ def model(case, beyond_at, moves):
 
     def force_and_arm(tooth, turned):
         psi, (d, gamma, beta, arm, curvatures) = tooth
-        way = turned * arm
+        way, slot_gap_mm = turned * arm, gaps[2]
         if moves:
-            moved_d, gamma, _, arm, moved = at(psi - turned)
-            way, curvatures = np.cos(gamma) * (moved_d - d), [moved[0], *curvatures[1:]]
+            # Aside in its slot by the gap there the tooth stands elsewhere on the flank, and so does it on the cam.
+            aside = slot_gap_mm / d
+            on_flank_d, _, beta, _, on_flank = at(psi - k * aside)
+            moved_d, gamma, _, arm, on_cam = at(psi - turned + drive.sense * aside)
+            way, slot_gap_mm, curvatures = np.cos(gamma) * (moved_d - on_flank_d), 0.0, [on_cam[0], *on_flank[1:]]
         # Equilibrium of the tooth between cam, flank and wall.
         ratios = [1.0, np.cos(gamma) / np.cos(beta), np.cos(gamma) * np.tan(beta) + drive.sense * np.sin(gamma)]
-        room = way - sum(f * gap for f, gap in zip(ratios, gaps))
+        room = way - sum(f * gap for f, gap in zip(ratios, [*gaps[:2], slot_gap_mm]))
         if room <= 0:
             return 0.0, arm
         besides = [0.0, beyond_at(np.degrees(psi)), 0.0]
