@@ -416,6 +416,11 @@ fn pause_after(look: Duration, least: Duration) -> Duration {
     (LOOKS_SHARE * look).clamp(least, LONGEST_PAUSE)
 }
 
+/// What is kept of a stored study besides its rows.
+fn view_bytes(study: &Study) -> u64 {
+    study.kept_bytes() - study.stored_bytes()
+}
+
 /// Whether a stored study need not be begun.
 const fn is_there(stored: &Stored) -> bool {
     stored.is_running() || stored.is_done()
@@ -526,17 +531,18 @@ impl Studies {
             return Ok(kept);
         }
         let study = frozen::thaw(&self.pool, frozen).await?.map_err(|reason| reason.told(&frozen.id))?;
-        let kept = self.keep_view(study);
+        // Where others have all the room, it is kept all the same: how many there are is bounded.
+        let room = self.room.keep(view_bytes(&study)).ok();
+        let kept = self.keep_view(study, room);
         let (state, problem) = state_of(stored);
         kept.stand(state, problem);
         Ok(kept)
     }
 
     /// Keeps what is known of a stored study, in the place of any other with its id and of the oldest that do not run.
-    fn keep_view(&self, study: Arc<Study>) -> Arc<Kept> {
-        let bytes = study.kept_bytes() - study.stored_bytes();
-        // Where others have all the room, it is kept all the same: how many there are is bounded.
-        let kept = Kept::new(study, None, bytes, self.room.keep(bytes).ok());
+    fn keep_view(&self, study: Arc<Study>, room: Option<room::Kept>) -> Arc<Kept> {
+        let bytes = view_bytes(&study);
+        let kept = Kept::new(study, None, bytes, room);
         let mut all = self.kept.lock();
         all.retain(|other| other.id != kept.id);
         while all.iter().map(|other| other.bytes).sum::<u64>() + bytes > VIEWS_BYTES
@@ -589,6 +595,8 @@ impl Studies {
         deadline: Instant,
     ) -> Result<Arc<Kept>, Problem> {
         let id = study.id().to_string();
+        // From here on, as it may wait long for its canary, and many others with it.
+        let mut room = Some(self.room.keep(view_bytes(&study))?);
         let (mut asked, mut new) = (Some(study), None);
         loop {
             let stored = store.find(&id).await?;
@@ -614,7 +622,7 @@ impl Studies {
                         let frozen = self.pool.within(deadline, freezing).await?;
                         new = Some((frozen, milliseconds(started.elapsed())));
                     }
-                    patiently(self.begin_in_turn(store, &id, known, new.as_ref())).await?
+                    patiently(self.begin_in_turn(store, &id, known, new.as_ref(), &mut room)).await?
                 }
             };
             if let Some(kept) = kept {
@@ -631,6 +639,7 @@ impl Studies {
         id: &str,
         known: Option<Arc<Kept>>,
         new: Option<&((Arc<Study>, NewStudy), u64)>,
+        room: &mut Option<room::Kept>,
     ) -> Result<Option<Arc<Kept>>, Problem> {
         let _turn = self.beginning.lock().await;
         let kept = match (store.find(id).await?, known, new) {
@@ -647,7 +656,7 @@ impl Studies {
                 }
                 let NewStudy { chunks, canary_variants, .. } = frozen;
                 tracing::info!(study = id, chunks, canary_variants, canary_ms, "a study is kept");
-                self.keep_view(Arc::clone(study))
+                self.keep_view(Arc::clone(study), room.take())
             }
             // Another has begun, or forgotten, it meanwhile.
             _ => return Ok(None),

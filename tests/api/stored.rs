@@ -341,6 +341,45 @@ async fn who_begins_a_stored_study_waits_for_no_other_that_begins() {
     keeper.end().await;
 }
 
+/// Sixty of them once ended a service of 256 MiB.
+#[tokio::test]
+async fn studies_that_wait_for_their_canary_have_taken_the_room_of_what_is_asked() {
+    let file = File::new();
+    let limits = Limits { max_concurrent_solves: 1, max_unread_bytes: 5_000_000, deadline_ms: 10_000, ..LIMITS };
+    let keeper = Keeper::of(&file, limits, false).await;
+    let occupied = Occupied::by_one(&keeper.service.app.pool).await;
+    // Each choice has a document of its own: some three megabytes of them.
+    let base = json!({
+        "drive": {
+            "wave_generator": { "semi_major_mm": 1600.0, "semi_minor_mm": 1599.0 },
+            "teeth": { "count": 900, "radius_mm": 3.0, "width_mm": 15.0 }, "ring": { "teeth": 898 }
+        },
+        "deviations": { "tooth_radius_um": vec![0.0; 900] }
+    });
+    let asked = |lowest: u64| {
+        let choices: Vec<_> = (lowest..lowest + 100).collect();
+        json!({
+            "study": "map", "base": base, "quantities": ["undercut"],
+            "over": { "/drive/teeth/width_mm": { "one_of": choices } }
+        })
+    };
+    let (one, other) = (asked(10), asked(20));
+    let begins = keeper.ask(&one);
+    let refused = async {
+        while keeper.service.app.room.taken_bytes() == 0 {
+            tokio::task::yield_now().await;
+        }
+        keeper.ask(&other).await.refused(503, "too_many_unread_bytes")
+    };
+    tokio::select! {
+        _ = refused => {}
+        begun = begins => panic!("it did not wait: {} {}", begun.status, begun.text()),
+    }
+    assert_eq!(keeper.service.app.room.taken_bytes(), 0, "who left gave it back");
+    drop(occupied);
+    keeper.end().await;
+}
+
 #[tokio::test]
 async fn a_study_that_another_has_cancelled_is_forgotten_by_who_deletes_it_next() {
     let file = File::new();
