@@ -152,6 +152,35 @@ fn a_stiffness_that_jumps_after_a_tooth_has_left_the_valley_is_found() {
     }
 }
 
+/// At two of the first moments one tooth carries, between them another one alone, which is not pressed at either.
+#[test]
+fn a_tooth_that_carries_between_two_of_the_first_moments_alone_is_found() {
+    let parameters = DriveParameters {
+        wave_generator: WaveGenerator::Eccentric {
+            radius_mm: 3.916_351_596_676_902,
+            eccentricity_mm: 1.402_432_608_186_466_4,
+        },
+        teeth: 9,
+        installed: 9,
+        tooth_radius_mm: 1.278_650_254_156_029_8,
+        tooth: ToothShape::Cylinder { width_mm: 1.341_311_874_813_533_3 },
+        ring_teeth: 8,
+        tip_radius_mm: None,
+    };
+    let load = LoadParameters {
+        law: JOHNSON,
+        wave_generator_moves: true,
+        corner_contact: true,
+        clearance_um: PerContact { wave_generator: 12.0, ring: 4.0, carrier: 4.0 },
+        ..load(8.821_845_665_400_59e-6, VirtualWork)
+    };
+    let dense = of(&parameters, &load, Points::samples(1500).unwrap()).unwrap();
+    let found = to(&parameters, &load, 1e-4);
+    for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
+        assert!(found >= dense * (1.0 - 1e-4), "{name}: {:e}", 1.0 - found / dense);
+    }
+}
+
 /// Where corners bend both ways within two stretches their second differences take each other away.
 #[test]
 fn a_capacity_between_two_corners_is_found() {

@@ -257,6 +257,39 @@ impl Seen {
         })
     }
 
+    /// Where some tooth may carry, or not, between two moments that follow each other, at which it does not, or does: lines through the moments on either side, extended, meet
+    /// beyond nothing, and a curve that is bent towards nothing stays on this side of both.
+    fn suspected_change(&self, at: usize) -> Option<f64> {
+        let moments = [at.checked_sub(1), Some(at), Some(at + 1), Some(at + 2)];
+        let [before, one, other, after] = moments.map(|at| self.order.get(at?).copied());
+        let (one, other) = (one?, other?);
+        let (low, high) = (self.fractions[one], self.fractions[other]);
+        let slope = |from: usize, to: usize, tooth: usize| {
+            (self.pressed(to)[tooth] - self.pressed(from)[tooth]) / (self.fractions[to] - self.fractions[from])
+        };
+        let nothing = CLOSED * self.rotation_rad(one);
+        let meeting = |tooth: usize| {
+            // As if it did not carry: a curve below nothing.
+            let sign = if self.pressed(one)[tooth] > 0.0 { -1.0 } else { 1.0 };
+            let [start, end] = [one, other].map(|moment| sign * self.pressed(moment)[tooth]);
+            let own = (end - start) / (high - low);
+            let beside = |from: Option<usize>, to: Option<usize>| Some(sign * slope(from?, to?, tooth));
+            // Where a piece ends, the curve goes on to bend as on the side that is seen.
+            let (rise, fall) = match (beside(before, Some(one)), beside(Some(other), after)) {
+                (Some(rise), Some(fall)) => (rise, fall),
+                (Some(rise), None) => (rise, 2.0 * own - rise),
+                (None, Some(fall)) => (2.0 * own - fall, fall),
+                (None, None) => return None,
+            };
+            let share = (own - fall) / (rise - fall);
+            let top = start + rise * share * (high - low);
+            let is_on_one_side = start <= 0.0 && end <= 0.0;
+            (is_on_one_side && rise > own && own > fall && top > nothing)
+                .then_some(low + share.clamp(0.125, 0.875) * (high - low))
+        };
+        (0..self.teeth).find_map(meeting)
+    }
+
     fn rotation_rad(&self, moment: usize) -> f64 {
         self.value(moment, LOADS * self.teeth)
     }
@@ -440,7 +473,13 @@ impl Judge {
     fn close_in_on_changes(&self, seen: &mut Seen, round: u32) {
         for at in 1..seen.order.len() {
             let (one, other) = (seen.order[at - 1], seen.order[at]);
-            let Some(tooth) = seen.tooth_changed(one, other) else { continue };
+            let Some(tooth) = seen.tooth_changed(one, other) else {
+                if seen.fractions[other] - seen.fractions[one] > self.nearest {
+                    let suspected = seen.suspected_change(at - 1);
+                    seen.wanted.extend(suspected);
+                }
+                continue;
+            };
             let (low, high) = (seen.fractions[one], seen.fractions[other]);
             if !self.change_matters(seen, one, other) {
                 continue;
@@ -884,6 +923,43 @@ mod tests {
             let expected = 3.0 * fifth.max(0.125 * fourth);
             let found = nodes.summit(&seen, 0, 3.0).error;
             assert!((found / expected - 1.0).abs() < 1e-9, "{found:e} is not {expected:e}");
+        }
+    }
+
+    /// A tooth that is pressed, or not, by such a curve, and the sixteen intervals of a piece.
+    fn seen_of_a_tooth(pressed: impl Fn(f64) -> f64) -> Seen {
+        let mut seen = seen_of(|_| 1.0);
+        for moment in 0..seen.fractions.len() {
+            let fraction = seen.fractions[moment];
+            seen.push_pressed(std::iter::once(pressed(fraction)));
+        }
+        seen
+    }
+
+    #[test]
+    fn a_tooth_that_carries_or_does_not_between_two_moments_alone_is_suspected_where_it_does() {
+        for step in 0..1000 {
+            let (summit, sign) = (0.001 * f64::from(step), if step % 2 == 0 { 1.0 } else { -1.0 });
+            // By a parabola that stands above nothing over a half of an interval.
+            let half = 0.25 / 16.0;
+            let seen = seen_of_a_tooth(|x| sign * (half * half - (x - summit) * (x - summit)));
+            let beside = (1..17).find(|&at| seen.fractions[at] > summit).unwrap_or(16);
+            let interval = [seen.fractions[beside - 1], seen.fractions[beside]];
+            if interval.iter().all(|end| (end - summit).abs() > half) {
+                let place = seen.suspected_change(beside - 1).expect("it changes within the interval");
+                assert!(interval[0] < place && place < interval[1], "{place} of {interval:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_tooth_that_stays_well_on_one_side_of_nothing_is_not_suspected() {
+        for step in 0..100 {
+            let phase = 0.07 * f64::from(step);
+            for sign in [1.0, -1.0] {
+                let seen = seen_of_a_tooth(|x| sign * (1.2 + (6.0 * x + phase).cos()));
+                assert!((0..16).all(|at| seen.suspected_change(at).is_none()), "{phase}");
+            }
         }
     }
 
