@@ -133,16 +133,20 @@ test('unlike zones are told as such: all their teeth are counted, each on its lo
   assert.ok((await resultOf(page, 'Most teeth in mesh, each zone')) > 0);
 });
 
-test('a ratio counts in thirds where there are three lobes', async () => {
+test('a ratio counts in thirds where there are three lobes, in halves where there are two', async () => {
   const page = await bed.open();
+  const counts = async (ratio) => {
+    await page.fill(field('/ratio'), ratio);
+    await page.keyboard.press('Enter');
+    await settled(page);
+    const { drive } = await designOf(page);
+    return [drive.teeth.count, drive.ring.teeth];
+  };
+  assert.deepEqual(await counts('14.5'), [29, 27]);
   await pick(page, WAVE_GENERATOR, 'harmonic');
   await enter(page, `${WAVE_GENERATOR}/lobes`, 3);
-  assert.equal(await page.inputValue(field('/ratio')), '9.33333');
-  await page.fill(field('/ratio'), '9.667');
-  await page.keyboard.press('Enter');
-  await settled(page);
-  const { drive } = await designOf(page);
-  assert.deepEqual([drive.teeth.count, drive.ring.teeth], [29, 26]);
+  assert.equal(await page.inputValue(field('/ratio')), '9.66667');
+  assert.deepEqual(await counts('9.333'), [28, 25]);
 });
 
 for (const [shape, fields] of [

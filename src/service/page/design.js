@@ -107,8 +107,8 @@ const ratio = {
   derived: { read: ({ geometry }) => geometry && Number(geometry.transmission_ratio.toPrecision(6)), write: withRatio },
   refuses: (value, design) => {
     const lobes = lobesOf(design);
-    const others = lobes > 2 ? `, or ${lobes} times it is whole` : '';
-    const isWhole = Number.isInteger(value) || (lobes > 2 && Math.abs(lobes * value - Math.round(lobes * value)) < 0.005);
+    const others = lobes > 1 ? `, or ${lobes} times it is whole` : '';
+    const isWhole = Math.abs(lobes * value - Math.round(lobes * value)) < 0.005;
     return isWhole && Math.abs(value) >= 2 ? undefined : `A ratio is a whole number, 2 or more${others}; negative where the carrier turns against the input. The last one stands.`;
   },
   next: (value, sense) => (value + sense > -2 && value + sense < 2 ? 2 * sense : value + sense),
@@ -399,7 +399,7 @@ export const GROUPS = [
   {
     title: 'Friction and wear',
     pointer: '/friction',
-    hint: 'What the teeth run on decides what a turn costs; with an input speed it is told in watts, and with wear rates in millimetres an hour.',
+    hint: 'What the teeth run on decides what a turn costs; with an input speed it is told in watts, and with wear rates in micrometres an hour.',
     summary: (design) => ({ plain: 'plain cam', race: 'race on a bearing', rolling: 'rolling' })[at(design, '/friction/wave_generator/kind')] ?? 'not computed',
     fields: [
       variant('/friction/wave_generator', 'kind', 'The teeth run on', [
