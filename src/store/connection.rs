@@ -11,11 +11,11 @@ use std::time::Duration;
 
 use sqlx::ConnectOptions as _;
 use sqlx::pool::{PoolConnection, PoolOptions};
-use sqlx::postgres::{PgPool, Postgres};
+use sqlx::postgres::{PgConnectOptions, PgPool, Postgres};
 use sqlx::sqlite::{Sqlite, SqliteConnectOptions, SqliteJournalMode, SqliteLockingMode, SqlitePool, SqliteSynchronous};
 
-use crate::PATIENCE;
 use crate::address::Address;
+use crate::{LOCK_PATIENCE, PATIENCE, SILENCE};
 
 /// A chunk by its study and its number.
 pub(crate) type ChunkName = (String, u64);
@@ -66,10 +66,13 @@ pub(crate) use on;
 pub enum StoreError {
     /// Nobody answers, or the server says no.
     #[error("the studies' store fails: {0}")]
-    Failed(#[from] sqlx::Error),
+    Failed(#[source] sqlx::Error),
     /// It was silent for too long.
     #[error("the studies' store did not answer within {} s", .0.as_secs())]
     Silent(Duration),
+    /// Another session has a lock on what was asked for, and the server waited for it as long as it is told to.
+    #[error("another session holds what is wanted of the studies' store, and does not let go of it")]
+    Locked,
     /// The database has another schema than this build works with.
     #[error("the studies' store has schema {found}, and this build works with {}: {}", crate::SCHEMA_VERSION, if *found < crate::SCHEMA_VERSION { "`toothwave migrate` brings it there" } else { "a newer build is needed" })]
     OtherSchema {
@@ -87,6 +90,20 @@ pub enum StoreError {
     /// A file knows no workers elsewhere.
     #[error("{0} is a file, which serves one process: workers share a PostgreSQL database")]
     NotShared(String),
+}
+
+/// PostgreSQL, appendix A.
+pub(crate) const LOCK_NOT_AVAILABLE: &str = "55P03";
+
+impl From<sqlx::Error> for StoreError {
+    fn from(error: sqlx::Error) -> Self {
+        match error {
+            // Of the pools' own patience, which is as long.
+            sqlx::Error::PoolTimedOut => Self::Silent(PATIENCE),
+            sqlx::Error::Database(refused) if refused.code().as_deref() == Some(LOCK_NOT_AVAILABLE) => Self::Locked,
+            error => Self::Failed(error),
+        }
+    }
 }
 
 /// Connections that are not leases: few statements, each over soon.
@@ -145,14 +162,8 @@ impl Store {
             Address::Server(options) => {
                 let options = options.as_ref().clone().application_name("toothwave").disable_statement_logging();
                 // A lease's session waits for its worker; the server ends it when that takes too long.
-                let leases = PoolOptions::<Postgres>::new()
-                    .max_connections(MOST_LEASES)
-                    .acquire_timeout(PATIENCE)
-                    .connect_lazy_with(options.clone().application_name("toothwave lease"));
-                let pool = PoolOptions::<Postgres>::new()
-                    .max_connections(CONNECTIONS)
-                    .acquire_timeout(PATIENCE)
-                    .connect_lazy_with(options);
+                let leases = sessions(MOST_LEASES, options.clone().application_name("toothwave lease"));
+                let pool = sessions(CONNECTIONS, options);
                 Ok(Self { database: Database::Server { pool, leases }, address: address.clone(), worker })
             }
         }
@@ -197,6 +208,30 @@ impl Store {
             }
         }
     }
+}
+
+/// Sessions that the server frees of whoever left them. One that is cut off, or stands still, in the middle of a transaction has it ended, and
+/// one that waits for a lock is told so before its client gives up: the server does not look whether anybody still waits for the answer, would
+/// keep a process for it, and would do in the end what was believed to have failed. Said in each session: there are those between who take no
+/// such options when a connection is made.
+fn sessions(most: u32, options: PgConnectOptions) -> PgPool {
+    let text =
+        "SELECT set_config('idle_in_transaction_session_timeout', $1, FALSE), set_config('lock_timeout', $2, FALSE)";
+    PoolOptions::new()
+        .max_connections(most)
+        .acquire_timeout(PATIENCE)
+        .after_connect(move |session, _| {
+            Box::pin(async move {
+                let limits = sqlx::query(text).bind(milliseconds(SILENCE)).bind(milliseconds(LOCK_PATIENCE));
+                limits.execute(session).await.map(|_| ())
+            })
+        })
+        .connect_lazy_with(options)
+}
+
+/// As PostgreSQL's settings are given.
+pub(crate) fn milliseconds(time: Duration) -> String {
+    time.as_millis().to_string()
 }
 
 /// A connection that is not given back in the middle of anything.

@@ -6,7 +6,7 @@ use std::time::Duration;
 use sqlx::pool::PoolConnection;
 use sqlx::postgres::Postgres;
 
-use crate::connection::{Connection, Database, Store, StoreError, on, within};
+use crate::connection::{Connection, Database, Store, StoreError, milliseconds, on, within};
 use crate::studies::{Cut, begin, commit};
 use crate::{MOST_ATTEMPTS, PATIENCE, stored};
 
@@ -130,7 +130,6 @@ async fn claim_there(
     Cut { id, chunk_variants }: &Cut,
     lease: Duration,
 ) -> Result<Option<u64>, StoreError> {
-    let lease_ms = lease.as_millis().to_string();
     sqlx::query("BEGIN").execute(&mut **connection).await?;
     let text = "SELECT chunk FROM chunks WHERE study = $1 AND EXISTS (SELECT 1 FROM studies WHERE id = $1 AND chunk_variants = $2)
         ORDER BY chunk LIMIT 1 FOR UPDATE OF chunks SKIP LOCKED";
@@ -142,7 +141,7 @@ async fn claim_there(
     };
     // A worker that is silent for longer has its transaction ended, and the chunk is free.
     sqlx::query("SELECT set_config('idle_in_transaction_session_timeout', $1, TRUE)")
-        .bind(lease_ms)
+        .bind(milliseconds(lease))
         .execute(&mut **connection)
         .await?;
     Ok(Some(crate::read(chunk)))

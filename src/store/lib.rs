@@ -33,6 +33,17 @@ pub const PATIENCE: Duration = Duration::from_secs(10);
 /// For what touches every chunk of a study, of which there may be a million.
 pub(crate) const LONG_PATIENCE: Duration = Duration::from_secs(120);
 
+/// So long does the server let a statement wait for a lock. For a row it may do so twice, first for whoever waits for it already, and the answer
+/// should come within [`PATIENCE`].
+pub(crate) const LOCK_PATIENCE: Duration = Duration::from_millis(4500);
+
+/// The same for who migrates, within [`LONG_PATIENCE`].
+pub(crate) const LONG_LOCK_PATIENCE: Duration = Duration::from_secs(100);
+
+/// So long may a session be silent in the middle of a transaction; a lease says for itself how long. Whoever lives goes on within milliseconds, or
+/// gives up after [`PATIENCE`].
+pub(crate) const SILENCE: Duration = Duration::from_secs(3 * PATIENCE.as_secs());
+
 /// How long a study that is to be forgotten waits for those who compute it to let go. Who sees that it was cancelled does within a second or so.
 const LETTING_GO: Duration = Duration::from_secs(5);
 

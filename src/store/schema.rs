@@ -1,7 +1,7 @@
 //! The tables, in versions that follow each other.
 
-use crate::connection::{Connection, Store, StoreError, on, within};
-use crate::{LONG_PATIENCE, PATIENCE, read, stored};
+use crate::connection::{Connection, Store, StoreError, milliseconds, on, within};
+use crate::{LONG_LOCK_PATIENCE, LONG_PATIENCE, PATIENCE, read, stored};
 
 /// The version that this build works with.
 pub const SCHEMA_VERSION: u64 = VERSIONS.len() as u64;
@@ -89,6 +89,9 @@ impl Store {
         self.with(LONG_PATIENCE, async |connection| {
             on!(connection, inner => sqlx::query("BEGIN").execute(inner).await.map(|_| ()))?;
             if let Connection::Server(inner) = connection {
+                // For others who migrate, and for leases, whose transactions have the tables.
+                let long = "SELECT set_config('lock_timeout', $1, TRUE)";
+                sqlx::query(long).bind(milliseconds(LONG_LOCK_PATIENCE)).execute(&mut **inner).await?;
                 sqlx::query(MIGRATION_LOCK).execute(&mut **inner).await?;
             }
             let known = "CREATE TABLE IF NOT EXISTS schema_versions (version BIGINT PRIMARY KEY, applied_at_s BIGINT NOT NULL)";

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-use crate::connection::{Connection, Database, Store, StoreError, on};
+use crate::connection::{Connection, Database, LOCK_NOT_AVAILABLE, Store, StoreError, on};
 use crate::schema::require_schema;
 use crate::{BATCH_CHUNKS, LETTING_GO, LONG_PATIENCE, LOOK_AGAIN, PATIENCE, read, stored};
 
@@ -155,9 +155,6 @@ const STUDY: &str = "SELECT id, kind, build, document, max_states, max_profile_p
 /// Those that wait for workers; of studies that are done no chunk is left.
 const WAITING: &str = "SELECT id, chunk_variants, build FROM studies WHERE NOT is_cancelled AND ends_at_s > unixepoch()
     AND (opened < chunks OR EXISTS (SELECT 1 FROM chunks WHERE study = id)) ORDER BY asked_at_s, id";
-
-/// PostgreSQL, appendix A.
-const LOCK_NOT_AVAILABLE: &str = "55P03";
 
 impl Store {
     /// Keeps a study, of which no chunk is open yet. Where it is kept already, perhaps in other chunks, nothing happens; whether it was not.

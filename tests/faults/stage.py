@@ -120,10 +120,10 @@ class Service(Process):
 
 class Cable:
     """Between a worker and the server. Once cut it passes nothing on in either direction and says nothing of it; connections that were
-    open then stay so for ever, as those of a machine that has gone do."""
+    open then stay so for ever, as those of a machine that has gone do. With `cut_at` it is cut by whoever says these words."""
 
-    def __init__(self, port):
-        self.to, self.is_cut, self.ends = port, False, []
+    def __init__(self, port, cut_at=None):
+        self.to, self.cut_at, self.is_cut, self.ends = port, cut_at, False, []
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.port = self.listener.getsockname()[1]
         threading.Thread(target=self.accept, daemon=True).start()
@@ -140,10 +140,11 @@ class Cable:
             for source, sink in ((near, far), (far, near)):
                 threading.Thread(target=self.pass_on, args=(link, source, sink), daemon=True).start()
 
-    @staticmethod
-    def pass_on(link, source, sink):
+    def pass_on(self, link, source, sink):
         with contextlib.suppress(OSError):
             while data := source.recv(65536):
+                if self.cut_at and self.cut_at in data:
+                    self.cut()
                 if not link["is_cut"]:
                     sink.sendall(data)
             if not link["is_cut"]:

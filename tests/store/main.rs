@@ -8,12 +8,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::task::Poll;
 use std::time::Duration;
 
-use sqlx::{Connection as _, SqliteConnection};
+use sqlx::{Connection as _, PgConnection, SqliteConnection};
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpListener;
 use tokio::sync::RwLock;
 use tokio::time::Instant;
-use toothwave_store::{Address, AddressError, Claim, Gap, Lease, MOST_ATTEMPTS, NewStudy, Store, StoreError};
+use toothwave_store::{Address, AddressError, Claim, Gap, Lease, MOST_ATTEMPTS, NewStudy, PATIENCE, Store, StoreError};
 
 const LEASE: Duration = Duration::from_secs(60);
 const BUSY: Duration = Duration::from_millis(3);
@@ -472,6 +472,57 @@ async fn a_worker_that_lives_keeps_its_chunk_however_long_that_takes() {
     worker.forget(&study.id).await.unwrap();
 }
 
+/// A session that is none of the store's.
+async fn stranger(address: &Address) -> PgConnection {
+    let Address::Server(options) = address else { panic!("{address}") };
+    PgConnection::connect_with(options).await.unwrap()
+}
+
+/// As by a worker that was cut off while it opened chunks.
+#[tokio::test]
+async fn who_wants_a_study_that_another_session_holds_is_told_so_in_time_and_the_server_does_nothing_of_it_later() {
+    let Some(address) = server() else { return };
+    let _others = SERVER.read().await;
+    let store = Store::open(&address).await.unwrap();
+    store.migrate().await.unwrap();
+    let study = study("held", 2);
+    store.create(&study).await.unwrap();
+    let mut holder = stranger(&address).await;
+    sqlx::query("BEGIN").execute(&mut holder).await.unwrap();
+    let lock = "SELECT 1 FROM studies WHERE id = $1 FOR NO KEY UPDATE";
+    sqlx::query(lock).bind(&study.id).execute(&mut holder).await.unwrap();
+    let began = Instant::now();
+    let cut = study.cut();
+    let (claimed_meanwhile, cancelled, resumed) =
+        tokio::join!(store.claim(&cut, LEASE), store.cancel(&study.id), store.resume(&study.id, LEASE));
+    assert!(began.elapsed() < PATIENCE, "{:?}", began.elapsed());
+    let waiting = "SELECT COUNT(*) FROM pg_stat_activity WHERE pg_backend_pid() = ANY (pg_blocking_pids(pid))";
+    assert_eq!(sqlx::query_scalar::<_, i64>(waiting).fetch_one(&mut holder).await.unwrap(), 0);
+    for answer in [claimed_meanwhile.map(drop), cancelled, resumed] {
+        assert!(matches!(answer, Err(StoreError::Locked)), "{answer:?}");
+    }
+    // Nobody else's business meanwhile, nor afterwards.
+    assert!(store.find(&study.id).await.unwrap().unwrap().is_running());
+    sqlx::query("ROLLBACK").execute(&mut holder).await.unwrap();
+    keep(&mut claimed(&store, &study).await).await;
+    assert!(store.find(&study.id).await.unwrap().unwrap().is_running());
+    store.forget(&study.id).await.unwrap();
+}
+
+#[tokio::test]
+async fn who_migrates_waits_for_others_who_do_for_longer_than_a_single_operation_may_take() {
+    let Some(address) = server() else { return };
+    let _others = SERVER.read().await;
+    let store = Store::open(&address).await.unwrap();
+    let mut another = stranger(&address).await;
+    sqlx::query("SELECT pg_advisory_lock(7355608)").execute(&mut another).await.unwrap();
+    let (migrated, ()) = tokio::join!(store.migrate(), async {
+        tokio::time::sleep(PATIENCE).await;
+        sqlx::query("SELECT pg_advisory_unlock(7355608)").execute(&mut another).await.unwrap();
+    });
+    migrated.unwrap();
+}
+
 /// A server that lets everybody in and says nothing more.
 async fn mute() -> Address {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
@@ -677,6 +728,9 @@ async fn a_study_that_is_forgotten_while_its_chunk_is_claimed_has_none_and_holds
             };
             let ((), forgotten) = tokio::join!(worked, store.forget(&study.id));
             forgotten.unwrap();
+            // Where the claim came first the study runs, and who runs is not forgotten while its chunk is in work.
+            store.cancel(&study.id).await.unwrap();
+            store.forget(&study.id).await.unwrap();
             assert_eq!(store.find(&study.id).await.unwrap(), None);
         }
     })
