@@ -266,13 +266,37 @@ pub struct Gaps<'a> {
     clearance_mm: PerContact<f64>,
     modification: Modification,
     deviations: Option<&'a Deviations>,
+    usual: Usual,
+}
+
+/// What moves teeth along the flank at most places: with a gap at its slot a tooth lies aside, as if its wall were turned away. Of items, those in the middle of
+/// their lists by size: nothing where most have nothing, and all of it where they are alike.
+#[derive(Debug, Clone, Copy, Default)]
+struct Usual {
+    turned: Turned,
+    carrier_mm: f64,
+}
+
+impl Usual {
+    fn of(clearance_mm: &PerContact<f64>, modification: &Modification, deviations: Option<&Deviations>) -> Self {
+        let of_items = |list: fn(&Deviations) -> &[f64]| deviations.map_or(0.0, |deviations| middle(list(deviations)));
+        let walls_um = modification.slot_wall_um + of_items(|deviations| &deviations.slot_wall_um);
+        let thinner_um = modification.tooth_radius_um + of_items(|deviations| &deviations.tooth_radius_um);
+        Self {
+            turned: Turned {
+                ring_rad: RAD_PER_ARCSEC * of_items(|deviations| &deviations.ring_space_angle_arcsec),
+                carrier_rad: RAD_PER_ARCSEC * of_items(|deviations| &deviations.slot_angle_arcsec),
+            },
+            carrier_mm: clearance_mm.carrier + MM_PER_UM * (walls_um + thinner_um),
+        }
+    }
 }
 
 /// How far flanks and walls are turned away about the axis: lost motion alone (docs/theory.md section 4.8).
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Turned {
     ring_rad: f64,
-    pub(crate) carrier_rad: f64,
+    carrier_rad: f64,
 }
 
 impl Turned {
@@ -285,6 +309,11 @@ impl Turned {
     pub(crate) const fn rad(&self) -> f64 {
         self.ring_rad + self.carrier_rad
     }
+
+    /// With a gap at the slot of a tooth, whose centre is so far out.
+    pub(crate) fn and_aside(self, gap_mm: f64, center_radius_mm: f64) -> Self {
+        Self { carrier_rad: self.carrier_rad + gap_mm / center_radius_mm, ..self }
+    }
 }
 
 impl<'a> Gaps<'a> {
@@ -295,12 +324,10 @@ impl<'a> Gaps<'a> {
         modification: Modification,
         deviations: Option<&'a Deviations>,
     ) -> Self {
-        Self {
-            drive,
-            clearance_mm: PerContact::of(|contact| MM_PER_UM * clearance_um.get(contact)),
-            modification,
-            deviations: deviations.filter(|deviations| !deviations.is_nil()),
-        }
+        let clearance_mm = PerContact::of(|contact| MM_PER_UM * clearance_um.get(contact));
+        let deviations = deviations.filter(|deviations| !deviations.is_nil());
+        let usual = Usual::of(&clearance_mm, &modification, deviations);
+        Self { drive, clearance_mm, modification, deviations, usual }
     }
 
     /// Whether there is no gap anywhere.
@@ -345,8 +372,7 @@ impl<'a> Gaps<'a> {
         self.turned_alike().lost_motion_rad(self.drive)
     }
 
-    /// What is turned at all places alike.
-    pub(crate) fn turned_alike(&self) -> Turned {
+    fn turned_alike(&self) -> Turned {
         let Modification { ring_rotation_arcsec, carrier_rotation_arcsec, .. } = &self.modification;
         Turned {
             ring_rad: RAD_PER_ARCSEC * ring_rotation_arcsec,
@@ -362,12 +388,9 @@ impl<'a> Gaps<'a> {
         })
     }
 
-    /// What of the items that are turned those in the middle are turned by: nothing where most are not, and all of it where they are alike.
-    pub(crate) fn turned_in_the_middle(&self) -> Turned {
-        self.deviations.map_or_else(Turned::default, |deviations| Turned {
-            ring_rad: RAD_PER_ARCSEC * middle(&deviations.ring_space_angle_arcsec),
-            carrier_rad: RAD_PER_ARCSEC * middle(&deviations.slot_angle_arcsec),
-        })
+    /// What is turned at most places besides what is alike, gaps at slots counted as well, for a tooth whose centre is so far out: positions on the flank count from there.
+    pub(crate) fn usually_turned(&self, center_radius_mm: f64) -> Turned {
+        self.usual.turned.and_aside(self.usual.carrier_mm, center_radius_mm)
     }
 
     /// The gaps but for those that flanks and walls leave which are turned away about the axis.

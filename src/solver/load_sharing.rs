@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use crate::cam::ToothCenter;
 use crate::contact::{Contact, ContactLaw, HertzLine, Material, Materials, Part, PerContact, half_width_mm};
 use crate::drive::{Draft, Drive, DriveParameters, ToothShape};
-use crate::gaps::{Deviations, Gaps, Modification, Turned};
+use crate::gaps::{Deviations, Gaps, Modification};
 use crate::mesh::{Mesh, Place};
 use crate::parts::CarrierRadii;
 use crate::position::Position;
@@ -298,8 +298,6 @@ pub struct LoadedDrive<'a> {
     contacts: Contacts,
     ring_bending: Option<RingBending>,
     wave_generator_moves: bool,
-    /// Lost motion of the items in the middle of the lists of those that are turned: what the wave generator has moved on by counts from there.
-    middle_lost_motion_rad: f64,
     tip_corner: Option<TipCorner>,
     /// How much more the corner gives way for each unit of the logarithm by which a contact there is narrower, where the ring's teeth bend.
     corner_growth_mm_per_n: f64,
@@ -386,7 +384,6 @@ impl<'a> LoadedDrive<'a> {
             .ok_or_else(|| SolveError::Impossible(vec![Violation::LawOfOtherTeeth]))?;
         let mesh = load.mesh(drive, deviations.unwrap_or(&Deviations::default()));
         let tip_corner = if load.presses_corners(drive) { TipCorner::of(drive.ring_tooth())? } else { None };
-        let gaps = Gaps::new(drive, &p.clearance_um, p.modification, deviations);
         let loaded = Self {
             drive,
             mesh,
@@ -396,13 +393,12 @@ impl<'a> LoadedDrive<'a> {
             law: p.law,
             contacts,
             wave_generator_moves: p.wave_generator_moves,
-            middle_lost_motion_rad: gaps.turned_in_the_middle().lost_motion_rad(drive),
             tip_corner,
             corner_growth_mm_per_n: tip_corner.filter(|_| p.ring_teeth_bend).map_or(0.0, |corner| {
                 corner.bending_growth() * p.materials.ring.compliance_per_mpa() / (PI * drive.tooth_width_mm())
             }),
             ring_bending: if p.ring_teeth_bend { Some(RingBending::new(drive, &p.materials.ring)?) } else { None },
-            gaps,
+            gaps: Gaps::new(drive, &p.clearance_um, p.modification, deviations),
         };
         let mut violations = p.clearance_violations_in(drive.sense(), drive.ring_tooth())?;
         violations.extend(p.modification.violation_in(drive));
@@ -565,6 +561,7 @@ impl<'a> LoadedDrive<'a> {
         })?;
         // Without friction the way that the wave generator makes and the torque that it takes have one arm.
         let arm_mm = center.cam_contact.lever_arm_mm;
+        let usually_turned = self.gaps.usually_turned(center.center_radius_mm);
         let gap = if self.gaps.is_nil() && corner.is_none() {
             None
         } else if !can_be_pressed {
@@ -572,13 +569,14 @@ impl<'a> LoadedDrive<'a> {
         } else {
             let mut gaps_mm = self.gaps.besides_turns(place, &center, &flank);
             let mut turned = self.gaps.turned_at(place);
-            if self.wave_generator_moves {
-                // The tooth goes aside in its slot, and along the flank, as if its wall were turned away: in the valley too, where the gap has no weight.
-                turned.carrier_rad += std::mem::take(&mut gaps_mm.carrier) / center.center_radius_mm;
+            if self.wave_generator_moves || corner.is_some() {
+                // Where the gap has no weight too, in the valley.
+                turned = turned.and_aside(std::mem::take(&mut gaps_mm.carrier), center.center_radius_mm);
             }
             if let Some(corner) = corner {
+                let apart_rad = turned.rad() - usually_turned.rad();
                 gaps_mm.ring +=
-                    corner.gap_mm(&flank) + self.beyond_lost_motion_mm(&turned, &center, &flank) / weights.ring;
+                    corner.gap_mm(&flank) + self.beyond_lost_motion_mm(apart_rad, &center, &flank) / weights.ring;
             }
             let along_mm = weights.iter().fold(0.0, |sum, (contact, weight)| sum + weight * gaps_mm.get(contact));
             let lost_motion_rad = turned.lost_motion_rad(self.drive);
@@ -608,8 +606,9 @@ impl<'a> LoadedDrive<'a> {
             }
         }
         let decline_mm_per_rad = self.arm_decline_mm_per_rad(&center);
-        let spring =
-            Spring::new(arm_mm + decline_mm_per_rad * self.middle_lost_motion_rad, decline_mm_per_rad, gap, approach);
+        // The tooth comes to its place on the flank as the wave generator has made up for what is usual, and has the arm of that place then.
+        let usual_rad = usually_turned.lost_motion_rad(self.drive);
+        let spring = Spring::new(arm_mm, usual_rad, decline_mm_per_rad, gap, approach);
         let pressure = PerContact::of(|contact| places.get(contact).pressure);
         Ok(ToothState { center, flank, force_ratio, curvature_per_mm, pressure, spring })
     }
@@ -624,13 +623,13 @@ impl<'a> LoadedDrive<'a> {
         (tan_pressure_angle_derivative - t * t) * center_radius_mm / (1.0 + t * t).sqrt()
     }
 
-    /// What a tooth before the flank loses by flanks and walls that are turned away, along `F_H` and beyond the lost motion that one on the flank would have: there
-    /// the ring's force has k times the arm of `F_H`, here another.
-    fn beyond_lost_motion_mm(&self, turned: &Turned, center: &ToothCenter, seen: &FlankPoint) -> f64 {
+    /// What a tooth before the flank loses by flanks and walls that are turned away by so much more than is usual, along `F_H` and beyond the lost motion that one on the
+    /// flank would have: there the ring's force has k times the arm of `F_H`, here another.
+    fn beyond_lost_motion_mm(&self, turned_rad: f64, center: &ToothCenter, seen: &FlankPoint) -> f64 {
         let t = center.tan_pressure_angle;
         let ring_arm_mm = center.center_radius_mm * seen.tan_pressure_angle / (1.0 + t * t).sqrt();
         let of_flank_mm = self.drive.flank().teeth_per_wave() * center.cam_contact.lever_arm_mm;
-        (self.gaps.turned_alike().rad() + turned.rad()) * (ring_arm_mm - of_flank_mm)
+        turned_rad * (ring_arm_mm - of_flank_mm)
     }
 
     /// Relative curvature of each contact of a tooth in the plane of motion.

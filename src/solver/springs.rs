@@ -16,11 +16,11 @@ const FARTHEST_RAD: f64 = 2.0 * PI;
 /// A tooth as load sharing sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spring {
-    /// Way along `F_H` for each radian that the wave generator turns: `|h'|` by kinematics.
+    /// Way along `F_H` for each radian that the wave generator turns once the gaps are closed: `|h'|` by kinematics.
     pub travel_arm_mm: f64,
-    /// Torque at the wave generator for each newton of `F_H`: `|h'|` by statics. Friction will part the two.
+    /// Torque at the wave generator for each newton of `F_H` then: `|h'|` by statics. Friction will part the two.
     pub static_arm_mm: f64,
-    /// How much shorter both become for each radian that the wave generator turns, moving on under the tooth; nothing where it counts as standing still.
+    /// How much shorter both become for each radian that the wave generator turns further, moving on under the tooth; nothing where it counts as standing still.
     pub arm_decline_mm_per_rad: f64,
     /// How far the wave generator turns before the gaps at this tooth are closed, `g/|h'|`; infinite where they never are. Lost motion that
     /// all teeth have alike may be left out, and then what is left may be below zero.
@@ -38,38 +38,56 @@ pub(crate) struct Gap {
     pub(crate) lost_motion_rad: f64,
 }
 
+/// How far the wave generator turns until a gap is closed, and the arm that is left then.
+struct Closing {
+    rad: f64,
+    arm_mm: f64,
+}
+
 impl Gap {
-    fn closing_rad(&self, arm_mm: f64, arm_decline_mm_per_rad: f64) -> f64 {
+    /// Where the tooth has this arm as the wave generator has made up for so much lost motion.
+    fn closing(&self, arm_mm: f64, usual_rad: f64, arm_decline_mm_per_rad: f64) -> Closing {
         // Backwards, where lost motion of all teeth makes up for it, no farther than to where an arm that grows begins.
         let begin_rad = |arm_mm: f64| {
             if arm_decline_mm_per_rad < 0.0 { arm_mm / arm_decline_mm_per_rad } else { f64::NEG_INFINITY }
         };
-        let lost_motion_rad = self.lost_motion_rad.max(begin_rad(arm_mm));
-        let arm_mm = (arm_mm - arm_decline_mm_per_rad * lost_motion_rad).max(0.0);
+        let beyond_usual_rad = (self.lost_motion_rad - usual_rad).max(begin_rad(arm_mm));
+        let arm_mm = (arm_mm - arm_decline_mm_per_rad * beyond_usual_rad).max(0.0);
         let has_ended = arm_mm == 0.0 && arm_decline_mm_per_rad >= 0.0;
-        if has_ended || self.along_mm == f64::INFINITY {
-            return f64::INFINITY;
+        let way_rad = turned_rad(arm_mm, arm_decline_mm_per_rad, self.along_mm).max(begin_rad(arm_mm));
+        if has_ended || self.along_mm == f64::INFINITY || way_rad == f64::INFINITY {
+            return Closing { rad: f64::INFINITY, arm_mm };
         }
-        turned_rad(arm_mm, arm_decline_mm_per_rad, self.along_mm).max(begin_rad(arm_mm)) + lost_motion_rad
+        Closing { rad: usual_rad + beyond_usual_rad + way_rad, arm_mm: arm_mm - arm_decline_mm_per_rad * way_rad }
     }
 }
 
 impl Spring {
-    /// A tooth with a gap, nothing where it has none, and the same arm in travel and statics. One without an arm never closes a gap: that of the slot
-    /// vanishes with the arm, but no rotation brings the tooth there, unless it lends the tooth an arm. Nor does one whose arm ends before.
-    pub(crate) fn new(arm_mm: f64, arm_decline_mm_per_rad: f64, gap: Option<Gap>, approach: Approach) -> Self {
-        let closing_rad = gap.map_or(0.0, |gap| gap.closing_rad(arm_mm, arm_decline_mm_per_rad));
+    /// A tooth with a gap, nothing where it has none, and the same arm in travel and statics, as it has when the wave generator has made up for lost motion that is usual. One
+    /// without an arm never closes a gap: that of the slot vanishes with the arm, but no rotation brings the tooth there, unless it lends the tooth an arm. Nor does one whose
+    /// arm ends before.
+    pub(crate) fn new(
+        arm_mm: f64,
+        usual_rad: f64,
+        arm_decline_mm_per_rad: f64,
+        gap: Option<Gap>,
+        approach: Approach,
+    ) -> Self {
+        let Closing { rad: closing_rad, arm_mm } =
+            gap.map_or(Closing { rad: 0.0, arm_mm }, |gap| gap.closing(arm_mm, usual_rad, arm_decline_mm_per_rad));
         Self { travel_arm_mm: arm_mm, static_arm_mm: arm_mm, arm_decline_mm_per_rad, closing_rad, approach }
     }
 
-    /// `Δφ |h'| - c Δφ²/2 - g`, c being the arm's decline, or nothing while a gap is open: from the closing angle θ on it is
-    /// `(Δφ - θ) (|h'| - c (Δφ + θ)/2)`.
+    /// What is turned beyond the closing angle, so that no digits are lost to that; below nothing while a gap is open.
+    fn closed_rad(&self, wind_up: &Rotation) -> f64 {
+        wind_up.excess_rad - (self.closing_rad - wind_up.closing_rad)
+    }
+
+    /// `(Δφ - θ) (|h'| - c (Δφ - θ)/2)` from the closing angle θ on, c being the decline of the arm that is left there, and nothing before.
     pub fn displacement_mm(&self, wind_up: &Rotation) -> f64 {
-        let closed_rad = wind_up.excess_rad - (self.closing_rad - wind_up.closing_rad);
-        let mean_arm_mm = self.travel_arm_mm - self.arm_decline_mm_per_rad * (self.closing_rad + 0.5 * closed_rad);
-        let displacement_mm = closed_rad * mean_arm_mm;
-        // Not a number where a gap never closes, and not pressed then either.
-        if displacement_mm > NOTHING_MM { displacement_mm } else { 0.0 }
+        let closed_rad = self.closed_rad(wind_up);
+        let displacement_mm = closed_rad * (self.travel_arm_mm - 0.5 * self.arm_decline_mm_per_rad * closed_rad);
+        if closed_rad > 0.0 && displacement_mm > NOTHING_MM { displacement_mm } else { 0.0 }
     }
 
     /// What is turned beyond the closing angle when the tooth is displaced so far; without end where it never is.
@@ -77,17 +95,25 @@ impl Spring {
         if self.arm_decline_mm_per_rad == 0.0 {
             return displacement_mm / self.travel_arm_mm;
         }
-        let arm_mm = self.travel_arm_mm - self.arm_decline_mm_per_rad * self.closing_rad;
-        turned_rad(arm_mm, self.arm_decline_mm_per_rad, displacement_mm)
+        turned_rad(self.travel_arm_mm, self.arm_decline_mm_per_rad, displacement_mm)
     }
 
     /// Torque at the wave generator for each newton of `F_H` when it has turned.
     pub fn turned_static_arm_mm(&self, wind_up: &Rotation) -> f64 {
-        self.static_arm_mm - self.arm_decline_mm_per_rad * wind_up.rad()
+        self.turned_arm_mm(self.static_arm_mm, wind_up)
     }
 
     fn turned_travel_arm_mm(&self, wind_up: &Rotation) -> f64 {
-        self.travel_arm_mm - self.arm_decline_mm_per_rad * wind_up.rad()
+        self.turned_arm_mm(self.travel_arm_mm, wind_up)
+    }
+
+    /// Of a tooth whose gap never closes, nothing is known but the arm without load.
+    fn turned_arm_mm(&self, arm_mm: f64, wind_up: &Rotation) -> f64 {
+        if self.closing_rad.is_finite() {
+            arm_mm - self.arm_decline_mm_per_rad * self.closed_rad(wind_up)
+        } else {
+            arm_mm
+        }
     }
 
     /// `F_H`; nothing while a gap is open.
@@ -353,8 +379,7 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
             let is_passed = arms_mm[0] > 0.0 && arms_mm[1] < 0.0;
             let decline_mm = spring.arm_decline_mm_per_rad;
             let largest_mm = if is_passed {
-                let closing_arm_mm = spring.travel_arm_mm - decline_mm * spring.closing_rad;
-                closing_arm_mm * closing_arm_mm / (2.0 * decline_mm)
+                spring.travel_arm_mm * spring.travel_arm_mm / (2.0 * decline_mm)
             } else {
                 ways_mm[0].max(ways_mm[1])
             };

@@ -16,8 +16,8 @@ import matplotlib.pyplot as plt
 
 HERE = Path(__file__).parent
 PLOTS = HERE.parent.parent / "docs" / "validation"
-# Each input angle of the cases is one of so many equal intervals of its drive's period.
-INTERVALS = 240
+# Each input angle of the cases is one of so many equal intervals of its drive's period; the more of them are for cases whose teeth lie aside in their slots.
+INTERVALS, OF_THESE = 240, 25
 CYLINDER_5_1 = {"count": 28, "radius_mm": 5.0, "width_mm": 15.0}
 CYLINDER_5_2 = {"count": 80, "installed": 40, "radius_mm": 1.5, "width_mm": 15.0}
 DRIVES = {
@@ -47,12 +47,24 @@ def swept(program, case, refined=REFINED[0]):
             "clearance": {"ring_um": case["ring_gap_um"], "carrier_um": case["slot_gap_um"]},
             **refined,
         },
-        "sweep": {"samples": INTERVALS, "wind_up": True},
+        "sweep": {"samples": INTERVALS * (OF_THESE if case["slot_gap_um"] else 1), "wind_up": True},
     }
     ask = lambda form: subprocess.run([program, "sweep", "-", "--format", form], input=json.dumps(document), capture_output=True, text=True, check=True).stdout
     rows = [{name: float(value) for name, value in row.items() if name != "loaded"} for row in csv.DictReader(ask("csv").splitlines())]
     angles = json.loads(ask("json"))["wind_up"]
     return rows, dict(zip(angles["input_angle_deg"], angles["wind_up_deg"]))
+
+
+def back_deg(case):
+    """How far back on the flank teeth stand that lie aside in their slots: the model's positions are those on the flank."""
+    drive, _ = DRIVES[case["drive"]]
+    radius_mm = 0.5 * (drive["wave_generator"]["semi_major_mm"] + drive["wave_generator"]["semi_minor_mm"]) + drive["teeth"]["radius_mm"] if case["slot_gap_um"] else 1.0
+    return 57.29577951308232 * drive["ring"]["teeth"] / 2 * 1e-3 * case["slot_gap_um"] / radius_mm
+
+
+def input_angle_deg(case):
+    drive, _ = DRIVES[case["drive"]]
+    return case["input_angle_deg"] + back_deg(case) * drive["teeth"]["count"] / drive["ring"]["teeth"]
 
 
 def gap_of(case):
@@ -70,9 +82,9 @@ def table(program, cases, refined):
     print("|---|---|---|---|---|---|---|---|---|---|---|")
     for case in cases:
         rows, wind_ups = swept(program, case, refined)
-        at = min(wind_ups, key=lambda angle: abs(angle - case["input_angle_deg"]))
+        at = min(wind_ups, key=lambda angle: abs(angle - input_angle_deg(case)))
         here = [row for row in rows if row["input_angle_deg"] == at]
-        pairs = [(tooth, min(here, key=lambda row: abs(row["position_deg"] - tooth["position_deg"]))) for tooth in case["teeth"]]
+        pairs = [(tooth, min(here, key=lambda row: abs(row["position_deg"] + back_deg(case) - tooth["position_deg"]))) for tooth in case["teeth"]]
         peak_n = max(tooth["force_n"][0] for tooth in case["teeth"])
         model_n = max(row["force_wave_generator_n"] for row in here)
         worst_n = max(abs(row["force_wave_generator_n"] - tooth["force_n"][0]) for tooth, row in pairs)
@@ -91,7 +103,7 @@ def corner_table(program, cases, refined):
     print("|---|---|---|---|---|---|---|---|---|")
     for case in sorted(cases, key=lambda case: (case["ring_gap_um"], -case["teeth"][-1]["position_deg"])):
         rows, wind_ups = swept(program, case, refined)
-        at = min(wind_ups, key=lambda angle: abs(angle - case["input_angle_deg"]))
+        at = min(wind_ups, key=lambda angle: abs(angle - input_angle_deg(case)))
         here = [row for row in rows if row["input_angle_deg"] == at]
         # A tooth that is not listed carries nothing.
         of_model = lambda deg: sum(row["force_wave_generator_n"] for row in here if abs(row["position_deg"] - deg) < 1e-3)
@@ -113,7 +125,7 @@ def plot(program, drive, cases):
         rows.sort(key=lambda row: row["position_deg"])
         for contact, name in enumerate(CONTACTS):
             panel.plot([row["position_deg"] for row in rows], [row[f"force_{name}_n"] for row in rows], color=COLOURS[name], linewidth=1)
-            panel.plot([tooth["position_deg"] for case in of_gap for tooth in case["teeth"]],
+            panel.plot([tooth["position_deg"] - back_deg(case) for case in of_gap for tooth in case["teeth"]],
                        [tooth["force_n"][contact] for case in of_gap for tooth in case["teeth"]], "o", markersize=4, markerfacecolor="none", color=COLOURS[name],
                        label=name.replace("_", " "))
         panel.set_title(f"{drive}, {gap}", fontsize=10)

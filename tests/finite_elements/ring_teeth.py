@@ -64,7 +64,7 @@ def model(case, beyond_at, moves):
     r, k = drive.radius_mm, drive.ring_teeth / drive.lobes
     unit = PER_MPA / drive.width_mm
     modulus = E_MPA / (2 * (1 - NU**2))
-    gaps = [0.0, 1e-3 * case.ring_gap_um, 1e-3 * case.slot_gap_um]
+    ring_gap_mm = 1e-3 * case.ring_gap_um
     tangent = lambda psi: np.tan(drive.normal_at(psi) - psi)
 
     def at(psi):
@@ -81,24 +81,24 @@ def model(case, beyond_at, moves):
     for i in range(-drive.installed, 2 * drive.installed):
         psi = 2 * np.pi * i / drive.installed - np.radians(case.input_angle_deg) * drive.ring_teeth / drive.count
         if 1e-9 < psi <= np.radians(ENGAGED_DEG[drive.name]) + 1e-9:
-            teeth.append((psi, at(psi)))
+            # Aside in its slot by the gap there it stands so far back on the flank, and the wave generator comes under it the later.
+            aside = 1e-3 * case.slot_gap_um / drive.center_radius_mm(psi)
+            teeth.append((psi - k * aside, (k + drive.sense) * aside, at(psi - k * aside)))
 
     def approach(force, curvature, besides):
         half = np.sqrt(4 * force / (np.pi * drive.width_mm * modulus * curvature))
         return force * unit * (2 * np.log(4 * r / half) - 1 + 2 * np.log(2 * case.depth_mm / half) - NU / (1 - NU) + besides)
 
     def force_and_arm(tooth, turned):
-        psi, (d, gamma, beta, arm, curvatures) = tooth
-        way, slot_gap_mm = turned * arm, gaps[2]
+        psi, lost_motion, (d, gamma, beta, arm, curvatures) = tooth
+        turned -= lost_motion
+        way = turned * arm
         if moves:
-            # Aside in its slot by the gap there the tooth stands elsewhere on the flank, and so does it on the cam.
-            aside = slot_gap_mm / d
-            on_flank_d, _, beta, _, on_flank = at(psi - k * aside)
-            moved_d, gamma, _, arm, on_cam = at(psi - turned + drive.sense * aside)
-            way, slot_gap_mm, curvatures = np.cos(gamma) * (moved_d - on_flank_d), 0.0, [on_cam[0], *on_flank[1:]]
+            moved_d, gamma, _, arm, moved = at(psi - turned)
+            way, curvatures = np.cos(gamma) * (moved_d - d), [moved[0], *curvatures[1:]]
         # Equilibrium of the tooth between cam, flank and wall.
         ratios = [1.0, np.cos(gamma) / np.cos(beta), np.cos(gamma) * np.tan(beta) + drive.sense * np.sin(gamma)]
-        room = way - sum(f * gap for f, gap in zip(ratios, [*gaps[:2], slot_gap_mm]))
+        room = way - ratios[1] * ring_gap_mm if turned > 0 else 0.0
         if room <= 0:
             return 0.0, arm
         besides = [0.0, beyond_at(np.degrees(psi)), 0.0]

@@ -6,10 +6,11 @@ use std::f64::consts::PI;
 
 use serde::Deserialize;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
+use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
 use toothwave_solver::model_error::{self, Beyond, ErrorRange, Measured};
 use toothwave_solver::{
-    Compatibility, ContactLaw, Deviations, Drive, DriveParameters, LoadCase, LoadParameters, PerContact, ToothShape,
-    Torque, WaveGenerator,
+    Compatibility, ContactLaw, Deviations, Drive, DriveParameters, LoadCase, LoadParameters, PerContact, Position,
+    ToothShape, Torque, WaveGenerator,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, ellipse, load, swept};
@@ -126,24 +127,28 @@ impl Case {
         }
     }
 
+    /// The model of its teeth: each lies aside in its slot by the gap there, and so far back on the flank.
     fn errors_under(&self, load: &LoadParameters) -> Errors {
-        let (drive, _) = self.drive_and_torque_nm();
-        let sweep = swept(&drive, load, INTERVALS);
-        let here = |angle_deg: f64| (angle_deg - self.input_angle_deg).abs() < 1e-5;
-        let of_model = |tooth: &Tooth| {
-            let states = &sweep.states;
-            let at = (0..states.len())
-                .find(|&at| {
-                    here(states.input_angle_deg[at]) && (states.position_deg[at] - tooth.position_deg).abs() < 1e-3
-                })
-                .unwrap_or_else(|| panic!("{}: no tooth at {} deg", self.name(), tooth.position_deg));
-            let of =
-                |columns: &PerContact<Vec<f64>>| [columns.wave_generator[at], columns.ring[at], columns.carrier[at]];
-            (of(&states.force_n), of(&states.stress_mpa))
+        let (parameters, _) = self.drive_and_torque_nm();
+        let drive = Drive::new(&parameters).unwrap();
+        let case = LoadCase::new(load).unwrap();
+        let loaded = LoadedDrive::new(&drive, &case).unwrap();
+        let on_flank = |tooth: &Tooth| {
+            let slot_rad = tooth.position_deg.to_radians();
+            let at = |position_rad: f64| Position::from_lobe(position_rad, drive.lobes());
+            let center_radius_mm = drive.flank().locus().at(at(slot_rad)).unwrap().center_radius_mm;
+            let back_rad = drive.flank().teeth_per_wave() * 1e-3 * self.slot_gap_um / center_radius_mm;
+            loaded.tooth(at(slot_rad - back_rad)).unwrap()
         };
-        let model: Vec<_> = self.teeth.iter().map(of_model).collect();
-        let listed = sweep.states.input_angle_deg.iter().filter(|&&angle_deg| here(angle_deg)).count();
-        assert_eq!(listed, self.teeth.len(), "{}: teeth in mesh", self.name());
+        let teeth: Vec<_> = self.teeth.iter().map(on_flank).collect();
+        let found = loaded.wind_up(&teeth).unwrap();
+        let of_model = |tooth: &ToothState| {
+            let force_n = loaded.forces_n(tooth, &found).unwrap();
+            let stress_mpa = loaded.stress_mpa(tooth, &force_n);
+            let of = |values: &PerContact<f64>| [values.wave_generator, values.ring, values.carrier];
+            (of(&force_n), of(&stress_mpa))
+        };
+        let model: Vec<_> = teeth.iter().map(of_model).collect();
 
         let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
         let peak_n = largest(&mut self.teeth.iter().map(|tooth| tooth.force_n[0]));
@@ -158,14 +163,12 @@ impl Case {
             let (tooth, (_, stress_mpa)) = self.teeth.iter().zip(&model).max_by(by_force).unwrap();
             stress_mpa[contact] / tooth.pressure_mpa[contact] - 1.0
         });
-        let angles = &sweep.input_angles;
-        let at = (0..angles.input_angle_deg.len()).find(|&at| here(angles.input_angle_deg[at])).unwrap();
         Errors {
             peak: peak_of_model_n / peak_n - 1.0,
             force,
             worst_tooth: largest(&mut misses.map(|miss_n| miss_n / peak_n)),
             stress,
-            wind_up: angles.wind_up_deg[at].to_radians() / self.wind_up_rad - 1.0,
+            wind_up: found.rotation_rad() / self.wind_up_rad - 1.0,
         }
     }
 }

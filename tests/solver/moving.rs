@@ -102,11 +102,12 @@ fn loads_are_those_at_which_the_moved_arms_make_the_torque() {
                     let psi = tooth.center.position.from_lobe_rad;
                     let cos = 1.0 / tooth.center.tan_pressure_angle.hypot(1.0);
                     let decline = (slope_mm(&drive, psi + 1e-5) - slope_mm(&drive, psi - 1e-5)) / 2e-5;
-                    // Aside in its slot, and along the flank, the tooth goes as far as the wave generator needs this rotation for.
+                    // The wave generator needs this rotation to move the tooth aside in its slot, to its place on the flank.
                     let lost_rad = drive.teeth_per_wave() * 1e-3 * clearance_um.carrier / tooth.center.center_radius_mm;
-                    let way_mm = |rad: f64| cos * (slope_mm(&drive, psi) * rad - 0.5 * decline * rad * rad);
+                    let turned_rad = turned_rad - lost_rad;
+                    let way_mm = cos * (slope_mm(&drive, psi) * turned_rad - 0.5 * decline * turned_rad * turned_rad);
                     let gap_mm = 1e-3 * (clearance_um.wave_generator + tooth.force_ratio.ring * clearance_um.ring);
-                    let pressed_mm = way_mm(turned_rad) - way_mm(lost_rad) - gap_mm;
+                    let pressed_mm = if turned_rad > 0.0 { way_mm - gap_mm } else { 0.0 };
                     let force_n =
                         if pressed_mm > 0.0 { tooth.spring.approach.force(pressed_mm).unwrap().force_n } else { 0.0 };
                     (force_n, cos * (slope_mm(&drive, psi) - decline * turned_rad))
@@ -219,18 +220,17 @@ fn gaps_at_the_slots_are_closed_at_the_rotation_that_rigid_bodies_need_in_the_va
         let loaded = LoadedDrive::new(&drive, &case).unwrap();
         let k = drive.flank().teeth_per_wave();
         let s = drive.sense();
-        for share in [0.3, 0.6, 0.9, 1.0] {
+        for share in [0.3, 0.6, 0.9, 0.97] {
             let position_rad = share * drive.flank_limit().position.from_lobe_rad;
             let tooth = loaded.tooth(Position::from_lobe(position_rad, drive.lobes())).unwrap();
-            // Where the tooth lies at its wall: so far aside, and as far out as the flank has it there.
-            let aside_rad = (1..20).fold(0.0, |aside_rad: f64, _| {
-                (1e-3 * carrier_um / at(&drive, position_rad - k * aside_rad).center_radius_mm).asin()
-            });
-            let on_flank_mm = at(&drive, position_rad - k * aside_rad).center_radius_mm;
+            // There on the flank the tooth lies at its wall, so far aside in a slot that stands k times as far before it.
+            let on_flank_mm = at(&drive, position_rad).center_radius_mm;
+            let aside_rad = (1e-3 * carrier_um / on_flank_mm).asin();
+            let slot_rad = position_rad + k * aside_rad;
             let under_mm =
-                |turned_rad: f64| at(&drive, position_rad - turned_rad + s * aside_rad).center_radius_mm - on_flank_mm;
+                |turned_rad: f64| at(&drive, slot_rad - turned_rad + s * aside_rad).center_radius_mm - on_flank_mm;
             let closing_rad = tooth.spring.closing_rad;
-            let [before_mm, after_mm] = [0.995, 1.005].map(|of| under_mm(of * closing_rad));
+            let [before_mm, after_mm] = [0.999, 1.001].map(|of| under_mm(of * closing_rad));
             assert!(before_mm < 0.0 && after_mm > 0.0, "{parameters:?} at {share}: {before_mm} {after_mm}");
         }
     }
@@ -250,6 +250,26 @@ fn what_gaps_at_the_slots_alone_cost_in_transmission_error_is_what_the_teeths_ra
     assert!(sweep.torque_balance_residual < 1e-12, "{:e}", sweep.torque_balance_residual);
 }
 
+/// Teeth come to the flank as many degrees earlier as they lie aside. By a law that knew nothing of it the largest force grew by 16 % with 50 µm.
+#[test]
+fn gaps_at_all_slots_alike_change_the_largest_force_at_a_bored_tip_by_no_more_than_radii_differ() {
+    for parameters in [PAPER_5_2, PAPER_5_2_BORED] {
+        let peak_n = |carrier_um: f64| {
+            let clearance_um = PerContact { carrier: carrier_um, ..PerContact::default() };
+            let load = LoadParameters { clearance_um, ring_teeth_bend: true, ..moving(3.0) };
+            let case = LoadCase::new(&load).unwrap();
+            let points = Points::tolerance(1e-4, 1_000_000).unwrap();
+            let sweep = sweep::sweep(&drive(&parameters), &case, points, &Never).unwrap();
+            sweep.peaks.wave_generator.force_n.value
+        };
+        let without_n = peak_n(0.0);
+        for carrier_um in [5.0, 20.0, 50.0] {
+            let share = peak_n(carrier_um) / without_n - 1.0;
+            assert!(share.abs() < 3e-4 * carrier_um + 1e-3, "{carrier_um} µm: {share}");
+        }
+    }
+}
+
 /// A search for the rotation under so light a load once had no end.
 #[test]
 fn a_light_load_across_wide_gaps_at_the_slots_is_borne_by_those_that_close_them_first() {
@@ -258,9 +278,9 @@ fn a_light_load_across_wide_gaps_at_the_slots_is_borne_by_those_that_close_them_
     let case = LoadCase::new(&LoadParameters { clearance_um, ..moving(1e-9) }).unwrap();
     let loaded = LoadedDrive::new(&drive, &case).unwrap();
     let (teeth, wind_up, forces) = shared(&loaded, 0);
-    let first_rad = teeth.iter().map(|tooth| tooth.spring.closing_rad).fold(f64::INFINITY, f64::min);
-    assert_eq!(wind_up.rotation.closing_rad, first_rad);
-    assert_eq!(forces.iter().filter(|&&force_n| force_n > 0.0).count(), 1);
+    for (tooth, &force_n) in teeth.iter().zip(&forces) {
+        assert_eq!(force_n > 0.0, tooth.spring.closing_rad < wind_up.rotation_rad(), "{force_n} N");
+    }
     let sweep = sweep::sweep(&drive, &case, Points::samples(7).unwrap(), &Never).unwrap();
     assert!(sweep.torque_balance_residual < 1e-12, "{:e}", sweep.torque_balance_residual);
 }

@@ -298,12 +298,14 @@ fn any_declining_spring() -> impl Strategy<Value = Spring> {
         } else {
             Approach::Power { exponent, coefficient, compliance_mm_per_n: 0.0 }
         };
+        // Where its arm ends a tooth has not gone any farther.
+        let gap = gap.unwrap_or(0.0);
+        let left_mm = travel_arm_mm * (1.0 - gap);
         Spring {
-            travel_arm_mm,
-            static_arm_mm: travel_arm_mm,
+            travel_arm_mm: left_mm,
+            static_arm_mm: left_mm,
             arm_decline_mm_per_rad: travel_arm_mm / end_rad,
-            // Where its arm ends a tooth has not gone any farther.
-            closing_rad: gap.map_or(0.0, |gap| gap * end_rad),
+            closing_rad: gap * end_rad,
             approach,
         }
     })
@@ -376,8 +378,8 @@ proptest! {
 #[test]
 fn a_spring_that_closes_its_gap_while_the_torque_falls_carries_what_those_before_it_cannot() {
     let spring = |arm_decline_mm_per_rad: f64, closing_rad: f64, approach: Approach| Spring {
-        travel_arm_mm: 1.0,
-        static_arm_mm: 1.0,
+        travel_arm_mm: 1.0 - arm_decline_mm_per_rad * closing_rad,
+        static_arm_mm: 1.0 - arm_decline_mm_per_rad * closing_rad,
         arm_decline_mm_per_rad,
         closing_rad,
         approach,
@@ -400,8 +402,8 @@ fn a_spring_that_closes_its_gap_while_the_torque_falls_carries_what_those_before
 #[test]
 fn a_torque_that_the_first_of_two_springs_makes_before_the_other_closes_is_carried_there() {
     let spring = |arm_mm: f64, end_rad: f64, closing_rad: f64, compliance_mm_per_n: f64| Spring {
-        travel_arm_mm: arm_mm,
-        static_arm_mm: arm_mm,
+        travel_arm_mm: arm_mm * (1.0 - closing_rad / end_rad),
+        static_arm_mm: arm_mm * (1.0 - closing_rad / end_rad),
         arm_decline_mm_per_rad: arm_mm / end_rad,
         closing_rad,
         approach: Approach::Linear { compliance_mm_per_n },
@@ -422,8 +424,8 @@ fn a_torque_that_the_first_of_two_springs_makes_before_the_other_closes_is_carri
 #[test]
 fn no_maximum_is_passed_at_which_all_gaps_are_closed() {
     let spring = |end_rad: f64, compliance_mm_per_n: f64| Spring {
-        travel_arm_mm: 5.0,
-        static_arm_mm: 5.0,
+        travel_arm_mm: 5.0 * (1.0 - 0.1 / end_rad),
+        static_arm_mm: 5.0 * (1.0 - 0.1 / end_rad),
         arm_decline_mm_per_rad: 5.0 / end_rad,
         closing_rad: 0.1,
         approach: Approach::Linear { compliance_mm_per_n },

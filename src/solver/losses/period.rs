@@ -284,14 +284,14 @@ impl RadialForces {
             return Ok(None);
         }
         let p = load.parameters();
-        let lost_motion_rad = Gaps::new(drive, &p.clearance_um, p.modification, None).lost_motion_rad();
+        let gaps = Gaps::new(drive, &p.clearance_um, p.modification, None);
         let mut forces = Self::default();
         at_each_input_angle(drive, &sweep.states, stop, |_, teeth| {
             let mut teeth: Vec<_> = teeth.iter().map(|tooth| tooth.loaded).collect();
             if p.wave_generator_moves {
                 let wind_up_rad = sweep.input_angles.wind_up_deg[forces.force_n.len()].to_radians();
                 for tooth in &mut teeth {
-                    *tooth = passed_by(drive, tooth, wind_up_rad - lost_motion_rad)?;
+                    *tooth = passed_by(drive, tooth, &gaps, wind_up_rad)?;
                 }
             }
             let force_n = mechanism.radial_force_n(&teeth);
@@ -304,10 +304,19 @@ impl RadialForces {
 }
 
 /// A tooth under which the wave generator has moved on, in the wave generator's frame: its force goes through the normal there.
-fn passed_by(drive: &Drive, tooth: &LoadedTooth, turned_rad: f64) -> Result<LoadedTooth, NotConverged> {
-    let position_rad = tooth.position_rad - turned_rad;
-    let from_lobe_rad = position_rad.abs().min(half_lobe_rad(drive.lobes()));
-    let center = drive.flank().locus().at(Position::from_lobe(from_lobe_rad, drive.lobes()))?;
+fn passed_by(
+    drive: &Drive,
+    tooth: &LoadedTooth,
+    gaps: &Gaps<'_>,
+    wind_up_rad: f64,
+) -> Result<LoadedTooth, NotConverged> {
+    let center_at = |position_rad: f64| {
+        let from_lobe_rad = position_rad.abs().min(half_lobe_rad(drive.lobes()));
+        drive.flank().locus().at(Position::from_lobe(from_lobe_rad, drive.lobes()))
+    };
+    let usual = gaps.usually_turned(center_at(tooth.position_rad)?.center_radius_mm);
+    let position_rad = tooth.position_rad - (wind_up_rad - gaps.lost_motion_rad() - usual.lost_motion_rad(drive));
+    let center = center_at(position_rad)?;
     Ok(LoadedTooth { position_rad, tan_pressure_angle: center.tan_pressure_angle.copysign(position_rad), ..*tooth })
 }
 
