@@ -68,9 +68,9 @@ pub enum FieldCode {
     BoreLeavesNoFlank,
     /// A clearance under `projection` that would load a tooth instead of freeing it.
     ClearanceNotMonotone,
-    /// The ring's outer radius does not exceed its root radius.
+    /// The ring's outer radius does not exceed the largest of its tooth spaces, at the root or, where a tip relief reaches beyond it, there.
     RingWithoutRim,
-    /// The carrier's inner radius does not exceed the semi-major axis.
+    /// The carrier's inner radius does not exceed the cam's largest radius.
     CarrierMeetsCam,
     /// The carrier's outer radius reaches the ring's tips.
     CarrierMeetsRing,

@@ -18,7 +18,7 @@ use crate::no_answer::NoAnswer;
 use crate::question::{Limits, Question, checked_drive, require_finite};
 
 /// The geometry of a drive. Ring and path stand in the ring's frame, x along the middle of a tooth space; the wave generator
-/// in its own, x along the major axis.
+/// in its own, x along the middle of a lobe, the major axis of an ellipse.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct GeometryAnswer {
     /// Version of the solver.
@@ -83,7 +83,7 @@ pub struct UndercutAnswer {
     pub critical_tooth_radius_mm: Option<f64>,
 }
 
-/// The tooth's polar angle from the major axis where it starts and stops to touch the ring's flank.
+/// The tooth's polar angle from the middle of its lobe, the major axis of an ellipse, where it starts and stops to touch the ring's flank.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct EngagementAnswer {
     /// Where it starts, towards the tip.
@@ -120,7 +120,7 @@ pub struct WaveGeneratorAnswer {
 /// The room that the mechanics leave the carrier, and its thinnest wall.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct CarrierAnswer {
-    /// Its inner radius is above this: the wave generator's semi-major axis.
+    /// Its inner radius is above this: the wave generator's largest radius, the semi-major axis of an ellipse.
     pub inner_radius_limit_mm: f64,
     /// Its outer radius is below this: the ring's tip radius.
     pub outer_radius_limit_mm: f64,
@@ -393,6 +393,6 @@ impl UndercutAnswer {
 
 impl EngagementAnswer {
     pub(crate) fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
-        writeln!(writer, "engagement from the major axis      {:.6} to {} deg", self.start_deg, self.end_deg)
+        writeln!(writer, "engagement from the lobe's middle   {:.6} to {} deg", self.start_deg, self.end_deg)
     }
 }

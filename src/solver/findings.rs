@@ -436,7 +436,7 @@ pub fn of_bearing(dynamic_load_rating_n: f64, load_n: f64) -> Option<Finding> {
 /// The findings about the ring as it is made (docs/theory.md section 8).
 pub(crate) fn of_ring(drive: &Drive, ring: &RingPart) -> Vec<Finding> {
     let flank = ring.space.set_back_flank();
-    let mut findings = thin_wall(drive, Wall::RingRim, ring.outer_radius_mm - ring.space.root_radius_mm());
+    let mut findings = thin_wall(drive, Wall::RingRim, ring.outer_radius_mm - ring.space.outermost_radius_mm());
     findings.extend(groove_not_drawn(drive, Contact::Ring));
     if ring.space.is_undercut_by_distance()
         && !drive.flank().is_undercut()

@@ -16,7 +16,7 @@ use crate::violation::{Misfit, Modified, Parameter, Violation};
 /// What the mechanics leave free. A radius that is `None` takes its default.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PartsParameters {
-    /// Outer radius of the ring; by default [`RIM`] times its root radius.
+    /// Outer radius of the ring; by default [`RIM`] times the largest radius of its tooth spaces.
     pub ring_outer_radius_mm: Option<f64>,
     /// Radius of the carrier's bore, inside which the cam turns; by default [`CARRIER_PLAY`] outside the cam.
     pub carrier_inner_radius_mm: Option<f64>,
@@ -118,7 +118,7 @@ impl PartsParameters {
         if let (Some(outer_mm), Some(clearance_mm)) = (outer_mm, clearance_mm)
             && let (Some(a), Some(r)) = (draft.cam_outer_mm, draft.tooth_radius_mm)
         {
-            let as_made_mm = self.ring_space(draft).map(|space| space.root_radius_mm());
+            let as_made_mm = self.ring_space(draft).map(|space| space.outermost_radius_mm());
             let root_mm = as_made_mm.unwrap_or(a + (r + (r + clearance_mm)));
             checks.above(Misfit::RingWithoutRim, outer_mm, root_mm * (1.0 + LEAST_WALL));
         }
@@ -273,7 +273,7 @@ pub struct ToothPart {
 impl RingPart {
     pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Result<Self, DriveError> {
         let space = ToothSpace::new(drive, MM_PER_UM * parameters.ring_clearance_um, &parameters.modification)?;
-        let outer_radius_mm = parameters.ring_outer_radius_mm.unwrap_or(RIM * space.root_radius_mm());
+        let outer_radius_mm = parameters.ring_outer_radius_mm.unwrap_or(RIM * space.outermost_radius_mm());
         let has_clearance = parameters.ring_clearance_um > 0.0;
         let is_set_back = parameters.modification.ring_equidistant_um > 0.0;
         Ok(Self { space, outer_radius_mm, has_clearance, is_set_back })

@@ -46,11 +46,13 @@ pub struct Profiles {
     pub wave_generator: Polyline,
 }
 
-/// A point of a curve with its tangent.
+/// A point of a curve with its tangent and the way it bends.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CurvePoint {
     pub(crate) point: Point2<f64>,
     pub(crate) tangent: Unit<Vector2<f64>>,
+    /// Of unlike signs on either side of an inflection.
+    pub(crate) bend: f64,
 }
 
 /// How densely a curve is sampled.
@@ -77,7 +79,7 @@ pub(crate) struct SampledCurve {
     pub(crate) tangents: Vec<Unit<Vector2<f64>>>,
 }
 
-/// Pieces that half a lobe starts with, so that no piece can hide more than one inflection.
+/// Pieces that half a lobe starts with, so short that no tangent stands across its chord.
 const PIECES: u32 = 16;
 
 /// Halvings of a piece at most: 2^40 chords of a piece are beyond every tolerance that the ranges allow.
@@ -172,7 +174,11 @@ pub(crate) fn flank_curve(
     sampled(Position::lobe(lobes), limit.position, lobes, density, stop, |position| {
         let tooth = flank.locus().at(position)?;
         let point = flank.at(&tooth);
-        Ok(CurvePoint { point: flank.point(&tooth, &point), tangent: flank.tangent(&tooth, &point) })
+        Ok(CurvePoint {
+            point: flank.point(&tooth, &point),
+            tangent: flank.tangent(&tooth, &point),
+            bend: flank.turning(&tooth),
+        })
     })
 }
 
@@ -184,7 +190,11 @@ fn path_half_tooth(drive: &Drive, density: Density, stop: &dyn Stop) -> Result<P
         let tooth = flank.locus().at(position)?;
         let point = flank.at(&tooth);
         let angle_rad = position.from_lobe_rad / flank.teeth_per_wave();
-        Ok(CurvePoint { point: on_circle(tooth.center_radius_mm, angle_rad), tangent: flank.tangent(&tooth, &point) })
+        Ok(CurvePoint {
+            point: on_circle(tooth.center_radius_mm, angle_rad),
+            tangent: flank.tangent(&tooth, &point),
+            bend: flank.turning(&tooth),
+        })
     })?
     .points;
     points.pop();
@@ -203,8 +213,8 @@ pub(crate) fn cam_half_lobe(
 ) -> Result<SampledCurve, SolveError> {
     let lobes = locus.lobes();
     let mut curve = sampled(Position::lobe(lobes), Position::valley(lobes), lobes, density, stop, |place| {
-        let CamPoint { point, tangent } = locus.cam_outline(clearance_mm, place)?;
-        Ok(CurvePoint { point, tangent })
+        let CamPoint { point, tangent, bend } = locus.cam_outline(clearance_mm, place)?;
+        Ok(CurvePoint { point, tangent, bend })
     })?;
     // The last point stands on the valley's line.
     if let Some(last) = curve.points.last_mut() {
@@ -281,17 +291,23 @@ pub(crate) fn sampled(
     let mut from = (start.from_valley_rad, curve(start)?);
     let mut curve_points = vec![from.1];
     let mut chords = 0;
+    let mut arc = Vec::new();
     for piece in 1..=PIECES {
         let x = start.from_valley_rad - span * (f64::from(piece) / f64::from(PIECES));
         let mut pending = vec![(x.max(end.from_valley_rad), at(x)?, 0)];
         while let Some(to) = pending.pop() {
             let (x, to_point, depth) = to;
-            if chord_deviation_mm(&from.1, &to_point) <= tolerance_mm || depth == MAX_DEPTH {
+            arc.clear();
+            if depth == MAX_DEPTH || chord_deviation_mm(&from.1, &to_point) <= tolerance_mm {
+                arc.push(from.1);
                 for step in 1..points_per_chord {
                     let share = f64::from(step) / f64::from(points_per_chord);
-                    curve_points.push(at(from.0 + share * (x - from.0))?);
+                    arc.push(at(from.0 + share * (x - from.0))?);
                 }
-                curve_points.push(to_point);
+                arc.push(to_point);
+            }
+            if !arc.is_empty() && (depth == MAX_DEPTH || inflections_seen(&arc) <= 1) {
+                curve_points.extend(&arc[1..]);
                 from = (x, to_point);
                 chords += 1;
                 if chords > max_chords {
@@ -307,15 +323,20 @@ pub(crate) fn sampled(
             }
         }
     }
-    let (points, tangents) = curve_points.into_iter().map(|CurvePoint { point, tangent }| (point, tangent)).unzip();
+    let (points, tangents) = curve_points.into_iter().map(|CurvePoint { point, tangent, .. }| (point, tangent)).unzip();
     Ok(SampledCurve { points, tangents })
 }
 
-/// An upper bound of the distance between an arc and its chord.
+/// How often an arc is seen to change the way it bends.
+fn inflections_seen(arc: &[CurvePoint]) -> usize {
+    arc.windows(2).filter(|pair| pair[0].bend * pair[1].bend < 0.0).count()
+}
+
+/// An upper bound of the distance between an arc with one inflection at most and its chord (docs/theory.md section 2.8).
 ///
 /// A convex arc lies in the triangle of its chord and its end tangents, whose height is
 /// `c sin α sin β / sin(α + β)`; an arc with one inflection stays below the tangent at one end and above that at the other, within
-/// `c max(tan α, tan β)`.
+/// `c max(tan α, tan β)`, on whichever sides of the chord these are.
 fn chord_deviation_mm(from: &CurvePoint, to: &CurvePoint) -> f64 {
     let chord = to.point - from.point;
     let length = chord.norm();
@@ -329,7 +350,8 @@ fn chord_deviation_mm(from: &CurvePoint, to: &CurvePoint) -> f64 {
         return length;
     }
     let sin_sum = sin_from * cos_to + cos_from * sin_to;
-    if sin_from * sin_to > 0.0 {
+    let is_convex = from.bend * to.bend >= 0.0 && sin_from * sin_to > 0.0;
+    if is_convex {
         length * (sin_from * sin_to / sin_sum).abs()
     } else {
         length * (sin_from / cos_from).abs().max((sin_to / cos_to).abs())

@@ -233,12 +233,20 @@ impl RingFlank {
         let tan_pressure_angle = k * tooth.tan_pressure_angle;
         let secant_squared = 1.0 + tan_pressure_angle * tan_pressure_angle;
         let cos_pressure_angle = 1.0 / secant_squared.sqrt();
-        let turning = 1.0 + k * k * tooth.tan_pressure_angle_derivative / secant_squared;
+        let turning = self.turning(tooth);
         let regularity = 1.0 + self.distance_mm * (cos_pressure_angle / tooth.center_radius_mm) * turning;
         // Positive wherever a tooth meshes; nearer to zero than its own rounding it is not known, and a curvature of
         // 1/0 or below would be neither.
         let regularity = regularity.max(f64::EPSILON);
         FlankPoint { distance_mm: self.distance_mm, tan_pressure_angle, cos_pressure_angle, regularity }
+    }
+
+    /// By how much the normal of flank and path turns for each radian that the path goes around the axis: of the sign of κ.
+    pub(crate) fn turning(&self, tooth: &ToothCenter) -> f64 {
+        let k = self.teeth_per_wave;
+        let tan_pressure_angle = k * tooth.tan_pressure_angle;
+        let secant_squared = 1.0 + tan_pressure_angle * tan_pressure_angle;
+        1.0 + k * k * tooth.tan_pressure_angle_derivative / secant_squared
     }
 
     /// Angle of the contact point from the tooth's centre line, seen from the axis: `atan(r sin β / (d + r cos β))`.

@@ -44,6 +44,7 @@ struct ShapedSpace {
     start: Position,
     end: Position,
     tip: Tip,
+    outermost_radius_mm: f64,
 }
 
 /// What shapes a flank besides its distance.
@@ -80,6 +81,15 @@ struct ShapedPoint {
 
 /// Places at which a shaped flank is looked at for its end, over half a lobe: far more than it has bends.
 const PLACES: u32 = 720;
+
+/// How near to its start a relief's summit is looked for: down to 2^-60 of the distance between places.
+const HALVINGS: i32 = 60;
+
+/// Golden sections that close in on a summit: to a millionth of the bracket, on a radius by less than rounding.
+const SECTIONS: u32 = 30;
+
+/// Where a shaped flank's direction is looked at on either side of a point, to tell how it bends there.
+const BESIDE_SHARE_OF_HALF_LOBE: f64 = 1e-5;
 
 /// What rounding may add to a radius.
 const ROUNDED: f64 = 1.0 + 1e-12;
@@ -135,13 +145,9 @@ impl ToothSpace {
         self.set_back.limit.end == FlankEnd::Undercut
     }
 
-    /// The largest radius of the space. A tip relief reaches beyond the root only where it is larger than the flank is high.
-    pub(crate) fn root_radius_mm(&self) -> f64 {
-        let shifted_mm = self.shaped.map_or(0.0, |ShapedSpace { flank, .. }| {
-            let relief_mm = flank.relief.map_or(0.0, |relief| relief.amount_mm);
-            flank.path_shift_mm + flank.profile_shift_mm + (relief_mm - flank.height_mm()).max(0.0)
-        });
-        self.set_back.flank.root_radius_mm() + shifted_mm
+    /// The largest radius of the space: that of the root, or what a tip relief reaches beyond it.
+    pub(crate) fn outermost_radius_mm(&self) -> f64 {
+        self.shaped.map_or_else(|| self.set_back.flank.root_radius_mm(), |shaped| shaped.outermost_radius_mm)
     }
 
     /// What ends it.
@@ -161,7 +167,7 @@ impl ToothSpace {
         let lobes = flank.flank.locus().lobes();
         let mut pieces = Vec::new();
         let mut piece = |from: Position, to: Position, is_relieved: bool| {
-            let curve = |place| flank.at(place, is_relieved).map(|at| at.curve_point());
+            let curve = |place| flank.curve_point(place, [from, to], is_relieved);
             pieces.push(sampled(from, to, lobes, density, stop, curve)?);
             Ok::<_, SolveError>(())
         };
@@ -202,12 +208,6 @@ impl ShapedFlank {
         let is_shaped = shaped.relief.is_some()
             || [shaped.path_shift_mm, shaped.profile_shift_mm, shaped.turned_rad].iter().any(|&by| by != 0.0);
         is_shaped.then_some(shaped)
-    }
-
-    /// How far the root lies outside a regular tip.
-    fn height_mm(&self) -> f64 {
-        let locus = self.flank.locus();
-        locus.cam_outer_radius_mm() - locus.cam_inner_radius_mm()
     }
 
     /// Distance from the path and its derivative by ψ; `is_relieved` says which, where the relief starts.
@@ -262,6 +262,57 @@ impl ShapedFlank {
             speed_mm,
             distance_mm,
         })
+    }
+
+    /// A point of the piece between two positions. Its bend is by how much the curve's direction turns from just before to just behind it: what a relief adds to the
+    /// curvature has no closed form without another derivative of T.
+    fn curve_point(
+        &self,
+        position: Position,
+        [from, to]: [Position; 2],
+        is_relieved: bool,
+    ) -> Result<CurvePoint, NotConverged> {
+        let lobes = position.lobes;
+        let beside_rad = BESIDE_SHARE_OF_HALF_LOBE * position.half_lobe_rad();
+        let tangent = |psi: f64| self.at(Position::from_lobe(psi, lobes), is_relieved).map(|at| at.tangent);
+        let before = tangent((position.from_lobe_rad - beside_rad).max(from.from_lobe_rad))?;
+        let behind = tangent((position.from_lobe_rad + beside_rad).min(to.from_lobe_rad))?;
+        let at = self.at(position, is_relieved)?;
+        let (sin, cos) = at.angle_rad.sin_cos();
+        let point = Point2::new(at.radius_mm * cos, at.radius_mm * sin);
+        Ok(CurvePoint { point, tangent: at.tangent, bend: before.perp(&behind) })
+    }
+
+    /// The largest radius from start to end. The flank falls from its start, and a relief that grows outward may carry it up again: by a power below two it
+    /// does at once, however little, so that places are looked at ever nearer to where the relief starts.
+    fn outermost_radius_mm(&self, start: Position, end: Position) -> Result<f64, NotConverged> {
+        let root_mm = if start.from_lobe_rad > 0.0 {
+            self.at(start, self.relief.is_some_and(|relief| start.from_lobe_rad > relief.start_rad))?.radius_mm
+        } else {
+            self.flank.root_radius_mm() + self.path_shift_mm + self.profile_shift_mm
+        };
+        let Some(relief) = self.relief.filter(|relief| relief.amount_mm > 0.0) else { return Ok(root_mm) };
+        let first_rad = relief.start_rad.max(start.from_lobe_rad);
+        let length_rad = end.from_lobe_rad - first_rad;
+        if length_rad <= 0.0 {
+            return Ok(root_mm);
+        }
+        let radius_mm = |beyond_rad: f64| {
+            let position = Position::from_lobe((first_rad + beyond_rad).min(end.from_lobe_rad), end.lobes);
+            self.at(position, true).map(|at| at.radius_mm)
+        };
+        let near = (0..HALVINGS).map(|i| length_rad * 0.5_f64.powi(HALVINGS - i) / f64::from(PLACES));
+        let far = (1..=PLACES).map(|i| length_rad * (f64::from(i) / f64::from(PLACES)));
+        let places: Vec<f64> = std::iter::once(0.0).chain(near).chain(far).collect();
+        let radii_mm = places.iter().map(|&beyond_rad| radius_mm(beyond_rad)).collect::<Result<Vec<_>, _>>()?;
+        let mut most_mm = radii_mm.iter().copied().fold(root_mm, f64::max);
+        for (around, radii_mm) in places.windows(3).zip(radii_mm.windows(3)) {
+            if radii_mm[1] >= radii_mm[0] && radii_mm[1] >= radii_mm[2] {
+                most_mm = most_mm.max(summit(around[0], around[2], radius_mm)?);
+            }
+        }
+        // What rounding alone puts outside the root is none of the relief's.
+        Ok(if most_mm > ROUNDED * root_mm { most_mm } else { root_mm })
     }
 
     /// Where the flank starts and ends; nothing where none is left.
@@ -336,21 +387,38 @@ impl ShapedFlank {
                     _ => relieved(end)?.radius_mm,
                 };
                 let has_land = is_turned_together || kind != FlankEnd::Undercut;
-                return Ok(Some(ShapedSpace { flank: self, start, end, tip: Tip { radius_mm, has_land } }));
+                let outermost_radius_mm = self.outermost_radius_mm(start, end)?;
+                let tip = Tip { radius_mm, has_land };
+                return Ok(Some(ShapedSpace { flank: self, start, end, tip, outermost_radius_mm }));
             }
             before = x;
         }
         let end = Position::valley(lobes);
         let tip = Tip { radius_mm: relieved(end)?.radius_mm, has_land: is_turned_together };
-        Ok(Some(ShapedSpace { flank: self, start, end, tip }))
+        let outermost_radius_mm = self.outermost_radius_mm(start, end)?;
+        Ok(Some(ShapedSpace { flank: self, start, end, tip, outermost_radius_mm }))
     }
 }
 
-impl ShapedPoint {
-    fn curve_point(&self) -> CurvePoint {
-        let (sin, cos) = self.angle_rad.sin_cos();
-        CurvePoint { point: Point2::new(self.radius_mm * cos, self.radius_mm * sin), tangent: self.tangent }
+/// The largest value of a function that rises to its summit between two places and falls from there, by golden sections.
+fn summit(
+    mut low: f64,
+    mut high: f64,
+    function: impl Fn(f64) -> Result<f64, NotConverged>,
+) -> Result<f64, NotConverged> {
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let mut most = f64::NEG_INFINITY;
+    for _ in 0..SECTIONS {
+        let (left, right) = (high - golden * (high - low), low + golden * (high - low));
+        let (at_left, at_right) = (function(left)?, function(right)?);
+        most = most.max(at_left).max(at_right);
+        if at_left < at_right {
+            low = left;
+        } else {
+            high = right;
+        }
     }
+    Ok(most)
 }
 
 /// The first of some places at which something holds.

@@ -89,7 +89,7 @@ fn family() -> Vec<DriveParameters> {
 }
 
 /// Any drive of the family that can be swept.
-fn any_of_the_family() -> impl Strategy<Value = DriveParameters> {
+pub(crate) fn any_of_the_family() -> impl Strategy<Value = DriveParameters> {
     let numbers = (0_usize..4, 1_i64..8, 2_i64..40, 1_i64..4, 0.1_f64..0.8, 0.02_f64..0.9, any::<bool>());
     (numbers, prop::option::of(0.05_f64..1.0)).prop_filter_map(
         "an impossible drive",

@@ -3,18 +3,20 @@
 use std::f64::consts::PI;
 
 use nalgebra::{Point2, Rotation2, Vector2};
+use proptest::prelude::*;
 use toothwave_solver::drawing::{Body, Drawing, DrawingParameters, Edge, Outline, Subject};
 use toothwave_solver::drive::{Draft, DriveError};
+use toothwave_solver::findings::Wall;
 use toothwave_solver::gaps::{Gaps, TipRelief};
 use toothwave_solver::mesh::Place;
-use toothwave_solver::parts::PartsParameters;
+use toothwave_solver::parts::{LEAST_WALL, PartsParameters, RIM};
 use toothwave_solver::violation::{Misfit, Modified};
 use toothwave_solver::{
-    Drive, DriveParameters, Modification, Never, Parameter, Part, PerContact, Position, ToothShape, Violation,
+    Drive, DriveParameters, Finding, Modification, Never, Parameter, Part, PerContact, Position, ToothShape, Violation,
     WaveGenerator,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, ellipse};
+use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, cases, drive, ellipse};
 
 const NONE: Modification = Modification::NONE;
 const ARCSEC: f64 = PI / 648_000.0;
@@ -506,6 +508,83 @@ fn a_relief_lower_than_the_flank_leaves_the_rim_where_it_is() {
         ring.section.outer
     };
     assert_eq!(outer(Modification { ring_tip_relief: Some(RELIEF), ..NONE }), outer(NONE));
+}
+
+/// What the rim is counted from: a ring that ends there is refused, and told how far out it has to end.
+fn told_reach_mm(p: &DriveParameters, parts: &PartsParameters) -> f64 {
+    let without_rim = PartsParameters { ring_outer_radius_mm: Some(1.0), ..*parts };
+    let violations = without_rim.violations(Part::Ring, &Draft::new(p).unwrap());
+    let limit = violations.iter().find_map(|violation| match *violation {
+        Violation::PartDoesNotFit { misfit: Misfit::RingWithoutRim, limit, .. } => Some(limit),
+        _ => None,
+    });
+    limit.unwrap_or_else(|| panic!("{violations:?}")) / (1.0 + LEAST_WALL)
+}
+
+proptest! {
+    #![proptest_config(cases(256))]
+
+    /// Within two tolerances of the drawn hole, between whose points the curve may reach farther by one.
+    #[test]
+    fn the_rim_begins_where_the_hole_reaches_farthest_out(
+        which in 0_usize..5,
+        power in prop::sample::select(vec![0.1, 0.5, 1.0, 1.5, 2.0, 3.0, 10.0]),
+        (amount, is_set_forward) in (-2.5_f64..0.5, prop::bool::weighted(0.2)),
+        start in prop::option::of(0.0_f64..0.98),
+        (rotation, shift, equidistant) in (prop::option::of(-0.1_f64..0.2), prop::option::of(-0.1_f64..0.1), prop::option::of(-0.1_f64..0.1)),
+    ) {
+        let p = [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()][which];
+        let drive = drive(&p);
+        let stroke_um = 1e3 * (drive.root_radius_mm() - drive.natural_tip_radius_mm());
+        let amount_um = 10.0_f64.powf(amount) * if is_set_forward { -stroke_um } else { stroke_um };
+        let start_deg = start.map_or(0.0, |share| share * drive.flank_limit().position.from_lobe_deg());
+        let pitch_arcsec = PI / p.ring_teeth as f64 / ARCSEC;
+        let parts = parts(Modification {
+            ring_tip_relief: Some(TipRelief { amount_um, start_deg, power }),
+            ring_rotation_arcsec: rotation.unwrap_or(0.0) * pitch_arcsec,
+            ring_profile_shift_um: 1e3 * shift.unwrap_or(0.0) * p.tooth_radius_mm,
+            ring_equidistant_um: 1e3 * equidistant.unwrap_or(0.0) * p.tooth_radius_mm,
+            ..NONE
+        });
+        let tolerance_mm = 1e-5 * p.tooth_radius_mm;
+        let parameters = DrawingParameters { chord_tolerance_mm: tolerance_mm, max_points: 10_000_000, input_angle_deg: 0.0 };
+        let draft = Draft::new(&p).unwrap();
+        let Ok(drawing) = Drawing::new(&draft, Subject::Part(Part::Ring), &parts, &parameters) else { return Ok(()) };
+        let section = drawing.bodies(&Never).unwrap().remove(0).section;
+        let of_hole = edges(&section.holes[0]);
+        let farthest = |points: &[Point2<f64>]| points.iter().map(|point| point.coords.norm()).fold(0.0, f64::max);
+        let drawn_mm = of_hole.iter().map(|edge| farthest(points(edge)).max(edge.start().coords.norm())).fold(0.0, f64::max);
+
+        let reach_mm = told_reach_mm(&p, &parts);
+        prop_assert!(reach_mm >= drawn_mm * (1.0 - 1e-11), "{reach_mm} told, {drawn_mm} drawn");
+        prop_assert!(reach_mm <= drawn_mm + 2.0 * tolerance_mm, "{reach_mm} told, {drawn_mm} drawn");
+        let Outline::Circle { radius_mm } = section.outer else { panic!("{:?}", section.outer) };
+        prop_assert!((radius_mm - RIM * reach_mm).abs() < 1e-12 * radius_mm);
+        let thin = PartsParameters { ring_outer_radius_mm: Some(reach_mm * (1.0 + 1e-3)), ..parts };
+        let found = Drawing::new(&draft, Subject::Part(Part::Ring), &thin, &parameters).unwrap().findings().unwrap();
+        let walls: Vec<_> = found.iter().filter_map(|finding| match *finding {
+            Finding::ThinWallAsMade { wall: Wall::RingRim, wall_mm, .. } => Some(wall_mm),
+            _ => None,
+        }).collect();
+        prop_assert!(matches!(walls[..], [wall_mm] if (wall_mm - 1e-3 * reach_mm).abs() < 1e-11 * reach_mm), "{walls:?}");
+    }
+}
+
+/// Near its start a relief of the first power from the root on grows faster than the flank falls, and of a power below one at once.
+#[test]
+fn a_relief_that_leaves_the_root_outward_takes_from_the_rim() {
+    for (amount_um, power, outer_mm) in [(500.0, 0.1, 68.2), (1000.0, 1.0, 68.02)] {
+        let relief = TipRelief { amount_um, start_deg: 0.0, power };
+        let parts = PartsParameters {
+            ring_outer_radius_mm: Some(outer_mm),
+            ..parts(Modification { ring_tip_relief: Some(relief), ..NONE })
+        };
+        let violations = parts.violations(Part::Ring, &Draft::new(&PAPER_5_1).unwrap());
+        assert!(
+            matches!(violations[..], [Violation::PartDoesNotFit { misfit: Misfit::RingWithoutRim, .. }]),
+            "{violations:?} of the power {power}"
+        );
+    }
 }
 
 #[test]

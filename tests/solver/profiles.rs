@@ -4,12 +4,13 @@ use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use nalgebra::{Point2, Rotation2};
+use nalgebra::{Point2, Rotation2, Vector2};
 use proptest::prelude::*;
 use toothwave_solver::profile::{Extent, Polyline, ProfileParameters, Profiles, expected_points, profiles};
-use toothwave_solver::{DriveParameters, Never, SolveError, Stop};
+use toothwave_solver::{DriveParameters, Never, SolveError, Stop, ToothShape, WaveGenerator};
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, cases, drive, semi_axes_mm};
+use crate::family::any_of_the_family;
 
 fn sampled(parameters: &DriveParameters, chord_tolerance_mm: f64, extent: Extent) -> Profiles {
     let request = ProfileParameters { chord_tolerance_mm, extent, max_points: 10_000_000 };
@@ -29,6 +30,124 @@ fn distance_mm(point: &Point2<f64>, polyline: &Polyline) -> f64 {
 /// The farthest that the fine polyline strays from the coarse one.
 fn deviation_mm(fine: &Polyline, coarse: &Polyline) -> f64 {
     fine.iter().step_by(7).map(|point| distance_mm(point, coarse)).fold(0.0, f64::max)
+}
+
+fn unit(angle_rad: f64) -> Vector2<f64> {
+    Vector2::new(angle_rad.cos(), angle_rad.sin())
+}
+
+/// Points of ring, path and cam from the root, the lobe on, by their closed forms over the cam's normal or, where the path is given, over ψ.
+fn closed_forms(p: &DriveParameters) -> [Polyline; 3] {
+    let (r, lobes) = (p.tooth_radius_mm, p.wave_generator.lobes() as f64);
+    let k = p.ring_teeth as f64 / lobes;
+    let end_rad = drive(p).flank_limit().position.from_lobe_rad;
+    let mut curves = [const { Vec::new() }; 3];
+    for i in 0..=1500 {
+        let angle = PI / lobes * f64::from(i) / 1500.0;
+        let support = match p.wave_generator {
+            WaveGenerator::Ellipse { semi_major_mm: a, semi_minor_mm: b } => {
+                let n = unit(angle);
+                let h = (a * n.x).hypot(b * n.y);
+                Ok((h, (b * b - a * a) * n.x * n.y / h))
+            }
+            WaveGenerator::Eccentric { radius_mm, eccentricity_mm: e } => {
+                Ok((radius_mm + e * angle.cos(), -e * angle.sin()))
+            }
+            WaveGenerator::Harmonic { mean_radius_mm, amplitude_mm: e, .. } => {
+                Ok((mean_radius_mm + e * (lobes * angle).cos(), -e * lobes * (lobes * angle).sin()))
+            }
+            WaveGenerator::HarmonicPath { mean_path_radius_mm, amplitude_mm: e, .. } => {
+                Err((mean_path_radius_mm + e * (lobes * angle).cos(), e * lobes * (lobes * angle).sin()))
+            }
+        };
+        let (psi, d, tan, normal) = match support {
+            Ok((h, slope)) => {
+                let tan = -slope / (h + r);
+                (angle - tan.atan(), (h + r).hypot(slope), tan, angle)
+            }
+            Err((d, drop)) => (angle, d, drop / d, angle + (drop / d).atan()),
+        };
+        let in_ring = d * unit(psi / k);
+        if psi <= end_rad {
+            curves[0].push(Point2::from(in_ring + r * unit(psi / k + (k * tan).atan())));
+        }
+        curves[1].push(Point2::from(in_ring));
+        curves[2].push(Point2::from(d * unit(psi) - r * unit(normal)));
+    }
+    curves
+}
+
+/// How far the closed forms are from the chords, over the tolerance: of ring, path and cam.
+fn deviations_over_tolerance(p: &DriveParameters, curves: &[Polyline; 3], tolerance_mm: f64) -> [f64; 3] {
+    let profiles = sampled(p, tolerance_mm, Extent::Tooth);
+    let from_middle = |curve: &Polyline| curve[curve.len() / 2..].to_vec();
+    let of_half_lobe = (profiles.wave_generator.len() - 1) / (2 * usize::try_from(p.wave_generator.lobes()).unwrap());
+    let chords = [
+        from_middle(&profiles.ring),
+        from_middle(&profiles.tooth_center_path),
+        profiles.wave_generator[..=of_half_lobe].to_vec(),
+    ];
+    std::array::from_fn(|i| {
+        // Both run the same way: the nearest chord of a point is looked for from that of the point before it on.
+        let mut nearest = 0;
+        let mut worst_mm = 0.0_f64;
+        for point in &curves[i] {
+            let last = (nearest + 40).min(chords[i].len() - 1);
+            let near: Vec<_> = (nearest..last).map(|j| distance_mm(point, &chords[i][j..=j + 1].to_vec())).collect();
+            let best = (0..near.len()).min_by(|&a, &b| near[a].total_cmp(&near[b])).unwrap();
+            worst_mm = worst_mm.max(near[best]);
+            nearest += best;
+        }
+        worst_mm / tolerance_mm
+    })
+}
+
+/// Beside the tolerance, what rounding adds.
+fn is_true(deviation_over_tolerance: f64) -> bool {
+    deviation_over_tolerance <= 1.0 + 1e-6
+}
+
+/// From this many points on a chord of 40 might be passed by between two points of the closed form.
+const RELATIVE_TOLERANCES: std::ops::Range<f64> = -6.0..-2.5;
+
+proptest! {
+    #![proptest_config(cases(192))]
+
+    #[test]
+    fn no_point_of_a_curve_is_farther_from_its_chord_than_the_tolerance(
+        p in any_of_the_family(),
+        exponents in prop::collection::vec(RELATIVE_TOLERANCES, 12),
+    ) {
+        let curves = closed_forms(&p);
+        for exponent in exponents {
+            let tolerance_mm = 10.0_f64.powf(exponent) * p.tooth_radius_mm;
+            let found = deviations_over_tolerance(&p, &curves, tolerance_mm);
+            prop_assert!(found.into_iter().all(is_true), "{found:?} at {tolerance_mm} mm");
+        }
+    }
+}
+
+/// With the inflection near one end of a chord both its end tangents lie on one side of it.
+#[test]
+fn a_chord_with_an_inflection_near_its_end_is_true_to_the_tolerance() {
+    let p = DriveParameters {
+        wave_generator: WaveGenerator::HarmonicPath {
+            lobes: 2,
+            mean_path_radius_mm: 67.416_168_989_479_36,
+            amplitude_mm: 6.566_526_084_734_569,
+        },
+        teeth: 8,
+        installed: 8,
+        tooth_radius_mm: 12.363_288_155_453_837,
+        tooth: ToothShape::Cylinder { width_mm: 32.0 },
+        ring_teeth: 6,
+        tip_radius_mm: None,
+    };
+    let curves = closed_forms(&p);
+    for tolerance_mm in [0.000_550_598_576_292_938, 0.000_74, 0.001] {
+        let found = deviations_over_tolerance(&p, &curves, tolerance_mm);
+        assert!(found.into_iter().all(is_true), "{found:?} at {tolerance_mm} mm");
+    }
 }
 
 #[test]

@@ -115,7 +115,7 @@ pub struct ToothPartDocument {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct RingPartDocument {
-    /// Outer radius; left out, 1.2 times the root radius.
+    /// Outer radius; left out, 1.2 times the largest radius of the tooth spaces, that of the root but for a tip relief that reaches beyond it.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
     pub outer_radius_mm: Option<f64>,
@@ -176,7 +176,7 @@ pub struct CarrierPartDocument {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct AssemblyDocument {
-    /// Angle of the wave generator from the start position, in which its major axis and tooth 0 stand in the middle of a tooth space.
+    /// Angle of the wave generator from the start position, in which the middle of a lobe, the major axis of an ellipse, and tooth 0 stand in the middle of a tooth space.
     #[schema(minimum = -1e7, maximum = 1e7, default = 0.0)]
     pub input_angle_deg: f64,
 }

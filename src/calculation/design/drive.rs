@@ -253,7 +253,7 @@ impl TeethDocument {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct RingDocument {
-    /// Teeth Z_K: two fewer or two more than the carrier's.
+    /// Teeth Z_K: as many fewer or more than the carrier's as the wave generator has lobes, two of an ellipse.
     #[schema(value_type = i64, minimum = 2, maximum = 10000)]
     pub teeth: Whole,
     /// Radius of a bore that truncates the teeth; null or left out, the ring keeps its natural tip.

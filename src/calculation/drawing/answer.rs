@@ -13,7 +13,7 @@ use crate::findings::FindingAnswer;
 pub enum DrawnPart {
     /// The ring, x along the middle of a tooth space.
     Ring,
-    /// The wave generator, x along its major axis.
+    /// The wave generator, x along the middle of a lobe, the major axis of an ellipse.
     WaveGenerator,
     /// The carrier, x along a slot.
     Carrier,

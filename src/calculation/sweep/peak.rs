@@ -11,7 +11,7 @@ pub struct PeakAnswer {
     pub value: f64,
     /// Input angle.
     pub input_angle_deg: f64,
-    /// Position of the tooth, from the major axis.
+    /// Position of the tooth, from the middle of its lobe: the major axis of an ellipse.
     pub position_deg: f64,
 }
 

@@ -217,6 +217,7 @@ impl Kind for Ellipse {
         Ok(CamPoint {
             point: point - set_back_mm * Vector2::new(normal.cos, normal.sin),
             tangent: Unit::new_unchecked(Vector2::new(-normal.sin, normal.cos)),
+            bend: 1.0,
         })
     }
 }

@@ -39,6 +39,8 @@ pub(crate) struct CamPoint {
     pub(crate) point: Point2<f64>,
     /// Counter-clockwise.
     pub(crate) tangent: Unit<Vector2<f64>>,
+    /// Negative where the cam is hollow.
+    pub(crate) bend: f64,
 }
 
 /// A tooth at one position. Mesh, ring and load follow from `d`, `T` and `T_ψ` alone.
@@ -167,6 +169,8 @@ pub(crate) trait Kind {
         Ok(CamPoint {
             point: Point2::from(center - inside_mm * Vector2::new(cos, sin)),
             tangent: Unit::new_unchecked(Vector2::new(-sin, cos)),
+            // As that of the cam itself, as far as its parallel curves are regular.
+            bend: tooth.cam_contact.curvature_per_mm,
         })
     }
 }
