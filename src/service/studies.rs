@@ -146,6 +146,8 @@ pub struct Kept {
 #[derive(Debug)]
 pub struct Rows {
     gathered: Mutex<Gathered>,
+    /// Held while they are read from the store, which one does for all who wait for it: when that was last begun.
+    gathering: tokio::sync::Mutex<Option<Instant>>,
     bytes: u64,
     room: room::Kept,
 }
@@ -155,12 +157,12 @@ pub struct Rows {
 pub enum Reading {
     /// An answer that is short.
     Made(StudyAnswer),
-    /// The rows that it is to be made of.
+    /// The rows that it is to be made of, as they are then: there are as many lists of their chunks as answers that are being made.
     Rows {
+        /// Whose.
+        kept: Arc<Kept>,
         /// Them.
-        gathered: Gathered,
-        /// Who holds their room.
-        held: Arc<Rows>,
+        rows: Arc<Rows>,
     },
 }
 
@@ -169,7 +171,7 @@ impl Reading {
     pub fn columns_bytes(&self) -> u64 {
         match self {
             Self::Made(_) => 0,
-            Self::Rows { gathered, .. } => gathered.study().stored_bytes(),
+            Self::Rows { kept, .. } => kept.study.stored_bytes(),
         }
     }
 
@@ -177,7 +179,7 @@ impl Reading {
     pub fn answer(self) -> StudyAnswer {
         match self {
             Self::Made(answer) => answer,
-            Self::Rows { gathered, held: _held } => gathered.answer(),
+            Self::Rows { kept, rows } => kept.gathered(&rows).answer(),
         }
     }
 }
@@ -336,13 +338,20 @@ impl Kept {
 
     /// Reads what a stored study has come to since it was last read.
     async fn gather(&self, rows: &Rows, store: &Store, pool: &Pool) -> Result<(), Problem> {
-        let missing: Vec<_> = rows.gathered.lock().missing().collect();
-        if missing.is_empty() {
-            return Ok(());
+        let (asked, cut) = (Instant::now(), self.cut());
+        let looking = async {
+            let gathering = rows.gathering.lock().await;
+            if gathering.is_some_and(|begun| begun >= asked) || rows.gathered.lock().is_complete() {
+                return Ok(None);
+            }
+            let begun = Instant::now();
+            Ok::<_, StoreError>(Some((gathering, begun, store.chunks_done(&cut).await?)))
+        };
+        let Some((mut gathering, begun, mut wanted)) = patiently(looking).await? else { return Ok(()) };
+        {
+            let gathered = rows.gathered.lock();
+            wanted.retain(|chunk| gathered.lacks(*chunk));
         }
-        let cut = self.cut();
-        let done = store.chunks_done(&cut).await?;
-        let wanted: Vec<_> = done.into_iter().filter(|chunk| missing.binary_search(chunk).is_ok()).collect();
         let a_part_bytes = (self.study.stored_bytes() / self.study.chunks().max(1)).max(1);
         let at_once = usize::try_from(READ_BYTES / a_part_bytes).unwrap_or(usize::MAX).max(1);
         for chunks in wanted.chunk_by(|one, next| one + 1 == *next).flat_map(|run| run.chunks(at_once)) {
@@ -356,6 +365,7 @@ impl Kept {
             let mut gathered = rows.gathered.lock();
             parts.into_iter().for_each(|(chunk, part)| gathered.add(chunk, part));
         }
+        *gathering = Some(begun);
         Ok(())
     }
 
@@ -753,7 +763,8 @@ impl Studies {
             drop(rows);
         }
         let room = self.room.keep(bytes)?;
-        Ok(Arc::new(Rows { gathered: Mutex::new(Gathered::new(study)), bytes, room }))
+        let (gathered, gathering) = (Mutex::new(Gathered::new(study)), tokio::sync::Mutex::default());
+        Ok(Arc::new(Rows { gathered, gathering, bytes, room }))
     }
 
     fn no_room(&self, bytes: u64) -> Problem {
@@ -825,11 +836,11 @@ impl Studies {
         if let Some(answer) = self.made_apart(kept, deadline).await? {
             return Ok(Reading::Made(answer));
         }
-        let held = self.rows(kept)?;
+        let rows = self.rows(kept)?;
         if let Keeping::Store { store, .. } = &self.keeping {
-            kept.gather(&held, store, &self.pool).await?;
+            kept.gather(&rows, store, &self.pool).await?;
         }
-        Ok(Reading::Rows { gathered: kept.gathered(&held), held })
+        Ok(Reading::Rows { kept: Arc::clone(kept), rows })
     }
 
     /// What a study has come to, where that takes long to be made of its rows: made once for all who ask meanwhile, and apart from their
@@ -868,9 +879,9 @@ impl Studies {
             if let Some(store) = &store {
                 kept.gather(&rows, store, &pool).await?;
             }
-            let gathered = kept.gathered(&rows);
             let make = move || {
-                let _held = (rows, room.reserve(kept.study.stored_bytes())?);
+                let _reserved = room.reserve(kept.study.stored_bytes())?;
+                let gathered = kept.gathered(&rows);
                 let (answer, is_whole) = (gathered.answer(), gathered.is_complete());
                 Ok(Arc::new(Made { answer, is_whole, at: Instant::now() }))
             };

@@ -426,6 +426,72 @@ async fn a_study_that_another_forgot_and_began_anew_in_other_chunks_is_whole() {
     workers.await.unwrap();
 }
 
+/// Whoever reads it goes through a list of them: of millions that took seconds, in which nobody else was answered.
+#[tokio::test]
+async fn a_study_however_large_has_a_hundred_thousand_chunks_at_most() {
+    let file = File::new();
+    let limits = Limits { max_study_variants: u64::MAX, max_study_bytes: u64::MAX, ..LIMITS };
+    let keeper = Keeper::of(&file, limits, false).await;
+    // Of chunks of a second there were millions.
+    let study = json!({
+        "study": "map", "base": shortest(), "quantities": ["peak_stress_ring_mpa"],
+        "over": {
+            "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.0, "steps": 100_000 },
+            "/load/input_torque_nm": { "min": 1.0, "max": 20.0, "steps": 100_000 }
+        }
+    });
+    let study = keeper.ask(&study).await.json();
+    let frozen = keeper.store.find(study["id"].as_str().unwrap()).await.unwrap().unwrap().study;
+    assert_eq!((frozen.variants, frozen.chunks, frozen.chunk_variants), (10_000_000_000, 100_000, 100_000));
+    assert_eq!(frozen.lease, Duration::from_secs(30), "who computes a long chunk is not silent");
+    keeper.end().await;
+}
+
+#[tokio::test]
+async fn an_answer_is_of_what_has_come_when_it_is_made_though_it_was_asked_for_before() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    let study = keeper.ask(&map(5)).await.json();
+    let studies = &keeper.service.app.studies;
+    let kept = studies.find(study["id"].as_str().unwrap()).await.unwrap().unwrap();
+    // Who waits for the turn to make it holds nothing of its own.
+    let reading = studies.read(&kept, keeper.service.app.pool.deadline()).await.unwrap();
+    let app = std::sync::Arc::clone(&keeper.service.app);
+    let workers = tokio::spawn(async move { app.studies.serve_store().await });
+    let done = keeper.wait_for(&map(5)).await;
+    assert_eq!(done["result"]["is_complete"], true);
+    assert_eq!(serde_json::to_value(reading.answer()).unwrap(), done["result"]);
+    keeper.service.app.studies.close();
+    workers.await.unwrap();
+}
+
+/// Each once read them for itself, and held them until its turn to decode them came.
+#[tokio::test]
+async fn rows_that_one_reads_from_the_store_are_read_for_all_who_wait_for_them() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, true).await;
+    let done = keeper.wait_for(&map(5)).await;
+    keeper.end().await;
+    let keeper = Keeper::of(&file, Limits { max_concurrent_solves: 1, ..LIMITS }, false).await;
+    let (studies, pool) = (&keeper.service.app.studies, &keeper.service.app.pool);
+    let kept = studies.find(done["id"].as_str().unwrap()).await.unwrap().unwrap();
+    let occupied = Occupied::by_one(pool).await;
+    let one = studies.read(&kept, pool.deadline());
+    let other = async {
+        // The store has one connection, and its turns are in order: after some, the one has what is there and waits to decode it.
+        for _ in 0..20 {
+            keeper.store.waiting().await.unwrap();
+            tokio::task::yield_now().await;
+        }
+        keeper.store.close().await;
+        tokio::join!(studies.read(&kept, pool.deadline()), occupied.end()).0
+    };
+    let (one, other) = tokio::join!(one, other);
+    for reading in [one, other] {
+        assert_eq!(serde_json::to_value(reading.unwrap().answer()).unwrap(), done["result"]);
+    }
+}
+
 #[tokio::test]
 async fn a_study_that_another_forgets_while_it_begins_is_no_fault_of_the_service() {
     let file = File::new();
