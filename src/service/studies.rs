@@ -146,8 +146,9 @@ pub struct Kept {
 #[derive(Debug)]
 pub struct Rows {
     gathered: Mutex<Gathered>,
-    /// Held while they are read from the store, which one does for all who wait for it: when that was last begun.
-    gathering: tokio::sync::Mutex<Option<Instant>>,
+    /// Held while they are read from the store, which one does for all who wait for it: what came of it last, with when it was begun, or
+    /// when it failed.
+    gathering: tokio::sync::Mutex<Option<(Instant, Result<(), Problem>)>>,
     bytes: u64,
     room: room::Kept,
 }
@@ -336,18 +337,29 @@ impl Kept {
         Cut { id: self.id.clone(), chunk_variants: self.study.chunk_variants() }
     }
 
-    /// Reads what a stored study has come to since it was last read.
+    /// Reads what a stored study has come to since it was last read, or waits for who does. Those who wait for one who fails fail as well:
+    /// of a store that says nothing each would wait as long again.
     async fn gather(&self, rows: &Rows, store: &Store, pool: &Pool) -> Result<(), Problem> {
-        let (asked, cut) = (Instant::now(), self.cut());
-        let looking = async {
-            let gathering = rows.gathering.lock().await;
-            if gathering.is_some_and(|begun| begun >= asked) || rows.gathered.lock().is_complete() {
-                return Ok(None);
-            }
-            let begun = Instant::now();
-            Ok::<_, StoreError>(Some((gathering, begun, store.chunks_done(&cut).await?)))
-        };
-        let Some((mut gathering, begun, mut wanted)) = patiently(looking).await? else { return Ok(()) };
+        let asked = Instant::now();
+        let mut last = rows.gathering.lock().await;
+        if rows.gathered.lock().is_complete() {
+            return Ok(());
+        }
+        if let Some((at, came)) = &*last
+            && *at >= asked
+        {
+            return came.clone();
+        }
+        let begun = Instant::now();
+        let came = self.gather_in_turn(rows, store, pool).await;
+        let at = if came.is_ok() { begun } else { Instant::now() };
+        *last = Some((at, came.clone()));
+        came
+    }
+
+    async fn gather_in_turn(&self, rows: &Rows, store: &Store, pool: &Pool) -> Result<(), Problem> {
+        let cut = self.cut();
+        let mut wanted = store.chunks_done(&cut).await?;
         {
             let gathered = rows.gathered.lock();
             wanted.retain(|chunk| gathered.lacks(*chunk));
@@ -365,7 +377,6 @@ impl Kept {
             let mut gathered = rows.gathered.lock();
             parts.into_iter().for_each(|(chunk, part)| gathered.add(chunk, part));
         }
-        *gathering = Some(begun);
         Ok(())
     }
 

@@ -9,11 +9,13 @@ use futures_util::future::join_all;
 use serde_json::{Value, json};
 use sqlx::{Connection as _, SqliteConnection};
 use tokio::task::JoinHandle;
+use toothwave::compute::Pool;
 use toothwave::config::Limits;
 use toothwave::parts::Parts;
-use toothwave::problem::ProblemCode;
+use toothwave::problem::{Problem, ProblemCode};
 use toothwave::studies::Keeping;
 use toothwave_store::{Address, Claim, Figures, NewStudy, Store};
+use toothwave_study::Study;
 
 use crate::asking::{Answer, LIMITS, Occupied, Question, Service};
 use crate::designs::{shortest, with};
@@ -465,6 +467,28 @@ async fn an_answer_is_of_what_has_come_when_it_is_made_though_it_was_asked_for_b
     workers.await.unwrap();
 }
 
+/// What comes of two who read the result of `map(5)`: one has its rows and waits for the turn to decode them; the other asks then, when the
+/// store answers nobody any more.
+async fn two_who_read(file: &File, end: impl AsyncFnOnce(&Pool, Occupied)) -> [Result<Value, Problem>; 2] {
+    let keeper = Keeper::of(file, Limits { max_concurrent_solves: 1, ..LIMITS }, false).await;
+    let (studies, pool) = (&keeper.service.app.studies, &keeper.service.app.pool);
+    let id = Study::read(map(5).to_string().as_bytes(), &keeper.service.app.limits.of_studies()).unwrap().id();
+    let kept = studies.find(&id.to_string()).await.unwrap().unwrap();
+    let occupied = Occupied::by_one(pool).await;
+    let one = studies.read(&kept, pool.deadline());
+    let other = async {
+        // Its one connection is given in turn: after some more turns the one has all that it asks for.
+        for _ in 0..20 {
+            keeper.store.waiting().await.unwrap();
+            tokio::task::yield_now().await;
+        }
+        keeper.store.close().await;
+        tokio::join!(studies.read(&kept, pool.deadline()), end(pool, occupied)).0
+    };
+    let (one, other) = tokio::join!(one, other);
+    [one, other].map(|reading| Ok(serde_json::to_value(reading?.answer()).unwrap()))
+}
+
 /// Each once read them for itself, and held them until its turn to decode them came.
 #[tokio::test]
 async fn rows_that_one_reads_from_the_store_are_read_for_all_who_wait_for_them() {
@@ -472,23 +496,19 @@ async fn rows_that_one_reads_from_the_store_are_read_for_all_who_wait_for_them()
     let keeper = Keeper::of(&file, LIMITS, true).await;
     let done = keeper.wait_for(&map(5)).await;
     keeper.end().await;
-    let keeper = Keeper::of(&file, Limits { max_concurrent_solves: 1, ..LIMITS }, false).await;
-    let (studies, pool) = (&keeper.service.app.studies, &keeper.service.app.pool);
-    let kept = studies.find(done["id"].as_str().unwrap()).await.unwrap().unwrap();
-    let occupied = Occupied::by_one(pool).await;
-    let one = studies.read(&kept, pool.deadline());
-    let other = async {
-        // The store has one connection, and its turns are in order: after some, the one has what is there and waits to decode it.
-        for _ in 0..20 {
-            keeper.store.waiting().await.unwrap();
-            tokio::task::yield_now().await;
-        }
-        keeper.store.close().await;
-        tokio::join!(studies.read(&kept, pool.deadline()), occupied.end()).0
-    };
-    let (one, other) = tokio::join!(one, other);
-    for reading in [one, other] {
-        assert_eq!(serde_json::to_value(reading.unwrap().answer()).unwrap(), done["result"]);
+    for answer in two_who_read(&file, async |_, occupied| occupied.end().await).await {
+        assert_eq!(answer.unwrap(), done["result"]);
+    }
+}
+
+#[tokio::test]
+async fn who_waits_for_rows_that_another_reads_is_told_why_they_do_not_come() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, true).await;
+    keeper.wait_for(&map(5)).await;
+    keeper.end().await;
+    for answer in two_who_read(&file, async |pool, _occupied| pool.close()).await {
+        assert_eq!(answer.unwrap_err().code, ProblemCode::ShuttingDown);
     }
 }
 
