@@ -157,7 +157,7 @@ pub struct Rows {
 #[derive(Debug)]
 pub enum Reading {
     /// An answer that is short.
-    Made(StudyAnswer),
+    Made(Box<StudyAnswer>),
     /// The rows that it is to be made of, as they are then: there are as many lists of their chunks as answers that are being made.
     Rows {
         /// Whose.
@@ -179,7 +179,7 @@ impl Reading {
     /// It.
     pub fn answer(self) -> StudyAnswer {
         match self {
-            Self::Made(answer) => answer,
+            Self::Made(answer) => *answer,
             Self::Rows { kept, rows } => kept.gathered(&rows).answer(),
         }
     }
@@ -845,7 +845,7 @@ impl Studies {
     /// Where the store does not answer, there is no room, or the time is over.
     pub async fn read(&self, kept: &Arc<Kept>, deadline: Instant) -> Result<Reading, Problem> {
         if let Some(answer) = self.made_apart(kept, deadline).await? {
-            return Ok(Reading::Made(answer));
+            return Ok(Reading::Made(Box::new(answer)));
         }
         let rows = self.rows(kept)?;
         if let Keeping::Store { store, .. } = &self.keeping {
