@@ -15,6 +15,9 @@ use crate::problem::{Problem, ProblemCode};
 /// What a chunk should take: long against what it costs to claim and to keep one, short against what a worker's end loses.
 const CHUNK: Duration = Duration::from_secs(1);
 
+/// Chunks of a study at most, though each takes longer then: whoever reads its result goes through a list of them.
+const MOST_CHUNKS: u64 = 100_000;
+
 /// A canary is long enough to tell how long variants take.
 const CANARY: Duration = Duration::from_millis(50);
 
@@ -24,11 +27,8 @@ const MOST_OF_A_CANARY: u64 = 4096;
 /// Bytes of what a chunk comes to, at most: one statement carries them.
 const MOST_OF_A_PART: u64 = 4 << 20;
 
-/// A worker is not taken for dead before it was silent over one chunk for as long as so many should take.
-const CHUNKS_OF_A_LEASE: u32 = 20;
-
-/// Nor before this time.
-const LEAST_LEASE: Duration = Duration::from_secs(30);
+/// A worker is not taken for dead before it was silent for so long. One that computes is not silent, however long its chunk takes.
+const LEASE: Duration = Duration::from_secs(30);
 
 /// Why a stored study is not computed here.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -67,13 +67,13 @@ pub async fn freeze(
     let a_variant = canary.busy / u32::try_from(canary_variants).unwrap_or(u32::MAX);
     let part_variants = MOST_OF_A_PART / (study.stored_bytes() / study.variants().max(1)).max(1);
     let wanted = u64::try_from(CHUNK.as_nanos() / a_variant.as_nanos().max(1)).unwrap_or(u64::MAX);
+    let wanted = wanted.max(study.variants().div_ceil(MOST_CHUNKS));
     #[cfg(feature = "fault-injection")]
     let wanted = crate::injected::chunk_variants().unwrap_or(wanted);
     let id = study.id().to_string();
     let canary = canary.hash();
     let study = Arc::into_inner(study).ok_or_else(|| Problem::internal(&"a canary goes on after its end"))?;
     let study = study.in_chunks_of(wanted.min(part_variants).max(1));
-    let a_chunk = a_variant.saturating_mul(u32::try_from(study.chunk_variants()).unwrap_or(u32::MAX));
     let frozen = NewStudy {
         id,
         kind: study.kind().into(),
@@ -86,7 +86,7 @@ pub async fn freeze(
         chunks: study.chunks(),
         canary_variants,
         canary,
-        lease: a_chunk.saturating_mul(CHUNKS_OF_A_LEASE).max(LEAST_LEASE),
+        lease: LEASE,
         time,
     };
     Ok((Arc::new(study), frozen))

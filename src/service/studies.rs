@@ -146,6 +146,9 @@ pub struct Kept {
 #[derive(Debug)]
 pub struct Rows {
     gathered: Mutex<Gathered>,
+    /// Held while they are read from the store, which one does for all who wait for it: what came of it last, with when it was begun, or
+    /// when it failed.
+    gathering: tokio::sync::Mutex<Option<(Instant, Result<(), Problem>)>>,
     bytes: u64,
     room: room::Kept,
 }
@@ -154,13 +157,13 @@ pub struct Rows {
 #[derive(Debug)]
 pub enum Reading {
     /// An answer that is short.
-    Made(StudyAnswer),
-    /// The rows that it is to be made of.
+    Made(Box<StudyAnswer>),
+    /// The rows that it is to be made of, as they are then: there are as many lists of their chunks as answers that are being made.
     Rows {
+        /// Whose.
+        kept: Arc<Kept>,
         /// Them.
-        gathered: Gathered,
-        /// Who holds their room.
-        held: Arc<Rows>,
+        rows: Arc<Rows>,
     },
 }
 
@@ -169,15 +172,15 @@ impl Reading {
     pub fn columns_bytes(&self) -> u64 {
         match self {
             Self::Made(_) => 0,
-            Self::Rows { gathered, .. } => gathered.study().stored_bytes(),
+            Self::Rows { kept, .. } => kept.study.stored_bytes(),
         }
     }
 
     /// It.
     pub fn answer(self) -> StudyAnswer {
         match self {
-            Self::Made(answer) => answer,
-            Self::Rows { gathered, held: _held } => gathered.answer(),
+            Self::Made(answer) => *answer,
+            Self::Rows { kept, rows } => kept.gathered(&rows).answer(),
         }
     }
 }
@@ -334,15 +337,33 @@ impl Kept {
         Cut { id: self.id.clone(), chunk_variants: self.study.chunk_variants() }
     }
 
-    /// Reads what a stored study has come to since it was last read.
+    /// Reads what a stored study has come to since it was last read, or waits for who does. Those who wait for one who fails fail as well:
+    /// of a store that says nothing each would wait as long again.
     async fn gather(&self, rows: &Rows, store: &Store, pool: &Pool) -> Result<(), Problem> {
-        let missing: Vec<_> = rows.gathered.lock().missing().collect();
-        if missing.is_empty() {
+        let asked = Instant::now();
+        let mut last = rows.gathering.lock().await;
+        if rows.gathered.lock().is_complete() {
             return Ok(());
         }
+        if let Some((at, came)) = &*last
+            && *at >= asked
+        {
+            return came.clone();
+        }
+        let begun = Instant::now();
+        let came = self.gather_in_turn(rows, store, pool).await;
+        let at = if came.is_ok() { begun } else { Instant::now() };
+        *last = Some((at, came.clone()));
+        came
+    }
+
+    async fn gather_in_turn(&self, rows: &Rows, store: &Store, pool: &Pool) -> Result<(), Problem> {
         let cut = self.cut();
-        let done = store.chunks_done(&cut).await?;
-        let wanted: Vec<_> = done.into_iter().filter(|chunk| missing.binary_search(chunk).is_ok()).collect();
+        let mut wanted = store.chunks_done(&cut).await?;
+        {
+            let gathered = rows.gathered.lock();
+            wanted.retain(|chunk| gathered.lacks(*chunk));
+        }
         let a_part_bytes = (self.study.stored_bytes() / self.study.chunks().max(1)).max(1);
         let at_once = usize::try_from(READ_BYTES / a_part_bytes).unwrap_or(usize::MAX).max(1);
         for chunks in wanted.chunk_by(|one, next| one + 1 == *next).flat_map(|run| run.chunks(at_once)) {
@@ -753,7 +774,8 @@ impl Studies {
             drop(rows);
         }
         let room = self.room.keep(bytes)?;
-        Ok(Arc::new(Rows { gathered: Mutex::new(Gathered::new(study)), bytes, room }))
+        let (gathered, gathering) = (Mutex::new(Gathered::new(study)), tokio::sync::Mutex::default());
+        Ok(Arc::new(Rows { gathered, gathering, bytes, room }))
     }
 
     fn no_room(&self, bytes: u64) -> Problem {
@@ -823,13 +845,13 @@ impl Studies {
     /// Where the store does not answer, there is no room, or the time is over.
     pub async fn read(&self, kept: &Arc<Kept>, deadline: Instant) -> Result<Reading, Problem> {
         if let Some(answer) = self.made_apart(kept, deadline).await? {
-            return Ok(Reading::Made(answer));
+            return Ok(Reading::Made(Box::new(answer)));
         }
-        let held = self.rows(kept)?;
+        let rows = self.rows(kept)?;
         if let Keeping::Store { store, .. } = &self.keeping {
-            kept.gather(&held, store, &self.pool).await?;
+            kept.gather(&rows, store, &self.pool).await?;
         }
-        Ok(Reading::Rows { gathered: kept.gathered(&held), held })
+        Ok(Reading::Rows { kept: Arc::clone(kept), rows })
     }
 
     /// What a study has come to, where that takes long to be made of its rows: made once for all who ask meanwhile, and apart from their
@@ -868,9 +890,9 @@ impl Studies {
             if let Some(store) = &store {
                 kept.gather(&rows, store, &pool).await?;
             }
-            let gathered = kept.gathered(&rows);
             let make = move || {
-                let _held = (rows, room.reserve(kept.study.stored_bytes())?);
+                let _reserved = room.reserve(kept.study.stored_bytes())?;
+                let gathered = kept.gathered(&rows);
                 let (answer, is_whole) = (gathered.answer(), gathered.is_complete());
                 Ok(Arc::new(Made { answer, is_whole, at: Instant::now() }))
             };

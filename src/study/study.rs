@@ -569,6 +569,11 @@ impl Gathered {
         self.gaps = chunks.into_iter().map(gap).collect();
     }
 
+    /// Whether a chunk has not come yet.
+    pub fn lacks(&self, chunk: u64) -> bool {
+        usize::try_from(chunk).ok().and_then(|chunk| self.parts.get(chunk)).is_some_and(Option::is_none)
+    }
+
     /// Chunks that have not come yet.
     pub fn missing(&self) -> impl Iterator<Item = u64> {
         (0..).zip(&self.parts).filter(|(_, part)| part.is_none()).map(|(chunk, _)| chunk)

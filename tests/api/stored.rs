@@ -9,11 +9,13 @@ use futures_util::future::join_all;
 use serde_json::{Value, json};
 use sqlx::{Connection as _, SqliteConnection};
 use tokio::task::JoinHandle;
+use toothwave::compute::Pool;
 use toothwave::config::Limits;
 use toothwave::parts::Parts;
-use toothwave::problem::ProblemCode;
+use toothwave::problem::{Problem, ProblemCode};
 use toothwave::studies::Keeping;
 use toothwave_store::{Address, Claim, Figures, NewStudy, Store};
+use toothwave_study::Study;
 
 use crate::asking::{Answer, LIMITS, Occupied, Question, Service};
 use crate::designs::{shortest, with};
@@ -424,6 +426,90 @@ async fn a_study_that_another_forgot_and_began_anew_in_other_chunks_is_whole() {
     assert_eq!(keeper.wait_for(&map(5)).await, whole);
     keeper.service.app.studies.close();
     workers.await.unwrap();
+}
+
+/// Whoever reads it goes through a list of them: of millions that took seconds, in which nobody else was answered.
+#[tokio::test]
+async fn a_study_however_large_has_a_hundred_thousand_chunks_at_most() {
+    let file = File::new();
+    let limits = Limits { max_study_variants: u64::MAX, max_study_bytes: u64::MAX, ..LIMITS };
+    let keeper = Keeper::of(&file, limits, false).await;
+    // Of chunks of a second there were millions.
+    let study = json!({
+        "study": "map", "base": shortest(), "quantities": ["peak_stress_ring_mpa"],
+        "over": {
+            "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.0, "steps": 100_000 },
+            "/load/input_torque_nm": { "min": 1.0, "max": 20.0, "steps": 100_000 }
+        }
+    });
+    let study = keeper.ask(&study).await.json();
+    let frozen = keeper.store.find(study["id"].as_str().unwrap()).await.unwrap().unwrap().study;
+    assert_eq!((frozen.variants, frozen.chunks, frozen.chunk_variants), (10_000_000_000, 100_000, 100_000));
+    assert_eq!(frozen.lease, Duration::from_secs(30), "who computes a long chunk is not silent");
+    keeper.end().await;
+}
+
+#[tokio::test]
+async fn an_answer_is_of_what_has_come_when_it_is_made_though_it_was_asked_for_before() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    let study = keeper.ask(&map(5)).await.json();
+    let studies = &keeper.service.app.studies;
+    let kept = studies.find(study["id"].as_str().unwrap()).await.unwrap().unwrap();
+    // Who waits for the turn to make it holds nothing of its own.
+    let reading = studies.read(&kept, keeper.service.app.pool.deadline()).await.unwrap();
+    let app = std::sync::Arc::clone(&keeper.service.app);
+    let workers = tokio::spawn(async move { app.studies.serve_store().await });
+    let done = keeper.wait_for(&map(5)).await;
+    assert_eq!(done["result"]["is_complete"], true);
+    assert_eq!(serde_json::to_value(reading.answer()).unwrap(), done["result"]);
+    keeper.service.app.studies.close();
+    workers.await.unwrap();
+}
+
+/// What comes of two who read the result of `map(5)`: one has its rows and waits for the turn to decode them; the other asks then, when the
+/// store answers nobody any more.
+async fn two_who_read(file: &File, end: impl AsyncFnOnce(&Pool, Occupied)) -> [Result<Value, Problem>; 2] {
+    let keeper = Keeper::of(file, Limits { max_concurrent_solves: 1, ..LIMITS }, false).await;
+    let (studies, pool) = (&keeper.service.app.studies, &keeper.service.app.pool);
+    let id = Study::read(map(5).to_string().as_bytes(), &keeper.service.app.limits.of_studies()).unwrap().id();
+    let kept = studies.find(&id.to_string()).await.unwrap().unwrap();
+    let occupied = Occupied::by_one(pool).await;
+    let one = studies.read(&kept, pool.deadline());
+    let other = async {
+        // Its one connection is given in turn: after some more turns the one has all that it asks for.
+        for _ in 0..20 {
+            keeper.store.waiting().await.unwrap();
+            tokio::task::yield_now().await;
+        }
+        keeper.store.close().await;
+        tokio::join!(studies.read(&kept, pool.deadline()), end(pool, occupied)).0
+    };
+    let (one, other) = tokio::join!(one, other);
+    [one, other].map(|reading| Ok(serde_json::to_value(reading?.answer()).unwrap()))
+}
+
+/// Each once read them for itself, and held them until its turn to decode them came.
+#[tokio::test]
+async fn rows_that_one_reads_from_the_store_are_read_for_all_who_wait_for_them() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, true).await;
+    let done = keeper.wait_for(&map(5)).await;
+    keeper.end().await;
+    for answer in two_who_read(&file, async |_, occupied| occupied.end().await).await {
+        assert_eq!(answer.unwrap(), done["result"]);
+    }
+}
+
+#[tokio::test]
+async fn who_waits_for_rows_that_another_reads_is_told_why_they_do_not_come() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, true).await;
+    keeper.wait_for(&map(5)).await;
+    keeper.end().await;
+    for answer in two_who_read(&file, async |pool, _occupied| pool.close()).await {
+        assert_eq!(answer.unwrap_err().code, ProblemCode::ShuttingDown);
+    }
 }
 
 #[tokio::test]

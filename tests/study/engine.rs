@@ -108,6 +108,10 @@ fn a_study_that_is_half_done_tells_what_it_has() {
         let mut half = Gathered::new(&study);
         half.add(1, Work::new(&study, 1).run(&Never).unwrap());
         assert!(!half.is_complete() && half.missing().eq((0..study.chunks()).filter(|&chunk| chunk != 1)));
+        assert!(
+            half.missing().all(|chunk| half.lacks(chunk))
+                && ![1, study.chunks()].iter().any(|&chunk| half.lacks(chunk))
+        );
         let answer: Value = serde_json::from_str(&text(&half, Format::Json)).unwrap();
         assert_eq!(answer["is_complete"], false);
         half.add(0, Work::new(&study, 0).run(&Never).unwrap());
