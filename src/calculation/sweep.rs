@@ -81,6 +81,11 @@ impl CheckedSweep {
         &self.duty.hardest().load
     }
 
+    /// What its single items deviate by.
+    pub const fn deviations(&self) -> &Deviations {
+        &self.deviations
+    }
+
     /// The same, of which wear and the life of a bearing are not asked.
     pub fn without_wear(self) -> Self {
         Self { wear_rate_mm3_per_nm: None, bearing_rating: None, ..self }
@@ -101,7 +106,7 @@ impl CheckedSweep {
     pub fn loss_totals(&self, hardest: &solver::Sweep, stop: &dyn Stop) -> Result<Option<LossTotalsAnswer>, NoAnswer> {
         let Some(friction) = &self.friction else { return Ok(None) };
         let forces = match self.bearing_rating {
-            Some(_) => period::RadialForces::of(&self.drive, self.load(), hardest, stop)?,
+            Some(_) => period::RadialForces::of(&self.drive, self.load(), &self.deviations, hardest, stop)?,
             None => None,
         };
         let losses = period::Losses::of(&self.drive, self.load(), hardest, friction, stop)?;
@@ -284,7 +289,7 @@ impl Question for Sweep {
         go_on()?;
         let model_error = error_of_model::of(drive, load, deviations, &sweep, parts).map_err(SolveError::from)?;
         go_on()?;
-        let forces = period::RadialForces::of(drive, load, &sweep, stop)?;
+        let forces = period::RadialForces::of(drive, load, deviations, &sweep, stop)?;
         let (mut of_friction, mut of_bearing) = (None, None);
         let mut losses = None;
         let mut points = duty.points.iter().map(|point| DutyPointAnswer::new(drive, point)).collect::<Vec<_>>();
@@ -380,13 +385,13 @@ impl CheckedSweep {
         losses: &period::Losses,
         stop: &dyn Stop,
     ) -> Result<Costs<'a>, NoAnswer> {
-        let Self { drive, duty, bearing_rating, .. } = self;
+        let Self { drive, duty, bearing_rating, deviations, .. } = self;
         let of_point = |(at, point): (usize, &CheckedDutyPoint)| {
             if at == duty.hardest {
                 return self.cost(point, friction, hardest, losses, stop);
             }
             let sweep = self.solve_under(&point.load, stop)?;
-            let forces = period::RadialForces::of(drive, &point.load, &sweep, stop)?;
+            let forces = period::RadialForces::of(drive, &point.load, deviations, &sweep, stop)?;
             let losses = period::Losses::of(drive, &point.load, &sweep, friction, stop)?;
             self.cost(point, friction, &Swept { sweep: &sweep, forces: forces.as_ref() }, &losses, stop)
         };

@@ -437,6 +437,13 @@ fn pause_after(look: Duration, least: Duration) -> Duration {
     (LOOKS_SHARE * look).clamp(least, LONGEST_PAUSE)
 }
 
+/// Notes that a study was asked for. Nobody is refused who reads from a store that cannot be written.
+async fn note_asked(store: &Store, id: &str) {
+    if let Err(error) = store.touch(id).await {
+        tracing::warn!(study = id, %error, "that the study was asked for could not be noted");
+    }
+}
+
 /// What is kept of a stored study besides its rows.
 fn view_bytes(study: &Study) -> u64 {
     study.kept_bytes() - study.stored_bytes()
@@ -533,10 +540,7 @@ impl Studies {
         if kept.unasked_s.load(Ordering::Relaxed) > noted_after_s {
             // By one, and until it is next looked at: who reads must not wait for others' writes.
             kept.unasked_s.store(0, Ordering::Relaxed);
-            // Nor is anybody refused who reads from a store that cannot be written.
-            if let Err(error) = store.touch(id).await {
-                tracing::warn!(study = id, %error, "that the study was asked for could not be noted");
-            }
+            note_asked(store, id).await;
         }
         Ok(Some(kept))
     }
@@ -554,19 +558,25 @@ impl Studies {
         let study = frozen::thaw(&self.pool, frozen).await?.map_err(|reason| reason.told(&frozen.id))?;
         // Where others have all the room, it is kept all the same: how many there are is bounded.
         let room = self.room.keep(view_bytes(&study)).ok();
-        let kept = self.keep_view(study, room);
+        let kept = Self::view(study, room);
         let (state, problem) = state_of(stored);
         kept.stand(state, problem);
-        Ok(kept)
+        Ok(self.keep_view(kept))
     }
 
-    /// Keeps what is known of a stored study, in the place of any other with its id and of the oldest that do not run.
-    fn keep_view(&self, study: Arc<Study>, room: Option<room::Kept>) -> Arc<Kept> {
+    fn view(study: Arc<Study>, room: Option<room::Kept>) -> Arc<Kept> {
         let bytes = view_bytes(&study);
-        let kept = Kept::new(study, None, bytes, room);
+        Kept::new(study, None, bytes, room)
+    }
+
+    /// Keeps what is known of a stored study, in the place of any other with its id and of the oldest that do not run. Where another has read it meanwhile, that is it.
+    fn keep_view(&self, kept: Arc<Kept>) -> Arc<Kept> {
         let mut all = self.kept.lock();
+        if let Some(known) = all.iter().find(|known| known.cut() == kept.cut()) {
+            return Arc::clone(known);
+        }
         all.retain(|other| other.id != kept.id);
-        while all.iter().map(|other| other.bytes).sum::<u64>() + bytes > VIEWS_BYTES
+        while all.iter().map(|other| other.bytes).sum::<u64>() + kept.bytes > VIEWS_BYTES
             && let Some(oldest) = all.iter().position(|other| !other.is_running())
         {
             drop(all.remove(oldest));
@@ -627,7 +637,7 @@ impl Studies {
             };
             let kept = match (stored, known) {
                 (Some(stored), Some(kept)) if is_there(&stored) => {
-                    store.touch(&id).await?;
+                    note_asked(store, &id).await;
                     Some(kept)
                 }
                 (_, known) => {
@@ -677,7 +687,7 @@ impl Studies {
                 }
                 let NewStudy { chunks, canary_variants, .. } = frozen;
                 tracing::info!(study = id, chunks, canary_variants, canary_ms, "a study is kept");
-                self.keep_view(Arc::clone(study), room.take())
+                self.keep_view(Self::view(Arc::clone(study), room.take()))
             }
             // Another has begun, or forgotten, it meanwhile.
             _ => return Ok(None),

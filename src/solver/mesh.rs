@@ -262,6 +262,11 @@ impl Mesh {
         1.0 - self.listed_spacings.fract()
     }
 
+    /// The fraction of a lap that has passed when a tooth stands at a position, above 0.
+    pub(crate) fn fraction_at_deg(&self, from_lobe_deg: f64) -> f64 {
+        1.0 - (from_lobe_deg / self.spacing_deg()).fract()
+    }
+
     /// The place that comes to the flank within a lap, and the fraction that has passed then, above 0.
     pub(crate) fn flank_fraction(&self) -> (u64, f64) {
         (floor_of_product(self.engaged_spacings, 1) + 1, 1.0 - self.engaged_spacings.fract())

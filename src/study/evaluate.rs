@@ -96,8 +96,11 @@ impl Evaluator {
         }
         let sweep = checked.solve(stop)?;
         let losses = if self.takes_losses { checked.loss_totals(&sweep, stop)? } else { None };
-        let radial_forces =
-            if self.takes_radial_forces { RadialForces::of(drive, checked.load(), &sweep, stop)? } else { None };
+        let radial_forces = if self.takes_radial_forces {
+            RadialForces::of(drive, checked.load(), checked.deviations(), &sweep, stop)?
+        } else {
+            None
+        };
         let loaded = Loaded { checked: &checked, peaks: (&sweep).into(), losses, radial_forces };
         self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) })
     }

@@ -382,6 +382,25 @@ async fn studies_that_wait_for_their_canary_have_taken_the_room_of_what_is_asked
     keeper.end().await;
 }
 
+/// Each had one of its own once, of up to eight megabytes, for as long as the study ran.
+#[tokio::test]
+async fn however_many_ask_at_once_for_a_study_that_is_not_known_here_it_is_kept_once() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    let mut study = map(5);
+    study["over"] = json!({ "/drive/teeth/width_mm": { "one_of": (0..200).map(|i| 10 + i).collect::<Vec<_>>() } });
+    study["base"]["deviations"] = json!({ "tooth_radius_um": vec![0.25; 28] });
+    let place = place(&keeper.ask(&study).await.json());
+    let once_bytes = keeper.service.app.room.taken_bytes();
+    assert!(once_bytes > 0);
+    keeper.end().await;
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    let answers = join_all((0..20).map(|_| keeper.service.get(&place))).await;
+    assert!(answers.iter().all(|answer| answer.status == 200));
+    assert_eq!(keeper.service.app.room.taken_bytes(), once_bytes);
+    keeper.end().await;
+}
+
 #[tokio::test]
 async fn a_study_that_another_has_cancelled_is_forgotten_by_who_deletes_it_next() {
     let file = File::new();

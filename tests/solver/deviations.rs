@@ -558,7 +558,7 @@ fn unlike_teeth_push_the_wave_generator_aside_with_the_sum_of_their_forces() {
         let case = LoadCase::new(&load).unwrap();
         let deviations = deviations(&p, ALL_KINDS[4], 3);
         let sweep = swept_with(&drive, &load, &deviations, Points::samples(2).unwrap()).unwrap();
-        let forces = RadialForces::of(&drive, &case, &sweep, &Never).unwrap().unwrap();
+        let forces = RadialForces::of(&drive, &case, &deviations, &sweep, &Never).unwrap().unwrap();
         for (angle, input_angle_deg) in sweep.input_angles.input_angle_deg.iter().enumerate() {
             let placed = placed_by_angles(&p, input_angle_deg.to_radians());
             let chains: Vec<_> = placed.into_iter().map(|tooth| chain(&p, &load, &deviations, tooth)).collect();
@@ -575,7 +575,7 @@ fn unlike_teeth_push_the_wave_generator_aside_with_the_sum_of_their_forces() {
         }
         // Where the zones are alike there is nothing.
         let alike = sweep::sweep(&drive, &case, Points::samples(2).unwrap(), &Never).unwrap();
-        assert_eq!(RadialForces::of(&drive, &case, &alike, &Never).unwrap(), None);
+        assert_eq!(RadialForces::of(&drive, &case, &Deviations::default(), &alike, &Never).unwrap(), None);
     }
 }
 

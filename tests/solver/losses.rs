@@ -17,11 +17,11 @@ use toothwave_solver::losses::{
     WaveGeneratorFriction, mean_over_period, power_w, pressure_velocity_mpa_m_per_s,
 };
 use toothwave_solver::mesh::{Mesh, Samples};
-use toothwave_solver::sweep::{Points, sweep};
+use toothwave_solver::sweep::{Points, sweep, sweep_with_deviations};
 use toothwave_solver::tooth::Pressure;
 use toothwave_solver::{
-    Compatibility, Contact, ContactLaw, DriveParameters, LoadCase, LoadParameters, Modification, Never, Parameter,
-    PerContact, SolveError, ToothShape, Violation, WaveGenerator,
+    Compatibility, Contact, ContactLaw, Deviations, DriveParameters, LoadCase, LoadParameters, Modification, Never,
+    Parameter, PerContact, SolveError, ToothShape, Violation, WaveGenerator,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, cases, drive, everywhere, load};
@@ -865,7 +865,7 @@ fn the_radial_force_of_a_sweep_is_that_of_the_torque_on_an_eccentric_and_none_on
     let forces = |parameters: &DriveParameters, load: &LoadParameters| {
         let (drive, load) = (drive(parameters), LoadCase::new(load).unwrap());
         let sweep = sweep(&drive, &load, Points::samples(9).unwrap(), &Never).unwrap();
-        RadialForces::of(&drive, &load, &sweep, &Never).unwrap()
+        RadialForces::of(&drive, &load, &Deviations::default(), &sweep, &Never).unwrap()
     };
     let assert_across = |RadialForces { force_n, direction_deg }: RadialForces, tolerance_n: f64| {
         assert_eq!(force_n.len(), 10);
@@ -1023,7 +1023,7 @@ fn the_bearing_of_an_eccentric_bears_the_force_across_it_at_the_speed_of_its_rac
     let (drive, mechanism) = (drive(&parameters), mechanism(&parameters));
     let load = LoadCase::new(&load(5.0, Compatibility::VirtualWork)).unwrap();
     let sweep = sweep(&drive, &load, Points::samples(20).unwrap(), &Never).unwrap();
-    let forces = RadialForces::of(&drive, &load, &sweep, &Never).unwrap().unwrap();
+    let forces = RadialForces::of(&drive, &load, &Deviations::default(), &sweep, &Never).unwrap().unwrap();
     let bearing = RaceBearing { coefficient: 0.002, radius_mm: 25.0 };
     let of = |wave_generator, element| {
         let losses = Losses::of(&drive, &load, &sweep, &with(wave_generator, 0.05), &Never).unwrap();
@@ -1051,6 +1051,35 @@ fn the_bearing_of_an_eccentric_bears_the_force_across_it_at_the_speed_of_its_rac
     }
 }
 
+/// Its component across the eccentricity makes the torque, wherever slots lie aside and whichever way that is said.
+#[test]
+fn across_the_eccentricity_the_radial_force_makes_the_torque_whatever_gaps_there_are_at_the_slots() {
+    let parameters = DriveParameters {
+        wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
+        teeth: 20,
+        installed: 20,
+        tooth_radius_mm: 2.0,
+        tooth: ToothShape::Cylinder { width_mm: 12.0 },
+        ring_teeth: 19,
+        tip_radius_mm: None,
+    };
+    let drive = drive(&parameters);
+    let of_slots = |slot_wall_um: f64| Modification { slot_wall_um, ..Modification::default() };
+    let of_each = |um: f64| Deviations { slot_wall_um: vec![um; 20], ..Deviations::default() };
+    for (modification, deviations) in
+        [(of_slots(100.0), Deviations::default()), (of_slots(0.0), of_each(100.0)), (of_slots(0.0), of_each(300.0))]
+    {
+        let load = LoadParameters { wave_generator_moves: true, modification, ..load(5.0, Compatibility::VirtualWork) };
+        let load = LoadCase::new(&load).unwrap();
+        let sweep = sweep_with_deviations(&drive, &load, &deviations, Points::samples(6).unwrap(), &Never).unwrap();
+        let forces = RadialForces::of(&drive, &load, &deviations, &sweep, &Never).unwrap().unwrap();
+        for (force_n, direction_deg) in forces.force_n.iter().zip(&forces.direction_deg) {
+            let across_n = force_n * direction_deg.to_radians().sin();
+            assert!((across_n.abs() / (5e3 / 1.2) - 1.0).abs() < 2e-3, "{across_n} N");
+        }
+    }
+}
+
 /// Where a tooth enters under load the force across the bearing jumps, and either side of the jump has its own intervals.
 #[test]
 fn a_bearings_mean_load_takes_half_of_each_interval_at_either_end_jumps_too() {
@@ -1066,7 +1095,7 @@ fn a_bearings_mean_load_takes_half_of_each_interval_at_either_end_jumps_too() {
     let (drive, mechanism) = (drive(&parameters), mechanism(&parameters));
     let load = LoadCase::new(&load(5.0, Compatibility::VirtualWork)).unwrap();
     let sweep = sweep(&drive, &load, Points::tolerance(1e-2, 100_000).unwrap(), &Never).unwrap();
-    let forces = RadialForces::of(&drive, &load, &sweep, &Never).unwrap().unwrap();
+    let forces = RadialForces::of(&drive, &load, &Deviations::default(), &sweep, &Never).unwrap().unwrap();
     let rolling = WaveGeneratorFriction::Rolling { bearing: RaceBearing { coefficient: 0.002, radius_mm: 25.0 } };
     let losses = Losses::of(&drive, &load, &sweep, &with(rolling, 0.05), &Never).unwrap();
     let found = BearingLoad::of(&mechanism, RollingElement::Ball, &sweep, &losses, &forces).unwrap();

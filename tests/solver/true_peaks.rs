@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
+use toothwave_solver::gaps::TipRelief;
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::sweep::{Points, SweepPeaks, peaks, sweep_plain};
 use toothwave_solver::{
@@ -178,6 +179,31 @@ fn a_tooth_that_carries_between_two_of_the_first_moments_alone_is_found() {
     let found = to(&parameters, &load, 1e-4);
     for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
         assert!(found >= dense * (1.0 - 1e-4), "{name}: {:e}", 1.0 - found / dense);
+    }
+}
+
+/// There a gap has a corner.
+#[test]
+fn a_peak_where_a_tooth_comes_to_the_relief_is_found() {
+    let parameters = DriveParameters {
+        wave_generator: WaveGenerator::Harmonic { lobes: 3, mean_radius_mm: 48.0, amplitude_mm: 1.0 },
+        teeth: 30,
+        installed: 30,
+        tooth_radius_mm: 3.0,
+        ring_teeth: 27,
+        ..PAPER_5_1
+    };
+    let ring_tip_relief = Some(TipRelief { amount_um: 15.77, start_deg: 13.4, power: 1.0 });
+    let load = LoadParameters {
+        law: JOHNSON,
+        wave_generator_moves: true,
+        modification: Modification { ring_tip_relief, ..Modification::default() },
+        ..load(13.51, VirtualWork)
+    };
+    let dense = of(&parameters, &load, Points::samples(6007).unwrap()).unwrap();
+    let found = to(&parameters, &load, 1e-5);
+    for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
+        assert!(found >= dense * (1.0 - 1e-5), "{name}: {:e}", 1.0 - found / dense);
     }
 }
 

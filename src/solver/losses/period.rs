@@ -3,7 +3,7 @@
 use crate::cam::ToothCenter;
 use crate::contact::{Contact, PerContact};
 use crate::drive::Drive;
-use crate::gaps::Gaps;
+use crate::gaps::{Deviations, Gaps};
 use crate::load_sharing::{LoadCase, LoadedDrive};
 use crate::losses::bearing::{LoadForRevolutions, RollingElement};
 use crate::losses::duty::{ColumnForTime, mean_at_each_place};
@@ -278,13 +278,19 @@ impl RadialForces {
     ///
     /// # Errors
     /// As [`Losses::of`].
-    pub fn of(drive: &Drive, load: &LoadCase, sweep: &Sweep, stop: &dyn Stop) -> Result<Option<Self>, SolveError> {
+    pub fn of(
+        drive: &Drive,
+        load: &LoadCase,
+        deviations: &Deviations,
+        sweep: &Sweep,
+        stop: &dyn Stop,
+    ) -> Result<Option<Self>, SolveError> {
         let mechanism = Mechanism::of_sweep(drive, sweep);
         if mechanism.lobes_loaded_alike() > 1 {
             return Ok(None);
         }
         let p = load.parameters();
-        let gaps = Gaps::new(drive, &p.clearance_um, p.modification, None);
+        let gaps = Gaps::new(drive, &p.clearance_um, p.modification, Some(deviations));
         let mut forces = Self::default();
         at_each_input_angle(drive, &sweep.states, stop, |_, teeth| {
             let mut teeth: Vec<_> = teeth.iter().map(|tooth| tooth.loaded).collect();

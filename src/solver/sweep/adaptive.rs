@@ -78,7 +78,7 @@ pub(crate) fn moments(
     let laps = if mesh.tells_items_apart() { mesh.laps() } else { 1 };
     let resolution = tolerance.relative().clamp(FINEST_RESOLUTION, COARSEST_RESOLUTION);
     let allowable_mpa = load.parameters().allowable_stress_mpa;
-    let pieces = || (0..laps).flat_map(|lap| Piece::of(&mesh, lap));
+    let pieces = || (0..laps).flat_map(|lap| Piece::of(loaded, lap));
     let in_columns = match looking {
         Looking::Fast => fast::moments(loaded, pieces(), tolerance, resolution, allowable_mpa, stop)?,
         Looking::Plain => None,

@@ -143,7 +143,7 @@ pub(crate) fn true_peaks(
     let size = kernel.tile_size(&mesh, Layout::PLAIN);
     let mut arena = vec![0.0; size.doubles()];
     let mut look = FastLook::new(&kernel, loaded, (mesh, Layout::PLAIN), &size, &mut arena, stop);
-    let Some(Found { seen, best }) = search(&mut look, Piece::of(&mesh, 0), tolerance, None)? else {
+    let Some(Found { seen, best }) = search(&mut look, Piece::of(loaded, 0), tolerance, None)? else {
         return Ok(None);
     };
     columns::check("torque balance", look.torque_balance_residual)?;

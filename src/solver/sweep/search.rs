@@ -9,6 +9,7 @@ use std::cell::OnceCell;
 use std::ops::Range;
 
 use crate::SolveError;
+use crate::load_sharing::LoadedDrive;
 use crate::mesh::Mesh;
 use crate::position::Position;
 use crate::ring::TipCorner;
@@ -116,7 +117,10 @@ pub(crate) struct AtPlace {
 
 impl Piece {
     /// Those of a lap.
-    pub(crate) fn of(mesh: &Mesh, lap: u64) -> impl Iterator<Item = Self> {
+    pub(crate) fn of(loaded: &LoadedDrive<'_>, lap: u64) -> impl Iterator<Item = Self> + use<> {
+        let mesh = *loaded.mesh();
+        let relieved_fraction =
+            loaded.gaps().modification().ring_tip_relief.map(|relief| mesh.fraction_at_deg(relief.start_deg));
         let (places, entry) = (mesh.whole_spacings(), mesh.entry_fraction());
         let is_whole = mesh.spacings_are_whole();
         let entering = |place| Some(AtPlace { place, position: mesh.last_position() });
@@ -125,8 +129,8 @@ impl Piece {
         let rest =
             Self { lap, start: entry, end: 1.0, places: places + 1, at_start: entering(places + 1), at_end: None };
         let pieces = std::iter::once(first).chain((!is_whole).then_some(rest));
-        let mesh = *mesh;
-        pieces.flat_map(move |piece| piece.cut_where_a_tooth_comes_to_the_flank(&mesh))
+        let pieces = pieces.flat_map(move |piece| piece.cut_where_a_tooth_comes_to_the_flank(&mesh));
+        pieces.flat_map(move |piece| piece.cut_where_a_tooth_comes_to_the_relief(relieved_fraction))
     }
 
     /// Loads have a corner there, and the ring's stress begins.
@@ -142,6 +146,15 @@ impl Piece {
         } else {
             [Some(self), None].into_iter().flatten()
         }
+    }
+
+    /// Its gap has a corner there, by a power of one, or grows by a bend from nothing.
+    fn cut_where_a_tooth_comes_to_the_relief(self, fraction: Option<f64>) -> impl Iterator<Item = Self> + use<> {
+        let cut = fraction.filter(|&fraction| fraction > self.start && fraction < self.end);
+        let [one, other] = cut.map_or([Some(self), None], |fraction| {
+            [Some(Self { end: fraction, at_end: None, ..self }), Some(Self { start: fraction, at_start: None, ..self })]
+        });
+        [one, other].into_iter().flatten()
     }
 
     /// The position at a place.
