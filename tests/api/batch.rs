@@ -1,5 +1,6 @@
 //! Batches: a document a line, an answer a line, in order and whatever each comes to.
 
+use std::convert::Infallible;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
@@ -342,6 +343,44 @@ async fn a_batch_that_is_sent_bit_by_bit_is_answered() {
         .unwrap();
     let service = Service::within(Limits { header_timeout_ms: 30_000, ..LIMITS });
     assert_eq!(lines(&service.send(request).await).len(), 40);
+}
+
+/// nginx passes on no more of a request once its answer has begun: a batch of some megabytes broke off behind it.
+#[tokio::test]
+async fn behind_a_proxy_a_batch_is_read_before_its_answer_begins_and_directly_answered_while_it_is_sent() {
+    for (forwarded_for, is_answered_at_once) in [(None, true), (Some("192.0.2.1"), false)] {
+        let service = Service::new();
+        let (send, sent) = tokio::sync::mpsc::unbounded_channel::<Bytes>();
+        let arriving = stream::unfold(sent, |mut sent| async {
+            sent.recv().await.map(|piece| (Ok::<_, Infallible>(piece), sent))
+        });
+        let mut request = Request::post("/v1/batch?peaks_only=true").header("content-type", "application/x-ndjson");
+        if let Some(address) = forwarded_for {
+            request = request.header("x-forwarded-for", address);
+        }
+        let response = service.response(request.body(Body::from_stream(arriving)).unwrap());
+        let mut response = std::pin::pin!(response);
+        let line = |index| Bytes::from(format!("{}\n", variant(index)));
+        send.send(line(0)).unwrap();
+        // As long as it could have begun in.
+        let mut is_begun = false;
+        for _ in 0..1000 {
+            is_begun = is_begun || futures_util::poll!(&mut response).is_ready();
+            if is_begun {
+                break;
+            }
+            tokio::task::yield_now().await;
+        }
+        assert_eq!(is_begun, is_answered_at_once, "{forwarded_for:?}");
+        if !is_begun {
+            send.send(line(1)).unwrap();
+            drop(send);
+            let body = response.await.into_body();
+            let text = axum::body::to_bytes(body, usize::MAX).await.unwrap();
+            let last = text.split(|&byte| byte == b'\n').rfind(|line| !line.is_empty()).unwrap();
+            assert_eq!(last, br#"{"asked":2,"answered":2}"#);
+        }
+    }
 }
 
 #[tokio::test]

@@ -21,7 +21,7 @@ use futures_util::{Stream, StreamExt as _, stream};
 use metrics::{counter, histogram};
 use parking_lot::Mutex;
 use serde::{Deserialize, Serialize};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
 use tokio_util::task::AbortOnDropHandle;
 use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::coincidence_degree::TeethInMeshAnswer;
@@ -474,13 +474,19 @@ impl Lines {
 /// How the batch has ended.
 type End = Arc<Mutex<BatchEnd>>;
 
-/// Reads lines ahead of their answers, as far as [`AHEAD_BYTES`] go, until the body ends or nobody wants answers any more.
-async fn read_ahead(mut lines: Lines, to: mpsc::UnboundedSender<Line>, end: End) {
+/// Reads lines ahead of their answers, as far as [`AHEAD_BYTES`] go, until the body ends or nobody wants answers any more. `reading` is dropped when no more is read before
+/// an answer.
+async fn read_ahead(mut lines: Lines, to: mpsc::UnboundedSender<Line>, end: End, reading: oneshot::Sender<()>) {
+    let mut reading = Some(reading);
     let ahead = Arc::new(Semaphore::new(AHEAD_BYTES));
     let mut index = 0;
     while let Some(document) = lines.next().await {
         let bytes = (document.as_ref().map_or(0, Bytes::len) + LINE_OVERHEAD_BYTES).min(AHEAD_BYTES);
-        let Ok(permits) = Arc::clone(&ahead).acquire_many_owned(u32::try_from(bytes).unwrap_or(u32::MAX)).await else {
+        let wanted = u32::try_from(bytes).unwrap_or(u32::MAX);
+        if ahead.available_permits() < bytes {
+            drop(reading.take());
+        }
+        let Ok(permits) = Arc::clone(&ahead).acquire_many_owned(wanted).await else {
             return;
         };
         if to.send(Line { index, document, _ahead: permits }).is_err() {
@@ -631,13 +637,26 @@ pub async fn batch(
     query: Result<Query<BatchQuery>, QueryRejection>,
     request: Request,
 ) -> Response {
+    // Proxies such as nginx pass on no more of a request once its answer has begun.
+    let has_proxy = request.headers().contains_key("x-forwarded-for");
     match begin(&app, query, request) {
-        Ok(response) => response,
+        Ok((response, read)) => {
+            if has_proxy {
+                // An error, as nothing is sent.
+                let _ = read.await;
+            }
+            response
+        }
         Err(problem) => problem.into_response(),
     }
 }
 
-fn begin(app: &App, query: Result<Query<BatchQuery>, QueryRejection>, request: Request) -> Result<Response, Problem> {
+/// The answer, and what ends when the body is read, or as much of it as is before an answer.
+fn begin(
+    app: &App,
+    query: Result<Query<BatchQuery>, QueryRejection>,
+    request: Request,
+) -> Result<(Response, oneshot::Receiver<()>), Problem> {
     let Query(query) = query.map_err(|error| Problem::new(ProblemCode::InvalidQuery, error.body_text()))?;
     query.require_possible()?;
     negotiation::require_ndjson(request.headers())?;
@@ -650,7 +669,8 @@ fn begin(app: &App, query: Result<Query<BatchQuery>, QueryRejection>, request: R
     // Bounded by bytes.
     let (to, from) = mpsc::unbounded_channel();
     let end = End::new(Mutex::new(BatchEnd { asked: 0, answered: 0, problem: None }));
-    tokio::spawn(read_ahead(lines, to, Arc::clone(&end)));
+    let (reading, read) = oneshot::channel();
+    tokio::spawn(read_ahead(lines, to, Arc::clone(&end), reading));
     let beside = app.room.beside(held_bytes as u64);
     let batch = Batch { pool: app.pool.clone(), room: beside, query, limits: app.limits };
     let answers = answers(batch, from, end).map(move |bytes| {
@@ -661,7 +681,7 @@ fn begin(app: &App, query: Result<Query<BatchQuery>, QueryRejection>, request: R
     let mut response = Body::from_stream(answers).into_response();
     response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(NDJSON));
     response.headers_mut().insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
-    Ok(response)
+    Ok((response, read))
 }
 
 #[cfg(test)]
