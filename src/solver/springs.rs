@@ -51,14 +51,14 @@ impl Gap {
         let begin_rad = |arm_mm: f64| {
             if arm_decline_mm_per_rad < 0.0 { arm_mm / arm_decline_mm_per_rad } else { f64::NEG_INFINITY }
         };
-        let beyond_usual_rad = (self.lost_motion_rad - usual_rad).max(begin_rad(arm_mm));
-        let arm_mm = (arm_mm - arm_decline_mm_per_rad * beyond_usual_rad).max(0.0);
+        let lost_motion_rad = self.lost_motion_rad.max(usual_rad + begin_rad(arm_mm));
+        let arm_mm = (arm_mm - arm_decline_mm_per_rad * (lost_motion_rad - usual_rad)).max(0.0);
         let has_ended = arm_mm == 0.0 && arm_decline_mm_per_rad >= 0.0;
         let way_rad = turned_rad(arm_mm, arm_decline_mm_per_rad, self.along_mm).max(begin_rad(arm_mm));
         if has_ended || self.along_mm == f64::INFINITY || way_rad == f64::INFINITY {
             return Closing { rad: f64::INFINITY, arm_mm };
         }
-        Closing { rad: usual_rad + beyond_usual_rad + way_rad, arm_mm: arm_mm - arm_decline_mm_per_rad * way_rad }
+        Closing { rad: lost_motion_rad + way_rad, arm_mm: arm_mm - arm_decline_mm_per_rad * way_rad }
     }
 }
 
