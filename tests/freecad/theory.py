@@ -224,7 +224,8 @@ class Theory:
         return math.pi / self.installed * (outer**2 - inner**2) - 2 * (half_slot(outer) - half_slot(inner))
 
     def ring_outer_radius_mm(self):
-        root = self.flank_point(0.0, self.clearance_mm("ring"), True)[0]
+        c = self.clearance_mm("ring")
+        root = self.flank_point(self.flank_start(c), c, True)[0]
         return self.parts.get("ring", {}).get("outer_radius_mm", 1.2 * root)
 
     def ring_opening_area_mm2(self, points=POINTS):
