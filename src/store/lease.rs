@@ -139,11 +139,14 @@ async fn claim_there(
         sqlx::query("ROLLBACK").execute(&mut **connection).await?;
         return Ok(None);
     };
-    // A worker that is silent for longer has its transaction ended, and the chunk is free.
-    sqlx::query("SELECT set_config('idle_in_transaction_session_timeout', $1, TRUE)")
-        .bind(milliseconds(lease))
-        .execute(&mut **connection)
-        .await?;
+    // A worker that is silent for longer has its transaction ended, and the chunk is free. One that waits for a lock to keep what it has computed has not: that
+    // would cost the chunk an attempt.
+    sqlx::query(
+        "SELECT set_config('idle_in_transaction_session_timeout', $1, TRUE), set_config('lock_timeout', '0', TRUE)",
+    )
+    .bind(milliseconds(lease))
+    .execute(&mut **connection)
+    .await?;
     Ok(Some(crate::read(chunk)))
 }
 

@@ -242,8 +242,8 @@ test('the peaks say how far to believe them', async () => {
   assert.ok(model);
   await setDocument(page, { ...unnamed, sweep: { wind_up: true } });
   assert.deepEqual(await told(), [
-    'The model’s own error: force −1 to +1 %, stress −2 to +2 %.',
-    'The model’s own error: wind-up −2 to 0 % where bodies are held at the law’s depth. ' +
+    'The model’s own error: force −1 to 0 %, stress −2 to +1 %.',
+    'The model’s own error: wind-up −2 to −1 % where bodies are held at the law’s depth. ' +
       'Besides, for a housed rim and fingers held at both ends: by the estimates −11 %, −25 to −20 % in earlier calculations of elastic bodies.',
     estimated,
   ]);

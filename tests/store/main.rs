@@ -523,6 +523,29 @@ async fn who_wants_a_study_that_another_session_holds_is_told_so_in_time_and_the
     store.forget(&study.id).await.unwrap();
 }
 
+/// As while the server builds an index. The chunk was free then, and after three times given up, though it was computed.
+#[tokio::test]
+async fn who_has_computed_a_chunk_waits_for_a_lock_and_keeps_its_lease_meanwhile() {
+    let Some(address) = server() else { return };
+    let _alone = SERVER.write().await;
+    let store = Store::open(&address).await.unwrap();
+    store.migrate().await.unwrap();
+    let study = study("waiting", 1);
+    store.create(&study).await.unwrap();
+    let mut lease = claimed(&store, &study).await;
+    let mut another = stranger(&address).await;
+    sqlx::raw_sql("BEGIN; LOCK TABLE results IN SHARE MODE").execute(&mut another).await.unwrap();
+    let ((), claimed_meanwhile) = tokio::join!(keep(&mut lease), async {
+        tokio::time::sleep(PATIENCE * 6 / 10).await;
+        let claimed = store.claim(&study.cut(), LEASE).await.unwrap();
+        sqlx::query("ROLLBACK").execute(&mut another).await.unwrap();
+        claimed
+    });
+    assert!(matches!(claimed_meanwhile, Claim::None), "{claimed_meanwhile:?}");
+    assert!(store.find(&study.id).await.unwrap().unwrap().is_done());
+    store.forget(&study.id).await.unwrap();
+}
+
 #[tokio::test]
 async fn who_migrates_waits_for_others_who_do_for_longer_than_a_single_operation_may_take() {
     let Some(address) = server() else { return };
