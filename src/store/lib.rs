@@ -30,7 +30,7 @@ const BATCH_CHUNKS: u64 = 256;
 /// What a single operation may take: a server that cannot be reached says nothing. Shorter than a proxy waits for an answer.
 pub const PATIENCE: Duration = Duration::from_secs(10);
 
-/// For what touches every chunk of a study, of which there may be a million.
+/// For what touches every chunk of a study, of which there may be very many.
 pub(crate) const LONG_PATIENCE: Duration = Duration::from_secs(120);
 
 /// So long does the server let a statement wait for a lock. For a row it may do so twice, first for whoever waits for it already, and the answer

@@ -53,6 +53,17 @@ pub(crate) const PAPER_5_2: DriveParameters = DriveParameters {
 /// Case 5.2 with the bore that reproduces the paper's figures 20-25.
 pub(crate) const PAPER_5_2_BORED: DriveParameters = DriveParameters { tip_radius_mm: Some(52.8227), ..PAPER_5_2 };
 
+/// One of one lobe, which was held against finite elements as the paper's cases were.
+pub(crate) const ECCENTRIC: DriveParameters = DriveParameters {
+    wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
+    teeth: 20,
+    installed: 20,
+    tooth_radius_mm: 2.0,
+    tooth: ToothShape::Cylinder { width_mm: 12.0 },
+    ring_teeth: 19,
+    tip_radius_mm: None,
+};
+
 pub(crate) fn drive(parameters: &DriveParameters) -> Drive {
     Drive::new(parameters).expect("a possible drive")
 }

@@ -10,10 +10,10 @@ use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
 use toothwave_solver::model_error::{self, Beyond, ErrorRange, Measured};
 use toothwave_solver::{
     Compatibility, ContactLaw, Deviations, Drive, DriveParameters, LoadCase, LoadParameters, PerContact, Position,
-    ToothShape, Torque, WaveGenerator,
+    Torque,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, ellipse, load, swept};
+use crate::drives::{ECCENTRIC, PAPER_5_1, PAPER_5_2, ellipse, load, swept};
 
 /// Each input angle of the cases is one of so many equal intervals of its drive's period.
 const INTERVALS: u64 = 240;
@@ -172,17 +172,6 @@ impl Case {
         }
     }
 }
-
-/// A drive of one lobe.
-const ECCENTRIC: DriveParameters = DriveParameters {
-    wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
-    teeth: 20,
-    installed: 20,
-    tooth_radius_mm: 2.0,
-    tooth: ToothShape::Cylinder { width_mm: 12.0 },
-    ring_teeth: 19,
-    tip_radius_mm: None,
-};
 
 fn percent(share: f64) -> f64 {
     100.0 * share

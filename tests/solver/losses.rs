@@ -24,7 +24,7 @@ use toothwave_solver::{
     Parameter, PerContact, SolveError, ToothShape, Violation, WaveGenerator,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, cases, drive, everywhere, load};
+use crate::drives::{ECCENTRIC, PAPER_5_1, PAPER_5_2, any_swept_drive, cases, drive, everywhere, load};
 use crate::reference::number;
 
 const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
@@ -1054,16 +1054,7 @@ fn the_bearing_of_an_eccentric_bears_the_force_across_it_at_the_speed_of_its_rac
 /// Its component across the eccentricity makes the torque, wherever slots lie aside and whichever way that is said.
 #[test]
 fn across_the_eccentricity_the_radial_force_makes_the_torque_whatever_gaps_there_are_at_the_slots() {
-    let parameters = DriveParameters {
-        wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
-        teeth: 20,
-        installed: 20,
-        tooth_radius_mm: 2.0,
-        tooth: ToothShape::Cylinder { width_mm: 12.0 },
-        ring_teeth: 19,
-        tip_radius_mm: None,
-    };
-    let drive = drive(&parameters);
+    let drive = drive(&ECCENTRIC);
     let of_slots = |slot_wall_um: f64| Modification { slot_wall_um, ..Modification::default() };
     let of_each = |um: f64| Deviations { slot_wall_um: vec![um; 20], ..Deviations::default() };
     for (modification, deviations) in

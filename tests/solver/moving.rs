@@ -11,20 +11,10 @@ use toothwave_solver::{
     Parameter, PerContact, Position, SolveError, ToothShape, Torque, Violation, WaveGenerator,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, everywhere, load, swept};
+use crate::drives::{ECCENTRIC, PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, everywhere, load, swept};
 
 const JOHNSON: ContactLaw =
     ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
-
-const ECCENTRIC: DriveParameters = DriveParameters {
-    wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
-    teeth: 20,
-    installed: 20,
-    tooth_radius_mm: 2.0,
-    tooth: ToothShape::Cylinder { width_mm: 12.0 },
-    ring_teeth: 19,
-    tip_radius_mm: None,
-};
 
 const THREE_LOBES: DriveParameters = DriveParameters {
     wave_generator: WaveGenerator::HarmonicPath { lobes: 3, mean_path_radius_mm: 52.0, amplitude_mm: 1.0 },

@@ -46,6 +46,15 @@ fn extremes(peaks: &SweepPeaks) -> Vec<(&'static str, f64)> {
     extremes
 }
 
+/// That no extreme of so many intervals is missed by more than the tolerance.
+fn assert_found(parameters: &DriveParameters, load: &LoadParameters, samples: u64, tolerance: f64) {
+    let dense = of(parameters, load, Points::samples(samples).unwrap()).unwrap();
+    let found = to(parameters, load, tolerance);
+    for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
+        assert!(found >= dense * (1.0 - tolerance), "{name}: {:e} {parameters:?}", 1.0 - found / dense);
+    }
+}
+
 fn by_every_law() -> Vec<(DriveParameters, LoadParameters)> {
     let mut all = designs();
     let by_work: Vec<_> = all
@@ -145,11 +154,7 @@ fn a_stiffness_that_jumps_after_a_tooth_has_left_the_valley_is_found() {
             ),
         ),
     ] {
-        let dense = of(&parameters, &load, Points::samples(1500).unwrap()).unwrap();
-        let found = to(&parameters, &load, 1e-4);
-        for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
-            assert!(found >= dense * (1.0 - 1e-4), "{name}: {:e} {parameters:?}", 1.0 - found / dense);
-        }
+        assert_found(&parameters, &load, 1500, 1e-4);
     }
 }
 
@@ -175,11 +180,7 @@ fn a_tooth_that_carries_between_two_of_the_first_moments_alone_is_found() {
         clearance_um: PerContact { wave_generator: 12.0, ring: 4.0, carrier: 4.0 },
         ..load(8.821_845_665_400_59e-6, VirtualWork)
     };
-    let dense = of(&parameters, &load, Points::samples(1500).unwrap()).unwrap();
-    let found = to(&parameters, &load, 1e-4);
-    for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
-        assert!(found >= dense * (1.0 - 1e-4), "{name}: {:e}", 1.0 - found / dense);
-    }
+    assert_found(&parameters, &load, 1500, 1e-4);
 }
 
 /// There a gap has a corner.
@@ -200,11 +201,7 @@ fn a_peak_where_a_tooth_comes_to_the_relief_is_found() {
         modification: Modification { ring_tip_relief, ..Modification::default() },
         ..load(13.51, VirtualWork)
     };
-    let dense = of(&parameters, &load, Points::samples(6007).unwrap()).unwrap();
-    let found = to(&parameters, &load, 1e-5);
-    for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
-        assert!(found >= dense * (1.0 - 1e-5), "{name}: {:e}", 1.0 - found / dense);
-    }
+    assert_found(&parameters, &load, 6007, 1e-5);
 }
 
 /// Where corners bend both ways within two stretches their second differences take each other away.

@@ -88,8 +88,7 @@ async fn with_a_file(job: &impl AsyncFn(Store)) {
 
 async fn with_the_server(job: &impl AsyncFn(Store)) {
     if let Some(address) = server() {
-        let store = Store::open(&address).await.unwrap();
-        store.migrate().await.unwrap();
+        let store = migrated(&address).await;
         job(store).await;
     }
 }
@@ -99,6 +98,13 @@ async fn claimed(store: &Store, study: &NewStudy) -> Lease {
         Claim::Chunk(lease) => lease,
         other => panic!("{other:?}"),
     }
+}
+
+/// The store at this address, with the schema of this build.
+async fn migrated(address: &Address) -> Store {
+    let store = Store::open(address).await.unwrap();
+    store.migrate().await.unwrap();
+    store
 }
 
 async fn keep(lease: &mut Lease) {
@@ -446,8 +452,7 @@ async fn a_file_serves_one_process() {
 async fn two_workers_share_a_server_and_a_lost_lease_is_somebody_elses() {
     let Some(address) = server() else { return };
     let _others = SERVER.read().await;
-    let (one, other) = (Store::open(&address).await.unwrap(), Store::open(&address).await.unwrap());
-    one.migrate().await.unwrap();
+    let (one, other) = (migrated(&address).await, Store::open(&address).await.unwrap());
     let study = study("two", 1);
     one.create(&study).await.unwrap();
     let Claim::Chunk(mut silent) = one.claim(&study.cut(), Duration::from_millis(50)).await.unwrap() else { panic!() };
@@ -467,8 +472,7 @@ async fn two_workers_share_a_server_and_a_lost_lease_is_somebody_elses() {
 async fn a_worker_that_lives_keeps_its_chunk_however_long_that_takes() {
     let Some(address) = server() else { return };
     let _others = SERVER.read().await;
-    let (worker, other) = (Store::open(&address).await.unwrap(), Store::open(&address).await.unwrap());
-    worker.migrate().await.unwrap();
+    let (worker, other) = (migrated(&address).await, Store::open(&address).await.unwrap());
     let study = study("long", 1);
     worker.create(&study).await.unwrap();
     let silence = Duration::from_millis(1500);
@@ -497,8 +501,7 @@ async fn stranger(address: &Address) -> PgConnection {
 async fn who_wants_a_study_that_another_session_holds_is_told_so_in_time_and_the_server_does_nothing_of_it_later() {
     let Some(address) = server() else { return };
     let _others = SERVER.read().await;
-    let store = Store::open(&address).await.unwrap();
-    store.migrate().await.unwrap();
+    let store = migrated(&address).await;
     let study = study("held", 2);
     store.create(&study).await.unwrap();
     let mut holder = stranger(&address).await;
@@ -528,8 +531,7 @@ async fn who_wants_a_study_that_another_session_holds_is_told_so_in_time_and_the
 async fn who_has_computed_a_chunk_waits_for_a_lock_and_keeps_its_lease_meanwhile() {
     let Some(address) = server() else { return };
     let _alone = SERVER.write().await;
-    let store = Store::open(&address).await.unwrap();
-    store.migrate().await.unwrap();
+    let store = migrated(&address).await;
     let study = study("waiting", 1);
     store.create(&study).await.unwrap();
     let mut lease = claimed(&store, &study).await;
@@ -662,8 +664,7 @@ async fn a_chunk_of_a_study_that_was_begun_anew_and_cut_otherwise_is_none_of_its
 async fn a_study_that_is_asked_for_again_while_it_is_to_be_forgotten_is_kept() {
     let Some(address) = server() else { return };
     let _others = SERVER.read().await;
-    let (service, worker) = (Store::open(&address).await.unwrap(), Store::open(&address).await.unwrap());
-    service.migrate().await.unwrap();
+    let (service, worker) = (migrated(&address).await, Store::open(&address).await.unwrap());
     let study = study("wanted", 1);
     service.create(&study).await.unwrap();
     let lease = claimed(&worker, &study).await;
@@ -682,8 +683,7 @@ async fn a_study_that_is_asked_for_again_while_it_is_to_be_forgotten_is_kept() {
 async fn a_worker_that_does_not_let_go_holds_up_whoever_forgets_its_study_and_nobody_else() {
     let Some(address) = server() else { return };
     let _others = SERVER.read().await;
-    let (service, worker) = (Store::open(&address).await.unwrap(), Store::open(&address).await.unwrap());
-    service.migrate().await.unwrap();
+    let (service, worker) = (migrated(&address).await, Store::open(&address).await.unwrap());
     let study = study("still", 1);
     service.create(&study).await.unwrap();
     let lease = claimed(&worker, &study).await;

@@ -4,6 +4,7 @@ mod adaptive;
 mod columns;
 mod fast;
 mod plain;
+mod plain_look;
 mod points;
 mod search;
 mod unloaded;

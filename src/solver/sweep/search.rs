@@ -136,25 +136,26 @@ impl Piece {
     /// Loads have a corner there, and the ring's stress begins.
     fn cut_where_a_tooth_comes_to_the_flank(self, mesh: &Mesh) -> impl Iterator<Item = Self> + use<> {
         let (place, fraction) = mesh.flank_fraction();
-        let (limit, is_cut) = (*mesh.flank_limit(), mesh.lists_teeth_before_flank());
+        let limit = *mesh.flank_limit();
         let on_flank = Some(AtPlace { place, position: limit.position });
         let before = Some(AtPlace { place, position: TipCorner::last_before_flank(&limit) });
-        if is_cut && fraction > self.start && fraction < self.end {
-            let [one, other] =
-                [Self { end: fraction, at_end: before, ..self }, Self { start: fraction, at_start: on_flank, ..self }];
-            [Some(one), Some(other)].into_iter().flatten()
-        } else {
-            [Some(self), None].into_iter().flatten()
-        }
+        self.cut_at(mesh.lists_teeth_before_flank().then_some(fraction), [before, on_flank])
     }
 
     /// Its gap has a corner there, by a power of one, or grows by a bend from nothing.
     fn cut_where_a_tooth_comes_to_the_relief(self, fraction: Option<f64>) -> impl Iterator<Item = Self> + use<> {
+        self.cut_at(fraction, [None, None])
+    }
+
+    /// The pieces before and behind a fraction, where it lies within, with the tooth that is known exactly at the end of one and the start of the other.
+    fn cut_at(
+        self,
+        fraction: Option<f64>,
+        [at_end, at_start]: [Option<AtPlace>; 2],
+    ) -> impl Iterator<Item = Self> + use<> {
         let cut = fraction.filter(|&fraction| fraction > self.start && fraction < self.end);
-        let [one, other] = cut.map_or([Some(self), None], |fraction| {
-            [Some(Self { end: fraction, at_end: None, ..self }), Some(Self { start: fraction, at_start: None, ..self })]
-        });
-        [one, other].into_iter().flatten()
+        let before = cut.map_or(self, |end| Self { end, at_end, ..self });
+        std::iter::once(before).chain(cut.map(|start| Self { start, at_start, ..self }))
     }
 
     /// The position at a place.

@@ -1,0 +1,116 @@
+//! The search for the extremes of a sweep, looking tooth by tooth.
+
+use crate::contact::PerContact;
+use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
+use crate::mesh::Mesh;
+use crate::sweep::search::{LOADS, Look, Piece, Seen};
+use crate::{SolveError, Stop};
+
+/// Moments tooth by tooth.
+pub(crate) struct PlainLook<'a> {
+    /// With one tooth at each place of the mesh, which stands for all that carry alike; where items deviate, with every tooth.
+    loaded: LoadedDrive<'a>,
+    mesh: Mesh,
+    allowable_stress_mpa: Option<PerContact<f64>>,
+    has_gaps: bool,
+    is_linear: bool,
+    stop: &'a dyn Stop,
+}
+
+impl<'a> PlainLook<'a> {
+    pub(crate) fn new(loaded: &LoadedDrive<'a>, load: &LoadCase, stop: &'a dyn Stop) -> Self {
+        let mesh = *loaded.mesh();
+        let tells_items_apart = mesh.tells_items_apart();
+        Self {
+            loaded: if tells_items_apart { *loaded } else { loaded.with_zones(mesh.teeth_at_each_place()) },
+            mesh,
+            allowable_stress_mpa: load.parameters().allowable_stress_mpa,
+            has_gaps: loaded.has_gaps() || tells_items_apart,
+            is_linear: loaded.is_linear(),
+            stop,
+        }
+    }
+
+    /// The drive, and how many teeth each that is looked at stands for.
+    pub(crate) const fn loaded(&self) -> &LoadedDrive<'a> {
+        &self.loaded
+    }
+
+    /// The teeth of a piece, place by place.
+    ///
+    /// # Errors
+    /// Those of a tooth, with the input angle.
+    pub(crate) fn teeth(&self, piece: &Piece, fraction: f64) -> Result<Vec<ToothState>, SolveError> {
+        if self.stop.stopped() {
+            return Err(SolveError::Stopped);
+        }
+        let lap_deg = self.mesh.sweep_period_deg() / self.mesh.laps() as f64;
+        let input_angle_deg = (piece.lap as f64 + fraction) * lap_deg;
+        self.teeth_by_place(piece, fraction).map_err(|error| error.at_input_angle(input_angle_deg))
+    }
+
+    fn teeth_by_place(&self, piece: &Piece, fraction: f64) -> Result<Vec<ToothState>, SolveError> {
+        let mesh = &self.mesh;
+        if !mesh.tells_items_apart() {
+            let places = 1..=piece.places;
+            return places.map(|place| self.loaded.tooth(piece.position(mesh, place, fraction))).collect();
+        }
+        let position = |place| piece.position(mesh, place, fraction);
+        let mut placed: Vec<_> = mesh.placed_between(1..=piece.places, piece.lap, position).collect();
+        // Those at one place stay in the order of their slots.
+        placed.sort_by(|one, other| one.position.from_lobe_rad.total_cmp(&other.position.from_lobe_rad));
+        placed.iter().map(|tooth| self.loaded.tooth_at(&tooth.place, tooth.position)).collect()
+    }
+}
+
+impl Look for PlainLook<'_> {
+    fn has_gaps(&self) -> bool {
+        self.has_gaps
+    }
+
+    fn is_linear(&self) -> bool {
+        self.is_linear
+    }
+
+    fn is_in_proportion(&self) -> bool {
+        self.is_linear
+    }
+
+    fn input_torque_nmm(&self) -> f64 {
+        self.loaded.input_torque_nmm()
+    }
+
+    fn teeth_at_each_place(&self) -> u64 {
+        if self.mesh.tells_items_apart() { self.mesh.listed_at_each_place() } else { 1 }
+    }
+
+    fn look(&mut self, fractions: &[f64], seen: &mut Seen) -> Result<bool, SolveError> {
+        let piece = seen.piece;
+        for &fraction in fractions {
+            let teeth = self.teeth(&piece, fraction)?;
+            let wind_up = self.loaded.wind_up(&teeth)?;
+            if self.has_gaps {
+                let rotation = wind_up.rotation;
+                let closings_rad = teeth.iter().map(|tooth| tooth.spring.closing_rad);
+                seen.push_pressed(
+                    closings_rad.map(|closing_rad| rotation.excess_rad + (rotation.closing_rad - closing_rad)),
+                );
+            }
+            let per_capacity = match &self.allowable_stress_mpa {
+                Some(allowable_mpa) => 1.0 / self.loaded.torque_limit(&teeth, allowable_mpa)?.input_torque_nmm,
+                None => 0.0,
+            };
+            let (rotation_rad, stiffness) = (wind_up.rotation_rad(), wind_up.stiffness_nmm_per_rad);
+            let count = seen.teeth;
+            let values = seen.push(fraction);
+            for (index, tooth) in teeth.iter().enumerate() {
+                for (quantity, load) in self.loaded.loads(tooth, &wind_up)?.into_iter().enumerate() {
+                    values[quantity * count + index] = load;
+                }
+            }
+            let totals = [rotation_rad, 1.0 / rotation_rad, stiffness, 1.0 / stiffness, per_capacity];
+            values[LOADS * count..].copy_from_slice(&totals);
+        }
+        Ok(true)
+    }
+}
