@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::{fs, io};
 
 use serde_json::Value;
@@ -177,12 +177,7 @@ impl Tree {
                     eprintln!("{}", error["rendered"].as_str().unwrap_or_default());
                 }
             }
-            eprintln!(
-                "round {round}: {} errors; {} mutants do not compile, {} cannot be built in",
-                errors.len(),
-                lines.len(),
-                sites.len()
-            );
+            eprintln!("round {round}: {} mutants do not compile, {} cannot be built in", lines.len(), sites.len());
             if lines.is_empty() && sites.is_empty() && names == 0 {
                 return Err(io::Error::other("errors that come from no mutant"));
             }
@@ -222,7 +217,6 @@ impl Tree {
             .args(self.of.settings(stage))
             .current_dir(&self.copy)
             .env("CARGO_TARGET_DIR", &self.target)
-            .stderr(Stdio::inherit())
             .output()?;
         let messages =
             output.stdout.split(|&byte| byte == b'\n').filter_map(|line| serde_json::from_slice::<Value>(line).ok());
@@ -240,7 +234,9 @@ impl Tree {
                 program = message["executable"].as_str().map(PathBuf::from).or(program);
             }
         }
+        // That mutants do not compile is expected: what cargo says of it would only look like a failure.
         if errors.is_empty() && !output.status.success() {
+            eprint!("{}", String::from_utf8_lossy(&output.stderr));
             return Err(io::Error::other("cargo fails without an error in the sources"));
         }
         Ok((errors, program))
