@@ -14,7 +14,7 @@ use toothwave_solver::{
 };
 use utoipa::ToSchema;
 
-use crate::design::{CompatibilityDocument, Design};
+use crate::design::{CompatibilityDocument, Design, LawName};
 use crate::forms::{Form, Format, Forms, csv_error};
 use crate::json::word;
 use crate::key::Encode;
@@ -91,43 +91,6 @@ pub struct UnavailableAnswer {
     pub law: LawName,
     /// Why.
     pub code: NoAnswerCode,
-}
-
-/// A contact law.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum LawName {
-    /// `k = π L1 E*/2`.
-    Linear,
-    /// Given stiffnesses.
-    Fixed,
-    /// Palmgren's.
-    Palmgren,
-    /// Johnson's.
-    Johnson,
-    /// Hertz's.
-    Hertz,
-}
-
-impl From<ContactLaw> for LawName {
-    fn from(law: ContactLaw) -> Self {
-        match law {
-            ContactLaw::Linear => Self::Linear,
-            ContactLaw::Fixed(_) => Self::Fixed,
-            ContactLaw::Palmgren => Self::Palmgren,
-            ContactLaw::Johnson { .. } => Self::Johnson,
-            ContactLaw::Hertz => Self::Hertz,
-        }
-    }
-}
-
-impl From<Compatibility> for CompatibilityDocument {
-    fn from(compatibility: Compatibility) -> Self {
-        match compatibility {
-            Compatibility::Projection => Self::Projection,
-            Compatibility::VirtualWork => Self::VirtualWork,
-        }
-    }
 }
 
 /// The checked parameters of the question.

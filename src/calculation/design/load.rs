@@ -6,7 +6,7 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use toothwave_solver::violation::Range;
-use toothwave_solver::{ContactLaw, Material, Parameter, PerContact};
+use toothwave_solver::{Compatibility, ContactLaw, Material, Parameter, PerContact};
 use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
@@ -348,6 +348,43 @@ impl From<&StiffnessDocument> for ContactLaw {
                 Self::Johnson { depth_mm: depth_mm.by_contact() }
             }
             StiffnessDocument::Hertz(_) => Self::Hertz,
+        }
+    }
+}
+
+/// A contact law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LawName {
+    /// `k = π L1 E*/2`.
+    Linear,
+    /// Given stiffnesses.
+    Fixed,
+    /// Palmgren's.
+    Palmgren,
+    /// Johnson's.
+    Johnson,
+    /// Hertz's.
+    Hertz,
+}
+
+impl From<ContactLaw> for LawName {
+    fn from(law: ContactLaw) -> Self {
+        match law {
+            ContactLaw::Linear => Self::Linear,
+            ContactLaw::Fixed(_) => Self::Fixed,
+            ContactLaw::Palmgren => Self::Palmgren,
+            ContactLaw::Johnson { .. } => Self::Johnson,
+            ContactLaw::Hertz => Self::Hertz,
+        }
+    }
+}
+
+impl From<Compatibility> for CompatibilityDocument {
+    fn from(compatibility: Compatibility) -> Self {
+        match compatibility {
+            Compatibility::Projection => Self::Projection,
+            Compatibility::VirtualWork => Self::VirtualWork,
         }
     }
 }

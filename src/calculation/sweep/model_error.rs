@@ -7,8 +7,7 @@ use toothwave_solver::LoadCase;
 use toothwave_solver::model_error::{self as solver, Beyond, ErrorRange, Held, HeldCase, Measured, ModelError};
 use utoipa::ToSchema;
 
-use crate::accuracy::LawName;
-use crate::design::CompatibilityDocument;
+use crate::design::{CompatibilityDocument, LawName};
 use crate::json::word;
 
 /// The expected error of the model, numerical ones apart: how far it was off elastic bodies, calculated by finite elements, in drives
