@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use metrics::{counter, histogram};
+use parking_lot::Mutex;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
@@ -61,6 +62,16 @@ impl Drop for StopOnDrop {
             self.signal.store(true, Ordering::Relaxed);
             counter!("toothwave_cancellations_total").increment(1);
         }
+    }
+}
+
+/// What a job holds that has not begun. It is given back when nobody waits any more: where the system refuses a thread, tokio keeps the job until
+/// another finds one, and there would be no other once each permit lay in such a job.
+struct Waiting<T>(Arc<Mutex<Option<T>>>);
+
+impl<T> Drop for Waiting<T> {
+    fn drop(&mut self) {
+        drop(self.0.lock().take());
     }
 }
 
@@ -250,10 +261,14 @@ impl Pool {
         }
         let mut stop = StopOnDrop { signal: Arc::default(), is_over: false };
         let signal = Arc::clone(&stop.signal);
+        let waiting = Waiting(Arc::new(Mutex::new(Some(held))));
+        let begun = Arc::clone(&waiting.0);
         // spawn_blocking loses the span, and cannot be aborted: span, permit and place go along.
         let span = Span::current();
         let running = tokio::task::spawn_blocking(move || {
-            let _held = held;
+            let Some(_held) = begun.lock().take() else {
+                return Err(Problem::internal(&"nobody waits for it any more"));
+            };
             span.in_scope(|| caught(|| job(&signal)))
         });
         let finished = tokio::select! {
@@ -299,6 +314,7 @@ fn shutting_down() -> Problem {
 
 #[cfg(test)]
 mod tests {
+    use std::io;
     use std::sync::mpsc;
     use std::time::Duration;
 
@@ -306,12 +322,30 @@ mod tests {
 
     use super::{Pool, Thread};
     use crate::config::Settings;
-    use crate::problem::Problem;
+    use crate::problem::{Problem, ProblemCode};
 
     #[derive(clap::Parser)]
     struct Line {
         #[command(flatten)]
         settings: Settings,
+    }
+
+    /// As where the system refuses a thread: tokio keeps the job until one is free.
+    #[test]
+    fn a_job_that_finds_no_thread_gives_its_permit_and_place_back_when_nobody_waits_any_more() -> io::Result<()> {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().max_blocking_threads(1).build()?;
+        runtime.block_on(async {
+            let Line { settings } = Line::parse_from(["serve", "--deadline-ms", "1"]);
+            let pool = Pool::new(settings.limits());
+            let (release, released) = mpsc::channel::<()>();
+            let busy = tokio::task::spawn_blocking(move || released.recv());
+            let refused = pool.run(pool.deadline(), Thread::Blocking, |_| Ok(())).await;
+            assert_eq!(refused.err().map(|problem| problem.code), Some(ProblemCode::DeadlineExceeded));
+            assert_eq!((pool.running(), pool.admitted()), (0, 0));
+            assert!(release.send(()).is_ok());
+            assert!(busy.await.is_ok_and(|done| done.is_ok()));
+        });
+        Ok(())
     }
 
     #[tokio::test(start_paused = true)]
