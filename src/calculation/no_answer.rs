@@ -15,9 +15,12 @@ pub struct NoAnswer {
     pub code: NoAnswerCode,
     /// What happened, and what to do about it.
     pub detail: String,
-    /// Where fields are at fault: each of them.
+    /// Where fields are at fault: each of them, of more than a hundred the first.
     pub errors: Vec<FieldError>,
 }
+
+/// So many fields at fault are named: of a list of thousands each would take a hundred times what it takes in the document.
+const MOST_ERRORS: usize = 100;
 
 /// Kinds of reason, each a stable word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
@@ -58,12 +61,13 @@ impl NoAnswer {
         Self { code, detail: detail.into(), errors }
     }
 
-    /// All violations of a design.
+    /// The violations of a design.
     pub fn impossible(violations: &[Violation]) -> Self {
-        let errors: Vec<_> = violations.iter().map(FieldError::from).collect();
-        let detail = match errors.as_slice() {
-            [only] => format!("{}: {}", only.pointer, only.detail),
-            several => format!("{} values are impossible; `errors` names each", several.len()),
+        let errors: Vec<_> = violations.iter().take(MOST_ERRORS).map(FieldError::from).collect();
+        let detail = match (errors.as_slice(), violations.len()) {
+            ([only], _) => format!("{}: {}", only.pointer, only.detail),
+            (_, several @ ..=MOST_ERRORS) => format!("{several} values are impossible; `errors` names each"),
+            (_, several) => format!("{several} values are impossible; `errors` names the first {MOST_ERRORS}"),
         };
         Self::at_fields(NoAnswerCode::ImpossibleDesign, detail, errors)
     }

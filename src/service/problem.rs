@@ -48,9 +48,9 @@ pub struct Problem {
     pub detail: String,
     /// The kind of problem, a stable word.
     pub code: ProblemCode,
-    /// Where fields are at fault: each of them.
+    /// Where fields are at fault: each of them, of more than 100 the first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schema(required = false)]
+    #[schema(required = false, max_items = 100)]
     pub errors: Vec<FieldError>,
     /// Of an internal error, why: for the log alone.
     #[serde(skip)]

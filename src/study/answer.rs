@@ -37,6 +37,12 @@ impl Forms for StudyAnswer {
             Self::Sensitivity(_) | Self::Tolerance(_) => 4096,
         }
     }
+
+    fn held_bytes(&self, format: Format) -> u64 {
+        let of_answer = if let Self::Map(map) = self { map.held_bytes() } else { 0 };
+        let of_groups = if format == Format::Parquet { self.table().parquet_bytes() } else { 0 };
+        of_answer + of_groups
+    }
 }
 
 impl StudyAnswer {

@@ -319,6 +319,12 @@ impl MapAnswer {
         places
     }
 
+    /// About how many bytes its columns take.
+    pub(crate) fn held_bytes(&self) -> u64 {
+        let of_possible = 8 * (self.quantities.len() + 1) * self.possible.variant.len();
+        (of_possible + 12 * self.impossible.variant.len()) as u64
+    }
+
     pub(crate) fn expected_bytes(&self) -> usize {
         4096 + (20 * self.quantities.len() + 8) * self.possible.variant.len() + 12 * self.impossible.variant.len()
     }

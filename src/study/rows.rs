@@ -70,6 +70,7 @@ impl<'a> RowsView<'a> {
         columns.extend(places);
         columns.extend(self.columns.iter().map(|(name, _)| Column::new(*name, Content::Number)));
         columns.push(Column::new("reason", Content::Word));
+        let length = self.answered.len() + self.refused.len();
         let (mut possible, mut impossible) = (0, 0);
         let rows = iter::from_fn(move || {
             let (answered, refused) = (self.answered.get(possible), self.refused.get(impossible));
@@ -95,7 +96,7 @@ impl<'a> RowsView<'a> {
             }
             Some(row)
         });
-        Table { columns, rows: Box::new(rows) }
+        Table { columns, length, rows: Box::new(rows) }
     }
 }
 

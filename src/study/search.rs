@@ -801,7 +801,8 @@ impl SearchAnswer {
             }));
             row
         });
-        Table { columns, rows: Box::new(rows) }
+        let length = self.front.len();
+        Table { columns, length, rows: Box::new(rows) }
     }
 }
 

@@ -274,7 +274,8 @@ impl SensitivityAnswer {
                 row
             })
         });
-        Table { columns, rows: Box::new(rows) }
+        let length = self.quantities.iter().map(|of| of.inputs.len()).sum();
+        Table { columns, length, rows: Box::new(rows) }
     }
 }
 

@@ -12,12 +12,18 @@ use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::types;
 use toothwave_calculation::forms::csv_error;
 
-/// Rows of a group in Parquet: what is held beside the answer until it is written.
+/// Rows of a group in Parquet, at most, and cells: these are held beside the answer until the group is written.
 const GROUP_ROWS: usize = 1 << 16;
+const GROUP_CELLS: usize = 1 << 19;
+
+/// What Parquet notes of each column of a group, to the end of the file.
+const NOTE_BYTES: u64 = 1 << 10;
 
 /// A table, its rows made one after the other.
 pub(crate) struct Table<'a> {
     pub(crate) columns: Vec<Column>,
+    /// How many rows there are.
+    pub(crate) length: usize,
     /// Each with a cell for every column.
     pub(crate) rows: Box<dyn Iterator<Item = Vec<Cell>> + 'a>,
 }
@@ -88,19 +94,42 @@ impl Table<'_> {
         // Parquet wants a writer of its own: it gets a buffer, which is emptied after each group.
         let file = SerializedFileWriter::new(Vec::new(), Arc::new(schema), Arc::new(properties));
         let mut file = file.map_err(parquet_error)?;
+        let group_rows = self.group_rows();
         loop {
-            let rows: Vec<_> = self.rows.by_ref().take(GROUP_ROWS).collect();
+            let rows: Vec<_> = self.rows.by_ref().take(group_rows).collect();
             if rows.is_empty() {
                 return writer.write_all(&file.into_inner().map_err(parquet_error)?);
             }
             write_group(&mut file, &self.columns, &rows).map_err(parquet_error)?;
             file.flush()?;
             writer.write_all(&mem::take(file.inner_mut()))?;
+            // A group may come to a few bytes: whoever wants it stopped is asked after each.
+            writer.flush()?;
         }
+    }
+
+    /// About how many bytes writing it as Parquet holds, beside what it is made of and what is written.
+    pub(crate) fn parquet_bytes(&self) -> u64 {
+        let (group_rows, columns) = (self.group_rows(), self.columns.len() as u64);
+        let of_row: u64 = self.columns.iter().map(Column::cell_bytes).sum();
+        let groups = self.length.div_ceil(group_rows) as u64;
+        self.length.min(group_rows) as u64 * of_row + groups.saturating_mul(columns).saturating_mul(NOTE_BYTES)
+    }
+
+    fn group_rows(&self) -> usize {
+        (GROUP_CELLS / self.columns.len().max(1)).clamp(1, GROUP_ROWS)
     }
 }
 
 impl Column {
+    /// What a cell takes until its group is written; a word, where it is short.
+    const fn cell_bytes(&self) -> u64 {
+        match self.kind {
+            Content::Count | Content::Number => 32,
+            Content::Word => 64,
+        }
+    }
+
     fn schema(&self) -> Result<types::Type, ParquetError> {
         let (physical, logical) = match self.kind {
             Content::Count => (Type::INT64, None),

@@ -488,6 +488,7 @@ impl ToleranceAnswer {
                 row
             })
         });
-        Table { columns, rows: Box::new(rows) }
+        let length = self.quantities.iter().map(|of| of.quantiles.len()).sum();
+        Table { columns, length, rows: Box::new(rows) }
     }
 }

@@ -196,6 +196,17 @@ async fn a_list_that_does_not_fit_is_told_at_its_place_and_every_entry_out_of_ra
 }
 
 #[tokio::test]
+async fn of_thousands_of_entries_out_of_range_the_first_hundred_are_told() {
+    let document = with_deviations(json!({ "wave_generator_lobe_um": vec![2e6; 5000] }));
+    for path in ["/v1/sweep", "/v1/accuracy"] {
+        let problem = Service::new().post(path, &document).await.refused(422, "impossible_design");
+        // Each of them, and that there are two lobes.
+        assert_eq!(problem["detail"], "5001 values are impossible; `errors` names the first 100", "{path}");
+        assert_eq!(problem["errors"].as_array().unwrap().len(), 100, "{path}");
+    }
+}
+
+#[tokio::test]
 async fn a_list_takes_numbers_alone() {
     for (wrong, pointer) in [
         (json!({ "slot_wall_um": 1.0 }), "/deviations/slot_wall_um"),

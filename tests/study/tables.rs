@@ -84,6 +84,33 @@ fn a_result_has_the_same_cells_as_parquet_and_as_csv() {
     assert_eq!(assert_same(&impossible), 0);
 }
 
+#[test]
+fn a_table_of_many_columns_is_written_in_groups_of_fewer_rows_and_says_what_it_holds_for_them() {
+    let fields = (0..200).map(|entry| (format!("/deviations/slot_wall_um/{entry}"), json!({ "one_of": [0] })));
+    let mut over: serde_json::Map<_, _> = fields.collect();
+    // Nearly all of them impossible, so that they take no time.
+    over.insert("/drive/teeth/radius_mm".into(), json!({ "min": 1.0, "max": 900.0, "steps": 6000 }));
+    let drive = json!({
+        "wave_generator": { "semi_major_mm": 600.0, "semi_minor_mm": 599.0 },
+        "teeth": { "count": 200, "radius_mm": 1.0, "width_mm": 15.0 },
+        "ring": { "teeth": 198 }
+    });
+    let base = with(&with(&paper(), "/drive", drive), "/deviations", json!({ "slot_wall_um": vec![0; 200] }));
+    let map = json!({ "study": "map", "base": base, "over": over, "quantities": ["transmission_ratio"] });
+    let answer = gathered(&map).answer();
+    let mut bytes = Vec::new();
+    answer.write(Format::Parquet, &mut bytes).unwrap();
+    let file = SerializedFileReader::new(Bytes::from(bytes)).unwrap();
+    let groups = file.metadata().row_groups();
+    assert_eq!(groups.iter().map(|group| group.num_rows()).sum::<i64>(), 6000);
+    let most =
+        groups.iter().map(|group| group.num_rows() * i64::try_from(group.columns().len()).unwrap()).max().unwrap();
+    assert!(groups.len() > 1 && most <= 1 << 19, "{most} cells in one of {} groups", groups.len());
+    // A number takes 8 bytes at the very least.
+    let beside = answer.held_bytes(Format::Parquet) - answer.held_bytes(Format::Csv);
+    assert!(beside >= 8 * u64::try_from(most).unwrap(), "{beside} bytes for {most} cells");
+}
+
 /// The rows of all chunks, of so many variants each, under one head.
 fn cells_of_chunks(document: &Value, variants: u64) -> Vec<Vec<String>> {
     let study = Study::read(document.to_string().as_bytes(), &LIMITS).unwrap().in_chunks_of(variants);

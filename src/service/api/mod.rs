@@ -284,6 +284,11 @@ impl<'a, W> Stoppable<'a, W> {
     fn new(inner: W, stop: &'a AtomicBool) -> Self {
         Self { inner, until_look: LOOK_EVERY_BYTES, stop }
     }
+
+    fn look(&mut self) -> io::Result<()> {
+        self.until_look = LOOK_EVERY_BYTES;
+        if self.stop.load(Ordering::Relaxed) { Err(io::Error::other("stopped")) } else { Ok(()) }
+    }
 }
 
 impl<W: Write> Write for Stoppable<'_, W> {
@@ -296,17 +301,14 @@ impl<W: Write> Write for Stoppable<'_, W> {
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         match self.until_look.checked_sub(bytes.len()) {
             Some(rest) => self.until_look = rest,
-            None => {
-                self.until_look = LOOK_EVERY_BYTES;
-                if self.stop.load(Ordering::Relaxed) {
-                    return Err(io::Error::other("stopped"));
-                }
-            }
+            None => self.look()?,
         }
         self.inner.write_all(bytes)
     }
 
+    // Of what comes to few bytes whoever writes it knows when to look.
     fn flush(&mut self) -> io::Result<()> {
+        self.look()?;
         self.inner.flush()
     }
 }
