@@ -100,7 +100,7 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
         keys.warn_of_readers();
     }
     let mut limits = settings.limits();
-    limits.max_connections = connections_that_fit(limits.max_connections);
+    limits.max_connections = connections_that_fit(limits.max_connections)?;
     let app = App::keeping(limits, keeping);
     let entry = Entry {
         cors_origins: settings.cors_origins.clone(),
@@ -195,17 +195,24 @@ pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: O
 }
 
 /// As many connections as are wanted, or as the process may open files for, whose number is raised as far as the process may do so itself.
-fn connections_that_fit(wanted: usize) -> usize {
+///
+/// # Errors
+/// Where that is none.
+fn connections_that_fit(wanted: usize) -> io::Result<usize> {
     let mut files = getrlimit(Resource::Nofile);
     files.current = files.maximum;
     // Where it is not allowed, the number stays what it was.
     let _ = setrlimit(Resource::Nofile, files);
-    let Some(files) = getrlimit(Resource::Nofile).current else { return wanted };
-    let fit = usize::try_from(files.saturating_sub(OTHER_FILES)).unwrap_or(usize::MAX).max(1);
+    let Some(files) = getrlimit(Resource::Nofile).current else { return Ok(wanted) };
+    let fit = usize::try_from(files.saturating_sub(OTHER_FILES)).unwrap_or(usize::MAX);
+    if fit == 0 {
+        let why = format!("the process may open {files} files: {OTHER_FILES}, and one for each connection, are wanted");
+        return Err(io::Error::other(why));
+    }
     if fit < wanted {
         tracing::warn!(files, wanted, fit, "fewer connections than wanted: the process may not open more files");
     }
-    wanted.min(fit)
+    Ok(wanted.min(fit))
 }
 
 /// Waits until every request is answered, at most for `bound`; just before its end running solves are told to stop.

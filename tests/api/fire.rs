@@ -128,6 +128,16 @@ fn where_the_process_may_open_few_files_it_admits_fewer_connections_and_refuses_
 }
 
 #[test]
+fn where_the_process_may_open_too_few_files_for_a_connection_it_does_not_start() {
+    let script = "ulimit -n 128; exec \"$0\" serve --listen 127.0.0.1:0";
+    let ended = Command::new("timeout").args(["60", "sh", "-c", script, env!("CARGO_BIN_EXE_toothwave")]).output();
+    let ended = ended.unwrap();
+    assert_eq!(ended.status.code(), Some(1));
+    let said = String::from_utf8(ended.stderr).unwrap();
+    assert!(said.contains("the process may open 128 files: 128, and one for each connection, are wanted"), "{said}");
+}
+
+#[test]
 fn a_limit_of_files_that_the_process_may_raise_itself_is_raised() {
     let process = held_to("-S -n 100", &["serve"]);
     let limits = ask_at(process.address, &Question::of("GET", "/v1/limits")).found();
