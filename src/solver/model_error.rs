@@ -2,9 +2,9 @@
 //! those that this speaks for.
 
 use crate::backing::{Backing, Fingers, Rim, Shares, Support};
-use crate::contact::{ContactLaw, Material};
+use crate::contact::{Contact, ContactLaw, Material};
 use crate::drive::{Drive, ToothShape};
-use crate::findings::{SOFT_BACKING_SHARE, widest_half_widths_mm};
+use crate::findings::{SOFT_BACKING_SHARE, is_beyond_steel, widest_half_widths_mm};
 use crate::gaps::Deviations;
 use crate::load_sharing::{Compatibility, LoadCase, LoadParameters};
 use crate::ring::FlankEnd;
@@ -22,6 +22,10 @@ pub const GAP_TO_UM: f64 = 10.0;
 
 /// Half the width of the widest contact of all states over the tooth's radius, at most: all drives that were calculated stay below.
 pub const HALF_WIDTH_SHARE_TO: f64 = 0.035;
+
+/// The same, at least, where the law is not Johnson's: its approach grows with another power of the force, so that the wind-up errs the more the lighter
+/// the load. The widest contacts of the drives that were calculated are 0.0168 to 0.034 of the radius by those laws.
+pub const HALF_WIDTH_SHARE_FROM: f64 = 0.015;
 
 /// How far the moduli of parts may differ to be alike: all bodies were of one steel.
 pub const ALIKE: f64 = 0.1;
@@ -90,7 +94,7 @@ pub enum Beyond {
     /// Teeth that enter under load: finite elements leave out the angles where one stands on the tip. A real tip takes its load little by little, and the
     /// peak comes out lower.
     EntryUnderLoad,
-    /// Parts of unlike moduli.
+    /// Parts of unlike moduli, or by Palmgren's law parts that are not of steel.
     Materials,
     /// A larger gap.
     Gap,
@@ -102,6 +106,8 @@ pub enum Beyond {
     SoftBacking,
     /// A wider contact.
     HalfWidth,
+    /// By a law other than Johnson's contacts that are all narrower.
+    LightLoad,
 }
 
 /// How parts are held that the law takes as held at its depth.
@@ -268,6 +274,10 @@ pub fn of(
     let is_alike =
         |material: &Material| (material.compliance_per_mpa() / own.compliance_per_mpa() - 1.0).abs() <= ALIKE;
     let mates = [&p.materials.wave_generator, &p.materials.ring, &p.materials.carrier];
+    let is_steels = p.law == ContactLaw::Palmgren;
+    let contacts = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
+    let is_beyond_steel = contacts.into_iter().any(|contact| is_beyond_steel(&p.materials, contact));
+    let tooth_radius_mm = drive.parameters().tooth_radius_mm;
     // Of lines the widest is not the one with the largest stress; flats and the ellipses of balls are known at their peaks alone.
     let at_peaks = sweep.peaks.iter().map(|(_, peaks)| peaks.half_width_mm);
     let of_lines = widest_half_widths_mm(drive, &sweep.states).map(|(_, half_width_mm)| half_width_mm);
@@ -279,7 +289,7 @@ pub fn of(
         (drive.sense() < 0.0, Beyond::RingWithMoreTeeth),
         (drive.largest_pressure_angle_deg()? > PRESSURE_ANGLE_TO_DEG, Beyond::PressureAngle),
         (has_pointed_tips(drive) && !p.corner_contact, Beyond::EntryUnderLoad),
-        (!mates.into_iter().all(is_alike), Beyond::Materials),
+        (!mates.into_iter().all(is_alike) || (is_steels && is_beyond_steel), Beyond::Materials),
         (p.clearance_um.iter().any(|(_, &gap_um)| gap_um > GAP_TO_UM), Beyond::Gap),
         (p.modification.first().is_some() || !deviations.is_nil(), Beyond::Modification),
         (p.series_compliance_mm_per_n.iter().any(|(_, &compliance)| compliance > 0.0), Beyond::SeriesCompliance),
@@ -287,7 +297,11 @@ pub fn of(
             parts.is_some_and(|(_, shares)| shares.shares.iter().any(|(_, share)| *share > SOFT_BACKING_SHARE)),
             Beyond::SoftBacking,
         ),
-        (widest_mm > HALF_WIDTH_SHARE_TO * drive.parameters().tooth_radius_mm, Beyond::HalfWidth),
+        (widest_mm > HALF_WIDTH_SHARE_TO * tooth_radius_mm, Beyond::HalfWidth),
+        (
+            !matches!(p.law, ContactLaw::Johnson { .. }) && widest_mm < HALF_WIDTH_SHARE_FROM * tooth_radius_mm,
+            Beyond::LightLoad,
+        ),
     ];
     let beyond = reasons.into_iter().filter(|&(is_beyond, _)| is_beyond).map(|(_, reason)| reason).collect();
     let held = parts.and_then(|(support, shares)| Held::of(support, shares));

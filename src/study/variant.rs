@@ -142,7 +142,21 @@ impl Template {
                 if found.code == FieldCode::MissingField {
                     found.detail = format!("{}: neither the base has it nor `{list}`", found.detail);
                 }
-                found.pointer = template.blamed(&found.pointer);
+                // Beyond the end of a list, or below a value: what is put there is at fault, not what the base has.
+                let has_fields =
+                    path(&found.pointer).is_some_and(|path| matches!(base.at(&path), Some(Tree::Object(_))));
+                let leads_on = |variable: &&Variable| {
+                    variable.pointer != found.pointer && is_within(&variable.pointer, &found.pointer)
+                };
+                let leading = template.variables.iter().find(leads_on);
+                found.pointer = match leading.filter(|_| !has_fields && found.code != FieldCode::MissingField) {
+                    Some(variable) => {
+                        found.code = FieldCode::UnknownField;
+                        found.detail = format!("no document of this base has such a field within `{}`", found.pointer);
+                        at(&variable.pointer)
+                    }
+                    None => template.blamed(&found.pointer),
+                };
                 found
             })?;
             template.forms.push(form);

@@ -147,8 +147,34 @@ fn an_entry_of_a_list_has_one_name() {
     };
     assert_eq!(numbers(&answer(&study("0"))["possible"]["quantities"]["input_torque_nm"]), [5.0, 6.0]);
     for name in ["00", "+0", "1"] {
-        assert!(faulty(&study(name)).0.starts_with("/base/load/duty"), "{name}");
+        let at = format!("/over/~1load~1duty~1{name}~1input_torque_nm");
+        assert_eq!(faulty(&study(name)), (at, "unknown_field".into()));
     }
+}
+
+#[test]
+fn what_leads_past_a_value_of_the_base_is_at_fault_and_not_the_base() {
+    let of = |pointer: &str| faulty(&map(json!({ pointer: { "min": 3.0, "max": 5.0, "steps": 2 } }), json!([])));
+    for pointer in [
+        "/drive/teeth/radius_mm/",
+        "/drive/teeth/count/x",
+        "/deviations/tooth_radius_um/99",
+        "/model/stiffness/depth_mm/ring",
+    ] {
+        let at = format!("/over/{}", pointer.replace('/', "~1"));
+        assert_eq!(of(pointer), (at, "unknown_field".into()));
+    }
+    // Where the base has no fields of a kind, they may still be put there.
+    let base = with(&paper(), "/load/allowable_stress_mpa", json!(1500.0));
+    let alone = json!({ "one_of": [1500.0] });
+    let over = json!({
+        "/load/allowable_stress_mpa/wave_generator": alone, "/load/allowable_stress_mpa/carrier": alone,
+        "/load/allowable_stress_mpa/ring": { "min": 1000.0, "max": 1500.0, "steps": 2 }
+    });
+    let study = with(&map(over, json!(["torque_capacity_output_nm"])), "/base", base);
+    let capacities_nm = answer(&study)["possible"]["quantities"]["torque_capacity_output_nm"].clone();
+    let [at_1000, at_1500] = numbers(&capacities_nm)[..] else { panic!("{capacities_nm}") };
+    assert!(at_1000 < at_1500);
 }
 
 /// They were refused for want of a speed, which every point of a duty has.

@@ -138,7 +138,7 @@ pub enum BeyondWord {
     PressureAngle,
     /// Teeth that enter under load, at angles that were left out: a real tip takes its load little by little, and the peak comes out lower.
     EntryUnderLoad,
-    /// Parts of unlike moduli.
+    /// Parts of unlike moduli, or by Palmgren's law parts that are not of steel.
     Materials,
     /// A larger gap.
     Gap,
@@ -150,6 +150,8 @@ pub enum BeyondWord {
     SoftBacking,
     /// A wider contact.
     HalfWidth,
+    /// By a law other than Johnson's contacts that are all narrower: its wind-up errs the more the lighter the load.
+    LightLoad,
 }
 
 impl From<Beyond> for BeyondWord {
@@ -167,6 +169,7 @@ impl From<Beyond> for BeyondWord {
             Beyond::SeriesCompliance => Self::SeriesCompliance,
             Beyond::SoftBacking => Self::SoftBacking,
             Beyond::HalfWidth => Self::HalfWidth,
+            Beyond::LightLoad => Self::LightLoad,
         }
     }
 }

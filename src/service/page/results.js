@@ -32,12 +32,13 @@ const BEYOND = {
   ring_with_more_teeth: 'a ring with more teeth',
   pressure_angle: 'a steeper flank',
   entry_under_load: 'teeth that enter under load',
-  materials: 'unlike materials',
+  materials: 'its materials',
   gap: 'larger gaps',
   modification: 'its modification',
   series_compliance: 'what gives way behind its contacts',
   soft_backing: 'soft parts behind its contacts',
   half_width: 'wider contacts',
+  light_load: 'so light a load under its law',
 };
 
 /** How far to believe some numbers: what the model was found to err by in drives of this case, calculated as elastic bodies. What is not like
