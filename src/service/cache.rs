@@ -127,8 +127,9 @@ impl Drop for Landing {
     }
 }
 
-/// Spellings that are remembered: some ten megabytes.
+/// Spellings that are remembered, at most, and bytes of answers for each: one takes some 360 bytes, so that all take a tenth of what answers may.
 const MOST_SPELLINGS: u64 = 65_536;
+const BYTES_A_SPELLING: u64 = 4096;
 
 /// What an entry costs beside its body.
 const ENTRY_OVERHEAD_BYTES: usize = 256;
@@ -141,7 +142,8 @@ impl Cache {
             // A body beyond 4 GiB weighs as much as can be said, and is not kept.
             .weigher(|_, stored: &Stored| u32::try_from(stored.body.len() + ENTRY_OVERHEAD_BYTES).unwrap_or(u32::MAX))
             .build();
-        Self { answers, keys: moka::sync::Cache::new(MOST_SPELLINGS), flights: Flights::default() }
+        let spellings = MOST_SPELLINGS.min(max_bytes / BYTES_A_SPELLING);
+        Self { answers, keys: moka::sync::Cache::new(spellings), flights: Flights::default() }
     }
 
     /// Bytes and entries kept now.
@@ -310,6 +312,16 @@ mod tests {
         assert!(cache.key(spelling(b"{}")).is_none());
         cache.remember(spelling(b"{}"), key(1.0));
         assert!(cache.key(spelling(b"{}")) == Some(key(1.0)) && cache.key(spelling(b"{ }")).is_none());
+    }
+
+    #[test]
+    fn however_many_spellings_there_are_few_are_remembered_where_few_answers_are_kept() {
+        let cache = Cache::new(1 << 20);
+        for number in 0..10_000_u32 {
+            cache.remember(Spelling::new("sweep", Representation::JSON, &number.to_le_bytes()), key(1.0));
+        }
+        cache.keys.run_pending_tasks();
+        assert!((1..=256).contains(&cache.keys.entry_count()), "{}", cache.keys.entry_count());
     }
 
     /// Its room is of those who asked.

@@ -49,6 +49,9 @@ const REFUSAL: Duration = Duration::from_secs(1);
 /// probe, which asks at once, is answered however many others come and say nothing.
 const SIDE_CONNECTIONS: usize = 64;
 
+/// What is read of a connection ahead of its turn, or waits to be written, at most: more than a head, and little for each of a thousand.
+const MOST_AHEAD_BYTES: usize = 1 << 16;
+
 /// Files that are kept for all but admitted connections: those beyond the last one, the listener, what the runtime has, the keys file.
 const OTHER_FILES: u64 = SIDE_CONNECTIONS as u64 + 64;
 
@@ -251,6 +254,7 @@ impl Server {
         let http = |patience| {
             let mut http = http1::Builder::new();
             http.timer(TokioTimer::new()).header_read_timeout(patience).max_header_size(MAX_HEADER_BYTES);
+            http.max_buf_size(MOST_AHEAD_BYTES);
             http
         };
         let mut side_http = http(REFUSAL);

@@ -172,7 +172,7 @@ impl Reading {
     pub fn columns_bytes(&self) -> u64 {
         match self {
             Self::Made(_) => 0,
-            Self::Rows { kept, .. } => kept.study.stored_bytes(),
+            Self::Rows { kept, .. } => kept.study.answer_bytes(),
         }
     }
 

@@ -196,6 +196,15 @@ impl Search {
         self.islands * (8 * numbers * points) as u64
     }
 
+    /// What the designs of an answer take, whole documents each, of which the longest takes so much as a tree: those of the front, or, where there is
+    /// none, those that come nearest.
+    pub(crate) fn designs_bytes(&self, document_bytes: usize) -> u64 {
+        /// Of a design with its quantities, beside its lists, whose numbers take a quarter of what they do in a tree.
+        const DESIGN_BYTES: usize = 8192;
+        let designs = (2 * crate::optimise::MOST_OF_FRONT).max(self.limits.len() + 1);
+        (designs * (DESIGN_BYTES + document_bytes / 2)) as u64
+    }
+
     /// That what is free changes every objective, and every quantity that is beyond its limit else.
     pub(crate) fn require_that_free_fields_matter(
         &self,

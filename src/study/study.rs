@@ -160,11 +160,12 @@ impl Study {
             refused.code = NoAnswerCode::TooManyVariants;
             return Err(refused);
         }
+        let bytes = study.kept_bytes().max(study.answer_bytes());
         #[expect(clippy::cast_precision_loss, reason = "told, not computed with")]
-        if study.kept_bytes() > limits.max_study_bytes {
-            let (bytes, limit) = (study.kept_bytes(), limits.max_study_bytes);
+        if bytes > limits.max_study_bytes {
+            let limit = limits.max_study_bytes;
             let detail = format!(
-                "the study with what it comes to takes {bytes} bytes, more than the {limit} of `max_study_bytes`: ask for fewer variants or quantities"
+                "the study with what it comes to takes {bytes} bytes, more than the {limit} of `max_study_bytes`: ask for fewer variants or quantities, or of a shorter base"
             );
             let mut refused = beyond("", FieldCode::TooManyVariants, detail, bytes as f64, limit as f64);
             refused.code = NoAnswerCode::TooManyVariants;
@@ -279,6 +280,15 @@ impl Study {
             }
         };
         OVERHEAD.saturating_add(bytes)
+    }
+
+    /// About what its answer takes beside what is kept.
+    pub fn answer_bytes(&self) -> u64 {
+        let of_designs = match &self.kind {
+            Kind::Search(search) => search.designs_bytes(self.template.longest_bytes()),
+            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => 0,
+        };
+        self.stored_bytes().saturating_add(of_designs)
     }
 
     /// About what it takes to keep it with what it comes to.

@@ -234,6 +234,11 @@ impl Template {
         choices.chain(self.examples()).map(Tree::bytes).sum()
     }
 
+    /// About what its longest document takes.
+    pub(crate) fn longest_bytes(&self) -> usize {
+        self.examples().map(Tree::bytes).max().unwrap_or_default()
+    }
+
     /// The document of a combination of choices, in which everything else stands at some value.
     fn form(&self, base: &Tree, combination: usize) -> Result<Form, Fault> {
         let mut form = Form {

@@ -1,11 +1,13 @@
 //! Searches.
 
 use serde_json::{Value, json};
+use toothwave_calculation::no_answer::NoAnswerCode;
 use toothwave_calculation::question::Question as _;
 use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::Never;
+use toothwave_study::{Limits, Study};
 
-use crate::asking::{CALCULATION, answer, faulty, paper, with};
+use crate::asking::{CALCULATION, LIMITS, answer, faulty, paper, study, with};
 
 /// Two objectives that pull at the teeth's radius, the diameter being theirs, and a limit.
 fn search() -> Value {
@@ -221,7 +223,7 @@ fn the_number_of_teeth_follows_from_those_of_the_ring() {
 #[test]
 fn a_newcomer_is_refused_at_what_was_given() {
     let detail = |document: &Value| {
-        let refused = crate::asking::study(document).expect_err("the study can be carried out");
+        let refused = study(document).expect_err("the study can be carried out");
         refused.errors[0].detail.clone()
     };
     let mut others = Vec::new();
@@ -454,7 +456,7 @@ fn a_search_that_nothing_free_can_answer_is_refused_before_it_runs() {
         requiring("transmission_ratio", json!({ "min": 13.0 })),
         with(&search(), radius, json!({ "min": -2.0, "max": 5.0 })),
     ] {
-        crate::asking::study(&document).unwrap_or_else(|refused| panic!("{refused}"));
+        study(&document).unwrap_or_else(|refused| panic!("{refused}"));
     }
 }
 
@@ -493,10 +495,35 @@ fn what_a_quantity_is_not_said_to_depend_on_leaves_it_as_it_is() {
                 "study": "search", "base": base, "evaluations": 100, "free": { pointer: { "min": 1e-3, "max": 2e-3 } },
                 "objectives": [{ "quantity": name, "goal": "min" }]
             });
-            let refused = crate::asking::study(&search).err().and_then(|refused| refused.errors.into_iter().next());
+            let refused = study(&search).err().and_then(|refused| refused.errors.into_iter().next());
             let is_unaffected =
                 refused.is_some_and(|error| toothwave_calculation::json::word(&error.code) == "unaffected");
             assert!(!(changes && is_unaffected), "{pointer} changes {name}");
         }
     }
+}
+
+/// Each design of the front is a whole document.
+#[test]
+fn what_a_search_of_a_long_document_comes_to_is_bounded_with_the_studies() {
+    let of = |entries: usize| {
+        let drive = json!({
+            "wave_generator": { "semi_major_mm": 20_600.0, "semi_minor_mm": 20_599.0 },
+            "teeth": { "count": entries, "radius_mm": 1.0, "width_mm": 15.0 },
+            "ring": { "teeth": entries - 2 }
+        });
+        let base = with(&with(&paper(), "/drive", drive), "/deviations", json!({ "slot_wall_um": vec![0; entries] }));
+        json!({
+            "study": "search", "base": base, "evaluations": 500,
+            "free": { "/drive/teeth/radius_mm": { "min": 0.5, "max": 1.0 } },
+            "objectives": [{ "quantity": "slot_wall_mm", "goal": "max" }, { "quantity": "peak_stress_mpa", "goal": "min" }]
+        })
+    };
+    let bytes = |entries| study(&of(entries)).unwrap().answer_bytes();
+    // 200 designs, each with eight bytes an entry at least.
+    assert!(bytes(9000) - bytes(1000) >= 200 * 8 * 8000);
+    let limits = Limits { max_study_bytes: 8 << 20, ..LIMITS };
+    let read = |entries| Study::read(of(entries).to_string().as_bytes(), &limits);
+    assert!(read(100).is_ok());
+    assert_eq!(read(9000).err().map(|refused| refused.code), Some(NoAnswerCode::TooManyVariants));
 }
