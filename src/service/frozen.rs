@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+use rustix::time::{ClockId, clock_gettime};
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_calculation::{BUILD, question};
 use toothwave_store::NewStudy;
@@ -149,6 +150,12 @@ pub fn decoded(bytes: &[u8]) -> Result<Part, Problem> {
     postcard::from_bytes(bytes).map_err(|error| Problem::internal(&error))
 }
 
+/// Time that this thread has had of a processor: a canary that had to stand aside for others would be cut in far too many chunks, for good.
+fn processor_time() -> Duration {
+    // It counts from the thread's start, and is never negative.
+    clock_gettime(ClockId::ThreadCPUTime).try_into().unwrap_or_default()
+}
+
 /// Variants spread over a study; of a search the beginning of its first island.
 struct Canary {
     study: Arc<Study>,
@@ -176,10 +183,10 @@ impl Canary {
 
     /// As far as a slice allows; whether it is over.
     fn slice(&mut self, stop: &AtomicBool) -> Result<bool, Problem> {
-        let started = Instant::now();
-        while self.sung < self.most
-            && self.until.is_none_or(|until| self.sung == 0 || self.busy + started.elapsed() < until)
-        {
+        let (started, begun) = (Instant::now(), processor_time());
+        let busy = self.busy;
+        let busy_now = || busy + processor_time().saturating_sub(begun);
+        while self.sung < self.most && self.until.is_none_or(|until| self.sung == 0 || busy_now() < until) {
             match &mut self.island {
                 Some(island) => {
                     if island.step(stop).map_err(|_| NoAnswer::stopped())? {
@@ -194,11 +201,11 @@ impl Canary {
             }
             self.sung += 1;
             if started.elapsed() >= SLICE {
-                self.busy += started.elapsed();
+                self.busy = busy_now();
                 return Ok(false);
             }
         }
-        self.busy += started.elapsed();
+        self.busy = busy_now();
         if let Some(island) = self.island.take() {
             self.hasher.update(&encoded(&island.finish())?);
         }

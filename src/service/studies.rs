@@ -263,7 +263,7 @@ impl Kept {
     }
 
     /// Told whenever it stands otherwise, or has come further.
-    pub fn watch(&self) -> impl Future<Output = ()> + Send + 'static {
+    pub fn watch(&self) -> impl Future<Output = ()> + Send + use<> {
         let mut state = self.state.subscribe();
         async move {
             // An error says that the study is forgotten: nothing more will come.
@@ -377,7 +377,18 @@ impl Kept {
             let mut gathered = rows.gathered.lock();
             parts.into_iter().for_each(|(chunk, part)| gathered.add(chunk, part));
         }
+        // Of one that was forgotten meanwhile there are fewer, or none, and nothing else says so.
+        let is_whole = rows.gathered.lock().is_complete();
+        let is_done = self.state.borrow().state == StudyState::Done;
+        if is_done && !is_whole && !self.look(store).await? {
+            return Err(self.forgotten());
+        }
         Ok(())
+    }
+
+    fn forgotten(&self) -> Problem {
+        let detail = format!("the study `{}` was forgotten in this moment; ask for it again", self.id);
+        Problem::new(ProblemCode::NotFound, detail)
     }
 
     /// Looks how a stored study stands; whether it is kept at all. One that was forgotten and begun anew, in other chunks, is not this one.
@@ -813,10 +824,7 @@ impl Studies {
                 *kept.rows.lock() = Some(Arc::clone(&rows));
                 Ok(rows)
             }
-            (None, Keeping::Memory | Keeping::Nowhere) => {
-                let detail = format!("the study `{}` was forgotten in this moment; ask for it again", kept.id);
-                Err(Problem::new(ProblemCode::NotFound, detail))
-            }
+            (None, Keeping::Memory | Keeping::Nowhere) => Err(kept.forgotten()),
         }
     }
 

@@ -532,6 +532,22 @@ async fn who_waits_for_rows_that_another_reads_is_told_why_they_do_not_come() {
 }
 
 #[tokio::test]
+async fn a_result_that_another_forgets_as_it_is_read_is_not_there_instead_of_empty() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, true).await;
+    let id = keeper.wait_for(&map(5)).await["id"].as_str().unwrap().to_owned();
+    keeper.end().await;
+    // Who has read nothing of it yet.
+    let reader = Keeper::of(&file, LIMITS, false).await;
+    let studies = &reader.service.app.studies;
+    let kept = studies.find(&id).await.unwrap().unwrap();
+    reader.store.forget(&id).await.unwrap();
+    let read = studies.read(&kept, reader.service.app.pool.deadline()).await;
+    assert_eq!(read.err().map(|problem| problem.code), Some(ProblemCode::NotFound));
+    reader.end().await;
+}
+
+#[tokio::test]
 async fn a_study_that_another_forgets_while_it_begins_is_no_fault_of_the_service() {
     let file = File::new();
     let keeper = Keeper::of(&file, LIMITS, false).await;

@@ -1,5 +1,8 @@
 //! Studies over HTTP: asked, waited for, watched, cancelled, gone on with, refused.
 
+use std::time::Duration;
+
+use futures_util::StreamExt as _;
 use serde_json::{Value, json};
 use toothwave::config::Limits;
 
@@ -79,6 +82,24 @@ async fn who_does_not_wait_is_told_where_the_study_stands_and_its_events_end_wit
     let told: Value = serde_json::from_str(last.split_once("data: ").unwrap().1).unwrap();
     assert_eq!(told["state"], "done");
     assert_eq!(service.get(&place(&study)).await.found(), told);
+}
+
+/// A chunk may take minutes, and a proxy takes who says nothing for gone. Each event once came with the next change alone.
+#[tokio::test]
+async fn events_tell_at_once_how_a_study_stands_and_give_a_sign_of_life_while_there_is_nothing_to_tell() {
+    let service = Service::within(Limits { max_concurrent_solves: 1, ..LIMITS });
+    let occupied = Occupied::by_one(&service.app.pool).await;
+    let study = begun(&service, &map(&shortest(), 5)).await.json();
+    let question = Question::of("GET", study["events_href"].as_str().unwrap());
+    let mut events = service.response(question.request()).await.into_body().into_data_stream();
+    tokio::time::pause();
+    let first = events.next().await.unwrap().unwrap();
+    assert!(first.starts_with(b"event: progress\n"), "{first:?}");
+    tokio::time::advance(Duration::from_secs(6)).await;
+    // A comment (HTML Living Standard, section 9.2).
+    assert_eq!(events.next().await.unwrap().unwrap()[..], b":\n\n"[..]);
+    tokio::time::resume();
+    drop(occupied);
 }
 
 #[tokio::test]

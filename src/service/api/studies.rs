@@ -10,7 +10,7 @@ use axum::extract::rejection::PathRejection;
 use axum::extract::{Path, Request, State};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
-use axum::response::sse::{Event, Sse};
+use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use futures_util::stream;
 use serde::Serialize;
@@ -33,6 +33,9 @@ const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-appli
 
 /// Between two events of a study's progress.
 const PAUSE: Duration = Duration::from_millis(100);
+
+/// After so long without an event a comment is sent: a chunk may take minutes, and a proxy takes who says nothing for gone.
+const SIGN_OF_LIFE: Duration = Duration::from_secs(5);
 
 /// Every quantity that a study can be asked for.
 #[derive(Debug, Serialize, ToSchema)]
@@ -171,27 +174,27 @@ pub async fn events(State(app): State<Arc<App>>, id: Result<Path<String>, PathRe
         Err(problem) => return problem.into_response(),
     };
     let closing = app.studies.closing().clone();
-    let events = stream::unfold(Some(kept), move |kept| {
+    // How it stands at once, and then whenever that changes.
+    let events = stream::unfold(Some((kept, None)), move |next| {
         let closing = closing.clone();
         async move {
-            let kept = kept?;
+            let (kept, changed) = next?;
+            if let Some(changed) = changed {
+                tokio::select! {
+                    () = async { changed.await; tokio::time::sleep(PAUSE).await } => {}
+                    () = closing.cancelled() => return None,
+                }
+            }
             // Subscribed before it is looked at, so that nothing is missed.
             let changed = kept.watch();
             let resource = kept.resource();
             let is_running = kept.is_running();
             let name = if is_running { EventName::Progress } else { EventName::End };
             let event = Event::default().event(word(&name)).json_data(&resource).unwrap_or_default();
-            if !is_running {
-                return Some((Ok::<_, Infallible>(event), None));
-            }
-            let next = tokio::select! {
-                () = async { changed.await; tokio::time::sleep(PAUSE).await } => Some(kept),
-                () = closing.cancelled() => None,
-            };
-            Some((Ok(event), next))
+            Some((Ok::<_, Infallible>(event), is_running.then_some((kept, Some(changed)))))
         }
     });
-    no_store(Sse::new(events).into_response())
+    no_store(Sse::new(events).keep_alive(KeepAlive::new().interval(SIGN_OF_LIFE)).into_response())
 }
 
 fn no_store(mut response: Response) -> Response {
