@@ -20,6 +20,9 @@ pub const PRESSURE_ANGLE_TO_DEG: f64 = 47.0;
 /// Gap at a contact, at most.
 pub const GAP_TO_UM: f64 = 10.0;
 
+/// The same over the tooth's radius, at most: 10 µm were at teeth of 1.5 mm.
+pub const GAP_SHARE_TO: f64 = 0.01 / 1.5;
+
 /// Half the width of the widest contact of all states over the tooth's radius, at most: all drives that were calculated stay below.
 pub const HALF_WIDTH_SHARE_TO: f64 = 0.035;
 
@@ -278,6 +281,7 @@ pub fn of(
     let contacts = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
     let is_beyond_steel = contacts.into_iter().any(|contact| is_beyond_steel(&p.materials, contact));
     let tooth_radius_mm = drive.parameters().tooth_radius_mm;
+    let most_um = GAP_TO_UM.min(1e3 * GAP_SHARE_TO * tooth_radius_mm);
     // Of lines the widest is not the one with the largest stress; flats and the ellipses of balls are known at their peaks alone.
     let at_peaks = sweep.peaks.iter().map(|(_, peaks)| peaks.half_width_mm);
     let of_lines = widest_half_widths_mm(drive, &sweep.states).map(|(_, half_width_mm)| half_width_mm);
@@ -290,7 +294,7 @@ pub fn of(
         (drive.largest_pressure_angle_deg()? > PRESSURE_ANGLE_TO_DEG, Beyond::PressureAngle),
         (has_pointed_tips(drive) && !p.corner_contact, Beyond::EntryUnderLoad),
         (!mates.into_iter().all(is_alike) || (is_steels && is_beyond_steel), Beyond::Materials),
-        (p.clearance_um.iter().any(|(_, &gap_um)| gap_um > GAP_TO_UM), Beyond::Gap),
+        (p.clearance_um.iter().any(|(_, &gap_um)| gap_um > most_um), Beyond::Gap),
         (p.modification.first().is_some() || !deviations.is_nil(), Beyond::Modification),
         (p.series_compliance_mm_per_n.iter().any(|(_, &compliance)| compliance > 0.0), Beyond::SeriesCompliance),
         (

@@ -19,6 +19,10 @@ use crate::root::NotConverged;
 /// of the flank by 0.4.
 const FINE: usize = 16;
 
+/// Elements of either half of its land, where the tip is bored, denser towards the flank's end; every other half is a single one. What the land would bear
+/// of a half-plane beside a force at the flank's end is what bends the tooth there.
+const FINE_OF_LAND: usize = 8;
+
 /// Tooth spaces on either side of the one whose flank is pressed, at most.
 const SPACES_BESIDE: u64 = 2;
 
@@ -145,9 +149,16 @@ impl Piece {
         fine.push(flank_point(flank, limit.position)? / pitch_mm);
         let coarse = [fine[0], fine[FINE]];
         let half_pitch_rad = PI / ring_teeth as f64;
-        // The tip, where a land or nothing lies beyond the flank.
-        let tip = Point2::new(half_pitch_rad.cos(), half_pitch_rad.sin()) * (drive.tip_radius_mm() / pitch_mm);
-        let land = ((tip - fine[FINE]).norm() > 1e-9).then_some(tip);
+        // From the middle of the tip, where a land or nothing lies beyond the flank.
+        let at_tip =
+            |angle_rad: f64| Point2::new(angle_rad.cos(), angle_rad.sin()) * (drive.tip_radius_mm() / pitch_mm);
+        let end_rad = fine[FINE].y.atan2(fine[FINE].x);
+        let has_land = (at_tip(half_pitch_rad) - fine[FINE]).norm() > 1e-9;
+        let land = |is_fine: bool| {
+            let steps = if is_fine { FINE_OF_LAND } else { 1 };
+            let shares = (1..=if has_land { steps } else { 0 }).rev().map(move |step| step as f64 / steps as f64);
+            shares.map(move |share| at_tip(end_rad + (half_pitch_rad - end_rad) * share * share)).collect::<Vec<_>>()
+        };
         let mirrored = |point: Point2<f64>| Point2::new(point.x, -point.y);
         let mut elements = Vec::new();
         let mut first_pressed = 0;
@@ -156,14 +167,15 @@ impl Piece {
         for space in (0..=2 * pressed_space).rev() {
             let turn = Rotation2::new(2.0 * half_pitch_rad * (space as f64 - pressed_space as f64));
             let points = |is_fine: bool| if is_fine { &fine[..] } else { &coarse[..] };
-            // Backwards about the axis, so that the material is on the left.
-            let forward = points(space == pressed_space).iter().rev().copied();
-            let backward = points(space == pressed_space + 1).iter().copied().map(mirrored);
-            let outline = land.into_iter().chain(forward).chain(backward).chain(land.map(mirrored));
-            let outline: Vec<_> = outline.map(|point| turn * point).collect();
-            if space == pressed_space {
-                first_pressed = elements.len() + usize::from(land.is_some());
+            let (is_pressed, is_behind) = (space == pressed_space, space == pressed_space + 1);
+            let (land_before, land_behind) = (land(is_pressed), land(is_behind));
+            if is_pressed {
+                first_pressed = elements.len() + land_before.len();
             }
+            // Backwards about the axis, so that the material is on the left.
+            let forward = land_before.into_iter().chain(points(is_pressed).iter().rev().copied());
+            let backward = points(is_behind).iter().copied().chain(land_behind.into_iter().rev()).map(mirrored);
+            let outline: Vec<_> = forward.chain(backward).map(|point| turn * point).collect();
             elements.extend(outline.windows(2).map(|ends| Element::new(ends[0], ends[1], false)));
         }
         if let [first, .., last] = elements[..] {

@@ -10,7 +10,7 @@ use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
 use toothwave_solver::model_error::{self, Beyond, ErrorRange, Measured};
 use toothwave_solver::{
     Compatibility, ContactLaw, Deviations, Drive, DriveParameters, LoadCase, LoadParameters, PerContact, Position,
-    Torque,
+    ToothShape, Torque,
 };
 
 use crate::drives::{ECCENTRIC, PAPER_5_1, PAPER_5_2, ellipse, load, swept};
@@ -340,6 +340,23 @@ fn the_drives_that_were_calculated_lie_within_the_range_and_others_do_not() {
         if drive.lobes() == 2 && case.drive == "5.1" && !LoadCase::new(&own).unwrap().has_gaps() {
             let gaps = PerContact { ring: 10.5, ..PerContact::default() };
             assert_eq!(beyond(&parameters, &LoadParameters { clearance_um: gaps, ..own }), [Beyond::Gap]);
+            // The same drive a tenth as large: what is a gap there hangs on the size.
+            let small = DriveParameters {
+                wave_generator: ellipse(5.8, 5.6),
+                tooth_radius_mm: 0.5,
+                tooth: ToothShape::Cylinder { width_mm: 1.5 },
+                ..parameters
+            };
+            for (gap_um, expected) in [(3.0, vec![]), (4.0, vec![Beyond::Gap])] {
+                let clearance_um = PerContact { ring: gap_um, ..PerContact::default() };
+                let load = LoadParameters {
+                    clearance_um,
+                    torque: Torque::Input(0.02),
+                    law: ContactLaw::Johnson { depth_mm: PerContact::of(|_| None) },
+                    ..own
+                };
+                assert_eq!(beyond(&small, &load), expected, "{gap_um} µm");
+            }
             let series = PerContact { carrier: 1e-7, ..PerContact::default() };
             let backed = LoadParameters { series_compliance_mm_per_n: series, ..own };
             assert_eq!(beyond(&parameters, &backed), [Beyond::SeriesCompliance]);

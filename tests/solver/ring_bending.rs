@@ -44,6 +44,27 @@ fn teeth_of_case_5_2_bend_as_those_of_finite_elements() {
     }
 }
 
+/// A force at the corner of a wedge moves it by more than a half-plane (Michell), whatever land lies beyond.
+#[test]
+fn a_bored_ring_gives_way_the_more_the_nearer_the_force_is_to_its_corner() {
+    let wide_land = DriveParameters {
+        wave_generator: ellipse(669.53, 572.498),
+        teeth: 27,
+        installed: 27,
+        ring_teeth: 29,
+        tooth_radius_mm: 39.783,
+        tip_radius_mm: Some(700.92),
+        ..PAPER_5_1
+    };
+    for parameters in [PAPER_5_2_BORED, wide_land] {
+        let drive = drive(&parameters);
+        let at = beyond_root(&drive, &Material::STEEL);
+        let end_deg = drive.flank_limit().position.from_lobe_deg();
+        let last_tenth: Vec<_> = (0..=100).map(|step| at((0.9 + 0.001 * f64::from(step)) * end_deg)).collect();
+        assert!(last_tenth.is_sorted(), "{parameters:?}: {last_tenth:?}");
+    }
+}
+
 #[test]
 fn a_ring_with_hardly_any_teeth_bends_nowhere_more_than_at_its_root() {
     let shallow = DriveParameters { wave_generator: ellipse(58.0, 57.99), ..PAPER_5_1 };
