@@ -221,8 +221,8 @@ pub struct SensitivityToInput {
     pub at_plus: Option<f64>,
     /// The largest change either way; 0 where neither has an answer.
     pub change: f64,
-    /// Change of the quantity over change of the input, between less and more; left out where one of them has no answer or they tell of a
-    /// kink or a jump.
+    /// Change of the quantity over change of the input, between less and more; left out where one of them has no answer or both ways
+    /// differ by more than a tenth: by a kink, a jump or a bend.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub derivative: Option<f64>,

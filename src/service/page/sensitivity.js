@@ -103,7 +103,9 @@ export class Sensitivity extends StudyView {
       return part;
     };
     const cell = (end) => html('td', { class: 'numeric number' }, end === undefined ? 'no answer' : difference(end, value));
-    const words = [label, ' ', html('span', { class: 'unit' }, withUnit(number(given), unit)), isSmooth ? '' : html('span', { class: 'unit' }, ', with a kink')];
+    // Where one way has no answer its cell says so.
+    const isUnlike = !isSmooth && less !== undefined && more !== undefined;
+    const words = [label, ' ', html('span', { class: 'unit' }, withUnit(number(given), unit)), isUnlike ? html('span', { class: 'unit' }, ', unlike either way') : ''];
     return html(
       'tr',
       {},
