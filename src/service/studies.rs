@@ -748,7 +748,9 @@ impl Studies {
             Some(kept) => kept,
             None => {
                 let study = Arc::new(study);
-                let rows = self.new_rows(&mut all, &study, study.kept_bytes())?;
+                let in_work = study.chunks().min(self.limits.max_concurrent_solves as u64);
+                let bytes = study.kept_bytes().saturating_add(in_work.saturating_mul(study.working_bytes()));
+                let rows = self.new_rows(&mut all, &study, bytes)?;
                 let kept = Kept::new(study, Some(rows), 0, None);
                 all.push_back(Arc::clone(&kept));
                 kept

@@ -531,16 +531,6 @@ fn is_flat(drive: &Drive, contact: Contact) -> bool {
     contact == Contact::Carrier && matches!(drive.parameters().tooth, ToothShape::FlatSided { .. })
 }
 
-/// The contact modulus of steel on steel.
-fn steel_modulus_mpa() -> f64 {
-    Materials { wave_generator: STEEL, teeth: STEEL, ring: STEEL, carrier: STEEL }.contact_modulus_mpa(Contact::Ring)
-}
-
-/// Whether Palmgren's constant, which is that of steel on steel, says nothing of a contact.
-pub(crate) fn is_beyond_steel(materials: &Materials, contact: Contact) -> bool {
-    (materials.contact_modulus_mpa(contact) / steel_modulus_mpa() - 1.0).abs() > STEEL_TOLERANCE
-}
-
 /// The findings about a drive's contacts under a load. `approaches_matter` where wind-up or clearance was asked for.
 pub fn of_contacts(
     drive: &Drive,
@@ -560,13 +550,16 @@ pub fn of_contacts(
         findings.push(Finding::LinearLawTooStiff { linear_um: 1e3 * linear_mm, palmgren_um: 1e3 * palmgren_mm });
     }
     if p.law == ContactLaw::Palmgren {
+        let steel = Materials { wave_generator: STEEL, teeth: STEEL, ring: STEEL, carrier: STEEL };
+        let steel_mpa = steel.contact_modulus_mpa(Contact::Ring);
         // A flat has a law of its own, which follows the modulus.
         for (contact, _) in peaks.iter().filter(|&(contact, _)| !is_flat(drive, contact)) {
-            if is_beyond_steel(&p.materials, contact) {
+            let contact_mpa = p.materials.contact_modulus_mpa(contact);
+            if (contact_mpa / steel_mpa - 1.0).abs() > STEEL_TOLERANCE {
                 findings.push(Finding::PalmgrenBeyondSteel {
                     contact,
-                    contact_modulus_gpa: 1e-3 * p.materials.contact_modulus_mpa(contact),
-                    steel_gpa: 1e-3 * steel_modulus_mpa(),
+                    contact_modulus_gpa: 1e-3 * contact_mpa,
+                    steel_gpa: 1e-3 * steel_mpa,
                 });
             }
         }

@@ -4,7 +4,7 @@
 use crate::backing::{Backing, Fingers, Rim, Shares, Support};
 use crate::contact::{Contact, ContactLaw, Material};
 use crate::drive::{Drive, ToothShape};
-use crate::findings::{SOFT_BACKING_SHARE, is_beyond_steel, widest_half_widths_mm};
+use crate::findings::{SOFT_BACKING_SHARE, widest_half_widths_mm};
 use crate::gaps::Deviations;
 use crate::load_sharing::{Compatibility, LoadCase, LoadParameters};
 use crate::ring::FlankEnd;
@@ -25,10 +25,6 @@ pub const GAP_SHARE_TO: f64 = 0.01 / 1.5;
 
 /// Half the width of the widest contact of all states over the tooth's radius, at most: all drives that were calculated stay below.
 pub const HALF_WIDTH_SHARE_TO: f64 = 0.035;
-
-/// The same, at least, where the law is not Johnson's: its approach grows with another power of the force, so that the wind-up errs the more the lighter
-/// the load. The widest contacts of the drives that were calculated are 0.0168 to 0.034 of the radius by those laws.
-pub const HALF_WIDTH_SHARE_FROM: f64 = 0.015;
 
 /// How far the moduli of parts may differ to be alike: all bodies were of one steel.
 pub const ALIKE: f64 = 0.1;
@@ -84,7 +80,8 @@ pub struct Measured {
 /// Why a drive is none of those that the measured errors speak for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Beyond {
-    /// Stiffnesses of the designer's own, or balls: nothing was measured.
+    /// Stiffnesses of the designer's own, or balls: nothing was measured. Of other laws than Johnson's three drives were, each under one load, and with any
+    /// other size or load they err otherwise: their approach grows with another power of the force, or knows no radius, modulus or backing.
     Law,
     /// Teeth that are no cylinders.
     ToothShape,
@@ -97,7 +94,7 @@ pub enum Beyond {
     /// Teeth that enter under load: finite elements leave out the angles where one stands on the tip. A real tip takes its load little by little, and the
     /// peak comes out lower.
     EntryUnderLoad,
-    /// Parts of unlike moduli, or by Palmgren's law parts that are not of steel.
+    /// Parts of unlike moduli.
     Materials,
     /// A larger gap.
     Gap,
@@ -105,12 +102,10 @@ pub enum Beyond {
     Modification,
     /// Something that gives way behind a contact.
     SeriesCompliance,
-    /// A part behind a contact that gives way by more than can be left out, by its estimate.
+    /// A part behind a contact that gives way by more than can be left out, by its estimate, or that has none.
     SoftBacking,
     /// A wider contact.
     HalfWidth,
-    /// By a law other than Johnson's contacts that are all narrower.
-    LightLoad,
 }
 
 /// How parts are held that the law takes as held at its depth.
@@ -277,35 +272,34 @@ pub fn of(
     let is_alike =
         |material: &Material| (material.compliance_per_mpa() / own.compliance_per_mpa() - 1.0).abs() <= ALIKE;
     let mates = [&p.materials.wave_generator, &p.materials.ring, &p.materials.carrier];
-    let is_steels = p.law == ContactLaw::Palmgren;
-    let contacts = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
-    let is_beyond_steel = contacts.into_iter().any(|contact| is_beyond_steel(&p.materials, contact));
     let tooth_radius_mm = drive.parameters().tooth_radius_mm;
     let most_um = GAP_TO_UM.min(1e3 * GAP_SHARE_TO * tooth_radius_mm);
+    // Slots that run into each other leave no finger that could be estimated.
+    let has_estimate = |shares: &Shares, contact: Contact| {
+        *p.series_compliance_mm_per_n.get(contact) > 0.0
+            || shares.shares.iter().any(|(estimate, _)| estimate.backing.contact() == contact)
+    };
+    let is_soft = |shares: &Shares| {
+        shares.shares.iter().any(|(_, share)| *share > SOFT_BACKING_SHARE)
+            || ![Contact::Ring, Contact::Carrier].into_iter().all(|contact| has_estimate(shares, contact))
+    };
     // Of lines the widest is not the one with the largest stress; flats and the ellipses of balls are known at their peaks alone.
     let at_peaks = sweep.peaks.iter().map(|(_, peaks)| peaks.half_width_mm);
     let of_lines = widest_half_widths_mm(drive, &sweep.states).map(|(_, half_width_mm)| half_width_mm);
     let widest_mm = at_peaks.chain(of_lines).fold(0.0, f64::max);
     let reasons = [
-        (measured.is_none(), Beyond::Law),
+        (measured.is_none() || !matches!(p.law, ContactLaw::Johnson { .. }), Beyond::Law),
         (!matches!(drive.parameters().tooth, ToothShape::Cylinder { .. }), Beyond::ToothShape),
         (drive.lobes() > LOBES_TO, Beyond::Lobes),
         (drive.sense() < 0.0, Beyond::RingWithMoreTeeth),
         (drive.largest_pressure_angle_deg()? > PRESSURE_ANGLE_TO_DEG, Beyond::PressureAngle),
         (has_pointed_tips(drive) && !p.corner_contact, Beyond::EntryUnderLoad),
-        (!mates.into_iter().all(is_alike) || (is_steels && is_beyond_steel), Beyond::Materials),
+        (!mates.into_iter().all(is_alike), Beyond::Materials),
         (p.clearance_um.iter().any(|(_, &gap_um)| gap_um > most_um), Beyond::Gap),
         (p.modification.first().is_some() || !deviations.is_nil(), Beyond::Modification),
         (p.series_compliance_mm_per_n.iter().any(|(_, &compliance)| compliance > 0.0), Beyond::SeriesCompliance),
-        (
-            parts.is_some_and(|(_, shares)| shares.shares.iter().any(|(_, share)| *share > SOFT_BACKING_SHARE)),
-            Beyond::SoftBacking,
-        ),
+        (parts.is_some_and(|(_, shares)| is_soft(shares)), Beyond::SoftBacking),
         (widest_mm > HALF_WIDTH_SHARE_TO * tooth_radius_mm, Beyond::HalfWidth),
-        (
-            !matches!(p.law, ContactLaw::Johnson { .. }) && widest_mm < HALF_WIDTH_SHARE_FROM * tooth_radius_mm,
-            Beyond::LightLoad,
-        ),
     ];
     let beyond = reasons.into_iter().filter(|&(is_beyond, _)| is_beyond).map(|(_, reason)| reason).collect();
     let held = parts.and_then(|(support, shares)| Held::of(support, shares));

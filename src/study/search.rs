@@ -196,6 +196,11 @@ impl Search {
         self.islands * (8 * numbers * points) as u64
     }
 
+    /// What the documents take of which the true peaks are looked at.
+    pub(crate) fn template_bytes(&self) -> usize {
+        self.at_true_peaks.as_ref().map_or(0, Template::bytes)
+    }
+
     /// What the designs of an answer take, whole documents each, of which the longest takes so much as a tree: those of the front, or, where there is
     /// none, those that come nearest.
     pub(crate) fn designs_bytes(&self, document_bytes: usize) -> u64 {

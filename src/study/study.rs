@@ -293,7 +293,16 @@ impl Study {
 
     /// About what it takes to keep it with what it comes to.
     pub fn kept_bytes(&self) -> u64 {
-        self.stored_bytes().saturating_add(self.template.bytes() as u64)
+        let of_true_peaks = match &self.kind {
+            Kind::Search(search) => search.template_bytes(),
+            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => 0,
+        };
+        self.stored_bytes().saturating_add((self.template.bytes() + of_true_peaks) as u64)
+    }
+
+    /// About what a chunk takes that is in work, beside what it comes to.
+    pub fn working_bytes(&self) -> u64 {
+        self.template.clone_bytes() as u64
     }
 }
 

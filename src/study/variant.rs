@@ -1,5 +1,8 @@
 //! Variants of a document: what is free in it, over which values, and the document with values put in.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use toothwave_calculation::design::Design;
 use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::json::{Fault, Tree, path};
@@ -16,6 +19,9 @@ const MOST_FORMS_BYTES: usize = 8 << 20;
 /// Fields that a form may leave out because only other kinds, shapes or laws have them: each is found by reading the whole form again, and
 /// all that there are have fewer.
 const MOST_LEFT_OUT: usize = 64;
+
+/// What a clone's own copies take, at most, beside the one that it fills.
+const OWN_BYTES: usize = 1 << 18;
 
 const RING_TEETH: [&str; 3] = ["drive", "ring", "teeth"];
 
@@ -64,13 +70,15 @@ pub(crate) enum Value {
     Choice(usize),
 }
 
-/// Documents with free fields: one for each combination of choices.
+/// Documents with free fields: one for each combination of choices. Clones share them, but for those that a clone has filled.
 #[derive(Debug, Clone)]
 pub(crate) struct Template {
     /// What the study's document calls the list of the variables.
     list: &'static str,
-    variables: Vec<Variable>,
-    forms: Vec<Form>,
+    variables: Arc<Vec<Variable>>,
+    forms: Arc<Vec<Form>>,
+    /// Copies of forms that are shared, by their index, to be filled.
+    own: BTreeMap<usize, Form>,
 }
 
 #[derive(Debug, Clone)]
@@ -123,7 +131,7 @@ impl Template {
             }
             variables.push(Variable { pointer: pointer.clone(), path, domain, choices });
         }
-        let mut template = Self { list, variables, forms: Vec::new() };
+        let mut template = Self { list, variables: Arc::new(variables), forms: Arc::default(), own: BTreeMap::new() };
         let mut combinations = template.variables.iter().map(|variable| variable.choices.len().max(1));
         let combinations = combinations.try_fold(1_usize, usize::checked_mul).filter(|&count| count <= MOST_FORMS);
         let Some(combinations) = combinations else {
@@ -159,9 +167,9 @@ impl Template {
                 };
                 found
             })?;
-            template.forms.push(form);
+            Arc::make_mut(&mut template.forms).push(form);
         }
-        for (index, variable) in template.variables.iter_mut().enumerate() {
+        for (index, variable) in Arc::make_mut(&mut template.variables).iter_mut().enumerate() {
             let Some(form) = template.forms.iter().find(|form| form.takes[index]) else {
                 let detail = format!("no variant takes `{}`", variable.pointer);
                 return Err(fault(&at(&variable.pointer), FieldCode::UnknownField, detail));
@@ -175,7 +183,7 @@ impl Template {
             }
         }
         // Until it was known which numbers are whole, any had to be: from here on each form is a variant of its own.
-        for form in &mut template.forms {
+        for form in Arc::make_mut(&mut template.forms) {
             form.put_least(&template.variables);
         }
         Ok(template)
@@ -234,6 +242,15 @@ impl Template {
         choices.chain(self.examples()).map(Tree::bytes).sum()
     }
 
+    fn own_bytes(&self) -> usize {
+        self.own.values().map(|form| form.tree.bytes()).sum()
+    }
+
+    /// About what a clone takes at most, once it has filled them all.
+    pub(crate) fn clone_bytes(&self) -> usize {
+        self.bytes().min(self.longest_bytes().max(OWN_BYTES))
+    }
+
     /// About what its longest document takes.
     pub(crate) fn longest_bytes(&self) -> usize {
         self.examples().map(Tree::bytes).max().unwrap_or_default()
@@ -248,7 +265,7 @@ impl Template {
                 && self.variables.iter().all(|variable| variable.path != RING_TEETH),
         };
         let mut rest = combination;
-        for variable in &self.variables {
+        for variable in self.variables.iter() {
             let value = match variable.domain {
                 Domain::OneOf(count) => {
                     let chosen = variable.choices[rest % count].clone();
@@ -275,7 +292,7 @@ impl Template {
             if form.tree.remove(&place).is_none() {
                 return Err(found);
             }
-            for (takes, variable) in form.takes.iter_mut().zip(&self.variables) {
+            for (takes, variable) in form.takes.iter_mut().zip(self.variables.iter()) {
                 *takes &= !variable.path.starts_with(&place);
             }
         }
@@ -296,7 +313,15 @@ impl Template {
     /// The document with these values, one for each variable. What the form does not take stays out.
     pub(crate) fn filled(&mut self, values: &[Value]) -> &Tree {
         let index = self.form_index(values);
-        let form = &mut self.forms[index];
+        let form = if Arc::strong_count(&self.forms) == 1 {
+            // Nobody else has them, so that nothing is copied.
+            &mut Arc::make_mut(&mut self.forms)[index]
+        } else {
+            if !self.own.contains_key(&index) && self.own_bytes() + self.forms[index].tree.bytes() > OWN_BYTES {
+                self.own.clear();
+            }
+            self.own.entry(index).or_insert_with(|| self.forms[index].clone())
+        };
         for ((variable, value), takes) in self.variables.iter().zip(values).zip(&form.takes) {
             if let (Value::Number(number), true) = (value, takes) {
                 form.tree.set(&variable.path, Tree::Number(*number));
@@ -320,14 +345,16 @@ impl Template {
 
     /// Puts the same value at a place in every form.
     pub(crate) fn set(&mut self, place: &[String], value: &Tree) {
-        for form in &mut self.forms {
+        self.own.clear();
+        for form in Arc::make_mut(&mut self.forms) {
             form.tree.set(place, value.clone());
         }
     }
 
     /// Takes away what stands at a place in every form.
     pub(crate) fn remove(&mut self, place: &[String]) {
-        for form in &mut self.forms {
+        self.own.clear();
+        for form in Arc::make_mut(&mut self.forms) {
             form.tree.remove(place);
         }
     }

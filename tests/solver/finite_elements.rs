@@ -372,23 +372,13 @@ fn the_drives_that_were_calculated_lie_within_the_range_and_others_do_not() {
                 beyond(&parameters, &LoadParameters { torque: Torque::Input(200.0), ..own }),
                 [Beyond::HalfWidth]
             );
-            // Laws with another power of the force err with the load, and Palmgren's knows no modulus.
+            // Other laws err otherwise with any other size or load.
             for law in [ContactLaw::Palmgren, ContactLaw::Linear] {
-                let by_law = LoadParameters { law, ..own };
-                assert_eq!(beyond(&parameters, &by_law), [], "{law:?}");
-                let light = LoadParameters { torque: Torque::Input(10.0), ..by_law };
-                assert_eq!(beyond(&parameters, &light), [Beyond::LightLoad], "{law:?}");
+                assert_eq!(beyond(&parameters, &LoadParameters { law, ..own }), [Beyond::Law], "{law:?}");
             }
-            assert_eq!(beyond(&parameters, &LoadParameters { torque: Torque::Input(0.2), ..own }), []);
-            let mut aluminium = LoadParameters { law: ContactLaw::Palmgren, ..own };
-            let materials = &mut aluminium.materials;
-            for part in
-                [&mut materials.wave_generator, &mut materials.teeth, &mut materials.ring, &mut materials.carrier]
-            {
-                part.youngs_modulus_gpa = 70.0;
+            for torque_nm in [0.2, 10.0] {
+                assert_eq!(beyond(&parameters, &LoadParameters { torque: Torque::Input(torque_nm), ..own }), []);
             }
-            assert_eq!(beyond(&parameters, &aluminium), [Beyond::Materials]);
-            assert_eq!(beyond(&parameters, &LoadParameters { law: case.johnson(), ..aluminium }), []);
             let fixed = ContactLaw::Fixed(PerContact { wave_generator: 4e5, ring: 4e5, carrier: 4e5 });
             assert_eq!(beyond(&parameters, &LoadParameters { law: fixed, ..own }), [Beyond::Law]);
             let turned = DriveParameters { ring_teeth: 30, tooth_radius_mm: 4.0, ..parameters };

@@ -6,7 +6,7 @@ use toothwave_calculation::question::Question as _;
 use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::Never;
 
-use crate::asking::{CALCULATION, answer, faulty, gathered, paper, text, with};
+use crate::asking::{CALCULATION, answer, faulty, gathered, paper, study, text, with};
 
 fn map(over: Value, quantities: Value) -> Value {
     json!({ "study": "map", "base": paper(), "over": over, "quantities": quantities })
@@ -274,4 +274,26 @@ fn what_fingers_give_way_is_what_the_sweep_estimates_as_they_are_held() {
     // The linear law, whose own error is as large, has none.
     let linear = answer(&map(over, json!(["carrier_finger_share"])));
     assert_eq!(numbers(&linear["possible"]["quantities"]["carrier_finger_share"]), [0.0]);
+}
+
+/// Each chunk in work once had them all: 256 of them, which together may take 8 MiB.
+#[test]
+fn chunks_in_work_share_the_documents_of_choices() {
+    let torques: Vec<_> = (10..266).collect();
+    let base = with(&paper(), "/deviations", json!({ "slot_wall_um": vec![0; 28], "ring_space_um": vec![0; 26] }));
+    let over = json!({
+        "/load/input_torque_nm": { "one_of": torques },
+        "/drive/teeth/width_mm": { "min": 10.0, "max": 11.0, "steps": 2 }
+    });
+    let quantities = json!(["input_torque_nm", "peak_force_n"]);
+    let of_choices = with(&map(over, quantities.clone()), "/base", base.clone());
+    let asked = study(&of_choices).unwrap();
+    assert!(asked.working_bytes() < (asked.kept_bytes() - asked.stored_bytes()) / 2);
+    // And fills each as if it were alone.
+    let over = json!({
+        "/load/input_torque_nm": { "min": 10.0, "max": 265.0, "steps": 256 },
+        "/drive/teeth/width_mm": { "min": 10.0, "max": 11.0, "steps": 2 }
+    });
+    let of_range = with(&map(over, quantities), "/base", base);
+    assert_eq!(answer(&of_choices)["possible"], answer(&of_range)["possible"]);
 }

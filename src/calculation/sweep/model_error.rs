@@ -126,7 +126,7 @@ pub struct RangeAnswer {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BeyondWord {
-    /// Stiffnesses of the designer's own, or balls.
+    /// Stiffnesses of the designer's own, or balls; any law but Johnson's: its errors are those of three drives, each under one load.
     Law,
     /// Teeth that are no cylinders.
     ToothShape,
@@ -138,7 +138,7 @@ pub enum BeyondWord {
     PressureAngle,
     /// Teeth that enter under load, at angles that were left out: a real tip takes its load little by little, and the peak comes out lower.
     EntryUnderLoad,
-    /// Parts of unlike moduli, or by Palmgren's law parts that are not of steel.
+    /// Parts of unlike moduli.
     Materials,
     /// A larger gap.
     Gap,
@@ -150,8 +150,6 @@ pub enum BeyondWord {
     SoftBacking,
     /// A wider contact.
     HalfWidth,
-    /// By a law other than Johnson's contacts that are all narrower: its wind-up errs the more the lighter the load.
-    LightLoad,
 }
 
 impl From<Beyond> for BeyondWord {
@@ -169,7 +167,6 @@ impl From<Beyond> for BeyondWord {
             Beyond::SeriesCompliance => Self::SeriesCompliance,
             Beyond::SoftBacking => Self::SoftBacking,
             Beyond::HalfWidth => Self::HalfWidth,
-            Beyond::LightLoad => Self::LightLoad,
         }
     }
 }

@@ -26,19 +26,18 @@ const greatest = (column) => column?.reduce((most, value) => Math.max(most, valu
 const percent = (share) => `${share > 0 ? '+' : share < 0 ? '−' : ''}${Math.abs(Math.round(100 * share))}`;
 const span = ({ low, high }) => `${percent(low)} to ${percent(high)} %`;
 const BEYOND = {
-  law: 'its law',
+  law: 'other sizes and loads under its law',
   tooth_shape: 'its shape of teeth',
   lobes: 'its lobes',
   ring_with_more_teeth: 'a ring with more teeth',
   pressure_angle: 'a steeper flank',
   entry_under_load: 'teeth that enter under load',
-  materials: 'its materials',
+  materials: 'unlike materials',
   gap: 'larger gaps',
   modification: 'its modification',
   series_compliance: 'what gives way behind its contacts',
   soft_backing: 'soft parts behind its contacts',
   half_width: 'wider contacts',
-  light_load: 'so light a load under its law',
 };
 
 /** How far to believe some numbers: what the model was found to err by in drives of this case, calculated as elastic bodies. What is not like
