@@ -373,6 +373,19 @@ fn a_sweep_with_deviations_ends_where_the_items_that_deviate_meet_again_and_no_s
     }
 }
 
+/// Each of the laps, slots by spaces, was once laid out before any was counted: gigabytes, and no stop was looked at.
+#[test]
+fn a_sweep_to_a_tolerance_of_sixteen_million_unlike_laps_is_refused_before_they_are_gone_through() {
+    let p = of(ellipse(15_996.0, 15_995.0), 3999, 3999, 3997, 2.0);
+    let unlike = |count: u32| (0..count).map(|item| f64::from(item % 7)).collect();
+    let deviations = Deviations { slot_wall_um: unlike(3999), ring_space_um: unlike(3997), ..Deviations::default() };
+    let drive = drive(&p);
+    assert!(deviations.mesh(&drive).load_periods() > 1_000_000);
+    let points = Points::tolerance(1e-3, 1_000_000).unwrap();
+    let refused = swept_with(&drive, &load(20.0, VirtualWork), &deviations, points);
+    assert_eq!(refused.err(), Some(SolveError::TooManyStates { limit: 1_000_000 }));
+}
+
 #[test]
 fn what_deviates_by_nothing_is_swept_as_one_zone_that_stands_for_all() {
     let drive = drive(&PAPER_5_1);

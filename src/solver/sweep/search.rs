@@ -383,7 +383,16 @@ pub(crate) fn search(
     if look.is_in_proportion() {
         STIFFNESSES.iter().for_each(|&quantity| is_sought[quantity] = false);
     }
-    let seen = pieces.map(|piece| Seen::new(piece, teeth(&piece))).collect();
+    let (mut seen, mut states) = (Vec::new(), 0_u64);
+    // Each is looked at: where slots and spaces are unlike there may be millions of laps, more than memory has room for.
+    for piece in pieces {
+        let of_piece = Seen::new(piece, teeth(&piece));
+        states = states.saturating_add((of_piece.wanted.len() * of_piece.teeth) as u64);
+        if states > tolerance.max_states() {
+            return Err(SolveError::TooManyStates { limit: tolerance.max_states() });
+        }
+        seen.push(of_piece);
+    }
     let mut search = Search { tolerance, lines, is_sought, seen, best: [Best::default(); QUANTITIES], states: 0 };
     let mut excess = 0.0;
     for round in 0..MAX_ROUNDS {
