@@ -3,9 +3,10 @@
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::gaps::TipRelief;
 use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
-use toothwave_solver::mesh::Samples;
+use toothwave_solver::mesh::{Place, Samples};
 use toothwave_solver::springs::{Rotation, Springs, WindUp};
 use toothwave_solver::sweep::{self, Points};
+use toothwave_solver::tooth::ToothContact;
 use toothwave_solver::{
     ContactLaw, Deviations, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Modification, Never,
     Parameter, PerContact, Position, SolveError, ToothShape, Torque, Violation, WaveGenerator,
@@ -223,6 +224,26 @@ fn gaps_at_the_slots_are_closed_at_the_rotation_that_rigid_bodies_need_in_the_va
             let [before_mm, after_mm] = [0.999, 1.001].map(|of| under_mm(of * closing_rad));
             assert!(before_mm < 0.0 && after_mm > 0.0, "{parameters:?} at {share}: {before_mm} {after_mm}");
         }
+    }
+}
+
+/// Positions count from where most items leave their teeth, whichever way a single one is off.
+#[test]
+fn what_a_single_item_is_turned_by_changes_nothing_at_the_teeth_of_others() {
+    let drive = drive(&PAPER_5_1);
+    let case = LoadCase::new(&moving(20.0)).unwrap();
+    let shape = ToothContact::of(&drive, case.parameters().carrier);
+    let spring = |slot_arcsec: f64, space_arcsec: f64| {
+        let (mut slot_angle_arcsec, mut ring_space_angle_arcsec) = (vec![0.0; 28], vec![0.0; 26]);
+        (slot_angle_arcsec[3], ring_space_angle_arcsec[3]) = (slot_arcsec, space_arcsec);
+        let deviations = Deviations { slot_angle_arcsec, ring_space_angle_arcsec, ..Deviations::default() };
+        let loaded = LoadedDrive::with_deviations(&drive, &case, &shape, Some(&deviations)).unwrap();
+        let other = Place { slot: 5, ring_space: 5, lobe: 0 };
+        loaded.tooth_at(&other, Position::from_lobe(0.6, 2)).unwrap().spring
+    };
+    for arcsec in [-60.0, 60.0] {
+        assert_eq!(spring(arcsec, 0.0), spring(0.0, 0.0));
+        assert_eq!(spring(0.0, arcsec), spring(0.0, 0.0));
     }
 }
 

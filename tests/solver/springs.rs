@@ -457,7 +457,7 @@ fn a_torque_that_is_made_just_where_the_next_spring_closes_is_carried_there() {
     };
     for step in 1..200 {
         let next_rad = 0.02 + 1e-3 * f64::from(step);
-        let springs = [spring(7.3, 0.003), spring(6.1, 0.017), spring(5.9, next_rad)];
+        let springs = [spring(7.3, 0.003), spring(6.1, 0.017), spring(5.0, 0.0191), spring(5.9, next_rad)];
         let all = Springs::new(&springs, 2.0);
         let torque_nmm = all.torque_nmm(&Rotation { closing_rad: next_rad, excess_rad: 0.0 }).unwrap().value;
         let rotation = all.wind_up(torque_nmm).unwrap().unwrap().rotation;

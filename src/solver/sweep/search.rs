@@ -942,26 +942,42 @@ mod tests {
 
     /// A tooth that is pressed, or not, by such a curve, and the sixteen intervals of a piece.
     fn seen_of_a_tooth(pressed: impl Fn(f64) -> f64) -> Seen {
-        let mut seen = seen_of(|_| 1.0);
-        for moment in 0..seen.fractions.len() {
-            let fraction = seen.fractions[moment];
+        let piece = Piece { lap: 0, start: 0.0, end: 1.0, places: 1, at_start: None, at_end: None };
+        let mut seen = Seen::new(piece, 1);
+        for fraction in std::mem::take(&mut seen.wanted) {
+            let rotation_rad = &mut seen.push(fraction)[LOADS];
+            *rotation_rad = 2.0;
             seen.push_pressed(std::iter::once(pressed(fraction)));
         }
+        seen.put_in_order();
         seen
     }
 
+    /// The secants on either side of an interval of a parabola meet in its middle.
     #[test]
-    fn a_tooth_that_carries_or_does_not_between_two_moments_alone_is_suspected_where_it_does() {
+    fn a_tooth_that_carries_or_does_not_between_two_moments_alone_is_suspected_halfway() {
+        let judge = Judge {
+            best: [1.0; QUANTITIES],
+            relative: 1e-6,
+            nearest: 1e-9,
+            is_late: false,
+            is_linear: false,
+            lines: None,
+            is_sought: [true; QUANTITIES],
+        };
         for step in 0..1000 {
             let (summit, sign) = (0.001 * f64::from(step), if step % 2 == 0 { 1.0 } else { -1.0 });
-            // By a parabola that stands above nothing over a half of an interval.
+            // It stands above nothing over a half of an interval.
             let half = 0.25 / 16.0;
-            let seen = seen_of_a_tooth(|x| sign * (half * half - (x - summit) * (x - summit)));
+            let mut seen = seen_of_a_tooth(|x| sign * (half * half - (x - summit) * (x - summit)));
             let beside = (1..17).find(|&at| seen.fractions[at] > summit).unwrap_or(16);
             let interval = [seen.fractions[beside - 1], seen.fractions[beside]];
             if interval.iter().all(|end| (end - summit).abs() > half) {
+                let is_halfway = |place: f64| (place - interval[0].midpoint(interval[1])).abs() < 1e-9;
                 let place = seen.suspected_change(beside - 1).expect("it changes within the interval");
-                assert!(interval[0] < place && place < interval[1], "{place} of {interval:?}");
+                assert!(is_halfway(place), "{place} of {interval:?}");
+                judge.close_in_on_changes(&mut seen, 0);
+                assert!(seen.wanted.iter().any(|&place| is_halfway(place)), "{:?} for {interval:?}", seen.wanted);
             }
         }
     }
