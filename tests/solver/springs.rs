@@ -374,6 +374,45 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(cases(256))]
+
+    /// By powers of two all numbers are the same but for their exponents.
+    #[test]
+    fn no_rotation_hangs_on_the_unit_of_length(springs in prop::collection::vec(any_declining_spring(), 1..5)) {
+        let torque_nmm = |step: u32| {
+            let rotation = Rotation { closing_rad: 0.0, excess_rad: 0.02 * f64::from(step) };
+            Springs::new(&springs, 2.0).torque_nmm(&rotation).unwrap().value
+        };
+        let most_nmm = (1..100).map(torque_nmm).fold(0.0, f64::max);
+        for share in [0.5, 0.9, 0.999, 1.1] {
+            let rotation = |power: i32| {
+                let unit = 2.0_f64.powi(power);
+                let in_unit = |spring: &Spring| Spring {
+                    travel_arm_mm: unit * spring.travel_arm_mm,
+                    static_arm_mm: unit * spring.static_arm_mm,
+                    arm_decline_mm_per_rad: unit * spring.arm_decline_mm_per_rad,
+                    closing_rad: spring.closing_rad,
+                    approach: match spring.approach {
+                        Approach::Power { exponent, coefficient, compliance_mm_per_n } => {
+                            Approach::Power { exponent, coefficient: unit * coefficient, compliance_mm_per_n }
+                        }
+                        Approach::Linear { compliance_mm_per_n } => {
+                            Approach::Linear { compliance_mm_per_n: unit * compliance_mm_per_n }
+                        }
+                        other => other,
+                    },
+                };
+                let springs: Vec<_> = springs.iter().map(in_unit).collect();
+                let wind_up = Springs::new(&springs, 2.0).wind_up(unit * share * most_nmm).unwrap();
+                wind_up.map(|wind_up| wind_up.rotation)
+            };
+            prop_assert_eq!(rotation(-20), rotation(0));
+            prop_assert_eq!(rotation(20), rotation(0));
+        }
+    }
+}
+
 /// Where a gap closes, a spring of Hertz's ellipse holds nothing yet, and the torque of those before falls on. That once was the end, and the load refused.
 #[test]
 fn a_spring_that_closes_its_gap_while_the_torque_falls_carries_what_those_before_it_cannot() {
