@@ -193,7 +193,7 @@ pub(crate) struct Seen {
 }
 
 impl Seen {
-    fn new(piece: Piece, teeth: usize) -> Self {
+    pub(crate) fn new(piece: Piece, teeth: usize) -> Self {
         let intervals = if piece.end - piece.start < SHORTEST_PIECE { 1 } else { FIRST_INTERVALS };
         let share = |interval| f64::from(interval) / f64::from(intervals);
         let inside = (1..intervals).map(|interval| piece.start + share(interval) * (piece.end - piece.start));
@@ -252,7 +252,7 @@ impl Seen {
         self.values[moment * self.stride() + curve]
     }
 
-    fn pressed(&self, moment: usize) -> &[f64] {
+    pub(crate) fn pressed(&self, moment: usize) -> &[f64] {
         &self.pressed[moment * self.teeth..][..self.teeth]
     }
 
@@ -853,6 +853,7 @@ impl Nodes {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Drive, DriveParameters, ToothShape, WaveGenerator};
 
     /// A curve over a lap of sixteen intervals, as the wind-up of one tooth.
     fn seen_of(curve: impl Fn(f64) -> f64) -> Seen {
@@ -951,6 +952,31 @@ mod tests {
         }
         seen.put_in_order();
         seen
+    }
+
+    #[test]
+    fn a_piece_is_cut_where_a_tooth_stands_at_the_start_of_the_relief() {
+        let parameters = DriveParameters {
+            wave_generator: WaveGenerator::Ellipse { semi_major_mm: 58.0, semi_minor_mm: 56.0 },
+            teeth: 28,
+            installed: 28,
+            tooth_radius_mm: 5.0,
+            tooth: ToothShape::Cylinder { width_mm: 15.0 },
+            ring_teeth: 26,
+            tip_radius_mm: None,
+        };
+        let mesh = Mesh::new(&Drive::new(&parameters).unwrap());
+        let whole = Piece { lap: 0, start: 0.0, end: 1.0, places: 7, at_start: None, at_end: None };
+        for start_deg in [1.0, 13.4, 20.0, 31.0, 50.0, 89.0] {
+            let fraction = mesh.fraction_at_deg(start_deg);
+            let [before, behind] = whole.cut_where_a_tooth_comes_to_the_relief(Some(fraction)).collect::<Vec<_>>()[..]
+            else {
+                panic!("{start_deg} deg: no cut at {fraction}")
+            };
+            assert_eq!((before.start, before.end, behind.start, behind.end), (0.0, fraction, fraction, 1.0));
+            let off_deg = |place| (before.position(&mesh, place, fraction).from_lobe_deg() - start_deg).abs();
+            assert!((1..=7).any(|place| off_deg(place) < 1e-12), "{start_deg} deg: cut at {fraction}");
+        }
     }
 
     /// The secants on either side of an interval of a parabola meet in its middle.
