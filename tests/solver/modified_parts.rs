@@ -435,10 +435,15 @@ fn a_rim_begins_outside_the_root_of_the_ring_as_it_is_made() {
         limit.unwrap_or_else(|| panic!("{found:?}"))
     };
     let set_back = Modification { ring_equidistant_um: 30.0, ..NONE };
+    let shifted = Modification { ring_path_shift_um: 40.0, ring_profile_shift_um: -15.0, ..NONE };
     // a + 2r, and what sets the flank back; a millionth of it is no rim yet.
-    for (modification, clearance_um, root_mm) in
-        [(NONE, 0.0, 68.0), (NONE, 20.0, 68.02), (set_back, 0.0, 68.03), (set_back, 20.0, 68.05)]
-    {
+    for (modification, clearance_um, root_mm) in [
+        (NONE, 0.0, 68.0),
+        (NONE, 20.0, 68.02),
+        (set_back, 0.0, 68.03),
+        (set_back, 20.0, 68.05),
+        (shifted, 20.0, 68.045),
+    ] {
         let limit = of(&PAPER_5_1, modification, clearance_um);
         assert!((limit - root_mm * (1.0 + 1e-6)).abs() < 1e-9, "{limit}, not {root_mm}");
     }

@@ -135,7 +135,7 @@ mod tests {
             ring_teeth: 26,
             tip_radius_mm: None,
         });
-        let drive = drive.unwrap();
+        let drive = drive.expect("a possible drive");
         let steel = Material::STEEL;
         let case = LoadCase::new(&LoadParameters {
             materials: Materials { wave_generator: steel, teeth: steel, ring: steel, carrier: steel },
@@ -151,14 +151,14 @@ mod tests {
             carrier: CarrierRadii::default(),
             allowable_stress_mpa: None,
         });
-        let case = case.unwrap();
-        let loaded = LoadedDrive::new(&drive, &case).unwrap();
+        let case = case.expect("a possible load");
+        let loaded = LoadedDrive::new(&drive, &case).expect("a possible case");
         let mut look = PlainLook::new(&loaded, &case, &Never);
         for piece in Piece::of(&loaded, 0) {
-            let count = usize::try_from(piece.places).unwrap();
+            let count = usize::try_from(piece.places).expect("a few");
             let mut seen = Seen::new(piece, count);
             let fractions = [0.1, 0.5, 0.8].map(|share| piece.start + share * (piece.end - piece.start));
-            assert!(look.look(&fractions, &mut seen).unwrap());
+            assert!(look.look(&fractions, &mut seen).expect("a look"));
             for moment in 0..fractions.len() {
                 let carry = seen.values(moment)[..count].iter().map(|&force_n| force_n > 0.0);
                 let are_pressed = seen.pressed(moment).iter().map(|&pressed_rad| pressed_rad > 0.0);

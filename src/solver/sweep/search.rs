@@ -965,7 +965,7 @@ mod tests {
             ring_teeth: 26,
             tip_radius_mm: None,
         };
-        let mesh = Mesh::new(&Drive::new(&parameters).unwrap());
+        let mesh = Mesh::new(&Drive::new(&parameters).expect("a possible drive"));
         let whole = Piece { lap: 0, start: 0.0, end: 1.0, places: 7, at_start: None, at_end: None };
         for start_deg in [1.0, 13.4, 20.0, 31.0, 50.0, 89.0] {
             let fraction = mesh.fraction_at_deg(start_deg);
