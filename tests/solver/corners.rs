@@ -510,6 +510,30 @@ fn a_space_that_is_turned_takes_its_corner_away_by_its_arm() {
     }
 }
 
+/// By virtual work: what the wall leaves counts as much as the slot's force does.
+#[test]
+fn a_slot_that_is_turned_takes_its_tooth_from_the_corner_by_the_share_of_the_slots_force() {
+    let drive = drive(&PAPER_5_2);
+    let end_deg = drive.flank_limit().position.from_lobe_deg();
+    let case = LoadCase::new(&pressed_corners(3.0)).unwrap();
+    let shape = ToothContact::of(&drive, case.parameters().carrier);
+    for beyond_deg in [0.1, 1.0, 4.0] {
+        let tooth = |arcsec: f64| {
+            let mut slot_angle_arcsec = vec![0.0; 40];
+            slot_angle_arcsec[0] = arcsec;
+            let deviations = Deviations { slot_angle_arcsec, ..Deviations::default() };
+            let loaded = LoadedDrive::with_deviations(&drive, &case, &shape, Some(&deviations)).unwrap();
+            let position = Position::from_lobe((end_deg + beyond_deg).to_radians(), 2);
+            loaded.tooth_at(&Place { slot: 0, ring_space: 0, lobe: 0 }, position).unwrap()
+        };
+        let (turned, as_it_is) = (tooth(0.01), tooth(0.0));
+        let found_mm = (turned.spring.closing_rad - as_it_is.spring.closing_rad) * as_it_is.spring.travel_arm_mm;
+        let wall_mm = f64::to_radians(0.01 / 3600.0) * as_it_is.center.center_radius_mm;
+        let expected_mm = as_it_is.force_ratio.carrier * wall_mm;
+        assert!((found_mm / expected_mm - 1.0).abs() < 1e-5, "{beyond_deg} deg: {found_mm} mm, {expected_mm} mm");
+    }
+}
+
 /// It is the same drive at another input angle. By a law that counted the turn as a gap at the corner forces changed by a tenth, and doubled.
 #[test]
 fn a_ring_or_a_carrier_that_is_turned_as_a_whole_changes_no_force_at_corners_nor_do_alike_gaps_at_all_slots() {

@@ -290,7 +290,9 @@ fn each_model_errs_as_much_as_it_says_that_it_does() {
                 let named =
                     format!("{compatibility:?}, {law:?}, {refined}, {wanted:?}: {what} {least:+.4} to {largest:+.4}");
                 let is_held = low <= least && largest <= high;
-                if !is_held || low < least - 0.015 || high > largest + 0.045 {
+                // There an earlier calculation went further.
+                let slack = if has_pointed_tips && has_gaps && what == "force" { 0.045 } else { 0.015 };
+                if !is_held || low < least - 0.015 || high > largest + slack {
                     wrong.push(format!("{named}, told {low:+} to {high:+}"));
                 }
             }

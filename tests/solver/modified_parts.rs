@@ -435,13 +435,20 @@ fn a_rim_begins_outside_the_root_of_the_ring_as_it_is_made() {
         limit.unwrap_or_else(|| panic!("{found:?}"))
     };
     let set_back = Modification { ring_equidistant_um: 30.0, ..NONE };
+    let shifted = Modification { ring_path_shift_um: 40.0, ring_profile_shift_um: -15.0, ..NONE };
     // a + 2r, and what sets the flank back; a millionth of it is no rim yet.
-    for (modification, clearance_um, root_mm) in
-        [(NONE, 0.0, 68.0), (NONE, 20.0, 68.02), (set_back, 0.0, 68.03), (set_back, 20.0, 68.05)]
-    {
+    for (modification, clearance_um, root_mm) in [
+        (NONE, 0.0, 68.0),
+        (NONE, 20.0, 68.02),
+        (set_back, 0.0, 68.03),
+        (set_back, 20.0, 68.05),
+        (shifted, 20.0, 68.045),
+    ] {
         let limit = of(&PAPER_5_1, modification, clearance_um);
         assert!((limit - root_mm * (1.0 + 1e-6)).abs() < 1e-9, "{limit}, not {root_mm}");
     }
+    // However wrong other parts are.
+    assert_eq!(of(&PAPER_5_1, Modification { slot_wall_um: 2e6, ..set_back }, 0.0), of(&PAPER_5_1, set_back, 0.0));
     // Where the drive is none, as far as is known.
     let impossible = DriveParameters { ring_teeth: 20, ..PAPER_5_1 };
     assert!((of(&impossible, NONE, 20.0) - 68.02 * (1.0 + 1e-6)).abs() < 1e-9);
@@ -675,6 +682,39 @@ fn a_relief_that_rises_out_of_its_space_is_refused() {
     assert_eq!(drawn(52.1).map(|_| ()), Err(DriveError::Impossible(vec![leaves_nothing])));
     let gentle = drawn(2.0).expect("a relief of the second power stays within the ring");
     assert!(gentle.bodies(&Never).is_ok());
+}
+
+/// A relief that is set forward and grows with some power bends the flank once more, and once more again, where it overtakes what the path bends. The tangent at one end of such a
+/// stretch may lie along its chord, as if there was nothing between.
+#[test]
+fn a_chord_on_which_a_relieved_flank_bends_more_than_once_is_true_to_the_tolerance() {
+    let p = PAPER_5_1;
+    let half_rad = 0.5 * PI;
+    let k = p.ring_teeth as f64 / 2.0;
+    for (amount_um, start_deg, power) in [
+        (-103.027_740_281_209_85, 17.017_335_274_292_947, 3.438_615_871_309_888),
+        (-67.021_817_668_199_62, 27.925_798_579_260_814, 3.852_224_926_774_075_4),
+    ] {
+        let ring_tip_relief = Some(TipRelief { amount_um, start_deg, power });
+        let parts = parts(Modification { ring_tip_relief, ..NONE });
+        for tolerance_mm in [1e-6, 2e-6, 4e-6, 8e-6] {
+            let ring = drawn(&p, Subject::Part(Part::Ring), &parts, tolerance_mm, 0.0).remove(0);
+            let edges = edges(&ring.section.holes[0]);
+            let space = placed(&edges[..edges.len() / usize::try_from(p.ring_teeth).unwrap()], 0.0);
+            let upper: Vec<_> = space.into_iter().filter(|point| point.y >= 0.0).collect();
+            let start_rad = start_deg.to_radians();
+            for step in 0..=600 {
+                let normal_rad = start_rad + (half_rad - start_rad) * f64::from(step) / 600.0;
+                let (center, position_rad) = in_ring(&p, normal_rad, 0.0);
+                let share = ((position_rad - start_rad) / (half_rad - start_rad)).max(0.0);
+                let distance_mm = p.tooth_radius_mm + 1e-3 * amount_um * share.powf(power);
+                let pressure_rad = (k * (normal_rad - position_rad).tan()).atan();
+                let point = Point2::from(center + distance_mm * unit(position_rad / k + pressure_rad));
+                let off_mm = distance(&upper, point);
+                assert!(off_mm <= tolerance_mm * (1.0 + 1e-6), "{off_mm:e} at {position_rad} for {tolerance_mm:e}");
+            }
+        }
+    }
 }
 
 /// Bézier's polygons of all curves.

@@ -3,9 +3,10 @@
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::gaps::TipRelief;
 use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
-use toothwave_solver::mesh::Samples;
+use toothwave_solver::mesh::{Place, Samples};
 use toothwave_solver::springs::{Rotation, Springs, WindUp};
 use toothwave_solver::sweep::{self, Points};
+use toothwave_solver::tooth::ToothContact;
 use toothwave_solver::{
     ContactLaw, Deviations, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Modification, Never,
     Parameter, PerContact, Position, SolveError, ToothShape, Torque, Violation, WaveGenerator,
@@ -223,6 +224,59 @@ fn gaps_at_the_slots_are_closed_at_the_rotation_that_rigid_bodies_need_in_the_va
             let [before_mm, after_mm] = [0.999, 1.001].map(|of| under_mm(of * closing_rad));
             assert!(before_mm < 0.0 && after_mm > 0.0, "{parameters:?} at {share}: {before_mm} {after_mm}");
         }
+    }
+}
+
+/// From where the slot is closed on the wave generator lifts the tooth by the gap that is left at the ring, under an arm that is no other for the slot's sake.
+#[test]
+fn a_tooth_whose_slot_is_turned_closes_its_other_gaps_by_the_way_that_is_left() {
+    let drive = drive(&PAPER_5_1);
+    let clearance_um = PerContact { ring: 300.0, ..PerContact::default() };
+    let case = LoadCase::new(&LoadParameters { clearance_um, ..moving(20.0) }).unwrap();
+    let shape = ToothContact::of(&drive, case.parameters().carrier);
+    for position_rad in [0.5, 1.2, 1.5] {
+        for arcsec in [-2000.0_f64, -300.0, 300.0] {
+            let mut slot_angle_arcsec = vec![0.0; 28];
+            slot_angle_arcsec[5] = arcsec;
+            let deviations = Deviations { slot_angle_arcsec, ..Deviations::default() };
+            let loaded = LoadedDrive::with_deviations(&drive, &case, &shape, Some(&deviations)).unwrap();
+            let place = Place { slot: 5, ring_space: 5, lobe: 0 };
+            let tooth = loaded.tooth_at(&place, Position::from_lobe(position_rad, 2)).unwrap();
+            let cos = 1.0 / tooth.center.tan_pressure_angle.hypot(1.0);
+            let arm_mm = cos * slope_mm(&drive, position_rad);
+            let decline_mm =
+                cos * (slope_mm(&drive, position_rad + 1e-5) - slope_mm(&drive, position_rad - 1e-5)) / 2e-5;
+            let slot_rad = drive.teeth_per_wave() * (arcsec / 3600.0).to_radians();
+            // An arm that grows begins where the valley passes.
+            let from_rad = if decline_mm < 0.0 { slot_rad.max(arm_mm / decline_mm) } else { slot_rad };
+            let way_mm = |turned_rad: f64| arm_mm * turned_rad - 0.5 * decline_mm * turned_rad * turned_rad;
+            let closing_rad = tooth.spring.closing_rad;
+            let (left_mm, gap_mm) = (way_mm(closing_rad) - way_mm(from_rad), 0.3 * tooth.force_ratio.ring);
+            assert!(closing_rad > from_rad, "{arcsec} at {position_rad}: {closing_rad}");
+            assert!((left_mm / gap_mm - 1.0).abs() < 1e-6, "{arcsec} at {position_rad}: {left_mm} of {gap_mm}");
+            let left_arm_mm = arm_mm - decline_mm * closing_rad;
+            assert!((tooth.spring.travel_arm_mm / left_arm_mm - 1.0).abs() < 1e-6, "{arcsec} at {position_rad}");
+        }
+    }
+}
+
+/// Positions count from where most items leave their teeth, whichever way a single one is off.
+#[test]
+fn what_a_single_item_is_turned_by_changes_nothing_at_the_teeth_of_others() {
+    let drive = drive(&PAPER_5_1);
+    let case = LoadCase::new(&moving(20.0)).unwrap();
+    let shape = ToothContact::of(&drive, case.parameters().carrier);
+    let spring = |slot_arcsec: f64, space_arcsec: f64| {
+        let (mut slot_angle_arcsec, mut ring_space_angle_arcsec) = (vec![0.0; 28], vec![0.0; 26]);
+        (slot_angle_arcsec[3], ring_space_angle_arcsec[3]) = (slot_arcsec, space_arcsec);
+        let deviations = Deviations { slot_angle_arcsec, ring_space_angle_arcsec, ..Deviations::default() };
+        let loaded = LoadedDrive::with_deviations(&drive, &case, &shape, Some(&deviations)).unwrap();
+        let other = Place { slot: 5, ring_space: 5, lobe: 0 };
+        loaded.tooth_at(&other, Position::from_lobe(0.6, 2)).unwrap().spring
+    };
+    for arcsec in [-60.0, 60.0] {
+        assert_eq!(spring(arcsec, 0.0), spring(0.0, 0.0));
+        assert_eq!(spring(0.0, arcsec), spring(0.0, 0.0));
     }
 }
 

@@ -150,6 +150,23 @@ fn a_chord_with_an_inflection_near_its_end_is_true_to_the_tolerance() {
     }
 }
 
+/// Of a circle's chord over the angle θ its tangents stand `c tan(θ/2)/2` high. Positions are spaced by a few per cent more or less than the circle's own angles.
+#[test]
+fn a_circle_is_halved_until_the_triangles_of_chords_and_tangents_are_as_low_as_the_tolerance() {
+    let radius_mm = 57.0;
+    let wave_generator = WaveGenerator::Eccentric { radius_mm, eccentricity_mm: 1.0 };
+    let p = DriveParameters { wave_generator, ring_teeth: 27, ..PAPER_5_1 };
+    for chords in [32_u16, 64, 256, 1024] {
+        let half_rad = 0.5 * PI / f64::from(chords);
+        let height_mm = 0.5 * (2.0 * radius_mm * half_rad.sin()) * half_rad.tan();
+        let points = |tolerance_mm| sampled(&p, tolerance_mm, Extent::Tooth).wave_generator.len();
+        assert_eq!(
+            [1.3, 0.7].map(|of| points(of * height_mm)),
+            [1, 2].map(|times| 2 * times * usize::from(chords) + 1)
+        );
+    }
+}
+
 #[test]
 fn every_chord_is_true_to_the_tolerance() {
     for parameters in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED] {

@@ -374,6 +374,45 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(cases(256))]
+
+    /// By powers of two all numbers are the same but for their exponents.
+    #[test]
+    fn no_rotation_hangs_on_the_unit_of_length(springs in prop::collection::vec(any_declining_spring(), 1..5)) {
+        let torque_nmm = |step: u32| {
+            let rotation = Rotation { closing_rad: 0.0, excess_rad: 0.02 * f64::from(step) };
+            Springs::new(&springs, 2.0).torque_nmm(&rotation).unwrap().value
+        };
+        let most_nmm = (1..100).map(torque_nmm).fold(0.0, f64::max);
+        for share in [0.5, 0.9, 0.999, 1.1] {
+            let rotation = |power: i32| {
+                let unit = 2.0_f64.powi(power);
+                let in_unit = |spring: &Spring| Spring {
+                    travel_arm_mm: unit * spring.travel_arm_mm,
+                    static_arm_mm: unit * spring.static_arm_mm,
+                    arm_decline_mm_per_rad: unit * spring.arm_decline_mm_per_rad,
+                    closing_rad: spring.closing_rad,
+                    approach: match spring.approach {
+                        Approach::Power { exponent, coefficient, compliance_mm_per_n } => {
+                            Approach::Power { exponent, coefficient: unit * coefficient, compliance_mm_per_n }
+                        }
+                        Approach::Linear { compliance_mm_per_n } => {
+                            Approach::Linear { compliance_mm_per_n: unit * compliance_mm_per_n }
+                        }
+                        other => other,
+                    },
+                };
+                let springs: Vec<_> = springs.iter().map(in_unit).collect();
+                let wind_up = Springs::new(&springs, 2.0).wind_up(unit * share * most_nmm).unwrap();
+                wind_up.map(|wind_up| wind_up.rotation)
+            };
+            prop_assert_eq!(rotation(-20), rotation(0));
+            prop_assert_eq!(rotation(20), rotation(0));
+        }
+    }
+}
+
 /// Where a gap closes, a spring of Hertz's ellipse holds nothing yet, and the torque of those before falls on. That once was the end, and the load refused.
 #[test]
 fn a_spring_that_closes_its_gap_while_the_torque_falls_carries_what_those_before_it_cannot() {
@@ -420,23 +459,49 @@ fn a_torque_that_the_first_of_two_springs_makes_before_the_other_closes_is_carri
     }
 }
 
-/// Both have closed their gaps when the first is passed. What the other would make farther on is on a branch that no load leads to.
+/// Both have closed their gaps when the first is passed. What the other would make farther on is on a branch that no load leads to. Arms shorter by a factor shorten
+/// all rotations by it.
 #[test]
-fn no_maximum_is_passed_at_which_all_gaps_are_closed() {
-    let spring = |end_rad: f64, compliance_mm_per_n: f64| Spring {
-        travel_arm_mm: 5.0 * (1.0 - 0.1 / end_rad),
-        static_arm_mm: 5.0 * (1.0 - 0.1 / end_rad),
-        arm_decline_mm_per_rad: 5.0 / end_rad,
-        closing_rad: 0.1,
-        approach: Approach::Linear { compliance_mm_per_n },
+fn no_maximum_is_passed_at_which_all_gaps_are_closed_however_short_the_arms_are() {
+    for shorter in [1.0, 1e-6, 1e-12, 1e-18, 1e-24] {
+        let spring = |end_rad: f64, compliance_mm_per_n: f64| Spring {
+            travel_arm_mm: shorter * 5.0 * (1.0 - 0.1 / end_rad),
+            static_arm_mm: shorter * 5.0 * (1.0 - 0.1 / end_rad),
+            arm_decline_mm_per_rad: 5.0 / end_rad,
+            closing_rad: shorter * 0.1,
+            approach: Approach::Linear { compliance_mm_per_n },
+        };
+        let springs = [spring(0.3, 1e-6), spring(6.0, 3e-5)];
+        let both = Springs::new(&springs, 2.0);
+        let torque_nmm = |rad: f64| {
+            let rotation = Rotation { closing_rad: shorter * 0.1, excess_rad: shorter * (rad - 0.1) };
+            both.torque_nmm(&rotation).unwrap().value
+        };
+        let most_nmm = (100..300).map(|step| torque_nmm(1e-3 * f64::from(step))).fold(0.0, f64::max);
+        assert!(torque_nmm(0.35) < 0.5 * most_nmm && torque_nmm(2.5) > 1.5 * most_nmm);
+        assert!(both.wind_up(0.99 * most_nmm).unwrap().unwrap().rotation.rad() < shorter * 0.3);
+        assert_eq!(both.wind_up(1.01 * most_nmm).unwrap(), None, "{shorter}");
+    }
+}
+
+/// By rounding, those before it may make less there by themselves.
+#[test]
+fn a_torque_that_is_made_just_where_the_next_spring_closes_is_carried_there() {
+    let spring = |arm_mm: f64, closing_rad: f64| Spring {
+        travel_arm_mm: arm_mm,
+        static_arm_mm: arm_mm,
+        arm_decline_mm_per_rad: 1.0,
+        closing_rad,
+        approach: Approach::Power { exponent: 0.9, coefficient: 1e-5, compliance_mm_per_n: 0.0 },
     };
-    let springs = [spring(0.3, 1e-6), spring(6.0, 3e-5)];
-    let both = Springs::new(&springs, 2.0);
-    let torque_nmm = |rad: f64| both.torque_nmm(&Rotation { closing_rad: 0.1, excess_rad: rad - 0.1 }).unwrap().value;
-    let most_nmm = (100..300).map(|step| torque_nmm(1e-3 * f64::from(step))).fold(0.0, f64::max);
-    assert!(torque_nmm(0.35) < 0.5 * most_nmm && torque_nmm(2.5) > 1.5 * most_nmm);
-    assert!(both.wind_up(0.99 * most_nmm).unwrap().unwrap().rotation.rad() < 0.3);
-    assert_eq!(both.wind_up(1.01 * most_nmm).unwrap(), None);
+    for step in 1..200 {
+        let next_rad = 0.02 + 1e-3 * f64::from(step);
+        let springs = [spring(7.3, 0.003), spring(6.1, 0.017), spring(5.0, 0.0191), spring(5.9, next_rad)];
+        let all = Springs::new(&springs, 2.0);
+        let torque_nmm = all.torque_nmm(&Rotation { closing_rad: next_rad, excess_rad: 0.0 }).unwrap().value;
+        let rotation = all.wind_up(torque_nmm).unwrap().unwrap().rotation;
+        assert!((rotation.rad() / next_rad - 1.0).abs() < 1e-12, "{rotation:?}, not {next_rad}");
+    }
 }
 
 /// Rounding of the closing angles, 1e7 times what is turned beyond them, is all that parts two ways to these loads: no reason for an internal error.

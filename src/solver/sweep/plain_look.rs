@@ -114,3 +114,61 @@ impl Look for PlainLook<'_> {
         Ok(true)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parts::CarrierRadii;
+    use crate::{
+        Compatibility, ContactLaw, Drive, DriveParameters, LoadParameters, Material, Materials, Modification, Never,
+        ToothShape, Torque, WaveGenerator,
+    };
+
+    #[test]
+    fn the_teeth_that_are_pressed_are_those_that_carry() {
+        let drive = Drive::new(&DriveParameters {
+            wave_generator: WaveGenerator::Ellipse { semi_major_mm: 58.0, semi_minor_mm: 56.0 },
+            teeth: 28,
+            installed: 28,
+            tooth_radius_mm: 5.0,
+            tooth: ToothShape::Cylinder { width_mm: 15.0 },
+            ring_teeth: 26,
+            tip_radius_mm: None,
+        });
+        let drive = drive.expect("a possible drive");
+        let steel = Material::STEEL;
+        let case = LoadCase::new(&LoadParameters {
+            materials: Materials { wave_generator: steel, teeth: steel, ring: steel, carrier: steel },
+            torque: Torque::Input(20.0),
+            compatibility: Compatibility::VirtualWork,
+            law: ContactLaw::Palmgren,
+            series_compliance_mm_per_n: PerContact::default(),
+            ring_teeth_bend: false,
+            wave_generator_moves: false,
+            corner_contact: false,
+            clearance_um: PerContact { wave_generator: 0.0, ring: 20.0, carrier: 5.0 },
+            modification: Modification::default(),
+            carrier: CarrierRadii::default(),
+            allowable_stress_mpa: None,
+        });
+        let case = case.expect("a possible load");
+        let loaded = LoadedDrive::new(&drive, &case).expect("a possible case");
+        let mut look = PlainLook::new(&loaded, &case, &Never);
+        for piece in Piece::of(&loaded, 0) {
+            let count = usize::try_from(piece.places).expect("a few");
+            let mut seen = Seen::new(piece, count);
+            let fractions = [0.1, 0.5, 0.8].map(|share| piece.start + share * (piece.end - piece.start));
+            assert!(look.look(&fractions, &mut seen).expect("a look"));
+            for moment in 0..fractions.len() {
+                let carry = seen.values(moment)[..count].iter().map(|&force_n| force_n > 0.0);
+                let are_pressed = seen.pressed(moment).iter().map(|&pressed_rad| pressed_rad > 0.0);
+                assert!(carry.eq(are_pressed), "{:?}", seen.pressed(moment));
+                assert!(
+                    seen.pressed(moment).iter().any(|&pressed_rad| pressed_rad < 0.0),
+                    "{:?}",
+                    seen.pressed(moment)
+                );
+            }
+        }
+    }
+}

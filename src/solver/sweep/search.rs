@@ -193,7 +193,7 @@ pub(crate) struct Seen {
 }
 
 impl Seen {
-    fn new(piece: Piece, teeth: usize) -> Self {
+    pub(crate) fn new(piece: Piece, teeth: usize) -> Self {
         let intervals = if piece.end - piece.start < SHORTEST_PIECE { 1 } else { FIRST_INTERVALS };
         let share = |interval| f64::from(interval) / f64::from(intervals);
         let inside = (1..intervals).map(|interval| piece.start + share(interval) * (piece.end - piece.start));
@@ -252,7 +252,7 @@ impl Seen {
         self.values[moment * self.stride() + curve]
     }
 
-    fn pressed(&self, moment: usize) -> &[f64] {
+    pub(crate) fn pressed(&self, moment: usize) -> &[f64] {
         &self.pressed[moment * self.teeth..][..self.teeth]
     }
 
@@ -862,6 +862,7 @@ impl Nodes {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Drive, DriveParameters, ToothShape, WaveGenerator};
 
     /// A curve over a lap of sixteen intervals, as the wind-up of one tooth.
     fn seen_of(curve: impl Fn(f64) -> f64) -> Seen {
@@ -951,26 +952,67 @@ mod tests {
 
     /// A tooth that is pressed, or not, by such a curve, and the sixteen intervals of a piece.
     fn seen_of_a_tooth(pressed: impl Fn(f64) -> f64) -> Seen {
-        let mut seen = seen_of(|_| 1.0);
-        for moment in 0..seen.fractions.len() {
-            let fraction = seen.fractions[moment];
+        let piece = Piece { lap: 0, start: 0.0, end: 1.0, places: 1, at_start: None, at_end: None };
+        let mut seen = Seen::new(piece, 1);
+        for fraction in std::mem::take(&mut seen.wanted) {
+            let rotation_rad = &mut seen.push(fraction)[LOADS];
+            *rotation_rad = 2.0;
             seen.push_pressed(std::iter::once(pressed(fraction)));
         }
+        seen.put_in_order();
         seen
     }
 
     #[test]
-    fn a_tooth_that_carries_or_does_not_between_two_moments_alone_is_suspected_where_it_does() {
+    fn a_piece_is_cut_where_a_tooth_stands_at_the_start_of_the_relief() {
+        let parameters = DriveParameters {
+            wave_generator: WaveGenerator::Ellipse { semi_major_mm: 58.0, semi_minor_mm: 56.0 },
+            teeth: 28,
+            installed: 28,
+            tooth_radius_mm: 5.0,
+            tooth: ToothShape::Cylinder { width_mm: 15.0 },
+            ring_teeth: 26,
+            tip_radius_mm: None,
+        };
+        let mesh = Mesh::new(&Drive::new(&parameters).expect("a possible drive"));
+        let whole = Piece { lap: 0, start: 0.0, end: 1.0, places: 7, at_start: None, at_end: None };
+        for start_deg in [1.0, 13.4, 20.0, 31.0, 50.0, 89.0] {
+            let fraction = mesh.fraction_at_deg(start_deg);
+            let [before, behind] = whole.cut_where_a_tooth_comes_to_the_relief(Some(fraction)).collect::<Vec<_>>()[..]
+            else {
+                panic!("{start_deg} deg: no cut at {fraction}")
+            };
+            assert_eq!((before.start, before.end, behind.start, behind.end), (0.0, fraction, fraction, 1.0));
+            let off_deg = |place| (before.position(&mesh, place, fraction).from_lobe_deg() - start_deg).abs();
+            assert!((1..=7).any(|place| off_deg(place) < 1e-12), "{start_deg} deg: cut at {fraction}");
+        }
+    }
+
+    /// The secants on either side of an interval of a parabola meet in its middle.
+    #[test]
+    fn a_tooth_that_carries_or_does_not_between_two_moments_alone_is_suspected_halfway() {
+        let judge = Judge {
+            best: [1.0; QUANTITIES],
+            relative: 1e-6,
+            nearest: 1e-9,
+            is_late: false,
+            is_linear: false,
+            lines: None,
+            is_sought: [true; QUANTITIES],
+        };
         for step in 0..1000 {
             let (summit, sign) = (0.001 * f64::from(step), if step % 2 == 0 { 1.0 } else { -1.0 });
-            // By a parabola that stands above nothing over a half of an interval.
+            // It stands above nothing over a half of an interval.
             let half = 0.25 / 16.0;
-            let seen = seen_of_a_tooth(|x| sign * (half * half - (x - summit) * (x - summit)));
+            let mut seen = seen_of_a_tooth(|x| sign * (half * half - (x - summit) * (x - summit)));
             let beside = (1..17).find(|&at| seen.fractions[at] > summit).unwrap_or(16);
             let interval = [seen.fractions[beside - 1], seen.fractions[beside]];
             if interval.iter().all(|end| (end - summit).abs() > half) {
+                let is_halfway = |place: f64| (place - interval[0].midpoint(interval[1])).abs() < 1e-9;
                 let place = seen.suspected_change(beside - 1).expect("it changes within the interval");
-                assert!(interval[0] < place && place < interval[1], "{place} of {interval:?}");
+                assert!(is_halfway(place), "{place} of {interval:?}");
+                judge.close_in_on_changes(&mut seen, 0);
+                assert!(seen.wanted.iter().any(|&place| is_halfway(place)), "{:?} for {interval:?}", seen.wanted);
             }
         }
     }
