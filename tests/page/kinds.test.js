@@ -304,6 +304,33 @@ test('an estimate of what gives way behind a contact is taken over into the desi
   assert.ok(!('fingers' in ((await answered(page)).design.parts?.carrier ?? {})));
 });
 
+test('an estimate taken over where the paper’s model is chosen brings the model along that takes it', async () => {
+  const page = await bed.open();
+  await setDocument(page, { drive: (await designOf(page)).drive, load: { input_torque_nm: 20 }, model: { compatibility: 'projection', stiffness: { law: 'linear' } } });
+  await answered(page);
+  await page.click('button[aria-label$="take over as series compliance"] >> visible=true');
+  await settled(page);
+  const { design, sweep } = await answered(page);
+  assert.equal(design.model.compatibility, 'virtual_work');
+  assert.equal(design.model.stiffness.law, 'linear');
+  assert.ok(sweep.peaks.ring.force_n.value > 0);
+});
+
+test('stresses by contact and lists of deviations are inputs that two designs may differ in', async () => {
+  const page = await bed.open();
+  const load = { input_torque_nm: 20 };
+  const { drive } = await designOf(page);
+  await setDocument(page, { drive, load });
+  await answered(page);
+  await page.click('#keep');
+  const tooth_radius_um = [...Array(27).fill(0), 2.5];
+  await setDocument(page, { drive, load: { ...load, allowable_stress_mpa: { wave_generator: 1400, ring: 950, carrier: 1300 } }, deviations: { tooth_radius_um } });
+  await answered(page);
+  const told = (await page.textContent('#differing')).replaceAll(/[\u00a0\u202f]/g, ' ');
+  assert.match(told, /Allowable stress – → wave generator 1400 MPa, ring 950 MPa, carrier 1300 MPa/);
+  assert.match(told, /Teeth thinner in radius, each – → 28, 0 to 2.5 µm/);
+});
+
 test('a document with kinds spelled out opens as it is, in the form and in a link', async () => {
   const design = {
     drive: {

@@ -129,7 +129,7 @@ const depth = (contact, label) =>
 const stiffness = (contact, label, symbol) => number(`/model/stiffness/${contact}_n_per_mm`, label, symbol, 'N/mm', { start: 500000, likely: 500000 });
 
 const compliance = (contact, label) =>
-  number(`/model/series_compliance_mm_per_n/${contact}`, label, '', 'mm/N', { optional: () => '0', likely: 1e-6 });
+  number(`/model/series_compliance_mm_per_n/${contact}`, label, '', 'mm/N', { optional: () => '0', likely: 1e-6, adjust: withVirtualWork });
 
 /** What the form starts friction with: a lubricated pair, and a light bearing under the middle of the race. */
 export const USUAL_FRICTION = { coefficient: 0.05, bearing: 0.002 };
@@ -149,8 +149,8 @@ function withFriction(design) {
 const withDuty = (design) =>
   at(design, '/load/duty') === undefined ? design : changed(changed(design, '/load/input_speed_rpm', undefined), '/sweep/tolerance', undefined);
 
-/** Parts otherwise than nominal go with virtual work alone; the law that was meant stays. */
-function withVirtualWork(design) {
+/** Parts otherwise than nominal, and what gives way behind contacts, go with virtual work alone; the law that was meant stays. */
+export function withVirtualWork(design) {
   if (compatibilityOf(design) !== 'projection') return design;
   return changed(changed(design, '/model/stiffness/law', lawOf(design)), '/model/compatibility', 'virtual_work');
 }
@@ -358,7 +358,7 @@ export const GROUPS = [
         likely: USUAL_SPEED_RPM,
         when: (design) => at(design, '/load/duty') === undefined,
       }),
-      number('/load/allowable_stress_mpa', 'Allowable stress', 'σ', 'MPa', { slider: WIDE, optional: () => 'not asked' }),
+      number('/load/allowable_stress_mpa', 'Allowable stress', 'σ', 'MPa', { slider: WIDE, optional: (design) => (at(design, '/load/allowable_stress_mpa') === undefined ? 'not asked' : 'by contact') }),
     ],
   },
   {

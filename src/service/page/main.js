@@ -3,7 +3,7 @@
 
 import * as access from './access.js';
 import { Accuracy } from './accuracy.js';
-import { changed, isSame } from './design.js';
+import { changed, isSame, withVirtualWork } from './design.js';
 import { html, oncePerFrame, setAttributes, setChildren, setProperties, setText } from './dom.js';
 import { Drawings } from './drawings.js';
 import { Explore } from './explore.js';
@@ -103,7 +103,7 @@ const results = new Results(
   { keyFigures: byId('key-figures'), table: byId('table') },
   showPeak,
   (pointer) => form.goTo(pointer),
-  ({ pointer, value }) => setDesign(changed(state.design, pointer, value)),
+  ({ pointer, value }) => setDesign(withVirtualWork(changed(state.design, pointer, value))),
 );
 
 const accuracy = new Accuracy(

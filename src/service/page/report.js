@@ -20,12 +20,31 @@ function shownValue(field, design) {
   if (field.kind === 'flag') return isOn(field, design) ? 'yes' : undefined;
   if (field.kind === 'oneOf' || field.derived) return undefined;
   if (field.kind === 'lines') return value && linesOf(field, value).map((line) => line.split('  ').map((number, index) => withUnit(number, field.columns[index].unit)).join(', ')).join('; ');
+  // One for each contact, which the form has no fields for.
+  if (value !== null && typeof value === 'object') return Object.entries(value).map(([contact, each]) => `${contact.replaceAll('_', ' ')} ${withUnit(String(each), field.unit)}`).join(', ');
   const shown = value ?? field.preset;
   return typeof shown === 'number' ? withUnit(String(shown), field.unit) : undefined;
 }
 
 /** Of fields of kinds and alternatives, only what a document gives: their presets are for when they are chosen. */
 const optional = (group) => new Set((group.parts ?? [group]).flatMap(({ fields }) => fields).flatMap((field) => field.options ?? []).flatMap((option) => option.fields ?? option.field ?? []));
+
+const LISTS = {
+  tooth_radius_um: ['Teeth thinner in radius, each', 'µm'],
+  slot_angle_arcsec: ['Slots turned, each', '″'],
+  slot_wall_um: ['Slot walls set back, each', 'µm'],
+  ring_space_um: ['Ring’s spaces set back, each', 'µm'],
+  ring_space_angle_arcsec: ['Ring’s spaces turned, each', '″'],
+  wave_generator_lobe_um: ['Lobes set back, each', 'µm'],
+};
+
+/** What single items deviate by: how many there are, from the least to the largest. */
+function shownList(name, design) {
+  const values = at(design, `/deviations/${name}`);
+  if (!Array.isArray(values) || values.length === 0) return undefined;
+  const [least, most] = [Math.min(...values), Math.max(...values)];
+  return `${values.length}, ${least === most ? '' : `${number(least)} to `}${withUnit(number(most), LISTS[name][1])}`;
+}
 
 /** The inputs in which two designs differ: `[{ pointer, label, value, reference }]`, in words; what is left out is `–`. */
 export function inputDifferences(design, reference) {
@@ -37,6 +56,11 @@ export function inputDifferences(design, reference) {
       if (value !== other) found.push({ pointer: field.pointer, label: fullLabel(field), value: value ?? DASH, reference: other ?? DASH });
     }
   }
+  for (const [name, [label]] of Object.entries(LISTS)) {
+    const [one, other] = [design, reference].map((each) => at(each, `/deviations/${name}`));
+    if (JSON.stringify(one ?? []) === JSON.stringify(other ?? [])) continue;
+    found.push({ pointer: `/deviations/${name}`, label, value: shownList(name, design) ?? DASH, reference: shownList(name, reference) ?? DASH });
+  }
   return found;
 }
 
@@ -47,6 +71,7 @@ export function reportOf(name, { design, version, reference, reasons }, address)
     const rows = fieldsOf(group)
       .filter((field) => !onlyGiven.has(field) || at(design, field.pointer) !== undefined)
       .map((field) => [field.label, shownValue(field, design)])
+      .concat(group.pointer === '/deviations' ? Object.entries(LISTS).map(([name, [label]]) => [label, shownList(name, design)]) : [])
       .filter(([, value]) => value !== undefined)
       .map(([label, value]) => html('tr', {}, html('th', {}, label), html('td', {}, value)));
     return rows.length ? html('table', {}, html('caption', {}, group.title), html('tbody', {}, rows)) : undefined;
