@@ -76,6 +76,14 @@ impl CheckedSweep {
         &self.drive
     }
 
+    /// About what it takes while only its peaks are looked for: of equal intervals no more than one, to a tolerance all moments that were seen.
+    pub fn peaks_bytes(&self) -> u64 {
+        match self.points {
+            Points::Samples(_) => 0,
+            Points::Tolerance(_) => STATE_BYTES * self.expected_states(),
+        }
+    }
+
     /// Its load, of a duty the hardest.
     pub fn load(&self) -> &LoadCase {
         &self.duty.hardest().load

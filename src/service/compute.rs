@@ -19,6 +19,17 @@ use crate::problem::{Problem, ProblemCode};
 /// A slice of what runs in turn begins nothing further after this time: so long at most does a single request wait behind short ones.
 pub const SLICE: Duration = Duration::from_millis(5);
 
+/// Of what unread answers may take, variants of studies may take another such part while they are computed.
+const PART_OF_VARIANTS: u64 = 4;
+
+/// A variant that takes no more is not counted: most take a hundredth.
+const SMALL_VARIANT_BYTES: u64 = 1 << 20;
+
+/// At least one, and no more than a semaphore of any machine can count.
+fn kib(bytes: u64) -> u32 {
+    u32::try_from(bytes >> 10).unwrap_or(u32::MAX).clamp(1, u32::MAX >> 3)
+}
+
 /// Runs solves, a bounded number at once and a bounded number waiting.
 #[derive(Debug, Clone)]
 pub struct Pool {
@@ -29,6 +40,8 @@ pub struct Pool {
     /// One for each slice of a batch that runs or waits for a permit: as many as there are permits, so that a single request
     /// never waits for more than one round of them.
     turns: Arc<Semaphore>,
+    /// One for each KiB that variants of studies may take at once while they are computed.
+    of_variants: Arc<Semaphore>,
     /// One for each batch that runs.
     batches: Arc<Semaphore>,
     /// One: for what is neither a solve nor short.
@@ -82,6 +95,7 @@ impl Pool {
             permits: Arc::new(Semaphore::new(limits.max_concurrent_solves)),
             places: Arc::new(Semaphore::new(limits.max_concurrent_solves + limits.max_queued_solves)),
             turns: Arc::new(Semaphore::new(limits.max_concurrent_solves)),
+            of_variants: Arc::new(Semaphore::new(kib(limits.max_unread_bytes / PART_OF_VARIANTS) as usize)),
             batches: Arc::new(Semaphore::new(limits.max_concurrent_batches)),
             aside: Arc::new(Semaphore::new(1)),
             unhurried: Arc::new(Semaphore::new(1)),
@@ -191,6 +205,31 @@ impl Pool {
         // Behind the single solves that came before: each may take as long as a slice.
         let permit = self.permit().await?;
         self.within(self.deadline(), self.run_permitted((turn, permit), Thread::Blocking, job)).await
+    }
+
+    /// Runs a slice of a study, of which each variant takes so many bytes while it is computed: beside others only as far as together they take no
+    /// more than variants may.
+    ///
+    /// # Errors
+    /// As [`Self::run_in_turn`].
+    pub async fn run_variants<T: Send + 'static>(
+        &self,
+        variant_bytes: u64,
+        job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        if variant_bytes <= SMALL_VARIANT_BYTES {
+            return self.run_in_turn(job).await;
+        }
+        let most = kib(self.limits.max_unread_bytes / PART_OF_VARIANTS);
+        let held = tokio::select! {
+            held = Arc::clone(&self.of_variants).acquire_many_owned(kib(variant_bytes).min(most)) => held,
+            () = self.closed.cancelled() => return Err(shutting_down()),
+        };
+        self.run_in_turn(move |stop| {
+            let _held = held;
+            job(stop)
+        })
+        .await
     }
 
     /// Runs what is no solve, and may yet take too long for the executor, on a thread of its own, one at a time: it waits for no solve.
@@ -315,10 +354,12 @@ fn shutting_down() -> Problem {
 #[cfg(test)]
 mod tests {
     use std::io;
-    use std::sync::mpsc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::sync::{Arc, mpsc};
     use std::time::Duration;
 
     use clap::Parser as _;
+    use futures_util::future::join_all;
 
     use super::{Pool, Thread};
     use crate::config::Settings;
@@ -346,6 +387,28 @@ mod tests {
             assert!(busy.await.is_ok_and(|done| done.is_ok()));
         });
         Ok(())
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+    async fn variants_that_take_much_are_computed_beside_others_only_as_far_as_there_is_room() {
+        let words = ["serve", "--max-concurrent-solves", "4", "--max-unread-bytes", "67108864"];
+        let Line { settings } = Line::parse_from(words);
+        let pool = Pool::new(settings.limits());
+        // Of 16 MiB for all of them.
+        for (variant_bytes, most_at_once) in [(6 << 20, 2), (10 << 20, 1), (1 << 30, 1)] {
+            let (running, most) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicUsize::new(0)));
+            let slices = (0..20).map(|_| {
+                let (running, most) = (Arc::clone(&running), Arc::clone(&most));
+                pool.run_variants(variant_bytes, move |_| {
+                    most.fetch_max(running.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
+                    std::thread::yield_now();
+                    running.fetch_sub(1, Ordering::SeqCst);
+                    Ok(())
+                })
+            });
+            assert!(join_all(slices).await.iter().all(Result::is_ok));
+            assert!(most.load(Ordering::SeqCst) <= most_at_once, "{variant_bytes}");
+        }
     }
 
     #[tokio::test(start_paused = true)]

@@ -27,7 +27,7 @@ const MOST_SOLVES: i64 = 1_000_000;
 const HELD_BACK_BYTES: u64 = 64 << 20;
 
 /// Of the memory, for each solve that runs at once, by default.
-const MEMORY_PER_SOLVE_BYTES: u64 = 96 << 20;
+const MEMORY_PER_SOLVE_BYTES: u64 = 32 << 20;
 
 /// Of the memory, for each connection, by default: an eighth of it is what a connection may hold without taking room.
 const MEMORY_PER_CONNECTION_BYTES: u64 = 8 * SMALL_BYTES;
@@ -84,7 +84,7 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_MAX_PROFILE_POINTS", value_name = "N")]
     pub max_profile_points: Option<u64>,
 
-    /// Solves that run at once [default: the cores that the process may use, or one for each 96 MiB of the memory]
+    /// Solves that run at once [default: the cores that the process may use, or one for each 32 MiB of the memory]
     #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_SOLVES", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_SOLVES))]
     pub max_concurrent_solves: Option<u32>,
 
@@ -273,7 +273,8 @@ impl WorkerSettings {
             max_concurrent_batches: 0,
             deadline_ms: MOST_OF_A_VARIANT_MS,
             cache_max_bytes: 0,
-            max_unread_bytes: 0,
+            // It has no answers: variants take their part of all of the memory.
+            max_unread_bytes: machine::memory_bytes().unwrap_or(UNKNOWN_MEMORY_BYTES),
             max_study_variants: u64::MAX,
             max_study_bytes: u64::MAX,
             max_concurrent_studies: 0,
@@ -434,7 +435,7 @@ mod tests {
                 let held = limits.max_unread_bytes + limits.cache_max_bytes + of_connections;
                 assert!(held + (38 << 20) <= memory_bytes, "{memory_mib} MiB, {cores} cores: {held}");
                 assert!(limits.max_study_bytes < limits.max_unread_bytes);
-                assert!(limits.max_concurrent_solves as u64 <= (memory_mib / 96).max(1));
+                assert!(limits.max_concurrent_solves as u64 * (32 << 20) <= memory_bytes);
             }
         }
     }

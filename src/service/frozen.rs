@@ -221,7 +221,7 @@ async fn sung(pool: &Pool, mut canary: Canary) -> Result<Canary, Problem> {
     loop {
         let is_over;
         (canary, is_over) = pool
-            .run_in_turn(move |stop| {
+            .run_variants(canary.study.variant_bytes(), move |stop| {
                 let is_over = canary.slice(stop)?;
                 Ok((canary, is_over))
             })

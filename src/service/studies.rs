@@ -1025,7 +1025,7 @@ impl Studies {
 async fn run_chunk(pool: &Pool, kept: &Arc<Kept>, chunk: u64) -> Result<(), Problem> {
     let mut work = Work::new(&kept.study, chunk);
     loop {
-        let sliced = pool.run_in_turn(move |stop| slice(work, stop)).await?;
+        let sliced = pool.run_variants(kept.study.variant_bytes(), move |stop| slice(work, stop)).await?;
         let Sliced { work: rest, variants, is_over } = sliced;
         counter!("toothwave_study_variants_total").increment(variants);
         kept.looked_at.fetch_add(variants, Ordering::Relaxed);

@@ -354,7 +354,7 @@ async fn run_chunk(pool: &Pool, study: &Arc<Study>, chunk: u64) -> Result<(Part,
     let mut busy = Duration::ZERO;
     loop {
         let started = Instant::now();
-        let sliced = pool.run_in_turn(move |stop| slice(work, stop)).await?;
+        let sliced = pool.run_variants(study.variant_bytes(), move |stop| slice(work, stop)).await?;
         busy += started.elapsed();
         counter!("toothwave_study_variants_total").increment(sliced.variants);
         work = sliced.work;

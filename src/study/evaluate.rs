@@ -105,6 +105,19 @@ impl Evaluator {
         self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) })
     }
 
+    /// About how many bytes a document takes while it is computed, as far as they are many: columns of states.
+    pub(crate) fn bytes(&self, document: &Tree) -> u64 {
+        let checked = || {
+            let design = document.read::<Design>().ok()?.normalised();
+            Sweep.check(&design, &self.limits).ok()
+        };
+        match self.takes_sweep.then(checked).flatten() {
+            Some(checked) if self.takes_losses || self.takes_radial_forces => Sweep::columns_bytes(&checked),
+            Some(checked) => checked.peaks_bytes(),
+            None => 0,
+        }
+    }
+
     /// As drawn (docs/theory.md section 8). A ring that is none has no outer diameter.
     fn ring_outer_radius_mm(&self, design: &Design, drive: &Drive) -> Result<f64, NoAnswer> {
         let parts = design.parts_parameters();

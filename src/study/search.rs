@@ -196,6 +196,19 @@ impl Search {
         self.islands * (8 * numbers * points) as u64
     }
 
+    /// What a design takes while it is looked at, all numbers being as small as they may, or as large; its true peaks too.
+    pub(crate) fn variant_bytes(&self, template: &Template, evaluator: &Evaluator) -> u64 {
+        let templates = std::iter::once(template).chain(&self.at_true_peaks);
+        let bytes = templates.flat_map(|template| {
+            [0.0, 1.0].map(|share| {
+                let mut template = template.clone();
+                let place = vec![share; template.variables().len()];
+                evaluator.bytes(template.filled(&variable_values(&template, &place)))
+            })
+        });
+        bytes.max().unwrap_or_default()
+    }
+
     /// What the documents take of which the true peaks are looked at.
     pub(crate) fn template_bytes(&self) -> usize {
         self.at_true_peaks.as_ref().map_or(0, Template::bytes)

@@ -49,6 +49,8 @@ pub struct Study {
     variants: u64,
     /// Of a chunk in rows.
     chunk_variants: u64,
+    /// What a variant takes while it is computed.
+    variant_bytes: u64,
 }
 
 #[derive(Debug)]
@@ -151,7 +153,8 @@ impl Study {
             require_possible_ranges(&quantities, &template, &limits.calculation)?;
         }
         let evaluator = Evaluator::new(quantities, limits.calculation);
-        let study = Self { id, kind, template, evaluator, variants, chunk_variants: CHUNK_VARIANTS };
+        let mut study =
+            Self { id, kind, template, evaluator, variants, chunk_variants: CHUNK_VARIANTS, variant_bytes: 0 };
         #[expect(clippy::cast_precision_loss, reason = "told, not computed with")]
         if variants > limits.max_study_variants {
             let limit = limits.max_study_variants;
@@ -171,7 +174,24 @@ impl Study {
             refused.code = NoAnswerCode::TooManyVariants;
             return Err(refused);
         }
+        study.variant_bytes = study.most_of_a_variant();
         Ok(study)
+    }
+
+    /// By some of them: those at both ends and in the middle.
+    fn most_of_a_variant(&self) -> u64 {
+        let mut template = self.template.clone();
+        let variants = [0, 1, self.variants / 2, self.variants.saturating_sub(1)];
+        let mut most = |rows: &dyn Rows| {
+            let bytes = variants.map(|variant| self.evaluator.bytes(rows.document(&mut template, variant)));
+            bytes.into_iter().max().unwrap_or_default()
+        };
+        match &self.kind {
+            Kind::Map(map) => most(map),
+            Kind::Sensitivity(sensitivity) => most(sensitivity),
+            Kind::Tolerance(tolerance) => most(tolerance),
+            Kind::Search(search) => search.variant_bytes(&self.template, &self.evaluator),
+        }
     }
 
     /// The same study, of deviations from a design that can be, by whose nature it can deviate so.
@@ -298,6 +318,11 @@ impl Study {
             Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => 0,
         };
         self.stored_bytes().saturating_add((self.template.bytes() + of_true_peaks) as u64)
+    }
+
+    /// About what a variant takes while it is computed, as far as that is much.
+    pub const fn variant_bytes(&self) -> u64 {
+        self.variant_bytes
     }
 
     /// About what a chunk takes that is in work, beside what it comes to.
