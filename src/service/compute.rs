@@ -15,6 +15,7 @@ use tracing::Span;
 use crate::beside::beside;
 use crate::config::Limits;
 use crate::problem::{Problem, ProblemCode};
+use crate::room;
 
 /// A slice of what runs in turn begins nothing further after this time: so long at most does a single request wait behind short ones.
 pub const SLICE: Duration = Duration::from_millis(5);
@@ -24,11 +25,6 @@ const PART_OF_VARIANTS: u64 = 4;
 
 /// A variant that takes no more is not counted: most take a hundredth.
 const SMALL_VARIANT_BYTES: u64 = 1 << 20;
-
-/// At least one, and no more than a semaphore of any machine can count.
-fn kib(bytes: u64) -> u32 {
-    u32::try_from(bytes >> 10).unwrap_or(u32::MAX).clamp(1, u32::MAX >> 3)
-}
 
 /// Runs solves, a bounded number at once and a bounded number waiting.
 #[derive(Debug, Clone)]
@@ -40,7 +36,7 @@ pub struct Pool {
     /// One for each slice of a batch that runs or waits for a permit: as many as there are permits, so that a single request
     /// never waits for more than one round of them.
     turns: Arc<Semaphore>,
-    /// One for each KiB that variants of studies may take at once while they are computed.
+    /// As many as there are for the bytes that variants of studies may take at once while they are computed.
     of_variants: Arc<Semaphore>,
     /// One for each batch that runs.
     batches: Arc<Semaphore>,
@@ -95,7 +91,7 @@ impl Pool {
             permits: Arc::new(Semaphore::new(limits.max_concurrent_solves)),
             places: Arc::new(Semaphore::new(limits.max_concurrent_solves + limits.max_queued_solves)),
             turns: Arc::new(Semaphore::new(limits.max_concurrent_solves)),
-            of_variants: Arc::new(Semaphore::new(kib(limits.max_unread_bytes / PART_OF_VARIANTS) as usize)),
+            of_variants: Arc::new(Semaphore::new(room::permits(limits.max_unread_bytes / PART_OF_VARIANTS) as usize)),
             batches: Arc::new(Semaphore::new(limits.max_concurrent_batches)),
             aside: Arc::new(Semaphore::new(1)),
             unhurried: Arc::new(Semaphore::new(1)),
@@ -220,9 +216,9 @@ impl Pool {
         if variant_bytes <= SMALL_VARIANT_BYTES {
             return self.run_in_turn(job).await;
         }
-        let most = kib(self.limits.max_unread_bytes / PART_OF_VARIANTS);
+        let most = room::permits(self.limits.max_unread_bytes / PART_OF_VARIANTS);
         let held = tokio::select! {
-            held = Arc::clone(&self.of_variants).acquire_many_owned(kib(variant_bytes).min(most)) => held,
+            held = Arc::clone(&self.of_variants).acquire_many_owned(room::permits(variant_bytes).min(most)) => held,
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
         self.run_in_turn(move |stop| {

@@ -197,6 +197,6 @@ impl Reserved {
 
 /// Permits for so many bytes: at least one, so that without any room large answers go one at a time, and no more than a semaphore of
 /// any machine can count.
-fn permits(bytes: u64) -> u32 {
+pub fn permits(bytes: u64) -> u32 {
     u32::try_from(bytes.div_ceil(1024)).unwrap_or(u32::MAX).clamp(1, u32::MAX >> 3)
 }

@@ -9,6 +9,9 @@ mod points;
 mod search;
 mod unloaded;
 
+#[cfg(test)]
+mod tried;
+
 use crate::drive::Drive;
 use crate::gaps::Deviations;
 use crate::load_sharing::{LoadCase, LoadedDrive};

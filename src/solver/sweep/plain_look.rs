@@ -119,23 +119,12 @@ impl Look for PlainLook<'_> {
 mod tests {
     use super::*;
     use crate::parts::CarrierRadii;
-    use crate::{
-        Compatibility, ContactLaw, Drive, DriveParameters, LoadParameters, Material, Materials, Modification, Never,
-        ToothShape, Torque, WaveGenerator,
-    };
+    use crate::sweep::tried::PAPER_5_1;
+    use crate::{Compatibility, ContactLaw, Drive, LoadParameters, Material, Materials, Modification, Never, Torque};
 
     #[test]
     fn the_teeth_that_are_pressed_are_those_that_carry() {
-        let drive = Drive::new(&DriveParameters {
-            wave_generator: WaveGenerator::Ellipse { semi_major_mm: 58.0, semi_minor_mm: 56.0 },
-            teeth: 28,
-            installed: 28,
-            tooth_radius_mm: 5.0,
-            tooth: ToothShape::Cylinder { width_mm: 15.0 },
-            ring_teeth: 26,
-            tip_radius_mm: None,
-        });
-        let drive = drive.expect("a possible drive");
+        let drive = Drive::new(&PAPER_5_1).expect("a possible drive");
         let steel = Material::STEEL;
         let case = LoadCase::new(&LoadParameters {
             materials: Materials { wave_generator: steel, teeth: steel, ring: steel, carrier: steel },

@@ -862,17 +862,23 @@ impl Nodes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Drive, DriveParameters, ToothShape, WaveGenerator};
+    use crate::Drive;
+    use crate::sweep::tried::PAPER_5_1;
 
-    /// A curve over a lap of sixteen intervals, as the wind-up of one tooth.
-    fn seen_of(curve: impl Fn(f64) -> f64) -> Seen {
+    /// A lap of sixteen intervals of one tooth, each moment put down by such a function.
+    fn seen_by(put_down: impl Fn(&mut Seen, f64)) -> Seen {
         let piece = Piece { lap: 0, start: 0.0, end: 1.0, places: 1, at_start: None, at_end: None };
         let mut seen = Seen::new(piece, 1);
         for fraction in std::mem::take(&mut seen.wanted) {
-            seen.push(fraction)[0] = curve(fraction);
+            put_down(&mut seen, fraction);
         }
         seen.put_in_order();
         seen
+    }
+
+    /// A curve as the first load of the tooth.
+    fn seen_of(curve: impl Fn(f64) -> f64) -> Seen {
+        seen_by(|seen, fraction| seen.push(fraction)[0] = curve(fraction))
     }
 
     /// That on every stretch what the curve is said to stay below is not below its largest value there; how far it is above at most.
@@ -950,31 +956,17 @@ mod tests {
         }
     }
 
-    /// A tooth that is pressed, or not, by such a curve, and the sixteen intervals of a piece.
+    /// A tooth that is pressed, or not, by such a curve.
     fn seen_of_a_tooth(pressed: impl Fn(f64) -> f64) -> Seen {
-        let piece = Piece { lap: 0, start: 0.0, end: 1.0, places: 1, at_start: None, at_end: None };
-        let mut seen = Seen::new(piece, 1);
-        for fraction in std::mem::take(&mut seen.wanted) {
-            let rotation_rad = &mut seen.push(fraction)[LOADS];
-            *rotation_rad = 2.0;
+        seen_by(|seen, fraction| {
+            seen.push(fraction)[LOADS] = 2.0;
             seen.push_pressed(std::iter::once(pressed(fraction)));
-        }
-        seen.put_in_order();
-        seen
+        })
     }
 
     #[test]
     fn a_piece_is_cut_where_a_tooth_stands_at_the_start_of_the_relief() {
-        let parameters = DriveParameters {
-            wave_generator: WaveGenerator::Ellipse { semi_major_mm: 58.0, semi_minor_mm: 56.0 },
-            teeth: 28,
-            installed: 28,
-            tooth_radius_mm: 5.0,
-            tooth: ToothShape::Cylinder { width_mm: 15.0 },
-            ring_teeth: 26,
-            tip_radius_mm: None,
-        };
-        let mesh = Mesh::new(&Drive::new(&parameters).expect("a possible drive"));
+        let mesh = Mesh::new(&Drive::new(&PAPER_5_1).expect("a possible drive"));
         let whole = Piece { lap: 0, start: 0.0, end: 1.0, places: 7, at_start: None, at_end: None };
         for start_deg in [1.0, 13.4, 20.0, 31.0, 50.0, 89.0] {
             let fraction = mesh.fraction_at_deg(start_deg);
