@@ -472,6 +472,18 @@ impl<'a> LoadedDrive<'a> {
         !self.gaps.is_nil() || self.tip_corner.is_some()
     }
 
+    /// The angle by which the wave generator moves a tooth at the flank's end as far as the tooth is from the axis; nothing where no corner is pressed.
+    ///
+    /// # Errors
+    /// [`NotConverged`] from the path.
+    pub(crate) fn distance_at_corner_rad(&self) -> Result<f64, NotConverged> {
+        if self.tip_corner.is_none() {
+            return Ok(0.0);
+        }
+        let center = self.drive.flank().locus().at(self.drive.flank_limit().position)?;
+        Ok(center.center_radius_mm / center.cam_contact.lever_arm_mm)
+    }
+
     /// The corner that a tooth meets first, where it stands before the flank.
     fn corner_at(&self, position: &Position) -> Option<&TipCorner> {
         self.tip_corner.as_ref().filter(|corner| corner.is_before_flank(position))
