@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use toothwave_solver::drive::Draft;
 use toothwave_solver::mesh::Samples;
-use toothwave_solver::model_error;
+use toothwave_solver::model_error::{self, Beyond, ModelError};
 use toothwave_solver::parts::CarrierRadii;
 use toothwave_solver::sweep::{ContactPeaks, Points, Tolerance, sweep_with_deviations};
 use toothwave_solver::{
@@ -20,7 +20,7 @@ use crate::json::word;
 use crate::key::Encode;
 use crate::no_answer::{NoAnswer, NoAnswerCode};
 use crate::question::{Limits, Question, checked_drive, checked_load};
-use crate::sweep::STATE_BYTES;
+use crate::sweep::{SEARCHED_BYTES, STATE_BYTES};
 
 /// The sample counts that are tried.
 const SAMPLES: [u64; 9] = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
@@ -70,7 +70,8 @@ pub struct WayAnswer {
     pub error: f64,
     /// Largest relative difference of the model's converged peaks from those of the design's own model.
     pub model_difference: f64,
-    /// Largest error of the model's forces that was measured against elastic bodies in drives of this case; left out where none was.
+    /// Largest error of the model's forces that was measured against elastic bodies in drives of this case; left out where none was, or where a sweep's
+    /// `model_error` has other reasons than the law to say that the design is beyond them.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub expected_model_error: Option<f64>,
@@ -138,17 +139,18 @@ impl Question for Accuracy {
     }
 
     fn working_bytes(checked: &CheckedAccuracy) -> u64 {
-        // Of the longest way that is tried.
         let CheckedAccuracy { drive, load, deviations, max_states, .. } = checked;
         let mesh = load.mesh(drive, deviations);
         let counts = SAMPLES.iter().filter_map(|&samples| Some(mesh.state_count(Samples::new(samples).ok()?)));
-        STATE_BYTES * counts.filter(|count| count <= max_states).max().unwrap_or(*max_states)
+        // The longest way that is tried is longer than the converged reference; where a limit or unlike laps make it short, nobody knows how long that one will be.
+        let states = counts.max().filter(|most| most <= max_states && mesh.laps() == 1).unwrap_or(*max_states);
+        (STATE_BYTES + SEARCHED_BYTES) * states
     }
 
     fn answer(checked: &CheckedAccuracy, stop: &dyn Stop) -> Result<AccuracyAnswer, NoAnswer> {
         let CheckedAccuracy { drive, load, deviations, requested_error, max_states } = checked;
-        let own = *load.parameters();
-        let own_peaks = converged(drive, load, deviations, *max_states, stop).map_err(|error| match error {
+        let parameters = *load.parameters();
+        let own = Converged::new(drive, load, deviations, *max_states, stop).map_err(|error| match error {
             // There is no field to blame: the reference's tolerance is ours.
             SolveError::TooManyStates { limit } => NoAnswer::new(
                 NoAnswerCode::TooManyStates,
@@ -157,9 +159,9 @@ impl Question for Accuracy {
             error => error.into(),
         })?;
         let (mut ways, mut unavailable) = (Vec::new(), Vec::new());
-        for model in models(drive, &own) {
+        for model in models(drive, &parameters) {
             let (compatibility, law) = (model.compatibility.into(), model.law.into());
-            match Model::new(checked, &model, &own_peaks, stop) {
+            match Model::new(checked, &model, &own.peaks, stop) {
                 Ok(Some(model)) => model.measure(&mut ways, stop)?,
                 // A gap that this form of compatibility would turn into load.
                 Ok(None) => {
@@ -173,7 +175,9 @@ impl Question for Accuracy {
             }
         }
         let is_own = |way: &&WayAnswer| {
-            way.compatibility == own.compatibility.into() && way.law == own.law.into() && way.error <= *requested_error
+            way.compatibility == parameters.compatibility.into()
+                && way.law == parameters.law.into()
+                && way.error <= *requested_error
         };
         let cheapest = ways.iter().filter(is_own).min_by(|one, other| one.solve_us.total_cmp(&other.solve_us)).cloned();
         Ok(AccuracyAnswer {
@@ -221,14 +225,26 @@ fn models(drive: &Drive, own: &LoadParameters) -> Vec<LoadParameters> {
     models
 }
 
-fn converged(
-    drive: &Drive,
-    load: &LoadCase,
-    deviations: &Deviations,
-    max_states: u64,
-    stop: &dyn Stop,
-) -> Result<PerContact<ContactPeaks>, SolveError> {
-    Ok(sweep_with_deviations(drive, load, deviations, Points::finest(max_states), stop)?.peaks)
+/// A model's converged peaks, and the largest error of its forces that was measured in such drives.
+struct Converged {
+    peaks: PerContact<ContactPeaks>,
+    expected_error: Option<f64>,
+}
+
+impl Converged {
+    fn new(
+        drive: &Drive,
+        load: &LoadCase,
+        deviations: &Deviations,
+        max_states: u64,
+        stop: &dyn Stop,
+    ) -> Result<Self, SolveError> {
+        let sweep = sweep_with_deviations(drive, load, deviations, Points::finest(max_states), stop)?;
+        let ModelError { measured, beyond, .. } = model_error::of(drive, load, deviations, &sweep, None)?;
+        let is_like = beyond.iter().all(|reason| matches!(reason, Beyond::Law));
+        let expected_error = measured.filter(|_| is_like).map(|measured| measured.force.largest());
+        Ok(Self { peaks: sweep.peaks, expected_error })
+    }
 }
 
 /// The largest relative difference of six peaks from their reference.
@@ -245,7 +261,7 @@ struct Model<'a> {
     drive: &'a Drive,
     deviations: &'a Deviations,
     load: LoadCase,
-    reference: PerContact<ContactPeaks>,
+    reference: Converged,
     difference: f64,
     max_states: u64,
 }
@@ -262,8 +278,8 @@ impl<'a> Model<'a> {
         if !parameters.clearance_violations(&Draft::new(drive.parameters())?)?.is_empty() {
             return Ok(None);
         }
-        let reference = converged(drive, &load, deviations, max_states, stop)?;
-        let difference = difference(&reference, own_peaks);
+        let reference = Converged::new(drive, &load, deviations, max_states, stop)?;
+        let difference = difference(&reference.peaks, own_peaks);
         Ok(Some(Self { drive, deviations, load, reference, difference, max_states }))
     }
 
@@ -300,10 +316,8 @@ impl<'a> Model<'a> {
         /// The share of the model's error below which a numerical one no longer counts.
         const FINER: f64 = 0.1;
         let p = self.load.parameters();
-        let error = difference(&found.peaks, &self.reference);
-        let case = model_error::case_of(self.drive, &self.load, self.deviations);
-        let measured = model_error::measured(p, case);
-        let expected_model_error = measured.map(|measured| measured.force.largest());
+        let error = difference(&found.peaks, &self.reference.peaks);
+        let expected_model_error = self.reference.expected_error;
         Ok(WayAnswer {
             compatibility: p.compatibility.into(),
             law: p.law.into(),

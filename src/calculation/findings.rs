@@ -277,7 +277,7 @@ impl FindingAnswer {
                 palmgren_um,
                 "µm",
                 "under the peak force the linear law lets the wave generator's contact approach by far less than real line contacts do: wind-up comes out too small and the effect of clearances too large".into(),
-                "choose the law `johnson`, or `fixed` with stiffnesses of your own",
+                "choose `virtual_work` with the law `johnson`, or the law `fixed` with stiffnesses of your own",
             ),
             Finding::ProjectionOnSteepFlank { pressure_angle_deg } => new(
                 Code::ProjectionOnSteepFlank,
@@ -323,7 +323,11 @@ impl FindingAnswer {
                     "the ring's rim, {}: by an estimate it adds this share to what a tooth gives way at its contacts, and forces and wind-up leave it out",
                     if is_free { "with nothing around it, bends" } else { "even if housed, gives way" }
                 ),
-                "house the ring or make its rim thicker, or give the estimate as the ring's series compliance",
+                if is_free {
+                    "house the ring or make its rim thicker, or give the estimate as the ring's series compliance"
+                } else {
+                    "give the estimate as the ring's series compliance, or let the housing begin nearer behind the teeth"
+                },
             ),
             Finding::PalmgrenBeyondSteel { contact, contact_modulus_gpa, steel_gpa } => new(
                 Code::PalmgrenBeyondSteel,
@@ -336,7 +340,7 @@ impl FindingAnswer {
                     "Palmgren's law holds for steel on steel, and the contact modulus at the {} is another",
                     contact_name(contact).replace('_', " ")
                 ),
-                "choose the law `johnson`, which follows the modulus",
+                "choose `virtual_work` with the law `johnson`, which follows the modulus",
             ),
             Finding::JohnsonBeyondHalfWidth { contact, half_width_mm, limit_mm } => new(
                 Code::JohnsonBeyondHalfWidth,
@@ -366,7 +370,7 @@ impl FindingAnswer {
                 if is_moving {
                     "lower the torque, choose stiffer contacts, or close the clearances"
                 } else {
-                    "lower the torque, close the clearances, or let the wave generator move"
+                    "lower the torque, close the clearances, or let the wave generator move, by `virtual_work`"
                 },
             ),
             Finding::ToothLeavesSlot { edge, center_radius_mm, wall_end_mm, is_loaded } => new(

@@ -396,7 +396,7 @@ impl Mesh {
     }
 
     /// The same in a sweep.
-    pub(crate) fn laps(&self) -> u64 {
+    pub fn laps(&self) -> u64 {
         self.laps_of_load_period() * self.load_periods()
     }
 

@@ -2,14 +2,16 @@
 //! those that this speaks for.
 
 use crate::backing::{Backing, Fingers, Rim, Shares, Support};
-use crate::contact::{Contact, ContactLaw, Material};
+use crate::contact::{Contact, ContactLaw, Material, PerContact};
 use crate::drive::{Drive, ToothShape};
-use crate::findings::{SOFT_BACKING_SHARE, widest_half_widths_mm};
+use crate::findings::{SOFT_BACKING_SHARE, WIND_UP_SHARE_OF_PERIOD, WIND_UP_TIMES_LOBES_RAD, widest_half_widths_mm};
 use crate::gaps::Deviations;
 use crate::load_sharing::{Compatibility, LoadCase, LoadParameters};
+use crate::mesh::Mesh;
 use crate::ring::FlankEnd;
 use crate::root::NotConverged;
 use crate::sweep::Sweep;
+use crate::tooth::line::{WIDE_SHARE, least_length_mm};
 
 /// Lobes of the wave generators that were held against finite elements, at most.
 pub const LOBES_TO: u32 = 2;
@@ -22,6 +24,23 @@ pub const GAP_TO_UM: f64 = 10.0;
 
 /// The same over the tooth's radius, at most: 10 µm were at teeth of 1.5 mm.
 pub const GAP_SHARE_TO: f64 = 0.01 / 1.5;
+
+/// The largest wind-up times the number of lobes, and the same over the period, of natural tips with a gap: the wave generator's arms and the teeth's places are
+/// those of the positions without load, or follow them to second order, and so far both were seen to hold. Without gaps all teeth move on alike, and it matters less.
+const WIND_UP_TO: WindUpTo = WindUpTo { times_lobes_rad: 0.02, share_of_period: 0.05 };
+
+/// The same of pointed and bored ones.
+const WIND_UP_AT_POINTED_TIPS_TO: WindUpTo = WindUpTo { times_lobes_rad: 0.031, share_of_period: 0.095 };
+
+/// Where their wind-up is told to be beyond the model.
+const WITHOUT_GAPS_TO: WindUpTo =
+    WindUpTo { times_lobes_rad: WIND_UP_TIMES_LOBES_RAD, share_of_period: WIND_UP_SHARE_OF_PERIOD };
+
+#[derive(Debug, Clone, Copy)]
+struct WindUpTo {
+    times_lobes_rad: f64,
+    share_of_period: f64,
+}
 
 /// Half the width of the widest contact of all states over the tooth's radius, at most: all drives that were calculated stay below.
 pub const HALF_WIDTH_SHARE_TO: f64 = 0.035;
@@ -92,12 +111,14 @@ pub enum Beyond {
     /// A steeper flank.
     PressureAngle,
     /// Teeth that enter under load: finite elements leave out the angles where one stands on the tip. A real tip takes its load little by little, and the
-    /// peak comes out lower.
+    /// peak comes out lower. With `corner_contact` those at pointed tips were calculated, not those at bores.
     EntryUnderLoad,
     /// Parts of unlike moduli.
     Materials,
     /// A larger gap.
     Gap,
+    /// A larger wind-up.
+    WindUp,
     /// Parts made otherwise than conjugate, or single items of them that deviate.
     Modification,
     /// Something that gives way behind a contact.
@@ -158,6 +179,43 @@ impl Held {
     }
 }
 
+/// How far drives of this size and shape may go to be like those that were calculated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// The largest gap of a contact.
+    pub gap_um: f64,
+    /// The largest wind-up.
+    pub wind_up_deg: f64,
+    /// The largest half-width of a contact over the tooth's radius.
+    pub half_width_over_tooth_radius: f64,
+}
+
+impl Range {
+    fn of(drive: &Drive, law: &ContactLaw, case: Case) -> Self {
+        let tooth_radius_mm = drive.parameters().tooth_radius_mm;
+        let to = match (case.has_gaps, case.has_pointed_tips) {
+            (false, _) => WITHOUT_GAPS_TO,
+            (true, false) => WIND_UP_TO,
+            (true, true) => WIND_UP_AT_POINTED_TIPS_TO,
+        };
+        let by_lobes_deg = (to.times_lobes_rad / f64::from(drive.lobes())).to_degrees();
+        // Where the law itself is told to end before.
+        let of_law = match law {
+            ContactLaw::Johnson { depth_mm } => PerContact::of(|contact| {
+                WIDE_SHARE * least_length_mm(depth_mm, contact, tooth_radius_mm) / tooth_radius_mm
+            }),
+            _ => PerContact::of(|_| f64::INFINITY),
+        };
+        Self {
+            gap_um: GAP_TO_UM.min(1e3 * GAP_SHARE_TO * tooth_radius_mm),
+            wind_up_deg: by_lobes_deg.min(to.share_of_period * Mesh::new(drive).period_deg()),
+            half_width_over_tooth_radius: of_law
+                .iter()
+                .fold(HALF_WIDTH_SHARE_TO, |least, (_, &share)| least.min(share)),
+        }
+    }
+}
+
 /// What is expected of the model for a drive under a load.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelError {
@@ -165,6 +223,8 @@ pub struct ModelError {
     pub measured: Option<Measured>,
     /// What comes on top of the wind-up's error, where that can be told.
     pub held: Option<Held>,
+    /// How far it goes for such a drive.
+    pub range: Range,
     /// Why the drive is beyond it; empty where it lies within.
     pub beyond: Vec<Beyond>,
 }
@@ -267,13 +327,14 @@ pub fn of(
     parts: Option<(&Support, &Shares)>,
 ) -> Result<ModelError, NotConverged> {
     let p = load.parameters();
-    let measured = measured(p, case_of(drive, load, deviations));
+    let case = case_of(drive, load, deviations);
+    let measured = measured(p, case);
     let own = p.materials.teeth;
     let is_alike =
         |material: &Material| (material.compliance_per_mpa() / own.compliance_per_mpa() - 1.0).abs() <= ALIKE;
     let mates = [&p.materials.wave_generator, &p.materials.ring, &p.materials.carrier];
     let tooth_radius_mm = drive.parameters().tooth_radius_mm;
-    let most_um = GAP_TO_UM.min(1e3 * GAP_SHARE_TO * tooth_radius_mm);
+    let range = Range::of(drive, &p.law, case);
     // Slots that run into each other leave no finger that could be estimated.
     let has_estimate = |shares: &Shares, contact: Contact| {
         *p.series_compliance_mm_per_n.get(contact) > 0.0
@@ -287,21 +348,24 @@ pub fn of(
     let at_peaks = sweep.peaks.iter().map(|(_, peaks)| peaks.half_width_mm);
     let of_lines = widest_half_widths_mm(drive, &sweep.states).map(|(_, half_width_mm)| half_width_mm);
     let widest_mm = at_peaks.chain(of_lines).fold(0.0, f64::max);
+    let wind_up_deg = sweep.input_angles.wind_up_deg.iter().copied().fold(0.0, f64::max);
+    let is_at_a_point = p.corner_contact && drive.flank_limit().end == FlankEnd::Undercut;
     let reasons = [
         (measured.is_none() || !matches!(p.law, ContactLaw::Johnson { .. }), Beyond::Law),
         (!matches!(drive.parameters().tooth, ToothShape::Cylinder { .. }), Beyond::ToothShape),
         (drive.lobes() > LOBES_TO, Beyond::Lobes),
         (drive.sense() < 0.0, Beyond::RingWithMoreTeeth),
         (drive.largest_pressure_angle_deg()? > PRESSURE_ANGLE_TO_DEG, Beyond::PressureAngle),
-        (has_pointed_tips(drive) && !p.corner_contact, Beyond::EntryUnderLoad),
+        (has_pointed_tips(drive) && !is_at_a_point, Beyond::EntryUnderLoad),
         (!mates.into_iter().all(is_alike), Beyond::Materials),
-        (p.clearance_um.iter().any(|(_, &gap_um)| gap_um > most_um), Beyond::Gap),
+        (p.clearance_um.iter().any(|(_, &gap_um)| gap_um > range.gap_um), Beyond::Gap),
+        (wind_up_deg > range.wind_up_deg, Beyond::WindUp),
         (p.modification.first().is_some() || !deviations.is_nil(), Beyond::Modification),
         (p.series_compliance_mm_per_n.iter().any(|(_, &compliance)| compliance > 0.0), Beyond::SeriesCompliance),
         (parts.is_some_and(|(_, shares)| is_soft(shares)), Beyond::SoftBacking),
-        (widest_mm > HALF_WIDTH_SHARE_TO * tooth_radius_mm, Beyond::HalfWidth),
+        (widest_mm > range.half_width_over_tooth_radius * tooth_radius_mm, Beyond::HalfWidth),
     ];
     let beyond = reasons.into_iter().filter(|&(is_beyond, _)| is_beyond).map(|(_, reason)| reason).collect();
     let held = parts.and_then(|(support, shares)| Held::of(support, shares));
-    Ok(ModelError { measured, held, beyond })
+    Ok(ModelError { measured, held, range, beyond })
 }

@@ -108,6 +108,21 @@ async fn every_form_and_law_is_tried_and_told_how_far_it_is_from_the_designs_own
     assert_eq!(answer["unavailable"], json!([]));
 }
 
+/// Case 5.2 with its teeth entering under load, of which the elements say nothing.
+#[tokio::test]
+async fn of_a_drive_beyond_those_that_were_calculated_no_error_of_the_model_is_told() {
+    let service = Service::new();
+    let case_5_2: Value = serde_json::from_str(include_str!("../../examples/paper-5.2.json")).unwrap();
+    let entering = with(&case_5_2, "/model", json!({}));
+    let pressed = with(&case_5_2, "/model", json!({ "corner_contact": true }));
+    for (document, expected) in [(entering, None), (pressed, Some(0.04))] {
+        let answer = service.post("/v1/accuracy", &document).await.found();
+        let own = ways(&answer).iter().find(|way| way["law"] == "johnson").unwrap().clone();
+        assert_eq!(own.get("expected_model_error").and_then(Value::as_f64), expected, "{own}");
+        assert!(expected.is_some() || own["is_finer_than_model"] == false);
+    }
+}
+
 #[tokio::test]
 async fn a_model_without_an_answer_is_named_with_the_reason() {
     let document = [

@@ -116,9 +116,11 @@ pub struct RangeAnswer {
     pub lobes: u32,
     /// Largest pressure angle of the ring's flank.
     pub pressure_angle_deg: f64,
-    /// Largest gap of a contact.
+    /// Largest gap of a contact, for teeth of this size.
     pub gap_um: f64,
-    /// Half of the largest width of a contact, over the tooth's radius.
+    /// Largest wind-up, for so many lobes and teeth, such tips, and gaps or none.
+    pub wind_up_deg: f64,
+    /// Half of the largest width of a contact, over the tooth's radius; less where the law's own limit comes before.
     pub half_width_over_tooth_radius: f64,
 }
 
@@ -136,12 +138,15 @@ pub enum BeyondWord {
     RingWithMoreTeeth,
     /// A steeper flank.
     PressureAngle,
-    /// Teeth that enter under load, at angles that were left out: a real tip takes its load little by little, and the peak comes out lower.
+    /// Teeth that enter under load, at angles that were left out: a real tip takes its load little by little, and the peak comes out lower. With `corner_contact`
+    /// bored tips alone.
     EntryUnderLoad,
     /// Parts of unlike moduli.
     Materials,
     /// A larger gap.
     Gap,
+    /// A larger wind-up: teeth no longer stand where they stand without load.
+    WindUp,
     /// Parts made otherwise than conjugate.
     Modification,
     /// Something that gives way behind a contact.
@@ -163,6 +168,7 @@ impl From<Beyond> for BeyondWord {
             Beyond::EntryUnderLoad => Self::EntryUnderLoad,
             Beyond::Materials => Self::Materials,
             Beyond::Gap => Self::Gap,
+            Beyond::WindUp => Self::WindUp,
             Beyond::Modification => Self::Modification,
             Beyond::SeriesCompliance => Self::SeriesCompliance,
             Beyond::SoftBacking => Self::SoftBacking,
@@ -206,8 +212,9 @@ impl ModelErrorAnswer {
             range: RangeAnswer {
                 lobes: solver::LOBES_TO,
                 pressure_angle_deg: solver::PRESSURE_ANGLE_TO_DEG,
-                gap_um: solver::GAP_TO_UM,
-                half_width_over_tooth_radius: solver::HALF_WIDTH_SHARE_TO,
+                gap_um: error.range.gap_um,
+                wind_up_deg: error.range.wind_up_deg,
+                half_width_over_tooth_radius: error.range.half_width_over_tooth_radius,
             },
             is_within: beyond.is_empty(),
             beyond,

@@ -147,7 +147,7 @@ export class Accuracy {
     const { requested_error: wanted, cheapest } = this.#measured.answer;
     if (!cheapest) return `No choice of input angles is within ${number(wanted, 2)} for this design’s own model.`;
     const expected = cheapest.expected_model_error;
-    const model = expected === undefined ? 'The model’s own error was not measured under this law.' : `The model itself errs by up to ${Math.round(100 * expected)} % against elastic bodies: smaller errors than a tenth of that are digits beyond it.`;
+    const model = expected === undefined ? 'The model’s own error was not measured in drives like this.' : `The model itself errs by up to ${Math.round(100 * expected)} % against elastic bodies: smaller errors than a tenth of that are digits beyond it.`;
     return `Fastest within ${number(wanted, 2)} for this design’s own model: ${pointsName(cheapest)}, ${number(cheapest.solve_us, 2)} µs. ${model}`;
   }
 }

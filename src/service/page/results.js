@@ -34,6 +34,7 @@ const BEYOND = {
   entry_under_load: 'teeth that enter under load',
   materials: 'unlike materials',
   gap: 'larger gaps',
+  wind_up: 'a larger wind-up',
   modification: 'its modification',
   series_compliance: 'what gives way behind its contacts',
   soft_backing: 'soft parts behind its contacts',
