@@ -24,7 +24,7 @@ pub const SLICE: Duration = Duration::from_millis(5);
 const PART_OF_VARIANTS: u64 = 4;
 
 /// A variant that takes no more is not counted: most take a hundredth.
-const SMALL_VARIANT_BYTES: u64 = 1 << 20;
+pub const SMALL_VARIANT_BYTES: u64 = 1 << 20;
 
 /// Runs solves, a bounded number at once and a bounded number waiting.
 #[derive(Debug, Clone)]
@@ -203,22 +203,22 @@ impl Pool {
         self.within(self.deadline(), self.run_permitted((turn, permit), Thread::Blocking, job)).await
     }
 
-    /// Runs a slice of a study, of which each variant takes so many bytes while it is computed: beside others only as far as together they take no
+    /// Runs a slice of a study that has room for variants of so many bytes while they are computed: beside others only as far as together they take no
     /// more than variants may.
     ///
     /// # Errors
     /// As [`Self::run_in_turn`].
     pub async fn run_variants<T: Send + 'static>(
         &self,
-        variant_bytes: u64,
+        room_bytes: u64,
         job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
-        if variant_bytes <= SMALL_VARIANT_BYTES {
+        if room_bytes <= SMALL_VARIANT_BYTES {
             return self.run_in_turn(job).await;
         }
         let most = room::permits(self.limits.max_unread_bytes / PART_OF_VARIANTS);
         let held = tokio::select! {
-            held = Arc::clone(&self.of_variants).acquire_many_owned(room::permits(variant_bytes).min(most)) => held,
+            held = Arc::clone(&self.of_variants).acquire_many_owned(room::permits(room_bytes).min(most)) => held,
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
         self.run_in_turn(move |stop| {

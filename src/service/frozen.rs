@@ -8,9 +8,9 @@ use rustix::time::{ClockId, clock_gettime};
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_calculation::{BUILD, question};
 use toothwave_store::NewStudy;
-use toothwave_study::{Limits, Part, Study, Work};
+use toothwave_study::{Interrupted, Limits, Part, Study, Work};
 
-use crate::compute::{Pool, SLICE};
+use crate::compute::{Pool, SLICE, SMALL_VARIANT_BYTES};
 use crate::problem::{Problem, ProblemCode};
 
 /// What a chunk should take: long against what it costs to claim and to keep one, short against what a worker's end loses.
@@ -159,6 +159,8 @@ fn processor_time() -> Duration {
 /// Variants spread over a study; of a search the beginning of its first island.
 struct Canary {
     study: Arc<Study>,
+    /// What its variants take while they are computed, as far as they were seen to.
+    room_bytes: u64,
     island: Option<Work>,
     hasher: blake3::Hasher,
     sung: u64,
@@ -169,10 +171,11 @@ struct Canary {
 
 impl Canary {
     fn new(study: &Arc<Study>, most: u64, until: Option<Duration>) -> Self {
-        let island = (study.kind() == "search").then(|| Work::new(study, 0));
+        let room_bytes = SMALL_VARIANT_BYTES;
+        let island = (study.kind() == "search").then(|| Work::new(study, 0).within(room_bytes));
         let most = most.min(study.variants());
         let hasher = blake3::Hasher::new();
-        Self { study: Arc::clone(study), island, hasher, sung: 0, most, until, busy: Duration::ZERO }
+        Self { study: Arc::clone(study), room_bytes, island, hasher, sung: 0, most, until, busy: Duration::ZERO }
     }
 
     /// Variants in an order whose every beginning is spread evenly (van der Corput's sequence): those at one end may be quick to refuse.
@@ -187,16 +190,28 @@ impl Canary {
         let busy = self.busy;
         let busy_now = || busy + processor_time().saturating_sub(begun);
         while self.sung < self.most && self.until.is_none_or(|until| self.sung == 0 || busy_now() < until) {
-            match &mut self.island {
-                Some(island) => {
-                    if island.step(stop).map_err(|_| NoAnswer::stopped())? {
+            let stepped = match &mut self.island {
+                Some(island) => island.step(stop).map(|is_over| (is_over, None)),
+                None => {
+                    let work = Work::of_variant(&self.study, self.variant()).within(self.room_bytes);
+                    work.run(stop).map(|part| (false, Some(part)))
+                }
+            };
+            match stepped {
+                Ok((is_over, part)) => {
+                    if is_over {
                         self.most = self.sung + 1;
                     }
+                    if let Some(part) = part {
+                        self.hasher.update(&encoded(&part)?);
+                    }
                 }
-                None => {
-                    let part =
-                        Work::of_variant(&self.study, self.variant()).run(stop).map_err(|_| NoAnswer::stopped())?;
-                    self.hasher.update(&encoded(&part)?);
+                Err(Interrupted::Stopped) => return Err(NoAnswer::stopped().into()),
+                Err(Interrupted::NeedsBytes(bytes)) => {
+                    self.room_bytes = bytes;
+                    self.island = self.island.take().map(|island| island.within(bytes));
+                    self.busy = busy_now();
+                    return Ok(false);
                 }
             }
             self.sung += 1;
@@ -221,7 +236,7 @@ async fn sung(pool: &Pool, mut canary: Canary) -> Result<Canary, Problem> {
     loop {
         let is_over;
         (canary, is_over) = pool
-            .run_variants(canary.study.variant_bytes(), move |stop| {
+            .run_variants(canary.room_bytes, move |stop| {
                 let is_over = canary.slice(stop)?;
                 Ok((canary, is_over))
             })

@@ -23,7 +23,7 @@ use toothwave_study::{Gathered, Study, StudyAnswer, Work};
 use tracing::Instrument as _;
 use utoipa::ToSchema;
 
-use crate::compute::Pool;
+use crate::compute::{Pool, SMALL_VARIANT_BYTES};
 use crate::config::Limits;
 use crate::frozen;
 use crate::parts::Parts;
@@ -1023,9 +1023,9 @@ impl Studies {
 
 /// Works a chunk out, a slice at a time.
 async fn run_chunk(pool: &Pool, kept: &Arc<Kept>, chunk: u64) -> Result<(), Problem> {
-    let mut work = Work::new(&kept.study, chunk);
+    let mut work = Work::new(&kept.study, chunk).within(SMALL_VARIANT_BYTES);
     loop {
-        let sliced = pool.run_variants(kept.study.variant_bytes(), move |stop| slice(work, stop)).await?;
+        let sliced = pool.run_variants(work.room_bytes(), move |stop| slice(work, stop)).await?;
         let Sliced { work: rest, variants, is_over } = sliced;
         counter!("toothwave_study_variants_total").increment(variants);
         kept.looked_at.fetch_add(variants, Ordering::Relaxed);

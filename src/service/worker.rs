@@ -15,9 +15,9 @@ use tokio_util::sync::CancellationToken;
 use toothwave_calculation::BUILD;
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_store::{Claim, Lease, Store, Waiting};
-use toothwave_study::{Part, Study, Work};
+use toothwave_study::{Interrupted, Part, Study, Work};
 
-use crate::compute::{Pool, SLICE};
+use crate::compute::{Pool, SLICE, SMALL_VARIANT_BYTES};
 use crate::frozen::{self, NotHere};
 #[cfg(feature = "fault-injection")]
 use crate::injected;
@@ -339,7 +339,7 @@ pub fn milliseconds(time: Duration) -> u64 {
 
 /// What a chunk comes to, and the time that it was computed for.
 async fn run_chunk(pool: &Pool, study: &Arc<Study>, chunk: u64) -> Result<(Part, Duration), Problem> {
-    let mut work = Work::new(study, chunk);
+    let mut work = Work::new(study, chunk).within(SMALL_VARIANT_BYTES);
     #[cfg(feature = "fault-injection")]
     {
         injected::poison(chunk);
@@ -354,7 +354,7 @@ async fn run_chunk(pool: &Pool, study: &Arc<Study>, chunk: u64) -> Result<(Part,
     let mut busy = Duration::ZERO;
     loop {
         let started = Instant::now();
-        let sliced = pool.run_variants(study.variant_bytes(), move |stop| slice(work, stop)).await?;
+        let sliced = pool.run_variants(work.room_bytes(), move |stop| slice(work, stop)).await?;
         busy += started.elapsed();
         counter!("toothwave_study_variants_total").increment(sliced.variants);
         work = sliced.work;
@@ -375,7 +375,7 @@ pub struct Sliced {
     pub is_over: bool,
 }
 
-/// As many variants as the time of a slice allows; at least one.
+/// As many variants as the time of a slice and the room of the work allow. Where a variant takes more room, the work that goes on has as much.
 ///
 /// # Errors
 /// When `stop` says so.
@@ -385,7 +385,13 @@ pub fn slice(mut work: Work, stop: &AtomicBool) -> Result<Sliced, Problem> {
     let started = Instant::now();
     let mut variants = 0;
     loop {
-        let is_over = work.step(stop).map_err(|_| NoAnswer::stopped())?;
+        let is_over = match work.step(stop) {
+            Ok(is_over) => is_over,
+            Err(Interrupted::Stopped) => return Err(NoAnswer::stopped().into()),
+            Err(Interrupted::NeedsBytes(bytes)) => {
+                return Ok(Sliced { work: work.within(bytes), variants, is_over: false });
+            }
+        };
         variants += 1;
         if is_over || started.elapsed() >= SLICE {
             return Ok(Sliced { work, variants, is_over });

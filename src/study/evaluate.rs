@@ -42,9 +42,29 @@ pub(crate) enum Outcome {
     Refused(Refusal),
 }
 
-/// The stop signal was seen.
+/// Why a variant was not computed yet. Whoever is to compute it is as it was before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stopped;
+pub enum Interrupted {
+    /// The stop signal was seen.
+    Stopped,
+    /// It takes about so many bytes while it is computed, and there is not room for so many.
+    NeedsBytes(u64),
+}
+
+/// The same, or what refuses it.
+enum NoValues {
+    Interrupted(Interrupted),
+    NoAnswer(NoAnswer),
+}
+
+impl<E: Into<NoAnswer>> From<E> for NoValues {
+    fn from(error: E) -> Self {
+        match error.into() {
+            NoAnswer { code: NoAnswerCode::Stopped, .. } => Self::Interrupted(Interrupted::Stopped),
+            reason => Self::NoAnswer(reason),
+        }
+    }
+}
 
 /// What is asked of every variant.
 #[derive(Debug, Clone)]
@@ -70,29 +90,34 @@ impl Evaluator {
         }
     }
 
-    /// What becomes of a document; a panic is an outcome too.
-    pub(crate) fn outcome(&self, document: &Tree, stop: &dyn Stop) -> Result<Outcome, Stopped> {
-        caught(|| match self.answer(document, stop) {
+    /// What becomes of a document where there is room for so many bytes while it is computed; a panic is an outcome too.
+    pub(crate) fn outcome(&self, document: &Tree, room_bytes: u64, stop: &dyn Stop) -> Result<Outcome, Interrupted> {
+        caught(|| match self.answer(document, room_bytes, stop) {
             Ok(values) => Ok(Outcome::Answered(values)),
-            Err(NoAnswer { code: NoAnswerCode::Stopped, .. }) => Err(Stopped),
-            Err(reason) => Ok(Outcome::Refused(reason.into())),
+            Err(NoValues::Interrupted(interrupted)) => Err(interrupted),
+            Err(NoValues::NoAnswer(reason)) => Ok(Outcome::Refused(reason.into())),
         })
     }
 
-    fn answer(&self, document: &Tree, stop: &dyn Stop) -> Result<Vec<f64>, NoAnswer> {
+    fn answer(&self, document: &Tree, room_bytes: u64, stop: &dyn Stop) -> Result<Vec<f64>, NoValues> {
         let design = document.read::<Design>()?.normalised();
         if !self.takes_sweep {
             let drive = CoincidenceDegree.check(&design, &self.limits)?;
             let ring_outer_radius_mm = self.ring_outer_radius_mm(&design, &drive)?;
-            return self.values(&Variant { drive: &drive, ring_outer_radius_mm, loaded: None });
+            return Ok(self.values(&Variant { drive: &drive, ring_outer_radius_mm, loaded: None })?);
         }
         let checked = Sweep.check(&design, &self.limits)?.without_wear();
         let drive = checked.drive();
         let ring_outer_radius_mm = self.ring_outer_radius_mm(&design, drive)?;
-        if !self.takes_losses && !self.takes_radial_forces {
+        let takes_columns = self.takes_losses || self.takes_radial_forces;
+        let bytes = if takes_columns { Sweep::columns_bytes(&checked) } else { checked.peaks_bytes() };
+        if bytes > room_bytes {
+            return Err(NoValues::Interrupted(Interrupted::NeedsBytes(bytes)));
+        }
+        if !takes_columns {
             let peaks = checked.peaks(stop)?;
             let loaded = Loaded { checked: &checked, peaks, losses: None, radial_forces: None };
-            return self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) });
+            return Ok(self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) })?);
         }
         let sweep = checked.solve(stop)?;
         let losses = if self.takes_losses { checked.loss_totals(&sweep, stop)? } else { None };
@@ -102,20 +127,7 @@ impl Evaluator {
             None
         };
         let loaded = Loaded { checked: &checked, peaks: (&sweep).into(), losses, radial_forces };
-        self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) })
-    }
-
-    /// About how many bytes a document takes while it is computed, as far as they are many: columns of states.
-    pub(crate) fn bytes(&self, document: &Tree) -> u64 {
-        let checked = || {
-            let design = document.read::<Design>().ok()?.normalised();
-            Sweep.check(&design, &self.limits).ok()
-        };
-        match self.takes_sweep.then(checked).flatten() {
-            Some(checked) if self.takes_losses || self.takes_radial_forces => Sweep::columns_bytes(&checked),
-            Some(checked) => checked.peaks_bytes(),
-            None => 0,
-        }
+        Ok(self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) })?)
     }
 
     /// As drawn (docs/theory.md section 8). A ring that is none has no outer diameter.
@@ -153,7 +165,7 @@ impl From<NoAnswer> for Refusal {
 }
 
 /// A fault at one variant is no reason to leave the others without an answer.
-fn caught(job: impl FnOnce() -> Result<Outcome, Stopped>) -> Result<Outcome, Stopped> {
+fn caught(job: impl FnOnce() -> Result<Outcome, Interrupted>) -> Result<Outcome, Interrupted> {
     panic::catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a text");

@@ -24,7 +24,7 @@ mod variant;
 
 pub use answer::StudyAnswer;
 pub use document::*;
-pub use evaluate::{Reason, Stopped};
+pub use evaluate::{Interrupted, Reason};
 pub use limit::Bound;
 pub use map::{AxisAnswer, MapAnswer};
 pub use quantity::{Needs, QUANTITIES, Quantity, Source};

@@ -9,7 +9,7 @@ use toothwave_calculation::json::Tree;
 use toothwave_solver::Stop;
 use utoipa::ToSchema;
 
-use crate::evaluate::{Evaluator, Outcome, Reason, Refusal, Stopped};
+use crate::evaluate::{Evaluator, Interrupted, Outcome, Reason, Refusal};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::Template;
 
@@ -240,10 +240,16 @@ impl RowsWork {
     }
 
     /// One variant further; whether that was the last one.
-    pub(crate) fn step(&mut self, rows: &impl Rows, evaluator: &Evaluator, stop: &dyn Stop) -> Result<bool, Stopped> {
+    pub(crate) fn step(
+        &mut self,
+        rows: &impl Rows,
+        evaluator: &Evaluator,
+        room_bytes: u64,
+        stop: &dyn Stop,
+    ) -> Result<bool, Interrupted> {
         if self.next < self.end {
             let document = rows.document(&mut self.template, self.next);
-            let outcome = evaluator.outcome(document, stop)?;
+            let outcome = evaluator.outcome(document, room_bytes, stop)?;
             self.part.push(self.next, outcome);
             self.next += 1;
         }

@@ -14,7 +14,7 @@ use utoipa::ToSchema;
 
 use crate::ask::{beyond, escaped, fault, index_of, named, whole};
 use crate::document::{FreeDocument, Goal, RangeDocument, RequireDocument, SearchDocument};
-use crate::evaluate::{Evaluator, Outcome, Stopped};
+use crate::evaluate::{Evaluator, Interrupted, Outcome};
 use crate::limit::{Bound, Limit, limits};
 use crate::map::asked;
 use crate::optimise::{Judged, Optimiser, Plan, Point, merged};
@@ -196,19 +196,6 @@ impl Search {
         self.islands * (8 * numbers * points) as u64
     }
 
-    /// What a design takes while it is looked at, all numbers being as small as they may, or as large; its true peaks too.
-    pub(crate) fn variant_bytes(&self, template: &Template, evaluator: &Evaluator) -> u64 {
-        let templates = std::iter::once(template).chain(&self.at_true_peaks);
-        let bytes = templates.flat_map(|template| {
-            [0.0, 1.0].map(|share| {
-                let mut template = template.clone();
-                let place = vec![share; template.variables().len()];
-                evaluator.bytes(template.filled(&variable_values(&template, &place)))
-            })
-        });
-        bytes.max().unwrap_or_default()
-    }
-
     /// What the documents take of which the true peaks are looked at.
     pub(crate) fn template_bytes(&self) -> usize {
         self.at_true_peaks.as_ref().map_or(0, Template::bytes)
@@ -288,9 +275,10 @@ fn some_value(quantity: &'static Quantity, template: &Template, limits: &questio
         let mut stream = Stream::new(0, stream);
         let place: Vec<_> = template.variables().iter().map(|_| stream.share()).collect();
         let values = variable_values(&template, &place);
-        match evaluator.outcome(template.filled(&values), &Never) {
+        match evaluator.outcome(template.filled(&values), 0, &Never) {
             Ok(Outcome::Answered(values)) => values.first().copied(),
-            Ok(Outcome::Refused(_)) | Err(Stopped) => None,
+            // Of a drive alone nothing takes room.
+            Ok(Outcome::Refused(_)) | Err(Interrupted::Stopped | Interrupted::NeedsBytes(_)) => None,
         }
     })
 }
@@ -541,8 +529,14 @@ impl Island {
     }
 
     /// One variant further; whether that was the last one.
-    pub(crate) fn step(&mut self, search: &Search, evaluator: &Evaluator, stop: &dyn Stop) -> Result<bool, Stopped> {
-        // A point that was asked for when the work was stopped is taken up again.
+    pub(crate) fn step(
+        &mut self,
+        search: &Search,
+        evaluator: &Evaluator,
+        room_bytes: u64,
+        stop: &dyn Stop,
+    ) -> Result<bool, Interrupted> {
+        // A point that was asked for when the work was interrupted is taken up again.
         let (place, is_scanning) = match self.pending.take() {
             Some(pending) => pending,
             None => {
@@ -551,11 +545,11 @@ impl Island {
             }
         };
         let values: Vec<Value> = variable_values(&self.template, &place);
-        let outcome = match evaluator.outcome(self.template.filled(&values), stop) {
+        let outcome = match evaluator.outcome(self.template.filled(&values), room_bytes, stop) {
             Ok(outcome) => outcome,
-            Err(stopped) => {
+            Err(interrupted) => {
                 self.pending = Some((place, is_scanning));
-                return Err(stopped);
+                return Err(interrupted);
             }
         };
         self.evaluated += 1;

@@ -18,7 +18,7 @@ use toothwave_solver::Stop;
 use crate::answer::StudyAnswer;
 use crate::ask::{all_named, beyond, fault};
 use crate::document::StudyDocument;
-use crate::evaluate::{Evaluator, Stopped};
+use crate::evaluate::{Evaluator, Interrupted};
 use crate::limit;
 use crate::map::{Map, MapAnswer};
 use crate::quantity::{Needs, QUANTITIES, Quantity};
@@ -49,8 +49,6 @@ pub struct Study {
     variants: u64,
     /// Of a chunk in rows.
     chunk_variants: u64,
-    /// What a variant takes while it is computed.
-    variant_bytes: u64,
 }
 
 #[derive(Debug)]
@@ -102,7 +100,7 @@ impl Study {
     /// # Errors
     /// As [`Self::read`].
     pub fn new(document: &StudyDocument, limits: &Limits) -> Result<Self, NoAnswer> {
-        let id = id(document)?;
+        let id = id(document, &limits.calculation)?;
         match document {
             StudyDocument::Map(map) => {
                 let (grid, template) = Map::new(map)?;
@@ -153,8 +151,7 @@ impl Study {
             require_possible_ranges(&quantities, &template, &limits.calculation)?;
         }
         let evaluator = Evaluator::new(quantities, limits.calculation);
-        let mut study =
-            Self { id, kind, template, evaluator, variants, chunk_variants: CHUNK_VARIANTS, variant_bytes: 0 };
+        let study = Self { id, kind, template, evaluator, variants, chunk_variants: CHUNK_VARIANTS };
         #[expect(clippy::cast_precision_loss, reason = "told, not computed with")]
         if variants > limits.max_study_variants {
             let limit = limits.max_study_variants;
@@ -174,24 +171,7 @@ impl Study {
             refused.code = NoAnswerCode::TooManyVariants;
             return Err(refused);
         }
-        study.variant_bytes = study.most_of_a_variant();
         Ok(study)
-    }
-
-    /// By some of them: those at both ends and in the middle.
-    fn most_of_a_variant(&self) -> u64 {
-        let mut template = self.template.clone();
-        let variants = [0, 1, self.variants / 2, self.variants.saturating_sub(1)];
-        let mut most = |rows: &dyn Rows| {
-            let bytes = variants.map(|variant| self.evaluator.bytes(rows.document(&mut template, variant)));
-            bytes.into_iter().max().unwrap_or_default()
-        };
-        match &self.kind {
-            Kind::Map(map) => most(map),
-            Kind::Sensitivity(sensitivity) => most(sensitivity),
-            Kind::Tolerance(tolerance) => most(tolerance),
-            Kind::Search(search) => search.variant_bytes(&self.template, &self.evaluator),
-        }
     }
 
     /// The same study, of deviations from a design that can be, by whose nature it can deviate so.
@@ -219,7 +199,7 @@ impl Study {
         Err(refused)
     }
 
-    /// What tells it from every other one: a hash of what is asked, of the build and of the machine's arithmetic.
+    /// What tells it from every other one: a hash of what is asked, of the limits of each variant, of the build and of the machine's arithmetic.
     pub const fn id(&self) -> Key {
         self.id
     }
@@ -320,23 +300,19 @@ impl Study {
         self.stored_bytes().saturating_add((self.template.bytes() + of_true_peaks) as u64)
     }
 
-    /// About what a variant takes while it is computed, as far as that is much.
-    pub const fn variant_bytes(&self) -> u64 {
-        self.variant_bytes
-    }
-
     /// About what a chunk takes that is in work, beside what it comes to.
     pub fn working_bytes(&self) -> u64 {
         self.template.clone_bytes() as u64
     }
 }
 
-/// The hash of what is asked: equal however the fields are ordered and the numbers spelled.
-fn id(document: &StudyDocument) -> Result<Key, NoAnswer> {
+/// The hash of what is asked, within limits that some variants may be beyond: equal however the fields are ordered and the numbers spelled.
+fn id(document: &StudyDocument, limits: &question::Limits) -> Result<Key, NoAnswer> {
     let text = serde_json::to_string(document).map_err(NoAnswer::internal)?;
     let sorted = json::tree(text.as_bytes())?.sorted();
     let text = serde_json::to_string(&sorted).map_err(NoAnswer::internal)?;
-    Ok(Key::new("study", &text.as_str(), &false))
+    let within = format!("{} states, {} points", limits.max_states, limits.max_profile_points);
+    Ok(Key::new("study", &text.as_str(), &within.as_str()))
 }
 
 /// The quantities of these names; all that every document has what they need for, where none is named.
@@ -499,6 +475,7 @@ fn is_of_base(template: &Template, example: &Tree, error: &FieldError) -> bool {
 pub struct Work {
     study: Arc<Study>,
     state: State,
+    room_bytes: u64,
 }
 
 #[derive(Debug)]
@@ -517,7 +494,18 @@ impl Work {
                 State::Rows(RowsWork::new(study.template.clone(), quantities, study.rows_of(chunk)))
             }
         };
-        Self { study: Arc::clone(study), state }
+        Self { study: Arc::clone(study), state, room_bytes: u64::MAX }
+    }
+
+    /// The same where there is room for so many bytes alone while a variant is computed.
+    #[must_use]
+    pub fn within(self, room_bytes: u64) -> Self {
+        Self { room_bytes, ..self }
+    }
+
+    /// The room that it has.
+    pub const fn room_bytes(&self) -> u64 {
+        self.room_bytes
     }
 
     /// One variant of a study in rows alone; of a search its first island. To see what variants take, and what they come to here.
@@ -527,7 +515,7 @@ impl Work {
             Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => {
                 let quantities = study.evaluator.quantities.len();
                 let rows = RowsWork::new(study.template.clone(), quantities, variant..study.variants.min(variant + 1));
-                Self { study: Arc::clone(study), state: State::Rows(rows) }
+                Self { study: Arc::clone(study), state: State::Rows(rows), room_bytes: u64::MAX }
             }
         }
     }
@@ -535,15 +523,15 @@ impl Work {
     /// One variant further; whether that was the last one.
     ///
     /// # Errors
-    /// When `stop` says so; the chunk is then as it was before.
-    pub fn step(&mut self, stop: &dyn Stop) -> Result<bool, Stopped> {
-        let Self { study, state } = self;
+    /// When `stop` says so, or where the variant takes more room than there is; the chunk is then as it was before.
+    pub fn step(&mut self, stop: &dyn Stop) -> Result<bool, Interrupted> {
+        let &mut Self { ref study, ref mut state, room_bytes } = self;
         let evaluator = &study.evaluator;
         match (&study.kind, state) {
-            (Kind::Map(map), State::Rows(rows)) => rows.step(map, evaluator, stop),
-            (Kind::Sensitivity(sensitivity), State::Rows(rows)) => rows.step(sensitivity, evaluator, stop),
-            (Kind::Tolerance(tolerance), State::Rows(rows)) => rows.step(tolerance, evaluator, stop),
-            (Kind::Search(search), State::Island(island)) => island.step(search, evaluator, stop),
+            (Kind::Map(map), State::Rows(rows)) => rows.step(map, evaluator, room_bytes, stop),
+            (Kind::Sensitivity(sensitivity), State::Rows(rows)) => rows.step(sensitivity, evaluator, room_bytes, stop),
+            (Kind::Tolerance(tolerance), State::Rows(rows)) => rows.step(tolerance, evaluator, room_bytes, stop),
+            (Kind::Search(search), State::Island(island)) => island.step(search, evaluator, room_bytes, stop),
             // Made for each other above.
             (Kind::Search(_), State::Rows(_)) | (_, State::Island(_)) => Ok(true),
         }
@@ -561,7 +549,7 @@ impl Work {
     ///
     /// # Errors
     /// As [`Self::step`].
-    pub fn run(mut self, stop: &dyn Stop) -> Result<Part, Stopped> {
+    pub fn run(mut self, stop: &dyn Stop) -> Result<Part, Interrupted> {
         while !self.step(stop)? {}
         Ok(self.finish())
     }

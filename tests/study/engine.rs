@@ -9,7 +9,7 @@ use toothwave_calculation::forms::Format;
 use toothwave_solver::{Never, Stop};
 use toothwave_study::{Gathered, Part, Study, Work};
 
-use crate::asking::{LIMITS, gathered, paper, study, text};
+use crate::asking::{LIMITS, beyond_room, gathered, paper, study, text};
 
 /// A study of each kind, each of several chunks.
 fn studies() -> [Value; 4] {
@@ -97,6 +97,33 @@ fn a_chunk_that_is_stopped_and_taken_up_again_has_the_same_bits() {
         }
         assert_eq!(work.finish(), whole, "{}", study.kind());
         assert!(stopped > 0 || study.kind() == "search", "{}", study.kind());
+    }
+}
+
+/// What takes columns of states says so before it has them, wherever it stands among variants that take none: so many bytes as they have, 96 of each state.
+#[test]
+fn a_variant_that_takes_more_room_than_there_is_says_how_much_and_is_taken_up_again_with_the_same_bits() {
+    let of_case = |key: &str, value: Value| {
+        let mut base = paper();
+        base["model"] = json!({ "compatibility": "virtual_work", "clearance": { "ring_um": 10 } });
+        base[key] = value;
+        base
+    };
+    let contact = json!({ "coefficient": 0.02 });
+    let cam = json!({ "kind": "plain", "coefficient": 0.02 });
+    let friction = of_case("friction", json!({ "wave_generator": cam, "ring": contact, "carrier": contact }));
+    let measured = of_case("deviations", json!({ "ring_runout": { "amount_um": 1, "angle_deg": 10 } }));
+    let over = json!({ "/sweep/samples": { "one_of": [2, 3, 5000, 4] } });
+    for (base, quantity, states_a_sample) in
+        [(friction, "efficiency_ring_fixed", 7), (measured, "peak_stress_ring_mpa", 26 * 7)]
+    {
+        let document = json!({ "study": "map", "base": base, "over": over, "quantities": [quantity] });
+        let study = study(&document).unwrap();
+        let whole = Work::new(&study, 0).run(&Never).unwrap();
+        let (part, needed) = beyond_room(&study, 1 << 16);
+        let last = *needed.last().unwrap();
+        assert!((96 * 5000 * states_a_sample..=200 * 5001 * states_a_sample).contains(&last), "{quantity}: {needed:?}");
+        assert_eq!(part, whole, "{quantity}");
     }
 }
 
