@@ -22,6 +22,17 @@ pub struct NoAnswer {
 /// So many fields at fault are named: of a list of thousands each would take a hundred times what it takes in the document.
 const MOST_ERRORS: usize = 100;
 
+/// So many bytes of a text are told: a name in a document may be as long as the document, and would stand in its problem many times.
+const MOST_OF_A_TEXT: usize = 1000;
+
+/// Ends a text that is longer than any that is meant to be read.
+pub fn clip(text: &mut String) {
+    if text.len() > MOST_OF_A_TEXT {
+        text.truncate(text.floor_char_boundary(MOST_OF_A_TEXT));
+        text.push('…');
+    }
+}
+
 /// Kinds of reason, each a stable word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -57,8 +68,14 @@ impl NoAnswer {
     }
 
     /// A reason in these fields.
-    pub fn at_fields(code: NoAnswerCode, detail: impl Into<String>, errors: Vec<FieldError>) -> Self {
-        Self { code, detail: detail.into(), errors }
+    pub fn at_fields(code: NoAnswerCode, detail: impl Into<String>, mut errors: Vec<FieldError>) -> Self {
+        for error in &mut errors {
+            clip(&mut error.pointer);
+            clip(&mut error.detail);
+        }
+        let mut detail = detail.into();
+        clip(&mut detail);
+        Self { code, detail, errors }
     }
 
     /// The violations of a design.

@@ -9,7 +9,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use toothwave_calculation::field::FieldError;
 use toothwave_calculation::json;
-use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
+use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode, clip};
 use toothwave_store::StoreError;
 use utoipa::ToSchema;
 
@@ -242,11 +242,14 @@ impl Problem {
 
     /// A problem of these fields.
     fn at_fields(code: ProblemCode, detail: impl Into<String>, errors: Vec<FieldError>) -> Self {
+        let mut detail = detail.into();
+        // Of a request's line too there may be very much to repeat.
+        clip(&mut detail);
         Self {
             kind: format!("urn:toothwave:problem:{}", json::word(&code)),
             title: code.title(),
             status: code.status().as_u16(),
-            detail: detail.into(),
+            detail,
             code,
             errors,
             cause: None,

@@ -225,6 +225,26 @@ async fn a_pointer_escapes_what_json_pointers_escape() {
     assert!(detail.contains("a/b~c"), "{detail}");
 }
 
+/// A name may be as long as a document; a problem told it six times, of which nothing was counted.
+#[tokio::test]
+async fn a_name_as_long_as_its_document_is_told_by_its_beginning() {
+    let name = "~".repeat(60_000);
+    let map =
+        json!({ "study": "map", "base": shortest(), "over": { format!("/drive/{name}"): { "min": 1, "max": 2 } } });
+    let documents = [
+        ("/v1/sweep", json!({ "drive": { &*name: 1 } })),
+        ("/v1/sweep", with(&shortest(), "/model", json!({ "compatibility": &name }))),
+        ("/v1/studies", map),
+    ];
+    let service = Service::new();
+    for (path, document) in documents {
+        let answer = service.post(path, &document).await;
+        let (_, _, detail) = answer.faulty_field();
+        assert!(detail.contains("~~~") && detail.ends_with('…'), "{path}: {detail}");
+        assert!(answer.body.len() < 6000, "{path}: {} bytes", answer.body.len());
+    }
+}
+
 #[tokio::test]
 async fn a_typo_is_never_a_silent_default() {
     let service = Service::new();
