@@ -16,6 +16,7 @@ use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use parking_lot::Mutex;
 use rayon::prelude::*;
+use tokio::runtime::{Builder, Runtime};
 use toothwave_calculation::accuracy::Accuracy;
 use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::drawing::Drawing;
@@ -261,14 +262,22 @@ fn arguments() -> Vec<OsString> {
     arguments
 }
 
+/// An executor, with as many threads for solves as there are permits: with more of them each solve would wake another, whose memory is cold. They stay,
+/// and one is there from the start: where the system refuses one and there is no other, tokio panics.
+fn runtime(solves: usize) -> io::Result<Runtime> {
+    const FOR_EVER: Duration = Duration::from_secs(u32::MAX as u64);
+    let mut builder = Builder::new_multi_thread();
+    let runtime = builder.max_blocking_threads(solves).thread_keep_alive(FOR_EVER).enable_all().build()?;
+    runtime.block_on(runtime.spawn_blocking(|| ()))?;
+    Ok(runtime)
+}
+
 fn run_service(settings: &Settings) -> Result<(), Failure> {
     let address = settings.store.address().map_err(Failure::BadInput)?;
     let parts = settings.parts.of_service(address.as_ref()).map_err(Failure::BadInput)?;
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
     log::start(filter)?;
-    // As many threads for solves as there are permits: with more of them each solve would wake another, whose memory is cold.
-    let solves = settings.limits().max_concurrent_solves;
-    let runtime = tokio::runtime::Builder::new_multi_thread().max_blocking_threads(solves).enable_all().build()?;
+    let runtime = runtime(settings.limits().max_concurrent_solves)?;
     let result = runtime.block_on(serve::serve(settings, address.as_ref(), parts));
     // A solve beyond its bound must not hold up the exit.
     runtime.shutdown_background();
@@ -292,8 +301,7 @@ fn run_worker(settings: &WorkerSettings) -> Result<(), Failure> {
     let parts = settings.parts.parts().map_err(Failure::BadInput)?;
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
     log::start(filter)?;
-    let solves = settings.limits().max_concurrent_solves;
-    let runtime = tokio::runtime::Builder::new_multi_thread().max_blocking_threads(solves).enable_all().build()?;
+    let runtime = runtime(settings.limits().max_concurrent_solves)?;
     let result = runtime.block_on(serve::serve_chunks(settings, &address, parts));
     runtime.shutdown_background();
     log::flush();
@@ -302,7 +310,7 @@ fn run_worker(settings: &WorkerSettings) -> Result<(), Failure> {
 
 fn migrate(settings: &StoreSettings) -> Result<(), Failure> {
     let address = shared_database(settings)?;
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    let runtime = Builder::new_current_thread().enable_all().build()?;
     let before = runtime.block_on(async { Store::open(&address).await?.migrate().await }).map_err(io::Error::other)?;
     print(|writer| writeln!(writer, "{address}: schema {before} before, {SCHEMA_VERSION} now"))
 }
