@@ -4,17 +4,17 @@ use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
+use toothwave_solver::backing::{Backings, Shares};
 use toothwave_solver::drive::Draft;
 use toothwave_solver::mesh::Samples;
 use toothwave_solver::model_error::{self, Beyond, ModelError};
-use toothwave_solver::parts::CarrierRadii;
 use toothwave_solver::sweep::{ContactPeaks, Points, Tolerance, sweep_with_deviations};
 use toothwave_solver::{
     Compatibility, ContactLaw, Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, ToothShape,
 };
 use utoipa::ToSchema;
 
-use crate::design::{CompatibilityDocument, Design, LawName};
+use crate::design::{CompatibilityDocument, Design, LawName, PartsDocument};
 use crate::forms::{Form, Format, Forms, csv_error};
 use crate::json::word;
 use crate::key::Encode;
@@ -100,6 +100,7 @@ pub struct CheckedAccuracy {
     drive: Drive,
     load: LoadCase,
     deviations: Deviations,
+    backings: Backings,
     requested_error: f64,
     max_states: u64,
 }
@@ -117,9 +118,10 @@ impl Question for Accuracy {
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
-        let Design { drive, materials, load, model, modification, deviations, accuracy, .. } = design;
-        let CarrierRadii { inner_mm, outer_mm } = design.carrier_of_flats();
-        (drive, materials, load, model, modification, (deviations, accuracy, inner_mm, outer_mm))
+        let Design { drive, materials, load, model, modification, deviations, accuracy, parts, .. } = design;
+        let PartsDocument { wave_generator, ring, carrier, teeth: _ } = parts;
+        let parts = (wave_generator, ring, ring.rim, carrier, carrier.fingers);
+        (drive, materials, load, model, modification, (deviations, accuracy, parts))
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedAccuracy, NoAnswer> {
@@ -129,7 +131,8 @@ impl Question for Accuracy {
         match (draft.drive(), load, design.requested_error()) {
             (Some(drive), Some(load), Ok(requested_error)) if violations.is_empty() => {
                 let (deviations, max_states) = (Deviations::from(&design.deviations), limits.max_states);
-                Ok(CheckedAccuracy { drive, load, deviations, requested_error, max_states })
+                let backings = Backings::of(&drive, &draft, &design.parts_parameters(), design.support());
+                Ok(CheckedAccuracy { drive, load, deviations, backings, requested_error, max_states })
             }
             (_, _, requested_error) => {
                 violations.extend(requested_error.err());
@@ -148,9 +151,9 @@ impl Question for Accuracy {
     }
 
     fn answer(checked: &CheckedAccuracy, stop: &dyn Stop) -> Result<AccuracyAnswer, NoAnswer> {
-        let CheckedAccuracy { drive, load, deviations, requested_error, max_states } = checked;
+        let &CheckedAccuracy { ref drive, ref load, requested_error, .. } = checked;
         let parameters = *load.parameters();
-        let own = Converged::new(drive, load, deviations, *max_states, stop).map_err(|error| match error {
+        let own = Converged::new(checked, load, stop).map_err(|error| match error {
             // There is no field to blame: the reference's tolerance is ours.
             SolveError::TooManyStates { limit } => NoAnswer::new(
                 NoAnswerCode::TooManyStates,
@@ -177,13 +180,13 @@ impl Question for Accuracy {
         let is_own = |way: &&WayAnswer| {
             way.compatibility == parameters.compatibility.into()
                 && way.law == parameters.law.into()
-                && way.error <= *requested_error
+                && way.error <= requested_error
         };
         let cheapest = ways.iter().filter(is_own).min_by(|one, other| one.solve_us.total_cmp(&other.solve_us)).cloned();
         Ok(AccuracyAnswer {
             solver_version: toothwave_solver::VERSION,
             build: crate::BUILD,
-            requested_error: *requested_error,
+            requested_error,
             cheapest,
             ways,
             unavailable,
@@ -232,15 +235,12 @@ struct Converged {
 }
 
 impl Converged {
-    fn new(
-        drive: &Drive,
-        load: &LoadCase,
-        deviations: &Deviations,
-        max_states: u64,
-        stop: &dyn Stop,
-    ) -> Result<Self, SolveError> {
-        let sweep = sweep_with_deviations(drive, load, deviations, Points::finest(max_states), stop)?;
-        let ModelError { measured, beyond, .. } = model_error::of(drive, load, deviations, &sweep, None)?;
+    fn new(checked: &CheckedAccuracy, load: &LoadCase, stop: &dyn Stop) -> Result<Self, SolveError> {
+        let CheckedAccuracy { drive, deviations, backings, max_states, .. } = checked;
+        let sweep = sweep_with_deviations(drive, load, deviations, Points::finest(*max_states), stop)?;
+        let shares = Shares::of(drive, load, backings, &sweep.peaks);
+        let parts = shares.as_ref().map(|shares| (backings.support(), shares));
+        let ModelError { measured, beyond, .. } = model_error::of(drive, load, deviations, &sweep, parts)?;
         let is_like = beyond.iter().all(|reason| matches!(reason, Beyond::Law));
         let expected_error = measured.filter(|_| is_like).map(|measured| measured.force.largest());
         Ok(Self { peaks: sweep.peaks, expected_error })
@@ -269,16 +269,17 @@ struct Model<'a> {
 impl<'a> Model<'a> {
     /// The model, or nothing where its clearances make no sense.
     fn new(
-        &CheckedAccuracy { ref drive, ref deviations, max_states, .. }: &'a CheckedAccuracy,
+        checked: &'a CheckedAccuracy,
         parameters: &LoadParameters,
         own_peaks: &PerContact<ContactPeaks>,
         stop: &dyn Stop,
     ) -> Result<Option<Self>, SolveError> {
+        let &CheckedAccuracy { ref drive, ref deviations, max_states, .. } = checked;
         let Ok(load) = LoadCase::new(parameters) else { return Ok(None) };
         if !parameters.clearance_violations(&Draft::new(drive.parameters())?)?.is_empty() {
             return Ok(None);
         }
-        let reference = Converged::new(drive, &load, deviations, max_states, stop)?;
+        let reference = Converged::new(checked, &load, stop)?;
         let difference = difference(&reference.peaks, own_peaks);
         Ok(Some(Self { drive, deviations, load, reference, difference, max_states }))
     }

@@ -262,12 +262,15 @@ fn arguments() -> Vec<OsString> {
     arguments
 }
 
+/// Threads on which a database's name is looked up, which is not to wait for solves.
+const LOOK_UPS: usize = 1;
+
 /// An executor, with as many threads for solves as there are permits: with more of them each solve would wake another, whose memory is cold. They stay,
 /// and one is there from the start: where the system refuses one and there is no other, tokio panics.
-fn runtime(solves: usize) -> io::Result<Runtime> {
+fn runtime(threads: usize) -> io::Result<Runtime> {
     const FOR_EVER: Duration = Duration::from_secs(u32::MAX as u64);
     let mut builder = Builder::new_multi_thread();
-    let runtime = builder.max_blocking_threads(solves).thread_keep_alive(FOR_EVER).enable_all().build()?;
+    let runtime = builder.max_blocking_threads(threads).thread_keep_alive(FOR_EVER).enable_all().build()?;
     runtime.block_on(runtime.spawn_blocking(|| ()))?;
     Ok(runtime)
 }
@@ -277,7 +280,8 @@ fn run_service(settings: &Settings) -> Result<(), Failure> {
     let parts = settings.parts.of_service(address.as_ref()).map_err(Failure::BadInput)?;
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
     log::start(filter)?;
-    let runtime = runtime(settings.limits().max_concurrent_solves)?;
+    let is_shared = address.as_ref().is_some_and(Address::is_shared);
+    let runtime = runtime(settings.limits().max_concurrent_solves + if is_shared { LOOK_UPS } else { 0 })?;
     let result = runtime.block_on(serve::serve(settings, address.as_ref(), parts));
     // A solve beyond its bound must not hold up the exit.
     runtime.shutdown_background();
@@ -301,7 +305,7 @@ fn run_worker(settings: &WorkerSettings) -> Result<(), Failure> {
     let parts = settings.parts.parts().map_err(Failure::BadInput)?;
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
     log::start(filter)?;
-    let runtime = runtime(settings.limits().max_concurrent_solves)?;
+    let runtime = runtime(settings.limits().max_concurrent_solves + LOOK_UPS)?;
     let result = runtime.block_on(serve::serve_chunks(settings, &address, parts));
     runtime.shutdown_background();
     log::flush();

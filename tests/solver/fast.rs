@@ -1030,6 +1030,29 @@ fn a_torque_that_is_off_at_any_of_the_three_parts_is_seen() {
     }
 }
 
+/// What no fast path reaches: pointed and bored tips by default. Studies ask it of as many intervals as a sweep may have.
+#[test]
+fn peaks_that_are_worked_out_tooth_by_tooth_keep_no_states_either() {
+    let gap = PerContact { ring: 2.0, ..PerContact::default() };
+    let unlike = DriveParameters { teeth: 81, installed: 27, ring_teeth: 79, tooth_radius_mm: 2.2, ..PAPER_5_2 };
+    let johnson = LoadParameters { law: JOHNSON, ..load(3.0, Compatibility::VirtualWork) };
+    for (parameters, load) in [
+        (PAPER_5_2, LoadParameters { ring_teeth_bend: true, ..johnson }),
+        (PAPER_5_2, LoadParameters { corner_contact: true, clearance_um: gap, ..johnson }),
+        (PAPER_5_1, LoadParameters { wave_generator_moves: true, clearance_um: gap, ..johnson }),
+        (unlike, LoadParameters { ring_teeth_bend: true, ..johnson }),
+    ] {
+        let load = LoadParameters { allowable_stress_mpa: Some(everywhere(900.0)), ..load };
+        let (drive, case) = (drive(&parameters), LoadCase::new(&load).unwrap());
+        let of = |samples| count_alloc(|| peaks(&drive, &case, Points::samples(samples).unwrap(), &Never).unwrap());
+        let ((_, growths, _), few) = of(1000);
+        assert_eq!(few, SweepPeaks::from(&swept(&parameters, &load, 1000)), "{parameters:?} {load:?}");
+        // An input angle may have its own: columns would grow by the logarithm of their length besides.
+        let ((_, more_growths, _), _) = of(5000);
+        assert_eq!((more_growths - growths) % 4000, 0, "{parameters:?} {load:?}");
+    }
+}
+
 #[test]
 fn a_sweep_allocates_columns_and_nothing_a_state() {
     let allocations = |samples| {

@@ -351,7 +351,7 @@ impl States {
         self.tooth.is_empty()
     }
 
-    fn peak(&self, column: &[f64], at: usize) -> Peak {
+    pub(crate) fn peak(&self, column: &[f64], at: usize) -> Peak {
         Peak { value: column[at], input_angle_deg: self.input_angle_deg[at], position_deg: self.position_deg[at] }
     }
 }

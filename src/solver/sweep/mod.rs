@@ -75,9 +75,14 @@ pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) ->
         Points::Samples(samples) => fast::peaks(&one_zone, mesh.samples_of_lap(samples), load, stop)?,
         Points::Tolerance(tolerance) => fast::true_peaks(&one_zone, tolerance, load, stop)?,
     };
-    match peaks {
-        Some(peaks) => Ok(SweepPeaks { loaded_teeth: peaks.loaded_teeth.times(mesh.listed_at_each_place()), ..peaks }),
-        None => plain::sweep(&loaded, load, points, Looking::Fast, stop).map(|sweep| SweepPeaks::from(&sweep)),
+    if let Some(peaks) = peaks {
+        return Ok(SweepPeaks { loaded_teeth: peaks.loaded_teeth.times(mesh.listed_at_each_place()), ..peaks });
+    }
+    match points {
+        Points::Samples(samples) => plain::peaks(&loaded, load, samples, stop),
+        Points::Tolerance(_) => {
+            plain::sweep(&loaded, load, points, Looking::Fast, stop).map(|sweep| SweepPeaks::from(&sweep))
+        }
     }
 }
 

@@ -1,13 +1,14 @@
 //! A sweep state by state: what the fast path is held against, and what is left where it does not reach.
 
-use crate::contact::{Materials, PerContact};
+use crate::contact::{Contact, Materials, PerContact};
 use crate::load_sharing::{LawEnd, LoadCase, LoadedDrive, ToothState, TorqueLimit};
-use crate::mesh::PlacedTooth;
+use crate::mesh::{PlacedTooth, Samples, TeethInMesh};
 use crate::root::NotConverged;
 use crate::springs::WindUp;
 use crate::sweep::adaptive::{self, Looking};
 use crate::sweep::columns::{
-    Columns, InputAngles, PeakAt, States, Sweep, TorqueBalance, TorqueCapacity, finished, worse,
+    Columns, ContactPeaks, Extremes, InputAngles, Peak, PeakAt, States, Sweep, SweepPeaks, TorqueBalance,
+    TorqueCapacity, check, finished, worse,
 };
 use crate::sweep::points::Points;
 use crate::tooth::Pressure;
@@ -19,6 +20,43 @@ struct Hardest {
     stress_mpa: f64,
     force_n: f64,
     pressure: Pressure,
+}
+
+impl States {
+    /// The first of the largest values of a column, and where it stands; nothing of none.
+    fn first_peak(&self, column: &[f64]) -> Option<(usize, Peak)> {
+        let at = peak_at(column);
+        (!column.is_empty()).then(|| (at, self.peak(column, at)))
+    }
+
+    /// Lets all states go, and keeps their room.
+    fn clear(&mut self) {
+        let Self {
+            input_angle_deg,
+            tooth,
+            lobe,
+            position_deg,
+            center_radius_mm,
+            wave_generator_angle_deg,
+            ring_angle_deg,
+            force_n,
+            stress_mpa,
+        } = self;
+        let of_places = [input_angle_deg, position_deg, center_radius_mm, wave_generator_angle_deg, ring_angle_deg];
+        of_places.into_iter().for_each(Vec::clear);
+        tooth.clear();
+        lobe.clear();
+        force_n.clear();
+        stress_mpa.clear();
+    }
+}
+
+impl InputAngles {
+    fn clear(&mut self) {
+        let Self { input_angle_deg, wind_up_deg, torsional_stiffness_nm_per_rad, loaded_teeth } = self;
+        [input_angle_deg, wind_up_deg, torsional_stiffness_nm_per_rad].into_iter().for_each(Vec::clear);
+        loaded_teeth.clear();
+    }
 }
 
 /// The first of the largest values of a column.
@@ -72,6 +110,110 @@ pub(crate) fn sweep(
         }
     }
     columns.finish(points, &load.parameters().materials)
+}
+
+/// The peaks of a sweep by equal intervals, of which some states are kept at a time.
+///
+/// # Errors
+/// As [`sweep`](crate::sweep::sweep()).
+pub(crate) fn peaks(
+    loaded: &LoadedDrive<'_>,
+    load: &LoadCase,
+    samples: Samples,
+    stop: &dyn Stop,
+) -> Result<SweepPeaks, SolveError> {
+    const STATES_AT_A_TIME: usize = 1024;
+    let mesh = *loaded.mesh();
+    let mut columns = Growing::new(loaded, load.parameters().allowable_stress_mpa);
+    let mut seen = SeenSoFar::default();
+    for sample in 0..=mesh.last_sample(samples) {
+        if stop.stopped() {
+            return Err(SolveError::Stopped);
+        }
+        columns.add(mesh.input_angle_deg(sample, samples), mesh.placed_at(sample, samples))?;
+        if columns.states.len() >= STATES_AT_A_TIME {
+            seen.take(&mut columns);
+        }
+    }
+    seen.take(&mut columns);
+    if let Some(end) = columns.law_end {
+        return Err(end.error(true));
+    }
+    check("torque balance", columns.torque_balance_residual)?;
+    let contacts = PerContact::of(|contact| {
+        let &SeenAt { force_n, stress_mpa, force_at_stress_n } = seen.contacts.get(contact);
+        let peaks = ContactPeaks::of_line(force_n, stress_mpa, force_at_stress_n, loaded.drive().tooth_width_mm());
+        columns.complete(peaks, &load.parameters().materials, contact)
+    });
+    Ok(SweepPeaks {
+        contacts,
+        wind_up_deg: seen.wind_up_deg,
+        torsional_stiffness_nm_per_rad: seen.torsional_stiffness_nm_per_rad,
+        loaded_teeth: seen.loaded_teeth,
+        torque_capacity: columns.torque_capacity,
+        torque_balance_residual: columns.torque_balance_residual,
+    })
+}
+
+/// What the states of a sweep came to that are kept no more.
+struct SeenSoFar {
+    contacts: PerContact<SeenAt>,
+    wind_up_deg: Extremes,
+    torsional_stiffness_nm_per_rad: Extremes,
+    loaded_teeth: TeethInMesh,
+}
+
+/// The first of the largest at a contact.
+#[derive(Debug, Clone, Copy)]
+struct SeenAt {
+    force_n: Peak,
+    stress_mpa: Peak,
+    force_at_stress_n: f64,
+}
+
+impl Default for SeenSoFar {
+    fn default() -> Self {
+        let none = Peak { value: f64::NEG_INFINITY, input_angle_deg: 0.0, position_deg: 0.0 };
+        Self {
+            contacts: PerContact::of(|_| SeenAt { force_n: none, stress_mpa: none, force_at_stress_n: 0.0 }),
+            wind_up_deg: Extremes::NONE,
+            torsional_stiffness_nm_per_rad: Extremes::NONE,
+            loaded_teeth: TeethInMesh { min: u64::MAX, max: 0 },
+        }
+    }
+}
+
+impl SeenSoFar {
+    /// Looks at all that has grown, and clears it away.
+    fn take(&mut self, columns: &mut Growing<'_>) {
+        let Growing { states, input_angles, .. } = columns;
+        self.contacts = PerContact::of(|contact| {
+            let mut seen = *self.contacts.get(contact);
+            let (forces_n, stresses_mpa) = (states.force_n.get(contact), states.stress_mpa.get(contact));
+            if let Some((_, force_n)) = states.first_peak(forces_n).filter(|(_, peak)| peak.value > seen.force_n.value)
+            {
+                seen.force_n = force_n;
+            }
+            let stress_mpa = states.first_peak(stresses_mpa);
+            if let Some((at, stress_mpa)) = stress_mpa.filter(|(_, peak)| peak.value > seen.stress_mpa.value) {
+                (seen.stress_mpa, seen.force_at_stress_n) = (stress_mpa, forces_n[at]);
+            }
+            seen
+        });
+        for (&wind_up_deg, (&stiffness, &loaded_teeth)) in input_angles
+            .wind_up_deg
+            .iter()
+            .zip(input_angles.torsional_stiffness_nm_per_rad.iter().zip(&input_angles.loaded_teeth))
+        {
+            self.wind_up_deg = self.wind_up_deg.with(wind_up_deg);
+            self.torsional_stiffness_nm_per_rad = self.torsional_stiffness_nm_per_rad.with(stiffness);
+            let TeethInMesh { min, max } = self.loaded_teeth;
+            let teeth = u64::from(loaded_teeth);
+            self.loaded_teeth = TeethInMesh { min: min.min(teeth), max: max.max(teeth) };
+        }
+        states.clear();
+        input_angles.clear();
+    }
 }
 
 /// A sweep as it grows by input angles.
@@ -197,29 +339,37 @@ impl<'a> Growing<'a> {
         Ok(loaded_teeth)
     }
 
-    fn finish(self, points: Points, materials: &Materials) -> Result<Sweep, SolveError> {
-        let Self { loaded, states, input_angles, torque_capacity, law_end, torque_balance_residual, hardest, .. } =
-            self;
-        if let Some(end) = law_end {
+    /// The peaks of a contact with what its hardest pressure makes of them.
+    fn complete(&self, peaks: ContactPeaks, materials: &Materials, contact: Contact) -> ContactPeaks {
+        match self.hardest.get(contact) {
+            Some(Hardest { force_n, pressure, .. }) => peaks.of_pressure(pressure, *force_n, materials, contact),
+            None => peaks,
+        }
+    }
+
+    fn finish(mut self, points: Points, materials: &Materials) -> Result<Sweep, SolveError> {
+        if let Some(end) = self.law_end {
             return Err(end.error(true));
         }
+        let states = std::mem::take(&mut self.states);
         let peaks = PerContact::of(|contact| PeakAt {
             force: peak_at(states.force_n.get(contact)),
             stress: peak_at(states.stress_mpa.get(contact)),
         });
-        let columns = Columns { states, input_angles, peaks, torque_balance_residual };
-        let mut sweep = finished(loaded, points, columns, torque_capacity)?;
-        sweep.peaks = PerContact::of(|contact| match hardest.get(contact) {
-            Some(Hardest { force_n, pressure, .. }) => {
-                sweep.peaks.get(contact).of_pressure(pressure, *force_n, materials, contact)
-            }
-            None => *sweep.peaks.get(contact),
-        });
+        let input_angles = std::mem::take(&mut self.input_angles);
+        let columns = Columns { states, input_angles, peaks, torque_balance_residual: self.torque_balance_residual };
+        let mut sweep = finished(self.loaded, points, columns, self.torque_capacity)?;
+        sweep.peaks = PerContact::of(|contact| self.complete(*sweep.peaks.get(contact), materials, contact));
         Ok(sweep)
     }
 }
 
 impl PerContact<Vec<f64>> {
+    fn clear(&mut self) {
+        let Self { wave_generator, ring, carrier } = self;
+        [wave_generator, ring, carrier].into_iter().for_each(Vec::clear);
+    }
+
     fn push(&mut self, values: PerContact<f64>) {
         self.wave_generator.push(values.wave_generator);
         self.ring.push(values.ring);
