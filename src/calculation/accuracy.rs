@@ -20,7 +20,7 @@ use crate::json::word;
 use crate::key::Encode;
 use crate::no_answer::{NoAnswer, NoAnswerCode};
 use crate::question::{Limits, Question, checked_drive, checked_load};
-use crate::sweep::{SEARCHED_BYTES, STATE_BYTES};
+use crate::sweep::{ANGLE_BYTES, SEARCHED_BYTES, STATE_BYTES};
 
 /// The sample counts that are tried.
 const SAMPLES: [u64; 9] = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
@@ -147,7 +147,8 @@ impl Question for Accuracy {
         let counts = SAMPLES.iter().filter_map(|&samples| Some(mesh.state_count(Samples::new(samples).ok()?)));
         // The longest way that is tried is longer than the converged reference; where a limit or unlike laps make it short, nobody knows how long that one will be.
         let states = counts.max().filter(|most| most <= max_states && mesh.laps() == 1).unwrap_or(*max_states);
-        (STATE_BYTES + SEARCHED_BYTES) * states
+        // Of each input angle a state at least.
+        (STATE_BYTES + SEARCHED_BYTES + ANGLE_BYTES) * states
     }
 
     fn answer(checked: &CheckedAccuracy, stop: &dyn Stop) -> Result<AccuracyAnswer, NoAnswer> {

@@ -57,20 +57,29 @@ pub struct CheckedSweep {
 /// Eleven columns of doubles and two of numbers.
 pub(crate) const STATE_BYTES: u64 = 11 * 8 + 2 * 4;
 
+/// Three columns of doubles and one of numbers, three of radial forces, one of the wind-up without load, and what stands between them while they are made.
+pub(crate) const ANGLE_BYTES: u64 = 11 * 8;
+
 /// What a sweep to a tolerance has of a state besides, until it is over: as much again.
 pub(crate) const SEARCHED_BYTES: u64 = STATE_BYTES;
 
 impl CheckedSweep {
-    /// What a column of states takes, all of them being asked of a state that takes so many bytes. Of a sweep to a tolerance nobody knows how many states they
-    /// will be: in 140 drives of all kinds they were up to 470 input angles a period, and of a few small ones up to 1400.
-    fn states_bytes(&self, of_a_state: u64) -> u64 {
+    /// What all states and input angles take of which each takes so many bytes. Of a sweep to a tolerance nobody knows how many they will be: in 140 drives of
+    /// all kinds they were up to 470 input angles a period, and of a few small ones up to 1400.
+    fn columns_of(&self, a_state: u64, an_angle: u64) -> u64 {
         const MANY_SAMPLES: u64 = 512;
         let mesh = self.load().mesh(&self.drive, &self.deviations);
         match self.points {
-            Points::Samples(samples) => mesh.state_count(samples) * of_a_state,
+            Points::Samples(samples) => {
+                mesh.state_count(samples) * a_state + (mesh.last_sample(samples) + 1) * an_angle
+            }
             Points::Tolerance(tolerance) => {
-                let many = Samples::new(MANY_SAMPLES).map_or(u64::MAX, |samples| mesh.state_count(samples));
-                many.min(tolerance.max_states()) * (of_a_state + SEARCHED_BYTES)
+                let many =
+                    Samples::new(MANY_SAMPLES).map(|samples| (mesh.state_count(samples), mesh.last_sample(samples)));
+                let most = tolerance.max_states();
+                let (states, angles) =
+                    many.map_or((most, most), |(states, angles)| (states.min(most), angles.min(most)));
+                states * (a_state + SEARCHED_BYTES) + angles * an_angle
             }
         }
     }
@@ -85,7 +94,7 @@ impl CheckedSweep {
     pub fn peaks_bytes(&self) -> u64 {
         match self.points {
             Points::Samples(_) if self.deviations.is_nil() => 0,
-            Points::Samples(_) | Points::Tolerance(_) => self.states_bytes(STATE_BYTES),
+            Points::Samples(_) | Points::Tolerance(_) => self.columns_of(STATE_BYTES, ANGLE_BYTES),
         }
     }
 
@@ -255,6 +264,8 @@ impl Question for Sweep {
     fn columns_bytes(checked: &CheckedSweep) -> u64 {
         // Three columns of slips and one of words.
         const LOSSES_BYTES: u64 = 3 * 8 + 2;
+        // Ratios by contact, bearing and race, powers, and what wears.
+        const LOSSES_ANGLE_BYTES: u64 = 9 * 8;
         // Three columns of depths, of each point of a duty.
         const WEAR_BYTES: u64 = 3 * 8;
         let CheckedSweep { duty, friction, wear_rate_mm3_per_nm, .. } = checked;
@@ -263,7 +274,8 @@ impl Question for Sweep {
         let sweeps = 1 + of(friction.is_some() && duty.points.len() > 1, 1);
         let of_sweeps = sweeps * (STATE_BYTES + of(friction.is_some(), LOSSES_BYTES));
         let of_wear = duty.points.len() as u64 * of(wear_rate_mm3_per_nm.is_some(), WEAR_BYTES);
-        checked.states_bytes(of_sweeps + of_wear)
+        let of_angles = sweeps * (ANGLE_BYTES + of(friction.is_some(), LOSSES_ANGLE_BYTES));
+        checked.columns_of(of_sweeps + of_wear, of_angles)
     }
 
     fn is_short(checked: &CheckedSweep) -> bool {

@@ -46,6 +46,14 @@ pub enum NotHere {
     /// Whatever the reason.
     #[error("the study's canary comes to other bits here")]
     OtherBits,
+    /// This process has not the memory for it.
+    #[error("a variant takes some {bytes} bytes while it is computed, and the memory here has room for {most_bytes}")]
+    NeedsMemory {
+        /// About what one of its variants takes.
+        bytes: u64,
+        /// What one may take here.
+        most_bytes: u64,
+    },
     /// This build knows no such study, though it is its own.
     #[error("the study cannot be read: {0}")]
     Unreadable(String),
@@ -63,7 +71,9 @@ pub async fn freeze(
     time: Duration,
 ) -> Result<(Arc<Study>, NewStudy), Problem> {
     let study = Arc::new(study);
-    let canary = sung(pool, Canary::new(&study, MOST_OF_A_CANARY, Some(CANARY))).await?;
+    // What was admitted here is computed here, alone if it has to be.
+    let canary = sung(pool, Canary::new(&study, MOST_OF_A_CANARY, Some(CANARY)), u64::MAX).await?;
+    let canary = canary.map_err(|reason| Problem::internal(&reason))?;
     let canary_variants = canary.sung.max(1);
     let a_variant = canary.busy / u32::try_from(canary_variants).unwrap_or(u32::MAX);
     let part_variants = MOST_OF_A_PART / (study.stored_bytes() / study.variants().max(1)).max(1);
@@ -97,7 +107,8 @@ impl NotHere {
     /// The problem of whoever asks for the study by its id.
     pub fn told(&self, id: &str) -> Problem {
         match self {
-            Self::Unreadable(_) => Problem::internal(self),
+            // The second is a worker's alone to say.
+            Self::Unreadable(_) | Self::NeedsMemory { .. } => Problem::internal(self),
             // The same question is another study here.
             Self::OtherBuild { .. } | Self::OtherArithmetic | Self::OtherBits => {
                 Problem::new(ProblemCode::NotFound, format!("no study `{id}` is known here: {self}; ask for it again"))
@@ -131,13 +142,18 @@ fn thawed(frozen: &NewStudy) -> Result<Arc<Study>, NotHere> {
     Ok(Arc::new(study))
 }
 
-/// Whether this process computes the study's bits.
+/// Why this process does not compute the study's bits, if it does not: those of its canary, of which no variant may take more than so many bytes.
 ///
 /// # Errors
 /// Where the canary has no turn, or the service stops.
-pub async fn has_the_same_bits(pool: &Pool, study: &Arc<Study>, frozen: &NewStudy) -> Result<bool, Problem> {
-    let canary = sung(pool, Canary::new(study, frozen.canary_variants, None)).await?;
-    Ok(canary.hash() == frozen.canary)
+pub async fn heard(
+    pool: &Pool,
+    study: &Arc<Study>,
+    frozen: &NewStudy,
+    most_bytes: u64,
+) -> Result<Result<(), NotHere>, Problem> {
+    let canary = sung(pool, Canary::new(study, frozen.canary_variants, None), most_bytes).await?;
+    Ok(canary.and_then(|canary| if canary.hash() == frozen.canary { Ok(()) } else { Err(NotHere::OtherBits) }))
 }
 
 /// A part as it is kept.
@@ -232,8 +248,8 @@ impl Canary {
     }
 }
 
-async fn sung(pool: &Pool, mut canary: Canary) -> Result<Canary, Problem> {
-    loop {
+async fn sung(pool: &Pool, mut canary: Canary, most_bytes: u64) -> Result<Result<Canary, NotHere>, Problem> {
+    while canary.room_bytes <= most_bytes {
         let is_over;
         (canary, is_over) = pool
             .run_variants(canary.room_bytes, move |stop| {
@@ -242,7 +258,8 @@ async fn sung(pool: &Pool, mut canary: Canary) -> Result<Canary, Problem> {
             })
             .await?;
         if is_over {
-            return Ok(canary);
+            return Ok(Ok(canary));
         }
     }
+    Ok(Err(NotHere::NeedsMemory { bytes: canary.room_bytes, most_bytes }))
 }

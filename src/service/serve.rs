@@ -182,7 +182,10 @@ pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: O
     let slots = limits.max_concurrent_solves;
     tracing::info!(studies = %studies, slots, build = BUILD, "working");
     let changed = watch::Sender::default();
-    let workers = Workers::new(store, parts, Pool::new(limits), slots, changed, stopping.clone(), patience);
+    // One that ends the process would end each that takes it up, canary first, and nobody else's study would come further.
+    let most_variant_bytes = limits.max_unread_bytes / 2;
+    let workers = Workers::new(store, parts, Pool::new(limits), slots, changed, stopping.clone(), patience)
+        .with_variants_of_at_most(most_variant_bytes);
     let stop = async {
         told_to_stop().await;
         tracing::info!("stopping: what is begun comes to its end");

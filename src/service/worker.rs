@@ -40,6 +40,8 @@ pub struct Workers {
     pool: Pool,
     /// Chunks that are computed side by side.
     slots: usize,
+    /// What a variant may take while it is computed.
+    most_variant_bytes: u64,
     /// Told when a study was asked for, or has come further, in this process.
     changed: watch::Sender<()>,
     /// Cancelled when no chunk is to be begun any more.
@@ -87,7 +89,14 @@ impl Workers {
         patience: Duration,
     ) -> Self {
         let (known, troubles) = Default::default();
-        Self { store, parts, pool, slots, changed, stopping, patience, known, troubles }
+        let most_variant_bytes = u64::MAX;
+        Self { store, parts, pool, slots, most_variant_bytes, changed, stopping, patience, known, troubles }
+    }
+
+    /// The same who leave studies to others of which a variant takes more than so many bytes while it is computed.
+    #[must_use]
+    pub fn with_variants_of_at_most(self, most_variant_bytes: u64) -> Self {
+        Self { most_variant_bytes, ..self }
     }
 
     /// Works until it is told to stop.
@@ -172,7 +181,7 @@ impl Workers {
                 Ok(found) => found?,
                 // Another time.
                 Err(problem) => {
-                    tracing::warn!(study = task.cut.id, %problem, "a study could not be looked at");
+                    tracing::warn!(study = task.cut.id, %problem, cause = problem.cause, "a study could not be looked at");
                     return None;
                 }
             }
@@ -194,16 +203,16 @@ impl Workers {
             Err(reason) => return Ok(Some(Err(reason))),
         };
         let started = Instant::now();
-        let is_same = frozen::has_the_same_bits(&self.pool, &study, &standing.study).await?;
+        let heard = frozen::heard(&self.pool, &study, &standing.study, self.most_variant_bytes).await?;
         let canary_ms = milliseconds(started.elapsed());
         tracing::info!(
             study = task.cut.id,
             canary_variants = standing.study.canary_variants,
             canary_ms,
-            is_same,
+            is_same = heard.is_ok(),
             "a canary sang"
         );
-        Ok(Some(if is_same { Ok((study, standing.study.lease)) } else { Err(NotHere::OtherBits) }))
+        Ok(Some(heard.map(|()| (study, standing.study.lease))))
     }
 
     /// Computes a chunk and keeps what it comes to, unless it is not wanted any more.
@@ -222,9 +231,12 @@ impl Workers {
         };
         tokio::pin!(is_over);
         let running = async {
-            let (part, busy) = run_chunk(&self.pool, study, chunk).await?;
+            let (part, busy) = match run_chunk(&self.pool, study, chunk, self.most_variant_bytes).await? {
+                Ok(computed) => computed,
+                Err(reason) => return Ok(Err(reason)),
+            };
             let (part, rows) = self.with_rows(study, part).await?;
-            Ok::<_, Problem>((part, rows, busy))
+            Ok::<_, Problem>(Ok((part, rows, busy)))
         };
         let computed = tokio::select! {
             computed = running => Some(computed),
@@ -232,7 +244,12 @@ impl Workers {
             _ = lease.renew() => None,
         };
         let (part, mut rows, busy) = match computed {
-            Some(Ok(computed)) => computed,
+            Some(Ok(Ok(computed))) => computed,
+            Some(Ok(Err(reason))) => {
+                tracing::warn!(study = id, chunk, %reason, "a study is left to other workers");
+                self.known.lock().await.insert(task.clone(), Err(reason));
+                return give_up(lease).await;
+            }
             Some(Err(problem)) => {
                 // The attempt stays noted: it may be the chunk's fault.
                 tracing::error!(study = id, chunk, %problem, cause = problem.cause, "a chunk failed");
@@ -337,8 +354,13 @@ pub fn milliseconds(time: Duration) -> u64 {
     u64::try_from(time.as_millis()).unwrap_or(u64::MAX)
 }
 
-/// What a chunk comes to, and the time that it was computed for.
-async fn run_chunk(pool: &Pool, study: &Arc<Study>, chunk: u64) -> Result<(Part, Duration), Problem> {
+/// What a chunk comes to, and the time that it was computed for, unless a variant of it takes more than one may.
+async fn run_chunk(
+    pool: &Pool,
+    study: &Arc<Study>,
+    chunk: u64,
+    most_variant_bytes: u64,
+) -> Result<Result<(Part, Duration), NotHere>, Problem> {
     let mut work = Work::new(study, chunk).within(SMALL_VARIANT_BYTES);
     #[cfg(feature = "fault-injection")]
     {
@@ -348,20 +370,21 @@ async fn run_chunk(pool: &Pool, study: &Arc<Study>, chunk: u64) -> Result<(Part,
         }
         if let Some(time) = injected::asleep() {
             tokio::time::sleep(time).await;
-            return Ok((work.finish(), time));
+            return Ok(Ok((work.finish(), time)));
         }
     }
     let mut busy = Duration::ZERO;
-    loop {
+    while work.room_bytes() <= most_variant_bytes {
         let started = Instant::now();
         let sliced = pool.run_variants(work.room_bytes(), move |stop| slice(work, stop)).await?;
         busy += started.elapsed();
         counter!("toothwave_study_variants_total").increment(sliced.variants);
         work = sliced.work;
         if sliced.is_over {
-            return Ok((work.finish(), busy));
+            return Ok(Ok((work.finish(), busy)));
         }
     }
+    Ok(Err(NotHere::NeedsMemory { bytes: work.room_bytes(), most_bytes: most_variant_bytes }))
 }
 
 /// A slice of a chunk.

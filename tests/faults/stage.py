@@ -42,12 +42,12 @@ def wait_until(what, patience_s=60, pause_s=0.05):
 
 
 class Process:
-    def __init__(self, binary, name, *words, faults=None, environment=None, user=None):
+    def __init__(self, binary, name, *words, faults=None, environment=None, keep_to=None):
         self.log = WORK / f"studies-{name}.log"
         self.output = open(self.log, "w")
         ordered = ";".join(f"{point}=return({number})" for point, number in (faults or {}).items())
         environment = os.environ | {"PGPASSWORD": PASSWORD, "FAILPOINTS": ordered} | (environment or {})
-        self.process = subprocess.Popen([binary, *map(str, words)], env=environment, stdout=self.output, stderr=self.output, user=user)
+        self.process = subprocess.Popen([binary, *map(str, words)], env=environment, stdout=self.output, stderr=self.output, preexec_fn=keep_to)
         self.pid = self.process.pid
 
     def send(self, number):
@@ -222,11 +222,11 @@ class Stage:
         self.processes.append(service)
         return service
 
-    def work(self, name="worker-1", studies=None, slots=1, environment=None, parts=None, binary=None, user=None, **faults):
+    def work(self, name="worker-1", studies=None, slots=1, environment=None, parts=None, keep_to=None, **faults):
         words = ["worker", "--studies", studies or self.studies, "--max-concurrent-solves", slots]
         if parts:
             words += ["--study-parts", parts]
-        worker = Process(binary or self.binary, name, *words, faults=faults, environment=environment, user=user)
+        worker = Process(self.binary, name, *words, faults=faults, environment=environment, keep_to=keep_to)
         self.processes.append(worker)
         return worker
 

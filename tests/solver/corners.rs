@@ -698,6 +698,23 @@ fn under_the_lightest_loads_corners_leave_fewer_digits_and_the_answer_says_how_f
     assert!(residuals.iter().all(|&residual| residual < 1e-7), "{residuals:?}");
 }
 
+/// What that rounding bends is no curve to be looked at ever nearer: the peaks are those of many intervals, as near as both know them.
+#[test]
+fn under_the_lightest_loads_corners_leave_the_extremes_as_many_digits_as_they_have() {
+    let bored = DriveParameters { tip_radius_mm: Some(53.2), ..PAPER_5_2 };
+    for (parameters, torque_nm) in [(bored, 1e-5), (bored, 1e-6), (PAPER_5_2, 1e-3), (PAPER_5_2, 1e-4)] {
+        let of = LoadParameters { law: ContactLaw::Linear, ring_teeth_bend: false, ..pressed_corners(torque_nm) };
+        let (drive, load) = (drive(&parameters), LoadCase::new(&of).unwrap());
+        let found = match sweep::sweep(&drive, &load, Points::tolerance(1e-8, 1_000_000).unwrap(), &Never) {
+            Ok(found) => found.peaks.wave_generator.force_n.value,
+            Err(SolveError::TooManyStates { .. }) => continue,
+            Err(error) => panic!("{torque_nm} N·m: {error}"),
+        };
+        let dense = swept(&parameters, &of, 3000).peaks.wave_generator.force_n.value;
+        assert!((found / dense - 1.0).abs() < 1e-3, "{torque_nm} N·m: {found} and {dense} N");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 

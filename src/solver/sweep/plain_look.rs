@@ -3,6 +3,7 @@
 use crate::contact::PerContact;
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
 use crate::mesh::Mesh;
+use crate::root::NotConverged;
 use crate::sweep::search::{LOADS, Look, Piece, Seen};
 use crate::{SolveError, Stop};
 
@@ -64,6 +65,10 @@ impl<'a> PlainLook<'a> {
 }
 
 impl Look for PlainLook<'_> {
+    fn distance_at_corner_rad(&self) -> Result<f64, NotConverged> {
+        self.loaded.distance_at_corner_rad()
+    }
+
     fn has_gaps(&self) -> bool {
         self.has_gaps
     }

@@ -330,6 +330,14 @@ pub(crate) trait Look {
     /// `M0` in N·mm.
     fn input_torque_nmm(&self) -> f64;
 
+    /// A rotation whose rounding is that of what teeth keep from a corner, where they are pressed against it.
+    ///
+    /// # Errors
+    /// [`NotConverged`] from the path.
+    fn distance_at_corner_rad(&self) -> Result<f64, NotConverged> {
+        Ok(0.0)
+    }
+
     /// How many teeth are told apart at each place.
     fn teeth_at_each_place(&self) -> u64;
 
@@ -405,7 +413,8 @@ pub(crate) fn search(
         }
     }
     // What is left is more than rounding only where curves are no curves.
-    if excess > tolerance.relative().max(OPEN).max(search.rounding(look.input_torque_nmm())) {
+    let rounding = search.rounding(look.input_torque_nmm(), look.distance_at_corner_rad()?);
+    if excess > tolerance.relative().max(OPEN).max(rounding) {
         return Err(NotConverged { what: "extremes of a sweep", iterations: MAX_ROUNDS, bracket_width: excess }.into());
     }
     Ok(Some(Found { seen: search.seen, best: search.best }))
@@ -413,11 +422,11 @@ pub(crate) fn search(
 
 impl Search {
     /// What rounding of closing angles may make of the loads, and of a bend that is counted several times: amplified by `Δφ K/M`, M what is given or
-    /// what is allowed.
-    fn rounding(&self, input_torque_nmm: f64) -> f64 {
+    /// what is allowed, and Δφ what teeth are from the axis where they are pressed against a corner.
+    fn rounding(&self, input_torque_nmm: f64, distance_at_corner_rad: f64) -> f64 {
         let [rotation_rad, stiffness_nmm_per_rad] = [LOADS, STIFFNESSES[0]].map(|quantity| self.best[quantity].value);
         let per_torque = self.best[CAPACITY].value.max(1.0 / input_torque_nmm);
-        ROUNDINGS * f64::EPSILON * (rotation_rad * stiffness_nmm_per_rad * per_torque)
+        ROUNDINGS * f64::EPSILON * (rotation_rad.max(distance_at_corner_rad) * stiffness_nmm_per_rad * per_torque)
     }
 
     /// Looks where it is wanted.
