@@ -34,7 +34,7 @@ use crate::parts::Parts;
 use crate::router::{self, Entry};
 use crate::socket::{Seen, Socket};
 use crate::studies::Keeping;
-use crate::worker::Workers;
+use crate::worker::{Capacity, Workers};
 
 /// How long the service still listens at least after it has said that it is not ready, so that whoever asks can learn it.
 const NOTICE: Duration = Duration::from_millis(200);
@@ -182,10 +182,8 @@ pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: O
     let slots = limits.max_concurrent_solves;
     tracing::info!(studies = %studies, slots, build = BUILD, "working");
     let changed = watch::Sender::default();
-    // One that ends the process would end each that takes it up, canary first, and nobody else's study would come further.
-    let most_variant_bytes = limits.max_unread_bytes / 2;
-    let workers = Workers::new(store, parts, Pool::new(limits), slots, changed, stopping.clone(), patience)
-        .with_variants_of_at_most(most_variant_bytes);
+    let capacity = Capacity { slots, variant_bytes: limits.max_unread_bytes / 2, admitted_states: 0 };
+    let workers = Workers::new(store, parts, Pool::new(limits), capacity, changed, stopping.clone(), patience);
     let stop = async {
         told_to_stop().await;
         tracing::info!("stopping: what is begun comes to its end");

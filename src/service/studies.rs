@@ -29,7 +29,7 @@ use crate::frozen;
 use crate::parts::Parts;
 use crate::problem::{Problem, ProblemCode};
 use crate::room::{self, Room};
-use crate::worker::{Sliced, Workers, milliseconds, slice};
+use crate::worker::{Capacity, Sliced, Workers, milliseconds, slice};
 
 /// Between two looks at how a stored study stands.
 const LOOK: Duration = Duration::from_secs(1);
@@ -929,14 +929,19 @@ impl Studies {
         let Keeping::Store { store, expiry, parts } = &self.keeping else { return };
         let workers = async {
             if !store.address().is_shared() {
-                let slots = self.limits.max_concurrent_solves;
                 // What a chunk has come to is little: it is begun anew.
                 let patience = Duration::ZERO;
+                // The file may be from a time of more memory; what is admitted now is computed now.
+                let capacity = Capacity {
+                    slots: self.limits.max_concurrent_solves,
+                    variant_bytes: self.limits.max_unread_bytes,
+                    admitted_states: self.limits.max_states,
+                };
                 Workers::new(
                     store.clone(),
                     parts.clone(),
                     self.pool.clone(),
-                    slots,
+                    capacity,
                     self.changed.clone(),
                     self.closing.clone(),
                     patience,

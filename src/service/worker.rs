@@ -38,10 +38,7 @@ pub struct Workers {
     /// Where rows are kept besides.
     parts: Option<Parts>,
     pool: Pool,
-    /// Chunks that are computed side by side.
-    slots: usize,
-    /// What a variant may take while it is computed.
-    most_variant_bytes: u64,
+    capacity: Capacity,
     /// Told when a study was asked for, or has come further, in this process.
     changed: watch::Sender<()>,
     /// Cancelled when no chunk is to be begun any more.
@@ -51,6 +48,17 @@ pub struct Workers {
     known: tokio::sync::Mutex<HashMap<Waiting, Known>>,
     /// What was last said of each.
     troubles: Mutex<BTreeMap<What, String>>,
+}
+
+/// What workers have room for. A variant that takes more would end the process, and each that takes it up again, canary first.
+#[derive(Debug, Clone, Copy)]
+pub struct Capacity {
+    /// Chunks that are computed side by side.
+    pub slots: usize,
+    /// What a variant may take while it is computed,
+    pub variant_bytes: u64,
+    /// unless its study lets none have more states than this: such a one was admitted here.
+    pub admitted_states: u64,
 }
 
 /// What may be in trouble: on a full device the store is read and not written.
@@ -71,8 +79,8 @@ impl What {
     }
 }
 
-/// A study that this process computes, or why it does not.
-type Known = Result<(Arc<Study>, Duration), NotHere>;
+/// A study that this process computes, the lease of its chunks and what its variants may take; or why it does not.
+type Known = Result<(Arc<Study>, Duration, u64), NotHere>;
 
 /// The studies that wait, as far as is known.
 type Tasks = watch::Receiver<Arc<Vec<Waiting>>>;
@@ -83,20 +91,13 @@ impl Workers {
         store: Store,
         parts: Option<Parts>,
         pool: Pool,
-        slots: usize,
+        capacity: Capacity,
         changed: watch::Sender<()>,
         stopping: CancellationToken,
         patience: Duration,
     ) -> Self {
         let (known, troubles) = Default::default();
-        let most_variant_bytes = u64::MAX;
-        Self { store, parts, pool, slots, most_variant_bytes, changed, stopping, patience, known, troubles }
-    }
-
-    /// The same who leave studies to others of which a variant takes more than so many bytes while it is computed.
-    #[must_use]
-    pub fn with_variants_of_at_most(self, most_variant_bytes: u64) -> Self {
-        Self { most_variant_bytes, ..self }
+        Self { store, parts, pool, capacity, changed, stopping, patience, known, troubles }
     }
 
     /// Works until it is told to stop.
@@ -104,7 +105,7 @@ impl Workers {
         let (tell, tasks) = watch::channel(Arc::default());
         let over = CancellationToken::new();
         let slots = async {
-            join_all((0..self.slots).map(|slot| self.fill(slot, tasks.clone()))).await;
+            join_all((0..self.capacity.slots).map(|slot| self.fill(slot, tasks.clone()))).await;
             over.cancel();
         };
         tokio::join!(slots, self.look(&tell, &over));
@@ -142,10 +143,10 @@ impl Workers {
                     return;
                 }
                 let task = &waiting[(turn + offset) % waiting.len()];
-                let Some((study, lease)) = self.study(task).await else { continue };
+                let Some((study, lease, most_bytes)) = self.study(task).await else { continue };
                 match self.store.claim(&task.cut, lease).await {
                     Ok(Claim::Chunk(lease)) => {
-                        self.compute(task, &study, lease, &mut tasks).await;
+                        self.compute(task, &study, most_bytes, lease, &mut tasks).await;
                         has_worked = true;
                     }
                     Ok(Claim::Gap(chunk)) => {
@@ -171,7 +172,7 @@ impl Workers {
     }
 
     /// The study, where this process computes it: of this build, with a canary of the same bits.
-    async fn study(&self, task: &Waiting) -> Option<(Arc<Study>, Duration)> {
+    async fn study(&self, task: &Waiting) -> Option<(Arc<Study>, Duration, u64)> {
         let mut known = self.known.lock().await;
         if let Some(known) = known.get(task) {
             return known.clone().ok();
@@ -202,8 +203,10 @@ impl Workers {
             Ok(study) => study,
             Err(reason) => return Ok(Some(Err(reason))),
         };
+        let Capacity { variant_bytes, admitted_states, .. } = self.capacity;
+        let most_bytes = if standing.study.max_states <= admitted_states { u64::MAX } else { variant_bytes };
         let started = Instant::now();
-        let heard = frozen::heard(&self.pool, &study, &standing.study, self.most_variant_bytes).await?;
+        let heard = frozen::heard(&self.pool, &study, &standing.study, most_bytes).await?;
         let canary_ms = milliseconds(started.elapsed());
         tracing::info!(
             study = task.cut.id,
@@ -212,11 +215,11 @@ impl Workers {
             is_same = heard.is_ok(),
             "a canary sang"
         );
-        Ok(Some(heard.map(|()| (study, standing.study.lease))))
+        Ok(Some(heard.map(|()| (study, standing.study.lease, most_bytes))))
     }
 
     /// Computes a chunk and keeps what it comes to, unless it is not wanted any more.
-    async fn compute(&self, task: &Waiting, study: &Arc<Study>, mut lease: Lease, tasks: &mut Tasks) {
+    async fn compute(&self, task: &Waiting, study: &Arc<Study>, most_bytes: u64, mut lease: Lease, tasks: &mut Tasks) {
         let (id, chunk) = (&task.cut.id, lease.chunk());
         let time_is_over = async {
             self.stopping.cancelled().await;
@@ -231,7 +234,7 @@ impl Workers {
         };
         tokio::pin!(is_over);
         let running = async {
-            let (part, busy) = match run_chunk(&self.pool, study, chunk, self.most_variant_bytes).await? {
+            let (part, busy) = match run_chunk(&self.pool, study, chunk, most_bytes).await? {
                 Ok(computed) => computed,
                 Err(reason) => return Ok(Err(reason)),
             };
@@ -359,7 +362,7 @@ async fn run_chunk(
     pool: &Pool,
     study: &Arc<Study>,
     chunk: u64,
-    most_variant_bytes: u64,
+    most_bytes: u64,
 ) -> Result<Result<(Part, Duration), NotHere>, Problem> {
     let mut work = Work::new(study, chunk).within(SMALL_VARIANT_BYTES);
     #[cfg(feature = "fault-injection")]
@@ -374,7 +377,7 @@ async fn run_chunk(
         }
     }
     let mut busy = Duration::ZERO;
-    while work.room_bytes() <= most_variant_bytes {
+    while work.room_bytes() <= most_bytes {
         let started = Instant::now();
         let sliced = pool.run_variants(work.room_bytes(), move |stop| slice(work, stop)).await?;
         busy += started.elapsed();
@@ -384,7 +387,7 @@ async fn run_chunk(
             return Ok(Ok((work.finish(), busy)));
         }
     }
-    Ok(Err(NotHere::NeedsMemory { bytes: work.room_bytes(), most_bytes: most_variant_bytes }))
+    Ok(Err(NotHere::NeedsMemory { bytes: work.room_bytes(), most_bytes }))
 }
 
 /// A slice of a chunk.

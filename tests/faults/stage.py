@@ -74,10 +74,10 @@ class Process:
 
 
 class Service(Process):
-    def __init__(self, binary, name, studies, faults=None, environment=None, words=()):
+    def __init__(self, binary, name, studies, faults=None, environment=None, words=(), keep_to=None):
         self.port = free_port()
         super().__init__(
-            binary, name, "serve", "--listen", f"127.0.0.1:{self.port}", "--studies", studies, *words, faults=faults, environment=environment
+            binary, name, "serve", "--listen", f"127.0.0.1:{self.port}", "--studies", studies, *words, faults=faults, environment=environment, keep_to=keep_to
         )
         wait_until(self.is_ready)
 
