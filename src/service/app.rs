@@ -34,7 +34,8 @@ impl App {
 
     /// An idle service within these limits, with its studies kept somewhere.
     pub fn keeping(limits: Limits, keeping: Keeping) -> Arc<Self> {
-        let (pool, room) = (Pool::new(limits), Room::new(limits.max_unread_bytes));
+        let room = Room::new(limits.max_unread_bytes);
+        let pool = Pool::new(limits).beside(&room);
         Arc::new(Self {
             limits,
             studies: Studies::new(pool.clone(), room.clone(), limits, keeping),

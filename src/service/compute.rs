@@ -15,7 +15,7 @@ use tracing::Span;
 use crate::beside::beside;
 use crate::config::Limits;
 use crate::problem::{Problem, ProblemCode};
-use crate::room;
+use crate::room::{self, Reserved, Room};
 
 /// A slice of what runs in turn begins nothing further after this time: so long at most does a single request wait behind short ones.
 pub const SLICE: Duration = Duration::from_millis(5);
@@ -44,6 +44,8 @@ pub struct Pool {
     aside: Arc<Semaphore>,
     /// One: for what takes seconds, and is wanted all the same.
     unhurried: Arc<Semaphore>,
+    /// Of answers, from which a variant takes what is beyond the part of variants; none where there are none.
+    room: Option<Room>,
     /// Cancelled when the service stops and has no time left.
     closed: CancellationToken,
     limits: Limits,
@@ -95,9 +97,16 @@ impl Pool {
             batches: Arc::new(Semaphore::new(limits.max_concurrent_batches)),
             aside: Arc::new(Semaphore::new(1)),
             unhurried: Arc::new(Semaphore::new(1)),
+            room: None,
             closed: CancellationToken::new(),
             limits,
         }
+    }
+
+    /// The same beside answers that take this room.
+    #[must_use]
+    pub fn beside(self, room: &Room) -> Self {
+        Self { room: Some(room.clone()), ..self }
     }
 
     /// Solves that run now.
@@ -216,9 +225,14 @@ impl Pool {
         if room_bytes <= SMALL_VARIANT_BYTES {
             return self.run_in_turn(job).await;
         }
-        let most = room::permits(self.limits.max_unread_bytes / PART_OF_VARIANTS);
+        let part_bytes = self.limits.max_unread_bytes / PART_OF_VARIANTS;
+        let wanted = async {
+            let permits = room::permits(room_bytes.min(part_bytes));
+            let held = Arc::clone(&self.of_variants).acquire_many_owned(permits).await;
+            (held, self.beyond_part(room_bytes.saturating_sub(part_bytes)).await)
+        };
         let held = tokio::select! {
-            held = Arc::clone(&self.of_variants).acquire_many_owned(room::permits(room_bytes).min(most)) => held,
+            held = wanted => held,
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
         self.run_in_turn(move |stop| {
@@ -226,6 +240,18 @@ impl Pool {
             job(stop)
         })
         .await
+    }
+
+    /// So many bytes of the room of answers, when there are as many.
+    async fn beyond_part(&self, bytes: u64) -> Option<Reserved> {
+        const LOOK: Duration = Duration::from_millis(20);
+        let room = self.room.as_ref().filter(|_| bytes > 0)?;
+        loop {
+            if let Ok(reserved) = room.reserve(bytes) {
+                return Some(reserved);
+            }
+            tokio::time::sleep(LOOK).await;
+        }
     }
 
     /// Runs what is no solve, and may yet take too long for the executor, on a thread of its own, one at a time: it waits for no solve.
@@ -350,6 +376,7 @@ fn shutting_down() -> Problem {
 #[cfg(test)]
 mod tests {
     use std::io;
+    use std::pin::pin;
     use std::sync::atomic::{AtomicUsize, Ordering};
     use std::sync::{Arc, mpsc};
     use std::time::Duration;
@@ -360,6 +387,7 @@ mod tests {
     use super::{Pool, Thread};
     use crate::config::Settings;
     use crate::problem::{Problem, ProblemCode};
+    use crate::room::{NoRoom, Room};
 
     #[derive(clap::Parser)]
     struct Line {
@@ -405,6 +433,21 @@ mod tests {
             assert!(join_all(slices).await.iter().all(Result::is_ok));
             assert!(most.load(Ordering::SeqCst) <= most_at_once, "{variant_bytes}");
         }
+    }
+
+    /// One alone has what it needs, of which nobody counted what is beyond the part of variants.
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_variant_that_takes_more_than_the_part_of_variants_waits_for_room_of_answers() -> Result<(), NoRoom> {
+        let Line { settings } = Line::parse_from(["serve", "--max-unread-bytes", "67108864"]);
+        let room = Room::new(64 << 20);
+        let pool = Pool::new(settings.limits()).beside(&room);
+        let unread = room.reserve(60 << 20)?;
+        let mut large = pin!(pool.run_variants(30 << 20, |_| Ok(())));
+        assert!(futures_util::poll!(&mut large).is_pending());
+        drop(unread);
+        assert!(large.await.is_ok());
+        assert_eq!(room.taken_bytes(), 0);
+        Ok(())
     }
 
     #[tokio::test(start_paused = true)]
