@@ -175,6 +175,8 @@ pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: O
             _ = interrupt.recv() => {}
         }
     };
+    // Each slot may have a connection and a file of rows.
+    open_as_many_files_as_possible();
     let store = Store::open(studies).await.map_err(io::Error::other)?;
     let limits = settings.limits();
     let stopping = CancellationToken::new();
@@ -198,15 +200,19 @@ pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: O
     Ok(())
 }
 
+/// Raises the number of files that the process may open as far as it may; where that is not allowed, it stays what it was.
+fn open_as_many_files_as_possible() {
+    let mut files = getrlimit(Resource::Nofile);
+    files.current = files.maximum;
+    let _ = setrlimit(Resource::Nofile, files);
+}
+
 /// As many connections as are wanted, or as the process may open files for, whose number is raised as far as the process may do so itself.
 ///
 /// # Errors
 /// Where that is none.
 fn connections_that_fit(wanted: usize) -> io::Result<usize> {
-    let mut files = getrlimit(Resource::Nofile);
-    files.current = files.maximum;
-    // Where it is not allowed, the number stays what it was.
-    let _ = setrlimit(Resource::Nofile, files);
+    open_as_many_files_as_possible();
     let Some(files) = getrlimit(Resource::Nofile).current else { return Ok(wanted) };
     let fit = usize::try_from(files.saturating_sub(OTHER_FILES)).unwrap_or(usize::MAX);
     if fit == 0 {

@@ -143,7 +143,13 @@ impl Workers {
                     return;
                 }
                 let task = &waiting[(turn + offset) % waiting.len()];
-                let Some((study, lease, most_bytes)) = self.study(task).await else { continue };
+                // A canary that is begun is no chunk: whoever is told to stop leaves it.
+                let found = tokio::select! {
+                    biased;
+                    () = self.stopping.cancelled() => return,
+                    found = self.study(task) => found,
+                };
+                let Some((study, lease, most_bytes)) = found else { continue };
                 match self.store.claim(&task.cut, lease).await {
                     Ok(Claim::Chunk(lease)) => {
                         self.compute(task, &study, most_bytes, lease, &mut tasks).await;
