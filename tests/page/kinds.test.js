@@ -248,7 +248,7 @@ test('the peaks say how far to believe them', async () => {
     estimated,
   ]);
   await setDocument(page, { ...unnamed, model: { clearance: { ring_um: 20 } } });
-  assert.match((await told())[0], /; not measured with larger gaps\.$/);
+  assert.match((await told())[0], /; not measured with larger gaps, a larger wind-up\.$/);
   await pick(page, LAW, 'fixed');
   assert.equal((await told())[0], 'The model’s own error: not measured under this law.');
 });
