@@ -227,9 +227,10 @@ impl Pool {
         }
         let part_bytes = self.limits.max_unread_bytes / PART_OF_VARIANTS;
         let wanted = async {
+            // First: clients may hold that for long, and who waits for it is in nobody's way.
+            let beyond = self.beyond_part(room_bytes.saturating_sub(part_bytes)).await;
             let permits = room::permits(room_bytes.min(part_bytes));
-            let held = Arc::clone(&self.of_variants).acquire_many_owned(permits).await;
-            (held, self.beyond_part(room_bytes.saturating_sub(part_bytes)).await)
+            (Arc::clone(&self.of_variants).acquire_many_owned(permits).await, beyond)
         };
         let held = tokio::select! {
             held = wanted => held,
@@ -443,6 +444,9 @@ mod tests {
         let pool = Pool::new(settings.limits()).beside(&room);
         let unread = room.reserve(60 << 20)?;
         let mut large = pin!(pool.run_variants(30 << 20, |_| Ok(())));
+        assert!(futures_util::poll!(&mut large).is_pending());
+        // One within it does not wait for that.
+        assert!(pool.run_variants(8 << 20, |_| Ok(())).await.is_ok());
         assert!(futures_util::poll!(&mut large).is_pending());
         drop(unread);
         assert!(large.await.is_ok());

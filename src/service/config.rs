@@ -26,6 +26,10 @@ const MOST_SOLVES: i64 = 1_000_000;
 /// allocator cannot give back. Of a small memory three quarters at most.
 const HELD_BACK_BYTES: u64 = 64 << 20;
 
+/// For each solve at once beyond so many as much more: each keeps up to 4 MiB on its thread that the allocator gives back to nobody else.
+const SOLVES_WITHIN: usize = 6;
+const KEPT_BY_SOLVE_BYTES: u64 = 4 << 20;
+
 /// Of the memory, for each solve that runs at once, by default.
 const MEMORY_PER_SOLVE_BYTES: u64 = 32 << 20;
 
@@ -100,12 +104,12 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_DEADLINE_MS", value_name = "MS", default_value_t = 10_000)]
     pub deadline_ms: u64,
 
-    /// Most bytes of answers that the cache keeps [default: 256 MiB, or an eighth of the memory but for 64 MiB]
+    /// Most bytes of answers that the cache keeps [default: 256 MiB, or an eighth of the memory but for 64 MiB and 4 MiB for each concurrent solve beyond six]
     #[arg(long, env = "TOOTHWAVE_CACHE_MAX_BYTES", value_name = "BYTES")]
     pub cache_max_bytes: Option<u64>,
 
     /// Most bytes of answers that nobody has read yet: being made, in batches, on their way; those up to 256 KiB not counted
-    /// [default: 512 MiB for each solve that runs at once, or half of the memory but for 64 MiB]
+    /// [default: 512 MiB for each solve that runs at once, or half of the memory but for as much]
     #[arg(long, env = "TOOTHWAVE_MAX_UNREAD_BYTES", value_name = "BYTES")]
     pub max_unread_bytes: Option<u64>,
 
@@ -353,7 +357,8 @@ impl Settings {
         let max_concurrent_solves =
             self.max_concurrent_solves.map_or_else(|| cores.min(solves_that_fit), |solves| solves as usize);
         let connections_that_fit = that_fit(MEMORY_PER_CONNECTION_BYTES).min(MOST_CONNECTIONS);
-        let shared_bytes = memory_bytes.saturating_sub(HELD_BACK_BYTES).max(memory_bytes / 4);
+        let kept_bytes = KEPT_BY_SOLVE_BYTES * max_concurrent_solves.saturating_sub(SOLVES_WITHIN) as u64;
+        let shared_bytes = memory_bytes.saturating_sub(HELD_BACK_BYTES + kept_bytes).max(memory_bytes / 4);
         let max_unread_bytes = self
             .max_unread_bytes
             .unwrap_or_else(|| (shared_bytes / 2).min(max_concurrent_solves as u64 * MOST_UNREAD_BYTES_PER_SOLVE));
@@ -438,6 +443,15 @@ mod tests {
                 assert!(limits.max_concurrent_solves as u64 * (32 << 20) <= memory_bytes);
             }
         }
+    }
+
+    /// Sixteen threads that had each solved a few ordinary sweeps kept 62 MiB, which was all that nobody else has.
+    #[test]
+    fn more_solves_at_once_than_a_small_memory_has_by_default_leave_less_to_answers() {
+        let of = |words: &[&str]| Line::parse_from(words).settings.limits_of(200 << 20, 16);
+        let (few, many) = (of(&["serve"]), of(&["serve", "--max-concurrent-solves", "16"]));
+        assert_eq!((few.max_concurrent_solves, few.max_unread_bytes), (6, 68 << 20));
+        assert_eq!((many.max_unread_bytes, many.cache_max_bytes), (48 << 20, 12 << 20));
     }
 
     #[test]
