@@ -14,7 +14,7 @@ use toothwave_solver::{
 };
 use utoipa::ToSchema;
 
-use crate::design::{CompatibilityDocument, Design, LawName, PartsDocument};
+use crate::design::{CompatibilityDocument, Design, LawName};
 use crate::forms::{Form, Format, Forms, csv_error};
 use crate::json::word;
 use crate::key::Encode;
@@ -119,9 +119,7 @@ impl Question for Accuracy {
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
         let Design { drive, materials, load, model, modification, deviations, accuracy, parts, .. } = design;
-        let PartsDocument { wave_generator, ring, carrier, teeth: _ } = parts;
-        let parts = (wave_generator, ring, ring.rim, carrier, carrier.fingers);
-        (drive, materials, load, model, modification, (deviations, accuracy, parts))
+        (drive, materials, load, model, modification, (deviations, accuracy, parts.behind_contacts()))
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedAccuracy, NoAnswer> {
@@ -259,12 +257,10 @@ fn difference(peaks: &PerContact<ContactPeaks>, reference: &PerContact<ContactPe
 
 /// A model of the design with its converged peaks.
 struct Model<'a> {
-    drive: &'a Drive,
-    deviations: &'a Deviations,
+    checked: &'a CheckedAccuracy,
     load: LoadCase,
     reference: Converged,
     difference: f64,
-    max_states: u64,
 }
 
 impl<'a> Model<'a> {
@@ -275,36 +271,37 @@ impl<'a> Model<'a> {
         own_peaks: &PerContact<ContactPeaks>,
         stop: &dyn Stop,
     ) -> Result<Option<Self>, SolveError> {
-        let &CheckedAccuracy { ref drive, ref deviations, max_states, .. } = checked;
         let Ok(load) = LoadCase::new(parameters) else { return Ok(None) };
-        if !parameters.clearance_violations(&Draft::new(drive.parameters())?)?.is_empty() {
+        if !parameters.clearance_violations(&Draft::new(checked.drive.parameters())?)?.is_empty() {
             return Ok(None);
         }
         let reference = Converged::new(checked, &load, stop)?;
         let difference = difference(&reference.peaks, own_peaks);
-        Ok(Some(Self { drive, deviations, load, reference, difference, max_states }))
+        Ok(Some(Self { checked, load, reference, difference }))
     }
 
     /// Tries every number of samples and every tolerance that the limit on states admits.
     fn measure(&self, ways: &mut Vec<WayAnswer>, stop: &dyn Stop) -> Result<(), SolveError> {
-        let mesh = self.load.mesh(self.drive, self.deviations);
+        let &CheckedAccuracy { ref drive, ref deviations, max_states, .. } = self.checked;
+        let mesh = self.load.mesh(drive, deviations);
         // All of them lie within the ranges.
         let samples = SAMPLES.into_iter().filter_map(|samples| Samples::new(samples).ok());
-        for samples in samples.filter(|&samples| mesh.state_count(samples) <= self.max_states) {
+        for samples in samples.filter(|&samples| mesh.state_count(samples) <= max_states) {
             ways.push(self.way(Points::Samples(samples), stop)?);
         }
-        for tolerance in TOLERANCES.into_iter().filter_map(|value| Tolerance::new(value, self.max_states).ok()) {
+        for tolerance in TOLERANCES.into_iter().filter_map(|value| Tolerance::new(value, max_states).ok()) {
             ways.push(self.way(Points::Tolerance(tolerance), stop)?);
         }
         Ok(())
     }
 
     fn way(&self, points: Points, stop: &dyn Stop) -> Result<WayAnswer, SolveError> {
+        let CheckedAccuracy { drive, deviations, .. } = self.checked;
         let begun = Instant::now();
         let mut times_us = Vec::with_capacity(MOST_RUNS);
         let found = loop {
             let started = Instant::now();
-            let found = sweep_with_deviations(self.drive, &self.load, self.deviations, points, stop)?;
+            let found = sweep_with_deviations(drive, &self.load, deviations, points, stop)?;
             times_us.push(1e6 * started.elapsed().as_secs_f64());
             if times_us.len() == MOST_RUNS || begun.elapsed() > ENOUGH {
                 break found;

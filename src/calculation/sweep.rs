@@ -13,7 +13,7 @@ use toothwave_solver::{
     model_error as error_of_model,
 };
 
-use crate::design::{BearingRating, Design, Duty, DutyPoint, PartsDocument};
+use crate::design::{BearingRating, Design, Duty, DutyPoint};
 use crate::field::FieldCode;
 use crate::findings::{FindingAnswer, drive_findings, write_findings};
 use crate::forms::{Form, Format, Forms, csv_error};
@@ -209,9 +209,7 @@ impl Question for Sweep {
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
         let Design { drive, materials, load, friction, model, modification, deviations, sweep, parts, .. } = design;
-        let PartsDocument { wave_generator, ring, carrier, teeth: _ } = parts;
-        let parts = (wave_generator, ring, ring.rim, carrier, carrier.fingers);
-        (drive, materials, load, friction, model, (modification, deviations, sweep, parts))
+        (drive, materials, load, friction, model, (modification, deviations, sweep, parts.behind_contacts()))
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedSweep, NoAnswer> {

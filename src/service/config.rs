@@ -109,7 +109,7 @@ pub struct Settings {
     pub cache_max_bytes: Option<u64>,
 
     /// Most bytes of answers that nobody has read yet: being made, in batches, on their way; those up to 256 KiB not counted
-    /// [default: 512 MiB for each solve that runs at once, or half of the memory but for as much]
+    /// [default: 512 MiB for each solve that runs at once, or half of the memory but for 64 MiB and 4 MiB for each solve beyond six]
     #[arg(long, env = "TOOTHWAVE_MAX_UNREAD_BYTES", value_name = "BYTES")]
     pub max_unread_bytes: Option<u64>,
 

@@ -79,8 +79,18 @@ impl What {
     }
 }
 
-/// A study that this process computes, the lease of its chunks and what its variants may take; or why it does not.
-type Known = Result<(Arc<Study>, Duration, u64), NotHere>;
+/// A study that this process computes, or why it does not.
+type Known = Result<Ours, NotHere>;
+
+/// A study that this process computes.
+#[derive(Debug, Clone)]
+struct Ours {
+    study: Arc<Study>,
+    /// Of its chunks.
+    lease: Duration,
+    /// What a variant of it may take while it is computed.
+    most_bytes: u64,
+}
 
 /// The studies that wait, as far as is known.
 type Tasks = watch::Receiver<Arc<Vec<Waiting>>>;
@@ -149,10 +159,10 @@ impl Workers {
                     () = self.stopping.cancelled() => return,
                     found = self.study(task) => found,
                 };
-                let Some((study, lease, most_bytes)) = found else { continue };
-                match self.store.claim(&task.cut, lease).await {
+                let Some(ours) = found else { continue };
+                match self.store.claim(&task.cut, ours.lease).await {
                     Ok(Claim::Chunk(lease)) => {
-                        self.compute(task, &study, most_bytes, lease, &mut tasks).await;
+                        self.compute(task, &ours, lease, &mut tasks).await;
                         has_worked = true;
                     }
                     Ok(Claim::Gap(chunk)) => {
@@ -178,7 +188,7 @@ impl Workers {
     }
 
     /// The study, where this process computes it: of this build, with a canary of the same bits.
-    async fn study(&self, task: &Waiting) -> Option<(Arc<Study>, Duration, u64)> {
+    async fn study(&self, task: &Waiting) -> Option<Ours> {
         let mut known = self.known.lock().await;
         if let Some(known) = known.get(task) {
             return known.clone().ok();
@@ -221,11 +231,12 @@ impl Workers {
             is_same = heard.is_ok(),
             "a canary sang"
         );
-        Ok(Some(heard.map(|()| (study, standing.study.lease, most_bytes))))
+        Ok(Some(heard.map(|()| Ours { study, lease: standing.study.lease, most_bytes })))
     }
 
     /// Computes a chunk and keeps what it comes to, unless it is not wanted any more.
-    async fn compute(&self, task: &Waiting, study: &Arc<Study>, most_bytes: u64, mut lease: Lease, tasks: &mut Tasks) {
+    async fn compute(&self, task: &Waiting, ours: &Ours, mut lease: Lease, tasks: &mut Tasks) {
+        let &Ours { ref study, most_bytes, .. } = ours;
         let (id, chunk) = (&task.cut.id, lease.chunk());
         let time_is_over = async {
             self.stopping.cancelled().await;

@@ -88,6 +88,14 @@ pub struct PartsDocument {
     pub carrier: CarrierPartDocument,
 }
 
+impl PartsDocument {
+    /// What of them a load's answer hangs on: all that stands behind the teeth's contacts.
+    pub(crate) fn behind_contacts(&self) -> impl Encode + '_ {
+        let Self { wave_generator, ring, carrier, teeth: _ } = self;
+        (wave_generator, ring, ring.rim, carrier, carrier.fingers)
+    }
+}
+
 /// The wave generator as it is made.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]

@@ -274,6 +274,46 @@ impl Extremes {
     }
 }
 
+/// What all teeth together come to at the input angles so far.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct AngleExtremes {
+    wind_up_deg: Extremes,
+    torsional_stiffness_nm_per_rad: Extremes,
+    loaded_teeth: Option<TeethInMesh>,
+}
+
+impl AngleExtremes {
+    pub(crate) const NONE: Self =
+        Self { wind_up_deg: Extremes::NONE, torsional_stiffness_nm_per_rad: Extremes::NONE, loaded_teeth: None };
+
+    /// One further.
+    #[inline(always)]
+    pub(crate) fn see(&mut self, wind_up_deg: f64, torsional_stiffness_nm_per_rad: f64, loaded_teeth: u64) {
+        self.wind_up_deg = self.wind_up_deg.with(wind_up_deg);
+        self.torsional_stiffness_nm_per_rad = self.torsional_stiffness_nm_per_rad.with(torsional_stiffness_nm_per_rad);
+        let TeethInMesh { min, max } =
+            self.loaded_teeth.unwrap_or(TeethInMesh { min: loaded_teeth, max: loaded_teeth });
+        self.loaded_teeth = Some(TeethInMesh { min: min.min(loaded_teeth), max: max.max(loaded_teeth) });
+    }
+
+    /// With what each contact comes to.
+    pub(crate) fn peaks(
+        self,
+        contacts: PerContact<ContactPeaks>,
+        torque_capacity: Option<TorqueCapacity>,
+        torque_balance_residual: f64,
+    ) -> SweepPeaks {
+        SweepPeaks {
+            contacts,
+            wind_up_deg: self.wind_up_deg,
+            torsional_stiffness_nm_per_rad: self.torsional_stiffness_nm_per_rad,
+            loaded_teeth: self.loaded_teeth.unwrap_or(TeethInMesh { min: 0, max: 0 }),
+            torque_capacity,
+            torque_balance_residual,
+        }
+    }
+}
+
 impl SweepPeaks {
     /// How far the carrier lags and leads over the period under the load: the range of the wind-up at the output.
     pub fn transmission_error_peak_to_peak_deg(&self, drive: &Drive) -> f64 {

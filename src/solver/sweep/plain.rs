@@ -2,12 +2,12 @@
 
 use crate::contact::{Contact, Materials, PerContact};
 use crate::load_sharing::{LawEnd, LoadCase, LoadedDrive, ToothState, TorqueLimit};
-use crate::mesh::{PlacedTooth, Samples, TeethInMesh};
+use crate::mesh::{PlacedTooth, Samples};
 use crate::root::NotConverged;
 use crate::springs::WindUp;
 use crate::sweep::adaptive::{self, Looking};
 use crate::sweep::columns::{
-    Columns, ContactPeaks, Extremes, InputAngles, Peak, PeakAt, States, Sweep, SweepPeaks, TorqueBalance,
+    AngleExtremes, Columns, ContactPeaks, InputAngles, Peak, PeakAt, States, Sweep, SweepPeaks, TorqueBalance,
     TorqueCapacity, check, finished, worse,
 };
 use crate::sweep::points::Points;
@@ -145,22 +145,13 @@ pub(crate) fn peaks(
         let peaks = ContactPeaks::of_line(force_n, stress_mpa, force_at_stress_n, loaded.drive().tooth_width_mm());
         columns.complete(peaks, &load.parameters().materials, contact)
     });
-    Ok(SweepPeaks {
-        contacts,
-        wind_up_deg: seen.wind_up_deg,
-        torsional_stiffness_nm_per_rad: seen.torsional_stiffness_nm_per_rad,
-        loaded_teeth: seen.loaded_teeth,
-        torque_capacity: columns.torque_capacity,
-        torque_balance_residual: columns.torque_balance_residual,
-    })
+    Ok(seen.angles.peaks(contacts, columns.torque_capacity, columns.torque_balance_residual))
 }
 
 /// What the states of a sweep came to that are kept no more.
 struct SeenSoFar {
     contacts: PerContact<SeenAt>,
-    wind_up_deg: Extremes,
-    torsional_stiffness_nm_per_rad: Extremes,
-    loaded_teeth: TeethInMesh,
+    angles: AngleExtremes,
 }
 
 /// The first of the largest at a contact.
@@ -176,9 +167,7 @@ impl Default for SeenSoFar {
         let none = Peak { value: f64::NEG_INFINITY, input_angle_deg: 0.0, position_deg: 0.0 };
         Self {
             contacts: PerContact::of(|_| SeenAt { force_n: none, stress_mpa: none, force_at_stress_n: 0.0 }),
-            wind_up_deg: Extremes::NONE,
-            torsional_stiffness_nm_per_rad: Extremes::NONE,
-            loaded_teeth: TeethInMesh { min: u64::MAX, max: 0 },
+            angles: AngleExtremes::NONE,
         }
     }
 }
@@ -200,16 +189,11 @@ impl SeenSoFar {
             }
             seen
         });
-        for (&wind_up_deg, (&stiffness, &loaded_teeth)) in input_angles
-            .wind_up_deg
-            .iter()
-            .zip(input_angles.torsional_stiffness_nm_per_rad.iter().zip(&input_angles.loaded_teeth))
+        let InputAngles { wind_up_deg, torsional_stiffness_nm_per_rad, loaded_teeth, .. } = input_angles;
+        for ((&wind_up_deg, &stiffness), &teeth) in
+            wind_up_deg.iter().zip(&*torsional_stiffness_nm_per_rad).zip(&*loaded_teeth)
         {
-            self.wind_up_deg = self.wind_up_deg.with(wind_up_deg);
-            self.torsional_stiffness_nm_per_rad = self.torsional_stiffness_nm_per_rad.with(stiffness);
-            let TeethInMesh { min, max } = self.loaded_teeth;
-            let teeth = u64::from(loaded_teeth);
-            self.loaded_teeth = TeethInMesh { min: min.min(teeth), max: max.max(teeth) };
+            self.angles.see(wind_up_deg, stiffness, u64::from(teeth));
         }
         states.clear();
         input_angles.clear();

@@ -6,13 +6,13 @@ use pulp::Simd;
 
 use super::lanes::LANES;
 use super::laps::{LapTeeth, Layout, whole};
-use super::sinks::{AngleExtremes, PeakSink};
+use super::sinks::PeakSink;
 use super::tile::{Tile, TileSize};
 use super::{Kernel, Law, least};
 use crate::contact::Contact;
 use crate::load_sharing::LoadedDrive;
 use crate::mesh::Mesh;
-use crate::sweep::columns::{TorqueBalance, TorqueCapacity};
+use crate::sweep::columns::{AngleExtremes, TorqueBalance, TorqueCapacity};
 use crate::sweep::search::{LOADS, Look, Piece, Seen};
 use crate::{SolveError, Stop};
 

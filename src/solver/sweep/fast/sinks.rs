@@ -8,10 +8,8 @@ use super::laps::{LapTeeth, Laps, Listed, Stretch, whole};
 use super::tile::Tile;
 use crate::contact::{Contact, PerContact};
 use crate::drive::Drive;
-use crate::mesh::{Place, TeethInMesh};
-use crate::sweep::columns::{
-    Columns, ContactPeaks, Extremes, InputAngles, Peak, PeakAt, States, SweepPeaks, TorqueCapacity,
-};
+use crate::mesh::Place;
+use crate::sweep::columns::{AngleExtremes, Columns, ContactPeaks, InputAngles, Peak, PeakAt, States, SweepPeaks};
 
 /// Whoever takes tiles, in order.
 pub(super) trait Sink {
@@ -220,45 +218,13 @@ impl RunningPeak {
     }
 }
 
-/// What all teeth together come to at the input angles so far.
-pub(super) struct AngleExtremes {
-    wind_up_deg: Extremes,
-    torsional_stiffness_nm_per_rad: Extremes,
-    loaded_teeth: Option<TeethInMesh>,
-}
-
 impl AngleExtremes {
-    pub(super) const NONE: Self =
-        Self { wind_up_deg: Extremes::NONE, torsional_stiffness_nm_per_rad: Extremes::NONE, loaded_teeth: None };
-
     /// Those of a tile, too.
     #[inline(always)]
     pub(super) fn take(&mut self, drive: &Drive, tile: &Tile<'_>, rows: usize) {
-        let torque_ratio = drive.teeth_per_wave();
         for row in 0..rows {
-            self.wind_up_deg = self.wind_up_deg.with(tile.row_rotation_rad[row].to_degrees());
-            let stiffness = 1e-3 * tile.row_stiffness[row] * torque_ratio * torque_ratio;
-            self.torsional_stiffness_nm_per_rad = self.torsional_stiffness_nm_per_rad.with(stiffness);
-            let loaded = tile.row_loaded[row] as u64;
-            let TeethInMesh { min, max } = self.loaded_teeth.unwrap_or(TeethInMesh { min: loaded, max: loaded });
-            self.loaded_teeth = Some(TeethInMesh { min: min.min(loaded), max: max.max(loaded) });
-        }
-    }
-
-    /// With what each contact comes to.
-    pub(super) fn peaks(
-        self,
-        contacts: PerContact<ContactPeaks>,
-        torque_capacity: Option<TorqueCapacity>,
-        torque_balance_residual: f64,
-    ) -> SweepPeaks {
-        SweepPeaks {
-            contacts,
-            wind_up_deg: self.wind_up_deg,
-            torsional_stiffness_nm_per_rad: self.torsional_stiffness_nm_per_rad,
-            loaded_teeth: self.loaded_teeth.unwrap_or(TeethInMesh { min: 0, max: 0 }),
-            torque_capacity,
-            torque_balance_residual,
+            let stiffness = InputAngles::of_output(drive, tile.row_stiffness[row]);
+            self.see(tile.row_rotation_rad[row].to_degrees(), stiffness, tile.row_loaded[row] as u64);
         }
     }
 }
