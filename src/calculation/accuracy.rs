@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use toothwave_solver::backing::{Backings, Shares};
 use toothwave_solver::drive::Draft;
-use toothwave_solver::mesh::Samples;
+use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::model_error::{self, Beyond, ModelError};
 use toothwave_solver::sweep::{ContactPeaks, Points, Tolerance, sweep_with_deviations};
 use toothwave_solver::{
@@ -20,7 +20,7 @@ use crate::json::word;
 use crate::key::Encode;
 use crate::no_answer::{NoAnswer, NoAnswerCode};
 use crate::question::{Limits, Question, checked_drive, checked_load};
-use crate::sweep::{ANGLE_BYTES, SEARCHED_BYTES, STATE_BYTES};
+use crate::sweep::Each;
 
 /// The sample counts that are tried.
 const SAMPLES: [u64; 9] = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
@@ -140,13 +140,16 @@ impl Question for Accuracy {
     }
 
     fn working_bytes(checked: &CheckedAccuracy) -> u64 {
-        let CheckedAccuracy { drive, load, deviations, max_states, .. } = checked;
+        let &CheckedAccuracy { ref drive, ref load, ref deviations, max_states, .. } = checked;
         let mesh = load.mesh(drive, deviations);
-        let counts = SAMPLES.iter().filter_map(|&samples| Some(mesh.state_count(Samples::new(samples).ok()?)));
-        // The longest way that is tried is longer than the converged reference; where a limit or unlike laps make it short, nobody knows how long that one will be.
-        let states = counts.max().filter(|most| most <= max_states && mesh.laps() == 1).unwrap_or(*max_states);
-        // Of each input angle a state at least.
-        (STATE_BYTES + SEARCHED_BYTES + ANGLE_BYTES) * states
+        // The longest way that is tried is longer than most converged references.
+        let input_angles = admitted_samples(mesh, max_states).map(|samples| mesh.last_sample(samples)).max();
+        Each::PLAIN.searched_bytes(&mesh, input_angles, max_states)
+    }
+
+    fn searched_bytes(checked: &CheckedAccuracy, input_angles: u64) -> u64 {
+        let CheckedAccuracy { drive, load, deviations, max_states, .. } = checked;
+        Each::PLAIN.searched_bytes(&load.mesh(drive, deviations), Some(input_angles), *max_states)
     }
 
     fn answer(checked: &CheckedAccuracy, stop: &dyn Stop) -> Result<AccuracyAnswer, NoAnswer> {
@@ -191,6 +194,13 @@ impl Question for Accuracy {
             unavailable,
         })
     }
+}
+
+/// Every number of samples that the limit on states admits.
+fn admitted_samples(mesh: Mesh, max_states: u64) -> impl Iterator<Item = Samples> {
+    // All of them lie within the ranges.
+    let samples = SAMPLES.into_iter().filter_map(|samples| Samples::new(samples).ok());
+    samples.filter(move |&samples| mesh.state_count(samples) <= max_states)
 }
 
 /// The design's own model first, then every other form of compatibility with a law that it and the teeth take and that needs no
@@ -283,10 +293,7 @@ impl<'a> Model<'a> {
     /// Tries every number of samples and every tolerance that the limit on states admits.
     fn measure(&self, ways: &mut Vec<WayAnswer>, stop: &dyn Stop) -> Result<(), SolveError> {
         let &CheckedAccuracy { ref drive, ref deviations, max_states, .. } = self.checked;
-        let mesh = self.load.mesh(drive, deviations);
-        // All of them lie within the ranges.
-        let samples = SAMPLES.into_iter().filter_map(|samples| Samples::new(samples).ok());
-        for samples in samples.filter(|&samples| mesh.state_count(samples) <= max_states) {
+        for samples in admitted_samples(self.load.mesh(drive, deviations), max_states) {
             ways.push(self.way(Points::Samples(samples), stop)?);
         }
         for tolerance in TOLERANCES.into_iter().filter_map(|value| Tolerance::new(value, max_states).ok()) {

@@ -1,5 +1,7 @@
 //! The walk from a document to an answer, which all questions share.
 
+use std::cell::{OnceCell, RefCell};
+
 pub use toothwave_solver::Stop;
 use toothwave_solver::drive::Draft;
 use toothwave_solver::{LoadCase, Parameter, SolveError, Violation, model_error};
@@ -47,6 +49,11 @@ pub trait Question: Send + 'static {
         0
     }
 
+    /// About how many bytes both are once a search for extremes has looked at so many input angles.
+    fn searched_bytes(_checked: &Self::Checked, _input_angles: u64) -> u64 {
+        0
+    }
+
     /// Whether solving, and writing the answer as JSON, is certain to take no longer than some 0.1 ms.
     fn is_short(_checked: &Self::Checked) -> bool {
         false
@@ -69,6 +76,42 @@ pub trait Question: Send + 'static {
     /// Why there is no answer.
     fn ask(&self, document: &[u8], limits: &Limits, stop: &dyn Stop) -> Result<Self::Answer, NoAnswer> {
         Self::answer(&self.check(&Design::read(document)?, limits)?, stop)
+    }
+}
+
+/// Solves, where a search for extremes takes room for all input angles that it has looked at before it looks at more.
+///
+/// # Errors
+/// That of `take`, which stops the search.
+pub fn with_room<T, E>(
+    stop: &dyn Stop,
+    take: impl FnMut(u64) -> Result<(), E>,
+    solve: impl FnOnce(&dyn Stop) -> Result<T, NoAnswer>,
+) -> Result<Result<T, NoAnswer>, E> {
+    let taking = Taking { stop, take: RefCell::new(take), refused: OnceCell::new() };
+    let solved = solve(&taking);
+    taking.refused.into_inner().map_or(Ok(solved), Err)
+}
+
+struct Taking<'a, F, E> {
+    stop: &'a dyn Stop,
+    take: RefCell<F>,
+    refused: OnceCell<E>,
+}
+
+impl<F: FnMut(u64) -> Result<(), E>, E> Stop for Taking<'_, F, E> {
+    fn stopped(&self) -> bool {
+        self.refused.get().is_some() || self.stop.stopped()
+    }
+
+    fn has_room_for(&self, input_angles: u64) -> bool {
+        match (self.take.borrow_mut())(input_angles) {
+            Ok(()) => true,
+            Err(refused) => {
+                self.refused.get_or_init(|| refused);
+                false
+            }
+        }
     }
 }
 

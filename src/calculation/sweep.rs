@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use toothwave_solver::backing::{Backings, Shares};
 use toothwave_solver::losses::wear::WearParameters;
 use toothwave_solver::losses::{Friction, Mechanism, period};
-use toothwave_solver::mesh::Samples;
+use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self as solver, Points};
 use toothwave_solver::{
@@ -55,32 +55,69 @@ pub struct CheckedSweep {
 }
 
 /// Eleven columns of doubles and two of numbers.
-pub(crate) const STATE_BYTES: u64 = 11 * 8 + 2 * 4;
+const STATE_BYTES: u64 = 11 * 8 + 2 * 4;
 
 /// Three columns of doubles and one of numbers, three of radial forces, one of the wind-up without load, and what stands between them while they are made.
-pub(crate) const ANGLE_BYTES: u64 = 11 * 8;
+const ANGLE_BYTES: u64 = 11 * 8;
 
 /// What a sweep to a tolerance has of a state besides, until it is over: as much again.
-pub(crate) const SEARCHED_BYTES: u64 = STATE_BYTES;
+const SEARCHED_BYTES: u64 = STATE_BYTES;
+
+/// Input angles a period of a sweep to a tolerance: in 140 drives of all kinds they were up to 470, and of a few small ones up to 1400. One that looks at
+/// more takes room for them on its way.
+const SEARCHED_SAMPLES: u64 = 512;
+
+/// What a state and an input angle take.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Each {
+    state_bytes: u64,
+    angle_bytes: u64,
+}
+
+impl Each {
+    pub(crate) const PLAIN: Self = Self { state_bytes: STATE_BYTES, angle_bytes: ANGLE_BYTES };
+
+    /// What those take that a search has looked at: so many input angles, or as many as are expected, and at most so many states.
+    pub(crate) fn searched_bytes(self, mesh: &Mesh, input_angles: Option<u64>, max_states: u64) -> u64 {
+        let of_samples = Samples::new(SEARCHED_SAMPLES)
+            .map(|samples| (u128::from(mesh.state_count(samples)), u128::from(mesh.last_sample(samples))));
+        let (all_states, all_angles) = of_samples.unwrap_or((1, 1));
+        let angles = input_angles.map_or(all_angles, u128::from);
+        let states = u64::try_from((angles * all_states).div_ceil(all_angles))
+            .map_or(max_states, |states| states.min(max_states));
+        let angles = u64::try_from(angles).map_or(states, |angles| angles.min(states));
+        states * (self.state_bytes + SEARCHED_BYTES) + angles * self.angle_bytes
+    }
+}
 
 impl CheckedSweep {
-    /// What all states and input angles take of which each takes so many bytes. Of a sweep to a tolerance nobody knows how many they will be: in 140 drives of
-    /// all kinds they were up to 470 input angles a period, and of a few small ones up to 1400.
-    fn columns_of(&self, a_state: u64, an_angle: u64) -> u64 {
-        const MANY_SAMPLES: u64 = 512;
+    /// What all states and input angles take, of a sweep to a tolerance those that a search has looked at, or as many as are expected.
+    fn bytes_of(&self, each: Each, input_angles: Option<u64>) -> u64 {
         let mesh = self.load().mesh(&self.drive, &self.deviations);
         match self.points {
             Points::Samples(samples) => {
-                mesh.state_count(samples) * a_state + (mesh.last_sample(samples) + 1) * an_angle
+                mesh.state_count(samples) * each.state_bytes + (mesh.last_sample(samples) + 1) * each.angle_bytes
             }
-            Points::Tolerance(tolerance) => {
-                let many =
-                    Samples::new(MANY_SAMPLES).map(|samples| (mesh.state_count(samples), mesh.last_sample(samples)));
-                let most = tolerance.max_states();
-                let (states, angles) =
-                    many.map_or((most, most), |(states, angles)| (states.min(most), angles.min(most)));
-                states * (a_state + SEARCHED_BYTES) + angles * an_angle
-            }
+            Points::Tolerance(tolerance) => each.searched_bytes(&mesh, input_angles, tolerance.max_states()),
+        }
+    }
+
+    /// In the answer.
+    fn each(&self) -> Each {
+        // Three columns of slips and one of words.
+        const LOSSES_BYTES: u64 = 3 * 8 + 2;
+        // Ratios by contact, bearing and race, powers, and what wears.
+        const LOSSES_ANGLE_BYTES: u64 = 9 * 8;
+        // Three columns of depths, of each point of a duty.
+        const WEAR_BYTES: u64 = 3 * 8;
+        let Self { duty, friction, wear_rate_mm3_per_nm, .. } = self;
+        let of = |is_asked, bytes| if is_asked { bytes } else { 0 };
+        // With friction every point is swept, one after the other beside the hardest.
+        let sweeps = 1 + of(friction.is_some() && duty.points.len() > 1, 1);
+        let of_wear = duty.points.len() as u64 * of(wear_rate_mm3_per_nm.is_some(), WEAR_BYTES);
+        Each {
+            state_bytes: sweeps * (STATE_BYTES + of(friction.is_some(), LOSSES_BYTES)) + of_wear,
+            angle_bytes: sweeps * (ANGLE_BYTES + of(friction.is_some(), LOSSES_ANGLE_BYTES)),
         }
     }
 
@@ -90,11 +127,11 @@ impl CheckedSweep {
     }
 
     /// About what it takes while only its peaks are looked for: of equal intervals no more than one, to a tolerance, or where items deviate, all moments that were
-    /// seen.
-    pub fn peaks_bytes(&self) -> u64 {
+    /// seen, which are so many or as many as are expected.
+    pub fn peaks_bytes(&self, input_angles: Option<u64>) -> u64 {
         match self.points {
             Points::Samples(_) if self.deviations.is_nil() => 0,
-            Points::Samples(_) | Points::Tolerance(_) => self.columns_of(STATE_BYTES, ANGLE_BYTES),
+            Points::Samples(_) | Points::Tolerance(_) => self.bytes_of(Each::PLAIN, input_angles),
         }
     }
 
@@ -260,20 +297,11 @@ impl Question for Sweep {
     }
 
     fn columns_bytes(checked: &CheckedSweep) -> u64 {
-        // Three columns of slips and one of words.
-        const LOSSES_BYTES: u64 = 3 * 8 + 2;
-        // Ratios by contact, bearing and race, powers, and what wears.
-        const LOSSES_ANGLE_BYTES: u64 = 9 * 8;
-        // Three columns of depths, of each point of a duty.
-        const WEAR_BYTES: u64 = 3 * 8;
-        let CheckedSweep { duty, friction, wear_rate_mm3_per_nm, .. } = checked;
-        let of = |is_asked, bytes| if is_asked { bytes } else { 0 };
-        // With friction every point is swept, one after the other beside the hardest.
-        let sweeps = 1 + of(friction.is_some() && duty.points.len() > 1, 1);
-        let of_sweeps = sweeps * (STATE_BYTES + of(friction.is_some(), LOSSES_BYTES));
-        let of_wear = duty.points.len() as u64 * of(wear_rate_mm3_per_nm.is_some(), WEAR_BYTES);
-        let of_angles = sweeps * (ANGLE_BYTES + of(friction.is_some(), LOSSES_ANGLE_BYTES));
-        checked.columns_of(of_sweeps + of_wear, of_angles)
+        checked.bytes_of(checked.each(), None)
+    }
+
+    fn searched_bytes(checked: &CheckedSweep, input_angles: u64) -> u64 {
+        checked.bytes_of(checked.each(), Some(input_angles))
     }
 
     fn is_short(checked: &CheckedSweep) -> bool {

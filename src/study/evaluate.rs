@@ -7,8 +7,8 @@ use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::design::Design;
 use toothwave_calculation::json::{Tree, word};
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
-use toothwave_calculation::question::{Limits, Question as _};
-use toothwave_calculation::sweep::Sweep;
+use toothwave_calculation::question::{Limits, Question as _, with_room};
+use toothwave_calculation::sweep::{CheckedSweep, Sweep};
 use toothwave_solver::losses::period::RadialForces;
 use toothwave_solver::parts::{LEAST_WALL, RIM};
 use toothwave_solver::violation::{Misfit, Violation};
@@ -110,24 +110,44 @@ impl Evaluator {
         let drive = checked.drive();
         let ring_outer_radius_mm = self.ring_outer_radius_mm(&design, drive)?;
         let takes_columns = self.takes_losses || self.takes_radial_forces;
-        let bytes = if takes_columns { Sweep::columns_bytes(&checked) } else { checked.peaks_bytes() };
+        let bytes = if takes_columns { Sweep::columns_bytes(&checked) } else { checked.peaks_bytes(None) };
         if bytes > room_bytes {
             return Err(NoValues::Interrupted(Interrupted::NeedsBytes(bytes)));
         }
+        let take = |input_angles| {
+            let bytes = |input_angles| {
+                if takes_columns {
+                    Sweep::searched_bytes(&checked, input_angles)
+                } else {
+                    checked.peaks_bytes(Some(input_angles))
+                }
+            };
+            // It begins anew with the room that it asks for: with a half more, not with a little more each time.
+            let wanted = || Interrupted::NeedsBytes(bytes(input_angles + input_angles / 2));
+            if bytes(input_angles) <= room_bytes { Ok(()) } else { Err(wanted()) }
+        };
+        let loaded = |stop: &dyn Stop| self.loaded(&checked, takes_columns, stop);
+        let loaded = with_room(stop, take, loaded).map_err(NoValues::Interrupted)??;
+        Ok(self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) })?)
+    }
+
+    fn loaded<'a>(
+        &self,
+        checked: &'a CheckedSweep,
+        takes_columns: bool,
+        stop: &dyn Stop,
+    ) -> Result<Loaded<'a>, NoAnswer> {
         if !takes_columns {
-            let peaks = checked.peaks(stop)?;
-            let loaded = Loaded { checked: &checked, peaks, losses: None, radial_forces: None };
-            return Ok(self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) })?);
+            return Ok(Loaded { checked, peaks: checked.peaks(stop)?, losses: None, radial_forces: None });
         }
         let sweep = checked.solve(stop)?;
         let losses = if self.takes_losses { checked.loss_totals(&sweep, stop)? } else { None };
         let radial_forces = if self.takes_radial_forces {
-            RadialForces::of(drive, checked.load(), checked.deviations(), &sweep, stop)?
+            RadialForces::of(checked.drive(), checked.load(), checked.deviations(), &sweep, stop)?
         } else {
             None
         };
-        let loaded = Loaded { checked: &checked, peaks: (&sweep).into(), losses, radial_forces };
-        Ok(self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) })?)
+        Ok(Loaded { checked, peaks: (&sweep).into(), losses, radial_forces })
     }
 
     /// As drawn (docs/theory.md section 8). A ring that is none has no outer diameter.

@@ -8,7 +8,7 @@ use toothwave::compute::{Pool, Thread};
 use toothwave::config::Limits;
 
 use crate::asking::{Answer, LIMITS, Listening, Occupied, Question, Service, ask_at, until};
-use crate::designs::{shortest, spelled_out, with};
+use crate::designs::{shortest, spelled_out, undercut, with};
 
 /// One solve at a time, and one that waits.
 const NARROW: Limits = Limits { max_concurrent_solves: 1, max_queued_solves: 1, ..LIMITS };
@@ -215,6 +215,33 @@ async fn answers_that_nobody_reads_leave_no_room_for_another_until_they_are_read
     service.ask(&large(500, 1)).await.found();
     drop(unread);
     service.ask(&large(500, 2)).await.found();
+}
+
+/// Where light loads press teeth against corners a search looks at more input angles than any other, and nobody knows it before.
+#[tokio::test]
+async fn a_search_that_looks_further_than_was_expected_takes_room_on_its_way() {
+    const BATCH_BYTES: u64 = 9 << 20;
+    let service =
+        Service::within(Limits { max_unread_bytes: BATCH_BYTES + 7_000_000, max_concurrent_solves: 1, ..LIMITS });
+    let model = json!({ "corner_contact": true, "clearance": { "carrier_um": 0.028, "ring_um": 0.0115 } });
+    let mut document = with(&with(&undercut(), "/model", model), "/sweep", json!({ "tolerance": 4.4e-9 }));
+    document["load"] = json!({ "input_torque_nm": 1.45e-6 });
+    document["drive"]["teeth"] = json!({ "count": 80, "radius_mm": 1.5, "width_mm": 10.0 });
+    let sweep = Question::post("/v1/sweep", document.to_string()).with("accept", "text/plain");
+    let batch = Question::post_as("application/x-ndjson", "/v1/batch?peaks_only=true", document.to_string());
+    for (question, others_bytes, refused) in
+        [(sweep, BATCH_BYTES + 4_500_000, r#""status":503"#), (batch, 4_500_000, r#""status":503,"problem""#)]
+    {
+        let others = service.app.room.reserve(others_bytes).unwrap();
+        let without_room = service.ask(&question).await;
+        assert!(without_room.text().contains(refused), "{}", without_room.text());
+        assert!(without_room.text().contains("too_many_unread_bytes"));
+        drop(others);
+        let alone = service.ask(&question).await;
+        assert_eq!(alone.status, 200);
+        assert!(!alone.text().contains(refused), "{}", alone.text());
+        assert_eq!(service.app.room.taken_bytes(), 0);
+    }
 }
 
 /// Of those that nobody waits to read: a study that is kept is none.

@@ -30,7 +30,7 @@ use toothwave_calculation::design::Design;
 use toothwave_calculation::findings::FindingAnswer;
 use toothwave_calculation::forms::{Format, Forms as _};
 use toothwave_calculation::geometry::Geometry;
-use toothwave_calculation::question::{self, Question};
+use toothwave_calculation::question::{self, Question, with_room};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_calculation::sweep::answer::{ChecksAnswer, LoadAnswer, PeaksAnswer, SweepAnswer, TorqueCapacityAnswer};
 use toothwave_calculation::sweep::backing::EstimateAnswer;
@@ -267,7 +267,8 @@ fn solved<Q: Question>(
         let checked = question.check(&Design::read(document)?, limits)?;
         let columns_bytes = Q::columns_bytes(&checked);
         let mut reserved = room.reserve(columns_bytes + Q::working_bytes(&checked))?;
-        let answer = Q::answer(&checked, stop)?;
+        let take = |input_angles| reserved.hold_at_least(Q::searched_bytes(&checked, input_angles));
+        let answer = with_room(stop, take, |stop| Q::answer(&checked, stop))??;
         let held_bytes = columns_bytes.max(answer.held_bytes(Format::Json));
         reserved.hold_at_most(held_bytes);
         Ok(Solved { answer, held_bytes, reserved })

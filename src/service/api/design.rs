@@ -115,6 +115,11 @@ impl Question for WholeDesign {
             + checked.sweep.as_ref().map_or(0, Sweep::working_bytes)
     }
 
+    fn searched_bytes(checked: &CheckedDesign, input_angles: u64) -> u64 {
+        let of_geometry = checked.geometry.as_ref().map_or(0, Geometry::columns_bytes);
+        of_geometry + checked.sweep.as_ref().map_or(0, |sweep| Sweep::searched_bytes(sweep, input_angles))
+    }
+
     fn answer(checked: &CheckedDesign, stop: &dyn Stop) -> Result<DesignAnswer, NoAnswer> {
         let mut problems = DesignProblems::default();
         Ok(DesignAnswer {

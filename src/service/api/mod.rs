@@ -19,7 +19,7 @@ use toothwave_calculation::design::Design;
 use toothwave_calculation::forms::{Format, Forms};
 use toothwave_calculation::key::Key;
 use toothwave_calculation::no_answer::NoAnswer;
-use toothwave_calculation::question::Question;
+use toothwave_calculation::question::{Question, with_room};
 use utoipa::IntoResponses;
 
 use crate::app::App;
@@ -216,7 +216,8 @@ fn solve<Q: Question>(
     let Representation { format, gzip } = representation;
     let text_bytes = if is_long(format) { columns_bytes * if gzip { 1 } else { 2 } } else { 0 };
     let mut reserved = room.reserve(columns_bytes + text_bytes + Q::working_bytes(checked))?;
-    let answer = Q::answer(checked, stop)?;
+    let take = |input_angles| reserved.hold_at_least(Q::searched_bytes(checked, input_angles));
+    let answer = with_room(stop, take, |stop| Q::answer(checked, stop))??;
     reserved.hold_at_most((columns_bytes + text_bytes).max(answer.held_bytes(format)));
     written(answer, representation, reserved, columns_bytes, started.elapsed(), stop)
 }

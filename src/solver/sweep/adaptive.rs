@@ -88,14 +88,14 @@ pub(crate) fn moments(
         None => {
             let mut look = PlainLook::new(loaded, load, stop);
             // This way tells of every moment.
-            search(&mut look, pieces(), tolerance, Some(resolution))?.unwrap_or_default()
+            search(&mut look, pieces(), tolerance, Some(resolution), stop)?.unwrap_or_default()
         }
     };
     let mut by_lap = vec![Vec::new(); usize::try_from(laps).unwrap_or(usize::MAX)];
     // A wave generator that moves presses a tooth before it is lifted, as it is behind the valley then.
     let loads_jump = mesh.loads_jump_at_entry() || load.parameters().wave_generator_moves;
     let without_load = if tolerance.looks_without_load() && loaded.has_gaps() {
-        unloaded::extremes(PlainLook::new(loaded, load, stop), pieces(), tolerance)?
+        unloaded::extremes(PlainLook::new(loaded, load, stop), pieces(), tolerance, stop)?
     } else {
         Vec::new()
     };

@@ -124,7 +124,7 @@ pub(crate) fn moments(
     let size = kernel.tile_size(loaded.mesh(), layout);
     let mut arena = vec![0.0; size.doubles()];
     let mut look = FastLook::new(&kernel, &one_zone, (*loaded.mesh(), layout), &size, &mut arena, stop);
-    search(&mut look, pieces, tolerance, Some(resolution))
+    search(&mut look, pieces, tolerance, Some(resolution), stop)
 }
 
 /// The true peaks to a tolerance; nothing where [`sweep`] has nothing.
@@ -143,7 +143,7 @@ pub(crate) fn true_peaks(
     let size = kernel.tile_size(&mesh, Layout::PLAIN);
     let mut arena = vec![0.0; size.doubles()];
     let mut look = FastLook::new(&kernel, loaded, (mesh, Layout::PLAIN), &size, &mut arena, stop);
-    let Some(Found { seen, best }) = search(&mut look, Piece::of(loaded, 0), tolerance, None)? else {
+    let Some(Found { seen, best }) = search(&mut look, Piece::of(loaded, 0), tolerance, None, stop)? else {
         return Ok(None);
     };
     columns::check("torque balance", look.torque_balance_residual)?;

@@ -8,13 +8,13 @@
 use std::cell::OnceCell;
 use std::ops::Range;
 
-use crate::SolveError;
 use crate::load_sharing::LoadedDrive;
 use crate::mesh::Mesh;
 use crate::position::Position;
 use crate::ring::TipCorner;
 use crate::root::NotConverged;
 use crate::sweep::points::Tolerance;
+use crate::{SolveError, Stop};
 
 /// Quantities of a tooth that have peaks: three forces, three stresses.
 pub(crate) const LOADS: usize = 6;
@@ -379,18 +379,24 @@ struct Search {
 /// Looks for the largest value of every quantity; nothing where this way of looking cannot tell.
 ///
 /// # Errors
-/// Those of looking; [`SolveError::TooManyStates`] beyond the tolerance's limit.
+/// Those of looking; [`SolveError::TooManyStates`] beyond the tolerance's limit, [`SolveError::Stopped`] where there is no room for more.
 pub(crate) fn search(
     look: &mut impl Look,
     pieces: impl Iterator<Item = Piece>,
     tolerance: Tolerance,
     lines: Option<f64>,
+    stop: &dyn Stop,
 ) -> Result<Option<Found>, SolveError> {
     let teeth = |piece: &Piece| usize::try_from(piece.places * look.teeth_at_each_place()).unwrap_or(usize::MAX);
     let mut is_sought = [true; QUANTITIES];
     if look.is_in_proportion() {
         STIFFNESSES.iter().for_each(|&quantity| is_sought[quantity] = false);
     }
+    let mut input_angles = 0;
+    let mut take_room = |wanted: usize| {
+        input_angles += wanted as u64;
+        if stop.has_room_for(input_angles) { Ok(()) } else { Err(SolveError::Stopped) }
+    };
     let (mut seen, mut states) = (Vec::new(), 0_u64);
     // Each is looked at: where slots and spaces are unlike there may be millions of laps, more than memory has room for.
     for piece in pieces {
@@ -399,6 +405,7 @@ pub(crate) fn search(
         if states > tolerance.max_states() {
             return Err(SolveError::TooManyStates { limit: tolerance.max_states() });
         }
+        take_room(of_piece.wanted.len())?;
         seen.push(of_piece);
     }
     let mut search = Search { tolerance, lines, is_sought, seen, best: [Best::default(); QUANTITIES], states: 0 };
@@ -408,9 +415,11 @@ pub(crate) fn search(
             return Ok(None);
         }
         excess = search.want(round, look.has_gaps(), look.is_linear());
-        if search.seen.iter().all(|seen| seen.wanted.is_empty()) {
+        let wanted: usize = search.seen.iter().map(|seen| seen.wanted.len()).sum();
+        if wanted == 0 {
             return Ok(Some(Found { seen: search.seen, best: search.best }));
         }
+        take_room(wanted)?;
     }
     // What is left is more than rounding only where curves are no curves.
     let rounding = search.rounding(look.input_torque_nmm(), look.distance_at_corner_rad()?);

@@ -74,6 +74,7 @@ pub(crate) fn extremes(
     teeth: PlainLook<'_>,
     pieces: impl Iterator<Item = Piece>,
     tolerance: Tolerance,
+    stop: &dyn Stop,
 ) -> Result<Vec<(Piece, f64)>, SolveError> {
     let margin = (MARGIN * tolerance.relative()).max(LEAST_MARGIN);
     let within = |piece: Piece| Piece {
@@ -92,7 +93,7 @@ pub(crate) fn extremes(
         look.scale_rad = first_rad;
     }
     // This way tells of every moment.
-    let found = search(&mut look, pieces.into_iter(), tolerance, None)?.unwrap_or_default();
+    let found = search(&mut look, pieces.into_iter(), tolerance, None, stop)?.unwrap_or_default();
     let sought = [EARLINESS, FIRST].map(|quantity| found.best[quantity]).into_iter();
     // Where no gap is open there is no largest.
     let sought = sought.filter(|best| best.value > 0.0);
