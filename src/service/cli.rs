@@ -415,7 +415,9 @@ fn batch(file: &Path, query: BatchQuery) -> Result<(), Failure> {
             let answers: Vec<_> = documents
                 .par_iter()
                 .map(|&(document, index)| {
-                    answer_line(query, index, document, &OFFLINE, &room, &AtomicBool::new(false)).text
+                    let answer = answer_line(query, index, document, &OFFLINE, &room, &AtomicBool::new(false));
+                    answer.is_told();
+                    answer.text
                 })
                 .collect();
             index += documents.len() as u64;

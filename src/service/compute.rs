@@ -1,5 +1,6 @@
 //! Where solves run: permits, a bounded queue, the deadline, cancellation; nothing else leaves the async executor.
 
+use std::io;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,6 +15,7 @@ use tracing::Span;
 
 use crate::beside::beside;
 use crate::config::Limits;
+use crate::memory::Memory;
 use crate::problem::{Problem, ProblemCode};
 use crate::room::{self, Reserved, Room};
 
@@ -46,6 +48,7 @@ pub struct Pool {
     unhurried: Arc<Semaphore>,
     /// Of answers, from which a variant takes what is beyond the part of variants; none where there are none.
     room: Option<Room>,
+    memory: Memory,
     /// Cancelled when the service stops and has no time left.
     closed: CancellationToken,
     limits: Limits,
@@ -98,6 +101,7 @@ impl Pool {
             aside: Arc::new(Semaphore::new(1)),
             unhurried: Arc::new(Semaphore::new(1)),
             room: None,
+            memory: Memory::default(),
             closed: CancellationToken::new(),
             limits,
         }
@@ -106,7 +110,12 @@ impl Pool {
     /// The same beside answers that take this room.
     #[must_use]
     pub fn beside(self, room: &Room) -> Self {
-        Self { room: Some(room.clone()), ..self }
+        Self { room: Some(room.clone()), memory: room.memory().clone(), ..self }
+    }
+
+    /// The memory that solves take.
+    pub fn memory(&self) -> &Memory {
+        &self.memory
     }
 
     /// Solves that run now.
@@ -213,7 +222,7 @@ impl Pool {
     }
 
     /// Runs a slice of a study that has room for variants of so many bytes while they are computed: beside others only as far as together they take no
-    /// more than variants may.
+    /// more than variants may, and where memory is scarce beside none.
     ///
     /// # Errors
     /// As [`Self::run_in_turn`].
@@ -229,7 +238,9 @@ impl Pool {
         let wanted = async {
             // First: clients may hold that for long, and who waits for it is in nobody's way.
             let beyond = self.beyond_part(room_bytes.saturating_sub(part_bytes)).await;
-            let permits = room::permits(room_bytes.min(part_bytes));
+            // Where memory is scarce, whatever was counted, alone.
+            let wanted_bytes = if self.memory.is_scarce() { part_bytes } else { room_bytes.min(part_bytes) };
+            let permits = room::permits(wanted_bytes);
             (Arc::clone(&self.of_variants).acquire_many_owned(permits).await, beyond)
         };
         let held = tokio::select! {
@@ -258,7 +269,7 @@ impl Pool {
     /// Runs what is no solve, and may yet take too long for the executor, on a thread of its own, one at a time: it waits for no solve.
     ///
     /// # Errors
-    /// `deadline_exceeded` when the time is over, `internal_error` where the job panicked, and whatever it returns.
+    /// `queue_full` where the system gives no thread, `deadline_exceeded` when the time is over, `internal_error` where the job panicked, and whatever it returns.
     pub async fn run_aside<T: Send + 'static>(
         &self,
         deadline: Instant,
@@ -270,7 +281,7 @@ impl Pool {
                 let _held = turn;
                 caught(job)
             };
-            beside(work).await.unwrap_or_else(|error| Err(Problem::internal(&error)))
+            beside(work).await.unwrap_or_else(|error| Err(no_thread(&error)))
         };
         self.within(deadline, running).await
     }
@@ -278,7 +289,7 @@ impl Pool {
     /// Runs what takes its time on a thread of its own, one at a time: it waits for no solve, no solve waits for it, and no deadline stops it.
     ///
     /// # Errors
-    /// `internal_error` where the job panicked, and whatever it returns.
+    /// `queue_full` where the system gives no thread, `internal_error` where the job panicked, and whatever it returns.
     pub async fn run_unhurried<T: Send + 'static>(
         &self,
         job: impl FnOnce() -> Result<T, Problem> + Send + 'static,
@@ -289,7 +300,7 @@ impl Pool {
             caught(job)
         };
         tokio::select! {
-            done = beside(work) => done.unwrap_or_else(|error| Err(Problem::internal(&error))),
+            done = beside(work) => done.unwrap_or_else(|error| Err(no_thread(&error))),
             () = self.closed.cancelled() => Err(shutting_down()),
         }
     }
@@ -367,6 +378,12 @@ pub fn caught<T>(job: impl FnOnce() -> Result<T, Problem>) -> Result<T, Problem>
     panic::catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|panic| Err(Problem::panicked(panic.as_ref())))
 }
 
+/// Of a job that panics somebody else tells.
+fn no_thread(error: &io::Error) -> Problem {
+    tracing::warn!(%error, "the system gave no thread");
+    Problem::new(ProblemCode::QueueFull, "the system gives the service no thread now; try again in a moment")
+}
+
 fn shutting_down() -> Problem {
     Problem::new(
         ProblemCode::ShuttingDown,
@@ -420,7 +437,10 @@ mod tests {
         let Line { settings } = Line::parse_from(words);
         let pool = Pool::new(settings.limits());
         // Of 16 MiB for all of them.
-        for (variant_bytes, most_at_once) in [(6 << 20, 2), (10 << 20, 1), (1 << 30, 1)] {
+        for (variant_bytes, is_scarce, most_at_once) in
+            [(6 << 20, false, 2), (6 << 20, true, 1), (10 << 20, false, 1), (1 << 30, false, 1)]
+        {
+            pool.memory().is_seen_to_be_scarce(is_scarce);
             let (running, most) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicUsize::new(0)));
             let slices = (0..20).map(|_| {
                 let (running, most) = (Arc::clone(&running), Arc::clone(&most));

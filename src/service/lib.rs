@@ -17,6 +17,7 @@ mod injected;
 pub mod keys;
 pub mod log;
 pub mod machine;
+pub mod memory;
 pub mod negotiation;
 pub mod observe;
 mod openapi;

@@ -8,6 +8,7 @@ use bytes::Bytes;
 use parking_lot::Mutex;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
+use crate::memory::Memory;
 use crate::problem::{Problem, ProblemCode};
 
 /// Answers up to here need no room, so that slow readers of large ones stop nobody's ordinary work; the bound on connections bounds
@@ -22,6 +23,7 @@ pub struct Room {
     /// Of these, the ones that are held for as long as studies are kept: for an answer that is alone all that is left is all the room.
     kept: Arc<AtomicU32>,
     max_bytes: u64,
+    memory: Memory,
 }
 
 /// A part of the room that is held while nobody waits to read it.
@@ -43,12 +45,20 @@ pub struct Reserved {
 
 /// There is not so much left.
 #[derive(Debug, Clone, Copy, thiserror::Error)]
-#[error(
-    "the answer takes {bytes} bytes: with the others that nobody has read yet more than the {max_bytes} of `max_unread_bytes`; try again in a moment"
-)]
-pub struct NoRoom {
-    bytes: u64,
-    max_bytes: u64,
+pub enum NoRoom {
+    /// As far as is counted.
+    #[error(
+        "the answer takes {bytes} bytes: with the others that nobody has read yet more than the {max_bytes} of `max_unread_bytes`; try again in a moment"
+    )]
+    Taken {
+        /// Wanted.
+        bytes: u64,
+        /// By all at once.
+        max_bytes: u64,
+    },
+    /// Whatever is counted.
+    #[error("nearly all of the service's memory is held, and the answer is large; try again in a moment")]
+    Scarce,
 }
 
 impl From<NoRoom> for Problem {
@@ -80,7 +90,13 @@ pub struct Sent(Arc<Mutex<Weak<OnItsWay>>>);
 impl Room {
     /// Room for at most `max_bytes` at once.
     pub fn new(max_bytes: u64) -> Self {
-        Self { free: Arc::new(Semaphore::new(permits(max_bytes) as usize)), kept: Arc::default(), max_bytes }
+        let free = Arc::new(Semaphore::new(permits(max_bytes) as usize));
+        Self { free, kept: Arc::default(), max_bytes, memory: Memory::default() }
+    }
+
+    /// The memory that the room is of.
+    pub fn memory(&self) -> &Memory {
+        &self.memory
     }
 
     /// The same room for one who holds so many bytes of it already: all of it is what is left.
@@ -152,6 +168,11 @@ impl Reserved {
         self.held.as_ref().map_or(0, |held| u32::try_from(held.num_permits()).unwrap_or(u32::MAX))
     }
 
+    /// Whether it is any: small answers take none.
+    pub const fn holds_any(&self) -> bool {
+        self.held.is_some()
+    }
+
     /// More, where it is less.
     ///
     /// # Errors
@@ -165,7 +186,10 @@ impl Reserved {
         if lacking == 0 {
             return Ok(());
         }
-        let no_room = |_| NoRoom { bytes, max_bytes: self.room.max_bytes };
+        if self.room.memory.is_scarce() {
+            return Err(NoRoom::Scarce);
+        }
+        let no_room = |_| NoRoom::Taken { bytes, max_bytes: self.room.max_bytes };
         let more = Arc::clone(&self.room.free).try_acquire_many_owned(lacking).map_err(no_room)?;
         match &mut self.held {
             Some(held) => held.merge(more),

@@ -115,6 +115,7 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
     // Whoever started the service may not read its output.
     std::thread::spawn(move || greet(address));
     tokio::spawn(observe::keep_up());
+    tokio::spawn(app.pool.memory().clone().watch());
     let store = tokio::spawn({
         let app = Arc::clone(&app);
         async move { app.studies.serve_store().await }
@@ -185,7 +186,9 @@ pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: O
     tracing::info!(studies = %studies, slots, build = BUILD, "working");
     let changed = watch::Sender::default();
     let capacity = Capacity { slots, variant_bytes: limits.max_unread_bytes / 2, admitted_states: 0 };
-    let workers = Workers::new(store, parts, Pool::new(limits), capacity, changed, stopping.clone(), patience);
+    let pool = Pool::new(limits);
+    tokio::spawn(pool.memory().clone().watch());
+    let workers = Workers::new(store, parts, pool, capacity, changed, stopping.clone(), patience);
     let stop = async {
         told_to_stop().await;
         tracing::info!("stopping: what is begun comes to its end");

@@ -7,7 +7,7 @@
 use std::collections::VecDeque;
 use std::io::{self, Write as _};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use axum::body::{Body, BodyDataStream};
@@ -30,7 +30,7 @@ use toothwave_calculation::design::Design;
 use toothwave_calculation::findings::FindingAnswer;
 use toothwave_calculation::forms::{Format, Forms as _};
 use toothwave_calculation::geometry::Geometry;
-use toothwave_calculation::question::{self, Question, with_room};
+use toothwave_calculation::question::{self, Question};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_calculation::sweep::answer::{ChecksAnswer, LoadAnswer, PeaksAnswer, SweepAnswer, TorqueCapacityAnswer};
 use toothwave_calculation::sweep::backing::EstimateAnswer;
@@ -39,7 +39,7 @@ use toothwave_calculation::sweep::losses::LossTotalsAnswer;
 use toothwave_calculation::sweep::model_error::ModelErrorAnswer;
 use utoipa::ToSchema;
 
-use super::{Growing, Stoppable, broken_body, write_problem};
+use super::{Growing, Stoppable, answered, broken_body, write_problem};
 use crate::app::App;
 use crate::compute::{self, Pool, SLICE};
 use crate::config::Limits;
@@ -182,6 +182,29 @@ pub struct AnsweredLine {
     /// The line.
     pub text: Vec<u8>,
     room: Option<Reserved>,
+    /// Why there is no answer.
+    problem: Option<Problem>,
+}
+
+impl AnsweredLine {
+    /// Counts it, and logs why an internal error happened: it is about to be told.
+    pub fn is_told(&self) {
+        let status = self.problem.as_ref().map_or(StatusCode::OK.as_u16(), |problem| problem.status);
+        counter!("toothwave_batch_documents_total", "status" => status.to_string()).increment(1);
+        if let Some(problem) = &self.problem {
+            observe::problem_is_told(problem);
+        }
+    }
+
+    fn of_problem(index: u64, problem: Problem) -> Self {
+        let line = BatchLine::<()> { index, status: problem.status, answer: None, problem: Some(problem) };
+        let mut text = Vec::new();
+        // Numbers and words alone, into memory: this does not fail.
+        if columns::write(&line, &mut text).is_ok() {
+            text.push(b'\n');
+        }
+        Self { text, room: None, problem: line.problem }
+    }
 }
 
 /// Answers one document.
@@ -199,7 +222,7 @@ pub fn answer_line(
         BatchEndpoint::Sweep if query.peaks_only => peaks_line(index, document, limits, room, stop),
         BatchEndpoint::Sweep => whole_line(&Sweep, index, document, limits, room, stop),
     };
-    answered.unwrap_or_else(|problem| problem_line(index, &problem))
+    answered.unwrap_or_else(|problem| AnsweredLine::of_problem(index, problem))
 }
 
 fn whole_line<Q: Question>(
@@ -261,20 +284,18 @@ fn solved<Q: Question>(
 ) -> Result<Solved<Q::Answer>, Problem> {
     let started = Instant::now();
     // A fault at one document is no reason to leave the others without an answer.
-    let answered = compute::caught(|| {
+    let solved = compute::caught(|| {
         #[cfg(feature = "fault-injection")]
         fail::fail_point!("solve");
         let checked = question.check(&Design::read(document)?, limits)?;
         let columns_bytes = Q::columns_bytes(&checked);
-        let mut reserved = room.reserve(columns_bytes + Q::working_bytes(&checked))?;
-        let take = |input_angles| reserved.hold_at_least(Q::searched_bytes(&checked, input_angles));
-        let answer = with_room(stop, take, |stop| Q::answer(&checked, stop))??;
+        let (answer, mut reserved) = answered::<Q>(&checked, 0, room, stop)?;
         let held_bytes = columns_bytes.max(answer.held_bytes(Format::Json));
         reserved.hold_at_most(held_bytes);
         Ok(Solved { answer, held_bytes, reserved })
     });
     histogram!("toothwave_solve_duration_seconds").record(started.elapsed());
-    answered
+    solved
 }
 
 fn line<A: Serialize>(index: u64, answer: &A, buffer: Growing, stop: &AtomicBool) -> Result<AnsweredLine, Problem> {
@@ -283,26 +304,9 @@ fn line<A: Serialize>(index: u64, answer: &A, buffer: Growing, stop: &AtomicBool
     let mut writer = Stoppable::new(buffer, stop);
     let written = columns::write(&line, &mut writer).and_then(|()| writer.write_all(b"\n"));
     written.map_err(|error| write_problem(error, stop))?;
-    count(status);
     let Growing { bytes: text, mut reserved, .. } = writer.inner;
     reserved.hold_at_most(text.capacity() as u64);
-    Ok(AnsweredLine { text, room: Some(reserved) })
-}
-
-fn problem_line(index: u64, problem: &Problem) -> AnsweredLine {
-    count(problem.status);
-    observe::problem_is_told(problem);
-    let line = BatchLine::<()> { index, status: problem.status, answer: None, problem: Some(problem.clone()) };
-    let mut text = Vec::new();
-    // Numbers and words alone, into memory: this does not fail.
-    if columns::write(&line, &mut text).is_ok() {
-        text.push(b'\n');
-    }
-    AnsweredLine { text, room: None }
-}
-
-fn count(status: u16) {
-    counter!("toothwave_batch_documents_total", "status" => status.to_string()).increment(1);
+    Ok(AnsweredLine { text, room: Some(reserved), problem: None })
 }
 
 /// Lines as they go out: short ones together, each long one by itself with its room, none of them copied again.
@@ -315,7 +319,9 @@ struct Answers {
 }
 
 impl Answers {
-    fn push(&mut self, AnsweredLine { text, room }: AnsweredLine) {
+    fn push(&mut self, line: AnsweredLine) {
+        line.is_told();
+        let AnsweredLine { text, room, .. } = line;
         self.lines += 1;
         self.bytes += text.len();
         if text.len() < LONG_LINE_BYTES {
@@ -551,7 +557,7 @@ impl Chunk {
             // Of the line that was being answered, or of the next one, so that there is an end.
             let index = slice.current.take().or_else(|| self.waiting.pop_front().map(|line| line.index));
             if let Some(index) = index {
-                self.answers.push(problem_line(index, &problem));
+                self.answers.push(AnsweredLine::of_problem(index, problem));
             }
         }
         self.answers.end_part();
@@ -574,11 +580,11 @@ fn work(slice: &Mutex<Slice>, batch: &Batch, stop: &AtomicBool) {
             Ok(document) => {
                 answer_line(batch.query, index, &document, &batch.limits.of_calculation(), &batch.room, stop)
             }
-            Err(problem) => problem_line(index, &problem),
+            Err(problem) => AnsweredLine::of_problem(index, problem),
         };
         let mut slice = slice.lock();
-        if slice.current.take() != Some(index) {
-            // The deadline came first, and the line has its problem.
+        // Whoever stops it says what becomes of the line, if anybody still waits for that.
+        if stop.load(Ordering::Relaxed) || slice.current.take() != Some(index) {
             return;
         }
         slice.answers.push(answer);
@@ -789,6 +795,19 @@ mod tests {
         let slice = slice.into_inner();
         assert_eq!(slice.answers.lines + slice.waiting.len() as u64, 3);
         slice.answers.lines
+    }
+
+    /// It is told neither as an answer nor as one that came too late.
+    #[test]
+    fn a_line_of_a_client_that_has_left_is_left_as_it_was() {
+        let query = BatchQuery { endpoint: BatchEndpoint::Sweep, peaks_only: true };
+        let batch = Batch { pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
+        let ahead = Arc::new(Semaphore::new(1)).try_acquire_owned().expect("a permit");
+        let line = Line { index: 7, document: Ok(Bytes::from("{")), _ahead: ahead };
+        let slice = Mutex::new(Slice { waiting: [line].into(), ..Slice::default() });
+        work(&slice, &batch, &AtomicBool::new(true));
+        let slice = slice.into_inner();
+        assert_eq!((slice.answers.lines, slice.current), (0, Some(7)));
     }
 
     /// Single requests wait for it.

@@ -1,6 +1,7 @@
 //! The endpoints: one file each, with its handler and what the API document says of it. What they share, the walk of a request from
 //! document to bytes, stands here.
 
+use std::cell::Cell;
 use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,13 +20,14 @@ use toothwave_calculation::design::Design;
 use toothwave_calculation::forms::{Format, Forms};
 use toothwave_calculation::key::Key;
 use toothwave_calculation::no_answer::NoAnswer;
-use toothwave_calculation::question::{Question, with_room};
+use toothwave_calculation::question::{Question, Stop, with_room};
 use utoipa::IntoResponses;
 
 use crate::app::App;
 use crate::cache::{Provenance, Served, Spelling, Stored, etag};
 use crate::compute::Thread;
 use crate::config::Limits;
+use crate::memory::Memory;
 use crate::negotiation::{self, Representation};
 use crate::problem::{Problem, ProblemCode};
 use crate::query::require_no_query;
@@ -215,11 +217,39 @@ fn solve<Q: Question>(
     let columns_bytes = Q::columns_bytes(checked);
     let Representation { format, gzip } = representation;
     let text_bytes = if is_long(format) { columns_bytes * if gzip { 1 } else { 2 } } else { 0 };
-    let mut reserved = room.reserve(columns_bytes + text_bytes + Q::working_bytes(checked))?;
-    let take = |input_angles| reserved.hold_at_least(Q::searched_bytes(checked, input_angles));
-    let answer = with_room(stop, take, |stop| Q::answer(checked, stop))??;
+    let (answer, mut reserved) = answered::<Q>(checked, text_bytes, room, stop)?;
     reserved.hold_at_most((columns_bytes + text_bytes).max(answer.held_bytes(format)));
     written(answer, representation, reserved, columns_bytes, started.elapsed(), stop)
+}
+
+/// An answer in the room that it takes, and beside it for its text, before and while it is made.
+fn answered<Q: Question>(
+    checked: &Q::Checked,
+    text_bytes: u64,
+    room: &Room,
+    stop: &AtomicBool,
+) -> Result<(Q::Answer, Reserved), Problem> {
+    let mut reserved = room.reserve(Q::columns_bytes(checked) + text_bytes + Q::working_bytes(checked))?;
+    let taking = Taking { stop, memory: reserved.holds_any().then(|| room.memory()), is_scarce: Cell::new(false) };
+    let take = |input_angles| reserved.hold_at_least(Q::searched_bytes(checked, input_angles));
+    let answer = with_room(&taking, take, |stop| Q::answer(checked, stop))?;
+    if taking.is_scarce.get() { Err(NoRoom::Scarce.into()) } else { Ok((answer?, reserved)) }
+}
+
+/// What stops a solve: nobody waits for it any more, or it takes room where memory has become scarce.
+struct Taking<'a> {
+    stop: &'a AtomicBool,
+    memory: Option<&'a Memory>,
+    is_scarce: Cell<bool>,
+}
+
+impl Stop for Taking<'_> {
+    fn stopped(&self) -> bool {
+        if self.memory.is_some_and(Memory::is_scarce) {
+            self.is_scarce.set(true);
+        }
+        self.is_scarce.get() || self.stop.stopped()
+    }
 }
 
 /// Whether a form is long where the columns are.
@@ -410,7 +440,7 @@ mod tests {
     use crate::cache::Stored;
     use crate::negotiation::Representation;
     use crate::problem::{Problem, ProblemCode};
-    use crate::room::Room;
+    use crate::room::{Room, SMALL_BYTES};
 
     /// The bytes of an answer, where so much room is left.
     fn solved<Q: Question>(question: &Q, format: Format, left_bytes: u64) -> Result<u64, ProblemCode> {
@@ -456,6 +486,32 @@ mod tests {
         let stop = AtomicBool::new(true);
         assert_eq!(code(solve::<Sweep>(&sweep, json, &room, &stop)), Err(ProblemCode::TooManyUnreadBytes));
         assert_eq!(code(solve::<Accuracy>(&accuracy, json, &room, &stop)), Err(ProblemCode::TooManyUnreadBytes));
+    }
+
+    /// Whatever was counted. One that takes hundreds of milliseconds, so that it is given up on its way, and one that takes no room.
+    #[test]
+    fn where_memory_becomes_scarce_what_takes_room_is_given_up_and_nothing_else() {
+        let document = include_str!("../../../examples/paper-5.1.json");
+        let design = Design::read(document.as_bytes()).expect("a design");
+        let limits = Limits { max_states: 1_000_000, max_profile_points: 1_000_000 };
+        let (json, stop) = (Representation::JSON, AtomicBool::new(false));
+        let room = Room::new(1 << 30);
+        let accuracy = Accuracy.check(&design, &limits).expect("a possible one");
+        let given_up = std::thread::scope(|scope| {
+            let solving = scope.spawn(|| solve::<Accuracy>(&accuracy, json, &room, &stop));
+            while room.taken_bytes() == 0 && !solving.is_finished() {
+                std::thread::yield_now();
+            }
+            room.memory().is_seen_to_be_scarce(true);
+            solving.join().expect("no panic")
+        });
+        assert_eq!(given_up.err().map(|problem| problem.code), Some(ProblemCode::TooManyUnreadBytes));
+        assert_eq!(room.taken_bytes(), 0);
+        assert!(room.reserve(SMALL_BYTES + 1).is_err());
+        let sweep = Sweep.check(&design, &limits).expect("a possible one");
+        assert!(solve::<Sweep>(&sweep, json, &room, &stop).is_ok());
+        room.memory().is_seen_to_be_scarce(false);
+        assert!(room.reserve(SMALL_BYTES + 1).is_ok());
     }
 
     /// It has two texts for each pole of its curves, at the bottom and at the top, to know them again.
