@@ -67,6 +67,9 @@ const SEARCHED_BYTES: u64 = STATE_BYTES;
 /// more takes room for them on its way.
 const SEARCHED_SAMPLES: u64 = 512;
 
+/// A number of about 18 characters and its comma.
+const NUMBER_TEXT_BYTES: usize = 20;
+
 /// What a state and an input angle take.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Each {
@@ -523,9 +526,13 @@ impl Forms for SweepAnswer {
     ];
 
     fn expected_bytes(&self) -> usize {
-        // Eleven numbers of about 18 characters and a short one, each with its comma.
-        let of_losses = if self.losses.is_some() { 80 } else { 0 };
-        4096 + (220 + of_losses) * self.states.tooth.len()
+        let of_states: usize = self.columns().iter().map(|(_, column)| column.text_bytes()).sum();
+        // Columns that stand by input angle.
+        let wind_up = self.wind_up.as_ref().map(|wind_up| 5 * wind_up.input_angle_deg.len());
+        let losses = self.losses.as_ref().map(|losses| 8 * losses.by_input_angle.input_angle_deg.len());
+        let radial_force = self.radial_force_n.as_ref().map(|force| 3 * force.input_angle_deg.len());
+        let numbers: usize = [wind_up, losses, radial_force].into_iter().flatten().sum();
+        4096 + of_states + NUMBER_TEXT_BYTES * numbers
     }
 
     fn held_bytes(&self, format: Format) -> u64 {
@@ -536,6 +543,16 @@ impl Forms for SweepAnswer {
 }
 
 impl Column<'_> {
+    /// About, as JSON.
+    const fn text_bytes(&self) -> usize {
+        match self {
+            Self::Numbers(numbers) => NUMBER_TEXT_BYTES * numbers.len(),
+            Self::Counts(counts) => 5 * counts.len(),
+            Self::Flags(flags) => 6 * flags.len(),
+            Self::Rolls(rolls) => 17 * rolls.len(),
+        }
+    }
+
     const fn bytes(&self) -> u64 {
         let bytes = match self {
             Self::Numbers(numbers) => size_of_val(*numbers),

@@ -16,7 +16,9 @@ use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use parking_lot::Mutex;
 use rayon::prelude::*;
+use rustix::process::Signal;
 use tokio::runtime::{Builder, Runtime};
+use tokio::signal::unix::{SignalKind, signal};
 use toothwave_calculation::accuracy::Accuracy;
 use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::drawing::Drawing;
@@ -33,7 +35,7 @@ use crate::api::batch::{BatchEnd, BatchEndpoint, BatchQuery, answer_line};
 use crate::config::{Settings, StoreSettings, WorkerSettings};
 use crate::problem::Problem;
 use crate::room::Room;
-use crate::{keys, log, observe, router, serve};
+use crate::{keys, log, memory, observe, router, serve};
 
 /// Bad input, as most tools have it.
 const EXIT_BAD_INPUT: u8 = 2;
@@ -266,12 +268,21 @@ fn arguments() -> Vec<OsString> {
 const LOOK_UPS: usize = 1;
 
 /// An executor, with as many threads for solves as there are permits: with more of them each solve would wake another, whose memory is cold. They stay,
-/// and one is there from the start: where the system refuses one and there is no other, tokio panics.
+/// and one is there from the start: where the system refuses one and there is no other, tokio panics. So it does where it refuses one of its own, and would
+/// wait for the others for ever, but that such a panic ends the process.
 fn runtime(threads: usize) -> io::Result<Runtime> {
     const FOR_EVER: Duration = Duration::from_secs(u32::MAX as u64);
     let mut builder = Builder::new_multi_thread();
     let runtime = builder.max_blocking_threads(threads).thread_keep_alive(FOR_EVER).enable_all().build()?;
-    runtime.block_on(runtime.spawn_blocking(|| ()))?;
+    runtime.block_on(async {
+        // Who is once waited for ends the process no more: a file that is as large as it may be, a log for instance, is an error like others, and
+        // keys may be told to be read again before anybody does so.
+        for number in [Signal::XFSZ, Signal::HUP] {
+            let _ = signal(SignalKind::from_raw(number.as_raw()))?;
+        }
+        tokio::task::spawn_blocking(|| ()).await.map_err(io::Error::other)
+    })?;
+    log::is_started();
     Ok(runtime)
 }
 
@@ -279,6 +290,7 @@ fn run_service(settings: &Settings) -> Result<(), Failure> {
     let address = settings.store.address().map_err(Failure::BadInput)?;
     let parts = settings.parts.of_service(address.as_ref()).map_err(Failure::BadInput)?;
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
+    memory::keep_pages_small();
     log::start(filter)?;
     let is_shared = address.as_ref().is_some_and(Address::is_shared);
     let runtime = runtime(settings.limits().max_concurrent_solves + if is_shared { LOOK_UPS } else { 0 })?;
@@ -304,6 +316,7 @@ fn run_worker(settings: &WorkerSettings) -> Result<(), Failure> {
     let address = shared_database(&settings.store)?;
     let parts = settings.parts.parts().map_err(Failure::BadInput)?;
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
+    memory::keep_pages_small();
     log::start(filter)?;
     let runtime = runtime(settings.limits().max_concurrent_solves + LOOK_UPS)?;
     let result = runtime.block_on(serve::serve_chunks(settings, &address, parts));
@@ -447,6 +460,9 @@ fn print(write: impl FnOnce(&mut io::BufWriter<io::StdoutLock<'static>>) -> io::
 }
 
 fn new_key(name: &str) -> Result<(), Failure> {
+    if name.contains(char::is_control) {
+        return Err(Failure::BadInput("a key's name is one line of text".into()));
+    }
     let (key, line) = keys::new_key(name).map_err(io::Error::other)?;
     print(|writer| writeln!(writer, "key, for its holder:        {key}\nline, for the keys file:    {line}"))
 }

@@ -4,7 +4,7 @@
 use std::io::{self, Write};
 use std::panic;
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Duration;
 
@@ -16,6 +16,9 @@ const WAITING_LINES: usize = 8_192;
 
 /// What the lines that wait at the end of the process get to be written.
 const LAST_LINES: Duration = Duration::from_millis(300);
+
+/// Whether a panic ends the process: one of what it begins with, for which others may wait for ever.
+static IS_STARTING: AtomicBool = AtomicBool::new(true);
 
 static LOST_LINES: AtomicU64 = AtomicU64::new(0);
 static WRITER: OnceLock<Log> = OnceLock::new();
@@ -45,8 +48,17 @@ pub fn start(filter: EnvFilter) -> io::Result<()> {
         let text = panic.payload_as_str().unwrap_or("without a text");
         let location = panic.location().map(ToString::to_string);
         tracing::error!(location, text, "a panic");
+        if IS_STARTING.load(Ordering::Relaxed) {
+            flush();
+            std::process::exit(1);
+        }
     }));
     Ok(())
+}
+
+/// A panic is from here on one of whatever panics.
+pub fn is_started() {
+    IS_STARTING.store(false, Ordering::Relaxed);
 }
 
 /// Waits until what was logged is written, but not for long.

@@ -3,7 +3,7 @@
 
 use std::fs;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::machine;
@@ -17,25 +17,54 @@ const SPARE_PART: u64 = 8;
 /// So often at most does the log say so.
 const SAY: Duration = Duration::from_secs(10);
 
+/// A memory below this is small.
+const SMALL_BYTES: u64 = 4 << 30;
+
 /// Whether nearly all of the memory is held.
-#[derive(Debug, Clone, Default)]
-pub struct Memory(Arc<AtomicBool>);
+#[derive(Debug, Clone)]
+pub struct Memory(Arc<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    is_scarce: AtomicBool,
+    /// Beyond this it is scarce; nobody knows before it is watched.
+    most_bytes: AtomicU64,
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self(Arc::new(Inner { is_scarce: AtomicBool::new(false), most_bytes: AtomicU64::new(u64::MAX) }))
+    }
+}
 
 impl Memory {
     /// Whether it is, as it was last seen.
     pub fn is_scarce(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.0.is_scarce.load(Ordering::Relaxed)
     }
 
     /// What is seen.
     pub fn is_seen_to_be_scarce(&self, is_scarce: bool) {
-        self.0.store(is_scarce, Ordering::Relaxed);
+        self.0.is_scarce.store(is_scarce, Ordering::Relaxed);
+    }
+
+    /// Whether so many bytes more would leave what is to be left, as it is in this moment.
+    pub fn has(&self, bytes: u64) -> bool {
+        let most_bytes = self.0.most_bytes.load(Ordering::Relaxed);
+        most_bytes == u64::MAX || held_bytes().is_none_or(|held_bytes| held_bytes.saturating_add(bytes) <= most_bytes)
+    }
+
+    /// Of which so much may be held.
+    pub fn is_of(&self, memory_bytes: u64) -> u64 {
+        let most_bytes = memory_bytes - memory_bytes / SPARE_PART;
+        self.0.most_bytes.store(most_bytes, Ordering::Relaxed);
+        most_bytes
     }
 
     /// Looks for ever, where the machine tells.
     pub async fn watch(self) {
         let Some(memory_bytes) = machine::memory_bytes() else { return };
-        let most_bytes = memory_bytes - memory_bytes / SPARE_PART;
+        let most_bytes = self.is_of(memory_bytes);
         let mut said: Option<Instant> = None;
         while let Some(held_bytes) = held_bytes() {
             let is_scarce = held_bytes > most_bytes;
@@ -53,6 +82,15 @@ impl Memory {
     }
 }
 
+/// Where the memory is small the kernel is to give no page of 2 MiB where one of 4 KiB was touched, as the allocator asks it to: of sixteen threads that had
+/// solved a little, tens of MiB were such pages, which nobody counts. Where it is large they are faster.
+pub fn keep_pages_small() {
+    if machine::memory_bytes().is_some_and(|bytes| bytes < SMALL_BYTES) {
+        // Where the kernel knows no such pages there are none.
+        let _ = rustix::thread::disable_transparent_huge_pages(true);
+    }
+}
+
 /// Of the memory, what this process alone holds and cannot be read again from files.
 fn held_bytes() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
@@ -62,7 +100,8 @@ fn held_bytes() -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
-    use super::held_bytes;
+    use super::{Memory, held_bytes};
+    use crate::room::Room;
 
     #[test]
     fn what_is_written_to_is_held() {
@@ -72,5 +111,24 @@ mod tests {
         // Other tests let go of little meanwhile.
         assert!(held_bytes().expect("Linux tells") - before > BYTES as u64 / 2);
         drop(written);
+    }
+
+    #[test]
+    fn an_answer_larger_than_all_the_room_grows_only_as_far_as_the_memory_really_has_it() {
+        const TERABYTE: u64 = 1 << 40;
+        let room = Room::new(1 << 20);
+        let mut larger = room.reserve(2 << 20).expect("alone it is given");
+        larger.hold_at_least(TERABYTE).expect("nobody knows how much memory there is");
+        larger.hold_at_most(2 << 20);
+        room.memory().is_of(2 * TERABYTE);
+        assert!(larger.hold_at_least(4 * TERABYTE).is_err());
+        assert!(larger.hold_at_least(TERABYTE).is_ok());
+        // What it was given is not asked of the memory again.
+        room.memory().is_of(0);
+        assert!(larger.hold_at_least(TERABYTE).is_ok());
+        assert!(larger.hold_at_least(2 * TERABYTE).is_err());
+        drop(larger);
+        assert!(room.reserve(1 << 20).is_ok());
+        assert!(Memory::default().has(u64::MAX));
     }
 }

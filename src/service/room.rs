@@ -41,6 +41,8 @@ impl Drop for Kept {
 pub struct Reserved {
     room: Room,
     held: Option<OwnedSemaphorePermit>,
+    /// What it was asked for, which may be more than all the room.
+    bytes: u64,
 }
 
 /// There is not so much left.
@@ -57,7 +59,9 @@ pub enum NoRoom {
         max_bytes: u64,
     },
     /// Whatever is counted.
-    #[error("nearly all of the service's memory is held, and the answer is large; try again in a moment")]
+    #[error(
+        "nearly all of the service's memory is held, and the answer is large; try again in a moment, or ask for less"
+    )]
     Scarce,
 }
 
@@ -110,13 +114,14 @@ impl Room {
         (taken as u64 * 1024).min(self.max_bytes)
     }
 
-    /// Room for an answer that takes so many bytes. One larger than all the room takes all of it.
+    /// Room for an answer that takes so many bytes. One larger than all the room takes all of it; what it takes beyond these is given as far as the
+    /// memory really has it.
     ///
     /// # Errors
     /// Where there is not so much left.
     pub fn reserve(&self, bytes: u64) -> Result<Reserved, NoRoom> {
-        let mut reserved = Reserved { room: self.clone(), held: None };
-        reserved.hold_at_least(bytes)?;
+        let mut reserved = Reserved { room: self.clone(), held: None, bytes };
+        reserved.hold_permits(self.permits_for(bytes), bytes)?;
         Ok(reserved)
     }
 
@@ -125,7 +130,7 @@ impl Room {
     /// # Errors
     /// Where there is not so much left.
     pub fn keep(&self, bytes: u64) -> Result<Kept, NoRoom> {
-        let mut reserved = Reserved { room: self.clone(), held: None };
+        let mut reserved = Reserved { room: self.clone(), held: None, bytes };
         reserved.hold_permits(self.permits_to_keep(bytes), bytes)?;
         self.kept.fetch_add(reserved.permits(), Ordering::Relaxed);
         Ok(Kept(reserved))
@@ -168,9 +173,9 @@ impl Reserved {
         self.held.as_ref().map_or(0, |held| u32::try_from(held.num_permits()).unwrap_or(u32::MAX))
     }
 
-    /// Whether it is any: small answers take none.
-    pub const fn holds_any(&self) -> bool {
-        self.held.is_some()
+    /// The memory that it is of; none where it is nothing, as of small answers.
+    pub fn memory(&self) -> Option<&Memory> {
+        self.held.as_ref().map(|_| self.room.memory())
     }
 
     /// More, where it is less.
@@ -178,6 +183,11 @@ impl Reserved {
     /// # Errors
     /// Where there is not so much left.
     pub fn hold_at_least(&mut self, bytes: u64) -> Result<(), NoRoom> {
+        let more_bytes = bytes.saturating_sub(self.bytes);
+        if more_bytes > 0 && bytes > self.room.max_bytes && !self.room.memory.has(more_bytes) {
+            return Err(NoRoom::Scarce);
+        }
+        self.bytes = self.bytes.max(bytes);
         self.hold_permits(self.room.permits_for(bytes), bytes)
     }
 
@@ -201,6 +211,7 @@ impl Reserved {
     /// Less, where it is more.
     pub fn hold_at_most(&mut self, bytes: u64) {
         let most = self.room.permits_for(bytes);
+        self.bytes = self.bytes.min(bytes);
         if let Some(held) = &mut self.held {
             drop(held.split(held.num_permits().saturating_sub(most as usize)));
         }

@@ -3,8 +3,9 @@
 use std::collections::VecDeque;
 use std::io::{self, Write};
 use std::net::SocketAddr;
+use std::pin::pin;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use axum::Router;
@@ -13,15 +14,16 @@ use futures_util::FutureExt as _;
 use hyper::body::Incoming;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
-use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
 use parking_lot::Mutex;
 use rustix::process::{Resource, getrlimit, setrlimit};
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
-use tokio::task::AbortHandle;
+use tokio::task::{AbortHandle, unconstrained};
+use tokio::time::{Instant, sleep, timeout_at};
 use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
 use toothwave_calculation::BUILD;
 use toothwave_store::{Address, Store};
 use tower::util::MapRequest;
@@ -54,6 +56,12 @@ const MOST_AHEAD_BYTES: usize = 1 << 16;
 
 /// Files that are kept for all but admitted connections: those beyond the last one, the listener, what the runtime has, the keys file.
 const OTHER_FILES: u64 = SIDE_CONNECTIONS as u64 + 64;
+
+/// Of a worker, beside its slots: as many other studies as a service admits beside one by default.
+const SLOTS_FOR_OTHERS: usize = 3;
+
+/// Between two looks whether something that has come is still unread.
+const UNREAD_LOOK: Duration = Duration::from_millis(1);
 
 /// After an error of the listener itself, such as too many open files.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
@@ -113,7 +121,10 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
     };
     let server = Server::new(&app, &entry);
     // Whoever started the service may not read its output.
-    std::thread::spawn(move || greet(address));
+    let greeting = std::thread::Builder::new().name("greeting".into()).spawn(move || greet(address));
+    if let Err(error) = greeting {
+        tracing::warn!(%error, "no thread for the greeting");
+    }
     tokio::spawn(observe::keep_up());
     tokio::spawn(app.pool.memory().clone().watch());
     let store = tokio::spawn({
@@ -136,7 +147,7 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
         tracing::info!("stopping: no longer ready, still listening");
         app.ready.store(false, Ordering::Relaxed);
         tokio::select! {
-            () = tokio::time::sleep(notice) => false,
+            () = sleep(notice) => false,
             () = told_to_stop() => true,
         }
     };
@@ -145,12 +156,12 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
         () = server.accept(&listener) => false,
     };
     if !is_told_twice {
-        server.accept_those_that_wait(&listener);
+        server.accept_those_that_wait(&listener).await;
         drop(listener);
         server.closing.cancel();
         app.studies.close();
         tokio::select! {
-            () = drain(server.graceful, &app, settings.shutdown()) => {}
+            () = drain(server.open, &app, settings.shutdown()) => {}
             () = told_to_stop() => tracing::warn!("told to stop again: what still ran is given up"),
         }
         // Chunks that are in work are given back, so that they count as never begun.
@@ -185,7 +196,12 @@ pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: O
     let slots = limits.max_concurrent_solves;
     tracing::info!(studies = %studies, slots, build = BUILD, "working");
     let changed = watch::Sender::default();
-    let capacity = Capacity { slots, variant_bytes: limits.max_unread_bytes / 2, admitted_states: 0 };
+    let capacity = Capacity {
+        slots,
+        slots_for_others: SLOTS_FOR_OTHERS,
+        variant_bytes: limits.max_unread_bytes / 2,
+        admitted_states: 0,
+    };
     let pool = Pool::new(limits);
     tokio::spawn(pool.memory().clone().watch());
     let workers = Workers::new(store, parts, pool, capacity, changed, stopping.clone(), patience);
@@ -229,17 +245,31 @@ fn connections_that_fit(wanted: usize) -> io::Result<usize> {
 }
 
 /// Waits until every request is answered, at most for `bound`; just before its end running solves are told to stop.
-async fn drain(connections: GracefulShutdown, app: &App, bound: Duration) {
+async fn drain(connections: TaskTracker, app: &App, bound: Duration) {
     let close_pool = async {
-        tokio::time::sleep(bound.saturating_sub(LAST_WORDS)).await;
+        sleep(bound.saturating_sub(LAST_WORDS)).await;
         tracing::warn!("requests still ran when the time to stop was nearly over");
         app.pool.close();
-        tokio::time::sleep(LAST_WORDS).await;
+        sleep(LAST_WORDS).await;
     };
+    connections.close();
     tokio::select! {
-        () = connections.shutdown() => {}
+        () = connections.wait() => {}
         () = close_pool => {}
     }
+}
+
+/// Waits until a connection is to be used no more, once the service stops: whether it ever asked. What has come in time is read before: hyper
+/// closes what it has read nothing of.
+async fn is_to_end(closing: CancellationToken, mut has_asked: watch::Receiver<bool>, seen: Seen) -> bool {
+    closing.cancelled().await;
+    let until = Instant::now() + NOTICE;
+    // An error says that there is no connection any more.
+    let Ok(Ok(_)) = timeout_at(until, has_asked.wait_for(|&has_asked| has_asked)).await else { return false };
+    while seen.has_unread() && Instant::now() < until {
+        sleep(UNREAD_LOOK).await;
+    }
+    true
 }
 
 struct Server {
@@ -250,7 +280,10 @@ struct Server {
     side_http: http1::Builder,
     /// The last of those, the oldest first.
     side_connections: Mutex<VecDeque<(AbortHandle, Seen)>>,
-    graceful: GracefulShutdown,
+    /// One for each of those, until its file is closed.
+    side_places: Arc<Semaphore>,
+    /// Connections that are served.
+    open: TaskTracker,
     /// Cancelled when the service stops.
     closing: CancellationToken,
     connections: Arc<Semaphore>,
@@ -275,7 +308,8 @@ impl Server {
             side: router::beyond_connections(Arc::clone(app), entry),
             side_http,
             side_connections: Mutex::default(),
-            graceful: GracefulShutdown::new(),
+            side_places: Arc::new(Semaphore::new(SIDE_CONNECTIONS)),
+            open: TaskTracker::new(),
             closing: CancellationToken::new(),
             connections: Arc::new(Semaphore::new(max_connections)),
             patience,
@@ -286,12 +320,12 @@ impl Server {
     async fn accept(&self, listener: &TcpListener) {
         loop {
             match listener.accept().await {
-                Ok((stream, _)) => self.take(stream),
+                Ok((stream, _)) => self.take(stream).await,
                 Err(error) => {
                     // A client that gave up is none of the listener's faults; the others pass when something is closed.
                     if !matches!(error.kind(), io::ErrorKind::ConnectionAborted | io::ErrorKind::ConnectionReset) {
                         tracing::error!(%error, "no connection could be accepted");
-                        tokio::time::sleep(ACCEPT_PAUSE).await;
+                        sleep(ACCEPT_PAUSE).await;
                     }
                 }
             }
@@ -299,56 +333,82 @@ impl Server {
     }
 
     /// Accepts the connections that came before the listener is closed, which would cut them.
-    fn accept_those_that_wait(&self, listener: &TcpListener) {
-        while let Some(Ok((stream, _))) = listener.accept().now_or_never() {
-            self.take(stream);
+    async fn accept_those_that_wait(&self, listener: &TcpListener) {
+        // However many there are: of its own the runtime would say that none waits after some hundred.
+        while let Some(Ok((stream, _))) = unconstrained(listener.accept()).now_or_never() {
+            self.take(stream).await;
         }
     }
 
-    fn take(&self, stream: TcpStream) {
+    async fn take(&self, stream: TcpStream) {
         let stream = Socket::new(stream, self.patience);
         match Arc::clone(&self.connections).try_acquire_owned() {
             Ok(permit) => self.serve(stream, permit),
-            Err(_) => self.serve_beside(stream),
+            Err(_) => {
+                // The files that are kept for these are few: none is opened before another is closed.
+                let place = self.side_place().await;
+                self.serve_beside(stream, place);
+            }
         }
     }
 
+    async fn side_place(&self) -> Option<OwnedSemaphorePermit> {
+        if let Ok(place) = Arc::clone(&self.side_places).try_acquire_owned() {
+            return Some(place);
+        }
+        {
+            let mut connections = self.side_connections.lock();
+            // Of a burst, those that ask may not have had their turn yet.
+            let silent = connections.iter().position(|(_, seen)| !seen.has_unread());
+            if let Some((oldest, _)) = connections.remove(silent.unwrap_or(0)) {
+                oldest.abort();
+            }
+        }
+        // An error says that the semaphore is closed, which it never is.
+        Arc::clone(&self.side_places).acquire_owned().await.ok()
+    }
+
     fn serve(&self, stream: Socket, permit: OwnedSemaphorePermit) {
-        let has_asked = Arc::new(AtomicBool::new(false));
-        let asked = Arc::clone(&has_asked);
+        let (asked, has_asked) = watch::channel(false);
         let service = MapRequest::new(self.router.clone(), move |request: hyper::Request<Incoming>| {
-            asked.store(true, Ordering::Relaxed);
+            asked.send_replace(true);
             request.map(Body::new)
         });
         let (left, closed) = (stream.left(), stream.closed());
+        let is_to_end = is_to_end(self.closing.clone(), has_asked, stream.seen());
         let connection = self.http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
-        let connection = self.graceful.watch(connection);
-        let closing = self.closing.clone();
-        // A client that has not finished its first request's head holds up no shutdown.
-        let never_asked = async move {
-            closing.cancelled().await;
-            tokio::time::sleep(NOTICE).await;
-            if has_asked.load(Ordering::Relaxed) {
-                std::future::pending::<()>().await;
-            }
-        };
-        tokio::spawn(async move {
+        self.open.spawn(async move {
             let _held = permit;
+            let mut connection = pin!(connection);
+            let to_its_end = async {
+                tokio::select! {
+                    // What goes wrong on a connection is its client's to know; the request, if there was one, is logged by itself.
+                    _ = connection.as_mut() => {}
+                    has_asked = is_to_end => {
+                        // A client that has not finished its first request's head holds up no shutdown.
+                        if !has_asked {
+                            return;
+                        }
+                        connection.as_mut().graceful_shutdown();
+                        let _ = connection.await;
+                    }
+                }
+                closed.await;
+            };
             tokio::select! {
-                // What goes wrong on a connection is its client's to know; the request, if there was one, is logged by itself.
-                _ = connection => closed.await,
+                () = to_its_end => {}
                 () = left => {}
-                () = never_asked => {}
             }
         });
     }
 
     /// Answers a connection beyond the last one: health and metrics as ever, all else with a refusal.
-    fn serve_beside(&self, stream: Socket) {
+    fn serve_beside(&self, stream: Socket, place: Option<OwnedSemaphorePermit>) {
         let service = MapRequest::new(self.side.clone(), |request: hyper::Request<Incoming>| request.map(Body::new));
         let (closed, seen) = (stream.closed(), stream.seen());
         let connection = self.side_http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
         let answered = tokio::spawn(async move {
+            let _held = place;
             let to_its_end = async {
                 let _ = connection.await;
                 closed.await;
@@ -356,14 +416,8 @@ impl Server {
             let _ = tokio::time::timeout(REFUSAL, to_its_end).await;
         });
         let mut connections = self.side_connections.lock();
+        connections.retain(|(answered, _)| !answered.is_finished());
         connections.push_back((answered.abort_handle(), seen));
-        if connections.len() > SIDE_CONNECTIONS {
-            // Of a burst, those that ask may not have had their turn yet.
-            let silent = connections.iter().position(|(_, seen)| !seen.has_unread());
-            if let Some((oldest, _)) = connections.remove(silent.unwrap_or(0)) {
-                oldest.abort();
-            }
-        }
     }
 }
 
@@ -381,4 +435,49 @@ The API: http://{address}/docs
     );
     // Whoever started the service may have closed its output; it serves all the same.
     let _ = io::stdout().write_all(text.as_bytes());
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+    use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+
+    use super::*;
+
+    #[derive(clap::Parser)]
+    struct Line {
+        #[command(flatten)]
+        settings: Settings,
+    }
+
+    /// A client whose connection is taken in when the service already closes, having sent this, and all that it gets.
+    async fn answered(sent: &[u8]) -> io::Result<String> {
+        let Line { settings } = Line::parse_from(["serve"]);
+        let server = Server::new(&App::new(settings.limits()), &Entry::default());
+        let listener = listen_on(SocketAddr::from(([127, 0, 0, 1], 0)))?;
+        let mut client = TcpStream::connect(listener.local_addr()?).await?;
+        client.write_all(sent).await?;
+        server.closing.cancel();
+        server.accept_those_that_wait(&listener).await;
+        let mut answer = String::new();
+        client.read_to_string(&mut answer).await?;
+        server.open.close();
+        server.open.wait().await;
+        Ok(answer)
+    }
+
+    #[tokio::test]
+    async fn what_has_come_before_the_service_closes_is_answered_though_nobody_has_read_it_yet() -> io::Result<()> {
+        let answer = answered(b"GET /health/live HTTP/1.1\r\nhost: localhost\r\n\r\n").await?;
+        assert!(answer.starts_with("HTTP/1.1 200"), "{answer:?}");
+        Ok(())
+    }
+
+    #[tokio::test]
+    async fn who_has_not_asked_holds_up_no_shutdown() -> io::Result<()> {
+        for sent in [&b""[..], b"GET /health/live HTTP/1.1\r\nhost:"] {
+            assert_eq!(answered(sent).await.unwrap_or_default(), "");
+        }
+        Ok(())
+    }
 }

@@ -97,6 +97,18 @@ fn a_log_whose_reader_is_stuck_stops_nothing_and_what_does_not_fit_is_counted() 
     assert_eq!(process.ended().code(), Some(0));
 }
 
+#[test]
+fn a_log_in_a_file_that_is_as_large_as_it_may_be_stops_nothing_and_is_counted() {
+    let file = scratch("as-large-as-it-may-be");
+    let mut command = Command::new("sh");
+    command.args(["-c", "ulimit -f 4; exec \"$0\" serve \"$@\"", env!("CARGO_BIN_EXE_toothwave")]);
+    let process = Process::of(&mut command, File::create(&file).unwrap().into());
+    assert!((0..10_000).any(|_| metric(process.address, "toothwave_log_lines_lost_total") >= 3.0));
+    process.signalled("-TERM");
+    assert_eq!(process.ended().code(), Some(0));
+    std::fs::remove_file(&file).unwrap();
+}
+
 // --- Connections
 
 /// A connection that was served once and says nothing more.
@@ -155,6 +167,15 @@ fn what_a_process_may_not_take_of_the_memory_is_not_shared_out() {
     assert_eq!(limits["max_connections"], 1_024_000_000 / (2 << 20));
 }
 
+/// One page of two megabytes for each touched one of four kilobytes is memory that nobody counts.
+#[test]
+fn where_the_memory_is_small_its_pages_are() {
+    let process = held_to("-v 1000000", &["serve"]);
+    let status = std::fs::read_to_string(format!("/proc/{}/status", process.child.id())).unwrap();
+    // Kernels before 5.0 do not say.
+    assert!(!status.contains("THP_enabled:\t1"), "{status}");
+}
+
 #[test]
 fn where_all_connections_are_taken_health_and_metrics_answer_however_many_others_come_and_say_nothing() {
     let process = Process::started(&["serve", "--max-connections", "3"]);
@@ -187,6 +208,26 @@ fn probes_in_a_burst_of_silent_connections_beyond_the_last_one_are_answered() {
         assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
     }
     drop((held, silent));
+}
+
+/// Where few files may be open, those beyond the last connection took them all before others were closed, and nobody was taken in for a while.
+#[test]
+fn a_burst_of_silent_connections_beyond_the_last_one_leaves_files_for_the_next() {
+    let file = scratch("a-burst");
+    let mut command = Command::new("sh");
+    command.args(["-c", "ulimit -n 150; exec \"$0\" serve \"$@\"", env!("CARGO_BIN_EXE_toothwave")]);
+    let process = Process::of(&mut command, File::create(&file).unwrap().into());
+    let held: Vec<_> = (0..150 - 128).map(|_| idle(process.address)).collect();
+    process.signalled("-STOP");
+    let silent: Vec<_> = (0..800).map(|_| TcpStream::connect(process.address).unwrap()).collect();
+    process.signalled("-CONT");
+    assert_eq!(ask_at(process.address, &live()).status, 200);
+    drop((held, silent));
+    process.signalled("-TERM");
+    assert_eq!(process.ended().code(), Some(0));
+    let log = std::fs::read_to_string(&file).unwrap();
+    assert!(!log.contains("no connection could be accepted"), "{log}");
+    std::fs::remove_file(&file).unwrap();
 }
 
 #[test]

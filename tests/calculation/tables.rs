@@ -75,3 +75,28 @@ fn an_arrow_stream_has_the_columns_of_csv_and_the_numbers_of_json() {
         assert_eq!(states, columns["tooth"].as_array().unwrap().len());
     }
 }
+
+/// Its buffer takes as much room, and would otherwise be there twice while it grows: of few teeth what stands by input angle is as long as the states.
+#[test]
+fn how_long_a_sweep_gets_as_json_is_known_before_it_is_written() {
+    let friction = json!({ "wave_generator": { "kind": "plain", "coefficient": 0.03 }, "ring": { "coefficient": 0.05 }, "carrier": { "coefficient": 0.04 } });
+    let eccentric = json!({
+        "wave_generator": { "kind": "eccentric", "radius_mm": 30.8, "eccentricity_mm": 1.2 },
+        "teeth": { "count": 24, "installed": 4, "radius_mm": 3.0, "width_mm": 15.0 },
+        "ring": { "teeth": 23 }
+    });
+    let sweep = json!({ "samples": 20_000, "wind_up": true });
+    let clearance = json!({ "clearance": { "ring_um": 5.0 } });
+    for document in [
+        json!({ "drive": drive(), "load": { "input_torque_nm": 20.0 }, "sweep": { "samples": 5_000 } }),
+        json!({ "drive": drive(), "load": { "input_torque_nm": 20.0 }, "friction": friction, "model": clearance, "sweep": sweep }),
+        json!({ "drive": eccentric, "load": { "input_torque_nm": 1.0 }, "friction": friction, "model": { "clearance": { "ring_um": 0.5 } }, "sweep": sweep }),
+    ] {
+        let answer = Sweep.ask(document.to_string().as_bytes(), &LIMITS, &Never).unwrap();
+        let mut bytes = Vec::new();
+        answer.write(Format::Json, &mut bytes).unwrap();
+        let share = answer.expected_bytes() as f64 / bytes.len() as f64;
+        // Efficiencies of which nothing is left are short.
+        assert!((1.0..1.35).contains(&share), "{share} of {} bytes", bytes.len());
+    }
+}

@@ -39,7 +39,7 @@ use toothwave_calculation::sweep::losses::LossTotalsAnswer;
 use toothwave_calculation::sweep::model_error::ModelErrorAnswer;
 use utoipa::ToSchema;
 
-use super::{Growing, Stoppable, answered, broken_body, write_problem};
+use super::{Growing, Stoppable, Taking, answered, broken_body, write_problem};
 use crate::app::App;
 use crate::compute::{self, Pool, SLICE};
 use crate::config::Limits;
@@ -301,9 +301,10 @@ fn solved<Q: Question>(
 fn line<A: Serialize>(index: u64, answer: &A, buffer: Growing, stop: &AtomicBool) -> Result<AnsweredLine, Problem> {
     let status = StatusCode::OK.as_u16();
     let line = BatchLine { index, status, answer: Some(answer), problem: None };
-    let mut writer = Stoppable::new(buffer, stop);
+    let taking = Taking::new(stop, &buffer.reserved);
+    let mut writer = Stoppable::new(buffer, &taking);
     let written = columns::write(&line, &mut writer).and_then(|()| writer.write_all(b"\n"));
-    written.map_err(|error| write_problem(error, stop))?;
+    written.map_err(|error| write_problem(error, &taking))?;
     let Growing { bytes: text, mut reserved, .. } = writer.inner;
     reserved.hold_at_most(text.capacity() as u64);
     Ok(AnsweredLine { text, room: Some(reserved), problem: None })
@@ -554,14 +555,20 @@ impl Chunk {
         self.waiting = std::mem::take(&mut slice.waiting);
         self.answers.append(std::mem::take(&mut slice.answers));
         if let Err(problem) = result {
-            // Of the line that was being answered, or of the next one, so that there is an end.
-            let index = slice.current.take().or_else(|| self.waiting.pop_front().map(|line| line.index));
+            // Of the line that was being answered; where nothing was, of the next one, so that there is an end.
+            let index = slice.current.take().or_else(|| self.next_to_blame());
             if let Some(index) = index {
                 self.answers.push(AnsweredLine::of_problem(index, problem));
             }
         }
         self.answers.end_part();
         self
+    }
+
+    /// A line that has no turn because the service stops, say; none where the slice has answered some before.
+    fn next_to_blame(&mut self) -> Option<u64> {
+        let next = if self.answers.lines == 0 { self.waiting.pop_front() } else { None };
+        next.map(|line| line.index)
     }
 }
 
@@ -704,7 +711,10 @@ mod tests {
     use serde_json::{Value, json};
     use tokio::sync::Semaphore;
 
-    use super::{Batch, BatchEndpoint, BatchQuery, Growing, Line, Lines, Pool, Room, SLICE_BYTES, Slice, line, work};
+    use super::{
+        Answers, Batch, BatchEndpoint, BatchQuery, Chunk, Growing, Line, Lines, Pool, Room, SLICE_BYTES, Slice, line,
+        work,
+    };
     use crate::config::Limits;
     use crate::problem::{Problem, ProblemCode};
 
@@ -795,6 +805,19 @@ mod tests {
         let slice = slice.into_inner();
         assert_eq!(slice.answers.lines + slice.waiting.len() as u64, 3);
         slice.answers.lines
+    }
+
+    /// The deadline may come between a slice's last line and its end.
+    #[test]
+    fn a_slice_that_has_answered_blames_no_line_that_it_has_not_begun() {
+        let query = BatchQuery { endpoint: BatchEndpoint::Sweep, peaks_only: true };
+        let batch = Batch { pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
+        let ahead = Arc::new(Semaphore::new(1)).try_acquire_owned().expect("a permit");
+        let line = Line { index: 7, document: Ok(Bytes::from("{}")), _ahead: ahead };
+        let mut chunk = Chunk { batch, waiting: [line].into(), answers: Answers { lines: 1, ..Answers::default() } };
+        assert_eq!((chunk.next_to_blame(), chunk.waiting.len()), (None, 1));
+        chunk.answers.lines = 0;
+        assert_eq!((chunk.next_to_blame(), chunk.waiting.len()), (Some(7), 0));
     }
 
     /// It is told neither as an answer nor as one that came too late.

@@ -4,7 +4,7 @@
 use std::cell::Cell;
 use std::io::{self, Write};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use axum::body::Body;
@@ -230,22 +230,28 @@ fn answered<Q: Question>(
     stop: &AtomicBool,
 ) -> Result<(Q::Answer, Reserved), Problem> {
     let mut reserved = room.reserve(Q::columns_bytes(checked) + text_bytes + Q::working_bytes(checked))?;
-    let taking = Taking { stop, memory: reserved.holds_any().then(|| room.memory()), is_scarce: Cell::new(false) };
+    let taking = Taking::new(stop, &reserved);
     let take = |input_angles| reserved.hold_at_least(Q::searched_bytes(checked, input_angles));
     let answer = with_room(&taking, take, |stop| Q::answer(checked, stop))?;
     if taking.is_scarce.get() { Err(NoRoom::Scarce.into()) } else { Ok((answer?, reserved)) }
 }
 
-/// What stops a solve: nobody waits for it any more, or it takes room where memory has become scarce.
+/// What stops a solve and the writing of its answer: nobody waits for them any more, or they take room where memory has become scarce.
 struct Taking<'a> {
     stop: &'a AtomicBool,
-    memory: Option<&'a Memory>,
+    memory: Option<Memory>,
     is_scarce: Cell<bool>,
+}
+
+impl<'a> Taking<'a> {
+    fn new(stop: &'a AtomicBool, reserved: &Reserved) -> Self {
+        Self { stop, memory: reserved.memory().cloned(), is_scarce: Cell::new(false) }
+    }
 }
 
 impl Stop for Taking<'_> {
     fn stopped(&self) -> bool {
-        if self.memory.is_some_and(Memory::is_scarce) {
+        if self.memory.as_ref().is_some_and(Memory::is_scarce) {
             self.is_scarce.set(true);
         }
         self.is_scarce.get() || self.stop.stopped()
@@ -270,12 +276,13 @@ fn written<A: Forms>(
     let expected_bytes = if gzip || !is_long { 0 } else { answer.expected_bytes() };
     let held_bytes = columns_bytes.max(answer.held_bytes(format));
     let buffer = Growing::new(reserved, held_bytes, expected_bytes)?;
+    let taking = Taking::new(stop, &buffer.reserved);
     let written = if gzip {
         // Before the encoder: of what compresses well little comes out of it for long.
-        let mut writer = Stoppable::new(GzEncoder::new(buffer, Compression::fast()), stop);
+        let mut writer = Stoppable::new(GzEncoder::new(buffer, Compression::fast()), &taking);
         answer.write(format, &mut writer).and_then(|()| writer.inner.finish())
     } else {
-        let mut writer = Stoppable::new(buffer, stop);
+        let mut writer = Stoppable::new(buffer, &taking);
         answer.write(format, &mut writer).map(|()| writer.inner)
     };
     drop(answer);
@@ -289,13 +296,16 @@ fn written<A: Forms>(
             let held = Some(reserved.send(body.clone(), &sent));
             Ok(Stored { body, sent, held, solve, server_timing })
         }
-        Err(error) => Err(write_problem(error, stop)),
+        Err(error) => Err(write_problem(error, &taking)),
     }
 }
 
 /// Why an answer could not be written into memory.
-fn write_problem(error: io::Error, stop: &AtomicBool) -> Problem {
-    if stop.load(Ordering::Relaxed) {
+fn write_problem(error: io::Error, taking: &Taking<'_>) -> Problem {
+    if taking.is_scarce.get() {
+        return NoRoom::Scarce.into();
+    }
+    if taking.stopped() {
         return NoAnswer::stopped().into();
     }
     error.downcast::<NoRoom>().map_or_else(|error| Problem::internal(&error), Into::into)
@@ -308,17 +318,17 @@ const LOOK_EVERY_BYTES: usize = 1 << 16;
 struct Stoppable<'a, W> {
     inner: W,
     until_look: usize,
-    stop: &'a AtomicBool,
+    stop: &'a dyn Stop,
 }
 
 impl<'a, W> Stoppable<'a, W> {
-    fn new(inner: W, stop: &'a AtomicBool) -> Self {
+    fn new(inner: W, stop: &'a dyn Stop) -> Self {
         Self { inner, until_look: LOOK_EVERY_BYTES, stop }
     }
 
     fn look(&mut self) -> io::Result<()> {
         self.until_look = LOOK_EVERY_BYTES;
-        if self.stop.load(Ordering::Relaxed) { Err(io::Error::other("stopped")) } else { Ok(()) }
+        if self.stop.stopped() { Err(io::Error::other("stopped")) } else { Ok(()) }
     }
 }
 
