@@ -25,6 +25,9 @@ pub const SLICE: Duration = Duration::from_millis(5);
 /// Of what unread answers may take, variants of studies may take another such part while they are computed.
 const PART_OF_VARIANTS: u64 = 4;
 
+/// What a single variant of a study may take: nobody waits for it, and a study has a time of its own.
+const MOST_OF_A_VARIANT: Duration = Duration::from_secs(3600);
+
 /// A variant that takes no more is not counted: most take a hundredth.
 pub const SMALL_VARIANT_BYTES: u64 = 1 << 20;
 
@@ -204,7 +207,7 @@ impl Pool {
         self.limits.max_concurrent_batches - self.batches.available_permits()
     }
 
-    /// Runs a slice of a batch or a study when its turn comes, however long that takes; its deadline begins when it runs.
+    /// Runs a slice of a batch when its turn comes, however long that takes; its deadline begins when it runs.
     ///
     /// # Errors
     /// As [`Self::run`], but for `queue_full`.
@@ -212,13 +215,32 @@ impl Pool {
         &self,
         job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
+        self.run_slice(Duration::from_millis(self.limits.deadline_ms), job).await
+    }
+
+    /// The same for so long at most. A time for which all of the process stood still is none in which a slice could come to its end: of that no more than a step
+    /// is counted.
+    async fn run_slice<T: Send + 'static>(
+        &self,
+        most: Duration,
+        job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        const STEPS: u32 = 8;
         let turn = tokio::select! {
             turn = Arc::clone(&self.turns).acquire_owned() => turn,
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
         // Behind the single solves that came before: each may take as long as a slice.
         let permit = self.permit().await?;
-        self.within(self.deadline(), self.run_permitted((turn, permit), Thread::Blocking, job)).await
+        let time_is_over = async {
+            for _ in 0..STEPS {
+                tokio::time::sleep(most / STEPS).await;
+            }
+        };
+        tokio::select! {
+            done = self.run_permitted((turn, permit), Thread::Blocking, job) => done,
+            () = time_is_over => Err(deadline_exceeded(most)),
+        }
     }
 
     /// Runs a slice of a study that has room for variants of so many bytes while they are computed: beside others only as far as together they take no
@@ -232,7 +254,7 @@ impl Pool {
         job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
         if room_bytes <= SMALL_VARIANT_BYTES {
-            return self.run_in_turn(job).await;
+            return self.run_slice(MOST_OF_A_VARIANT, job).await;
         }
         let part_bytes = self.limits.max_unread_bytes / PART_OF_VARIANTS;
         let wanted = async {
@@ -247,11 +269,11 @@ impl Pool {
             held = wanted => held,
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
-        self.run_in_turn(move |stop| {
+        let job = move |stop: &AtomicBool| {
             let _held = held;
             job(stop)
-        })
-        .await
+        };
+        self.run_slice(MOST_OF_A_VARIANT, job).await
     }
 
     /// So many bytes of the room of answers, when there are as many.
@@ -259,7 +281,8 @@ impl Pool {
         const LOOK: Duration = Duration::from_millis(20);
         let room = self.room.as_ref().filter(|_| bytes > 0)?;
         loop {
-            if let Ok(reserved) = room.reserve(bytes) {
+            // One that takes more than all there is was admitted all the same.
+            if let Ok(reserved) = room.reserve(bytes.min(self.limits.max_unread_bytes)) {
                 return Some(reserved);
             }
             tokio::time::sleep(LOOK).await;
@@ -362,12 +385,16 @@ impl Pool {
 
     /// The problem of what took too long.
     pub fn deadline_exceeded(&self) -> Problem {
-        let detail = format!(
-            "the computation did not finish within {} ms, waiting included; ask for less or try again in a moment",
-            self.limits.deadline_ms
-        );
-        Problem::new(ProblemCode::DeadlineExceeded, detail)
+        deadline_exceeded(Duration::from_millis(self.limits.deadline_ms))
     }
+}
+
+fn deadline_exceeded(time: Duration) -> Problem {
+    let detail = format!(
+        "the computation did not finish within {} ms, waiting included; ask for less or try again in a moment",
+        time.as_millis()
+    );
+    Problem::new(ProblemCode::DeadlineExceeded, detail)
 }
 
 /// Makes a panic of a job the problem of those who asked for it.
@@ -472,6 +499,29 @@ mod tests {
         assert!(large.await.is_ok());
         assert_eq!(room.taken_bytes(), 0);
         Ok(())
+    }
+
+    /// As of one that was stopped and goes on, or whose machine slept: what runs goes on with it.
+    #[tokio::test(start_paused = true)]
+    async fn a_time_for_which_the_process_stood_still_is_not_taken_from_a_slice() {
+        let Line { settings } = Line::parse_from(["serve", "--deadline-ms", "1000"]);
+        let pool = Pool::new(settings.limits());
+        let (begin, begun) = tokio::sync::oneshot::channel();
+        let (release, released) = mpsc::channel::<()>();
+        let slice = tokio::spawn(async move {
+            let work = move |_: &_| {
+                // Whether anybody listens is the test's own matter.
+                let _ = begin.send(());
+                released.recv().map_err(|error| Problem::internal(&error))
+            };
+            pool.run_in_turn(work).await
+        });
+        assert!(begun.await.is_ok());
+        tokio::time::advance(Duration::from_secs(60)).await;
+        tokio::task::yield_now().await;
+        assert!(!slice.is_finished());
+        assert!(release.send(()).is_ok());
+        assert!(slice.await.is_ok_and(|done| done.is_ok()));
     }
 
     #[tokio::test(start_paused = true)]

@@ -63,9 +63,6 @@ const POINT_BYTES: u64 = 800;
 /// Chunks that a worker may compute at once: each holds a connection to the database.
 const MOST_CHUNKS: i64 = 1000;
 
-/// What a single variant of a study may take in a worker, where nobody waits for it.
-const MOST_OF_A_VARIANT_MS: u64 = 3_600_000;
-
 /// Bytes of a request's line and headers together, at most.
 pub const MAX_HEADER_BYTES: usize = 40_960;
 
@@ -275,7 +272,7 @@ impl WorkerSettings {
             max_concurrent_solves: self.max_concurrent_solves.map_or_else(cores, |solves| solves as usize),
             max_queued_solves: 0,
             max_concurrent_batches: 0,
-            deadline_ms: MOST_OF_A_VARIANT_MS,
+            deadline_ms: u64::MAX,
             cache_max_bytes: 0,
             // It has no answers: variants take their part of all of the memory.
             max_unread_bytes: machine::memory_bytes().unwrap_or(UNKNOWN_MEMORY_BYTES),

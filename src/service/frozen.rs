@@ -19,6 +19,9 @@ const CHUNK: Duration = Duration::from_secs(1);
 /// Chunks of a study at most, though each takes longer then: whoever reads its result goes through a list of them.
 const MOST_CHUNKS: u64 = 100_000;
 
+/// And at least, where not all of its variants were seen before.
+const LEAST_CHUNKS: u64 = 64;
+
 /// A canary is long enough to tell how long variants take.
 const CANARY: Duration = Duration::from_millis(50);
 
@@ -78,7 +81,9 @@ pub async fn freeze(
     let a_variant = canary.busy / u32::try_from(canary_variants).unwrap_or(u32::MAX);
     let part_variants = MOST_OF_A_PART / (study.stored_bytes() / study.variants().max(1)).max(1);
     let wanted = u64::try_from(CHUNK.as_nanos() / a_variant.as_nanos().max(1)).unwrap_or(u64::MAX);
-    let wanted = wanted.max(study.variants().div_ceil(MOST_CHUNKS));
+    // Of what a canary has not seen some may take far longer: whatever that is, little of the study is lost with one chunk.
+    let most = if canary_variants < study.variants() { study.variants().div_ceil(LEAST_CHUNKS) } else { u64::MAX };
+    let wanted = wanted.min(most).max(study.variants().div_ceil(MOST_CHUNKS));
     #[cfg(feature = "fault-injection")]
     let wanted = crate::injected::chunk_variants().unwrap_or(wanted);
     let id = study.id().to_string();
@@ -194,9 +199,12 @@ impl Canary {
         Self { study: Arc::clone(study), room_bytes, island, hasher, sung: 0, most, until, busy: Duration::ZERO }
     }
 
-    /// Variants in an order whose every beginning is spread evenly (van der Corput's sequence): those at one end may be quick to refuse.
+    /// Variants in an order whose every beginning is spread evenly: those at one end may be quick to refuse. By steps of the golden ratio, which no number of
+    /// variants that stand on an axis divides: halves, quarters and so on see of an axis of two values the first alone.
     fn variant(&self) -> u64 {
-        let share = u128::from(self.sung.reverse_bits());
+        /// Of 2⁶⁴.
+        const GOLDEN_RATIO: u64 = 0x9E37_79B9_7F4A_7C15;
+        let share = u128::from(self.sung.wrapping_mul(GOLDEN_RATIO));
         u64::try_from((share * u128::from(self.study.variants())) >> 64).unwrap_or(0)
     }
 

@@ -58,6 +58,9 @@ const LARGE_BYTES: u64 = 1 << 20;
 /// What is known of stored studies besides their rows, at most: hundreds of the usual, or the few largest.
 const VIEWS_BYTES: u64 = 32 << 20;
 
+/// Chunks of a study in memory at least, as far as it has so many variants: of what is broken off a chunk is lost, and variants may take seconds.
+const LEAST_CHUNKS: u64 = 256;
+
 /// That a stored study was asked for is noted when it was not for this share of its expiry, so that who reads does not write each time.
 const NOTE_SHARE: u32 = 10;
 
@@ -279,7 +282,13 @@ impl Kept {
     fn cancel(&self) {
         let run = self.cancelled.lock();
         run.cancel();
-        self.stand(StudyState::Cancelled, None);
+        self.break_off(StudyState::Cancelled, None);
+    }
+
+    /// Of one that runs in this process: chunks that are not over are begun anew when it goes on.
+    fn break_off(&self, state: StudyState, problem: Option<Problem>) {
+        self.looked_at.store(self.here(|gathered| gathered.variants()), Ordering::Relaxed);
+        self.stand(state, problem);
     }
 
     fn new(study: Arc<Study>, rows: Option<Arc<Rows>>, bytes: u64, room: Option<room::Kept>) -> Arc<Self> {
@@ -747,7 +756,8 @@ impl Studies {
         let kept = match known {
             Some(kept) => kept,
             None => {
-                let study = Arc::new(study);
+                let chunk_variants = (study.variants() / LEAST_CHUNKS).clamp(1, study.chunk_variants());
+                let study = Arc::new(study.in_chunks_of(chunk_variants));
                 let in_work = study.chunks().min(self.limits.max_concurrent_solves as u64);
                 let bytes = study.kept_bytes().saturating_add(in_work.saturating_mul(study.working_bytes()));
                 let rows = self.new_rows(&mut all, &study, bytes)?;
@@ -934,6 +944,7 @@ impl Studies {
                 // The file may be from a time of more memory; what is admitted now is computed now.
                 let capacity = Capacity {
                     slots: self.limits.max_concurrent_solves,
+                    slots_for_others: self.limits.max_concurrent_studies.saturating_sub(1),
                     variant_bytes: self.limits.max_unread_bytes,
                     admitted_states: self.limits.max_states,
                 };
@@ -1017,9 +1028,10 @@ impl Studies {
             }
             match ended {
                 Ok(Ok(())) => kept.stand(StudyState::Done, None),
-                Ok(Err(problem)) => kept.stand(StudyState::Failed, Some(problem)),
+                Ok(Err(problem)) => kept.break_off(StudyState::Failed, Some(problem)),
                 Err(_) => {
-                    kept.stand(StudyState::Failed, Some(too_late(&format!("the {} ms of", limits.study_deadline_ms))))
+                    let problem = too_late(&format!("the {} ms of", limits.study_deadline_ms));
+                    kept.break_off(StudyState::Failed, Some(problem));
                 }
             }
         });

@@ -10,7 +10,7 @@ use bytes::Bytes;
 use futures_util::future::join_all;
 use metrics::counter;
 use parking_lot::Mutex;
-use tokio::sync::watch;
+use tokio::sync::{OnceCell, watch};
 use tokio_util::sync::CancellationToken;
 use toothwave_calculation::BUILD;
 use toothwave_calculation::no_answer::NoAnswer;
@@ -45,7 +45,9 @@ pub struct Workers {
     stopping: CancellationToken,
     /// What a chunk that is in work then gets to come to its end.
     patience: Duration,
-    known: tokio::sync::Mutex<HashMap<Waiting, Known>>,
+    known: Mutex<HashMap<Waiting, Arc<OnceCell<Known>>>>,
+    /// Chunks of each study that are in work here.
+    in_work: Mutex<HashMap<String, usize>>,
     /// What was last said of each.
     troubles: Mutex<BTreeMap<What, String>>,
 }
@@ -53,8 +55,10 @@ pub struct Workers {
 /// What workers have room for. A variant that takes more would end the process, and each that takes it up again, canary first.
 #[derive(Debug, Clone, Copy)]
 pub struct Capacity {
-    /// Chunks that are computed side by side.
+    /// Chunks of one study that are computed side by side.
     pub slots: usize,
+    /// Besides, one of each of so many other studies: a chunk may be long, and they are not to wait for its end. All of them are computed in slices that take turns.
+    pub slots_for_others: usize,
     /// What a variant may take while it is computed,
     pub variant_bytes: u64,
     /// unless its study lets none have more states than this: such a one was admitted here.
@@ -92,6 +96,49 @@ struct Ours {
     most_bytes: u64,
 }
 
+/// Why it is not known of a study whether this process computes it.
+enum Unseen {
+    /// It waits no more.
+    Gone,
+    Problem(Problem),
+}
+
+impl From<Problem> for Unseen {
+    fn from(problem: Problem) -> Self {
+        Self::Problem(problem)
+    }
+}
+
+/// A chunk of a study that is in work, or may soon be.
+struct InWork<'a> {
+    all: &'a Mutex<HashMap<String, usize>>,
+    id: &'a str,
+}
+
+impl<'a> InWork<'a> {
+    /// Where fewer than so many are.
+    fn one_more(all: &'a Mutex<HashMap<String, usize>>, id: &'a str, most: usize) -> Option<Self> {
+        let mut counts = all.lock();
+        let count = counts.entry(id.into()).or_default();
+        (*count < most).then(|| {
+            *count += 1;
+            Self { all, id }
+        })
+    }
+}
+
+impl Drop for InWork<'_> {
+    fn drop(&mut self) {
+        let mut counts = self.all.lock();
+        if let Some(count) = counts.get_mut(self.id) {
+            *count -= 1;
+            if *count == 0 {
+                counts.remove(self.id);
+            }
+        }
+    }
+}
+
 /// The studies that wait, as far as is known.
 type Tasks = watch::Receiver<Arc<Vec<Waiting>>>;
 
@@ -106,8 +153,8 @@ impl Workers {
         stopping: CancellationToken,
         patience: Duration,
     ) -> Self {
-        let (known, troubles) = Default::default();
-        Self { store, parts, pool, capacity, changed, stopping, patience, known, troubles }
+        let (known, in_work, troubles) = Default::default();
+        Self { store, parts, pool, capacity, changed, stopping, patience, known, in_work, troubles }
     }
 
     /// Works until it is told to stop.
@@ -115,7 +162,8 @@ impl Workers {
         let (tell, tasks) = watch::channel(Arc::default());
         let over = CancellationToken::new();
         let slots = async {
-            join_all((0..self.capacity.slots).map(|slot| self.fill(slot, tasks.clone()))).await;
+            let Capacity { slots, slots_for_others, .. } = self.capacity;
+            join_all((0..slots + slots_for_others).map(|slot| self.fill(slot, tasks.clone()))).await;
             over.cancel();
         };
         tokio::join!(slots, self.look(&tell, &over));
@@ -128,7 +176,7 @@ impl Workers {
             match self.store.waiting().await {
                 Ok(waiting) => {
                     self.is_well(What::Reading);
-                    self.known.lock().await.retain(|task, _| waiting.contains(task));
+                    self.known.lock().retain(|task, _| waiting.contains(task));
                     tell.send_replace(Arc::new(waiting));
                 }
                 // What was begun may go on: it is kept when the store is back.
@@ -142,17 +190,26 @@ impl Workers {
         }
     }
 
-    /// One chunk after the other, of the studies in turn.
+    /// One chunk after the other, of the studies in turn, first of those of which the fewest are in work.
     async fn fill(&self, slot: usize, mut tasks: Tasks) {
+        let Capacity { slots, .. } = self.capacity;
+        let most_in_work = if slot < slots { slots } else { 1 };
         let mut turn = slot;
         while !self.stopping.is_cancelled() {
             let waiting = Arc::clone(&tasks.borrow_and_update());
             let mut has_worked = false;
-            for offset in 0..waiting.len() {
+            let mut in_turn: Vec<_> =
+                (0..waiting.len()).map(|offset| turn.wrapping_add(offset) % waiting.len()).collect();
+            {
+                let in_work = self.in_work.lock();
+                in_turn.sort_by_key(|&index| in_work.get(&waiting[index].cut.id).copied());
+            }
+            for index in in_turn {
                 if self.stopping.is_cancelled() {
                     return;
                 }
-                let task = &waiting[(turn + offset) % waiting.len()];
+                let task = &waiting[index];
+                let Some(_one_more) = InWork::one_more(&self.in_work, &task.cut.id, most_in_work) else { continue };
                 // A canary that is begun is no chunk: whoever is told to stop leaves it.
                 let found = tokio::select! {
                     biased;
@@ -174,7 +231,7 @@ impl Workers {
                     Err(error) => self.is_in_trouble(What::Writing, &error),
                 }
                 if has_worked {
-                    turn = turn.wrapping_add(offset + 1);
+                    turn = index + 1;
                     break;
                 }
             }
@@ -189,35 +246,36 @@ impl Workers {
 
     /// The study, where this process computes it: of this build, with a canary of the same bits.
     async fn study(&self, task: &Waiting) -> Option<Ours> {
-        let mut known = self.known.lock().await;
-        if let Some(known) = known.get(task) {
-            return known.clone().ok();
-        }
-        let found = if task.build == BUILD {
-            match self.admitted(task).await {
-                Ok(found) => found?,
-                // Another time.
-                Err(problem) => {
-                    tracing::warn!(study = task.cut.id, %problem, cause = problem.cause, "a study could not be looked at");
-                    return None;
-                }
+        // Whoever wants this one waits for its canary, and nobody else.
+        let known = Arc::clone(self.known.lock().entry(task.clone()).or_default());
+        let found = known.get_or_try_init(|| async {
+            let found = if task.build == BUILD {
+                self.admitted(task).await?
+            } else {
+                Err(NotHere::OtherBuild { theirs: task.build.clone() })
+            };
+            if let Err(reason) = &found {
+                tracing::warn!(study = task.cut.id, %reason, "a study is left to other workers");
             }
-        } else {
-            Err(NotHere::OtherBuild { theirs: task.build.clone() })
-        };
-        if let Err(reason) = &found {
-            tracing::warn!(study = task.cut.id, %reason, "a study is left to other workers");
+            Ok::<_, Unseen>(found)
+        });
+        match found.await {
+            Ok(found) => found.clone().ok(),
+            Err(Unseen::Gone) => None,
+            // Another time.
+            Err(Unseen::Problem(problem)) => {
+                tracing::warn!(study = task.cut.id, %problem, cause = problem.cause, "a study could not be looked at");
+                None
+            }
         }
-        known.insert(task.clone(), found.clone());
-        found.ok()
     }
 
-    async fn admitted(&self, task: &Waiting) -> Result<Option<Known>, Problem> {
-        let standing = self.store.find(&task.cut.id).await?.filter(|standing| standing.study.cut() == task.cut);
-        let Some(standing) = standing else { return Ok(None) };
+    async fn admitted(&self, task: &Waiting) -> Result<Known, Unseen> {
+        let standing = self.store.find(&task.cut.id).await.map_err(Problem::from)?;
+        let standing = standing.filter(|standing| standing.study.cut() == task.cut).ok_or(Unseen::Gone)?;
         let study = match frozen::thaw(&self.pool, &standing.study).await? {
             Ok(study) => study,
-            Err(reason) => return Ok(Some(Err(reason))),
+            Err(reason) => return Ok(Err(reason)),
         };
         let Capacity { variant_bytes, admitted_states, .. } = self.capacity;
         let most_bytes = if standing.study.max_states <= admitted_states { u64::MAX } else { variant_bytes };
@@ -231,7 +289,7 @@ impl Workers {
             is_same = heard.is_ok(),
             "a canary sang"
         );
-        Ok(Some(heard.map(|()| Ours { study, lease: standing.study.lease, most_bytes })))
+        Ok(heard.map(|()| Ours { study, lease: standing.study.lease, most_bytes }))
     }
 
     /// Computes a chunk and keeps what it comes to, unless it is not wanted any more.
@@ -267,7 +325,7 @@ impl Workers {
             Some(Ok(Ok(computed))) => computed,
             Some(Ok(Err(reason))) => {
                 tracing::warn!(study = id, chunk, %reason, "a study is left to other workers");
-                self.known.lock().await.insert(task.clone(), Err(reason));
+                self.known.lock().insert(task.clone(), Arc::new(OnceCell::new_with(Some(Err(reason)))));
                 return give_up(lease).await;
             }
             Some(Err(problem)) => {
@@ -339,12 +397,13 @@ impl Workers {
             return Ok((part, None));
         }
         let study = Arc::clone(study);
+        let bytes = study.rows_bytes(&part);
         let writing = move |_: &AtomicBool| {
             let mut rows = Vec::new();
             study.write_rows(&part, &mut rows).map_err(|error| Problem::internal(&error))?;
             Ok((part, Some(rows.into())))
         };
-        self.pool.run_in_turn(writing).await
+        self.pool.run_variants(bytes, writing).await
     }
 
     /// Says what is wrong, once.

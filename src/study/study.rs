@@ -25,6 +25,7 @@ use crate::quantity::{Needs, QUANTITIES, Quantity};
 use crate::rows::{CHUNK_VARIANTS, GapAnswer, Rows, RowsPart, RowsParts, RowsWork};
 use crate::search::{Island, IslandPart, Search, SearchAnswer};
 use crate::sensitivity::{Sensitivity, SensitivityAnswer};
+use crate::table::Table;
 use crate::tolerance::{Tolerance, ToleranceAnswer};
 use crate::variant::{Domain, Template};
 
@@ -247,20 +248,28 @@ impl Study {
         !matches!(self.kind, Kind::Search(_))
     }
 
+    /// About what it takes to write the rows of a chunk, its text among that.
+    pub fn rows_bytes(&self, part: &Part) -> u64 {
+        self.rows_table(part).map_or(0, |table| table.parquet_bytes() + table.text_bytes())
+    }
+
     /// Writes the rows of a chunk as Apache Parquet, with the same bytes whoever does; of a map they have the columns of its result. Nothing
     /// where there are none.
     ///
     /// # Errors
     /// Those of the writer.
     pub fn write_rows(&self, part: &Part, writer: &mut dyn Write) -> io::Result<()> {
-        let Part::Rows(rows) = part else { return Ok(()) };
-        let table = match &self.kind {
-            Kind::Map(map) => rows.table(map, &self.evaluator),
-            Kind::Sensitivity(sensitivity) => rows.table(sensitivity, &self.evaluator),
-            Kind::Tolerance(tolerance) => rows.table(tolerance, &self.evaluator),
-            Kind::Search(_) => return Ok(()),
-        };
-        table.write_parquet(writer)
+        self.rows_table(part).map_or(Ok(()), |table| table.write_parquet(writer))
+    }
+
+    fn rows_table<'a>(&'a self, part: &'a Part) -> Option<Table<'a>> {
+        let Part::Rows(rows) = part else { return None };
+        match &self.kind {
+            Kind::Map(map) => Some(rows.table(map, &self.evaluator)),
+            Kind::Sensitivity(sensitivity) => Some(rows.table(sensitivity, &self.evaluator)),
+            Kind::Tolerance(tolerance) => Some(rows.table(tolerance, &self.evaluator)),
+            Kind::Search(_) => None,
+        }
     }
 
     /// The variants of a chunk in rows.

@@ -116,6 +116,11 @@ impl Table<'_> {
         self.length.min(group_rows) as u64 * of_row + groups.saturating_mul(columns).saturating_mul(NOTE_BYTES)
     }
 
+    /// About how many bytes it is as Parquet: numbers are not compressed, and each row has a bit that says whether it has one.
+    pub(crate) fn text_bytes(&self) -> u64 {
+        (self.length as u64).saturating_mul(self.columns.len() as u64).saturating_mul(9)
+    }
+
     fn group_rows(&self) -> usize {
         (GROUP_CELLS / self.columns.len().max(1)).clamp(1, GROUP_ROWS)
     }
@@ -125,8 +130,8 @@ impl Column {
     /// What a cell takes until its group is written; a word, where it is short.
     const fn cell_bytes(&self) -> u64 {
         match self.kind {
-            Content::Count | Content::Number => 32,
-            Content::Word => 64,
+            Content::Count | Content::Number => 32 + 8,
+            Content::Word => 128,
         }
     }
 

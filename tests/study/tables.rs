@@ -124,6 +124,7 @@ fn cells_of_chunks(document: &Value, variants: u64) -> Vec<Vec<String>> {
             study.write_rows(&part, &mut bytes).unwrap();
             bytes
         });
+        assert!(study.rows_bytes(&part) > 2 * one.len() as u64, "its cells are there with the text of a group");
         assert_eq!(one, other, "the bytes of a chunk follow from it");
         let mut rows = cells_of_file(one);
         let head = rows.remove(0);
