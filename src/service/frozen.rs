@@ -271,3 +271,39 @@ async fn sung(pool: &Pool, mut canary: Canary, most_bytes: u64) -> Result<Result
     }
     Ok(Err(NotHere::NeedsMemory { bytes: canary.room_bytes, most_bytes }))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use toothwave_calculation::question;
+    use toothwave_study::{Limits, Study};
+
+    use super::Canary;
+
+    #[test]
+    fn every_beginning_of_a_canary_is_spread_over_a_study_and_sees_each_value_of_its_axes() {
+        let base = include_str!("../../examples/paper-5.1.json");
+        let over = r#"{ "/drive/teeth/radius_mm": { "min": 3, "max": 7, "steps": 8192 }, "/sweep/samples": { "one_of": [16, 50] } }"#;
+        let document =
+            format!(r#"{{ "study": "map", "base": {base}, "over": {over}, "quantities": ["peak_stress_ring_mpa"] }}"#);
+        let calculation = question::Limits { max_states: 1_000_000, max_profile_points: 1_000_000 };
+        let limits = Limits { calculation, max_study_variants: u64::MAX, max_study_bytes: u64::MAX };
+        let study = Arc::new(Study::read(document.as_bytes(), &limits).expect("a study"));
+        let mut canary = Canary::new(&study, 4096, None);
+        let mut seen = Vec::new();
+        for begun in 0..4096_u64 {
+            canary.sung = begun;
+            seen.push(canary.variant());
+            if begun % 64 == 63 {
+                let share = |of: &dyn Fn(u64) -> bool| {
+                    seen.iter().filter(|&&variant| of(variant)).count() as f64 / seen.len() as f64
+                };
+                assert!((0.4..0.6).contains(&share(&|variant| variant % 2 == 1)), "{begun}");
+                for quarter in 0..4 {
+                    assert!((0.2..0.3).contains(&share(&|variant| variant / 4096 == quarter)), "{begun}");
+                }
+            }
+        }
+    }
+}

@@ -447,6 +447,58 @@ async fn a_study_that_another_forgot_and_began_anew_in_other_chunks_is_whole() {
     workers.await.unwrap();
 }
 
+/// Of two axes of powers of two the canary saw those variants alone that took no time, and the study was one chunk.
+#[tokio::test]
+async fn a_study_of_which_its_canary_has_not_seen_all_has_many_chunks() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    let mut study = map(8192);
+    study["over"]["/sweep/samples"] = json!({ "one_of": [16, 50] });
+    let study = keeper.ask(&study).await.json();
+    let frozen = keeper.store.find(study["id"].as_str().unwrap()).await.unwrap().unwrap().study;
+    assert!(frozen.canary_variants < frozen.variants);
+    assert!(frozen.chunks >= 64, "{} chunks of {} variants", frozen.chunks, frozen.variants);
+    keeper.end().await;
+}
+
+/// A chunk of hundreds of thousands of variants, on one core.
+#[tokio::test]
+async fn a_study_does_not_wait_for_the_end_of_anothers_chunk() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, Limits { max_concurrent_solves: 1, ..LIMITS }, false).await;
+    let mut long = map(700);
+    long["over"]["/load/input_torque_nm"] = json!({ "min": 10.0, "max": 20.0, "steps": 700 });
+    let study = keeper.ask(&long).await.json();
+    let first = keeper.store.find(study["id"].as_str().unwrap()).await.unwrap().unwrap().study;
+    keeper.store.forget(&first.id).await.unwrap();
+    let long = NewStudy { chunk_variants: first.variants, chunks: 1, ..first };
+    keeper.store.create(&long).await.unwrap();
+    let app = std::sync::Arc::clone(&keeper.service.app);
+    let workers = tokio::spawn(async move { app.studies.serve_store().await });
+    while keeper.store.figures().await.unwrap().in_work == 0 {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    assert_eq!(keeper.wait_for(&map(5)).await["state"], "done");
+    assert_eq!(keeper.store.chunks_done(&long.cut()).await.unwrap(), [0; 0]);
+    keeper.store.cancel(&long.id).await.unwrap();
+    keeper.service.app.studies.close();
+    workers.await.unwrap();
+}
+
+/// What a request may take is none of a study's: its canary was begun again and again, and it ran for ever.
+#[tokio::test]
+async fn a_file_of_studies_is_worked_on_where_requests_have_less_time_than_a_slice() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    let study = keeper.ask(&map(300)).await.json();
+    keeper.end().await;
+    let keeper = Keeper::of(&file, Limits { deadline_ms: 1, ..LIMITS }, true).await;
+    while !keeper.store.find(study["id"].as_str().unwrap()).await.unwrap().unwrap().is_done() {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    keeper.end().await;
+}
+
 /// Whoever reads it goes through a list of them: of millions that took seconds, in which nobody else was answered.
 #[tokio::test]
 async fn a_study_however_large_has_a_hundred_thousand_chunks_at_most() {

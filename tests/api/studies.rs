@@ -131,6 +131,23 @@ async fn a_cancelled_study_keeps_what_it_has_and_goes_on_when_it_is_asked_for_ag
     assert_eq!(deleted(&service, &place(&study)).await, 404);
 }
 
+/// In memory chunks of thousands of variants were lost, of which each may take seconds, and were counted as looked at.
+#[tokio::test]
+async fn a_study_that_is_cancelled_has_the_variants_that_it_says_it_has_looked_at() {
+    let service = Service::within(LIMITS);
+    let study = begun(&service, &long()).await.json();
+    while service.get(&place(&study)).await.found()["looked_at"].as_u64().unwrap() < 8000 {
+        tokio::time::sleep(Duration::from_millis(1)).await;
+    }
+    assert_eq!(deleted(&service, &place(&study)).await, 204);
+    let stands = service.get(&place(&study)).await.found();
+    let partial = service.get(&format!("{}/result", place(&study))).await.found();
+    let has = |what: &str| partial[what]["variant"].as_array().unwrap().len() as u64;
+    let variants = has("possible") + has("impossible");
+    assert_eq!((&stands["state"], &stands["looked_at"]), (&json!("cancelled"), &json!(variants)));
+    assert!(variants > 4000, "{variants}");
+}
+
 #[tokio::test]
 async fn who_lets_go_of_a_study_lets_go_of_none_that_was_asked_for_since() {
     let service = Service::within(Limits { max_concurrent_solves: 1, ..LIMITS });
