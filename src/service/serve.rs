@@ -156,7 +156,7 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
         () = server.accept(&listener) => false,
     };
     if !is_told_twice {
-        server.accept_those_that_wait(&listener).await;
+        server.accept_those_that_wait(&listener);
         drop(listener);
         server.closing.cancel();
         app.studies.close();
@@ -333,10 +333,15 @@ impl Server {
     }
 
     /// Accepts the connections that came before the listener is closed, which would cut them.
-    async fn accept_those_that_wait(&self, listener: &TcpListener) {
-        // However many there are: of its own the runtime would say that none waits after some hundred.
-        while let Some(Ok((stream, _))) = unconstrained(listener.accept()).now_or_never() {
-            self.take(stream).await;
+    fn accept_those_that_wait(&self, listener: &TcpListener) {
+        // As many as could wait: those that come meanwhile, of many clients ever more, hold up no shutdown.
+        for _ in 0..BACKLOG {
+            // Of its own the runtime would say that none waits after some hundred.
+            let Some(Ok((stream, _))) = unconstrained(listener.accept()).now_or_never() else { return };
+            // Beyond the last connection nobody is taken in any more.
+            if let Ok(permit) = Arc::clone(&self.connections).try_acquire_owned() {
+                self.serve(Socket::new(stream, self.patience), permit);
+            }
         }
     }
 
@@ -458,7 +463,7 @@ mod tests {
         let mut client = TcpStream::connect(listener.local_addr()?).await?;
         client.write_all(sent).await?;
         server.closing.cancel();
-        server.accept_those_that_wait(&listener).await;
+        server.accept_those_that_wait(&listener);
         let mut answer = String::new();
         client.read_to_string(&mut answer).await?;
         server.open.close();

@@ -159,8 +159,13 @@ pub struct Rows {
 /// What a study has come to, for who tells it: as long as this is held its rows stay, and their room is taken.
 #[derive(Debug)]
 pub enum Reading {
-    /// An answer that is short.
-    Made(Box<StudyAnswer>),
+    /// An answer that is made already, once for all who wait to tell it.
+    Made {
+        /// Whose.
+        kept: Arc<Kept>,
+        /// It.
+        made: Arc<Made>,
+    },
     /// The rows that it is to be made of, as they are then: there are as many lists of their chunks as answers that are being made.
     Rows {
         /// Whose.
@@ -174,7 +179,7 @@ impl Reading {
     /// About what the answer takes that is still to be made.
     pub fn columns_bytes(&self) -> u64 {
         match self {
-            Self::Made(_) => 0,
+            Self::Made { kept, .. } => kept.study.told_bytes(),
             Self::Rows { kept, .. } => kept.study.answer_bytes(),
         }
     }
@@ -182,7 +187,7 @@ impl Reading {
     /// It.
     pub fn answer(self) -> StudyAnswer {
         match self {
-            Self::Made(answer) => *answer,
+            Self::Made { made, .. } => made.answer.clone(),
             Self::Rows { kept, rows } => kept.gathered(&rows).answer(),
         }
     }
@@ -190,11 +195,14 @@ impl Reading {
 
 /// An answer that was made apart from the requests for it.
 #[derive(Debug)]
-struct Made {
-    answer: StudyAnswer,
+pub struct Made {
+    /// It.
+    pub answer: StudyAnswer,
     /// Whether every chunk is in it.
     is_whole: bool,
     at: Instant,
+    /// For as long as it is kept.
+    _room: room::Kept,
 }
 
 /// The same while it is made: all who ask meanwhile share it.
@@ -874,8 +882,8 @@ impl Studies {
     /// # Errors
     /// Where the store does not answer, there is no room, or the time is over.
     pub async fn read(&self, kept: &Arc<Kept>, deadline: Instant) -> Result<Reading, Problem> {
-        if let Some(answer) = self.made_apart(kept, deadline).await? {
-            return Ok(Reading::Made(Box::new(answer)));
+        if let Some(made) = self.made_apart(kept, deadline).await? {
+            return Ok(Reading::Made { kept: Arc::clone(kept), made });
         }
         let rows = self.rows(kept)?;
         if let Keeping::Store { store, .. } = &self.keeping {
@@ -889,7 +897,7 @@ impl Studies {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub async fn made_apart(&self, kept: &Arc<Kept>, deadline: Instant) -> Result<Option<StudyAnswer>, Problem> {
+    pub async fn made_apart(&self, kept: &Arc<Kept>, deadline: Instant) -> Result<Option<Arc<Made>>, Problem> {
         if !kept.is_made_apart() {
             return Ok(None);
         }
@@ -905,7 +913,7 @@ impl Studies {
                 "the study's answer is still being made of its rows, which goes on; ask for it again in a moment";
             Problem::new(ProblemCode::DeadlineExceeded, detail)
         })??;
-        Ok(Some(made.answer.clone()))
+        Ok(Some(made))
     }
 
     fn making(&self, kept: &Arc<Kept>) -> Result<Making, Problem> {
@@ -922,9 +930,10 @@ impl Studies {
             }
             let make = move || {
                 let _reserved = room.reserve(kept.study.stored_bytes())?;
+                let of_answer = room.keep(kept.study.told_bytes())?;
                 let gathered = kept.gathered(&rows);
                 let (answer, is_whole) = (gathered.answer(), gathered.is_complete());
-                Ok(Arc::new(Made { answer, is_whole, at: Instant::now() }))
+                Ok(Arc::new(Made { answer, is_whole, at: Instant::now(), _room: of_answer }))
             };
             pool.run_unhurried(make).await
         };

@@ -217,7 +217,13 @@ impl Workers {
                     found = self.study(task) => found,
                 };
                 let Some(ours) = found else { continue };
-                match self.store.claim(&task.cut, ours.lease).await {
+                // Nor is one that the store does not give.
+                let claimed = tokio::select! {
+                    biased;
+                    () = self.stopping.cancelled() => return,
+                    claimed = self.store.claim(&task.cut, ours.lease) => claimed,
+                };
+                match claimed {
                     Ok(Claim::Chunk(lease)) => {
                         self.compute(task, &ours, lease, &mut tasks).await;
                         has_worked = true;

@@ -58,7 +58,7 @@ impl Store {
             }
         };
         // From here on dropping the lease sets the chunk free.
-        let lease = Lease { store: self.clone(), cut: cut.clone(), chunk, silence: lease, held };
+        let mut lease = Lease { store: self.clone(), cut: cut.clone(), chunk, silence: lease, held };
         match self.note_attempt(&cut.id, chunk).await {
             Ok(true) => return Ok(Claim::Chunk(lease)),
             Ok(false) => {}
@@ -66,7 +66,12 @@ impl Store {
             Err(StoreError::Failed(sqlx::Error::Database(error))) if error.is_foreign_key_violation() => {
                 return Ok(Claim::None);
             }
-            Err(error) => return Err(error),
+            Err(error) => {
+                if matches!(error, StoreError::Silent(_)) {
+                    lease.take_back_attempt().await;
+                }
+                return Err(error);
+            }
         }
         lease.give_up().await?;
         Ok(Claim::Gap(chunk))
@@ -120,6 +125,18 @@ impl Store {
                     .map(|done| done.rows_affected() == 1)
             })?;
             Ok(noted)
+        })
+        .await
+    }
+
+    /// Deletes what is noted of attempts of this process.
+    async fn delete_attempts(&self, study: &str, chunk: u64) -> Result<(), StoreError> {
+        let text = "DELETE FROM attempts WHERE study = $1 AND chunk = $2 AND worker = $3";
+        self.with(PATIENCE, async |connection| {
+            on!(connection, inner => {
+                sqlx::query(text).bind(study).bind(stored(chunk)).bind(&*self.worker).execute(inner).await.map(|_| ())
+            })?;
+            Ok(())
         })
         .await
     }
@@ -228,16 +245,26 @@ impl Lease {
     /// # Errors
     /// Where the store does not answer; the attempt then stays noted.
     pub async fn give_back(self) -> Result<(), StoreError> {
-        let store = self.store.clone();
-        let (study, chunk, worker) = (self.cut.id.clone(), stored(self.chunk), store.worker.to_string());
+        let (store, cut, chunk) = (self.store.clone(), self.cut.clone(), self.chunk);
         drop(self);
-        let text = "DELETE FROM attempts WHERE study = $1 AND chunk = $2 AND worker = $3";
-        store
-            .with(PATIENCE, async |connection| {
-                on!(connection, inner => sqlx::query(text).bind(study).bind(chunk).bind(worker).execute(inner).await.map(|_| ()))?;
-                Ok(())
-            })
-            .await
+        store.delete_attempts(&cut.id, chunk).await
+    }
+
+    /// Holds the chunk until nothing is noted of an attempt that was not begun: a store that said nothing in time, since it does not flush for a while
+    /// say, may note it all the same when it goes on. Were the chunk let go, it would be claimed next, and three such attempts were a gap.
+    async fn take_back_attempt(&mut self) {
+        const FIRST_PAUSE: Duration = Duration::from_secs(1);
+        const LONGEST_PAUSE: Duration = Duration::from_secs(30);
+        // What is deleted first may not see what is still being committed; when that comes to its end, so has this.
+        let (mut deleted, mut pause) = (0, FIRST_PAUSE);
+        while deleted < 2 {
+            self.say().await;
+            tokio::time::sleep(pause).await;
+            match self.store.delete_attempts(&self.cut.id, self.chunk).await {
+                Ok(()) => (deleted, pause) = (deleted + 1, FIRST_PAUSE),
+                Err(_) => pause = (2 * pause).min(LONGEST_PAUSE),
+            }
+        }
     }
 
     /// Makes the chunk a gap.

@@ -86,6 +86,13 @@ impl Sensitivity {
         Ok((Self { inputs: moved }, template))
     }
 
+    /// What the answer takes: of each quantity an entry for each input.
+    pub(crate) fn answer_bytes(&self, quantities: usize) -> u64 {
+        // A text takes a few bytes more than it has.
+        let an_input = |input: &Input| size_of::<SensitivityToInput>() + input.pointer.len() + 16;
+        (quantities * self.inputs.iter().map(an_input).sum::<usize>()) as u64
+    }
+
     pub(crate) const fn variants(&self) -> u64 {
         1 + 2 * self.inputs.len() as u64
     }

@@ -291,13 +291,20 @@ impl Study {
         OVERHEAD.saturating_add(bytes)
     }
 
-    /// About what its answer takes beside what is kept.
+    /// About what its answer takes beside what is kept, while it is made.
     pub fn answer_bytes(&self) -> u64 {
-        let of_designs = match &self.kind {
+        self.stored_bytes().saturating_add(self.told_bytes())
+    }
+
+    /// About what its answer takes when it is made, but for what is as much as is stored.
+    pub fn told_bytes(&self) -> u64 {
+        let quantities = self.evaluator.quantities.len();
+        match &self.kind {
+            Kind::Map(_) => 0,
             Kind::Search(search) => search.designs_bytes(self.template.longest_bytes()),
-            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => 0,
-        };
-        self.stored_bytes().saturating_add(of_designs)
+            Kind::Sensitivity(sensitivity) => sensitivity.answer_bytes(quantities),
+            Kind::Tolerance(tolerance) => tolerance.answer_bytes(quantities),
+        }
     }
 
     /// About what it takes to keep it with what it comes to.

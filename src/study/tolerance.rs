@@ -172,6 +172,14 @@ impl Tolerance {
         if self.kinds.len() > 1 { ALONE.min(self.samples) } else { 0 }
     }
 
+    /// What the answer takes: of each quantity an entry for each kind of deviation, and its histogram.
+    pub(crate) fn answer_bytes(&self, quantities: usize) -> u64 {
+        const HISTOGRAM_BYTES: usize = 2048;
+        // A text takes a few bytes more than it has.
+        let a_kind = |kind: &Kind| size_of::<ContributorAnswer>() + kind.name.len() + 16;
+        (quantities * (HISTOGRAM_BYTES + self.kinds.iter().map(a_kind).sum::<usize>())) as u64
+    }
+
     pub(crate) fn variants(&self) -> u64 {
         1 + self.samples + self.alone() * self.kinds.len() as u64
     }

@@ -386,6 +386,35 @@ fn no_client_that_keeps_its_connection_loses_a_request_when_the_process_is_told_
     assert_eq!(process.ended().code(), Some(0));
 }
 
+/// Each is refused, and asks again at once, on and on: there is always one more that waits to be taken in.
+#[test]
+fn clients_that_keep_coming_hold_up_no_stop() {
+    let process = Process::started(&["serve", "--max-connections", "4"]);
+    let address = process.address;
+    let held: Vec<_> = (0..4).map(|_| idle(address)).collect();
+    let begun = Arc::new(AtomicUsize::new(0));
+    let clients: Vec<_> = (0..250)
+        .map(|_| {
+            let begun = Arc::clone(&begun);
+            std::thread::spawn(move || {
+                while let Ok(mut stream) = TcpStream::connect(address) {
+                    begun.fetch_add(1, Ordering::Relaxed);
+                    // What becomes of it is none of this test's matter.
+                    let _ = stream.write_all(b"GET /v1/limits HTTP/1.1\r\nhost: localhost\r\n\r\n");
+                    let _ = stream.read(&mut [0; 512]);
+                }
+            })
+        })
+        .collect();
+    while begun.load(Ordering::Relaxed) < 1000 {
+        std::thread::yield_now();
+    }
+    process.signalled("-TERM");
+    assert_eq!(process.ended().code(), Some(0));
+    clients.into_iter().for_each(|client| client.join().unwrap());
+    drop(held);
+}
+
 #[test]
 fn a_process_that_is_told_twice_to_stop_ends_at_once() {
     for lame_duck_ms in ["0", "600000"] {

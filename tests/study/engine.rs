@@ -5,13 +5,13 @@ use std::sync::{Arc, Mutex};
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use toothwave_calculation::forms::Format;
+use toothwave_calculation::forms::{Format, Forms as _};
 use toothwave_calculation::question::Question as _;
 use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::{Never, Stop};
 use toothwave_study::{Gathered, Part, Study, Work};
 
-use crate::asking::{LIMITS, beyond_room, gathered, paper, study, text};
+use crate::asking::{LIMITS, beyond_room, gathered, paper, study, text, with};
 
 /// A study of each kind, each of several chunks.
 fn studies() -> [Value; 4] {
@@ -152,6 +152,28 @@ fn a_search_for_peaks_that_looks_further_than_was_expected_asks_for_more_room_on
         // What is known before is below what the states alone take.
         assert!(needed[0] < states_bytes && states_bytes < *needed.last().unwrap(), "{quantity}: {needed:?}");
         assert_eq!(part, Work::new(&study, 0).run(&Never).unwrap(), "{quantity}");
+    }
+}
+
+/// Of each quantity an entry for each input or kind of deviation, with its name: nine times what was counted.
+#[test]
+fn what_the_answer_of_a_study_of_many_inputs_takes_is_known_before_it_is_made() {
+    let inputs = |what: &Value| (0..26).map(|i| (format!("/deviations/ring_space_um/{i}"), what.clone())).collect();
+    let base = with(&paper(), "/deviations", json!({ "ring_space_um": vec![0.0; 26] }));
+    let base = with(&base, "/model", json!({ "clearance": { "ring_um": 9.0 } }));
+    let moved: serde_json::Map<_, _> = inputs(&json!({ "plus_minus": 0.5 }));
+    let drawn: serde_json::Map<_, _> = inputs(&json!({ "distribution": "normal", "sigma": 0.1, "limit": 0.3 }));
+    let quantities = ["peak_force_n", "peak_stress_ring_mpa", "peak_stress_carrier_mpa"];
+    for document in [
+        json!({ "study": "sensitivity", "base": base, "inputs": moved, "quantities": quantities }),
+        json!({ "study": "tolerance", "base": base, "inputs": drawn, "quantities": quantities, "samples": 10 }),
+    ] {
+        let study = study(&document).unwrap();
+        let mut text = Vec::new();
+        gathered(&document).answer().write(Format::Json, &mut text).unwrap();
+        // Names and numbers take about as much as their text.
+        let (told, text) = (study.told_bytes(), text.len() as u64);
+        assert!((text / 2..4 * text).contains(&told), "{told} for {text} of text: {}", document["study"]);
     }
 }
 
