@@ -489,6 +489,9 @@ mod tests {
         let Line { settings } = Line::parse_from(["serve", "--max-unread-bytes", "67108864"]);
         let room = Room::new(64 << 20);
         let pool = Pool::new(settings.limits()).beside(&room);
+        room.memory().is_seen_to_be_scarce(true);
+        assert!(pool.memory().is_scarce(), "both are of one memory");
+        room.memory().is_seen_to_be_scarce(false);
         let unread = room.reserve(60 << 20)?;
         let mut large = pin!(pool.run_variants(30 << 20, |_| Ok(())));
         assert!(futures_util::poll!(&mut large).is_pending());

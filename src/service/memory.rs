@@ -11,8 +11,9 @@ use crate::machine;
 /// Between two looks: in that time a processor fills some megabytes.
 const LOOK: Duration = Duration::from_millis(5);
 
-/// Of the memory, so much at least is nobody's: beyond the rest it is scarce.
-const SPARE_PART: u64 = 8;
+/// Of the memory, such a part at least is nobody's: beyond the rest it is scarce. Until that is seen two processors still fill some of it, and the kernel
+/// has its own.
+const SPARE_PART: u64 = 5;
 
 /// So often at most does the log say so.
 const SAY: Duration = Duration::from_secs(10);

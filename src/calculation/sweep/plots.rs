@@ -50,6 +50,8 @@ pub(super) fn write(sweep: &SweepAnswer, writer: &mut dyn Write) -> io::Result<(
     let pass = Pass::of(sweep);
     let (mut plots, mut layouts) = (Vec::new(), Vec::new());
     for panel in panels(sweep) {
+        // Of a million states each takes tens of milliseconds: whoever wants it stopped is asked before.
+        writer.flush()?;
         // The state with the largest load of those at a place.
         let point = |place: &Range<usize>| {
             let there = &pass.states[place.clone()];
