@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
 fn main() -> io::Result<()> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    // As it runs, not as it was compiled: checkouts that share a folder of builds share this program.
+    let manifest = env::var("CARGO_MANIFEST_DIR").map_err(io::Error::other)?;
+    let root = Path::new(&manifest).join("../..");
     let sources = ["Cargo.lock", "Cargo.toml", "examples", "src"].map(|name| root.join(name));
     let mut files = Vec::new();
     for source in &sources {
