@@ -27,6 +27,9 @@ use crate::problem::Problem;
 /// Between two looks at what there is to do, and at what was cancelled.
 const PAUSE: Duration = Duration::from_secs(1);
 
+/// What a claim that is being made gets when no chunk is to be begun any more.
+const NEARLY: Duration = Duration::from_millis(200);
+
 /// Between two tries to keep a result: at first, and at most.
 const RETRY: Duration = Duration::from_millis(200);
 const LONGEST_RETRY: Duration = Duration::from_secs(10);
@@ -217,11 +220,14 @@ impl Workers {
                     found = self.study(task) => found,
                 };
                 let Some(ours) = found else { continue };
-                // Nor is one that the store does not give.
+                // Nor is one that the store does not give. What is nearly claimed is, and then given back: its attempt may be noted already.
+                let told_to_stop = async {
+                    self.stopping.cancelled().await;
+                    tokio::time::sleep(NEARLY).await;
+                };
                 let claimed = tokio::select! {
-                    biased;
-                    () = self.stopping.cancelled() => return,
                     claimed = self.store.claim(&task.cut, ours.lease) => claimed,
+                    () = told_to_stop => return,
                 };
                 match claimed {
                     Ok(Claim::Chunk(lease)) => {
