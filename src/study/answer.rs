@@ -34,7 +34,8 @@ impl Forms for StudyAnswer {
         match self {
             Self::Map(map) => map.expected_bytes(),
             Self::Search(search) => 4096 + 2048 * search.front.len(),
-            Self::Sensitivity(_) | Self::Tolerance(_) => 4096,
+            Self::Sensitivity(sensitivity) => sensitivity.expected_bytes(),
+            Self::Tolerance(tolerance) => tolerance.expected_bytes(),
         }
     }
 

@@ -260,6 +260,11 @@ impl SensitivityAnswer {
         }
     }
 
+    pub(crate) fn expected_bytes(&self) -> usize {
+        let inputs = self.quantities.iter().flat_map(|of| &of.inputs);
+        4096 + inputs.map(|input| 220 + input.pointer.len()).sum::<usize>()
+    }
+
     /// A row a quantity and input.
     pub(crate) fn table(&self) -> Table<'_> {
         let words = ["quantity", "pointer"].map(|name| Column::new(name, Content::Word));

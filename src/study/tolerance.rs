@@ -485,6 +485,14 @@ impl ToleranceAnswer {
         }
     }
 
+    pub(crate) fn expected_bytes(&self) -> usize {
+        let of_quantity = |of: &ToleranceQuantityAnswer| {
+            let contributors = of.contributors.iter().map(|kind| 100 + kind.deviation.len());
+            1000 + 26 * of.histogram.drives.len() + contributors.sum::<usize>()
+        };
+        2048 + self.quantities.iter().map(of_quantity).sum::<usize>()
+    }
+
     /// A row a quantity and quantile.
     pub(crate) fn table(&self) -> Table<'_> {
         let mut columns = vec![Column::new("quantity", Content::Word)];

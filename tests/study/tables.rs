@@ -205,3 +205,23 @@ fn a_large_map_comes_in_several_groups() {
     let map = json!({ "study": "map", "base": paper(), "quantities": ["transmission_ratio"], "over": { "/load/input_torque_nm": steps } });
     assert_eq!(assert_same(&map), 70_000);
 }
+
+#[test]
+fn the_text_of_many_inputs_has_its_room_before_it_is_written_and_less_than_twice_that() {
+    let mut base = with(&paper(), "/model/compatibility", json!("virtual_work"));
+    base["deviations"] = json!({ "tooth_radius_um": (1..=28).collect::<Vec<_>>() });
+    let inputs: serde_json::Map<_, _> =
+        (0..28).map(|tooth| (format!("/deviations/tooth_radius_um/{tooth}"), json!({ "plus_minus": 0.01 }))).collect();
+    let quantities = ["peak_stress_ring_mpa", "peak_stress_mpa", "slot_wall_mm"];
+    let sensitivity = json!({ "study": "sensitivity", "base": base, "quantities": quantities, "inputs": inputs });
+    let normal = json!({ "distribution": "normal", "sigma": 0.002 });
+    let tolerance = json!({
+        "study": "tolerance", "base": paper(), "samples": 3000, "quantities": quantities,
+        "inputs": { "/drive/teeth/radius_mm": normal, "/load/input_torque_nm": normal }
+    });
+    for document in [sensitivity, tolerance] {
+        let gathered = gathered(&document);
+        let (text, expected_bytes) = (text(&gathered, Format::Json), gathered.answer().expected_bytes());
+        assert!((text.len()..2 * text.len()).contains(&expected_bytes), "{expected_bytes} for {}", text.len());
+    }
+}
