@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{Read as _, Write as _};
-use std::net::{SocketAddr, TcpStream};
+use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Barrier};
@@ -255,8 +255,8 @@ fn a_client_that_takes_less_than_the_least_of_its_answer_is_left() {
 
 // --- Leaving
 
-/// Asks for an endless sweep, with something behind the request, and leaves while it runs.
-fn leaves(encoding: &str, behind: &str) {
+/// Asks for an endless sweep, with something behind the request, and leaves in some way while it runs.
+fn leaves<T>(encoding: &str, behind: &str, leave: impl FnOnce(TcpStream) -> T) {
     let process = Process::started(&ENDLESS);
     let document = endless();
     let mut stream = TcpStream::connect(process.address).unwrap();
@@ -266,20 +266,28 @@ fn leaves(encoding: &str, behind: &str) {
     );
     stream.write_all(format!("{head}{document}{behind}").as_bytes()).unwrap();
     until_running(process.address, 1.0);
-    drop(stream);
+    let _left = leave(stream);
     until_running(process.address, 0.0);
     assert_eq!(metric(process.address, "toothwave_cancellations_total"), 1.0);
 }
 
 #[test]
 fn a_client_that_leaves_ends_its_solve() {
-    leaves("identity", "");
+    leaves("identity", "", drop);
+}
+
+#[test]
+fn a_client_that_says_that_it_sends_no_more_is_taken_for_gone() {
+    leaves("identity", "", |stream| {
+        stream.shutdown(Shutdown::Write).unwrap();
+        stream
+    });
 }
 
 #[test]
 fn a_byte_of_another_request_does_not_hide_that_the_client_has_left() {
-    leaves("gzip", "G");
-    leaves("identity", &"GET /health/live HTTP/1.1\r\n".repeat(3000));
+    leaves("gzip", "G", drop);
+    leaves("identity", &"GET /health/live HTTP/1.1\r\n".repeat(3000), drop);
 }
 
 #[test]
