@@ -239,7 +239,7 @@ impl From<io::Error> for Failure {
 
 impl From<Problem> for Failure {
     fn from(problem: Problem) -> Self {
-        observe::problem_is_told(&problem);
+        observe::note_problem(&problem);
         // A service's limits can be set, those of the command line are its own.
         let limits = ["`max_states`", "`max_profile_points`", "`max_study_variants`", "`max_study_bytes`"];
         let text = limits.iter().fold(problem.to_string(), |text, limit| text.replace(limit, "the command line"));
@@ -282,7 +282,7 @@ fn runtime(threads: usize) -> io::Result<Runtime> {
         }
         tokio::task::spawn_blocking(|| ()).await.map_err(io::Error::other)
     })?;
-    log::is_started();
+    log::end_of_start();
     Ok(runtime)
 }
 
@@ -429,7 +429,7 @@ fn batch(file: &Path, query: BatchQuery) -> Result<(), Failure> {
                 .par_iter()
                 .map(|&(document, index)| {
                     let answer = answer_line(query, index, document, &OFFLINE, &room, &AtomicBool::new(false));
-                    answer.is_told();
+                    answer.note_told();
                     answer.text
                 })
                 .collect();

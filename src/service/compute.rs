@@ -20,7 +20,10 @@ use crate::problem::{Problem, ProblemCode};
 use crate::room::{self, Reserved, Room};
 
 /// A slice of what runs in turn begins nothing further after this time: so long at most does a single request wait behind short ones.
-pub const SLICE: Duration = Duration::from_millis(5);
+const SLICE: Duration = Duration::from_millis(5);
+
+/// Or after this one, where others have as long slices: a single step of theirs, such as a variant of a study, may take as long.
+const LONGEST_SLICE: Duration = Duration::from_secs(1);
 
 /// Of what unread answers may take, variants of studies may take another such part while they are computed.
 const PART_OF_VARIANTS: u64 = 4;
@@ -52,9 +55,67 @@ pub struct Pool {
     /// Of answers, from which a variant takes what is beyond the part of variants; none where there are none.
     room: Option<Room>,
     memory: Memory,
+    pace: Pace,
     /// Cancelled when the service stops and has no time left.
     closed: CancellationToken,
     limits: Limits,
+}
+
+/// How long slices are. Whoever waits for a turn behind one that cannot be cut as short gets as much when it comes: else a thousand short steps would wait for a
+/// long one each.
+#[derive(Debug, Clone, Default)]
+pub struct Pace(Arc<Mutex<Option<LongStep>>>);
+
+/// The longest step of late.
+#[derive(Debug, Clone, Copy)]
+struct LongStep {
+    took: Duration,
+    at: Instant,
+}
+
+impl Pace {
+    /// A slice that begins now.
+    pub fn slice(&self) -> Slice {
+        let now = Instant::now();
+        Slice { pace: self.clone(), most: self.most(now), started: now, last: now }
+    }
+
+    fn most(&self, now: Instant) -> Duration {
+        /// So many times what it took a step is remembered: the next one of as many that compute side by side is over by then.
+        const REMEMBERED: u32 = 4;
+        let longest = self.0.lock().filter(|step| now < step.at + REMEMBERED * step.took);
+        longest.map_or(SLICE, |step| step.took.clamp(SLICE, LONGEST_SLICE))
+    }
+
+    fn note(&self, took: Duration, now: Instant) {
+        if took > SLICE && took >= self.most(now) {
+            *self.0.lock() = Some(LongStep { took: took.min(LONGEST_SLICE), at: now });
+        }
+    }
+}
+
+/// A slice that runs.
+#[derive(Debug)]
+pub struct Slice {
+    pace: Pace,
+    most: Duration,
+    started: Instant,
+    last: Instant,
+}
+
+impl Slice {
+    /// After a step: whether no further one is to begin.
+    pub fn is_over(&mut self) -> bool {
+        let now = Instant::now();
+        self.pace.note(now - self.last, now);
+        self.last = now;
+        self.busy() >= self.most
+    }
+
+    /// What its steps have taken.
+    pub fn busy(&self) -> Duration {
+        self.last - self.started
+    }
 }
 
 /// Where a solve runs.
@@ -105,6 +166,7 @@ impl Pool {
             unhurried: Arc::new(Semaphore::new(1)),
             room: None,
             memory: Memory::default(),
+            pace: Pace::default(),
             closed: CancellationToken::new(),
             limits,
         }
@@ -119,6 +181,11 @@ impl Pool {
     /// The memory that solves take.
     pub fn memory(&self) -> &Memory {
         &self.memory
+    }
+
+    /// How long slices are that run in turn.
+    pub const fn pace(&self) -> &Pace {
+        &self.pace
     }
 
     /// Solves that run now.
@@ -215,7 +282,8 @@ impl Pool {
         &self,
         job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
-        self.run_slice(Duration::from_millis(self.limits.deadline_ms), job).await
+        // Its last step gets as much as its first.
+        self.run_slice(Duration::from_millis(self.limits.deadline_ms) + LONGEST_SLICE, job).await
     }
 
     /// The same for so long at most. A time for which all of the process stood still is none in which a slice could come to its end: of that no more than a step
@@ -467,7 +535,7 @@ mod tests {
         for (variant_bytes, is_scarce, most_at_once) in
             [(6 << 20, false, 2), (6 << 20, true, 1), (10 << 20, false, 1), (1 << 30, false, 1)]
         {
-            pool.memory().is_seen_to_be_scarce(is_scarce);
+            pool.memory().set_scarce(is_scarce);
             let (running, most) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicUsize::new(0)));
             let slices = (0..20).map(|_| {
                 let (running, most) = (Arc::clone(&running), Arc::clone(&most));
@@ -489,9 +557,9 @@ mod tests {
         let Line { settings } = Line::parse_from(["serve", "--max-unread-bytes", "67108864"]);
         let room = Room::new(64 << 20);
         let pool = Pool::new(settings.limits()).beside(&room);
-        room.memory().is_seen_to_be_scarce(true);
+        room.memory().set_scarce(true);
         assert!(pool.memory().is_scarce(), "both are of one memory");
-        room.memory().is_seen_to_be_scarce(false);
+        room.memory().set_scarce(false);
         let unread = room.reserve(60 << 20)?;
         let mut large = pin!(pool.run_variants(30 << 20, |_| Ok(())));
         assert!(futures_util::poll!(&mut large).is_pending());

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use rustix::time::{ClockId, clock_gettime};
 use toothwave_calculation::no_answer::NoAnswer;
@@ -10,7 +10,7 @@ use toothwave_calculation::{BUILD, question};
 use toothwave_store::NewStudy;
 use toothwave_study::{Interrupted, Limits, Part, Study, Work};
 
-use crate::compute::{Pool, SLICE, SMALL_VARIANT_BYTES};
+use crate::compute::{Pool, SMALL_VARIANT_BYTES, Slice};
 use crate::problem::{Problem, ProblemCode};
 
 /// What a chunk should take: long against what it costs to claim and to keep one, short against what a worker's end loses.
@@ -177,12 +177,31 @@ fn processor_time() -> Duration {
     clock_gettime(ClockId::ThreadCPUTime).try_into().unwrap_or_default()
 }
 
+/// The golden section of so many, or a little more: without a common divisor, so that steps of it lead to each, and in turn to every value of an axis that they
+/// stand on.
+fn stride(variants: u64) -> u64 {
+    /// Of 2⁶⁴.
+    const GOLDEN_SECTION: u128 = 0x9E37_79B9_7F4A_7C15;
+    let least = u64::try_from((u128::from(variants) * GOLDEN_SECTION) >> 64).unwrap_or(0).max(1);
+    (least..).find(|&stride| divisor(stride, variants) == 1).unwrap_or(1)
+}
+
+/// The greatest common one.
+const fn divisor(mut one: u64, mut other: u64) -> u64 {
+    while other != 0 {
+        (one, other) = (other, one % other);
+    }
+    one
+}
+
 /// Variants spread over a study; of a search the beginning of its first island.
 struct Canary {
     study: Arc<Study>,
     /// What its variants take while they are computed, as far as they were seen to.
     room_bytes: u64,
     island: Option<Work>,
+    /// From one variant to the next.
+    stride: u64,
     hasher: blake3::Hasher,
     sung: u64,
     most: u64,
@@ -195,29 +214,37 @@ impl Canary {
         let room_bytes = SMALL_VARIANT_BYTES;
         let island = (study.kind() == "search").then(|| Work::new(study, 0).within(room_bytes));
         let most = most.min(study.variants());
-        let hasher = blake3::Hasher::new();
-        Self { study: Arc::clone(study), room_bytes, island, hasher, sung: 0, most, until, busy: Duration::ZERO }
+        let (stride, hasher) = (stride(study.variants()), blake3::Hasher::new());
+        Self {
+            study: Arc::clone(study),
+            room_bytes,
+            island,
+            stride,
+            hasher,
+            sung: 0,
+            most,
+            until,
+            busy: Duration::ZERO,
+        }
     }
 
-    /// Variants in an order whose every beginning is spread evenly: those at one end may be quick to refuse. By steps of the golden ratio, which no number of
-    /// variants that stand on an axis divides: halves, quarters and so on see of an axis of two values the first alone.
+    /// Variants in an order whose every beginning is spread evenly: those at one end may be quick to refuse. Each comes once.
     fn variant(&self) -> u64 {
-        /// Of 2⁶⁴.
-        const GOLDEN_RATIO: u64 = 0x9E37_79B9_7F4A_7C15;
-        let share = u128::from(self.sung.wrapping_mul(GOLDEN_RATIO));
-        u64::try_from((share * u128::from(self.study.variants())) >> 64).unwrap_or(0)
+        let variants = u128::from(self.study.variants().max(1));
+        u64::try_from(u128::from(self.sung) * u128::from(self.stride) % variants).unwrap_or(0)
     }
 
     /// As far as a slice allows; whether it is over.
-    fn slice(&mut self, stop: &AtomicBool) -> Result<bool, Problem> {
-        let (started, begun) = (Instant::now(), processor_time());
+    fn slice(&mut self, mut time: Slice, stop: &AtomicBool) -> Result<bool, Problem> {
+        let begun = processor_time();
         let busy = self.busy;
         let busy_now = || busy + processor_time().saturating_sub(begun);
         while self.sung < self.most && self.until.is_none_or(|until| self.sung == 0 || busy_now() < until) {
             let stepped = match &mut self.island {
                 Some(island) => island.step(stop).map(|is_over| (is_over, None)),
                 None => {
-                    let work = Work::of_variant(&self.study, self.variant()).within(self.room_bytes);
+                    let variant = self.variant();
+                    let work = Work::of_span(&self.study, variant..variant + 1).within(self.room_bytes);
                     work.run(stop).map(|part| (false, Some(part)))
                 }
             };
@@ -239,7 +266,7 @@ impl Canary {
                 }
             }
             self.sung += 1;
-            if started.elapsed() >= SLICE {
+            if time.is_over() {
                 self.busy = busy_now();
                 return Ok(false);
             }
@@ -258,10 +285,11 @@ impl Canary {
 
 async fn sung(pool: &Pool, mut canary: Canary, most_bytes: u64) -> Result<Result<Canary, NotHere>, Problem> {
     while canary.room_bytes <= most_bytes {
+        let pace = pool.pace().clone();
         let is_over;
         (canary, is_over) = pool
             .run_variants(canary.room_bytes, move |stop| {
-                let is_over = canary.slice(stop)?;
+                let is_over = canary.slice(pace.slice(), stop)?;
                 Ok((canary, is_over))
             })
             .await?;
@@ -281,16 +309,22 @@ mod tests {
 
     use super::Canary;
 
-    #[test]
-    fn every_beginning_of_a_canary_is_spread_over_a_study_and_sees_each_value_of_its_axes() {
+    /// A map of so many radii, each with two numbers of states.
+    fn map_of(radii: u64) -> Arc<Study> {
         let base = include_str!("../../examples/paper-5.1.json");
-        let over = r#"{ "/drive/teeth/radius_mm": { "min": 3, "max": 7, "steps": 8192 }, "/sweep/samples": { "one_of": [16, 50] } }"#;
+        let over = format!(
+            r#"{{ "/drive/teeth/radius_mm": {{ "min": 3, "max": 7, "steps": {radii} }}, "/sweep/samples": {{ "one_of": [16, 50] }} }}"#
+        );
         let document =
             format!(r#"{{ "study": "map", "base": {base}, "over": {over}, "quantities": ["peak_stress_ring_mpa"] }}"#);
         let calculation = question::Limits { max_states: 1_000_000, max_profile_points: 1_000_000 };
         let limits = Limits { calculation, max_study_variants: u64::MAX, max_study_bytes: u64::MAX };
-        let study = Arc::new(Study::read(document.as_bytes(), &limits).expect("a study"));
-        let mut canary = Canary::new(&study, 4096, None);
+        Arc::new(Study::read(document.as_bytes(), &limits).expect("a study"))
+    }
+
+    #[test]
+    fn every_beginning_of_a_canary_is_spread_over_a_study_and_sees_each_value_of_its_axes() {
+        let mut canary = Canary::new(&map_of(8192), 4096, None);
         let mut seen = Vec::new();
         for begun in 0..4096_u64 {
             canary.sung = begun;
@@ -304,6 +338,21 @@ mod tests {
                     assert!((0.2..0.3).contains(&share(&|variant| variant / 4096 == quarter)), "{begun}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_canary_of_as_many_variants_as_there_are_sees_each_once() {
+        for radii in [1, 2, 3, 5, 21, 50, 150, 1023, 2048] {
+            let mut canary = Canary::new(&map_of(radii), 4096, None);
+            let mut seen: Vec<_> = (0..canary.most)
+                .map(|sung| {
+                    canary.sung = sung;
+                    canary.variant()
+                })
+                .collect();
+            seen.sort_unstable();
+            assert_eq!(seen, (0..2 * radii).collect::<Vec<_>>());
         }
     }
 }

@@ -6,7 +6,7 @@
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::Read as _;
-use std::os::unix::fs::PermissionsExt as _;
+use std::os::unix::fs::{OpenOptionsExt as _, PermissionsExt as _};
 use std::sync::Arc;
 
 use axum::extract::{Request, State};
@@ -14,11 +14,16 @@ use axum::http::{HeaderValue, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use parking_lot::RwLock;
+use rustix::fs::OFlags;
+use tokio::sync::Semaphore;
 
 use crate::problem::{Problem, ProblemCode};
 
 /// Of a keys file, which may turn out to be something that never ends: tens of thousands of keys.
 const MOST_BYTES: u64 = 4 << 20;
+
+/// Readings of the file at once: each has a thread.
+const MOST_READINGS: usize = 4;
 
 /// Random bytes of a new key.
 const KEY_BYTES: usize = 32;
@@ -28,6 +33,8 @@ const KEY_BYTES: usize = 32;
 pub struct Keys {
     path: Arc<str>,
     last: Arc<RwLock<Reading>>,
+    /// One for each reading that has not come to its end.
+    readings: Arc<Semaphore>,
 }
 
 /// What a reading of the file found.
@@ -54,15 +61,27 @@ impl Keys {
     }
 
     fn of(path: &str, known: Vec<Known>) -> Self {
-        Self { path: path.into(), last: Arc::new(RwLock::new(Reading { number: 0, known })) }
+        let last = Arc::new(RwLock::new(Reading { number: 0, known }));
+        Self { path: path.into(), last, readings: Arc::new(Semaphore::new(MOST_READINGS)) }
     }
 
-    /// Begins to read the file again, for the `number`th time, on a thread of its own: it may be a pipe that nobody writes to, or stand on a
-    /// device that is away. A reading that never comes to its end holds up no later one.
+    /// Begins to read the file again, for the `number`th time, on a thread of its own: it may stand on a device that is away. A reading that does not come to
+    /// its end holds up no later one, but for the last of several.
     pub fn reload(&self, number: u64) {
+        let Ok(place) = Arc::clone(&self.readings).try_acquire_owned() else {
+            tracing::error!(
+                readings = MOST_READINGS,
+                "the keys stay as they were: earlier readings have not come to their end"
+            );
+            return;
+        };
         let keys = self.clone();
+        let reading = move || {
+            let _held = place;
+            keys.read_again(number);
+        };
         tracing::info!(path = %self.path, "reading the keys file again");
-        if let Err(error) = std::thread::Builder::new().name("keys".into()).spawn(move || keys.read_again(number)) {
+        if let Err(error) = std::thread::Builder::new().name("keys".into()).spawn(reading) {
             tracing::error!(%error, "the keys stay as they were");
         }
     }
@@ -110,7 +129,12 @@ impl Keys {
 
 fn known_in(path: &str) -> Result<Vec<Known>, String> {
     let mut text = String::new();
-    let file = File::open(path).map_err(|error| error.to_string())?;
+    // Else to open a pipe would wait for who writes to it.
+    let file = File::options().read(true).custom_flags(OFlags::NONBLOCK.bits().cast_signed()).open(path);
+    let file = file.map_err(|error| error.to_string())?;
+    if !file.metadata().map_err(|error| error.to_string())?.is_file() {
+        return Err("a keys file is a regular file, so that it can be read again".into());
+    }
     file.take(MOST_BYTES + 1).read_to_string(&mut text).map_err(|error| error.to_string())?;
     if text.len() as u64 > MOST_BYTES {
         return Err(format!("a keys file has at most {MOST_BYTES} bytes"));

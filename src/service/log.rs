@@ -57,7 +57,7 @@ pub fn start(filter: EnvFilter) -> io::Result<()> {
 }
 
 /// A panic is from here on one of whatever panics.
-pub fn is_started() {
+pub fn end_of_start() {
     IS_STARTING.store(false, Ordering::Relaxed);
 }
 

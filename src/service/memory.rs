@@ -1,7 +1,9 @@
 //! What the process really holds of the memory. What answers, variants and the cache take is counted before they have it, some of it by
 //! estimates; this is looked at besides, so that no estimate that was too low ends the process.
 
-use std::fs;
+use std::fs::File;
+use std::io;
+use std::os::unix::fs::FileExt as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -21,7 +23,7 @@ const SAY: Duration = Duration::from_secs(10);
 /// A memory below this is small.
 const SMALL_BYTES: u64 = 4 << 30;
 
-/// Whether nearly all of the memory is held.
+/// Whether more of the memory is held than should be.
 #[derive(Debug, Clone)]
 pub struct Memory(Arc<Inner>);
 
@@ -44,19 +46,20 @@ impl Memory {
         self.0.is_scarce.load(Ordering::Relaxed)
     }
 
-    /// What is seen.
-    pub fn is_seen_to_be_scarce(&self, is_scarce: bool) {
+    /// Sets what is seen.
+    pub fn set_scarce(&self, is_scarce: bool) {
         self.0.is_scarce.store(is_scarce, Ordering::Relaxed);
     }
 
     /// Whether so many bytes more would leave what is to be left, as it is in this moment.
     pub fn has(&self, bytes: u64) -> bool {
         let most_bytes = self.0.most_bytes.load(Ordering::Relaxed);
-        most_bytes == u64::MAX || held_bytes().is_none_or(|held_bytes| held_bytes.saturating_add(bytes) <= most_bytes)
+        let held_bytes = || Status::open().and_then(|status| status.held_bytes());
+        most_bytes == u64::MAX || held_bytes().is_ok_and(|held_bytes| held_bytes.saturating_add(bytes) <= most_bytes)
     }
 
-    /// Of which so much may be held.
-    pub fn is_of(&self, memory_bytes: u64) -> u64 {
+    /// Sets how large it is, and with that what may be held.
+    pub fn set_size(&self, memory_bytes: u64) -> u64 {
         let most_bytes = memory_bytes - memory_bytes / SPARE_PART;
         self.0.most_bytes.store(most_bytes, Ordering::Relaxed);
         most_bytes
@@ -64,20 +67,24 @@ impl Memory {
 
     /// Looks for ever, where the machine tells.
     pub async fn watch(self) {
-        let Some(memory_bytes) = machine::memory_bytes() else { return };
-        let most_bytes = self.is_of(memory_bytes);
+        // Opened once: where the process has no more files that must not end the watch.
+        let (Some(memory_bytes), Ok(status)) = (machine::memory_bytes(), Status::open()) else { return };
+        let most_bytes = self.set_size(memory_bytes);
         let mut said: Option<Instant> = None;
-        while let Some(held_bytes) = held_bytes() {
-            let is_scarce = held_bytes > most_bytes;
-            if is_scarce && said.is_none_or(|said| said.elapsed() > SAY) {
-                tracing::warn!(
-                    held_bytes,
-                    memory_bytes,
-                    "memory is scarce: no large answer is begun, those that are made are given up"
-                );
-                said = Some(Instant::now());
+        loop {
+            // What cannot be seen for once is as it was.
+            if let Ok(held_bytes) = status.held_bytes() {
+                let is_scarce = held_bytes > most_bytes;
+                if is_scarce && said.is_none_or(|said| said.elapsed() > SAY) {
+                    tracing::warn!(
+                        held_bytes,
+                        memory_bytes,
+                        "memory is scarce: no large answer is begun, those that are made are given up"
+                    );
+                    said = Some(Instant::now());
+                }
+                self.set_scarce(is_scarce);
             }
-            self.is_seen_to_be_scarce(is_scarce);
             tokio::time::sleep(LOOK).await;
         }
     }
@@ -92,25 +99,39 @@ pub fn keep_pages_small() {
     }
 }
 
-/// Of the memory, what this process alone holds and cannot be read again from files.
-fn held_bytes() -> Option<u64> {
-    let status = fs::read_to_string("/proc/self/status").ok()?;
-    let kib = status.lines().find_map(|line| line.strip_prefix("RssAnon:"))?.split_whitespace().next()?;
-    Some(1024 * kib.parse::<u64>().ok()?)
+/// What the kernel tells of this process.
+struct Status(File);
+
+impl Status {
+    fn open() -> io::Result<Self> {
+        File::open("/proc/self/status").map(Self)
+    }
+
+    /// Of the memory, what this process alone holds and cannot be read again from files.
+    fn held_bytes(&self) -> io::Result<u64> {
+        let mut text = [0; 4096];
+        let read = self.0.read_at(&mut text, 0)?;
+        let kib = str::from_utf8(&text[..read]).ok().and_then(|text| {
+            let line = text.lines().find_map(|line| line.strip_prefix("RssAnon:"))?;
+            line.split_whitespace().next()?.parse::<u64>().ok()
+        });
+        kib.map(|kib| 1024 * kib).ok_or_else(|| io::ErrorKind::InvalidData.into())
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Memory, held_bytes};
+    use super::{Memory, Status};
     use crate::room::Room;
 
     #[test]
     fn what_is_written_to_is_held() {
         const BYTES: usize = 256 << 20;
-        let before = held_bytes().expect("Linux tells");
+        let status = Status::open().expect("Linux tells");
+        let before = status.held_bytes().expect("it does");
         let written = std::hint::black_box(vec![1_u8; BYTES]);
         // Other tests let go of little meanwhile.
-        assert!(held_bytes().expect("Linux tells") - before > BYTES as u64 / 2);
+        assert!(status.held_bytes().expect("again and again") - before > BYTES as u64 / 2);
         drop(written);
     }
 
@@ -121,11 +142,11 @@ mod tests {
         let mut larger = room.reserve(2 << 20).expect("alone it is given");
         larger.hold_at_least(TERABYTE).expect("nobody knows how much memory there is");
         larger.hold_at_most(2 << 20);
-        room.memory().is_of(2 * TERABYTE);
+        room.memory().set_size(2 * TERABYTE);
         assert!(larger.hold_at_least(4 * TERABYTE).is_err());
         assert!(larger.hold_at_least(TERABYTE).is_ok());
         // What it was given is not asked of the memory again.
-        room.memory().is_of(0);
+        room.memory().set_size(0);
         assert!(larger.hold_at_least(TERABYTE).is_ok());
         assert!(larger.hold_at_least(2 * TERABYTE).is_err());
         drop(larger);

@@ -261,7 +261,7 @@ pub async fn observe(State(app): State<Arc<App>>, request: Request, next: Next) 
     unanswered.is_answered = true;
     let elapsed = started.elapsed();
     let problem = response.extensions().get::<Problem>().map(|problem| {
-        span.in_scope(|| problem_is_told(problem));
+        span.in_scope(|| note_problem(problem));
         problem.code
     });
     let status = response.status().as_u16();
@@ -453,7 +453,7 @@ impl HttpBody for Observed {
 }
 
 /// Logs why an internal error happened, and counts refusals by their code: here alone, where a problem is about to be told.
-pub fn problem_is_told(problem: &Problem) {
+pub fn note_problem(problem: &Problem) {
     if let Some(cause) = &problem.cause {
         tracing::error!(cause, "internal error");
     }

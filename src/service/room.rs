@@ -1,6 +1,7 @@
 //! Room for large answers that nobody has read yet: while they are made, while they wait in a batch, while they are on their way. However
 //! many are asked for, and however slowly they are read, they must not fill the memory.
 
+use std::ops::Deref;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Weak};
 
@@ -29,6 +30,29 @@ pub struct Room {
 /// A part of the room that is held while nobody waits to read it.
 #[derive(Debug)]
 pub struct Kept(Reserved);
+
+impl Kept {
+    /// More, where it is less.
+    ///
+    /// # Errors
+    /// Where there is not so much left.
+    pub fn hold_at_least(&mut self, bytes: u64) -> Result<(), NoRoom> {
+        let Self(reserved) = self;
+        let before = reserved.permits();
+        match reserved.hold_permits(reserved.room.permits_to_keep(bytes), bytes) {
+            Err(NoRoom::Taken { .. }) if bytes <= SMALL_BYTES => {}
+            held => held?,
+        }
+        reserved.bytes = reserved.bytes.max(bytes);
+        reserved.room.kept.fetch_add(reserved.permits() - before, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// As much as it was asked to hold.
+    pub const fn bytes(&self) -> u64 {
+        self.0.bytes
+    }
+}
 
 impl Drop for Kept {
     fn drop(&mut self) {
@@ -60,7 +84,7 @@ pub enum NoRoom {
     },
     /// Whatever is counted.
     #[error(
-        "nearly all of the service's memory is held, and the answer is large; try again in a moment, or ask for less"
+        "the service's memory is held but for what it needs itself, and the answer is large; try again in a moment, or ask for less"
     )]
     Scarce,
 }
@@ -125,25 +149,26 @@ impl Room {
         Ok(reserved)
     }
 
-    /// Room for what is kept: so many bytes, though they were all of it.
+    /// Room for what is kept: so many bytes, though they were all of it. What is small is kept though there is none, but not where memory is scarce: how much
+    /// that comes to is bounded by whoever keeps it.
     ///
     /// # Errors
     /// Where there is not so much left.
     pub fn keep(&self, bytes: u64) -> Result<Kept, NoRoom> {
-        let mut reserved = Reserved { room: self.clone(), held: None, bytes };
-        reserved.hold_permits(self.permits_to_keep(bytes), bytes)?;
-        self.kept.fetch_add(reserved.permits(), Ordering::Relaxed);
-        Ok(Kept(reserved))
+        let mut kept = Kept(Reserved { room: self.clone(), held: None, bytes: 0 });
+        kept.hold_at_least(bytes)?;
+        Ok(kept)
     }
 
     /// Whether so many bytes could be kept once those have given back what they hold.
-    pub fn could_keep<'a>(&self, bytes: u64, given_back: impl IntoIterator<Item = &'a Kept>) -> bool {
+    pub fn could_keep(&self, bytes: u64, given_back: impl IntoIterator<Item: Deref<Target = Kept>>) -> bool {
         let given_back: u64 = given_back.into_iter().map(|kept| u64::from(kept.0.permits())).sum();
-        self.free.available_permits() as u64 + given_back >= u64::from(self.permits_to_keep(bytes))
+        bytes <= SMALL_BYTES
+            || self.free.available_permits() as u64 + given_back >= u64::from(self.permits_to_keep(bytes))
     }
 
     fn permits_to_keep(&self, bytes: u64) -> u32 {
-        if bytes <= SMALL_BYTES { 0 } else { permits(bytes.min(self.max_bytes)) }
+        permits(bytes.min(self.max_bytes))
     }
 
     /// An answer that is kept, taking room until it is dropped.
@@ -164,7 +189,7 @@ impl Room {
     fn permits_for(&self, bytes: u64) -> u32 {
         let all = permits(self.max_bytes).saturating_sub(self.kept.load(Ordering::Relaxed));
         // One at least: where all is kept none is left for an answer.
-        self.permits_to_keep(bytes).min(all.max(1))
+        if bytes <= SMALL_BYTES { 0 } else { self.permits_to_keep(bytes).min(all.max(1)) }
     }
 }
 

@@ -44,6 +44,9 @@ const NOTICE: Duration = Duration::from_millis(200);
 /// What running solves get at the end of the bound on a shutdown to be answered that it is over.
 const LAST_WORDS: Duration = Duration::from_millis(300);
 
+/// What a worker's chunks that did not come to their end get to be given back: with the bound on its shutdown below the ten seconds that container engines wait.
+const GIVING_BACK: Duration = Duration::from_millis(1500);
+
 /// What a client beyond the last connection gets for all of its request and answer.
 const REFUSAL: Duration = Duration::from_secs(1);
 
@@ -179,8 +182,6 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
 /// Where the process gets no signals.
 pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: Option<Parts>) -> io::Result<()> {
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
-    // It has no keys to read again, and who sends it to the service's processes means none to end.
-    let _hang_up = signal(SignalKind::hangup())?;
     let mut told_to_stop = async || {
         tokio::select! {
             _ = terminate.recv() => {}
@@ -209,11 +210,14 @@ pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: O
         told_to_stop().await;
         tracing::info!("stopping: what is begun comes to its end");
         stopping.cancel();
-        told_to_stop().await;
+        tokio::select! {
+            () = told_to_stop() => tracing::warn!("told to stop again: what still ran is given up"),
+            () = sleep(patience + GIVING_BACK) => tracing::warn!("the studies' store did not take back in time what was begun"),
+        }
     };
     tokio::select! {
         () = workers.work() => {}
-        () = stop => tracing::warn!("told to stop again: what still ran is given up"),
+        () = stop => {}
     }
     tracing::info!("stopped");
     Ok(())
@@ -350,7 +354,7 @@ impl Server {
         match Arc::clone(&self.connections).try_acquire_owned() {
             Ok(permit) => self.serve(stream, permit),
             Err(_) => {
-                // The files that are kept for these are few: none is opened before another is closed.
+                // The files that are kept for these are few: no further one is opened before another is closed.
                 let place = self.side_place().await;
                 self.serve_beside(stream, place);
             }
@@ -363,6 +367,7 @@ impl Server {
         }
         {
             let mut connections = self.side_connections.lock();
+            connections.retain(|(_, seen)| seen.is_open());
             // Of a burst, those that ask may not have had their turn yet.
             let silent = connections.iter().position(|(_, seen)| !seen.has_unread());
             if let Some((oldest, _)) = connections.remove(silent.unwrap_or(0)) {
@@ -381,6 +386,7 @@ impl Server {
         });
         let (left, closed) = (stream.left(), stream.closed());
         let is_to_end = is_to_end(self.closing.clone(), has_asked, stream.seen());
+        let closing = self.closing.clone();
         let connection = self.http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
         self.open.spawn(async move {
             let _held = permit;
@@ -398,7 +404,15 @@ impl Server {
                         let _ = connection.await;
                     }
                 }
-                closed.await;
+                // Who is answered, and does not close, holds up no shutdown either.
+                let has_had_time = async {
+                    closing.cancelled().await;
+                    sleep(NOTICE).await;
+                };
+                tokio::select! {
+                    () = closed => {}
+                    () = has_had_time => {}
+                }
             };
             tokio::select! {
                 () = to_its_end => {}
@@ -420,9 +434,7 @@ impl Server {
             };
             let _ = tokio::time::timeout(REFUSAL, to_its_end).await;
         });
-        let mut connections = self.side_connections.lock();
-        connections.retain(|(answered, _)| !answered.is_finished());
-        connections.push_back((answered.abort_handle(), seen));
+        self.side_connections.lock().push_back((answered.abort_handle(), seen));
     }
 }
 

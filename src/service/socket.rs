@@ -68,6 +68,11 @@ impl Drop for Stream {
 pub struct Seen(Weak<Stream>);
 
 impl Seen {
+    /// Whether it is still open here.
+    pub fn is_open(&self) -> bool {
+        self.0.strong_count() > 0
+    }
+
     /// Whether the client has said something that nobody has read yet.
     pub fn has_unread(&self) -> bool {
         let peek = |stream: Arc<Stream>| recv(&stream.tcp, &mut [0], RecvFlags::PEEK | RecvFlags::DONTWAIT);

@@ -5,12 +5,13 @@
 //! those of batches do. Those of a store are the workers', who are here where the store is a file, and elsewhere where it is a server.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-use futures_util::future::{BoxFuture, Shared};
-use futures_util::{FutureExt as _, StreamExt as _, TryStreamExt as _, stream};
+use futures_util::FutureExt as _;
+use futures_util::future::{BoxFuture, Shared, try_join_all};
 use metrics::counter;
 use parking_lot::Mutex;
 use serde::Serialize;
@@ -19,17 +20,17 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use toothwave_calculation::BUILD;
 use toothwave_store::{Cut, Figures, NewStudy, PATIENCE, Standing as Stored, Store, StoreError};
-use toothwave_study::{Gathered, Study, StudyAnswer, Work};
+use toothwave_study::{Gathered, Part, Study, StudyAnswer, Work};
 use tracing::Instrument as _;
 use utoipa::ToSchema;
 
-use crate::compute::{Pool, SMALL_VARIANT_BYTES};
+use crate::compute::{Pool, SMALL_VARIANT_BYTES, Slice};
 use crate::config::Limits;
 use crate::frozen;
 use crate::parts::Parts;
 use crate::problem::{Problem, ProblemCode};
 use crate::room::{self, Room};
-use crate::worker::{Capacity, Sliced, Workers, milliseconds, slice};
+use crate::worker::{Capacity, Workers, milliseconds, slice};
 
 /// Between two looks at how a stored study stands.
 const LOOK: Duration = Duration::from_secs(1);
@@ -58,8 +59,11 @@ const LARGE_BYTES: u64 = 1 << 20;
 /// What is known of stored studies besides their rows, at most: hundreds of the usual, or the few largest.
 const VIEWS_BYTES: u64 = 32 << 20;
 
-/// Chunks of a study in memory at least, as far as it has so many variants: of what is broken off a chunk is lost, and variants may take seconds.
-const LEAST_CHUNKS: u64 = 256;
+/// A study in memory is shared out in so many pieces, as far as it has so many variants, or in four for each solve that may run at once.
+const LEAST_PIECES: u64 = 16;
+
+/// What has come of a piece is handed over after such a time: of what is broken off no more is lost.
+const HAND_OVER: Duration = Duration::from_secs(1);
 
 /// That a stored study was asked for is noted when it was not for this share of its expiry, so that who reads does not write each time.
 const NOTE_SHARE: u32 = 10;
@@ -138,8 +142,6 @@ pub struct Kept {
     /// Whether somebody looks how it stands while it runs, and one look at a time.
     is_followed: AtomicBool,
     looking: tokio::sync::Mutex<()>,
-    /// The last answer that was made apart, or is.
-    making: Mutex<Option<Making>>,
     /// What it takes besides its rows.
     bytes: u64,
     _room: Option<room::Kept>,
@@ -152,43 +154,50 @@ pub struct Rows {
     /// Held while they are read from the store, which one does for all who wait for it: what came of it last, with when it was begun, or
     /// when it failed.
     gathering: tokio::sync::Mutex<Option<(Instant, Result<(), Problem>)>>,
-    bytes: u64,
-    room: room::Kept,
+    /// The last answer that was made apart, or is.
+    making: Mutex<Option<Making>>,
+    /// What they take beside what has come.
+    other_bytes: u64,
+    room: Mutex<room::Kept>,
+}
+
+impl Rows {
+    fn bytes(&self) -> u64 {
+        self.room.lock().bytes()
+    }
+
+    /// Adds to what has come. There may be more reasons, each with its words, than was known before.
+    fn add(&self, add: impl FnOnce(&mut Gathered)) -> Result<(), Problem> {
+        let bytes = {
+            let mut gathered = self.gathered.lock();
+            add(&mut gathered);
+            gathered.bytes()
+        };
+        Ok(self.room.lock().hold_at_least(self.other_bytes + bytes)?)
+    }
 }
 
 /// What a study has come to, for who tells it: as long as this is held its rows stay, and their room is taken.
 #[derive(Debug)]
-pub enum Reading {
-    /// An answer that is made already, once for all who wait to tell it.
-    Made {
-        /// Whose.
-        kept: Arc<Kept>,
-        /// It.
-        made: Arc<Made>,
-    },
-    /// The rows that it is to be made of, as they are then: there are as many lists of their chunks as answers that are being made.
-    Rows {
-        /// Whose.
-        kept: Arc<Kept>,
-        /// Them.
-        rows: Arc<Rows>,
-    },
+pub struct Reading {
+    kept: Arc<Kept>,
+    /// What the answer is to be made of, as it is then: there are as many lists of its parts as answers that are being made.
+    rows: Arc<Rows>,
+    /// Where it is made already, once for all who wait to tell it.
+    made: Option<Arc<Made>>,
 }
 
 impl Reading {
     /// About what the answer takes that is still to be made.
     pub fn columns_bytes(&self) -> u64 {
-        match self {
-            Self::Made { kept, .. } => kept.study.told_bytes(),
-            Self::Rows { kept, .. } => kept.study.answer_bytes(),
-        }
+        if self.made.is_some() { self.kept.study.told_bytes() } else { self.kept.study.answer_bytes() }
     }
 
     /// It.
     pub fn answer(self) -> StudyAnswer {
-        match self {
-            Self::Made { made, .. } => made.answer.clone(),
-            Self::Rows { kept, rows } => kept.gathered(&rows).answer(),
+        match &self.made {
+            Some(made) => made.answer.clone(),
+            None => self.kept.gathered(&self.rows).answer(),
         }
     }
 }
@@ -201,8 +210,6 @@ pub struct Made {
     /// Whether every chunk is in it.
     is_whole: bool,
     at: Instant,
-    /// For as long as it is kept.
-    _room: room::Kept,
 }
 
 /// The same while it is made: all who ask meanwhile share it.
@@ -312,7 +319,6 @@ impl Kept {
             unasked_s: AtomicU64::new(0),
             is_followed: AtomicBool::new(false),
             looking: tokio::sync::Mutex::default(),
-            making: Mutex::default(),
             bytes,
             _room: room,
         })
@@ -333,11 +339,6 @@ impl Kept {
     /// Its rows, but where somebody reads them.
     fn unread_rows(&self) -> Option<Arc<Rows>> {
         self.rows.lock().as_ref().filter(|rows| Arc::strong_count(rows) == 1).cloned()
-    }
-
-    /// Whether its answer is made apart: that of a tolerance study is short, and its rows have to be sorted for it. That of a map is its rows.
-    fn is_made_apart(&self) -> bool {
-        self.study.kind() == "tolerance" && self.study.stored_bytes() >= LARGE_BYTES
     }
 
     /// Whether who asks now is served by an answer that is made, or was.
@@ -391,8 +392,7 @@ impl Kept {
                 decoded.collect::<Result<Vec<_>, Problem>>()
             };
             let parts = pool.run_in_turn(decode).await?;
-            let mut gathered = rows.gathered.lock();
-            parts.into_iter().for_each(|(chunk, part)| gathered.add(chunk, part));
+            rows.add(|gathered| parts.into_iter().for_each(|(chunk, part)| gathered.add(chunk, part)))?;
         }
         // Of one that was forgotten meanwhile there are fewer, or none, and nothing else says so.
         let is_whole = rows.gathered.lock().is_complete();
@@ -472,9 +472,16 @@ async fn note_asked(store: &Store, id: &str) {
     }
 }
 
-/// What is kept of a stored study besides its rows.
+/// Whether a study's answer is made apart: that of a tolerance study is short, and its rows have to be sorted for it. That of a map is its rows.
+fn is_made_apart(study: &Study) -> bool {
+    study.kind() == "tolerance" && study.stored_bytes() >= LARGE_BYTES
+}
+
+/// What is kept of a study besides its rows.
 fn view_bytes(study: &Study) -> u64 {
-    study.kept_bytes() - study.stored_bytes()
+    /// The study itself, what is noted of it, its places in lists.
+    const OTHER_BYTES: u64 = 4096;
+    OTHER_BYTES + study.kept_bytes() - study.stored_bytes()
 }
 
 /// Whether a stored study need not be begun.
@@ -604,7 +611,8 @@ impl Studies {
             return Arc::clone(known);
         }
         all.retain(|other| other.id != kept.id);
-        while all.iter().map(|other| other.bytes).sum::<u64>() + kept.bytes > VIEWS_BYTES
+        let most_bytes = self.limits.max_study_bytes.min(VIEWS_BYTES);
+        while all.iter().map(|other| other.bytes).sum::<u64>() + kept.bytes > most_bytes
             && let Some(oldest) = all.iter().position(|other| !other.is_running())
         {
             drop(all.remove(oldest));
@@ -764,11 +772,10 @@ impl Studies {
         let kept = match known {
             Some(kept) => kept,
             None => {
-                let chunk_variants = (study.variants() / LEAST_CHUNKS).clamp(1, study.chunk_variants());
-                let study = Arc::new(study.in_chunks_of(chunk_variants));
-                let in_work = study.chunks().min(self.limits.max_concurrent_solves as u64);
-                let bytes = study.kept_bytes().saturating_add(in_work.saturating_mul(study.working_bytes()));
-                let rows = self.new_rows(&mut all, &study, bytes)?;
+                let study = Arc::new(study);
+                let in_work = study.span().end.min(self.limits.max_concurrent_solves as u64);
+                let working_bytes = in_work.saturating_mul(study.working_bytes());
+                let rows = self.new_rows(&mut all, &study, view_bytes(&study).saturating_add(working_bytes))?;
                 let kept = Kept::new(study, Some(rows), 0, None);
                 all.push_back(Arc::clone(&kept));
                 kept
@@ -779,22 +786,30 @@ impl Studies {
         Ok(kept)
     }
 
-    /// A place for what a study comes to, none of which is there yet. For it the oldest go, as many as it takes, and none where all of them
-    /// would be too few: in memory those that do not run are forgotten; of stored ones the rows can be read again.
-    fn new_rows(&self, all: &mut VecDeque<Arc<Kept>>, study: &Arc<Study>, bytes: u64) -> Result<Arc<Rows>, Problem> {
+    /// A place for what a study comes to, none of which is there yet, and so many bytes beside it. For it the oldest go, as many as it takes, and none where all
+    /// of them would be too few: in memory those that do not run are forgotten; of stored ones the rows can be read again.
+    fn new_rows(
+        &self,
+        all: &mut VecDeque<Arc<Kept>>,
+        study: &Arc<Study>,
+        beside_bytes: u64,
+    ) -> Result<Arc<Rows>, Problem> {
         let is_stored = matches!(self.keeping, Keeping::Store { .. });
         let most = self.limits.max_study_bytes;
-        let held: u64 = all.iter().filter_map(|kept| Some(kept.rows.lock().as_ref()?.bytes)).sum();
+        let of_made = if is_made_apart(study) { study.told_bytes() } else { 0 };
+        let other_bytes = beside_bytes.saturating_add(of_made);
+        let bytes = study.stored_bytes().saturating_add(other_bytes);
+        let held: u64 = all.iter().filter_map(|kept| Some(kept.rows.lock().as_ref()?.bytes())).sum();
         let mut going: Vec<(Arc<Kept>, Arc<Rows>)> = Vec::new();
         let mut could_go = all
             .iter()
             .filter(|kept| is_stored || !kept.is_running())
             .filter_map(|kept| Some((Arc::clone(kept), kept.unread_rows()?)));
         loop {
-            let left = held - going.iter().map(|(_, rows)| rows.bytes).sum::<u64>();
+            let left = held.saturating_sub(going.iter().map(|(_, rows)| rows.bytes()).sum());
             // One that was admitted when the bound was larger has all of it.
             let is_within = left + bytes.min(most) <= most;
-            if is_within && self.room.could_keep(bytes, going.iter().map(|(_, rows)| &rows.room)) {
+            if is_within && self.room.could_keep(bytes, going.iter().map(|(_, rows)| rows.room.lock())) {
                 break;
             }
             match could_go.next() {
@@ -814,9 +829,9 @@ impl Studies {
             }
             drop(rows);
         }
-        let room = self.room.keep(bytes)?;
-        let (gathered, gathering) = (Mutex::new(Gathered::new(study)), tokio::sync::Mutex::default());
-        Ok(Arc::new(Rows { gathered, gathering, bytes, room }))
+        let room = Mutex::new(self.room.keep(bytes)?);
+        let (gathered, gathering, making) = (Mutex::new(Gathered::new(study)), Default::default(), Mutex::default());
+        Ok(Arc::new(Rows { gathered, gathering, making, other_bytes, room }))
     }
 
     fn no_room(&self, bytes: u64) -> Problem {
@@ -840,7 +855,7 @@ impl Studies {
         match (here, &self.keeping) {
             (Some(rows), _) => Ok(rows),
             (None, Keeping::Store { .. }) => {
-                let rows = self.new_rows(&mut all, &kept.study, kept.study.stored_bytes())?;
+                let rows = self.new_rows(&mut all, &kept.study, 0)?;
                 *kept.rows.lock() = Some(Arc::clone(&rows));
                 Ok(rows)
             }
@@ -882,30 +897,30 @@ impl Studies {
     /// # Errors
     /// Where the store does not answer, there is no room, or the time is over.
     pub async fn read(&self, kept: &Arc<Kept>, deadline: Instant) -> Result<Reading, Problem> {
-        if let Some(made) = self.made_apart(kept, deadline).await? {
-            return Ok(Reading::Made { kept: Arc::clone(kept), made });
-        }
         let rows = self.rows(kept)?;
-        if let Keeping::Store { store, .. } = &self.keeping {
+        let made = self.made_apart(kept, &rows, deadline).await?;
+        if let (None, Keeping::Store { store, .. }) = (&made, &self.keeping) {
             kept.gather(&rows, store, &self.pool).await?;
         }
-        Ok(Reading::Rows { kept: Arc::clone(kept), rows })
+        Ok(Reading { kept: Arc::clone(kept), rows, made })
     }
 
     /// What a study has come to, where that takes long to be made of its rows: made once for all who ask meanwhile, and apart from their
     /// requests, so that it goes on when the time of one of them is over.
-    ///
-    /// # Errors
-    /// As [`Self::read`].
-    pub async fn made_apart(&self, kept: &Arc<Kept>, deadline: Instant) -> Result<Option<Arc<Made>>, Problem> {
-        if !kept.is_made_apart() {
+    async fn made_apart(
+        &self,
+        kept: &Arc<Kept>,
+        rows: &Arc<Rows>,
+        deadline: Instant,
+    ) -> Result<Option<Arc<Made>>, Problem> {
+        if !is_made_apart(&kept.study) {
             return Ok(None);
         }
         let making = {
-            let mut making = kept.making.lock();
+            let mut making = rows.making.lock();
             match &*making {
                 Some(making) if kept.serves(making) => making.clone(),
-                _ => making.insert(self.making(kept)?).clone(),
+                _ => making.insert(self.making(kept, rows)).clone(),
             }
         };
         let made = tokio::time::timeout_at(deadline, making.made).await.map_err(|_| {
@@ -916,10 +931,9 @@ impl Studies {
         Ok(Some(made))
     }
 
-    fn making(&self, kept: &Arc<Kept>) -> Result<Making, Problem> {
-        let rows = self.rows(kept)?;
+    fn making(&self, kept: &Arc<Kept>, rows: &Arc<Rows>) -> Making {
         let is_of_running = kept.is_running();
-        let (kept, pool, room) = (Arc::clone(kept), self.pool.clone(), self.room.clone());
+        let (kept, rows, pool, room) = (Arc::clone(kept), Arc::clone(rows), self.pool.clone(), self.room.clone());
         let store = match &self.keeping {
             Keeping::Store { store, .. } => Some(store.clone()),
             Keeping::Memory | Keeping::Nowhere => None,
@@ -930,16 +944,15 @@ impl Studies {
             }
             let make = move || {
                 let _reserved = room.reserve(kept.study.stored_bytes())?;
-                let of_answer = room.keep(kept.study.told_bytes())?;
                 let gathered = kept.gathered(&rows);
                 let (answer, is_whole) = (gathered.answer(), gathered.is_complete());
-                Ok(Arc::new(Made { answer, is_whole, at: Instant::now(), _room: of_answer }))
+                Ok(Arc::new(Made { answer, is_whole, at: Instant::now() }))
             };
             pool.run_unhurried(make).await
         };
         let made = tokio::spawn(made.in_current_span());
         let made = made.map(|joined| joined.unwrap_or_else(|error| Err(Problem::internal(&error)))).boxed().shared();
-        Ok(Making { made, is_of_running })
+        Making { made, is_of_running }
     }
 
     /// What a store is served by in this process, until it closes: the workers where it is a file, and whoever forgets old studies and
@@ -1020,10 +1033,14 @@ impl Studies {
         let (kept, pool, limits) = (Arc::clone(kept), self.pool.clone(), self.limits);
         tokio::spawn(async move {
             let missing: Vec<_> = kept.here(|gathered| gathered.missing().collect());
-            let chunks = stream::iter(missing)
-                .map(|chunk| run_chunk(&pool, &kept, chunk))
-                .buffer_unordered(limits.max_concurrent_solves)
-                .try_collect::<()>();
+            let most = kept.study.span().end.div_ceil(LEAST_PIECES.max(4 * limits.max_concurrent_solves as u64));
+            let pieces = missing.into_iter().flat_map(|span| {
+                let starts = span.clone().step_by(usize::try_from(most).unwrap_or(usize::MAX));
+                starts.map(move |start| start..span.end.min(start + most))
+            });
+            let pieces = Arc::new(Pieces(Mutex::new(pieces.collect())));
+            let side_by_side = (0..limits.max_concurrent_solves).map(|_| run_pieces(&pool, &kept, &pieces, &cancelled));
+            let chunks = try_join_all(side_by_side);
             let ended = tokio::select! {
                 // First: what is cancelled begins nothing more. It was said to stand so already.
                 biased;
@@ -1036,7 +1053,7 @@ impl Studies {
                 return;
             }
             match ended {
-                Ok(Ok(())) => kept.stand(StudyState::Done, None),
+                Ok(Ok(_)) => kept.stand(StudyState::Done, None),
                 Ok(Err(problem)) => kept.break_off(StudyState::Failed, Some(problem)),
                 Err(_) => {
                     let problem = too_late(&format!("the {} ms of", limits.study_deadline_ms));
@@ -1047,25 +1064,86 @@ impl Studies {
     }
 }
 
-/// Works a chunk out, a slice at a time.
-async fn run_chunk(pool: &Pool, kept: &Arc<Kept>, chunk: u64) -> Result<(), Problem> {
-    let mut work = Work::new(&kept.study, chunk).within(SMALL_VARIANT_BYTES);
-    loop {
-        let sliced = pool.run_variants(work.room_bytes(), move |stop| slice(work, stop)).await?;
-        let Sliced { work: rest, variants, is_over } = sliced;
-        counter!("toothwave_study_variants_total").increment(variants);
-        kept.looked_at.fetch_add(variants, Ordering::Relaxed);
-        if is_over {
-            kept.here(|gathered| {
-                gathered.add(chunk, rest.finish());
-                kept.impossible.store(gathered.refused(), Ordering::Relaxed);
-            });
-            kept.state.send_modify(|_| {});
+/// What of a study is still to be worked on, the first piece first.
+#[derive(Debug)]
+struct Pieces(Mutex<VecDeque<Range<u64>>>);
+
+impl Pieces {
+    fn next(&self, study: &Arc<Study>) -> Option<Work> {
+        let piece = self.0.lock().pop_front()?;
+        Some(Work::of_span(study, piece).within(SMALL_VARIANT_BYTES))
+    }
+}
+
+/// What a slice has done of pieces.
+struct Come {
+    /// The piece that is not over, to go on with.
+    rest: Option<Work>,
+    over: Vec<(Range<u64>, Part)>,
+    variants: u64,
+    busy: Duration,
+}
+
+impl Come {
+    /// One piece after the other, as far as the slice's time goes.
+    fn of(
+        mut work: Work,
+        study: &Arc<Study>,
+        pieces: &Pieces,
+        mut time: Slice,
+        stop: &AtomicBool,
+    ) -> Result<Self, Problem> {
+        let (mut over, mut variants) = (Vec::new(), 0);
+        let rest = loop {
+            let sliced = slice(work, &mut time, stop)?;
+            variants += sliced.variants;
+            if !sliced.is_over {
+                break Some(sliced.work);
+            }
+            over.push(sliced.work.finish_span());
+            let next = if time.is_over() { None } else { pieces.next(study) };
+            let Some(next) = next else { break None };
+            work = next;
+        };
+        Ok(Self { rest, over, variants, busy: time.busy() })
+    }
+}
+
+/// Works pieces out, a slice at a time, until there are no more, and hands over what they come to.
+async fn run_pieces(
+    pool: &Pool,
+    kept: &Arc<Kept>,
+    pieces: &Arc<Pieces>,
+    cancelled: &CancellationToken,
+) -> Result<(), Problem> {
+    // One that runs has them.
+    let rows = kept.rows.lock().clone().ok_or_else(|| kept.forgotten())?;
+    let (mut rest, mut busy) = (None, Duration::ZERO);
+    while let Some(work) = rest.take().or_else(|| pieces.next(&kept.study)) {
+        let room_bytes = work.room_bytes();
+        let (study, pieces, pace) = (Arc::clone(&kept.study), Arc::clone(pieces), pool.pace().clone());
+        let job = move |stop: &AtomicBool| Come::of(work, &study, &pieces, pace.slice(), stop);
+        let mut came = pool.run_variants(room_bytes, job).await?;
+        counter!("toothwave_study_variants_total").increment(came.variants);
+        busy += came.busy;
+        if busy >= HAND_OVER {
+            busy = Duration::ZERO;
+            came.over.extend(came.rest.as_mut().and_then(Work::hand_over));
+        }
+        // Whoever cancels it says what it has come to: from then on no more comes.
+        let _held = kept.cancelled.lock();
+        if cancelled.is_cancelled() {
             return Ok(());
         }
+        kept.looked_at.fetch_add(came.variants, Ordering::Relaxed);
+        rows.add(|gathered| {
+            came.over.into_iter().for_each(|(span, part)| gathered.add_span(span, part));
+            kept.impossible.store(gathered.refused(), Ordering::Relaxed);
+        })?;
         kept.state.send_modify(|_| {});
-        work = rest;
+        rest = came.rest;
     }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_store::{Claim, Lease, Store, Waiting};
 use toothwave_study::{Interrupted, Part, Study, Work};
 
-use crate::compute::{Pool, SLICE, SMALL_VARIANT_BYTES};
+use crate::compute::{Pool, SMALL_VARIANT_BYTES, Slice};
 use crate::frozen::{self, NotHere};
 #[cfg(feature = "fault-injection")]
 use crate::injected;
@@ -27,7 +27,7 @@ use crate::problem::Problem;
 /// Between two looks at what there is to do, and at what was cancelled.
 const PAUSE: Duration = Duration::from_secs(1);
 
-/// What a claim that is being made gets when no chunk is to be begun any more.
+/// What a claim that is being made gets at least when no chunk is to be begun any more.
 const NEARLY: Duration = Duration::from_millis(200);
 
 /// Between two tries to keep a result: at first, and at most.
@@ -223,13 +223,14 @@ impl Workers {
                 // Nor is one that the store does not give. What is nearly claimed is, and then given back: its attempt may be noted already.
                 let told_to_stop = async {
                     self.stopping.cancelled().await;
-                    tokio::time::sleep(NEARLY).await;
+                    tokio::time::sleep(self.patience.max(NEARLY)).await;
                 };
                 let claimed = tokio::select! {
                     claimed = self.store.claim(&task.cut, ours.lease) => claimed,
                     () = told_to_stop => return,
                 };
                 match claimed {
+                    Ok(Claim::Chunk(lease)) if self.stopping.is_cancelled() => return give_up(lease).await,
                     Ok(Claim::Chunk(lease)) => {
                         self.compute(task, &ours, lease, &mut tasks).await;
                         has_worked = true;
@@ -466,9 +467,13 @@ async fn run_chunk(
     }
     let mut busy = Duration::ZERO;
     while work.room_bytes() <= most_bytes {
-        let started = Instant::now();
-        let sliced = pool.run_variants(work.room_bytes(), move |stop| slice(work, stop)).await?;
-        busy += started.elapsed();
+        let (room_bytes, pace) = (work.room_bytes(), pool.pace().clone());
+        let job = move |stop: &AtomicBool| {
+            let mut time = pace.slice();
+            slice(work, &mut time, stop).map(|sliced| (sliced, time.busy()))
+        };
+        let (sliced, took) = pool.run_variants(room_bytes, job).await?;
+        busy += took;
         counter!("toothwave_study_variants_total").increment(sliced.variants);
         work = sliced.work;
         if sliced.is_over {
@@ -478,12 +483,12 @@ async fn run_chunk(
     Ok(Err(NotHere::NeedsMemory { bytes: work.room_bytes(), most_bytes }))
 }
 
-/// A slice of a chunk.
+/// What a slice has done of a chunk.
 #[derive(Debug)]
 pub struct Sliced {
     /// The chunk, to go on with.
     pub work: Work,
-    /// Variants that the slice looked at.
+    /// Variants that were looked at.
     pub variants: u64,
     /// Whether the chunk is over.
     pub is_over: bool,
@@ -493,10 +498,9 @@ pub struct Sliced {
 ///
 /// # Errors
 /// When `stop` says so.
-pub fn slice(mut work: Work, stop: &AtomicBool) -> Result<Sliced, Problem> {
+pub fn slice(mut work: Work, time: &mut Slice, stop: &AtomicBool) -> Result<Sliced, Problem> {
     #[cfg(feature = "fault-injection")]
     fail::fail_point!("solve");
-    let started = Instant::now();
     let mut variants = 0;
     loop {
         let is_over = match work.step(stop) {
@@ -507,7 +511,7 @@ pub fn slice(mut work: Work, stop: &AtomicBool) -> Result<Sliced, Problem> {
             }
         };
         variants += 1;
-        if is_over || started.elapsed() >= SLICE {
+        if time.is_over() || is_over {
             return Ok(Sliced { work, variants, is_over });
         }
     }

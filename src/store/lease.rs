@@ -42,6 +42,20 @@ enum Held {
     Lost,
 }
 
+/// Waits, on a server, for whoever notes an attempt at the chunk or takes one back, and has others wait until the transaction is over: what a commit does not
+/// come to its end with is seen by nobody, and holds its locks.
+macro_rules! of_attempts {
+    () => {
+        "pg_advisory_xact_lock(hashtextextended($1, $2))"
+    };
+}
+
+macro_rules! unless_begun_as_often {
+    () => {
+        " WHERE (SELECT COUNT(*) FROM attempts WHERE study = $1 AND chunk = $2) < $4"
+    };
+}
+
 impl Store {
     /// A chunk of a study that is nobody's, held until it is kept, for so long at most on a server.
     ///
@@ -111,8 +125,18 @@ impl Store {
     /// Notes that a chunk is about to be computed, unless it was begun as often as chunks are. Committed apart from the lease: it outlives
     /// the worker.
     async fn note_attempt(&self, study: &str, chunk: u64) -> Result<bool, StoreError> {
-        let text = "INSERT INTO attempts SELECT $1, $2, $3, unixepoch()
-            WHERE (SELECT COUNT(*) FROM attempts WHERE study = $1 AND chunk = $2) < $4";
+        let text = match &self.database {
+            Database::File { .. } => {
+                concat!("INSERT INTO attempts SELECT $1, $2, $3, unixepoch()", unless_begun_as_often!())
+            }
+            // Until its commit is over, whoever takes it back waits for it.
+            Database::Server { .. } => concat!(
+                "INSERT INTO attempts SELECT $1, $2, $3, unixepoch() FROM (SELECT ",
+                of_attempts!(),
+                ") AS held",
+                unless_begun_as_often!()
+            ),
+        };
         self.with(PATIENCE, async |connection| {
             let noted = on!(connection, inner => {
                 sqlx::query(text)
@@ -129,14 +153,20 @@ impl Store {
         .await
     }
 
-    /// Deletes what is noted of attempts of this process.
+    /// Deletes what is noted of attempts of this process, and what is being noted.
     async fn delete_attempts(&self, study: &str, chunk: u64) -> Result<(), StoreError> {
         let text = "DELETE FROM attempts WHERE study = $1 AND chunk = $2 AND worker = $3";
         self.with(PATIENCE, async |connection| {
+            begin(connection).await?;
+            if let Connection::Server(session) = connection {
+                // A statement of its own: the next one sees what was committed until then.
+                let text = concat!("SELECT ", of_attempts!());
+                sqlx::query(text).bind(study).bind(stored(chunk)).execute(&mut **session).await?;
+            }
             on!(connection, inner => {
                 sqlx::query(text).bind(study).bind(stored(chunk)).bind(&*self.worker).execute(inner).await.map(|_| ())
             })?;
-            Ok(())
+            commit(connection).await
         })
         .await
     }
@@ -255,15 +285,21 @@ impl Lease {
     async fn take_back_attempt(&mut self) {
         const FIRST_PAUSE: Duration = Duration::from_secs(1);
         const LONGEST_PAUSE: Duration = Duration::from_secs(30);
-        // What is deleted first may not see what is still being committed; when that comes to its end, so has this.
-        let (mut deleted, mut pause) = (0, FIRST_PAUSE);
-        while deleted < 2 {
-            self.say().await;
-            tokio::time::sleep(pause).await;
-            match self.store.delete_attempts(&self.cut.id, self.chunk).await {
-                Ok(()) => (deleted, pause) = (deleted + 1, FIRST_PAUSE),
-                Err(_) => pause = (2 * pause).min(LONGEST_PAUSE),
+        let (store, cut, chunk) = (self.store.clone(), self.cut.clone(), self.chunk);
+        let taken_back = async {
+            // What is deleted first may come before what is to be noted.
+            let (mut deleted, mut pause) = (0, FIRST_PAUSE);
+            while deleted < 2 {
+                tokio::time::sleep(pause).await;
+                match store.delete_attempts(&cut.id, chunk).await {
+                    Ok(()) => (deleted, pause) = (deleted + 1, FIRST_PAUSE),
+                    Err(_) => pause = (2 * pause).min(LONGEST_PAUSE),
+                }
             }
+        };
+        tokio::select! {
+            () = taken_back => {}
+            _ = self.renew() => {}
         }
     }
 

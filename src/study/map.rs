@@ -1,5 +1,7 @@
 //! A map: quantities over a grid.
 
+use std::sync::Arc;
+
 use serde::Serialize;
 use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::json::Tree;
@@ -16,12 +18,13 @@ use crate::variant::{Asked, Domain, Template, Value, Variable};
 /// The grid of a map: the last axis is the fastest.
 #[derive(Debug, Clone)]
 pub(crate) struct Map {
+    variables: Arc<Vec<Variable>>,
+    /// One for each of these.
     axes: Vec<Axis>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 struct Axis {
-    variable: Variable,
     values: Values,
     /// Whether all its values are numbers.
     is_number: bool,
@@ -93,7 +96,16 @@ impl Map {
         let template = Template::new(&document.base.0, &free, "over")?;
         let axes = template.variables().iter().zip(document.over.values());
         let axes = axes.map(|(variable, over)| Axis::new(variable, over)).collect::<Result<_, _>>()?;
-        Ok((Self { axes }, template))
+        Ok((Self { variables: template.shared_variables(), axes }, template))
+    }
+
+    /// About what it takes in memory beside its template.
+    pub(crate) const fn bytes(&self) -> usize {
+        self.axes.len() * size_of::<Axis>()
+    }
+
+    fn variables_with_axes(&self) -> impl Iterator<Item = (&Variable, &Axis)> {
+        self.variables.iter().zip(&self.axes)
     }
 
     /// Variants of the grid; none where there are more than can be counted.
@@ -176,22 +188,22 @@ impl Axis {
             Values::Choices(_) => values.all().all(|value| matches!(variable.spelled(value), Tree::Number(_))),
             Values::Whole { .. } | Values::Steps { .. } => true,
         };
-        Ok(Self { variable: variable.clone(), values, is_number })
+        Ok(Self { values, is_number })
     }
 
-    fn answer(&self) -> AxisAnswer {
-        let cells = || self.values.all().map(|value| self.cell(value));
+    fn answer(&self, variable: &Variable) -> AxisAnswer {
+        let cells = || self.values.all().map(|value| self.cell(variable, value));
         let number = |cell| if let Cell::Number(number) = cell { Some(number) } else { None };
         let (values, choices) = if self.is_number {
             (Some(cells().filter_map(number).collect()), None)
         } else {
             (None, Some(cells().map(|cell| cell.text()).collect()))
         };
-        AxisAnswer { pointer: self.variable.pointer.clone(), values, choices }
+        AxisAnswer { pointer: variable.pointer.clone(), values, choices }
     }
 
-    fn cell(&self, value: Value) -> Cell {
-        match self.variable.spelled(value) {
+    fn cell(&self, variable: &Variable, value: Value) -> Cell {
+        match variable.spelled(value) {
             Tree::Number(number) if self.is_number => Cell::Number(number),
             other => Cell::Word(spelled(&other)),
         }
@@ -213,11 +225,13 @@ impl Rows for Map {
 
     fn places(&self) -> Vec<Column> {
         let kind = |axis: &Axis| if axis.is_number { Content::Number } else { Content::Word };
-        self.axes.iter().map(|axis| Column::new(axis.variable.pointer.as_str(), kind(axis))).collect()
+        let column = |(variable, axis): (&Variable, &Axis)| Column::new(variable.pointer.as_str(), kind(axis));
+        self.variables_with_axes().map(column).collect()
     }
 
     fn place(&self, variant: u64) -> Vec<Cell> {
-        self.axes.iter().zip(self.values(variant)).map(|(axis, value)| axis.cell(value)).collect()
+        let values = self.values(variant);
+        self.variables_with_axes().zip(values).map(|((variable, axis), value)| axis.cell(variable, value)).collect()
     }
 }
 
@@ -273,7 +287,7 @@ impl MapAnswer {
             is_complete,
             gaps: Vec::new(),
             variants: map.variants().unwrap_or(u64::MAX),
-            over: map.axes.iter().map(Axis::answer).collect(),
+            over: map.variables_with_axes().map(|(variable, axis)| axis.answer(variable)).collect(),
             possible: PossibleAnswer {
                 variant: rows.answered,
                 quantities: quantities.iter().copied().zip(rows.columns).collect(),

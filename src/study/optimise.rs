@@ -47,6 +47,14 @@ pub struct Point {
     pub values: Vec<f64>,
 }
 
+impl Point {
+    /// About what it takes in memory beside itself.
+    pub(crate) fn bytes(&self) -> usize {
+        let Judged { violations, objectives } = &self.judged;
+        [&self.place, violations, objectives, &self.values].iter().map(|of| size_of_val(of.as_slice())).sum()
+    }
+}
+
 /// How long each stage is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Plan {

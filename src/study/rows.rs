@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::iter;
+use std::mem;
 use std::ops::{Range, RangeInclusive};
 
 use serde::{Deserialize, Serialize};
@@ -11,7 +12,7 @@ use utoipa::ToSchema;
 
 use crate::evaluate::{Evaluator, Interrupted, Outcome, Reason, Refusal};
 use crate::table::{Cell, Column, Content, Table};
-use crate::variant::Template;
+use crate::variant::{GRAIN_BYTES, Template};
 
 /// Variants of a chunk: some tens of milliseconds of the cheapest ones, so that a study keeps several cores busy and progress is seen.
 pub(crate) const CHUNK_VARIANTS: u64 = 4096;
@@ -49,6 +50,15 @@ pub(crate) struct RefusalNoted {
     pub(crate) detail: String,
     pub(crate) first: u64,
     pub(crate) count: u64,
+}
+
+impl RefusalNoted {
+    /// About what it takes in memory.
+    pub(crate) fn bytes(&self) -> usize {
+        let Reason { code, pointer } = &self.reason;
+        size_of::<Self>()
+            + [code, pointer, &self.detail].iter().map(|text| GRAIN_BYTES + text.capacity()).sum::<usize>()
+    }
 }
 
 /// Rows as a table wants them, of a part or of an answer.
@@ -112,6 +122,22 @@ pub(crate) struct RowsWork {
 impl RowsPart {
     pub(crate) fn new(quantities: usize) -> Self {
         Self { columns: vec![Vec::new(); quantities], ..Self::default() }
+    }
+
+    pub(crate) fn shrink(&mut self) {
+        self.answered.shrink_to_fit();
+        self.columns.iter_mut().for_each(Vec::shrink_to_fit);
+        self.refused.shrink_to_fit();
+        self.reasons.shrink_to_fit();
+        self.refusals.shrink_to_fit();
+    }
+
+    /// About what it takes in memory.
+    pub(crate) fn bytes(&self) -> usize {
+        let columns = self.columns.iter().map(|column| size_of::<Vec<f64>>() + size_of_val(column.as_slice()));
+        let refusals = self.refusals.iter().map(RefusalNoted::bytes);
+        let variants = size_of_val(self.answered.as_slice()) + size_of_val(self.refused.as_slice());
+        variants + size_of_val(self.reasons.as_slice()) + columns.sum::<usize>() + refusals.sum::<usize>()
     }
 
     /// Its rows as a table.
@@ -254,6 +280,17 @@ impl RowsWork {
             self.next += 1;
         }
         Ok(self.next == self.end)
+    }
+
+    /// What has come since it was asked the last time.
+    pub(crate) fn hand_over(&mut self) -> RowsPart {
+        let quantities = self.part.columns.len();
+        mem::replace(&mut self.part, RowsPart::new(quantities))
+    }
+
+    /// The first variant that was not looked at.
+    pub(crate) const fn next(&self) -> u64 {
+        self.next
     }
 
     pub(crate) fn finish(self) -> RowsPart {

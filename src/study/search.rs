@@ -601,6 +601,15 @@ fn variable_values(template: &Template, place: &[f64]) -> Vec<Value> {
 }
 
 impl IslandPart {
+    /// About what it takes in memory.
+    pub(crate) fn bytes(&self) -> usize {
+        let points = self.front.iter().chain(self.relaxations.iter().flatten()).chain(&self.nearest);
+        let places = size_of_val(self.relaxations.as_slice()) + size_of_val(self.front.as_slice());
+        places
+            + points.map(Point::bytes).sum::<usize>()
+            + self.scan.refusals.iter().map(RefusalNoted::bytes).sum::<usize>()
+    }
+
     pub(crate) const fn evaluated(&self) -> u64 {
         self.evaluated
     }

@@ -13,7 +13,7 @@ use crate::document::{InputDocument, SensitivityDocument};
 use crate::evaluate::Evaluator;
 use crate::rows::{GapAnswer, ReasonAnswer, Rows, RowsPart};
 use crate::table::{Cell, Column, Content, Table};
-use crate::variant::{Asked, Domain, Template, Value};
+use crate::variant::{Asked, Domain, GRAIN_BYTES, Template, Value};
 
 /// How far an input is moved where nothing is said, as a share of its value.
 const RELATIVE: f64 = 0.01;
@@ -91,6 +91,11 @@ impl Sensitivity {
         // A text takes a few bytes more than it has.
         let an_input = |input: &Input| size_of::<SensitivityToInput>() + input.pointer.len() + 16;
         (quantities * self.inputs.iter().map(an_input).sum::<usize>()) as u64
+    }
+
+    /// About what it takes in memory beside its template.
+    pub(crate) fn bytes(&self) -> usize {
+        self.inputs.iter().map(|input| size_of::<Input>() + GRAIN_BYTES + input.pointer.len()).sum()
     }
 
     pub(crate) const fn variants(&self) -> u64 {

@@ -1,5 +1,6 @@
 //! The engine: a study is pure chunks, and a merge that does not depend on their order.
 
+use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::ops::Range;
 use std::sync::Arc;
@@ -70,6 +71,22 @@ pub enum Part {
 }
 
 impl Part {
+    /// Gives back what it has not filled.
+    fn shrink(&mut self) {
+        if let Self::Rows(rows) = self {
+            rows.shrink();
+        }
+    }
+
+    /// About what it takes in memory.
+    fn bytes(&self) -> usize {
+        size_of::<Self>()
+            + match self {
+                Self::Rows(rows) => rows.bytes(),
+                Self::Island(island) => island.bytes(),
+            }
+    }
+
     /// Variants that it has looked at.
     pub const fn variants(&self) -> u64 {
         match self {
@@ -272,10 +289,19 @@ impl Study {
         }
     }
 
-    /// The variants of a chunk in rows.
-    fn rows_of(&self, chunk: u64) -> Range<u64> {
-        let first = chunk.saturating_mul(self.chunk_variants).min(self.variants);
-        first..self.variants.min(first.saturating_add(self.chunk_variants))
+    /// All that it consists of: its variants, or the islands of a search.
+    pub const fn span(&self) -> Range<u64> {
+        match &self.kind {
+            Kind::Search(search) => 0..search.islands(),
+            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => 0..self.variants,
+        }
+    }
+
+    /// Of that, what a chunk consists of.
+    fn span_of(&self, chunk: u64) -> Range<u64> {
+        let (end, length) = (self.span().end, if self.has_rows() { self.chunk_variants } else { 1 });
+        let first = chunk.saturating_mul(length).min(end);
+        first..end.min(first.saturating_add(length))
     }
 
     /// About what it takes to keep what it comes to.
@@ -309,11 +335,13 @@ impl Study {
 
     /// About what it takes to keep it with what it comes to.
     pub fn kept_bytes(&self) -> u64 {
-        let of_true_peaks = match &self.kind {
+        let of_kind = match &self.kind {
+            Kind::Map(map) => map.bytes(),
             Kind::Search(search) => search.template_bytes(),
-            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => 0,
+            Kind::Sensitivity(sensitivity) => sensitivity.bytes(),
+            Kind::Tolerance(tolerance) => tolerance.bytes(),
         };
-        self.stored_bytes().saturating_add((self.template.bytes() + of_true_peaks) as u64)
+        self.stored_bytes().saturating_add((self.template.bytes() + of_kind) as u64)
     }
 
     /// About what a chunk takes that is in work, beside what it comes to.
@@ -490,6 +518,8 @@ fn is_of_base(template: &Template, example: &Tree, error: &FieldError) -> bool {
 #[derive(Debug)]
 pub struct Work {
     study: Arc<Study>,
+    /// Of its span, the first that was not handed over.
+    first: u64,
     state: State,
     room_bytes: u64,
 }
@@ -503,14 +533,20 @@ enum State {
 impl Work {
     /// A chunk of a study, not begun yet.
     pub fn new(study: &Arc<Study>, chunk: u64) -> Self {
+        Self::of_span(study, study.span_of(chunk))
+    }
+
+    /// A part of [`Study::span`], of a search an island, not begun yet.
+    pub fn of_span(study: &Arc<Study>, span: Range<u64>) -> Self {
+        let first = span.start;
         let state = match &study.kind {
-            Kind::Search(search) => State::Island(Box::new(Island::new(search, study.template.clone(), chunk))),
+            Kind::Search(search) => State::Island(Box::new(Island::new(search, study.template.clone(), first))),
             Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => {
                 let quantities = study.evaluator.quantities.len();
-                State::Rows(RowsWork::new(study.template.clone(), quantities, study.rows_of(chunk)))
+                State::Rows(RowsWork::new(study.template.clone(), quantities, span))
             }
         };
-        Self { study: Arc::clone(study), state, room_bytes: u64::MAX }
+        Self { study: Arc::clone(study), first, state, room_bytes: u64::MAX }
     }
 
     /// The same where there is room for so many bytes alone while a variant is computed.
@@ -524,24 +560,12 @@ impl Work {
         self.room_bytes
     }
 
-    /// One variant of a study in rows alone; of a search its first island. To see what variants take, and what they come to here.
-    pub fn of_variant(study: &Arc<Study>, variant: u64) -> Self {
-        match &study.kind {
-            Kind::Search(_) => Self::new(study, 0),
-            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => {
-                let quantities = study.evaluator.quantities.len();
-                let rows = RowsWork::new(study.template.clone(), quantities, variant..study.variants.min(variant + 1));
-                Self { study: Arc::clone(study), state: State::Rows(rows), room_bytes: u64::MAX }
-            }
-        }
-    }
-
     /// One variant further; whether that was the last one.
     ///
     /// # Errors
     /// When `stop` says so, or where the variant takes more room than there is; the chunk is then as it was before.
     pub fn step(&mut self, stop: &dyn Stop) -> Result<bool, Interrupted> {
-        let &mut Self { ref study, ref mut state, room_bytes } = self;
+        let &mut Self { ref study, ref mut state, room_bytes, .. } = self;
         let evaluator = &study.evaluator;
         match (&study.kind, state) {
             (Kind::Map(map), State::Rows(rows)) => rows.step(map, evaluator, room_bytes, stop),
@@ -551,6 +575,25 @@ impl Work {
             // Made for each other above.
             (Kind::Search(_), State::Rows(_)) | (_, State::Island(_)) => Ok(true),
         }
+    }
+
+    /// What of rows has come since it was asked the last time, with the span that it is of; the rest is still to be worked on. An island has nothing before it is
+    /// over.
+    pub fn hand_over(&mut self) -> Option<(Range<u64>, Part)> {
+        let State::Rows(rows) = &mut self.state else { return None };
+        let part = rows.hand_over();
+        let span = self.first..rows.next();
+        self.first = span.end;
+        (!span.is_empty()).then_some((span, Part::Rows(part)))
+    }
+
+    /// What is left of that when it is over.
+    pub fn finish_span(self) -> (Range<u64>, Part) {
+        let end = match &self.state {
+            State::Rows(rows) => rows.next(),
+            State::Island(_) => self.first + 1,
+        };
+        (self.first..end, self.finish())
     }
 
     /// What the chunk comes to, once it is over.
@@ -575,19 +618,36 @@ impl Work {
 #[derive(Debug, Clone)]
 pub struct Gathered {
     study: Arc<Study>,
-    /// Shared with whoever makes an answer of them meanwhile.
-    parts: Vec<Option<Arc<Part>>>,
+    /// By the first of the span that each is of. Shared with whoever makes an answer of them meanwhile.
+    parts: BTreeMap<u64, Gathering>,
+    /// Of the study's span, how much has not come.
     missing: u64,
     variants: u64,
     refused: u64,
+    bytes: u64,
     gaps: Vec<GapAnswer>,
+}
+
+/// A part with the end of the span that it is of.
+#[derive(Debug, Clone)]
+struct Gathering {
+    end: u64,
+    part: Arc<Part>,
 }
 
 impl Gathered {
     /// None yet.
     pub fn new(study: &Arc<Study>) -> Self {
-        let parts = (0..study.chunks()).map(|_| None).collect();
-        Self { study: Arc::clone(study), parts, missing: study.chunks(), variants: 0, refused: 0, gaps: Vec::new() }
+        let missing = study.span().end;
+        Self {
+            study: Arc::clone(study),
+            parts: BTreeMap::new(),
+            missing,
+            variants: 0,
+            refused: 0,
+            bytes: 0,
+            gaps: Vec::new(),
+        }
     }
 
     /// The study.
@@ -597,13 +657,24 @@ impl Gathered {
 
     /// Takes what a chunk has come to; a second time it changes nothing.
     pub fn add(&mut self, chunk: u64, part: Part) {
-        let place = usize::try_from(chunk).ok().and_then(|chunk| self.parts.get_mut(chunk));
-        if let Some(place @ None) = place {
-            self.missing -= 1;
-            self.variants += part.variants();
-            self.refused += part.refused();
-            *place = Some(Arc::new(part));
+        self.add_span(self.study.span_of(chunk), part);
+    }
+
+    /// The same of a part of the study's span that overlaps no other but itself.
+    pub fn add_span(&mut self, span: Range<u64>, mut part: Part) {
+        if span.is_empty() || self.has(span.start) {
+            return;
         }
+        part.shrink();
+        self.missing -= span.end - span.start;
+        self.variants += part.variants();
+        self.refused += part.refused();
+        self.bytes += (size_of::<(u64, Gathering)>() + part.bytes()) as u64;
+        self.parts.insert(span.start, Gathering { end: span.end, part: Arc::new(part) });
+    }
+
+    fn has(&self, place: u64) -> bool {
+        self.parts.range(..=place).next_back().is_some_and(|(_, Gathering { end, .. })| place < *end)
     }
 
     /// Takes note of the chunks that will not come, each with how often it was tried.
@@ -619,12 +690,20 @@ impl Gathered {
 
     /// Whether a chunk has not come yet.
     pub fn lacks(&self, chunk: u64) -> bool {
-        usize::try_from(chunk).ok().and_then(|chunk| self.parts.get(chunk)).is_some_and(Option::is_none)
+        let span = self.study.span_of(chunk);
+        !span.is_empty() && !self.has(span.start)
     }
 
-    /// Chunks that have not come yet.
-    pub fn missing(&self) -> impl Iterator<Item = u64> {
-        (0..).zip(&self.parts).filter(|(_, part)| part.is_none()).map(|(chunk, _)| chunk)
+    /// Of the study's span, what has not come yet.
+    pub fn missing(&self) -> impl Iterator<Item = Range<u64>> {
+        let starts = self.parts.keys().copied().chain([self.study.span().end]);
+        let ends = [0].into_iter().chain(self.parts.values().map(|gathering| gathering.end));
+        ends.zip(starts).map(|(end, start)| end..start).filter(|span| !span.is_empty())
+    }
+
+    /// About what has come takes in memory.
+    pub const fn bytes(&self) -> u64 {
+        self.bytes
     }
 
     /// Whether all have come.
@@ -664,7 +743,7 @@ impl Gathered {
                 StudyAnswer::Map(MapAnswer::new(map, evaluator, rows, is_complete))
             }
             Kind::Search(search) => {
-                let islands = self.parts.iter().flatten().filter_map(|part| match &**part {
+                let islands = self.parts.values().filter_map(|gathering| match &*gathering.part {
                     Part::Island(island) => Some(island),
                     Part::Rows(_) => None,
                 });
@@ -684,7 +763,7 @@ impl Gathered {
 
     /// All rows that have come.
     fn rows(&self) -> RowsParts<'_> {
-        let rows = self.parts.iter().flatten().filter_map(|part| match &**part {
+        let rows = self.parts.values().filter_map(|gathering| match &*gathering.part {
             Part::Rows(rows) => Some(rows),
             Part::Island(_) => None,
         });

@@ -15,7 +15,7 @@ use crate::random::Stream;
 use crate::rank::{QuantileAnswer, ShareAnswer, quantile, share};
 use crate::rows::{GapAnswer, ReasonAnswer, Rows, RowsPart, RowsParts};
 use crate::table::{Cell, Column, Content, Table};
-use crate::variant::{Asked, Domain, Template, Value, Variable};
+use crate::variant::{Asked, Domain, GRAIN_BYTES, Template, Value, Variable};
 
 /// Drives in which one kind of deviation stands alone, for each kind.
 const ALONE: u64 = 1000;
@@ -178,6 +178,19 @@ impl Tolerance {
         // A text takes a few bytes more than it has.
         let a_kind = |kind: &Kind| size_of::<ContributorAnswer>() + kind.name.len() + 16;
         (quantities * (HISTOGRAM_BYTES + self.kinds.iter().map(a_kind).sum::<usize>())) as u64
+    }
+
+    /// About what it takes in memory beside its template.
+    pub(crate) fn bytes(&self) -> usize {
+        let of_kind = |kind: &Kind| {
+            let path: &[String] = match &kind.place {
+                Place::Items { path, .. } | Place::Runout { path } => path,
+                Place::Number { .. } => &[],
+            };
+            let texts = path.iter().chain([&kind.name]);
+            size_of::<Kind>() + texts.map(|text| size_of::<String>() + GRAIN_BYTES + text.len()).sum::<usize>()
+        };
+        self.kinds.iter().map(of_kind).sum()
     }
 
     pub(crate) fn variants(&self) -> u64 {

@@ -20,6 +20,9 @@ const MOST_FORMS_BYTES: usize = 8 << 20;
 /// all that there are have fewer.
 const MOST_LEFT_OUT: usize = 64;
 
+/// What is taken of memory comes in steps: a text or a list takes so much more than it has.
+pub(crate) const GRAIN_BYTES: usize = 16;
+
 /// What a clone's own copies take, at most, beside the one that it fills.
 const OWN_BYTES: usize = 1 << 18;
 
@@ -225,6 +228,10 @@ impl Template {
         &self.variables
     }
 
+    pub(crate) fn shared_variables(&self) -> Arc<Vec<Variable>> {
+        Arc::clone(&self.variables)
+    }
+
     /// What a form takes at most: the base, and whatever is put into it.
     fn form_bytes(&self, base: &Tree) -> usize {
         /// Of an object that is made for a name on the way, beside the name.
@@ -238,8 +245,12 @@ impl Template {
 
     /// About what the template takes in memory.
     pub(crate) fn bytes(&self) -> usize {
-        let choices = self.variables.iter().flat_map(|variable| &variable.choices);
-        choices.chain(self.examples()).map(Tree::bytes).sum()
+        let takes = self.forms.iter().map(|form| GRAIN_BYTES + form.takes.len());
+        self.forms_bytes() + takes.sum::<usize>() + self.variables.iter().map(Variable::bytes).sum::<usize>()
+    }
+
+    fn forms_bytes(&self) -> usize {
+        self.examples().map(Tree::bytes).sum()
     }
 
     fn own_bytes(&self) -> usize {
@@ -248,7 +259,7 @@ impl Template {
 
     /// About what a clone takes at most, once it has filled them all.
     pub(crate) fn clone_bytes(&self) -> usize {
-        self.bytes().min(self.longest_bytes().max(OWN_BYTES))
+        self.forms_bytes().min(self.longest_bytes().max(OWN_BYTES))
     }
 
     /// About what its longest document takes.
@@ -415,6 +426,13 @@ impl Form {
 }
 
 impl Variable {
+    /// About what it takes in memory.
+    fn bytes(&self) -> usize {
+        let path = self.path.iter().map(|name| size_of::<String>() + GRAIN_BYTES + name.len());
+        let choices = self.choices.iter().map(|choice| GRAIN_BYTES + choice.bytes());
+        size_of::<Self>() + GRAIN_BYTES + self.pointer.len() + path.sum::<usize>() + choices.sum::<usize>()
+    }
+
     /// The value at a share of the domain, 0 to 1; every whole number and every choice has an equal part of it.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of choices")]
     pub(crate) fn at_share(&self, share: f64) -> Value {

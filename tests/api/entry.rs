@@ -51,8 +51,14 @@ fn a_keys_file_without_a_key_or_with_something_else_is_refused() {
 }
 
 #[test]
-fn a_keys_file_that_never_ends_is_refused() {
-    assert!(Keys::read("/dev/zero").unwrap_err().contains("at most"));
+fn a_keys_file_that_is_none_or_is_too_large_is_refused() {
+    for never_ends in ["/dev/zero", "/dev/stdin", "."] {
+        assert!(Keys::read(never_ends).unwrap_err().contains("regular file"), "{never_ends}");
+    }
+    let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("large-keys-{}", std::process::id()));
+    std::fs::File::create(&file).unwrap().set_len(5 << 20).unwrap();
+    assert!(Keys::read(file.to_str().unwrap()).unwrap_err().contains("at most"));
+    std::fs::remove_file(&file).unwrap();
 }
 
 #[test]

@@ -808,14 +808,14 @@ async fn who_asks_for_a_study_that_is_over_gets_all_of_it_though_another_asked_w
     let begun = service.ask(&Question::post("/v1/studies", study)).await.json();
     assert_eq!(begun["state"], "running");
     let kept = studies.find(begun["id"].as_str().unwrap()).await.unwrap().unwrap();
-    let refused = studies.made_apart(&kept, tokio::time::Instant::now()).await.unwrap_err();
+    let refused = studies.read(&kept, tokio::time::Instant::now()).await.unwrap_err();
     assert_eq!(refused.code, ProblemCode::DeadlineExceeded);
     while service.get(&place(&begun)).await.found()["state"] == "running" {
         tokio::task::yield_now().await;
     }
     let an_hour = tokio::time::Instant::now() + EXPIRY;
-    let (made, ()) = tokio::join!(studies.made_apart(&kept, an_hour), async { release.send(()).unwrap() });
-    assert_eq!(serde_json::to_value(&made.unwrap().unwrap().answer).unwrap()["is_complete"], true);
+    let (made, ()) = tokio::join!(studies.read(&kept, an_hour), async { release.send(()).unwrap() });
+    assert_eq!(serde_json::to_value(made.unwrap().answer()).unwrap()["is_complete"], true);
     assert!(before.await.unwrap().unwrap());
 }
 
@@ -836,8 +836,8 @@ async fn the_answer_of_a_large_study_goes_on_being_made_when_the_time_of_who_ask
     // Whose time is over at once: an answer that ended with its request would never be there.
     let mut refused = 0;
     let made = loop {
-        match studies.made_apart(&kept, tokio::time::Instant::now()).await {
-            Ok(made) => break made.unwrap(),
+        match studies.read(&kept, tokio::time::Instant::now()).await {
+            Ok(made) => break made,
             Err(problem) => {
                 assert_eq!(problem.code, ProblemCode::DeadlineExceeded);
                 refused += 1;
@@ -848,7 +848,7 @@ async fn the_answer_of_a_large_study_goes_on_being_made_when_the_time_of_who_ask
     assert!(refused > 0);
     let result = replica.service.get(&format!("{}/result", place(&told))).await.found();
     assert_eq!(result, told["result"]);
-    assert_eq!(serde_json::to_value(&made.answer).unwrap(), result);
+    assert_eq!(serde_json::to_value(made.answer()).unwrap(), result);
     replica.end().await;
 }
 

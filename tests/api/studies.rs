@@ -131,21 +131,25 @@ async fn a_cancelled_study_keeps_what_it_has_and_goes_on_when_it_is_asked_for_ag
     assert_eq!(deleted(&service, &place(&study)).await, 404);
 }
 
-/// In memory chunks of thousands of variants were lost, of which each may take seconds, and were counted as looked at.
+/// In memory thousands of variants were lost, of which each may take seconds, and were counted as looked at.
 #[tokio::test]
 async fn a_study_that_is_cancelled_has_the_variants_that_it_says_it_has_looked_at() {
     let service = Service::within(LIMITS);
     let study = begun(&service, &long()).await.json();
-    while service.get(&place(&study)).await.found()["looked_at"].as_u64().unwrap() < 8000 {
-        tokio::time::sleep(Duration::from_millis(1)).await;
+    let variants = async || {
+        let partial = service.get(&format!("{}/result", place(&study))).await.found();
+        let has = |what: &str| partial[what]["variant"].as_array().unwrap().len() as u64;
+        has("possible") + has("impossible")
+    };
+    // After a second something is handed over, long before any piece is over.
+    while variants().await == 0 {
+        tokio::time::sleep(Duration::from_millis(20)).await;
     }
     assert_eq!(deleted(&service, &place(&study)).await, 204);
     let stands = service.get(&place(&study)).await.found();
-    let partial = service.get(&format!("{}/result", place(&study))).await.found();
-    let has = |what: &str| partial[what]["variant"].as_array().unwrap().len() as u64;
-    let variants = has("possible") + has("impossible");
+    let variants = variants().await;
     assert_eq!((&stands["state"], &stands["looked_at"]), (&json!("cancelled"), &json!(variants)));
-    assert!(variants > 4000, "{variants}");
+    assert!(variants < 490_000, "{variants}");
 }
 
 #[tokio::test]
@@ -216,7 +220,7 @@ async fn a_study_that_is_too_large_is_refused_with_the_limit_before_anything_run
 
 #[tokio::test]
 async fn more_studies_than_may_run_are_refused_and_the_oldest_that_is_done_makes_room() {
-    let limits = Limits { max_concurrent_solves: 1, max_concurrent_studies: 1, max_study_bytes: 40_000, ..LIMITS };
+    let limits = Limits { max_concurrent_solves: 1, max_concurrent_studies: 1, max_study_bytes: 60_000, ..LIMITS };
     let service = Service::within(limits);
     let occupied = Occupied::by_one(&service.app.pool).await;
     let first = begun(&service, &map(&shortest(), 5)).await.json();
@@ -232,14 +236,14 @@ async fn more_studies_than_may_run_are_refused_and_the_oldest_that_is_done_makes
 
 #[tokio::test]
 async fn a_study_that_is_refused_makes_none_forgotten() {
-    let service = Service::within(Limits { max_concurrent_solves: 1, max_study_bytes: 100_000, ..LIMITS });
+    let service = Service::within(Limits { max_concurrent_solves: 1, max_study_bytes: 145_000, ..LIMITS });
     let (one, other) =
         (waited_for(&service, &map(&shortest(), 5)).await, waited_for(&service, &map(&shortest(), 6)).await);
     let occupied = Occupied::by_one(&service.app.pool).await;
-    // 58 kB each: beside one that runs, which is never forgotten, no other has room whatever is.
-    let running = begun(&service, &map(&shortest(), 1300)).await.json();
+    // 86 kB each: beside one that runs, which is never forgotten, no other has room whatever is.
+    let running = begun(&service, &map(&shortest(), 2000)).await.json();
     assert_eq!(running["state"], "running");
-    begun(&service, &map(&shortest(), 1301)).await.refused(503, "queue_full");
+    begun(&service, &map(&shortest(), 2001)).await.refused(503, "queue_full");
     for kept in [&one, &other] {
         assert_eq!(service.get(&place(kept)).await.status, 200, "it was there before");
     }

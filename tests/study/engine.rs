@@ -181,14 +181,17 @@ fn what_the_answer_of_a_study_of_many_inputs_takes_is_known_before_it_is_made() 
 fn a_study_that_is_half_done_tells_what_it_has() {
     let [map, search, ..] = studies();
     for document in [map, search] {
-        let study = study(&document).unwrap();
+        let study = in_chunks_of(&document, 100);
         let mut half = Gathered::new(&study);
         half.add(1, Work::new(&study, 1).run(&Never).unwrap());
-        assert!(!half.is_complete() && half.missing().eq((0..study.chunks()).filter(|&chunk| chunk != 1)));
         assert!(
-            half.missing().all(|chunk| half.lacks(chunk))
-                && ![1, study.chunks()].iter().any(|&chunk| half.lacks(chunk))
+            !half.is_complete()
+                && (0..=study.chunks()).all(|chunk| half.lacks(chunk) != [1, study.chunks()].contains(&chunk))
         );
+        // Before it, and behind it.
+        let one = if study.has_rows() { 100 } else { 1 };
+        let missing = [0..one, 2 * one..study.span().end].into_iter().filter(|span| !span.is_empty());
+        assert!(half.missing().eq(missing));
         let answer: Value = serde_json::from_str(&text(&half, Format::Json)).unwrap();
         assert_eq!(answer["is_complete"], false);
         half.add(0, Work::new(&study, 0).run(&Never).unwrap());
@@ -225,13 +228,45 @@ fn a_study_in_chunks_of_any_size_has_the_same_bits() {
     }
 }
 
+/// In pieces of any size, and each piece in parts of any.
+#[test]
+fn a_study_that_is_handed_over_bit_by_bit_has_the_same_bits() {
+    for document in studies() {
+        let whole = text(&gathered(&document), Format::Json);
+        let study = study(&document).unwrap();
+        let mut gathered = Gathered::new(&study);
+        let (mut first, mut steps) = (0, 0);
+        while first < study.span().end {
+            let end = study.span().end.min(first + if study.has_rows() { 1 + first % 1000 } else { 1 });
+            let mut work = Work::of_span(&study, first..end);
+            while !work.step(&Never).unwrap() {
+                steps += 1;
+                if steps % 17 == 0
+                    && let Some((span, part)) = work.hand_over()
+                {
+                    assert!(gathered.missing().all(|missing| span.end <= missing.start || missing.start <= span.start));
+                    gathered.add_span(span, part);
+                }
+            }
+            let (span, part) = work.finish_span();
+            // A second time changes nothing.
+            for _ in 0..2 {
+                gathered.add_span(span.clone(), part.clone());
+            }
+            first = end;
+        }
+        assert!(gathered.is_complete() && gathered.missing().next().is_none());
+        assert!(text(&gathered, Format::Json) == whole, "{}", study.kind());
+    }
+}
+
 #[test]
 fn a_variant_alone_is_what_it_is_among_the_others() {
     let [map, _, sensitivity, tolerance] = studies();
     for document in [map, sensitivity, tolerance] {
         let study = in_chunks_of(&document, 1);
         for variant in [0, study.variants() / 2, study.variants() - 1] {
-            let alone = Work::of_variant(&study, variant).run(&Never).unwrap();
+            let alone = Work::of_span(&study, variant..variant + 1).run(&Never).unwrap();
             assert_eq!(alone, Work::new(&study, variant).run(&Never).unwrap());
             assert_eq!(alone.variants(), 1);
         }

@@ -41,7 +41,7 @@ use utoipa::ToSchema;
 
 use super::{Growing, Stoppable, Taking, answered, broken_body, write_problem};
 use crate::app::App;
-use crate::compute::{self, Pool, SLICE};
+use crate::compute::{self, Pool};
 use crate::config::Limits;
 use crate::problem::{Problem, ProblemCode};
 use crate::room::{Reserved, Room, Sent};
@@ -188,11 +188,11 @@ pub struct AnsweredLine {
 
 impl AnsweredLine {
     /// Counts it, and logs why an internal error happened: it is about to be told.
-    pub fn is_told(&self) {
+    pub fn note_told(&self) {
         let status = self.problem.as_ref().map_or(StatusCode::OK.as_u16(), |problem| problem.status);
         counter!("toothwave_batch_documents_total", "status" => status.to_string()).increment(1);
         if let Some(problem) = &self.problem {
-            observe::problem_is_told(problem);
+            observe::note_problem(problem);
         }
     }
 
@@ -321,7 +321,7 @@ struct Answers {
 
 impl Answers {
     fn push(&mut self, line: AnsweredLine) {
-        line.is_told();
+        line.note_told();
         let AnsweredLine { text, room, .. } = line;
         self.lines += 1;
         self.bytes += text.len();
@@ -545,9 +545,9 @@ impl Chunk {
     /// One slice further: at least one line is answered.
     async fn advance(mut self) -> Self {
         let slice = Arc::new(Mutex::new(Slice { waiting: std::mem::take(&mut self.waiting), ..Slice::default() }));
-        let (shared, batch) = (Arc::clone(&slice), self.batch.clone());
+        let (shared, batch, pace) = (Arc::clone(&slice), self.batch.clone(), self.batch.pool.pace().clone());
         let result = self.batch.pool.run_in_turn(move |stop| {
-            work(&shared, &batch, stop);
+            work(&shared, &batch, pace.slice(), stop);
             Ok(())
         });
         let result = result.await;
@@ -573,8 +573,7 @@ impl Chunk {
 }
 
 /// Answers lines until the slice's time or room is over.
-fn work(slice: &Mutex<Slice>, batch: &Batch, stop: &AtomicBool) {
-    let started = Instant::now();
+fn work(slice: &Mutex<Slice>, batch: &Batch, mut time: compute::Slice, stop: &AtomicBool) {
     loop {
         let line = {
             let mut slice = slice.lock();
@@ -595,7 +594,7 @@ fn work(slice: &Mutex<Slice>, batch: &Batch, stop: &AtomicBool) {
             return;
         }
         slice.answers.push(answer);
-        if started.elapsed() >= SLICE || slice.answers.bytes >= SLICE_BYTES {
+        if time.is_over() || slice.answers.bytes >= SLICE_BYTES {
             return;
         }
     }
@@ -715,6 +714,7 @@ mod tests {
         Answers, Batch, BatchEndpoint, BatchQuery, Chunk, Growing, Line, Lines, Pool, Room, SLICE_BYTES, Slice, line,
         work,
     };
+    use crate::compute::Pace;
     use crate::config::Limits;
     use crate::problem::{Problem, ProblemCode};
 
@@ -801,7 +801,7 @@ mod tests {
             _ahead: Arc::clone(&ahead).try_acquire_owned().expect("a permit"),
         });
         let slice = Mutex::new(Slice { waiting: waiting.collect(), ..Slice::default() });
-        work(&slice, &batch, &AtomicBool::new(false));
+        work(&slice, &batch, Pace::default().slice(), &AtomicBool::new(false));
         let slice = slice.into_inner();
         assert_eq!(slice.answers.lines + slice.waiting.len() as u64, 3);
         slice.answers.lines
@@ -828,7 +828,7 @@ mod tests {
         let ahead = Arc::new(Semaphore::new(1)).try_acquire_owned().expect("a permit");
         let line = Line { index: 7, document: Ok(Bytes::from("{")), _ahead: ahead };
         let slice = Mutex::new(Slice { waiting: [line].into(), ..Slice::default() });
-        work(&slice, &batch, &AtomicBool::new(true));
+        work(&slice, &batch, Pace::default().slice(), &AtomicBool::new(true));
         let slice = slice.into_inner();
         assert_eq!((slice.answers.lines, slice.current), (0, Some(7)));
     }

@@ -512,7 +512,7 @@ mod tests {
             while room.taken_bytes() == 0 && !solving.is_finished() {
                 std::thread::yield_now();
             }
-            room.memory().is_seen_to_be_scarce(true);
+            room.memory().set_scarce(true);
             solving.join().expect("no panic")
         });
         assert_eq!(given_up.err().map(|problem| problem.code), Some(ProblemCode::TooManyUnreadBytes));
@@ -520,7 +520,7 @@ mod tests {
         assert!(room.reserve(SMALL_BYTES + 1).is_err());
         let sweep = Sweep.check(&design, &limits).expect("a possible one");
         assert!(solve::<Sweep>(&sweep, json, &room, &stop).is_ok());
-        room.memory().is_seen_to_be_scarce(false);
+        room.memory().set_scarce(false);
         assert!(room.reserve(SMALL_BYTES + 1).is_ok());
     }
 
