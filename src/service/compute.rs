@@ -1,5 +1,6 @@
 //! Where solves run: permits, a bounded queue, the deadline, cancellation; nothing else leaves the async executor.
 
+use std::any::Any;
 use std::io;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Arc;
@@ -64,7 +65,7 @@ pub struct Pool {
 /// How long slices are. Whoever waits for a turn behind one that cannot be cut as short gets as much when it comes: else a thousand short steps would wait for a
 /// long one each.
 #[derive(Debug, Clone, Default)]
-pub struct Pace(Arc<Mutex<Option<LongStep>>>);
+struct Pace(Arc<Mutex<Option<LongStep>>>);
 
 /// The longest step of late.
 #[derive(Debug, Clone, Copy)]
@@ -74,17 +75,11 @@ struct LongStep {
 }
 
 impl Pace {
-    /// A slice that begins now.
-    pub fn slice(&self) -> Slice {
-        let now = Instant::now();
-        Slice { pace: self.clone(), most: self.most(now), started: now, last: now }
-    }
-
     fn most(&self, now: Instant) -> Duration {
         /// So many times what it took a step is remembered: the next one of as many that compute side by side is over by then.
         const REMEMBERED: u32 = 4;
         let longest = self.0.lock().filter(|step| now < step.at + REMEMBERED * step.took);
-        longest.map_or(SLICE, |step| step.took.clamp(SLICE, LONGEST_SLICE))
+        longest.map_or(SLICE, |step| step.took)
     }
 
     fn note(&self, took: Duration, now: Instant) {
@@ -104,6 +99,11 @@ pub struct Slice {
 }
 
 impl Slice {
+    fn new(pace: &Pace, spent: Duration) -> Self {
+        let now = Instant::now();
+        Self { pace: pace.clone(), most: pace.most(now).saturating_sub(spent), started: now, last: now }
+    }
+
     /// After a step: whether no further one is to begin.
     pub fn is_over(&mut self) -> bool {
         let now = Instant::now();
@@ -115,6 +115,44 @@ impl Slice {
     /// What its steps have taken.
     pub fn busy(&self) -> Duration {
         self.last - self.started
+    }
+}
+
+#[cfg(test)]
+impl Default for Slice {
+    fn default() -> Self {
+        Self::new(&Pace::default(), Duration::ZERO)
+    }
+}
+
+/// One who runs slices one after the other. A turn of which it has not used all is its own until the next, where that comes soon.
+#[derive(Debug, Default)]
+pub struct Lane {
+    turn: Arc<Mutex<Option<Arc<dyn Any + Send + Sync>>>>,
+    /// Of the turn.
+    spent: Duration,
+}
+
+impl Lane {
+    /// For so long a turn is kept: somebody waits for it meanwhile, and no core works.
+    const KEPT: Duration = Duration::from_millis(20);
+
+    fn keep(&mut self, turn: Arc<dyn Any + Send + Sync>, spent: Duration) {
+        self.spent = spent;
+        let (lane, kept) = (Arc::downgrade(&self.turn), Arc::downgrade(&turn));
+        *self.turn.lock() = Some(turn);
+        tokio::spawn(async move {
+            tokio::time::sleep(Self::KEPT).await;
+            // It may have been used meanwhile, and be another.
+            if let (Some(lane), Some(kept)) = (lane.upgrade(), kept.upgrade()) {
+                lane.lock().take_if(|turn| Arc::ptr_eq(turn, &kept));
+            }
+        });
+    }
+
+    fn let_go(&mut self) {
+        *self.turn.lock() = None;
+        self.spent = Duration::ZERO;
     }
 }
 
@@ -181,11 +219,6 @@ impl Pool {
     /// The memory that solves take.
     pub fn memory(&self) -> &Memory {
         &self.memory
-    }
-
-    /// How long slices are that run in turn.
-    pub const fn pace(&self) -> &Pace {
-        &self.pace
     }
 
     /// Solves that run now.
@@ -274,7 +307,7 @@ impl Pool {
         self.limits.max_concurrent_batches - self.batches.available_permits()
     }
 
-    /// Runs a slice of a batch when its turn comes, however long that takes; its deadline begins when it runs.
+    /// Runs what is one slice when its turn comes, however long that takes; its deadline begins when it runs.
     ///
     /// # Errors
     /// As [`Self::run`], but for `queue_full`.
@@ -282,33 +315,71 @@ impl Pool {
         &self,
         job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
-        // Its last step gets as much as its first.
-        self.run_slice(Duration::from_millis(self.limits.deadline_ms) + LONGEST_SLICE, job).await
+        let deadline = Duration::from_millis(self.limits.deadline_ms);
+        self.run_slice(&mut Lane::default(), deadline, |_, stop| job(stop)).await
+    }
+
+    /// Runs a slice of a batch when its turn comes. Each of its steps has the deadline at least.
+    ///
+    /// # Errors
+    /// As [`Self::run_in_turn`].
+    pub async fn run_steps<T: Send + 'static>(
+        &self,
+        lane: &mut Lane,
+        job: impl FnOnce(&mut Slice, &AtomicBool) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let deadline = Duration::from_millis(self.limits.deadline_ms);
+        self.run_slice(lane, deadline + self.pace.most(Instant::now()), job).await
     }
 
     /// The same for so long at most. A time for which all of the process stood still is none in which a slice could come to its end: of that no more than a step
     /// is counted.
     async fn run_slice<T: Send + 'static>(
         &self,
+        lane: &mut Lane,
         most: Duration,
-        job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
+        job: impl FnOnce(&mut Slice, &AtomicBool) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
         const STEPS: u32 = 8;
+        let kept = lane.turn.lock().take();
+        let turn = match kept {
+            Some(turn) => turn,
+            None => {
+                lane.let_go();
+                self.turn().await?
+            }
+        };
+        let time_is_over = async {
+            for _ in 0..STEPS {
+                tokio::time::sleep(most / STEPS).await;
+            }
+        };
+        let (pace, spent) = (self.pace.clone(), lane.spent);
+        let timed = move |stop: &AtomicBool| {
+            let mut time = Slice::new(&pace, spent);
+            job(&mut time, stop).map(|done| (done, time.busy()))
+        };
+        let (done, busy) = tokio::select! {
+            done = self.run_permitted(Arc::clone(&turn), Thread::Blocking, timed) => done,
+            () = time_is_over => Err(deadline_exceeded(most)),
+        }?;
+        // Where all have short steps the next turn comes as soon.
+        let most = self.pace.most(Instant::now());
+        if most > SLICE && spent + busy < most {
+            lane.keep(turn, spent + busy);
+        }
+        Ok(done)
+    }
+
+    /// A turn, and with it a permit.
+    async fn turn(&self) -> Result<Arc<dyn Any + Send + Sync>, Problem> {
         let turn = tokio::select! {
             turn = Arc::clone(&self.turns).acquire_owned() => turn,
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
         // Behind the single solves that came before: each may take as long as a slice.
         let permit = self.permit().await?;
-        let time_is_over = async {
-            for _ in 0..STEPS {
-                tokio::time::sleep(most / STEPS).await;
-            }
-        };
-        tokio::select! {
-            done = self.run_permitted((turn, permit), Thread::Blocking, job) => done,
-            () = time_is_over => Err(deadline_exceeded(most)),
-        }
+        Ok(Arc::new((turn, permit)))
     }
 
     /// Runs a slice of a study that has room for variants of so many bytes while they are computed: beside others only as far as together they take no
@@ -318,12 +389,15 @@ impl Pool {
     /// As [`Self::run_in_turn`].
     pub async fn run_variants<T: Send + 'static>(
         &self,
+        lane: &mut Lane,
         room_bytes: u64,
-        job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
+        job: impl FnOnce(&mut Slice, &AtomicBool) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
         if room_bytes <= SMALL_VARIANT_BYTES {
-            return self.run_slice(MOST_OF_A_VARIANT, job).await;
+            return self.run_slice(lane, MOST_OF_A_VARIANT, job).await;
         }
+        // Nobody waits for room with a turn in hand.
+        lane.let_go();
         let part_bytes = self.limits.max_unread_bytes / PART_OF_VARIANTS;
         let wanted = async {
             // First: clients may hold that for long, and who waits for it is in nobody's way.
@@ -337,11 +411,11 @@ impl Pool {
             held = wanted => held,
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
-        let job = move |stop: &AtomicBool| {
+        let job = move |time: &mut Slice, stop: &AtomicBool| {
             let _held = held;
-            job(stop)
+            job(time, stop)
         };
-        self.run_slice(MOST_OF_A_VARIANT, job).await
+        self.run_slice(lane, MOST_OF_A_VARIANT, job).await
     }
 
     /// So many bytes of the room of answers, when there are as many.
@@ -406,7 +480,7 @@ impl Pool {
         self.run_permitted((place, permit), on, job).await
     }
 
-    async fn permit(&self) -> Result<impl Send + 'static, Problem> {
+    async fn permit(&self) -> Result<impl Send + Sync + 'static, Problem> {
         tokio::select! {
             permit = Arc::clone(&self.permits).acquire_owned() => Ok(permit),
             () = self.closed.cancelled() => Err(shutting_down()),
@@ -490,14 +564,14 @@ fn shutting_down() -> Problem {
 mod tests {
     use std::io;
     use std::pin::pin;
-    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
     use std::sync::{Arc, mpsc};
     use std::time::Duration;
 
     use clap::Parser as _;
     use futures_util::future::join_all;
 
-    use super::{Pool, Thread};
+    use super::{Lane, Pool, Slice, Thread};
     use crate::config::Settings;
     use crate::problem::{Problem, ProblemCode};
     use crate::room::{NoRoom, Room};
@@ -539,16 +613,84 @@ mod tests {
             let (running, most) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicUsize::new(0)));
             let slices = (0..20).map(|_| {
                 let (running, most) = (Arc::clone(&running), Arc::clone(&most));
-                pool.run_variants(variant_bytes, move |_| {
+                let job = move |_: &mut Slice, _: &AtomicBool| {
                     most.fetch_max(running.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
                     std::thread::yield_now();
                     running.fetch_sub(1, Ordering::SeqCst);
                     Ok(())
-                })
+                };
+                let pool = &pool;
+                async move { pool.run_variants(&mut Lane::default(), variant_bytes, job).await }
             });
             assert!(join_all(slices).await.iter().all(Result::is_ok));
             assert!(most.load(Ordering::SeqCst) <= most_at_once, "{variant_bytes}");
         }
+    }
+
+    /// A study of a thousand quick variants waited a thousand times behind another's slow ones.
+    #[tokio::test(flavor = "multi_thread")]
+    async fn who_has_short_steps_gets_as_much_of_the_time_as_who_has_long_ones() -> Result<(), Problem> {
+        const STEP: Duration = Duration::from_millis(50);
+        let Line { settings } = Line::parse_from(["serve", "--max-concurrent-solves", "1"]);
+        let pool = Pool::new(settings.limits());
+        let slices = Arc::new(AtomicUsize::new(0));
+        let long = tokio::spawn({
+            let (pool, slices) = (pool.clone(), Arc::clone(&slices));
+            async move {
+                let step = |time: &mut Slice, _: &AtomicBool| {
+                    std::thread::sleep(STEP);
+                    time.is_over();
+                    Ok(())
+                };
+                let mut lane = Lane::default();
+                while pool.run_variants(&mut lane, 0, step).await.is_ok() {
+                    slices.fetch_add(1, Ordering::SeqCst);
+                }
+            }
+        });
+        while slices.load(Ordering::SeqCst) < 2 {
+            tokio::task::yield_now().await;
+        }
+        let before = slices.load(Ordering::SeqCst);
+        // Each slice of a millisecond, after which other work is at hand: cut off by its bytes, say, or as a chunk of its own.
+        let (mut lane, mut busy) = (Lane::default(), Duration::ZERO);
+        for _ in 0..40 {
+            let step = |time: &mut Slice, _: &AtomicBool| {
+                std::thread::sleep(Duration::from_millis(1));
+                time.is_over();
+                Ok(time.busy())
+            };
+            busy += pool.run_variants(&mut lane, 0, step).await?;
+        }
+        let beside = u32::try_from(slices.load(Ordering::SeqCst) - before).unwrap_or(u32::MAX);
+        long.abort();
+        // The other's last slice has begun before, its first one after the end; without turns of the same length it would have had forty.
+        assert!(beside <= 2 * (1 + busy.div_duration_f64(STEP).ceil() as u32), "{beside} slices beside {busy:?}");
+        Ok(())
+    }
+
+    /// A turn that is kept is nobody's for long.
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_turn_that_is_not_used_again_soon_is_given_back() -> Result<(), Problem> {
+        let Line { settings } = Line::parse_from(["serve", "--max-concurrent-solves", "1"]);
+        let pool = Pool::new(settings.limits());
+        let mut lane = Lane::default();
+        let long = |time: &mut Slice, _: &AtomicBool| {
+            std::thread::sleep(Duration::from_millis(30));
+            time.is_over();
+            Ok(())
+        };
+        pool.run_variants(&mut lane, 0, long).await?;
+        let mut other = Lane::default();
+        pool.run_variants(&mut other, 0, |_, _| Ok(())).await?;
+        assert!(other.turn.lock().is_some(), "of a turn of thirty milliseconds it used none");
+        // Nobody uses it, and nobody lets go of it.
+        pool.run_in_turn(|_| Ok(())).await?;
+        assert!(other.turn.lock().is_none());
+        pool.run_variants(&mut other, 0, |_, _| Ok(())).await?;
+        drop(other);
+        assert_eq!(pool.running(), 0);
+        Ok(())
     }
 
     /// One alone has what it needs, of which nobody counted what is beyond the part of variants.
@@ -561,10 +703,11 @@ mod tests {
         assert!(pool.memory().is_scarce(), "both are of one memory");
         room.memory().set_scarce(false);
         let unread = room.reserve(60 << 20)?;
-        let mut large = pin!(pool.run_variants(30 << 20, |_| Ok(())));
+        let mut lane = Lane::default();
+        let mut large = pin!(pool.run_variants(&mut lane, 30 << 20, |_, _| Ok(())));
         assert!(futures_util::poll!(&mut large).is_pending());
         // One within it does not wait for that.
-        assert!(pool.run_variants(8 << 20, |_| Ok(())).await.is_ok());
+        assert!(pool.run_variants(&mut Lane::default(), 8 << 20, |_, _| Ok(())).await.is_ok());
         assert!(futures_util::poll!(&mut large).is_pending());
         drop(unread);
         assert!(large.await.is_ok());

@@ -10,7 +10,7 @@ use toothwave_calculation::{BUILD, question};
 use toothwave_store::NewStudy;
 use toothwave_study::{Interrupted, Limits, Part, Study, Work};
 
-use crate::compute::{Pool, SMALL_VARIANT_BYTES, Slice};
+use crate::compute::{Lane, Pool, SMALL_VARIANT_BYTES, Slice};
 use crate::problem::{Problem, ProblemCode};
 
 /// What a chunk should take: long against what it costs to claim and to keep one, short against what a worker's end loses.
@@ -161,14 +161,31 @@ pub async fn heard(
     Ok(canary.and_then(|canary| if canary.hash() == frozen.canary { Ok(()) } else { Err(NotHere::OtherBits) }))
 }
 
-/// A part as it is kept.
-pub fn encoded(part: &Part) -> Result<Vec<u8>, Problem> {
+fn encoded(part: &Part) -> Result<Vec<u8>, Problem> {
     postcard::to_stdvec(part).map_err(|error| Problem::internal(&error))
 }
 
-/// A part as it was kept.
-pub fn decoded(bytes: &[u8]) -> Result<Part, Problem> {
+/// What a chunk came to as it is kept: with what tells whether it is still that, since what keeps it may be damaged and the store does not see it.
+pub fn sealed(study: &str, chunk: u64, part: &Part) -> Result<Vec<u8>, Problem> {
+    let mut bytes = encoded(part)?;
+    let seal = seal(study, chunk, &bytes);
+    bytes.extend_from_slice(seal.as_bytes());
+    Ok(bytes)
+}
+
+/// The same as it was kept.
+pub fn unsealed(study: &str, chunk: u64, bytes: &[u8]) -> Result<Part, Problem> {
+    let damaged =
+        || Problem::internal(&format!("what chunk {chunk} of the study {study} came to is damaged in its store"));
+    let (bytes, kept) = bytes.split_last_chunk::<{ blake3::OUT_LEN }>().ok_or_else(damaged)?;
+    if seal(study, chunk, bytes) != *kept {
+        return Err(damaged());
+    }
     postcard::from_bytes(bytes).map_err(|error| Problem::internal(&error))
+}
+
+fn seal(study: &str, chunk: u64, bytes: &[u8]) -> blake3::Hash {
+    blake3::Hasher::new().update(study.as_bytes()).update(&chunk.to_le_bytes()).update(bytes).finalize()
 }
 
 /// Time that this thread has had of a processor: a canary that had to stand aside for others would be cut in far too many chunks, for good.
@@ -235,7 +252,7 @@ impl Canary {
     }
 
     /// As far as a slice allows; whether it is over.
-    fn slice(&mut self, mut time: Slice, stop: &AtomicBool) -> Result<bool, Problem> {
+    fn slice(&mut self, time: &mut Slice, stop: &AtomicBool) -> Result<bool, Problem> {
         let begun = processor_time();
         let busy = self.busy;
         let busy_now = || busy + processor_time().saturating_sub(begun);
@@ -284,12 +301,12 @@ impl Canary {
 }
 
 async fn sung(pool: &Pool, mut canary: Canary, most_bytes: u64) -> Result<Result<Canary, NotHere>, Problem> {
+    let mut lane = Lane::default();
     while canary.room_bytes <= most_bytes {
-        let pace = pool.pace().clone();
         let is_over;
         (canary, is_over) = pool
-            .run_variants(canary.room_bytes, move |stop| {
-                let is_over = canary.slice(pace.slice(), stop)?;
+            .run_variants(&mut lane, canary.room_bytes, move |time, stop| {
+                let is_over = canary.slice(time, stop)?;
                 Ok((canary, is_over))
             })
             .await?;

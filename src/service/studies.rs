@@ -24,7 +24,7 @@ use toothwave_study::{Gathered, Part, Study, StudyAnswer, Work};
 use tracing::Instrument as _;
 use utoipa::ToSchema;
 
-use crate::compute::{Pool, SMALL_VARIANT_BYTES, Slice};
+use crate::compute::{Lane, Pool, SMALL_VARIANT_BYTES, Slice};
 use crate::config::Limits;
 use crate::frozen;
 use crate::parts::Parts;
@@ -387,11 +387,14 @@ impl Kept {
         for chunks in wanted.chunk_by(|one, next| one + 1 == *next).flat_map(|run| run.chunks(at_once)) {
             let last = chunks.last().unwrap_or(&chunks[0]);
             let stored = store.parts(&cut, chunks[0], *last).await?;
-            let decode = move |_: &AtomicBool| {
-                let decoded = stored.iter().map(|stored| Ok((stored.chunk, frozen::decoded(&stored.part)?)));
-                decoded.collect::<Result<Vec<_>, Problem>>()
+            let id = self.id.clone();
+            let unseal = move |_: &AtomicBool| {
+                let part = |stored: &toothwave_store::Kept| {
+                    Ok((stored.chunk, frozen::unsealed(&id, stored.chunk, &stored.part)?))
+                };
+                stored.iter().map(part).collect::<Result<Vec<_>, Problem>>()
             };
-            let parts = pool.run_in_turn(decode).await?;
+            let parts = pool.run_in_turn(unseal).await?;
             rows.add(|gathered| parts.into_iter().for_each(|(chunk, part)| gathered.add(chunk, part)))?;
         }
         // Of one that was forgotten meanwhile there are fewer, or none, and nothing else says so.
@@ -1090,12 +1093,12 @@ impl Come {
         mut work: Work,
         study: &Arc<Study>,
         pieces: &Pieces,
-        mut time: Slice,
+        time: &mut Slice,
         stop: &AtomicBool,
     ) -> Result<Self, Problem> {
         let (mut over, mut variants) = (Vec::new(), 0);
         let rest = loop {
-            let sliced = slice(work, &mut time, stop)?;
+            let sliced = slice(work, time, stop)?;
             variants += sliced.variants;
             if !sliced.is_over {
                 break Some(sliced.work);
@@ -1118,12 +1121,12 @@ async fn run_pieces(
 ) -> Result<(), Problem> {
     // One that runs has them.
     let rows = kept.rows.lock().clone().ok_or_else(|| kept.forgotten())?;
-    let (mut rest, mut busy) = (None, Duration::ZERO);
+    let (mut lane, mut rest, mut busy) = (Lane::default(), None, Duration::ZERO);
     while let Some(work) = rest.take().or_else(|| pieces.next(&kept.study)) {
         let room_bytes = work.room_bytes();
-        let (study, pieces, pace) = (Arc::clone(&kept.study), Arc::clone(pieces), pool.pace().clone());
-        let job = move |stop: &AtomicBool| Come::of(work, &study, &pieces, pace.slice(), stop);
-        let mut came = pool.run_variants(room_bytes, job).await?;
+        let (study, pieces) = (Arc::clone(&kept.study), Arc::clone(pieces));
+        let job = move |time: &mut Slice, stop: &AtomicBool| Come::of(work, &study, &pieces, time, stop);
+        let mut came = pool.run_variants(&mut lane, room_bytes, job).await?;
         counter!("toothwave_study_variants_total").increment(came.variants);
         busy += came.busy;
         if busy >= HAND_OVER {

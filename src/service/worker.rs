@@ -10,14 +10,14 @@ use bytes::Bytes;
 use futures_util::future::join_all;
 use metrics::counter;
 use parking_lot::Mutex;
-use tokio::sync::{OnceCell, watch};
+use tokio::sync::{OnceCell, RwLock, RwLockReadGuard, RwLockWriteGuard, watch};
 use tokio_util::sync::CancellationToken;
 use toothwave_calculation::BUILD;
 use toothwave_calculation::no_answer::NoAnswer;
-use toothwave_store::{Claim, Lease, Store, Waiting};
+use toothwave_store::{Claim, Lease, Store, StoreError, Waiting};
 use toothwave_study::{Interrupted, Part, Study, Work};
 
-use crate::compute::{Pool, SMALL_VARIANT_BYTES, Slice};
+use crate::compute::{Lane, Pool, SMALL_VARIANT_BYTES, Slice};
 use crate::frozen::{self, NotHere};
 #[cfg(feature = "fault-injection")]
 use crate::injected;
@@ -49,10 +49,18 @@ pub struct Workers {
     /// What a chunk that is in work then gets to come to its end.
     patience: Duration,
     known: Mutex<HashMap<Waiting, Arc<OnceCell<Known>>>>,
+    /// Held by each chunk that is in work here.
+    side_by_side: RwLock<()>,
     /// Chunks of each study that are in work here.
     in_work: Mutex<HashMap<String, usize>>,
     /// What was last said of each.
     troubles: Mutex<BTreeMap<What, String>>,
+}
+
+/// What a chunk is computed beside, as long as this is held.
+enum Beside<'a> {
+    Others(#[expect(dead_code, reason = "held")] Option<RwLockReadGuard<'a, ()>>),
+    None(#[expect(dead_code, reason = "held")] RwLockWriteGuard<'a, ()>),
 }
 
 /// What workers have room for. A variant that takes more would end the process, and each that takes it up again, canary first.
@@ -156,8 +164,8 @@ impl Workers {
         stopping: CancellationToken,
         patience: Duration,
     ) -> Self {
-        let (known, in_work, troubles) = Default::default();
-        Self { store, parts, pool, capacity, changed, stopping, patience, known, in_work, troubles }
+        let (known, side_by_side, in_work, troubles) = Default::default();
+        Self { store, parts, pool, capacity, changed, stopping, patience, known, side_by_side, in_work, troubles }
     }
 
     /// Works until it is told to stop.
@@ -197,7 +205,7 @@ impl Workers {
     async fn fill(&self, slot: usize, mut tasks: Tasks) {
         let Capacity { slots, .. } = self.capacity;
         let most_in_work = if slot < slots { slots } else { 1 };
-        let mut turn = slot;
+        let (mut turn, mut lane) = (slot, Lane::default());
         while !self.stopping.is_cancelled() {
             let waiting = Arc::clone(&tasks.borrow_and_update());
             let mut has_worked = false;
@@ -226,21 +234,21 @@ impl Workers {
                     tokio::time::sleep(self.patience.max(NEARLY)).await;
                 };
                 let claimed = tokio::select! {
-                    claimed = self.store.claim(&task.cut, ours.lease) => claimed,
+                    claimed = self.claim(task, &ours) => claimed,
                     () = told_to_stop => return,
                 };
                 match claimed {
-                    Ok(Claim::Chunk(lease)) if self.stopping.is_cancelled() => return give_up(lease).await,
-                    Ok(Claim::Chunk(lease)) => {
-                        self.compute(task, &ours, lease, &mut tasks).await;
+                    Ok((Claim::Chunk(lease), _)) if self.stopping.is_cancelled() => return give_up(lease).await,
+                    Ok((Claim::Chunk(lease), _beside)) => {
+                        self.compute(&mut lane, task, &ours, lease, &mut tasks).await;
                         has_worked = true;
                     }
-                    Ok(Claim::Gap(chunk)) => {
+                    Ok((Claim::Gap(chunk), _)) => {
                         tracing::warn!(study = task.cut.id, chunk, "a chunk was given up: no attempt came to a result");
                         self.changed.send_replace(());
                         has_worked = true;
                     }
-                    Ok(Claim::None) => {}
+                    Ok((Claim::None, _)) => {}
                     Err(error) => self.is_in_trouble(What::Writing, &error),
                 }
                 if has_worked {
@@ -255,6 +263,27 @@ impl Workers {
                 }
             }
         }
+    }
+
+    /// A chunk that is begun, and what it is computed beside: one that came to no result before may be what ended its process, and is computed beside none, so
+    /// that no other is taken for that.
+    async fn claim(&self, task: &Waiting, ours: &Ours) -> Result<(Claim, Beside<'_>), StoreError> {
+        let Some(mut lease) = self.store.hold(&task.cut, ours.lease).await? else {
+            return Ok((Claim::None, Beside::Others(None)));
+        };
+        let is_suspect = lease.attempts().await? > 0;
+        let beside = async {
+            if is_suspect {
+                Beside::None(self.side_by_side.write().await)
+            } else {
+                Beside::Others(Some(self.side_by_side.read().await))
+            }
+        };
+        let beside = tokio::select! {
+            beside = beside => beside,
+            never = lease.renew() => match never {},
+        };
+        Ok((lease.begin().await?, beside))
     }
 
     /// The study, where this process computes it: of this build, with a canary of the same bits.
@@ -306,7 +335,7 @@ impl Workers {
     }
 
     /// Computes a chunk and keeps what it comes to, unless it is not wanted any more.
-    async fn compute(&self, task: &Waiting, ours: &Ours, mut lease: Lease, tasks: &mut Tasks) {
+    async fn compute(&self, lane: &mut Lane, task: &Waiting, ours: &Ours, mut lease: Lease, tasks: &mut Tasks) {
         let &Ours { ref study, most_bytes, .. } = ours;
         let (id, chunk) = (&task.cut.id, lease.chunk());
         let time_is_over = async {
@@ -322,7 +351,7 @@ impl Workers {
         };
         tokio::pin!(is_over);
         let running = async {
-            let (part, busy) = match run_chunk(&self.pool, study, chunk, most_bytes).await? {
+            let (part, busy) = match run_chunk(&self.pool, lane, study, chunk, most_bytes).await? {
                 Ok(computed) => computed,
                 Err(reason) => return Ok(Err(reason)),
             };
@@ -353,7 +382,7 @@ impl Workers {
                 return;
             }
         };
-        let bytes = match frozen::encoded(&part) {
+        let bytes = match frozen::sealed(id, chunk, &part) {
             Ok(bytes) => bytes,
             Err(problem) => {
                 tracing::error!(study = id, chunk, cause = problem.cause, "a chunk cannot be kept");
@@ -411,12 +440,12 @@ impl Workers {
         }
         let study = Arc::clone(study);
         let bytes = study.rows_bytes(&part);
-        let writing = move |_: &AtomicBool| {
+        let writing = move |_: &mut Slice, _: &AtomicBool| {
             let mut rows = Vec::new();
             study.write_rows(&part, &mut rows).map_err(|error| Problem::internal(&error))?;
             Ok((part, Some(rows.into())))
         };
-        self.pool.run_variants(bytes, writing).await
+        self.pool.run_variants(&mut Lane::default(), bytes, writing).await
     }
 
     /// Says what is wrong, once.
@@ -449,6 +478,7 @@ pub fn milliseconds(time: Duration) -> u64 {
 /// What a chunk comes to, and the time that it was computed for, unless a variant of it takes more than one may.
 async fn run_chunk(
     pool: &Pool,
+    lane: &mut Lane,
     study: &Arc<Study>,
     chunk: u64,
     most_bytes: u64,
@@ -467,12 +497,10 @@ async fn run_chunk(
     }
     let mut busy = Duration::ZERO;
     while work.room_bytes() <= most_bytes {
-        let (room_bytes, pace) = (work.room_bytes(), pool.pace().clone());
-        let job = move |stop: &AtomicBool| {
-            let mut time = pace.slice();
-            slice(work, &mut time, stop).map(|sliced| (sliced, time.busy()))
-        };
-        let (sliced, took) = pool.run_variants(room_bytes, job).await?;
+        let room_bytes = work.room_bytes();
+        let job =
+            move |time: &mut Slice, stop: &AtomicBool| slice(work, time, stop).map(|sliced| (sliced, time.busy()));
+        let (sliced, took) = pool.run_variants(lane, room_bytes, job).await?;
         busy += took;
         counter!("toothwave_study_variants_total").increment(sliced.variants);
         work = sliced.work;

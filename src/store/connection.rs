@@ -109,6 +109,9 @@ impl From<sqlx::Error> for StoreError {
 /// Connections that are not leases: few statements, each over soon.
 const CONNECTIONS: u32 = 8;
 
+/// A session for leases that had none for so long is closed: others may want it, of whom a server takes so many.
+const IDLE_LEASE: Duration = Duration::from_secs(5);
+
 /// More than any machine computes chunks side by side.
 const MOST_LEASES: u32 = 1024;
 
@@ -162,8 +165,9 @@ impl Store {
             Address::Server(options) => {
                 let options = options.as_ref().clone().application_name("toothwave").disable_statement_logging();
                 // A lease's session waits for its worker; the server ends it when that takes too long.
-                let leases = sessions(MOST_LEASES, options.clone().application_name("toothwave lease"));
-                let pool = sessions(CONNECTIONS, options);
+                let leases = options.clone().application_name("toothwave lease");
+                let leases = sessions(MOST_LEASES, leases, Some(IDLE_LEASE));
+                let pool = sessions(CONNECTIONS, options, None);
                 Ok(Self { database: Database::Server { pool, leases }, address: address.clone(), worker })
             }
         }
@@ -214,11 +218,12 @@ impl Store {
 /// one that waits for a lock is told so before its client gives up: the server does not look whether anybody still waits for the answer, would
 /// keep a process for it, and would do in the end what was believed to have failed. Said in each session: there are those between who take no
 /// such options when a connection is made.
-fn sessions(most: u32, options: PgConnectOptions) -> PgPool {
+fn sessions(most: u32, options: PgConnectOptions, idle: Option<Duration>) -> PgPool {
     let text =
         "SELECT set_config('idle_in_transaction_session_timeout', $1, FALSE), set_config('lock_timeout', $2, FALSE)";
     PoolOptions::new()
         .max_connections(most)
+        .idle_timeout(idle)
         .acquire_timeout(PATIENCE)
         .after_connect(move |session, _| {
             Box::pin(async move {

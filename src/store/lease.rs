@@ -21,7 +21,7 @@ pub enum Claim {
     None,
 }
 
-/// A chunk that nobody else computes meanwhile. One that is dropped is free again; that it was begun stays noted.
+/// A chunk that nobody else computes meanwhile. One that is dropped is free again; where it was begun, that stays noted.
 #[derive(Debug)]
 pub struct Lease {
     store: Store,
@@ -57,38 +57,33 @@ macro_rules! unless_begun_as_often {
 }
 
 impl Store {
+    /// A chunk of a study that is nobody's, and is begun: [`Self::hold`] and [`Lease::begin`] in one.
+    ///
+    /// # Errors
+    /// As these.
+    pub async fn claim(&self, cut: &Cut, lease: Duration) -> Result<Claim, StoreError> {
+        match self.hold(cut, lease).await? {
+            Some(lease) => lease.begin().await,
+            None => Ok(Claim::None),
+        }
+    }
+
     /// A chunk of a study that is nobody's, held until it is kept, for so long at most on a server.
     ///
     /// # Errors
     /// Where the store does not answer.
-    pub async fn claim(&self, cut: &Cut, lease: Duration) -> Result<Claim, StoreError> {
+    pub async fn hold(&self, cut: &Cut, lease: Duration) -> Result<Option<Lease>, StoreError> {
         let mut are_all_open = false;
         let (chunk, held) = loop {
             match self.claim_open(cut, lease).await? {
                 Some(claimed) => break claimed,
-                None if are_all_open => return Ok(Claim::None),
+                None if are_all_open => return Ok(None),
                 // Another may have opened the last ones meanwhile: they are looked for once more.
                 None => are_all_open = !self.open_more(&cut.id).await?,
             }
         };
         // From here on dropping the lease sets the chunk free.
-        let mut lease = Lease { store: self.clone(), cut: cut.clone(), chunk, silence: lease, held };
-        match self.note_attempt(&cut.id, chunk).await {
-            Ok(true) => return Ok(Claim::Chunk(lease)),
-            Ok(false) => {}
-            // The study was forgotten in this moment.
-            Err(StoreError::Failed(sqlx::Error::Database(error))) if error.is_foreign_key_violation() => {
-                return Ok(Claim::None);
-            }
-            Err(error) => {
-                if matches!(error, StoreError::Silent(_)) {
-                    lease.take_back_attempt().await;
-                }
-                return Err(error);
-            }
-        }
-        lease.give_up().await?;
-        Ok(Claim::Gap(chunk))
+        Ok(Some(Lease { store: self.clone(), cut: cut.clone(), chunk, silence: lease, held }))
     }
 
     /// A chunk among those that are open.
@@ -210,6 +205,45 @@ impl Lease {
     /// The chunk's number.
     pub const fn chunk(&self) -> u64 {
         self.chunk
+    }
+
+    /// How often the chunk was begun before, and came to no result.
+    ///
+    /// # Errors
+    /// Where the store does not answer.
+    pub async fn attempts(&self) -> Result<u64, StoreError> {
+        let text = "SELECT COUNT(*) FROM attempts WHERE study = $1 AND chunk = $2";
+        let attempts = self.store.with(PATIENCE, async |connection| {
+            let chunk = stored(self.chunk);
+            Ok(on!(connection, inner => {
+                sqlx::query_scalar::<_, i64>(text).bind(&self.cut.id).bind(chunk).fetch_one(inner).await
+            })?)
+        });
+        attempts.await.map(crate::read)
+    }
+
+    /// Notes that the chunk is about to be computed; one that was begun as often as chunks are is a gap instead.
+    ///
+    /// # Errors
+    /// Where the store does not answer.
+    pub async fn begin(mut self) -> Result<Claim, StoreError> {
+        let chunk = self.chunk;
+        match self.store.note_attempt(&self.cut.id, chunk).await {
+            Ok(true) => return Ok(Claim::Chunk(self)),
+            Ok(false) => {}
+            // The study was forgotten in this moment.
+            Err(StoreError::Failed(sqlx::Error::Database(error))) if error.is_foreign_key_violation() => {
+                return Ok(Claim::None);
+            }
+            Err(error) => {
+                if matches!(error, StoreError::Silent(_)) {
+                    self.take_back_attempt().await;
+                }
+                return Err(error);
+            }
+        }
+        self.give_up().await?;
+        Ok(Claim::Gap(chunk))
     }
 
     /// Says that its holder is alive, three times in the time that it may be silent, for as long as this is polled: a chunk may take longer than

@@ -7,7 +7,7 @@ use crate::{LONG_LOCK_PATIENCE, LONG_PATIENCE, PATIENCE, read, stored};
 pub const SCHEMA_VERSION: u64 = VERSIONS.len() as u64;
 
 /// What brings each version about from the one before. A version that was released is never changed.
-const VERSIONS: [&str; 3] = [VERSION_1, VERSION_2, VERSION_3];
+const VERSIONS: [&str; 4] = [VERSION_1, VERSION_2, VERSION_3, VERSION_4];
 
 /// Times are seconds since 1970 by the database's clock, so that those of the machines need not agree.
 const VERSION_1: &str = "
@@ -73,6 +73,12 @@ const VERSION_3: &str = "
 CREATE INDEX counts_of_results ON results (study, variants, refused);
 ";
 
+/// What waits for workers is told from here: in SQLite's table all that stands behind the document, which may be long, and who looks each second would go through
+/// those of all studies.
+const VERSION_4: &str = "
+CREATE INDEX studies_that_wait ON studies (ends_at_s, opened, chunks, asked_at_s, id, chunk_variants, build) WHERE NOT is_cancelled;
+";
+
 /// What PostgreSQL needs to be spoken to as SQLite is, and to keep parts as they are: their numbers hardly compress.
 const SERVER_VERSION_1: &str = "
 CREATE FUNCTION unixepoch() RETURNS BIGINT LANGUAGE SQL VOLATILE
@@ -80,7 +86,7 @@ CREATE FUNCTION unixepoch() RETURNS BIGINT LANGUAGE SQL VOLATILE
 ALTER TABLE results ALTER COLUMN part SET STORAGE EXTERNAL;
 ";
 
-const SERVER_VERSIONS: [&str; VERSIONS.len()] = [SERVER_VERSION_1, "", ""];
+const SERVER_VERSIONS: [&str; VERSIONS.len()] = [SERVER_VERSION_1, "", "", ""];
 
 /// Any number that means this to everybody who migrates the same database.
 const MIGRATION_LOCK: &str = "SELECT pg_advisory_xact_lock(7355608)";

@@ -468,7 +468,8 @@ impl Store {
                 "SELECT CAST(COALESCE(SUM(chunks - opened + (SELECT COUNT(*) FROM chunks WHERE study = id)), 0) AS BIGINT) FROM studies
                     WHERE NOT is_cancelled AND ends_at_s > unixepoch()",
                 "SELECT COUNT(*) FROM attempts",
-                "SELECT COUNT(*) FROM gaps",
+                "SELECT COUNT(*) FROM gaps WHERE NOT EXISTS
+                    (SELECT 1 FROM results WHERE results.study = gaps.study AND results.chunk = gaps.chunk)",
             ]) {
                 *count = on!(connection, inner => sqlx::query_scalar(text).fetch_one(inner).await)?;
             }

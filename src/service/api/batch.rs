@@ -41,7 +41,7 @@ use utoipa::ToSchema;
 
 use super::{Growing, Stoppable, Taking, answered, broken_body, write_problem};
 use crate::app::App;
-use crate::compute::{self, Pool};
+use crate::compute::{self, Lane, Pool};
 use crate::config::Limits;
 use crate::problem::{Problem, ProblemCode};
 use crate::room::{Reserved, Room, Sent};
@@ -517,6 +517,8 @@ struct Chunk {
 #[derive(Clone)]
 struct Batch {
     pool: Pool,
+    /// Of its slices, those that do not run: as many as run at once.
+    lanes: Arc<Mutex<Vec<Lane>>>,
     room: Room,
     query: BatchQuery,
     limits: Limits,
@@ -545,12 +547,14 @@ impl Chunk {
     /// One slice further: at least one line is answered.
     async fn advance(mut self) -> Self {
         let slice = Arc::new(Mutex::new(Slice { waiting: std::mem::take(&mut self.waiting), ..Slice::default() }));
-        let (shared, batch, pace) = (Arc::clone(&slice), self.batch.clone(), self.batch.pool.pace().clone());
-        let result = self.batch.pool.run_in_turn(move |stop| {
-            work(&shared, &batch, pace.slice(), stop);
+        let (shared, batch) = (Arc::clone(&slice), self.batch.clone());
+        let mut lane = self.batch.lanes.lock().pop().unwrap_or_default();
+        let result = self.batch.pool.run_steps(&mut lane, move |time, stop| {
+            work(&shared, &batch, time, stop);
             Ok(())
         });
         let result = result.await;
+        self.batch.lanes.lock().push(lane);
         let mut slice = slice.lock();
         self.waiting = std::mem::take(&mut slice.waiting);
         self.answers.append(std::mem::take(&mut slice.answers));
@@ -573,7 +577,7 @@ impl Chunk {
 }
 
 /// Answers lines until the slice's time or room is over.
-fn work(slice: &Mutex<Slice>, batch: &Batch, mut time: compute::Slice, stop: &AtomicBool) {
+fn work(slice: &Mutex<Slice>, batch: &Batch, time: &mut compute::Slice, stop: &AtomicBool) {
     loop {
         let line = {
             let mut slice = slice.lock();
@@ -685,7 +689,7 @@ fn begin(
     let (reading, read) = oneshot::channel();
     tokio::spawn(read_ahead(lines, to, Arc::clone(&end), reading));
     let beside = app.room.beside(held_bytes as u64);
-    let batch = Batch { pool: app.pool.clone(), room: beside, query, limits: app.limits };
+    let batch = Batch { lanes: Arc::default(), pool: app.pool.clone(), room: beside, query, limits: app.limits };
     let answers = answers(batch, from, end).map(move |bytes| {
         // Place and room are held until the last answer is sent or the client has left.
         let _held = (&place, &room);
@@ -714,7 +718,7 @@ mod tests {
         Answers, Batch, BatchEndpoint, BatchQuery, Chunk, Growing, Line, Lines, Pool, Room, SLICE_BYTES, Slice, line,
         work,
     };
-    use crate::compute::Pace;
+    use crate::compute;
     use crate::config::Limits;
     use crate::problem::{Problem, ProblemCode};
 
@@ -793,7 +797,8 @@ mod tests {
     /// How many of three such lines one slice answers.
     fn answered_in_a_slice(document: &Result<Bytes, Problem>) -> u64 {
         let query = BatchQuery { endpoint: BatchEndpoint::Sweep, peaks_only: true };
-        let batch = Batch { pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
+        let batch =
+            Batch { lanes: Arc::default(), pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
         let ahead = Arc::new(Semaphore::new(3));
         let waiting = (0..3).map(|index| Line {
             index,
@@ -801,7 +806,7 @@ mod tests {
             _ahead: Arc::clone(&ahead).try_acquire_owned().expect("a permit"),
         });
         let slice = Mutex::new(Slice { waiting: waiting.collect(), ..Slice::default() });
-        work(&slice, &batch, Pace::default().slice(), &AtomicBool::new(false));
+        work(&slice, &batch, &mut compute::Slice::default(), &AtomicBool::new(false));
         let slice = slice.into_inner();
         assert_eq!(slice.answers.lines + slice.waiting.len() as u64, 3);
         slice.answers.lines
@@ -811,7 +816,8 @@ mod tests {
     #[test]
     fn a_slice_that_has_answered_blames_no_line_that_it_has_not_begun() {
         let query = BatchQuery { endpoint: BatchEndpoint::Sweep, peaks_only: true };
-        let batch = Batch { pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
+        let batch =
+            Batch { lanes: Arc::default(), pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
         let ahead = Arc::new(Semaphore::new(1)).try_acquire_owned().expect("a permit");
         let line = Line { index: 7, document: Ok(Bytes::from("{}")), _ahead: ahead };
         let mut chunk = Chunk { batch, waiting: [line].into(), answers: Answers { lines: 1, ..Answers::default() } };
@@ -824,11 +830,12 @@ mod tests {
     #[test]
     fn a_line_of_a_client_that_has_left_is_left_as_it_was() {
         let query = BatchQuery { endpoint: BatchEndpoint::Sweep, peaks_only: true };
-        let batch = Batch { pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
+        let batch =
+            Batch { lanes: Arc::default(), pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
         let ahead = Arc::new(Semaphore::new(1)).try_acquire_owned().expect("a permit");
         let line = Line { index: 7, document: Ok(Bytes::from("{")), _ahead: ahead };
         let slice = Mutex::new(Slice { waiting: [line].into(), ..Slice::default() });
-        work(&slice, &batch, Pace::default().slice(), &AtomicBool::new(true));
+        work(&slice, &batch, &mut compute::Slice::default(), &AtomicBool::new(true));
         let slice = slice.into_inner();
         assert_eq!((slice.answers.lines, slice.current), (0, Some(7)));
     }
