@@ -322,9 +322,10 @@ mod tests {
     use std::sync::Arc;
 
     use toothwave_calculation::question;
-    use toothwave_study::{Limits, Study};
+    use toothwave_solver::Never;
+    use toothwave_study::{Limits, Study, Work};
 
-    use super::Canary;
+    use super::{Canary, sealed, unsealed};
 
     /// A map of so many radii, each with two numbers of states.
     fn map_of(radii: u64) -> Arc<Study> {
@@ -337,6 +338,21 @@ mod tests {
         let calculation = question::Limits { max_states: 1_000_000, max_profile_points: 1_000_000 };
         let limits = Limits { calculation, max_study_variants: u64::MAX, max_study_bytes: u64::MAX };
         Arc::new(Study::read(document.as_bytes(), &limits).expect("a study"))
+    }
+
+    /// SQLite, and PostgreSQL by default, tell nothing of a bit that has become another: a number was 2e-308 instead of 4.5, in a study that was done.
+    #[test]
+    fn what_a_chunk_came_to_is_none_where_a_bit_of_it_is_another() {
+        let part = Work::new(&map_of(5), 0).run(&Never).expect("an answer");
+        let kept = sealed("one", 7, &part).expect("it is kept");
+        assert_eq!(unsealed("one", 7, &kept).expect("and read"), part);
+        for bit in 0..8 * kept.len() {
+            let mut damaged = kept.clone();
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            assert!(unsealed("one", 7, &damaged).is_err(), "{bit}");
+        }
+        assert!(unsealed("one", 8, &kept).is_err() && unsealed("other", 7, &kept).is_err());
+        assert!(unsealed("one", 7, &kept[..20]).is_err());
     }
 
     #[test]

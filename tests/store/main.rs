@@ -230,7 +230,7 @@ async fn a_study_of_the_first_schema_goes_on_where_it_was() {
     keep(&mut claimed(&store, &study).await).await;
     store.close().await;
     let mut older = SqliteConnection::connect(&format!("sqlite:{}", file.0.display())).await.unwrap();
-    let changes = "DROP INDEX counts_of_results; ALTER TABLE studies DROP COLUMN opened; DELETE FROM schema_versions WHERE version > 1";
+    let changes = "DROP INDEX counts_of_results; DROP INDEX studies_that_wait; ALTER TABLE studies DROP COLUMN opened; DELETE FROM schema_versions WHERE version > 1";
     sqlx::raw_sql(changes).execute(&mut older).await.unwrap();
     older.close().await.unwrap();
     let store = Store::open(&file.address()).await.unwrap();
@@ -494,6 +494,62 @@ async fn a_worker_that_lives_keeps_its_chunk_however_long_that_takes() {
 async fn stranger(address: &Address) -> PgConnection {
     let Address::Server(options) = address else { panic!("{address}") };
     PgConnection::connect_with(options).await.unwrap()
+}
+
+/// Where the server does not flush for a while what was to be noted stands there, seen by nobody, and three such attempts were a gap.
+#[tokio::test]
+async fn an_attempt_that_is_still_being_noted_is_taken_back_when_that_has_come_to_its_end() {
+    let Some(address) = server() else { return };
+    let _others = SERVER.read().await;
+    let store = migrated(&address).await;
+    let study = study("noted", 1);
+    store.create(&study).await.unwrap();
+    let (mut noting, mut other) = (stranger(&address).await, stranger(&address).await);
+    let mut waits = async || {
+        let waiting = "SELECT COUNT(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted";
+        while sqlx::query_scalar::<_, i64>(waiting).fetch_one(&mut other).await.unwrap() == 0 {}
+    };
+    let lock = "SELECT pg_advisory_xact_lock(hashtextextended($1, 0))";
+    sqlx::raw_sql("BEGIN").execute(&mut noting).await.unwrap();
+    sqlx::query(lock).bind(&study.id).execute(&mut noting).await.unwrap();
+    let mut claimed = Box::pin(claimed(&store, &study));
+    tokio::select! {
+        _ = &mut claimed => panic!("whoever notes an attempt waits for others"),
+        () = waits() => {}
+    }
+    sqlx::raw_sql("COMMIT").execute(&mut noting).await.unwrap();
+    let lease = claimed.await;
+    // As the store does it, but for the end.
+    sqlx::raw_sql("BEGIN").execute(&mut noting).await.unwrap();
+    let noted = "INSERT INTO attempts SELECT study, chunk, worker, began_at_s FROM attempts WHERE study = $1";
+    for text in [lock, noted] {
+        sqlx::query(text).bind(&study.id).execute(&mut noting).await.unwrap();
+    }
+    let mut given_back = Box::pin(lease.give_back());
+    tokio::select! {
+        _ = &mut given_back => panic!("nobody knows what is being noted"),
+        () = waits() => {}
+    }
+    sqlx::raw_sql("COMMIT").execute(&mut noting).await.unwrap();
+    given_back.await.unwrap();
+    let left = "SELECT COUNT(*) FROM attempts WHERE study = $1";
+    assert_eq!(sqlx::query_scalar::<_, i64>(left).bind(&study.id).fetch_one(&mut other).await.unwrap(), 0);
+    store.forget(&study.id).await.unwrap();
+}
+
+#[tokio::test]
+async fn a_chunk_tells_how_often_it_was_begun_before() {
+    with_each_store(async |store| {
+        let study = study("begun", 1);
+        store.create(&study).await.unwrap();
+        for before in 0..2 {
+            let lease = store.hold(&study.cut(), LEASE).await.unwrap().unwrap();
+            assert_eq!(lease.attempts().await.unwrap(), before);
+            assert!(matches!(lease.begin().await.unwrap(), Claim::Chunk(_)));
+        }
+        store.forget(&study.id).await.unwrap();
+    })
+    .await;
 }
 
 /// As by a worker that was cut off while it opened chunks.
