@@ -114,7 +114,7 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_MAX_STUDY_VARIANTS", value_name = "N", default_value_t = 10_000_000)]
     pub max_study_variants: u64,
 
-    /// Most bytes that all studies which are kept in memory come to, and of stored ones those whose results are being read; they count as unread [default: 256 MiB, or a quarter of max-unread-bytes]
+    /// Most bytes that all studies which are kept in memory come to, and of stored ones those whose results are being read; they count as unread, those up to 256 KiB as far as there is room [default: 256 MiB, or a quarter of max-unread-bytes]
     #[arg(long, env = "TOOTHWAVE_MAX_STUDY_BYTES", value_name = "BYTES")]
     pub max_study_bytes: Option<u64>,
 
@@ -249,7 +249,7 @@ pub struct WorkerSettings {
     #[command(flatten)]
     pub parts: PartsSettings,
 
-    /// Chunks that are computed at once [default: the cores that the process may use]
+    /// Chunks that are computed at once, and of up to three other studies one each beside them [default: the cores that the process may use]
     #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_SOLVES", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_CHUNKS))]
     pub max_concurrent_solves: Option<u32>,
 
