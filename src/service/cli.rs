@@ -186,9 +186,19 @@ pub fn run() -> ExitCode {
     }
 }
 
-/// Says what went wrong, where anybody listens: standard error may be full or closed.
+/// Says what went wrong, where anybody listens: standard error may be full or closed, or a pipe that nobody reads, which whoever ends waits for no longer than a
+/// moment.
 fn complain(what: &dyn std::fmt::Display, status: ExitCode) -> ExitCode {
-    let _ = writeln!(io::stderr(), "toothwave: {}", printable(&what.to_string()));
+    const PATIENCE: Duration = Duration::from_millis(300);
+    let text = printable(&what.to_string());
+    let (said, done) = std::sync::mpsc::sync_channel(1);
+    let saying = move || {
+        let _ = writeln!(io::stderr(), "toothwave: {text}");
+        let _ = said.send(());
+    };
+    if std::thread::Builder::new().spawn(saying).is_ok() {
+        let _ = done.recv_timeout(PATIENCE);
+    }
     status
 }
 

@@ -40,6 +40,9 @@ pub const fn content_type(format: Format) -> &'static str {
     }
 }
 
+/// Of a list of what is accepted, in bytes: each of its items is read, sorted and compared before anything else is known of a request, and browsers' have some hundred bytes.
+const MOST_OF_A_LIST: usize = 4096;
+
 /// A format with its coding: what an entity tag stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Representation {
@@ -67,6 +70,11 @@ impl Representation {
     pub fn negotiate(headers: &HeaderMap, others: impl Iterator<Item = Format>) -> Result<Self, Problem> {
         let gzip = accepts_gzip(headers);
         let accepted = joined(headers, &header::ACCEPT);
+        if accepted.len() > MOST_OF_A_LIST {
+            let detail =
+                format!("`Accept` has {} bytes, more than the {MOST_OF_A_LIST} that are read of it", accepted.len());
+            return Err(Problem::new(ProblemCode::NotAcceptable, detail));
+        }
         if accepted.trim().is_empty() {
             return Ok(Self { format: Format::Json, gzip });
         }
@@ -149,6 +157,9 @@ fn without_parameters(accepted: &str) -> String {
 /// Whether the request prefers gzip to no coding at all.
 fn accepts_gzip(headers: &HeaderMap) -> bool {
     let accepted = joined(headers, &header::ACCEPT_ENCODING);
+    if accepted.len() > MOST_OF_A_LIST {
+        return false;
+    }
     let quality = |coding: &str| {
         accepted.split(',').find_map(|item| {
             let mut parts = item.split(';').map(str::trim);

@@ -240,9 +240,9 @@ const DOCS_POLICY: HeaderValue = HeaderValue::from_static(
     "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'",
 );
 
-/// The documentation's pages say 404 in words of their own, and no policy.
+/// The documentation's pages say 404 in words of their own, of names that are no text 400, and no policy.
 async fn as_documentation(mut response: Response) -> Response {
-    if response.status() == StatusCode::NOT_FOUND {
+    if matches!(response.status(), StatusCode::NOT_FOUND | StatusCode::BAD_REQUEST) {
         return Problem::new(ProblemCode::NotFound, "the documentation has no such page").into_response();
     }
     response.headers_mut().insert(header::CONTENT_SECURITY_POLICY, DOCS_POLICY);

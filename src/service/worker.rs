@@ -1,7 +1,9 @@
 //! Workers: they take chunks of stored studies, one after the other, compute them and keep what they come to.
 
 use std::collections::{BTreeMap, HashMap};
+use std::convert::Infallible;
 use std::error::Error;
+use std::future;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -14,7 +16,7 @@ use tokio::sync::{OnceCell, RwLock, RwLockReadGuard, RwLockWriteGuard, watch};
 use tokio_util::sync::CancellationToken;
 use toothwave_calculation::BUILD;
 use toothwave_calculation::no_answer::NoAnswer;
-use toothwave_store::{Claim, Lease, Store, StoreError, Waiting};
+use toothwave_store::{Claim, Lease, MOST_ATTEMPTS, Store, StoreError, Waiting};
 use toothwave_study::{Interrupted, Part, Study, Work};
 
 use crate::compute::{Lane, Pool, SMALL_VARIANT_BYTES, Slice};
@@ -29,6 +31,9 @@ const PAUSE: Duration = Duration::from_secs(1);
 
 /// What a claim that is being made gets at least when no chunk is to be begun any more.
 const NEARLY: Duration = Duration::from_millis(200);
+
+/// For so long a chunk that is computed beside none waits for that, and has others wait: what ends a process mostly does so at once, and chunks may take minutes.
+const ALONE: Duration = Duration::from_secs(3);
 
 /// Between two tries to keep a result: at first, and at most.
 const RETRY: Duration = Duration::from_millis(200);
@@ -239,8 +244,16 @@ impl Workers {
                 };
                 match claimed {
                     Ok((Claim::Chunk(lease), _)) if self.stopping.is_cancelled() => return give_up(lease).await,
-                    Ok((Claim::Chunk(lease), _beside)) => {
-                        self.compute(&mut lane, task, &ours, lease, &mut tasks).await;
+                    Ok((Claim::Chunk(lease), beside)) => {
+                        let no_longer_alone = async {
+                            tokio::time::sleep(ALONE).await;
+                            drop(beside);
+                            future::pending::<Infallible>().await
+                        };
+                        tokio::select! {
+                            () = self.compute(&mut lane, task, &ours, lease, &mut tasks) => {}
+                            never = no_longer_alone => match never {},
+                        }
                         has_worked = true;
                     }
                     Ok((Claim::Gap(chunk), _)) => {
@@ -265,19 +278,18 @@ impl Workers {
         }
     }
 
-    /// A chunk that is begun, and what it is computed beside: one that came to no result before may be what ended its process, and is computed beside none, so
-    /// that no other is taken for that.
+    /// A chunk that is begun, and what it is computed beside: one that came to no result in all attempts but the last may be what ended its process, and is computed
+    /// beside none, so that no other is taken for that.
     async fn claim(&self, task: &Waiting, ours: &Ours) -> Result<(Claim, Beside<'_>), StoreError> {
         let Some(mut lease) = self.store.hold(&task.cut, ours.lease).await? else {
             return Ok((Claim::None, Beside::Others(None)));
         };
-        let is_suspect = lease.attempts().await? > 0;
+        let is_suspect = lease.attempts().await? + 1 >= MOST_ATTEMPTS;
         let beside = async {
-            if is_suspect {
-                Beside::None(self.side_by_side.write().await)
-            } else {
-                Beside::Others(Some(self.side_by_side.read().await))
+            if is_suspect && let Ok(none) = tokio::time::timeout(ALONE, self.side_by_side.write()).await {
+                return Beside::None(none);
             }
+            Beside::Others(Some(self.side_by_side.read().await))
         };
         let beside = tokio::select! {
             beside = beside => beside,

@@ -493,7 +493,9 @@ async fn a_query_that_a_path_does_not_know_is_refused() {
 
 #[tokio::test]
 async fn a_file_of_the_page_whose_name_is_no_text_is_not_found() {
-    Service::new().get("/page/%FF").await.refused(404, "not_found");
+    for name in ["/page/%FF", "/docs/%FF"] {
+        Service::new().get(name).await.refused(404, "not_found");
+    }
 }
 
 #[tokio::test]

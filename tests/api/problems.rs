@@ -292,6 +292,20 @@ async fn a_client_that_accepts_no_format_of_a_path_is_told_which_there_are() {
     }
 }
 
+/// Thousands of ranges took milliseconds each, in which nobody else was answered.
+#[tokio::test]
+async fn of_lists_of_what_is_accepted_no_more_is_read_than_anybody_sends() {
+    let service = Service::new();
+    let list = |length: usize| format!("application/json,{}", "a/b,".repeat(length / 4));
+    assert_eq!(service.ask(&sweep().with("accept", &list(4000))).await.status, 200);
+    let problem = service.ask(&sweep().with("accept", &list(4100))).await.refused(406, "not_acceptable");
+    assert!(problem["detail"].as_str().unwrap().contains("4096"), "{problem}");
+    for (length, coding) in [(4000, "gzip"), (4100, "")] {
+        let list = format!("gzip,{}", "ab,".repeat(length / 3));
+        assert_eq!(service.ask(&sweep().with("accept-encoding", &list)).await.header("content-encoding"), coding);
+    }
+}
+
 #[tokio::test]
 async fn a_body_that_is_too_large_is_refused_with_its_length_and_the_limit() {
     let service = Service::within(Limits { max_body_bytes: 1_000, ..LIMITS });
