@@ -15,7 +15,7 @@ use tracing::Instrument;
 
 use crate::negotiation::Representation;
 use crate::problem::Problem;
-use crate::room::{SMALL_BYTES, Sent};
+use crate::room::Sent;
 
 /// The strong entity tag of a representation: its bytes follow from the key alone.
 pub fn etag(key: Key) -> String {
@@ -131,6 +131,9 @@ impl Drop for Landing {
 const MOST_SPELLINGS: u64 = 65_536;
 const BYTES_A_SPELLING: u64 = 4096;
 
+/// An answer up to here is short: some tens of them come to little.
+const SHORT_BYTES: usize = 1 << 14;
+
 /// What an entry costs beside its body: of 60 000 short answers each took some 1060 bytes more, its spelling among them.
 const ENTRY_OVERHEAD_BYTES: usize = 640;
 
@@ -243,11 +246,11 @@ impl Cache {
     }
 }
 
-/// Keeps an answer. The cache forgets what goes beyond its bound when it comes to that: of large ones at once, or it would hold some beyond it,
-/// which take no room any more.
+/// Keeps an answer. The cache forgets what goes beyond its bound when it comes to that, which is after tens of insertions: of all but short ones at once, or
+/// it would hold some beyond it, which take no room any more.
 fn keep(answers: &moka::sync::Cache<Key, Stored>, key: Key, stored: &Stored) {
     answers.insert(key, Stored { held: None, ..stored.clone() });
-    if stored.body.len() as u64 > SMALL_BYTES {
+    if stored.body.len() > SHORT_BYTES {
         answers.run_pending_tasks();
     }
 }

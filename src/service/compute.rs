@@ -26,6 +26,9 @@ const SLICE: Duration = Duration::from_millis(5);
 /// Or after this one, where others have as long slices: a single step of theirs, such as a variant of a study, may take as long.
 const LONGEST_SLICE: Duration = Duration::from_secs(1);
 
+/// A single solve waits for so long behind slices, where they are not known to be long.
+const PATIENCE: Duration = Duration::from_millis(50);
+
 /// Of what unread answers may take, variants of studies may take another such part while they are computed.
 const PART_OF_VARIANTS: u64 = 4;
 
@@ -40,6 +43,8 @@ pub const SMALL_VARIANT_BYTES: u64 = 1 << 20;
 pub struct Pool {
     /// One for each solve that runs.
     permits: Arc<Semaphore>,
+    /// One: for a single solve behind slices that hold permits for long, since a step of theirs is never cut.
+    spare: Arc<Semaphore>,
     /// One for each solve that runs or waits, those of batches apart.
     places: Arc<Semaphore>,
     /// One for each slice of a batch that runs or waits for a permit: as many as there are permits, so that a single request
@@ -196,6 +201,7 @@ impl Pool {
     pub fn new(limits: Limits) -> Self {
         Self {
             permits: Arc::new(Semaphore::new(limits.max_concurrent_solves)),
+            spare: Arc::new(Semaphore::new(1)),
             places: Arc::new(Semaphore::new(limits.max_concurrent_solves + limits.max_queued_solves)),
             turns: Arc::new(Semaphore::new(limits.max_concurrent_solves)),
             of_variants: Arc::new(Semaphore::new(room::permits(limits.max_unread_bytes / PART_OF_VARIANTS) as usize)),
@@ -223,7 +229,7 @@ impl Pool {
 
     /// Solves that run now.
     pub fn running(&self) -> usize {
-        self.limits.max_concurrent_solves - self.permits.available_permits()
+        self.limits.max_concurrent_solves + 1 - self.permits.available_permits() - self.spare.available_permits()
     }
 
     /// Single solves that run or wait now.
@@ -476,8 +482,27 @@ impl Pool {
         on: Thread,
         job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
-        let permit = self.permit().await?;
+        let permit = self.permit_of_a_single_one().await?;
         self.run_permitted((place, permit), on, job).await
+    }
+
+    async fn permit_of_a_single_one(&self) -> Result<impl Send + Sync + 'static, Problem> {
+        let spare = async {
+            if self.pace.most(Instant::now()) == SLICE {
+                tokio::time::sleep(PATIENCE).await;
+            }
+            // Behind others of its kind it waits.
+            if self.turns.available_permits() == self.limits.max_concurrent_solves {
+                std::future::pending::<()>().await;
+            }
+            Arc::clone(&self.spare).acquire_owned().await
+        };
+        tokio::select! {
+            biased;
+            permit = Arc::clone(&self.permits).acquire_owned() => Ok(permit),
+            permit = spare => Ok(permit),
+            () = self.closed.cancelled() => Err(shutting_down()),
+        }
     }
 
     async fn permit(&self) -> Result<impl Send + Sync + 'static, Problem> {
@@ -666,6 +691,33 @@ mod tests {
         long.abort();
         // The other's last slice has begun before, its first one after the end; without turns of the same length it would have had forty.
         assert!(beside <= 2 * (1 + busy.div_duration_f64(STEP).ceil() as u32), "{beside} slices beside {busy:?}");
+        Ok(())
+    }
+
+    /// Two studies of variants of some seconds each held up all single requests.
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_single_solve_does_not_wait_for_a_step_that_takes_long() -> Result<(), Problem> {
+        let Line { settings } = Line::parse_from(["serve", "--max-concurrent-solves", "2"]);
+        let pool = Pool::new(settings.limits());
+        let (senders, slices): (Vec<_>, Vec<_>) = (0..2)
+            .map(|_| {
+                let (release, released) = mpsc::channel::<()>();
+                let (pool, mut lane) = (pool.clone(), Lane::default());
+                let step = move |_: &mut Slice, _: &AtomicBool| Ok(released.recv().is_err());
+                (release, tokio::spawn(async move { pool.run_variants(&mut lane, 0, step).await }))
+            })
+            .unzip();
+        while pool.running() < 2 {
+            tokio::task::yield_now().await;
+        }
+        for _ in 0..3 {
+            assert_eq!(pool.run(pool.deadline(), Thread::Blocking, |_| Ok(7)).await?, 7);
+        }
+        drop(senders);
+        for slice in slices {
+            assert!(slice.await.map_err(|error| Problem::internal(&error))??);
+        }
+        assert_eq!(pool.running(), 0);
         Ok(())
     }
 
