@@ -561,7 +561,7 @@ impl Studies {
     /// Where the store does not answer, or this is not the build or the processor that the study was asked of.
     pub async fn find(&self, id: &str) -> Result<Option<Arc<Kept>>, Problem> {
         let here = self.find_here(id);
-        let Keeping::Store { store, expiry, .. } = &self.keeping else { return Ok(here) };
+        let Keeping::Store { store, .. } = &self.keeping else { return Ok(here) };
         let kept = match here.filter(|kept| kept.is_followed.load(Ordering::SeqCst)) {
             Some(kept) => kept,
             None => {
@@ -574,13 +574,18 @@ impl Studies {
                 kept
             }
         };
-        let noted_after_s = (*expiry / NOTE_SHARE).as_secs();
-        if kept.unasked_s.load(Ordering::Relaxed) > noted_after_s {
-            // By one, and until it is next looked at: who reads must not wait for others' writes.
+        // By one, and until it is next looked at: who reads must not wait for others' writes.
+        if self.is_to_be_noted(kept.unasked_s.load(Ordering::Relaxed)) {
             kept.unasked_s.store(0, Ordering::Relaxed);
             note_asked(store, id).await;
         }
         Ok(Some(kept))
+    }
+
+    /// Whether it is to be noted that a stored study was asked for, which was not for so long.
+    fn is_to_be_noted(&self, unasked_s: u64) -> bool {
+        let Keeping::Store { expiry, .. } = &self.keeping else { return false };
+        unasked_s > (*expiry / NOTE_SHARE).as_secs()
     }
 
     /// A stored study as it is kept here, without its rows.
@@ -676,7 +681,9 @@ impl Studies {
             };
             let kept = match (stored, known) {
                 (Some(stored), Some(kept)) if is_there(&stored) => {
-                    note_asked(store, &id).await;
+                    if self.is_to_be_noted(stored.unasked.as_secs()) {
+                        note_asked(store, &id).await;
+                    }
                     Some(kept)
                 }
                 (_, known) => {
