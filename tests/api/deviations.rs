@@ -317,6 +317,33 @@ fn points_of_curves(svg: &str) -> Vec<usize> {
     paths.map(|(path, _)| path.split(" L ").count()).collect()
 }
 
+/// Where teeth enter under load the curves are cut at each, and of ten thousand teeth a plot of few states took forty megabytes.
+#[tokio::test]
+async fn curves_have_no_more_pieces_than_can_be_seen_however_many_teeth_enter_under_load() {
+    let document = json!({
+        "drive": {
+            "wave_generator": { "kind": "harmonic", "lobes": 20, "mean_radius_mm": 19_998.0, "amplitude_mm": 0.05 },
+            "teeth": { "count": 9999, "radius_mm": 5.9, "width_mm": 15.0 },
+            "ring": { "teeth": 9979, "tip_radius_mm": 20_009.751 }
+        },
+        "load": { "input_torque_nm": 20.0 },
+        "model": { "compatibility": "projection", "stiffness": { "law": "linear" } },
+        "sweep": { "samples": 4 }
+    });
+    let question = Question::post("/v1/sweep", document.to_string());
+    let service = Service::new();
+    let states = service.ask(&question.clone().with("accept", "text/csv")).await.text().lines().count();
+    assert!(states > 10_000, "{states}");
+    let svg = service.ask(&question.with("accept", "image/svg+xml")).await;
+    let points = points_of_curves(svg.text());
+    assert!(
+        points.len() > 6 * 100 && points.len() <= 6 * 501 && points.iter().sum::<usize>() <= 6 * 4501,
+        "{} of {}",
+        points.len(),
+        points.iter().sum::<usize>()
+    );
+}
+
 #[tokio::test]
 async fn where_single_items_deviate_a_plot_has_one_load_for_each_place_the_largest_of_all_teeth() {
     let document = with(&deviating(), "/sweep/samples", json!(5));

@@ -18,6 +18,9 @@ const COLORS: [&str; 2] = ["#0072b2", "#d55e00"];
 /// More points than a line of a plot this wide can show.
 const MOST_POINTS: usize = 4000;
 
+/// And more pieces of one.
+const MOST_PIECES: usize = 500;
+
 /// Positions closer than this, in degrees, are one place.
 const SAME_DEG: f64 = 1e-9;
 
@@ -200,9 +203,13 @@ impl Pass {
             }
         }
         let stride = places.len().div_ceil(MOST_POINTS).max(1);
+        let mut ending = 0;
+        let between_ends = places.iter().filter(|(_, ends)| *ends).count().div_ceil(MOST_PIECES).max(1);
         let mut pieces = vec![Vec::new()];
         for (index, (place, ends)) in places.into_iter().enumerate() {
             let current = pieces.len() - 1;
+            ending += usize::from(ends);
+            let ends = ends && ending % between_ends == 0;
             if index % stride == 0 || ends {
                 pieces[current].push(place);
             }
