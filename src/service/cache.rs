@@ -156,6 +156,12 @@ impl Cache {
         CacheSize { bytes: self.answers.weighted_size(), entries: self.answers.entry_count() }
     }
 
+    /// Lets go of all answers: each can be computed again.
+    pub fn let_go(&self) {
+        self.answers.invalidate_all();
+        self.answers.run_pending_tasks();
+    }
+
     /// The answer under `key`, if it is kept.
     pub fn get(&self, key: Key) -> Option<Stored> {
         self.answers.get(&key)

@@ -249,7 +249,7 @@ pub struct WorkerSettings {
     #[command(flatten)]
     pub parts: PartsSettings,
 
-    /// Chunks that are computed at once, and of up to three other studies one each beside them [default: the cores that the process may use]
+    /// Chunks that are computed at once, and of up to three other studies one each beside them [default: the cores that the process may use, or one for each 32 MiB of the memory]
     #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_SOLVES", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_CHUNKS))]
     pub max_concurrent_solves: Option<u32>,
 
@@ -265,17 +265,26 @@ pub struct WorkerSettings {
 impl WorkerSettings {
     /// Limits of a process that only computes chunks: each was admitted with its study.
     pub fn limits(&self) -> Limits {
+        self.limits_of(machine::memory_bytes().unwrap_or(UNKNOWN_MEMORY_BYTES), cores())
+    }
+
+    /// Those on a machine with so much memory and so many cores for the process.
+    fn limits_of(&self, memory_bytes: u64, cores: usize) -> Limits {
+        let solves_that_fit = usize::try_from(memory_bytes / MEMORY_PER_SOLVE_BYTES).unwrap_or(usize::MAX).max(1);
         Limits {
             max_states: u64::MAX,
             max_profile_points: u64::MAX,
             max_body_bytes: 0,
-            max_concurrent_solves: self.max_concurrent_solves.map_or_else(cores, |solves| solves as usize),
+            // What chunks have come to so far is counted nowhere: of each it is some megabytes at most.
+            max_concurrent_solves: self
+                .max_concurrent_solves
+                .map_or_else(|| cores.min(solves_that_fit), |solves| solves as usize),
             max_queued_solves: 0,
             max_concurrent_batches: 0,
             deadline_ms: u64::MAX,
             cache_max_bytes: 0,
             // It has no answers: variants take their part of all of the memory.
-            max_unread_bytes: machine::memory_bytes().unwrap_or(UNKNOWN_MEMORY_BYTES),
+            max_unread_bytes: memory_bytes,
             max_study_variants: u64::MAX,
             max_study_bytes: u64::MAX,
             max_concurrent_studies: 0,
@@ -449,6 +458,22 @@ mod tests {
         let (few, many) = (of(&["serve"]), of(&["serve", "--max-concurrent-solves", "16"]));
         assert_eq!((few.max_concurrent_solves, few.max_unread_bytes), (6, 68 << 20));
         assert_eq!((many.max_unread_bytes, many.cache_max_bytes), (48 << 20, 12 << 20));
+    }
+
+    #[test]
+    fn a_worker_has_no_more_slots_than_its_memory_has_room_for() {
+        #[derive(clap::Parser)]
+        struct WorkerLine {
+            #[command(flatten)]
+            settings: super::WorkerSettings,
+        }
+        let slots = |words: &[&str], memory_bytes| {
+            let line = WorkerLine::parse_from(words);
+            line.settings.limits_of(memory_bytes, 32).max_concurrent_solves
+        };
+        let words = ["worker", "--studies", "studies.sqlite", "--max-concurrent-solves", "16"];
+        assert_eq!([1 << 20, 128 << 20, 64 << 30].map(|bytes| slots(&words[..3], bytes)), [1, 4, 32]);
+        assert_eq!(slots(&words, 128 << 20), 16, "whoever asks for them has them");
     }
 
     #[test]

@@ -66,6 +66,9 @@ const SLOTS_FOR_OTHERS: usize = 3;
 /// Between two looks whether something that has come is still unread.
 const UNREAD_LOOK: Duration = Duration::from_millis(1);
 
+/// Between two looks whether the cache has to give way.
+const SCARCE_LOOK: Duration = Duration::from_millis(50);
+
 /// After an error of the listener itself, such as too many open files.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
@@ -131,6 +134,7 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
     }
     tokio::spawn(observe::keep_up());
     tokio::spawn(app.pool.memory().clone().watch());
+    tokio::spawn(give_way(Arc::clone(&app)));
     let store = tokio::spawn({
         let app = Arc::clone(&app);
         async move { app.studies.serve_store().await }
@@ -439,6 +443,16 @@ impl Server {
         // Each keeps some kilobytes of its task.
         connections.retain(|(_, seen)| seen.is_open());
         connections.push_back((answered.abort_handle(), seen));
+    }
+}
+
+/// Where memory is scarce the cache gives way before clients are refused.
+async fn give_way(app: Arc<App>) {
+    loop {
+        if app.pool.memory().is_scarce() {
+            app.cache.let_go();
+        }
+        sleep(SCARCE_LOOK).await;
     }
 }
 

@@ -35,6 +35,9 @@ const NEARLY: Duration = Duration::from_millis(200);
 /// For so long a chunk that is computed beside none waits for that, and has others wait: what ends a process mostly does so at once, and chunks may take minutes.
 const ALONE: Duration = Duration::from_secs(3);
 
+/// Between two looks at memory that is scarce.
+const SCARCE_PAUSE: Duration = Duration::from_millis(20);
+
 /// Between two tries to keep a result: at first, and at most.
 const RETRY: Duration = Duration::from_millis(200);
 const LONGEST_RETRY: Duration = Duration::from_secs(10);
@@ -233,6 +236,17 @@ impl Workers {
                     found = self.study(task) => found,
                 };
                 let Some(ours) = found else { continue };
+                // What is in work comes to its end, and is let go, before more is begun.
+                let has_memory = async {
+                    while self.pool.memory().is_scarce() {
+                        tokio::time::sleep(SCARCE_PAUSE).await;
+                    }
+                };
+                tokio::select! {
+                    biased;
+                    () = self.stopping.cancelled() => return,
+                    () = has_memory => {}
+                }
                 // Nor is one that the store does not give. What is nearly claimed is, and then given back: its attempt may be noted already.
                 let told_to_stop = async {
                     self.stopping.cancelled().await;
