@@ -1,6 +1,5 @@
 //! Where solves run: permits, a bounded queue, the deadline, cancellation; nothing else leaves the async executor.
 
-use std::any::Any;
 use std::io;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Arc;
@@ -9,7 +8,7 @@ use std::time::Duration;
 
 use metrics::{counter, histogram};
 use parking_lot::Mutex;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::{AcquireError, OwnedSemaphorePermit, Semaphore};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tracing::Span;
@@ -130,10 +129,16 @@ impl Default for Slice {
     }
 }
 
+/// An error says that the semaphore is closed, which it never is.
+type Held = Result<OwnedSemaphorePermit, AcquireError>;
+
+/// A turn, and with it a permit.
+type Turn = Arc<(Held, Held)>;
+
 /// One who runs slices one after the other. A turn of which it has not used all is its own until the next, where that comes soon.
 #[derive(Debug, Default)]
 pub struct Lane {
-    turn: Arc<Mutex<Option<Arc<dyn Any + Send + Sync>>>>,
+    turn: Arc<Mutex<Option<Turn>>>,
     /// Of the turn.
     spent: Duration,
 }
@@ -142,7 +147,7 @@ impl Lane {
     /// For so long a turn is kept: somebody waits for it meanwhile, and no core works.
     const KEPT: Duration = Duration::from_millis(20);
 
-    fn keep(&mut self, turn: Arc<dyn Any + Send + Sync>, spent: Duration) {
+    fn keep(&mut self, turn: Turn, spent: Duration) {
         self.spent = spent;
         let (lane, kept) = (Arc::downgrade(&self.turn), Arc::downgrade(&turn));
         *self.turn.lock() = Some(turn);
@@ -377,8 +382,7 @@ impl Pool {
         Ok(done)
     }
 
-    /// A turn, and with it a permit.
-    async fn turn(&self) -> Result<Arc<dyn Any + Send + Sync>, Problem> {
+    async fn turn(&self) -> Result<Turn, Problem> {
         let turn = tokio::select! {
             turn = Arc::clone(&self.turns).acquire_owned() => turn,
             () = self.closed.cancelled() => return Err(shutting_down()),
@@ -486,7 +490,7 @@ impl Pool {
         self.run_permitted((place, permit), on, job).await
     }
 
-    async fn permit_of_a_single_one(&self) -> Result<impl Send + Sync + 'static, Problem> {
+    async fn permit_of_a_single_one(&self) -> Result<Held, Problem> {
         let spare = async {
             if self.pace.most(Instant::now()) == SLICE {
                 tokio::time::sleep(PATIENCE).await;
@@ -505,7 +509,7 @@ impl Pool {
         }
     }
 
-    async fn permit(&self) -> Result<impl Send + Sync + 'static, Problem> {
+    async fn permit(&self) -> Result<Held, Problem> {
         tokio::select! {
             permit = Arc::clone(&self.permits).acquire_owned() => Ok(permit),
             () = self.closed.cancelled() => Err(shutting_down()),

@@ -270,15 +270,12 @@ impl WorkerSettings {
 
     /// Those on a machine with so much memory and so many cores for the process.
     fn limits_of(&self, memory_bytes: u64, cores: usize) -> Limits {
-        let solves_that_fit = usize::try_from(memory_bytes / MEMORY_PER_SOLVE_BYTES).unwrap_or(usize::MAX).max(1);
         Limits {
             max_states: u64::MAX,
             max_profile_points: u64::MAX,
             max_body_bytes: 0,
             // What chunks have come to so far is counted nowhere: of each it is some megabytes at most.
-            max_concurrent_solves: self
-                .max_concurrent_solves
-                .map_or_else(|| cores.min(solves_that_fit), |solves| solves as usize),
+            max_concurrent_solves: concurrent_solves(self.max_concurrent_solves, memory_bytes, cores),
             max_queued_solves: 0,
             max_concurrent_batches: 0,
             deadline_ms: u64::MAX,
@@ -294,6 +291,15 @@ impl WorkerSettings {
             header_timeout_ms: 0,
         }
     }
+}
+
+/// As many as were asked for, or as there are cores and memory for.
+fn concurrent_solves(asked: Option<u32>, memory_bytes: u64, cores: usize) -> usize {
+    asked.map_or_else(|| cores.min(that_fit(memory_bytes, MEMORY_PER_SOLVE_BYTES)), |solves| solves as usize)
+}
+
+fn that_fit(memory_bytes: u64, each_bytes: u64) -> usize {
+    usize::try_from(memory_bytes / each_bytes).unwrap_or(usize::MAX).max(1)
 }
 
 /// The limits that a client can read.
@@ -358,11 +364,8 @@ impl Settings {
 
     /// Those on a machine with so much memory and so many cores for the process.
     fn limits_of(&self, memory_bytes: u64, cores: usize) -> Limits {
-        let that_fit = |each_bytes: u64| usize::try_from(memory_bytes / each_bytes).unwrap_or(usize::MAX).max(1);
-        let solves_that_fit = that_fit(MEMORY_PER_SOLVE_BYTES);
-        let max_concurrent_solves =
-            self.max_concurrent_solves.map_or_else(|| cores.min(solves_that_fit), |solves| solves as usize);
-        let connections_that_fit = that_fit(MEMORY_PER_CONNECTION_BYTES).min(MOST_CONNECTIONS);
+        let max_concurrent_solves = concurrent_solves(self.max_concurrent_solves, memory_bytes, cores);
+        let connections_that_fit = that_fit(memory_bytes, MEMORY_PER_CONNECTION_BYTES).min(MOST_CONNECTIONS);
         let kept_bytes = KEPT_BY_SOLVE_BYTES * max_concurrent_solves.saturating_sub(SOLVES_WITHIN) as u64;
         let shared_bytes = memory_bytes.saturating_sub(HELD_BACK_BYTES + kept_bytes).max(memory_bytes / 4);
         let max_unread_bytes = self

@@ -65,8 +65,8 @@ impl Memory {
         most_bytes
     }
 
-    /// Looks for ever, where the machine tells.
-    pub async fn watch(self) {
+    /// Looks for ever, where the machine tells, and has give way what can where memory is scarce.
+    pub async fn watch(self, give_way: impl Fn()) {
         // Opened once: where the process has no more files that must not end the watch.
         let (Some(memory_bytes), Ok(status)) = (machine::memory_bytes(), Status::open()) else { return };
         let most_bytes = self.set_size(memory_bytes);
@@ -84,6 +84,9 @@ impl Memory {
                     said = Some(Instant::now());
                 }
                 self.set_scarce(is_scarce);
+                if is_scarce {
+                    give_way();
+                }
             }
             tokio::time::sleep(LOOK).await;
         }

@@ -66,9 +66,6 @@ const SLOTS_FOR_OTHERS: usize = 3;
 /// Between two looks whether something that has come is still unread.
 const UNREAD_LOOK: Duration = Duration::from_millis(1);
 
-/// Between two looks whether the cache has to give way.
-const SCARCE_LOOK: Duration = Duration::from_millis(50);
-
 /// After an error of the listener itself, such as too many open files.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
@@ -133,8 +130,11 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
         tracing::warn!(%error, "no thread for the greeting");
     }
     tokio::spawn(observe::keep_up());
-    tokio::spawn(app.pool.memory().clone().watch());
-    tokio::spawn(give_way(Arc::clone(&app)));
+    tokio::spawn({
+        let app = Arc::clone(&app);
+        // Before clients are refused.
+        app.pool.memory().clone().watch(move || app.cache.let_go())
+    });
     let store = tokio::spawn({
         let app = Arc::clone(&app);
         async move { app.studies.serve_store().await }
@@ -209,7 +209,7 @@ pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: O
         admitted_states: 0,
     };
     let pool = Pool::new(limits);
-    tokio::spawn(pool.memory().clone().watch());
+    tokio::spawn(pool.memory().clone().watch(|| {}));
     let workers = Workers::new(store, parts, pool, capacity, changed, stopping.clone(), patience);
     let stop = async {
         told_to_stop().await;
@@ -443,16 +443,6 @@ impl Server {
         // Each keeps some kilobytes of its task.
         connections.retain(|(_, seen)| seen.is_open());
         connections.push_back((answered.abort_handle(), seen));
-    }
-}
-
-/// Where memory is scarce the cache gives way before clients are refused.
-async fn give_way(app: Arc<App>) {
-    loop {
-        if app.pool.memory().is_scarce() {
-            app.cache.let_go();
-        }
-        sleep(SCARCE_LOOK).await;
     }
 }
 

@@ -12,7 +12,7 @@ use bytes::Bytes;
 use futures_util::future::join_all;
 use metrics::counter;
 use parking_lot::Mutex;
-use tokio::sync::{OnceCell, RwLock, RwLockReadGuard, RwLockWriteGuard, watch};
+use tokio::sync::{OnceCell, Semaphore, SemaphorePermit, watch};
 use tokio_util::sync::CancellationToken;
 use toothwave_calculation::BUILD;
 use toothwave_calculation::no_answer::NoAnswer;
@@ -57,18 +57,12 @@ pub struct Workers {
     /// What a chunk that is in work then gets to come to its end.
     patience: Duration,
     known: Mutex<HashMap<Waiting, Arc<OnceCell<Known>>>>,
-    /// Held by each chunk that is in work here.
-    side_by_side: RwLock<()>,
+    /// One for each chunk that may be in work here: all of them for one that is computed beside none.
+    side_by_side: Semaphore,
     /// Chunks of each study that are in work here.
     in_work: Mutex<HashMap<String, usize>>,
     /// What was last said of each.
     troubles: Mutex<BTreeMap<What, String>>,
-}
-
-/// What a chunk is computed beside, as long as this is held.
-enum Beside<'a> {
-    Others(#[expect(dead_code, reason = "held")] Option<RwLockReadGuard<'a, ()>>),
-    None(#[expect(dead_code, reason = "held")] RwLockWriteGuard<'a, ()>),
 }
 
 /// What workers have room for. A variant that takes more would end the process, and each that takes it up again, canary first.
@@ -82,6 +76,12 @@ pub struct Capacity {
     pub variant_bytes: u64,
     /// unless its study lets none have more states than this: such a one was admitted here.
     pub admitted_states: u64,
+}
+
+impl Capacity {
+    const fn all_slots(&self) -> usize {
+        self.slots + self.slots_for_others
+    }
 }
 
 /// What may be in trouble: on a full device the store is read and not written.
@@ -172,7 +172,8 @@ impl Workers {
         stopping: CancellationToken,
         patience: Duration,
     ) -> Self {
-        let (known, side_by_side, in_work, troubles) = Default::default();
+        let (known, in_work, troubles) = Default::default();
+        let side_by_side = Semaphore::new(capacity.all_slots());
         Self { store, parts, pool, capacity, changed, stopping, patience, known, side_by_side, in_work, troubles }
     }
 
@@ -181,8 +182,7 @@ impl Workers {
         let (tell, tasks) = watch::channel(Arc::default());
         let over = CancellationToken::new();
         let slots = async {
-            let Capacity { slots, slots_for_others, .. } = self.capacity;
-            join_all((0..slots + slots_for_others).map(|slot| self.fill(slot, tasks.clone()))).await;
+            join_all((0..self.capacity.all_slots()).map(|slot| self.fill(slot, tasks.clone()))).await;
             over.cancel();
         };
         tokio::join!(slots, self.look(&tell, &over));
@@ -294,16 +294,16 @@ impl Workers {
 
     /// A chunk that is begun, and what it is computed beside: one that came to no result in all attempts but the last may be what ended its process, and is computed
     /// beside none, so that no other is taken for that.
-    async fn claim(&self, task: &Waiting, ours: &Ours) -> Result<(Claim, Beside<'_>), StoreError> {
-        let Some(mut lease) = self.store.hold(&task.cut, ours.lease).await? else {
-            return Ok((Claim::None, Beside::Others(None)));
-        };
+    async fn claim(&self, task: &Waiting, ours: &Ours) -> Result<(Claim, Option<SemaphorePermit<'_>>), StoreError> {
+        let Some(mut lease) = self.store.hold(&task.cut, ours.lease).await? else { return Ok((Claim::None, None)) };
         let is_suspect = lease.attempts().await? + 1 >= MOST_ATTEMPTS;
+        let all = u32::try_from(self.capacity.all_slots()).unwrap_or(u32::MAX);
+        // An error says that the semaphore is closed, which it never is.
         let beside = async {
-            if is_suspect && let Ok(none) = tokio::time::timeout(ALONE, self.side_by_side.write()).await {
-                return Beside::None(none);
+            if is_suspect && let Ok(none) = tokio::time::timeout(ALONE, self.side_by_side.acquire_many(all)).await {
+                return none.ok();
             }
-            Beside::Others(Some(self.side_by_side.read().await))
+            self.side_by_side.acquire().await.ok()
         };
         let beside = tokio::select! {
             beside = beside => beside,
