@@ -3,6 +3,14 @@
 use std::hint::black_box;
 use std::sync::LazyLock;
 
+use crate::BUILD;
+
+/// What every bit of an answer follows from besides what is asked, in a word: the build, and after a hyphen the arithmetic of the processor.
+pub fn origin() -> &'static str {
+    static ORIGIN: LazyLock<String> = LazyLock::new(|| format!("{BUILD}-{:016x}", u64::from_be_bytes(arithmetic())));
+    &ORIGIN
+}
+
 /// Which code the mathematical library chose for this processor, told by what it makes of some thousand arguments: the same binary can give other last bits
 /// on another one. So does the solver, which uses wider instructions where there are any.
 pub(crate) fn arithmetic() -> [u8; 8] {

@@ -24,3 +24,5 @@ pub mod no_answer;
 pub mod question;
 pub mod sweep;
 mod union;
+
+pub use arithmetic::origin;

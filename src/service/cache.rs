@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use axum::http::HeaderValue;
 use bytes::Bytes;
+use memmap2::MmapOptions;
 use parking_lot::Mutex;
 use tokio::sync::watch;
 use tokio_util::sync::{CancellationToken, DropGuard};
@@ -98,6 +99,7 @@ pub struct Cache {
     answers: moka::sync::Cache<Key, Stored>,
     keys: moka::sync::Cache<Spelling, Key>,
     flights: Flights,
+    max_bytes: u64,
 }
 
 /// Solves under way, by the key of their answer. What drops a [`Landing`] must not hold the lock, which that takes.
@@ -132,7 +134,13 @@ const MOST_SPELLINGS: u64 = 65_536;
 const BYTES_A_SPELLING: u64 = 4096;
 
 /// An answer up to here is short: some tens of them come to little.
-const SHORT_BYTES: usize = 1 << 14;
+const SHORT_BYTES: usize = 1 << 13;
+
+/// Bodies that are kept in pages of their own, at most: the kernel lets a process have some 65 000 mappings.
+const MOST_COPIES: u64 = 16_384;
+
+/// The allocator gives a body beyond this a place that it shares with none.
+const LONG_BYTES: usize = 1 << 19;
 
 /// What an entry costs beside its body: of 60 000 short answers each took some 1060 bytes more, its spelling among them.
 const ENTRY_OVERHEAD_BYTES: usize = 640;
@@ -146,7 +154,15 @@ impl Cache {
             .weigher(|_, stored: &Stored| u32::try_from(stored.body.len() + ENTRY_OVERHEAD_BYTES).unwrap_or(u32::MAX))
             .build();
         let spellings = MOST_SPELLINGS.min(max_bytes / BYTES_A_SPELLING);
-        Self { answers, keys: moka::sync::Cache::new(spellings), flights: Flights::default() }
+        Self { answers, keys: moka::sync::Cache::new(spellings), flights: Flights::default(), max_bytes }
+    }
+
+    /// Whether a body is to be copied into pages of its own, to be kept: as it was written it would hold the place of others that are long gone, or that of all
+    /// that its writer had. 8 MiB of bodies held 58.
+    pub fn wants_copy(&self, body: &Vec<u8>) -> bool {
+        let may_be_kept = self.max_bytes / MOST_COPIES < body.len() as u64 && body.len() as u64 <= self.max_bytes;
+        let has_its_place = body.len() > LONG_BYTES && body.capacity() - body.len() <= body.len() / 4;
+        may_be_kept && body.len() > SHORT_BYTES && !has_its_place
     }
 
     /// Bytes and entries kept now.
@@ -252,6 +268,13 @@ impl Cache {
     }
 }
 
+/// A copy of an answer's bytes in pages of its own, which are the system's again with the last who has them; none where it gives none.
+pub fn in_own_pages(bytes: &[u8]) -> Option<Bytes> {
+    let mut pages = MmapOptions::new().len(bytes.len()).populate().map_anon().ok()?;
+    pages.copy_from_slice(bytes);
+    Some(Bytes::from_owner(pages))
+}
+
 /// Keeps an answer. The cache forgets what goes beyond its bound when it comes to that, which is after tens of insertions: of all but short ones at once, or
 /// it would hold some beyond it, which take no room any more.
 fn keep(answers: &moka::sync::Cache<Key, Stored>, key: Key, stored: &Stored) {
@@ -280,7 +303,7 @@ mod tests {
     use bytes::Bytes;
     use toothwave_calculation::key::Key;
 
-    use super::{Cache, Served, Spelling, Stored, keep};
+    use super::{Cache, Served, Spelling, Stored, in_own_pages, keep};
     use crate::negotiation::Representation;
     use crate::problem::{Problem, ProblemCode};
     use crate::room::Sent;
@@ -321,6 +344,28 @@ mod tests {
         assert!(cache.key(spelling(b"{}")).is_none());
         cache.remember(spelling(b"{}"), key(1.0));
         assert!(cache.key(spelling(b"{}")) == Some(key(1.0)) && cache.key(spelling(b"{ }")).is_none());
+    }
+
+    #[test]
+    fn a_body_that_is_kept_is_copied_unless_it_is_short_or_has_a_place_of_its_own() {
+        const MIB: usize = 1 << 20;
+        let body = |length, capacity| {
+            let mut body = Vec::with_capacity(capacity);
+            body.resize(length, 0);
+            body
+        };
+        let wants_copy = |cache_mib: u64, body| Cache::new(cache_mib << 20).wants_copy(&body);
+        assert!(
+            wants_copy(8, body(20_000, 20_000))
+                && wants_copy(8, body(MIB / 2, MIB / 2))
+                && wants_copy(8, body(MIB, 2 * MIB))
+        );
+        assert!(!wants_copy(8, body(8000, 16_000)), "it is short");
+        assert!(!wants_copy(8, body(MIB, MIB + MIB / 8)), "it has a place of its own");
+        assert!(!wants_copy(8, body(9 * MIB, 18 * MIB)), "the cache does not keep it");
+        assert!(!wants_copy(1024, body(20_000, 20_000)), "there might be fifty thousand");
+        let copy = in_own_pages(&[7; 20_000]).expect("some memory");
+        assert_eq!(copy, vec![7; 20_000]);
     }
 
     #[test]

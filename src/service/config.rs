@@ -249,7 +249,7 @@ pub struct WorkerSettings {
     #[command(flatten)]
     pub parts: PartsSettings,
 
-    /// Chunks that are computed at once, and of up to three other studies one each beside them [default: the cores that the process may use, or one for each 32 MiB of the memory]
+    /// Chunks that are computed at once, and of up to three other studies one each beside them; at most one for each 32 MiB of the memory [default: the cores that the process may use]
     #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_SOLVES", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_CHUNKS))]
     pub max_concurrent_solves: Option<u32>,
 
@@ -274,8 +274,9 @@ impl WorkerSettings {
             max_states: u64::MAX,
             max_profile_points: u64::MAX,
             max_body_bytes: 0,
-            // What chunks have come to so far is counted nowhere: of each it is some megabytes at most.
-            max_concurrent_solves: concurrent_solves(self.max_concurrent_solves, memory_bytes, cores),
+            // More threads would keep all of the memory between them, and leave none for what they compute.
+            max_concurrent_solves: concurrent_solves(self.max_concurrent_solves, memory_bytes, cores)
+                .min(that_fit(memory_bytes, MEMORY_PER_SOLVE_BYTES)),
             max_queued_solves: 0,
             max_concurrent_batches: 0,
             deadline_ms: u64::MAX,
@@ -476,7 +477,7 @@ mod tests {
         };
         let words = ["worker", "--studies", "studies.sqlite", "--max-concurrent-solves", "16"];
         assert_eq!([1 << 20, 128 << 20, 64 << 30].map(|bytes| slots(&words[..3], bytes)), [1, 4, 32]);
-        assert_eq!(slots(&words, 128 << 20), 16, "whoever asks for them has them");
+        assert_eq!([128 << 20, 64 << 30].map(|bytes| slots(&words, bytes)), [4, 16], "nor where more are asked for");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use rustix::time::{ClockId, clock_gettime};
 use toothwave_calculation::no_answer::NoAnswer;
-use toothwave_calculation::{BUILD, question};
+use toothwave_calculation::{BUILD, origin, question};
 use toothwave_store::NewStudy;
 use toothwave_study::{Interrupted, Limits, Part, Study, Work};
 
@@ -93,7 +93,7 @@ pub async fn freeze(
     let frozen = NewStudy {
         id,
         kind: study.kind().into(),
-        build: BUILD.into(),
+        origin: origin().into(),
         document: String::from_utf8_lossy(document).into_owned(),
         max_states: limits.max_states,
         max_profile_points: limits.max_profile_points,
@@ -122,6 +122,19 @@ impl NotHere {
     }
 }
 
+/// That studies of this origin are computed here.
+///
+/// # Errors
+/// Why they are not.
+pub fn require_origin(theirs: &str) -> Result<(), NotHere> {
+    let build = theirs.split('-').next().unwrap_or_default();
+    match theirs {
+        ours if ours == origin() => Ok(()),
+        _ if build == BUILD => Err(NotHere::OtherArithmetic),
+        _ => Err(NotHere::OtherBuild { theirs: build.into() }),
+    }
+}
+
 /// The study that was frozen, or why it is none here.
 ///
 /// # Errors
@@ -132,9 +145,7 @@ pub async fn thaw(pool: &Pool, frozen: &NewStudy) -> Result<Result<Arc<Study>, N
 }
 
 fn thawed(frozen: &NewStudy) -> Result<Arc<Study>, NotHere> {
-    if frozen.build != BUILD {
-        return Err(NotHere::OtherBuild { theirs: frozen.build.clone() });
-    }
+    require_origin(&frozen.origin)?;
     let calculation = question::Limits { max_states: frozen.max_states, max_profile_points: frozen.max_profile_points };
     // Whoever took it on admitted as much.
     let limits = Limits { calculation, max_study_variants: u64::MAX, max_study_bytes: u64::MAX };
@@ -142,7 +153,7 @@ fn thawed(frozen: &NewStudy) -> Result<Arc<Study>, NotHere> {
         .map_err(|refused| NotHere::Unreadable(refused.to_string()))?
         .in_chunks_of(frozen.chunk_variants);
     if study.id().to_string() != frozen.id {
-        return Err(NotHere::OtherArithmetic);
+        return Err(NotHere::Unreadable("its document asks for another one".into()));
     }
     Ok(Arc::new(study))
 }

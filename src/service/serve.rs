@@ -200,11 +200,15 @@ pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: O
     let stopping = CancellationToken::new();
     let patience = Duration::from_millis(settings.shutdown_ms);
     let slots = limits.max_concurrent_solves;
+    if let Some(asked) = settings.max_concurrent_solves.filter(|&asked| asked as usize > slots) {
+        tracing::warn!(asked, slots, "fewer chunks at once than asked for: the memory has no room for more");
+    }
     tracing::info!(studies = %studies, slots, build = BUILD, "working");
     let changed = watch::Sender::default();
     let capacity = Capacity {
         slots,
         slots_for_others: SLOTS_FOR_OTHERS,
+        chunks_bytes: limits.max_unread_bytes / 8,
         variant_bytes: limits.max_unread_bytes / 2,
         admitted_states: 0,
     };

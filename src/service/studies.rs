@@ -18,7 +18,7 @@ use serde::Serialize;
 use tokio::sync::watch;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
-use toothwave_calculation::BUILD;
+use toothwave_calculation::origin;
 use toothwave_store::{Cut, Figures, NewStudy, PATIENCE, Standing as Stored, Store, StoreError};
 use toothwave_study::{Gathered, Part, Study, StudyAnswer, Work};
 use tracing::Instrument as _;
@@ -49,6 +49,9 @@ const EXPIRE: Duration = Duration::from_secs(60);
 
 /// What a study gets that many processes share: nobody waits for it, and whoever wants its end cancels it.
 const ENDLESS: Duration = Duration::from_secs(100 * 365 * 86_400);
+
+/// Of what unread answers may take, chunks that are in work here may take another such part.
+const PART_OF_CHUNKS: u64 = 8;
 
 /// Of what is read of a store at once.
 const READ_BYTES: u64 = 16 << 20;
@@ -742,10 +745,10 @@ impl Studies {
         Ok(Some(kept))
     }
 
-    /// That one more study may run. Those of other builds wait for other workers, perhaps for ever.
+    /// That one more study may run. Those of other builds, and of other kinds of processors, wait for other workers, perhaps for ever.
     async fn require_one_more(&self, store: &Store) -> Result<(), Problem> {
-        let of_this_build = store.waiting().await?.iter().filter(|waiting| waiting.build == BUILD).count();
-        if of_this_build >= self.limits.max_concurrent_studies { Err(self.too_many_studies()) } else { Ok(()) }
+        let of_this_kind = store.waiting().await?.iter().filter(|waiting| waiting.origin == origin()).count();
+        if of_this_kind >= self.limits.max_concurrent_studies { Err(self.too_many_studies()) } else { Ok(()) }
     }
 
     /// Time that a study gets, to the second.
@@ -873,33 +876,39 @@ impl Studies {
         }
     }
 
-    /// Cancels a study that runs, and forgets one that does not.
+    /// Cancels a study that runs, and forgets one that does not; whether it was kept. A stored one may be of another build.
     ///
     /// # Errors
     /// Where the store does not answer.
-    pub async fn cancel_or_forget(&self, kept: &Arc<Kept>) -> Result<(), Problem> {
-        if let Keeping::Store { store, .. } = &self.keeping {
-            // Another process may have cancelled it since, or forgotten it.
-            if !kept.look(store).await? {
-                Self::let_go(&mut self.kept.lock(), kept);
-            } else if kept.is_running() {
-                store.cancel(&kept.id).await?;
-                kept.stand(StudyState::Cancelled, None);
+    pub async fn cancel_or_forget(&self, id: &str) -> Result<bool, Problem> {
+        let Keeping::Store { store, .. } = &self.keeping else {
+            let mut all = self.kept.lock();
+            let Some(kept) = all.iter().find(|kept| kept.id == id).cloned() else { return Ok(false) };
+            if kept.is_running() {
+                kept.cancel();
             } else {
-                store.forget(&kept.id).await?;
-                Self::let_go(&mut self.kept.lock(), kept);
+                Self::let_go(&mut all, &kept);
             }
-            // Workers learn it at once where they are here.
-            self.changed.send_replace(());
-            return Ok(());
+            return Ok(true);
+        };
+        let stored = store.find(id).await?;
+        match &stored {
+            Some(stored) if stored.is_running() => {
+                store.cancel(id).await?;
+                if let Some(kept) = self.find_here(id) {
+                    kept.stand(StudyState::Cancelled, None);
+                }
+            }
+            _ => {
+                if stored.is_some() {
+                    store.forget(id).await?;
+                }
+                self.kept.lock().retain(|kept| kept.id != id);
+            }
         }
-        let mut all = self.kept.lock();
-        if kept.is_running() {
-            kept.cancel()
-        } else {
-            Self::let_go(&mut all, kept)
-        }
-        Ok(())
+        // Workers learn it at once where they are here.
+        self.changed.send_replace(());
+        Ok(stored.is_some())
     }
 
     /// What a study has come to, or the rows that its answer is soon made of.
@@ -977,6 +986,7 @@ impl Studies {
                 let capacity = Capacity {
                     slots: self.limits.max_concurrent_solves,
                     slots_for_others: self.limits.max_concurrent_studies.saturating_sub(1),
+                    chunks_bytes: self.limits.max_unread_bytes / PART_OF_CHUNKS,
                     variant_bytes: self.limits.max_unread_bytes,
                     admitted_states: self.limits.max_states,
                 };

@@ -12,9 +12,8 @@ use bytes::Bytes;
 use futures_util::future::join_all;
 use metrics::counter;
 use parking_lot::Mutex;
-use tokio::sync::{OnceCell, Semaphore, SemaphorePermit, watch};
+use tokio::sync::{AcquireError, OnceCell, Semaphore, SemaphorePermit, watch};
 use tokio_util::sync::CancellationToken;
-use toothwave_calculation::BUILD;
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_store::{Claim, Lease, MOST_ATTEMPTS, Store, StoreError, Waiting};
 use toothwave_study::{Interrupted, Part, Study, Work};
@@ -25,6 +24,7 @@ use crate::frozen::{self, NotHere};
 use crate::injected;
 use crate::parts::Parts;
 use crate::problem::Problem;
+use crate::room;
 
 /// Between two looks at what there is to do, and at what was cancelled.
 const PAUSE: Duration = Duration::from_secs(1);
@@ -61,6 +61,8 @@ pub struct Workers {
     side_by_side: Semaphore,
     /// Chunks of each study that are in work here.
     in_work: Mutex<HashMap<String, usize>>,
+    /// As many as there are for the bytes that chunks may take which are in work.
+    of_chunks: Semaphore,
     /// What was last said of each.
     troubles: Mutex<BTreeMap<What, String>>,
 }
@@ -72,6 +74,8 @@ pub struct Capacity {
     pub slots: usize,
     /// Besides, one of each of so many other studies: a chunk may be long, and they are not to wait for its end. All of them are computed in slices that take turns.
     pub slots_for_others: usize,
+    /// Chunks that are in work may take so much together, or one alone, beside the variants that are computed.
+    pub chunks_bytes: u64,
     /// What a variant may take while it is computed,
     pub variant_bytes: u64,
     /// unless its study lets none have more states than this: such a one was admitted here.
@@ -174,7 +178,21 @@ impl Workers {
     ) -> Self {
         let (known, in_work, troubles) = Default::default();
         let side_by_side = Semaphore::new(capacity.all_slots());
-        Self { store, parts, pool, capacity, changed, stopping, patience, known, side_by_side, in_work, troubles }
+        let of_chunks = Semaphore::new(room::permits(capacity.chunks_bytes) as usize);
+        Self {
+            store,
+            parts,
+            pool,
+            capacity,
+            changed,
+            stopping,
+            patience,
+            known,
+            side_by_side,
+            of_chunks,
+            in_work,
+            troubles,
+        }
     }
 
     /// Works until it is told to stop.
@@ -236,17 +254,11 @@ impl Workers {
                     found = self.study(task) => found,
                 };
                 let Some(ours) = found else { continue };
-                // What is in work comes to its end, and is let go, before more is begun.
-                let has_memory = async {
-                    while self.pool.memory().is_scarce() {
-                        tokio::time::sleep(SCARCE_PAUSE).await;
-                    }
-                };
-                tokio::select! {
+                let _of_it = tokio::select! {
                     biased;
                     () = self.stopping.cancelled() => return,
-                    () = has_memory => {}
-                }
+                    room = self.room_for_a_chunk(&ours.study) => room,
+                };
                 // Nor is one that the store does not give. What is nearly claimed is, and then given back: its attempt may be noted already.
                 let told_to_stop = async {
                     self.stopping.cancelled().await;
@@ -292,6 +304,16 @@ impl Workers {
         }
     }
 
+    /// Room for one more chunk of a study, when there is. What is in work comes to its end, and is let go, before more is begun.
+    async fn room_for_a_chunk(&self, study: &Study) -> Result<SemaphorePermit<'_>, AcquireError> {
+        let bytes = chunk_bytes(study, self.parts.is_some()).min(self.capacity.chunks_bytes);
+        let room = self.of_chunks.acquire_many(room::permits(bytes)).await;
+        while self.pool.memory().is_scarce() {
+            tokio::time::sleep(SCARCE_PAUSE).await;
+        }
+        room
+    }
+
     /// A chunk that is begun, and what it is computed beside: one that came to no result in all attempts but the last may be what ended its process, and is computed
     /// beside none, so that no other is taken for that.
     async fn claim(&self, task: &Waiting, ours: &Ours) -> Result<(Claim, Option<SemaphorePermit<'_>>), StoreError> {
@@ -317,10 +339,9 @@ impl Workers {
         // Whoever wants this one waits for its canary, and nobody else.
         let known = Arc::clone(self.known.lock().entry(task.clone()).or_default());
         let found = known.get_or_try_init(|| async {
-            let found = if task.build == BUILD {
-                self.admitted(task).await?
-            } else {
-                Err(NotHere::OtherBuild { theirs: task.build.clone() })
+            let found = match frozen::require_origin(&task.origin) {
+                Ok(()) => self.admitted(task).await?,
+                Err(reason) => Err(reason),
             };
             if let Err(reason) = &found {
                 tracing::warn!(study = task.cut.id, %reason, "a study is left to other workers");
@@ -489,6 +510,12 @@ impl Workers {
             tracing::info!("{} is well again", what.name());
         }
     }
+}
+
+/// About what a chunk takes that is in work, beside the variants that are computed: what it has come to, the same as it is kept, and its rows where they are.
+fn chunk_bytes(study: &Study, has_parts: bool) -> u64 {
+    let part_bytes = study.stored_bytes() / study.chunks().max(1);
+    study.working_bytes() + part_bytes * if has_parts { 3 } else { 2 }
 }
 
 /// Gives a chunk back that is not wanted, or because the time is over. Where nobody answers, that it was begun stays noted.

@@ -16,8 +16,8 @@ pub struct NewStudy {
     pub id: String,
     /// Its kind.
     pub kind: String,
-    /// The build that it belongs to.
-    pub build: String,
+    /// The build and the kind of processor that it belongs to, in a word.
+    pub origin: String,
     /// What is asked, as it was sent.
     pub document: String,
     /// Most states of a variant's sweep.
@@ -121,8 +121,8 @@ pub struct Kept {
 pub struct Waiting {
     /// Which.
     pub cut: Cut,
-    /// The build that it belongs to.
-    pub build: String,
+    /// The build and the kind of processor that it belongs to, in a word.
+    pub origin: String,
 }
 
 /// The whole store in numbers.
@@ -172,7 +172,7 @@ impl Store {
                 )
                 .bind(&study.id)
                 .bind(&study.kind)
-                .bind(&study.build)
+                .bind(&study.origin)
                 .bind(&study.document)
                 .bind(stored(study.max_states))
                 .bind(stored(study.max_profile_points))
@@ -386,8 +386,10 @@ impl Store {
             require_schema(connection).await?;
             let rows: Vec<(String, i64, String)> =
                 on!(connection, inner => sqlx::query_as(WAITING).fetch_all(inner).await)?;
-            let waiting =
-                |(id, chunk_variants, build)| Waiting { cut: Cut { id, chunk_variants: read(chunk_variants) }, build };
+            let waiting = |(id, chunk_variants, origin)| Waiting {
+                cut: Cut { id, chunk_variants: read(chunk_variants) },
+                origin,
+            };
             Ok(rows.into_iter().map(waiting).collect())
         })
         .await
@@ -513,11 +515,11 @@ pub(crate) async fn commit(connection: &mut Connection) -> Result<(), StoreError
 
 fn study(row: StudyRow) -> (NewStudy, bool, Duration) {
     #[rustfmt::skip]
-    let (id, kind, build, document, max_states, max_profile_points, variants, chunk_variants, chunks, canary_variants, canary, lease_ms, is_cancelled, left_s, unasked_s) = row;
+    let (id, kind, origin, document, max_states, max_profile_points, variants, chunk_variants, chunks, canary_variants, canary, lease_ms, is_cancelled, left_s, unasked_s) = row;
     let study = NewStudy {
         id,
         kind,
-        build,
+        origin,
         document,
         max_states: read(max_states),
         max_profile_points: read(max_profile_points),

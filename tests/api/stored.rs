@@ -14,6 +14,7 @@ use toothwave::config::Limits;
 use toothwave::parts::Parts;
 use toothwave::problem::{Problem, ProblemCode};
 use toothwave::studies::Keeping;
+use toothwave_calculation::BUILD;
 use toothwave_store::{Address, Claim, Figures, NewStudy, Store};
 use toothwave_study::Study;
 
@@ -661,18 +662,18 @@ async fn a_study_of_another_build_or_of_other_bits_is_left_to_others() {
     let frozen = store.find(study["id"].as_str().unwrap()).await.unwrap().unwrap().study;
     store.forget(&frozen.id).await.unwrap();
     for other in [
-        NewStudy { id: "of-another-build".into(), build: "another".into(), ..frozen.clone() },
-        NewStudy { id: "of-another-processor".into(), ..frozen.clone() },
+        NewStudy { id: "of-another-build".into(), origin: "another-build".into(), ..frozen.clone() },
+        NewStudy { id: "of-another-processor".into(), origin: format!("{BUILD}-another"), ..frozen.clone() },
         NewStudy { canary: "of other bits".into(), ..frozen.clone() },
     ] {
         store.create(&other).await.unwrap();
     }
     keeper.end().await;
-    // Of the three that wait two are of this build: one more may run of three, though not of two.
-    let keeper = Keeper::of(&file, Limits { max_concurrent_studies: 2, ..LIMITS }, false).await;
+    // Of the three that wait one is of this build and kind of processor: one more may run of two, though not of one.
+    let keeper = Keeper::of(&file, Limits { max_concurrent_studies: 1, ..LIMITS }, false).await;
     keeper.ask(&map(6)).await.refused(503, "queue_full");
     keeper.end().await;
-    let keeper = Keeper::of(&file, Limits { max_concurrent_studies: 3, ..LIMITS }, true).await;
+    let keeper = Keeper::of(&file, Limits { max_concurrent_studies: 2, ..LIMITS }, true).await;
     // Once this one is done, the workers have looked at those as well.
     assert_eq!(keeper.wait_for(&map(6)).await["state"], "done");
     for id in ["of-another-build", "of-another-processor", &frozen.id] {
@@ -683,6 +684,12 @@ async fn a_study_of_another_build_or_of_other_bits_is_left_to_others() {
     for id in ["of-another-build", "of-another-processor"] {
         let problem = keeper.service.get(&format!("/v1/studies/{id}")).await.refused(404, "not_found");
         assert!(problem["detail"].as_str().unwrap().contains("another"), "{problem}");
+        // Nor can it be watched here; that it ends can be seen to.
+        for stands in [Some(false), None] {
+            let told = keeper.service.ask(&Question::of("DELETE", &format!("/v1/studies/{id}"))).await;
+            assert_eq!(told.status, 204);
+            assert_eq!(keeper.store.find(id).await.unwrap().map(|standing| standing.is_running()), stands, "{id}");
+        }
     }
     keeper.end().await;
 }

@@ -152,22 +152,6 @@ async fn a_study_that_is_cancelled_has_the_variants_that_it_says_it_has_looked_a
     assert!(variants < 490_000, "{variants}");
 }
 
-#[tokio::test]
-async fn who_lets_go_of_a_study_lets_go_of_none_that_was_asked_for_since() {
-    let service = Service::within(Limits { max_concurrent_solves: 1, ..LIMITS });
-    let occupied = Occupied::by_one(&service.app.pool).await;
-    let study = begun(&service, &map(&shortest(), 5)).await.json();
-    let studies = &service.app.studies;
-    let found = studies.find(study["id"].as_str().unwrap()).await.unwrap().unwrap();
-    // Cancelled, forgotten, asked for again; and then comes one more who had found the first.
-    studies.cancel_or_forget(&found).await.unwrap();
-    studies.cancel_or_forget(&found).await.unwrap();
-    assert_eq!(begun(&service, &map(&shortest(), 5)).await.status, 202);
-    studies.cancel_or_forget(&found).await.unwrap();
-    assert_eq!(service.get(&place(&study)).await.found()["state"], "running");
-    occupied.end().await;
-}
-
 /// What runs and is not kept could be cancelled by nobody, and would count nowhere.
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
 async fn however_many_ask_for_a_study_and_cancel_it_at_once_none_runs_that_is_not_kept() {

@@ -50,7 +50,7 @@ fn study(id: &str, chunks: u64) -> NewStudy {
     NewStudy {
         id: format!("{id}-{}", std::process::id()),
         kind: "map".into(),
-        build: "this".into(),
+        origin: "this".into(),
         document: "{}".into(),
         max_states: 10,
         max_profile_points: 20,
@@ -124,7 +124,7 @@ async fn a_study_is_kept_as_it_was_asked_and_once() {
         assert_eq!(NewStudy { time: study.time, ..standing.study.clone() }, study);
         assert!(standing.is_running() && !standing.is_done());
         assert!(
-            store.waiting().await.unwrap().iter().any(|waiting| waiting.cut.id == study.id && waiting.build == "this")
+            store.waiting().await.unwrap().iter().any(|waiting| waiting.cut.id == study.id && waiting.origin == "this")
         );
         store.forget(&study.id).await.unwrap();
         assert_eq!(store.find(&study.id).await.unwrap(), None);

@@ -12,7 +12,7 @@ use axum::extract::Request;
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use bytes::BytesMut;
+use bytes::{Bytes, BytesMut};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use futures_util::StreamExt as _;
@@ -24,7 +24,7 @@ use toothwave_calculation::question::{Question, Stop, with_room};
 use utoipa::IntoResponses;
 
 use crate::app::App;
-use crate::cache::{Provenance, Served, Spelling, Stored, etag};
+use crate::cache::{Cache, Provenance, Served, Spelling, Stored, etag, in_own_pages};
 use crate::compute::Thread;
 use crate::config::Limits;
 use crate::memory::Memory;
@@ -104,9 +104,10 @@ async fn walk<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Resu
                         Representation::JSON if Q::is_short(&checked) => Thread::Executor,
                         _ => Thread::Blocking,
                     };
-                    let room = app.room.clone();
+                    let (room, cache) = (app.room.clone(), app.cache.clone());
                     let solve = async move {
-                        let job = move |stop: &AtomicBool| solve::<Q>(&checked, representation, &room, stop);
+                        let job =
+                            move |stop: &AtomicBool| solve::<Q>(&checked, representation, &room, Some(&cache), stop);
                         pool.run_while_wanted(thread, job).await
                     };
                     let solved = app.cache.solve_once(key, tokio::time::sleep_until(deadline), solve).await?;
@@ -133,7 +134,7 @@ fn log_design(key: Key) {
 /// A request as far as all endpoints read it alike.
 struct Asked {
     headers: HeaderMap,
-    body: bytes::Bytes,
+    body: Bytes,
     representation: Representation,
     deadline: tokio::time::Instant,
 }
@@ -156,7 +157,7 @@ async fn respond_afresh<Q: Question>(question: Q, app: Arc<App>, request: Reques
         let Asked { body, representation, deadline, .. } = Asked::read::<Q>(&app, request).await?;
         let checked = question.check(&Design::read(&body)?, &app.limits.of_calculation())?;
         let room = app.room.clone();
-        let job = move |stop: &AtomicBool| solve::<Q>(&checked, representation, &room, stop);
+        let job = move |stop: &AtomicBool| solve::<Q>(&checked, representation, &room, None, stop);
         with_body(&app.room, app.pool.run(deadline, Thread::Blocking, job).await?, representation)
     };
     let mut response = walk.await.unwrap_or_else(IntoResponse::into_response);
@@ -169,7 +170,7 @@ async fn read_body(
     body: Body,
     limits: &Limits,
     deadline: tokio::time::Instant,
-) -> Result<bytes::Bytes, Problem> {
+) -> Result<Bytes, Problem> {
     let limit = limits.max_body_bytes;
     let too_large = |length: &str| {
         let detail = format!("the body has {length}more than the {limit} bytes of `max_body_bytes`");
@@ -209,6 +210,7 @@ fn solve<Q: Question>(
     checked: &Q::Checked,
     representation: Representation,
     room: &Room,
+    cache: Option<&Cache>,
     stop: &AtomicBool,
 ) -> Result<Stored, Problem> {
     #[cfg(feature = "fault-injection")]
@@ -219,7 +221,7 @@ fn solve<Q: Question>(
     let text_bytes = if is_long(format) { columns_bytes * if gzip { 1 } else { 2 } } else { 0 };
     let (answer, mut reserved) = answered::<Q>(checked, text_bytes, room, stop)?;
     reserved.hold_at_most((columns_bytes + text_bytes).max(answer.held_bytes(format)));
-    written(answer, representation, reserved, columns_bytes, started.elapsed(), stop)
+    written(answer, representation, reserved, columns_bytes, started.elapsed(), cache, stop)
 }
 
 /// An answer in the room that it takes, and beside it for its text, before and while it is made.
@@ -263,13 +265,14 @@ const fn is_long(format: Format) -> bool {
     matches!(format, Format::Json | Format::Csv | Format::Arrow | Format::Parquet)
 }
 
-/// Writes an answer, which took so long and whose columns take so many bytes, into its final bytes.
+/// Writes an answer, which took so long and whose columns take so many bytes, into its final bytes, which the cache may keep.
 fn written<A: Forms>(
     answer: A,
     Representation { format, gzip }: Representation,
     reserved: Reserved,
     columns_bytes: u64,
     solve: Duration,
+    cache: Option<&Cache>,
     stop: &AtomicBool,
 ) -> Result<Stored, Problem> {
     let is_long = is_long(format);
@@ -287,11 +290,10 @@ fn written<A: Forms>(
     };
     drop(answer);
     match written {
-        Ok(Growing { bytes, reserved, .. }) => {
+        Ok(buffer) => {
             let server_timing = format!("solve;dur={:.3}", 1e3 * solve.as_secs_f64());
             let server_timing = HeaderValue::try_from(server_timing).map_err(|error| Problem::internal(&error))?;
-            // To its size: the cache keeps it, and weighs its length.
-            let body: bytes::Bytes = bytes.into_boxed_slice().into();
+            let (body, reserved) = buffer.into_body(cache);
             let sent = Sent::default();
             let held = Some(reserved.send(body.clone(), &sent));
             Ok(Stored { body, sent, held, solve, server_timing })
@@ -378,6 +380,17 @@ impl Growing {
         self.reserved.hold_at_most(self.held_bytes + capacity as u64);
         Ok(())
     }
+
+    /// Its bytes, and the room that they take.
+    fn into_body(self, cache: Option<&Cache>) -> (Bytes, Reserved) {
+        let Self { bytes, mut reserved, .. } = self;
+        let copied = cache.filter(|cache| cache.wants_copy(&bytes)).and_then(|_| {
+            // What was written is gone by now. While the bytes are copied they are there twice.
+            reserved.hold_at_least((bytes.capacity() + bytes.len()) as u64).ok()?;
+            in_own_pages(&bytes)
+        });
+        (copied.unwrap_or_else(|| bytes.into_boxed_slice().into()), reserved)
+    }
 }
 
 impl Write for Growing {
@@ -462,7 +475,7 @@ mod tests {
         let checked = question.check(&design, &limits).expect("a possible one");
         let room = Room::new(1 << 30);
         let _others = room.reserve((1 << 30) - left_bytes).expect("room");
-        let stored = solve::<Q>(&checked, Representation { format, gzip: false }, &room, &AtomicBool::new(false));
+        let stored = solve::<Q>(&checked, Representation { format, gzip: false }, &room, None, &AtomicBool::new(false));
         stored.map(|stored| stored.body.len() as u64).map_err(|problem| problem.code)
     }
 
@@ -494,8 +507,8 @@ mod tests {
         let sweep = Sweep.check(&design, &limits).expect("a possible one");
         let accuracy = Accuracy.check(&design, &limits).expect("a possible one");
         let stop = AtomicBool::new(true);
-        assert_eq!(code(solve::<Sweep>(&sweep, json, &room, &stop)), Err(ProblemCode::TooManyUnreadBytes));
-        assert_eq!(code(solve::<Accuracy>(&accuracy, json, &room, &stop)), Err(ProblemCode::TooManyUnreadBytes));
+        assert_eq!(code(solve::<Sweep>(&sweep, json, &room, None, &stop)), Err(ProblemCode::TooManyUnreadBytes));
+        assert_eq!(code(solve::<Accuracy>(&accuracy, json, &room, None, &stop)), Err(ProblemCode::TooManyUnreadBytes));
     }
 
     /// Whatever was counted. One that takes hundreds of milliseconds, so that it is given up on its way, and one that takes no room.
@@ -508,7 +521,7 @@ mod tests {
         let room = Room::new(1 << 30);
         let accuracy = Accuracy.check(&design, &limits).expect("a possible one");
         let given_up = std::thread::scope(|scope| {
-            let solving = scope.spawn(|| solve::<Accuracy>(&accuracy, json, &room, &stop));
+            let solving = scope.spawn(|| solve::<Accuracy>(&accuracy, json, &room, None, &stop));
             while room.taken_bytes() == 0 && !solving.is_finished() {
                 std::thread::yield_now();
             }
@@ -519,7 +532,7 @@ mod tests {
         assert_eq!(room.taken_bytes(), 0);
         assert!(room.reserve(SMALL_BYTES + 1).is_err());
         let sweep = Sweep.check(&design, &limits).expect("a possible one");
-        assert!(solve::<Sweep>(&sweep, json, &room, &stop).is_ok());
+        assert!(solve::<Sweep>(&sweep, json, &room, None, &stop).is_ok());
         room.memory().set_scarce(false);
         assert!(room.reserve(SMALL_BYTES + 1).is_ok());
     }

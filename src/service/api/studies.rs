@@ -99,11 +99,10 @@ pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRej
     )
 )]
 pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
-    match kept(&app, id).await {
-        Ok(kept) => match app.studies.cancel_or_forget(&kept).await {
-            Ok(()) => StatusCode::NO_CONTENT.into_response(),
-            Err(problem) => problem.into_response(),
-        },
+    let id = id_of(id);
+    match app.studies.cancel_or_forget(&id).await {
+        Ok(true) => StatusCode::NO_CONTENT.into_response(),
+        Ok(false) => not_kept(&id).into_response(),
         Err(problem) => problem.into_response(),
     }
 }
@@ -203,14 +202,18 @@ fn no_store(mut response: Response) -> Response {
 }
 
 async fn kept(app: &App, id: Result<Path<String>, PathRejection>) -> Result<Arc<Kept>, Problem> {
-    // An id that is no text is no study's either, and PostgreSQL takes no text with a zero in it.
-    let id = id.map(|Path(id)| id).unwrap_or_default();
-    let found = if id.contains('\0') { None } else { app.studies.find(&id).await? };
-    found.ok_or_else(|| {
-        let detail =
-            format!("no study `{id}` is kept: it was never asked for here, or was forgotten; ask for it again");
-        Problem::new(ProblemCode::NotFound, detail)
-    })
+    let id = id_of(id);
+    app.studies.find(&id).await?.ok_or_else(|| not_kept(&id))
+}
+
+/// An id that is no text is no study's either, and PostgreSQL takes no text with a zero in it.
+fn id_of(id: Result<Path<String>, PathRejection>) -> String {
+    id.ok().map(|Path(id)| id).filter(|id| !id.contains('\0')).unwrap_or_default()
+}
+
+fn not_kept(id: &str) -> Problem {
+    let detail = format!("no study `{id}` is kept: it was never asked for here, or was forgotten; ask for it again");
+    Problem::new(ProblemCode::NotFound, detail)
 }
 
 async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Response, Problem> {
@@ -281,7 +284,7 @@ async fn written_apart<A: Forms + Send>(
     let job = move |stop: &AtomicBool| {
         let reserved = room.reserve(columns_bytes)?;
         let answer = reading.answer();
-        written(told(answer), representation, reserved, columns_bytes, Duration::ZERO, stop)
+        written(told(answer), representation, reserved, columns_bytes, Duration::ZERO, None, stop)
     };
     let stored = app.pool.run(app.pool.deadline(), Thread::Blocking, job).await?;
     with_body(&app.room, stored, representation)
