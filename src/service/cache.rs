@@ -133,13 +133,13 @@ impl Drop for Landing {
 const MOST_SPELLINGS: u64 = 65_536;
 const BYTES_A_SPELLING: u64 = 4096;
 
-/// An answer up to here is short: some tens of them come to little.
+/// An answer up to here is short: some tens of them come to little, and the allocator's pages for such are small.
 const SHORT_BYTES: usize = 1 << 13;
 
 /// Bodies that are kept in pages of their own, at most: the kernel lets a process have some 65 000 mappings.
-const MOST_COPIES: u64 = 16_384;
+const MOST_COPIES: u64 = 32_768;
 
-/// The allocator gives a body beyond this a place that it shares with none.
+/// The allocator gives a body beyond this pages that it shares with none.
 const LONG_BYTES: usize = 1 << 19;
 
 /// What an entry costs beside its body: of 60 000 short answers each took some 1060 bytes more, its spelling among them.
@@ -151,18 +151,18 @@ impl Cache {
         let answers = moka::sync::Cache::builder()
             .max_capacity(max_bytes)
             // A body beyond 4 GiB weighs as much as can be said, and is not kept.
-            .weigher(|_, stored: &Stored| u32::try_from(stored.body.len() + ENTRY_OVERHEAD_BYTES).unwrap_or(u32::MAX))
+            .weigher(|_, stored: &Stored| u32::try_from(held_bytes(&stored.body)).unwrap_or(u32::MAX))
             .build();
         let spellings = MOST_SPELLINGS.min(max_bytes / BYTES_A_SPELLING);
         Self { answers, keys: moka::sync::Cache::new(spellings), flights: Flights::default(), max_bytes }
     }
 
-    /// Whether a body is to be copied into pages of its own, to be kept: as it was written it would hold the place of others that are long gone, or that of all
-    /// that its writer had. 8 MiB of bodies held 58.
+    /// Whether a body that may be kept is to be copied into pages of its own. The allocator has pages of up to 4 MiB for bodies of about one length, and as long as
+    /// one of these is kept it holds the whole page: 8 MiB of bodies held 58. A longer body has its own, but as many as its writer had.
     pub fn wants_copy(&self, body: &Vec<u8>) -> bool {
         let may_be_kept = self.max_bytes / MOST_COPIES < body.len() as u64 && body.len() as u64 <= self.max_bytes;
-        let has_its_place = body.len() > LONG_BYTES && body.capacity() - body.len() <= body.len() / 4;
-        may_be_kept && body.len() > SHORT_BYTES && !has_its_place
+        let has_its_own = body.len() > LONG_BYTES && body.capacity() - body.len() <= body.len() / 4;
+        may_be_kept && body.len() > SHORT_BYTES && !has_its_own
     }
 
     /// Bytes and entries kept now.
@@ -268,6 +268,12 @@ impl Cache {
     }
 }
 
+/// What an answer with this body takes where it is kept.
+fn held_bytes(body: &Bytes) -> usize {
+    const PAGE_BYTES: usize = 4096;
+    ENTRY_OVERHEAD_BYTES + if body.len() > SHORT_BYTES { body.len().next_multiple_of(PAGE_BYTES) } else { body.len() }
+}
+
 /// A copy of an answer's bytes in pages of its own, which are the system's again with the last who has them; none where it gives none.
 pub fn in_own_pages(bytes: &[u8]) -> Option<Bytes> {
     let mut pages = MmapOptions::new().len(bytes.len()).populate().map_anon().ok()?;
@@ -347,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_that_is_kept_is_copied_unless_it_is_short_or_has_a_place_of_its_own() {
+    fn a_body_that_is_kept_is_copied_unless_it_is_short_or_has_pages_of_its_own() {
         const MIB: usize = 1 << 20;
         let body = |length, capacity| {
             let mut body = Vec::with_capacity(capacity);
@@ -361,7 +367,7 @@ mod tests {
                 && wants_copy(8, body(MIB, 2 * MIB))
         );
         assert!(!wants_copy(8, body(8000, 16_000)), "it is short");
-        assert!(!wants_copy(8, body(MIB, MIB + MIB / 8)), "it has a place of its own");
+        assert!(!wants_copy(8, body(MIB, MIB + MIB / 8)), "it has pages of its own");
         assert!(!wants_copy(8, body(9 * MIB, 18 * MIB)), "the cache does not keep it");
         assert!(!wants_copy(1024, body(20_000, 20_000)), "there might be fifty thousand");
         let copy = in_own_pages(&[7; 20_000]).expect("some memory");

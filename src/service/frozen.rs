@@ -128,10 +128,12 @@ impl NotHere {
 /// Why they are not.
 pub fn require_origin(theirs: &str) -> Result<(), NotHere> {
     let build = theirs.split('-').next().unwrap_or_default();
-    match theirs {
-        ours if ours == origin() => Ok(()),
-        _ if build == BUILD => Err(NotHere::OtherArithmetic),
-        _ => Err(NotHere::OtherBuild { theirs: build.into() }),
+    if theirs == origin() {
+        Ok(())
+    } else if build == BUILD {
+        Err(NotHere::OtherArithmetic)
+    } else {
+        Err(NotHere::OtherBuild { theirs: build.into() })
     }
 }
 
@@ -153,7 +155,7 @@ fn thawed(frozen: &NewStudy) -> Result<Arc<Study>, NotHere> {
         .map_err(|refused| NotHere::Unreadable(refused.to_string()))?
         .in_chunks_of(frozen.chunk_variants);
     if study.id().to_string() != frozen.id {
-        return Err(NotHere::Unreadable("its document asks for another one".into()));
+        return Err(NotHere::Unreadable("its document is another study's".into()));
     }
     Ok(Arc::new(study))
 }
@@ -178,7 +180,9 @@ fn encoded(part: &Part) -> Result<Vec<u8>, Problem> {
 
 /// What a chunk came to as it is kept: with what tells whether it is still that, since what keeps it may be damaged and the store does not see it.
 pub fn sealed(study: &str, chunk: u64, part: &Part) -> Result<Vec<u8>, Problem> {
-    let mut bytes = encoded(part)?;
+    // As much as it comes to, about: one that grows would take twice as much.
+    let room = part.bytes() + blake3::OUT_LEN;
+    let mut bytes = postcard::to_extend(part, Vec::with_capacity(room)).map_err(|error| Problem::internal(&error))?;
     let seal = seal(study, chunk, &bytes);
     bytes.extend_from_slice(seal.as_bytes());
     Ok(bytes)

@@ -36,7 +36,7 @@ use crate::parts::Parts;
 use crate::router::{self, Entry};
 use crate::socket::{Seen, Socket};
 use crate::studies::Keeping;
-use crate::worker::{Capacity, Workers};
+use crate::worker::{Capacity, PART_OF_CHUNKS, Workers};
 
 /// How long the service still listens at least after it has said that it is not ready, so that whoever asks can learn it.
 const NOTICE: Duration = Duration::from_millis(200);
@@ -208,7 +208,7 @@ pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: O
     let capacity = Capacity {
         slots,
         slots_for_others: SLOTS_FOR_OTHERS,
-        chunks_bytes: limits.max_unread_bytes / 8,
+        chunks_bytes: limits.max_unread_bytes / PART_OF_CHUNKS,
         variant_bytes: limits.max_unread_bytes / 2,
         admitted_states: 0,
     };

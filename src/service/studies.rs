@@ -30,7 +30,7 @@ use crate::frozen;
 use crate::parts::Parts;
 use crate::problem::{Problem, ProblemCode};
 use crate::room::{self, Room};
-use crate::worker::{Capacity, Workers, milliseconds, slice};
+use crate::worker::{Capacity, PART_OF_CHUNKS, Workers, milliseconds, slice};
 
 /// Between two looks at how a stored study stands.
 const LOOK: Duration = Duration::from_secs(1);
@@ -49,9 +49,6 @@ const EXPIRE: Duration = Duration::from_secs(60);
 
 /// What a study gets that many processes share: nobody waits for it, and whoever wants its end cancels it.
 const ENDLESS: Duration = Duration::from_secs(100 * 365 * 86_400);
-
-/// Of what unread answers may take, chunks that are in work here may take another such part.
-const PART_OF_CHUNKS: u64 = 8;
 
 /// Of what is read of a store at once.
 const READ_BYTES: u64 = 16 << 20;
@@ -891,23 +888,24 @@ impl Studies {
             }
             return Ok(true);
         };
-        let stored = store.find(id).await?;
-        match &stored {
-            Some(stored) if stored.is_running() => {
-                store.cancel(id).await?;
-                if let Some(kept) = self.find_here(id) {
-                    kept.stand(StudyState::Cancelled, None);
-                }
-            }
-            _ => {
-                if stored.is_some() {
-                    store.forget(id).await?;
-                }
-                self.kept.lock().retain(|kept| kept.id != id);
-            }
+        let (here, stored) = (self.find_here(id), store.find(id).await?);
+        let is_running = stored.as_ref().is_some_and(Stored::is_running);
+        if is_running {
+            store.cancel(id).await?;
+        } else if stored.is_some() {
+            store.forget(id).await?;
         }
-        // Workers learn it at once where they are here.
-        self.changed.send_replace(());
+        match here {
+            Some(kept) if is_running => {
+                kept.look(store).await?;
+            }
+            Some(kept) => Self::let_go(&mut self.kept.lock(), &kept),
+            None => {}
+        }
+        if stored.is_some() {
+            // Workers learn it at once where they are here.
+            self.changed.send_replace(());
+        }
         Ok(stored.is_some())
     }
 

@@ -12,7 +12,7 @@ use bytes::Bytes;
 use futures_util::future::join_all;
 use metrics::counter;
 use parking_lot::Mutex;
-use tokio::sync::{AcquireError, OnceCell, Semaphore, SemaphorePermit, watch};
+use tokio::sync::{OnceCell, Semaphore, SemaphorePermit, watch};
 use tokio_util::sync::CancellationToken;
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_store::{Claim, Lease, MOST_ATTEMPTS, Store, StoreError, Waiting};
@@ -38,6 +38,9 @@ const ALONE: Duration = Duration::from_secs(3);
 /// Between two looks at memory that is scarce.
 const SCARCE_PAUSE: Duration = Duration::from_millis(20);
 
+/// Of a `worker`'s memory, or of what unread answers may take, chunks that are in work may take such a part.
+pub const PART_OF_CHUNKS: u64 = 8;
+
 /// Between two tries to keep a result: at first, and at most.
 const RETRY: Duration = Duration::from_millis(200);
 const LONGEST_RETRY: Duration = Duration::from_secs(10);
@@ -61,8 +64,7 @@ pub struct Workers {
     side_by_side: Semaphore,
     /// Chunks of each study that are in work here.
     in_work: Mutex<HashMap<String, usize>>,
-    /// As many as there are for the bytes that chunks may take which are in work.
-    of_chunks: Semaphore,
+    room: RoomOfChunks,
     /// What was last said of each.
     troubles: Mutex<BTreeMap<What, String>>,
 }
@@ -74,7 +76,8 @@ pub struct Capacity {
     pub slots: usize,
     /// Besides, one of each of so many other studies: a chunk may be long, and they are not to wait for its end. All of them are computed in slices that take turns.
     pub slots_for_others: usize,
-    /// Chunks that are in work may take so much together, or one alone, beside the variants that are computed.
+    /// What chunks that are in work may take, those together that take more than a slot's share of it, or one of them alone; not counted are the variants that are
+    /// computed.
     pub chunks_bytes: u64,
     /// What a variant may take while it is computed,
     pub variant_bytes: u64,
@@ -136,6 +139,8 @@ impl From<Problem> for Unseen {
 struct InWork<'a> {
     all: &'a Mutex<HashMap<String, usize>>,
     id: &'a str,
+    /// Whether no other was, or might have been.
+    is_first: bool,
 }
 
 impl<'a> InWork<'a> {
@@ -145,7 +150,7 @@ impl<'a> InWork<'a> {
         let count = counts.entry(id.into()).or_default();
         (*count < most).then(|| {
             *count += 1;
-            Self { all, id }
+            Self { all, id, is_first: *count == 1 }
         })
     }
 }
@@ -158,6 +163,36 @@ impl Drop for InWork<'_> {
             if *count == 0 {
                 counts.remove(self.id);
             }
+        }
+    }
+}
+
+/// Room for what chunks that are in work have come to. One that takes no more than its slot's share takes none: all of them together come to no more than as much
+/// again.
+#[derive(Debug)]
+struct RoomOfChunks {
+    free: Semaphore,
+    all_bytes: u64,
+    share_bytes: u64,
+}
+
+impl RoomOfChunks {
+    fn new(all_bytes: u64, slots: usize) -> Self {
+        let free = Semaphore::new(room::permits(all_bytes) as usize);
+        Self { free, all_bytes, share_bytes: all_bytes / slots.max(1) as u64 }
+    }
+
+    fn permits(&self, bytes: u64) -> u32 {
+        if bytes <= self.share_bytes { 0 } else { room::permits(bytes.min(self.all_bytes)) }
+    }
+
+    /// Room for so many bytes, when there is: those who wait have it in turn. None while there is none for who does not wait.
+    async fn take(&self, bytes: u64, waits: bool) -> Option<SemaphorePermit<'_>> {
+        let permits = self.permits(bytes);
+        // An error says besides that the semaphore is closed, which it never is.
+        match self.free.try_acquire_many(permits) {
+            Err(_) if waits => self.free.acquire_many(permits).await.ok(),
+            taken => taken.ok(),
         }
     }
 }
@@ -178,21 +213,8 @@ impl Workers {
     ) -> Self {
         let (known, in_work, troubles) = Default::default();
         let side_by_side = Semaphore::new(capacity.all_slots());
-        let of_chunks = Semaphore::new(room::permits(capacity.chunks_bytes) as usize);
-        Self {
-            store,
-            parts,
-            pool,
-            capacity,
-            changed,
-            stopping,
-            patience,
-            known,
-            side_by_side,
-            of_chunks,
-            in_work,
-            troubles,
-        }
+        let room = RoomOfChunks::new(capacity.chunks_bytes, capacity.all_slots());
+        Self { store, parts, pool, capacity, changed, stopping, patience, known, side_by_side, room, in_work, troubles }
     }
 
     /// Works until it is told to stop.
@@ -246,7 +268,7 @@ impl Workers {
                     return;
                 }
                 let task = &waiting[index];
-                let Some(_one_more) = InWork::one_more(&self.in_work, &task.cut.id, most_in_work) else { continue };
+                let Some(one_more) = InWork::one_more(&self.in_work, &task.cut.id, most_in_work) else { continue };
                 // A canary that is begun is no chunk: whoever is told to stop leaves it.
                 let found = tokio::select! {
                     biased;
@@ -254,11 +276,24 @@ impl Workers {
                     found = self.study(task) => found,
                 };
                 let Some(ours) = found else { continue };
-                let _of_it = tokio::select! {
+                // Of each study one waits for room at most, so that each gets some in turn.
+                let has_room = async {
+                    let bytes = chunk_bytes(&ours.study, self.parts.is_some());
+                    let room = self.room.take(bytes, one_more.is_first).await;
+                    // What is in work comes to its end, and is let go, before more is begun.
+                    while room.is_some() && self.pool.memory().is_scarce() {
+                        tokio::time::sleep(SCARCE_PAUSE).await;
+                    }
+                    room
+                };
+                let room = tokio::select! {
                     biased;
                     () = self.stopping.cancelled() => return,
-                    room = self.room_for_a_chunk(&ours.study) => room,
+                    // It was cancelled, or forgotten.
+                    _ = tasks.wait_for(|waiting| !waiting.contains(task)) => None,
+                    room = has_room => room,
                 };
+                let Some(_room) = room else { continue };
                 // Nor is one that the store does not give. What is nearly claimed is, and then given back: its attempt may be noted already.
                 let told_to_stop = async {
                     self.stopping.cancelled().await;
@@ -302,16 +337,6 @@ impl Workers {
                 }
             }
         }
-    }
-
-    /// Room for one more chunk of a study, when there is. What is in work comes to its end, and is let go, before more is begun.
-    async fn room_for_a_chunk(&self, study: &Study) -> Result<SemaphorePermit<'_>, AcquireError> {
-        let bytes = chunk_bytes(study, self.parts.is_some()).min(self.capacity.chunks_bytes);
-        let room = self.of_chunks.acquire_many(room::permits(bytes)).await;
-        while self.pool.memory().is_scarce() {
-            tokio::time::sleep(SCARCE_PAUSE).await;
-        }
-        room
     }
 
     /// A chunk that is begun, and what it is computed beside: one that came to no result in all attempts but the last may be what ended its process, and is computed
@@ -429,6 +454,7 @@ impl Workers {
                 return;
             }
         };
+        let (variants, refused) = (part.variants(), part.refused());
         let bytes = match frozen::sealed(id, chunk, &part) {
             Ok(bytes) => bytes,
             Err(problem) => {
@@ -436,6 +462,7 @@ impl Workers {
                 return;
             }
         };
+        drop(part);
         let mut retry = RETRY;
         // What is computed is not computed again because the store is away for a while.
         loop {
@@ -446,7 +473,7 @@ impl Workers {
                 _ = lease.renew() => false,
             };
             if kept {
-                match lease.keep(&bytes, part.variants(), part.refused(), busy).await {
+                match lease.keep(&bytes, variants, refused, busy).await {
                     Ok(()) => {
                         self.is_well(What::Writing);
                         self.changed.send_replace(());
@@ -512,10 +539,12 @@ impl Workers {
     }
 }
 
-/// About what a chunk takes that is in work, beside the variants that are computed: what it has come to, the same as it is kept, and its rows where they are.
+/// About what a chunk takes that is in work, beside the variants that are computed: what it has come to, in columns that grow by doubling, and the same as it is
+/// kept, or then on its way to the store; and its rows where they are kept.
 fn chunk_bytes(study: &Study, has_parts: bool) -> u64 {
     let part_bytes = study.stored_bytes() / study.chunks().max(1);
-    study.working_bytes() + part_bytes * if has_parts { 3 } else { 2 }
+    let copies = if has_parts && study.has_rows() { 4 } else { 3 };
+    study.working_bytes().saturating_add(part_bytes.saturating_mul(copies))
 }
 
 /// Gives a chunk back that is not wanted, or because the time is over. Where nobody answers, that it was begun stays noted.
@@ -595,5 +624,27 @@ pub fn slice(mut work: Work, time: &mut Slice, stop: &AtomicBool) -> Result<Slic
         if time.is_over() || is_over {
             return Ok(Sliced { work, variants, is_over });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::pin::pin;
+
+    use super::RoomOfChunks;
+
+    /// Three studies of such chunks ended a worker of 128 MiB that had been told to compute thirty-two at once.
+    #[tokio::test]
+    async fn chunks_that_come_to_much_are_in_work_beside_others_only_as_far_as_there_is_room() {
+        let room = RoomOfChunks::new(16 << 20, 8);
+        let first = room.take(12 << 20, true).await;
+        assert!(first.is_some() && room.take(12 << 20, false).await.is_none());
+        assert!(room.take(2 << 20, false).await.is_some(), "a slot's share is there whatever others take");
+        assert!(room.take(4 << 20, false).await.is_some());
+        let mut large = pin!(room.take(1 << 30, true));
+        assert!(futures_util::poll!(&mut large).is_pending());
+        assert!(room.take(4 << 20, false).await.is_none(), "it would never have its turn");
+        drop(first);
+        assert!(large.await.is_some(), "alone it has what it needs");
     }
 }

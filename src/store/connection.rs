@@ -84,6 +84,9 @@ pub enum StoreError {
         "another process has the studies' file {0}: a file serves one process; several of them share a PostgreSQL database"
     )]
     InUse(String),
+    /// Somebody keeps something else there.
+    #[error("{0} is a database of something else: name a file that is not there yet")]
+    Foreign(String),
     /// A worker has a chunk in its hands, and does not let go.
     #[error("a worker computes a chunk of the study and does not let go of it; try again once its lease is over")]
     InWork,
@@ -119,7 +122,7 @@ impl Store {
     /// The store at an address; a server is not connected to before it is needed.
     ///
     /// # Errors
-    /// Where a file cannot be opened, is another process's, or has a schema of a newer build.
+    /// Where a file cannot be opened, is another process's or something else's, or has a schema of a newer build.
     pub async fn open(address: &Address) -> Result<Self, StoreError> {
         let worker = worker_name().into();
         match address {

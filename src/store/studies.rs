@@ -16,7 +16,7 @@ pub struct NewStudy {
     pub id: String,
     /// Its kind.
     pub kind: String,
-    /// The build and the kind of processor that it belongs to, in a word.
+    /// The build and the kind of processor that it belongs to, in a word: the column `build`.
     pub origin: String,
     /// What is asked, as it was sent.
     pub document: String,

@@ -79,7 +79,7 @@ impl Part {
     }
 
     /// About what it takes in memory.
-    fn bytes(&self) -> usize {
+    pub fn bytes(&self) -> usize {
         size_of::<Self>()
             + match self {
                 Self::Rows(rows) => rows.bytes(),

@@ -681,9 +681,9 @@ async fn a_study_of_another_build_or_of_other_bits_is_left_to_others() {
         assert_eq!((standing.done, standing.is_running()), (0, true), "{id}");
     }
     // Whoever has kept the id of one is told so.
-    for id in ["of-another-build", "of-another-processor"] {
+    for (id, why) in [("of-another-build", "belongs to build another"), ("of-another-processor", "kind of processor")] {
         let problem = keeper.service.get(&format!("/v1/studies/{id}")).await.refused(404, "not_found");
-        assert!(problem["detail"].as_str().unwrap().contains("another"), "{problem}");
+        assert!(problem["detail"].as_str().unwrap().contains(why), "{problem}");
         // Nor can it be watched here; that it ends can be seen to.
         for stands in [Some(false), None] {
             let told = keeper.service.ask(&Question::of("DELETE", &format!("/v1/studies/{id}"))).await;

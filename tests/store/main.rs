@@ -220,6 +220,20 @@ async fn two_who_find_no_open_chunk_at_once_open_each_once() {
     .await;
 }
 
+/// A mistaken path had our tables put beside somebody's.
+#[tokio::test]
+async fn a_file_of_something_else_is_left_as_it_was() {
+    let file = File::new();
+    let mut theirs = SqliteConnection::connect(&format!("sqlite://{}?mode=rwc", file.0.display())).await.unwrap();
+    sqlx::raw_sql("CREATE TABLE bread (flour)").execute(&mut theirs).await.unwrap();
+    theirs.close().await.unwrap();
+    assert!(matches!(Store::open(&file.address()).await, Err(StoreError::Foreign(_))));
+    let mut theirs = SqliteConnection::connect(&format!("sqlite://{}", file.0.display())).await.unwrap();
+    let tables =
+        sqlx::query_scalar::<_, String>("SELECT name FROM sqlite_schema").fetch_all(&mut theirs).await.unwrap();
+    assert_eq!(tables, ["bread"]);
+}
+
 /// Whose chunks were all written when it was first kept.
 #[tokio::test]
 async fn a_study_of_the_first_schema_goes_on_where_it_was() {

@@ -460,7 +460,7 @@ mod tests {
     use toothwave_calculation::sweep::Sweep;
 
     use super::{Growing, LOOK_EVERY_BYTES, Stoppable, solve};
-    use crate::cache::Stored;
+    use crate::cache::{Cache, Stored};
     use crate::negotiation::Representation;
     use crate::problem::{Problem, ProblemCode};
     use crate::room::{Room, SMALL_BYTES};
@@ -535,6 +535,21 @@ mod tests {
         assert!(solve::<Sweep>(&sweep, json, &room, None, &stop).is_ok());
         room.memory().set_scarce(false);
         assert!(room.reserve(SMALL_BYTES + 1).is_ok());
+    }
+
+    /// Those of the allocator begin behind a head.
+    #[test]
+    fn an_answer_that_may_be_kept_is_written_into_pages_of_its_own() {
+        let design = Design::read(include_bytes!("../../../examples/paper-5.1.json")).expect("a design");
+        let limits = Limits { max_states: 1_000_000, max_profile_points: 1_000_000 };
+        let sweep = Sweep.check(&design, &limits).expect("a possible one");
+        let begins_a_page = |cache: Option<&Cache>| {
+            let room = Room::new(1 << 30);
+            let stored = solve::<Sweep>(&sweep, Representation::JSON, &room, cache, &AtomicBool::new(false));
+            stored.expect("an answer").body.as_ptr().addr().is_multiple_of(4096)
+        };
+        assert!(begins_a_page(Some(&Cache::new(1 << 20))));
+        assert!(!begins_a_page(Some(&Cache::new(0))) && !begins_a_page(None));
     }
 
     /// It has two texts for each pole of its curves, at the bottom and at the top, to know them again.

@@ -95,16 +95,15 @@ pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRej
     responses(
         (status = 204, description = "It does not run any more, or is forgotten."),
         (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
-        (status = 503, description = "The store of studies does not answer, the study could not be looked at in time, or a worker that stands still has a chunk of it in its hands; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
+        (status = 503, description = "The store of studies does not answer, or a worker that stands still has a chunk of it in its hands; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
     )
 )]
 pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
-    let id = id_of(id);
-    match app.studies.cancel_or_forget(&id).await {
-        Ok(true) => StatusCode::NO_CONTENT.into_response(),
-        Ok(false) => not_kept(&id).into_response(),
-        Err(problem) => problem.into_response(),
-    }
+    let cancelled = async {
+        let id = id_of(id)?;
+        if app.studies.cancel_or_forget(&id).await? { Ok(StatusCode::NO_CONTENT) } else { Err(not_kept(&id)) }
+    };
+    cancelled.await.into_response()
 }
 
 /// What a study has come to: whole, or as far as it has come.
@@ -202,13 +201,14 @@ fn no_store(mut response: Response) -> Response {
 }
 
 async fn kept(app: &App, id: Result<Path<String>, PathRejection>) -> Result<Arc<Kept>, Problem> {
-    let id = id_of(id);
+    let id = id_of(id)?;
     app.studies.find(&id).await?.ok_or_else(|| not_kept(&id))
 }
 
 /// An id that is no text is no study's either, and PostgreSQL takes no text with a zero in it.
-fn id_of(id: Result<Path<String>, PathRejection>) -> String {
-    id.ok().map(|Path(id)| id).filter(|id| !id.contains('\0')).unwrap_or_default()
+fn id_of(id: Result<Path<String>, PathRejection>) -> Result<String, Problem> {
+    let id = id.map(|Path(id)| id).unwrap_or_default();
+    if id.is_empty() || id.contains('\0') { Err(not_kept(&id)) } else { Ok(id) }
 }
 
 fn not_kept(id: &str) -> Problem {
