@@ -111,13 +111,13 @@ impl CheckedSweep {
         const LOSSES_BYTES: u64 = 3 * 8 + 2;
         // Ratios by contact, bearing and race, powers, and what wears.
         const LOSSES_ANGLE_BYTES: u64 = 9 * 8;
-        // Three columns of depths, of each point of a duty.
+        // Three columns of depths, of each point of a duty and of their mean.
         const WEAR_BYTES: u64 = 3 * 8;
         let Self { duty, friction, wear_rate_mm3_per_nm, .. } = self;
         let of = |is_asked, bytes| if is_asked { bytes } else { 0 };
         // With friction every point is swept, one after the other beside the hardest.
         let sweeps = 1 + of(friction.is_some() && duty.points.len() > 1, 1);
-        let of_wear = duty.points.len() as u64 * of(wear_rate_mm3_per_nm.is_some(), WEAR_BYTES);
+        let of_wear = (duty.points.len() as u64 + 1) * of(wear_rate_mm3_per_nm.is_some(), WEAR_BYTES);
         Each {
             state_bytes: sweeps * (STATE_BYTES + of(friction.is_some(), LOSSES_BYTES)) + of_wear,
             angle_bytes: sweeps * (ANGLE_BYTES + of(friction.is_some(), LOSSES_ANGLE_BYTES)),

@@ -3,7 +3,7 @@
 use std::io;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use metrics::{counter, histogram};
@@ -46,6 +46,8 @@ pub struct Pool {
     spare: Arc<Semaphore>,
     /// One for each solve that runs or waits, those of batches apart.
     places: Arc<Semaphore>,
+    /// Those of them that wait for a permit.
+    waiting: Arc<AtomicUsize>,
     /// One for each slice of a batch that runs or waits for a permit: as many as there are permits, so that a single request
     /// never waits for more than one round of them.
     turns: Arc<Semaphore>,
@@ -195,6 +197,22 @@ impl Drop for StopOnDrop {
 /// another finds one, and there would be no other once each permit lay in such a job.
 struct Waiting<T>(Arc<Mutex<Option<T>>>);
 
+/// One among those that are counted.
+struct Counted<'a>(&'a AtomicUsize);
+
+impl<'a> Counted<'a> {
+    fn one_more(count: &'a AtomicUsize) -> Self {
+        count.fetch_add(1, Ordering::Relaxed);
+        Self(count)
+    }
+}
+
+impl Drop for Counted<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
 impl<T> Drop for Waiting<T> {
     fn drop(&mut self) {
         drop(self.0.lock().take());
@@ -208,6 +226,7 @@ impl Pool {
             permits: Arc::new(Semaphore::new(limits.max_concurrent_solves)),
             spare: Arc::new(Semaphore::new(1)),
             places: Arc::new(Semaphore::new(limits.max_concurrent_solves + limits.max_queued_solves)),
+            waiting: Arc::default(),
             turns: Arc::new(Semaphore::new(limits.max_concurrent_solves)),
             of_variants: Arc::new(Semaphore::new(room::permits(limits.max_unread_bytes / PART_OF_VARIANTS) as usize)),
             batches: Arc::new(Semaphore::new(limits.max_concurrent_batches)),
@@ -237,9 +256,9 @@ impl Pool {
         self.limits.max_concurrent_solves + 1 - self.permits.available_permits() - self.spare.available_permits()
     }
 
-    /// Single solves that run or wait now.
-    pub fn admitted(&self) -> usize {
-        self.limits.max_concurrent_solves + self.limits.max_queued_solves - self.places.available_permits()
+    /// Single solves that wait now.
+    pub fn waiting(&self) -> usize {
+        self.waiting.load(Ordering::Relaxed)
     }
 
     /// The deadline of a request that arrives now.
@@ -491,6 +510,7 @@ impl Pool {
     }
 
     async fn permit_of_a_single_one(&self) -> Result<Held, Problem> {
+        let _waits = Counted::one_more(&self.waiting);
         let spare = async {
             if self.pace.most(Instant::now()) == SLICE {
                 tokio::time::sleep(PATIENCE).await;
@@ -618,11 +638,12 @@ mod tests {
         runtime.block_on(async {
             let Line { settings } = Line::parse_from(["serve", "--deadline-ms", "1"]);
             let pool = Pool::new(settings.limits());
+            let places = pool.places.available_permits();
             let (release, released) = mpsc::channel::<()>();
             let busy = tokio::task::spawn_blocking(move || released.recv());
             let refused = pool.run(pool.deadline(), Thread::Blocking, |_| Ok(())).await;
             assert_eq!(refused.err().map(|problem| problem.code), Some(ProblemCode::DeadlineExceeded));
-            assert_eq!((pool.running(), pool.admitted()), (0, 0));
+            assert_eq!((pool.running(), pool.waiting(), pool.places.available_permits()), (0, 0, places));
             assert!(release.send(()).is_ok());
             assert!(busy.await.is_ok_and(|done| done.is_ok()));
         });
@@ -717,6 +738,21 @@ mod tests {
         for _ in 0..3 {
             assert_eq!(pool.run(pool.deadline(), Thread::Blocking, |_| Ok(7)).await?, 7);
         }
+        // Beside slices that hold all permits one runs; who comes next waits, and counts as such.
+        let (release, released) = mpsc::channel::<()>();
+        let single = pool.clone();
+        let long = move |_: &AtomicBool| Ok(released.recv().is_err());
+        let long = tokio::spawn(async move { single.run_while_wanted(Thread::Blocking, long).await });
+        while pool.running() < 3 {
+            tokio::task::yield_now().await;
+        }
+        let mut next = pin!(pool.run_while_wanted(Thread::Blocking, |_| Ok(7)));
+        assert!(futures_util::poll!(&mut next).is_pending());
+        assert_eq!(pool.waiting(), 1);
+        drop(release);
+        assert_eq!(next.await?, 7);
+        assert!(long.await.map_err(|error| Problem::internal(&error))??);
+        assert_eq!(pool.waiting(), 0);
         drop(senders);
         for slice in slices {
             assert!(slice.await.map_err(|error| Problem::internal(&error))??);

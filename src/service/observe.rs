@@ -98,15 +98,14 @@ fn refused(code: ProblemCode) -> Counter {
 /// The metrics as text; levels are read at this moment.
 pub fn render(app: &App) -> String {
     let size = app.cache.size();
-    let running = app.pool.running();
     #[expect(clippy::cast_precision_loss, reason = "a gauge")]
     {
         gauge!("toothwave_cache_bytes").set(size.bytes as f64);
         gauge!("toothwave_cache_entries").set(size.entries as f64);
         gauge!("toothwave_batches_running").set(app.pool.batches() as f64);
         gauge!("toothwave_studies_running").set(app.studies.running() as f64);
-        gauge!("toothwave_solves_running").set(running as f64);
-        gauge!("toothwave_solves_queued").set(app.pool.admitted().saturating_sub(running) as f64);
+        gauge!("toothwave_solves_running").set(app.pool.running() as f64);
+        gauge!("toothwave_solves_queued").set(app.pool.waiting() as f64);
         gauge!("toothwave_connections").set(socket::open() as f64);
         gauge!("toothwave_unread_bytes").set(app.room.taken_bytes() as f64);
     }

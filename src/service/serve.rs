@@ -168,13 +168,17 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
         drop(listener);
         server.closing.cancel();
         app.studies.close();
+        let ended = async {
+            let until = Instant::now() + settings.shutdown();
+            drain(server.open, &app, settings.shutdown()).await;
+            // Chunks that are in work are given back, so that they count as never begun.
+            if timeout_at(until.max(Instant::now() + LAST_WORDS), store).await.is_err() {
+                tracing::warn!("the studies' store did not take back in time what was begun");
+            }
+        };
         tokio::select! {
-            () = drain(server.open, &app, settings.shutdown()) => {}
+            () = ended => {}
             () = told_to_stop() => tracing::warn!("told to stop again: what still ran is given up"),
-        }
-        // Chunks that are in work are given back, so that they count as never begun.
-        if tokio::time::timeout(LAST_WORDS, store).await.is_err() {
-            tracing::warn!("the studies' store did not close in time");
         }
     }
     tracing::info!("stopped");

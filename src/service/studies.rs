@@ -50,6 +50,9 @@ const EXPIRE: Duration = Duration::from_secs(60);
 /// What a study gets that many processes share: nobody waits for it, and whoever wants its end cancels it.
 const ENDLESS: Duration = Duration::from_secs(100 * 365 * 86_400);
 
+/// For so long a store is waited for that is closed.
+const CLOSE: Duration = Duration::from_millis(300);
+
 /// Of what is read of a store at once.
 const READ_BYTES: u64 = 16 << 20;
 
@@ -1020,8 +1023,15 @@ impl Studies {
                 }
             }
         };
-        tokio::join!(workers, count, forget);
-        store.close().await;
+        let others = async {
+            tokio::select! {
+                _ = async { tokio::join!(count, forget) } => {}
+                () = self.closing.cancelled() => {}
+            }
+        };
+        tokio::join!(workers, others);
+        // What was committed is there: whoever does not hear of the end finds it out.
+        let _ = tokio::time::timeout(CLOSE, store.close()).await;
     }
 
     /// Waits; whether the service closes instead.

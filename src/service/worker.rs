@@ -29,9 +29,6 @@ use crate::room;
 /// Between two looks at what there is to do, and at what was cancelled.
 const PAUSE: Duration = Duration::from_secs(1);
 
-/// What a claim that is being made gets at least when no chunk is to be begun any more.
-const NEARLY: Duration = Duration::from_millis(200);
-
 /// For so long a chunk that is computed beside none waits for that, and has others wait: what ends a process mostly does so at once, and chunks may take minutes.
 const ALONE: Duration = Duration::from_secs(3);
 
@@ -294,16 +291,8 @@ impl Workers {
                     room = has_room => room,
                 };
                 let Some(_room) = room else { continue };
-                // Nor is one that the store does not give. What is nearly claimed is, and then given back: its attempt may be noted already.
-                let told_to_stop = async {
-                    self.stopping.cancelled().await;
-                    tokio::time::sleep(self.patience.max(NEARLY)).await;
-                };
-                let claimed = tokio::select! {
-                    claimed = self.claim(task, &ours) => claimed,
-                    () = told_to_stop => return,
-                };
-                match claimed {
+                // One that is being claimed is claimed, and then given back: its attempt may be noted already.
+                match self.claim(task, &ours).await {
                     Ok((Claim::Chunk(lease), _)) if self.stopping.is_cancelled() => return give_up(lease).await,
                     Ok((Claim::Chunk(lease), beside)) => {
                         let no_longer_alone = async {
@@ -354,6 +343,7 @@ impl Workers {
         };
         let beside = tokio::select! {
             beside = beside => beside,
+            () = self.stopping.cancelled() => return Ok((Claim::None, None)),
             never = lease.renew() => match never {},
         };
         Ok((lease.begin().await?, beside))

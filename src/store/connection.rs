@@ -98,6 +98,24 @@ pub enum StoreError {
 /// PostgreSQL, appendix A.
 pub(crate) const LOCK_NOT_AVAILABLE: &str = "55P03";
 
+/// The same: the server ends the session, since it is told to, or has crashed.
+const SESSION_ENDED: &str = "57P";
+
+impl StoreError {
+    /// Whether what was asked may have been done, or be done yet: nobody said that it was not.
+    pub(crate) fn leaves_open(&self) -> bool {
+        match self {
+            Self::Silent(_) => true,
+            Self::Failed(sqlx::Error::PoolClosed) => false,
+            Self::Failed(sqlx::Error::Database(error)) => {
+                error.code().is_some_and(|code| code.starts_with(SESSION_ENDED))
+            }
+            Self::Failed(_) => true,
+            _ => false,
+        }
+    }
+}
+
 impl From<sqlx::Error> for StoreError {
     fn from(error: sqlx::Error) -> Self {
         match error {

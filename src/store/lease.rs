@@ -236,7 +236,7 @@ impl Lease {
                 return Ok(Claim::None);
             }
             Err(error) => {
-                if matches!(error, StoreError::Silent(_)) {
+                if error.leaves_open() {
                     self.take_back_attempt().await;
                 }
                 return Err(error);
@@ -315,10 +315,10 @@ impl Lease {
     }
 
     /// Holds the chunk until nothing is noted of an attempt that was not begun: a store that said nothing in time, since it does not flush for a while
-    /// say, may note it all the same when it goes on. Were the chunk let go, it would be claimed next, and three such attempts were a gap.
+    /// say, may note it all the same when it goes on, and one that was cut off before it said so may have. Were the chunk let go, it would be claimed next, and three such attempts were a gap.
     async fn take_back_attempt(&mut self) {
         const FIRST_PAUSE: Duration = Duration::from_secs(1);
-        const LONGEST_PAUSE: Duration = Duration::from_secs(30);
+        const LONGEST_PAUSE: Duration = Duration::from_secs(10);
         let (store, cut, chunk) = (self.store.clone(), self.cut.clone(), self.chunk);
         let taken_back = async {
             // What is deleted first may come before what is to be noted.

@@ -9,7 +9,8 @@ static int flush(const char *name, int file) {
   int (*flushed)(int) = (int (*)(int))dlsym(RTLD_NEXT, name);
   const char *slow = getenv("SLOW_DISK");
   if (slow && access(slow, F_OK) == 0) {
-    struct timespec rest = {atoi(getenv("SLOW_DISK_S")), 0};
+    double seconds = atof(getenv("SLOW_DISK_S"));
+    struct timespec rest = {(time_t)seconds, (long)(1e9 * (seconds - (time_t)seconds))};
     while (nanosleep(&rest, &rest)) {
     }
   }

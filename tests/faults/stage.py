@@ -216,8 +216,8 @@ class Stage:
     def migrate(self, environment):
         run(self.binary, "migrate", "--studies", self.studies, env=os.environ | environment)
 
-    def serve(self, name, chunk_variants=CHUNK_VARIANTS, **how):
-        faults = {"chunk_variants": chunk_variants} if chunk_variants else None
+    def serve(self, name, chunk_variants=CHUNK_VARIANTS, slow_ms=None, **how):
+        faults = {name: number for name, number in (("chunk_variants", chunk_variants), ("slow_ms", slow_ms)) if number} or None
         service = Service(self.binary, name, self.studies, faults=faults, **how)
         self.processes.append(service)
         return service

@@ -960,8 +960,9 @@ fn a_duty_wears_each_place_by_its_mean_and_not_by_the_mean_of_the_largest() {
         mm_per_hour: PerContact { wave_generator: Vec::new(), ring: ring.into(), carrier: vec![1.0, 2.0] },
         race_mm_per_hour: Some(race),
     };
-    let points = [(3.0, wear([4.0, 0.0], 1.0)), (1.0, wear([0.0, 8.0], 5.0))]
-        .map(|(share_of_time, wear)| WearForTime { share_of_time, wear });
+    let wears = [wear([4.0, 0.0], 1.0), wear([0.0, 8.0], 5.0)];
+    let points = [3.0, 1.0].iter().zip(&wears).map(|(&share_of_time, wear)| WearForTime { share_of_time, wear });
+    let points: Vec<_> = points.collect();
     assert_eq!(Wear::over_duty(&points), wear([3.0, 2.0], 2.0));
 }
 

@@ -551,6 +551,44 @@ async fn an_attempt_that_is_still_being_noted_is_taken_back_when_that_has_come_t
     store.forget(&study.id).await.unwrap();
 }
 
+/// Three restarts of a server that flushes slowly made a gap of a chunk that nobody had begun.
+#[tokio::test]
+async fn an_attempt_of_which_nobody_knows_whether_it_was_noted_is_taken_back() {
+    let Some(address) = server() else { return };
+    let _nobody = SERVER.write().await;
+    let store = migrated(&address).await;
+    let study = study("cut", 1);
+    store.create(&study).await.unwrap();
+    drop(claimed(&store, &study).await);
+    let lease = loop {
+        match store.hold(&study.cut(), LEASE).await.unwrap() {
+            Some(lease) => break lease,
+            None => tokio::task::yield_now().await,
+        }
+    };
+    let (mut noting, mut other) = (stranger(&address).await, stranger(&address).await);
+    let lock = "SELECT pg_advisory_xact_lock(hashtextextended($1, 0))";
+    sqlx::raw_sql("BEGIN").execute(&mut noting).await.unwrap();
+    sqlx::query(lock).bind(&study.id).execute(&mut noting).await.unwrap();
+    let mut begun = Box::pin(lease.begin());
+    let ended = async {
+        let end = "SELECT pg_terminate_backend(pid) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted";
+        while sqlx::query(end).fetch_all(&mut other).await.unwrap().is_empty() {}
+    };
+    tokio::select! {
+        _ = &mut begun => panic!("whoever notes an attempt waits for others"),
+        () = ended => {}
+    }
+    // As if it had been committed before the session was ended.
+    let noted = "INSERT INTO attempts SELECT study, chunk, worker, began_at_s FROM attempts WHERE study = $1";
+    sqlx::query(noted).bind(&study.id).execute(&mut noting).await.unwrap();
+    sqlx::raw_sql("COMMIT").execute(&mut noting).await.unwrap();
+    assert!(matches!(begun.await, Err(StoreError::Failed(_))));
+    let left = "SELECT COUNT(*) FROM attempts WHERE study = $1";
+    assert_eq!(sqlx::query_scalar::<_, i64>(left).bind(&study.id).fetch_one(&mut other).await.unwrap(), 0);
+    store.forget(&study.id).await.unwrap();
+}
+
 #[tokio::test]
 async fn a_chunk_tells_how_often_it_was_begun_before() {
     with_each_store(async |store| {

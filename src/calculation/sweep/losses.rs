@@ -308,8 +308,9 @@ impl Costs<'_> {
     }
 
     fn wear(&self, states: &States) -> Option<WearAnswer> {
-        let of_point =
-            |point: &Cost| Some(WearForTime { share_of_time: point.share_of_time, wear: point.wear.clone()? });
+        fn of_point(point: &Cost) -> Option<WearForTime<'_>> {
+            Some(WearForTime { share_of_time: point.share_of_time, wear: point.wear.as_ref()? })
+        }
         let points: Option<Vec<_>> = self.points.iter().map(of_point).collect();
         let wear = Wear::over_duty(&points?);
         let peaks = wear.peaks(states);

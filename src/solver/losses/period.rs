@@ -136,12 +136,12 @@ pub struct Wear {
 }
 
 /// The wear of one point of a duty.
-#[derive(Debug, Clone, PartialEq)]
-pub struct WearForTime {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WearForTime<'a> {
     /// The point's share of the running time, or what is in proportion to it.
     pub share_of_time: f64,
     /// What it wears.
-    pub wear: Wear,
+    pub wear: &'a Wear,
 }
 
 impl Wear {
@@ -185,7 +185,7 @@ impl Wear {
 
     /// The mean over a duty of at least one point, each with its share of the time and swept over the same input angles: at each place, since
     /// depths add where they are.
-    pub fn over_duty(points: &[WearForTime]) -> Self {
+    pub fn over_duty(points: &[WearForTime<'_>]) -> Self {
         let mm_per_hour = PerContact::of(|contact| {
             let columns: Vec<_> = points
                 .iter()
