@@ -155,7 +155,7 @@ fn thawed(frozen: &NewStudy) -> Result<Arc<Study>, NotHere> {
         .map_err(|refused| NotHere::Unreadable(refused.to_string()))?
         .in_chunks_of(frozen.chunk_variants);
     if study.id().to_string() != frozen.id {
-        return Err(NotHere::Unreadable("its document is another study's".into()));
+        return Err(NotHere::Unreadable("it has another id here".into()));
     }
     Ok(Arc::new(study))
 }

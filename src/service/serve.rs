@@ -172,8 +172,10 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
             let until = Instant::now() + settings.shutdown();
             drain(server.open, &app, settings.shutdown()).await;
             // Chunks that are in work are given back, so that they count as never begun.
-            if timeout_at(until.max(Instant::now() + LAST_WORDS), store).await.is_err() {
-                tracing::warn!("the studies' store did not take back in time what was begun");
+            match timeout_at(until.max(Instant::now() + LAST_WORDS), store).await {
+                Ok(Ok(())) => {}
+                Ok(Err(error)) => tracing::error!(%error, "the studies' store was not closed in order"),
+                Err(_) => tracing::warn!("the studies' store did not take back in time what was begun"),
             }
         };
         tokio::select! {

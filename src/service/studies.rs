@@ -50,7 +50,7 @@ const EXPIRE: Duration = Duration::from_secs(60);
 /// What a study gets that many processes share: nobody waits for it, and whoever wants its end cancels it.
 const ENDLESS: Duration = Duration::from_secs(100 * 365 * 86_400);
 
-/// For so long a store is waited for that is closed.
+/// For so long a server is told that nobody needs it any more.
 const CLOSE: Duration = Duration::from_millis(300);
 
 /// Of what is read of a store at once.
@@ -898,16 +898,15 @@ impl Studies {
         } else if stored.is_some() {
             store.forget(id).await?;
         }
-        match here {
-            Some(kept) if is_running => {
-                kept.look(store).await?;
-            }
-            Some(kept) => Self::let_go(&mut self.kept.lock(), &kept),
-            None => {}
-        }
         if stored.is_some() {
             // Workers learn it at once where they are here.
             self.changed.send_replace(());
+        }
+        match here {
+            // It is cancelled, though how far it came may not be told now.
+            Some(kept) if is_running && kept.look(store).await.is_err() => kept.stand(StudyState::Cancelled, None),
+            Some(kept) if !is_running => Self::let_go(&mut self.kept.lock(), &kept),
+            _ => {}
         }
         Ok(stored.is_some())
     }
@@ -1030,8 +1029,12 @@ impl Studies {
             }
         };
         tokio::join!(workers, others);
-        // What was committed is there: whoever does not hear of the end finds it out.
-        let _ = tokio::time::timeout(CLOSE, store.close()).await;
+        if store.address().is_shared() {
+            // A server that does not hear of it finds it out.
+            let _ = tokio::time::timeout(CLOSE, store.close()).await;
+        } else {
+            store.close().await;
+        }
     }
 
     /// Waits; whether the service closes instead.

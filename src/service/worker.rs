@@ -73,8 +73,7 @@ pub struct Capacity {
     pub slots: usize,
     /// Besides, one of each of so many other studies: a chunk may be long, and they are not to wait for its end. All of them are computed in slices that take turns.
     pub slots_for_others: usize,
-    /// What chunks that are in work may take, those together that take more than a slot's share of it, or one of them alone; not counted are the variants that are
-    /// computed.
+    /// What all chunks that are in work may take at once, beside the variants that are computed.
     pub chunks_bytes: u64,
     /// What a variant may take while it is computed,
     pub variant_bytes: u64,
@@ -136,7 +135,7 @@ impl From<Problem> for Unseen {
 struct InWork<'a> {
     all: &'a Mutex<HashMap<String, usize>>,
     id: &'a str,
-    /// Whether no other was, or might have been.
+    /// Whether no other of the study was.
     is_first: bool,
 }
 
@@ -164,8 +163,8 @@ impl Drop for InWork<'_> {
     }
 }
 
-/// Room for what chunks that are in work have come to. One that takes no more than its slot's share takes none: all of them together come to no more than as much
-/// again.
+/// Room for what chunks in work come to. Those that come to more than a slot's share are counted: together they take no more than all the room, or one is alone. The
+/// others are not: there are no more of them than slots, so that they take no more than as much again.
 #[derive(Debug)]
 struct RoomOfChunks {
     free: Semaphore,
@@ -291,7 +290,7 @@ impl Workers {
                     room = has_room => room,
                 };
                 let Some(_room) = room else { continue };
-                // One that is being claimed is claimed, and then given back: its attempt may be noted already.
+                // One whose attempt is being noted is claimed, and then given back.
                 match self.claim(task, &ours).await {
                     Ok((Claim::Chunk(lease), _)) if self.stopping.is_cancelled() => return give_up(lease).await,
                     Ok((Claim::Chunk(lease), beside)) => {
@@ -331,8 +330,16 @@ impl Workers {
     /// A chunk that is begun, and what it is computed beside: one that came to no result in all attempts but the last may be what ended its process, and is computed
     /// beside none, so that no other is taken for that.
     async fn claim(&self, task: &Waiting, ours: &Ours) -> Result<(Claim, Option<SemaphorePermit<'_>>), StoreError> {
-        let Some(mut lease) = self.store.hold(&task.cut, ours.lease).await? else { return Ok((Claim::None, None)) };
-        let is_suspect = lease.attempts().await? + 1 >= MOST_ATTEMPTS;
+        let held = async {
+            let Some(lease) = self.store.hold(&task.cut, ours.lease).await? else { return Ok(None) };
+            let is_suspect = lease.attempts().await? + 1 >= MOST_ATTEMPTS;
+            Ok::<_, StoreError>(Some((lease, is_suspect)))
+        };
+        let held = tokio::select! {
+            held = held => held?,
+            () = self.stopping.cancelled() => None,
+        };
+        let Some((mut lease, is_suspect)) = held else { return Ok((Claim::None, None)) };
         let all = u32::try_from(self.capacity.all_slots()).unwrap_or(u32::MAX);
         // An error says that the semaphore is closed, which it never is.
         let beside = async {

@@ -7,12 +7,14 @@ use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::Mutex;
-use std::time::Duration;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use sqlx::ConnectOptions as _;
 use sqlx::pool::{PoolConnection, PoolOptions};
-use sqlx::postgres::{PgConnectOptions, PgPool, Postgres};
+use sqlx::postgres::{PgConnectOptions, PgDatabaseError, PgPool, PgSeverity, Postgres};
 use sqlx::sqlite::{Sqlite, SqliteConnectOptions, SqliteJournalMode, SqliteLockingMode, SqlitePool, SqliteSynchronous};
+
+use sqlx::{ConnectOptions as _, Connection as _};
 
 use crate::address::Address;
 use crate::{LOCK_PATIENCE, PATIENCE, SILENCE};
@@ -27,6 +29,8 @@ pub struct Store {
     address: Address,
     /// What this process is called in the store.
     pub(crate) worker: Arc<str>,
+    /// Counts its attempts, from a number that no process of the same name had before.
+    attempts: Arc<AtomicU64>,
 }
 
 #[derive(Debug, Clone)]
@@ -98,18 +102,17 @@ pub enum StoreError {
 /// PostgreSQL, appendix A.
 pub(crate) const LOCK_NOT_AVAILABLE: &str = "55P03";
 
-/// The same: the server ends the session, since it is told to, or has crashed.
-const SESSION_ENDED: &str = "57P";
-
 impl StoreError {
     /// Whether what was asked may have been done, or be done yet: nobody said that it was not.
     pub(crate) fn leaves_open(&self) -> bool {
         match self {
             Self::Silent(_) => true,
             Self::Failed(sqlx::Error::PoolClosed) => false,
-            Self::Failed(sqlx::Error::Database(error)) => {
-                error.code().is_some_and(|code| code.starts_with(SESSION_ENDED))
-            }
+            Self::Failed(sqlx::Error::Database(error)) => match error.try_downcast_ref::<PgDatabaseError>() {
+                // What is an error was not done; with these the session ends, at whatever it was.
+                Some(error) => matches!(error.severity(), PgSeverity::Fatal | PgSeverity::Panic),
+                None => error.code().is_some_and(|code| is_of_file(&code)),
+            },
             Self::Failed(_) => true,
             _ => false,
         }
@@ -143,9 +146,13 @@ impl Store {
     /// Where a file cannot be opened, is another process's or something else's, or has a schema of a newer build.
     pub async fn open(address: &Address) -> Result<Self, StoreError> {
         let worker = worker_name().into();
+        let attempts = Arc::new(AtomicU64::new(nanoseconds_now()));
         match address {
             Address::File(path) => {
                 make_private(path);
+                if is_foreign(path).await {
+                    return Err(StoreError::Foreign(address.to_string()));
+                }
                 let options = SqliteConnectOptions::new()
                     .filename(path)
                     .create_if_missing(true)
@@ -176,6 +183,7 @@ impl Store {
                     database: Database::File { pool, leased: Arc::default() },
                     address: address.clone(),
                     worker,
+                    attempts,
                 };
                 store.migrate().await.map_err(|error| match error {
                     StoreError::Failed(error) => in_use(error, address),
@@ -189,9 +197,14 @@ impl Store {
                 let leases = options.clone().application_name("toothwave lease");
                 let leases = sessions(MOST_LEASES, leases, Some(IDLE_LEASE));
                 let pool = sessions(CONNECTIONS, options, None);
-                Ok(Self { database: Database::Server { pool, leases }, address: address.clone(), worker })
+                Ok(Self { database: Database::Server { pool, leases }, address: address.clone(), worker, attempts })
             }
         }
+    }
+
+    /// What the next attempt of this process is called.
+    pub(crate) fn attempt_name(&self) -> String {
+        format!("{}#{:x}", self.worker, self.attempts.fetch_add(1, Ordering::Relaxed))
     }
 
     /// Where it is.
@@ -286,6 +299,35 @@ pub(crate) async fn within<T>(
 /// given; where none can be made SQLite says why.
 fn make_private(path: &Path) {
     let _ = OpenOptions::new().write(true).create_new(true).mode(0o600).open(path);
+}
+
+/// Whether SQLite's file could not be read or written: what was to be committed may be in its log all the same.
+fn is_of_file(code: &str) -> bool {
+    const IO_ERROR: u64 = 10;
+    code.parse::<u64>().is_ok_and(|code| code & 0xff == IO_ERROR)
+}
+
+/// Whether a file is a database of something else. It is only read: what a connection of ours asks for changes it.
+async fn is_foreign(path: &Path) -> bool {
+    let options = SqliteConnectOptions::new().filename(path).read_only(true).disable_statement_logging();
+    let tables = async {
+        let mut connection = options.connect().await?;
+        let tables = sqlx::query_scalar("SELECT name FROM sqlite_schema WHERE type = 'table'");
+        let tables: Vec<String> = tables.fetch_all(&mut connection).await?;
+        connection.close().await?;
+        Ok::<_, sqlx::Error>(tables)
+    };
+    // Where it cannot be read that is said of it when it is opened.
+    let tables = tables.await.unwrap_or_default();
+    let has = |name: &str| tables.iter().any(|table| table == name);
+    let is_ours = tables.is_empty() || (has("studies") && has("schema_versions"));
+    !is_ours
+}
+
+/// Since 1970.
+fn nanoseconds_now() -> u64 {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(now.as_nanos()).unwrap_or_default()
 }
 
 /// SQLite's word for a file that somebody else has.

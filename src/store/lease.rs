@@ -27,6 +27,8 @@ pub struct Lease {
     store: Store,
     cut: Cut,
     chunk: u64,
+    /// What its attempt is called.
+    attempt: String,
     /// So long may its holder be silent.
     silence: Duration,
     held: Held,
@@ -41,6 +43,12 @@ enum Held {
     /// Not any more: the server ended it.
     Lost,
 }
+
+/// Before what a store did not do is tried again.
+const PAUSE: Duration = Duration::from_secs(1);
+
+/// So often is a chunk given back to a store that is cut off.
+const GIVEN_BACK: usize = 4;
 
 /// Waits, on a server, for whoever notes an attempt at the chunk or takes one back, and has others wait until the transaction is over: what a commit does not
 /// come to its end with is seen by nobody, and holds its locks.
@@ -83,7 +91,8 @@ impl Store {
             }
         };
         // From here on dropping the lease sets the chunk free.
-        Ok(Some(Lease { store: self.clone(), cut: cut.clone(), chunk, silence: lease, held }))
+        let (store, attempt) = (self.clone(), self.attempt_name());
+        Ok(Some(Lease { store, cut: cut.clone(), chunk, attempt, silence: lease, held }))
     }
 
     /// A chunk among those that are open.
@@ -119,7 +128,7 @@ impl Store {
 
     /// Notes that a chunk is about to be computed, unless it was begun as often as chunks are. Committed apart from the lease: it outlives
     /// the worker.
-    async fn note_attempt(&self, study: &str, chunk: u64) -> Result<bool, StoreError> {
+    async fn note_attempt(&self, study: &str, chunk: u64, attempt: &str) -> Result<bool, StoreError> {
         let text = match &self.database {
             Database::File { .. } => {
                 concat!("INSERT INTO attempts SELECT $1, $2, $3, unixepoch()", unless_begun_as_often!())
@@ -137,7 +146,7 @@ impl Store {
                 sqlx::query(text)
                     .bind(study)
                     .bind(stored(chunk))
-                    .bind(&*self.worker)
+                    .bind(attempt)
                     .bind(stored(MOST_ATTEMPTS))
                     .execute(inner)
                     .await
@@ -148,8 +157,8 @@ impl Store {
         .await
     }
 
-    /// Deletes what is noted of attempts of this process, and what is being noted.
-    async fn delete_attempts(&self, study: &str, chunk: u64) -> Result<(), StoreError> {
+    /// Deletes what is noted of an attempt, or is being noted.
+    async fn delete_attempt(&self, study: &str, chunk: u64, attempt: &str) -> Result<(), StoreError> {
         let text = "DELETE FROM attempts WHERE study = $1 AND chunk = $2 AND worker = $3";
         self.with(PATIENCE, async |connection| {
             begin(connection).await?;
@@ -159,7 +168,7 @@ impl Store {
                 sqlx::query(text).bind(study).bind(stored(chunk)).execute(&mut **session).await?;
             }
             on!(connection, inner => {
-                sqlx::query(text).bind(study).bind(stored(chunk)).bind(&*self.worker).execute(inner).await.map(|_| ())
+                sqlx::query(text).bind(study).bind(stored(chunk)).bind(attempt).execute(inner).await.map(|_| ())
             })?;
             commit(connection).await
         })
@@ -228,7 +237,7 @@ impl Lease {
     /// Where the store does not answer.
     pub async fn begin(mut self) -> Result<Claim, StoreError> {
         let chunk = self.chunk;
-        match self.store.note_attempt(&self.cut.id, chunk).await {
+        match self.store.note_attempt(&self.cut.id, chunk, &self.attempt).await {
             Ok(true) => return Ok(Claim::Chunk(self)),
             Ok(false) => {}
             // The study was forgotten in this moment.
@@ -309,24 +318,29 @@ impl Lease {
     /// # Errors
     /// Where the store does not answer; the attempt then stays noted.
     pub async fn give_back(self) -> Result<(), StoreError> {
-        let (store, cut, chunk) = (self.store.clone(), self.cut.clone(), self.chunk);
-        drop(self);
-        store.delete_attempts(&cut.id, chunk).await
+        // Whoever claims it next is to see that it was not begun.
+        for _ in 1..GIVEN_BACK {
+            match self.store.delete_attempt(&self.cut.id, self.chunk, &self.attempt).await {
+                Err(error) if error.leaves_open() => tokio::time::sleep(PAUSE).await,
+                done => return done,
+            }
+        }
+        self.store.delete_attempt(&self.cut.id, self.chunk, &self.attempt).await
     }
 
-    /// Holds the chunk until nothing is noted of an attempt that was not begun: a store that said nothing in time, since it does not flush for a while
-    /// say, may note it all the same when it goes on, and one that was cut off before it said so may have. Were the chunk let go, it would be claimed next, and three such attempts were a gap.
+    /// Sees to it that nothing is noted of an attempt that was not begun: a store that said nothing in time, since it does not flush for a while
+    /// say, may note it all the same when it goes on, and one that was cut off before it said so may have. Three such attempts were a gap. Meanwhile the chunk is
+    /// held, unless its lease was cut off too: else it would be claimed next.
     async fn take_back_attempt(&mut self) {
-        const FIRST_PAUSE: Duration = Duration::from_secs(1);
         const LONGEST_PAUSE: Duration = Duration::from_secs(10);
-        let (store, cut, chunk) = (self.store.clone(), self.cut.clone(), self.chunk);
+        let (store, cut, chunk, attempt) = (self.store.clone(), self.cut.clone(), self.chunk, self.attempt.clone());
         let taken_back = async {
             // What is deleted first may come before what is to be noted.
-            let (mut deleted, mut pause) = (0, FIRST_PAUSE);
+            let (mut deleted, mut pause) = (0, PAUSE);
             while deleted < 2 {
                 tokio::time::sleep(pause).await;
-                match store.delete_attempts(&cut.id, chunk).await {
-                    Ok(()) => (deleted, pause) = (deleted + 1, FIRST_PAUSE),
+                match store.delete_attempt(&cut.id, chunk, &attempt).await {
+                    Ok(()) => (deleted, pause) = (deleted + 1, PAUSE),
                     Err(_) => pause = (2 * pause).min(LONGEST_PAUSE),
                 }
             }

@@ -95,7 +95,7 @@ impl Store {
     /// Brings the store to the schema of this build, in one transaction, and returns the version that it had before.
     ///
     /// # Errors
-    /// Where it has a newer schema, is a file of something else, or does not answer.
+    /// Where it has a newer schema, or does not answer.
     pub async fn migrate(&self) -> Result<u64, StoreError> {
         self.with(LONG_PATIENCE, async |connection| {
             on!(connection, inner => sqlx::query("BEGIN").execute(inner).await.map(|_| ()))?;
@@ -104,12 +104,6 @@ impl Store {
                 let long = "SELECT set_config('lock_timeout', $1, TRUE)";
                 sqlx::query(long).bind(milliseconds(LONG_LOCK_PATIENCE)).execute(&mut **inner).await?;
                 sqlx::query(MIGRATION_LOCK).execute(&mut **inner).await?;
-            }
-            if let Connection::File(inner) = connection {
-                let others = "SELECT COUNT(*) FROM sqlite_schema WHERE NOT EXISTS (SELECT 1 FROM sqlite_schema WHERE name = 'schema_versions')";
-                if sqlx::query_scalar::<_, i64>(others).fetch_one(&mut **inner).await? > 0 {
-                    return Err(StoreError::Foreign(self.address().to_string()));
-                }
             }
             let known = "CREATE TABLE IF NOT EXISTS schema_versions (version BIGINT PRIMARY KEY, applied_at_s BIGINT NOT NULL)";
             on!(connection, inner => sqlx::query(known).execute(inner).await.map(|_| ()))?;
