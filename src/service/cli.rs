@@ -277,6 +277,11 @@ fn arguments() -> Vec<OsString> {
 /// Threads on which a database's name is looked up, which is not to wait for solves.
 const LOOK_UPS: usize = 1;
 
+/// Threads that a service's solves run on: one for each that may run at once, and one for the single one that runs beside long slices.
+const fn threads_of(limits: &crate::config::Limits, is_shared: bool) -> usize {
+    limits.max_concurrent_solves + 1 + if is_shared { LOOK_UPS } else { 0 }
+}
+
 /// An executor, with as many threads for solves as there are permits: with more of them each solve would wake another, whose memory is cold. They stay,
 /// and one is there from the start: where the system refuses one and there is no other, tokio panics. So it does where it refuses one of its own, and would
 /// wait for the others for ever, but that such a panic ends the process.
@@ -303,7 +308,7 @@ fn run_service(settings: &Settings) -> Result<(), Failure> {
     memory::keep_pages_small();
     log::start(filter)?;
     let is_shared = address.as_ref().is_some_and(Address::is_shared);
-    let runtime = runtime(settings.limits().max_concurrent_solves + if is_shared { LOOK_UPS } else { 0 })?;
+    let runtime = runtime(threads_of(&settings.limits(), is_shared))?;
     let result = runtime.block_on(serve::serve(settings, address.as_ref(), parts));
     // A solve beyond its bound must not hold up the exit.
     runtime.shutdown_background();
@@ -491,4 +496,46 @@ fn health(mut address: SocketAddr) -> Result<(), Failure> {
     let mut head = [0; 12];
     stream.read_exact(&mut head)?;
     if head == *b"HTTP/1.1 200" { Ok(()) } else { Err(io::Error::other("the service is not well").into()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc;
+
+    use clap::Parser as _;
+
+    use super::{Cli, Command, runtime, threads_of};
+    use crate::compute::{Lane, Pool, Thread};
+    use crate::problem::Problem;
+
+    /// One study of variants of some seconds each had ordinary sweeps refused at their deadline: each had a permit, and no thread.
+    #[test]
+    fn a_single_solve_has_a_thread_beside_slices_that_hold_all_permits() {
+        let cli = Cli::parse_from(["toothwave", "serve", "--max-concurrent-solves", "2"]);
+        let Command::Serve(settings) = cli.command else { panic!("a service") };
+        let limits = settings.limits();
+        let runtime = runtime(threads_of(&limits, false)).expect("a runtime");
+        let answer = runtime.block_on(async {
+            let pool = Pool::new(limits);
+            let (senders, slices): (Vec<_>, Vec<_>) = (0..2)
+                .map(|_| {
+                    let (release, released) = mpsc::channel::<()>();
+                    let (pool, mut lane) = (pool.clone(), Lane::default());
+                    let slice =
+                        async move { pool.run_variants(&mut lane, 0, move |_, _| Ok(released.recv().is_err())).await };
+                    (release, tokio::spawn(slice))
+                })
+                .unzip();
+            while pool.running() < 2 {
+                tokio::task::yield_now().await;
+            }
+            let answer = pool.run(pool.deadline(), Thread::Blocking, |_| Ok(7)).await;
+            drop(senders);
+            for slice in slices {
+                slice.await.map_err(|error| Problem::internal(&error))??;
+            }
+            answer
+        });
+        assert!(answer.is_ok_and(|answer| answer == 7));
+    }
 }

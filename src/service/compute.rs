@@ -283,6 +283,18 @@ impl Pool {
         tokio::time::timeout_at(deadline, future).await.unwrap_or_else(|_| Err(self.deadline_exceeded()))
     }
 
+    /// What comes of `future`, which may wait for others, until the pool is closed.
+    ///
+    /// # Errors
+    /// `shutting_down`, and whatever it comes to.
+    pub async fn until_closed<T>(&self, future: impl Future<Output = Result<T, Problem>>) -> Result<T, Problem> {
+        tokio::select! {
+            biased;
+            done = future => done,
+            () = self.closed.cancelled() => Err(shutting_down()),
+        }
+    }
+
     /// Runs `job` as [`Self::run_while_wanted`] does, until the deadline.
     ///
     /// # Errors

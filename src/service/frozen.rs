@@ -7,7 +7,7 @@ use std::time::Duration;
 use rustix::time::{ClockId, clock_gettime};
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_calculation::{BUILD, origin, question};
-use toothwave_store::NewStudy;
+use toothwave_store::{Cut, NewStudy};
 use toothwave_study::{Interrupted, Limits, Part, Study, Work};
 
 use crate::compute::{Lane, Pool, SMALL_VARIANT_BYTES, Slice};
@@ -157,6 +157,10 @@ fn thawed(frozen: &NewStudy) -> Result<Arc<Study>, NotHere> {
     if study.id().to_string() != frozen.id {
         return Err(NotHere::Unreadable("it has another id here".into()));
     }
+    // What keeps it may be damaged, and the store does not see it: a study in other chunks than it was cut into would be done with some of them.
+    if (study.variants(), study.chunks()) != (frozen.variants, frozen.chunks) {
+        return Err(NotHere::Unreadable("it has other chunks here".into()));
+    }
     Ok(Arc::new(study))
 }
 
@@ -179,28 +183,30 @@ fn encoded(part: &Part) -> Result<Vec<u8>, Problem> {
 }
 
 /// What a chunk came to as it is kept: with what tells whether it is still that, since what keeps it may be damaged and the store does not see it.
-pub fn sealed(study: &str, chunk: u64, part: &Part) -> Result<Vec<u8>, Problem> {
+pub fn sealed(cut: &Cut, chunk: u64, part: &Part) -> Result<Vec<u8>, Problem> {
     // As much as it comes to, about: one that grows would take twice as much.
     let room = part.bytes() + blake3::OUT_LEN;
     let mut bytes = postcard::to_extend(part, Vec::with_capacity(room)).map_err(|error| Problem::internal(&error))?;
-    let seal = seal(study, chunk, &bytes);
+    let seal = seal(cut, chunk, &bytes);
     bytes.extend_from_slice(seal.as_bytes());
     Ok(bytes)
 }
 
 /// The same as it was kept.
-pub fn unsealed(study: &str, chunk: u64, bytes: &[u8]) -> Result<Part, Problem> {
+pub fn unsealed(cut: &Cut, chunk: u64, bytes: &[u8]) -> Result<Part, Problem> {
     let damaged =
-        || Problem::internal(&format!("what chunk {chunk} of the study {study} came to is damaged in its store"));
+        || Problem::internal(&format!("what chunk {chunk} of the study {} came to is damaged in its store", cut.id));
     let (bytes, kept) = bytes.split_last_chunk::<{ blake3::OUT_LEN }>().ok_or_else(damaged)?;
-    if seal(study, chunk, bytes) != *kept {
+    if seal(cut, chunk, bytes) != *kept {
         return Err(damaged());
     }
     postcard::from_bytes(bytes).map_err(|error| Problem::internal(&error))
 }
 
-fn seal(study: &str, chunk: u64, bytes: &[u8]) -> blake3::Hash {
-    blake3::Hasher::new().update(study.as_bytes()).update(&chunk.to_le_bytes()).update(bytes).finalize()
+fn seal(cut: &Cut, chunk: u64, bytes: &[u8]) -> blake3::Hash {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(cut.id.as_bytes()).update(&cut.chunk_variants.to_le_bytes()).update(&chunk.to_le_bytes());
+    hasher.update(bytes).finalize()
 }
 
 /// Time that this thread has had of a processor: a canary that had to stand aside for others would be cut in far too many chunks, for good.
@@ -338,6 +344,7 @@ mod tests {
 
     use toothwave_calculation::question;
     use toothwave_solver::Never;
+    use toothwave_store::Cut;
     use toothwave_study::{Limits, Study, Work};
 
     use super::{Canary, sealed, unsealed};
@@ -359,15 +366,18 @@ mod tests {
     #[test]
     fn what_a_chunk_came_to_is_none_where_a_bit_of_it_is_another() {
         let part = Work::new(&map_of(5), 0).run(&Never).expect("an answer");
-        let kept = sealed("one", 7, &part).expect("it is kept");
-        assert_eq!(unsealed("one", 7, &kept).expect("and read"), part);
+        let cut = |id: &str, chunk_variants| Cut { id: id.into(), chunk_variants };
+        let one = cut("one", 100);
+        let kept = sealed(&one, 7, &part).expect("it is kept");
+        assert_eq!(unsealed(&one, 7, &kept).expect("and read"), part);
         for bit in 0..8 * kept.len() {
             let mut damaged = kept.clone();
             damaged[bit / 8] ^= 1 << (bit % 8);
-            assert!(unsealed("one", 7, &damaged).is_err(), "{bit}");
+            assert!(unsealed(&one, 7, &damaged).is_err(), "{bit}");
         }
-        assert!(unsealed("one", 8, &kept).is_err() && unsealed("other", 7, &kept).is_err());
-        assert!(unsealed("one", 7, &kept[..20]).is_err());
+        assert!(unsealed(&one, 8, &kept).is_err() && unsealed(&cut("other", 100), 7, &kept).is_err());
+        assert!(unsealed(&cut("one", 101), 7, &kept).is_err(), "in chunks of another size it is of other variants");
+        assert!(unsealed(&one, 7, &kept[..20]).is_err());
     }
 
     #[test]

@@ -380,6 +380,7 @@ impl Kept {
 
     async fn gather_in_turn(&self, rows: &Rows, store: &Store, pool: &Pool) -> Result<(), Problem> {
         let cut = self.cut();
+        let was_done = self.state.borrow().state == StudyState::Done;
         let mut wanted = store.chunks_done(&cut).await?;
         {
             let gathered = rows.gathered.lock();
@@ -390,10 +391,10 @@ impl Kept {
         for chunks in wanted.chunk_by(|one, next| one + 1 == *next).flat_map(|run| run.chunks(at_once)) {
             let last = chunks.last().unwrap_or(&chunks[0]);
             let stored = store.parts(&cut, chunks[0], *last).await?;
-            let id = self.id.clone();
+            let cut = cut.clone();
             let unseal = move |_: &AtomicBool| {
                 let part = |stored: &toothwave_store::Kept| {
-                    Ok((stored.chunk, frozen::unsealed(&id, stored.chunk, &stored.part)?))
+                    Ok((stored.chunk, frozen::unsealed(&cut, stored.chunk, &stored.part)?))
                 };
                 stored.iter().map(part).collect::<Result<Vec<_>, Problem>>()
             };
@@ -402,9 +403,17 @@ impl Kept {
         }
         // Of one that was forgotten meanwhile there are fewer, or none, and nothing else says so.
         let is_whole = rows.gathered.lock().is_complete();
-        let is_done = self.state.borrow().state == StudyState::Done;
-        if is_done && !is_whole && !self.look(store).await? {
-            return Err(self.forgotten());
+        let is_done = || self.state.borrow().state == StudyState::Done;
+        if is_done() && !is_whole {
+            if !self.look(store).await? {
+                return Err(self.forgotten());
+            }
+            if was_done && is_done() {
+                return Err(Problem::internal(&format!(
+                    "of the study {} the store has fewer chunks than it counts: it is damaged",
+                    self.id
+                )));
+            }
         }
         Ok(())
     }

@@ -452,7 +452,7 @@ impl Workers {
             }
         };
         let (variants, refused) = (part.variants(), part.refused());
-        let bytes = match frozen::sealed(id, chunk, &part) {
+        let bytes = match frozen::sealed(&task.cut, chunk, &part) {
             Ok(bytes) => bytes,
             Err(problem) => {
                 tracing::error!(study = id, chunk, cause = problem.cause, "a chunk cannot be kept");

@@ -156,6 +156,13 @@ const STUDY: &str = "SELECT id, kind, build, document, max_states, max_profile_p
 const WAITING: &str = "SELECT id, chunk_variants, build FROM studies WHERE NOT is_cancelled AND ends_at_s > unixepoch()
     AND (opened < chunks OR EXISTS (SELECT 1 FROM chunks WHERE study = id)) ORDER BY asked_at_s, id";
 
+macro_rules! has_expired {
+    () => {
+        "asked_at_s <= unixepoch() - $1
+            AND NOT EXISTS (SELECT 1 FROM attempts WHERE study = id AND began_at_s > unixepoch() - $1)"
+    };
+}
+
 impl Store {
     /// Keeps a study, of which no chunk is open yet. Where it is kept already, perhaps in other chunks, nothing happens; whether it was not.
     ///
@@ -330,12 +337,23 @@ impl Store {
     pub async fn expire(&self, unasked_for: Duration) -> Result<u64, StoreError> {
         self.with(LONG_PATIENCE, async |connection| {
             require_schema(connection).await?;
-            let text = "DELETE FROM studies WHERE asked_at_s <= unixepoch() - $1
-                AND NOT EXISTS (SELECT 1 FROM attempts WHERE study = id AND began_at_s > unixepoch() - $1)";
             let unasked_for_s = stored(unasked_for.as_secs());
-            let gone = on!(connection, inner => {
-                sqlx::query(text).bind(unasked_for_s).execute(inner).await.map(|done| done.rows_affected())
+            let ids: Vec<String> = on!(connection, inner => {
+                sqlx::query_scalar(concat!("SELECT id FROM studies WHERE ", has_expired!())).bind(unasked_for_s).fetch_all(inner).await
             })?;
+            let mut gone = 0;
+            for id in ids {
+                // One that somebody computes yet does not keep the others.
+                let text = concat!("DELETE FROM studies WHERE id = $2 AND ", has_expired!());
+                let deleted = on!(connection, inner => {
+                    sqlx::query(text).bind(unasked_for_s).bind(id).execute(inner).await.map(|done| done.rows_affected())
+                });
+                match deleted.map_err(StoreError::from) {
+                    Ok(deleted) => gone += deleted,
+                    Err(StoreError::Locked) => {}
+                    Err(error) => return Err(error),
+                }
+            }
             Ok(gone)
         })
         .await

@@ -274,3 +274,17 @@ async fn an_answer_larger_than_all_that_may_be_unread_is_given_when_it_is_alone(
         service.ask(&large(500, 2)).await.found();
     }
 }
+
+/// Where bodies may be of megabytes, some tens of them that were nearly sent ended a service of 128 MiB.
+#[tokio::test]
+async fn bodies_that_are_long_take_room_while_they_come_and_until_they_are_answered() {
+    let service = Service::within(Limits { max_body_bytes: 4 << 20, max_unread_bytes: 4 << 20, ..LIMITS });
+    let long = format!("{}{}", " ".repeat(1 << 20), shortest());
+    let ask = async || service.ask(&Question::post("/v1/coincidence-degree", long.clone())).await;
+    assert_eq!(ask().await.status, 200);
+    assert_eq!(service.app.room.taken_bytes(), 0);
+    let others = service.app.room.reserve(3 << 20).unwrap();
+    ask().await.refused(503, "too_many_unread_bytes");
+    drop(others);
+    assert_eq!(ask().await.status, 200);
+}

@@ -8,6 +8,7 @@ use std::time::Duration;
 use futures_util::future::join_all;
 use serde_json::{Value, json};
 use sqlx::{Connection as _, SqliteConnection};
+use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
 use toothwave::compute::Pool;
 use toothwave::config::Limits;
@@ -692,6 +693,46 @@ async fn a_study_of_another_build_or_of_other_bits_is_left_to_others() {
         }
     }
     keeper.end().await;
+}
+
+/// A study in chunks of another size than it was cut into was done and complete, with some of its samples.
+#[tokio::test]
+async fn a_study_of_which_what_is_frozen_or_indexed_is_damaged_is_told_so_and_has_no_result() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, true).await;
+    let study = keeper.wait_for(&map(500)).await;
+    keeper.end().await;
+    let whole = fs::read(&file.0).unwrap();
+    for damage in [
+        "UPDATE studies SET chunk_variants = chunk_variants + 1",
+        "UPDATE studies SET chunks = chunks - 1",
+        "UPDATE studies SET variants = variants + 1",
+        // As an index does that has lost some of them.
+        "UPDATE results SET chunk = 1000 WHERE chunk = 0",
+    ] {
+        let mut damaged = SqliteConnection::connect(&format!("sqlite:{}", file.0.display())).await.unwrap();
+        let changed = sqlx::query(damage).execute(&mut damaged).await.unwrap().rows_affected();
+        damaged.close().await.unwrap();
+        assert_eq!(changed, 1, "{damage}");
+        let keeper = Keeper::of(&file, LIMITS, false).await;
+        keeper.service.get(&format!("{}/result", place(&study))).await.refused(500, "internal_error");
+        keeper.end().await;
+        fs::write(&file.0, &whole).unwrap();
+    }
+}
+
+/// Whoever waited for a silent database at the end of a stop got no answer at all.
+#[tokio::test]
+async fn who_waits_for_the_store_at_the_end_of_a_stop_is_told_so() {
+    let mute = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let address = format!("postgres://any@{}/studies?sslmode=disable", mute.local_addr().unwrap());
+    let store = Store::open(&Address::new(&address, None).unwrap()).await.unwrap();
+    let service = Service::keeping(LIMITS, Keeping::Store { store, expiry: EXPIRY, parts: None });
+    let (asker, app) = (service.clone(), std::sync::Arc::clone(&service.app));
+    let answer = tokio::spawn(async move { asker.get("/v1/studies/any").await });
+    let _silence = mute.accept().await.unwrap();
+    app.pool.close();
+    answer.await.unwrap().refused(503, "shutting_down");
 }
 
 #[tokio::test]

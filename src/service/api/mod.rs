@@ -3,6 +3,7 @@
 
 use std::cell::Cell;
 use std::io::{self, Write};
+use std::ops::Deref;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -26,7 +27,6 @@ use utoipa::IntoResponses;
 use crate::app::App;
 use crate::cache::{Cache, Provenance, Served, Spelling, Stored, etag, in_own_pages};
 use crate::compute::Thread;
-use crate::config::Limits;
 use crate::memory::Memory;
 use crate::negotiation::{self, Representation};
 use crate::problem::{Problem, ProblemCode};
@@ -134,7 +134,7 @@ fn log_design(key: Key) {
 /// A request as far as all endpoints read it alike.
 struct Asked {
     headers: HeaderMap,
-    body: Bytes,
+    body: Read,
     representation: Representation,
     deadline: tokio::time::Instant,
 }
@@ -146,7 +146,7 @@ impl Asked {
         require_no_query(&uri)?;
         negotiation::require_json(&headers)?;
         let representation = Representation::negotiate(&headers, Q::Answer::FORMS.iter().map(|(format, _)| *format))?;
-        let body = read_body(&headers, body, &app.limits, deadline).await?;
+        let body = read_body(app, &headers, body, deadline).await?;
         Ok(Self { headers, body, representation, deadline })
     }
 }
@@ -165,13 +165,27 @@ async fn respond_afresh<Q: Question>(question: Q, app: Arc<App>, request: Reques
     response
 }
 
+/// A body that was read, with the room that it takes.
+struct Read {
+    bytes: Bytes,
+    _room: Reserved,
+}
+
+impl Deref for Read {
+    type Target = Bytes;
+
+    fn deref(&self) -> &Bytes {
+        &self.bytes
+    }
+}
+
 async fn read_body(
+    app: &App,
     headers: &HeaderMap,
     body: Body,
-    limits: &Limits,
     deadline: tokio::time::Instant,
-) -> Result<Bytes, Problem> {
-    let limit = limits.max_body_bytes;
+) -> Result<Read, Problem> {
+    let limit = app.limits.max_body_bytes;
     let too_large = |length: &str| {
         let detail = format!("the body has {length}more than the {limit} bytes of `max_body_bytes`");
         Problem::new(ProblemCode::BodyTooLarge, detail)
@@ -182,22 +196,27 @@ async fn read_body(
     }
     let mut pieces = body.into_data_stream();
     // One piece of its own, and those that arrive are let go: they may be of a byte each, and hold the whole buffer that they were read into.
-    let mut whole = BytesMut::new();
+    let (mut whole, mut room) = (BytesMut::new(), app.room.reserve(0)?);
     let reading = async {
         while let Some(piece) = pieces.next().await {
             let piece = piece.map_err(|error| broken_body(&error))?;
             if piece.len() > limit - whole.len() {
                 return Err(too_large(""));
             }
+            // It grows by doubling.
+            room.hold_at_least(2 * (whole.len() + piece.len()) as u64)?;
             whole.extend_from_slice(&piece);
         }
         Ok(())
     };
-    tokio::time::timeout_at(deadline, reading).await.unwrap_or_else(|_| {
-        let detail = format!("the body did not arrive within {} ms", limits.deadline_ms);
-        Err(Problem::new(ProblemCode::RequestTimeout, detail))
-    })?;
-    Ok(whole.freeze())
+    let in_time = async {
+        tokio::time::timeout_at(deadline, reading).await.unwrap_or_else(|_| {
+            let detail = format!("the body did not arrive within {} ms", app.limits.deadline_ms);
+            Err(Problem::new(ProblemCode::RequestTimeout, detail))
+        })
+    };
+    app.pool.until_closed(in_time).await?;
+    Ok(Read { bytes: whole.freeze(), _room: room })
 }
 
 /// The problem of a body that does not end as it should.

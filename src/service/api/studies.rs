@@ -101,7 +101,11 @@ pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRej
 pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
     let cancelled = async {
         let id = id_of(id)?;
-        if app.studies.cancel_or_forget(&id).await? { Ok(StatusCode::NO_CONTENT) } else { Err(not_kept(&id)) }
+        if app.pool.until_closed(Box::pin(app.studies.cancel_or_forget(&id))).await? {
+            Ok(StatusCode::NO_CONTENT)
+        } else {
+            Err(not_kept(&id))
+        }
     };
     cancelled.await.into_response()
 }
@@ -202,7 +206,7 @@ fn no_store(mut response: Response) -> Response {
 
 async fn kept(app: &App, id: Result<Path<String>, PathRejection>) -> Result<Arc<Kept>, Problem> {
     let id = id_of(id)?;
-    app.studies.find(&id).await?.ok_or_else(|| not_kept(&id))
+    app.pool.until_closed(Box::pin(app.studies.find(&id))).await?.ok_or_else(|| not_kept(&id))
 }
 
 /// An id that is no text is no study's either, and PostgreSQL takes no text with a zero in it.
@@ -222,11 +226,11 @@ async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Respons
     require_no_query(&uri)?;
     negotiation::require_json(&headers)?;
     let representation = Representation::negotiate(&headers, std::iter::empty())?;
-    let body = read_body(&headers, body, &app.limits, deadline).await?;
+    let body = read_body(app, &headers, body, deadline).await?;
     // Its choices stand for hundreds of designs, so that a document of 64 KB may take long to be read.
     let (question, limits) = (body.clone(), app.limits.of_studies());
     let study = app.pool.run_aside(deadline, move || Ok(Study::read(&question, &limits)?)).await?;
-    let kept = app.studies.begin(study, &body, deadline).await?;
+    let kept = app.pool.until_closed(Box::pin(app.studies.begin(study, &body, deadline))).await?;
     let wait = wait_wanted(&headers);
     if let Some(wait) = wait {
         let wait_until = deadline.min(tokio::time::Instant::now() + wait);
