@@ -282,7 +282,7 @@ const fn threads_of(limits: &crate::config::Limits, is_shared: bool) -> usize {
     limits.max_concurrent_solves + 1 + if is_shared { LOOK_UPS } else { 0 }
 }
 
-/// An executor, with as many threads for solves as there are permits: with more of them each solve would wake another, whose memory is cold. They stay,
+/// An executor, with so many threads for solves: with many more than there are permits each solve would wake another, whose memory is cold. They stay,
 /// and one is there from the start: where the system refuses one and there is no other, tokio panics. So it does where it refuses one of its own, and would
 /// wait for the others for ever, but that such a panic ends the process.
 fn runtime(threads: usize) -> io::Result<Runtime> {

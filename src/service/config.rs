@@ -275,7 +275,9 @@ impl WorkerSettings {
             max_profile_points: u64::MAX,
             max_body_bytes: 0,
             // More threads would keep all of the memory between them, and leave none for what they compute.
-            max_concurrent_solves: concurrent_solves(self.max_concurrent_solves, memory_bytes, cores)
+            max_concurrent_solves: self
+                .max_concurrent_solves
+                .map_or(cores, |solves| solves as usize)
                 .min(that_fit(memory_bytes, MEMORY_PER_SOLVE_BYTES)),
             max_queued_solves: 0,
             max_concurrent_batches: 0,
@@ -292,11 +294,6 @@ impl WorkerSettings {
             header_timeout_ms: 0,
         }
     }
-}
-
-/// As many as were asked for, or as there are cores and memory for.
-fn concurrent_solves(asked: Option<u32>, memory_bytes: u64, cores: usize) -> usize {
-    asked.map_or_else(|| cores.min(that_fit(memory_bytes, MEMORY_PER_SOLVE_BYTES)), |solves| solves as usize)
 }
 
 fn that_fit(memory_bytes: u64, each_bytes: u64) -> usize {
@@ -365,7 +362,9 @@ impl Settings {
 
     /// Those on a machine with so much memory and so many cores for the process.
     fn limits_of(&self, memory_bytes: u64, cores: usize) -> Limits {
-        let max_concurrent_solves = concurrent_solves(self.max_concurrent_solves, memory_bytes, cores);
+        let solves_that_fit = that_fit(memory_bytes, MEMORY_PER_SOLVE_BYTES);
+        let max_concurrent_solves =
+            self.max_concurrent_solves.map_or_else(|| cores.min(solves_that_fit), |solves| solves as usize);
         let connections_that_fit = that_fit(memory_bytes, MEMORY_PER_CONNECTION_BYTES).min(MOST_CONNECTIONS);
         let kept_bytes = KEPT_BY_SOLVE_BYTES * max_concurrent_solves.saturating_sub(SOLVES_WITHIN) as u64;
         let shared_bytes = memory_bytes.saturating_sub(HELD_BACK_BYTES + kept_bytes).max(memory_bytes / 4);

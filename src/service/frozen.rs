@@ -158,7 +158,10 @@ fn thawed(frozen: &NewStudy) -> Result<Arc<Study>, NotHere> {
         return Err(NotHere::Unreadable("it has another id here".into()));
     }
     // What keeps it may be damaged, and the store does not see it: a study in other chunks than it was cut into would be done with some of them.
-    if (study.variants(), study.chunks()) != (frozen.variants, frozen.chunks) {
+    let cut = |variants, chunks, chunk_variants| (variants, chunks, chunk_variants);
+    if cut(study.variants(), study.chunks(), study.chunk_variants())
+        != cut(frozen.variants, frozen.chunks, frozen.chunk_variants)
+    {
         return Err(NotHere::Unreadable("it has other chunks here".into()));
     }
     Ok(Arc::new(study))

@@ -319,13 +319,14 @@ impl Lease {
     /// Where the store does not answer; the attempt then stays noted.
     pub async fn give_back(self) -> Result<(), StoreError> {
         // Whoever claims it next is to see that it was not begun.
-        for _ in 1..GIVEN_BACK {
+        let mut tries = 1;
+        loop {
             match self.store.delete_attempt(&self.cut.id, self.chunk, &self.attempt).await {
-                Err(error) if error.leaves_open() => tokio::time::sleep(PAUSE).await,
+                Err(error) if error.leaves_open() && tries < GIVEN_BACK => tries += 1,
                 done => return done,
             }
+            tokio::time::sleep(PAUSE).await;
         }
-        self.store.delete_attempt(&self.cut.id, self.chunk, &self.attempt).await
     }
 
     /// Sees to it that nothing is noted of an attempt that was not begun: a store that said nothing in time, since it does not flush for a while

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-use crate::connection::{Connection, Database, LOCK_NOT_AVAILABLE, Store, StoreError, on};
+use crate::connection::{Connection, Database, Store, StoreError, on};
 use crate::schema::require_schema;
 use crate::{BATCH_CHUNKS, LETTING_GO, LONG_PATIENCE, LOOK_AGAIN, PATIENCE, read, stored};
 
@@ -156,6 +156,7 @@ const STUDY: &str = "SELECT id, kind, build, document, max_states, max_profile_p
 const WAITING: &str = "SELECT id, chunk_variants, build FROM studies WHERE NOT is_cancelled AND ends_at_s > unixepoch()
     AND (opened < chunks OR EXISTS (SELECT 1 FROM chunks WHERE study = id)) ORDER BY asked_at_s, id";
 
+/// Nobody has asked for a study, or computed it, for so many seconds.
 macro_rules! has_expired {
     () => {
         "asked_at_s <= unixepoch() - $1
@@ -278,7 +279,7 @@ impl Store {
     /// As [`Self::create`], and [`StoreError::InWork`].
     pub async fn forget(&self, id: &str) -> Result<(), StoreError> {
         let began = Instant::now();
-        while !self.forget_at_once(id).await? {
+        while !self.forget_at_once(id, None).await? {
             if began.elapsed() >= LETTING_GO {
                 return Err(StoreError::InWork);
             }
@@ -291,31 +292,22 @@ impl Store {
         Ok(())
     }
 
-    /// Forgets a study of which no chunk is in work; whether that was so.
-    async fn forget_at_once(&self, id: &str) -> Result<bool, StoreError> {
+    /// Forgets a study of which no chunk is in work, and which nobody has wanted for so long; whether that was so.
+    async fn forget_at_once(&self, id: &str, unwanted_for: Option<Duration>) -> Result<bool, StoreError> {
         self.with(LONG_PATIENCE, async |connection| {
             require_schema(connection).await?;
             begin(connection).await?;
             if let Connection::Server(server) = &mut *connection {
                 sqlx::query("SET LOCAL lock_timeout = '10ms'").execute(&mut **server).await?;
             }
-            // Its chunks first: whoever computes one must not wait for the study meanwhile. Nor does anybody open more of them.
-            for text in [
-                "UPDATE studies SET opened = chunks WHERE id = $1",
-                "DELETE FROM chunks WHERE study = $1",
-                "DELETE FROM studies WHERE id = $1",
-            ] {
-                match on!(connection, inner => sqlx::query(text).bind(id).execute(inner).await.map(|_| ())) {
-                    Ok(()) => {}
-                    Err(sqlx::Error::Database(refused)) if refused.code().as_deref() == Some(LOCK_NOT_AVAILABLE) => {
-                        on!(connection, inner => sqlx::query("ROLLBACK").execute(inner).await.map(|_| ()))?;
-                        return Ok(false);
-                    }
-                    Err(error) => return Err(error.into()),
+            match forget_within(connection, id, unwanted_for).await {
+                Ok(true) => commit(connection).await.map(|()| true),
+                Ok(false) | Err(StoreError::Locked) => {
+                    on!(connection, inner => sqlx::query("ROLLBACK").execute(inner).await.map(|_| ()))?;
+                    Ok(false)
                 }
+                Err(error) => Err(error),
             }
-            commit(connection).await?;
-            Ok(true)
         })
         .await
     }
@@ -335,28 +327,20 @@ impl Store {
     /// # Errors
     /// As [`Self::create`].
     pub async fn expire(&self, unasked_for: Duration) -> Result<u64, StoreError> {
-        self.with(LONG_PATIENCE, async |connection| {
-            require_schema(connection).await?;
-            let unasked_for_s = stored(unasked_for.as_secs());
-            let ids: Vec<String> = on!(connection, inner => {
-                sqlx::query_scalar(concat!("SELECT id FROM studies WHERE ", has_expired!())).bind(unasked_for_s).fetch_all(inner).await
-            })?;
-            let mut gone = 0;
-            for id in ids {
-                // One that somebody computes yet does not keep the others.
-                let text = concat!("DELETE FROM studies WHERE id = $2 AND ", has_expired!());
-                let deleted = on!(connection, inner => {
-                    sqlx::query(text).bind(unasked_for_s).bind(id).execute(inner).await.map(|done| done.rows_affected())
-                });
-                match deleted.map_err(StoreError::from) {
-                    Ok(deleted) => gone += deleted,
-                    Err(StoreError::Locked) => {}
-                    Err(error) => return Err(error),
-                }
-            }
-            Ok(gone)
-        })
-        .await
+        let unasked_for_s = stored(unasked_for.as_secs());
+        let ids: Vec<String> = self
+            .with(LONG_PATIENCE, async |connection| {
+                require_schema(connection).await?;
+                let text = concat!("SELECT id FROM studies WHERE ", has_expired!());
+                Ok(on!(connection, inner => sqlx::query_scalar(text).bind(unasked_for_s).fetch_all(inner).await)?)
+            })
+            .await?;
+        let mut gone = 0;
+        for id in ids {
+            // One that somebody computes yet does not keep the others.
+            gone += u64::from(self.forget_at_once(&id, Some(unasked_for)).await?);
+        }
+        Ok(gone)
     }
 
     /// How a study stands, where it is kept.
@@ -511,6 +495,30 @@ impl Store {
         })
         .await
     }
+}
+
+/// Forgets a study, if nobody has wanted it for so long; whether that was so.
+async fn forget_within(
+    connection: &mut Connection,
+    id: &str,
+    unwanted_for: Option<Duration>,
+) -> Result<bool, StoreError> {
+    let close = "UPDATE studies SET opened = chunks WHERE id = $1";
+    on!(connection, inner => sqlx::query(close).bind(id).execute(inner).await.map(|_| ()))?;
+    if let Some(time) = unwanted_for {
+        let text = concat!("SELECT COUNT(*) FROM studies WHERE ", has_expired!(), " AND id = $2");
+        let unwanted_s = stored(time.as_secs());
+        let unwanted: i64 =
+            on!(connection, inner => sqlx::query_scalar(text).bind(unwanted_s).bind(id).fetch_one(inner).await)?;
+        if unwanted == 0 {
+            return Ok(false);
+        }
+    }
+    // Its chunks first: whoever computes one must not wait for the study meanwhile. Nor does anybody open more of them.
+    for text in ["DELETE FROM chunks WHERE study = $1", "DELETE FROM studies WHERE id = $1"] {
+        on!(connection, inner => sqlx::query(text).bind(id).execute(inner).await.map(|_| ()))?;
+    }
+    Ok(true)
 }
 
 /// Sessions of leases whose transactions are open.

@@ -281,7 +281,7 @@ async fn those_who_ask_while_it_is_solved_wait_for_that_solve() {
     // The queue has one place: a second solve would be refused.
     let askers: Vec<_> = (0..100).map(|_| asked(&service, question("/v1/sweep"))).collect();
     settle().await;
-    assert_eq!(service.app.pool.waiting(), 1);
+    assert_eq!(service.app.pool.admitted(), 2);
     occupied.end().await;
     let mut answers = Vec::new();
     for asker in askers {
@@ -297,13 +297,13 @@ async fn those_who_wait_get_their_answer_even_if_the_first_to_ask_leaves() {
     let service = Service::within(Limits { max_concurrent_solves: 1, max_queued_solves: 1, ..LIMITS });
     let occupied = Occupied::by_one(&service.app.pool).await;
     let first = asked(&service, question("/v1/sweep"));
-    until("the first waits", || service.app.pool.waiting() == 1).await;
+    until("the first is admitted", || service.app.pool.admitted() == 2).await;
     let followers: Vec<_> = (0..10).map(|_| asked(&service, question("/v1/sweep"))).collect();
     settle().await;
     first.abort();
     assert!(first.await.unwrap_err().is_cancelled());
     settle().await;
-    assert_eq!(service.app.pool.waiting(), 1, "its solve goes on");
+    assert_eq!(service.app.pool.admitted(), 2, "its solve goes on");
     occupied.end().await;
     for follower in followers {
         let answer = follower.await.unwrap();
@@ -331,7 +331,7 @@ async fn a_solve_whose_clients_have_all_left_is_stopped_and_the_next_to_ask_gets
 
     let occupied = Occupied::by_one(&service.app.pool).await;
     let first = asked(&service, question("/v1/sweep"));
-    until("the first waits", || service.app.pool.waiting() == 1).await;
+    until("the first is admitted", || service.app.pool.admitted() == 2).await;
     first.abort();
     let second = asked(&service, question("/v1/sweep"));
     assert!(first.await.unwrap_err().is_cancelled());

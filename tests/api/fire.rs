@@ -873,7 +873,7 @@ async fn a_joiner_is_answered_though_the_time_of_the_first_is_over() {
     };
     crate::asking::until("the pool is occupied", || service.app.pool.running() == 1).await;
     let first = ask();
-    crate::asking::until("the first waits", || service.app.pool.waiting() == 1).await;
+    crate::asking::until("the first waits", || service.app.pool.admitted() == 2).await;
     tokio::time::advance(Duration::from_millis(600)).await;
     let joiner = ask();
     for _ in 0..1000 {

@@ -20,7 +20,7 @@ fn large(samples: u32, torque_nm: u32) -> Question {
 }
 
 fn is_idle(pool: &Pool) -> bool {
-    (pool.running(), pool.waiting()) == (0, 0)
+    (pool.running(), pool.admitted()) == (0, 0)
 }
 
 /// What answers however full the service is.
@@ -91,19 +91,19 @@ async fn exactly_as_many_are_admitted_as_run_and_wait() {
     let limits = Limits { max_concurrent_solves: 2, max_queued_solves: 3, ..LIMITS };
     let service = Service::within(limits);
     let (one, other) = (Occupied::by_one(&service.app.pool).await, Occupied::by_one(&service.app.pool).await);
-    assert_eq!((service.app.pool.running(), service.app.pool.waiting()), (2, 0));
+    assert_eq!((service.app.pool.running(), service.app.pool.admitted()), (2, 2));
     let mut waiting = Vec::new();
     for torque_nm in 1..=3 {
-        let (asker, before) = (service.clone(), service.app.pool.waiting());
+        let (asker, admitted) = (service.clone(), service.app.pool.admitted());
         waiting.push(tokio::spawn(async move { asker.ask(&large(50, torque_nm)).await }));
-        until("one more waits", || service.app.pool.waiting() == before + 1).await;
+        until("one more waits", || service.app.pool.admitted() == admitted + 1).await;
     }
     for torque_nm in 4..=9 {
         let problem = service.ask(&large(50, torque_nm)).await.refused(503, "queue_full");
         let detail = problem["detail"].as_str().unwrap();
         assert!(detail.contains('2') && detail.contains('3'), "the limits are not in `{detail}`");
     }
-    assert_eq!((service.app.pool.running(), service.app.pool.waiting()), (2, 3));
+    assert_eq!((service.app.pool.running(), service.app.pool.admitted()), (2, 5));
     one.end().await;
     other.end().await;
     for asker in waiting {
@@ -161,7 +161,7 @@ async fn waiting_counts_towards_the_deadline_and_gives_its_place_back() {
     // Not through the deadline of the pool itself: this one holds on.
     let occupied = Occupied::by_one(&service.app.pool).await;
     service.ask(&large(50, 1)).await.refused(503, "deadline_exceeded");
-    assert_eq!(service.app.pool.waiting(), 0, "only the solve runs");
+    assert_eq!(service.app.pool.admitted(), 1, "only the solve that runs");
     drop(occupied);
     until("the pool is idle", || is_idle(&service.app.pool)).await;
 }
@@ -277,7 +277,7 @@ async fn an_answer_larger_than_all_that_may_be_unread_is_given_when_it_is_alone(
 
 /// Where bodies may be of megabytes, some tens of them that were nearly sent ended a service of 128 MiB.
 #[tokio::test]
-async fn bodies_that_are_long_take_room_while_they_come_and_until_they_are_answered() {
+async fn bodies_that_are_long_take_room_until_they_are_read() {
     let service = Service::within(Limits { max_body_bytes: 4 << 20, max_unread_bytes: 4 << 20, ..LIMITS });
     let long = format!("{}{}", " ".repeat(1 << 20), shortest());
     let ask = async || service.ask(&Question::post("/v1/coincidence-degree", long.clone())).await;
@@ -287,4 +287,10 @@ async fn bodies_that_are_long_take_room_while_they_come_and_until_they_are_answe
     ask().await.refused(503, "too_many_unread_bytes");
     drop(others);
     assert_eq!(ask().await.status, 200);
+    // What comes of one may take all the room, made or kept.
+    let document = with(&spelled_out(), "/sweep/samples", json!(2000)).to_string();
+    for _ in 0..2 {
+        let long = format!("{}{document}", " ".repeat(3 << 19));
+        assert_eq!(service.ask(&Question::post("/v1/sweep", long)).await.status, 200);
+    }
 }

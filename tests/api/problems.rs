@@ -418,6 +418,6 @@ async fn a_panic_is_an_internal_error_that_tells_nothing_of_itself() {
         let problem = pool.run::<()>(pool.deadline(), thread, |_| panic!("the flux capacitor")).await.unwrap_err();
         assert_eq!(problem.status, 500);
         assert!(!serde_json::to_string(&problem).unwrap().contains("flux"), "{problem}");
-        assert_eq!((pool.running(), pool.waiting()), (0, 0), "and its permit is back");
+        assert_eq!((pool.running(), pool.admitted()), (0, 0), "and its permit is back");
     }
 }

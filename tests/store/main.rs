@@ -377,6 +377,23 @@ async fn a_study_that_nobody_asks_for_and_nobody_computes_expires_though_it_wait
     .await;
 }
 
+/// One that a worker had in its hands kept all others.
+#[tokio::test]
+async fn a_study_that_is_in_work_does_not_keep_others_from_expiring() {
+    let Some(address) = server() else { return };
+    let _nobody = SERVER.write().await;
+    let store = migrated(&address).await;
+    let (held, left) = (study("held-yet", 1), study("left", 1));
+    store.create(&held).await.unwrap();
+    store.create(&left).await.unwrap();
+    let lease = store.hold(&held.cut(), LEASE).await.unwrap();
+    assert!(lease.is_some() && store.expire(Duration::ZERO).await.unwrap() >= 1);
+    assert_eq!(store.find(&left.id).await.unwrap(), None);
+    assert!(store.find(&held.id).await.unwrap().is_some_and(|standing| standing.is_running()));
+    drop(lease);
+    store.forget(&held.id).await.unwrap();
+}
+
 /// The file's store as it is when so many seconds more have passed since anybody asked.
 async fn unasked_for(file: &File, seconds: u64) -> Store {
     let mut later = SqliteConnection::connect(&format!("sqlite:{}", file.0.display())).await.unwrap();
@@ -508,6 +525,13 @@ async fn stranger(address: &Address) -> PgConnection {
     PgConnection::connect_with(options).await.unwrap()
 }
 
+/// Begins to note an attempt at the first chunk, or to take one back: others who do wait until that has come to its end.
+async fn note_as_the_store_does(session: &mut PgConnection, study: &NewStudy) {
+    sqlx::raw_sql("BEGIN").execute(&mut *session).await.unwrap();
+    let lock = "SELECT pg_advisory_xact_lock(hashtextextended($1, 0))";
+    sqlx::query(lock).bind(&study.id).execute(session).await.unwrap();
+}
+
 /// Where the server does not flush for a while what was to be noted stands there, seen by nobody, and three such attempts were a gap.
 #[tokio::test]
 async fn an_attempt_that_is_still_being_noted_is_taken_back_when_that_has_come_to_its_end() {
@@ -521,9 +545,7 @@ async fn an_attempt_that_is_still_being_noted_is_taken_back_when_that_has_come_t
         let waiting = "SELECT COUNT(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted";
         while sqlx::query_scalar::<_, i64>(waiting).fetch_one(&mut other).await.unwrap() == 0 {}
     };
-    let lock = "SELECT pg_advisory_xact_lock(hashtextextended($1, 0))";
-    sqlx::raw_sql("BEGIN").execute(&mut noting).await.unwrap();
-    sqlx::query(lock).bind(&study.id).execute(&mut noting).await.unwrap();
+    note_as_the_store_does(&mut noting, &study).await;
     let mut claimed = Box::pin(claimed(&store, &study));
     tokio::select! {
         _ = &mut claimed => panic!("whoever notes an attempt waits for others"),
@@ -531,12 +553,9 @@ async fn an_attempt_that_is_still_being_noted_is_taken_back_when_that_has_come_t
     }
     sqlx::raw_sql("COMMIT").execute(&mut noting).await.unwrap();
     let lease = claimed.await;
-    // As the store does it, but for the end.
-    sqlx::raw_sql("BEGIN").execute(&mut noting).await.unwrap();
+    note_as_the_store_does(&mut noting, &study).await;
     let noted = "INSERT INTO attempts SELECT study, chunk, worker, began_at_s FROM attempts WHERE study = $1";
-    for text in [lock, noted] {
-        sqlx::query(text).bind(&study.id).execute(&mut noting).await.unwrap();
-    }
+    sqlx::query(noted).bind(&study.id).execute(&mut noting).await.unwrap();
     let mut given_back = Box::pin(lease.give_back());
     tokio::select! {
         _ = &mut given_back => panic!("nobody knows what is being noted"),
@@ -565,9 +584,7 @@ async fn an_attempt_of_which_nobody_knows_whether_it_was_noted_is_taken_back() {
         }
     };
     let (mut noting, mut other) = (stranger(&address).await, stranger(&address).await);
-    let lock = "SELECT pg_advisory_xact_lock(hashtextextended($1, 0))";
-    sqlx::raw_sql("BEGIN").execute(&mut noting).await.unwrap();
-    sqlx::query(lock).bind(&study.id).execute(&mut noting).await.unwrap();
+    note_as_the_store_does(&mut noting, &study).await;
     let mut begun = Box::pin(lease.begin());
     let ended = async {
         let end = "SELECT pg_terminate_backend(pid) FROM pg_locks JOIN pg_database ON database = pg_database.oid

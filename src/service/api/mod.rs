@@ -87,11 +87,14 @@ async fn walk<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Resu
     let known = app.cache.key(spelling).and_then(|key| app.cache.get(key).map(|stored| (key, stored)));
     let (key, stored, served) = match known {
         Some((key, stored)) => {
+            drop(body);
             log_design(key);
             (key, stored, Served::Hit)
         }
         None => {
             let design = Design::read(&body)?;
+            // The answer may want all the room.
+            drop(body);
             let key = question.key(&design, &representation);
             log_design(key);
             let (stored, served) = match app.cache.get(key) {
@@ -156,6 +159,7 @@ async fn respond_afresh<Q: Question>(question: Q, app: Arc<App>, request: Reques
     let walk = async {
         let Asked { body, representation, deadline, .. } = Asked::read::<Q>(&app, request).await?;
         let checked = question.check(&Design::read(&body)?, &app.limits.of_calculation())?;
+        drop(body);
         let room = app.room.clone();
         let job = move |stop: &AtomicBool| solve::<Q>(&checked, representation, &room, None, stop);
         with_body(&app.room, app.pool.run(deadline, Thread::Blocking, job).await?, representation)

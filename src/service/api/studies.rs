@@ -101,7 +101,7 @@ pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRej
 pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
     let cancelled = async {
         let id = id_of(id)?;
-        if app.pool.until_closed(Box::pin(app.studies.cancel_or_forget(&id))).await? {
+        if app.pool.until_closed(app.studies.cancel_or_forget(&id)).await? {
             Ok(StatusCode::NO_CONTENT)
         } else {
             Err(not_kept(&id))
@@ -206,7 +206,7 @@ fn no_store(mut response: Response) -> Response {
 
 async fn kept(app: &App, id: Result<Path<String>, PathRejection>) -> Result<Arc<Kept>, Problem> {
     let id = id_of(id)?;
-    app.pool.until_closed(Box::pin(app.studies.find(&id))).await?.ok_or_else(|| not_kept(&id))
+    app.pool.until_closed(app.studies.find(&id)).await?.ok_or_else(|| not_kept(&id))
 }
 
 /// An id that is no text is no study's either, and PostgreSQL takes no text with a zero in it.
@@ -230,7 +230,7 @@ async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Respons
     // Its choices stand for hundreds of designs, so that a document of 64 KB may take long to be read.
     let (question, limits) = (body.clone(), app.limits.of_studies());
     let study = app.pool.run_aside(deadline, move || Ok(Study::read(&question, &limits)?)).await?;
-    let kept = app.pool.until_closed(Box::pin(app.studies.begin(study, &body, deadline))).await?;
+    let kept = app.pool.until_closed(app.studies.begin(study, &body, deadline)).await?;
     let wait = wait_wanted(&headers);
     if let Some(wait) = wait {
         let wait_until = deadline.min(tokio::time::Instant::now() + wait);
@@ -283,7 +283,7 @@ async fn written_apart<A: Forms + Send>(
     representation: Representation,
     told: impl FnOnce(StudyAnswer) -> A + Send + 'static,
 ) -> Result<Response, Problem> {
-    let reading = app.studies.read(kept, app.pool.deadline()).await?;
+    let reading = app.pool.until_closed(app.studies.read(kept, app.pool.deadline())).await?;
     let (room, columns_bytes) = (app.room.clone(), reading.columns_bytes());
     let job = move |stop: &AtomicBool| {
         let reserved = room.reserve(columns_bytes)?;
