@@ -137,6 +137,13 @@ pub fn require_origin(theirs: &str) -> Result<(), NotHere> {
     }
 }
 
+/// What is kept of a study besides its rows, about.
+pub fn view_bytes(study: &Study) -> u64 {
+    /// The study itself, what is noted of it, its places in lists.
+    const OTHER_BYTES: u64 = 4096;
+    OTHER_BYTES + study.kept_bytes() - study.stored_bytes()
+}
+
 /// The study that was frozen, or why it is none here.
 ///
 /// # Errors

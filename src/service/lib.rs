@@ -27,6 +27,7 @@ pub mod query;
 pub mod room;
 pub mod router;
 pub mod serve;
+pub mod shelf;
 pub mod socket;
 pub mod studies;
 pub mod worker;

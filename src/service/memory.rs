@@ -65,8 +65,8 @@ impl Memory {
         most_bytes
     }
 
-    /// Looks for ever, where the machine tells, and has give way what can where memory is scarce.
-    pub async fn watch(self, give_way: impl Fn()) {
+    /// Looks for ever, where the machine tells, and has give way what can where memory is scarce; the log says then what is not done.
+    pub async fn watch(self, not_done: &str, give_way: impl Fn()) {
         // Opened once: where the process has no more files that must not end the watch.
         let (Some(memory_bytes), Ok(status)) = (machine::memory_bytes(), Status::open()) else { return };
         let most_bytes = self.set_size(memory_bytes);
@@ -76,11 +76,7 @@ impl Memory {
             if let Ok(held_bytes) = status.held_bytes() {
                 let is_scarce = held_bytes > most_bytes;
                 if is_scarce && said.is_none_or(|said| said.elapsed() > SAY) {
-                    tracing::warn!(
-                        held_bytes,
-                        memory_bytes,
-                        "memory is scarce: no large answer is begun, those that are made are given up"
-                    );
+                    tracing::warn!(held_bytes, memory_bytes, "memory is scarce: {not_done}");
                     said = Some(Instant::now());
                 }
                 self.set_scarce(is_scarce);

@@ -38,6 +38,9 @@ use crate::socket::{Seen, Socket};
 use crate::studies::Keeping;
 use crate::worker::{Capacity, PART_OF_CHUNKS, Workers};
 
+/// What is not done while memory is scarce.
+const NO_LARGE_ANSWER: &str = "no large answer is begun, those that are made are given up";
+
 /// How long the service still listens at least after it has said that it is not ready, so that whoever asks can learn it.
 const NOTICE: Duration = Duration::from_millis(200);
 
@@ -133,7 +136,7 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
     tokio::spawn({
         let app = Arc::clone(&app);
         // Before clients are refused.
-        app.pool.memory().clone().watch(move || app.cache.let_go())
+        app.pool.memory().clone().watch(NO_LARGE_ANSWER, move || app.cache.let_go())
     });
     let store = tokio::spawn({
         let app = Arc::clone(&app);
@@ -219,7 +222,7 @@ pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: O
         admitted_states: 0,
     };
     let pool = Pool::new(limits);
-    tokio::spawn(pool.memory().clone().watch(|| {}));
+    tokio::spawn(pool.memory().clone().watch("no chunk is begun while another is in work", || {}));
     let workers = Workers::new(store, parts, pool, capacity, changed, stopping.clone(), patience);
     let stop = async {
         told_to_stop().await;

@@ -26,7 +26,7 @@ use utoipa::ToSchema;
 
 use crate::compute::{Lane, Pool, SMALL_VARIANT_BYTES, Slice};
 use crate::config::Limits;
-use crate::frozen;
+use crate::frozen::{self, view_bytes};
 use crate::parts::Parts;
 use crate::problem::{Problem, ProblemCode};
 use crate::room::{self, Room};
@@ -490,13 +490,6 @@ async fn note_asked(store: &Store, id: &str) {
 /// Whether a study's answer is made apart: that of a tolerance study is short, and its rows have to be sorted for it. That of a map is its rows.
 fn is_made_apart(study: &Study) -> bool {
     study.kind() == "tolerance" && study.stored_bytes() >= LARGE_BYTES
-}
-
-/// What is kept of a study besides its rows.
-fn view_bytes(study: &Study) -> u64 {
-    /// The study itself, what is noted of it, its places in lists.
-    const OTHER_BYTES: u64 = 4096;
-    OTHER_BYTES + study.kept_bytes() - study.stored_bytes()
 }
 
 /// Whether a stored study need not be begun.

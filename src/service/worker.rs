@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::convert::Infallible;
 use std::error::Error;
 use std::future;
+use std::mem;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -12,19 +13,19 @@ use bytes::Bytes;
 use futures_util::future::join_all;
 use metrics::counter;
 use parking_lot::Mutex;
-use tokio::sync::{OnceCell, Semaphore, SemaphorePermit, watch};
+use tokio::sync::{OnceCell, OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
 use tokio_util::sync::CancellationToken;
 use toothwave_calculation::no_answer::NoAnswer;
-use toothwave_store::{Claim, Lease, MOST_ATTEMPTS, Store, StoreError, Waiting};
+use toothwave_store::{Claim, Lease, MOST_ATTEMPTS, NewStudy, Store, StoreError, Waiting};
 use toothwave_study::{Interrupted, Part, Study, Work};
 
 use crate::compute::{Lane, Pool, SMALL_VARIANT_BYTES, Slice};
-use crate::frozen::{self, NotHere};
+use crate::frozen::{self, NotHere, view_bytes};
 #[cfg(feature = "fault-injection")]
 use crate::injected;
 use crate::parts::Parts;
 use crate::problem::Problem;
-use crate::room;
+use crate::shelf::{SharedRoom, Shelf, Takes};
 
 /// Between two looks at what there is to do, and at what was cancelled.
 const PAUSE: Duration = Duration::from_secs(1);
@@ -34,6 +35,9 @@ const ALONE: Duration = Duration::from_secs(3);
 
 /// Between two looks at memory that is scarce.
 const SCARCE_PAUSE: Duration = Duration::from_millis(20);
+
+/// After so long nothing that is held of scarce memory is given back by itself: what the allocator keeps is used again by who asks it.
+const LONGEST_SCARCE: Duration = Duration::from_secs(10);
 
 /// Of a `worker`'s memory, or of what unread answers may take, chunks that are in work may take such a part.
 pub const PART_OF_CHUNKS: u64 = 8;
@@ -56,12 +60,15 @@ pub struct Workers {
     stopping: CancellationToken,
     /// What a chunk that is in work then gets to come to its end.
     patience: Duration,
-    known: Mutex<HashMap<Waiting, Arc<OnceCell<Known>>>>,
+    known: Mutex<HashMap<Waiting, Arc<Seen>>>,
+    shelf: Shelf<Waiting, Ours>,
     /// One for each chunk that may be in work here: all of them for one that is computed beside none.
     side_by_side: Semaphore,
     /// Chunks of each study that are in work here.
     in_work: Mutex<HashMap<String, usize>>,
-    room: RoomOfChunks,
+    room: SharedRoom,
+    /// Held by the chunk that is computed though memory is scarce.
+    though_scarce: Semaphore,
     /// What was last said of each.
     troubles: Mutex<BTreeMap<What, String>>,
 }
@@ -73,7 +80,7 @@ pub struct Capacity {
     pub slots: usize,
     /// Besides, one of each of so many other studies: a chunk may be long, and they are not to wait for its end. All of them are computed in slices that take turns.
     pub slots_for_others: usize,
-    /// What all chunks that are in work may take at once, beside the variants that are computed.
+    /// What all chunks that are in work may take at once, beside the variants that are computed; and what all studies may that they are of.
     pub chunks_bytes: u64,
     /// What a variant may take while it is computed,
     pub variant_bytes: u64,
@@ -105,23 +112,43 @@ impl What {
     }
 }
 
-/// A study that this process computes, or why it does not.
-type Known = Result<Ours, NotHere>;
-
-/// A study that this process computes.
-#[derive(Debug, Clone)]
-struct Ours {
-    study: Arc<Study>,
-    /// Of its chunks.
-    lease: Duration,
-    /// What a variant of it may take while it is computed.
-    most_bytes: u64,
+/// What is known of a study that waits, whether or not it is read.
+#[derive(Debug, Default)]
+struct Seen {
+    /// Whether this process computes it, or why not.
+    verdict: OnceCell<Result<(), NotHere>>,
+    /// What it takes once it is read, as far as is known; held while it is read.
+    bytes: tokio::sync::Mutex<u64>,
 }
 
-/// Why it is not known of a study whether this process computes it.
+/// A study that this process computes.
+#[derive(Debug)]
+struct Ours {
+    study: Arc<Study>,
+    frozen: NewStudy,
+    /// What a variant of it may take while it is computed.
+    most_bytes: u64,
+    _room: OwnedSemaphorePermit,
+}
+
+impl Ours {
+    fn bytes_of(study: &Study, frozen: &NewStudy) -> u64 {
+        view_bytes(study) + frozen.document.len() as u64
+    }
+}
+
+impl Takes for Ours {
+    fn bytes(&self) -> u64 {
+        Self::bytes_of(&self.study, &self.frozen)
+    }
+}
+
+/// Why a study is not to be had now.
 enum Unseen {
     /// It waits no more.
     Gone,
+    /// Others that are in use take all the room, or it is just being read.
+    NotNow,
     Problem(Problem),
 }
 
@@ -163,36 +190,6 @@ impl Drop for InWork<'_> {
     }
 }
 
-/// Room for what chunks in work come to. Those that come to more than a slot's share are counted: together they take no more than all the room, or one is alone. The
-/// others are not: there are no more of them than slots, so that they take no more than as much again.
-#[derive(Debug)]
-struct RoomOfChunks {
-    free: Semaphore,
-    all_bytes: u64,
-    share_bytes: u64,
-}
-
-impl RoomOfChunks {
-    fn new(all_bytes: u64, slots: usize) -> Self {
-        let free = Semaphore::new(room::permits(all_bytes) as usize);
-        Self { free, all_bytes, share_bytes: all_bytes / slots.max(1) as u64 }
-    }
-
-    fn permits(&self, bytes: u64) -> u32 {
-        if bytes <= self.share_bytes { 0 } else { room::permits(bytes.min(self.all_bytes)) }
-    }
-
-    /// Room for so many bytes, when there is: those who wait have it in turn. None while there is none for who does not wait.
-    async fn take(&self, bytes: u64, waits: bool) -> Option<SemaphorePermit<'_>> {
-        let permits = self.permits(bytes);
-        // An error says besides that the semaphore is closed, which it never is.
-        match self.free.try_acquire_many(permits) {
-            Err(_) if waits => self.free.acquire_many(permits).await.ok(),
-            taken => taken.ok(),
-        }
-    }
-}
-
 /// The studies that wait, as far as is known.
 type Tasks = watch::Receiver<Arc<Vec<Waiting>>>;
 
@@ -209,8 +206,25 @@ impl Workers {
     ) -> Self {
         let (known, in_work, troubles) = Default::default();
         let side_by_side = Semaphore::new(capacity.all_slots());
-        let room = RoomOfChunks::new(capacity.chunks_bytes, capacity.all_slots());
-        Self { store, parts, pool, capacity, changed, stopping, patience, known, side_by_side, room, in_work, troubles }
+        let shelf = Shelf::new(capacity.chunks_bytes, capacity.all_slots());
+        let room = SharedRoom::new(capacity.chunks_bytes, capacity.all_slots());
+        let though_scarce = Semaphore::new(1);
+        Self {
+            store,
+            parts,
+            pool,
+            capacity,
+            changed,
+            stopping,
+            patience,
+            known,
+            shelf,
+            side_by_side,
+            in_work,
+            room,
+            though_scarce,
+            troubles,
+        }
     }
 
     /// Works until it is told to stop.
@@ -232,6 +246,7 @@ impl Workers {
                 Ok(waiting) => {
                     self.is_well(What::Reading);
                     self.known.lock().retain(|task, _| waiting.contains(task));
+                    self.shelf.retain(|task| waiting.contains(task));
                     tell.send_replace(Arc::new(waiting));
                 }
                 // What was begun may go on: it is kept when the store is back.
@@ -265,31 +280,22 @@ impl Workers {
                 }
                 let task = &waiting[index];
                 let Some(one_more) = InWork::one_more(&self.in_work, &task.cut.id, most_in_work) else { continue };
-                // A canary that is begun is no chunk: whoever is told to stop leaves it.
-                let found = tokio::select! {
-                    biased;
-                    () = self.stopping.cancelled() => return,
-                    found = self.study(task) => found,
-                };
-                let Some(ours) = found else { continue };
                 // Of each study one waits for room at most, so that each gets some in turn.
-                let has_room = async {
-                    let bytes = chunk_bytes(&ours.study, self.parts.is_some());
-                    let room = self.room.take(bytes, one_more.is_first).await;
-                    // What is in work comes to its end, and is let go, before more is begun.
-                    while room.is_some() && self.pool.memory().is_scarce() {
-                        tokio::time::sleep(SCARCE_PAUSE).await;
-                    }
-                    room
+                let waits = one_more.is_first;
+                let ready = async {
+                    let ours = self.study(task, waits).await?;
+                    let room = self.room.take(chunk_bytes(&ours.study, self.parts.is_some()), waits).await?;
+                    Some((ours, room, self.memory().await))
                 };
-                let room = tokio::select! {
+                // A canary that is begun is no chunk: whoever is told to stop leaves it.
+                let ready = tokio::select! {
                     biased;
                     () = self.stopping.cancelled() => return,
                     // It was cancelled, or forgotten.
                     _ = tasks.wait_for(|waiting| !waiting.contains(task)) => None,
-                    room = has_room => room,
+                    ready = ready => ready,
                 };
-                let Some(_room) = room else { continue };
+                let Some((ours, _room, _memory)) = ready else { continue };
                 // One whose attempt is being noted is claimed, and then given back.
                 match self.claim(task, &ours).await {
                     Ok((Claim::Chunk(lease), _)) if self.stopping.is_cancelled() => return give_up(lease).await,
@@ -331,7 +337,7 @@ impl Workers {
     /// beside none, so that no other is taken for that.
     async fn claim(&self, task: &Waiting, ours: &Ours) -> Result<(Claim, Option<SemaphorePermit<'_>>), StoreError> {
         let held = async {
-            let Some(lease) = self.store.hold(&task.cut, ours.lease).await? else { return Ok(None) };
+            let Some(lease) = self.store.hold(&task.cut, ours.frozen.lease).await? else { return Ok(None) };
             let is_suspect = lease.attempts().await? + 1 >= MOST_ATTEMPTS;
             Ok::<_, StoreError>(Some((lease, is_suspect)))
         };
@@ -356,23 +362,44 @@ impl Workers {
         Ok((lease.begin().await?, beside))
     }
 
-    /// The study, where this process computes it: of this build, with a canary of the same bits.
-    async fn study(&self, task: &Waiting) -> Option<Ours> {
-        // Whoever wants this one waits for its canary, and nobody else.
-        let known = Arc::clone(self.known.lock().entry(task.clone()).or_default());
-        let found = known.get_or_try_init(|| async {
-            let found = match frozen::require_origin(&task.origin) {
-                Ok(()) => self.admitted(task).await?,
-                Err(reason) => Err(reason),
-            };
-            if let Err(reason) = &found {
-                tracing::warn!(study = task.cut.id, %reason, "a study is left to other workers");
+    /// Waits while memory is scarce, so that what is in work comes to its end and is let go before more is begun. Where nothing is, that would be for ever:
+    /// one is begun all the same after a while, beside none.
+    async fn memory(&self) -> Option<SemaphorePermit<'_>> {
+        let asked = Instant::now();
+        while self.pool.memory().is_scarce() {
+            self.shelf.clear();
+            let is_none_in_work = self.side_by_side.available_permits() == self.capacity.all_slots();
+            if is_none_in_work
+                && asked.elapsed() > LONGEST_SCARCE
+                && let Ok(alone) = self.though_scarce.try_acquire()
+            {
+                return Some(alone);
             }
-            Ok::<_, Unseen>(found)
-        });
-        match found.await {
-            Ok(found) => found.clone().ok(),
-            Err(Unseen::Gone) => None,
+            tokio::time::sleep(SCARCE_PAUSE).await;
+        }
+        None
+    }
+
+    /// The study, where this process computes it: of this build, with a canary of the same bits. None for now where it has no room, for who does not wait.
+    async fn study(&self, task: &Waiting, waits: bool) -> Option<Arc<Ours>> {
+        let seen = Arc::clone(self.known.lock().entry(task.clone()).or_default());
+        // Whoever wants this one waits for its canary, and nobody else.
+        let ours = async {
+            let verdict = seen.verdict.get_or_try_init(|| self.judged(task, &seen)).await?;
+            if verdict.is_err() {
+                return Ok(None);
+            }
+            match self.read(task, &seen, waits).await? {
+                Ok(ours) => Ok(Some(ours)),
+                Err(reason) => {
+                    self.leave_to_others(task, reason);
+                    Ok(None)
+                }
+            }
+        };
+        match ours.await {
+            Ok(ours) => ours,
+            Err(Unseen::Gone | Unseen::NotNow) => None,
             // Another time.
             Err(Unseen::Problem(problem)) => {
                 tracing::warn!(study = task.cut.id, %problem, cause = problem.cause, "a study could not be looked at");
@@ -381,31 +408,70 @@ impl Workers {
         }
     }
 
-    async fn admitted(&self, task: &Waiting) -> Result<Known, Unseen> {
-        let standing = self.store.find(&task.cut.id).await.map_err(Problem::from)?;
-        let standing = standing.filter(|standing| standing.study.cut() == task.cut).ok_or(Unseen::Gone)?;
-        let study = match frozen::thaw(&self.pool, &standing.study).await? {
-            Ok(study) => study,
-            Err(reason) => return Ok(Err(reason)),
+    /// Whether this process computes a study.
+    async fn judged(&self, task: &Waiting, seen: &Seen) -> Result<Result<(), NotHere>, Unseen> {
+        let judged = async {
+            if let Err(reason) = frozen::require_origin(&task.origin) {
+                return Ok(Err(reason));
+            }
+            let ours = match self.read(task, seen, true).await? {
+                Ok(ours) => ours,
+                Err(reason) => return Ok(Err(reason)),
+            };
+            let started = Instant::now();
+            let heard = frozen::heard(&self.pool, &ours.study, &ours.frozen, ours.most_bytes).await?;
+            let (canary_variants, canary_ms) = (ours.frozen.canary_variants, milliseconds(started.elapsed()));
+            tracing::info!(study = task.cut.id, canary_variants, canary_ms, is_same = heard.is_ok(), "a canary sang");
+            Ok::<_, Unseen>(heard)
         };
+        let judged = judged.await?;
+        if let Err(reason) = &judged {
+            say_left_to_others(task, reason);
+        }
+        Ok(judged)
+    }
+
+    /// A study as it is stored, or on the shelf.
+    async fn read(&self, task: &Waiting, seen: &Seen, waits: bool) -> Result<Result<Arc<Ours>, NotHere>, Unseen> {
         let Capacity { variant_bytes, admitted_states, .. } = self.capacity;
-        let most_bytes = if standing.study.max_states <= admitted_states { u64::MAX } else { variant_bytes };
-        let started = Instant::now();
-        let heard = frozen::heard(&self.pool, &study, &standing.study, most_bytes).await?;
-        let canary_ms = milliseconds(started.elapsed());
-        tracing::info!(
-            study = task.cut.id,
-            canary_variants = standing.study.canary_variants,
-            canary_ms,
-            is_same = heard.is_ok(),
-            "a canary sang"
-        );
-        Ok(heard.map(|()| Ours { study, lease: standing.study.lease, most_bytes }))
+        let mut bytes = match seen.bytes.try_lock() {
+            Err(_) if waits => seen.bytes.lock().await,
+            held => held.map_err(|_| Unseen::NotNow)?,
+        };
+        loop {
+            if let Some(ours) = self.shelf.get(task) {
+                return Ok(Ok(ours));
+            }
+            // Until it was read once nobody knows what it takes.
+            let room = self.shelf.room(*bytes, waits).await.ok_or(Unseen::NotNow)?;
+            let standing = self.store.find(&task.cut.id).await.map_err(Problem::from)?;
+            let standing = standing.filter(|standing| standing.study.cut() == task.cut).ok_or(Unseen::Gone)?;
+            let frozen = standing.study;
+            let study = match frozen::thaw(&self.pool, &frozen).await? {
+                Ok(study) => study,
+                Err(reason) => return Ok(Err(reason)),
+            };
+            let known_bytes = mem::replace(&mut *bytes, Ours::bytes_of(&study, &frozen));
+            if known_bytes < *bytes && !self.shelf.is_small(*bytes) {
+                continue;
+            }
+            let most_bytes = if frozen.max_states <= admitted_states { u64::MAX } else { variant_bytes };
+            let ours = Arc::new(Ours { study, frozen, most_bytes, _room: room });
+            self.shelf.put(task.clone(), &ours);
+            return Ok(Ok(ours));
+        }
+    }
+
+    /// A study is not computed here after all.
+    fn leave_to_others(&self, task: &Waiting, reason: NotHere) {
+        say_left_to_others(task, &reason);
+        let seen = Seen { verdict: OnceCell::new_with(Some(Err(reason))), ..Seen::default() };
+        self.known.lock().insert(task.clone(), Arc::new(seen));
     }
 
     /// Computes a chunk and keeps what it comes to, unless it is not wanted any more.
     async fn compute(&self, lane: &mut Lane, task: &Waiting, ours: &Ours, mut lease: Lease, tasks: &mut Tasks) {
-        let &Ours { ref study, most_bytes, .. } = ours;
+        let Ours { study, most_bytes, .. } = ours;
         let (id, chunk) = (&task.cut.id, lease.chunk());
         let time_is_over = async {
             self.stopping.cancelled().await;
@@ -420,7 +486,7 @@ impl Workers {
         };
         tokio::pin!(is_over);
         let running = async {
-            let (part, busy) = match run_chunk(&self.pool, lane, study, chunk, most_bytes).await? {
+            let (part, busy) = match run_chunk(&self.pool, lane, study, chunk, *most_bytes).await? {
                 Ok(computed) => computed,
                 Err(reason) => return Ok(Err(reason)),
             };
@@ -435,8 +501,7 @@ impl Workers {
         let (part, mut rows, busy) = match computed {
             Some(Ok(Ok(computed))) => computed,
             Some(Ok(Err(reason))) => {
-                tracing::warn!(study = id, chunk, %reason, "a study is left to other workers");
-                self.known.lock().insert(task.clone(), Arc::new(OnceCell::new_with(Some(Err(reason)))));
+                self.leave_to_others(task, reason);
                 return give_up(lease).await;
             }
             Some(Err(problem)) => {
@@ -536,6 +601,10 @@ impl Workers {
     }
 }
 
+fn say_left_to_others(task: &Waiting, reason: &NotHere) {
+    tracing::warn!(study = task.cut.id, %reason, "a study is left to other workers");
+}
+
 /// About what a chunk takes that is in work, beside the variants that are computed: what it has come to, in columns that grow by doubling, and the same as it is
 /// kept, or then on its way to the store; and its rows where they are kept.
 fn chunk_bytes(study: &Study, has_parts: bool) -> u64 {
@@ -621,27 +690,5 @@ pub fn slice(mut work: Work, time: &mut Slice, stop: &AtomicBool) -> Result<Slic
         if time.is_over() || is_over {
             return Ok(Sliced { work, variants, is_over });
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::pin::pin;
-
-    use super::RoomOfChunks;
-
-    /// Three studies of such chunks ended a worker of 128 MiB that had been told to compute thirty-two at once.
-    #[tokio::test]
-    async fn chunks_that_come_to_much_are_in_work_beside_others_only_as_far_as_there_is_room() {
-        let room = RoomOfChunks::new(16 << 20, 8);
-        let first = room.take(12 << 20, true).await;
-        assert!(first.is_some() && room.take(12 << 20, false).await.is_none());
-        assert!(room.take(2 << 20, false).await.is_some(), "a slot's share is there whatever others take");
-        assert!(room.take(4 << 20, false).await.is_some());
-        let mut large = pin!(room.take(1 << 30, true));
-        assert!(futures_util::poll!(&mut large).is_pending());
-        assert!(room.take(4 << 20, false).await.is_none(), "it would never have its turn");
-        drop(first);
-        assert!(large.await.is_some(), "alone it has what it needs");
     }
 }
