@@ -270,6 +270,7 @@ impl<'de> Visitor<'de> for TreeVisitor {
         while let Some(tree) = items.next_element()? {
             trees.push(tree);
         }
+        trees.shrink_to_fit();
         Ok(Tree::Array(trees))
     }
 
@@ -278,6 +279,8 @@ impl<'de> Visitor<'de> for TreeVisitor {
         while let Some(entry) = entries.next_entry()? {
             fields.push(entry);
         }
+        // An object of one field would take as much as one of four.
+        fields.shrink_to_fit();
         Ok(Tree::Object(fields))
     }
 }

@@ -40,6 +40,12 @@ impl Encode for f64 {
     }
 }
 
+impl Encode for u64 {
+    fn encode(&self, encoder: &mut Encoder) {
+        encoder.0.extend_from_slice(&self.to_le_bytes());
+    }
+}
+
 impl Encode for bool {
     fn encode(&self, encoder: &mut Encoder) {
         encoder.byte(u8::from(*self));

@@ -162,7 +162,7 @@ fn one_of<T: Copy + Send + Sync + 'static>(choices: &'static [Choice<T>]) -> imp
 pub fn run() -> ExitCode {
     let cli = match Cli::try_parse_from(arguments()) {
         Ok(cli) => cli,
-        Err(error) => return refuse(&error),
+        Err(error) => return refuse(error),
     };
     let result = match cli.command {
         Command::Serve(settings) => run_service(&settings),
@@ -189,17 +189,23 @@ pub fn run() -> ExitCode {
 /// Says what went wrong, where anybody listens: standard error may be full or closed, or a pipe that nobody reads, which whoever ends waits for no longer than a
 /// moment.
 fn complain(what: &dyn std::fmt::Display, status: ExitCode) -> ExitCode {
-    const PATIENCE: Duration = Duration::from_millis(300);
     let text = printable(&what.to_string());
+    within_patience(move || {
+        let _ = writeln!(io::stderr(), "toothwave: {text}");
+    });
+    status
+}
+
+fn within_patience(say: impl FnOnce() + Send + 'static) {
+    const PATIENCE: Duration = Duration::from_millis(300);
     let (said, done) = std::sync::mpsc::sync_channel(1);
     let saying = move || {
-        let _ = writeln!(io::stderr(), "toothwave: {text}");
+        say();
         let _ = said.send(());
     };
     if std::thread::Builder::new().spawn(saying).is_ok() {
         let _ = done.recv_timeout(PATIENCE);
     }
-    status
 }
 
 /// A text without what a terminal obeys: it may name fields of a document that somebody else wrote.
@@ -217,9 +223,15 @@ fn printable(text: &str) -> String {
 
 /// Says what is wrong with the command line. It names the first fault alone; of the settings in the environment, by which containers are
 /// configured, every one is named.
-fn refuse(error: &clap::Error) -> ExitCode {
-    let _ = error.print();
-    if error.use_stderr() {
+fn refuse(error: clap::Error) -> ExitCode {
+    let status = ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(EXIT_BAD_INPUT));
+    if !error.use_stderr() {
+        // Help, which whoever asked for it reads.
+        let _ = error.print();
+        return status;
+    }
+    within_patience(move || {
+        let _ = error.print();
         let settings = Settings::augment_args(clap::Command::new("toothwave").no_binary_name(true));
         for setting in settings.get_arguments().filter(|setting| setting.get_env().is_some()) {
             let alone = clap::Command::new("toothwave").no_binary_name(true).arg(setting.clone());
@@ -229,8 +241,8 @@ fn refuse(error: &clap::Error) -> ExitCode {
                 let _ = other.print();
             }
         }
-    }
-    ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(EXIT_BAD_INPUT))
+    });
+    status
 }
 
 #[derive(Debug)]

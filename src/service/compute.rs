@@ -17,7 +17,7 @@ use crate::beside::beside;
 use crate::config::Limits;
 use crate::memory::Memory;
 use crate::problem::{Problem, ProblemCode};
-use crate::room::{self, Reserved, Room};
+use crate::room::{self, NoRoom, Reserved, Room};
 
 /// A slice of what runs in turn begins nothing further after this time: so long at most does a single request wait behind short ones.
 const SLICE: Duration = Duration::from_millis(5);
@@ -59,7 +59,7 @@ pub struct Pool {
     aside: Arc<Semaphore>,
     /// One: for what takes seconds, and is wanted all the same.
     unhurried: Arc<Semaphore>,
-    /// Of answers, from which a variant takes what is beyond the part of variants; none where there are none.
+    /// Of answers, from which a variant takes what is beyond the part of variants, and what is read of a store; none where there are none.
     room: Option<Room>,
     memory: Memory,
     pace: Pace,
@@ -251,6 +251,22 @@ impl Pool {
         &self.memory
     }
 
+    /// Room for so many bytes beside answers, as far as there is; where there are none, as far as the memory really has it.
+    ///
+    /// # Errors
+    /// Where there is not so much left.
+    pub fn reserve(&self, bytes: u64) -> Result<Option<Reserved>, NoRoom> {
+        match &self.room {
+            Some(room) => {
+                let mut reserved = room.nothing();
+                reserved.hold_at_least(bytes)?;
+                Ok(Some(reserved))
+            }
+            None if bytes <= room::SMALL_BYTES || self.memory.has(bytes) => Ok(None),
+            None => Err(NoRoom::Scarce),
+        }
+    }
+
     /// Solves that run now.
     pub fn running(&self) -> usize {
         self.limits.max_concurrent_solves + 1 - self.permits.available_permits() - self.spare.available_permits()
@@ -328,10 +344,14 @@ impl Pool {
         let Ok(place) = Arc::clone(&self.places).try_acquire_owned() else {
             return Err(self.queue_full());
         };
+        let pace = self.pace.clone();
         let timed = move |stop: &AtomicBool| {
             let started = Instant::now();
             let result = job(stop);
-            histogram!("toothwave_solve_duration_seconds").record(started.elapsed());
+            let (now, took) = (Instant::now(), started.elapsed());
+            // Slices wait for it as for a long step.
+            pace.note(took, now);
+            histogram!("toothwave_solve_duration_seconds").record(took);
             result
         };
         self.run_holding(place, on, timed).await
@@ -695,45 +715,56 @@ mod tests {
         }
     }
 
-    /// A study of a thousand quick variants waited a thousand times behind another's slow ones.
+    /// A study of a thousand quick variants waited a thousand times behind another's slow ones, and a batch of a tenth of a second half a minute behind four clients
+    /// who asked for one long sweep after the other.
     #[tokio::test(flavor = "multi_thread")]
     async fn who_has_short_steps_gets_as_much_of_the_time_as_who_has_long_ones() -> Result<(), Problem> {
         const STEP: Duration = Duration::from_millis(50);
-        let Line { settings } = Line::parse_from(["serve", "--max-concurrent-solves", "1"]);
-        let pool = Pool::new(settings.limits());
-        let slices = Arc::new(AtomicUsize::new(0));
-        let long = tokio::spawn({
-            let (pool, slices) = (pool.clone(), Arc::clone(&slices));
-            async move {
-                let step = |time: &mut Slice, _: &AtomicBool| {
-                    std::thread::sleep(STEP);
-                    time.is_over();
-                    Ok(())
-                };
-                let mut lane = Lane::default();
-                while pool.run_variants(&mut lane, 0, step).await.is_ok() {
-                    slices.fetch_add(1, Ordering::SeqCst);
+        for is_single in [false, true] {
+            let Line { settings } = Line::parse_from(["serve", "--max-concurrent-solves", "1"]);
+            let pool = Pool::new(settings.limits());
+            let others = Arc::new(AtomicUsize::new(0));
+            let long = tokio::spawn({
+                let (pool, others) = (pool.clone(), Arc::clone(&others));
+                async move {
+                    let single = |_: &AtomicBool| {
+                        std::thread::sleep(STEP);
+                        Ok(())
+                    };
+                    let step = move |time: &mut Slice, stop: &AtomicBool| {
+                        let done = single(stop);
+                        time.is_over();
+                        done
+                    };
+                    let mut lane = Lane::default();
+                    while if is_single {
+                        pool.run_while_wanted(Thread::Blocking, single).await.is_ok()
+                    } else {
+                        pool.run_variants(&mut lane, 0, step).await.is_ok()
+                    } {
+                        others.fetch_add(1, Ordering::SeqCst);
+                    }
                 }
+            });
+            while others.load(Ordering::SeqCst) < 2 {
+                tokio::task::yield_now().await;
             }
-        });
-        while slices.load(Ordering::SeqCst) < 2 {
-            tokio::task::yield_now().await;
+            let before = others.load(Ordering::SeqCst);
+            // Each slice of a millisecond, after which other work is at hand: cut off by its bytes, say, or as a chunk of its own.
+            let (mut lane, mut busy) = (Lane::default(), Duration::ZERO);
+            for _ in 0..40 {
+                let step = |time: &mut Slice, _: &AtomicBool| {
+                    std::thread::sleep(Duration::from_millis(1));
+                    time.is_over();
+                    Ok(time.busy())
+                };
+                busy += pool.run_variants(&mut lane, 0, step).await?;
+            }
+            let beside = u32::try_from(others.load(Ordering::SeqCst) - before).unwrap_or(u32::MAX);
+            long.abort();
+            // Without turns of the same length it would have had forty.
+            assert!(beside * STEP <= 2 * busy + 4 * STEP, "{beside} beside {busy:?}");
         }
-        let before = slices.load(Ordering::SeqCst);
-        // Each slice of a millisecond, after which other work is at hand: cut off by its bytes, say, or as a chunk of its own.
-        let (mut lane, mut busy) = (Lane::default(), Duration::ZERO);
-        for _ in 0..40 {
-            let step = |time: &mut Slice, _: &AtomicBool| {
-                std::thread::sleep(Duration::from_millis(1));
-                time.is_over();
-                Ok(time.busy())
-            };
-            busy += pool.run_variants(&mut lane, 0, step).await?;
-        }
-        let beside = u32::try_from(slices.load(Ordering::SeqCst) - before).unwrap_or(u32::MAX);
-        long.abort();
-        // Without turns of the same length it would have had forty.
-        assert!(beside * STEP <= 2 * busy + 4 * STEP, "{beside} slices beside {busy:?}");
         Ok(())
     }
 

@@ -105,7 +105,7 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_CACHE_MAX_BYTES", value_name = "BYTES")]
     pub cache_max_bytes: Option<u64>,
 
-    /// Most bytes of answers that nobody has read yet: being made, in batches, on their way; those up to 256 KiB not counted
+    /// Most bytes of answers that nobody has read yet: being made, in batches, on their way, those up to 256 KiB not counted; of bodies above 128 KiB that arrive; and of studies that are kept
     /// [default: 512 MiB for each solve that runs at once, or half of the memory but for 64 MiB and 4 MiB for each solve beyond six]
     #[arg(long, env = "TOOTHWAVE_MAX_UNREAD_BYTES", value_name = "BYTES")]
     pub max_unread_bytes: Option<u64>,
@@ -319,7 +319,7 @@ pub struct Limits {
     pub deadline_ms: u64,
     /// Most bytes of answers that the cache keeps.
     pub cache_max_bytes: u64,
-    /// Most bytes of answers that nobody has read yet: being made, in batches, on their way; those up to 256 KiB not counted.
+    /// Most bytes of answers that nobody has read yet: being made, in batches, on their way, those up to 256 KiB not counted; of bodies above 128 KiB that arrive; and of studies that are kept.
     pub max_unread_bytes: u64,
     /// Most variants of a study.
     pub max_study_variants: u64,

@@ -50,11 +50,13 @@ pub enum NotHere {
     #[error("the study's canary comes to other bits here")]
     OtherBits,
     /// This process has not the memory for it.
-    #[error("a variant takes some {bytes} bytes while it is computed, and the memory here has room for {most_bytes}")]
+    #[error(
+        "it takes some {bytes} bytes while it is read, or a variant is computed, and the memory here has room for {most_bytes}"
+    )]
     NeedsMemory {
-        /// About what one of its variants takes.
+        /// About what its document takes, or one of its variants.
         bytes: u64,
-        /// What one may take here.
+        /// What that may be here.
         most_bytes: u64,
     },
     /// This build knows no such study, though it is its own.
@@ -137,6 +139,13 @@ pub fn require_origin(theirs: &str) -> Result<(), NotHere> {
     }
 }
 
+/// About what a document of such a length takes besides while a study is read from it, at most: its tree, once as it stands and once sorted.
+pub const fn reading_bytes(document_bytes: usize) -> u64 {
+    /// Measured with lists of numbers, texts and objects, each as short as can be.
+    const TIMES: u64 = 48;
+    document_bytes as u64 * TIMES
+}
+
 /// What is kept of a study besides its rows, about.
 pub fn view_bytes(study: &Study) -> u64 {
     /// The study itself, what is noted of it, its places in lists.
@@ -149,8 +158,12 @@ pub fn view_bytes(study: &Study) -> u64 {
 /// # Errors
 /// Where reading it takes too long.
 pub async fn thaw(pool: &Pool, frozen: &NewStudy) -> Result<Result<Arc<Study>, NotHere>, Problem> {
-    let frozen = frozen.clone();
-    pool.run_aside(pool.deadline(), move || Ok(thawed(&frozen))).await
+    let (frozen, room) = (frozen.clone(), pool.clone());
+    let thaw = move || {
+        let _room = room.reserve(reading_bytes(frozen.document.len()))?;
+        Ok(thawed(&frozen))
+    };
+    pool.run_aside(pool.deadline(), thaw).await
 }
 
 fn thawed(frozen: &NewStudy) -> Result<Arc<Study>, NotHere> {

@@ -6,7 +6,10 @@ use std::io;
 use std::os::unix::fs::FileExt as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use parking_lot::Mutex;
+use tokio::time::Instant;
 
 use crate::machine;
 
@@ -30,13 +33,15 @@ pub struct Memory(Arc<Inner>);
 #[derive(Debug)]
 struct Inner {
     is_scarce: AtomicBool,
+    scarce_since: Mutex<Option<Instant>>,
     /// Beyond this it is scarce; nobody knows before it is watched.
     most_bytes: AtomicU64,
 }
 
 impl Default for Memory {
     fn default() -> Self {
-        Self(Arc::new(Inner { is_scarce: AtomicBool::new(false), most_bytes: AtomicU64::new(u64::MAX) }))
+        let (is_scarce, scarce_since) = Default::default();
+        Self(Arc::new(Inner { is_scarce, scarce_since, most_bytes: AtomicU64::new(u64::MAX) }))
     }
 }
 
@@ -48,7 +53,14 @@ impl Memory {
 
     /// Sets what is seen.
     pub fn set_scarce(&self, is_scarce: bool) {
-        self.0.is_scarce.store(is_scarce, Ordering::Relaxed);
+        if self.0.is_scarce.swap(is_scarce, Ordering::Relaxed) != is_scarce {
+            *self.0.scarce_since.lock() = is_scarce.then(Instant::now);
+        }
+    }
+
+    /// For how long it has been.
+    pub fn scarce_for(&self) -> Duration {
+        self.0.scarce_since.lock().map_or(Duration::ZERO, |since| since.elapsed())
     }
 
     /// Whether so many bytes more would leave what is to be left, as it is in this moment.

@@ -74,7 +74,7 @@ pub struct Reserved {
 pub enum NoRoom {
     /// As far as is counted.
     #[error(
-        "the answer takes {bytes} bytes: with the others that nobody has read yet more than the {max_bytes} of `max_unread_bytes`; try again in a moment"
+        "{bytes} bytes are wanted: with what others take, answers that nobody has read yet first of all, more than the {max_bytes} of `max_unread_bytes`; try again in a moment"
     )]
     Taken {
         /// Wanted.
@@ -138,6 +138,11 @@ impl Room {
         (taken as u64 * 1024).min(self.max_bytes)
     }
 
+    /// None yet.
+    pub fn nothing(&self) -> Reserved {
+        Reserved { room: self.clone(), held: None, bytes: 0 }
+    }
+
     /// Room for an answer that takes so many bytes. One larger than all the room takes all of it; what it takes beyond these is given as far as the
     /// memory really has it.
     ///
@@ -155,7 +160,7 @@ impl Room {
     /// # Errors
     /// Where there is not so much left.
     pub fn keep(&self, bytes: u64) -> Result<Kept, NoRoom> {
-        let mut kept = Kept(Reserved { room: self.clone(), held: None, bytes: 0 });
+        let mut kept = Kept(self.nothing());
         kept.hold_at_least(bytes)?;
         Ok(kept)
     }

@@ -2,18 +2,27 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 
 use parking_lot::Mutex;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::time::Instant;
 
 use crate::room;
+
+/// So long is what was read handed out for further use though another waits for its room.
+const TURN: Duration = Duration::from_secs(10);
+
+/// Between two looks of who waits at what is not used any more.
+const LOOK: Duration = Duration::from_millis(100);
 
 /// Room that slots share. Those who want more than a slot's share are counted: together they take no more than all the room, or one is alone. The others are not:
 /// there are no more of them than slots, so that they take no more than as much again.
 #[derive(Debug)]
 pub struct SharedRoom {
     free: Arc<Semaphore>,
+    /// One waits at most: the other slots have something else to do.
+    waits: Semaphore,
     all_bytes: u64,
     share_bytes: u64,
 }
@@ -22,10 +31,9 @@ impl SharedRoom {
     /// Of so many bytes.
     pub fn new(all_bytes: u64, slots: usize) -> Self {
         let free = Arc::new(Semaphore::new(room::permits(all_bytes) as usize));
-        Self { free, all_bytes, share_bytes: all_bytes / slots.max(1) as u64 }
+        Self { free, waits: Semaphore::new(1), all_bytes, share_bytes: all_bytes / slots.max(1) as u64 }
     }
 
-    /// Whether so many bytes are a slot's share at most.
     const fn is_small(&self, bytes: u64) -> bool {
         bytes <= self.share_bytes
     }
@@ -34,107 +42,127 @@ impl SharedRoom {
         if self.is_small(bytes) { 0 } else { room::permits(bytes.min(self.all_bytes)) }
     }
 
+    fn is_waited_for(&self) -> bool {
+        self.waits.available_permits() == 0
+    }
+
+    /// Room for so many bytes, where there is.
     fn try_take(&self, bytes: u64) -> Option<OwnedSemaphorePermit> {
         Arc::clone(&self.free).try_acquire_many_owned(self.permits(bytes)).ok()
     }
 
-    /// Room for so many bytes, when there is: those who wait have it in turn. None while there is none for who does not wait.
-    pub async fn take(&self, bytes: u64, waits: bool) -> Option<OwnedSemaphorePermit> {
-        match self.try_take(bytes) {
-            // An error says that the semaphore is closed, which it never is.
-            None if waits => Arc::clone(&self.free).acquire_many_owned(self.permits(bytes)).await.ok(),
-            taken => taken,
+    /// Room for so many bytes, when there is; none where another waits for some.
+    pub async fn take(&self, bytes: u64) -> Option<OwnedSemaphorePermit> {
+        let taken = self.try_take(bytes);
+        if taken.is_some() {
+            return taken;
         }
+        let _waits = self.waits.try_acquire().ok()?;
+        // An error says that the semaphore is closed, which it never is.
+        Arc::clone(&self.free).acquire_many_owned(self.permits(bytes)).await.ok()
     }
 }
 
-/// What takes some of the memory for as long as it is held.
-pub trait Takes {
-    /// About how much.
-    fn bytes(&self) -> u64;
-}
-
-/// What was read and may be wanted again: the last few, which make room for what is in use. What is no more on it is let go by its last user.
+/// What was read, for all who use it and the last few for who may want them again. What is not used makes room for what is.
 #[derive(Debug)]
 pub struct Shelf<K, V> {
     room: SharedRoom,
-    most_bytes: u64,
-    kept: Mutex<VecDeque<(K, Arc<V>)>>,
-    waiting: AtomicUsize,
+    /// What was wanted last comes last.
+    read: Mutex<VecDeque<Read<K, V>>>,
+    most_unused_bytes: u64,
 }
 
-/// One who waits for room: nothing is kept meanwhile.
-struct WaitsForRoom<'a>(&'a AtomicUsize);
+#[derive(Debug)]
+struct Read<K, V> {
+    key: K,
+    value: Arc<V>,
+    bytes: u64,
+    since: Instant,
+}
 
-impl Drop for WaitsForRoom<'_> {
-    fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::SeqCst);
+impl<K, V> Read<K, V> {
+    fn is_used(&self) -> bool {
+        Arc::strong_count(&self.value) > 1
     }
 }
 
-impl<K: PartialEq, V: Takes> Shelf<K, V> {
-    /// For what is in use in these slots, within so many bytes; what is kept besides, or because it is small, takes no more than half of that.
+impl<K: PartialEq, V> Shelf<K, V> {
+    /// For what is used in these slots, within so many bytes.
     pub fn new(all_bytes: u64, slots: usize) -> Self {
-        let (kept, waiting) = Default::default();
-        Self { room: SharedRoom::new(all_bytes, slots), most_bytes: all_bytes / 2, kept, waiting }
+        Self { room: SharedRoom::new(all_bytes, slots), read: Mutex::default(), most_unused_bytes: all_bytes / 2 }
     }
 
-    /// Whether what takes so many bytes has room whatever else is in use.
-    pub const fn is_small(&self, bytes: u64) -> bool {
-        self.room.is_small(bytes)
-    }
-
-    /// Room for what is to be read, as [`SharedRoom::take`] has it; what nobody uses gives way.
-    pub async fn room(&self, bytes: u64, waits: bool) -> Option<OwnedSemaphorePermit> {
+    /// Room for what is to be read, where there is, also what is not used and gives way.
+    pub fn try_room(&self, bytes: u64) -> Option<OwnedSemaphorePermit> {
         loop {
             let taken = self.room.try_take(bytes);
-            if taken.is_some() {
+            if taken.is_some() || !self.drop_unused() {
                 return taken;
             }
-            if self.kept.lock().pop_front().is_none() {
-                break;
-            }
         }
-        if !waits {
-            return None;
-        }
-        self.waiting.fetch_add(1, Ordering::SeqCst);
-        let _waits = WaitsForRoom(&self.waiting);
-        // What came since: whoever uses it goes on, and the next one waits for its turn as well.
-        self.clear();
-        self.room.take(bytes, true).await
     }
 
-    /// What was read, where it is still here.
+    /// The same, when there is; none where another waits for some.
+    pub async fn room(&self, bytes: u64) -> Option<OwnedSemaphorePermit> {
+        let taken = self.try_room(bytes);
+        if taken.is_some() {
+            return taken;
+        }
+        let gives_way = async {
+            loop {
+                tokio::time::sleep(LOOK).await;
+                while self.drop_unused() {}
+            }
+        };
+        tokio::select! {
+            taken = self.room.take(bytes) => taken,
+            () = gives_way => None,
+        }
+    }
+
+    /// Drops of what is counted that which was wanted longest ago and is not used; whether there was some.
+    fn drop_unused(&self) -> bool {
+        let mut read = self.read.lock();
+        let place = read.iter().position(|read| !read.is_used() && !self.room.is_small(read.bytes));
+        place.and_then(|place| read.remove(place)).is_some()
+    }
+
+    /// What was read, where it is still here: not where another waits for its room and its turn is over.
     pub fn get(&self, key: &K) -> Option<Arc<V>> {
-        let mut kept = self.kept.lock();
-        let place = kept.iter().position(|(other, _)| other == key)?;
-        let found = kept.remove(place)?;
-        let value = Arc::clone(&found.1);
-        kept.push_back(found);
+        let mut all = self.read.lock();
+        let place = all.iter().position(|read| read.key == *key)?;
+        let read = all.remove(place)?;
+        let is_counted = !self.room.is_small(read.bytes);
+        if is_counted && self.room.is_waited_for() && read.since.elapsed() > TURN {
+            return None;
+        }
+        let value = Arc::clone(&read.value);
+        all.push_back(read);
         Some(value)
     }
 
-    /// Keeps what was read, in the place of what was wanted longest ago; not where somebody waits for room.
-    pub fn put(&self, key: K, value: &Arc<V>) {
-        let mut kept = self.kept.lock();
-        if self.waiting.load(Ordering::SeqCst) > 0 {
-            return;
-        }
-        kept.push_back((key, Arc::clone(value)));
-        while kept.iter().map(|(_, value)| value.bytes()).sum::<u64>() > self.most_bytes {
-            kept.pop_front();
-        }
+    /// Keeps what was read, and takes so many bytes, which it has room for.
+    pub fn put(&self, key: K, value: &Arc<V>, bytes: u64) {
+        let mut all = self.read.lock();
+        all.push_back(Read { key, value: Arc::clone(value), bytes, since: Instant::now() });
+        let mut unused_bytes: u64 = all.iter().filter(|read| !read.is_used()).map(|read| read.bytes).sum();
+        all.retain(|read| {
+            let stays = unused_bytes <= self.most_unused_bytes || read.is_used();
+            if !stays {
+                unused_bytes -= read.bytes;
+            }
+            stays
+        });
     }
 
     /// Keeps only what is wanted.
     pub fn retain(&self, is_wanted: impl Fn(&K) -> bool) {
-        self.kept.lock().retain(|(key, _)| is_wanted(key));
+        self.read.lock().retain(|read| is_wanted(&read.key));
     }
 
-    /// Keeps nothing.
+    /// Keeps nothing that is not used.
     pub fn clear(&self) {
-        self.kept.lock().clear();
+        self.read.lock().retain(Read::is_used);
     }
 }
 
@@ -142,84 +170,112 @@ impl<K: PartialEq, V: Takes> Shelf<K, V> {
 mod tests {
     use std::pin::pin;
     use std::sync::Arc;
+    use std::time::Duration;
 
     use tokio::sync::OwnedSemaphorePermit;
 
-    use super::{SharedRoom, Shelf, Takes};
+    use super::{SharedRoom, Shelf, TURN};
+
+    const MIB: u64 = 1 << 20;
 
     /// Three studies of such chunks ended a worker of 128 MiB that had been told to compute thirty-two at once.
     #[tokio::test]
     async fn chunks_that_come_to_much_are_in_work_beside_others_only_as_far_as_there_is_room() {
-        let room = SharedRoom::new(16 << 20, 8);
-        let first = room.take(12 << 20, true).await;
-        assert!(first.is_some() && room.take(12 << 20, false).await.is_none());
-        assert!(room.take(2 << 20, false).await.is_some(), "a slot's share is there whatever others take");
-        assert!(room.take(4 << 20, false).await.is_some());
-        let mut large = pin!(room.take(1 << 30, true));
+        let room = SharedRoom::new(16 * MIB, 8);
+        let first = room.take(12 * MIB).await;
+        assert!(first.is_some());
+        let mut large = pin!(room.take(1024 * MIB));
         assert!(futures_util::poll!(&mut large).is_pending());
-        assert!(room.take(4 << 20, false).await.is_none(), "it would never have its turn");
+        assert!(room.take(2 * MIB).await.is_some(), "a slot's share is there whatever others take");
+        assert!(room.take(4 * MIB).await.is_none(), "the one who waits would never have its turn");
+        assert!(room.take(12 * MIB).await.is_none(), "a second one has something else to do than to wait");
         drop(first);
         assert!(large.await.is_some(), "alone it has what it needs");
     }
 
-    /// A study that was read.
-    #[derive(Debug)]
-    struct Read {
-        bytes: u64,
-        _room: OwnedSemaphorePermit,
+    type Studies = Shelf<u32, OwnedSemaphorePermit>;
+
+    fn shelf() -> Studies {
+        Shelf::new(16 * MIB, 8)
     }
 
-    impl Takes for Read {
-        fn bytes(&self) -> u64 {
-            self.bytes
-        }
-    }
-
-    async fn read(shelf: &Shelf<u32, Read>, study: u32, bytes: u64) -> Arc<Read> {
-        let read = Arc::new(Read { bytes, _room: shelf.room(bytes, true).await.expect("room") });
-        shelf.put(study, &read);
+    async fn read(shelf: &Studies, study: u32, bytes: u64) -> Arc<OwnedSemaphorePermit> {
+        let read = Arc::new(shelf.room(bytes).await.expect("room"));
+        shelf.put(study, &read, bytes);
         read
     }
 
     /// All that waited were kept, and thirteen large ones held a worker's memory for ever.
     #[tokio::test]
-    async fn of_the_studies_that_wait_the_last_few_are_kept() {
-        let shelf = Shelf::new(16 << 20, 8);
+    async fn of_the_studies_that_nobody_uses_the_last_few_are_kept() {
+        let shelf = shelf();
+        let used = read(&shelf, 1000, MIB).await;
         for study in 0..100 {
-            read(&shelf, study, 1 << 20).await;
+            read(&shelf, study, MIB).await;
         }
-        let kept = || (0..100).filter(|study| shelf.get(study).is_some()).collect::<Vec<_>>();
-        assert_eq!(kept(), (92..100).collect::<Vec<_>>());
-        assert!(shelf.get(&92).is_some());
-        read(&shelf, 100, 1 << 20).await;
-        assert!(shelf.get(&92).is_some() && shelf.get(&93).is_none(), "what was wanted last is kept longest");
-        shelf.retain(|study| *study == 92);
-        assert_eq!(kept(), [92]);
+        let kept = || (0..=1000).filter(|study| shelf.get(study).is_some()).collect::<Vec<_>>();
+        let last = (91..100).chain([1000]).collect::<Vec<_>>();
+        assert_eq!(kept(), last, "the last one was in use when it was put there");
+        assert!(shelf.get(&91).is_some());
+        read(&shelf, 100, MIB).await;
+        assert!(shelf.get(&91).is_some() && shelf.get(&92).is_none(), "what was wanted last is kept longest");
+        shelf.retain(|study| [91, 1000].contains(study));
+        assert_eq!(kept(), [91, 1000]);
+        shelf.clear();
+        assert_eq!(kept(), [1000]);
+        drop(used);
+    }
+
+    /// One that is larger than what is kept unused was computed in one slot, however many there were.
+    #[tokio::test]
+    async fn a_study_in_use_is_there_for_all_slots_however_large_it_is() {
+        let shelf = shelf();
+        let used = read(&shelf, 1, 100 * MIB).await;
+        assert!(shelf.get(&1).is_some_and(|shared| Arc::ptr_eq(&shared, &used)));
     }
 
     #[tokio::test]
-    async fn a_study_that_is_kept_makes_room_for_one_that_is_used() {
-        let shelf = Shelf::new(16 << 20, 8);
-        drop(read(&shelf, 1, 8 << 20).await);
-        assert!(shelf.get(&1).is_some());
-        let all = shelf.room(16 << 20, false).await;
-        assert!(all.is_some() && shelf.get(&1).is_none());
+    async fn a_study_that_nobody_uses_makes_room_for_one_that_is_but_small_ones_stay() {
+        let shelf = shelf();
+        drop(read(&shelf, 1, MIB).await);
+        drop(read(&shelf, 2, 7 * MIB).await);
+        let used = read(&shelf, 3, 8 * MIB).await;
+        assert!(shelf.get(&2).is_some(), "both have room");
+        assert!(shelf.try_room(10 * MIB).is_none() && shelf.get(&3).is_some(), "one that is used makes none");
+        drop(used);
+        assert!(shelf.try_room(10 * MIB).is_some() && shelf.get(&3).is_none() && shelf.get(&1).is_some());
     }
 
-    /// Were they kept meanwhile, one study's chunks would follow each other for ever, and another large one had no turn.
-    #[tokio::test]
-    async fn while_one_waits_for_room_what_is_in_use_is_not_kept_for_the_next() {
-        let shelf = Shelf::new(16 << 20, 8);
-        let used = read(&shelf, 1, 8 << 20).await;
-        let mut next = pin!(shelf.room(12 << 20, true));
+    /// Its chunks would follow each other for ever, and another large one had no turn.
+    #[tokio::test(start_paused = true)]
+    async fn a_study_that_others_wait_for_is_handed_out_for_a_turn_and_no_longer() {
+        let shelf = shelf();
+        let used = read(&shelf, 1, 8 * MIB).await;
+        tokio::time::sleep(2 * TURN).await;
+        assert!(shelf.get(&1).is_some(), "nobody waits");
+        drop(used);
+        let used = read(&shelf, 2, 12 * MIB).await;
+        assert!(shelf.get(&1).is_none());
+        let mut next = pin!(shelf.room(12 * MIB));
         assert!(futures_util::poll!(&mut next).is_pending());
-        assert!(shelf.get(&1).is_none());
-        shelf.put(1, &used);
-        assert!(shelf.get(&1).is_none());
-        assert!(shelf.room(8 << 20, false).await.is_none(), "nor is there room for it before the other had its turn");
+        tokio::time::sleep(TURN / 2).await;
+        assert!(futures_util::poll!(&mut next).is_pending());
+        assert!(shelf.get(&2).is_some(), "its turn is not over");
+        tokio::time::sleep(TURN).await;
+        assert!(futures_util::poll!(&mut next).is_pending());
+        assert!(shelf.get(&2).is_none());
         drop(used);
         assert!(next.await.is_some());
-        read(&shelf, 2, 8 << 20).await;
-        assert!(shelf.get(&2).is_some(), "and then there is");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_study_that_is_used_no_more_while_another_waits_makes_room_for_it() {
+        let shelf = shelf();
+        let used = read(&shelf, 1, 12 * MIB).await;
+        let mut next = pin!(shelf.room(12 * MIB));
+        assert!(futures_util::poll!(&mut next).is_pending());
+        drop(used);
+        let waited = tokio::time::timeout(Duration::from_secs(1), next).await;
+        assert!(waited.is_ok_and(|room| room.is_some()));
     }
 }

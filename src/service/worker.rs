@@ -4,7 +4,6 @@ use std::collections::{BTreeMap, HashMap};
 use std::convert::Infallible;
 use std::error::Error;
 use std::future;
-use std::mem;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -13,7 +12,7 @@ use bytes::Bytes;
 use futures_util::future::join_all;
 use metrics::counter;
 use parking_lot::Mutex;
-use tokio::sync::{OnceCell, OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
 use tokio_util::sync::CancellationToken;
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_store::{Claim, Lease, MOST_ATTEMPTS, NewStudy, Store, StoreError, Waiting};
@@ -25,7 +24,7 @@ use crate::frozen::{self, NotHere, view_bytes};
 use crate::injected;
 use crate::parts::Parts;
 use crate::problem::Problem;
-use crate::shelf::{SharedRoom, Shelf, Takes};
+use crate::shelf::{SharedRoom, Shelf};
 
 /// Between two looks at what there is to do, and at what was cancelled.
 const PAUSE: Duration = Duration::from_secs(1);
@@ -36,7 +35,7 @@ const ALONE: Duration = Duration::from_secs(3);
 /// Between two looks at memory that is scarce.
 const SCARCE_PAUSE: Duration = Duration::from_millis(20);
 
-/// After so long nothing that is held of scarce memory is given back by itself: what the allocator keeps is used again by who asks it.
+/// After so long nothing that is held of scarce memory comes back by itself: what the allocator keeps it uses again for who asks.
 const LONGEST_SCARCE: Duration = Duration::from_secs(10);
 
 /// Of a `worker`'s memory, or of what unread answers may take, chunks that are in work may take such a part.
@@ -60,14 +59,17 @@ pub struct Workers {
     stopping: CancellationToken,
     /// What a chunk that is in work then gets to come to its end.
     patience: Duration,
-    known: Mutex<HashMap<Waiting, Arc<Seen>>>,
+    /// Each in the hands of one slot at a time.
+    known: Mutex<HashMap<Waiting, Arc<tokio::sync::Mutex<Seen>>>>,
     shelf: Shelf<Waiting, Ours>,
     /// One for each chunk that may be in work here: all of them for one that is computed beside none.
     side_by_side: Semaphore,
     /// Chunks of each study that are in work here.
     in_work: Mutex<HashMap<String, usize>>,
     room: SharedRoom,
-    /// Held by the chunk that is computed though memory is scarce.
+    /// Shared by all chunks that are begun and not over.
+    begun: Arc<()>,
+    /// Held by the one that is begun though memory is scarce.
     though_scarce: Semaphore,
     /// What was last said of each.
     troubles: Mutex<BTreeMap<What, String>>,
@@ -115,10 +117,12 @@ impl What {
 /// What is known of a study that waits, whether or not it is read.
 #[derive(Debug, Default)]
 struct Seen {
-    /// Whether this process computes it, or why not.
-    verdict: OnceCell<Result<(), NotHere>>,
-    /// What it takes once it is read, as far as is known; held while it is read.
-    bytes: tokio::sync::Mutex<u64>,
+    /// Whether this process is known to compute its bits.
+    has_sung: bool,
+    /// Whether it is known not to.
+    is_left_to_others: bool,
+    /// What it takes once it is read, as far as is known.
+    bytes: u64,
 }
 
 /// A study that this process computes.
@@ -128,28 +132,26 @@ struct Ours {
     frozen: NewStudy,
     /// What a variant of it may take while it is computed.
     most_bytes: u64,
+    /// What a chunk takes that is in work, beside the study.
+    chunk_bytes: u64,
     _room: OwnedSemaphorePermit,
 }
 
-impl Ours {
-    fn bytes_of(study: &Study, frozen: &NewStudy) -> u64 {
-        view_bytes(study) + frozen.document.len() as u64
-    }
-}
-
-impl Takes for Ours {
-    fn bytes(&self) -> u64 {
-        Self::bytes_of(&self.study, &self.frozen)
-    }
-}
-
-/// Why a study is not to be had now.
+/// Why a study is not to be had.
 enum Unseen {
     /// It waits no more.
     Gone,
-    /// Others that are in use take all the room, or it is just being read.
-    NotNow,
+    /// Others that are used take all the room, and one waits for some.
+    NoRoom,
+    /// It is computed by others.
+    NotHere(NotHere),
     Problem(Problem),
+}
+
+impl From<NotHere> for Unseen {
+    fn from(reason: NotHere) -> Self {
+        Self::NotHere(reason)
+    }
 }
 
 impl From<Problem> for Unseen {
@@ -162,8 +164,6 @@ impl From<Problem> for Unseen {
 struct InWork<'a> {
     all: &'a Mutex<HashMap<String, usize>>,
     id: &'a str,
-    /// Whether no other of the study was.
-    is_first: bool,
 }
 
 impl<'a> InWork<'a> {
@@ -173,7 +173,7 @@ impl<'a> InWork<'a> {
         let count = counts.entry(id.into()).or_default();
         (*count < most).then(|| {
             *count += 1;
-            Self { all, id, is_first: *count == 1 }
+            Self { all, id }
         })
     }
 }
@@ -208,7 +208,7 @@ impl Workers {
         let side_by_side = Semaphore::new(capacity.all_slots());
         let shelf = Shelf::new(capacity.chunks_bytes, capacity.all_slots());
         let room = SharedRoom::new(capacity.chunks_bytes, capacity.all_slots());
-        let though_scarce = Semaphore::new(1);
+        let (begun, though_scarce) = (Arc::default(), Semaphore::new(1));
         Self {
             store,
             parts,
@@ -222,6 +222,7 @@ impl Workers {
             side_by_side,
             in_work,
             room,
+            begun,
             though_scarce,
             troubles,
         }
@@ -279,23 +280,16 @@ impl Workers {
                     return;
                 }
                 let task = &waiting[index];
-                let Some(one_more) = InWork::one_more(&self.in_work, &task.cut.id, most_in_work) else { continue };
-                // Of each study one waits for room at most, so that each gets some in turn.
-                let waits = one_more.is_first;
-                let ready = async {
-                    let ours = self.study(task, waits).await?;
-                    let room = self.room.take(chunk_bytes(&ours.study, self.parts.is_some()), waits).await?;
-                    Some((ours, room, self.memory().await))
-                };
+                let Some(_one_more) = InWork::one_more(&self.in_work, &task.cut.id, most_in_work) else { continue };
                 // A canary that is begun is no chunk: whoever is told to stop leaves it.
                 let ready = tokio::select! {
                     biased;
                     () = self.stopping.cancelled() => return,
                     // It was cancelled, or forgotten.
                     _ = tasks.wait_for(|waiting| !waiting.contains(task)) => None,
-                    ready = ready => ready,
+                    ready = self.ready(task) => ready,
                 };
-                let Some((ours, _room, _memory)) = ready else { continue };
+                let Some((ours, _held)) = ready else { continue };
                 // One whose attempt is being noted is claimed, and then given back.
                 match self.claim(task, &ours).await {
                     Ok((Claim::Chunk(lease), _)) if self.stopping.is_cancelled() => return give_up(lease).await,
@@ -362,15 +356,25 @@ impl Workers {
         Ok((lease.begin().await?, beside))
     }
 
+    /// A study of which a chunk can be begun, and what that holds until it is over; none where another slot has the study in hand, or waits for room as this one
+    /// would: there are others.
+    async fn ready(&self, task: &Waiting) -> Option<(Arc<Ours>, impl Sized)> {
+        let though_scarce = self.memory().await;
+        let ours = self.study(task).await?;
+        let room = self.room.take(ours.chunk_bytes).await?;
+        // What was waited for is let go, and waited for again.
+        let has_memory = though_scarce.is_some() || !self.pool.memory().is_scarce();
+        has_memory.then(|| (ours, (room, though_scarce, Arc::clone(&self.begun))))
+    }
+
     /// Waits while memory is scarce, so that what is in work comes to its end and is let go before more is begun. Where nothing is, that would be for ever:
     /// one is begun all the same after a while, beside none.
     async fn memory(&self) -> Option<SemaphorePermit<'_>> {
-        let asked = Instant::now();
         while self.pool.memory().is_scarce() {
             self.shelf.clear();
-            let is_none_in_work = self.side_by_side.available_permits() == self.capacity.all_slots();
-            if is_none_in_work
-                && asked.elapsed() > LONGEST_SCARCE
+            let is_none_begun = Arc::strong_count(&self.begun) == 1;
+            if is_none_begun
+                && self.pool.memory().scarce_for() > LONGEST_SCARCE
                 && let Ok(alone) = self.though_scarce.try_acquire()
             {
                 return Some(alone);
@@ -380,93 +384,71 @@ impl Workers {
         None
     }
 
-    /// The study, where this process computes it: of this build, with a canary of the same bits. None for now where it has no room, for who does not wait.
-    async fn study(&self, task: &Waiting, waits: bool) -> Option<Arc<Ours>> {
+    /// The study, where this process computes it.
+    async fn study(&self, task: &Waiting) -> Option<Arc<Ours>> {
         let seen = Arc::clone(self.known.lock().entry(task.clone()).or_default());
-        // Whoever wants this one waits for its canary, and nobody else.
-        let ours = async {
-            let verdict = seen.verdict.get_or_try_init(|| self.judged(task, &seen)).await?;
-            if verdict.is_err() {
-                return Ok(None);
+        let mut seen = seen.try_lock().ok()?;
+        if seen.is_left_to_others {
+            return None;
+        }
+        match self.found(task, &mut seen).await {
+            Ok(ours) => return Some(ours),
+            Err(Unseen::Gone | Unseen::NoRoom) => {}
+            Err(Unseen::NotHere(reason)) => {
+                say_left_to_others(task, &reason);
+                seen.is_left_to_others = true;
             }
-            match self.read(task, &seen, waits).await? {
-                Ok(ours) => Ok(Some(ours)),
-                Err(reason) => {
-                    self.leave_to_others(task, reason);
-                    Ok(None)
-                }
-            }
-        };
-        match ours.await {
-            Ok(ours) => ours,
-            Err(Unseen::Gone | Unseen::NotNow) => None,
             // Another time.
             Err(Unseen::Problem(problem)) => {
                 tracing::warn!(study = task.cut.id, %problem, cause = problem.cause, "a study could not be looked at");
-                None
             }
         }
+        None
     }
 
-    /// Whether this process computes a study.
-    async fn judged(&self, task: &Waiting, seen: &Seen) -> Result<Result<(), NotHere>, Unseen> {
-        let judged = async {
-            if let Err(reason) = frozen::require_origin(&task.origin) {
-                return Ok(Err(reason));
-            }
-            let ours = match self.read(task, seen, true).await? {
-                Ok(ours) => ours,
-                Err(reason) => return Ok(Err(reason)),
-            };
+    /// The study as it was read, of this build and with a canary of the same bits.
+    async fn found(&self, task: &Waiting, seen: &mut Seen) -> Result<Arc<Ours>, Unseen> {
+        let ours = match self.shelf.get(task) {
+            Some(ours) if seen.has_sung => return Ok(ours),
+            Some(ours) => ours,
+            None => self.read(task, seen).await?,
+        };
+        if !seen.has_sung {
             let started = Instant::now();
             let heard = frozen::heard(&self.pool, &ours.study, &ours.frozen, ours.most_bytes).await?;
             let (canary_variants, canary_ms) = (ours.frozen.canary_variants, milliseconds(started.elapsed()));
             tracing::info!(study = task.cut.id, canary_variants, canary_ms, is_same = heard.is_ok(), "a canary sang");
-            Ok::<_, Unseen>(heard)
-        };
-        let judged = judged.await?;
-        if let Err(reason) = &judged {
-            say_left_to_others(task, reason);
+            heard?;
+            seen.has_sung = true;
         }
-        Ok(judged)
+        // Slots that found it in this one's hand do not wait for it.
+        self.changed.send_replace(());
+        Ok(ours)
     }
 
-    /// A study as it is stored, or on the shelf.
-    async fn read(&self, task: &Waiting, seen: &Seen, waits: bool) -> Result<Result<Arc<Ours>, NotHere>, Unseen> {
+    async fn read(&self, task: &Waiting, seen: &mut Seen) -> Result<Arc<Ours>, Unseen> {
+        frozen::require_origin(&task.origin)?;
+        let mut room = self.shelf.room(seen.bytes).await.ok_or(Unseen::NoRoom)?;
+        let standing = self.store.find(&task.cut.id).await.map_err(Problem::from)?;
+        let standing = standing.filter(|standing| standing.study.cut() == task.cut).ok_or(Unseen::Gone)?;
+        let frozen = standing.study;
+        let (bytes, most_bytes) = (frozen::reading_bytes(frozen.document.len()), self.capacity.variant_bytes);
+        if bytes > most_bytes {
+            return Err(NotHere::NeedsMemory { bytes, most_bytes }.into());
+        }
+        let study = frozen::thaw(&self.pool, &frozen).await??;
+        let bytes = view_bytes(&study) + frozen.document.len() as u64;
+        if bytes > seen.bytes {
+            // Nobody knew before.
+            seen.bytes = bytes;
+            room = self.shelf.try_room(bytes).ok_or(Unseen::NoRoom)?;
+        }
         let Capacity { variant_bytes, admitted_states, .. } = self.capacity;
-        let mut bytes = match seen.bytes.try_lock() {
-            Err(_) if waits => seen.bytes.lock().await,
-            held => held.map_err(|_| Unseen::NotNow)?,
-        };
-        loop {
-            if let Some(ours) = self.shelf.get(task) {
-                return Ok(Ok(ours));
-            }
-            // Until it was read once nobody knows what it takes.
-            let room = self.shelf.room(*bytes, waits).await.ok_or(Unseen::NotNow)?;
-            let standing = self.store.find(&task.cut.id).await.map_err(Problem::from)?;
-            let standing = standing.filter(|standing| standing.study.cut() == task.cut).ok_or(Unseen::Gone)?;
-            let frozen = standing.study;
-            let study = match frozen::thaw(&self.pool, &frozen).await? {
-                Ok(study) => study,
-                Err(reason) => return Ok(Err(reason)),
-            };
-            let known_bytes = mem::replace(&mut *bytes, Ours::bytes_of(&study, &frozen));
-            if known_bytes < *bytes && !self.shelf.is_small(*bytes) {
-                continue;
-            }
-            let most_bytes = if frozen.max_states <= admitted_states { u64::MAX } else { variant_bytes };
-            let ours = Arc::new(Ours { study, frozen, most_bytes, _room: room });
-            self.shelf.put(task.clone(), &ours);
-            return Ok(Ok(ours));
-        }
-    }
-
-    /// A study is not computed here after all.
-    fn leave_to_others(&self, task: &Waiting, reason: NotHere) {
-        say_left_to_others(task, &reason);
-        let seen = Seen { verdict: OnceCell::new_with(Some(Err(reason))), ..Seen::default() };
-        self.known.lock().insert(task.clone(), Arc::new(seen));
+        let most_bytes = if frozen.max_states <= admitted_states { u64::MAX } else { variant_bytes };
+        let chunk_bytes = chunk_bytes(&study, self.parts.is_some());
+        let ours = Arc::new(Ours { study, frozen, most_bytes, chunk_bytes, _room: room });
+        self.shelf.put(task.clone(), &ours, bytes);
+        Ok(ours)
     }
 
     /// Computes a chunk and keeps what it comes to, unless it is not wanted any more.
@@ -501,7 +483,9 @@ impl Workers {
         let (part, mut rows, busy) = match computed {
             Some(Ok(Ok(computed))) => computed,
             Some(Ok(Err(reason))) => {
-                self.leave_to_others(task, reason);
+                say_left_to_others(task, &reason);
+                let seen = Seen { is_left_to_others: true, ..Seen::default() };
+                self.known.lock().insert(task.clone(), Arc::new(seen.into()));
                 return give_up(lease).await;
             }
             Some(Err(problem)) => {

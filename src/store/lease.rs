@@ -32,6 +32,8 @@ pub struct Lease {
     /// So long may its holder be silent.
     silence: Duration,
     held: Held,
+    /// Whether its attempt counts as one that came to no result, should it come to none.
+    is_noted: bool,
 }
 
 #[derive(Debug)]
@@ -43,6 +45,9 @@ enum Held {
     /// Not any more: the server ended it.
     Lost,
 }
+
+/// A holder says so often at least that it is alive, though it may be silent for longer: it learns soon that its lease is lost.
+const SAY: Duration = Duration::from_secs(3);
 
 /// Before what a store did not do is tried again.
 const PAUSE: Duration = Duration::from_secs(1);
@@ -57,6 +62,13 @@ macro_rules! of_attempts {
         "pg_advisory_xact_lock(hashtextextended($1, $2))"
     };
 }
+
+/// Of an attempt.
+const WHATEVER_ELSE: &str = "DELETE FROM attempts WHERE study = $1 AND chunk = $2 AND worker = $3";
+
+/// The same, where another one is noted.
+const IF_ANOTHER_BEGAN: &str = "DELETE FROM attempts WHERE study = $1 AND chunk = $2 AND worker = $3
+    AND EXISTS (SELECT 1 FROM attempts AS others WHERE others.study = $1 AND others.chunk = $2 AND others.worker <> $3)";
 
 macro_rules! unless_begun_as_often {
     () => {
@@ -92,7 +104,7 @@ impl Store {
         };
         // From here on dropping the lease sets the chunk free.
         let (store, attempt) = (self.clone(), self.attempt_name());
-        Ok(Some(Lease { store, cut: cut.clone(), chunk, attempt, silence: lease, held }))
+        Ok(Some(Lease { store, cut: cut.clone(), chunk, attempt, silence: lease, held, is_noted: false }))
     }
 
     /// A chunk among those that are open.
@@ -157,9 +169,14 @@ impl Store {
         .await
     }
 
-    /// Deletes what is noted of an attempt, or is being noted.
-    async fn delete_attempt(&self, study: &str, chunk: u64, attempt: &str) -> Result<(), StoreError> {
-        let text = "DELETE FROM attempts WHERE study = $1 AND chunk = $2 AND worker = $3";
+    /// Deletes what is noted of an attempt, or is being noted; whether there was something.
+    async fn delete_attempt(
+        &self,
+        study: &str,
+        chunk: u64,
+        attempt: &str,
+        text: &'static str,
+    ) -> Result<bool, StoreError> {
         self.with(PATIENCE, async |connection| {
             begin(connection).await?;
             if let Connection::Server(session) = connection {
@@ -167,10 +184,11 @@ impl Store {
                 let text = concat!("SELECT ", of_attempts!());
                 sqlx::query(text).bind(study).bind(stored(chunk)).execute(&mut **session).await?;
             }
-            on!(connection, inner => {
-                sqlx::query(text).bind(study).bind(stored(chunk)).bind(attempt).execute(inner).await.map(|_| ())
+            let was_noted = on!(connection, inner => {
+                sqlx::query(text).bind(study).bind(stored(chunk)).bind(attempt).execute(inner).await.map(|done| done.rows_affected() > 0)
             })?;
-            commit(connection).await
+            commit(connection).await?;
+            Ok(was_noted)
         })
         .await
     }
@@ -238,7 +256,10 @@ impl Lease {
     pub async fn begin(mut self) -> Result<Claim, StoreError> {
         let chunk = self.chunk;
         match self.store.note_attempt(&self.cut.id, chunk, &self.attempt).await {
-            Ok(true) => return Ok(Claim::Chunk(self)),
+            Ok(true) => {
+                self.is_noted = true;
+                return Ok(Claim::Chunk(self));
+            }
             Ok(false) => {}
             // The study was forgotten in this moment.
             Err(StoreError::Failed(sqlx::Error::Database(error))) if error.is_foreign_key_violation() => {
@@ -255,12 +276,19 @@ impl Lease {
         Ok(Claim::Gap(chunk))
     }
 
-    /// Says that its holder is alive, three times in the time that it may be silent, for as long as this is polled: a chunk may take longer than
-    /// the canary let expect.
+    /// Says that its holder is alive, three times in the time that it may be silent or more, for as long as this is polled: a chunk may take longer than
+    /// the canary let expect. Where the lease is lost all the same, the holder goes on, and its attempt counts no more once another has begun the chunk: three
+    /// restarts of a server while one long chunk was computed made a gap of it.
     pub async fn renew(&mut self) -> Infallible {
         loop {
-            tokio::time::sleep(self.silence / 3).await;
+            tokio::time::sleep(SAY.min(self.silence / 3)).await;
             self.say().await;
+            if matches!(self.held, Held::Lost) && self.is_noted {
+                let deleted =
+                    self.store.delete_attempt(&self.cut.id, self.chunk, &self.attempt, IF_ANOTHER_BEGAN).await;
+                // An error: at the next time.
+                self.is_noted = !deleted.unwrap_or(false);
+            }
         }
     }
 
@@ -321,9 +349,9 @@ impl Lease {
         // Whoever claims it next is to see that it was not begun.
         let mut tries = 1;
         loop {
-            match self.store.delete_attempt(&self.cut.id, self.chunk, &self.attempt).await {
+            match self.store.delete_attempt(&self.cut.id, self.chunk, &self.attempt, WHATEVER_ELSE).await {
                 Err(error) if error.leaves_open() && tries < GIVEN_BACK => tries += 1,
-                done => return done,
+                done => return done.map(drop),
             }
             tokio::time::sleep(PAUSE).await;
         }
@@ -340,8 +368,8 @@ impl Lease {
             let (mut deleted, mut pause) = (0, PAUSE);
             while deleted < 2 {
                 tokio::time::sleep(pause).await;
-                match store.delete_attempt(&cut.id, chunk, &attempt).await {
-                    Ok(()) => (deleted, pause) = (deleted + 1, PAUSE),
+                match store.delete_attempt(&cut.id, chunk, &attempt, WHATEVER_ELSE).await {
+                    Ok(_) => (deleted, pause) = (deleted + 1, PAUSE),
                     Err(_) => pause = (2 * pause).min(LONGEST_PAUSE),
                 }
             }

@@ -81,6 +81,16 @@ async fn representations(service: &Service) -> Vec<(&'static str, &'static str, 
     answers
 }
 
+/// Whoever kept that a sweep has too many states was told by a service of larger limits that this is so still.
+#[tokio::test]
+async fn an_answer_that_tells_of_a_limit_has_another_entity_tag_where_that_is_another() {
+    let few = Service::within(Limits { max_states: 10, ..LIMITS }).ask(&question("/v1/design")).await;
+    let service = Service::new();
+    let again = service.ask(&question("/v1/design").with("if-none-match", few.etag())).await;
+    assert_eq!((few.found()["problems"]["sweep"]["code"].as_str(), again.status), (Some("too_many_states"), 200));
+    assert_ne!(few.etag(), again.etag());
+}
+
 #[tokio::test]
 async fn every_representation_has_an_entity_tag_of_its_own() {
     let service = Service::new();

@@ -610,6 +610,32 @@ async fn an_attempt_of_which_nobody_knows_whether_it_was_noted_is_taken_back() {
     store.forget(&study.id).await.unwrap();
 }
 
+/// Three restarts of a server, or three times that it ended a session, and a chunk of 40 s was a gap, though all who computed it lived.
+#[tokio::test]
+async fn an_attempt_whose_lease_was_lost_counts_no_more_once_another_has_begun_the_chunk() {
+    let Some(address) = server() else { return };
+    let _nobody = SERVER.write().await;
+    let store = migrated(&address).await;
+    let study = study("lost", 1);
+    store.create(&study).await.unwrap();
+    let mut stranger = stranger(&address).await;
+    let noted = "SELECT COUNT(*) FROM attempts WHERE study = $1";
+    let mut holders = Vec::new();
+    for _ in 0..=MOST_ATTEMPTS {
+        let lease = store.claim(&study.cut(), Duration::from_secs(3)).await.unwrap();
+        let Claim::Chunk(mut lease) = lease else { panic!("a gap, though all live") };
+        let end = "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE state = 'idle in transaction' AND datname = current_database()";
+        assert_eq!(sqlx::query(end).fetch_all(&mut stranger).await.unwrap().len(), 1);
+        holders.push(tokio::spawn(async move { lease.renew().await }));
+        // The one before takes its attempt back.
+        while sqlx::query_scalar::<_, i64>(noted).bind(&study.id).fetch_one(&mut stranger).await.unwrap() != 1 {
+            tokio::task::yield_now().await;
+        }
+    }
+    holders.iter().for_each(|holder| holder.abort());
+    store.forget(&study.id).await.unwrap();
+}
+
 #[tokio::test]
 async fn a_chunk_tells_how_often_it_was_begun_before() {
     with_each_store(async |store| {

@@ -17,7 +17,7 @@ use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use bytes::{Bytes, BytesMut};
 use clap::ValueEnum;
-use futures_util::{Stream, StreamExt as _, stream};
+use futures_util::{FutureExt as _, Stream, StreamExt as _, stream};
 use metrics::{counter, histogram};
 use parking_lot::Mutex;
 use serde::{Deserialize, Serialize};
@@ -39,12 +39,12 @@ use toothwave_calculation::sweep::losses::LossTotalsAnswer;
 use toothwave_calculation::sweep::model_error::ModelErrorAnswer;
 use utoipa::ToSchema;
 
-use super::{Growing, Stoppable, Taking, answered, broken_body, write_problem};
+use super::{Growing, Read, Stoppable, Taking, answered, broken_body, write_problem};
 use crate::app::App;
 use crate::compute::{self, Lane, Pool};
 use crate::config::Limits;
 use crate::problem::{Problem, ProblemCode};
-use crate::room::{Reserved, Room, Sent};
+use crate::room::{Reserved, Room, SMALL_BYTES, Sent};
 use crate::{negotiation, observe};
 
 /// Lines of a chunk at most.
@@ -354,7 +354,7 @@ impl Answers {
 /// A document that waits, or what stands in its place.
 struct Line {
     index: u64,
-    document: Result<Bytes, Problem>,
+    document: Result<Read, Problem>,
     /// Its share of what may be read ahead.
     _ahead: OwnedSemaphorePermit,
 }
@@ -363,6 +363,9 @@ struct Line {
 struct Lines {
     body: BodyDataStream,
     buffer: BytesMut,
+    /// What it takes, where lines are long.
+    held: Reserved,
+    room: Room,
     /// So much of it holds no end of a line.
     searched_bytes: usize,
     max_line_bytes: usize,
@@ -378,10 +381,12 @@ struct Lines {
 }
 
 impl Lines {
-    fn new(body: Body, max_line_bytes: usize, patience: Duration) -> Self {
+    fn new(body: Body, max_line_bytes: usize, patience: Duration, room: &Room) -> Self {
         Self {
             body: body.into_data_stream(),
             buffer: BytesMut::new(),
+            held: room.nothing(),
+            room: room.clone(),
             searched_bytes: 0,
             max_line_bytes,
             patience,
@@ -394,22 +399,27 @@ impl Lines {
     }
 
     /// The next line, or what was wrong with it; nothing at the end.
-    async fn next(&mut self) -> Option<Result<Bytes, Problem>> {
+    async fn next(&mut self) -> Option<Result<Read, Problem>> {
         loop {
             let unsearched = &self.buffer[self.searched_bytes..];
             if let Some(end) = unsearched.iter().position(|&byte| byte == b'\n') {
                 let end = std::mem::take(&mut self.searched_bytes) + end;
                 let line = self.buffer.split_to(end + 1);
                 let line = &line[..end];
-                if std::mem::take(&mut self.is_skipping) {
-                    continue;
+                let read = if std::mem::take(&mut self.is_skipping) {
+                    None
+                } else if line.len() > self.max_line_bytes {
+                    Some(Err(self.too_long()))
+                } else {
+                    self.by_itself(line)
+                };
+                if 2 * end as u64 > SMALL_BYTES {
+                    // What came behind it must not hold all that it took.
+                    self.buffer = BytesMut::from(&self.buffer[..]);
+                    self.held.hold_at_most(0);
                 }
-                if line.len() > self.max_line_bytes {
-                    return Some(Err(self.too_long()));
-                }
-                if !line.trim_ascii().is_empty() {
-                    // By itself: it may wait long, and must not hold all that was received with it.
-                    return Some(Ok(Bytes::copy_from_slice(line)));
+                if read.is_some() {
+                    return read;
                 }
                 continue;
             }
@@ -423,11 +433,32 @@ impl Lines {
             }
             if self.is_over {
                 self.searched_bytes = 0;
-                let rest = self.buffer.split();
-                return (!rest.trim_ascii().is_empty()).then(|| Ok(Bytes::copy_from_slice(&rest)));
+                let rest = std::mem::take(&mut self.buffer);
+                return self.by_itself(&rest);
+            }
+            // It grows by doubling.
+            if !self.is_skipping
+                && let Err(no_room) = self.held.hold_at_least(2 * self.buffer.len() as u64)
+            {
+                self.forget();
+                self.is_skipping = true;
+                return Some(Err(no_room.into()));
             }
             self.receive().await;
         }
+    }
+
+    /// A line that is not blank: it may wait long, and must not hold all that was received with it.
+    fn by_itself(&self, line: &[u8]) -> Option<Result<Read, Problem>> {
+        if line.trim_ascii().is_empty() {
+            return None;
+        }
+        let read = || {
+            let mut room = self.room.nothing();
+            room.hold_at_least(line.len() as u64)?;
+            Ok(Read { bytes: Bytes::copy_from_slice(line), _room: room })
+        };
+        Some(read())
     }
 
     /// Takes what arrives next, or finds that nothing more will, or too little.
@@ -469,7 +500,8 @@ impl Lines {
     }
 
     fn forget(&mut self) {
-        self.buffer.clear();
+        self.buffer = BytesMut::new();
+        self.held.hold_at_most(0);
         self.searched_bytes = 0;
     }
 
@@ -489,7 +521,7 @@ async fn read_ahead(mut lines: Lines, to: mpsc::UnboundedSender<Line>, end: End,
     let ahead = Arc::new(Semaphore::new(AHEAD_BYTES));
     let mut index = 0;
     while let Some(document) = lines.next().await {
-        let bytes = (document.as_ref().map_or(0, Bytes::len) + LINE_OVERHEAD_BYTES).min(AHEAD_BYTES);
+        let bytes = (document.as_ref().map_or(0, |read| read.len()) + LINE_OVERHEAD_BYTES).min(AHEAD_BYTES);
         let wanted = u32::try_from(bytes).unwrap_or(u32::MAX);
         if ahead.available_permits() < bytes {
             drop(reading.take());
@@ -659,8 +691,8 @@ pub async fn batch(
     match begin(&app, query, request) {
         Ok((response, read)) => {
             if has_proxy {
-                // An error, as nothing is sent.
-                let _ = read.await;
+                // An error, as nothing is sent; or the service stops, and says so line by line.
+                let _ = app.pool.until_closed(read.map(Ok)).await;
             }
             response
         }
@@ -682,13 +714,13 @@ fn begin(
     let held_bytes = AHEAD_BYTES + app.limits.max_concurrent_solves * SLICE_BYTES;
     let room = app.room.reserve(held_bytes as u64)?;
     let patience = Duration::from_millis(app.limits.header_timeout_ms);
-    let lines = Lines::new(request.into_body(), app.limits.max_body_bytes, patience);
+    let beside = app.room.beside(held_bytes as u64);
+    let lines = Lines::new(request.into_body(), app.limits.max_body_bytes, patience, &beside);
     // Bounded by bytes.
     let (to, from) = mpsc::unbounded_channel();
     let end = End::new(Mutex::new(BatchEnd { asked: 0, answered: 0, problem: None }));
     let (reading, read) = oneshot::channel();
     tokio::spawn(read_ahead(lines, to, Arc::clone(&end), reading));
-    let beside = app.room.beside(held_bytes as u64);
     let batch = Batch { lanes: Arc::default(), pool: app.pool.clone(), room: beside, query, limits: app.limits };
     let answers = answers(batch, from, end).map(move |bytes| {
         // Place and room are held until the last answer is sent or the client has left.
@@ -738,24 +770,46 @@ mod tests {
     #[tokio::test]
     async fn a_line_that_waits_holds_no_more_than_itself() {
         let text = format!("{}\n{{}}\n{}\n[]", " ".repeat(60_000), " ".repeat(60_000));
-        let mut lines = Lines::new(Body::from(text), 65_536, Duration::MAX);
+        let mut lines = Lines::new(Body::from(text), 65_536, Duration::MAX, &Room::new(0));
         let mut read = Vec::new();
         while let Some(line) = lines.next().await {
-            read.push(line.expect("a line"));
+            read.push(line.expect("a line").bytes);
         }
         assert_eq!(read, ["{}", "[]"]);
         for line in read {
             assert!(line.try_into_mut().expect("its bytes are its own").capacity() <= 2);
         }
     }
+
+    /// Nine batches of lines of sixteen megabytes ended a process of 256 MiB.
+    #[tokio::test]
+    async fn long_lines_take_room_until_they_are_answered() {
+        const LINE: usize = 1 << 20;
+        let room = Room::new(5 << 20);
+        let text = format!("{}\n{}\n{}\n[]", "1".repeat(LINE), "2".repeat(LINE), "3".repeat(LINE));
+        let pieces =
+            text.into_bytes().chunks(10_000).map(|piece| Ok::<_, io::Error>(piece.to_vec())).collect::<Vec<_>>();
+        let mut lines = Lines::new(Body::from_stream(stream::iter(pieces)), LINE, Duration::MAX, &room);
+        let first = lines.next().await.expect("a line").expect("room");
+        let second = lines.next().await.expect("a line").expect("room");
+        assert!(room.taken_bytes() >= 2 * LINE as u64);
+        // Two wait, and while it arrives it may take twice its length.
+        let kept = room.reserve(2 << 20).expect("room");
+        let refused = lines.next().await.expect("a line").map(|read| read.bytes);
+        assert_eq!(refused.map_err(|problem| problem.code), Err(ProblemCode::TooManyUnreadBytes));
+        assert_eq!(lines.next().await.expect("the next line").expect("room").bytes, "[]");
+        drop((first, second, kept));
+        assert_eq!(room.taken_bytes(), 0);
+    }
+
     /// The lines of a body that arrives in these pieces, those of more than five bytes as what is wrong with them.
     async fn read(pieces: &[&'static str]) -> Vec<Result<Bytes, ProblemCode>> {
         let pieces: Vec<_> =
             pieces.iter().map(|piece| Ok::<_, io::Error>(Bytes::from_static(piece.as_bytes()))).collect();
-        let mut lines = Lines::new(Body::from_stream(stream::iter(pieces)), 5, Duration::MAX);
+        let mut lines = Lines::new(Body::from_stream(stream::iter(pieces)), 5, Duration::MAX, &Room::new(0));
         let mut read = Vec::new();
         while let Some(line) = lines.next().await {
-            read.push(line.map_err(|problem| problem.code));
+            read.push(line.map(|read| read.bytes).map_err(|problem| problem.code));
         }
         read
     }
@@ -794,6 +848,10 @@ mod tests {
         header_timeout_ms: 0,
     };
 
+    fn read_of(bytes: Bytes) -> super::Read {
+        super::Read { bytes, _room: Room::new(0).nothing() }
+    }
+
     /// How many of three such lines one slice answers.
     fn answered_in_a_slice(document: &Result<Bytes, Problem>) -> u64 {
         let query = BatchQuery { endpoint: BatchEndpoint::Sweep, peaks_only: true };
@@ -802,7 +860,7 @@ mod tests {
         let ahead = Arc::new(Semaphore::new(3));
         let waiting = (0..3).map(|index| Line {
             index,
-            document: document.clone(),
+            document: document.clone().map(read_of),
             _ahead: Arc::clone(&ahead).try_acquire_owned().expect("a permit"),
         });
         let slice = Mutex::new(Slice { waiting: waiting.collect(), ..Slice::default() });
@@ -819,7 +877,7 @@ mod tests {
         let batch =
             Batch { lanes: Arc::default(), pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
         let ahead = Arc::new(Semaphore::new(1)).try_acquire_owned().expect("a permit");
-        let line = Line { index: 7, document: Ok(Bytes::from("{}")), _ahead: ahead };
+        let line = Line { index: 7, document: Ok(read_of(Bytes::from("{}"))), _ahead: ahead };
         let mut chunk = Chunk { batch, waiting: [line].into(), answers: Answers { lines: 1, ..Answers::default() } };
         assert_eq!((chunk.next_to_blame(), chunk.waiting.len()), (None, 1));
         chunk.answers.lines = 0;
@@ -833,7 +891,7 @@ mod tests {
         let batch =
             Batch { lanes: Arc::default(), pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
         let ahead = Arc::new(Semaphore::new(1)).try_acquire_owned().expect("a permit");
-        let line = Line { index: 7, document: Ok(Bytes::from("{")), _ahead: ahead };
+        let line = Line { index: 7, document: Ok(read_of(Bytes::from("{"))), _ahead: ahead };
         let slice = Mutex::new(Slice { waiting: [line].into(), ..Slice::default() });
         work(&slice, &batch, &mut compute::Slice::default(), &AtomicBool::new(true));
         let slice = slice.into_inner();

@@ -70,9 +70,9 @@ impl Forms for DesignAnswer {
     }
 }
 
-/// What is asked.
+/// What is asked, within limits that are part of the answer: where a sweep is beyond them it says so.
 #[derive(Debug)]
-pub struct WholeDesign;
+pub struct WholeDesign(pub Limits);
 
 /// The parameters of one question, or why it has no answer.
 type Checked<Q> = Result<<Q as Question>::Checked, NoAnswer>;
@@ -94,7 +94,8 @@ impl Question for WholeDesign {
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
-        (Geometry.reads(design), CoincidenceDegree.reads(design), Sweep.reads(design))
+        let Limits { max_states, max_profile_points } = self.0;
+        (Geometry.reads(design), CoincidenceDegree.reads(design), Sweep.reads(design), max_states, max_profile_points)
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedDesign, NoAnswer> {
@@ -171,5 +172,5 @@ fn part<Q: Question>(
     )
 )]
 pub async fn design(State(app): State<Arc<App>>, request: Request) -> Response {
-    respond(WholeDesign, app, request).await
+    respond(WholeDesign(app.limits.of_calculation()), app, request).await
 }

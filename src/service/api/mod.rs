@@ -200,7 +200,7 @@ async fn read_body(
     }
     let mut pieces = body.into_data_stream();
     // One piece of its own, and those that arrive are let go: they may be of a byte each, and hold the whole buffer that they were read into.
-    let (mut whole, mut room) = (BytesMut::new(), app.room.reserve(0)?);
+    let (mut whole, mut room) = (BytesMut::new(), app.room.nothing());
     let reading = async {
         while let Some(piece) = pieces.next().await {
             let piece = piece.map_err(|error| broken_body(&error))?;

@@ -22,6 +22,7 @@ use utoipa::ToSchema;
 use super::{Problems, read_body, with_body, written};
 use crate::app::App;
 use crate::compute::Thread;
+use crate::frozen::reading_bytes;
 use crate::negotiation::{self, Representation};
 use crate::problem::{Problem, ProblemCode};
 use crate::query::require_no_query;
@@ -229,7 +230,12 @@ async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Respons
     let body = read_body(app, &headers, body, deadline).await?;
     // Its choices stand for hundreds of designs, so that a document of 64 KB may take long to be read.
     let (question, limits) = (body.clone(), app.limits.of_studies());
-    let study = app.pool.run_aside(deadline, move || Ok(Study::read(&question, &limits)?)).await?;
+    let room = app.pool.clone();
+    let read = move || {
+        let _room = room.reserve(reading_bytes(question.len()))?;
+        Ok(Study::read(&question, &limits)?)
+    };
+    let study = app.pool.run_aside(deadline, read).await?;
     let kept = app.pool.until_closed(app.studies.begin(study, &body, deadline)).await?;
     let wait = wait_wanted(&headers);
     if let Some(wait) = wait {
