@@ -388,6 +388,11 @@ impl Pool {
         self.run_slice(&mut Lane::default(), deadline, |_, stop| job(stop)).await
     }
 
+    /// Whether others have so long steps that a turn is kept until it is used up.
+    pub fn are_turns_long(&self) -> bool {
+        self.pace.most(Instant::now()) > SLICE
+    }
+
     /// Runs a slice of a batch when its turn comes. Each of its steps has the deadline at least.
     ///
     /// # Errors

@@ -456,7 +456,7 @@ impl Lines {
         let read = || {
             let mut room = self.room.nothing();
             room.hold_at_least(line.len() as u64)?;
-            Ok(Read { bytes: Bytes::copy_from_slice(line), _room: room })
+            Ok(Read { bytes: Bytes::copy_from_slice(line), room })
         };
         Some(read())
     }
@@ -549,8 +549,8 @@ struct Chunk {
 #[derive(Clone)]
 struct Batch {
     pool: Pool,
-    /// Of its slices, those that do not run: as many as run at once.
-    lanes: Arc<Mutex<Vec<Lane>>>,
+    /// Where turns are long its chunks have them in common, one after the other: they are due in their order, and a turn that one leaves is the next one's.
+    lane: Arc<tokio::sync::Mutex<Lane>>,
     room: Room,
     query: BatchQuery,
     limits: Limits,
@@ -580,13 +580,18 @@ impl Chunk {
     async fn advance(mut self) -> Self {
         let slice = Arc::new(Mutex::new(Slice { waiting: std::mem::take(&mut self.waiting), ..Slice::default() }));
         let (shared, batch) = (Arc::clone(&slice), self.batch.clone());
-        let mut lane = self.batch.lanes.lock().pop().unwrap_or_default();
-        let result = self.batch.pool.run_steps(&mut lane, move |time, stop| {
+        let (mut own, mut common) = (Lane::default(), None);
+        let lane = if self.batch.pool.are_turns_long() {
+            &mut **common.insert(self.batch.lane.lock().await)
+        } else {
+            &mut own
+        };
+        let result = self.batch.pool.run_steps(lane, move |time, stop| {
             work(&shared, &batch, time, stop);
             Ok(())
         });
         let result = result.await;
-        self.batch.lanes.lock().push(lane);
+        drop(common);
         let mut slice = slice.lock();
         self.waiting = std::mem::take(&mut slice.waiting);
         self.answers.append(std::mem::take(&mut slice.answers));
@@ -721,7 +726,7 @@ fn begin(
     let end = End::new(Mutex::new(BatchEnd { asked: 0, answered: 0, problem: None }));
     let (reading, read) = oneshot::channel();
     tokio::spawn(read_ahead(lines, to, Arc::clone(&end), reading));
-    let batch = Batch { lanes: Arc::default(), pool: app.pool.clone(), room: beside, query, limits: app.limits };
+    let batch = Batch { lane: Arc::default(), pool: app.pool.clone(), room: beside, query, limits: app.limits };
     let answers = answers(batch, from, end).map(move |bytes| {
         // Place and room are held until the last answer is sent or the client has left.
         let _held = (&place, &room);
@@ -849,14 +854,14 @@ mod tests {
     };
 
     fn read_of(bytes: Bytes) -> super::Read {
-        super::Read { bytes, _room: Room::new(0).nothing() }
+        super::Read { bytes, room: Room::new(0).nothing() }
     }
 
     /// How many of three such lines one slice answers.
     fn answered_in_a_slice(document: &Result<Bytes, Problem>) -> u64 {
         let query = BatchQuery { endpoint: BatchEndpoint::Sweep, peaks_only: true };
         let batch =
-            Batch { lanes: Arc::default(), pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
+            Batch { lane: Arc::default(), pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
         let ahead = Arc::new(Semaphore::new(3));
         let waiting = (0..3).map(|index| Line {
             index,
@@ -875,7 +880,7 @@ mod tests {
     fn a_slice_that_has_answered_blames_no_line_that_it_has_not_begun() {
         let query = BatchQuery { endpoint: BatchEndpoint::Sweep, peaks_only: true };
         let batch =
-            Batch { lanes: Arc::default(), pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
+            Batch { lane: Arc::default(), pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
         let ahead = Arc::new(Semaphore::new(1)).try_acquire_owned().expect("a permit");
         let line = Line { index: 7, document: Ok(read_of(Bytes::from("{}"))), _ahead: ahead };
         let mut chunk = Chunk { batch, waiting: [line].into(), answers: Answers { lines: 1, ..Answers::default() } };
@@ -889,7 +894,7 @@ mod tests {
     fn a_line_of_a_client_that_has_left_is_left_as_it_was() {
         let query = BatchQuery { endpoint: BatchEndpoint::Sweep, peaks_only: true };
         let batch =
-            Batch { lanes: Arc::default(), pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
+            Batch { lane: Arc::default(), pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
         let ahead = Arc::new(Semaphore::new(1)).try_acquire_owned().expect("a permit");
         let line = Line { index: 7, document: Ok(read_of(Bytes::from("{"))), _ahead: ahead };
         let slice = Mutex::new(Slice { waiting: [line].into(), ..Slice::default() });
