@@ -345,6 +345,23 @@ async fn a_batch_that_is_sent_bit_by_bit_is_answered() {
     assert_eq!(lines(&service.send(request).await).len(), 40);
 }
 
+/// Whoever sent through a proxy got no answer at all, though the first line was there.
+#[tokio::test]
+async fn behind_a_proxy_lines_that_have_come_are_told_of_a_stop_though_more_is_to_come() {
+    let service = Service::new();
+    let arriving =
+        stream::iter([Ok::<_, Infallible>(Bytes::from(format!("{}\n", variant(0))))]).chain(stream::pending());
+    let request = Request::post("/v1/batch?peaks_only=true")
+        .header("content-type", "application/x-ndjson")
+        .header("x-forwarded-for", "192.0.2.1");
+    let mut response = std::pin::pin!(service.response(request.body(Body::from_stream(arriving)).unwrap()));
+    assert!(futures_util::poll!(&mut response).is_pending());
+    service.app.pool.close();
+    let first = response.await.into_body().into_data_stream().next().await.unwrap().unwrap();
+    let line: Value = serde_json::from_slice(&first).unwrap();
+    assert_eq!((line["index"].as_u64(), line["problem"]["code"].as_str()), (Some(0), Some("shutting_down")));
+}
+
 /// nginx passes on no more of a request once its answer has begun: a batch of some megabytes broke off behind it.
 #[tokio::test]
 async fn behind_a_proxy_a_batch_is_read_before_its_answer_begins_and_directly_answered_while_it_is_sent() {
