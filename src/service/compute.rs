@@ -393,6 +393,11 @@ impl Pool {
         self.pace.most(Instant::now()) > SLICE
     }
 
+    /// Whether a slice that asks now need not wait.
+    pub fn has_free_permit(&self) -> bool {
+        self.permits.available_permits() > 0
+    }
+
     /// Runs a slice of a batch when its turn comes. Each of its steps has the deadline at least.
     ///
     /// # Errors

@@ -139,7 +139,8 @@ pub fn require_origin(theirs: &str) -> Result<(), NotHere> {
     }
 }
 
-/// About what a document of such a length takes besides while a study is read from it, at most: its tree, once as it stands and once sorted.
+/// About what a document of such a length takes besides while a study is read from it, at most: its tree, once as it stands and once sorted. What its choices
+/// stand for is bounded, and not counted here.
 pub const fn reading_bytes(document_bytes: usize) -> u64 {
     /// Measured with lists of numbers, texts and objects, each as short as can be.
     const TIMES: u64 = 48;
@@ -156,11 +157,11 @@ pub fn view_bytes(study: &Study) -> u64 {
 /// The study that was frozen, or why it is none here.
 ///
 /// # Errors
-/// Where reading it takes too long.
-pub async fn thaw(pool: &Pool, frozen: &NewStudy) -> Result<Result<Arc<Study>, NotHere>, Problem> {
+/// Where reading it takes too long, or there is no room for that.
+pub async fn thaw(pool: &Pool, frozen: &NewStudy, takes_room: bool) -> Result<Result<Arc<Study>, NotHere>, Problem> {
     let (frozen, room) = (frozen.clone(), pool.clone());
     let thaw = move || {
-        let _room = room.reserve(reading_bytes(frozen.document.len()))?;
+        let _room = takes_room.then(|| room.reserve(reading_bytes(frozen.document.len()))).transpose()?;
         Ok(thawed(&frozen))
     };
     pool.run_aside(pool.deadline(), thaw).await

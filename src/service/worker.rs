@@ -360,11 +360,20 @@ impl Workers {
     /// would: there are others.
     async fn ready(&self, task: &Waiting) -> Option<(Arc<Ours>, impl Sized)> {
         let though_scarce = self.memory().await;
-        let ours = self.study(task).await?;
+        let ours = self.study(task, though_scarce.is_none()).await?;
         let room = self.room.take(ours.chunk_bytes).await?;
-        // What was waited for is let go, and waited for again.
-        let has_memory = though_scarce.is_some() || !self.pool.memory().is_scarce();
-        has_memory.then(|| (ours, (room, though_scarce, Arc::clone(&self.begun))))
+        let though_scarce = match though_scarce {
+            // The study itself may have made it so: it goes on where nothing else does, or is let go until then.
+            None if self.pool.memory().is_scarce() => {
+                Some(self.though_scarce.try_acquire().ok().filter(|_| self.is_none_begun())?)
+            }
+            held => held,
+        };
+        Some((ours, (room, though_scarce, Arc::clone(&self.begun))))
+    }
+
+    fn is_none_begun(&self) -> bool {
+        Arc::strong_count(&self.begun) == 1
     }
 
     /// Waits while memory is scarce, so that what is in work comes to its end and is let go before more is begun. Where nothing is, that would be for ever:
@@ -372,8 +381,7 @@ impl Workers {
     async fn memory(&self) -> Option<SemaphorePermit<'_>> {
         while self.pool.memory().is_scarce() {
             self.shelf.clear();
-            let is_none_begun = Arc::strong_count(&self.begun) == 1;
-            if is_none_begun
+            if self.is_none_begun()
                 && self.pool.memory().scarce_for() > LONGEST_SCARCE
                 && let Ok(alone) = self.though_scarce.try_acquire()
             {
@@ -384,14 +392,14 @@ impl Workers {
         None
     }
 
-    /// The study, where this process computes it.
-    async fn study(&self, task: &Waiting) -> Option<Arc<Ours>> {
+    /// The study, where this process computes it, and where it has room to be read, if it takes any.
+    async fn study(&self, task: &Waiting, takes_room: bool) -> Option<Arc<Ours>> {
         let seen = Arc::clone(self.known.lock().entry(task.clone()).or_default());
         let mut seen = seen.try_lock().ok()?;
         if seen.is_left_to_others {
             return None;
         }
-        match self.found(task, &mut seen).await {
+        match self.found(task, &mut seen, takes_room).await {
             Ok(ours) => return Some(ours),
             Err(Unseen::Gone | Unseen::NoRoom) => {}
             Err(Unseen::NotHere(reason)) => {
@@ -407,11 +415,11 @@ impl Workers {
     }
 
     /// The study as it was read, of this build and with a canary of the same bits.
-    async fn found(&self, task: &Waiting, seen: &mut Seen) -> Result<Arc<Ours>, Unseen> {
+    async fn found(&self, task: &Waiting, seen: &mut Seen, takes_room: bool) -> Result<Arc<Ours>, Unseen> {
         let ours = match self.shelf.get(task) {
             Some(ours) if seen.has_sung => return Ok(ours),
             Some(ours) => ours,
-            None => self.read(task, seen).await?,
+            None => self.read(task, seen, takes_room).await?,
         };
         if !seen.has_sung {
             let started = Instant::now();
@@ -426,25 +434,25 @@ impl Workers {
         Ok(ours)
     }
 
-    async fn read(&self, task: &Waiting, seen: &mut Seen) -> Result<Arc<Ours>, Unseen> {
+    async fn read(&self, task: &Waiting, seen: &mut Seen, takes_room: bool) -> Result<Arc<Ours>, Unseen> {
         frozen::require_origin(&task.origin)?;
         let mut room = self.shelf.room(seen.bytes).await.ok_or(Unseen::NoRoom)?;
         let standing = self.store.find(&task.cut.id).await.map_err(Problem::from)?;
         let standing = standing.filter(|standing| standing.study.cut() == task.cut).ok_or(Unseen::Gone)?;
         let frozen = standing.study;
-        let (bytes, most_bytes) = (frozen::reading_bytes(frozen.document.len()), self.capacity.variant_bytes);
+        let Capacity { variant_bytes, admitted_states, .. } = self.capacity;
+        let most_bytes = if frozen.max_states <= admitted_states { u64::MAX } else { variant_bytes };
+        let bytes = frozen::reading_bytes(frozen.document.len());
         if bytes > most_bytes {
             return Err(NotHere::NeedsMemory { bytes, most_bytes }.into());
         }
-        let study = frozen::thaw(&self.pool, &frozen).await??;
+        let study = frozen::thaw(&self.pool, &frozen, takes_room).await??;
         let bytes = view_bytes(&study) + frozen.document.len() as u64;
         if bytes > seen.bytes {
             // Nobody knew before.
             seen.bytes = bytes;
             room = self.shelf.try_room(bytes).ok_or(Unseen::NoRoom)?;
         }
-        let Capacity { variant_bytes, admitted_states, .. } = self.capacity;
-        let most_bytes = if frozen.max_states <= admitted_states { u64::MAX } else { variant_bytes };
         let chunk_bytes = chunk_bytes(&study, self.parts.is_some());
         let ours = Arc::new(Ours { study, frozen, most_bytes, chunk_bytes, _room: room });
         self.shelf.put(task.clone(), &ours, bytes);

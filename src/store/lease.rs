@@ -66,9 +66,10 @@ macro_rules! of_attempts {
 /// Of an attempt.
 const WHATEVER_ELSE: &str = "DELETE FROM attempts WHERE study = $1 AND chunk = $2 AND worker = $3";
 
-/// The same, where another one is noted.
+/// The same, where another one is noted that was begun since: of an earlier one nobody knows whether it ended its process.
 const IF_ANOTHER_BEGAN: &str = "DELETE FROM attempts WHERE study = $1 AND chunk = $2 AND worker = $3
-    AND EXISTS (SELECT 1 FROM attempts AS others WHERE others.study = $1 AND others.chunk = $2 AND others.worker <> $3)";
+    AND EXISTS (SELECT 1 FROM attempts AS others WHERE others.study = $1 AND others.chunk = $2 AND others.worker <> $3
+        AND others.began_at_s >= attempts.began_at_s)";
 
 macro_rules! unless_begun_as_often {
     () => {

@@ -549,7 +549,8 @@ struct Chunk {
 #[derive(Clone)]
 struct Batch {
     pool: Pool,
-    /// Where turns are long its chunks have them in common, one after the other: they are due in their order, and a turn that one leaves is the next one's.
+    /// Where turns are long and no permit is free its chunks have them in common, one after the other: each would wait for its own, and the one that is kept would
+    /// go unused.
     lane: Arc<tokio::sync::Mutex<Lane>>,
     room: Room,
     query: BatchQuery,
@@ -581,10 +582,12 @@ impl Chunk {
         let slice = Arc::new(Mutex::new(Slice { waiting: std::mem::take(&mut self.waiting), ..Slice::default() }));
         let (shared, batch) = (Arc::clone(&slice), self.batch.clone());
         let (mut own, mut common) = (Lane::default(), None);
-        let lane = if self.batch.pool.are_turns_long() {
-            &mut **common.insert(self.batch.lane.lock().await)
-        } else {
-            &mut own
+        let pool = &self.batch.pool;
+        let lane = match self.batch.lane.try_lock() {
+            _ if !pool.are_turns_long() => &mut own,
+            Ok(lane) => &mut **common.insert(lane),
+            Err(_) if pool.has_free_permit() => &mut own,
+            Err(_) => &mut **common.insert(self.batch.lane.lock().await),
         };
         let result = self.batch.pool.run_steps(lane, move |time, stop| {
             work(&shared, &batch, time, stop);
