@@ -428,9 +428,9 @@ impl Workers {
             tracing::info!(study = task.cut.id, canary_variants, canary_ms, is_same = heard.is_ok(), "a canary sang");
             heard?;
             seen.has_sung = true;
+            // Slots that found it in this one's hand do not wait for it. Told of each reading, those that find nothing free would read for ever.
+            self.changed.send_replace(());
         }
-        // Slots that found it in this one's hand do not wait for it.
-        self.changed.send_replace(());
         Ok(ours)
     }
 
