@@ -561,7 +561,7 @@ impl Pool {
     async fn permit_of_a_single_one(&self) -> Result<Held, Problem> {
         let _waits = Counted::one_more(&self.waiting);
         let spare = async {
-            if self.pace.most(Instant::now()) == SLICE {
+            if !self.are_turns_long() {
                 tokio::time::sleep(PATIENCE).await;
             }
             // Behind others of its kind it waits.

@@ -38,9 +38,6 @@ use crate::socket::{Seen, Socket};
 use crate::studies::Keeping;
 use crate::worker::{Capacity, PART_OF_CHUNKS, Workers};
 
-/// What is not done while memory is scarce.
-const NO_LARGE_ANSWER: &str = "no large answer is begun, those that are made are given up";
-
 /// How long the service still listens at least after it has said that it is not ready, so that whoever asks can learn it.
 const NOTICE: Duration = Duration::from_millis(200);
 
@@ -135,8 +132,9 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
     tokio::spawn(observe::keep_up());
     tokio::spawn({
         let app = Arc::clone(&app);
+        let not_done = "no large answer is begun, those that are made are given up";
         // Before clients are refused.
-        app.pool.memory().clone().watch(NO_LARGE_ANSWER, move || app.cache.let_go())
+        app.pool.memory().clone().watch(not_done, move || app.cache.let_go())
     });
     let store = tokio::spawn({
         let app = Arc::clone(&app);

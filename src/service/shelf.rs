@@ -1,6 +1,7 @@
 //! What workers hold at once of the memory: studies that they have read, and what the chunks come to that they compute.
 
 use std::collections::VecDeque;
+use std::convert::Infallible;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -17,7 +18,7 @@ const TURN: Duration = Duration::from_secs(10);
 const LOOK: Duration = Duration::from_millis(100);
 
 /// Room that slots share. Those who want more than a slot's share are counted: together they take no more than all the room, or one is alone. The others are not:
-/// there are no more of them than slots, so that they take no more than as much again.
+/// of those in use there are no more than slots, so that they take no more than as much again.
 #[derive(Debug)]
 pub struct SharedRoom {
     free: Arc<Semaphore>,
@@ -108,15 +109,17 @@ impl<K: PartialEq, V> Shelf<K, V> {
         if taken.is_some() {
             return taken;
         }
-        let gives_way = async {
-            loop {
-                tokio::time::sleep(LOOK).await;
-                while self.drop_unused() {}
-            }
-        };
         tokio::select! {
             taken = self.room.take(bytes) => taken,
-            () = gives_way => None,
+            never = self.keep_dropping_unused() => match never {},
+        }
+    }
+
+    /// Of what is counted, all that comes out of use, for as long as this is polled.
+    async fn keep_dropping_unused(&self) -> Infallible {
+        loop {
+            tokio::time::sleep(LOOK).await;
+            while self.drop_unused() {}
         }
     }
 

@@ -519,6 +519,14 @@ async fn a_worker_that_lives_keeps_its_chunk_however_long_that_takes() {
     worker.forget(&study.id).await.unwrap();
 }
 
+/// A server's store, and a study in it that runs.
+async fn stored(address: &Address, name: &str, chunks: u64) -> (Store, NewStudy) {
+    let store = migrated(address).await;
+    let study = study(name, chunks);
+    store.create(&study).await.unwrap();
+    (store, study)
+}
+
 /// A session that is none of the store's.
 async fn stranger(address: &Address) -> PgConnection {
     let Address::Server(options) = address else { panic!("{address}") };
@@ -537,9 +545,7 @@ async fn note_as_the_store_does(session: &mut PgConnection, study: &NewStudy) {
 async fn an_attempt_that_is_still_being_noted_is_taken_back_when_that_has_come_to_its_end() {
     let Some(address) = server() else { return };
     let _others = SERVER.read().await;
-    let store = migrated(&address).await;
-    let study = study("noted", 1);
-    store.create(&study).await.unwrap();
+    let (store, study) = stored(&address, "noted", 1).await;
     let (mut noting, mut other) = (stranger(&address).await, stranger(&address).await);
     let mut waits = async || {
         let waiting = "SELECT COUNT(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted";
@@ -573,9 +579,7 @@ async fn an_attempt_that_is_still_being_noted_is_taken_back_when_that_has_come_t
 async fn an_attempt_of_which_nobody_knows_whether_it_was_noted_is_taken_back() {
     let Some(address) = server() else { return };
     let _nobody = SERVER.write().await;
-    let store = migrated(&address).await;
-    let study = study("cut", 1);
-    store.create(&study).await.unwrap();
+    let (store, study) = stored(&address, "cut", 1).await;
     drop(claimed(&store, &study).await);
     let lease = loop {
         match store.hold(&study.cut(), LEASE).await.unwrap() {
@@ -615,9 +619,7 @@ async fn an_attempt_of_which_nobody_knows_whether_it_was_noted_is_taken_back() {
 async fn an_attempt_whose_lease_was_lost_counts_no_more_once_another_has_begun_the_chunk() {
     let Some(address) = server() else { return };
     let _nobody = SERVER.write().await;
-    let store = migrated(&address).await;
-    let study = study("lost", 1);
-    store.create(&study).await.unwrap();
+    let (store, study) = stored(&address, "lost", 1).await;
     let mut stranger = stranger(&address).await;
     let noted = "SELECT COUNT(*) FROM attempts WHERE study = $1";
     let mut holders = Vec::new();
@@ -656,9 +658,7 @@ async fn a_chunk_tells_how_often_it_was_begun_before() {
 async fn who_wants_a_study_that_another_session_holds_is_told_so_in_time_and_the_server_does_nothing_of_it_later() {
     let Some(address) = server() else { return };
     let _others = SERVER.read().await;
-    let store = migrated(&address).await;
-    let study = study("held", 2);
-    store.create(&study).await.unwrap();
+    let (store, study) = stored(&address, "held", 2).await;
     let mut holder = stranger(&address).await;
     sqlx::query("BEGIN").execute(&mut holder).await.unwrap();
     let lock = "SELECT 1 FROM studies WHERE id = $1 FOR NO KEY UPDATE";
@@ -686,9 +686,7 @@ async fn who_wants_a_study_that_another_session_holds_is_told_so_in_time_and_the
 async fn who_has_computed_a_chunk_waits_for_a_lock_and_keeps_its_lease_meanwhile() {
     let Some(address) = server() else { return };
     let _alone = SERVER.write().await;
-    let store = migrated(&address).await;
-    let study = study("waiting", 1);
-    store.create(&study).await.unwrap();
+    let (store, study) = stored(&address, "waiting", 1).await;
     let mut lease = claimed(&store, &study).await;
     let mut another = stranger(&address).await;
     sqlx::raw_sql("BEGIN; LOCK TABLE results IN SHARE MODE").execute(&mut another).await.unwrap();
