@@ -251,17 +251,13 @@ impl Pool {
         &self.memory
     }
 
-    /// Room for so many bytes beside answers, as far as there is; where there are none, as far as the memory really has it.
+    /// Room for so many bytes beside answers, as soon as there is; where there are none, as far as the memory really has it.
     ///
     /// # Errors
-    /// Where there is not so much left.
-    pub fn reserve(&self, bytes: u64) -> Result<Option<Reserved>, NoRoom> {
+    /// Where there is not so much until the deadline.
+    pub async fn reserve_until(&self, deadline: Instant, bytes: u64) -> Result<Option<Reserved>, NoRoom> {
         match &self.room {
-            Some(room) => {
-                let mut reserved = room.nothing();
-                reserved.hold_at_least(bytes)?;
-                Ok(Some(reserved))
-            }
+            Some(room) => room.reserve_until(deadline, bytes).await.map(Some),
             None if bytes <= room::SMALL_BYTES || self.memory.has(bytes) => Ok(None),
             None => Err(NoRoom::Scarce),
         }
@@ -863,6 +859,26 @@ mod tests {
         drop(unread);
         assert!(large.await.is_ok());
         assert_eq!(room.taken_bytes(), 0);
+        Ok(())
+    }
+
+    /// Where answers keep all room, one that is read of a store had never any: it tried once.
+    #[tokio::test(start_paused = true)]
+    async fn what_is_read_waits_for_room_of_answers_in_its_turn() -> Result<(), NoRoom> {
+        let Line { settings } = Line::parse_from(["serve", "--deadline-ms", "1000"]);
+        let room = Room::new(64 << 20);
+        let pool = Pool::new(settings.limits()).beside(&room);
+        let (first, second) = (room.reserve(32 << 20)?, room.reserve(32 << 20)?);
+        let mut read = pin!(pool.reserve_until(pool.deadline(), 48 << 20));
+        assert!(futures_util::poll!(&mut read).is_pending());
+        drop(first);
+        assert!(futures_util::poll!(&mut read).is_pending());
+        assert!(room.reserve(16 << 20).is_err(), "it is the next");
+        drop(second);
+        assert!(read.await?.is_some());
+        assert_eq!(room.taken_bytes(), 0);
+        let _all = room.reserve(64 << 20)?;
+        assert!(pool.reserve_until(pool.deadline(), 48 << 20).await.is_err(), "by the deadline there was none");
         Ok(())
     }
 

@@ -159,12 +159,15 @@ pub fn view_bytes(study: &Study) -> u64 {
 /// # Errors
 /// Where reading it takes too long, or there is no room for that.
 pub async fn thaw(pool: &Pool, frozen: &NewStudy, takes_room: bool) -> Result<Result<Arc<Study>, NotHere>, Problem> {
-    let (frozen, room) = (frozen.clone(), pool.clone());
+    let deadline = pool.deadline();
+    let bytes = if takes_room { reading_bytes(frozen.document.len()) } else { 0 };
+    let room = pool.reserve_until(deadline, bytes).await?;
+    let frozen = frozen.clone();
     let thaw = move || {
-        let _room = takes_room.then(|| room.reserve(reading_bytes(frozen.document.len()))).transpose()?;
+        let _room = room;
         Ok(thawed(&frozen))
     };
-    pool.run_aside(pool.deadline(), thaw).await
+    pool.run_aside(deadline, thaw).await
 }
 
 fn thawed(frozen: &NewStudy) -> Result<Arc<Study>, NotHere> {

@@ -8,6 +8,7 @@ use std::sync::{Arc, Weak};
 use bytes::Bytes;
 use parking_lot::Mutex;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::time::{Instant, timeout_at};
 
 use crate::memory::Memory;
 use crate::problem::{Problem, ProblemCode};
@@ -84,7 +85,7 @@ pub enum NoRoom {
     },
     /// Whatever is counted.
     #[error(
-        "the service's memory is held but for what it needs itself, and the answer is large; try again in a moment, or ask for less"
+        "the service's memory is held but for what it needs itself, and what is asked for is large; try again in a moment, or ask for less"
     )]
     Scarce,
 }
@@ -152,6 +153,25 @@ impl Room {
         let mut reserved = Reserved { room: self.clone(), held: None, bytes };
         reserved.hold_permits(self.permits_for(bytes), bytes)?;
         Ok(reserved)
+    }
+
+    /// The same until then, in the order in which it is asked for.
+    ///
+    /// # Errors
+    /// Where there is not so much by then, or memory is scarce.
+    pub async fn reserve_until(&self, deadline: Instant, bytes: u64) -> Result<Reserved, NoRoom> {
+        let mut reserved = self.nothing();
+        let taken = match reserved.hold_at_least(bytes) {
+            Ok(()) => return Ok(reserved),
+            Err(NoRoom::Scarce) => return Err(NoRoom::Scarce),
+            Err(taken) => taken,
+        };
+        let permits = self.permits_for(bytes);
+        // Also an error says that there is none: that the semaphore is closed, which it never is.
+        match timeout_at(deadline, Arc::clone(&self.free).acquire_many_owned(permits)).await {
+            Ok(Ok(held)) => Ok(Reserved { room: self.clone(), held: Some(held), bytes }),
+            _ => Err(taken),
+        }
     }
 
     /// Room for what is kept: so many bytes, though they were all of it. What is small is kept though there is none, but not where memory is scarce: how much

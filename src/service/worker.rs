@@ -121,6 +121,8 @@ struct Seen {
     has_sung: bool,
     /// Whether it is known not to.
     is_left_to_others: bool,
+    /// Whether it could not be looked at the last time, which was said.
+    is_in_trouble: bool,
     /// What it takes once it is read, as far as is known.
     bytes: u64,
 }
@@ -400,7 +402,10 @@ impl Workers {
             return None;
         }
         match self.found(task, &mut seen, takes_room).await {
-            Ok(ours) => return Some(ours),
+            Ok(ours) => {
+                seen.is_in_trouble = false;
+                return Some(ours);
+            }
             Err(Unseen::Gone | Unseen::NoRoom) => {}
             Err(Unseen::NotHere(reason)) => {
                 say_left_to_others(task, &reason);
@@ -408,7 +413,10 @@ impl Workers {
             }
             // Another time.
             Err(Unseen::Problem(problem)) => {
-                tracing::warn!(study = task.cut.id, %problem, cause = problem.cause, "a study could not be looked at");
+                if !std::mem::replace(&mut seen.is_in_trouble, true) {
+                    let cause = problem.cause.as_deref();
+                    tracing::warn!(study = task.cut.id, %problem, cause, "a study cannot be looked at; tried again until it can");
+                }
             }
         }
         None

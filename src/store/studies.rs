@@ -152,9 +152,28 @@ const STUDY: &str = "SELECT id, kind, build, document, max_states, max_profile_p
     canary, lease_ms, is_cancelled, CAST(ends_at_s - unixepoch() AS BIGINT), CAST(unixepoch() - asked_at_s AS BIGINT)
     FROM studies WHERE id = $1";
 
-/// Those that wait for workers; of studies that are done no chunk is left.
-const WAITING: &str = "SELECT id, chunk_variants, build FROM studies WHERE NOT is_cancelled AND ends_at_s > unixepoch()
-    AND (opened < chunks OR EXISTS (SELECT 1 FROM chunks WHERE study = id)) ORDER BY asked_at_s, id";
+/// Open chunks of a study of the outer query that are still to be computed. One that has a result has its row for as long as another worker has it in hand: its first
+/// holder's lease was lost, and what that one computed was kept.
+macro_rules! to_be_computed {
+    () => {
+        "FROM chunks WHERE chunks.study = studies.id
+            AND NOT EXISTS (SELECT 1 FROM results WHERE results.study = chunks.study AND results.chunk = chunks.chunk)"
+    };
+}
+
+/// A study waits for workers.
+macro_rules! waits {
+    () => {
+        concat!(
+            "NOT is_cancelled AND ends_at_s > unixepoch() AND (opened < chunks OR EXISTS (SELECT 1 ",
+            to_be_computed!(),
+            "))"
+        )
+    };
+}
+
+const WAITING: &str =
+    concat!("SELECT id, chunk_variants, build FROM studies WHERE ", waits!(), " ORDER BY asked_at_s, id");
 
 /// Nobody has asked for a study, or computed it, for so many seconds.
 macro_rules! has_expired {
@@ -469,8 +488,11 @@ impl Store {
             for (count, text) in counts.iter_mut().zip([
                 "SELECT COUNT(*) FROM studies",
                 "SELECT COUNT(*) FROM results",
-                "SELECT CAST(COALESCE(SUM(chunks - opened + (SELECT COUNT(*) FROM chunks WHERE study = id)), 0) AS BIGINT) FROM studies
-                    WHERE NOT is_cancelled AND ends_at_s > unixepoch()",
+                concat!(
+                    "SELECT CAST(COALESCE(SUM(chunks - opened + (SELECT COUNT(*) ",
+                    to_be_computed!(),
+                    ")), 0) AS BIGINT) FROM studies WHERE NOT is_cancelled AND ends_at_s > unixepoch()"
+                ),
                 "SELECT COUNT(*) FROM attempts",
                 "SELECT COUNT(*) FROM gaps WHERE NOT EXISTS
                     (SELECT 1 FROM results WHERE results.study = gaps.study AND results.chunk = gaps.chunk)",
@@ -478,12 +500,8 @@ impl Store {
                 *count = on!(connection, inner => sqlx::query_scalar(text).fetch_one(inner).await)?;
             }
             let running: Vec<i64> = on!(connection, inner => {
-                sqlx::query_scalar(
-                    "SELECT CAST(unixepoch() - asked_at_s AS BIGINT) FROM studies WHERE NOT is_cancelled AND ends_at_s > unixepoch()
-                        AND (opened < chunks OR EXISTS (SELECT 1 FROM chunks WHERE study = id))",
-                )
-                .fetch_all(inner)
-                .await
+                let text = concat!("SELECT CAST(unixepoch() - asked_at_s AS BIGINT) FROM studies WHERE ", waits!());
+                sqlx::query_scalar(text).fetch_all(inner).await
             })?;
             let in_work = match (&self.database, connection) {
                 (Database::File { leased, .. }, _) => leased.lock().map_or(0, |leased| leased.len() as u64),

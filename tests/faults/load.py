@@ -11,6 +11,7 @@ import random
 import subprocess
 import sys
 import time
+import uuid
 
 # What a client does when its connection is cut: it tries again, once, after this.
 RETRY_AFTER_S = 3.0
@@ -28,6 +29,7 @@ class Tally:
     def __init__(self, panics=False):
         self.panics = panics  # Whether solves panic by order, and 500 is the proper answer then.
         self.sent = self.answered = self.served_by_retry = self.left = 0
+        self.cut = []  # The ids of requests that had no answer at the first try.
         self.refused = collections.Counter()
         self.lost = collections.Counter()
         self.seconds = []
@@ -35,6 +37,7 @@ class Tally:
     def __iadd__(self, other):
         for name in ("sent", "answered", "served_by_retry", "left"):
             setattr(self, name, getattr(self, name) + getattr(other, name))
+        self.cut += other.cut
         self.refused += other.refused
         self.lost += other.lost
         self.seconds += other.seconds
@@ -119,16 +122,17 @@ class Work:
         self.fresh, self.slowly = fresh, slowly
         self.digest = None
 
-    def request(self):
+    def request(self, id=None):
+        headers = [*self.headers, *([f"X-Request-Id: {id}"] if id else [])]
         if self.document is None:
-            return f"GET {self.path} HTTP/1.1\r\nHost: {self.host}\r\n\r\n".encode()
+            return "\r\n".join([f"GET {self.path} HTTP/1.1", f"Host: {self.host}", *headers, "", ""]).encode()
         document = dict(self.document)
         if self.fresh:
             # Nobody asked for this torque before: it must be solved.
             document["load"] = {"input_torque_nm": 10 + 10 * random.random()}
         body = json.dumps(document).encode()
         head = [f"POST {self.path} HTTP/1.1", f"Host: {self.host}", "Content-Type: application/json"]
-        head += [f"Content-Length: {len(body)}", *self.headers, "", ""]
+        head += [f"Content-Length: {len(body)}", *headers, "", ""]
         return "\r\n".join(head).encode() + body
 
     def is_right(self, body):
@@ -141,7 +145,8 @@ class Work:
 
 async def _one(client, work, due, tally, leaves):
     tally.sent += 1
-    request = work.request()
+    id = uuid.uuid4().hex
+    request = work.request(id)
     if leaves:
         try:
             await client.ask(request, leave_after_s=random.uniform(0.005, 0.15))
@@ -159,6 +164,7 @@ async def _one(client, work, due, tally, leaves):
             if attempt:
                 tally.lost[f"cut twice: {cut}"] += 1
                 return
+            tally.cut.append(id)
             await asyncio.sleep(RETRY_AFTER_S)
             continue
         if status == 200 and not work.is_right(body):

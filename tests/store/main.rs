@@ -638,6 +638,29 @@ async fn an_attempt_whose_lease_was_lost_counts_no_more_once_another_has_begun_t
     store.forget(&study.id).await.unwrap();
 }
 
+/// It counted as one that runs until the other worker was through with the chunk, minutes later, and nobody could forget it.
+#[tokio::test]
+async fn a_study_whose_results_are_all_there_waits_for_nobody_though_a_chunk_is_in_work_once_more() {
+    let Some(address) = server() else { return };
+    let _nobody = SERVER.write().await;
+    let (store, study) = stored(&address, "twice", 1).await;
+    let mut first = claimed(&store, &study).await;
+    let end = "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE state = 'idle in transaction' AND datname = current_database()";
+    assert_eq!(sqlx::query(end).fetch_all(&mut stranger(&address).await).await.unwrap().len(), 1);
+    first.say().await;
+    let second = claimed(&store, &study).await;
+    let is_waiting = async || store.waiting().await.unwrap().iter().any(|waiting| waiting.cut == study.cut());
+    let before = store.figures().await.unwrap();
+    assert!(is_waiting().await && (before.running, before.waiting) == (1, 1));
+    keep(&mut first).await;
+    assert!(store.find(&study.id).await.unwrap().unwrap().is_done());
+    let after = store.figures().await.unwrap();
+    assert!(!is_waiting().await && (after.running, after.waiting, after.in_work) == (0, 0, 1), "{after:?}");
+    // Who is told that it waits no more lets go of it.
+    second.give_back().await.unwrap();
+    store.forget(&study.id).await.unwrap();
+}
+
 #[tokio::test]
 async fn a_chunk_tells_how_often_it_was_begun_before() {
     with_each_store(async |store| {

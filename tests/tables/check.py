@@ -5,6 +5,7 @@
 
 import io
 import json
+import os
 import pathlib
 import sys
 import urllib.request
@@ -105,3 +106,6 @@ check_sweep({
     "model": {"compatibility": "virtual_work", "stiffness": {"law": "linear"}, "clearance": {"ring_um": 5.0}},
     "friction": {"wave_generator": {"kind": "plain", "coefficient": 0.03}, "ring": {"coefficient": 0.05}, "carrier": {"coefficient": 0.05}},
 })
+# pyarrow's own threads now and then abort an interpreter that ends in order, though all was read (apache/arrow, issue 34314).
+sys.stdout.flush()
+os._exit(0)
