@@ -31,6 +31,9 @@ const PATIENCE: Duration = Duration::from_millis(50);
 /// Of what unread answers may take, variants of studies may take another such part while they are computed.
 const PART_OF_VARIANTS: u64 = 4;
 
+/// And what is read of a store such a part: by default 4 MiB or more, of which the longest document takes three.
+const PART_ASIDE: u64 = 8;
+
 /// What a single variant of a study may take: nobody waits for it, and a study has a time of its own.
 const MOST_OF_A_VARIANT: Duration = Duration::from_secs(3600);
 
@@ -251,16 +254,25 @@ impl Pool {
         &self.memory
     }
 
-    /// Room for so many bytes beside answers, as soon as there is; where there are none, as far as the memory really has it.
+    /// Room for so many bytes that are taken aside. A part of what unread answers may take is there for that besides, since one is there at a time; what is beyond it is taken
+    /// of that itself, when there is as much, and otherwise as far as the memory really has it.
     ///
     /// # Errors
     /// Where there is not so much until the deadline.
-    pub async fn reserve_until(&self, deadline: Instant, bytes: u64) -> Result<Option<Reserved>, NoRoom> {
-        match &self.room {
-            Some(room) => room.reserve_until(deadline, bytes).await.map(Some),
-            None if bytes <= room::SMALL_BYTES || self.memory.has(bytes) => Ok(None),
-            None => Err(NoRoom::Scarce),
+    pub async fn room_aside(&self, deadline: Instant, bytes: u64) -> Result<Option<Reserved>, NoRoom> {
+        let max_bytes = self.limits.max_unread_bytes;
+        let beyond_bytes = bytes.saturating_sub(max_bytes / PART_ASIDE);
+        let is_all_counted = self.room.is_some() && bytes <= max_bytes;
+        if !is_all_counted && beyond_bytes > 0 && !self.memory.has(beyond_bytes) {
+            return Err(NoRoom::Scarce);
         }
+        let beyond = tokio::time::timeout_at(deadline, self.of_answers(beyond_bytes)).await;
+        beyond.map_err(|_| NoRoom::Taken { bytes, max_bytes })
+    }
+
+    /// Whether answers are held that nobody has read yet.
+    pub fn has_unread(&self) -> bool {
+        self.room.as_ref().is_some_and(Room::has_unread)
     }
 
     /// Solves that run now.
@@ -475,7 +487,7 @@ impl Pool {
         let part_bytes = self.limits.max_unread_bytes / PART_OF_VARIANTS;
         let wanted = async {
             // First: clients may hold that for long, and who waits for it is in nobody's way.
-            let beyond = self.beyond_part(room_bytes.saturating_sub(part_bytes)).await;
+            let beyond = self.of_answers(room_bytes.saturating_sub(part_bytes)).await;
             // Where memory is scarce, whatever was counted, alone.
             let wanted_bytes = if self.memory.is_scarce() { part_bytes } else { room_bytes.min(part_bytes) };
             let permits = room::permits(wanted_bytes);
@@ -493,7 +505,7 @@ impl Pool {
     }
 
     /// So many bytes of the room of answers, when there are as many.
-    async fn beyond_part(&self, bytes: u64) -> Option<Reserved> {
+    async fn of_answers(&self, bytes: u64) -> Option<Reserved> {
         const LOOK: Duration = Duration::from_millis(20);
         let room = self.room.as_ref().filter(|_| bytes > 0)?;
         loop {
@@ -862,23 +874,24 @@ mod tests {
         Ok(())
     }
 
-    /// Where answers keep all room, one that is read of a store had never any: it tried once.
+    /// Where answers keep all room, one that is read of a store had never any.
     #[tokio::test(start_paused = true)]
-    async fn what_is_read_waits_for_room_of_answers_in_its_turn() -> Result<(), NoRoom> {
-        let Line { settings } = Line::parse_from(["serve", "--deadline-ms", "1000"]);
+    async fn what_is_read_of_a_store_has_room_beside_answers_and_beyond_that_waits_for_some_in_nobodys_way()
+    -> Result<(), NoRoom> {
+        let Line { settings } = Line::parse_from(["serve", "--max-unread-bytes", "67108864", "--deadline-ms", "1000"]);
         let room = Room::new(64 << 20);
         let pool = Pool::new(settings.limits()).beside(&room);
         let (first, second) = (room.reserve(32 << 20)?, room.reserve(32 << 20)?);
-        let mut read = pin!(pool.reserve_until(pool.deadline(), 48 << 20));
+        assert!(pool.room_aside(pool.deadline(), 8 << 20).await?.is_none());
+        let mut read = pin!(pool.room_aside(pool.deadline(), 48 << 20));
         assert!(futures_util::poll!(&mut read).is_pending());
         drop(first);
         assert!(futures_util::poll!(&mut read).is_pending());
-        assert!(room.reserve(16 << 20).is_err(), "it is the next");
+        drop(room.reserve(32 << 20)?);
         drop(second);
         assert!(read.await?.is_some());
-        assert_eq!(room.taken_bytes(), 0);
         let _all = room.reserve(64 << 20)?;
-        assert!(pool.reserve_until(pool.deadline(), 48 << 20).await.is_err(), "by the deadline there was none");
+        assert!(pool.room_aside(pool.deadline(), 48 << 20).await.is_err(), "by the deadline there was none");
         Ok(())
     }
 

@@ -158,10 +158,9 @@ pub fn view_bytes(study: &Study) -> u64 {
 ///
 /// # Errors
 /// Where reading it takes too long, or there is no room for that.
-pub async fn thaw(pool: &Pool, frozen: &NewStudy, takes_room: bool) -> Result<Result<Arc<Study>, NotHere>, Problem> {
+pub async fn thaw(pool: &Pool, frozen: &NewStudy) -> Result<Result<Arc<Study>, NotHere>, Problem> {
     let deadline = pool.deadline();
-    let bytes = if takes_room { reading_bytes(frozen.document.len()) } else { 0 };
-    let room = pool.reserve_until(deadline, bytes).await?;
+    let room = pool.room_aside(deadline, reading_bytes(frozen.document.len())).await?;
     let frozen = frozen.clone();
     let thaw = move || {
         let _room = room;

@@ -8,7 +8,6 @@ use std::sync::{Arc, Weak};
 use bytes::Bytes;
 use parking_lot::Mutex;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use tokio::time::{Instant, timeout_at};
 
 use crate::memory::Memory;
 use crate::problem::{Problem, ProblemCode};
@@ -139,6 +138,12 @@ impl Room {
         (taken as u64 * 1024).min(self.max_bytes)
     }
 
+    /// Whether some is taken that is not held for as long as studies are kept.
+    pub fn has_unread(&self) -> bool {
+        let taken = permits(self.max_bytes) as usize - self.free.available_permits();
+        taken > self.kept.load(Ordering::Relaxed) as usize
+    }
+
     /// None yet.
     pub fn nothing(&self) -> Reserved {
         Reserved { room: self.clone(), held: None, bytes: 0 }
@@ -153,25 +158,6 @@ impl Room {
         let mut reserved = Reserved { room: self.clone(), held: None, bytes };
         reserved.hold_permits(self.permits_for(bytes), bytes)?;
         Ok(reserved)
-    }
-
-    /// The same until then, in the order in which it is asked for.
-    ///
-    /// # Errors
-    /// Where there is not so much by then, or memory is scarce.
-    pub async fn reserve_until(&self, deadline: Instant, bytes: u64) -> Result<Reserved, NoRoom> {
-        let mut reserved = self.nothing();
-        let taken = match reserved.hold_at_least(bytes) {
-            Ok(()) => return Ok(reserved),
-            Err(NoRoom::Scarce) => return Err(NoRoom::Scarce),
-            Err(taken) => taken,
-        };
-        let permits = self.permits_for(bytes);
-        // Also an error says that there is none: that the semaphore is closed, which it never is.
-        match timeout_at(deadline, Arc::clone(&self.free).acquire_many_owned(permits)).await {
-            Ok(Ok(held)) => Ok(Reserved { room: self.clone(), held: Some(held), bytes }),
-            _ => Err(taken),
-        }
     }
 
     /// Room for what is kept: so many bytes, though they were all of it. What is small is kept though there is none, but not where memory is scarce: how much

@@ -134,11 +134,12 @@ impl<K: PartialEq, V> Shelf<K, V> {
     pub fn get(&self, key: &K) -> Option<Arc<V>> {
         let mut all = self.read.lock();
         let place = all.iter().position(|read| read.key == *key)?;
-        let read = all.remove(place)?;
-        let is_counted = !self.room.is_small(read.bytes);
-        if is_counted && self.room.is_waited_for() && read.since.elapsed() > TURN {
+        let is_counted = !self.room.is_small(all[place].bytes);
+        // It stays until it is not used any more: who waits may have enough before, or leave.
+        if is_counted && self.room.is_waited_for() && all[place].since.elapsed() > TURN {
             return None;
         }
+        let read = all.remove(place)?;
         let value = Arc::clone(&read.value);
         all.push_back(read);
         Some(value)
@@ -147,6 +148,7 @@ impl<K: PartialEq, V> Shelf<K, V> {
     /// Keeps what was read, and takes so many bytes, which it has room for.
     pub fn put(&self, key: K, value: &Arc<V>, bytes: u64) {
         let mut all = self.read.lock();
+        all.retain(|read| read.key != key);
         all.push_back(Read { key, value: Arc::clone(value), bytes, since: Instant::now() });
         let mut unused_bytes: u64 = all.iter().filter(|read| !read.is_used()).map(|read| read.bytes).sum();
         all.retain(|read| {
@@ -269,6 +271,19 @@ mod tests {
         assert!(shelf.get(&2).is_none());
         drop(used);
         assert!(next.await.is_some());
+    }
+
+    /// It was read a second time beside itself, or not at all, while its chunks went on.
+    #[tokio::test(start_paused = true)]
+    async fn a_study_whose_turn_is_over_is_handed_out_again_once_nobody_waits_any_more() {
+        let shelf = shelf();
+        let used = read(&shelf, 1, 12 * MIB).await;
+        let mut next = Box::pin(shelf.room(12 * MIB));
+        assert!(futures_util::poll!(&mut next).is_pending());
+        tokio::time::sleep(2 * TURN).await;
+        assert!(shelf.get(&1).is_none());
+        drop(next);
+        assert!(shelf.get(&1).is_some_and(|shared| Arc::ptr_eq(&shared, &used)));
     }
 
     #[tokio::test(start_paused = true)]

@@ -603,7 +603,7 @@ impl Studies {
         if let Some(kept) = known {
             return Ok(kept);
         }
-        let study = frozen::thaw(&self.pool, frozen, true).await?.map_err(|reason| reason.told(&frozen.id))?;
+        let study = frozen::thaw(&self.pool, frozen).await?.map_err(|reason| reason.told(&frozen.id))?;
         // Where others have all the room, it is kept all the same: how many there are is bounded.
         let room = self.room.keep(view_bytes(&study)).ok();
         let kept = Self::view(study, room);

@@ -35,7 +35,7 @@ const ALONE: Duration = Duration::from_secs(3);
 /// Between two looks at memory that is scarce.
 const SCARCE_PAUSE: Duration = Duration::from_millis(20);
 
-/// After so long nothing that is held of scarce memory comes back by itself: what the allocator keeps it uses again for who asks.
+/// After so long nothing that is held of scarce memory comes back by itself where no answer is unread: what the allocator keeps it uses again for who asks.
 const LONGEST_SCARCE: Duration = Duration::from_secs(10);
 
 /// Of a `worker`'s memory, or of what unread answers may take, chunks that are in work may take such a part.
@@ -145,6 +145,8 @@ enum Unseen {
     Gone,
     /// Others that are used take all the room, and one waits for some.
     NoRoom,
+    /// All its chunks are done or in work.
+    NothingFree,
     /// It is computed by others.
     NotHere(NotHere),
     Problem(Problem),
@@ -333,8 +335,8 @@ impl Workers {
     /// beside none, so that no other is taken for that.
     async fn claim(&self, task: &Waiting, ours: &Ours) -> Result<(Claim, Option<SemaphorePermit<'_>>), StoreError> {
         let held = async {
-            let Some(lease) = self.store.hold(&task.cut, ours.frozen.lease).await? else { return Ok(None) };
-            let is_suspect = lease.attempts().await? + 1 >= MOST_ATTEMPTS;
+            let Some(mut lease) = self.store.hold(&task.cut, ours.frozen.lease).await? else { return Ok(None) };
+            let is_suspect = lease.attempts_that_count().await? + 1 >= MOST_ATTEMPTS;
             Ok::<_, StoreError>(Some((lease, is_suspect)))
         };
         let held = tokio::select! {
@@ -362,7 +364,7 @@ impl Workers {
     /// would: there are others.
     async fn ready(&self, task: &Waiting) -> Option<(Arc<Ours>, impl Sized)> {
         let though_scarce = self.memory().await;
-        let ours = self.study(task, though_scarce.is_none()).await?;
+        let ours = self.study(task).await?;
         let room = self.room.take(ours.chunk_bytes).await?;
         let though_scarce = match though_scarce {
             // The study itself may have made it so: it goes on where nothing else does, or is let go until then.
@@ -378,12 +380,13 @@ impl Workers {
         Arc::strong_count(&self.begun) == 1
     }
 
-    /// Waits while memory is scarce, so that what is in work comes to its end and is let go before more is begun. Where nothing is, that would be for ever:
-    /// one is begun all the same after a while, beside none.
+    /// Waits while memory is scarce, so that what is in work comes to its end and is let go before more is begun. Where nothing is, and no answer is unread, that
+    /// would be for ever: one is begun all the same after a while, beside none.
     async fn memory(&self) -> Option<SemaphorePermit<'_>> {
         while self.pool.memory().is_scarce() {
             self.shelf.clear();
             if self.is_none_begun()
+                && !self.pool.has_unread()
                 && self.pool.memory().scarce_for() > LONGEST_SCARCE
                 && let Ok(alone) = self.though_scarce.try_acquire()
             {
@@ -394,25 +397,27 @@ impl Workers {
         None
     }
 
-    /// The study, where this process computes it, and where it has room to be read, if it takes any.
-    async fn study(&self, task: &Waiting, takes_room: bool) -> Option<Arc<Ours>> {
+    /// The study, where this process computes it, and has room to read it.
+    async fn study(&self, task: &Waiting) -> Option<Arc<Ours>> {
         let seen = Arc::clone(self.known.lock().entry(task.clone()).or_default());
         let mut seen = seen.try_lock().ok()?;
         if seen.is_left_to_others {
             return None;
         }
-        match self.found(task, &mut seen, takes_room).await {
+        match self.found(task, &mut seen).await {
             Ok(ours) => {
                 seen.is_in_trouble = false;
                 return Some(ours);
             }
-            Err(Unseen::Gone | Unseen::NoRoom) => {}
+            Err(Unseen::Gone | Unseen::NoRoom | Unseen::NothingFree) => {}
             Err(Unseen::NotHere(reason)) => {
                 say_left_to_others(task, &reason);
                 seen.is_left_to_others = true;
             }
             // Another time.
             Err(Unseen::Problem(problem)) => {
+                // It may have been for want of memory.
+                self.shelf.clear();
                 if !std::mem::replace(&mut seen.is_in_trouble, true) {
                     let cause = problem.cause.as_deref();
                     tracing::warn!(study = task.cut.id, %problem, cause, "a study cannot be looked at; tried again until it can");
@@ -423,11 +428,11 @@ impl Workers {
     }
 
     /// The study as it was read, of this build and with a canary of the same bits.
-    async fn found(&self, task: &Waiting, seen: &mut Seen, takes_room: bool) -> Result<Arc<Ours>, Unseen> {
+    async fn found(&self, task: &Waiting, seen: &mut Seen) -> Result<Arc<Ours>, Unseen> {
         let ours = match self.shelf.get(task) {
             Some(ours) if seen.has_sung => return Ok(ours),
             Some(ours) => ours,
-            None => self.read(task, seen, takes_room).await?,
+            None => self.read(task, seen).await?,
         };
         if !seen.has_sung {
             let started = Instant::now();
@@ -442,8 +447,12 @@ impl Workers {
         Ok(ours)
     }
 
-    async fn read(&self, task: &Waiting, seen: &mut Seen, takes_room: bool) -> Result<Arc<Ours>, Unseen> {
+    async fn read(&self, task: &Waiting, seen: &mut Seen) -> Result<Arc<Ours>, Unseen> {
         frozen::require_origin(&task.origin)?;
+        // One whose chunks are all in others' hands must not take the turn of one that has some.
+        if !self.store.has_free_chunk(&task.cut).await.map_err(Problem::from)? {
+            return Err(Unseen::NothingFree);
+        }
         let mut room = self.shelf.room(seen.bytes).await.ok_or(Unseen::NoRoom)?;
         let standing = self.store.find(&task.cut.id).await.map_err(Problem::from)?;
         let standing = standing.filter(|standing| standing.study.cut() == task.cut).ok_or(Unseen::Gone)?;
@@ -454,7 +463,7 @@ impl Workers {
         if bytes > most_bytes {
             return Err(NotHere::NeedsMemory { bytes, most_bytes }.into());
         }
-        let study = frozen::thaw(&self.pool, &frozen, takes_room).await??;
+        let study = frozen::thaw(&self.pool, &frozen).await??;
         let bytes = view_bytes(&study) + frozen.document.len() as u64;
         if bytes > seen.bytes {
             // Nobody knew before.
@@ -547,6 +556,7 @@ impl Workers {
             lease.say().await;
             tokio::select! {
                 () = tokio::time::sleep(retry) => {}
+                never = lease.renew() => match never {},
                 () = &mut is_over => break give_up(lease).await,
             }
             retry = (2 * retry).min(LONGEST_RETRY);

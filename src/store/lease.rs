@@ -7,7 +7,7 @@ use sqlx::pool::PoolConnection;
 use sqlx::postgres::Postgres;
 
 use crate::connection::{Connection, Database, Store, StoreError, milliseconds, on, within};
-use crate::studies::{Cut, begin, commit};
+use crate::studies::{Cut, begin, commit, say};
 use crate::{MOST_ATTEMPTS, PATIENCE, stored};
 
 /// What comes of asking for a chunk.
@@ -63,13 +63,20 @@ macro_rules! of_attempts {
     };
 }
 
-/// Of an attempt.
-const WHATEVER_ELSE: &str = "DELETE FROM attempts WHERE study = $1 AND chunk = $2 AND worker = $3";
+/// Chunks of a study that nobody holds.
+macro_rules! free_chunks {
+    ($which:literal) => {
+        concat!(
+            "SELECT chunk FROM chunks WHERE study = $1 AND EXISTS (SELECT 1 FROM studies WHERE id = $1 AND chunk_variants = $2)",
+            $which,
+            " ORDER BY chunk LIMIT 1 FOR UPDATE OF chunks SKIP LOCKED"
+        )
+    };
+}
 
-/// The same, where another one is noted that was begun since: of an earlier one nobody knows whether it ended its process.
-const IF_ANOTHER_BEGAN: &str = "DELETE FROM attempts WHERE study = $1 AND chunk = $2 AND worker = $3
-    AND EXISTS (SELECT 1 FROM attempts AS others WHERE others.study = $1 AND others.chunk = $2 AND others.worker <> $3
-        AND others.began_at_s >= attempts.began_at_s)";
+const FIRST_FREE: &str = free_chunks!("");
+
+const THIS_IF_FREE: &str = free_chunks!(" AND chunk = $3");
 
 macro_rules! unless_begun_as_often {
     () => {
@@ -108,17 +115,51 @@ impl Store {
         Ok(Some(Lease { store, cut: cut.clone(), chunk, attempt, silence: lease, held, is_noted: false }))
     }
 
+    /// Whether a chunk of a study is nobody's.
+    ///
+    /// # Errors
+    /// Where the store does not answer.
+    pub async fn has_free_chunk(&self, cut: &Cut) -> Result<bool, StoreError> {
+        if matches!(self.database, Database::File { .. }) {
+            return Ok(self.hold(cut, Duration::ZERO).await?.is_some());
+        }
+        self.with(PATIENCE, async |connection| {
+            let Connection::Server(session) = connection else { return Ok(false) };
+            let text = "SELECT opened < chunks FROM studies WHERE id = $1 AND chunk_variants = $2";
+            let chunk_variants = stored(cut.chunk_variants);
+            let are_more = sqlx::query_scalar(text).bind(&cut.id).bind(chunk_variants);
+            if are_more.fetch_optional(&mut **session).await? == Some(true) {
+                return Ok(true);
+            }
+            let first = sqlx::query_scalar::<_, i64>(FIRST_FREE).bind(&cut.id).bind(chunk_variants);
+            Ok(first.fetch_optional(&mut **session).await?.is_some())
+        })
+        .await
+    }
+
     /// A chunk among those that are open.
     async fn claim_open(&self, cut: &Cut, lease: Duration) -> Result<Option<(u64, Held)>, StoreError> {
-        let Database::Server { leases, .. } = &self.database else { return self.claim_here(cut).await };
-        let mut connection = within(PATIENCE, async { Ok(leases.acquire().await?) }).await?;
-        match within(PATIENCE, claim_there(&mut connection, cut, lease)).await {
-            Ok(chunk) => Ok(chunk.map(|chunk| (chunk, Held::There(Box::new(connection))))),
-            Err(error) => {
-                connection.close_on_drop();
-                Err(error)
-            }
+        if matches!(self.database, Database::File { .. }) {
+            self.claim_here(cut).await
+        } else {
+            self.claim_there(cut, None, lease).await
         }
+    }
+
+    /// The same on a server, or this chunk where it is free.
+    async fn claim_there(
+        &self,
+        cut: &Cut,
+        chunk: Option<u64>,
+        lease: Duration,
+    ) -> Result<Option<(u64, Held)>, StoreError> {
+        let Database::Server { leases, .. } = &self.database else { return Ok(None) };
+        let connection = within(PATIENCE, async { Ok(leases.acquire().await?) }).await?;
+        let mut begun = Begun(Some(Box::new(connection)));
+        let Some(connection) = &mut begun.0 else { return Ok(None) };
+        let chunk = within(PATIENCE, begin_lease(connection, cut, chunk, lease)).await?;
+        let connection = begun.0.take();
+        Ok(chunk.zip(connection.map(Held::There)))
     }
 
     async fn claim_here(&self, Cut { id, chunk_variants }: &Cut) -> Result<Option<(u64, Held)>, StoreError> {
@@ -170,14 +211,9 @@ impl Store {
         .await
     }
 
-    /// Deletes what is noted of an attempt, or is being noted; whether there was something.
-    async fn delete_attempt(
-        &self,
-        study: &str,
-        chunk: u64,
-        attempt: &str,
-        text: &'static str,
-    ) -> Result<bool, StoreError> {
+    /// Deletes what is noted of an attempt, or is being noted.
+    async fn delete_attempt(&self, study: &str, chunk: u64, attempt: &str) -> Result<(), StoreError> {
+        let delete = "DELETE FROM attempts WHERE study = $1 AND chunk = $2 AND worker = $3";
         self.with(PATIENCE, async |connection| {
             begin(connection).await?;
             if let Connection::Server(session) = connection {
@@ -185,27 +221,37 @@ impl Store {
                 let text = concat!("SELECT ", of_attempts!());
                 sqlx::query(text).bind(study).bind(stored(chunk)).execute(&mut **session).await?;
             }
-            let was_noted = on!(connection, inner => {
-                sqlx::query(text).bind(study).bind(stored(chunk)).bind(attempt).execute(inner).await.map(|done| done.rows_affected() > 0)
+            on!(connection, inner => {
+                sqlx::query(delete).bind(study).bind(stored(chunk)).bind(attempt).execute(inner).await.map(|_| ())
             })?;
-            commit(connection).await?;
-            Ok(was_noted)
+            commit(connection).await
         })
         .await
     }
 }
 
-async fn claim_there(
+/// The session of a lease that is being begun: whoever fails or leaves meanwhile ends its transaction with it.
+struct Begun(Option<Box<PoolConnection<Postgres>>>);
+
+impl Drop for Begun {
+    fn drop(&mut self) {
+        if let Some(connection) = &mut self.0 {
+            connection.close_on_drop();
+        }
+    }
+}
+
+async fn begin_lease(
     connection: &mut PoolConnection<Postgres>,
     Cut { id, chunk_variants }: &Cut,
+    chunk: Option<u64>,
     lease: Duration,
 ) -> Result<Option<u64>, StoreError> {
     sqlx::query("BEGIN").execute(&mut **connection).await?;
-    let text = "SELECT chunk FROM chunks WHERE study = $1 AND EXISTS (SELECT 1 FROM studies WHERE id = $1 AND chunk_variants = $2)
-        ORDER BY chunk LIMIT 1 FOR UPDATE OF chunks SKIP LOCKED";
-    let chunk: Option<i64> =
-        sqlx::query_scalar(text).bind(id).bind(stored(*chunk_variants)).fetch_optional(&mut **connection).await?;
-    let Some(chunk) = chunk else {
+    let free = sqlx::query_scalar::<_, i64>(if chunk.is_some() { THIS_IF_FREE } else { FIRST_FREE });
+    let free = free.bind(id).bind(stored(*chunk_variants));
+    let free = if let Some(chunk) = chunk { free.bind(stored(chunk)) } else { free };
+    let Some(chunk) = free.fetch_optional(&mut **connection).await? else {
         sqlx::query("ROLLBACK").execute(&mut **connection).await?;
         return Ok(None);
     };
@@ -235,11 +281,25 @@ impl Lease {
         self.chunk
     }
 
-    /// How often the chunk was begun before, and came to no result.
+    /// How often the chunk was begun before, and came to no result. Where that is as often as chunks are, who lost a lease and goes on is given the time to find out that
+    /// the chunk is another's, and to take its attempt back.
     ///
     /// # Errors
     /// Where the store does not answer.
-    pub async fn attempts(&self) -> Result<u64, StoreError> {
+    pub async fn attempts_that_count(&mut self) -> Result<u64, StoreError> {
+        const LOOKS: usize = 4;
+        for _ in 1..LOOKS {
+            let attempts = self.attempts().await?;
+            if attempts < MOST_ATTEMPTS || matches!(self.held, Held::Here) {
+                return Ok(attempts);
+            }
+            tokio::time::sleep(self.often()).await;
+            self.say().await;
+        }
+        self.attempts().await
+    }
+
+    async fn attempts(&self) -> Result<u64, StoreError> {
         let text = "SELECT COUNT(*) FROM attempts WHERE study = $1 AND chunk = $2";
         let attempts = self.store.with(PATIENCE, async |connection| {
             let chunk = stored(self.chunk);
@@ -278,29 +338,44 @@ impl Lease {
     }
 
     /// Says that its holder is alive, three times in the time that it may be silent or more, for as long as this is polled: a chunk may take longer than
-    /// the canary let expect. Where the lease is lost all the same, the holder goes on, and its attempt counts no more once another has begun the chunk: three
-    /// restarts of a server while one long chunk was computed made a gap of it.
+    /// the canary let expect.
     pub async fn renew(&mut self) -> Infallible {
         loop {
-            tokio::time::sleep(SAY.min(self.silence / 3)).await;
+            tokio::time::sleep(self.often()).await;
             self.say().await;
-            if matches!(self.held, Held::Lost) && self.is_noted {
-                let deleted =
-                    self.store.delete_attempt(&self.cut.id, self.chunk, &self.attempt, IF_ANOTHER_BEGAN).await;
-                // An error: at the next time.
-                self.is_noted = !deleted.unwrap_or(false);
-            }
         }
     }
 
-    /// Says so once. Where the server has ended the lease all the same, or does not answer, there is no more to say.
+    fn often(&self) -> Duration {
+        SAY.min(self.silence / 3)
+    }
+
+    /// Says so once. A lease that is lost all the same is taken again if nobody else has the chunk: restarts of a server while one long chunk was computed, or its full disk
+    /// while what that came to was to be kept, made a gap of it.
     pub async fn say(&mut self) {
-        let Held::There(connection) = &mut self.held else { return };
-        let said = within(PATIENCE, async { Ok(sqlx::query("SELECT 1").execute(&mut ***connection).await?) }).await;
-        if said.is_err() {
-            connection.close_on_drop();
-            self.held = Held::Lost;
+        if let Held::There(connection) = &mut self.held {
+            let said = within(PATIENCE, async { Ok(sqlx::query("SELECT 1").execute(&mut ***connection).await?) }).await;
+            if said.is_err() {
+                connection.close_on_drop();
+                self.held = Held::Lost;
+            }
         }
+        if matches!(self.held, Held::Lost) && self.is_noted {
+            // An error: at the next time.
+            let _ = self.hold_again().await;
+        }
+    }
+
+    /// Takes a lease again that was lost. Where another has the chunk by now, or it is over, its holder goes on, and its attempt counts no more.
+    async fn hold_again(&mut self) -> Result<(), StoreError> {
+        let Self { store, cut, chunk, attempt, silence, .. } = &*self;
+        if let Some((_, held)) = store.claim_there(cut, Some(*chunk), *silence).await? {
+            self.held = held;
+        } else {
+            store.delete_attempt(&cut.id, *chunk, attempt).await?;
+            self.is_noted = false;
+        }
+        Ok(())
     }
 
     /// Keeps what the chunk came to. Whoever comes second changes nothing: the bits are the same. Where the lease was lost, or is lost with
@@ -316,12 +391,23 @@ impl Lease {
             Held::There(connection) => {
                 let mut connection = Connection::Server(*connection);
                 let kept = within(PATIENCE, async {
+                    say(&mut connection, "SAVEPOINT held").await?;
                     write(&mut connection, &cut, chunk, result, &worker, true).await?;
                     commit(&mut connection).await
                 })
                 .await;
-                if let (Err(_), Connection::Server(connection)) = (&kept, &mut connection) {
-                    connection.close_on_drop();
+                if kept.is_ok() {
+                    return kept;
+                }
+                // Where the server says that it has no room, the chunk is not another's for that.
+                let is_held = matches!(kept, Err(StoreError::Failed(sqlx::Error::Database(_))))
+                    && within(PATIENCE, say(&mut connection, "ROLLBACK TO SAVEPOINT held")).await.is_ok();
+                if let Connection::Server(mut connection) = connection {
+                    if is_held {
+                        self.held = Held::There(Box::new(connection));
+                    } else {
+                        connection.close_on_drop();
+                    }
                 }
                 kept
             }
@@ -350,9 +436,9 @@ impl Lease {
         // Whoever claims it next is to see that it was not begun.
         let mut tries = 1;
         loop {
-            match self.store.delete_attempt(&self.cut.id, self.chunk, &self.attempt, WHATEVER_ELSE).await {
+            match self.store.delete_attempt(&self.cut.id, self.chunk, &self.attempt).await {
                 Err(error) if error.leaves_open() && tries < GIVEN_BACK => tries += 1,
-                done => return done.map(drop),
+                done => return done,
             }
             tokio::time::sleep(PAUSE).await;
         }
@@ -369,8 +455,8 @@ impl Lease {
             let (mut deleted, mut pause) = (0, PAUSE);
             while deleted < 2 {
                 tokio::time::sleep(pause).await;
-                match store.delete_attempt(&cut.id, chunk, &attempt, WHATEVER_ELSE).await {
-                    Ok(_) => (deleted, pause) = (deleted + 1, PAUSE),
+                match store.delete_attempt(&cut.id, chunk, &attempt).await {
+                    Ok(()) => (deleted, pause) = (deleted + 1, PAUSE),
                     Err(_) => pause = (2 * pause).min(LONGEST_PAUSE),
                 }
             }

@@ -548,12 +548,15 @@ async fn sessions_that_compute(connection: &mut Connection) -> Result<u64, Store
 }
 
 pub(crate) async fn begin(connection: &mut Connection) -> Result<(), StoreError> {
-    on!(connection, inner => sqlx::query("BEGIN").execute(inner).await.map(|_| ()))?;
-    Ok(())
+    say(connection, "BEGIN").await
 }
 
 pub(crate) async fn commit(connection: &mut Connection) -> Result<(), StoreError> {
-    on!(connection, inner => sqlx::query("COMMIT").execute(inner).await.map(|_| ()))?;
+    say(connection, "COMMIT").await
+}
+
+pub(crate) async fn say(connection: &mut Connection, text: &'static str) -> Result<(), StoreError> {
+    on!(connection, inner => sqlx::query(text).execute(inner).await.map(|_| ()))?;
     Ok(())
 }
 

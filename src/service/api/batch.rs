@@ -456,7 +456,7 @@ impl Lines {
         let read = || {
             let mut room = self.room.nothing();
             room.hold_at_least(line.len() as u64)?;
-            Ok(Read { bytes: Bytes::copy_from_slice(line), room })
+            Ok(Read { bytes: Bytes::copy_from_slice(line), _room: room })
         };
         Some(read())
     }
@@ -857,7 +857,7 @@ mod tests {
     };
 
     fn read_of(bytes: Bytes) -> super::Read {
-        super::Read { bytes, room: Room::new(0).nothing() }
+        super::Read { bytes, _room: Room::new(0).nothing() }
     }
 
     /// How many of three such lines one slice answers.

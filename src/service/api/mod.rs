@@ -172,7 +172,7 @@ async fn respond_afresh<Q: Question>(question: Q, app: Arc<App>, request: Reques
 /// A body that was read, with the room that it takes.
 struct Read {
     bytes: Bytes,
-    room: Reserved,
+    _room: Reserved,
 }
 
 impl Deref for Read {
@@ -220,7 +220,7 @@ async fn read_body(
         })
     };
     app.pool.until_closed(in_time).await?;
-    Ok(Read { bytes: whole.freeze(), room })
+    Ok(Read { bytes: whole.freeze(), _room: room })
 }
 
 /// The problem of a body that does not end as it should.

@@ -229,16 +229,15 @@ async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Respons
     let representation = Representation::negotiate(&headers, std::iter::empty())?;
     let body = read_body(app, &headers, body, deadline).await?;
     // Its choices stand for hundreds of designs, so that a document of 64 KB may take long to be read.
-    let (question, limits, mut room) = (body.bytes.clone(), app.limits.of_studies(), body.room);
+    let (question, limits) = (body.bytes.clone(), app.limits.of_studies());
+    let room = app.pool.room_aside(deadline, reading_bytes(question.len())).await?;
     let read = move || {
-        room.hold_at_least(reading_bytes(question.len()))?;
-        let study = Study::read(&question, &limits)?;
-        room.hold_at_most(2 * question.len() as u64);
-        Ok((study, room))
+        let _room = room;
+        Ok(Study::read(&question, &limits)?)
     };
-    let (study, room) = app.pool.run_aside(deadline, read).await?;
+    let study = app.pool.run_aside(deadline, read).await?;
     let kept = app.pool.until_closed(app.studies.begin(study, &body.bytes, deadline)).await?;
-    drop((body.bytes, room));
+    drop(body);
     let wait = wait_wanted(&headers);
     if let Some(wait) = wait {
         let wait_until = deadline.min(tokio::time::Instant::now() + wait);
