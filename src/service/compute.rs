@@ -18,6 +18,7 @@ use crate::config::Limits;
 use crate::memory::Memory;
 use crate::problem::{Problem, ProblemCode};
 use crate::room::{self, NoRoom, Reserved, Room};
+use crate::turns::{self, Had, Turns};
 
 /// A slice of what runs in turn begins nothing further after this time: so long at most does a single request wait behind short ones.
 const SLICE: Duration = Duration::from_millis(5);
@@ -53,7 +54,7 @@ pub struct Pool {
     waiting: Arc<AtomicUsize>,
     /// One for each slice of a batch that runs or waits for a permit: as many as there are permits, so that a single request
     /// never waits for more than one round of them.
-    turns: Arc<Semaphore>,
+    turns: Turns,
     /// As many as there are for the bytes that variants of studies may take at once while they are computed.
     of_variants: Arc<Semaphore>,
     /// One for each batch that runs.
@@ -138,7 +139,7 @@ impl Default for Slice {
 type Held = Result<OwnedSemaphorePermit, AcquireError>;
 
 /// A turn, and with it a permit.
-type Turn = Arc<(Held, Held)>;
+type Turn = Arc<(turns::Turn, Held)>;
 
 /// One who runs slices one after the other. A turn of which it has not used all is its own until the next, where that comes soon.
 #[derive(Debug, Default)]
@@ -146,6 +147,8 @@ pub struct Lane {
     turn: Arc<Mutex<Option<Turn>>>,
     /// Of the turn.
     spent: Duration,
+    /// Of all turns.
+    had: Had,
 }
 
 impl Lane {
@@ -230,7 +233,7 @@ impl Pool {
             spare: Arc::new(Semaphore::new(1)),
             places: Arc::new(Semaphore::new(limits.max_concurrent_solves + limits.max_queued_solves)),
             waiting: Arc::default(),
-            turns: Arc::new(Semaphore::new(limits.max_concurrent_solves)),
+            turns: Turns::new(limits.max_concurrent_solves),
             of_variants: Arc::new(Semaphore::new(room::permits(limits.max_unread_bytes / PART_OF_VARIANTS) as usize)),
             batches: Arc::new(Semaphore::new(limits.max_concurrent_batches)),
             aside: Arc::new(Semaphore::new(1)),
@@ -255,19 +258,19 @@ impl Pool {
     }
 
     /// Room for so many bytes that are taken aside. A part of what unread answers may take is there for that besides, since one is there at a time; what is beyond it is taken
-    /// of that itself, when there is as much, and otherwise as far as the memory really has it.
+    /// of that itself, of which who asks holds some already; of more than that there is as much as the memory really has.
     ///
     /// # Errors
-    /// Where there is not so much until the deadline.
-    pub async fn room_aside(&self, deadline: Instant, bytes: u64) -> Result<Option<Reserved>, NoRoom> {
+    /// Where there is not so much in time.
+    pub async fn room_aside(&self, deadline: Instant, bytes: u64, held_bytes: u64) -> Result<Option<Reserved>, NoRoom> {
         let max_bytes = self.limits.max_unread_bytes;
         let beyond_bytes = bytes.saturating_sub(max_bytes / PART_ASIDE);
         let is_all_counted = self.room.is_some() && bytes <= max_bytes;
         if !is_all_counted && beyond_bytes > 0 && !self.memory.has(beyond_bytes) {
             return Err(NoRoom::Scarce);
         }
-        let beyond = tokio::time::timeout_at(deadline, self.of_answers(beyond_bytes)).await;
-        beyond.map_err(|_| NoRoom::Taken { bytes, max_bytes })
+        let Some(room) = &self.room else { return Ok(None) };
+        room.beside(held_bytes).reserve_in_time(deadline, beyond_bytes).await.map(Some)
     }
 
     /// Whether answers are held that nobody has read yet.
@@ -433,7 +436,7 @@ impl Pool {
             Some(turn) => turn,
             None => {
                 lane.let_go();
-                self.turn().await?
+                self.turn(&lane.had).await?
             }
         };
         let time_is_over = async {
@@ -446,10 +449,13 @@ impl Pool {
             let mut time = Slice::new(&pace, spent);
             job(&mut time, stop).map(|done| (done, time.busy()))
         };
-        let (done, busy) = tokio::select! {
+        let began = Instant::now();
+        let sliced = tokio::select! {
             done = self.run_permitted(Arc::clone(&turn), Thread::Blocking, timed) => done,
             () = time_is_over => Err(deadline_exceeded(most)),
-        }?;
+        };
+        self.turns.note(&mut lane.had, began.elapsed());
+        let (done, busy) = sliced?;
         // Where all have short steps the next turn comes as soon.
         let most = self.pace.most(Instant::now());
         if most > SLICE && spent + busy < most {
@@ -458,9 +464,9 @@ impl Pool {
         Ok(done)
     }
 
-    async fn turn(&self) -> Result<Turn, Problem> {
+    async fn turn(&self, had: &Had) -> Result<Turn, Problem> {
         let turn = tokio::select! {
-            turn = Arc::clone(&self.turns).acquire_owned() => turn,
+            turn = self.turns.take(had) => turn,
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
         // Behind the single solves that came before: each may take as long as a slice.
@@ -573,7 +579,7 @@ impl Pool {
                 tokio::time::sleep(PATIENCE).await;
             }
             // Behind others of its kind it waits.
-            if self.turns.available_permits() == self.limits.max_concurrent_solves {
+            if self.turns.free() == self.limits.max_concurrent_solves {
                 std::future::pending::<()>().await;
             }
             Arc::clone(&self.spare).acquire_owned().await
@@ -882,16 +888,16 @@ mod tests {
         let room = Room::new(64 << 20);
         let pool = Pool::new(settings.limits()).beside(&room);
         let (first, second) = (room.reserve(32 << 20)?, room.reserve(32 << 20)?);
-        assert!(pool.room_aside(pool.deadline(), 8 << 20).await?.is_none());
-        let mut read = pin!(pool.room_aside(pool.deadline(), 48 << 20));
+        assert!(pool.room_aside(pool.deadline(), 8 << 20, 0).await.is_ok());
+        let mut read = pin!(pool.room_aside(pool.deadline(), 48 << 20, 0));
         assert!(futures_util::poll!(&mut read).is_pending());
         drop(first);
         assert!(futures_util::poll!(&mut read).is_pending());
         drop(room.reserve(32 << 20)?);
         drop(second);
-        assert!(read.await?.is_some());
+        drop(read.await?);
         let _all = room.reserve(64 << 20)?;
-        assert!(pool.room_aside(pool.deadline(), 48 << 20).await.is_err(), "by the deadline there was none");
+        assert!(pool.room_aside(pool.deadline(), 48 << 20, 0).await.is_err(), "by the deadline there was none");
         Ok(())
     }
 
@@ -933,7 +939,7 @@ mod tests {
         }
         let waiting = pool.clone();
         let slice = tokio::spawn(async move { waiting.run_in_turn(|_| Ok(())).await });
-        while pool.turns.available_permits() > 0 {
+        while pool.turns.free() > 0 {
             tokio::task::yield_now().await;
         }
         tokio::time::advance(Duration::from_secs(10)).await;

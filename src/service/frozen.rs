@@ -160,7 +160,7 @@ pub fn view_bytes(study: &Study) -> u64 {
 /// Where reading it takes too long, or there is no room for that.
 pub async fn thaw(pool: &Pool, frozen: &NewStudy) -> Result<Result<Arc<Study>, NotHere>, Problem> {
     let deadline = pool.deadline();
-    let room = pool.room_aside(deadline, reading_bytes(frozen.document.len())).await?;
+    let room = pool.room_aside(deadline, reading_bytes(frozen.document.len()), 0).await?;
     let frozen = frozen.clone();
     let thaw = move || {
         let _room = room;

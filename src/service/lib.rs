@@ -30,4 +30,5 @@ pub mod serve;
 pub mod shelf;
 pub mod socket;
 pub mod studies;
+pub mod turns;
 pub mod worker;

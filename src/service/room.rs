@@ -1,13 +1,17 @@
 //! Room for large answers that nobody has read yet: while they are made, while they wait in a batch, while they are on their way. However
 //! many are asked for, and however slowly they are read, they must not fill the memory.
 
+use std::collections::BTreeSet;
 use std::ops::Deref;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::pin::pin;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Weak};
+use std::time::Duration;
 
 use bytes::Bytes;
 use parking_lot::Mutex;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore};
+use tokio::time::{Instant, timeout_at};
 
 use crate::memory::Memory;
 use crate::problem::{Problem, ProblemCode};
@@ -16,6 +20,9 @@ use crate::problem::{Problem, ProblemCode};
 /// them too.
 pub const SMALL_BYTES: u64 = 1 << 18;
 
+/// A request waits for room no longer than this: as long as most that take some are computed for.
+const PATIENCE: Duration = Duration::from_secs(5);
+
 /// Room for so many bytes.
 #[derive(Debug, Clone)]
 pub struct Room {
@@ -23,8 +30,51 @@ pub struct Room {
     free: Arc<Semaphore>,
     /// Of these, the ones that are held for as long as studies are kept: for an answer that is alone all that is left is all the room.
     kept: Arc<AtomicU32>,
+    queue: Arc<Queue>,
     max_bytes: u64,
     memory: Memory,
+}
+
+/// Who waits for room. Nothing is held meanwhile, and who wants least comes first: so nobody is kept from a little by who wants much, again and again.
+#[derive(Debug, Default)]
+struct Queue {
+    /// By the permits that they want, and the order in which they came.
+    waiting: Mutex<BTreeSet<(u32, u64)>>,
+    came: AtomicU64,
+    /// Told when some is given back, or somebody waits no more.
+    changed: Notify,
+}
+
+/// A place among them, until it is dropped.
+struct Place<'a> {
+    queue: &'a Queue,
+    place: (u32, u64),
+}
+
+impl Queue {
+    /// Whether somebody waits for no more than so much.
+    fn goes_before(&self, permits: u32) -> bool {
+        self.waiting.lock().first().is_some_and(|&(wanted, _)| wanted <= permits)
+    }
+
+    fn come(&self, permits: u32) -> Place<'_> {
+        let place = (permits, self.came.fetch_add(1, Ordering::Relaxed));
+        self.waiting.lock().insert(place);
+        Place { queue: self, place }
+    }
+}
+
+impl Place<'_> {
+    fn is_first(&self) -> bool {
+        self.queue.waiting.lock().first() == Some(&self.place)
+    }
+}
+
+impl Drop for Place<'_> {
+    fn drop(&mut self) {
+        self.queue.waiting.lock().remove(&self.place);
+        self.queue.changed.notify_waiters();
+    }
 }
 
 /// A part of the room that is held while nobody waits to read it.
@@ -119,7 +169,8 @@ impl Room {
     /// Room for at most `max_bytes` at once.
     pub fn new(max_bytes: u64) -> Self {
         let free = Arc::new(Semaphore::new(permits(max_bytes) as usize));
-        Self { free, kept: Arc::default(), max_bytes, memory: Memory::default() }
+        let (kept, queue, memory) = Default::default();
+        Self { free, kept, queue, max_bytes, memory }
     }
 
     /// The memory that the room is of.
@@ -160,6 +211,41 @@ impl Room {
         Ok(reserved)
     }
 
+    /// Waits for room where others have it, or came before, and none where there is some: it is taken when it is needed.
+    ///
+    /// # Errors
+    /// Where there is not so much in time.
+    pub async fn wait_for(&self, deadline: Instant, bytes: u64) -> Result<Option<Reserved>, NoRoom> {
+        let permits = self.permits_for(bytes);
+        let is_there = self.free.available_permits() >= permits as usize && !self.queue.goes_before(permits);
+        if permits == 0 || is_there {
+            return Ok(None);
+        }
+        let deadline = deadline.min(Instant::now() + PATIENCE);
+        let place = self.queue.come(permits);
+        loop {
+            let mut changed = pin!(self.queue.changed.notified());
+            changed.as_mut().enable();
+            if place.is_first() {
+                match self.reserve(bytes) {
+                    Err(NoRoom::Taken { .. }) => {}
+                    reserved => return reserved.map(Some),
+                }
+            }
+            if timeout_at(deadline, changed).await.is_err() {
+                return Err(NoRoom::Taken { bytes, max_bytes: self.max_bytes });
+            }
+        }
+    }
+
+    /// Room, which others may have to give back first.
+    ///
+    /// # Errors
+    /// Where there is not so much in time.
+    pub async fn reserve_in_time(&self, deadline: Instant, bytes: u64) -> Result<Reserved, NoRoom> {
+        self.wait_for(deadline, bytes).await?.map_or_else(|| self.reserve(bytes), Ok)
+    }
+
     /// Room for what is kept: so many bytes, though they were all of it. What is small is kept though there is none, but not where memory is scarce: how much
     /// that comes to is bounded by whoever keeps it.
     ///
@@ -185,16 +271,19 @@ impl Room {
     /// An answer that is kept, taking room until it is dropped.
     ///
     /// # Errors
-    /// Where there is not so much left.
-    pub fn take(&self, answer: Bytes, sent: &Sent) -> Result<Bytes, NoRoom> {
+    /// Where there is not so much in time.
+    pub async fn take(&self, deadline: Instant, answer: Bytes, sent: &Sent) -> Result<Bytes, NoRoom> {
         let bytes = answer.len() as u64;
         if bytes <= SMALL_BYTES {
             return Ok(answer);
         }
-        if let Some(shared) = sent.0.lock().upgrade() {
-            return Ok(Bytes::from_owner(Share(shared)));
+        let is_on_its_way = || sent.0.lock().upgrade().map(|shared| Bytes::from_owner(Share(shared)));
+        if let Some(shared) = is_on_its_way() {
+            return Ok(shared);
         }
-        Ok(self.reserve(bytes)?.send(answer, sent))
+        let reserved = self.reserve_in_time(deadline, bytes).await?;
+        // Others may have waited as well.
+        Ok(is_on_its_way().unwrap_or_else(|| reserved.send(answer, sent)))
     }
 
     fn permits_for(&self, bytes: u64) -> u32 {
@@ -204,7 +293,20 @@ impl Room {
     }
 }
 
+impl Drop for Reserved {
+    fn drop(&mut self) {
+        if self.held.take().is_some() {
+            self.room.queue.changed.notify_waiters();
+        }
+    }
+}
+
 impl Reserved {
+    /// As much of the room as it is.
+    pub fn held_bytes(&self) -> u64 {
+        u64::from(self.permits()) * 1024
+    }
+
     fn permits(&self) -> u32 {
         self.held.as_ref().map_or(0, |held| u32::try_from(held.num_permits()).unwrap_or(u32::MAX))
     }
@@ -250,6 +352,7 @@ impl Reserved {
         self.bytes = self.bytes.min(bytes);
         if let Some(held) = &mut self.held {
             drop(held.split(held.num_permits().saturating_sub(most as usize)));
+            self.room.queue.changed.notify_waiters();
         }
     }
 
@@ -270,4 +373,61 @@ impl Reserved {
 /// any machine can count.
 pub fn permits(bytes: u64) -> u32 {
     u32::try_from(bytes.div_ceil(1024)).unwrap_or(u32::MAX).clamp(1, u32::MAX >> 3)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::pin::pin;
+    use std::time::Duration;
+
+    use futures_util::poll;
+    use tokio::time::Instant;
+
+    use super::{NoRoom, PATIENCE, Room};
+
+    const MIB: u64 = 1 << 20;
+
+    fn later() -> Instant {
+        Instant::now() + 10 * PATIENCE
+    }
+
+    /// One client who asked for one large answer after the other kept all others from any, and from batches.
+    #[tokio::test(start_paused = true)]
+    async fn who_wants_a_little_room_comes_before_who_wants_all_of_it_again_and_again() -> Result<(), NoRoom> {
+        let room = Room::new(64 * MIB);
+        assert!(room.wait_for(later(), 64 * MIB).await?.is_none(), "there is some");
+        let all = room.reserve(64 * MIB)?;
+        let mut again = pin!(room.wait_for(later(), 64 * MIB));
+        assert!(poll!(&mut again).is_pending());
+        let (mut little, mut more) = (pin!(room.wait_for(later(), MIB)), pin!(room.wait_for(later(), 2 * MIB)));
+        assert!(poll!(&mut little).is_pending() && poll!(&mut more).is_pending());
+        drop(all);
+        assert!(room.wait_for(later(), MIB / 2).await?.is_none(), "nobody waits for as little");
+        let mut next = pin!(room.wait_for(later(), 64 * MIB));
+        assert!(poll!(&mut next).is_pending(), "others came before");
+        let (little, more) = (little.await?, more.await?);
+        assert!(little.is_some() && more.is_some() && poll!(&mut again).is_pending());
+        drop((little, more));
+        assert!(again.await?.is_some());
+        assert!(next.await?.is_some());
+        assert_eq!(room.taken_bytes(), 0);
+        Ok(())
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn nobody_waits_for_room_beyond_the_deadline_nor_for_long_nor_where_memory_is_scarce() -> Result<(), NoRoom> {
+        let room = Room::new(64 * MIB);
+        let _all = room.reserve(64 * MIB)?;
+        for (deadline, waits) in [(later(), PATIENCE), (Instant::now() + PATIENCE + PATIENCE / 2, PATIENCE / 2)] {
+            let came = Instant::now();
+            assert!(matches!(room.wait_for(deadline, MIB).await, Err(NoRoom::Taken { .. })));
+            assert!(came.elapsed() >= waits && came.elapsed() < waits + Duration::from_millis(10));
+        }
+        room.memory().set_scarce(true);
+        let came = Instant::now();
+        assert!(matches!(room.wait_for(later(), MIB).await, Err(NoRoom::Scarce)));
+        assert_eq!(came.elapsed(), Duration::ZERO);
+        assert!(room.wait_for(later(), 1024).await?.is_none(), "what is small takes none");
+        Ok(())
+    }
 }

@@ -269,7 +269,7 @@ impl Workers {
     async fn fill(&self, slot: usize, mut tasks: Tasks) {
         let Capacity { slots, .. } = self.capacity;
         let most_in_work = if slot < slots { slots } else { 1 };
-        let (mut turn, mut lane) = (slot, Lane::default());
+        let (mut turn, mut lane, mut last) = (slot, Lane::default(), None);
         while !self.stopping.is_cancelled() {
             let waiting = Arc::clone(&tasks.borrow_and_update());
             let mut has_worked = false;
@@ -298,6 +298,10 @@ impl Workers {
                 match self.claim(task, &ours).await {
                     Ok((Claim::Chunk(lease), _)) if self.stopping.is_cancelled() => return give_up(lease).await,
                     Ok((Claim::Chunk(lease), beside)) => {
+                        // What another study has had of the time is not this one's.
+                        if last.replace(task.cut.clone()).is_none_or(|last| last != task.cut) {
+                            lane = Lane::default();
+                        }
                         let no_longer_alone = async {
                             tokio::time::sleep(ALONE).await;
                             drop(beside);

@@ -298,7 +298,8 @@ async fn bodies_that_are_long_take_room_until_they_are_read() {
 /// One of 4 MiB took 360, and ended a service of 256.
 #[tokio::test]
 async fn a_study_that_is_read_takes_room_for_what_its_document_may_come_to() {
-    let service = Service::within(Limits { max_body_bytes: 4 << 20, max_unread_bytes: 100 << 20, ..LIMITS });
+    let limits = Limits { max_body_bytes: 4 << 20, max_unread_bytes: 100 << 20, deadline_ms: 1000, ..LIMITS };
+    let service = Service::within(limits);
     let document = |bytes: usize| format!(r#"{{ "study": "map", "base": [{}0] }}"#, r#"{"":0},"#.repeat(bytes / 7));
     let ask = async |bytes| service.ask(&Question::post("/v1/studies", document(bytes))).await;
     ask(1 << 20).await.refused(422, "invalid_document");

@@ -289,7 +289,8 @@ fn solved<Q: Question>(
         fail::fail_point!("solve");
         let checked = question.check(&Design::read(document)?, limits)?;
         let columns_bytes = Q::columns_bytes(&checked);
-        let (answer, mut reserved) = answered::<Q>(&checked, 0, room, stop)?;
+        let reserved = room.reserve(Q::columns_bytes(&checked) + Q::working_bytes(&checked))?;
+        let (answer, mut reserved) = answered::<Q>(&checked, reserved, stop)?;
         let held_bytes = columns_bytes.max(answer.held_bytes(Format::Json));
         reserved.hold_at_most(held_bytes);
         Ok(Solved { answer, held_bytes, reserved })
@@ -456,7 +457,7 @@ impl Lines {
         let read = || {
             let mut room = self.room.nothing();
             room.hold_at_least(line.len() as u64)?;
-            Ok(Read { bytes: Bytes::copy_from_slice(line), _room: room })
+            Ok(Read { bytes: Bytes::copy_from_slice(line), room })
         };
         Some(read())
     }
@@ -696,7 +697,7 @@ pub async fn batch(
 ) -> Response {
     // Proxies such as nginx pass on no more of a request once its answer has begun.
     let has_proxy = request.headers().contains_key("x-forwarded-for");
-    match begin(&app, query, request) {
+    match begin(&app, query, request).await {
         Ok((response, read)) => {
             if has_proxy {
                 // An error, as nothing is sent; or the service stops, and says so line by line.
@@ -709,7 +710,7 @@ pub async fn batch(
 }
 
 /// The answer, and what ends when the body is read, or as much of it as is before an answer.
-fn begin(
+async fn begin(
     app: &App,
     query: Result<Query<BatchQuery>, QueryRejection>,
     request: Request,
@@ -720,7 +721,7 @@ fn begin(
     let place = app.pool.batch_place()?;
     // Lines that wait, and of each chunk that is worked on its short answers; a long one has room of its own.
     let held_bytes = AHEAD_BYTES + app.limits.max_concurrent_solves * SLICE_BYTES;
-    let room = app.room.reserve(held_bytes as u64)?;
+    let room = app.room.reserve_in_time(app.pool.deadline(), held_bytes as u64).await?;
     let patience = Duration::from_millis(app.limits.header_timeout_ms);
     let beside = app.room.beside(held_bytes as u64);
     let lines = Lines::new(request.into_body(), app.limits.max_body_bytes, patience, &beside);
@@ -857,7 +858,7 @@ mod tests {
     };
 
     fn read_of(bytes: Bytes) -> super::Read {
-        super::Read { bytes, _room: Room::new(0).nothing() }
+        super::Read { bytes, room: Room::new(0).nothing() }
     }
 
     /// How many of three such lines one slice answers.

@@ -109,8 +109,11 @@ async fn walk<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Resu
                     };
                     let (room, cache) = (app.room.clone(), app.cache.clone());
                     let solve = async move {
-                        let job =
-                            move |stop: &AtomicBool| solve::<Q>(&checked, representation, &room, Some(&cache), stop);
+                        let reserved =
+                            room.wait_for(deadline, Expected::of::<Q>(&checked, representation).bytes()).await?;
+                        let job = move |stop: &AtomicBool| {
+                            solve::<Q>(&checked, representation, &room, reserved, Some(&cache), stop)
+                        };
                         pool.run_while_wanted(thread, job).await
                     };
                     let solved = app.cache.solve_once(key, tokio::time::sleep_until(deadline), solve).await?;
@@ -126,7 +129,7 @@ async fn walk<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Resu
     if negotiation::is_not_modified(&headers, &etag) {
         return Ok(caching(StatusCode::NOT_MODIFIED.into_response(), provenance, &etag));
     }
-    Ok(caching(with_body(&app.room, stored, representation)?, provenance, &etag))
+    Ok(caching(with_body(&app.room, deadline, stored, representation).await?, provenance, &etag))
 }
 
 /// The design's hash, for the request's log line.
@@ -161,8 +164,10 @@ async fn respond_afresh<Q: Question>(question: Q, app: Arc<App>, request: Reques
         let checked = question.check(&Design::read(&body)?, &app.limits.of_calculation())?;
         drop(body);
         let room = app.room.clone();
-        let job = move |stop: &AtomicBool| solve::<Q>(&checked, representation, &room, None, stop);
-        with_body(&app.room, app.pool.run(deadline, Thread::Blocking, job).await?, representation)
+        let reserved = room.wait_for(deadline, Expected::of::<Q>(&checked, representation).bytes()).await?;
+        let job = move |stop: &AtomicBool| solve::<Q>(&checked, representation, &room, reserved, None, stop);
+        let stored = app.pool.run(deadline, Thread::Blocking, job).await?;
+        with_body(&app.room, deadline, stored, representation).await
     };
     let mut response = walk.await.unwrap_or_else(IntoResponse::into_response);
     response.headers_mut().insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
@@ -172,7 +177,7 @@ async fn respond_afresh<Q: Question>(question: Q, app: Arc<App>, request: Reques
 /// A body that was read, with the room that it takes.
 struct Read {
     bytes: Bytes,
-    _room: Reserved,
+    room: Reserved,
 }
 
 impl Deref for Read {
@@ -220,7 +225,7 @@ async fn read_body(
         })
     };
     app.pool.until_closed(in_time).await?;
-    Ok(Read { bytes: whole.freeze(), _room: room })
+    Ok(Read { bytes: whole.freeze(), room })
 }
 
 /// The problem of a body that does not end as it should.
@@ -228,33 +233,52 @@ fn broken_body(error: &axum::Error) -> Problem {
     Problem::new(ProblemCode::BrokenBody, format!("the body cannot be read to its end: {error}"))
 }
 
-/// Solves and writes the final bytes.
+/// What an answer takes before it is made.
+struct Expected {
+    columns_bytes: u64,
+    text_bytes: u64,
+    /// While it is computed.
+    working_bytes: u64,
+}
+
+impl Expected {
+    fn of<Q: Question>(checked: &Q::Checked, Representation { format, gzip }: Representation) -> Self {
+        let columns_bytes = Q::columns_bytes(checked);
+        let text_bytes = if is_long(format) { columns_bytes * if gzip { 1 } else { 2 } } else { 0 };
+        Self { columns_bytes, text_bytes, working_bytes: Q::working_bytes(checked) }
+    }
+
+    const fn bytes(&self) -> u64 {
+        self.columns_bytes + self.text_bytes + self.working_bytes
+    }
+}
+
+/// Solves and writes the final bytes, in the room that was waited for, or that there is.
 fn solve<Q: Question>(
     checked: &Q::Checked,
     representation: Representation,
     room: &Room,
+    reserved: Option<Reserved>,
     cache: Option<&Cache>,
     stop: &AtomicBool,
 ) -> Result<Stored, Problem> {
     #[cfg(feature = "fault-injection")]
     fail::fail_point!("solve");
     let started = Instant::now();
-    let columns_bytes = Q::columns_bytes(checked);
-    let Representation { format, gzip } = representation;
-    let text_bytes = if is_long(format) { columns_bytes * if gzip { 1 } else { 2 } } else { 0 };
-    let (answer, mut reserved) = answered::<Q>(checked, text_bytes, room, stop)?;
-    reserved.hold_at_most((columns_bytes + text_bytes).max(answer.held_bytes(format)));
+    let expected = Expected::of::<Q>(checked, representation);
+    let reserved = reserved.map_or_else(|| room.reserve(expected.bytes()), Ok)?;
+    let (answer, mut reserved) = answered::<Q>(checked, reserved, stop)?;
+    let Expected { columns_bytes, text_bytes, .. } = expected;
+    reserved.hold_at_most((columns_bytes + text_bytes).max(answer.held_bytes(representation.format)));
     written(answer, representation, reserved, columns_bytes, started.elapsed(), cache, stop)
 }
 
-/// An answer in the room that it takes, and beside it for its text, before and while it is made.
+/// An answer, in room for it and beside it for its text, which grows with it.
 fn answered<Q: Question>(
     checked: &Q::Checked,
-    text_bytes: u64,
-    room: &Room,
+    mut reserved: Reserved,
     stop: &AtomicBool,
 ) -> Result<(Q::Answer, Reserved), Problem> {
-    let mut reserved = room.reserve(Q::columns_bytes(checked) + text_bytes + Q::working_bytes(checked))?;
     let taking = Taking::new(stop, &reserved);
     let take = |input_angles| reserved.hold_at_least(Q::searched_bytes(checked, input_angles));
     let answer = with_room(&taking, take, |stop| Q::answer(checked, stop))?;
@@ -440,8 +464,14 @@ pub const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
 /// Where an answer came from (RFC 9211).
 pub const CACHE_STATUS: HeaderName = HeaderName::from_static("cache-status");
 
-fn with_body(room: &Room, stored: Stored, representation: Representation) -> Result<Response, Problem> {
-    let mut response = (StatusCode::OK, room.take(stored.body, &stored.sent)?).into_response();
+async fn with_body(
+    room: &Room,
+    deadline: tokio::time::Instant,
+    stored: Stored,
+    representation: Representation,
+) -> Result<Response, Problem> {
+    let body = room.take(deadline, stored.body, &stored.sent).await?;
+    let mut response = (StatusCode::OK, body).into_response();
     let headers = response.headers_mut();
     // Those here and those of the layers around.
     headers.reserve(12);
@@ -498,7 +528,8 @@ mod tests {
         let checked = question.check(&design, &limits).expect("a possible one");
         let room = Room::new(1 << 30);
         let _others = room.reserve((1 << 30) - left_bytes).expect("room");
-        let stored = solve::<Q>(&checked, Representation { format, gzip: false }, &room, None, &AtomicBool::new(false));
+        let stored =
+            solve::<Q>(&checked, Representation { format, gzip: false }, &room, None, None, &AtomicBool::new(false));
         stored.map(|stored| stored.body.len() as u64).map_err(|problem| problem.code)
     }
 
@@ -530,8 +561,11 @@ mod tests {
         let sweep = Sweep.check(&design, &limits).expect("a possible one");
         let accuracy = Accuracy.check(&design, &limits).expect("a possible one");
         let stop = AtomicBool::new(true);
-        assert_eq!(code(solve::<Sweep>(&sweep, json, &room, None, &stop)), Err(ProblemCode::TooManyUnreadBytes));
-        assert_eq!(code(solve::<Accuracy>(&accuracy, json, &room, None, &stop)), Err(ProblemCode::TooManyUnreadBytes));
+        assert_eq!(code(solve::<Sweep>(&sweep, json, &room, None, None, &stop)), Err(ProblemCode::TooManyUnreadBytes));
+        assert_eq!(
+            code(solve::<Accuracy>(&accuracy, json, &room, None, None, &stop)),
+            Err(ProblemCode::TooManyUnreadBytes)
+        );
     }
 
     /// Whatever was counted. One that takes hundreds of milliseconds, so that it is given up on its way, and one that takes no room.
@@ -544,7 +578,7 @@ mod tests {
         let room = Room::new(1 << 30);
         let accuracy = Accuracy.check(&design, &limits).expect("a possible one");
         let given_up = std::thread::scope(|scope| {
-            let solving = scope.spawn(|| solve::<Accuracy>(&accuracy, json, &room, None, &stop));
+            let solving = scope.spawn(|| solve::<Accuracy>(&accuracy, json, &room, None, None, &stop));
             while room.taken_bytes() == 0 && !solving.is_finished() {
                 std::thread::yield_now();
             }
@@ -555,7 +589,7 @@ mod tests {
         assert_eq!(room.taken_bytes(), 0);
         assert!(room.reserve(SMALL_BYTES + 1).is_err());
         let sweep = Sweep.check(&design, &limits).expect("a possible one");
-        assert!(solve::<Sweep>(&sweep, json, &room, None, &stop).is_ok());
+        assert!(solve::<Sweep>(&sweep, json, &room, None, None, &stop).is_ok());
         room.memory().set_scarce(false);
         assert!(room.reserve(SMALL_BYTES + 1).is_ok());
     }
@@ -568,7 +602,7 @@ mod tests {
         let sweep = Sweep.check(&design, &limits).expect("a possible one");
         let begins_a_page = |cache: Option<&Cache>| {
             let room = Room::new(1 << 30);
-            let stored = solve::<Sweep>(&sweep, Representation::JSON, &room, cache, &AtomicBool::new(false));
+            let stored = solve::<Sweep>(&sweep, Representation::JSON, &room, None, cache, &AtomicBool::new(false));
             stored.expect("an answer").body.as_ptr().addr().is_multiple_of(4096)
         };
         assert!(begins_a_page(Some(&Cache::new(1 << 20))));

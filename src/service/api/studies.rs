@@ -230,7 +230,7 @@ async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Respons
     let body = read_body(app, &headers, body, deadline).await?;
     // Its choices stand for hundreds of designs, so that a document of 64 KB may take long to be read.
     let (question, limits) = (body.bytes.clone(), app.limits.of_studies());
-    let room = app.pool.room_aside(deadline, reading_bytes(question.len())).await?;
+    let room = app.pool.room_aside(deadline, reading_bytes(question.len()), body.room.held_bytes()).await?;
     let read = move || {
         let _room = room;
         Ok(Study::read(&question, &limits)?)
@@ -291,14 +291,15 @@ async fn written_apart<A: Forms + Send>(
     told: impl FnOnce(StudyAnswer) -> A + Send + 'static,
 ) -> Result<Response, Problem> {
     let reading = app.pool.until_closed(app.studies.read(kept, app.pool.deadline())).await?;
-    let (room, columns_bytes) = (app.room.clone(), reading.columns_bytes());
+    let (room, columns_bytes, deadline) = (app.room.clone(), reading.columns_bytes(), app.pool.deadline());
+    let reserved = room.wait_for(deadline, columns_bytes).await?;
     let job = move |stop: &AtomicBool| {
-        let reserved = room.reserve(columns_bytes)?;
+        let reserved = reserved.map_or_else(|| room.reserve(columns_bytes), Ok)?;
         let answer = reading.answer();
         written(told(answer), representation, reserved, columns_bytes, Duration::ZERO, None, stop)
     };
-    let stored = app.pool.run(app.pool.deadline(), Thread::Blocking, job).await?;
-    with_body(&app.room, stored, representation)
+    let stored = app.pool.run(deadline, Thread::Blocking, job).await?;
+    with_body(&app.room, deadline, stored, representation).await
 }
 
 impl Forms for StudyResource {
