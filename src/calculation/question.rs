@@ -23,7 +23,7 @@ pub struct Limits {
 /// What a design document can be asked.
 pub trait Question: Send + 'static {
     /// The checked parameters that the answer follows from.
-    type Checked: Send + 'static;
+    type Checked: Send + Sync + 'static;
     /// The answer; its serialisation is its JSON.
     type Answer: Forms;
 

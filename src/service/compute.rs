@@ -273,9 +273,9 @@ impl Pool {
         room.beside(held_bytes).reserve_in_time(deadline, beyond_bytes).await.map(Some)
     }
 
-    /// Whether answers are held that nobody has read yet.
-    pub fn has_unread(&self) -> bool {
-        self.room.as_ref().is_some_and(Room::has_unread)
+    /// Whether answers that nobody has read yet take much.
+    pub fn has_much_unread(&self) -> bool {
+        self.room.as_ref().is_some_and(Room::has_much_unread)
     }
 
     /// Solves that run now.

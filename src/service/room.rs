@@ -189,10 +189,11 @@ impl Room {
         (taken as u64 * 1024).min(self.max_bytes)
     }
 
-    /// Whether some is taken that is not held for as long as studies are kept.
-    pub fn has_unread(&self) -> bool {
-        let taken = permits(self.max_bytes) as usize - self.free.available_permits();
-        taken > self.kept.load(Ordering::Relaxed) as usize
+    /// Whether more than half of it is taken by what is not kept.
+    pub fn has_much_unread(&self) -> bool {
+        let all = permits(self.max_bytes) as usize;
+        let unread = (all - self.free.available_permits()).saturating_sub(self.kept.load(Ordering::Relaxed) as usize);
+        unread > all / 2
     }
 
     /// None yet.
@@ -211,16 +212,30 @@ impl Room {
         Ok(reserved)
     }
 
-    /// Waits for room where others have it, or came before, and none where there is some: it is taken when it is needed.
+    /// The same, where nobody waits for as little: none where there is not so much left.
     ///
     /// # Errors
-    /// Where there is not so much in time.
-    pub async fn wait_for(&self, deadline: Instant, bytes: u64) -> Result<Option<Reserved>, NoRoom> {
+    /// Where memory is scarce.
+    pub fn reserve_now(&self, bytes: u64) -> Result<Option<Reserved>, NoRoom> {
         let permits = self.permits_for(bytes);
-        let is_there = self.free.available_permits() >= permits as usize && !self.queue.goes_before(permits);
-        if permits == 0 || is_there {
+        if permits > 0 && self.queue.goes_before(permits) {
             return Ok(None);
         }
+        match self.reserve(bytes) {
+            Err(NoRoom::Taken { .. }) => Ok(None),
+            reserved => reserved.map(Some),
+        }
+    }
+
+    /// The same when there is, and nobody waits for less.
+    ///
+    /// # Errors
+    /// Where that takes too long, and where memory is scarce.
+    pub async fn reserve_in_time(&self, deadline: Instant, bytes: u64) -> Result<Reserved, NoRoom> {
+        if let Some(reserved) = self.reserve_now(bytes)? {
+            return Ok(reserved);
+        }
+        let permits = self.permits_for(bytes);
         let deadline = deadline.min(Instant::now() + PATIENCE);
         let place = self.queue.come(permits);
         loop {
@@ -229,21 +244,13 @@ impl Room {
             if place.is_first() {
                 match self.reserve(bytes) {
                     Err(NoRoom::Taken { .. }) => {}
-                    reserved => return reserved.map(Some),
+                    reserved => return reserved,
                 }
             }
             if timeout_at(deadline, changed).await.is_err() {
                 return Err(NoRoom::Taken { bytes, max_bytes: self.max_bytes });
             }
         }
-    }
-
-    /// Room, which others may have to give back first.
-    ///
-    /// # Errors
-    /// Where there is not so much in time.
-    pub async fn reserve_in_time(&self, deadline: Instant, bytes: u64) -> Result<Reserved, NoRoom> {
-        self.wait_for(deadline, bytes).await?.map_or_else(|| self.reserve(bytes), Ok)
     }
 
     /// Room for what is kept: so many bytes, though they were all of it. What is small is kept though there is none, but not where memory is scarce: how much
@@ -351,8 +358,11 @@ impl Reserved {
         let most = self.room.permits_for(bytes);
         self.bytes = self.bytes.min(bytes);
         if let Some(held) = &mut self.held {
-            drop(held.split(held.num_permits().saturating_sub(most as usize)));
-            self.room.queue.changed.notify_waiters();
+            let less = held.num_permits().saturating_sub(most as usize);
+            drop(held.split(less));
+            if less > 0 {
+                self.room.queue.changed.notify_waiters();
+            }
         }
     }
 
@@ -395,21 +405,19 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn who_wants_a_little_room_comes_before_who_wants_all_of_it_again_and_again() -> Result<(), NoRoom> {
         let room = Room::new(64 * MIB);
-        assert!(room.wait_for(later(), 64 * MIB).await?.is_none(), "there is some");
-        let all = room.reserve(64 * MIB)?;
-        let mut again = pin!(room.wait_for(later(), 64 * MIB));
+        let all = room.reserve_in_time(later(), 64 * MIB).await?;
+        let mut again = pin!(room.reserve_in_time(later(), 64 * MIB));
         assert!(poll!(&mut again).is_pending());
-        let (mut little, mut more) = (pin!(room.wait_for(later(), MIB)), pin!(room.wait_for(later(), 2 * MIB)));
+        let (mut little, mut more) =
+            (pin!(room.reserve_in_time(later(), MIB)), pin!(room.reserve_in_time(later(), 2 * MIB)));
         assert!(poll!(&mut little).is_pending() && poll!(&mut more).is_pending());
         drop(all);
-        assert!(room.wait_for(later(), MIB / 2).await?.is_none(), "nobody waits for as little");
-        let mut next = pin!(room.wait_for(later(), 64 * MIB));
-        assert!(poll!(&mut next).is_pending(), "others came before");
+        assert!(room.reserve_now(MIB / 2)?.is_some(), "nobody waits for as little");
+        assert!(room.reserve_now(64 * MIB)?.is_none() && room.reserve_now(MIB)?.is_none(), "others came before");
         let (little, more) = (little.await?, more.await?);
-        assert!(little.is_some() && more.is_some() && poll!(&mut again).is_pending());
+        assert!(poll!(&mut again).is_pending());
         drop((little, more));
-        assert!(again.await?.is_some());
-        assert!(next.await?.is_some());
+        drop(again.await?);
         assert_eq!(room.taken_bytes(), 0);
         Ok(())
     }
@@ -420,14 +428,14 @@ mod tests {
         let _all = room.reserve(64 * MIB)?;
         for (deadline, waits) in [(later(), PATIENCE), (Instant::now() + PATIENCE + PATIENCE / 2, PATIENCE / 2)] {
             let came = Instant::now();
-            assert!(matches!(room.wait_for(deadline, MIB).await, Err(NoRoom::Taken { .. })));
+            assert!(matches!(room.reserve_in_time(deadline, MIB).await, Err(NoRoom::Taken { .. })));
             assert!(came.elapsed() >= waits && came.elapsed() < waits + Duration::from_millis(10));
         }
         room.memory().set_scarce(true);
         let came = Instant::now();
-        assert!(matches!(room.wait_for(later(), MIB).await, Err(NoRoom::Scarce)));
+        assert!(matches!(room.reserve_in_time(later(), MIB).await, Err(NoRoom::Scarce)));
         assert_eq!(came.elapsed(), Duration::ZERO);
-        assert!(room.wait_for(later(), 1024).await?.is_none(), "what is small takes none");
+        assert!(room.reserve_in_time(later(), 1024).await.is_ok(), "what is small takes none");
         Ok(())
     }
 }

@@ -23,7 +23,7 @@ use crate::frozen::{self, NotHere, view_bytes};
 #[cfg(feature = "fault-injection")]
 use crate::injected;
 use crate::parts::Parts;
-use crate::problem::Problem;
+use crate::problem::{Problem, ProblemCode};
 use crate::shelf::{SharedRoom, Shelf};
 
 /// Between two looks at what there is to do, and at what was cancelled.
@@ -35,7 +35,7 @@ const ALONE: Duration = Duration::from_secs(3);
 /// Between two looks at memory that is scarce.
 const SCARCE_PAUSE: Duration = Duration::from_millis(20);
 
-/// After so long nothing that is held of scarce memory comes back by itself where no answer is unread: what the allocator keeps it uses again for who asks.
+/// After so long nothing that is held of scarce memory comes back by itself where unread answers do not fill it: what the allocator keeps it uses again for who asks.
 const LONGEST_SCARCE: Duration = Duration::from_secs(10);
 
 /// Of a `worker`'s memory, or of what unread answers may take, chunks that are in work may take such a part.
@@ -384,13 +384,13 @@ impl Workers {
         Arc::strong_count(&self.begun) == 1
     }
 
-    /// Waits while memory is scarce, so that what is in work comes to its end and is let go before more is begun. Where nothing is, and no answer is unread, that
+    /// Waits while memory is scarce, so that what is in work comes to its end and is let go before more is begun. Where nothing is, and unread answers do not fill it, that
     /// would be for ever: one is begun all the same after a while, beside none.
     async fn memory(&self) -> Option<SemaphorePermit<'_>> {
         while self.pool.memory().is_scarce() {
             self.shelf.clear();
             if self.is_none_begun()
-                && !self.pool.has_unread()
+                && !self.pool.has_much_unread()
                 && self.pool.memory().scarce_for() > LONGEST_SCARCE
                 && let Ok(alone) = self.though_scarce.try_acquire()
             {
@@ -420,8 +420,9 @@ impl Workers {
             }
             // Another time.
             Err(Unseen::Problem(problem)) => {
-                // It may have been for want of memory.
-                self.shelf.clear();
+                if problem.code == ProblemCode::TooManyUnreadBytes {
+                    self.shelf.clear();
+                }
                 if !std::mem::replace(&mut seen.is_in_trouble, true) {
                     let cause = problem.cause.as_deref();
                     tracing::warn!(study = task.cut.id, %problem, cause, "a study cannot be looked at; tried again until it can");

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use sqlx::pool::PoolConnection;
 use sqlx::postgres::Postgres;
+use tokio::time::Instant;
 
 use crate::connection::{Connection, Database, Store, StoreError, milliseconds, on, within};
 use crate::studies::{Cut, begin, commit, say};
@@ -34,6 +35,8 @@ pub struct Lease {
     held: Held,
     /// Whether its attempt counts as one that came to no result, should it come to none.
     is_noted: bool,
+    /// When it was found to be lost.
+    lost: Option<Instant>,
 }
 
 #[derive(Debug)]
@@ -112,7 +115,7 @@ impl Store {
         };
         // From here on dropping the lease sets the chunk free.
         let (store, attempt) = (self.clone(), self.attempt_name());
-        Ok(Some(Lease { store, cut: cut.clone(), chunk, attempt, silence: lease, held, is_noted: false }))
+        Ok(Some(Lease { store, cut: cut.clone(), chunk, attempt, silence: lease, held, is_noted: false, lost: None }))
     }
 
     /// Whether a chunk of a study is nobody's.
@@ -211,6 +214,20 @@ impl Store {
         .await
     }
 
+    /// Whether a chunk is over, or another has begun it since this attempt: of an earlier one nobody knows whether it ended its process.
+    async fn is_anothers(&self, study: &str, chunk: u64, attempt: &str) -> Result<bool, StoreError> {
+        let text = "SELECT NOT EXISTS (SELECT 1 FROM chunks WHERE study = $1 AND chunk = $2) OR EXISTS (SELECT 1 FROM attempts AS own, attempts AS others
+            WHERE own.study = $1 AND own.chunk = $2 AND own.worker = $3 AND others.study = $1 AND others.chunk = $2 AND others.worker <> $3
+                AND others.began_at_s >= own.began_at_s)";
+        self.with(PATIENCE, async |connection| {
+            let chunk = stored(chunk);
+            Ok(on!(connection, inner => {
+                sqlx::query_scalar(text).bind(study).bind(chunk).bind(attempt).fetch_one(inner).await
+            })?)
+        })
+        .await
+    }
+
     /// Deletes what is noted of an attempt, or is being noted.
     async fn delete_attempt(&self, study: &str, chunk: u64, attempt: &str) -> Result<(), StoreError> {
         let delete = "DELETE FROM attempts WHERE study = $1 AND chunk = $2 AND worker = $3";
@@ -287,8 +304,10 @@ impl Lease {
     /// # Errors
     /// Where the store does not answer.
     pub async fn attempts_that_count(&mut self) -> Result<u64, StoreError> {
-        const LOOKS: usize = 4;
-        for _ in 1..LOOKS {
+        // In this time its server has ended its session, and it has found that out.
+        let patience = self.silence + 2 * self.often() + PATIENCE;
+        let came = Instant::now();
+        while came.elapsed() < patience {
             let attempts = self.attempts().await?;
             if attempts < MOST_ATTEMPTS || matches!(self.held, Held::Here) {
                 return Ok(attempts);
@@ -333,6 +352,10 @@ impl Lease {
                 return Err(error);
             }
         }
+        if matches!(self.held, Held::Lost) {
+            // Whoever has the chunk now says what becomes of it.
+            return Ok(Claim::None);
+        }
         self.give_up().await?;
         Ok(Claim::Gap(chunk))
     }
@@ -368,10 +391,12 @@ impl Lease {
 
     /// Takes a lease again that was lost. Where another has the chunk by now, or it is over, its holder goes on, and its attempt counts no more.
     async fn hold_again(&mut self) -> Result<(), StoreError> {
+        let lost = *self.lost.get_or_insert_with(Instant::now);
         let Self { store, cut, chunk, attempt, silence, .. } = &*self;
         if let Some((_, held)) = store.claim_there(cut, Some(*chunk), *silence).await? {
-            self.held = held;
-        } else {
+            (self.held, self.lost) = (held, None);
+        } else if lost.elapsed() > *silence || store.is_anothers(&cut.id, *chunk, attempt).await? {
+            // Before, it may be this one's own session, which the server ends in that time.
             store.delete_attempt(&cut.id, *chunk, attempt).await?;
             self.is_noted = false;
         }
@@ -401,7 +426,12 @@ impl Lease {
                 }
                 // Where the server says that it has no room, the chunk is not another's for that.
                 let is_held = matches!(kept, Err(StoreError::Failed(sqlx::Error::Database(_))))
-                    && within(PATIENCE, say(&mut connection, "ROLLBACK TO SAVEPOINT held")).await.is_ok();
+                    && within(PATIENCE, async {
+                        say(&mut connection, "ROLLBACK TO SAVEPOINT held").await?;
+                        say(&mut connection, "RELEASE SAVEPOINT held").await
+                    })
+                    .await
+                    .is_ok();
                 if let Connection::Server(mut connection) = connection {
                     if is_held {
                         self.held = Held::There(Box::new(connection));

@@ -684,9 +684,13 @@ async fn a_study_whose_results_are_all_there_waits_for_nobody_though_a_chunk_is_
     let _nobody = SERVER.write().await;
     let (store, study) = stored(&address, "twice", 1).await;
     let mut first = claimed(&store, &study).await;
-    assert_eq!(sqlx::query(END_LEASES).fetch_all(&mut stranger(&address).await).await.unwrap().len(), 1);
-    first.say().await;
+    let mut stranger = stranger(&address).await;
+    assert_eq!(sqlx::query(END_LEASES).fetch_all(&mut stranger).await.unwrap().len(), 1);
+    while !store.has_free_chunk(&study.cut()).await.unwrap() {
+        tokio::task::yield_now().await;
+    }
     let second = claimed(&store, &study).await;
+    first.say().await;
     let is_waiting = async || store.waiting().await.unwrap().iter().any(|waiting| waiting.cut == study.cut());
     let before = store.figures().await.unwrap();
     assert!(is_waiting().await && (before.running, before.waiting) == (1, 1));

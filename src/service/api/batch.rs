@@ -718,10 +718,11 @@ async fn begin(
     let Query(query) = query.map_err(|error| Problem::new(ProblemCode::InvalidQuery, error.body_text()))?;
     query.require_possible()?;
     negotiation::require_ndjson(request.headers())?;
-    let place = app.pool.batch_place()?;
     // Lines that wait, and of each chunk that is worked on its short answers; a long one has room of its own.
     let held_bytes = AHEAD_BYTES + app.limits.max_concurrent_solves * SLICE_BYTES;
-    let room = app.room.reserve_in_time(app.pool.deadline(), held_bytes as u64).await?;
+    let waited = async { Ok(app.room.reserve_in_time(app.pool.deadline(), held_bytes as u64).await?) };
+    let room = app.pool.until_closed(waited).await?;
+    let place = app.pool.batch_place()?;
     let patience = Duration::from_millis(app.limits.header_timeout_ms);
     let beside = app.room.beside(held_bytes as u64);
     let lines = Lines::new(request.into_body(), app.limits.max_body_bytes, patience, &beside);

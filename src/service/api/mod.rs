@@ -101,20 +101,22 @@ async fn walk<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Resu
                 // What is kept was checked when it was solved.
                 Some(stored) => (stored, Served::Hit),
                 None => {
-                    let checked = question.check(&design, &app.limits.of_calculation())?;
-                    let pool = app.pool.clone();
+                    let checked = Arc::new(question.check(&design, &app.limits.of_calculation())?);
+                    let solving = Arc::clone(&app);
                     let thread = match representation {
                         Representation::JSON if Q::is_short(&checked) => Thread::Executor,
                         _ => Thread::Blocking,
                     };
-                    let (room, cache) = (app.room.clone(), app.cache.clone());
                     let solve = async move {
-                        let reserved =
-                            room.wait_for(deadline, Expected::of::<Q>(&checked, representation).bytes()).await?;
-                        let job = move |stop: &AtomicBool| {
-                            solve::<Q>(&checked, representation, &room, reserved, Some(&cache), stop)
+                        let run = |reserved| {
+                            let (checked, room, cache) =
+                                (Arc::clone(&checked), solving.room.clone(), solving.cache.clone());
+                            let job = move |stop: &AtomicBool| {
+                                try_to_solve::<Q>(&checked, representation, &room, reserved, Some(&cache), stop)
+                            };
+                            solving.pool.run_while_wanted(thread, job)
                         };
-                        pool.run_while_wanted(thread, job).await
+                        in_room(&solving, deadline, run).await
                     };
                     let solved = app.cache.solve_once(key, tokio::time::sleep_until(deadline), solve).await?;
                     solved.ok_or_else(|| app.pool.deadline_exceeded())?
@@ -129,7 +131,7 @@ async fn walk<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Resu
     if negotiation::is_not_modified(&headers, &etag) {
         return Ok(caching(StatusCode::NOT_MODIFIED.into_response(), provenance, &etag));
     }
-    Ok(caching(with_body(&app.room, deadline, stored, representation).await?, provenance, &etag))
+    Ok(caching(with_body(&app, deadline, stored, representation).await?, provenance, &etag))
 }
 
 /// The design's hash, for the request's log line.
@@ -161,13 +163,14 @@ impl Asked {
 async fn respond_afresh<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Response {
     let walk = async {
         let Asked { body, representation, deadline, .. } = Asked::read::<Q>(&app, request).await?;
-        let checked = question.check(&Design::read(&body)?, &app.limits.of_calculation())?;
+        let checked = Arc::new(question.check(&Design::read(&body)?, &app.limits.of_calculation())?);
         drop(body);
-        let room = app.room.clone();
-        let reserved = room.wait_for(deadline, Expected::of::<Q>(&checked, representation).bytes()).await?;
-        let job = move |stop: &AtomicBool| solve::<Q>(&checked, representation, &room, reserved, None, stop);
-        let stored = app.pool.run(deadline, Thread::Blocking, job).await?;
-        with_body(&app.room, deadline, stored, representation).await
+        let run = |reserved| {
+            let (checked, room) = (Arc::clone(&checked), app.room.clone());
+            let job = move |stop: &AtomicBool| try_to_solve::<Q>(&checked, representation, &room, reserved, None, stop);
+            app.pool.run(deadline, Thread::Blocking, job)
+        };
+        with_body(&app, deadline, in_room(&app, deadline, run).await?, representation).await
     };
     let mut response = walk.await.unwrap_or_else(IntoResponse::into_response);
     response.headers_mut().insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
@@ -253,22 +256,62 @@ impl Expected {
     }
 }
 
-/// Solves and writes the final bytes, in the room that was waited for, or that there is.
-fn solve<Q: Question>(
+/// What comes of a solve that wants room.
+enum Tried {
+    Solved(Stored),
+    /// There is not so much in this moment, or others wait for less.
+    WantsRoom(u64),
+}
+
+/// What comes of a solve in the room that there is when it begins, or in some that it waits for: no permit is held meanwhile.
+async fn in_room<F: Future<Output = Result<Tried, Problem>>>(
+    app: &App,
+    deadline: tokio::time::Instant,
+    run: impl Fn(Option<Reserved>) -> F,
+) -> Result<Stored, Problem> {
+    let mut reserved = None;
+    loop {
+        match run(reserved.take()).await? {
+            Tried::Solved(stored) => return Ok(stored),
+            Tried::WantsRoom(bytes) => {
+                let waited = async { Ok(app.room.reserve_in_time(deadline, bytes).await?) };
+                reserved = Some(app.pool.until_closed(waited).await?);
+            }
+        }
+    }
+}
+
+/// Solves in room that was waited for, or that there is.
+fn try_to_solve<Q: Question>(
     checked: &Q::Checked,
     representation: Representation,
     room: &Room,
     reserved: Option<Reserved>,
     cache: Option<&Cache>,
     stop: &AtomicBool,
+) -> Result<Tried, Problem> {
+    let expected = Expected::of::<Q>(checked, representation);
+    let bytes = expected.bytes();
+    match reserved.map_or_else(|| room.reserve_now(bytes), |reserved| Ok(Some(reserved)))? {
+        Some(reserved) => solve::<Q>(checked, representation, &expected, reserved, cache, stop).map(Tried::Solved),
+        None => Ok(Tried::WantsRoom(bytes)),
+    }
+}
+
+/// Solves and writes the final bytes.
+fn solve<Q: Question>(
+    checked: &Q::Checked,
+    representation: Representation,
+    expected: &Expected,
+    reserved: Reserved,
+    cache: Option<&Cache>,
+    stop: &AtomicBool,
 ) -> Result<Stored, Problem> {
     #[cfg(feature = "fault-injection")]
     fail::fail_point!("solve");
     let started = Instant::now();
-    let expected = Expected::of::<Q>(checked, representation);
-    let reserved = reserved.map_or_else(|| room.reserve(expected.bytes()), Ok)?;
     let (answer, mut reserved) = answered::<Q>(checked, reserved, stop)?;
-    let Expected { columns_bytes, text_bytes, .. } = expected;
+    let Expected { columns_bytes, text_bytes, .. } = *expected;
     reserved.hold_at_most((columns_bytes + text_bytes).max(answer.held_bytes(representation.format)));
     written(answer, representation, reserved, columns_bytes, started.elapsed(), cache, stop)
 }
@@ -465,12 +508,13 @@ pub const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
 pub const CACHE_STATUS: HeaderName = HeaderName::from_static("cache-status");
 
 async fn with_body(
-    room: &Room,
+    app: &App,
     deadline: tokio::time::Instant,
     stored: Stored,
     representation: Representation,
 ) -> Result<Response, Problem> {
-    let body = room.take(deadline, stored.body, &stored.sent).await?;
+    let taken = async { Ok(app.room.take(deadline, stored.body, &stored.sent).await?) };
+    let body = app.pool.until_closed(taken).await?;
     let mut response = (StatusCode::OK, body).into_response();
     let headers = response.headers_mut();
     // Those here and those of the layers around.
@@ -512,11 +556,24 @@ mod tests {
     use toothwave_calculation::question::{Limits, Question};
     use toothwave_calculation::sweep::Sweep;
 
-    use super::{Growing, LOOK_EVERY_BYTES, Stoppable, solve};
+    use super::{Expected, Growing, LOOK_EVERY_BYTES, Stoppable};
     use crate::cache::{Cache, Stored};
     use crate::negotiation::Representation;
     use crate::problem::{Problem, ProblemCode};
     use crate::room::{Room, SMALL_BYTES};
+
+    /// In the room that there is, and no other.
+    fn solve<Q: Question>(
+        checked: &Q::Checked,
+        representation: Representation,
+        room: &Room,
+        cache: Option<&Cache>,
+        stop: &AtomicBool,
+    ) -> Result<Stored, Problem> {
+        let expected = Expected::of::<Q>(checked, representation);
+        let reserved = room.reserve(expected.bytes())?;
+        super::solve::<Q>(checked, representation, &expected, reserved, cache, stop)
+    }
 
     /// The bytes of an answer, where so much room is left.
     fn solved<Q: Question>(question: &Q, format: Format, left_bytes: u64) -> Result<u64, ProblemCode> {
@@ -528,8 +585,7 @@ mod tests {
         let checked = question.check(&design, &limits).expect("a possible one");
         let room = Room::new(1 << 30);
         let _others = room.reserve((1 << 30) - left_bytes).expect("room");
-        let stored =
-            solve::<Q>(&checked, Representation { format, gzip: false }, &room, None, None, &AtomicBool::new(false));
+        let stored = solve::<Q>(&checked, Representation { format, gzip: false }, &room, None, &AtomicBool::new(false));
         stored.map(|stored| stored.body.len() as u64).map_err(|problem| problem.code)
     }
 
@@ -561,11 +617,8 @@ mod tests {
         let sweep = Sweep.check(&design, &limits).expect("a possible one");
         let accuracy = Accuracy.check(&design, &limits).expect("a possible one");
         let stop = AtomicBool::new(true);
-        assert_eq!(code(solve::<Sweep>(&sweep, json, &room, None, None, &stop)), Err(ProblemCode::TooManyUnreadBytes));
-        assert_eq!(
-            code(solve::<Accuracy>(&accuracy, json, &room, None, None, &stop)),
-            Err(ProblemCode::TooManyUnreadBytes)
-        );
+        assert_eq!(code(solve::<Sweep>(&sweep, json, &room, None, &stop)), Err(ProblemCode::TooManyUnreadBytes));
+        assert_eq!(code(solve::<Accuracy>(&accuracy, json, &room, None, &stop)), Err(ProblemCode::TooManyUnreadBytes));
     }
 
     /// Whatever was counted. One that takes hundreds of milliseconds, so that it is given up on its way, and one that takes no room.
@@ -578,7 +631,7 @@ mod tests {
         let room = Room::new(1 << 30);
         let accuracy = Accuracy.check(&design, &limits).expect("a possible one");
         let given_up = std::thread::scope(|scope| {
-            let solving = scope.spawn(|| solve::<Accuracy>(&accuracy, json, &room, None, None, &stop));
+            let solving = scope.spawn(|| solve::<Accuracy>(&accuracy, json, &room, None, &stop));
             while room.taken_bytes() == 0 && !solving.is_finished() {
                 std::thread::yield_now();
             }
@@ -589,7 +642,7 @@ mod tests {
         assert_eq!(room.taken_bytes(), 0);
         assert!(room.reserve(SMALL_BYTES + 1).is_err());
         let sweep = Sweep.check(&design, &limits).expect("a possible one");
-        assert!(solve::<Sweep>(&sweep, json, &room, None, None, &stop).is_ok());
+        assert!(solve::<Sweep>(&sweep, json, &room, None, &stop).is_ok());
         room.memory().set_scarce(false);
         assert!(room.reserve(SMALL_BYTES + 1).is_ok());
     }
@@ -602,7 +655,7 @@ mod tests {
         let sweep = Sweep.check(&design, &limits).expect("a possible one");
         let begins_a_page = |cache: Option<&Cache>| {
             let room = Room::new(1 << 30);
-            let stored = solve::<Sweep>(&sweep, Representation::JSON, &room, None, cache, &AtomicBool::new(false));
+            let stored = solve::<Sweep>(&sweep, Representation::JSON, &room, cache, &AtomicBool::new(false));
             stored.expect("an answer").body.as_ptr().addr().is_multiple_of(4096)
         };
         assert!(begins_a_page(Some(&Cache::new(1 << 20))));

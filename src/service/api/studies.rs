@@ -291,15 +291,15 @@ async fn written_apart<A: Forms + Send>(
     told: impl FnOnce(StudyAnswer) -> A + Send + 'static,
 ) -> Result<Response, Problem> {
     let reading = app.pool.until_closed(app.studies.read(kept, app.pool.deadline())).await?;
-    let (room, columns_bytes, deadline) = (app.room.clone(), reading.columns_bytes(), app.pool.deadline());
-    let reserved = room.wait_for(deadline, columns_bytes).await?;
+    let (columns_bytes, deadline) = (reading.columns_bytes(), app.pool.deadline());
+    let waited = async { Ok(app.room.reserve_in_time(deadline, columns_bytes).await?) };
+    let reserved = app.pool.until_closed(waited).await?;
     let job = move |stop: &AtomicBool| {
-        let reserved = reserved.map_or_else(|| room.reserve(columns_bytes), Ok)?;
         let answer = reading.answer();
         written(told(answer), representation, reserved, columns_bytes, Duration::ZERO, None, stop)
     };
     let stored = app.pool.run(deadline, Thread::Blocking, job).await?;
-    with_body(&app.room, deadline, stored, representation).await
+    with_body(app, deadline, stored, representation).await
 }
 
 impl Forms for StudyResource {
