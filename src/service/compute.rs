@@ -147,11 +147,16 @@ pub struct Lane {
     turn: Arc<Mutex<Option<Turn>>>,
     /// Of the turn.
     spent: Duration,
-    /// Of all turns.
-    had: Had,
+    /// Of all turns, also those of its companions.
+    had: Arc<Mutex<Had>>,
 }
 
 impl Lane {
+    /// Another of the same: what they have had of the time is counted together.
+    pub fn companion(had: &Arc<Mutex<Had>>) -> Self {
+        Self { had: Arc::clone(had), ..Self::default() }
+    }
+
     /// For so long a turn is kept: somebody waits for it meanwhile, and no core works.
     const KEPT: Duration = Duration::from_millis(20);
 
@@ -454,7 +459,7 @@ impl Pool {
             done = self.run_permitted(Arc::clone(&turn), Thread::Blocking, timed) => done,
             () = time_is_over => Err(deadline_exceeded(most)),
         };
-        self.turns.note(&mut lane.had, began.elapsed());
+        self.turns.note(&mut lane.had.lock(), began.elapsed());
         let (done, busy) = sliced?;
         // Where all have short steps the next turn comes as soon.
         let most = self.pace.most(Instant::now());
@@ -464,9 +469,10 @@ impl Pool {
         Ok(done)
     }
 
-    async fn turn(&self, had: &Had) -> Result<Turn, Problem> {
+    async fn turn(&self, had: &Mutex<Had>) -> Result<Turn, Problem> {
+        let had = *had.lock();
         let turn = tokio::select! {
-            turn = self.turns.take(had) => turn,
+            turn = self.turns.take(&had) => turn,
             () = self.closed.cancelled() => return Err(shutting_down()),
         };
         // Behind the single solves that came before: each may take as long as a slice.

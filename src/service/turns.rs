@@ -1,6 +1,6 @@
 //! Whose turn it is, among those who have more to do than one slice.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -23,15 +23,11 @@ struct Queue {
     even: Duration,
     /// The longest step of late.
     longest: Duration,
-    /// By the time that they have had, and the order in which they came.
-    waiting: BTreeMap<(Duration, u64), Waiting>,
+    /// Those who wait for their first turn, in the order in which they came.
+    new: VecDeque<oneshot::Sender<Turn>>,
+    /// The others, by the time that they have had, and the order in which they came.
+    waiting: BTreeMap<(Duration, u64), oneshot::Sender<Turn>>,
     came: u64,
-}
-
-#[derive(Debug)]
-struct Waiting {
-    is_new: bool,
-    tell: oneshot::Sender<Turn>,
 }
 
 /// One that is taken, until it is dropped.
@@ -47,8 +43,8 @@ impl Turns {
     pub fn new(count: usize) -> Self {
         // It begins late enough for everybody to come before.
         let even = Duration::from_secs(24 * 3600);
-        let (longest, waiting, came) = Default::default();
-        Self(Arc::new(Mutex::new(Queue { free: count, even, longest, waiting, came })))
+        let (longest, new, waiting, came) = Default::default();
+        Self(Arc::new(Mutex::new(Queue { free: count, even, longest, new, waiting, came })))
     }
 
     /// Turns that nobody has.
@@ -65,9 +61,13 @@ impl Turns {
                 return Turn(Some(self.clone()));
             }
             let (tell, told) = oneshot::channel();
-            queue.came += 1;
-            let place = (queue.had(had), queue.came);
-            queue.waiting.insert(place, Waiting { is_new: had.0.is_none(), tell });
+            if had.0.is_none() {
+                queue.new.push_back(tell);
+            } else {
+                queue.came += 1;
+                let place = (queue.had(had), queue.came);
+                queue.waiting.insert(place, tell);
+            }
             told
         };
         // An error: the queue is gone, which it is not before this.
@@ -81,7 +81,7 @@ impl Turns {
         let took = took.min(LONGEST);
         let mut queue = self.0.lock();
         had.0 = Some(queue.had(had) + took);
-        let wanting = u32::try_from(queue.waiting.len() + 1).unwrap_or(u32::MAX);
+        let wanting = u32::try_from(queue.new.len() + queue.waiting.len() + 1).unwrap_or(u32::MAX);
         queue.even += took / wanting;
         queue.longest = took.max(queue.longest - queue.longest / FORGOTTEN);
     }
@@ -93,6 +93,20 @@ impl Queue {
         let least = self.even.saturating_sub(self.longest);
         had.0.map_or(least, |had| had.clamp(least, self.even + self.longest))
     }
+
+    /// Who is the next.
+    fn next(&mut self) -> Option<oneshot::Sender<Turn>> {
+        let least = self.waiting.first_key_value().map(|(&(had, _), _)| had);
+        if least.is_none_or(|least| self.had(&Had(None)) <= least)
+            && let Some(next) = self.new.pop_front()
+        {
+            return Some(next);
+        }
+        let ((had, _), next) = self.waiting.pop_first()?;
+        // Who has had least of those who always want some is behind the others by a step at most.
+        self.even = self.even.clamp(had, had + self.longest);
+        Some(next)
+    }
 }
 
 impl Drop for Turn {
@@ -101,19 +115,15 @@ impl Drop for Turn {
         let mut turn = Self(Some(turns.clone()));
         loop {
             let mut queue = turns.0.lock();
-            let Some(((had, _), Waiting { is_new, tell })) = queue.waiting.pop_first() else {
+            let Some(next) = queue.next() else {
                 queue.free += 1;
                 drop(queue);
                 turn.0 = None;
                 return;
             };
-            if !is_new {
-                // Who has had least of those who always want some is behind the others by a step at most.
-                queue.even = queue.even.clamp(had, had + queue.longest);
-            }
             drop(queue);
             // Who waits no more has let go of the other end.
-            match tell.send(turn) {
+            match next.send(turn) {
                 Ok(()) => return,
                 Err(back) => turn = back,
             }
@@ -150,6 +160,8 @@ mod tests {
             })
         });
         let others = others.collect::<Vec<_>>();
+        // At first each of them is new.
+        tokio::time::sleep(15 * LONG).await;
         for _ in 0..30 {
             tokio::time::sleep(19 * LONG / 2).await;
             let came = Instant::now();

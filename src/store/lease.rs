@@ -247,6 +247,13 @@ impl Store {
     }
 }
 
+/// Whether what the server refuses may be tried again within the same transaction: not where this is in another's way, as in a deadlock, or came too late (class 40 of
+/// PostgreSQL's appendix A).
+fn leaves_transaction(error: &StoreError) -> bool {
+    let StoreError::Failed(sqlx::Error::Database(refused)) = error else { return false };
+    !refused.code().is_none_or(|code| code.starts_with("40"))
+}
+
 /// The session of a lease that is being begun: whoever fails or leaves meanwhile ends its transaction with it.
 struct Begun(Option<Box<PoolConnection<Postgres>>>);
 
@@ -425,7 +432,7 @@ impl Lease {
                     return kept;
                 }
                 // Where the server says that it has no room, the chunk is not another's for that.
-                let is_held = matches!(kept, Err(StoreError::Failed(sqlx::Error::Database(_))))
+                let is_held = kept.as_ref().is_err_and(leaves_transaction)
                     && within(PATIENCE, async {
                         say(&mut connection, "ROLLBACK TO SAVEPOINT held").await?;
                         say(&mut connection, "RELEASE SAVEPOINT held").await

@@ -92,6 +92,11 @@ struct Form {
     derives_ring_teeth: bool,
 }
 
+fn too_many_forms(list: &str) -> NoAnswer {
+    let detail = format!("the choices have more than {MOST_FORMS} combinations");
+    fault(&format!("/{list}"), FieldCode::OutOfRange, detail)
+}
+
 impl Template {
     /// The documents of a base with these free fields, of which `list` is the name in the study's document.
     ///
@@ -128,6 +133,10 @@ impl Template {
                 }
                 _ => {}
             }
+            // Before each is compared with the others: of twelve thousand that took a second.
+            if choices.len() > MOST_FORMS {
+                return Err(too_many_forms(list));
+            }
             if let Some(twice) = (1..choices.len()).find(|&index| choices[..index].contains(&choices[index])) {
                 let detail = "it is one of the choices already";
                 return Err(fault(&format!("{}/one_of/{twice}", at(pointer)), FieldCode::ConflictingFields, detail));
@@ -137,10 +146,7 @@ impl Template {
         let mut template = Self { list, variables: Arc::new(variables), forms: Arc::default(), own: BTreeMap::new() };
         let mut combinations = template.variables.iter().map(|variable| variable.choices.len().max(1));
         let combinations = combinations.try_fold(1_usize, usize::checked_mul).filter(|&count| count <= MOST_FORMS);
-        let Some(combinations) = combinations else {
-            let detail = format!("the choices have more than {MOST_FORMS} combinations");
-            return Err(fault(&format!("/{list}"), FieldCode::OutOfRange, detail));
-        };
+        let combinations = combinations.ok_or_else(|| too_many_forms(list))?;
         let bytes = combinations.saturating_mul(template.form_bytes(base));
         if combinations > 1 && bytes > MOST_FORMS_BYTES {
             let detail = format!(

@@ -652,9 +652,10 @@ async fn a_lease_that_was_lost_is_taken_again_and_its_attempt_counts_no_more_whe
         end_sessions().await;
         until(held, 0).await;
         assert!(store.has_free_chunk(&cut).await.unwrap());
-        let next = store.hold(&cut, silence).await.unwrap().expect("it is free");
+        let mut next = store.hold(&cut, silence).await.unwrap().expect("it is free");
         tokio::select! {
             never = holder.renew() => match never {},
+            never = next.renew() => match never {},
             () = until(noted, 0) => {}
         }
         let Claim::Chunk(next) = next.begin().await.unwrap() else { panic!("a gap, though all live") };

@@ -45,6 +45,7 @@ use crate::compute::{self, Lane, Pool};
 use crate::config::Limits;
 use crate::problem::{Problem, ProblemCode};
 use crate::room::{Reserved, Room, SMALL_BYTES, Sent};
+use crate::turns::Had;
 use crate::{negotiation, observe};
 
 /// Lines of a chunk at most.
@@ -553,9 +554,19 @@ struct Batch {
     /// Where turns are long and no permit is free its chunks have them in common, one after the other: each would wait for its own, and the one that is kept would
     /// go unused.
     lane: Arc<tokio::sync::Mutex<Lane>>,
+    /// What all of them have had of the time.
+    had: Arc<Mutex<Had>>,
     room: Room,
     query: BatchQuery,
     limits: Limits,
+}
+
+impl Batch {
+    fn new(pool: Pool, room: Room, query: BatchQuery, limits: Limits) -> Self {
+        let had = Arc::default();
+        let lane = Arc::new(tokio::sync::Mutex::new(Lane::companion(&had)));
+        Self { pool, lane, had, room, query, limits }
+    }
 }
 
 /// What a slice works on; it outlives the slice where the deadline stops that.
@@ -582,7 +593,7 @@ impl Chunk {
     async fn advance(mut self) -> Self {
         let slice = Arc::new(Mutex::new(Slice { waiting: std::mem::take(&mut self.waiting), ..Slice::default() }));
         let (shared, batch) = (Arc::clone(&slice), self.batch.clone());
-        let (mut own, mut common) = (Lane::default(), None);
+        let (mut own, mut common) = (Lane::companion(&self.batch.had), None);
         let pool = &self.batch.pool;
         let lane = match self.batch.lane.try_lock() {
             _ if !pool.are_turns_long() => &mut own,
@@ -628,9 +639,10 @@ fn work(slice: &Mutex<Slice>, batch: &Batch, time: &mut compute::Slice, stop: &A
         };
         let Some(Line { index, document, _ahead }) = line else { return };
         let answer = match document {
-            Ok(document) => {
-                answer_line(batch.query, index, &document, &batch.limits.of_calculation(), &batch.room, stop)
-            }
+            Ok(mut document) => match document.hold_tree() {
+                Ok(()) => answer_line(batch.query, index, &document, &batch.limits.of_calculation(), &batch.room, stop),
+                Err(no_room) => AnsweredLine::of_problem(index, no_room.into()),
+            },
             Err(problem) => AnsweredLine::of_problem(index, problem),
         };
         let mut slice = slice.lock();
@@ -731,7 +743,7 @@ async fn begin(
     let end = End::new(Mutex::new(BatchEnd { asked: 0, answered: 0, problem: None }));
     let (reading, read) = oneshot::channel();
     tokio::spawn(read_ahead(lines, to, Arc::clone(&end), reading));
-    let batch = Batch { lane: Arc::default(), pool: app.pool.clone(), room: beside, query, limits: app.limits };
+    let batch = Batch::new(app.pool.clone(), beside, query, app.limits);
     let answers = answers(batch, from, end).map(move |bytes| {
         // Place and room are held until the last answer is sent or the client has left.
         let _held = (&place, &room);
@@ -865,8 +877,7 @@ mod tests {
     /// How many of three such lines one slice answers.
     fn answered_in_a_slice(document: &Result<Bytes, Problem>) -> u64 {
         let query = BatchQuery { endpoint: BatchEndpoint::Sweep, peaks_only: true };
-        let batch =
-            Batch { lane: Arc::default(), pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
+        let batch = Batch::new(Pool::new(LIMITS), Room::new(1 << 30), query, LIMITS);
         let ahead = Arc::new(Semaphore::new(3));
         let waiting = (0..3).map(|index| Line {
             index,
@@ -884,8 +895,7 @@ mod tests {
     #[test]
     fn a_slice_that_has_answered_blames_no_line_that_it_has_not_begun() {
         let query = BatchQuery { endpoint: BatchEndpoint::Sweep, peaks_only: true };
-        let batch =
-            Batch { lane: Arc::default(), pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
+        let batch = Batch::new(Pool::new(LIMITS), Room::new(1 << 30), query, LIMITS);
         let ahead = Arc::new(Semaphore::new(1)).try_acquire_owned().expect("a permit");
         let line = Line { index: 7, document: Ok(read_of(Bytes::from("{}"))), _ahead: ahead };
         let mut chunk = Chunk { batch, waiting: [line].into(), answers: Answers { lines: 1, ..Answers::default() } };
@@ -898,8 +908,7 @@ mod tests {
     #[test]
     fn a_line_of_a_client_that_has_left_is_left_as_it_was() {
         let query = BatchQuery { endpoint: BatchEndpoint::Sweep, peaks_only: true };
-        let batch =
-            Batch { lane: Arc::default(), pool: Pool::new(LIMITS), room: Room::new(1 << 30), query, limits: LIMITS };
+        let batch = Batch::new(Pool::new(LIMITS), Room::new(1 << 30), query, LIMITS);
         let ahead = Arc::new(Semaphore::new(1)).try_acquire_owned().expect("a permit");
         let line = Line { index: 7, document: Ok(read_of(Bytes::from("{"))), _ahead: ahead };
         let slice = Mutex::new(Slice { waiting: [line].into(), ..Slice::default() });

@@ -27,11 +27,12 @@ use utoipa::IntoResponses;
 use crate::app::App;
 use crate::cache::{Cache, Provenance, Served, Spelling, Stored, etag, in_own_pages};
 use crate::compute::Thread;
+use crate::frozen::reading_bytes;
 use crate::memory::Memory;
 use crate::negotiation::{self, Representation};
 use crate::problem::{Problem, ProblemCode};
 use crate::query::require_no_query;
-use crate::room::{NoRoom, Reserved, Room, Sent};
+use crate::room::{NoRoom, Reserved, Room, SMALL_BYTES, Sent};
 
 pub mod accuracy;
 pub mod batch;
@@ -82,7 +83,7 @@ pub async fn respond<Q: Question>(question: Q, app: Arc<App>, request: Request) 
 }
 
 async fn walk<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Result<Response, Problem> {
-    let Asked { headers, body, representation, deadline } = Asked::read::<Q>(&app, request).await?;
+    let Asked { headers, mut body, representation, deadline } = Asked::read::<Q>(&app, request).await?;
     let spelling = Spelling::new(question.name(), representation, &body);
     let known = app.cache.key(spelling).and_then(|key| app.cache.get(key).map(|stored| (key, stored)));
     let (key, stored, served) = match known {
@@ -92,6 +93,7 @@ async fn walk<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Resu
             (key, stored, Served::Hit)
         }
         None => {
+            body.hold_tree()?;
             let design = Design::read(&body)?;
             // The answer may want all the room.
             drop(body);
@@ -162,7 +164,8 @@ impl Asked {
 /// The same walk for an answer that is measured there and then: never cached.
 async fn respond_afresh<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Response {
     let walk = async {
-        let Asked { body, representation, deadline, .. } = Asked::read::<Q>(&app, request).await?;
+        let Asked { mut body, representation, deadline, .. } = Asked::read::<Q>(&app, request).await?;
+        body.hold_tree()?;
         let checked = Arc::new(question.check(&Design::read(&body)?, &app.limits.of_calculation())?);
         drop(body);
         let run = |reserved| {
@@ -181,6 +184,16 @@ async fn respond_afresh<Q: Question>(question: Q, app: Arc<App>, request: Reques
 struct Read {
     bytes: Bytes,
     room: Reserved,
+}
+
+impl Read {
+    /// Room for the tree that a document is read into, which takes up to so many times its length; of what is short nothing is counted.
+    fn hold_tree(&mut self) -> Result<(), NoRoom> {
+        if 2 * self.bytes.len() as u64 > SMALL_BYTES {
+            self.room.hold_at_least(reading_bytes(self.bytes.len()))?;
+        }
+        Ok(())
+    }
 }
 
 impl Deref for Read {
@@ -556,11 +569,11 @@ mod tests {
     use toothwave_calculation::question::{Limits, Question};
     use toothwave_calculation::sweep::Sweep;
 
-    use super::{Expected, Growing, LOOK_EVERY_BYTES, Stoppable};
+    use super::{Expected, Growing, LOOK_EVERY_BYTES, SMALL_BYTES, Stoppable};
     use crate::cache::{Cache, Stored};
     use crate::negotiation::Representation;
     use crate::problem::{Problem, ProblemCode};
-    use crate::room::{Room, SMALL_BYTES};
+    use crate::room::Room;
 
     /// In the room that there is, and no other.
     fn solve<Q: Question>(
