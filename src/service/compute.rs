@@ -472,8 +472,9 @@ impl Pool {
     async fn turn(&self, had: &Mutex<Had>) -> Result<Turn, Problem> {
         let had = *had.lock();
         let turn = tokio::select! {
-            turn = self.turns.take(&had) => turn,
+            biased;
             () = self.closed.cancelled() => return Err(shutting_down()),
+            turn = self.turns.take(&had) => turn,
         };
         // Behind the single solves that came before: each may take as long as a slice.
         let permit = self.permit().await?;
@@ -600,8 +601,9 @@ impl Pool {
 
     async fn permit(&self) -> Result<Held, Problem> {
         tokio::select! {
-            permit = Arc::clone(&self.permits).acquire_owned() => Ok(permit),
+            biased;
             () = self.closed.cancelled() => Err(shutting_down()),
+            permit = Arc::clone(&self.permits).acquire_owned() => Ok(permit),
         }
     }
 

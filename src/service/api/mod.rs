@@ -260,7 +260,12 @@ struct Expected {
 impl Expected {
     fn of<Q: Question>(checked: &Q::Checked, Representation { format, gzip }: Representation) -> Self {
         let columns_bytes = Q::columns_bytes(checked);
-        let text_bytes = if is_long(format) { columns_bytes * if gzip { 1 } else { 2 } } else { 0 };
+        // A number has 8 bytes, and its text 20 about.
+        let text_bytes = match is_long(format) {
+            true if gzip => columns_bytes,
+            true => columns_bytes * 5 / 2,
+            false => 0,
+        };
         Self { columns_bytes, text_bytes, working_bytes: Q::working_bytes(checked) }
     }
 
