@@ -241,6 +241,9 @@ impl Room {
         loop {
             let mut changed = pin!(self.queue.changed.notified());
             changed.as_mut().enable();
+            if self.memory.is_scarce() {
+                return Err(NoRoom::Scarce);
+            }
             if place.is_first() {
                 match self.reserve(bytes) {
                     Err(NoRoom::Taken { .. }) => {}

@@ -295,7 +295,7 @@ impl Workers {
                 };
                 let Some((ours, _held)) = ready else { continue };
                 // One whose attempt is being noted is claimed, and then given back.
-                match self.claim(task, &ours).await {
+                match self.claim(task, &ours, &mut tasks).await {
                     Ok((Claim::Chunk(lease), _)) if self.stopping.is_cancelled() => return give_up(lease).await,
                     Ok((Claim::Chunk(lease), beside)) => {
                         // What another study has had of the time is not this one's.
@@ -337,7 +337,12 @@ impl Workers {
 
     /// A chunk that is begun, and what it is computed beside: one that came to no result in all attempts but the last may be what ended its process, and is computed
     /// beside none, so that no other is taken for that.
-    async fn claim(&self, task: &Waiting, ours: &Ours) -> Result<(Claim, Option<SemaphorePermit<'_>>), StoreError> {
+    async fn claim(
+        &self,
+        task: &Waiting,
+        ours: &Ours,
+        tasks: &mut Tasks,
+    ) -> Result<(Claim, Option<SemaphorePermit<'_>>), StoreError> {
         let held = async {
             let Some(mut lease) = self.store.hold(&task.cut, ours.frozen.lease).await? else { return Ok(None) };
             let is_suspect = lease.attempts_that_count().await? + 1 >= MOST_ATTEMPTS;
@@ -346,6 +351,8 @@ impl Workers {
         let held = tokio::select! {
             held = held => held?,
             () = self.stopping.cancelled() => None,
+            // It was cancelled, or forgotten, while it was seen whether its chunk becomes a gap.
+            _ = tasks.wait_for(|waiting| !waiting.contains(task)) => None,
         };
         let Some((mut lease, is_suspect)) = held else { return Ok((Claim::None, None)) };
         let all = u32::try_from(self.capacity.all_slots()).unwrap_or(u32::MAX);

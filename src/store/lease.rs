@@ -316,7 +316,7 @@ impl Lease {
         let came = Instant::now();
         while came.elapsed() < patience {
             let attempts = self.attempts().await?;
-            if attempts < MOST_ATTEMPTS || matches!(self.held, Held::Here) {
+            if attempts < MOST_ATTEMPTS || !matches!(self.held, Held::There(_)) {
                 return Ok(attempts);
             }
             tokio::time::sleep(self.often()).await;

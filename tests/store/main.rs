@@ -653,6 +653,9 @@ async fn a_lease_that_was_lost_is_taken_again_and_its_attempt_counts_no_more_whe
         until(held, 0).await;
         assert!(store.has_free_chunk(&cut).await.unwrap());
         let mut next = store.hold(&cut, silence).await.unwrap().expect("it is free");
+        // It may be a session of its own that has it.
+        holder.say().await;
+        until(noted, 1).await;
         tokio::select! {
             never = holder.renew() => match never {},
             never = next.renew() => match never {},
@@ -692,6 +695,9 @@ async fn a_study_whose_results_are_all_there_waits_for_nobody_though_a_chunk_is_
     }
     let second = claimed(&store, &study).await;
     first.say().await;
+    let attempts = "SELECT COUNT(*) FROM attempts WHERE study = $1";
+    let attempts = sqlx::query_scalar::<_, i64>(attempts).bind(&study.id).fetch_one(&mut stranger).await.unwrap();
+    assert_eq!(attempts, 1, "the second has begun it");
     let is_waiting = async || store.waiting().await.unwrap().iter().any(|waiting| waiting.cut == study.cut());
     let before = store.figures().await.unwrap();
     assert!(is_waiting().await && (before.running, before.waiting) == (1, 1));

@@ -39,7 +39,7 @@ use toothwave_calculation::sweep::losses::LossTotalsAnswer;
 use toothwave_calculation::sweep::model_error::ModelErrorAnswer;
 use utoipa::ToSchema;
 
-use super::{Growing, Read, Stoppable, Taking, answered, broken_body, write_problem};
+use super::{Growing, Read, Stoppable, Taking, answered, broken_body, tree_bytes, write_problem};
 use crate::app::App;
 use crate::compute::{self, Lane, Pool};
 use crate::config::Limits;
@@ -288,7 +288,10 @@ fn solved<Q: Question>(
     let solved = compute::caught(|| {
         #[cfg(feature = "fault-injection")]
         fail::fail_point!("solve");
+        let mut tree = room.nothing();
+        tree.hold_at_least(tree_bytes(document))?;
         let checked = question.check(&Design::read(document)?, limits)?;
+        drop(tree);
         let columns_bytes = Q::columns_bytes(&checked);
         let reserved = room.reserve(Q::columns_bytes(&checked) + Q::working_bytes(&checked))?;
         let (answer, mut reserved) = answered::<Q>(&checked, reserved, stop)?;
@@ -639,10 +642,9 @@ fn work(slice: &Mutex<Slice>, batch: &Batch, time: &mut compute::Slice, stop: &A
         };
         let Some(Line { index, document, _ahead }) = line else { return };
         let answer = match document {
-            Ok(mut document) => match document.hold_tree() {
-                Ok(()) => answer_line(batch.query, index, &document, &batch.limits.of_calculation(), &batch.room, stop),
-                Err(no_room) => AnsweredLine::of_problem(index, no_room.into()),
-            },
+            Ok(document) => {
+                answer_line(batch.query, index, &document, &batch.limits.of_calculation(), &batch.room, stop)
+            }
             Err(problem) => AnsweredLine::of_problem(index, problem),
         };
         let mut slice = slice.lock();
@@ -732,6 +734,8 @@ async fn begin(
     negotiation::require_ndjson(request.headers())?;
     // Lines that wait, and of each chunk that is worked on its short answers; a long one has room of its own.
     let held_bytes = AHEAD_BYTES + app.limits.max_concurrent_solves * SLICE_BYTES;
+    // Refused at once where all places are taken; none is held by who waits for room.
+    drop(app.pool.batch_place()?);
     let waited = async { Ok(app.room.reserve_in_time(app.pool.deadline(), held_bytes as u64).await?) };
     let room = app.pool.until_closed(waited).await?;
     let place = app.pool.batch_place()?;

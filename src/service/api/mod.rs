@@ -93,7 +93,7 @@ async fn walk<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Resu
             (key, stored, Served::Hit)
         }
         None => {
-            body.hold_tree()?;
+            body.room.hold_at_least(tree_bytes(&body))?;
             let design = Design::read(&body)?;
             // The answer may want all the room.
             drop(body);
@@ -165,7 +165,7 @@ impl Asked {
 async fn respond_afresh<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Response {
     let walk = async {
         let Asked { mut body, representation, deadline, .. } = Asked::read::<Q>(&app, request).await?;
-        body.hold_tree()?;
+        body.room.hold_at_least(tree_bytes(&body))?;
         let checked = Arc::new(question.check(&Design::read(&body)?, &app.limits.of_calculation())?);
         drop(body);
         let run = |reserved| {
@@ -186,14 +186,9 @@ struct Read {
     room: Reserved,
 }
 
-impl Read {
-    /// Room for the tree that a document is read into, which takes up to so many times its length; of what is short nothing is counted.
-    fn hold_tree(&mut self) -> Result<(), NoRoom> {
-        if 2 * self.bytes.len() as u64 > SMALL_BYTES {
-            self.room.hold_at_least(reading_bytes(self.bytes.len()))?;
-        }
-        Ok(())
-    }
+/// Of the tree that a design is read into, which takes up to so many times its length; of what is short nothing is counted.
+const fn tree_bytes(document: &[u8]) -> u64 {
+    if 2 * document.len() as u64 > SMALL_BYTES { reading_bytes(document.len()) } else { 0 }
 }
 
 impl Deref for Read {
