@@ -293,7 +293,7 @@ fn solved<Q: Question>(
         let checked = question.check(&Design::read(document)?, limits)?;
         drop(tree);
         let columns_bytes = Q::columns_bytes(&checked);
-        let reserved = room.reserve(Q::columns_bytes(&checked) + Q::working_bytes(&checked))?;
+        let reserved = room.reserve(columns_bytes + Q::working_bytes(&checked))?;
         let (answer, mut reserved) = answered::<Q>(&checked, reserved, stop)?;
         let held_bytes = columns_bytes.max(answer.held_bytes(Format::Json));
         reserved.hold_at_most(held_bytes);
