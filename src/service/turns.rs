@@ -133,9 +133,11 @@ impl Drop for Turn {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
     use std::time::Duration;
 
     use futures_util::poll;
+    use parking_lot::Mutex;
     use tokio::time::Instant;
 
     use super::{Had, Turns};
@@ -201,6 +203,46 @@ mod tests {
             running = is_its_turn;
             rounds += 1;
         }
+    }
+
+    /// Where nothing held `even` near those who always want turns, those of short steps had a third of the time.
+    #[tokio::test(start_paused = true)]
+    async fn who_has_short_steps_has_as_much_of_the_time_as_who_has_long_ones_though_others_come_and_go() {
+        let turns = Turns::new(1);
+        let steps = [500, 500, 500, 5, 5, 5].map(Duration::from_millis);
+        let times = steps.map(|step| {
+            let turns = turns.clone();
+            let time = Arc::new(Mutex::new(Duration::ZERO));
+            let counted = Arc::clone(&time);
+            let runs = tokio::spawn(async move {
+                let mut had = Had::default();
+                loop {
+                    let turn = turns.take(&had).await;
+                    tokio::time::sleep(step).await;
+                    turns.note(&mut had, step);
+                    *counted.lock() += step;
+                    drop(turn);
+                }
+            });
+            (time, runs)
+        });
+        for _ in 0..200 {
+            tokio::time::sleep(LONG).await;
+            let turns = turns.clone();
+            tokio::spawn(async move {
+                let mut had = Had::default();
+                let turn = turns.take(&had).await;
+                tokio::time::sleep(LONG / 2).await;
+                turns.note(&mut had, LONG / 2);
+                drop(turn);
+            });
+        }
+        let times = times.map(|(time, runs)| {
+            runs.abort();
+            *time.lock()
+        });
+        let least = times.iter().min().copied().unwrap_or_default();
+        assert!(times.iter().all(|&time| least > time * 9 / 10), "{times:?}");
     }
 
     #[tokio::test]

@@ -293,11 +293,13 @@ impl Workers {
                     _ = tasks.wait_for(|waiting| !waiting.contains(task)) => None,
                     ready = self.ready(task) => ready,
                 };
-                let Some((ours, _held)) = ready else { continue };
+                let Some(ready) = ready else { continue };
+                let lease = ready.0.frozen.lease;
                 // One whose attempt is being noted is claimed, and then given back.
-                match self.claim(task, &ours, &mut tasks).await {
+                match self.claim(task, lease, ready, &mut tasks).await {
                     Ok((Claim::Chunk(lease), _)) if self.stopping.is_cancelled() => return give_up(lease).await,
-                    Ok((Claim::Chunk(lease), beside)) => {
+                    Ok((Claim::Chunk(lease), None)) => give_up(lease).await,
+                    Ok((Claim::Chunk(lease), Some(((ours, _held), beside)))) => {
                         // What another study has had of the time is not this one's.
                         if last.replace(task.cut.clone()).is_none_or(|last| last != task.cut) {
                             lane = Lane::default();
@@ -335,40 +337,54 @@ impl Workers {
         }
     }
 
-    /// A chunk that is begun, and what it is computed beside: one that came to no result in all attempts but the last may be what ended its process, and is computed
-    /// beside none, so that no other is taken for that.
-    async fn claim(
+    /// A chunk that is begun, and what is held until it is over, what it is computed beside among it: one that came to no result in all attempts but the last may be what
+    /// ended its process, and is computed beside none, so that no other is taken for that.
+    async fn claim<H>(
         &self,
         task: &Waiting,
-        ours: &Ours,
+        lease: Duration,
+        held: H,
         tasks: &mut Tasks,
-    ) -> Result<(Claim, Option<SemaphorePermit<'_>>), StoreError> {
-        let held = async {
-            let Some(mut lease) = self.store.hold(&task.cut, ours.frozen.lease).await? else { return Ok(None) };
-            let is_suspect = lease.attempts_that_count().await? + 1 >= MOST_ATTEMPTS;
-            Ok::<_, StoreError>(Some((lease, is_suspect)))
+    ) -> Result<(Claim, Option<(H, SemaphorePermit<'_>)>), StoreError> {
+        let nothing = Ok((Claim::None, None));
+        let found = async {
+            let Some(lease) = self.store.hold(&task.cut, lease).await? else { return Ok(None) };
+            let attempts = lease.attempts().await?;
+            Ok::<_, StoreError>(Some((lease, attempts)))
         };
-        let held = tokio::select! {
-            held = held => held?,
+        let found = tokio::select! {
+            found = found => found?,
             () = self.stopping.cancelled() => None,
-            // It was cancelled, or forgotten, while it was seen whether its chunk becomes a gap.
-            _ = tasks.wait_for(|waiting| !waiting.contains(task)) => None,
         };
-        let Some((mut lease, is_suspect)) = held else { return Ok((Claim::None, None)) };
+        let Some((mut lease, attempts)) = found else { return nothing };
+        if attempts >= MOST_ATTEMPTS {
+            // What it would be computed with is others' while it is seen whether it becomes a gap.
+            drop(held);
+            let attempts = tokio::select! {
+                attempts = lease.attempts_that_count() => attempts?,
+                () = self.stopping.cancelled() => return nothing,
+                // It was cancelled, or forgotten.
+                _ = tasks.wait_for(|waiting| !waiting.contains(task)) => return nothing,
+            };
+            // Where one was taken back it is claimed as any other.
+            return if attempts < MOST_ATTEMPTS { nothing } else { Ok((lease.begin().await?, None)) };
+        }
         let all = u32::try_from(self.capacity.all_slots()).unwrap_or(u32::MAX);
         // An error says that the semaphore is closed, which it never is.
         let beside = async {
-            if is_suspect && let Ok(none) = tokio::time::timeout(ALONE, self.side_by_side.acquire_many(all)).await {
+            if attempts + 1 == MOST_ATTEMPTS
+                && let Ok(none) = tokio::time::timeout(ALONE, self.side_by_side.acquire_many(all)).await
+            {
                 return none.ok();
             }
             self.side_by_side.acquire().await.ok()
         };
         let beside = tokio::select! {
             beside = beside => beside,
-            () = self.stopping.cancelled() => return Ok((Claim::None, None)),
+            () = self.stopping.cancelled() => return nothing,
             never = lease.renew() => match never {},
         };
-        Ok((lease.begin().await?, beside))
+        Ok((lease.begin().await?, beside.map(|beside| (held, beside))))
     }
 
     /// A study of which a chunk can be begun, and what that holds until it is over; none where another slot has the study in hand, or waits for room as this one

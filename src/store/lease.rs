@@ -305,8 +305,23 @@ impl Lease {
         self.chunk
     }
 
-    /// How often the chunk was begun before, and came to no result. Where that is as often as chunks are, who lost a lease and goes on is given the time to find out that
-    /// the chunk is another's, and to take its attempt back.
+    /// How often the chunk was begun before, and came to no result.
+    ///
+    /// # Errors
+    /// Where the store does not answer.
+    pub async fn attempts(&self) -> Result<u64, StoreError> {
+        let text = "SELECT COUNT(*) FROM attempts WHERE study = $1 AND chunk = $2";
+        let attempts = self.store.with(PATIENCE, async |connection| {
+            let chunk = stored(self.chunk);
+            Ok(on!(connection, inner => {
+                sqlx::query_scalar::<_, i64>(text).bind(&self.cut.id).bind(chunk).fetch_one(inner).await
+            })?)
+        });
+        attempts.await.map(crate::read)
+    }
+
+    /// The same after who lost a lease and goes on has had the time to find out that the chunk is another's, and to take its attempt back, where attempts are as many as
+    /// chunks have.
     ///
     /// # Errors
     /// Where the store does not answer.
@@ -323,17 +338,6 @@ impl Lease {
             self.say().await;
         }
         self.attempts().await
-    }
-
-    async fn attempts(&self) -> Result<u64, StoreError> {
-        let text = "SELECT COUNT(*) FROM attempts WHERE study = $1 AND chunk = $2";
-        let attempts = self.store.with(PATIENCE, async |connection| {
-            let chunk = stored(self.chunk);
-            Ok(on!(connection, inner => {
-                sqlx::query_scalar::<_, i64>(text).bind(&self.cut.id).bind(chunk).fetch_one(inner).await
-            })?)
-        });
-        attempts.await.map(crate::read)
     }
 
     /// Notes that the chunk is about to be computed; one that was begun as often as chunks are is a gap instead.
