@@ -29,13 +29,13 @@ pub struct App {
 impl App {
     /// An idle service within these limits, which keeps studies in memory.
     pub fn new(limits: Limits) -> Arc<Self> {
-        Self::keeping(limits, Keeping::Memory)
+        Self::keeping(Pool::new(limits), limits, Keeping::Memory)
     }
 
-    /// An idle service within these limits, with its studies kept somewhere.
-    pub fn keeping(limits: Limits, keeping: Keeping) -> Arc<Self> {
+    /// An idle service within these limits, which the pool is within too, with its studies kept somewhere.
+    pub fn keeping(pool: Pool, limits: Limits, keeping: Keeping) -> Arc<Self> {
         let room = Room::new(limits.max_unread_bytes);
-        let pool = Pool::new(limits).beside(&room);
+        let pool = pool.beside(&room);
         Arc::new(Self {
             limits,
             studies: Studies::new(pool.clone(), room.clone(), limits, keeping),

@@ -286,31 +286,43 @@ fn arguments() -> Vec<OsString> {
     arguments
 }
 
-/// Threads on which a database's name is looked up, which is not to wait for solves.
-const LOOK_UPS: usize = 1;
+/// Threads on which a database's name is looked up. Where nobody answers each takes its time, whoever gave it up.
+const LOOK_UPS: usize = 4;
 
-/// Threads that a service's solves run on: one for each that may run at once, and one for the single one that runs beside long slices.
-const fn threads_of(limits: &crate::config::Limits, is_shared: bool) -> usize {
-    limits.max_concurrent_solves + 1 + if is_shared { LOOK_UPS } else { 0 }
-}
-
-/// An executor, with so many threads for solves: with many more than there are permits each solve would wake another, whose memory is cold. They stay,
-/// and one is there from the start: where the system refuses one and there is no other, tokio panics. So it does where it refuses one of its own, and would
-/// wait for the others for ever, but that such a panic ends the process.
-fn runtime(threads: usize) -> io::Result<Runtime> {
-    const FOR_EVER: Duration = Duration::from_secs(u32::MAX as u64);
-    let mut builder = Builder::new_multi_thread();
-    let runtime = builder.max_blocking_threads(threads).thread_keep_alive(FOR_EVER).enable_all().build()?;
+/// An executor, whose other threads nothing is solved on. Where the system refuses one of its own it would wait for the others for ever, but that such a panic ends the
+/// process.
+fn runtime() -> io::Result<Runtime> {
+    let runtime = with_threads(Builder::new_multi_thread().enable_all(), LOOK_UPS)?;
     runtime.block_on(async {
         // Who is once waited for ends the process no more: a file that is as large as it may be, a log for instance, is an error like others, and
         // keys may be told to be read again before anybody does so.
         for number in [Signal::XFSZ, Signal::HUP] {
             let _ = signal(SignalKind::from_raw(number.as_raw()))?;
         }
-        tokio::task::spawn_blocking(|| ()).await.map_err(io::Error::other)
+        Ok::<_, io::Error>(())
     })?;
     log::end_of_start();
     Ok(runtime)
+}
+
+/// Threads that so many solves run on, and the single one that runs beside long slices: with many more than there are permits each solve would wake another,
+/// whose memory is cold.
+fn threads_of_solves(max_concurrent_solves: usize) -> io::Result<Runtime> {
+    with_threads(&mut Builder::new_current_thread(), max_concurrent_solves + 1)
+}
+
+/// With so many threads for what waits or computes. They stay, and one is there from the start: where the system refuses one and there is no other, tokio panics.
+fn with_threads(builder: &mut Builder, most: usize) -> io::Result<Runtime> {
+    const FOR_EVER: Duration = Duration::from_secs(u32::MAX as u64);
+    let runtime = builder.max_blocking_threads(most).thread_keep_alive(FOR_EVER).build()?;
+    runtime.block_on(runtime.spawn_blocking(|| ())).map_err(io::Error::other)?;
+    Ok(runtime)
+}
+
+/// A solve beyond its bound must not hold up the exit, nor a name that nobody answers for.
+fn end(runtime: Runtime, solves: Runtime) {
+    runtime.shutdown_background();
+    solves.shutdown_background();
 }
 
 fn run_service(settings: &Settings) -> Result<(), Failure> {
@@ -319,11 +331,9 @@ fn run_service(settings: &Settings) -> Result<(), Failure> {
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
     memory::keep_pages_small();
     log::start(filter)?;
-    let is_shared = address.as_ref().is_some_and(Address::is_shared);
-    let runtime = runtime(threads_of(&settings.limits(), is_shared))?;
-    let result = runtime.block_on(serve::serve(settings, address.as_ref(), parts));
-    // A solve beyond its bound must not hold up the exit.
-    runtime.shutdown_background();
+    let (solves, runtime) = (threads_of_solves(settings.limits().max_concurrent_solves)?, runtime()?);
+    let result = runtime.block_on(serve::serve(settings, address.as_ref(), parts, solves.handle()));
+    end(runtime, solves);
     log::flush();
     Ok(result?)
 }
@@ -345,9 +355,9 @@ fn run_worker(settings: &WorkerSettings) -> Result<(), Failure> {
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
     memory::keep_pages_small();
     log::start(filter)?;
-    let runtime = runtime(settings.limits().max_concurrent_solves + LOOK_UPS)?;
-    let result = runtime.block_on(serve::serve_chunks(settings, &address, parts));
-    runtime.shutdown_background();
+    let (solves, runtime) = (threads_of_solves(settings.limits().max_concurrent_solves)?, runtime()?);
+    let result = runtime.block_on(serve::serve_chunks(settings, &address, parts, solves.handle()));
+    end(runtime, solves);
     log::flush();
     Ok(result?)
 }
@@ -516,19 +526,27 @@ mod tests {
 
     use clap::Parser as _;
 
-    use super::{Cli, Command, runtime, threads_of};
+    use super::{Cli, Command, LOOK_UPS, end, runtime, threads_of_solves};
     use crate::compute::{Lane, Pool, Thread};
     use crate::problem::Problem;
 
-    /// One study of variants of some seconds each had ordinary sweeps refused at their deadline: each had a permit, and no thread.
+    /// One study of variants of some seconds each had ordinary sweeps refused at their deadline: each had a permit, and no thread; and so had a database whose name nobody
+    /// looked up.
     #[test]
-    fn a_single_solve_has_a_thread_beside_slices_that_hold_all_permits() {
+    fn a_single_solve_has_a_thread_beside_slices_that_hold_all_permits_and_look_ups_that_do_not_end() {
         let cli = Cli::parse_from(["toothwave", "serve", "--max-concurrent-solves", "2"]);
         let Command::Serve(settings) = cli.command else { panic!("a service") };
         let limits = settings.limits();
-        let runtime = runtime(threads_of(&limits, false)).expect("a runtime");
+        let runtime = runtime().expect("a runtime");
+        let solves = threads_of_solves(limits.max_concurrent_solves).expect("threads");
         let answer = runtime.block_on(async {
-            let pool = Pool::new(limits);
+            let pool = Pool::new(limits).on(solves.handle());
+            let look_ups = (0..2 * LOOK_UPS).map(|_| {
+                let (release, released) = mpsc::channel::<()>();
+                tokio::task::spawn_blocking(move || released.recv());
+                release
+            });
+            let _unanswered: Vec<_> = look_ups.collect();
             let (senders, slices): (Vec<_>, Vec<_>) = (0..2)
                 .map(|_| {
                     let (release, released) = mpsc::channel::<()>();
@@ -548,6 +566,7 @@ mod tests {
             }
             answer
         });
+        end(runtime, solves);
         assert!(answer.is_ok_and(|answer| answer == 7));
     }
 }

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use metrics::{counter, histogram};
 use parking_lot::Mutex;
+use tokio::runtime::Handle;
 use tokio::sync::{AcquireError, OwnedSemaphorePermit, Semaphore};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
@@ -57,6 +58,8 @@ pub struct Pool {
     turns: Turns,
     /// As many as there are for the bytes that variants of studies may take at once while they are computed.
     of_variants: Arc<Semaphore>,
+    /// One: for a variant that takes more than that.
+    of_a_large_variant: Arc<Semaphore>,
     /// One for each batch that runs.
     batches: Arc<Semaphore>,
     /// One: for what is neither a solve nor short.
@@ -70,6 +73,8 @@ pub struct Pool {
     /// Cancelled when the service stops and has no time left.
     closed: CancellationToken,
     limits: Limits,
+    /// Where its threads are not those of who asks.
+    threads: Option<Handle>,
 }
 
 /// How long slices are. Whoever waits for a turn behind one that cannot be cut as short gets as much when it comes: else a thousand short steps would wait for a
@@ -240,6 +245,7 @@ impl Pool {
             waiting: Arc::default(),
             turns: Turns::new(limits.max_concurrent_solves),
             of_variants: Arc::new(Semaphore::new(room::permits(limits.max_unread_bytes / PART_OF_VARIANTS) as usize)),
+            of_a_large_variant: Arc::new(Semaphore::new(1)),
             batches: Arc::new(Semaphore::new(limits.max_concurrent_batches)),
             aside: Arc::new(Semaphore::new(1)),
             unhurried: Arc::new(Semaphore::new(1)),
@@ -248,7 +254,14 @@ impl Pool {
             pace: Pace::default(),
             closed: CancellationToken::new(),
             limits,
+            threads: None,
         }
+    }
+
+    /// The same with solves on the threads of this runtime, which nothing else has.
+    #[must_use]
+    pub fn on(self, threads: &Handle) -> Self {
+        Self { threads: Some(threads.clone()), ..self }
     }
 
     /// The same beside answers that take this room.
@@ -499,12 +512,18 @@ impl Pool {
         lane.let_go();
         let part_bytes = self.limits.max_unread_bytes / PART_OF_VARIANTS;
         let wanted = async {
+            let beyond_bytes = room_bytes.saturating_sub(part_bytes);
+            // Those that have to wait for it hold nothing of answers meanwhile.
+            let alone = match beyond_bytes {
+                0 => None,
+                _ => Some(Arc::clone(&self.of_a_large_variant).acquire_owned().await),
+            };
             // First: clients may hold that for long, and who waits for it is in nobody's way.
-            let beyond = self.of_answers(room_bytes.saturating_sub(part_bytes)).await;
+            let beyond = self.of_answers(beyond_bytes).await;
             // Where memory is scarce, whatever was counted, alone.
             let wanted_bytes = if self.memory.is_scarce() { part_bytes } else { room_bytes.min(part_bytes) };
             let permits = room::permits(wanted_bytes);
-            (Arc::clone(&self.of_variants).acquire_many_owned(permits).await, beyond)
+            (Arc::clone(&self.of_variants).acquire_many_owned(permits).await, beyond, alone)
         };
         let held = tokio::select! {
             held = wanted => held,
@@ -623,7 +642,8 @@ impl Pool {
         let begun = Arc::clone(&waiting.0);
         // spawn_blocking loses the span, and cannot be aborted: span, permit and place go along.
         let span = Span::current();
-        let running = tokio::task::spawn_blocking(move || {
+        let threads = self.threads.clone().unwrap_or_else(Handle::current);
+        let running = threads.spawn_blocking(move || {
             let Some(_held) = begun.lock().take() else {
                 return Err(Problem::internal(&"nobody waits for it any more"));
             };
@@ -885,6 +905,35 @@ mod tests {
         drop(unread);
         assert!(large.await.is_ok());
         assert_eq!(room.taken_bytes(), 0);
+        Ok(())
+    }
+
+    /// Each slot of a study whose variants take more than their part held what was beyond it for itself, though one of them computed.
+    #[tokio::test(flavor = "multi_thread")]
+    async fn variants_that_wait_for_another_large_one_hold_no_room_of_answers() -> Result<(), NoRoom> {
+        let words = ["serve", "--max-unread-bytes", "67108864", "--max-concurrent-solves", "4"];
+        let Line { settings } = Line::parse_from(words);
+        let room = Room::new(64 << 20);
+        let pool = Pool::new(settings.limits()).beside(&room);
+        let (begin, begun) = tokio::sync::oneshot::channel();
+        let (release, released) = mpsc::channel::<()>();
+        let (mut first, mut second) = (Lane::default(), Lane::default());
+        let computing = pool.run_variants(&mut first, 30 << 20, move |_, _| {
+            // Whether anybody listens is the test's own matter.
+            let _ = begin.send(());
+            released.recv().map_err(|error| Problem::internal(&error))
+        });
+        let mut computing = pin!(computing);
+        tokio::select! {
+            _ = &mut computing => panic!("nobody released it"),
+            begun = begun => assert!(begun.is_ok()),
+        }
+        let taken_bytes = room.taken_bytes();
+        let mut waiting = pin!(pool.run_variants(&mut second, 30 << 20, |_, _| Ok(())));
+        assert!(futures_util::poll!(&mut waiting).is_pending());
+        assert_eq!(room.taken_bytes(), taken_bytes);
+        assert!(release.send(()).is_ok());
+        assert!(computing.await.is_ok() && waiting.await.is_ok());
         Ok(())
     }
 

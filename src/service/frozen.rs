@@ -7,7 +7,7 @@ use std::time::Duration;
 use rustix::time::{ClockId, clock_gettime};
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_calculation::{BUILD, origin, question};
-use toothwave_store::{Cut, NewStudy};
+use toothwave_store::{Cut, NewStudy, Store};
 use toothwave_study::{Interrupted, Limits, Part, Study, Work};
 
 use crate::compute::{Lane, Pool, SMALL_VARIANT_BYTES, Slice};
@@ -141,10 +141,10 @@ pub fn require_origin(theirs: &str) -> Result<(), NotHere> {
 
 /// About what a document of such a length takes besides while a study is read from it, at most: its tree, once as it stands and once sorted. What its choices
 /// stand for is bounded, and not counted here.
-pub const fn reading_bytes(document_bytes: usize) -> u64 {
+pub const fn reading_bytes(document_bytes: u64) -> u64 {
     /// Measured with lists of numbers, texts and objects, each as short as can be.
     const TIMES: u64 = 48;
-    document_bytes as u64 * TIMES
+    document_bytes.saturating_mul(TIMES)
 }
 
 /// What is kept of a study besides its rows, about.
@@ -154,17 +154,22 @@ pub fn view_bytes(study: &Study) -> u64 {
     OTHER_BYTES + study.kept_bytes() - study.stored_bytes()
 }
 
-/// The study that was frozen, or why it is none here.
+/// The study that is kept as it was cut so, as it was frozen too, where it still is; or why it is none here. Its document is asked of the store when there is room for it.
 ///
 /// # Errors
-/// Where reading it takes too long, or there is no room for that.
-pub async fn thaw(pool: &Pool, frozen: &NewStudy) -> Result<Result<Arc<Study>, NotHere>, Problem> {
+/// Where the store does not answer, reading it takes too long, or there is no room for that.
+pub async fn thaw(
+    pool: &Pool,
+    store: &Store,
+    cut: &Cut,
+    document_bytes: u64,
+) -> Result<Option<Result<(Arc<Study>, NewStudy), NotHere>>, Problem> {
     let deadline = pool.deadline();
-    let room = pool.room_aside(deadline, reading_bytes(frozen.document.len()), 0).await?;
-    let frozen = frozen.clone();
+    let room = pool.room_aside(deadline, document_bytes.saturating_add(reading_bytes(document_bytes)), 0).await?;
+    let Some(found) = store.find(&cut.id).await?.filter(|found| found.study.cut() == *cut) else { return Ok(None) };
     let thaw = move || {
         let _room = room;
-        Ok(thawed(&frozen))
+        Ok(Some(thawed(&found.study).map(|study| (study, found.study))))
     };
     pool.run_aside(deadline, thaw).await
 }

@@ -203,13 +203,19 @@ fn with_layers(paths: Router<Arc<App>>, app: Arc<App>, Entry { cors_origins, key
 /// A page of another site can have its own name resolve to this machine, and would then be of the same origin as the service. It cannot
 /// change the `Host` that the browser sends.
 async fn require_host_of_this_machine(request: Request, next: Next) -> Response {
-    let of_header = || request.headers().get(header::HOST)?.to_str().ok()?.parse::<Authority>().ok();
+    let mut hosts = request.headers().get_all(header::HOST).iter();
+    let of_header = || hosts.next()?.to_str().ok()?.parse::<Authority>().ok().filter(|_| hosts.next().is_none());
     let host = request.uri().authority().cloned().or_else(of_header);
     // Without any it is no browser.
     let is_absent = host.is_none() && !request.headers().contains_key(header::HOST);
     let is_of_this_machine = |host: Authority| {
+        let port = host.as_str().strip_prefix(host.host());
+        let is_port =
+            |port: &str| port.strip_prefix(':').is_some_and(|port| port.bytes().all(|byte| byte.is_ascii_digit()));
         let name = host.host().trim_start_matches('[').trim_end_matches(']');
-        name.eq_ignore_ascii_case("localhost") || name.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
+        port.is_some_and(|port| port.is_empty() || is_port(port))
+            && (name.eq_ignore_ascii_case("localhost")
+                || name.parse::<IpAddr>().is_ok_and(|address| address.is_loopback()))
     };
     if is_absent || host.is_some_and(is_of_this_machine) {
         return next.run(request).await;

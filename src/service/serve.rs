@@ -18,6 +18,7 @@ use hyper_util::service::TowerToHyperService;
 use parking_lot::Mutex;
 use rustix::process::{Resource, getrlimit, setrlimit};
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
+use tokio::runtime::Handle;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 use tokio::task::{AbortHandle, unconstrained};
@@ -69,6 +70,9 @@ const UNREAD_LOOK: Duration = Duration::from_millis(1);
 /// After an error of the listener itself, such as too many open files.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
+/// What has come of a connection and is not read yet may take so much in the system, which doubles it for what it notes.
+const UNREAD_BYTES: u32 = 1 << 16;
+
 /// Connections that may wait to be taken in: of a burst the system drops those beyond, and their clients try again after a second.
 const BACKLOG: u32 = 4096;
 
@@ -76,6 +80,8 @@ fn listen_on(address: SocketAddr) -> io::Result<TcpListener> {
     let socket = if address.is_ipv4() { TcpSocket::new_v4()? } else { TcpSocket::new_v6()? };
     // As a service has it that is started again: connections of before may still be coming to their end.
     socket.set_reuseaddr(true)?;
+    // Each of a thousand clients that send on what nobody reads could have some MiB of the system's memory otherwise, which may be the container's.
+    socket.set_recv_buffer_size(UNREAD_BYTES)?;
     socket.bind(address)?;
     socket.listen(BACKLOG)
 }
@@ -84,7 +90,12 @@ fn listen_on(address: SocketAddr) -> io::Result<TcpListener> {
 ///
 /// # Errors
 /// Where the address cannot be listened on, or the process gets no signals.
-pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option<Parts>) -> io::Result<()> {
+pub async fn serve(
+    settings: &Settings,
+    studies: Option<&Address>,
+    parts: Option<Parts>,
+    threads: &Handle,
+) -> io::Result<()> {
     observe::install_recorder();
     // First: as the only process of a container it would not be ended by a signal that nobody takes, and to open a store may take long.
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
@@ -116,7 +127,7 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
     }
     let mut limits = settings.limits();
     limits.max_connections = connections_that_fit(limits.max_connections)?;
-    let app = App::keeping(limits, keeping);
+    let app = App::keeping(Pool::new(limits).on(threads), limits, keeping);
     let entry = Entry {
         cors_origins: settings.cors_origins.clone(),
         // A page of another site that resolves its own name to this machine knows no key.
@@ -173,7 +184,11 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
             let until = Instant::now() + settings.shutdown();
             drain(server.open, &app, settings.shutdown()).await;
             // Chunks that are in work are given back, so that they count as never begun.
-            match timeout_at(until.max(Instant::now() + LAST_WORDS), store).await {
+            let until = until.max(Instant::now() + LAST_WORDS);
+            let served = timeout_at(until, store).await;
+            // Not before: what is begun is answered from it.
+            let closed = timeout_at(until, app.studies.close_store()).await;
+            match served.and_then(|served| closed.map(|()| served)) {
                 Ok(Ok(())) => {}
                 Ok(Err(error)) => tracing::error!(%error, "the studies' store was not closed in order"),
                 Err(_) => tracing::warn!("the studies' store did not take back in time what was begun"),
@@ -192,7 +207,12 @@ pub async fn serve(settings: &Settings, studies: Option<&Address>, parts: Option
 ///
 /// # Errors
 /// Where the process gets no signals.
-pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: Option<Parts>) -> io::Result<()> {
+pub async fn serve_chunks(
+    settings: &WorkerSettings,
+    studies: &Address,
+    parts: Option<Parts>,
+    threads: &Handle,
+) -> io::Result<()> {
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
     let mut told_to_stop = async || {
         tokio::select! {
@@ -219,7 +239,7 @@ pub async fn serve_chunks(settings: &WorkerSettings, studies: &Address, parts: O
         variant_bytes: limits.max_unread_bytes / 2,
         admitted_states: 0,
     };
-    let pool = Pool::new(limits);
+    let pool = Pool::new(limits).on(threads);
     tokio::spawn(pool.memory().clone().watch("no chunk is begun while another is in work", || {}));
     let workers = Workers::new(store, parts, pool, capacity, changed, stopping.clone(), patience);
     let stop = async {

@@ -219,8 +219,8 @@ pub struct Made {
 #[derive(Debug, Clone)]
 struct Making {
     made: Shared<BoxFuture<'static, Result<Arc<Made>, Problem>>>,
-    /// Whether the study still ran when it was begun: more may have come since than is in it.
-    is_of_running: bool,
+    /// How often the study had come to stand otherwise when it was begun: more may have come since than is in it.
+    changes: u64,
 }
 
 /// How a study stands, and why it broke off.
@@ -228,6 +228,8 @@ struct Making {
 struct Standing {
     state: StudyState,
     problem: Option<Problem>,
+    /// How often it has come to stand otherwise.
+    changes: u64,
 }
 
 /// A study as it stands.
@@ -262,7 +264,7 @@ pub struct StudyResource {
 impl Kept {
     /// How it stands.
     pub fn resource(&self) -> StudyResource {
-        let Standing { state, problem } = self.state.borrow().clone();
+        let Standing { state, problem, .. } = self.state.borrow().clone();
         let looked_at = self.looked_at.load(Ordering::Relaxed);
         StudyResource {
             id: self.id.clone(),
@@ -293,7 +295,10 @@ impl Kept {
     }
 
     fn stand(&self, state: StudyState, problem: Option<Problem>) {
-        self.state.send_replace(Standing { state, problem });
+        self.state.send_modify(|standing| {
+            let changes = standing.changes + u64::from(standing.state != state);
+            *standing = Standing { state, problem, changes };
+        });
     }
 
     /// Stops what runs in this process.
@@ -317,7 +322,7 @@ impl Kept {
             study,
             looked_at: AtomicU64::new(0),
             impossible: AtomicU64::new(0),
-            state: watch::Sender::new(Standing { state: StudyState::Running, problem: None }),
+            state: watch::Sender::new(Standing { state: StudyState::Running, problem: None, changes: 0 }),
             cancelled: Mutex::default(),
             unasked_s: AtomicU64::new(0),
             is_followed: AtomicBool::new(false),
@@ -347,7 +352,7 @@ impl Kept {
     /// Whether who asks now is served by an answer that is made, or was.
     fn serves(&self, making: &Making) -> bool {
         match making.made.peek() {
-            None => self.is_running() || !making.is_of_running,
+            None => self.is_running() || making.changes == self.state.borrow().changes,
             Some(Ok(made)) => made.is_whole || (self.is_running() && made.at.elapsed() < FRESH),
             Some(Err(_)) => false,
         }
@@ -428,7 +433,7 @@ impl Kept {
         let looking = async {
             // One at a time, so that what is seen last is what was last the case.
             let held = self.looking.lock().await;
-            Ok::<_, StoreError>((held, store.find(&self.id).await?))
+            Ok::<_, StoreError>((held, store.look(&self.id).await?))
         };
         let (_held, found) = patiently(looking).await?;
         let Some(stored) = found.filter(|stored| stored.study.cut() == self.cut()) else {
@@ -460,6 +465,11 @@ impl Kept {
                     tracing::warn!(study = self.id, %error, "how a study stands is not known");
                 }
                 pause = pause_after(started.elapsed(), LOOK);
+                // However often it comes further.
+                tokio::select! {
+                    () = tokio::time::sleep(pause_after(started.elapsed(), Duration::ZERO)) => {}
+                    () = closing.cancelled() => {}
+                }
             }
             self.is_followed.store(false, Ordering::SeqCst);
             // It may have been asked for again in this moment, by one who believed that it is followed.
@@ -487,9 +497,10 @@ async fn note_asked(store: &Store, id: &str) {
     }
 }
 
-/// Whether a study's answer is made apart: that of a tolerance study is short, and its rows have to be sorted for it. That of a map is its rows.
+/// Whether a study's answer is made apart: that of a tolerance study is short, and its rows have to be sorted for it; so is that of a search, and its islands' fronts have to
+/// be merged. That of a map is its rows.
 fn is_made_apart(study: &Study) -> bool {
-    study.kind() == "tolerance" && study.stored_bytes() >= LARGE_BYTES
+    matches!(study.kind(), "tolerance" | "search") && study.stored_bytes() >= LARGE_BYTES
 }
 
 /// Whether a stored study need not be begun.
@@ -570,11 +581,14 @@ impl Studies {
         let kept = match here.filter(|kept| kept.is_followed.load(Ordering::SeqCst)) {
             Some(kept) => kept,
             None => {
-                let Some(stored) = store.find(id).await? else {
+                let kept = match store.look(id).await? {
+                    Some(stored) => self.kept_here(store, &stored).await?,
+                    None => None,
+                };
+                let Some(kept) = kept else {
                     self.kept.lock().retain(|kept| kept.id != id);
                     return Ok(None);
                 };
-                let kept = self.kept_here(&stored).await?;
                 self.see(store, &kept).await?;
                 kept
             }
@@ -593,23 +607,25 @@ impl Studies {
         unasked_s > (*expiry / NOTE_SHARE).as_secs()
     }
 
-    /// A stored study as it is kept here, without its rows.
+    /// A stored study as it is kept here, without its rows, unless it was forgotten meanwhile.
     ///
     /// # Errors
     /// Where this is not the build or the processor that it was asked of.
-    async fn kept_here(&self, stored: &Stored) -> Result<Arc<Kept>, Problem> {
-        let frozen = &stored.study;
-        let known = self.kept.lock().iter().find(|kept| kept.cut() == frozen.cut()).cloned();
-        if let Some(kept) = known {
-            return Ok(kept);
+    async fn kept_here(&self, store: &Store, stored: &Stored) -> Result<Option<Arc<Kept>>, Problem> {
+        let cut = stored.study.cut();
+        let known = self.kept.lock().iter().find(|kept| kept.cut() == cut).cloned();
+        if known.is_some() {
+            return Ok(known);
         }
-        let study = frozen::thaw(&self.pool, frozen).await?.map_err(|reason| reason.told(&frozen.id))?;
+        let thawed = frozen::thaw(&self.pool, store, &cut, stored.document_bytes).await?;
+        let Some(thawed) = thawed else { return Ok(None) };
+        let (study, _) = thawed.map_err(|reason| reason.told(&cut.id))?;
         // Where others have all the room, it is kept all the same: how many there are is bounded.
         let room = self.room.keep(view_bytes(&study)).ok();
         let kept = Self::view(study, room);
         let (state, problem) = state_of(stored);
         kept.stand(state, problem);
-        Ok(self.keep_view(kept))
+        Ok(Some(self.keep_view(kept)))
     }
 
     fn view(study: Arc<Study>, room: Option<room::Kept>) -> Arc<Kept> {
@@ -679,9 +695,9 @@ impl Studies {
         let mut room = Some(self.room.keep(view_bytes(&study))?);
         let (mut asked, mut new) = (Some(study), None);
         loop {
-            let stored = store.find(&id).await?;
+            let stored = store.look(&id).await?;
             let known = match &stored {
-                Some(stored) => Some(self.kept_here(stored).await?),
+                Some(stored) => self.kept_here(store, stored).await?,
                 None => None,
             };
             let kept = match (stored, known) {
@@ -724,7 +740,7 @@ impl Studies {
         room: &mut Option<room::Kept>,
     ) -> Result<Option<Arc<Kept>>, Problem> {
         let _turn = self.beginning.lock().await;
-        let kept = match (store.find(id).await?, known, new) {
+        let kept = match (store.look(id).await?, known, new) {
             (Some(stored), Some(kept), _) if !is_there(&stored) && stored.study.cut() == kept.cut() => {
                 self.require_one_more(store).await?;
                 store.resume(id, self.time(store)).await?;
@@ -893,7 +909,7 @@ impl Studies {
             }
             return Ok(true);
         };
-        let (here, stored) = (self.find_here(id), store.find(id).await?);
+        let (here, stored) = (self.find_here(id), store.look(id).await?);
         let is_running = stored.as_ref().is_some_and(Stored::is_running);
         if is_running {
             store.cancel(id).await?;
@@ -953,7 +969,7 @@ impl Studies {
     }
 
     fn making(&self, kept: &Arc<Kept>, rows: &Arc<Rows>) -> Making {
-        let is_of_running = kept.is_running();
+        let changes = kept.state.borrow().changes;
         let (kept, rows, pool, room) = (Arc::clone(kept), Arc::clone(rows), self.pool.clone(), self.room.clone());
         let store = match &self.keeping {
             Keeping::Store { store, .. } => Some(store.clone()),
@@ -973,11 +989,10 @@ impl Studies {
         };
         let made = tokio::spawn(made.in_current_span());
         let made = made.map(|joined| joined.unwrap_or_else(|error| Err(Problem::internal(&error)))).boxed().shared();
-        Making { made, is_of_running }
+        Making { made, changes }
     }
 
-    /// What a store is served by in this process, until it closes: the workers where it is a file, and whoever forgets old studies and
-    /// counts.
+    /// What a store is served by in this process, until the service is told to stop: the workers where it is a file, and whoever forgets old studies and counts.
     pub async fn serve_store(&self) {
         let Keeping::Store { store, expiry, parts } = &self.keeping else { return };
         let workers = async {
@@ -1031,6 +1046,11 @@ impl Studies {
             }
         };
         tokio::join!(workers, others);
+    }
+
+    /// Lets go of the store, when nobody asks it any more.
+    pub async fn close_store(&self) {
+        let Keeping::Store { store, .. } = &self.keeping else { return };
         if store.address().is_shared() {
             // A server that does not hear of it finds it out.
             let _ = tokio::time::timeout(CLOSE, store.close()).await;
@@ -1188,5 +1208,35 @@ mod tests {
         assert_eq!(pause_after(Duration::from_millis(3), LOOK), LOOK);
         assert_eq!(pause_after(Duration::from_millis(400), LOOK), Duration::from_secs(4));
         assert_eq!(pause_after(Duration::from_secs(8), LOOK), LONGEST_PAUSE);
+    }
+
+    /// One that was cancelled, asked for again and done in that time was answered with what it had come to before, as that of one that is done.
+    #[test]
+    fn an_answer_that_is_being_made_serves_who_asks_while_the_study_stands_as_it_did() {
+        let document = include_bytes!("../../examples/paper-5.1.json");
+        let base: serde_json::Value = serde_json::from_slice(document).expect("a design");
+        let over = serde_json::json!({ "/drive/teeth/radius_mm": { "min": 3.0, "max": 5.0, "steps": 3 } });
+        let question = serde_json::json!({ "study": "map", "base": base, "over": over }).to_string();
+        let calculation = toothwave_calculation::question::Limits { max_states: 1000, max_profile_points: 1000 };
+        let limits = toothwave_study::Limits { calculation, max_study_variants: 10, max_study_bytes: u64::MAX };
+        let study = Study::read(question.as_bytes(), &limits).expect("a study");
+        let kept = Kept::new(Arc::new(study), None, 0, None);
+        let making = || {
+            let made = futures_util::future::pending().boxed().shared();
+            Making { made, changes: kept.state.borrow().changes }
+        };
+        let of_running = making();
+        kept.stand(StudyState::Running, None);
+        assert!(kept.serves(&of_running));
+        kept.stand(StudyState::Cancelled, None);
+        let of_cancelled = making();
+        assert!(kept.serves(&of_cancelled) && !kept.serves(&of_running));
+        kept.stand(StudyState::Running, None);
+        assert!(kept.serves(&of_cancelled), "it is told that it is not complete");
+        kept.stand(StudyState::Done, None);
+        assert!(!kept.serves(&of_cancelled));
+        let of_done = making();
+        kept.stand(StudyState::Done, None);
+        assert!(kept.serves(&of_done));
     }
 }

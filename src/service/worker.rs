@@ -299,14 +299,15 @@ impl Workers {
                 match self.claim(task, lease, ready, &mut tasks).await {
                     Ok((Claim::Chunk(lease), _)) if self.stopping.is_cancelled() => return give_up(lease).await,
                     Ok((Claim::Chunk(lease), None)) => give_up(lease).await,
-                    Ok((Claim::Chunk(lease), Some(((ours, _held), beside)))) => {
+                    Ok((Claim::Chunk(lease), Some(((ours, _held), mut beside)))) => {
                         // What another study has had of the time is not this one's.
                         if last.replace(task.cut.clone()).is_none_or(|last| last != task.cut) {
                             lane = Lane::default();
                         }
                         let no_longer_alone = async {
                             tokio::time::sleep(ALONE).await;
-                            drop(beside);
+                            // Its own stays, so that one that is to be computed beside none sees it.
+                            drop(beside.split(beside.num_permits().saturating_sub(1)));
                             future::pending::<Infallible>().await
                         };
                         tokio::select! {
@@ -481,18 +482,16 @@ impl Workers {
         if !self.store.has_free_chunk(&task.cut).await.map_err(Problem::from)? {
             return Err(Unseen::NothingFree);
         }
-        let mut room = self.shelf.room(seen.bytes).await.ok_or(Unseen::NoRoom)?;
-        let standing = self.store.find(&task.cut.id).await.map_err(Problem::from)?;
-        let standing = standing.filter(|standing| standing.study.cut() == task.cut).ok_or(Unseen::Gone)?;
-        let frozen = standing.study;
         let Capacity { variant_bytes, admitted_states, .. } = self.capacity;
-        let most_bytes = if frozen.max_states <= admitted_states { u64::MAX } else { variant_bytes };
-        let bytes = frozen::reading_bytes(frozen.document.len());
+        let most_bytes = if task.max_states <= admitted_states { u64::MAX } else { variant_bytes };
+        let bytes = frozen::reading_bytes(task.document_bytes);
         if bytes > most_bytes {
             return Err(NotHere::NeedsMemory { bytes, most_bytes }.into());
         }
-        let study = frozen::thaw(&self.pool, &frozen).await??;
-        let bytes = view_bytes(&study) + frozen.document.len() as u64;
+        let mut room = self.shelf.room(seen.bytes.max(task.document_bytes)).await.ok_or(Unseen::NoRoom)?;
+        let thawed = frozen::thaw(&self.pool, &self.store, &task.cut, task.document_bytes).await?;
+        let (study, frozen) = thawed.ok_or(Unseen::Gone)??;
+        let bytes = view_bytes(&study) + task.document_bytes;
         if bytes > seen.bytes {
             // Nobody knew before.
             seen.bytes = bytes;

@@ -71,6 +71,8 @@ pub struct Gap {
 pub struct Standing {
     /// As it was first kept; of `time` what is left.
     pub study: NewStudy,
+    /// Length of its document.
+    pub document_bytes: u64,
     /// Whether it was told to stop.
     pub is_cancelled: bool,
     /// Chunks that have a result.
@@ -123,6 +125,10 @@ pub struct Waiting {
     pub cut: Cut,
     /// The build and the kind of processor that it belongs to, in a word.
     pub origin: String,
+    /// Most states that one of its variants has.
+    pub max_states: u64,
+    /// Length of its document.
+    pub document_bytes: u64,
 }
 
 /// The whole store in numbers.
@@ -146,11 +152,18 @@ pub struct Figures {
     pub oldest: Duration,
 }
 
-type StudyRow = (String, String, String, String, i64, i64, i64, i64, i64, i64, String, i64, bool, i64, i64);
+type StudyRow = (String, String, String, String, i64, i64, i64, i64, i64, i64, String, i64, bool, i64, i64, i64);
 
-const STUDY: &str = "SELECT id, kind, build, document, max_states, max_profile_points, variants, chunk_variants, chunks, canary_variants,
-    canary, lease_ms, is_cancelled, CAST(ends_at_s - unixepoch() AS BIGINT), CAST(unixepoch() - asked_at_s AS BIGINT)
-    FROM studies WHERE id = $1";
+macro_rules! study_with {
+    ($document:literal) => {
+        concat!(
+            "SELECT id, kind, build, ",
+            $document,
+            ", max_states, max_profile_points, variants, chunk_variants, chunks, canary_variants, canary, lease_ms, is_cancelled,
+            CAST(ends_at_s - unixepoch() AS BIGINT), CAST(unixepoch() - asked_at_s AS BIGINT), CAST(octet_length(document) AS BIGINT) FROM studies WHERE id = $1"
+        )
+    };
+}
 
 /// Open chunks of a study of the outer query that are still to be computed. One that has a result has its row for as long as another worker has it in hand: its first
 /// holder's lease was lost, and what that one computed was kept.
@@ -172,8 +185,11 @@ macro_rules! waits {
     };
 }
 
-const WAITING: &str =
-    concat!("SELECT id, chunk_variants, build FROM studies WHERE ", waits!(), " ORDER BY asked_at_s, id");
+const WAITING: &str = concat!(
+    "SELECT id, chunk_variants, build, max_states, CAST(octet_length(document) AS BIGINT) FROM studies WHERE ",
+    waits!(),
+    " ORDER BY asked_at_s, id"
+);
 
 /// Nobody has asked for a study, or computed it, for so many seconds.
 macro_rules! has_expired {
@@ -266,7 +282,9 @@ impl Store {
             for text in [
                 "DELETE FROM attempts WHERE study = $1 AND chunk IN (SELECT chunk FROM gaps WHERE study = $1)",
                 "INSERT INTO chunks SELECT study, chunk FROM gaps WHERE study = $1 ON CONFLICT DO NOTHING",
-                "DELETE FROM gaps WHERE study = $1",
+                // One that is noted in this moment stays: its chunk is not open again.
+                "DELETE FROM gaps WHERE study = $1 AND (EXISTS (SELECT 1 FROM chunks WHERE chunks.study = $1 AND chunks.chunk = gaps.chunk)
+                    OR EXISTS (SELECT 1 FROM results WHERE results.study = $1 AND results.chunk = gaps.chunk))",
             ] {
                 on!(connection, inner => sqlx::query(text).bind(id).execute(inner).await.map(|_| ()))?;
             }
@@ -303,7 +321,7 @@ impl Store {
                 return Err(StoreError::InWork);
             }
             tokio::time::sleep(LOOK_AGAIN).await;
-            if self.find(id).await?.is_some_and(|standing| standing.is_running()) {
+            if self.look(id).await?.is_some_and(|standing| standing.is_running()) {
                 // Somebody wants it again.
                 break;
             }
@@ -367,9 +385,21 @@ impl Store {
     /// # Errors
     /// As [`Self::create`].
     pub async fn find(&self, id: &str) -> Result<Option<Standing>, StoreError> {
+        self.stands(id, study_with!("document")).await
+    }
+
+    /// The same without its document, which may take much.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub async fn look(&self, id: &str) -> Result<Option<Standing>, StoreError> {
+        self.stands(id, study_with!("''")).await
+    }
+
+    async fn stands(&self, id: &str, text: &'static str) -> Result<Option<Standing>, StoreError> {
         self.with(PATIENCE, async |connection| {
             require_schema(connection).await?;
-            let row: Option<StudyRow> = on!(connection, inner => sqlx::query_as(STUDY).bind(id).fetch_optional(inner).await)?;
+            let row: Option<StudyRow> = on!(connection, inner => sqlx::query_as(text).bind(id).fetch_optional(inner).await)?;
             let Some(row) = row else { return Ok(None) };
             // Gaps before results: a chunk that came to a result at last is counted as one.
             let gaps: Vec<(i64, i64)> = on!(connection, inner => {
@@ -391,9 +421,10 @@ impl Store {
                 .await
             })?;
             let gaps = gaps.into_iter().map(|(chunk, attempts)| Gap { chunk: read(chunk), attempts: read(attempts) });
+            let document_bytes = read(row.15);
             let (study, is_cancelled, unasked) = study(row);
             let (done, looked_at, refused) = (read(done), read(looked_at), read(refused));
-            Ok(Some(Standing { study, is_cancelled, done, looked_at, refused, gaps: gaps.collect(), unasked }))
+            Ok(Some(Standing { study, document_bytes, is_cancelled, done, looked_at, refused, gaps: gaps.collect(), unasked }))
         })
         .await
     }
@@ -405,11 +436,13 @@ impl Store {
     pub async fn waiting(&self) -> Result<Vec<Waiting>, StoreError> {
         self.with(PATIENCE, async |connection| {
             require_schema(connection).await?;
-            let rows: Vec<(String, i64, String)> =
+            let rows: Vec<(String, i64, String, i64, i64)> =
                 on!(connection, inner => sqlx::query_as(WAITING).fetch_all(inner).await)?;
-            let waiting = |(id, chunk_variants, origin)| Waiting {
+            let waiting = |(id, chunk_variants, origin, max_states, document_bytes)| Waiting {
                 cut: Cut { id, chunk_variants: read(chunk_variants) },
                 origin,
+                max_states: read(max_states),
+                document_bytes: read(document_bytes),
             };
             Ok(rows.into_iter().map(waiting).collect())
         })
@@ -562,7 +595,7 @@ pub(crate) async fn say(connection: &mut Connection, text: &'static str) -> Resu
 
 fn study(row: StudyRow) -> (NewStudy, bool, Duration) {
     #[rustfmt::skip]
-    let (id, kind, origin, document, max_states, max_profile_points, variants, chunk_variants, chunks, canary_variants, canary, lease_ms, is_cancelled, left_s, unasked_s) = row;
+    let (id, kind, origin, document, max_states, max_profile_points, variants, chunk_variants, chunks, canary_variants, canary, lease_ms, is_cancelled, left_s, unasked_s, _) = row;
     let study = NewStudy {
         id,
         kind,

@@ -127,6 +127,11 @@ impl Template {
                     let detail = format!("the range is empty: its least value {min:?} is above its largest {max:?}");
                     return Err(beyond(&format!("{}/min", at(pointer)), FieldCode::OutOfRange, detail, min, max));
                 }
+                Domain::Real { min, max } if !(max - min).is_finite() => {
+                    let detail =
+                        format!("the range from {min:?} to {max:?} is wider than numbers go: choose a narrower one");
+                    return Err(beyond(&at(pointer), FieldCode::OutOfRange, detail, max, min));
+                }
                 Domain::OneOf(0) => {
                     let detail = "a choice of nothing: name at least one value";
                     return Err(fault(&format!("{}/one_of", at(pointer)), FieldCode::OutOfRange, detail));

@@ -217,7 +217,7 @@ impl Service {
 
     /// With its studies kept somewhere, and served as they are in a whole service.
     pub(crate) fn keeping(limits: Limits, keeping: Keeping) -> Self {
-        let app = App::keeping(limits, keeping);
+        let app = App::keeping(Pool::new(limits), limits, keeping);
         Self { router: router(Arc::clone(&app), &Entry::default()), app }
     }
 

@@ -472,7 +472,11 @@ fn what_listens_on_this_machine_alone_answers_to_its_names_alone() {
     for host in ["localhost", "LOCALHOST:8080", "127.0.0.1", "127.0.0.1:1", "[::1]", "[::1]:8080"] {
         assert_eq!(status(&format!("host: {host}\r\n")).0, "200", "{host}");
     }
-    for host in ["rebound.example", "localhost.example:8080", "10.0.0.1", "127.0.0.1.example", ""] {
+    let strangers = ["rebound.example", "localhost.example:8080", "10.0.0.1", "127.0.0.1.example", ""];
+    // None of these is a name.
+    let malformed =
+        ["[::1]rebound.example", "rebound.example@127.0.0.1", "127.0.0.1:x", "localhost\r\nhost: rebound.example"];
+    for host in strangers.into_iter().chain(malformed) {
         let (status, answer) = status(&format!("host: {host}\r\n"));
         assert!(status == "421" && answer.contains("\"misdirected_request\""), "{host}: {answer}");
     }

@@ -87,10 +87,10 @@ impl Keeper {
     /// As when the process is told to stop.
     pub(crate) async fn end(self) {
         self.service.app.studies.close();
-        match self.workers {
-            Some(workers) => workers.await.unwrap(),
-            None => self.store.close().await,
+        if let Some(workers) = self.workers {
+            workers.await.unwrap();
         }
+        self.service.app.studies.close_store().await;
     }
 
     async fn ask(&self, study: &Value) -> Answer {
@@ -719,6 +719,20 @@ async fn a_study_of_which_what_is_frozen_or_indexed_is_damaged_is_told_so_and_ha
         keeper.end().await;
         fs::write(&file.0, &whole).unwrap();
     }
+}
+
+/// Their store was closed in the moment in which the service was told to stop, though it had seconds left to answer what was begun.
+#[tokio::test]
+async fn requests_for_studies_that_are_begun_at_a_stop_are_answered_from_the_store() {
+    let file = File::new();
+    let mut keeper = Keeper::of(&file, LIMITS, true).await;
+    let study = keeper.wait_for(&map(50)).await;
+    keeper.service.app.studies.close();
+    keeper.workers.take().unwrap().await.unwrap();
+    keeper.service.get(&format!("{}/result", place(&study))).await.found();
+    let service = keeper.service.clone();
+    keeper.end().await;
+    service.get(&format!("{}/result", place(&study))).await.refused(503, "store_unavailable");
 }
 
 /// Whoever waited for a silent database at the end of a stop got no answer at all.

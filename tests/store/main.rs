@@ -123,9 +123,12 @@ async fn a_study_is_kept_as_it_was_asked_and_once() {
         assert!(standing.study.time <= study.time && standing.study.time > study.time / 2);
         assert_eq!(NewStudy { time: study.time, ..standing.study.clone() }, study);
         assert!(standing.is_running() && !standing.is_done());
-        assert!(
-            store.waiting().await.unwrap().iter().any(|waiting| waiting.cut.id == study.id && waiting.origin == "this")
-        );
+        let waiting = store.waiting().await.unwrap();
+        let waiting = waiting.iter().find(|waiting| waiting.cut.id == study.id).unwrap();
+        assert_eq!((&*waiting.origin, waiting.max_states, waiting.document_bytes), ("this", 10, 2));
+        let seen = store.look(&study.id).await.unwrap().unwrap();
+        assert_eq!((seen.document_bytes, &*seen.study.document), (2, ""));
+        assert_eq!(NewStudy { document: study.document.clone(), ..seen.study }, standing.study);
         store.forget(&study.id).await.unwrap();
         assert_eq!(store.find(&study.id).await.unwrap(), None);
     })
@@ -750,6 +753,44 @@ async fn who_wants_a_study_that_another_session_holds_is_told_so_in_time_and_the
     sqlx::query("ROLLBACK").execute(&mut holder).await.unwrap();
     keep(&mut claimed(&store, &study).await).await;
     assert!(store.find(&study.id).await.unwrap().unwrap().is_running());
+    store.forget(&study.id).await.unwrap();
+}
+
+/// The chunk of a gap that was noted in this moment was in nobody's hands for ever, and the study ran.
+#[tokio::test]
+async fn a_gap_that_is_noted_while_a_study_is_let_go_on_stays_one() {
+    let Some(address) = server() else { return };
+    let _others = SERVER.read().await;
+    let (store, study) = stored(&address, "noted", 2).await;
+    // Both are open.
+    drop((claimed(&store, &study).await, claimed(&store, &study).await));
+    let mut worker = stranger(&address).await;
+    let gap = async |worker: &mut PgConnection, chunk: i64| {
+        for text in ["INSERT INTO gaps VALUES ($1, $2, 3)", "DELETE FROM chunks WHERE study = $1 AND chunk = $2"] {
+            sqlx::query(text).bind(&study.id).bind(chunk).execute(&mut *worker).await.unwrap();
+        }
+    };
+    gap(&mut worker, 0).await;
+    // Whoever lets it go on waits for who opens its chunk as well, and then sees the other gap.
+    let mut opener = stranger(&address).await;
+    sqlx::query("BEGIN").execute(&mut opener).await.unwrap();
+    let opens: i32 = sqlx::query_scalar("SELECT pg_backend_pid()").fetch_one(&mut opener).await.unwrap();
+    let open = "INSERT INTO chunks VALUES ($1, 0)";
+    sqlx::query(open).bind(&study.id).execute(&mut opener).await.unwrap();
+    let (resumed, ()) = tokio::join!(store.resume(&study.id, LEASE), async {
+        let waits = "SELECT EXISTS (SELECT 1 FROM pg_stat_activity WHERE $1 = ANY (pg_blocking_pids(pid)))";
+        while !sqlx::query_scalar::<_, bool>(waits).bind(opens).fetch_one(&mut worker).await.unwrap() {}
+        gap(&mut worker, 1).await;
+        sqlx::query("COMMIT").execute(&mut opener).await.unwrap();
+    });
+    resumed.unwrap();
+    let standing = store.find(&study.id).await.unwrap().unwrap();
+    assert_eq!(standing.gaps, [Gap { chunk: 1, attempts: 3 }]);
+    keep(&mut free_again(&store, &study, 0).await).await;
+    assert!(store.find(&study.id).await.unwrap().unwrap().is_exhausted());
+    store.resume(&study.id, LEASE).await.unwrap();
+    keep(&mut free_again(&store, &study, 1).await).await;
+    assert!(store.find(&study.id).await.unwrap().unwrap().is_done());
     store.forget(&study.id).await.unwrap();
 }
 

@@ -116,6 +116,8 @@ fn what_cannot_be_mapped_is_said_at_its_field() {
         (json!({ "min": 3.0, "steps": 2 }), "", "missing_field"),
         (json!({ "min": 3.0, "max": 5.0, "one_of": [3.0] }), "", "conflicting_fields"),
         (json!({ "one_of": [] }), "/one_of", "out_of_range"),
+        // Its values were infinite, and none at all.
+        (json!({ "min": -1e308, "max": 1e308, "steps": 3 }), "", "out_of_range"),
         (json!({ "min": null, "max": 5.0 }), "/min", "wrong_type"),
     ] {
         let expected = (format!("/over/~1drive~1teeth~1radius_mm{field}"), code.to_owned());

@@ -364,6 +364,11 @@ struct Line {
     _ahead: OwnedSemaphorePermit,
 }
 
+/// A line without the rest of an end as other systems write it.
+fn unended(line: &[u8]) -> &[u8] {
+    line.strip_suffix(b"\r").unwrap_or(line)
+}
+
 /// Splits a body into lines as it arrives.
 struct Lines {
     body: BodyDataStream,
@@ -410,7 +415,7 @@ impl Lines {
             if let Some(end) = unsearched.iter().position(|&byte| byte == b'\n') {
                 let end = std::mem::take(&mut self.searched_bytes) + end;
                 let line = self.buffer.split_to(end + 1);
-                let line = &line[..end];
+                let line = unended(&line[..end]);
                 let read = if std::mem::take(&mut self.is_skipping) {
                     None
                 } else if line.len() > self.max_line_bytes {
@@ -431,7 +436,7 @@ impl Lines {
             self.searched_bytes = self.buffer.len();
             if self.is_skipping {
                 self.forget();
-            } else if self.buffer.len() > self.max_line_bytes {
+            } else if unended(&self.buffer).len() > self.max_line_bytes {
                 self.forget();
                 self.is_skipping = true;
                 return Some(Err(self.too_long()));
@@ -847,9 +852,17 @@ mod tests {
         for pieces in [&["12345\n[]"][..], &["12345", "\n[]"], &["1", "2345", "\n", "[", "]"]] {
             assert_eq!(read(pieces).await, [whole.clone(), next.clone()], "{pieces:?}");
         }
-        for pieces in
-            [&["123456\n[]"][..], &["123456", "\n[]"], &["123", "456", "7\n[]"], &["123456", "7", "8\n", "[]"]]
-        {
+        // As other systems end them.
+        for pieces in [&["12345\r\n[]"][..], &["12345\r", "\n[]\r\n"], &["12345", "\r\n[]"]] {
+            assert_eq!(read(pieces).await, [whole.clone(), next.clone()], "{pieces:?}");
+        }
+        for pieces in [
+            &["123456\n[]"][..],
+            &["123456\r", "\n[]"],
+            &["123456", "\n[]"],
+            &["123", "456", "7\n[]"],
+            &["123456", "7", "8\n", "[]"],
+        ] {
             assert_eq!(read(pieces).await, [too_long.clone(), next.clone()], "{pieces:?}");
         }
         assert_eq!((read(&["12345"]).await, read(&["123456"]).await), (vec![whole], vec![too_long]));

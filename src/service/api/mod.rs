@@ -188,7 +188,7 @@ struct Read {
 
 /// Of the tree that a design is read into, which takes up to so many times its length; of what is short nothing is counted.
 const fn tree_bytes(document: &[u8]) -> u64 {
-    if 2 * document.len() as u64 > SMALL_BYTES { reading_bytes(document.len()) } else { 0 }
+    if 2 * document.len() as u64 > SMALL_BYTES { reading_bytes(document.len() as u64) } else { 0 }
 }
 
 impl Deref for Read {

@@ -230,7 +230,7 @@ async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Respons
     let body = read_body(app, &headers, body, deadline).await?;
     // Its choices stand for hundreds of designs, so that a document of 64 KB may take long to be read.
     let (question, limits) = (body.bytes.clone(), app.limits.of_studies());
-    let room = app.pool.room_aside(deadline, reading_bytes(question.len()), body.room.held_bytes()).await?;
+    let room = app.pool.room_aside(deadline, reading_bytes(question.len() as u64), body.room.held_bytes()).await?;
     let read = move || {
         let _room = room;
         Ok(Study::read(&question, &limits)?)
