@@ -31,6 +31,9 @@ const MOST_OF_A_CANARY: u64 = 4096;
 /// Bytes of what a chunk comes to, at most: one statement carries them.
 const MOST_OF_A_PART: u64 = 4 << 20;
 
+/// Bytes of a chunk's rows as they are kept besides, at most: they have all inputs, of which there may be hundreds.
+const MOST_OF_ROWS: u64 = 8 << 20;
+
 /// A worker is not taken for dead before it was silent for so long. One that computes is not silent, however long its chunk takes.
 const LEASE: Duration = Duration::from_secs(30);
 
@@ -82,6 +85,7 @@ pub async fn freeze(
     let canary_variants = canary.sung.max(1);
     let a_variant = canary.busy / u32::try_from(canary_variants).unwrap_or(u32::MAX);
     let part_variants = MOST_OF_A_PART / (study.stored_bytes() / study.variants().max(1)).max(1);
+    let part_variants = part_variants.min(MOST_OF_ROWS / study.row_bytes().max(1));
     let wanted = u64::try_from(CHUNK.as_nanos() / a_variant.as_nanos().max(1)).unwrap_or(u64::MAX);
     // Of what a canary has not seen some may take far longer: whatever that is, little of the study is lost with one chunk.
     let most = if canary_variants < study.variants() { study.variants().div_ceil(LEAST_CHUNKS) } else { u64::MAX };
@@ -372,13 +376,56 @@ async fn sung(pool: &Pool, mut canary: Canary, most_bytes: u64) -> Result<Result
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
+    use std::time::Duration;
 
+    use clap::Parser as _;
+    use serde_json::json;
     use toothwave_calculation::question;
     use toothwave_solver::Never;
     use toothwave_store::Cut;
     use toothwave_study::{Limits, Study, Work};
 
-    use super::{Canary, sealed, unsealed};
+    use super::{Canary, MOST_OF_ROWS, freeze, sealed, unsealed};
+    use crate::compute::Pool;
+    use crate::config::Settings;
+
+    #[derive(clap::Parser)]
+    struct Line {
+        #[command(flatten)]
+        settings: Settings,
+    }
+
+    const CALCULATION: question::Limits = question::Limits { max_states: 1_000_000, max_profile_points: 1_000_000 };
+    const LIMITS: Limits = Limits { calculation: CALCULATION, max_study_variants: u64::MAX, max_study_bytes: u64::MAX };
+
+    /// A chunk of short results and long rows, 144 MB of them, ended a worker of 128 MiB that kept them in a folder.
+    #[tokio::test]
+    async fn a_chunk_comes_to_few_bytes_of_rows_however_many_inputs_each_has() {
+        const TEETH: usize = 500;
+        let drive = json!({
+            "wave_generator": { "kind": "harmonic_path", "lobes": 1, "mean_path_radius_mm": 1500.0, "amplitude_mm": 1.0 },
+            "teeth": { "count": TEETH, "radius_mm": 2.0, "width_mm": 15.0 }, "ring": { "teeth": TEETH - 1 }
+        });
+        let deviates =
+            |tooth| (format!("/deviations/tooth_radius_um/{tooth}"), json!({ "distribution": "uniform", "limit": 1 }));
+        let inputs: serde_json::Map<_, _> = (0..TEETH).map(deviates).collect();
+        let document = json!({
+            "study": "tolerance", "base": { "drive": drive, "deviations": { "tooth_radius_um": vec![0.0; TEETH] } },
+            "inputs": inputs, "quantities": ["outer_diameter_mm"], "samples": 2_000_000, "seed": 1
+        });
+        let document = document.to_string();
+        let study = Study::read(document.as_bytes(), &LIMITS).expect("a study");
+        let Line { settings } = Line::parse_from(["serve"]);
+        let pool = Pool::new(settings.limits());
+        let frozen = freeze(&pool, study, document.as_bytes(), &CALCULATION, Duration::MAX).await;
+        let (study, frozen) = frozen.expect("a frozen study");
+        assert_eq!(frozen.chunk_variants, MOST_OF_ROWS / study.row_bytes());
+        let mut rows = Vec::new();
+        let part = Work::new(&study, 0).run(&Never).expect("an answer");
+        study.write_rows(&part, &mut rows).expect("rows");
+        // What stands at the end of a file comes besides.
+        assert!(rows.len() as u64 <= MOST_OF_ROWS * 5 / 4, "{}", rows.len());
+    }
 
     /// A map of so many radii, each with two numbers of states.
     fn map_of(radii: u64) -> Arc<Study> {
@@ -388,9 +435,7 @@ mod tests {
         );
         let document =
             format!(r#"{{ "study": "map", "base": {base}, "over": {over}, "quantities": ["peak_stress_ring_mpa"] }}"#);
-        let calculation = question::Limits { max_states: 1_000_000, max_profile_points: 1_000_000 };
-        let limits = Limits { calculation, max_study_variants: u64::MAX, max_study_bytes: u64::MAX };
-        Arc::new(Study::read(document.as_bytes(), &limits).expect("a study"))
+        Arc::new(Study::read(document.as_bytes(), &LIMITS).expect("a study"))
     }
 
     /// SQLite, and PostgreSQL by default, tell nothing of a bit that has become another: a number was 2e-308 instead of 4.5, in a study that was done.

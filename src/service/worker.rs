@@ -643,11 +643,12 @@ fn say_left_to_others(task: &Waiting, reason: &NotHere) {
 }
 
 /// About what a chunk takes that is in work, beside the variants that are computed: what it has come to, in columns that grow by doubling, and the same as it is
-/// kept, or then on its way to the store; and its rows where they are kept.
+/// kept, or then on its way to the store; and its rows where they are kept, which grow in the same way.
 fn chunk_bytes(study: &Study, has_parts: bool) -> u64 {
     let part_bytes = study.stored_bytes() / study.chunks().max(1);
-    let copies = if has_parts && study.has_rows() { 4 } else { 3 };
-    study.working_bytes().saturating_add(part_bytes.saturating_mul(copies))
+    let rows_bytes =
+        if has_parts { study.row_bytes().saturating_mul(2).saturating_mul(study.chunk_variants()) } else { 0 };
+    study.working_bytes().saturating_add(part_bytes.saturating_mul(3)).saturating_add(rows_bytes)
 }
 
 /// Gives a chunk back that is not wanted, or because the time is over. Where nobody answers, that it was begun stays noted.

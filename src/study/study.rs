@@ -26,7 +26,7 @@ use crate::quantity::{Needs, QUANTITIES, Quantity};
 use crate::rows::{CHUNK_VARIANTS, GapAnswer, Rows, RowsPart, RowsParts, RowsWork};
 use crate::search::{Island, IslandPart, Search, SearchAnswer};
 use crate::sensitivity::{Sensitivity, SensitivityAnswer};
-use crate::table::Table;
+use crate::table::{CELL_BYTES, Table};
 use crate::tolerance::{Tolerance, ToleranceAnswer};
 use crate::variant::{Domain, Template};
 
@@ -263,6 +263,18 @@ impl Study {
     /// Whether its chunks come to rows, one a variant; an island of a search comes to designs.
     pub const fn has_rows(&self) -> bool {
         !matches!(self.kind, Kind::Search(_))
+    }
+
+    /// About what a row is as Parquet.
+    pub fn row_bytes(&self) -> u64 {
+        let places = match &self.kind {
+            Kind::Map(map) => map.places(),
+            Kind::Sensitivity(sensitivity) => sensitivity.places(),
+            Kind::Tolerance(tolerance) => tolerance.places(),
+            Kind::Search(_) => return 0,
+        };
+        // Its number and its reason besides.
+        CELL_BYTES * (places.len() + self.evaluator.quantities.len() + 2) as u64
     }
 
     /// About what it takes to write the rows of a chunk, its text among that.

@@ -83,7 +83,7 @@ pub async fn respond<Q: Question>(question: Q, app: Arc<App>, request: Request) 
 }
 
 async fn walk<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Result<Response, Problem> {
-    let Asked { headers, mut body, representation, deadline } = Asked::read::<Q>(&app, request).await?;
+    let Asked { headers, body, representation, deadline } = Asked::read::<Q>(&app, request).await?;
     let spelling = Spelling::new(question.name(), representation, &body);
     let known = app.cache.key(spelling).and_then(|key| app.cache.get(key).map(|stored| (key, stored)));
     let (key, stored, served) = match known {
@@ -93,11 +93,11 @@ async fn walk<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Resu
             (key, stored, Served::Hit)
         }
         None => {
-            body.room.hold_at_least(tree_bytes(&body))?;
-            let design = Design::read(&body)?;
-            // The answer may want all the room.
-            drop(body);
-            let key = question.key(&design, &representation);
+            let keyed = move |design: &Design| {
+                let key = question.key(design, &representation);
+                (question, key)
+            };
+            let (design, (question, key)) = read_design(&app, deadline, body, keyed).await?;
             log_design(key);
             let (stored, served) = match app.cache.get(key) {
                 // What is kept was checked when it was solved.
@@ -164,10 +164,9 @@ impl Asked {
 /// The same walk for an answer that is measured there and then: never cached.
 async fn respond_afresh<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Response {
     let walk = async {
-        let Asked { mut body, representation, deadline, .. } = Asked::read::<Q>(&app, request).await?;
-        body.room.hold_at_least(tree_bytes(&body))?;
-        let checked = Arc::new(question.check(&Design::read(&body)?, &app.limits.of_calculation())?);
-        drop(body);
+        let Asked { body, representation, deadline, .. } = Asked::read::<Q>(&app, request).await?;
+        let (design, ()) = read_design(&app, deadline, body, |_| ()).await?;
+        let checked = Arc::new(question.check(&design, &app.limits.of_calculation())?);
         let run = |reserved| {
             let (checked, room) = (Arc::clone(&checked), app.room.clone());
             let job = move |stop: &AtomicBool| try_to_solve::<Q>(&checked, representation, &room, reserved, None, stop);
@@ -197,6 +196,25 @@ impl Deref for Read {
     fn deref(&self) -> &Bytes {
         &self.bytes
     }
+}
+
+/// The design of a body, and what is told of it. One that is long is read on a thread apart: it would keep the executor from all others.
+async fn read_design<T: Send + 'static>(
+    app: &App,
+    deadline: tokio::time::Instant,
+    mut body: Read,
+    tell: impl FnOnce(&Design) -> T + Send + 'static,
+) -> Result<(Design, T), Problem> {
+    let tree_bytes = tree_bytes(&body);
+    body.room.hold_at_least(tree_bytes)?;
+    let read = move || {
+        let design = Design::read(&body)?;
+        // The answer may want all the room.
+        drop(body);
+        let told = tell(&design);
+        Ok((design, told))
+    };
+    if tree_bytes == 0 { read() } else { app.pool.run_aside(deadline, read).await }
 }
 
 async fn read_body(
