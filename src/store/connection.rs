@@ -133,8 +133,8 @@ impl From<sqlx::Error> for StoreError {
 /// Connections that are not leases: few statements, each over soon.
 const CONNECTIONS: u32 = 8;
 
-/// A session for leases that had none for so long is closed: others may want it, of whom a server takes so many.
-const IDLE_LEASE: Duration = Duration::from_secs(5);
+/// A session that was not used for so long is closed: others may want it, leases among them, of whom a server takes so many.
+const IDLE: Duration = Duration::from_secs(5);
 
 /// More than any machine computes chunks side by side.
 const MOST_LEASES: u32 = 1024;
@@ -195,8 +195,8 @@ impl Store {
                 let options = options.as_ref().clone().application_name("toothwave").disable_statement_logging();
                 // A lease's session waits for its worker; the server ends it when that takes too long.
                 let leases = options.clone().application_name("toothwave lease");
-                let leases = sessions(MOST_LEASES, leases, Some(IDLE_LEASE));
-                let pool = sessions(CONNECTIONS, options, None);
+                let leases = sessions(MOST_LEASES, leases);
+                let pool = sessions(CONNECTIONS, options);
                 Ok(Self { database: Database::Server { pool, leases }, address: address.clone(), worker, attempts })
             }
         }
@@ -250,14 +250,16 @@ impl Store {
 
 /// Sessions that the server frees of whoever left them. One that is cut off, or stands still, in the middle of a transaction has it ended, and
 /// one that waits for a lock is told so before its client gives up: the server does not look whether anybody still waits for the answer, would
-/// keep a process for it, and would do in the end what was believed to have failed. Said in each session: there are those between who take no
-/// such options when a connection is made.
-fn sessions(most: u32, options: PgConnectOptions, idle: Option<Duration>) -> PgPool {
+/// keep a process for it, and would do in the end what was believed to have failed. Of a host that is gone without a word it ends them within a minute. Said in each session: there
+/// are those between who take no such options when a connection is made.
+fn sessions(most: u32, options: PgConnectOptions) -> PgPool {
     let text =
-        "SELECT set_config('idle_in_transaction_session_timeout', $1, FALSE), set_config('lock_timeout', $2, FALSE)";
+        "SELECT set_config('idle_in_transaction_session_timeout', $1, FALSE), set_config('lock_timeout', $2, FALSE),
+        set_config('tcp_keepalives_idle', '30', FALSE), set_config('tcp_keepalives_interval', '10', FALSE),
+        set_config('tcp_keepalives_count', '3', FALSE)";
     PoolOptions::new()
         .max_connections(most)
-        .idle_timeout(idle)
+        .idle_timeout(IDLE)
         .acquire_timeout(PATIENCE)
         .after_connect(move |session, _| {
             Box::pin(async move {

@@ -61,7 +61,8 @@ pub async fn quantities() -> Json<QuantitiesAnswer> {
     responses(
         (status = 200, description = "The study does not run any more; with its result, as far as it has come.", body = StudyResource),
         (status = 202, description = "It runs; `Location` says where it stands.", body = StudyResource, headers(("Location" = String, description = "The study."))),
-        Problems
+        Problems,
+        (status = 501, description = "This is one of several replicas that share no store.", body = Problem, content_type = "application/problem+json")
     )
 )]
 pub async fn begin(State(app): State<Arc<App>>, request: Request) -> Response {
@@ -77,6 +78,7 @@ pub async fn begin(State(app): State<Arc<App>>, request: Request) -> Response {
     responses(
         (status = 200, description = "It.", body = StudyResource),
         (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
+        (status = 500, description = "What is kept of it is damaged.", body = Problem, content_type = "application/problem+json"),
         (status = 503, description = "The store of studies does not answer, or the study could not be looked at in time; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
     )
 )]
