@@ -5,6 +5,7 @@ use toothwave_calculation::design::Design;
 use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::json::{Tree, path};
 use toothwave_calculation::no_answer::NoAnswer;
+use toothwave_solver::violation::MAX_TEETH;
 use utoipa::ToSchema;
 
 use crate::ask::{escaped, fault, whole};
@@ -238,7 +239,8 @@ struct Items {
 impl Items {
     fn of(design: &Design) -> Self {
         let parameters = design.drive_parameters();
-        let count = |count: i64| usize::try_from(count).unwrap_or_default();
+        // Of more a base is refused, and not before these stand in it.
+        let count = |count: i64| usize::try_from(count.min(MAX_TEETH)).unwrap_or_default();
         Self {
             slots: count(parameters.installed),
             ring_spaces: count(parameters.ring_teeth),

@@ -49,6 +49,30 @@ fn the_stress_goes_as_the_root_of_the_torque() {
     assert!((derivative / (number(&of["value"]) / 40.0) - 1.0).abs() < 1e-8, "{of}");
 }
 
+/// One of them, of 10¹⁵ spaces of the ring, ended the process: a number was set aside for each before the count was looked at.
+#[test]
+fn a_base_of_a_count_that_no_drive_has_is_refused_before_its_items_deviate() {
+    let normal = json!({ "distribution": "normal", "sigma": 3.0 });
+    let of_slots = with(&paper(), "/drive/ring", json!({}));
+    for (base, deviation, field) in [
+        (with(&paper(), "/drive/ring/teeth", json!(1e15)), "ring_space_um", "/drive/ring/teeth"),
+        (with(&paper(), "/drive/teeth/installed", json!(1e15)), "slot_wall_um", "/drive/teeth/installed"),
+        (with(&of_slots, "/drive/teeth/count", json!(1e15)), "tooth_radius_um", "/drive/teeth/count"),
+        (
+            with(
+                &paper(),
+                "/drive/wave_generator",
+                json!({ "kind": "harmonic_path", "lobes": 1e15, "mean_path_radius_mm": 57.0, "amplitude_mm": 1.0 }),
+            ),
+            "wave_generator_lobe_um",
+            "/drive/wave_generator/lobes",
+        ),
+    ] {
+        let study = json!({ "study": "tolerance", "base": base, "deviations": { deviation: normal }, "quantities": [], "samples": 10 });
+        assert_eq!(faulty(&study), (format!("/base{field}"), "out_of_range".into()));
+    }
+}
+
 #[test]
 fn a_count_has_differences_and_one_that_is_impossible_has_none() {
     let base = with(&paper(), "/drive/ring", json!({}));

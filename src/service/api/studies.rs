@@ -62,6 +62,7 @@ pub async fn quantities() -> Json<QuantitiesAnswer> {
         (status = 200, description = "The study does not run any more; with its result, as far as it has come.", body = StudyResource),
         (status = 202, description = "It runs; `Location` says where it stands.", body = StudyResource, headers(("Location" = String, description = "The study."))),
         Problems,
+        (status = 404, description = "It was forgotten before it was answered: others took its room, or deleted it. Ask again.", body = Problem, content_type = "application/problem+json"),
         (status = 501, description = "This is one of several replicas that share no store.", body = Problem, content_type = "application/problem+json")
     )
 )]
