@@ -145,6 +145,14 @@ mod tests {
     const LONG: Duration = Duration::from_secs(2);
     const SHORT: Duration = Duration::from_millis(5);
 
+    /// A turn that takes so long.
+    async fn step(turns: &Turns, had: &mut Had, took: Duration) {
+        let turn = turns.take(had).await;
+        tokio::time::sleep(took).await;
+        turns.note(had, took);
+        drop(turn);
+    }
+
     /// A batch of one line waited 44 s behind fifteen of slow ones.
     #[tokio::test(start_paused = true)]
     async fn who_comes_with_little_to_do_waits_for_a_step_and_not_for_one_of_each() {
@@ -154,10 +162,7 @@ mod tests {
             tokio::spawn(async move {
                 let mut had = Had::default();
                 loop {
-                    let turn = turns.take(&had).await;
-                    tokio::time::sleep(LONG).await;
-                    turns.note(&mut had, LONG);
-                    drop(turn);
+                    step(&turns, &mut had, LONG).await;
                 }
             })
         });
@@ -205,23 +210,20 @@ mod tests {
         }
     }
 
-    /// Where nothing held `even` near those who always want turns, those of short steps had a third of the time.
+    /// Where nothing held `even` near those who always want turns, those of short steps had a fifth of the time of others.
     #[tokio::test(start_paused = true)]
     async fn who_has_short_steps_has_as_much_of_the_time_as_who_has_long_ones_though_others_come_and_go() {
         let turns = Turns::new(1);
-        let steps = [500, 500, 500, 5, 5, 5].map(Duration::from_millis);
-        let times = steps.map(|step| {
+        let lengths = [500, 500, 500, 5, 5, 5].map(Duration::from_millis);
+        let times = lengths.map(|length| {
             let turns = turns.clone();
             let time = Arc::new(Mutex::new(Duration::ZERO));
             let counted = Arc::clone(&time);
             let runs = tokio::spawn(async move {
                 let mut had = Had::default();
                 loop {
-                    let turn = turns.take(&had).await;
-                    tokio::time::sleep(step).await;
-                    turns.note(&mut had, step);
-                    *counted.lock() += step;
-                    drop(turn);
+                    step(&turns, &mut had, length).await;
+                    *counted.lock() += length;
                 }
             });
             (time, runs)
@@ -229,13 +231,7 @@ mod tests {
         for _ in 0..200 {
             tokio::time::sleep(LONG).await;
             let turns = turns.clone();
-            tokio::spawn(async move {
-                let mut had = Had::default();
-                let turn = turns.take(&had).await;
-                tokio::time::sleep(LONG / 2).await;
-                turns.note(&mut had, LONG / 2);
-                drop(turn);
-            });
+            tokio::spawn(async move { step(&turns, &mut Had::default(), LONG / 2).await });
         }
         let times = times.map(|(time, runs)| {
             runs.abort();
