@@ -593,12 +593,18 @@ impl Studies {
                 kept
             }
         };
+        self.is_asked_for(&kept).await;
+        Ok(Some(kept))
+    }
+
+    /// Keeps a stored study from expiring, for somebody who asks for it, or still listens.
+    pub async fn is_asked_for(&self, kept: &Kept) {
+        let Keeping::Store { store, .. } = &self.keeping else { return };
         // By one, and until it is next looked at: who reads must not wait for others' writes.
         if self.is_to_be_noted(kept.unasked_s.load(Ordering::Relaxed)) {
             kept.unasked_s.store(0, Ordering::Relaxed);
-            note_asked(store, id).await;
+            note_asked(store, &kept.id).await;
         }
-        Ok(Some(kept))
     }
 
     /// Whether it is to be noted that a stored study was asked for, which was not for so long.
@@ -800,36 +806,57 @@ impl Studies {
         if all.iter().filter(|kept| kept.is_running()).count() >= self.limits.max_concurrent_studies {
             return Err(self.too_many_studies());
         }
-        let kept = match known {
-            Some(kept) => kept,
+        let in_work = self.in_work(&study);
+        let working_bytes = study.working_bytes().saturating_mul(in_work);
+        let (kept, working) = match known {
+            Some(kept) => {
+                // These do not go for it.
+                let _its_rows = kept.rows.lock().clone();
+                self.make_room(&mut all, 0, working_bytes)?;
+                (kept, self.room.keep(working_bytes)?)
+            }
             None => {
                 let study = Arc::new(study);
-                let in_work = study.span().end.min(self.limits.max_concurrent_solves as u64);
-                let working_bytes = in_work.saturating_mul(study.working_bytes());
-                let rows = self.new_rows(&mut all, &study, view_bytes(&study).saturating_add(working_bytes))?;
+                let rows = self.new_rows(&mut all, &study, view_bytes(&study), working_bytes)?;
+                let working = self.room.keep(working_bytes)?;
                 let kept = Kept::new(study, Some(rows), 0, None);
                 all.push_back(Arc::clone(&kept));
-                kept
+                (kept, working)
             }
         };
         // Under the lock: nobody else lets it run as well, or forgets it meanwhile.
-        self.run(&kept);
+        self.run(&kept, in_work, working);
         Ok(kept)
     }
 
-    /// A place for what a study comes to, none of which is there yet, and so many bytes beside it. For it the oldest go, as many as it takes, and none where all
-    /// of them would be too few: in memory those that do not run are forgotten; of stored ones the rows can be read again.
+    /// How many pieces of a study are in work at once: one at least, and no more than take their part of the room.
+    fn in_work(&self, study: &Study) -> u64 {
+        let most = self.limits.max_unread_bytes / PART_OF_CHUNKS / study.working_bytes().max(1);
+        study.span().end.min(self.limits.max_concurrent_solves as u64).min(most.max(1))
+    }
+
+    /// A place for what a study comes to, none of which is there yet, and so many bytes beside it that stay with it; there is room for so many more while it runs.
     fn new_rows(
         &self,
         all: &mut VecDeque<Arc<Kept>>,
         study: &Arc<Study>,
         beside_bytes: u64,
+        working_bytes: u64,
     ) -> Result<Arc<Rows>, Problem> {
-        let is_stored = matches!(self.keeping, Keeping::Store { .. });
-        let most = self.limits.max_study_bytes;
         let of_made = if is_made_apart(study) { study.told_bytes() } else { 0 };
         let other_bytes = beside_bytes.saturating_add(of_made);
         let bytes = study.stored_bytes().saturating_add(other_bytes);
+        self.make_room(all, bytes, working_bytes)?;
+        let room = Mutex::new(self.room.keep(bytes)?);
+        let (gathered, gathering, making) = (Mutex::new(Gathered::new(study)), Default::default(), Mutex::default());
+        Ok(Arc::new(Rows { gathered, gathering, making, other_bytes, room }))
+    }
+
+    /// For what a study comes to, and what its work takes, the oldest go, as many as it takes, and none where all of them would be too few: in memory those that
+    /// do not run are forgotten; of stored ones the rows can be read again.
+    fn make_room(&self, all: &mut VecDeque<Arc<Kept>>, bytes: u64, working_bytes: u64) -> Result<(), Problem> {
+        let is_stored = matches!(self.keeping, Keeping::Store { .. });
+        let most = self.limits.max_study_bytes;
         let held: u64 = all.iter().filter_map(|kept| Some(kept.rows.lock().as_ref()?.bytes())).sum();
         let mut going: Vec<(Arc<Kept>, Arc<Rows>)> = Vec::new();
         let mut could_go = all
@@ -840,7 +867,8 @@ impl Studies {
             let left = held.saturating_sub(going.iter().map(|(_, rows)| rows.bytes()).sum());
             // One that was admitted when the bound was larger has all of it.
             let is_within = left + bytes.min(most) <= most;
-            if is_within && self.room.could_keep(bytes, going.iter().map(|(_, rows)| rows.room.lock())) {
+            let given_back = going.iter().map(|(_, rows)| rows.room.lock());
+            if is_within && self.room.could_keep(bytes.saturating_add(working_bytes), given_back) {
                 break;
             }
             match could_go.next() {
@@ -860,9 +888,7 @@ impl Studies {
             }
             drop(rows);
         }
-        let room = Mutex::new(self.room.keep(bytes)?);
-        let (gathered, gathering, making) = (Mutex::new(Gathered::new(study)), Default::default(), Mutex::default());
-        Ok(Arc::new(Rows { gathered, gathering, making, other_bytes, room }))
+        Ok(())
     }
 
     fn no_room(&self, bytes: u64) -> Problem {
@@ -886,7 +912,7 @@ impl Studies {
         match (here, &self.keeping) {
             (Some(rows), _) => Ok(rows),
             (None, Keeping::Store { .. }) => {
-                let rows = self.new_rows(&mut all, &kept.study, 0)?;
+                let rows = self.new_rows(&mut all, &kept.study, 0, 0)?;
                 *kept.rows.lock() = Some(Arc::clone(&rows));
                 Ok(rows)
             }
@@ -1077,7 +1103,8 @@ impl Studies {
         &self.closing
     }
 
-    fn run(&self, kept: &Arc<Kept>) {
+    /// Lets so many pieces of a study run at once, which take this room until they are over.
+    fn run(&self, kept: &Arc<Kept>, in_work: u64, working: room::Kept) {
         let cancelled = CancellationToken::new();
         *kept.cancelled.lock() = cancelled.clone();
         kept.looked_at.store(kept.here(|gathered| gathered.variants()), Ordering::Relaxed);
@@ -1092,7 +1119,8 @@ impl Studies {
                 starts.map(move |start| start..span.end.min(start + most))
             });
             let pieces = Arc::new(Pieces(Mutex::new(pieces.collect())));
-            let side_by_side = (0..limits.max_concurrent_solves).map(|_| run_pieces(&pool, &kept, &pieces, &cancelled));
+            let working = Arc::new(working);
+            let side_by_side = (0..in_work).map(|_| run_pieces(&pool, &kept, &pieces, &working, &cancelled));
             let chunks = try_join_all(side_by_side);
             let ended = tokio::select! {
                 // First: what is cancelled begins nothing more. It was said to stand so already.
@@ -1167,6 +1195,7 @@ async fn run_pieces(
     pool: &Pool,
     kept: &Arc<Kept>,
     pieces: &Arc<Pieces>,
+    working: &Arc<room::Kept>,
     cancelled: &CancellationToken,
 ) -> Result<(), Problem> {
     // One that runs has them.
@@ -1174,8 +1203,12 @@ async fn run_pieces(
     let (mut lane, mut rest, mut busy) = (Lane::default(), None, Duration::ZERO);
     while let Some(work) = rest.take().or_else(|| pieces.next(&kept.study)) {
         let room_bytes = work.room_bytes();
-        let (study, pieces) = (Arc::clone(&kept.study), Arc::clone(pieces));
-        let job = move |time: &mut Slice, stop: &AtomicBool| Come::of(work, &study, &pieces, time, stop);
+        let (study, pieces, working) = (Arc::clone(&kept.study), Arc::clone(pieces), Arc::clone(working));
+        let job = move |time: &mut Slice, stop: &AtomicBool| {
+            // A slice that nobody waits for any more still has it.
+            let _working = working;
+            Come::of(work, &study, &pieces, time, stop)
+        };
         let mut came = pool.run_variants(&mut lane, room_bytes, job).await?;
         counter!("toothwave_study_variants_total").increment(came.variants);
         busy += came.busy;

@@ -372,12 +372,16 @@ impl Store {
                 Ok(on!(connection, inner => sqlx::query_scalar(text).bind(unasked_for_s).fetch_all(inner).await)?)
             })
             .await?;
-        let mut gone = 0;
+        let (mut gone, mut refused) = (0, None);
         for id in ids {
-            // One that somebody computes yet does not keep the others.
-            gone += u64::from(self.forget_at_once(&id, Some(unasked_for)).await?);
+            // One that somebody computes yet does not keep the others, nor does one that the store refuses to delete.
+            match self.forget_at_once(&id, Some(unasked_for)).await {
+                Ok(is_gone) => gone += u64::from(is_gone),
+                Err(error) if error.leaves_open() => return Err(error),
+                Err(error) => refused = Some(error),
+            }
         }
-        Ok(gone)
+        refused.map_or(Ok(gone), Err)
     }
 
     /// How a study stands, where it is kept.

@@ -3,8 +3,9 @@
 use std::fs;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use futures_util::StreamExt as _;
 use futures_util::future::join_all;
 use serde_json::{Value, json};
 use sqlx::{Connection as _, SqliteConnection};
@@ -318,6 +319,33 @@ async fn who_reads_a_stored_study_in_whatever_way_keeps_it_from_expiring() {
         keeper.service.get(&place(&left)).await.refused(404, "not_found");
         keeper.end().await;
     }
+}
+
+/// Whoever only listened to one that nobody computed was told in the end that it is cancelled: it was forgotten.
+#[tokio::test]
+async fn who_listens_to_a_stored_study_keeps_it_from_expiring() {
+    let file = File::new();
+    let store = file.store().await;
+    // It is noted each second.
+    let expiry = Duration::ZERO;
+    let service = Service::keeping(LIMITS, Keeping::Store { store: store.clone(), expiry, parts: None });
+    let study = service.ask(&Question::post("/v1/studies", map(5).to_string())).await.json();
+    let (begun, id) = (Instant::now(), study["id"].as_str().unwrap());
+    let question = Question::of("GET", study["events_href"].as_str().unwrap());
+    let mut events = service.response(question.request()).await.into_body().into_data_stream();
+    let mut is_kept = false;
+    for _ in 0..100 {
+        events.next().await.unwrap().unwrap();
+        let unasked = store.look(id).await.unwrap().unwrap().unasked;
+        is_kept |= unasked + Duration::from_secs(2) < begun.elapsed();
+        if is_kept {
+            break;
+        }
+    }
+    assert!(is_kept, "who listened was not counted as asking");
+    drop(events);
+    service.app.studies.close();
+    service.app.studies.close_store().await;
 }
 
 /// Those that need a turn of computing for it wait for one; nobody waits for them.

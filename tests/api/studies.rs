@@ -254,6 +254,46 @@ async fn a_study_that_unread_answers_leave_no_room_makes_none_forgotten() {
     occupied.end().await;
 }
 
+/// What the work of a study with a long base takes was held until it was forgotten: of 64 KB with 16 solves all the room of a small service.
+#[tokio::test]
+async fn a_study_holds_room_for_its_work_while_that_goes_on_and_no_longer() {
+    let limits = Limits { max_concurrent_solves: 2, max_unread_bytes: 20 << 20, ..LIMITS };
+    let service = Service::within(limits);
+    let base = with(&shortest(), "/deviations", json!({ "ring_space_um": vec![0; 30_000] }));
+    let taken_bytes = || service.app.room.taken_bytes();
+    let occupied = async || [Occupied::by_one(&service.app.pool).await, Occupied::by_one(&service.app.pool).await];
+    let both = occupied().await;
+    let study = begun(&service, &map(&base, 5)).await.json();
+    let running_bytes = taken_bytes();
+    assert_eq!(deleted(&service, &place(&study)).await, 204);
+    for one in both {
+        one.end().await;
+    }
+    until("a cancelled study gives back what its work takes", || taken_bytes() < running_bytes / 2).await;
+    let both = occupied().await;
+    assert_eq!(begun(&service, &map(&base, 5)).await.json()["state"], "running");
+    assert_eq!(taken_bytes(), running_bytes, "it goes on");
+    for one in both {
+        one.end().await;
+    }
+    assert_eq!(waited_for(&service, &map(&base, 5)).await["state"], "done");
+    until("a done study gives back what its work takes", || taken_bytes() < running_bytes / 2).await;
+}
+
+/// One such study that ran took all the room from others.
+#[tokio::test]
+async fn pieces_that_take_much_are_worked_on_side_by_side_as_far_as_an_eighth_of_the_room_goes() {
+    let limits = Limits { max_concurrent_solves: 8, max_unread_bytes: 20 << 20, ..LIMITS };
+    let service = Service::within(limits);
+    let mut occupied = Vec::new();
+    for _ in 0..limits.max_concurrent_solves {
+        occupied.push(Occupied::by_one(&service.app.pool).await);
+    }
+    let base = with(&shortest(), "/deviations", json!({ "ring_space_um": vec![0; 30_000] }));
+    assert_eq!(begun(&service, &map(&base, 50)).await.json()["state"], "running");
+    assert!(service.app.room.taken_bytes() < limits.max_unread_bytes / 4, "{}", service.app.room.taken_bytes());
+}
+
 #[tokio::test]
 async fn a_study_beyond_its_time_says_so_and_goes_on_when_it_is_asked_for_again() {
     let service = Service::within(Limits { study_deadline_ms: 0, ..LIMITS });

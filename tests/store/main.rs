@@ -441,6 +441,26 @@ async fn a_study_says_how_long_nobody_has_asked_for_it_and_one_that_is_asked_for
     assert_eq!(store.find(&left.id).await.unwrap(), None);
 }
 
+/// The first that could not be deleted kept all that came after it, for ever.
+#[tokio::test]
+async fn a_study_that_cannot_be_deleted_does_not_keep_others_from_expiring() {
+    let file = File::new();
+    let studies = [study("one", 1), study("two", 1), study("three", 1)];
+    let store = Store::open(&file.address()).await.unwrap();
+    for study in &studies {
+        store.create(study).await.unwrap();
+    }
+    store.close().await;
+    let mut other = SqliteConnection::connect(&format!("sqlite:{}", file.0.display())).await.unwrap();
+    let stays = "CREATE TRIGGER stays BEFORE DELETE ON studies WHEN old.id LIKE 'one%' BEGIN SELECT RAISE(ABORT, 'it stays'); END";
+    sqlx::raw_sql(stays).execute(&mut other).await.unwrap();
+    other.close().await.unwrap();
+    let store = unasked_for(&file, 1000).await;
+    assert!(store.expire(Duration::from_secs(500)).await.unwrap_err().to_string().contains("it stays"));
+    let [one, two, three] = studies.each_ref().map(|study| store.find(&study.id));
+    assert!(one.await.unwrap().is_some() && two.await.unwrap().is_none() && three.await.unwrap().is_none());
+}
+
 #[tokio::test]
 async fn what_was_kept_in_a_file_is_there_after_its_process() {
     let file = File::new();

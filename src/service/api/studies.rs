@@ -179,16 +179,20 @@ pub async fn events(State(app): State<Arc<App>>, id: Result<Path<String>, PathRe
         Ok(kept) => kept,
         Err(problem) => return problem.into_response(),
     };
-    let closing = app.studies.closing().clone();
     // How it stands at once, and then whenever that changes.
     let events = stream::unfold(Some((kept, None)), move |next| {
-        let closing = closing.clone();
+        let app = Arc::clone(&app);
         async move {
             let (kept, changed) = next?;
             if let Some(changed) = changed {
+                let next_look = async {
+                    changed.await;
+                    tokio::time::sleep(PAUSE).await;
+                    app.studies.is_asked_for(&kept).await;
+                };
                 tokio::select! {
-                    () = async { changed.await; tokio::time::sleep(PAUSE).await } => {}
-                    () = closing.cancelled() => return None,
+                    () = next_look => {}
+                    () = app.studies.closing().cancelled() => return None,
                 }
             }
             // Subscribed before it is looked at, so that nothing is missed.
