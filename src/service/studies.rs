@@ -243,7 +243,7 @@ pub struct StudyResource {
     pub state: StudyState,
     /// Variants that it looks at.
     pub variants: u64,
-    /// Variants that were looked at.
+    /// Variants that were looked at: of a search also those that it judges once more in the end, at true peaks.
     pub looked_at: u64,
     /// Of those that the result holds, the ones without an answer.
     pub impossible: u64,
