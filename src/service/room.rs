@@ -2,7 +2,6 @@
 //! many are asked for, and however slowly they are read, they must not fill the memory.
 
 use std::collections::BTreeSet;
-use std::ops::Deref;
 use std::pin::pin;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Weak};
@@ -101,6 +100,11 @@ impl Kept {
     /// As much as it was asked to hold.
     pub const fn bytes(&self) -> u64 {
         self.0.bytes
+    }
+
+    /// As much of the room as it is.
+    pub fn held_bytes(&self) -> u64 {
+        self.0.held_bytes()
     }
 }
 
@@ -267,11 +271,10 @@ impl Room {
         Ok(kept)
     }
 
-    /// Whether so many bytes could be kept once those have given back what they hold.
-    pub fn could_keep(&self, bytes: u64, given_back: impl IntoIterator<Item: Deref<Target = Kept>>) -> bool {
-        let given_back: u64 = given_back.into_iter().map(|kept| u64::from(kept.0.permits())).sum();
+    /// Whether so many bytes could be kept once so many that are held were given back.
+    pub fn could_keep(&self, bytes: u64, given_back_bytes: u64) -> bool {
         bytes <= SMALL_BYTES
-            || self.free.available_permits() as u64 + given_back >= u64::from(self.permits_to_keep(bytes))
+            || self.free.available_permits() as u64 + given_back_bytes / 1024 >= u64::from(self.permits_to_keep(bytes))
     }
 
     fn permits_to_keep(&self, bytes: u64) -> u32 {

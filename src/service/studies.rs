@@ -29,7 +29,7 @@ use crate::config::Limits;
 use crate::frozen::{self, view_bytes};
 use crate::parts::Parts;
 use crate::problem::{Problem, ProblemCode};
-use crate::room::{self, Room};
+use crate::room::{self, NoRoom, Room};
 use crate::worker::{Capacity, PART_OF_CHUNKS, Workers, milliseconds, slice};
 
 /// Between two looks at how a stored study stands.
@@ -53,8 +53,8 @@ const ENDLESS: Duration = Duration::from_secs(100 * 365 * 86_400);
 /// For so long a server is told that nobody needs it any more.
 const CLOSE: Duration = Duration::from_millis(300);
 
-/// Of what is read of a store at once.
-const READ_BYTES: u64 = 16 << 20;
+/// Of what is read of a store at once: it is unpacked beside that.
+const READ_BYTES: u64 = 4 << 20;
 
 /// Rows of which an answer takes longer than some milliseconds.
 const LARGE_BYTES: u64 = 1 << 20;
@@ -219,6 +219,8 @@ pub struct Made {
 #[derive(Debug, Clone)]
 struct Making {
     made: Shared<BoxFuture<'static, Result<Arc<Made>, Problem>>>,
+    /// Nobody wants it any more when the last of these is gone.
+    _wanted: Arc<()>,
     /// How often the study had come to stand otherwise when it was begun: more may have come since than is in it.
     changes: u64,
 }
@@ -351,7 +353,8 @@ impl Kept {
 
     /// Whether who asks now is served by an answer that is made, or was.
     fn serves(&self, making: &Making) -> bool {
-        match making.made.peek() {
+        // Where nobody has waited to its end nobody knows yet that it is made.
+        match making.made.clone().now_or_never() {
             None => self.is_running() || making.changes == self.state.borrow().changes,
             Some(Ok(made)) => made.is_whole || (self.is_running() && made.at.elapsed() < FRESH),
             Some(Err(_)) => false,
@@ -389,13 +392,13 @@ impl Kept {
         let mut wanted = store.chunks_done(&cut).await?;
         {
             let gathered = rows.gathered.lock();
-            wanted.retain(|chunk| gathered.lacks(*chunk));
+            wanted.retain(|(chunk, _)| gathered.lacks(*chunk));
         }
-        let a_part_bytes = (self.study.stored_bytes() / self.study.chunks().max(1)).max(1);
-        let at_once = usize::try_from(READ_BYTES / a_part_bytes).unwrap_or(usize::MAX).max(1);
-        for chunks in wanted.chunk_by(|one, next| one + 1 == *next).flat_map(|run| run.chunks(at_once)) {
-            let last = chunks.last().unwrap_or(&chunks[0]);
-            let stored = store.parts(&cut, chunks[0], *last).await?;
+        for (first, last) in self.read_together(&wanted) {
+            if pool.memory().is_scarce() {
+                return Err(NoRoom::Scarce.into());
+            }
+            let stored = store.parts(&cut, first, last).await?;
             let cut = cut.clone();
             let unseal = move |_: &AtomicBool| {
                 let part = |stored: &toothwave_store::Kept| {
@@ -404,7 +407,12 @@ impl Kept {
                 stored.iter().map(part).collect::<Result<Vec<_>, Problem>>()
             };
             let parts = pool.run_in_turn(unseal).await?;
-            rows.add(|gathered| parts.into_iter().for_each(|(chunk, part)| gathered.add(chunk, part)))?;
+            let added = rows.add(|gathered| parts.into_iter().for_each(|(chunk, part)| gathered.add(chunk, part)));
+            if added.is_err() {
+                // They are in the store, and here without room for them.
+                *rows.gathered.lock() = Gathered::new(&self.study);
+            }
+            added?;
         }
         // Of one that was forgotten meanwhile there are fewer, or none, and nothing else says so.
         let is_whole = rows.gathered.lock().is_complete();
@@ -421,6 +429,25 @@ impl Kept {
             }
         }
         Ok(())
+    }
+
+    /// The first and the last of chunks without a gap that are read together, of those that are wanted, each with its length.
+    fn read_together(&self, wanted: &[(u64, u64)]) -> Vec<(u64, u64)> {
+        let expected_bytes = self.study.stored_bytes() / self.study.chunks().max(1);
+        let mut runs: Vec<(u64, u64)> = Vec::new();
+        let mut bytes = 0;
+        for &(chunk, length) in wanted {
+            let part_bytes = length.max(expected_bytes);
+            bytes += part_bytes;
+            match runs.last_mut() {
+                Some((_, last)) if *last + 1 == chunk && bytes <= READ_BYTES => *last = chunk,
+                _ => {
+                    bytes = part_bytes;
+                    runs.push((chunk, chunk));
+                }
+            }
+        }
+        runs
     }
 
     fn forgotten(&self) -> Problem {
@@ -494,6 +521,22 @@ fn pause_after(look: Duration, least: Duration) -> Duration {
 async fn note_asked(store: &Store, id: &str) {
     if let Err(error) = store.touch(id).await {
         tracing::warn!(study = id, %error, "that the study was asked for could not be noted");
+    }
+}
+
+/// Cancels a stored study. Where the store was silent it may be cancelled all the same, and who asked once more would forget it.
+///
+/// # Errors
+/// Where the store does not answer.
+async fn cancelled(store: &Store, id: &str) -> Result<(), Problem> {
+    let Err(error) = store.cancel(id).await else { return Ok(()) };
+    match store.look(id).await {
+        Ok(Some(stored)) if !stored.is_cancelled => Err(error.into()),
+        Ok(_) => Ok(()),
+        Err(_) => {
+            let detail = "the studies' store does not answer, and the study may be cancelled by now: a second DELETE would forget it then, so look how it stands before";
+            Err(Problem { detail: detail.into(), ..error.into() })
+        }
     }
 }
 
@@ -647,11 +690,13 @@ impl Studies {
         }
         all.retain(|other| other.id != kept.id);
         let most_bytes = self.limits.max_study_bytes.min(VIEWS_BYTES);
-        while all.iter().map(|other| other.bytes).sum::<u64>() + kept.bytes > most_bytes
-            && let Some(oldest) = all.iter().position(|other| !other.is_running())
-        {
-            drop(all.remove(oldest));
-        }
+        let bytes = all.iter().map(|other| other.bytes).sum::<u64>() + kept.bytes;
+        let mut beyond_bytes = bytes.saturating_sub(most_bytes);
+        all.retain(|other| {
+            let goes = beyond_bytes > 0 && !other.is_running();
+            beyond_bytes -= if goes { other.bytes.min(beyond_bytes) } else { 0 };
+            !goes
+        });
         all.push_back(Arc::clone(&kept));
         kept
     }
@@ -857,22 +902,28 @@ impl Studies {
     fn make_room(&self, all: &mut VecDeque<Arc<Kept>>, bytes: u64, working_bytes: u64) -> Result<(), Problem> {
         let is_stored = matches!(self.keeping, Keeping::Store { .. });
         let most = self.limits.max_study_bytes;
-        let held: u64 = all.iter().filter_map(|kept| Some(kept.rows.lock().as_ref()?.bytes())).sum();
+        let mut left: u64 = all.iter().filter_map(|kept| Some(kept.rows.lock().as_ref()?.bytes())).sum();
+        let mut given_back_bytes = 0;
         let mut going: Vec<(Arc<Kept>, Arc<Rows>)> = Vec::new();
         let mut could_go = all
             .iter()
             .filter(|kept| is_stored || !kept.is_running())
             .filter_map(|kept| Some((Arc::clone(kept), kept.unread_rows()?)));
         loop {
-            let left = held.saturating_sub(going.iter().map(|(_, rows)| rows.bytes()).sum());
-            // One that was admitted when the bound was larger has all of it.
-            let is_within = left + bytes.min(most) <= most;
-            let given_back = going.iter().map(|(_, rows)| rows.room.lock());
-            if is_within && self.room.could_keep(bytes.saturating_add(working_bytes), given_back) {
+            // One that was admitted when the bound was larger has all of it; what is kept already is.
+            let is_within = bytes == 0 || left + bytes.min(most) <= most;
+            if is_within && self.room.could_keep(bytes.saturating_add(working_bytes), given_back_bytes) {
                 break;
             }
             match could_go.next() {
-                Some(next) => going.push(next),
+                Some((kept, rows)) => {
+                    {
+                        let room = rows.room.lock();
+                        left = left.saturating_sub(room.bytes());
+                        given_back_bytes += room.held_bytes();
+                    }
+                    going.push((kept, rows));
+                }
                 None if is_within => {
                     going.clear();
                     break;
@@ -881,12 +932,11 @@ impl Studies {
             }
         }
         drop(could_go);
-        for (kept, rows) in going {
+        for (kept, _) in &going {
             *kept.rows.lock() = None;
-            if !is_stored {
-                Self::let_go(all, &kept);
-            }
-            drop(rows);
+        }
+        if !is_stored && !going.is_empty() {
+            all.retain(|kept| kept.rows.lock().is_some());
         }
         Ok(())
     }
@@ -938,7 +988,7 @@ impl Studies {
         let (here, stored) = (self.find_here(id), store.look(id).await?);
         let is_running = stored.as_ref().is_some_and(Stored::is_running);
         if is_running {
-            store.cancel(id).await?;
+            cancelled(store, id).await?;
         } else if stored.is_some() {
             store.forget(id).await?;
         }
@@ -996,6 +1046,8 @@ impl Studies {
 
     fn making(&self, kept: &Arc<Kept>, rows: &Arc<Rows>) -> Making {
         let changes = kept.state.borrow().changes;
+        let wanted = Arc::new(());
+        let is_wanted = Arc::downgrade(&wanted);
         let (kept, rows, pool, room) = (Arc::clone(kept), Arc::clone(rows), self.pool.clone(), self.room.clone());
         let store = match &self.keeping {
             Keeping::Store { store, .. } => Some(store.clone()),
@@ -1005,7 +1057,15 @@ impl Studies {
             if let Some(store) = &store {
                 kept.gather(&rows, store, &pool).await?;
             }
+            // Who waits for a turn keeps nothing from being forgotten.
+            let (kept_then, rows_then) = (Arc::downgrade(&kept), Arc::downgrade(&rows));
+            drop((kept, rows));
             let make = move || {
+                let (Some(kept), Some(rows), Some(_wanted)) =
+                    (kept_then.upgrade(), rows_then.upgrade(), is_wanted.upgrade())
+                else {
+                    return Err(Problem::internal(&"nobody wants this answer any more"));
+                };
                 let _reserved = room.reserve(kept.study.stored_bytes())?;
                 let gathered = kept.gathered(&rows);
                 let (answer, is_whole) = (gathered.answer(), gathered.is_complete());
@@ -1015,7 +1075,7 @@ impl Studies {
         };
         let made = tokio::spawn(made.in_current_span());
         let made = made.map(|joined| joined.unwrap_or_else(|error| Err(Problem::internal(&error)))).boxed().shared();
-        Making { made, changes }
+        Making { made, _wanted: wanted, changes }
     }
 
     /// What a store is served by in this process, until the service is told to stop: the workers where it is a file, and whoever forgets old studies and counts.
@@ -1256,7 +1316,7 @@ mod tests {
         let kept = Kept::new(Arc::new(study), None, 0, None);
         let making = || {
             let made = futures_util::future::pending().boxed().shared();
-            Making { made, changes: kept.state.borrow().changes }
+            Making { made, _wanted: Arc::default(), changes: kept.state.borrow().changes }
         };
         let of_running = making();
         kept.stand(StudyState::Running, None);

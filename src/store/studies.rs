@@ -309,7 +309,7 @@ impl Store {
         self.once("UPDATE studies SET asked_at_s = unixepoch() WHERE id = $1", id).await
     }
 
-    /// Forgets a study with all that it has come to. Workers that have chunks of it in their hands are waited for, some seconds, and not by
+    /// Forgets a study that does not run, with all that it has come to. Workers that have chunks of it in their hands are waited for, some seconds, and not by
     /// holding a connection: one that stands still keeps its chunk until its lease is over.
     ///
     /// # Errors
@@ -321,8 +321,8 @@ impl Store {
                 return Err(StoreError::InWork);
             }
             tokio::time::sleep(LOOK_AGAIN).await;
-            if self.look(id).await?.is_some_and(|standing| standing.is_running()) {
-                // Somebody wants it again.
+            if self.look(id).await?.is_none_or(|standing| standing.is_running()) {
+                // Another has forgotten it, or wants it again.
                 break;
             }
         }
@@ -453,18 +453,18 @@ impl Store {
         .await
     }
 
-    /// The numbers of the chunks that have a result.
+    /// The numbers of the chunks that have a result, each with its length.
     ///
     /// # Errors
     /// As [`Self::create`].
-    pub async fn chunks_done(&self, Cut { id, chunk_variants }: &Cut) -> Result<Vec<u64>, StoreError> {
+    pub async fn chunks_done(&self, Cut { id, chunk_variants }: &Cut) -> Result<Vec<(u64, u64)>, StoreError> {
         self.with(PATIENCE, async |connection| {
-            let text = "SELECT chunk FROM results WHERE study = $1 AND EXISTS (SELECT 1 FROM studies WHERE id = $1 AND chunk_variants = $2)
+            let text = "SELECT chunk, CAST(octet_length(part) AS BIGINT) FROM results WHERE study = $1 AND EXISTS (SELECT 1 FROM studies WHERE id = $1 AND chunk_variants = $2)
                 ORDER BY chunk";
-            let rows: Vec<i64> = on!(connection, inner => {
-                sqlx::query_scalar(text).bind(id).bind(stored(*chunk_variants)).fetch_all(inner).await
+            let rows: Vec<(i64, i64)> = on!(connection, inner => {
+                sqlx::query_as(text).bind(id).bind(stored(*chunk_variants)).fetch_all(inner).await
             })?;
-            Ok(rows.into_iter().map(read).collect())
+            Ok(rows.into_iter().map(|(chunk, bytes)| (read(chunk), read(bytes))).collect())
         })
         .await
     }
@@ -558,8 +558,15 @@ async fn forget_within(
     id: &str,
     unwanted_for: Option<Duration>,
 ) -> Result<bool, StoreError> {
-    let close = "UPDATE studies SET opened = chunks WHERE id = $1";
-    on!(connection, inner => sqlx::query(close).bind(id).execute(inner).await.map(|_| ()))?;
+    // Who was told that it does not run any more may have been overtaken by one who lets it go on.
+    let close = match unwanted_for {
+        None => concat!("UPDATE studies SET opened = chunks WHERE id = $1 AND NOT (", waits!(), ")"),
+        Some(_) => "UPDATE studies SET opened = chunks WHERE id = $1",
+    };
+    let is_closed = on!(connection, inner => sqlx::query(close).bind(id).execute(inner).await.map(|done| done.rows_affected() == 1))?;
+    if !is_closed {
+        return Ok(false);
+    }
     if let Some(time) = unwanted_for {
         let text = concat!("SELECT COUNT(*) FROM studies WHERE ", has_expired!(), " AND id = $2");
         let unwanted_s = stored(time.as_secs());

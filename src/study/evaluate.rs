@@ -18,11 +18,11 @@ use utoipa::ToSchema;
 use crate::quantity::{Loaded, OUTER_DIAMETER_MM, Quantity, Takes, Variant};
 
 /// Why a variant has no answer.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, ToSchema)]
 pub struct Reason {
     /// The code of the field at fault, of the problem where no field is, or `panic`.
     pub code: String,
-    /// The field at fault, empty where none is.
+    /// The field at fault, of a list's entries the list; empty where none is.
     pub pointer: String,
 }
 
@@ -176,11 +176,19 @@ impl Evaluator {
 impl From<NoAnswer> for Refusal {
     fn from(NoAnswer { code, detail, errors }: NoAnswer) -> Self {
         let reason = match errors.first() {
-            Some(error) => Reason { code: word(&error.code), pointer: error.pointer.clone() },
+            Some(error) => Reason { code: word(&error.code), pointer: without_entry(&error.pointer).into() },
             None => Reason { code: word(&code), pointer: String::new() },
         };
         let detail = errors.into_iter().next().map_or(detail, |error| error.detail);
         Self { reason, detail }
+    }
+}
+
+/// A field without the number of its entry: of a drive with thousands of teeth each would be a reason of its own.
+fn without_entry(pointer: &str) -> &str {
+    match pointer.rsplit_once('/') {
+        Some((list, entry)) if entry.parse::<u64>().is_ok() => list,
+        _ => pointer,
     }
 }
 

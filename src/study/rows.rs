@@ -1,6 +1,7 @@
 //! Variants in rows: what maps, sensitivities and tolerances have in common. Each variant follows from its number alone.
 
-use std::collections::BTreeMap;
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, HashMap};
 use std::iter;
 use std::mem;
 use std::ops::{Range, RangeInclusive};
@@ -53,6 +54,14 @@ pub(crate) struct RefusalNoted {
 }
 
 impl RefusalNoted {
+    /// Counts more of its kind.
+    fn add(&mut self, first: u64, count: u64, detail: &str) {
+        self.count += count;
+        if first < self.first {
+            (self.first, self.detail) = (first, detail.into());
+        }
+    }
+
     /// About what it takes in memory.
     pub(crate) fn bytes(&self) -> usize {
         let Reason { code, pointer } = &self.reason;
@@ -237,10 +246,17 @@ impl RowsParts<'_> {
 
     /// Every reason with how many variants have it.
     pub(crate) fn refusals(&self) -> Vec<RefusalNoted> {
-        let mut refusals = Vec::new();
+        let mut refusals: Vec<RefusalNoted> = Vec::new();
+        // There may be as many as inputs, in each of a hundred thousand parts.
+        let mut places = HashMap::new();
         for noted in self.0.iter().flat_map(|part| &part.refusals) {
-            let refusal = Refusal { reason: noted.reason.clone(), detail: noted.detail.clone() };
-            note(&mut refusals, noted.first, noted.count, refusal);
+            match places.entry(&noted.reason) {
+                Entry::Vacant(place) => {
+                    place.insert(refusals.len());
+                    refusals.push(noted.clone());
+                }
+                Entry::Occupied(place) => refusals[*place.get()].add(noted.first, noted.count, &noted.detail),
+            }
         }
         refusals
     }
@@ -252,11 +268,7 @@ pub(crate) fn note(refusals: &mut Vec<RefusalNoted>, first: u64, count: u64, ref
         refusals.push(RefusalNoted { reason: refusal.reason, detail: refusal.detail.clone(), first, count: 0 });
         refusals.len() - 1
     });
-    let noted = &mut refusals[index];
-    noted.count += count;
-    if first < noted.first {
-        (noted.first, noted.detail) = (first, refusal.detail);
-    }
+    refusals[index].add(first, count, &refusal.detail);
     u32::try_from(index).unwrap_or(u32::MAX)
 }
 
@@ -303,7 +315,7 @@ impl RowsWork {
 pub struct ReasonAnswer {
     /// The code of the field at fault, or of the problem where no field is.
     pub code: String,
-    /// The field at fault, by JSON pointer into the design; empty where none is.
+    /// The field at fault, by JSON pointer into the design, of a list's entries the list; empty where none is.
     pub pointer: String,
     /// Variants that have no answer for this reason.
     pub variants: u64,

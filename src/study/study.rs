@@ -28,7 +28,7 @@ use crate::search::{Island, IslandPart, Search, SearchAnswer};
 use crate::sensitivity::{Sensitivity, SensitivityAnswer};
 use crate::table::{CELL_BYTES, Table};
 use crate::tolerance::{Tolerance, ToleranceAnswer};
-use crate::variant::{Domain, Template};
+use crate::variant::{Domain, Template, Variable};
 
 /// What studies are computed at most.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -457,23 +457,37 @@ fn require_possible_ranges(
     template: &Template,
     limits: &question::Limits,
 ) -> Result<(), NoAnswer> {
-    for (index, variable) in template.variables().iter().enumerate() {
-        let (Domain::Real { min, max } | Domain::Whole { min, max }) = variable.domain else { continue };
-        if OF_THE_DRIVE.contains(&variable.pointer.as_str()) {
-            continue;
-        }
-        // Nothing of it where its largest value is too small, or its least too large.
-        for (end, value, is_below) in [("max", max, true), ("min", min, false)] {
-            let Some(example) = template.example_at(index, value) else { continue };
-            let errors = check(quantities, &example, limits).err().map_or_else(Vec::new, |refused| refused.errors);
-            let is_outside = |error: &&FieldError| {
-                error.pointer == variable.pointer
-                    && error.code == FieldCode::OutOfRange
-                    && error.limit.is_some_and(|limit| (value < limit) == is_below)
-            };
-            if let Some(FieldError { detail, limit, .. }) = errors.iter().find(is_outside) {
-                let at = format!("{}/{end}", template.blamed(&variable.pointer));
-                return Err(beyond(&at, FieldCode::OutOfRange, detail, value, limit.unwrap_or(value)));
+    let errors_of =
+        |example: &Tree| check(quantities, example, limits).err().map_or_else(Vec::new, |refused| refused.errors);
+    // Nothing of a range where its largest value is too small, or its least too large.
+    for (end, is_below) in [("max", true), ("min", false)] {
+        let value = |variable: &Variable| match variable.domain {
+            Domain::Real { min, max } | Domain::Whole { min, max } => Some(if is_below { max } else { min }),
+            Domain::OneOf(_) => None,
+        };
+        let is_outside = |error: &FieldError, pointer: &str, value: f64| {
+            error.pointer == pointer
+                && error.code == FieldCode::OutOfRange
+                && error.limit.is_some_and(|limit| (value < limit) == is_below)
+        };
+        // All of them at once, as there may be thousands; then by itself what is said to be outside.
+        for example in template.examples_at(value) {
+            for error in errors_of(&example) {
+                let free = template.variables().iter().enumerate();
+                let mut free = free.filter(|(_, variable)| variable.pointer == error.pointer);
+                let Some((index, variable)) = free.next() else { continue };
+                let Some(value) = value(variable).filter(|&value| is_outside(&error, &variable.pointer, value)) else {
+                    continue;
+                };
+                let Some(alone) = template.example_at(index, value) else { continue };
+                let errors = errors_of(&alone);
+                let found = errors.iter().find(|error| is_outside(error, &variable.pointer, value));
+                if let Some(FieldError { detail, limit, .. }) = found
+                    && !OF_THE_DRIVE.contains(&variable.pointer.as_str())
+                {
+                    let at = format!("{}/{end}", template.blamed(&variable.pointer));
+                    return Err(beyond(&at, FieldCode::OutOfRange, detail, value, limit.unwrap_or(value)));
+                }
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Variants of a document: what is free in it, over which values, and the document with values put in.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use toothwave_calculation::design::Design;
@@ -104,6 +104,10 @@ impl Template {
     /// Where a document cannot be read, whatever the values; where a range is empty, or no document takes a free field.
     pub(crate) fn new(base: &Tree, free: &[(String, Asked)], list: &'static str) -> Result<Self, NoAnswer> {
         let at = |pointer: &str| format!("/{list}/{}", escaped(pointer));
+        let above = |pointer: &str| -> Vec<String> {
+            pointer.match_indices('/').skip(1).map(|(end, _)| pointer[..end].to_owned()).collect()
+        };
+        let all_above: BTreeSet<String> = free.iter().flat_map(|(pointer, _)| above(pointer)).collect();
         let mut variables = Vec::new();
         for (pointer, asked) in free {
             let Some(path) = path(pointer) else {
@@ -112,9 +116,8 @@ impl Template {
                 );
                 return Err(fault(&at(pointer), FieldCode::UnknownField, detail));
             };
-            let is_below = |(other, _): &&(String, Asked)| is_within(other, pointer) && other != pointer;
             let has_fields = matches!(base.at(&path), Some(Tree::Object(_) | Tree::Array(_)));
-            if has_fields || free.iter().any(|other| is_below(&other)) {
+            if has_fields || all_above.contains(pointer) {
                 let detail = format!("`{pointer}` is no value but holds fields: name one of these");
                 return Err(fault(&at(pointer), FieldCode::WrongType, detail));
             }
@@ -159,8 +162,9 @@ impl Template {
             );
             return Err(fault(&format!("/{list}"), FieldCode::OutOfRange, detail));
         }
+        let mut left_out = BTreeMap::new();
         for combination in 0..combinations {
-            let form = template.form(base, combination).map_err(|mut found| {
+            let form = template.form(base, combination, &mut left_out).map_err(|mut found| {
                 if found.code == FieldCode::MissingField {
                     found.detail = format!("{}: neither the base has it nor `{list}`", found.detail);
                 }
@@ -183,12 +187,25 @@ impl Template {
             })?;
             Arc::make_mut(&mut template.forms).push(form);
         }
-        for (index, variable) in Arc::make_mut(&mut template.variables).iter_mut().enumerate() {
-            let Some(form) = template.forms.iter().find(|form| form.takes[index]) else {
+        template.require_possible_values_above(base)?;
+        let is_taken = |place: &[String]| template.forms.iter().any(|form| form.tree.at(place).is_some());
+        let is_unknown = |place: &[String]| base.at(place).is_some() && !is_taken(place);
+        if let Some(found) = left_out.into_iter().find_map(|(place, found)| is_unknown(&place).then_some(found)) {
+            return Err(fault(&format!("/base{}", found.pointer), found.code, found.detail));
+        }
+        let mut of_forms = vec![Vec::new(); template.forms.len()];
+        for (index, variable) in template.variables.iter().enumerate() {
+            let Some(form) = template.forms.iter().position(|form| form.takes[index]) else {
                 let detail = format!("no variant takes `{}`", variable.pointer);
                 return Err(fault(&at(&variable.pointer), FieldCode::UnknownField, detail));
             };
-            variable.domain = form.domain(variable);
+            of_forms[form].push(index);
+        }
+        let variables: &mut Vec<Variable> = Arc::make_mut(&mut template.variables);
+        for (form, indices) in template.forms.iter().zip(of_forms) {
+            form.find_whole(variables, &indices);
+        }
+        for variable in template.variables.iter() {
             if let Domain::Whole { min, max } = variable.domain
                 && min > max
             {
@@ -201,6 +218,33 @@ impl Template {
             form.put_least(&template.variables);
         }
         Ok(template)
+    }
+
+    /// That where fields are put in the place of a value, as of one stress for all contacts, the value could have stood there too.
+    fn require_possible_values_above(&self, base: &Tree) -> Result<(), NoAnswer> {
+        let ring_teeth = RING_TEETH.map(String::from);
+        let derives = self.forms.iter().any(|form| form.derives_ring_teeth);
+        let mut put_in: Vec<&[String]> = self.variables.iter().map(Variable::path).collect();
+        put_in.extend(derives.then_some(&ring_teeth[..]));
+        let value_above = |path: &&[String]| {
+            let is_value = |length: &usize| {
+                base.at(&path[..*length]).is_some_and(|tree| !matches!(tree, Tree::Object(_) | Tree::Array(_)))
+            };
+            (0..path.len()).find(is_value).map(|length| path[..length].to_vec())
+        };
+        let places: BTreeSet<Vec<String>> = put_in.iter().filter_map(value_above).collect();
+        for place in places {
+            let fields_there = |form: &&Form| matches!(form.tree.at(&place), Some(Tree::Object(_)));
+            let (Some(form), Some(value)) = (self.forms.iter().find(fields_there), base.at(&place)) else { continue };
+            let mut tree = form.tree.clone();
+            tree.set(&place, value.clone());
+            if let Err(found) = tree.read::<Design>()
+                && path(&found.pointer).is_some_and(|at| at == place)
+            {
+                return Err(fault(&format!("/base{}", found.pointer), found.code, found.detail));
+            }
+        }
+        Ok(())
     }
 
     /// Where in the study's document that stands which a design has at a place.
@@ -278,8 +322,13 @@ impl Template {
         self.examples().map(Tree::bytes).max().unwrap_or_default()
     }
 
-    /// The document of a combination of choices, in which everything else stands at some value.
-    fn form(&self, base: &Tree, combination: usize) -> Result<Form, Fault> {
+    /// The document of a combination of choices, in which everything else stands at some value, and what of the base it does not know is left out.
+    fn form(
+        &self,
+        base: &Tree,
+        combination: usize,
+        all_left_out: &mut BTreeMap<Vec<String>, Fault>,
+    ) -> Result<Form, Fault> {
         let mut form = Form {
             tree: base.clone(),
             takes: vec![true; self.variables.len()],
@@ -302,7 +351,7 @@ impl Template {
         loop {
             form.derive();
             let Err(found) = form.tree.read::<Design>() else { return Ok(form) };
-            // What only another kind, shape or law has is left out; nothing else is.
+            // What another kind, shape or law has; whether one has it is known when all forms are.
             let is_of_choice = self.variables.iter().filter(|variable| !variable.choices.is_empty()).any(|variable| {
                 let parent = variable.pointer.rsplit_once('/').map_or("", |(parent, _)| parent);
                 found.pointer.strip_prefix(parent).is_some_and(|rest| rest.starts_with('/'))
@@ -317,6 +366,7 @@ impl Template {
             for (takes, variable) in form.takes.iter_mut().zip(self.variables.iter()) {
                 *takes &= !variable.path.starts_with(&place);
             }
+            all_left_out.entry(place).or_insert(found);
         }
     }
 
@@ -363,6 +413,20 @@ impl Template {
         let mut tree = self.forms.iter().find(|form| form.takes[index])?.tree.clone();
         tree.set(&self.variables[index].path, Tree::Number(value));
         Some(tree)
+    }
+
+    /// A document of each form in which every free number has the value that it is given.
+    pub(crate) fn examples_at(&self, value: impl Fn(&Variable) -> Option<f64>) -> impl Iterator<Item = Tree> {
+        self.forms.iter().map(move |form| {
+            let mut form = form.clone();
+            for (variable, _) in self.variables.iter().zip(&form.takes).filter(|(_, takes)| **takes) {
+                if let Some(number) = value(variable) {
+                    form.tree.set(&variable.path, Tree::Number(number));
+                }
+            }
+            form.derive();
+            form.tree
+        })
     }
 
     /// Puts the same value at a place in every form.
@@ -422,16 +486,26 @@ impl Form {
         self.derive();
     }
 
-    /// The domain of a variable as this form reads it: a number between two whole ones is no whole number.
-    fn domain(&self, variable: &Variable) -> Domain {
-        let Domain::Real { min, max } = variable.domain else { return variable.domain.clone() };
+    /// Finds which of these variables are whole as this form reads them: a number between two whole ones is none. All are tried at once, as there may be thousands.
+    fn find_whole(&self, variables: &mut [Variable], indices: &[usize]) {
         let mut tree = self.tree.clone();
-        tree.set(&variable.path, Tree::Number(min.floor() + 0.5));
-        match tree.read::<Design>() {
-            Err(found) if found.pointer == variable.pointer && found.code == FieldCode::WrongType => {
-                Domain::Whole { min: min.ceil(), max: max.floor() }
+        let mut real = BTreeMap::new();
+        for &index in indices {
+            let Variable { pointer, path, domain, .. } = &variables[index];
+            if let Domain::Real { min, .. } = domain {
+                tree.set(path, Tree::Number(min.floor() + 0.5));
+                real.insert(pointer.clone(), index);
             }
-            _ => Domain::Real { min, max },
+        }
+        while let Err(found) = tree.read::<Design>()
+            && found.code == FieldCode::WrongType
+            && let Some(index) = real.remove(&found.pointer)
+        {
+            let Variable { path, domain, .. } = &mut variables[index];
+            if let Domain::Real { min, max } = *domain {
+                *domain = Domain::Whole { min: min.ceil(), max: max.floor() };
+                tree.set(path, Tree::Number(min.ceil()));
+            }
         }
     }
 }

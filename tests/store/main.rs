@@ -129,7 +129,7 @@ async fn a_study_is_kept_as_it_was_asked_and_once() {
         let seen = store.look(&study.id).await.unwrap().unwrap();
         assert_eq!((seen.document_bytes, &*seen.study.document), (2, ""));
         assert_eq!(NewStudy { document: study.document.clone(), ..seen.study }, standing.study);
-        store.forget(&study.id).await.unwrap();
+        gone(&store, &study).await;
         assert_eq!(store.find(&study.id).await.unwrap(), None);
     })
     .await;
@@ -151,13 +151,13 @@ async fn a_chunk_is_in_one_pair_of_hands_and_its_result_is_kept_once() {
         let standing = store.find(&study.id).await.unwrap().unwrap();
         assert!(standing.is_done() && !standing.is_running());
         assert_eq!((standing.done, standing.looked_at, standing.refused), (3, 21, 3));
-        assert_eq!(store.chunks_done(&study.cut()).await.unwrap(), [0, 1, 2]);
+        assert_eq!(store.chunks_done(&study.cut()).await.unwrap(), [(0, 8), (1, 8), (2, 8)]);
         for kept in store.parts(&study.cut(), 0, 2).await.unwrap() {
             assert_eq!(kept.part, kept.chunk.to_le_bytes());
         }
         assert_eq!(store.parts(&study.cut(), 1, 1).await.unwrap().len(), 1);
         assert!(matches!(store.claim(&study.cut(), LEASE).await.unwrap(), Claim::None));
-        store.forget(&study.id).await.unwrap();
+        gone(&store, &study).await;
     })
     .await;
 }
@@ -179,7 +179,7 @@ async fn of_many_chunks_each_is_claimed_once_in_their_order() {
         let standing = store.find(&study.id).await.unwrap().unwrap();
         assert!(standing.is_done());
         assert_eq!(standing.looked_at, study.variants);
-        store.forget(&study.id).await.unwrap();
+        gone(&store, &study).await;
     })
     .await;
 }
@@ -200,7 +200,7 @@ async fn all_chunks_of_a_study_wait_though_few_are_open_and_none_of_one_that_is_
         store.resume(&study.id, LEASE).await.unwrap();
         drop(claimed(&store, &study).await);
         assert_eq!(store.figures().await.unwrap().waiting - before.waiting, MANY_CHUNKS);
-        store.forget(&study.id).await.unwrap();
+        gone(&store, &study).await;
         assert_eq!(store.figures().await.unwrap().waiting, before.waiting);
     })
     .await;
@@ -217,7 +217,7 @@ async fn two_who_find_no_open_chunk_at_once_open_each_once() {
             for lease in [one, other] {
                 lease.give_back().await.unwrap();
             }
-            store.forget(&study.id).await.unwrap();
+            gone(&store, &study).await;
         }
     })
     .await;
@@ -302,7 +302,7 @@ async fn a_lease_that_is_dropped_sets_its_chunk_free_and_three_of_them_make_it_a
         let mut again = free_again(&store, &study, 0).await;
         keep(&mut again).await;
         assert!(store.find(&study.id).await.unwrap().unwrap().is_done());
-        store.forget(&study.id).await.unwrap();
+        gone(&store, &study).await;
     })
     .await;
 }
@@ -328,7 +328,7 @@ async fn a_chunk_that_is_given_back_was_never_tried() {
         }
         keep(&mut free_again(&store, &study, 0).await).await;
         assert!(store.find(&study.id).await.unwrap().unwrap().is_done());
-        store.forget(&study.id).await.unwrap();
+        gone(&store, &study).await;
     })
     .await;
 }
@@ -345,7 +345,7 @@ async fn a_cancelled_study_waits_for_nobody_until_it_is_asked_for_again() {
         assert!(store.waiting().await.unwrap().iter().all(|waiting| waiting.cut.id != study.id));
         store.resume(&study.id, Duration::from_secs(60)).await.unwrap();
         assert!(store.waiting().await.unwrap().iter().any(|waiting| waiting.cut.id == study.id));
-        store.forget(&study.id).await.unwrap();
+        gone(&store, &study).await;
     })
     .await;
 }
@@ -394,7 +394,13 @@ async fn a_study_that_is_in_work_does_not_keep_others_from_expiring() {
     assert_eq!(store.find(&left.id).await.unwrap(), None);
     assert!(store.find(&held.id).await.unwrap().is_some_and(|standing| standing.is_running()));
     drop(lease);
-    store.forget(&held.id).await.unwrap();
+    gone(&store, &held).await;
+}
+
+/// Forgotten, whether it runs or not.
+async fn gone(store: &Store, study: &NewStudy) {
+    store.cancel(&study.id).await.unwrap();
+    store.forget(&study.id).await.unwrap();
 }
 
 /// The file's store as it is when so many seconds more have passed since anybody asked.
@@ -441,6 +447,25 @@ async fn a_study_says_how_long_nobody_has_asked_for_it_and_one_that_is_asked_for
     assert_eq!(store.find(&left.id).await.unwrap(), None);
 }
 
+/// Between a look and what follows from it another may let the study go on: it was forgotten with all that it had come to.
+#[tokio::test]
+async fn a_study_that_goes_on_is_not_forgotten_by_who_has_seen_it_cancelled() {
+    let file = File::new();
+    let study = study("on", 2);
+    let store = Store::open(&file.address()).await.unwrap();
+    store.create(&study).await.unwrap();
+    keep(&mut claimed(&store, &study).await).await;
+    store.cancel(&study.id).await.unwrap();
+    store.resume(&study.id, LEASE).await.unwrap();
+    store.forget(&study.id).await.unwrap();
+    let standing = store.find(&study.id).await.unwrap().unwrap();
+    assert!(standing.is_running() && standing.done == 1);
+    gone(&store, &study).await;
+    assert_eq!(store.find(&study.id).await.unwrap(), None);
+    // Nor does anybody wait for one that is gone.
+    store.forget(&study.id).await.unwrap();
+}
+
 /// The first that could not be deleted kept all that came after it, for ever.
 #[tokio::test]
 async fn a_study_that_cannot_be_deleted_does_not_keep_others_from_expiring() {
@@ -472,7 +497,7 @@ async fn what_was_kept_in_a_file_is_there_after_its_process() {
     store.close().await;
     drop(unfinished);
     let store = Store::open(&file.address()).await.unwrap();
-    assert_eq!(store.chunks_done(&study.cut()).await.unwrap(), [0]);
+    assert_eq!(store.chunks_done(&study.cut()).await.unwrap(), [(0, 8)]);
     assert_eq!(claimed(&store, &study).await.chunk(), 1);
 }
 
@@ -517,7 +542,7 @@ async fn two_workers_share_a_server_and_a_lost_lease_is_somebody_elses() {
     let standing = one.find(&study.id).await.unwrap().unwrap();
     assert!(standing.is_done());
     assert_eq!((standing.done, standing.looked_at), (1, 1));
-    one.forget(&study.id).await.unwrap();
+    gone(&one, &study).await;
 }
 
 #[tokio::test]
@@ -539,7 +564,7 @@ async fn a_worker_that_lives_keeps_its_chunk_however_long_that_takes() {
     }
     lease.keep(&[1], 7, 0, BUSY).await.unwrap();
     assert!(worker.find(&study.id).await.unwrap().unwrap().is_done());
-    worker.forget(&study.id).await.unwrap();
+    gone(&worker, &study).await;
 }
 
 /// A server's store, and a study in it that runs.
@@ -597,7 +622,7 @@ async fn an_attempt_that_is_still_being_noted_is_taken_back_when_that_has_come_t
     given_back.await.unwrap();
     let left = "SELECT COUNT(*) FROM attempts WHERE study = $1";
     assert_eq!(sqlx::query_scalar::<_, i64>(left).bind(&study.id).fetch_one(&mut other).await.unwrap(), 0);
-    store.forget(&study.id).await.unwrap();
+    gone(&store, &study).await;
 }
 
 /// Three restarts of a server that flushes slowly made a gap of a chunk that nobody had begun.
@@ -637,7 +662,7 @@ async fn an_attempt_of_which_nobody_knows_whether_it_was_noted_is_taken_back() {
     // The one that came to nothing before stays noted.
     let left: Vec<String> = sqlx::query_scalar(names).bind(&study.id).fetch_all(&mut other).await.unwrap();
     assert_eq!(left, [before]);
-    store.forget(&study.id).await.unwrap();
+    gone(&store, &study).await;
 }
 
 /// Restarts of a server ended three leases of one long chunk, and it was a gap, though all who had computed it lived; or two of three had died, and one had not.
@@ -701,7 +726,7 @@ async fn a_lease_that_was_lost_is_taken_again_and_its_attempt_counts_no_more_whe
     }
     assert!(matches!(next.begin().await.unwrap(), Claim::Chunk(_)));
     drop(holder);
-    store.forget(&study.id).await.unwrap();
+    gone(&store, &study).await;
 }
 
 /// It counted as one that runs until the other worker was through with the chunk, minutes later, and nobody could forget it.
@@ -730,7 +755,7 @@ async fn a_study_whose_results_are_all_there_waits_for_nobody_though_a_chunk_is_
     assert!(!is_waiting().await && (after.running, after.waiting, after.in_work) == (0, 0, 1), "{after:?}");
     // Who is told that it waits no more lets go of it.
     second.give_back().await.unwrap();
-    store.forget(&study.id).await.unwrap();
+    gone(&store, &study).await;
 }
 
 #[tokio::test]
@@ -743,7 +768,7 @@ async fn a_chunk_tells_how_often_it_was_begun_before() {
             assert_eq!(lease.attempts_that_count().await.unwrap(), before);
             assert!(matches!(lease.begin().await.unwrap(), Claim::Chunk(_)));
         }
-        store.forget(&study.id).await.unwrap();
+        gone(&store, &study).await;
     })
     .await;
 }
@@ -773,7 +798,7 @@ async fn who_wants_a_study_that_another_session_holds_is_told_so_in_time_and_the
     sqlx::query("ROLLBACK").execute(&mut holder).await.unwrap();
     keep(&mut claimed(&store, &study).await).await;
     assert!(store.find(&study.id).await.unwrap().unwrap().is_running());
-    store.forget(&study.id).await.unwrap();
+    gone(&store, &study).await;
 }
 
 /// The chunk of a gap that was noted in this moment was in nobody's hands for ever, and the study ran.
@@ -811,7 +836,7 @@ async fn a_gap_that_is_noted_while_a_study_is_let_go_on_stays_one() {
     store.resume(&study.id, LEASE).await.unwrap();
     keep(&mut free_again(&store, &study, 1).await).await;
     assert!(store.find(&study.id).await.unwrap().unwrap().is_done());
-    store.forget(&study.id).await.unwrap();
+    gone(&store, &study).await;
 }
 
 /// As while the server builds an index. The chunk was free then, and after three times given up, though it was computed.
@@ -831,7 +856,7 @@ async fn who_has_computed_a_chunk_waits_for_a_lock_and_keeps_its_lease_meanwhile
     });
     assert!(matches!(claimed_meanwhile, Claim::None), "{claimed_meanwhile:?}");
     assert!(store.find(&study.id).await.unwrap().unwrap().is_done());
-    store.forget(&study.id).await.unwrap();
+    gone(&store, &study).await;
 }
 
 #[tokio::test]
@@ -925,7 +950,7 @@ async fn a_chunk_of_a_study_that_was_begun_anew_and_cut_otherwise_is_none_of_its
         if store.address().is_shared() {
             lost.keep(&[1], 7, 0, BUSY).await.unwrap();
         }
-        store.forget(&first.id).await.unwrap();
+        gone(&store, &first).await;
         let second = NewStudy { chunk_variants: 21, chunks: 1, ..first.clone() };
         assert!(store.create(&second).await.unwrap());
         lost.keep(&[1], 7, 0, BUSY).await.unwrap();
@@ -940,8 +965,8 @@ async fn a_chunk_of_a_study_that_was_begun_anew_and_cut_otherwise_is_none_of_its
             (store.chunks_done(&first.cut()).await.unwrap(), store.parts(&first.cut(), 0, 0).await.unwrap()),
             (vec![], vec![])
         );
-        assert_eq!(store.chunks_done(&second.cut()).await.unwrap(), [0]);
-        store.forget(&first.id).await.unwrap();
+        assert_eq!(store.chunks_done(&second.cut()).await.unwrap(), [(0, 1)]);
+        gone(&store, &first).await;
     })
     .await;
 }
@@ -961,7 +986,7 @@ async fn a_study_that_is_asked_for_again_while_it_is_to_be_forgotten_is_kept() {
     forgotten.unwrap();
     lease.give_back().await.unwrap();
     assert!(service.find(&study.id).await.unwrap().unwrap().is_running());
-    service.forget(&study.id).await.unwrap();
+    gone(&service, &study).await;
 }
 
 /// As one does that stands still.
@@ -992,7 +1017,7 @@ async fn a_worker_that_does_not_let_go_holds_up_whoever_forgets_its_study_and_no
         let forgotten = forgotten.await.unwrap();
         assert!(matches!(forgotten, Ok(()) | Err(StoreError::InWork)), "{forgotten:?}");
     }
-    service.forget(&study.id).await.unwrap();
+    gone(&service, &study).await;
     assert_eq!(service.find(&study.id).await.unwrap(), None);
 }
 
@@ -1024,7 +1049,7 @@ async fn whoever_leaves_in_the_middle_of_anything_leaves_no_transaction_open() {
                 store.create(study).await.unwrap();
                 let waiting = store.waiting().await.unwrap();
                 assert!(waiting.iter().any(|waiting| waiting.cut.id == study.id), "{times}: {}", study.id);
-                store.forget(&study.id).await.unwrap();
+                gone(&store, &study).await;
             }
             if is_whole {
                 break;

@@ -329,6 +329,22 @@ fn impossible_drives_fail_the_yield_and_enter_no_quantile() {
     assert_eq!(found["reasons"][0]["code"], "teeth_touch");
 }
 
+/// Of a drive with thousands of teeth each entry was a reason of its own: a study came to ten times what was expected of it.
+#[test]
+fn all_entries_of_a_list_that_are_out_of_range_are_one_reason() {
+    let of_spaces = json!({ "ring_space_angle_arcsec": { "distribution": "normal", "sigma": 50_000.0 } });
+    let study = json!({
+        "study": "tolerance", "base": with(&paper(), "/model", json!({ "compatibility": "virtual_work" })), "samples": 300,
+        "deviations": of_spaces, "quantities": ["peak_stress_ring_mpa"]
+    });
+    let found = answer(&study);
+    let reasons = found["reasons"].as_array().unwrap();
+    let out_of_range: Vec<_> = reasons.iter().filter(|reason| reason["code"] == "out_of_range").collect();
+    let [reason] = out_of_range[..] else { panic!("{reasons:?}") };
+    assert_eq!(reason["pointer"], "/deviations/ring_space_angle_arcsec");
+    assert!(number(&reason["variants"]) > 100.0, "{reason}");
+}
+
 #[test]
 fn what_cannot_be_drawn_is_said_at_its_field() {
     for (distribution, field, code) in [

@@ -137,6 +137,48 @@ fn what_cannot_be_mapped_is_said_at_its_field() {
     assert_eq!(faulty(&capacity), ("/base/load/allowable_stress_mpa".into(), "missing_field".into()));
 }
 
+/// A typo beside a choice was left out as what another kind has, and the default taken in its place: other stresses, and no word of it.
+#[test]
+fn a_field_of_the_base_that_no_variant_knows_is_refused_and_not_left_out() {
+    let radii = || json!({ "/drive/teeth/radius_mm": { "one_of": [4.0, 5.0] } });
+    let compatibilities = json!({ "/model/compatibility": { "one_of": ["virtual_work", "projection"] } });
+    let shapes = json!({ "/drive/teeth/shape": { "one_of": ["cylinder", "ball"] } });
+    for (over, place, value) in [
+        (radii(), "/drive/teeth/instaled", json!(14)),
+        (compatibilities, "/model/stiffnes", json!({ "law": "linear" })),
+        (shapes.clone(), "/drive/teeth/groove_radius", json!({ "ring": 5.0 })),
+        // Of a shape that is none of the choices.
+        (shapes.clone(), "/drive/teeth/flat_length_mm", json!(3.0)),
+    ] {
+        let study = map(over, json!(["coincidence_degree"]));
+        let base = with(&paper(), "/model", json!({}));
+        let study = with(&study, "/base", with(&base, place, value));
+        assert_eq!(faulty(&study), (format!("/base{place}"), "unknown_field".into()), "{place}");
+    }
+    // What one of the choices has is left out of the others.
+    let base = with(&paper(), "/drive/teeth/groove_radius_mm", json!({ "ring": 6.0 }));
+    answer(&with(&map(shapes, json!(["coincidence_degree"])), "/base", base));
+}
+
+/// What is put into an object that the base has not was put in the place of anything else that stood there.
+#[test]
+fn a_value_of_the_base_that_cannot_stand_above_a_field_is_refused_and_not_replaced() {
+    let radii = || json!({ "/drive/teeth/radius_mm": { "min": 4.0, "max": 5.0, "steps": 2 } });
+    let varied = |pointer: &str, min: f64| json!({ pointer: { "min": min, "max": 2.0 * min, "steps": 2 } });
+    for (over, place, value) in [
+        (radii(), "/drive/ring", json!(30)),
+        (radii(), "/drive/ring", json!("30")),
+        (radii(), "/drive/ring", json!(null)),
+        (varied("/model/clearance/ring_um", 1.0), "/model", json!("projection")),
+        (varied("/model/clearance/ring_um", 1.0), "/model/clearance", json!(100)),
+        (varied("/load/input_torque_nm", 10.0), "/load", json!(5)),
+    ] {
+        let base = with(&with(&paper(), "/model", json!({})), place, value.clone());
+        let study = with(&map(over, json!(["coincidence_degree"])), "/base", base);
+        assert_eq!(faulty(&study), (format!("/base{place}"), "wrong_type".into()), "{place} {value}");
+    }
+}
+
 /// RFC 6901 knows no `00` and no `+0`. Beside `0` such a name made two columns of one value, of which one was not in force.
 #[test]
 fn an_entry_of_a_list_has_one_name() {
