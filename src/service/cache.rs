@@ -401,16 +401,21 @@ mod tests {
     #[test]
     fn large_answers_beyond_the_bound_are_let_go_at_once() {
         const BODY_BYTES: usize = 1 << 20;
-        let cache = Cache::new(3 * BODY_BYTES as u64);
+        let (cache, another) = (Cache::new(3 * BODY_BYTES as u64), Cache::new(BODY_BYTES as u64));
         let kept = Arc::new(());
+        let bodies = || Arc::strong_count(&kept) - 1;
+        // What another test's thread may look at yet goes when that has moved on, and who looks into any cache helps with it.
+        let are_let_go = |_| {
+            another.get(key(-1.0));
+            bodies() * BODY_BYTES <= 3 * BODY_BYTES
+        };
         for number in 0..20 {
             let body = Bytes::from_owner(Counted(vec![0; BODY_BYTES], Arc::clone(&kept)));
             let server_timing = HeaderValue::from_static("");
             let stored = Stored { body, sent: Sent::default(), held: None, solve: Duration::ZERO, server_timing };
             keep(&cache.answers, key(f64::from(number)), &stored);
             drop(stored);
-            let bodies = Arc::strong_count(&kept) - 1;
-            assert!(bodies * BODY_BYTES <= 3 * BODY_BYTES, "{bodies} bodies after {number}");
+            assert!((0..100_000).any(are_let_go), "{} bodies after {number}", bodies());
         }
     }
 }

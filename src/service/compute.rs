@@ -18,6 +18,7 @@ use crate::beside::beside;
 use crate::config::Limits;
 use crate::memory::Memory;
 use crate::problem::{Problem, ProblemCode};
+use crate::queue;
 use crate::room::{self, NoRoom, Reserved, Room};
 use crate::turns::{self, Had, Turns};
 
@@ -62,8 +63,8 @@ pub struct Pool {
     of_a_large_variant: Arc<Semaphore>,
     /// One for each batch that runs.
     batches: Arc<Semaphore>,
-    /// One: for what is neither a solve nor short.
-    aside: Arc<Semaphore>,
+    /// For what is neither a solve nor short.
+    aside: queue::Lane,
     /// One: for what takes seconds, and is wanted all the same.
     unhurried: Arc<Semaphore>,
     /// Of answers, from which a variant takes what is beyond the part of variants, and what is read of a store; none where there are none.
@@ -247,7 +248,7 @@ impl Pool {
             of_variants: Arc::new(Semaphore::new(room::permits(limits.max_unread_bytes / PART_OF_VARIANTS) as usize)),
             of_a_large_variant: Arc::new(Semaphore::new(1)),
             batches: Arc::new(Semaphore::new(limits.max_concurrent_batches)),
-            aside: Arc::new(Semaphore::new(1)),
+            aside: queue::Lane::default(),
             unhurried: Arc::new(Semaphore::new(1)),
             room: None,
             memory: Memory::default(),
@@ -549,17 +550,19 @@ impl Pool {
         }
     }
 
-    /// Runs what is no solve, and may yet take too long for the executor, on a thread of its own, one at a time: it waits for no solve.
+    /// Runs what is no solve, and may yet take too long for the executor, on a thread of its own, one at a time, what has the shortest text first: it waits for no
+    /// solve.
     ///
     /// # Errors
     /// `queue_full` where the system gives no thread, `deadline_exceeded` when the time is over, `internal_error` where the job panicked, and whatever it returns.
     pub async fn run_aside<T: Send + 'static>(
         &self,
         deadline: Instant,
+        text_bytes: u64,
         job: impl FnOnce() -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
         let running = async {
-            let turn = Arc::clone(&self.aside).acquire_owned().await.map_err(|error| Problem::internal(&error))?;
+            let turn = self.aside.take(text_bytes).await;
             let work = move || {
                 let _held = turn;
                 caught(job)

@@ -175,7 +175,7 @@ pub async fn thaw(
         let _room = room;
         Ok(Some(thawed(&found.study).map(|study| (study, found.study))))
     };
-    pool.run_aside(deadline, thaw).await
+    pool.run_aside(deadline, document_bytes, thaw).await
 }
 
 fn thawed(frozen: &NewStudy) -> Result<Arc<Study>, NotHere> {

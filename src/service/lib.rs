@@ -24,6 +24,7 @@ mod openapi;
 pub mod parts;
 pub mod problem;
 pub mod query;
+pub mod queue;
 pub mod room;
 pub mod router;
 pub mod serve;

@@ -1,19 +1,19 @@
 //! Room for large answers that nobody has read yet: while they are made, while they wait in a batch, while they are on their way. However
 //! many are asked for, and however slowly they are read, they must not fill the memory.
 
-use std::collections::BTreeSet;
 use std::pin::pin;
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use bytes::Bytes;
 use parking_lot::Mutex;
-use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::{Instant, timeout_at};
 
 use crate::memory::Memory;
 use crate::problem::{Problem, ProblemCode};
+use crate::queue::Queue;
 
 /// Answers up to here need no room, so that slow readers of large ones stop nobody's ordinary work; the bound on connections bounds
 /// them too.
@@ -29,51 +29,10 @@ pub struct Room {
     free: Arc<Semaphore>,
     /// Of these, the ones that are held for as long as studies are kept: for an answer that is alone all that is left is all the room.
     kept: Arc<AtomicU32>,
+    /// Who waits for it, by the permits that they want: so nobody is kept from a little by who wants much, again and again.
     queue: Arc<Queue>,
     max_bytes: u64,
     memory: Memory,
-}
-
-/// Who waits for room. Nothing is held meanwhile, and who wants least comes first: so nobody is kept from a little by who wants much, again and again.
-#[derive(Debug, Default)]
-struct Queue {
-    /// By the permits that they want, and the order in which they came.
-    waiting: Mutex<BTreeSet<(u32, u64)>>,
-    came: AtomicU64,
-    /// Told when some is given back, or somebody waits no more.
-    changed: Notify,
-}
-
-/// A place among them, until it is dropped.
-struct Place<'a> {
-    queue: &'a Queue,
-    place: (u32, u64),
-}
-
-impl Queue {
-    /// Whether somebody waits for no more than so much.
-    fn goes_before(&self, permits: u32) -> bool {
-        self.waiting.lock().first().is_some_and(|&(wanted, _)| wanted <= permits)
-    }
-
-    fn come(&self, permits: u32) -> Place<'_> {
-        let place = (permits, self.came.fetch_add(1, Ordering::Relaxed));
-        self.waiting.lock().insert(place);
-        Place { queue: self, place }
-    }
-}
-
-impl Place<'_> {
-    fn is_first(&self) -> bool {
-        self.queue.waiting.lock().first() == Some(&self.place)
-    }
-}
-
-impl Drop for Place<'_> {
-    fn drop(&mut self) {
-        self.queue.waiting.lock().remove(&self.place);
-        self.queue.changed.notify_waiters();
-    }
 }
 
 /// A part of the room that is held while nobody waits to read it.
@@ -222,7 +181,7 @@ impl Room {
     /// Where memory is scarce.
     pub fn reserve_now(&self, bytes: u64) -> Result<Option<Reserved>, NoRoom> {
         let permits = self.permits_for(bytes);
-        if permits > 0 && self.queue.goes_before(permits) {
+        if permits > 0 && self.queue.goes_before(u64::from(permits)) {
             return Ok(None);
         }
         match self.reserve(bytes) {
@@ -241,9 +200,9 @@ impl Room {
         }
         let permits = self.permits_for(bytes);
         let deadline = deadline.min(Instant::now() + PATIENCE);
-        let place = self.queue.come(permits);
+        let place = self.queue.come(u64::from(permits));
         loop {
-            let mut changed = pin!(self.queue.changed.notified());
+            let mut changed = pin!(self.queue.changed());
             changed.as_mut().enable();
             if self.memory.is_scarce() {
                 return Err(NoRoom::Scarce);
@@ -309,7 +268,7 @@ impl Room {
 impl Drop for Reserved {
     fn drop(&mut self) {
         if self.held.take().is_some() {
-            self.room.queue.changed.notify_waiters();
+            self.room.queue.tell();
         }
     }
 }
@@ -367,7 +326,7 @@ impl Reserved {
             let less = held.num_permits().saturating_sub(most as usize);
             drop(held.split(less));
             if less > 0 {
-                self.room.queue.changed.notify_waiters();
+                self.room.queue.tell();
             }
         }
     }

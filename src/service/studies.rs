@@ -617,7 +617,7 @@ impl Studies {
     /// The study with this id, where it is kept. Who asks for one keeps it from expiring.
     ///
     /// # Errors
-    /// Where the store does not answer, or this is not the build or the processor that the study was asked of.
+    /// Where the store does not answer, this is not the build or the processor that the study was asked of, or there is no room for what it consists of.
     pub async fn find(&self, id: &str) -> Result<Option<Arc<Kept>>, Problem> {
         let here = self.find_here(id);
         let Keeping::Store { store, .. } = &self.keeping else { return Ok(here) };
@@ -659,19 +659,23 @@ impl Studies {
     /// A stored study as it is kept here, without its rows, unless it was forgotten meanwhile.
     ///
     /// # Errors
-    /// Where this is not the build or the processor that it was asked of.
+    /// Where this is not the build or the processor that it was asked of, or there is no room for it.
     async fn kept_here(&self, store: &Store, stored: &Stored) -> Result<Option<Arc<Kept>>, Problem> {
         let cut = stored.study.cut();
         let known = self.kept.lock().iter().find(|kept| kept.cut() == cut).cloned();
         if known.is_some() {
             return Ok(known);
         }
+        // A short document may stand for much, of which nothing is counted before it is read.
+        if self.room.memory().is_scarce() {
+            return Err(NoRoom::Scarce.into());
+        }
         let thawed = frozen::thaw(&self.pool, store, &cut, stored.document_bytes).await?;
         let Some(thawed) = thawed else { return Ok(None) };
         let (study, _) = thawed.map_err(|reason| reason.told(&cut.id))?;
-        // Where others have all the room, it is kept all the same: how many there are is bounded.
-        let room = self.room.keep(view_bytes(&study)).ok();
-        let kept = Self::view(study, room);
+        // Each request holds its own, whatever is known of others.
+        let room = self.room.keep(view_bytes(&study))?;
+        let kept = Self::view(study, Some(room));
         let (state, problem) = state_of(stored);
         kept.stand(state, problem);
         Ok(Some(self.keep_view(kept)))
@@ -1013,7 +1017,9 @@ impl Studies {
         let rows = self.rows(kept)?;
         let made = self.made_apart(kept, &rows, deadline).await?;
         if let (None, Keeping::Store { store, .. }) = (&made, &self.keeping) {
-            kept.gather(&rows, store, &self.pool).await?;
+            // Meanwhile it holds room, and the turn may be behind variants of minutes. What has come by then stays.
+            let gathered = Box::pin(kept.gather(&rows, store, &self.pool));
+            self.pool.within(deadline, gathered).await?;
         }
         Ok(Reading { kept: Arc::clone(kept), rows, made })
     }

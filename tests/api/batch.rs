@@ -362,6 +362,24 @@ async fn behind_a_proxy_lines_that_have_come_are_told_of_a_stop_though_more_is_t
     assert_eq!((line["index"].as_u64(), line["problem"]["code"].as_str()), (Some(0), Some("shutting_down")));
 }
 
+/// It held up the stop for as long as that may take, and broke off without its last line.
+#[tokio::test]
+async fn a_batch_of_a_silent_client_has_its_last_line_when_the_service_stops() {
+    let service = Service::new();
+    let arriving =
+        stream::iter([Ok::<_, Infallible>(Bytes::from(format!("{}\n", variant(0))))]).chain(stream::pending());
+    let request = Request::post("/v1/batch?peaks_only=true").header("content-type", "application/x-ndjson");
+    let response = service.response(request.body(Body::from_stream(arriving)).unwrap()).await;
+    let mut told = response.into_body().into_data_stream();
+    let first: Value = serde_json::from_slice(&told.next().await.unwrap().unwrap()).unwrap();
+    assert_eq!(first["status"], 200);
+    service.app.pool.close();
+    let end: Value = serde_json::from_slice(&told.next().await.unwrap().unwrap()).unwrap();
+    assert_eq!((&end["asked"], &end["answered"]), (&json!(1), &json!(1)));
+    assert_eq!(end["problem"]["code"], "shutting_down");
+    assert!(told.next().await.is_none());
+}
+
 /// nginx passes on no more of a request once its answer has begun: a batch of some megabytes broke off behind it.
 #[tokio::test]
 async fn behind_a_proxy_a_batch_is_read_before_its_answer_begins_and_directly_answered_while_it_is_sent() {

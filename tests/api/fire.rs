@@ -845,7 +845,7 @@ async fn studies_are_read_one_at_a_time_beside_all_else() {
             let _ = released.recv();
             Ok(())
         };
-        pool.run_aside(tokio::time::Instant::now() + Duration::from_secs(600), job).await
+        pool.run_aside(tokio::time::Instant::now() + Duration::from_secs(600), 0, job).await
     });
     has_begun.await.unwrap();
     let asked = map_over(&shortest(), &json!({ "/drive/teeth/radius_mm": { "one_of": [4.0] } }));

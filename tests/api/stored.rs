@@ -321,6 +321,33 @@ async fn who_reads_a_stored_study_in_whatever_way_keeps_it_from_expiring() {
     }
 }
 
+/// Sixty requests for studies of 5 KB with 256 choices, 7 MB each as they are read, ended a process of 128 MiB: of what there was no room for nothing was counted.
+#[tokio::test]
+async fn what_a_stored_study_consists_of_takes_room_for_each_who_asks_where_it_is_much() {
+    let file = File::new();
+    let keeper = Keeper::of(&file, LIMITS, true).await;
+    let choices: Vec<_> = (0..256).map(|choice| 3.0 + f64::from(choice) * 1e-3).collect();
+    let mut much = map(5);
+    much["over"] = json!({ "/drive/teeth/radius_mm": { "one_of": choices } });
+    let (much, little) = (keeper.wait_for(&much).await, keeper.wait_for(&map(5)).await);
+    keeper.end().await;
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    let room = &keeper.service.app.room;
+    let others = room.reserve(LIMITS.max_unread_bytes).unwrap();
+    keeper.service.get(&place(&much)).await.refused(503, "too_many_unread_bytes");
+    assert_eq!(keeper.service.get(&place(&little)).await.found()["state"], "done");
+    drop(others);
+    assert_eq!(keeper.service.get(&place(&much)).await.found()["state"], "done");
+    assert!(room.taken_bytes() > 1 << 18);
+    // Nor is any read while memory is scarce.
+    keeper.end().await;
+    let keeper = Keeper::of(&file, LIMITS, false).await;
+    keeper.service.app.room.memory().set_scarce(true);
+    keeper.service.get(&place(&little)).await.refused(503, "too_many_unread_bytes");
+    assert_eq!(keeper.service.ask(&Question::of("DELETE", &place(&little))).await.status, 204);
+    keeper.end().await;
+}
+
 /// Whoever only listened to one that nobody computed was told in the end that it is cancelled: it was forgotten.
 #[tokio::test]
 async fn who_listens_to_a_stored_study_keeps_it_from_expiring() {

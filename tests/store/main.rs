@@ -1049,7 +1049,7 @@ async fn whoever_leaves_in_the_middle_of_anything_leaves_no_transaction_open() {
                 store.create(study).await.unwrap();
                 let waiting = store.waiting().await.unwrap();
                 assert!(waiting.iter().any(|waiting| waiting.cut.id == study.id), "{times}: {}", study.id);
-                gone(&store, &study).await;
+                gone(&store, study).await;
             }
             if is_whole {
                 break;

@@ -526,11 +526,25 @@ type End = Arc<Mutex<BatchEnd>>;
 
 /// Reads lines ahead of their answers, as far as [`AHEAD_BYTES`] go, until the body ends or nobody wants answers any more. `reading` is dropped when no more is read before
 /// an answer.
-async fn read_ahead(mut lines: Lines, to: mpsc::UnboundedSender<Line>, end: End, reading: oneshot::Sender<()>) {
+async fn read_ahead(
+    pool: Pool,
+    mut lines: Lines,
+    to: mpsc::UnboundedSender<Line>,
+    end: End,
+    reading: oneshot::Sender<()>,
+) {
     let mut reading = Some(reading);
     let ahead = Arc::new(Semaphore::new(AHEAD_BYTES));
     let mut index = 0;
-    while let Some(document) = lines.next().await {
+    loop {
+        let document = match pool.until_closed(lines.next().map(Ok)).await {
+            Ok(Some(document)) => document,
+            Ok(None) => break,
+            Err(stopping) => {
+                end.lock().problem = Some(stopping);
+                return;
+            }
+        };
         let bytes = (document.as_ref().map_or(0, |read| read.len()) + LINE_OVERHEAD_BYTES).min(AHEAD_BYTES);
         let wanted = u32::try_from(bytes).unwrap_or(u32::MAX);
         if ahead.available_permits() < bytes {
@@ -751,7 +765,7 @@ async fn begin(
     let (to, from) = mpsc::unbounded_channel();
     let end = End::new(Mutex::new(BatchEnd { asked: 0, answered: 0, problem: None }));
     let (reading, read) = oneshot::channel();
-    tokio::spawn(read_ahead(lines, to, Arc::clone(&end), reading));
+    tokio::spawn(read_ahead(app.pool.clone(), lines, to, Arc::clone(&end), reading));
     let batch = Batch::new(app.pool.clone(), beside, query, app.limits);
     let answers = answers(batch, from, end).map(move |bytes| {
         // Place and room are held until the last answer is sent or the client has left.

@@ -205,7 +205,7 @@ async fn read_design<T: Send + 'static>(
     mut body: Read,
     tell: impl FnOnce(&Design) -> T + Send + 'static,
 ) -> Result<(Design, T), Problem> {
-    let tree_bytes = tree_bytes(&body);
+    let (text_bytes, tree_bytes) = (body.len() as u64, tree_bytes(&body));
     body.room.hold_at_least(tree_bytes)?;
     let read = move || {
         let design = Design::read(&body)?;
@@ -214,7 +214,7 @@ async fn read_design<T: Send + 'static>(
         let told = tell(&design);
         Ok((design, told))
     };
-    if tree_bytes == 0 { read() } else { app.pool.run_aside(deadline, read).await }
+    if tree_bytes == 0 { read() } else { app.pool.run_aside(deadline, text_bytes, read).await }
 }
 
 async fn read_body(

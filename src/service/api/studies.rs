@@ -237,12 +237,13 @@ async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Respons
     let body = read_body(app, &headers, body, deadline).await?;
     // Its choices stand for hundreds of designs, so that a document of 64 KB may take long to be read.
     let (question, limits) = (body.bytes.clone(), app.limits.of_studies());
-    let room = app.pool.room_aside(deadline, reading_bytes(question.len() as u64), body.room.held_bytes()).await?;
+    let text_bytes = question.len() as u64;
+    let room = app.pool.room_aside(deadline, reading_bytes(text_bytes), body.room.held_bytes()).await?;
     let read = move || {
         let _room = room;
         Ok(Study::read(&question, &limits)?)
     };
-    let study = app.pool.run_aside(deadline, read).await?;
+    let study = app.pool.run_aside(deadline, text_bytes, read).await?;
     let kept = app.pool.until_closed(app.studies.begin(study, &body.bytes, deadline)).await?;
     drop(body);
     let wait = wait_wanted(&headers);
