@@ -219,7 +219,10 @@ fn traceparent(headers: &HeaderMap) -> Option<&str> {
     let is_hexadecimal = |part: &str| part.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
     let parts: Vec<_> = value.split('-').collect();
     let lengths: Vec<_> = parts.iter().map(|part| part.len()).collect();
-    (lengths == [2, 32, 16, 2] && parts.iter().all(|part| is_hexadecimal(part))).then_some(value)
+    let is_one = lengths == [2, 32, 16, 2] && parts.iter().all(|part| is_hexadecimal(part));
+    // No version, and no ids (W3C Trace Context, section 3.2.2).
+    let is_void = || parts[0] == "ff" || parts[1..3].iter().any(|id| id.bytes().all(|byte| byte == b'0'));
+    (is_one && !is_void()).then_some(value)
 }
 
 /// The middleware: a request's id and a span with it; when the answer's head is ready, the metrics and the headers that every answer
