@@ -36,8 +36,8 @@ struct Axis {
 enum Values {
     /// A choice of so many.
     Choices(u32),
-    /// So many whole numbers, one after the other.
-    Whole { min: f64, count: u32 },
+    /// So many whole numbers, each so much above the one before.
+    Whole { min: f64, by: f64, count: u32 },
     /// So many values, equally far apart, both ends among them.
     Steps { min: f64, max: f64, steps: u32 },
 }
@@ -52,7 +52,7 @@ impl Values {
     fn at(&self, index: u32) -> Value {
         match *self {
             Self::Choices(_) => Value::Choice(index as usize),
-            Self::Whole { min, .. } => Value::Number(min + f64::from(index)),
+            Self::Whole { min, by, .. } => Value::Number(min + by * f64::from(index)),
             Self::Steps { min, max, steps } => {
                 let share = f64::from(index) / (f64::from(steps) - 1.0).max(1.0);
                 // Both ends are met exactly.
@@ -163,26 +163,22 @@ impl Axis {
                     let detail = format!("the range has {all:?} whole numbers, more than {MOST_STEPS:?}");
                     return Err(beyond(&at, FieldCode::OutOfRange, detail, all, MOST_STEPS));
                 }
-                Values::Whole { min: *min, count: count(all) }
+                Values::Whole { min: *min, by: 1.0, count: count(all) }
             }
             (Domain::Real { min, max } | Domain::Whole { min, max }, Some(steps)) if min >= max && steps > 1.0 => {
                 let detail = format!("the range holds one value, {min:?}, and not {steps:?}");
                 return Err(beyond(&format!("{at}/steps"), FieldCode::OutOfRange, detail, steps, 1.0));
             }
-            (Domain::Real { min, max } | Domain::Whole { min, max }, Some(steps)) => {
-                let values = Values::Steps { min: *min, max: *max, steps: count(steps) };
-                let fraction = |value| match value {
-                    Value::Number(number) => Some(number).filter(|number| number.fract() != 0.0),
-                    Value::Choice(_) => None,
-                };
-                if matches!(variable.domain, Domain::Whole { .. })
-                    && let Some(value) = values.all().find_map(fraction)
-                {
-                    let detail = format!("a whole number is wanted here, and these steps come to {value:?}");
+            (Domain::Whole { min, max }, Some(steps)) => {
+                // Of whole numbers below 2^53 a quotient that is whole is exact.
+                let by = (max - min) / (steps - 1.0).max(1.0);
+                if by.fract() != 0.0 {
+                    let detail = format!("a whole number is wanted here, and these steps are of {by:?}");
                     return Err(fault(&format!("{at}/steps"), FieldCode::WrongType, detail));
                 }
-                values
+                Values::Whole { min: *min, by, count: count(steps) }
             }
+            (Domain::Real { min, max }, Some(steps)) => Values::Steps { min: *min, max: *max, steps: count(steps) },
         };
         let is_number = match values {
             Values::Choices(_) => values.all().all(|value| matches!(variable.spelled(value), Tree::Number(_))),

@@ -160,7 +160,7 @@ impl Search {
         let is_free = free.keys().any(|pointer| pointer.starts_with("/sweep/"));
         let is_swept = quantities.iter().any(|quantity| quantity.needs > Needs::Drive);
         if is_swept && !is_free && base.at(&samples).is_none() && base.at(&tolerance).is_none() {
-            base.set(&samples, Tree::Number(SAMPLES));
+            put_in(&mut base, &samples, Tree::Number(SAMPLES));
         }
         let template = Template::new(&base, &list, "free")?;
         let has_duty = base.at(&path("/load/duty").unwrap_or_default()).is_some();
@@ -177,6 +177,15 @@ impl Search {
         let start = document.start.iter().enumerate();
         let start = start.map(|(index, design)| place_of(&design.0, &template, index)).collect::<Result<_, _>>()?;
         let islands = (evaluations / ISLAND_EVALUATIONS).clamp(1, 4096);
+        let of_an_island = evaluations / islands;
+        let most = of_an_island - of_an_island / SCAN_SHARE;
+        if document.start.len() as u64 > most {
+            let count = document.start.len();
+            let detail = format!(
+                "each of {islands} islands looks at {of_an_island} variants and begins with all of these: at most {most}, not {count}, or more `evaluations`"
+            );
+            return Err(fault("/start", FieldCode::OutOfRange, detail));
+        }
         Ok((Self { limits, objectives, islands, evaluations, seed, start, at_true_peaks }, template, quantities))
     }
 
@@ -331,7 +340,7 @@ fn from_envelope(
     if is_missing(base, TOOTH_COUNT) {
         if let Some(Tree::Number(ring_teeth)) = base.at(&path("/drive/ring/teeth").unwrap_or_default()) {
             let count = ring_teeth + lobes;
-            base.set(&path(TOOTH_COUNT).unwrap_or_default(), Tree::Number(count));
+            put_in(base, &path(TOOTH_COUNT).unwrap_or_default(), Tree::Number(count));
         } else {
             let (Some(least_ratio), Some(largest_ratio)) = range(TRANSMISSION_RATIO) else {
                 return Err(missing("limit `transmission_ratio` from both sides"));
@@ -387,6 +396,14 @@ fn from_envelope(
     Ok(())
 }
 
+/// Puts a value into the base, but not in the place of what reading it refuses.
+fn put_in(base: &mut Tree, place: &[String], value: Tree) {
+    let has_fields = |length: usize| base.at(&place[..length]).is_none_or(|tree| matches!(tree, Tree::Object(_)));
+    if (0..place.len()).all(has_fields) {
+        base.set(place, value);
+    }
+}
+
 /// The lobes of the base's wave generator. Where it names none, one is put in, whose path tells the teeth's extremes; where it does not say
 /// how many lobes, they are two.
 fn with_wave_generator(base: &mut Tree) -> Result<f64, NoAnswer> {
@@ -395,7 +412,7 @@ fn with_wave_generator(base: &mut Tree) -> Result<f64, NoAnswer> {
     const MOST: f64 = 1000.0;
     let place = |pointer: &str| path(pointer).unwrap_or_default();
     if base.at(&place("/drive/wave_generator")).is_none() {
-        base.set(&place(KIND), Tree::Text("harmonic_path".into()));
+        put_in(base, &place(KIND), Tree::Text("harmonic_path".into()));
     }
     match (word_at(base, KIND), base.at(&place(LOBES))) {
         (Some("eccentric"), _) => Ok(1.0),
@@ -408,7 +425,7 @@ fn with_wave_generator(base: &mut Tree) -> Result<f64, NoAnswer> {
             Err(beyond(&format!("/base{LOBES}"), FieldCode::OutOfRange, detail, *lobes, limit))
         }
         (Some("harmonic" | "harmonic_path"), None) => {
-            base.set(&place(LOBES), Tree::Number(TWO));
+            put_in(base, &place(LOBES), Tree::Number(TWO));
             Ok(TWO)
         }
         // An ellipse, or what reading the base refuses.

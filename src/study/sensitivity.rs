@@ -79,7 +79,12 @@ impl Sensitivity {
                 template.variables().iter().map(|variable| matches!(variable.domain, Domain::Whole { .. })).collect();
             if counted.contains(&true) {
                 let inputs = moved.iter().zip(&counted).filter(|(_, counted)| !**counted);
-                let inputs = inputs.map(|(input, _)| (input.pointer.clone(), InputDocument::default())).collect();
+                let inputs: BTreeMap<_, _> =
+                    inputs.map(|(input, _)| (input.pointer.clone(), InputDocument::default())).collect();
+                if inputs.is_empty() {
+                    let detail = "the base has no number but counts and zeros: name what is to be moved";
+                    return Err(fault("/inputs", FieldCode::MissingField, detail));
+                }
                 return Self::new(&SensitivityDocument { inputs, ..document.clone() });
             }
         }

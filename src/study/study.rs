@@ -1,6 +1,6 @@
 //! The engine: a study is pure chunks, and a merge that does not depend on their order.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::io::{self, Write};
 use std::ops::Range;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::design::Design;
 use toothwave_calculation::field::{FieldCode, FieldError};
-use toothwave_calculation::json::{self, Tree, path};
+use toothwave_calculation::json::{self, Fault, Tree, path};
 use toothwave_calculation::key::Key;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::question::{self, Question as _};
@@ -110,7 +110,9 @@ impl Study {
     /// # Errors
     /// Whatever is known to be impossible before anything is computed, at the field that says so.
     pub fn read(text: &[u8], limits: &Limits) -> Result<Self, NoAnswer> {
-        Self::new(&json::read(text)?, limits)
+        let tree = json::tree(text)?;
+        require_each_field_once(&tree)?;
+        Self::new(&tree.read()?, limits)
     }
 
     /// The study that a document asks for.
@@ -140,12 +142,9 @@ impl Study {
                 Self::checked(id, kind, template, quantities, variants, limits)?.with_possible_base(limits)
             }
             StudyDocument::Tolerance(document) => {
-                let mut quantities = all_named(&document.quantities)?;
-                let bounds = limit::limits(&document.require, &mut quantities)?;
-                let (tolerance, template) = Tolerance::new(document, bounds)?;
-                if quantities.is_empty() {
-                    quantities = asked_quantities(&[], &template)?;
-                }
+                let (mut tolerance, template) = Tolerance::new(document)?;
+                let mut quantities = asked_quantities(&document.quantities, &template)?;
+                tolerance.limits = limit::limits(&document.require, &mut quantities)?;
                 let variants = tolerance.variants();
                 let kind = Kind::Tolerance(tolerance);
                 Self::checked(id, kind, template, quantities, variants, limits)?.with_possible_base(limits)
@@ -362,6 +361,30 @@ impl Study {
     }
 }
 
+/// That no object names a field twice: of two ranges or limits of one name one would be dropped without a word.
+fn require_each_field_once(tree: &Tree) -> Result<(), Fault> {
+    match tree {
+        Tree::Object(fields) => {
+            let mut names = HashSet::new();
+            for (name, value) in fields {
+                if !names.insert(name) {
+                    let detail = format!("the field `{name}` stands here twice");
+                    return Err(Fault::of_field(FieldCode::DuplicateField, name, detail));
+                }
+                require_each_field_once(value).map_err(|found| found.within(name))?;
+            }
+            Ok(())
+        }
+        Tree::Array(items) => {
+            let mut items = items.iter().enumerate();
+            items.try_for_each(|(index, item)| {
+                require_each_field_once(item).map_err(|found| found.within(&index.to_string()))
+            })
+        }
+        Tree::Null | Tree::Bool(_) | Tree::Number(_) | Tree::Text(_) => Ok(()),
+    }
+}
+
 /// The hash of what is asked, within limits that some variants may be beyond: equal however the fields are ordered and the numbers spelled.
 fn id(document: &StudyDocument, limits: &question::Limits) -> Result<Key, NoAnswer> {
     let text = serde_json::to_string(document).map_err(NoAnswer::internal)?;
@@ -522,11 +545,18 @@ const OF_THE_DRIVE: [&str; 1] = ["/modification/ring_tip_relief/start_deg"];
 fn is_of_base(template: &Template, example: &Tree, error: &FieldError) -> bool {
     let stands = path(&error.pointer).and_then(|path| example.at(&path));
     match error.code {
-        FieldCode::OutOfRange => {
-            matches!(stands, Some(Tree::Number(_)))
-                && !template.is_varied(&error.pointer)
-                && !OF_THE_DRIVE.contains(&error.pointer.as_str())
+        FieldCode::OutOfRange => match stands {
+            Some(Tree::Number(_)) => {
+                !template.is_varied(&error.pointer) && !OF_THE_DRIVE.contains(&error.pointer.as_str())
+            }
+            // Of a list it is the sum, or how many there are.
+            Some(Tree::Array(_)) => !template.varies_within(&[&error.pointer]),
+            _ => false,
+        },
+        FieldCode::ConflictingFields => {
+            !template.varies_within(&["/drive", "/load", "/model", "/modification", "/deviations", "/friction"])
         }
+        FieldCode::WrongLength => !template.varies_within(&["/drive", "/deviations"]),
         FieldCode::CamNotElongated => !template.varies_within(&["/drive/wave_generator"]),
         FieldCode::InstalledNoDivisor | FieldCode::GrooveTooTight | FieldCode::FlatTooLong => {
             !template.varies_within(&["/drive/teeth"])

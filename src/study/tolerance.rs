@@ -105,7 +105,8 @@ impl Distribution {
 }
 
 impl Tolerance {
-    pub(crate) fn new(document: &ToleranceDocument, limits: Vec<Limit>) -> Result<(Self, Template), NoAnswer> {
+    /// Without its limits, which are of quantities.
+    pub(crate) fn new(document: &ToleranceDocument) -> Result<(Self, Template), NoAnswer> {
         let base = &document.base.0;
         let samples = whole("/samples", document.samples.value(), 10.0, 1e8)?;
         let seed = whole("/seed", document.seed.value(), 0.0, 9_007_199_254_740_991.0)?;
@@ -165,7 +166,7 @@ impl Tolerance {
         for example in template.examples() {
             example.read::<Design>()?;
         }
-        Ok((Self { kinds, samples, seed, limits }, template))
+        Ok((Self { kinds, samples, seed, limits: Vec::new() }, template))
     }
 
     /// Drives with one kind of deviation alone, for each; none where there is only one kind.

@@ -104,20 +104,25 @@ impl Template {
     /// Where a document cannot be read, whatever the values; where a range is empty, or no document takes a free field.
     pub(crate) fn new(base: &Tree, free: &[(String, Asked)], list: &'static str) -> Result<Self, NoAnswer> {
         let at = |pointer: &str| format!("/{list}/{}", escaped(pointer));
-        let above = |pointer: &str| -> Vec<String> {
-            pointer.match_indices('/').skip(1).map(|(end, _)| pointer[..end].to_owned()).collect()
-        };
-        let all_above: BTreeSet<String> = free.iter().flat_map(|(pointer, _)| above(pointer)).collect();
-        let mut variables = Vec::new();
-        for (pointer, asked) in free {
+        let mut paths = Vec::new();
+        for (pointer, _) in free {
             let Some(path) = path(pointer) else {
                 let detail = format!(
                     "`{pointer}` is no JSON pointer into a design document: one begins with `/`, and none leads deeper than 128 levels"
                 );
                 return Err(fault(&at(pointer), FieldCode::UnknownField, detail));
             };
+            paths.push(path);
+        }
+        let above = |(pointer, _): &'_ (String, Asked)| {
+            pointer.match_indices('/').skip(1).map(|(end, _)| end).collect::<Vec<_>>()
+        };
+        let all_above: BTreeSet<&str> =
+            free.iter().flat_map(|one| above(one).into_iter().map(|end| &one.0[..end])).collect();
+        let mut variables = Vec::new();
+        for ((pointer, asked), path) in free.iter().zip(paths) {
             let has_fields = matches!(base.at(&path), Some(Tree::Object(_) | Tree::Array(_)));
-            if has_fields || all_above.contains(pointer) {
+            if has_fields || all_above.contains(&**pointer) {
                 let detail = format!("`{pointer}` is no value but holds fields: name one of these");
                 return Err(fault(&at(pointer), FieldCode::WrongType, detail));
             }
@@ -260,7 +265,9 @@ impl Template {
     pub(crate) fn is_varied(&self, pointer: &str) -> bool {
         let derives = self.forms.iter().any(|form| form.derives_ring_teeth);
         self.variables.iter().any(|variable| variable.pointer == pointer)
-            || derives && path(pointer).is_some_and(|path| path == RING_TEETH)
+            || derives
+                && path(pointer).is_some_and(|path| path == RING_TEETH)
+                && self.varies_within(&["/drive/teeth/count", "/drive/wave_generator"])
     }
 
     /// Whether variants may differ in what stands at any of these places or within it.

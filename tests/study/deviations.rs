@@ -329,6 +329,30 @@ fn impossible_drives_fail_the_yield_and_enter_no_quantile() {
     assert_eq!(found["reasons"][0]["code"], "teeth_touch");
 }
 
+/// It asked itself what else there is to be moved, without end, and the process ended.
+#[test]
+fn a_base_without_any_number_but_counts_has_nothing_to_be_moved() {
+    let base = json!({ "drive": {
+        "wave_generator": { "semi_major_mm": 0, "semi_minor_mm": 0 }, "teeth": { "count": 28, "radius_mm": 0, "width_mm": 0 }, "ring": { "teeth": 26 }
+    } });
+    let fault = ("/inputs".to_owned(), "missing_field".to_owned());
+    assert_eq!(faulty(&json!({ "study": "sensitivity", "base": base })), fault);
+}
+
+/// What was required was all that was answered.
+#[test]
+fn a_tolerance_study_that_names_no_quantities_has_all_of_them_whatever_it_requires() {
+    let mut study = with(&tolerance(json!({ "distribution": "uniform", "limit": 0.01 })), "/samples", json!(10));
+    study.as_object_mut().unwrap().remove("quantities");
+    let names = |study: &Value| {
+        let found = answer(study)["quantities"].as_array().unwrap().clone();
+        found.iter().map(|of| of["quantity"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    let all = names(&study);
+    assert!(all.len() > 10);
+    assert_eq!(names(&with(&study, "/require", json!({ "ring_root_radius_mm": { "max": 100.0 } }))), all);
+}
+
 /// Of a drive with thousands of teeth each entry was a reason of its own: a study came to ten times what was expected of it.
 #[test]
 fn all_entries_of_a_list_that_are_out_of_range_are_one_reason() {

@@ -1,12 +1,14 @@
 //! Maps.
 
 use serde_json::{Value, json};
+use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::forms::Format;
 use toothwave_calculation::question::Question as _;
 use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::Never;
+use toothwave_study::Study;
 
-use crate::asking::{CALCULATION, answer, beyond_room, faulty, gathered, paper, study, text, with};
+use crate::asking::{CALCULATION, LIMITS, answer, beyond_room, faulty, gathered, paper, study, text, with};
 
 fn map(over: Value, quantities: Value) -> Value {
     json!({ "study": "map", "base": paper(), "over": over, "quantities": quantities })
@@ -176,6 +178,67 @@ fn a_value_of_the_base_that_cannot_stand_above_a_field_is_refused_and_not_replac
         let base = with(&with(&paper(), "/model", json!({})), place, value.clone());
         let study = with(&map(over, json!(["coincidence_degree"])), "/base", base);
         assert_eq!(faulty(&study), (format!("/base{place}"), "wrong_type".into()), "{place} {value}");
+    }
+}
+
+/// One pointer of ten thousand slashes took fifty megabytes: each of its beginnings was copied.
+#[test]
+fn a_pointer_deeper_than_any_document_is_refused_before_anything_is_made_of_it() {
+    let deep = "/".repeat(1 << 20);
+    let over = json!({ deep: { "min": 0, "max": 1, "steps": 2 } });
+    let (at, code) = faulty(&map(over, json!([])));
+    assert!(at.starts_with("/over/~1~1") && code == "unknown_field", "{code}");
+}
+
+/// Of `min + i/(n-1)·(max-min)` two thirds were none: 7.999999999999999.
+#[test]
+fn every_grid_of_whole_numbers_is_one() {
+    for (min, by, count) in [(2, 1, 48), (20, 5, 30), (10, 10, 16), (20, 2, 39)] {
+        let max = min + by * (count - 1);
+        let over = json!({ "/drive/teeth/count": { "min": min, "max": max, "steps": count } });
+        let counts = answer(&map(over, json!(["undercut"])))["over"][0]["values"].clone();
+        let expected: Vec<_> = (0..count).map(|index| f64::from(min + by * index)).collect();
+        assert_eq!(numbers(&counts), expected);
+    }
+}
+
+/// Of two ranges of one name the first was dropped, of two limits as well.
+#[test]
+fn a_name_that_stands_twice_is_refused_wherever_it_stands() {
+    let range = r#"{ "min": 3, "max": 5, "steps": 2 }"#;
+    let base = paper();
+    let twice = |list: &str, name: &str, one: &str, rest: &str| {
+        let text = format!(r#"{{ "base": {base}, "{list}": {{ "{name}": {one}, "{name}": {one} }}, {rest} }}"#);
+        let refused = Study::read(text.as_bytes(), &LIMITS).unwrap_err();
+        (refused.errors[0].pointer.clone(), refused.errors[0].code)
+    };
+    let radius = "/drive/teeth/radius_mm";
+    let expected = |list: &str| (format!("/{list}/~1drive~1teeth~1radius_mm"), FieldCode::DuplicateField);
+    assert_eq!(twice("over", radius, range, r#""study": "map""#), expected("over"));
+    assert_eq!(twice("free", radius, range, r#""study": "search", "objectives": []"#), expected("free"));
+    let limit = twice("require", "slot_wall_mm", r#"{ "min": 1 }"#, r#""study": "tolerance", "inputs": {}"#);
+    assert_eq!(limit, ("/require/slot_wall_mm".into(), FieldCode::DuplicateField));
+}
+
+/// Each variant was refused, one after the other.
+#[test]
+fn values_of_the_base_that_go_together_in_no_variant_are_refused_before_any() {
+    let point = |share: f64| json!({ "input_torque_nm": 20.0, "input_speed_rpm": 500.0, "share_of_time": share });
+    let radii = || json!({ "/drive/teeth/radius_mm": { "min": 4.0, "max": 5.0, "steps": 2 } });
+    let torques = || json!({ "/load/input_torque_nm": { "min": 4.0, "max": 5.0, "steps": 2 } });
+    let ellipse_of_three = with(&with(&paper(), "/drive/teeth/count", json!(3)), "/drive/ring", json!({}));
+    for (base, over, place, code) in [
+        (with(&paper(), "/load", json!({ "duty": [point(0.5), point(0.4)] })), radii(), "/load/duty", "out_of_range"),
+        (
+            with(&paper(), "/deviations", json!({ "slot_wall_um": [1.0] })),
+            json!({ "/load/input_torque_nm": { "min": 4.0, "max": 5.0, "steps": 2 } }),
+            "/deviations/slot_wall_um",
+            "wrong_length",
+        ),
+        (ellipse_of_three, torques(), "/drive/ring/teeth", "out_of_range"),
+    ] {
+        let study = with(&map(over, json!(["peak_force_n"])), "/base", base);
+        assert_eq!(faulty(&study), (format!("/base{place}"), code.to_owned()));
     }
 }
 

@@ -38,6 +38,33 @@ fn hypervolume(points: &[(f64, f64)], corner: (f64, f64)) -> f64 {
     area
 }
 
+/// It put an object with its own number of samples in the place of what the base had.
+#[test]
+fn a_search_replaces_nothing_of_the_base_that_reading_it_refuses() {
+    let swept = with(&search(), "/objectives/0", json!({ "quantity": "peak_stress_ring_mpa", "goal": "min" }));
+    let envelope = json!({
+        "study": "search", "base": {}, "require": { "transmission_ratio": { "min": 10, "max": 20 }, "outer_diameter_mm": { "max": 120 } },
+        "objectives": [{ "quantity": "slot_wall_mm", "goal": "max" }]
+    });
+    for value in [json!(5), json!("fine"), json!(null)] {
+        let study = with(&swept, "/base/sweep", value.clone());
+        assert_eq!(faulty(&study), ("/base/sweep".into(), "wrong_type".into()), "{value}");
+        let study = with(&envelope, "/base/drive", value.clone());
+        assert_eq!(faulty(&study), ("/base/drive".into(), "wrong_type".into()), "{value}");
+    }
+}
+
+/// Those of an island that has no evaluations left for them were never looked at, or looked at beyond what was asked.
+#[test]
+fn there_are_no_more_designs_to_begin_with_than_each_island_looks_at() {
+    let started = |count: usize| {
+        let study = with(&search(), "/evaluations", json!(100));
+        with(&study, "/start", json!(vec![paper(); count]))
+    };
+    assert_eq!(faulty(&started(100)), ("/start".into(), "out_of_range".into()));
+    assert_eq!(answer(&started(20))["evaluated"], 100);
+}
+
 #[test]
 fn the_front_is_that_of_all_drives_of_a_fine_grid() {
     let map = json!({
