@@ -284,6 +284,10 @@ pub fn in_own_pages(bytes: &[u8]) -> Option<Bytes> {
 /// Keeps an answer. The cache forgets what goes beyond its bound when it comes to that, which is after tens of insertions: of all but short ones at once, or
 /// it would hold some beyond it, which take no room any more.
 fn keep(answers: &moka::sync::Cache<Key, Stored>, key: Key, stored: &Stored) {
+    // What is more than all of it would only be there for as long as it takes to let it go.
+    if answers.policy().max_capacity().is_some_and(|most| held_bytes(&stored.body) as u64 > most) {
+        return;
+    }
     answers.insert(key, Stored { held: None, ..stored.clone() });
     if stored.body.len() > SHORT_BYTES {
         answers.run_pending_tasks();

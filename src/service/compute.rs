@@ -550,8 +550,8 @@ impl Pool {
         }
     }
 
-    /// Runs what is no solve, and may yet take too long for the executor, on a thread of its own, one at a time, what has the shortest text first: it waits for no
-    /// solve.
+    /// Runs what is no solve, and may yet take too long for the executor, on a thread of its own, one at a time, what has the shortest text and what came first by turns: it
+    /// waits for no solve.
     ///
     /// # Errors
     /// `queue_full` where the system gives no thread, `deadline_exceeded` when the time is over, `internal_error` where the job panicked, and whatever it returns.
@@ -589,6 +589,17 @@ impl Pool {
             done = beside(work) => done.unwrap_or_else(|error| Err(no_thread(&error))),
             () = self.closed.cancelled() => Err(shutting_down()),
         }
+    }
+
+    /// Runs what takes some milliseconds, and for which somebody waits, as a single solve does, though it takes no place of one.
+    ///
+    /// # Errors
+    /// As [`Self::run_while_wanted`], but for `queue_full`.
+    pub async fn run_short<T: Send + 'static>(
+        &self,
+        job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        self.run_holding((), Thread::Blocking, job).await
     }
 
     async fn run_holding<T: Send + 'static>(

@@ -55,6 +55,9 @@ pub struct Problem {
     /// Of an internal error, why: for the log alone.
     #[serde(skip)]
     pub cause: Option<String>,
+    /// Whether what was asked may be done all the same: nobody is told to ask again.
+    #[serde(skip)]
+    pub is_open: bool,
 }
 
 /// Kinds of problem.
@@ -253,6 +256,7 @@ impl Problem {
             code,
             errors,
             cause: None,
+            is_open: false,
         }
     }
 
@@ -287,7 +291,7 @@ impl IntoResponse for Problem {
         let status = self.code.status();
         let body = serde_json::to_vec(&self).unwrap_or_default();
         let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], body).into_response();
-        if status == StatusCode::SERVICE_UNAVAILABLE {
+        if status == StatusCode::SERVICE_UNAVAILABLE && !self.is_open {
             response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from(RETRY_AFTER_S));
         }
         response.extensions_mut().insert(self);

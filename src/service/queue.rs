@@ -64,41 +64,82 @@ impl Drop for Place<'_> {
     }
 }
 
-/// A lane for one at a time, the shortest of those who wait first.
+/// A lane for one at a time: by turns the shortest of those who wait, and who came first, so that nobody is kept from it by many short ones or by many long ones.
 #[derive(Debug, Clone, Default)]
 pub struct Lane(Arc<OneLane>);
 
 #[derive(Debug, Default)]
 struct OneLane {
-    is_taken: Mutex<bool>,
-    queue: Queue,
+    state: Mutex<LaneState>,
+    changed: Notify,
+}
+
+#[derive(Debug, Default)]
+struct LaneState {
+    is_taken: bool,
+    taken: u64,
+    came: u64,
+    /// By their length, and the order in which they came.
+    waiting: BTreeSet<(u64, u64)>,
+}
+
+impl LaneState {
+    fn next(&self) -> Option<(u64, u64)> {
+        let is_for_the_first = !self.taken.is_multiple_of(2);
+        let first = || self.waiting.iter().min_by_key(|(_, came)| came);
+        if is_for_the_first { first() } else { self.waiting.first() }.copied()
+    }
 }
 
 /// The lane, until it is dropped.
 #[derive(Debug)]
 pub struct OnLane(Lane);
 
+/// A place before it, until it is dropped.
+struct Waits<'a> {
+    lane: &'a OneLane,
+    place: (u64, u64),
+}
+
 impl Lane {
     /// The lane when it is free, for one of such a length.
     pub async fn take(&self, length: u64) -> OnLane {
         let Self(lane) = self;
-        let place = lane.queue.come(length);
+        let place = {
+            let mut state = lane.state.lock();
+            state.came += 1;
+            let place = (length, state.came);
+            state.waiting.insert(place);
+            place
+        };
+        let _waits = Waits { lane, place };
         loop {
-            let mut changed = pin!(lane.queue.changed());
+            let mut changed = pin!(lane.changed.notified());
             changed.as_mut().enable();
-            if place.is_first() && !std::mem::replace(&mut *lane.is_taken.lock(), true) {
-                return OnLane(self.clone());
+            {
+                let mut state = lane.state.lock();
+                if !state.is_taken && state.next() == Some(place) {
+                    (state.is_taken, state.taken) = (true, state.taken + 1);
+                    return OnLane(self.clone());
+                }
             }
             changed.await;
         }
     }
 }
 
+impl Drop for Waits<'_> {
+    fn drop(&mut self) {
+        self.lane.state.lock().waiting.remove(&self.place);
+        self.lane.changed.notify_waiters();
+    }
+}
+
 impl Drop for OnLane {
     fn drop(&mut self) {
         let Self(Lane(lane)) = self;
-        *lane.is_taken.lock() = false;
-        lane.queue.tell();
+        lane.state.lock().is_taken = false;
+        lane.changed.notify_waiters();
     }
 }
 
@@ -110,21 +151,42 @@ mod tests {
 
     use super::Lane;
 
-    /// Forty-five clients whose studies took half a second each to be read kept a short one waiting until its time was over.
+    /// Forty-five clients whose studies took half a second each to be read kept a short one waiting until its time was over; of six with short ones a longer one.
     #[tokio::test]
-    async fn the_shortest_goes_first_and_one_at_a_time() {
+    async fn the_shortest_and_who_came_first_have_the_lane_by_turns() {
         let lane = Lane::default();
-        let first = lane.take(1000).await;
-        let (mut long, mut short) = (pin!(lane.take(1000)), pin!(lane.take(10)));
-        let mut gone = Box::pin(lane.take(1));
-        assert!(poll!(&mut long).is_pending() && poll!(&mut short).is_pending() && poll!(&mut gone).is_pending());
-        drop(gone);
-        drop(first);
-        assert!(poll!(&mut long).is_pending());
-        let on_lane = short.await;
-        assert!(poll!(&mut long).is_pending());
+        let mut on_lane = lane.take(1000).await;
+        // Who came first, among ever more of either kind.
+        let (mut long, mut short) = (Box::pin(lane.take(1000)), Box::pin(lane.take(10)));
+        let mut more = Vec::new();
+        assert!(poll!(&mut long).is_pending() && poll!(&mut short).is_pending());
+        for length in [1, 2, 3, 1000, 1001, 1002] {
+            more.push(Box::pin(lane.take(length)));
+            assert!(poll!(more.last_mut().expect("it was pushed")).is_pending());
+        }
         drop(on_lane);
-        drop(long.await);
-        drop(lane.take(1000).await);
+        on_lane = long.await;
+        assert!(poll!(&mut short).is_pending() && poll!(&mut more[1]).is_pending());
+        drop(on_lane);
+        // The shortest; and one that waits no more holds up nobody.
+        on_lane = more.remove(0).await;
+        drop(more.remove(0));
+        drop(on_lane);
+        on_lane = short.await;
+        drop(on_lane);
+        drop(more);
+        drop(lane.take(5).await);
+    }
+
+    #[tokio::test]
+    async fn one_has_the_lane_at_a_time() {
+        let lane = Lane::default();
+        let on_lane = lane.take(1).await;
+        let mut next = pin!(lane.take(1));
+        assert!(poll!(&mut next).is_pending());
+        drop(on_lane);
+        let on_lane = next.await;
+        assert!(poll!(pin!(lane.take(1))).is_pending());
+        drop(on_lane);
     }
 }

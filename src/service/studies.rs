@@ -169,14 +169,12 @@ impl Rows {
         self.room.lock().bytes()
     }
 
-    /// Adds to what has come. There may be more reasons, each with its words, than was known before.
-    fn add(&self, add: impl FnOnce(&mut Gathered)) -> Result<(), Problem> {
-        let bytes = {
-            let mut gathered = self.gathered.lock();
-            add(&mut gathered);
-            gathered.bytes()
-        };
-        Ok(self.room.lock().hold_at_least(self.other_bytes + bytes)?)
+    /// Adds so much to what has come, if there is room for it: there may be more reasons, each with its words, than was known before.
+    fn add(&self, more_bytes: u64, add: impl FnOnce(&mut Gathered)) -> Result<(), Problem> {
+        let mut gathered = self.gathered.lock();
+        self.room.lock().hold_at_least(self.other_bytes + gathered.bytes() + more_bytes)?;
+        add(&mut gathered);
+        Ok(())
     }
 }
 
@@ -287,6 +285,11 @@ impl Kept {
         self.state.borrow().state == StudyState::Running
     }
 
+    /// Whether its answer is all of its rows.
+    pub fn is_a_map(&self) -> bool {
+        self.study.kind() == "map"
+    }
+
     /// Told whenever it stands otherwise, or has come further.
     pub fn watch(&self) -> impl Future<Output = ()> + Send + use<> {
         let mut state = self.state.subscribe();
@@ -356,7 +359,10 @@ impl Kept {
         // Where nobody has waited to its end nobody knows yet that it is made.
         match making.made.clone().now_or_never() {
             None => self.is_running() || making.changes == self.state.borrow().changes,
-            Some(Ok(made)) => made.is_whole || (self.is_running() && made.at.elapsed() < FRESH),
+            Some(Ok(made)) => {
+                let is_the_same = || self.is_running() || making.changes == self.state.borrow().changes;
+                made.is_whole || (made.at.elapsed() < FRESH && is_the_same())
+            }
             Some(Err(_)) => false,
         }
     }
@@ -406,13 +412,10 @@ impl Kept {
                 };
                 stored.iter().map(part).collect::<Result<Vec<_>, Problem>>()
             };
-            let parts = pool.run_in_turn(unseal).await?;
-            let added = rows.add(|gathered| parts.into_iter().for_each(|(chunk, part)| gathered.add(chunk, part)));
-            if added.is_err() {
-                // They are in the store, and here without room for them.
-                *rows.gathered.lock() = Gathered::new(&self.study);
-            }
-            added?;
+            // Not in turn: variants may take minutes.
+            let parts = pool.run_short(unseal).await?;
+            let more_bytes = parts.iter().map(|(_, part)| part.bytes() as u64).sum();
+            rows.add(more_bytes, |gathered| parts.into_iter().for_each(|(chunk, part)| gathered.add(chunk, part)))?;
         }
         // Of one that was forgotten meanwhile there are fewer, or none, and nothing else says so.
         let is_whole = rows.gathered.lock().is_complete();
@@ -524,20 +527,15 @@ async fn note_asked(store: &Store, id: &str) {
     }
 }
 
-/// Cancels a stored study. Where the store was silent it may be cancelled all the same, and who asked once more would forget it.
-///
-/// # Errors
-/// Where the store does not answer.
-async fn cancelled(store: &Store, id: &str) -> Result<(), Problem> {
-    let Err(error) = store.cancel(id).await else { return Ok(()) };
-    match store.look(id).await {
-        Ok(Some(stored)) if !stored.is_cancelled => Err(error.into()),
-        Ok(_) => Ok(()),
-        Err(_) => {
-            let detail = "the studies' store does not answer, and the study may be cancelled by now: a second DELETE would forget it then, so look how it stands before";
-            Err(Problem { detail: detail.into(), ..error.into() })
-        }
+/// Why a stored study was not cancelled, as far as anybody knows: who asks once more forgets it where it was.
+fn not_cancelled(error: StoreError) -> Problem {
+    let is_open = error.leaves_open();
+    let problem = Problem::from(error);
+    if !is_open {
+        return problem;
     }
+    let detail = "the studies' store does not answer, and the study may be cancelled by now, or soon: a second DELETE would forget it then, so look how it stands before";
+    Problem { detail: detail.into(), is_open, ..problem }
 }
 
 /// Whether a study's answer is made apart: that of a tolerance study is short, and its rows have to be sorted for it; so is that of a search, and its islands' fronts have to
@@ -625,7 +623,7 @@ impl Studies {
             Some(kept) => kept,
             None => {
                 let kept = match store.look(id).await? {
-                    Some(stored) => self.kept_here(store, &stored).await?,
+                    Some(stored) => self.kept_here(store, &stored, &mut None).await?,
                     None => None,
                 };
                 let Some(kept) = kept else {
@@ -660,7 +658,12 @@ impl Studies {
     ///
     /// # Errors
     /// Where this is not the build or the processor that it was asked of, or there is no room for it.
-    async fn kept_here(&self, store: &Store, stored: &Stored) -> Result<Option<Arc<Kept>>, Problem> {
+    async fn kept_here(
+        &self,
+        store: &Store,
+        stored: &Stored,
+        room: &mut Option<room::Kept>,
+    ) -> Result<Option<Arc<Kept>>, Problem> {
         let cut = stored.study.cut();
         let known = self.kept.lock().iter().find(|kept| kept.cut() == cut).cloned();
         if known.is_some() {
@@ -673,8 +676,11 @@ impl Studies {
         let thawed = frozen::thaw(&self.pool, store, &cut, stored.document_bytes).await?;
         let Some(thawed) = thawed else { return Ok(None) };
         let (study, _) = thawed.map_err(|reason| reason.told(&cut.id))?;
-        // Each request holds its own, whatever is known of others.
-        let room = self.room.keep(view_bytes(&study))?;
+        // Each request holds its own, whatever is known of others; who asks it anew has it already.
+        let room = match room.take() {
+            Some(room) => room,
+            None => self.room.keep(view_bytes(&study))?,
+        };
         let kept = Self::view(study, Some(room));
         let (state, problem) = state_of(stored);
         kept.stand(state, problem);
@@ -752,7 +758,7 @@ impl Studies {
         loop {
             let stored = store.look(&id).await?;
             let known = match &stored {
-                Some(stored) => self.kept_here(store, stored).await?,
+                Some(stored) => self.kept_here(store, stored, &mut room).await?,
                 None => None,
             };
             let kept = match (stored, known) {
@@ -867,7 +873,9 @@ impl Studies {
             None => {
                 let study = Arc::new(study);
                 let rows = self.new_rows(&mut all, &study, view_bytes(&study), working_bytes)?;
-                let working = self.room.keep(working_bytes)?;
+                // Together no more than there is, as it was looked at.
+                let left_bytes = self.limits.max_unread_bytes.saturating_sub(rows.bytes());
+                let working = self.room.keep(working_bytes.min(left_bytes))?;
                 let kept = Kept::new(study, Some(rows), 0, None);
                 all.push_back(Arc::clone(&kept));
                 (kept, working)
@@ -989,10 +997,13 @@ impl Studies {
             }
             return Ok(true);
         };
+        let asked = Instant::now();
         let (here, stored) = (self.find_here(id), store.look(id).await?);
         let is_running = stored.as_ref().is_some_and(Stored::is_running);
         if is_running {
-            cancelled(store, id).await?;
+            // Both within the time that a proxy waits.
+            let cancelled = tokio::time::timeout_at(asked + PATIENCE, store.cancel(id)).await;
+            cancelled.unwrap_or(Err(StoreError::Silent(PATIENCE))).map_err(not_cancelled)?;
         } else if stored.is_some() {
             store.forget(id).await?;
         }
@@ -1179,7 +1190,9 @@ impl Studies {
         let (kept, pool, limits) = (Arc::clone(kept), self.pool.clone(), self.limits);
         tokio::spawn(async move {
             let missing: Vec<_> = kept.here(|gathered| gathered.missing().collect());
-            let most = kept.study.span().end.div_ceil(LEAST_PIECES.max(4 * limits.max_concurrent_solves as u64));
+            let shares = LEAST_PIECES.max(4 * limits.max_concurrent_solves as u64);
+            // An island is a piece of its own.
+            let most = if kept.study.has_rows() { kept.study.span().end.div_ceil(shares) } else { 1 };
             let pieces = missing.into_iter().flat_map(|span| {
                 let starts = span.clone().step_by(usize::try_from(most).unwrap_or(usize::MAX));
                 starts.map(move |start| start..span.end.min(start + most))
@@ -1200,7 +1213,11 @@ impl Studies {
                 return;
             }
             match ended {
-                Ok(Ok(_)) => kept.stand(StudyState::Done, None),
+                Ok(Ok(_)) if kept.here(|gathered| gathered.is_complete()) => kept.stand(StudyState::Done, None),
+                Ok(Ok(_)) => {
+                    let problem = Problem::internal(&"not all of the study was worked on");
+                    kept.break_off(StudyState::Failed, Some(problem));
+                }
                 Ok(Err(problem)) => kept.break_off(StudyState::Failed, Some(problem)),
                 Err(_) => {
                     let problem = too_late(&format!("the {} ms of", limits.study_deadline_ms));
@@ -1288,7 +1305,8 @@ async fn run_pieces(
             return Ok(());
         }
         kept.looked_at.fetch_add(came.variants, Ordering::Relaxed);
-        rows.add(|gathered| {
+        let more_bytes = came.over.iter().map(|(_, part)| part.bytes() as u64).sum();
+        rows.add(more_bytes, |gathered| {
             came.over.into_iter().for_each(|(span, part)| gathered.add_span(span, part));
             kept.impossible.store(gathered.refused(), Ordering::Relaxed);
         })?;
@@ -1330,10 +1348,16 @@ mod tests {
         kept.stand(StudyState::Cancelled, None);
         let of_cancelled = making();
         assert!(kept.serves(&of_cancelled) && !kept.serves(&of_running));
+        // Made when nobody waited any more: it was thrown away, and made anew for whoever came back, again and again.
+        let answer = Gathered::new(&kept.study).answer();
+        let made = Arc::new(Made { answer, is_whole: false, at: Instant::now() });
+        let made = futures_util::future::ready(Ok(made)).boxed().shared();
+        let ready = Making { made, ..making() };
+        assert!(kept.serves(&ready));
         kept.stand(StudyState::Running, None);
         assert!(kept.serves(&of_cancelled), "it is told that it is not complete");
         kept.stand(StudyState::Done, None);
-        assert!(!kept.serves(&of_cancelled));
+        assert!(!kept.serves(&of_cancelled) && !kept.serves(&ready));
         let of_done = making();
         kept.stand(StudyState::Done, None);
         assert!(kept.serves(&of_done));

@@ -104,7 +104,7 @@ pub(crate) const LOCK_NOT_AVAILABLE: &str = "55P03";
 
 impl StoreError {
     /// Whether what was asked may have been done, or be done yet: nobody said that it was not.
-    pub(crate) fn leaves_open(&self) -> bool {
+    pub fn leaves_open(&self) -> bool {
         match self {
             Self::Silent(_) => true,
             Self::Failed(sqlx::Error::PoolClosed) => false,

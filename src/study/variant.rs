@@ -232,8 +232,11 @@ impl Template {
         let mut put_in: Vec<&[String]> = self.variables.iter().map(Variable::path).collect();
         put_in.extend(derives.then_some(&ring_teeth[..]));
         let value_above = |path: &&[String]| {
-            let is_value = |length: &usize| {
-                base.at(&path[..*length]).is_some_and(|tree| !matches!(tree, Tree::Object(_) | Tree::Array(_)))
+            let is_value = |length: &usize| match base.at(&path[..*length]) {
+                None | Some(Tree::Object(_)) => false,
+                // An entry that is there is a field of it.
+                Some(Tree::Array(_)) => base.at(&path[..=*length]).is_none(),
+                Some(_) => true,
             };
             (0..path.len()).find(is_value).map(|length| path[..length].to_vec())
         };

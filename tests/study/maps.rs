@@ -171,6 +171,8 @@ fn a_value_of_the_base_that_cannot_stand_above_a_field_is_refused_and_not_replac
         (radii(), "/drive/ring", json!(30)),
         (radii(), "/drive/ring", json!("30")),
         (radii(), "/drive/ring", json!(null)),
+        (radii(), "/drive/ring", json!([{ "teeth": 26, "tip_radius_mm": 67 }])),
+        (varied("/model/clearance/ring_um", 1.0), "/model", json!([{ "compatibility": "projection" }])),
         (varied("/model/clearance/ring_um", 1.0), "/model", json!("projection")),
         (varied("/model/clearance/ring_um", 1.0), "/model/clearance", json!(100)),
         (varied("/load/input_torque_nm", 10.0), "/load", json!(5)),

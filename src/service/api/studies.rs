@@ -99,7 +99,7 @@ pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRej
     responses(
         (status = 204, description = "It does not run any more, or is forgotten."),
         (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
-        (status = 503, description = "The store of studies does not answer, or a worker that stands still has a chunk of it in its hands; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
+        (status = 503, description = "The store of studies does not answer, or a worker that stands still has a chunk of it in its hands; `Retry-After` says when to try again. Without that header the study may be cancelled all the same.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
     )
 )]
 pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
@@ -300,8 +300,9 @@ async fn written_apart<A: Forms + Send>(
 ) -> Result<Response, Problem> {
     let reading = app.pool.until_closed(app.studies.read(kept, app.pool.deadline())).await?;
     let (columns_bytes, deadline) = (reading.columns_bytes(), app.pool.deadline());
-    // With its text, of some twenty letters a number: what finds no room for that once it is made does not wait for it.
-    let expected_bytes = columns_bytes.saturating_mul(7) / 2;
+    // Of a map, with its text, of some twenty letters a number: what finds no room for that once it is made does not wait for it.
+    let is_long = kept.is_a_map() && !representation.gzip;
+    let expected_bytes = if is_long { columns_bytes.saturating_mul(7) / 2 } else { columns_bytes };
     let waited = async { Ok(app.room.reserve_in_time(deadline, expected_bytes).await?) };
     let reserved = app.pool.until_closed(waited).await?;
     let job = move |stop: &AtomicBool| {
