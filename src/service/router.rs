@@ -275,5 +275,13 @@ fn cors(origins: &[String]) -> CorsLayer {
         .allow_origin(allowed)
         .allow_methods(Any)
         .allow_headers(AllowHeaders::mirror_request())
-        .expose_headers([header::ETAG, header::RETRY_AFTER, CACHE_STATUS, SERVER_TIMING, observe::X_REQUEST_ID])
+        .expose_headers([
+            header::ETAG,
+            header::LOCATION,
+            header::RETRY_AFTER,
+            CACHE_STATUS,
+            studies::PREFERENCE_APPLIED,
+            SERVER_TIMING,
+            observe::X_REQUEST_ID,
+        ])
 }

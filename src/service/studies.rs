@@ -15,7 +15,7 @@ use futures_util::future::{BoxFuture, Shared, try_join_all};
 use metrics::counter;
 use parking_lot::Mutex;
 use serde::Serialize;
-use tokio::sync::watch;
+use tokio::sync::{Semaphore, watch};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use toothwave_calculation::origin;
@@ -52,6 +52,9 @@ const ENDLESS: Duration = Duration::from_secs(100 * 365 * 86_400);
 
 /// For so long a server is told that nobody needs it any more.
 const CLOSE: Duration = Duration::from_millis(300);
+
+/// Stored studies that are forgotten at once, of the connections that there are for all else.
+const FORGET_AT_ONCE: usize = 2;
 
 /// Of what is read of a store at once: it is unpacked beside that.
 const READ_BYTES: u64 = 4 << 20;
@@ -121,6 +124,8 @@ pub struct Studies {
     kept: Mutex<VecDeque<Arc<Kept>>>,
     /// Held while a stored study begins: as many as are counted run, and no more.
     beginning: tokio::sync::Mutex<()>,
+    /// One for each stored study that is forgotten at once.
+    forgetting: Arc<Semaphore>,
     /// Cancelled when the service stops: nobody waits for a study any more.
     closing: CancellationToken,
 }
@@ -527,15 +532,17 @@ async fn note_asked(store: &Store, id: &str) {
     }
 }
 
-/// Why a stored study was not cancelled, as far as anybody knows: who asks once more forgets it where it was.
-fn not_cancelled(error: StoreError) -> Problem {
+/// Why a stored study is not cancelled or forgotten, as far as anybody knows: a second DELETE would forget one that was cancelled, or was asked for anew.
+fn perhaps_done(error: StoreError, done: &str) -> Problem {
     let is_open = error.leaves_open();
     let problem = Problem::from(error);
     if !is_open {
         return problem;
     }
-    let detail = "the studies' store does not answer, and the study may be cancelled by now, or soon: a second DELETE would forget it then, so look how it stands before";
-    Problem { detail: detail.into(), is_open, ..problem }
+    let detail = format!(
+        "the studies' store does not answer in time, and the study may be {done} by now, or soon: look how it stands before you ask again"
+    );
+    Problem { detail, is_open, ..problem }
 }
 
 /// Whether a study's answer is made apart: that of a tolerance study is short, and its rows have to be sorted for it; so is that of a search, and its islands' fronts have to
@@ -591,6 +598,7 @@ impl Studies {
             figures: Mutex::default(),
             kept: Mutex::default(),
             beginning: tokio::sync::Mutex::default(),
+            forgetting: Arc::new(Semaphore::new(FORGET_AT_ONCE)),
             closing: CancellationToken::new(),
         }
     }
@@ -863,19 +871,24 @@ impl Studies {
         }
         let in_work = self.in_work(&study);
         let working_bytes = study.working_bytes().saturating_mul(in_work);
+        // Beside its rows no more than there is.
+        let beside = |rows: &Rows| {
+            // Each of the two takes whole KiB.
+            let left_bytes = self.limits.max_unread_bytes.saturating_sub(rows.bytes().saturating_add(1024));
+            working_bytes.min(left_bytes / 1024 * 1024)
+        };
         let (kept, working) = match known {
             Some(kept) => {
                 // These do not go for it.
-                let _its_rows = kept.rows.lock().clone();
+                let rows = kept.rows.lock().clone().ok_or_else(|| kept.forgotten())?;
+                let working_bytes = beside(&rows);
                 self.make_room(&mut all, 0, working_bytes)?;
                 (kept, self.room.keep(working_bytes)?)
             }
             None => {
                 let study = Arc::new(study);
                 let rows = self.new_rows(&mut all, &study, view_bytes(&study), working_bytes)?;
-                // Together no more than there is, as it was looked at.
-                let left_bytes = self.limits.max_unread_bytes.saturating_sub(rows.bytes());
-                let working = self.room.keep(working_bytes.min(left_bytes))?;
+                let working = self.room.keep(beside(&rows))?;
                 let kept = Kept::new(study, Some(rows), 0, None);
                 all.push_back(Arc::clone(&kept));
                 (kept, working)
@@ -912,6 +925,10 @@ impl Studies {
     /// For what a study comes to, and what its work takes, the oldest go, as many as it takes, and none where all of them would be too few: in memory those that
     /// do not run are forgotten; of stored ones the rows can be read again.
     fn make_room(&self, all: &mut VecDeque<Arc<Kept>>, bytes: u64, working_bytes: u64) -> Result<(), Problem> {
+        // Whatever went, nothing would be kept.
+        if self.room.memory().is_scarce() {
+            return Err(NoRoom::Scarce.into());
+        }
         let is_stored = matches!(self.keeping, Keeping::Store { .. });
         let most = self.limits.max_study_bytes;
         let mut left: u64 = all.iter().filter_map(|kept| Some(kept.rows.lock().as_ref()?.bytes())).sum();
@@ -924,7 +941,8 @@ impl Studies {
         loop {
             // One that was admitted when the bound was larger has all of it; what is kept already is.
             let is_within = bytes == 0 || left + bytes.min(most) <= most;
-            if is_within && self.room.could_keep(bytes.saturating_add(working_bytes), given_back_bytes) {
+            let both_bytes = bytes.saturating_add(1024).saturating_add(working_bytes);
+            if is_within && self.room.could_keep(both_bytes, given_back_bytes) {
                 break;
             }
             match could_go.next() {
@@ -1001,23 +1019,49 @@ impl Studies {
         let (here, stored) = (self.find_here(id), store.look(id).await?);
         let is_running = stored.as_ref().is_some_and(Stored::is_running);
         if is_running {
-            // Both within the time that a proxy waits.
+            // All of it within the time that a proxy waits.
             let cancelled = tokio::time::timeout_at(asked + PATIENCE, store.cancel(id)).await;
-            cancelled.unwrap_or(Err(StoreError::Silent(PATIENCE))).map_err(not_cancelled)?;
+            cancelled.unwrap_or(Err(StoreError::Silent(PATIENCE))).map_err(|error| perhaps_done(error, "cancelled"))?;
         } else if stored.is_some() {
-            store.forget(id).await?;
+            self.forget_apart(store, id, asked + PATIENCE).await?;
         }
         if stored.is_some() {
             // Workers learn it at once where they are here.
             self.changed.send_replace(());
         }
         match here {
-            // It is cancelled, though how far it came may not be told now.
-            Some(kept) if is_running && kept.look(store).await.is_err() => kept.stand(StudyState::Cancelled, None),
-            Some(kept) if !is_running => Self::let_go(&mut self.kept.lock(), &kept),
-            _ => {}
+            Some(kept) if is_running => {
+                let looked = tokio::time::timeout_at(asked + PATIENCE, kept.look(store)).await;
+                if !matches!(looked, Ok(Ok(_))) {
+                    // It is cancelled, though how far it came may not be told now.
+                    kept.stand(StudyState::Cancelled, None);
+                }
+            }
+            Some(kept) => Self::let_go(&mut self.kept.lock(), &kept),
+            None => {}
         }
         Ok(stored.is_some())
+    }
+
+    /// Forgets a stored study, which goes on when the time is over: one of very many chunks takes long, and so does a server whose disk stands still. Few do at once, so
+    /// that others find the store's connections.
+    async fn forget_apart(&self, store: &Store, id: &str, until: Instant) -> Result<(), Problem> {
+        let silent = || StoreError::Silent(PATIENCE);
+        let turn = tokio::time::timeout_at(until, Arc::clone(&self.forgetting).acquire_owned()).await;
+        let turn = turn.map_err(|_| silent())?.map_err(|error| Problem::internal(&error))?;
+        let (store, id) = (store.clone(), id.to_owned());
+        let forgotten = async move {
+            let _turn = turn;
+            store.forget(&id).await
+        };
+        let forgetting = tokio::spawn(forgotten.in_current_span());
+        match tokio::time::timeout_at(until, forgetting).await {
+            Ok(joined) => {
+                let forgotten = joined.map_err(|error| Problem::internal(&error))?;
+                forgotten.map_err(|error| perhaps_done(error, "forgotten"))
+            }
+            Err(_) => Err(perhaps_done(silent(), "forgotten")),
+        }
     }
 
     /// What a study has come to, or the rows that its answer is soon made of.

@@ -203,7 +203,7 @@ pub struct SearchDocument {
     #[serde(default = "default_seed")]
     #[schema(value_type = i64, minimum = 0, maximum = 9007199254740991_i64, default = 1, required = false)]
     pub seed: Whole,
-    /// Designs to begin with, each with a value for everything that is free.
+    /// Designs to begin with, each with a value for everything that is free: nothing else of it is read.
     #[serde(default)]
     pub start: Vec<Base>,
 }

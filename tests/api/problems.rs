@@ -76,7 +76,7 @@ async fn every_problem_carries_the_headers_that_browsers_ask_for() {
     for (answer, status, _) in provoked(&service).await {
         assert_eq!(answer.header("access-control-allow-origin"), "https://cad.example", "{status}");
         let exposed = answer.header("access-control-expose-headers").to_ascii_lowercase();
-        for header in ["etag", "retry-after", "cache-status", "server-timing"] {
+        for header in ["etag", "location", "retry-after", "cache-status", "preference-applied", "server-timing"] {
             assert!(exposed.contains(header), "{status}: {exposed}");
         }
     }

@@ -280,6 +280,29 @@ async fn a_study_holds_room_for_its_work_while_that_goes_on_and_no_longer() {
     until("a done study gives back what its work takes", || taken_bytes() < running_bytes / 2).await;
 }
 
+/// What its work takes was wanted once more beside its rows, and more than there is.
+#[tokio::test]
+async fn a_study_that_takes_all_the_room_goes_on_as_it_began() {
+    let limits = Limits { max_unread_bytes: 8 << 20, max_study_bytes: 8 << 20, max_concurrent_solves: 1, ..LIMITS };
+    let service = Service::within(limits);
+    let mut study = map(&shortest(), 1275);
+    let choices: Vec<_> = (0..16).map(|choice| 1.0 + f64::from(choice)).collect();
+    study["over"]["/load/input_torque_nm"] = json!({ "one_of": choices });
+    study["over"]["/drive/teeth/width_mm"] = json!({ "one_of": choices });
+    study["quantities"] = json!(["undercut"]);
+    let occupied = Occupied::by_one(&service.app.pool).await;
+    let begun_once = begun(&service, &study).await.json();
+    assert_eq!(begun_once["state"], "running", "{begun_once}");
+    assert_eq!(deleted(&service, &place(&begun_once)).await, 204);
+    assert_eq!(begun(&service, &study).await.json()["state"], "running");
+    assert_eq!(deleted(&service, &place(&begun_once)).await, 204);
+    // Nor is anything forgotten for another while memory is scarce.
+    service.app.room.memory().set_scarce(true);
+    begun(&service, &map(&shortest(), 5)).await.refused(503, "too_many_unread_bytes");
+    assert_eq!(service.get(&place(&begun_once)).await.found()["state"], "cancelled");
+    occupied.end().await;
+}
+
 /// One such study that ran took all the room from others.
 #[tokio::test]
 async fn pieces_that_take_much_are_worked_on_side_by_side_as_far_as_an_eighth_of_the_room_goes() {

@@ -30,7 +30,8 @@ use crate::studies::{Kept, StudyResource};
 
 /// What a client would rather have (RFC 7240).
 const PREFER: HeaderName = HeaderName::from_static("prefer");
-const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
+/// What of a request's wishes was followed (RFC 7240).
+pub const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
 
 /// Between two events of a study's progress.
 const PAUSE: Duration = Duration::from_millis(100);
@@ -99,13 +100,16 @@ pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRej
     responses(
         (status = 204, description = "It does not run any more, or is forgotten."),
         (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
-        (status = 503, description = "The store of studies does not answer, or a worker that stands still has a chunk of it in its hands; `Retry-After` says when to try again. Without that header the study may be cancelled all the same.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
+        (status = 503, description = "The store of studies does not answer, or a worker that stands still has a chunk of it in its hands; `Retry-After` says when to try again. Without that header the study may be cancelled, or forgotten, all the same.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
     )
 )]
 pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
     let cancelled = async {
         let id = id_of(id)?;
-        if app.pool.until_closed(app.studies.cancel_or_forget(&id)).await? {
+        let cancelled = app.pool.until_closed(app.studies.cancel_or_forget(&id)).await;
+        // At the end of a stop it may be on its way to the store.
+        let is_open = |problem: &Problem| problem.is_open || problem.code == ProblemCode::ShuttingDown;
+        if cancelled.map_err(|problem| Problem { is_open: is_open(&problem), ..problem })? {
             Ok(StatusCode::NO_CONTENT)
         } else {
             Err(not_kept(&id))
