@@ -288,7 +288,9 @@ fn wait_wanted(headers: &HeaderMap) -> Option<Duration> {
     let preferences = headers.get_all(PREFER).iter().filter_map(|value| value.to_str().ok());
     preferences.flat_map(|list| list.split([',', ';'])).find_map(|preference| {
         let (name, value) = preference.split_once('=')?;
-        let seconds = value.trim().trim_matches('"').parse::<u64>().ok()?;
+        let seconds = value.trim().trim_matches('"');
+        let is_number = !seconds.is_empty() && seconds.bytes().all(|byte| byte.is_ascii_digit());
+        let seconds = is_number.then(|| seconds.parse::<u64>().unwrap_or(u64::MAX))?;
         // So long that nothing is waited for longer, so short that it can be added to any time.
         let seconds = seconds.min(u64::from(u32::MAX));
         name.trim().eq_ignore_ascii_case("wait").then(|| Duration::from_secs(seconds))
