@@ -15,7 +15,7 @@ use futures_util::future::{BoxFuture, Shared, try_join_all};
 use metrics::counter;
 use parking_lot::Mutex;
 use serde::Serialize;
-use tokio::sync::{Semaphore, watch};
+use tokio::sync::{OwnedMutexGuard, Semaphore, watch};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use toothwave_calculation::origin;
@@ -123,7 +123,7 @@ pub struct Studies {
     /// The oldest first. Whoever changes whether a study of this list runs holds it.
     kept: Mutex<VecDeque<Arc<Kept>>>,
     /// Held while a stored study begins: as many as are counted run, and no more.
-    beginning: tokio::sync::Mutex<()>,
+    beginning: Arc<tokio::sync::Mutex<()>>,
     /// One for each stored study that is forgotten at once.
     forgetting: Arc<Semaphore>,
     /// Cancelled when the service stops: nobody waits for a study any more.
@@ -532,6 +532,20 @@ async fn note_asked(store: &Store, id: &str) {
     }
 }
 
+/// What comes of a statement with which a study begins, which has the turn until that is known, though nobody waits for it any more: a server that does not come to
+/// the end of it comes to it later, and meanwhile the next would begin one more.
+async fn to_its_end<T: Send + 'static>(
+    turn: OwnedMutexGuard<()>,
+    statement: impl Future<Output = Result<T, StoreError>> + Send + 'static,
+) -> Result<T, Problem> {
+    let ending = async move {
+        let _turn = turn;
+        statement.await
+    };
+    let ended = tokio::spawn(ending.in_current_span()).await;
+    Ok(ended.map_err(|error| Problem::internal(&error))??)
+}
+
 /// Why a stored study is not cancelled or forgotten, as far as anybody knows: a second DELETE would forget one that was cancelled, or was asked for anew.
 fn perhaps_done(error: StoreError, done: &str) -> Problem {
     let is_open = error.leaves_open();
@@ -597,7 +611,7 @@ impl Studies {
             changed: watch::Sender::default(),
             figures: Mutex::default(),
             kept: Mutex::default(),
-            beginning: tokio::sync::Mutex::default(),
+            beginning: Arc::default(),
             forgetting: Arc::new(Semaphore::new(FORGET_AT_ONCE)),
             closing: CancellationToken::new(),
         }
@@ -808,16 +822,18 @@ impl Studies {
         new: Option<&((Arc<Study>, NewStudy), u64)>,
         room: &mut Option<room::Kept>,
     ) -> Result<Option<Arc<Kept>>, Problem> {
-        let _turn = self.beginning.lock().await;
+        let turn = Arc::clone(&self.beginning).lock_owned().await;
         let kept = match (store.look(id).await?, known, new) {
             (Some(stored), Some(kept), _) if !is_there(&stored) && stored.study.cut() == kept.cut() => {
                 self.require_one_more(store).await?;
-                store.resume(id, self.time(store)).await?;
+                let (store, id, time) = (store.clone(), id.to_owned(), self.time(store));
+                to_its_end(turn, async move { store.resume(&id, time).await }).await?;
                 kept
             }
             (None, None, Some(((study, frozen), canary_ms))) => {
                 self.require_one_more(store).await?;
-                if !store.create(frozen).await? {
+                let (store, new) = (store.clone(), frozen.clone());
+                if !to_its_end(turn, async move { store.create(&new).await }).await? {
                     // Another replica was first, whose chunks may be others.
                     return Ok(None);
                 }

@@ -33,6 +33,10 @@ pub const PATIENCE: Duration = Duration::from_secs(10);
 /// For what touches every chunk of a study, of which there may be very many.
 pub(crate) const LONG_PATIENCE: Duration = Duration::from_secs(120);
 
+/// For what lets a study run: a server that takes it and does not come to its end, since its disk or its standby stands still, comes to it later, and who gives
+/// up sooner tries sooner again.
+pub(crate) const BEGIN_PATIENCE: Duration = Duration::from_secs(30);
+
 /// So long does the server let a statement wait for a lock. For a row it may do so twice, first for whoever waits for it already, and the answer
 /// should come within [`PATIENCE`].
 pub(crate) const LOCK_PATIENCE: Duration = Duration::from_millis(4500);

@@ -7,7 +7,7 @@ use tokio::time::Instant;
 
 use crate::connection::{Connection, Database, Store, StoreError, on};
 use crate::schema::require_schema;
-use crate::{BATCH_CHUNKS, LETTING_GO, LONG_PATIENCE, LOOK_AGAIN, PATIENCE, read, stored};
+use crate::{BATCH_CHUNKS, BEGIN_PATIENCE, LETTING_GO, LONG_PATIENCE, LOOK_AGAIN, PATIENCE, read, stored};
 
 /// A study as it is first kept: all that follows from it is frozen with it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -205,7 +205,7 @@ impl Store {
     /// # Errors
     /// Where the store does not answer, or has another schema.
     pub async fn create(&self, study: &NewStudy) -> Result<bool, StoreError> {
-        self.with(PATIENCE, async |connection| {
+        self.with(BEGIN_PATIENCE, async |connection| {
             require_schema(connection).await?;
             let time_s = stored(study.time.as_secs());
             let is_new = on!(connection, inner => {
@@ -271,7 +271,7 @@ impl Store {
     /// # Errors
     /// As [`Self::create`].
     pub async fn resume(&self, id: &str, time: Duration) -> Result<(), StoreError> {
-        self.with(PATIENCE, async |connection| {
+        self.with(BEGIN_PATIENCE, async |connection| {
             require_schema(connection).await?;
             begin(connection).await?;
             let time_s = stored(time.as_secs());

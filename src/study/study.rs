@@ -110,9 +110,13 @@ impl Study {
     /// # Errors
     /// Whatever is known to be impossible before anything is computed, at the field that says so.
     pub fn read(text: &[u8], limits: &Limits) -> Result<Self, NoAnswer> {
-        let tree = json::tree(text)?;
-        require_each_field_once(&tree)?;
-        Self::new(&tree.read()?, limits)
+        let document = {
+            // Gone before more is made of it.
+            let tree = json::tree(text)?;
+            require_each_field_once(&tree)?;
+            tree.read()?
+        };
+        Self::new(&document, limits)
     }
 
     /// The study that a document asks for.
@@ -388,7 +392,10 @@ fn require_each_field_once(tree: &Tree) -> Result<(), Fault> {
 /// The hash of what is asked, within limits that some variants may be beyond: equal however the fields are ordered and the numbers spelled.
 fn id(document: &StudyDocument, limits: &question::Limits) -> Result<Key, NoAnswer> {
     let text = serde_json::to_string(document).map_err(NoAnswer::internal)?;
-    let sorted = json::tree(text.as_bytes())?.sorted();
+    let tree = json::tree(text.as_bytes())?;
+    // Nobody needs the one while the other is made.
+    drop(text);
+    let sorted = tree.sorted();
     let text = serde_json::to_string(&sorted).map_err(NoAnswer::internal)?;
     let within = format!("{} states, {} points", limits.max_states, limits.max_profile_points);
     Ok(Key::new("study", &text.as_str(), &within.as_str()))
