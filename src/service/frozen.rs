@@ -147,7 +147,7 @@ pub fn require_origin(theirs: &str) -> Result<(), NotHere> {
 /// stand for is bounded, and not counted here.
 pub const fn reading_bytes(document_bytes: u64) -> u64 {
     /// Measured with lists of numbers, texts and objects, each as short as can be.
-    const TIMES: u64 = 48;
+    const TIMES: u64 = 64;
     document_bytes.saturating_mul(TIMES)
 }
 
