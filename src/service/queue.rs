@@ -1,4 +1,4 @@
-//! Who waits for something of which there is not enough: nothing is held meanwhile, and who wants least comes first.
+//! Who waits for something of which there is not enough, and a lane for one at a time: nothing is held meanwhile.
 
 use std::collections::BTreeSet;
 use std::pin::pin;
@@ -55,6 +55,12 @@ impl Place<'_> {
     pub fn is_first(&self) -> bool {
         self.queue.waiting.lock().first() == Some(&self.place)
     }
+
+    /// Whether nobody who waits came before.
+    pub fn came_first(&self) -> bool {
+        let (_, came) = self.place;
+        self.queue.waiting.lock().iter().all(|&(_, other)| came <= other)
+    }
 }
 
 impl Drop for Place<'_> {
@@ -71,54 +77,32 @@ pub struct Lane(Arc<OneLane>);
 #[derive(Debug, Default)]
 struct OneLane {
     state: Mutex<LaneState>,
-    changed: Notify,
+    queue: Queue,
 }
 
 #[derive(Debug, Default)]
 struct LaneState {
     is_taken: bool,
+    /// How often it was.
     taken: u64,
-    came: u64,
-    /// By their length, and the order in which they came.
-    waiting: BTreeSet<(u64, u64)>,
-}
-
-impl LaneState {
-    fn next(&self) -> Option<(u64, u64)> {
-        let is_for_the_first = !self.taken.is_multiple_of(2);
-        let first = || self.waiting.iter().min_by_key(|(_, came)| came);
-        if is_for_the_first { first() } else { self.waiting.first() }.copied()
-    }
 }
 
 /// The lane, until it is dropped.
 #[derive(Debug)]
 pub struct OnLane(Lane);
 
-/// A place before it, until it is dropped.
-struct Waits<'a> {
-    lane: &'a OneLane,
-    place: (u64, u64),
-}
-
 impl Lane {
     /// The lane when it is free, for one of such a length.
     pub async fn take(&self, length: u64) -> OnLane {
         let Self(lane) = self;
-        let place = {
-            let mut state = lane.state.lock();
-            state.came += 1;
-            let place = (length, state.came);
-            state.waiting.insert(place);
-            place
-        };
-        let _waits = Waits { lane, place };
+        let place = lane.queue.come(length);
         loop {
-            let mut changed = pin!(lane.changed.notified());
+            let mut changed = pin!(lane.queue.changed());
             changed.as_mut().enable();
             {
                 let mut state = lane.state.lock();
-                if !state.is_taken && state.next() == Some(place) {
+                let is_next = if state.taken.is_multiple_of(2) { place.is_first() } else { place.came_first() };
+                if !state.is_taken && is_next {
                     (state.is_taken, state.taken) = (true, state.taken + 1);
                     return OnLane(self.clone());
                 }
@@ -128,18 +112,11 @@ impl Lane {
     }
 }
 
-impl Drop for Waits<'_> {
-    fn drop(&mut self) {
-        self.lane.state.lock().waiting.remove(&self.place);
-        self.lane.changed.notify_waiters();
-    }
-}
-
 impl Drop for OnLane {
     fn drop(&mut self) {
         let Self(Lane(lane)) = self;
         lane.state.lock().is_taken = false;
-        lane.changed.notify_waiters();
+        lane.queue.tell();
     }
 }
 

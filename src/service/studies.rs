@@ -15,7 +15,7 @@ use futures_util::future::{BoxFuture, Shared, try_join_all};
 use metrics::counter;
 use parking_lot::Mutex;
 use serde::Serialize;
-use tokio::sync::{OwnedMutexGuard, Semaphore, watch};
+use tokio::sync::{Semaphore, watch};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use toothwave_calculation::origin;
@@ -532,18 +532,17 @@ async fn note_asked(store: &Store, id: &str) {
     }
 }
 
-/// What comes of a statement with which a study begins, which has the turn until that is known, though nobody waits for it any more: a server that does not come to
-/// the end of it comes to it later, and meanwhile the next would begin one more.
+/// What comes of a statement that has its turn until that is known, though nobody waits for it any more: a server that does not come to the end of it comes to it
+/// later, and meanwhile the next would have one more beside it.
 async fn to_its_end<T: Send + 'static>(
-    turn: OwnedMutexGuard<()>,
+    turn: impl Send + 'static,
     statement: impl Future<Output = Result<T, StoreError>> + Send + 'static,
-) -> Result<T, Problem> {
+) -> Result<Result<T, StoreError>, Problem> {
     let ending = async move {
         let _turn = turn;
         statement.await
     };
-    let ended = tokio::spawn(ending.in_current_span()).await;
-    Ok(ended.map_err(|error| Problem::internal(&error))??)
+    tokio::spawn(ending.in_current_span()).await.map_err(|error| Problem::internal(&error))
 }
 
 /// Why a stored study is not cancelled or forgotten, as far as anybody knows: a second DELETE would forget one that was cancelled, or was asked for anew.
@@ -827,13 +826,13 @@ impl Studies {
             (Some(stored), Some(kept), _) if !is_there(&stored) && stored.study.cut() == kept.cut() => {
                 self.require_one_more(store).await?;
                 let (store, id, time) = (store.clone(), id.to_owned(), self.time(store));
-                to_its_end(turn, async move { store.resume(&id, time).await }).await?;
+                to_its_end(turn, async move { store.resume(&id, time).await }).await??;
                 kept
             }
             (None, None, Some(((study, frozen), canary_ms))) => {
                 self.require_one_more(store).await?;
                 let (store, new) = (store.clone(), frozen.clone());
-                if !to_its_end(turn, async move { store.create(&new).await }).await? {
+                if !to_its_end(turn, async move { store.create(&new).await }).await?? {
                     // Another replica was first, whose chunks may be others.
                     return Ok(None);
                 }
@@ -1066,18 +1065,9 @@ impl Studies {
         let turn = tokio::time::timeout_at(until, Arc::clone(&self.forgetting).acquire_owned()).await;
         let turn = turn.map_err(|_| silent())?.map_err(|error| Problem::internal(&error))?;
         let (store, id) = (store.clone(), id.to_owned());
-        let forgotten = async move {
-            let _turn = turn;
-            store.forget(&id).await
-        };
-        let forgetting = tokio::spawn(forgotten.in_current_span());
-        match tokio::time::timeout_at(until, forgetting).await {
-            Ok(joined) => {
-                let forgotten = joined.map_err(|error| Problem::internal(&error))?;
-                forgotten.map_err(|error| perhaps_done(error, "forgotten"))
-            }
-            Err(_) => Err(perhaps_done(silent(), "forgotten")),
-        }
+        let forgetting = to_its_end(turn, async move { store.forget(&id).await });
+        let forgotten = tokio::time::timeout_at(until, forgetting).await;
+        forgotten.unwrap_or_else(|_| Ok(Err(silent())))?.map_err(|error| perhaps_done(error, "forgotten"))
     }
 
     /// What a study has come to, or the rows that its answer is soon made of.
