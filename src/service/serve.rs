@@ -48,7 +48,7 @@ const LAST_WORDS: Duration = Duration::from_millis(300);
 /// What a worker's chunks that did not come to their end get to be given back: with the bound on its shutdown below the ten seconds that container engines wait.
 const GIVING_BACK: Duration = Duration::from_millis(1500);
 
-/// What a client beyond the last connection gets for all of its request and answer.
+/// What a client beyond the last connection gets for all of its request and answer, and then to take it.
 const REFUSAL: Duration = Duration::from_secs(1);
 
 /// Connections beyond the last one that are open at once: of more the oldest is closed, but none whose request waits to be read, so that a
@@ -73,6 +73,9 @@ const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 /// What has come of a connection and is not read yet may take so much in the system, which doubles it for what it notes.
 const UNREAD_BYTES: u32 = 1 << 16;
 
+/// What a client was sent and has not acknowledged takes as much, doubled likewise. A client far away gets so much in each round trip.
+const UNACKNOWLEDGED_BYTES: u32 = 1 << 17;
+
 /// Connections that may wait to be taken in: of a burst the system drops those beyond, and their clients try again after a second.
 const BACKLOG: u32 = 4096;
 
@@ -82,6 +85,7 @@ fn listen_on(address: SocketAddr) -> io::Result<TcpListener> {
     socket.set_reuseaddr(true)?;
     // Each of a thousand clients that send on what nobody reads could have some MiB of the system's memory otherwise, which may be the container's.
     socket.set_recv_buffer_size(UNREAD_BYTES)?;
+    socket.set_send_buffer_size(UNACKNOWLEDGED_BYTES)?;
     socket.bind(address)?;
     socket.listen(BACKLOG)
 }
@@ -386,9 +390,8 @@ impl Server {
     }
 
     async fn take(&self, stream: TcpStream) {
-        let stream = Socket::new(stream, self.patience);
         match Arc::clone(&self.connections).try_acquire_owned() {
-            Ok(permit) => self.serve(stream, permit),
+            Ok(permit) => self.serve(Socket::new(stream, self.patience), permit),
             Err(_) => {
                 // The files that are kept for these are few: no further one is opened before another is closed.
                 let place = self.side_place().await;
@@ -426,8 +429,8 @@ impl Server {
         let connection = self.http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
         self.open.spawn(async move {
             let _held = permit;
-            let mut connection = pin!(connection);
-            let to_its_end = async {
+            let to_its_end = async move {
+                let mut connection = pin!(connection);
                 tokio::select! {
                     // What goes wrong on a connection is its client's to know; the request, if there was one, is logged by itself.
                     _ = connection.as_mut() => {}
@@ -440,35 +443,33 @@ impl Server {
                         let _ = connection.await;
                     }
                 }
-                // Who is answered, and does not close, holds up no shutdown either.
-                let has_had_time = async {
-                    closing.cancelled().await;
-                    sleep(NOTICE).await;
-                };
-                tokio::select! {
-                    () = closed => {}
-                    () = has_had_time => {}
-                }
             };
             tokio::select! {
                 () = to_its_end => {}
                 () = left => {}
             }
+            // Who is answered, and does not take it or does not close, holds up no shutdown either.
+            let has_had_time = async {
+                closing.cancelled().await;
+                sleep(NOTICE).await;
+            };
+            tokio::select! {
+                () = closed => {}
+                () = has_had_time => {}
+            }
         });
     }
 
     /// Answers a connection beyond the last one: health and metrics as ever, all else with a refusal.
-    fn serve_beside(&self, stream: Socket, place: Option<OwnedSemaphorePermit>) {
+    fn serve_beside(&self, stream: TcpStream, place: Option<OwnedSemaphorePermit>) {
+        let stream = Socket::new(stream, REFUSAL);
         let service = MapRequest::new(self.side.clone(), |request: hyper::Request<Incoming>| request.map(Body::new));
         let (closed, seen) = (stream.closed(), stream.seen());
         let connection = self.side_http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
         let answered = tokio::spawn(async move {
             let _held = place;
-            let to_its_end = async {
-                let _ = connection.await;
-                closed.await;
-            };
-            let _ = tokio::time::timeout(REFUSAL, to_its_end).await;
+            let _ = tokio::time::timeout(REFUSAL, connection).await;
+            closed.await;
         });
         let mut connections = self.side_connections.lock();
         // Each keeps some kilobytes of its task.
@@ -541,7 +542,7 @@ mod tests {
             let mut client = TcpStream::connect(address).await?;
             let (stream, _) = listener.accept().await?;
             let place = server.side_place().await;
-            server.serve_beside(Socket::new(stream, server.patience), place);
+            server.serve_beside(stream, place);
             client.write_all(b"GET /health/live HTTP/1.1\r\nhost: localhost\r\n\r\n").await?;
             let mut answer = String::new();
             client.read_to_string(&mut answer).await?;
@@ -550,6 +551,29 @@ mod tests {
             most = most.max(server.side_connections.lock().len());
         }
         assert!(most < 10, "{most}");
+        Ok(())
+    }
+
+    /// Of each client whose network was gone the system kept what it had been sent for minutes, 2 MB each, and its place was another's: 210 MiB at 128 MiB.
+    #[tokio::test]
+    async fn who_does_not_take_what_it_was_sent_keeps_its_place_until_that_is_thrown_away() -> io::Result<()> {
+        let Line { settings } = Line::parse_from(["serve", "--header-timeout-ms", "300"]);
+        let server = Server::new(&App::new(settings.limits()), &Entry::default());
+        let listener = listen_on(SocketAddr::from(([127, 0, 0, 1], 0)))?;
+        let socket = TcpSocket::new_v4()?;
+        socket.set_recv_buffer_size(1 << 12)?;
+        let mut client = socket.connect(listener.local_addr()?).await?;
+        let (stream, _) = listener.accept().await?;
+        server.take(stream).await;
+        client.write_all(b"GET /openapi.json HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n").await?;
+        // It has its answer's beginning, and the rest is the system's.
+        client.readable().await?;
+        let all = server.connections.available_permits() + 1;
+        server.open.close();
+        server.open.wait().await;
+        assert_eq!(server.connections.available_permits(), all);
+        let error = client.read_to_end(&mut Vec::new()).await.expect_err("what was thrown away");
+        assert_eq!(error.kind(), io::ErrorKind::ConnectionReset);
         Ok(())
     }
 

@@ -8,17 +8,13 @@ use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
 use rustix::net::{RecvFlags, recv};
+use socket2::SockRef;
 use tokio::io::{AsyncRead, AsyncWrite, Interest, ReadBuf};
 use tokio::net::TcpStream;
 use tokio::time::{Instant, Sleep, sleep, timeout};
 
 /// What a client that is written to has to take at least, on the average over its patience: below it, it is taken for one that does not read.
 const LEAST_TAKEN_BYTES_PER_S: u64 = 8 << 10;
-
-/// Of what is handed to the system, so much waits to be sent at most. Left to itself it takes megabytes, and more only when a third of them is
-/// gone: a client that takes its answer slowly would for long look like one that takes nothing.
-#[cfg(any(target_os = "linux", target_os = "android"))]
-const UNSENT_BYTES: u32 = 1 << 18;
 
 /// What tells that a client has closed its side. Where the system can tell that by itself, bytes that nobody has read yet, which make a
 /// connection readable all the time, are not waited for again and again.
@@ -27,10 +23,14 @@ const CLOSED: Interest = Interest::PRIORITY;
 #[cfg(not(any(target_os = "linux", target_os = "android")))]
 const CLOSED: Interest = Interest::READABLE;
 
-/// Pause between two looks, where it cannot; and what a client that has left is given for what is nearly answered.
+/// Pause between two looks, where it cannot, or whether a client has all that it was sent; and what a client that has left is given for what is
+/// nearly answered.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// After the last answer, who has sent nothing for so long sends nothing more.
+/// The longest pause between two looks whether a client has closed its side.
+const LONGEST_LOOK: Duration = Duration::from_millis(320);
+
+/// Who is closed because nothing happened has so long to close its side.
 const SILENCE: Duration = Duration::from_secs(1);
 
 /// Of what a client still sends after the last answer, read at once.
@@ -53,8 +53,20 @@ pub fn sent_bytes() -> u64 {
 #[derive(Debug)]
 struct Stream {
     tcp: TcpStream,
-    /// Whether all is written that will be.
-    is_shut: AtomicBool,
+    /// Whether the last was written just now, and the client may still be taking it.
+    is_over: AtomicBool,
+}
+
+impl Stream {
+    /// The system is to forget what the client has not taken as soon as the connection is closed here: it would keep that for minutes, and nobody would know.
+    fn give_up(&self) {
+        let _ = SockRef::from(&self.tcp).set_linger(Some(Duration::ZERO));
+    }
+
+    /// Whether both sides are closed, and each knows it of the other: the client has all that it was sent.
+    fn is_ended(&self) -> bool {
+        self.tcp.peer_addr().is_err()
+    }
 }
 
 impl Drop for Stream {
@@ -95,10 +107,8 @@ impl Socket {
     pub fn new(stream: TcpStream, patience: Duration) -> Self {
         // Without it small answers could wait for the client's acknowledgement of earlier ones.
         let _ = stream.set_nodelay(true);
-        #[cfg(any(target_os = "linux", target_os = "android"))]
-        let _ = socket2::SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT_BYTES);
         OPEN.fetch_add(1, Ordering::Relaxed);
-        let stream = Arc::new(Stream { tcp: stream, is_shut: AtomicBool::new(false) });
+        let stream = Arc::new(Stream { tcp: stream, is_over: AtomicBool::new(false) });
         Self { stream, patience, stalled: None, taken_bytes: 0 }
     }
 
@@ -119,29 +129,38 @@ impl Socket {
             }
             // What is nearly answered still goes out.
             sleep(LOOK).await;
+            stream.is_over.store(true, Ordering::Relaxed);
         }
     }
 
-    /// Waits, where the last answer is written, until the client has closed its side, and passes over what it still sends: at most for its
-    /// patience, and while it sends anything.
+    /// Closes this side, waits until the client has all and has closed its own, and passes over what it still sends. Who has not done so within its patience is
+    /// given up, and one to whom nothing was written of late within a second.
     ///
     /// A client that sends all of a body before it reads gets its answer only so, where that came before the body's end: to close a
     /// connection with unread bytes resets it, and the answer is lost (RFC 9112, section 9.6).
     pub fn closed(&self) -> impl Future<Output = ()> + Send + 'static {
         let (stream, patience) = (Arc::clone(&self.stream), self.patience);
         async move {
-            if !stream.is_shut.load(Ordering::Relaxed) {
-                return;
-            }
+            let _ = rustix::net::shutdown(&stream.tcp, rustix::net::Shutdown::Write);
+            let patience = if stream.is_over.load(Ordering::Relaxed) { patience } else { SILENCE };
             let until = Instant::now() + patience;
-            let mut passed_over = vec![0; PASSED_OVER_BYTES];
-            while Instant::now() < until && matches!(timeout(SILENCE, stream.tcp.readable()).await, Ok(Ok(()))) {
+            let (mut pause, mut passed_over) = (LOOK, vec![0; PASSED_OVER_BYTES]);
+            while !stream.is_ended() {
+                if Instant::now() >= until {
+                    return stream.give_up();
+                }
                 match stream.tcp.try_read(&mut passed_over) {
-                    Ok(0) => return,
-                    Ok(_) => {}
-                    Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                    Ok(1..) => {
+                        pause = LOOK;
+                        continue;
+                    }
+                    Ok(0) => sleep(pause).await,
+                    Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+                        let _ = timeout(pause, stream.tcp.readable()).await;
+                    }
                     Err(_) => return,
                 }
+                pause = LONGEST_LOOK.min(2 * pause);
             }
         }
     }
@@ -162,6 +181,7 @@ impl Socket {
                     self.stalled = None;
                     let least_bytes = u128::from(LEAST_TAKEN_BYTES_PER_S) * self.patience.as_millis() / 1000;
                     if u128::from(std::mem::take(&mut self.taken_bytes)) < least_bytes {
+                        self.stream.give_up();
                         return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
                     }
                     continue;
@@ -216,8 +236,9 @@ impl AsyncWrite for Socket {
         Poll::Ready(Ok(()))
     }
 
+    /// What is done then: see [`Self::closed`].
     fn poll_shutdown(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<io::Result<()>> {
-        self.stream.is_shut.store(true, Ordering::Relaxed);
-        Poll::Ready(Ok(rustix::net::shutdown(&self.stream.tcp, rustix::net::Shutdown::Write)?))
+        self.stream.is_over.store(true, Ordering::Relaxed);
+        Poll::Ready(Ok(()))
     }
 }

@@ -4,7 +4,7 @@
 //! A study's chunks are worked on side by side, each in slices of a few milliseconds that wait for their turn behind single requests, as
 //! those of batches do. Those of a store are the workers', who are here where the store is a file, and elsewhere where it is a server.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -124,6 +124,8 @@ pub struct Studies {
     kept: Mutex<VecDeque<Arc<Kept>>>,
     /// Held while a stored study begins: as many as are counted run, and no more.
     beginning: Arc<tokio::sync::Mutex<()>>,
+    /// The stored studies that were asked for, of which that is still to be noted.
+    asked: Arc<Mutex<BTreeSet<String>>>,
     /// One for each stored study that is forgotten at once.
     forgetting: Arc<Semaphore>,
     /// Cancelled when the service stops: nobody waits for a study any more.
@@ -487,24 +489,18 @@ impl Kept {
     /// Looks on while it runs.
     async fn follow(&self, store: &Store, changed: &watch::Sender<()>, closing: &CancellationToken) {
         let mut changed = changed.subscribe();
-        let mut pause = LOOK;
+        let (mut least, mut most) = (Duration::ZERO, LOOK);
         while !self.is_followed.swap(true, Ordering::SeqCst) {
             while self.is_running() && !closing.is_cancelled() {
                 tokio::select! {
-                    _ = changed.changed() => {}
-                    () = tokio::time::sleep(pause) => {}
+                    () = next_look(&mut changed, least, most) => {}
                     () = closing.cancelled() => break,
                 }
                 let started = Instant::now();
                 if let Err(error) = self.look(store).await {
                     tracing::warn!(study = self.id, %error, "how a study stands is not known");
                 }
-                pause = pause_after(started.elapsed(), LOOK);
-                // However often it comes further.
-                tokio::select! {
-                    () = tokio::time::sleep(pause_after(started.elapsed(), Duration::ZERO)) => {}
-                    () = closing.cancelled() => {}
-                }
+                (least, most) = pauses_after(started.elapsed());
             }
             self.is_followed.store(false, Ordering::SeqCst);
             // It may have been asked for again in this moment, by one who believed that it is followed.
@@ -525,10 +521,18 @@ fn pause_after(look: Duration, least: Duration) -> Duration {
     (LOOKS_SHARE * look).clamp(least, LONGEST_PAUSE)
 }
 
-/// Notes that a study was asked for. Nobody is refused who reads from a store that cannot be written.
-async fn note_asked(store: &Store, id: &str) {
-    if let Err(error) = store.touch(id).await {
-        tracing::warn!(study = id, %error, "that the study was asked for could not be noted");
+/// Between a look at a study and the next one, where it has come further and where nobody knows.
+fn pauses_after(look: Duration) -> (Duration, Duration) {
+    (pause_after(look, Duration::ZERO), pause_after(look, LOOK))
+}
+
+/// Waits until a study is to be looked at once more: when something has come further, and not before the least pause however often that is, or after the longest.
+async fn next_look(changed: &mut watch::Receiver<()>, least: Duration, most: Duration) {
+    let latest = Instant::now() + most;
+    tokio::time::sleep(least).await;
+    tokio::select! {
+        _ = changed.changed() => {}
+        () = tokio::time::sleep_until(latest) => {}
     }
 }
 
@@ -611,6 +615,7 @@ impl Studies {
             figures: Mutex::default(),
             kept: Mutex::default(),
             beginning: Arc::default(),
+            asked: Arc::default(),
             forgetting: Arc::new(Semaphore::new(FORGET_AT_ONCE)),
             closing: CancellationToken::new(),
         }
@@ -655,18 +660,45 @@ impl Studies {
                 kept
             }
         };
-        self.is_asked_for(&kept).await;
+        self.is_asked_for(&kept);
         Ok(Some(kept))
     }
 
     /// Keeps a stored study from expiring, for somebody who asks for it, or still listens.
-    pub async fn is_asked_for(&self, kept: &Kept) {
+    pub fn is_asked_for(&self, kept: &Kept) {
         let Keeping::Store { store, .. } = &self.keeping else { return };
-        // By one, and until it is next looked at: who reads must not wait for others' writes.
+        // Until it is next looked at.
         if self.is_to_be_noted(kept.unasked_s.load(Ordering::Relaxed)) {
             kept.unasked_s.store(0, Ordering::Relaxed);
-            note_asked(store, &kept.id).await;
+            self.note_asked(store, &kept.id);
         }
+    }
+
+    /// Notes that a study was asked for, one after the other. Nobody waits for it, and nobody is refused: who reads needs no store that can be written.
+    fn note_asked(&self, store: &Store, id: &str) {
+        let is_first = {
+            let mut asked = self.asked.lock();
+            let is_first = asked.is_empty();
+            asked.insert(id.to_owned());
+            is_first
+        };
+        // The others are noted by who notes the first.
+        if !is_first {
+            return;
+        }
+        let (store, asked, closing) = (store.clone(), Arc::clone(&self.asked), self.closing.clone());
+        let mut next = Some(id.to_owned());
+        let noting = async move {
+            while let Some(id) = next {
+                if let Err(error) = store.touch(&id).await {
+                    tracing::warn!(study = id, %error, "that the study was asked for could not be noted");
+                }
+                let mut asked = asked.lock();
+                asked.remove(&id);
+                next = asked.first().cloned();
+            }
+        };
+        tokio::spawn(async move { closing.run_until_cancelled(noting).await }.in_current_span());
     }
 
     /// Whether it is to be noted that a stored study was asked for, which was not for so long.
@@ -785,7 +817,7 @@ impl Studies {
             let kept = match (stored, known) {
                 (Some(stored), Some(kept)) if is_there(&stored) => {
                     if self.is_to_be_noted(stored.unasked.as_secs()) {
-                        note_asked(store, &id).await;
+                        self.note_asked(store, &id);
                     }
                     Some(kept)
                 }
@@ -1375,6 +1407,19 @@ mod tests {
         assert_eq!(pause_after(Duration::from_millis(3), LOOK), LOOK);
         assert_eq!(pause_after(Duration::from_millis(400), LOOK), Duration::from_secs(4));
         assert_eq!(pause_after(Duration::from_secs(8), LOOK), LONGEST_PAUSE);
+        assert_eq!(pauses_after(Duration::from_millis(3)), (Duration::from_millis(30), LOOK));
+    }
+
+    /// After a database that was away it was 20 s, and a study that had been cancelled or was done was told as running so long.
+    #[tokio::test(start_paused = true)]
+    async fn of_the_two_pauses_before_a_look_the_longer_one_is_waited_for_and_not_both() {
+        let sender = watch::Sender::default();
+        let (mut changed, begun) = (sender.subscribe(), Instant::now());
+        next_look(&mut changed, LONGEST_PAUSE, LONGEST_PAUSE).await;
+        assert_eq!(begun.elapsed(), LONGEST_PAUSE);
+        sender.send_replace(());
+        next_look(&mut changed, LOOK, LONGEST_PAUSE).await;
+        assert_eq!(begun.elapsed(), LONGEST_PAUSE + LOOK);
     }
 
     /// One that was cancelled, asked for again and done in that time was answered with what it had come to before, as that of one that is done.

@@ -298,15 +298,15 @@ impl Store {
     /// # Errors
     /// As [`Self::create`].
     pub async fn cancel(&self, id: &str) -> Result<(), StoreError> {
-        self.once("UPDATE studies SET is_cancelled = TRUE WHERE id = $1", id).await
+        self.once(PATIENCE, "UPDATE studies SET is_cancelled = TRUE WHERE id = $1", id).await
     }
 
-    /// Notes that a study was asked for: it expires so much later.
+    /// Notes that a study was asked for: it expires so much later. Nobody needs it soon, so that it waits for long where the database does not write.
     ///
     /// # Errors
     /// As [`Self::create`].
     pub async fn touch(&self, id: &str) -> Result<(), StoreError> {
-        self.once("UPDATE studies SET asked_at_s = unixepoch() WHERE id = $1", id).await
+        self.once(LONG_PATIENCE, "UPDATE studies SET asked_at_s = unixepoch() WHERE id = $1", id).await
     }
 
     /// Forgets a study that does not run, with all that it has come to. Workers that have chunks of it in their hands are waited for, some seconds, and not by
@@ -350,8 +350,8 @@ impl Store {
     }
 
     /// A statement about one study.
-    async fn once(&self, text: &'static str, id: &str) -> Result<(), StoreError> {
-        self.with(PATIENCE, async |connection| {
+    async fn once(&self, patience: Duration, text: &'static str, id: &str) -> Result<(), StoreError> {
+        self.with(patience, async |connection| {
             require_schema(connection).await?;
             on!(connection, inner => sqlx::query(text).bind(id).execute(inner).await.map(|_| ()))?;
             Ok(())

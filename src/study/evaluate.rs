@@ -11,8 +11,8 @@ use toothwave_calculation::question::{Limits, Question as _, with_room};
 use toothwave_calculation::sweep::{CheckedSweep, Sweep};
 use toothwave_solver::losses::period::RadialForces;
 use toothwave_solver::parts::{LEAST_WALL, RIM};
-use toothwave_solver::violation::{Misfit, Violation};
-use toothwave_solver::{Drive, SolveError, Stop};
+use toothwave_solver::violation::{Misfit, Parameter, Violation};
+use toothwave_solver::{Drive, Part, SolveError, Stop};
 use utoipa::ToSchema;
 
 use crate::quantity::{Loaded, OUTER_DIAMETER_MM, Quantity, Takes, Variant};
@@ -156,11 +156,18 @@ impl Evaluator {
         let root_radius_mm = drive.root_radius_mm() + 1e-3 * parts.ring_clearance_um;
         let value = parts.ring_outer_radius_mm.unwrap_or(RIM * root_radius_mm);
         let limit = root_radius_mm * (1.0 + LEAST_WALL);
-        if self.takes_outer_diameter && value <= limit {
-            let misfit = Misfit::RingWithoutRim;
-            return Err(NoAnswer::impossible(&[Violation::PartDoesNotFit { misfit, value, limit }]));
+        if !self.takes_outer_diameter {
+            return Ok(value);
         }
-        Ok(value)
+        let out_of_range = Parameter::PartClearance(Part::Ring).check(parts.ring_clearance_um);
+        let out_of_range = out_of_range
+            .or_else(|| parts.ring_outer_radius_mm.and_then(|radius| Parameter::RingOuterRadius.check(radius)));
+        let misfit = Misfit::RingWithoutRim;
+        let without_rim = (value <= limit).then_some(Violation::PartDoesNotFit { misfit, value, limit });
+        match out_of_range.or(without_rim) {
+            Some(violation) => Err(NoAnswer::impossible(&[violation])),
+            None => Ok(value),
+        }
     }
 
     fn values(&self, variant: &Variant<'_>) -> Result<Vec<f64>, NoAnswer> {

@@ -66,6 +66,16 @@ fn a_ring_that_is_smaller_than_its_root_has_no_outer_diameter() {
     assert_eq!(found["possible"]["variant"], json!([0, 1, 2, 3]));
 }
 
+/// It was told as a fault of the service: twice the radius is no number.
+#[test]
+fn an_outer_radius_out_of_its_range_is_the_reason_why_there_is_no_outer_diameter() {
+    let over = json!({ "/parts/ring/outer_radius_mm": { "one_of": [72.0, 1e308] } });
+    let found = answer(&map(over, json!(["outer_diameter_mm"])));
+    assert_eq!(numbers(&found["possible"]["quantities"]["outer_diameter_mm"]), [144.0]);
+    let reason = &found["reasons"][0];
+    assert_eq!((&reason["code"], &reason["pointer"]), (&json!("out_of_range"), &json!("/parts/ring/outer_radius_mm")));
+}
+
 #[test]
 fn every_whole_number_of_a_range_is_a_step_of_its_own() {
     let base = with(&paper(), "/drive/ring", json!({}));

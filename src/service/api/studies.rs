@@ -192,7 +192,7 @@ pub async fn events(State(app): State<Arc<App>>, id: Result<Path<String>, PathRe
                 let next_look = async {
                     changed.await;
                     tokio::time::sleep(PAUSE).await;
-                    app.studies.is_asked_for(&kept).await;
+                    app.studies.is_asked_for(&kept);
                 };
                 tokio::select! {
                     () = next_look => {}
@@ -221,10 +221,11 @@ async fn kept(app: &App, id: Result<Path<String>, PathRejection>) -> Result<Arc<
     app.pool.until_closed(app.studies.find(&id)).await?.ok_or_else(|| not_kept(&id))
 }
 
-/// An id that is no text is no study's either, and PostgreSQL takes no text with a zero in it.
+/// An id of other letters is no study's, and no database takes all of them: PostgreSQL no zero, and beyond ASCII what its encoding has.
 fn id_of(id: Result<Path<String>, PathRejection>) -> Result<String, Problem> {
     let id = id.map(|Path(id)| id).unwrap_or_default();
-    if id.is_empty() || id.contains('\0') { Err(not_kept(&id)) } else { Ok(id) }
+    let is_word = !id.is_empty() && id.bytes().all(|byte| byte.is_ascii_graphic());
+    if is_word { Ok(id) } else { Err(not_kept(&id)) }
 }
 
 fn not_kept(id: &str) -> Problem {
