@@ -80,7 +80,6 @@ impl Representation {
         }
         let formats: Vec<_> = iter::once(Format::Json).chain(others).collect();
         let media_types: Vec<_> = formats.iter().copied().map(media_type).collect();
-        // A header that cannot be read accepts nothing.
         let best = Accept::from_str(&without_parameters(&accepted))
             .ok()
             .and_then(|accept| accept.negotiate(&media_types).cloned());
@@ -142,8 +141,8 @@ fn require_type(headers: &HeaderMap, wanted: &str, fits: impl Fn(&MediaType<'_>)
     }
 }
 
-/// Media ranges with nothing but their weights: who asks for `application/json; charset=utf-8` takes JSON as it is. No type that is
-/// offered has a parameter with a quoted `,` or `;`.
+/// Media ranges with nothing but their weights, and only those that can be read: who asks for `application/json; charset=utf-8` takes JSON as it is, and older
+/// clients list `*` beside `*/*`. No type that is offered has a parameter with a quoted `,` or `;`.
 fn without_parameters(accepted: &str) -> String {
     let ranges = accepted.split(',').map(|range| {
         let (media_type, parameters) = range.split_once(';').unwrap_or((range, ""));
@@ -151,7 +150,7 @@ fn without_parameters(accepted: &str) -> String {
             parameters.split(';').find(|parameter| parameter.trim_start().to_ascii_lowercase().starts_with("q="));
         weight.map_or_else(|| media_type.to_owned(), |weight| format!("{media_type};{}", weight.trim()))
     });
-    ranges.collect::<Vec<_>>().join(",")
+    ranges.filter(|range| MediaType::parse(range.trim()).is_ok()).collect::<Vec<_>>().join(",")
 }
 
 /// Whether the request prefers gzip to no coding at all.

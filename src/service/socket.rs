@@ -33,8 +33,8 @@ const LONGEST_LOOK: Duration = Duration::from_millis(320);
 /// Who is closed because nothing happened has so long to close its side.
 const SILENCE: Duration = Duration::from_secs(1);
 
-/// Of what a client still sends after the last answer, read at once.
-const PASSED_OVER_BYTES: usize = 1 << 14;
+/// Of what a client still sends after the last answer, read at each look: what the system takes of it.
+const PASSED_OVER_BYTES: usize = 1 << 16;
 
 static OPEN: AtomicUsize = AtomicUsize::new(0);
 static SENT_BYTES: AtomicU64 = AtomicU64::new(0);
@@ -150,11 +150,13 @@ impl Socket {
                     return stream.give_up();
                 }
                 match stream.tcp.try_read(&mut passed_over) {
-                    Ok(1..) => {
-                        pause = LOOK;
-                        continue;
+                    // Who sends without end keeps no thread.
+                    Ok(bytes) => {
+                        if bytes > 0 {
+                            pause = LOOK;
+                        }
+                        sleep(pause).await;
                     }
-                    Ok(0) => sleep(pause).await,
                     Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
                         let _ = timeout(pause, stream.tcp.readable()).await;
                     }
@@ -240,5 +242,30 @@ impl AsyncWrite for Socket {
     fn poll_shutdown(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<io::Result<()>> {
         self.stream.is_over.store(true, Ordering::Relaxed);
         Poll::Ready(Ok(()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use futures_util::FutureExt as _;
+    use tokio::net::TcpListener;
+
+    use super::*;
+
+    /// Sixteen clients that sent without end after a refusal had all others wait for seconds, health too.
+    #[tokio::test]
+    async fn who_sends_on_after_the_last_answer_keeps_no_thread() -> io::Result<()> {
+        let listener = TcpListener::bind("127.0.0.1:0").await?;
+        let client = TcpStream::connect(listener.local_addr()?).await?;
+        let socket = Socket::new(listener.accept().await?.0, Duration::from_secs(30));
+        let mut sent_bytes = 0;
+        while sent_bytes <= PASSED_OVER_BYTES {
+            client.writable().await?;
+            sent_bytes += client.try_write(&[0; 1 << 12])?;
+        }
+        let seen = socket.seen();
+        socket.stream.tcp.readable().await?;
+        assert!(socket.closed().now_or_never().is_none() && seen.has_unread(), "all was read at once");
+        Ok(())
     }
 }

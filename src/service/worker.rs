@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::convert::Infallible;
 use std::error::Error;
 use std::future;
+use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -564,11 +565,22 @@ impl Workers {
         let mut retry = RETRY;
         // What is computed is not computed again because the store is away for a while.
         loop {
-            let kept = tokio::select! {
+            let kept = {
                 // First: what the store has a result of has its rows.
-                kept = self.keep_rows(study, chunk, &mut rows) => kept,
-                () = &mut is_over => break give_up(lease).await,
-                _ = lease.renew() => false,
+                let mut keeping = pin!(self.keep_rows(study, chunk, &mut rows));
+                tokio::select! {
+                    kept = keeping.as_mut() => kept,
+                    () = &mut is_over => {
+                        give_up(lease).await;
+                        // Where the folder stands still, its thread and the rows stay until it goes on, and with them this place and its room.
+                        tokio::select! {
+                            _ = keeping => {}
+                            () = self.stopping.cancelled() => {}
+                        }
+                        return;
+                    }
+                    never = lease.renew() => match never {},
+                }
             };
             if kept {
                 match lease.keep(&bytes, variants, refused, busy).await {

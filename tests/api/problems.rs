@@ -251,6 +251,10 @@ async fn the_best_format_that_the_client_accepts_is_chosen() {
         ("application/json; charset=utf-8", "application/json"),
         ("text/csv; charset=utf-8; header=present", "text/csv"),
         ("text/csv;charset=utf-8;q=0.5, application/json;charset=utf-8;q=0.4", "text/csv"),
+        // What cannot be read is passed over, as empty items are, and a list in quotes.
+        ("text/html, image/gif, image/jpeg, *; q=.2, */*; q=.2", "application/json"),
+        ("text/csv, ,", "text/csv"),
+        ("text/csv, text/x;a=\"b,c\"", "text/csv"),
         ("*/*", "application/json"),
         ("application/*", "application/json"),
         ("text/*", "text/csv"),

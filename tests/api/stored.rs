@@ -900,6 +900,34 @@ async fn a_cancelled_study_whose_rows_find_no_place_holds_up_no_other() {
     keeper.end().await;
 }
 
+/// Of each time that such a study was cancelled and asked for again a thread and its rows stayed, which nobody counted: ten ended a worker of 128 MiB.
+#[tokio::test]
+async fn of_a_folder_that_stands_still_no_more_threads_wait_than_chunks_are_in_work() {
+    let (file, folder) = (File::new(), Folder::new());
+    let asked = Keeper::of(&file, LIMITS, false).await;
+    let study = asked.ask(&map(5)).await.json();
+    let id = study["id"].as_str().unwrap();
+    let frozen = asked.store.find(id).await.unwrap().unwrap().study;
+    asked.end().await;
+    // Who opens it waits until somebody reads.
+    let of_study = folder.0.join(format!("{id}-by-{}", frozen.chunk_variants));
+    fs::create_dir(&of_study).unwrap();
+    let still = of_study.join(".0000000000.begun");
+    rustix::fs::mknodat(rustix::fs::CWD, &still, rustix::fs::FileType::Fifo, rustix::fs::Mode::RWXU, 0).unwrap();
+    let one_slot = Limits { max_concurrent_solves: 1, deadline_ms: 60_000, ..LIMITS };
+    let keeper = Keeper::with_parts(&file, one_slot, true, Some(Parts::new(&folder.0).unwrap())).await;
+    for evaluations in 100..104 {
+        assert_eq!(keeper.ask(&map(5)).await.json()["state"], "running");
+        // By the others' slot, whose rows are none.
+        assert_eq!(keeper.wait_for(&with(&search(), "/evaluations", json!(evaluations))).await["state"], "done");
+        assert_eq!(keeper.service.ask(&Question::of("DELETE", &place(&study))).await.status, 204);
+    }
+    let written = tokio::task::spawn_blocking(move || fs::read(still)).await.unwrap().unwrap();
+    let ends = written.windows(4).filter(|window| window == b"PAR1").count();
+    assert_eq!(ends, 2, "a file has one at either end");
+    keeper.end().await;
+}
+
 #[test]
 fn rows_are_kept_in_a_folder_that_is_there() {
     let folder = Folder::new();
