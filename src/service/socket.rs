@@ -7,6 +7,7 @@ use std::sync::{Arc, Weak};
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::net::{RecvFlags, recv};
 use socket2::SockRef;
 use tokio::io::{AsyncRead, AsyncWrite, Interest, ReadBuf};
@@ -53,7 +54,7 @@ pub fn sent_bytes() -> u64 {
 #[derive(Debug)]
 struct Stream {
     tcp: TcpStream,
-    /// Whether the last was written just now, and the client may still be taking it.
+    /// Whether the last was written just now, and the client may be taking it.
     is_over: AtomicBool,
 }
 
@@ -61,6 +62,18 @@ impl Stream {
     /// The system is to forget what the client has not taken as soon as the connection is closed here: it would keep that for minutes, and nobody would know.
     fn give_up(&self) {
         let _ = SockRef::from(&self.tcp).set_linger(Some(Duration::ZERO));
+    }
+
+    fn is_given_up(&self) -> bool {
+        matches!(SockRef::from(&self.tcp).linger(), Ok(Some(Duration::ZERO)))
+    }
+
+    /// Whether the client has more to take than some kilobytes, where nothing more is written.
+    fn has_more_to_take(&self) -> bool {
+        // The least that there is: beside more than that the system takes nothing.
+        let _ = SockRef::from(&self.tcp).set_send_buffer_size(0);
+        let at_once = Timespec { tv_sec: 0, tv_nsec: 0 };
+        matches!(poll(&mut [PollFd::new(&self.tcp, PollFlags::OUT)], Some(&at_once)), Ok(0))
     }
 
     /// Whether both sides are closed, and each knows it of the other: the client has all that it was sent.
@@ -134,15 +147,19 @@ impl Socket {
     }
 
     /// Closes this side, waits until the client has all and has closed its own, and passes over what it still sends. Who has not done so within its patience is
-    /// given up, and one to whom nothing was written of late within a second.
+    /// given up, and within a second one that was closed because nothing happened and has all but some kilobytes.
     ///
     /// A client that sends all of a body before it reads gets its answer only so, where that came before the body's end: to close a
     /// connection with unread bytes resets it, and the answer is lost (RFC 9112, section 9.6).
     pub fn closed(&self) -> impl Future<Output = ()> + Send + 'static {
         let (stream, patience) = (Arc::clone(&self.stream), self.patience);
         async move {
+            if stream.is_given_up() {
+                return;
+            }
+            let is_taking = stream.is_over.load(Ordering::Relaxed) || stream.has_more_to_take();
+            let patience = if is_taking { patience } else { SILENCE };
             let _ = rustix::net::shutdown(&stream.tcp, rustix::net::Shutdown::Write);
-            let patience = if stream.is_over.load(Ordering::Relaxed) { patience } else { SILENCE };
             let until = Instant::now() + patience;
             let (mut pause, mut passed_over) = (LOOK, vec![0; PASSED_OVER_BYTES]);
             while !stream.is_ended() {
@@ -248,7 +265,8 @@ impl AsyncWrite for Socket {
 #[cfg(test)]
 mod tests {
     use futures_util::FutureExt as _;
-    use tokio::net::TcpListener;
+    use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+    use tokio::net::{TcpListener, TcpSocket};
 
     use super::*;
 
@@ -266,6 +284,25 @@ mod tests {
         let seen = socket.seen();
         socket.stream.tcp.readable().await?;
         assert!(socket.closed().now_or_never().is_none() && seen.has_unread(), "all was read at once");
+        Ok(())
+    }
+    /// Who read slowly, or paused, and had asked for nothing more for 30 s lost the end of its answer otherwise.
+    #[tokio::test]
+    async fn a_client_has_more_to_take_until_it_has_taken_next_to_all() -> io::Result<()> {
+        let listener = TcpListener::bind("127.0.0.1:0").await?;
+        let client = TcpSocket::new_v4()?;
+        client.set_recv_buffer_size(1 << 12)?;
+        let mut client = client.connect(listener.local_addr()?).await?;
+        let mut socket = Socket::new(listener.accept().await?.0, Duration::from_secs(30));
+        assert!(!socket.stream.has_more_to_take(), "nothing was written");
+        SockRef::from(&socket.stream.tcp).set_send_buffer_size(1 << 17)?;
+        let answer = [1; 1 << 16];
+        socket.write_all(&answer).await?;
+        assert!(socket.stream.has_more_to_take());
+        client.read_exact(&mut [0; 1 << 16]).await?;
+        while socket.stream.has_more_to_take() {
+            tokio::task::yield_now().await;
+        }
         Ok(())
     }
 }
