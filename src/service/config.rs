@@ -408,16 +408,20 @@ fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }
 
-/// An origin as browsers write it in `Origin`, or `*`, which stands for all.
+/// An origin as browsers write it in `Origin`, or `*`, which stands for all. Written otherwise it would be none that comes.
 fn origin(text: &str) -> Result<String, String> {
     let is_origin = || {
         let uri = text.parse::<Uri>().ok()?;
-        Some(uri.scheme().is_some() && uri.authority().is_some() && !text.ends_with('/') && uri.path() == "/")
+        let (scheme, host) = (uri.scheme_str()?, uri.host()?);
+        let port = uri.port_u16().filter(|port| !matches!((scheme, port), ("http", 80) | ("https", 443)));
+        let port = port.map_or_else(String::new, |port| format!(":{port}"));
+        let written = format!("{scheme}://{host}{port}").to_ascii_lowercase();
+        Some(written == text && !host.contains('*'))
     };
     if text == "*" || is_origin() == Some(true) {
         Ok(text.into())
     } else {
-        Err("an origin has a scheme, a host and perhaps a port, and no path".into())
+        Err("an origin is written as browsers send it: a scheme, a host in small letters and a port where it is not the scheme's own, and no path; or `*` alone for all".into())
     }
 }
 
@@ -429,12 +433,30 @@ fn log_filter(text: &str) -> Result<String, String> {
 mod tests {
     use clap::Parser;
 
-    use super::{SMALL_BYTES, Settings};
+    use super::{SMALL_BYTES, Settings, origin};
 
     #[derive(Parser)]
     struct Line {
         #[command(flatten)]
         settings: Settings,
+    }
+
+    /// Others started, and allowed nobody.
+    #[test]
+    fn an_origin_is_written_as_browsers_send_it() {
+        for taken in ["*", "https://a.example", "http://localhost:8081", "http://[::1]:8081", "https://a.example:80"] {
+            assert_eq!(origin(taken).as_deref(), Ok(taken));
+        }
+        for refused in [
+            "https://*.a.example",
+            "https://A.example",
+            "https://a.example:443",
+            "a.example",
+            "null",
+            "https://a.example/",
+        ] {
+            assert!(origin(refused).is_err(), "{refused}");
+        }
     }
 
     /// The process itself takes some 25 MiB, and half as much again goes to what is not counted.
