@@ -74,6 +74,10 @@ fn an_outer_radius_out_of_its_range_is_the_reason_why_there_is_no_outer_diameter
     assert_eq!(numbers(&found["possible"]["quantities"]["outer_diameter_mm"]), [144.0]);
     let reason = &found["reasons"][0];
     assert_eq!((&reason["code"], &reason["pointer"]), (&json!("out_of_range"), &json!("/parts/ring/outer_radius_mm")));
+    let over = json!({ "/parts/ring/clearance_um": { "one_of": [10.0, 1e300] } });
+    let found = answer(&map(over, json!(["outer_diameter_mm"])));
+    assert_eq!(found["possible"]["variant"], json!([0]));
+    assert_eq!(found["reasons"][0]["pointer"], json!("/parts/ring/clearance_um"));
 }
 
 #[test]
