@@ -858,13 +858,8 @@ async fn the_service_knows_how_the_store_stands() {
 #[tokio::test]
 async fn the_rows_of_a_stored_study_are_a_parquet_file_a_chunk_besides() {
     let (file, folder) = (File::new(), Folder::new());
-    let asked = Keeper::of(&file, LIMITS, false).await;
-    let id = asked.ask(&map(5)).await.json()["id"].as_str().unwrap().to_owned();
-    let frozen = asked.store.find(&id).await.unwrap().unwrap().study;
-    assert_eq!(frozen.chunks, 1);
-    asked.end().await;
+    let (_, of_study) = asked_for_in(&file, &folder).await;
     // What a worker left behind that was killed in the middle.
-    let of_study = folder.0.join(format!("{id}-by-{}", frozen.chunk_variants));
     fs::create_dir(&of_study).unwrap();
     fs::write(of_study.join(".0000000000.begun"), vec![b'x'; 100_000]).unwrap();
     let parts = Parts::new(&folder.0).unwrap();
@@ -881,16 +876,23 @@ async fn the_rows_of_a_stored_study_are_a_parquet_file_a_chunk_besides() {
     keeper.end().await;
 }
 
-#[tokio::test]
-async fn a_cancelled_study_whose_rows_find_no_place_holds_up_no_other() {
-    let (file, folder) = (File::new(), Folder::new());
-    let asked = Keeper::of(&file, LIMITS, false).await;
+/// A study that nobody has computed yet, and where its rows will be.
+async fn asked_for_in(file: &File, folder: &Folder) -> (Value, PathBuf) {
+    let asked = Keeper::of(file, LIMITS, false).await;
     let study = asked.ask(&map(5)).await.json();
     let id = study["id"].as_str().unwrap();
     let frozen = asked.store.find(id).await.unwrap().unwrap().study;
     asked.end().await;
-    // No file can be given the name of a folder that is not empty.
+    assert_eq!(frozen.chunks, 1);
     let of_study = folder.0.join(format!("{id}-by-{}", frozen.chunk_variants));
+    (study, of_study)
+}
+
+#[tokio::test]
+async fn a_cancelled_study_whose_rows_find_no_place_holds_up_no_other() {
+    let (file, folder) = (File::new(), Folder::new());
+    let (study, of_study) = asked_for_in(&file, &folder).await;
+    // No file can be given the name of a folder that is not empty.
     fs::create_dir_all(of_study.join("0000000000.parquet/taken")).unwrap();
     let one_slot = Limits { max_concurrent_solves: 1, deadline_ms: 60_000, ..LIMITS };
     let keeper = Keeper::with_parts(&file, one_slot, true, Some(Parts::new(&folder.0).unwrap())).await;
@@ -907,13 +909,8 @@ async fn a_cancelled_study_whose_rows_find_no_place_holds_up_no_other() {
 #[tokio::test]
 async fn of_a_folder_that_stands_still_no_more_threads_wait_than_chunks_are_in_work() {
     let (file, folder) = (File::new(), Folder::new());
-    let asked = Keeper::of(&file, LIMITS, false).await;
-    let study = asked.ask(&map(5)).await.json();
-    let id = study["id"].as_str().unwrap();
-    let frozen = asked.store.find(id).await.unwrap().unwrap().study;
-    asked.end().await;
+    let (study, of_study) = asked_for_in(&file, &folder).await;
     // Who opens it waits until somebody reads.
-    let of_study = folder.0.join(format!("{id}-by-{}", frozen.chunk_variants));
     fs::create_dir(&of_study).unwrap();
     let still = of_study.join(".0000000000.begun");
     rustix::fs::mknodat(rustix::fs::CWD, &still, rustix::fs::FileType::Fifo, rustix::fs::Mode::RWXU, 0).unwrap();
