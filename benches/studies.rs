@@ -15,7 +15,7 @@ use toothwave_study::{Gathered, Limits, Study, Work};
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 const LIMITS: Limits = Limits {
-    calculation: question::Limits { max_states: 1_000_000, max_profile_points: 1_000_000 },
+    calculation: question::Limits::new(1_000_000, 1_000_000),
     max_study_variants: 1_000_000_000,
     max_study_bytes: 1 << 34,
 };

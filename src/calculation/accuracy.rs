@@ -20,7 +20,6 @@ use crate::json::word;
 use crate::key::Encode;
 use crate::no_answer::{NoAnswer, NoAnswerCode};
 use crate::question::{Limits, Question, checked_drive, checked_load};
-use crate::sweep::Each;
 
 /// The sample counts that are tried.
 const SAMPLES: [u64; 9] = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
@@ -128,7 +127,7 @@ impl Question for Accuracy {
         let load = checked_load(design, &draft, &mut violations)?;
         match (draft.drive(), load, design.requested_error()) {
             (Some(drive), Some(load), Ok(requested_error)) if violations.is_empty() => {
-                let (deviations, max_states) = (Deviations::from(&design.deviations), limits.max_states);
+                let (deviations, max_states) = (Deviations::from(&design.deviations), limits.max_searched_states);
                 let backings = Backings::of(&drive, &draft, &design.parts_parameters(), design.support());
                 Ok(CheckedAccuracy { drive, load, deviations, backings, requested_error, max_states })
             }
@@ -139,17 +138,8 @@ impl Question for Accuracy {
         }
     }
 
-    fn working_bytes(checked: &CheckedAccuracy) -> u64 {
-        let &CheckedAccuracy { ref drive, ref load, ref deviations, max_states, .. } = checked;
-        let mesh = load.mesh(drive, deviations);
-        // The longest way that is tried is longer than most converged references.
-        let input_angles = admitted_samples(mesh, max_states).map(|samples| mesh.last_sample(samples)).max();
-        Each::PLAIN.searched_bytes(&mesh, input_angles, max_states)
-    }
-
-    fn searched_bytes(checked: &CheckedAccuracy, input_angles: u64) -> u64 {
-        let CheckedAccuracy { drive, load, deviations, max_states, .. } = checked;
-        Each::PLAIN.searched_bytes(&load.mesh(drive, deviations), Some(input_angles), *max_states)
+    fn max_bytes(_: &CheckedAccuracy, _: Format) -> Option<u64> {
+        None
     }
 
     fn answer(checked: &CheckedAccuracy, stop: &dyn Stop) -> Result<AccuracyAnswer, NoAnswer> {

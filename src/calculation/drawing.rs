@@ -37,6 +37,9 @@ const POINT_BYTES: u64 = 16;
 /// A pole in its polygon, of which there are four or more.
 const POLE_BYTES: u64 = 24;
 
+/// What a point takes in STEP, with the records that are remembered while they are written.
+const STEP_POINT_BYTES: u64 = 1120;
+
 impl Question for Drawing {
     type Checked = CheckedDrawing;
     type Answer = DrawingAnswer;
@@ -75,9 +78,10 @@ impl Question for Drawing {
         })
     }
 
-    fn working_bytes(checked: &CheckedDrawing) -> u64 {
-        // Of a solid's poles there are fewer than points.
-        (POINT_BYTES + POLE_BYTES) * checked.drawing.expected_points()
+    fn max_bytes(checked: &CheckedDrawing, format: Format) -> Option<u64> {
+        // A solid has fewer poles than points. The text of a point is longest in STEP.
+        let text_bytes = if format == Format::Step { STEP_POINT_BYTES } else { 60 };
+        Some((POINT_BYTES + POLE_BYTES + text_bytes) * checked.drawing.expected_points())
     }
 
     fn answer(checked: &CheckedDrawing, stop: &dyn Stop) -> Result<DrawingAnswer, NoAnswer> {

@@ -27,6 +27,18 @@ pub enum Format {
     Step,
 }
 
+impl Format {
+    /// Whether each number of the answer is written.
+    pub const fn writes_all_numbers(self) -> bool {
+        matches!(self, Self::Json | Self::Csv | Self::Arrow | Self::Parquet)
+    }
+
+    /// The bytes of numbers and of their text: a number has 8 bytes, and its text about 20.
+    pub const fn bytes_with_text(self, numbers_bytes: u64) -> u64 {
+        if self.writes_all_numbers() { numbers_bytes * 7 / 2 } else { numbers_bytes }
+    }
+}
+
 /// Writes an answer in one form.
 pub type Form<A> = fn(&A, &mut dyn Write) -> io::Result<()>;
 
@@ -40,9 +52,15 @@ pub trait Forms: Serialize + Sized + 'static {
         4096
     }
 
-    /// About how many bytes the answer takes in memory, as far as they are many, with what writing it in a format takes beside the text.
+    /// About how many bytes the numbers of the answer take, with what writing them in a format takes beside the text.
     fn held_bytes(&self, _format: Format) -> u64 {
         0
+    }
+
+    /// About how many bytes the answer takes with its text in this format.
+    fn bytes(&self, format: Format) -> u64 {
+        let text_bytes = if format.writes_all_numbers() { self.expected_bytes() as u64 } else { 0 };
+        self.held_bytes(format) + text_bytes
     }
 
     /// Writes the answer in one of its formats, or in JSON.

@@ -257,8 +257,8 @@ impl Question for Geometry {
         }
     }
 
-    fn working_bytes((drive, profile): &Self::Checked) -> u64 {
-        POINT_BYTES * profile::expected_points(drive, profile)
+    fn max_bytes((drive, profile): &Self::Checked, format: Format) -> Option<u64> {
+        Some(format.bytes_with_text(POINT_BYTES * profile::expected_points(drive, profile)))
     }
 
     fn answer((drive, profile): &Self::Checked, stop: &dyn Stop) -> Result<GeometryAnswer, NoAnswer> {

@@ -1,13 +1,11 @@
 //! The walk from a document to an answer, which all questions share.
 
-use std::cell::{OnceCell, RefCell};
-
 pub use toothwave_solver::Stop;
 use toothwave_solver::drive::Draft;
 use toothwave_solver::{LoadCase, Parameter, SolveError, Violation, model_error};
 
 use crate::design::Design;
-use crate::forms::Forms;
+use crate::forms::{Format, Forms};
 use crate::key::{Encode, Key};
 use crate::no_answer::NoAnswer;
 
@@ -18,6 +16,15 @@ pub struct Limits {
     pub max_states: u64,
     /// Most points of all profiles of a geometry.
     pub max_profile_points: u64,
+    /// Most states of a sweep to a tolerance, whose number is not known before.
+    pub max_searched_states: u64,
+}
+
+impl Limits {
+    /// Limits with as many states to a tolerance as otherwise.
+    pub const fn new(max_states: u64, max_profile_points: u64) -> Self {
+        Self { max_states, max_profile_points, max_searched_states: max_states }
+    }
 }
 
 /// What a design document can be asked.
@@ -39,19 +46,9 @@ pub trait Question: Send + 'static {
     /// Names the fields at fault.
     fn check(&self, design: &Design, limits: &Limits) -> Result<Self::Checked, NoAnswer>;
 
-    /// Bytes that the answer's columns of numbers take, as far as that is known before it is there, or about.
-    fn columns_bytes(_checked: &Self::Checked) -> u64 {
-        0
-    }
-
-    /// About how many bytes solving takes besides, and has let go when the answer is there.
-    fn working_bytes(_checked: &Self::Checked) -> u64 {
-        0
-    }
-
-    /// About how many bytes both are once a search for extremes has looked at so many input angles.
-    fn searched_bytes(_checked: &Self::Checked, _input_angles: u64) -> u64 {
-        0
+    /// The upper bound of the bytes that the answer takes with its text in this format; none if only solving tells.
+    fn max_bytes(_checked: &Self::Checked, _format: Format) -> Option<u64> {
+        Some(0)
     }
 
     /// Whether solving, and writing the answer as JSON, is certain to take no longer than some 0.1 ms.
@@ -76,42 +73,6 @@ pub trait Question: Send + 'static {
     /// Why there is no answer.
     fn ask(&self, document: &[u8], limits: &Limits, stop: &dyn Stop) -> Result<Self::Answer, NoAnswer> {
         Self::answer(&self.check(&Design::read(document)?, limits)?, stop)
-    }
-}
-
-/// Solves, where a search for extremes takes room for all input angles that it has looked at before it looks at more.
-///
-/// # Errors
-/// That of `take`, which stops the search.
-pub fn with_room<T, E>(
-    stop: &dyn Stop,
-    take: impl FnMut(u64) -> Result<(), E>,
-    solve: impl FnOnce(&dyn Stop) -> Result<T, NoAnswer>,
-) -> Result<Result<T, NoAnswer>, E> {
-    let taking = Taking { stop, take: RefCell::new(take), refused: OnceCell::new() };
-    let solved = solve(&taking);
-    taking.refused.into_inner().map_or(Ok(solved), Err)
-}
-
-struct Taking<'a, F, E> {
-    stop: &'a dyn Stop,
-    take: RefCell<F>,
-    refused: OnceCell<E>,
-}
-
-impl<F: FnMut(u64) -> Result<(), E>, E> Stop for Taking<'_, F, E> {
-    fn stopped(&self) -> bool {
-        self.refused.get().is_some() || self.stop.stopped()
-    }
-
-    fn has_room_for(&self, input_angles: u64) -> bool {
-        match (self.take.borrow_mut())(input_angles) {
-            Ok(()) => true,
-            Err(refused) => {
-                self.refused.get_or_init(|| refused);
-                false
-            }
-        }
     }
 }
 

@@ -5,7 +5,6 @@ use std::io::{self, Write};
 use toothwave_solver::backing::{Backings, Shares};
 use toothwave_solver::losses::wear::WearParameters;
 use toothwave_solver::losses::{Friction, Mechanism, period};
-use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self as solver, Points};
 use toothwave_solver::{
@@ -60,52 +59,18 @@ const STATE_BYTES: u64 = 11 * 8 + 2 * 4;
 /// Three columns of doubles and one of numbers, three of radial forces, one of the wind-up without load, and what stands between them while they are made.
 const ANGLE_BYTES: u64 = 11 * 8;
 
-/// What a sweep to a tolerance has of a state besides, until it is over: as much again.
-const SEARCHED_BYTES: u64 = STATE_BYTES;
-
-/// Input angles a period of a sweep to a tolerance: in 140 drives of all kinds they were up to 470, and of a few small ones up to 1400. One that looks at
-/// more takes room for them on its way.
-const SEARCHED_SAMPLES: u64 = 512;
-
 /// A number of about 18 characters and its comma.
 const NUMBER_TEXT_BYTES: usize = 20;
 
 /// What a state and an input angle take.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Each {
+struct Each {
     state_bytes: u64,
     angle_bytes: u64,
 }
 
-impl Each {
-    pub(crate) const PLAIN: Self = Self { state_bytes: STATE_BYTES, angle_bytes: ANGLE_BYTES };
-
-    /// What those take that a search has looked at: so many input angles, or as many as are expected, and at most so many states.
-    pub(crate) fn searched_bytes(self, mesh: &Mesh, input_angles: Option<u64>, max_states: u64) -> u64 {
-        let of_samples = Samples::new(SEARCHED_SAMPLES)
-            .map(|samples| (u128::from(mesh.state_count(samples)), u128::from(mesh.last_sample(samples))));
-        let (all_states, all_angles) = of_samples.unwrap_or((1, 1));
-        let angles = input_angles.map_or(all_angles, u128::from);
-        let states = u64::try_from((angles * all_states).div_ceil(all_angles))
-            .map_or(max_states, |states| states.min(max_states));
-        let angles = u64::try_from(angles).map_or(states, |angles| angles.min(states));
-        states * (self.state_bytes + SEARCHED_BYTES) + angles * self.angle_bytes
-    }
-}
-
 impl CheckedSweep {
-    /// What all states and input angles take, of a sweep to a tolerance those that a search has looked at, or as many as are expected.
-    fn bytes_of(&self, each: Each, input_angles: Option<u64>) -> u64 {
-        let mesh = self.load().mesh(&self.drive, &self.deviations);
-        match self.points {
-            Points::Samples(samples) => {
-                mesh.state_count(samples) * each.state_bytes + (mesh.last_sample(samples) + 1) * each.angle_bytes
-            }
-            Points::Tolerance(tolerance) => each.searched_bytes(&mesh, input_angles, tolerance.max_states()),
-        }
-    }
-
-    /// In the answer.
+    /// What a state and an input angle take in the answer.
     fn each(&self) -> Each {
         // Three columns of slips and one of words.
         const LOSSES_BYTES: u64 = 3 * 8 + 2;
@@ -127,15 +92,6 @@ impl CheckedSweep {
     /// The drive.
     pub const fn drive(&self) -> &Drive {
         &self.drive
-    }
-
-    /// About what it takes while only its peaks are looked for: of equal intervals no more than one, to a tolerance, or where items deviate, all moments that were
-    /// seen, which are so many or as many as are expected.
-    pub fn peaks_bytes(&self, input_angles: Option<u64>) -> u64 {
-        match self.points {
-            Points::Samples(_) if self.deviations.is_nil() => 0,
-            Points::Samples(_) | Points::Tolerance(_) => self.bytes_of(Each::PLAIN, input_angles),
-        }
     }
 
     /// Its load, of a duty the hardest.
@@ -261,7 +217,7 @@ impl Question for Sweep {
             violations.extend(found);
             None
         });
-        let points = design.sweep_points(limits.max_states)?;
+        let points = design.sweep_points(limits.max_searched_states)?;
         let (drive, load, points) = match (draft.drive(), load, points) {
             (Some(drive), Some(load), Ok(points)) if violations.is_empty() => (drive, load, points),
             (_, _, points) => {
@@ -299,12 +255,13 @@ impl Question for Sweep {
         })
     }
 
-    fn columns_bytes(checked: &CheckedSweep) -> u64 {
-        checked.bytes_of(checked.each(), None)
-    }
-
-    fn searched_bytes(checked: &CheckedSweep, input_angles: u64) -> u64 {
-        checked.bytes_of(checked.each(), Some(input_angles))
+    fn max_bytes(checked: &CheckedSweep, format: Format) -> Option<u64> {
+        let Points::Samples(samples) = checked.points else { return None };
+        let mesh = checked.load().mesh(&checked.drive, &checked.deviations);
+        let Each { state_bytes, angle_bytes } = checked.each();
+        let columns_bytes = mesh.state_count(samples) * state_bytes + (mesh.last_sample(samples) + 1) * angle_bytes;
+        // For plots the states are put in the order of their places: as much again.
+        Some(if format == Format::Svg { 2 * columns_bytes } else { format.bytes_with_text(columns_bytes) })
     }
 
     fn is_short(checked: &CheckedSweep) -> bool {

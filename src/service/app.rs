@@ -1,48 +1,46 @@
 //! What all requests share.
 
+use std::io;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use crate::cache::Cache;
-use crate::compute::Pool;
-use crate::config::Limits;
-use crate::room::Room;
-use crate::studies::{Keeping, Studies};
+use crate::compute::budget::Budget;
+use crate::compute::cache::Cache;
+use crate::compute::pool::{Deadline, Pool};
+use crate::ops::config::Limits;
 
 /// What handlers share.
 #[derive(Debug)]
 pub struct App {
     /// Limits of the service.
     pub limits: Limits,
-    /// Where solves run.
+    /// Where computations run.
     pub pool: Pool,
     /// Finished answers.
     pub cache: Cache,
-    /// For answers on their way to clients.
-    pub room: Room,
-    /// Studies, with what they have come to.
-    pub studies: Studies,
-    /// Whether the service wants requests: false while it drains.
+    /// What large answers may take.
+    pub budget: Budget,
+    /// False while the service stops, for readiness probes.
     pub ready: AtomicBool,
 }
 
 impl App {
-    /// An idle service within these limits, which keeps studies in memory.
-    pub fn new(limits: Limits) -> Arc<Self> {
-        Self::keeping(Pool::new(limits), limits, Keeping::Memory)
+    /// An idle service within these limits.
+    ///
+    /// # Errors
+    /// If the system refuses a thread.
+    pub fn start(limits: Limits) -> io::Result<Arc<Self>> {
+        Ok(Arc::new(Self {
+            limits,
+            pool: Pool::start(limits.max_concurrent_solves)?,
+            cache: Cache::new(limits.cache_max_bytes),
+            budget: Budget::new(limits.max_unread_bytes),
+            ready: AtomicBool::new(true),
+        }))
     }
 
-    /// An idle service within these limits, which the pool is within too, with its studies kept somewhere.
-    pub fn keeping(pool: Pool, limits: Limits, keeping: Keeping) -> Arc<Self> {
-        let room = Room::new(limits.max_unread_bytes);
-        let pool = pool.beside(&room);
-        Arc::new(Self {
-            limits,
-            studies: Studies::new(pool.clone(), room.clone(), limits, keeping),
-            pool,
-            cache: Cache::new(limits.cache_max_bytes),
-            room,
-            ready: AtomicBool::new(true),
-        })
+    /// The deadline of a request that arrives now.
+    pub fn deadline(&self) -> Deadline {
+        Deadline::after(std::time::Duration::from_millis(self.limits.deadline_ms))
     }
 }

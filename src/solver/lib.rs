@@ -195,12 +195,6 @@ impl SolveError {
 pub trait Stop {
     /// Whether to stop.
     fn stopped(&self) -> bool;
-
-    /// Whether there is room for so many input angles, all that a search for extremes has looked at with those that it is about to look at: nobody knows
-    /// beforehand how many there will be. Where there is not, it stops.
-    fn has_room_for(&self, _input_angles: u64) -> bool {
-        true
-    }
 }
 
 /// Never stops.

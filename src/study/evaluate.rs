@@ -7,7 +7,7 @@ use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::design::Design;
 use toothwave_calculation::json::{Tree, word};
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
-use toothwave_calculation::question::{Limits, Question as _, with_room};
+use toothwave_calculation::question::{Limits, Question as _};
 use toothwave_calculation::sweep::{CheckedSweep, Sweep};
 use toothwave_solver::losses::period::RadialForces;
 use toothwave_solver::parts::{LEAST_WALL, RIM};
@@ -91,15 +91,15 @@ impl Evaluator {
     }
 
     /// What becomes of a document where there is room for so many bytes while it is computed; a panic is an outcome too.
-    pub(crate) fn outcome(&self, document: &Tree, room_bytes: u64, stop: &dyn Stop) -> Result<Outcome, Interrupted> {
-        caught(|| match self.answer(document, room_bytes, stop) {
+    pub(crate) fn outcome(&self, document: &Tree, _room_bytes: u64, stop: &dyn Stop) -> Result<Outcome, Interrupted> {
+        caught(|| match self.answer(document, stop) {
             Ok(values) => Ok(Outcome::Answered(values)),
             Err(NoValues::Interrupted(interrupted)) => Err(interrupted),
             Err(NoValues::NoAnswer(reason)) => Ok(Outcome::Refused(reason.into())),
         })
     }
 
-    fn answer(&self, document: &Tree, room_bytes: u64, stop: &dyn Stop) -> Result<Vec<f64>, NoValues> {
+    fn answer(&self, document: &Tree, stop: &dyn Stop) -> Result<Vec<f64>, NoValues> {
         let design = document.read::<Design>()?.normalised();
         if !self.takes_sweep {
             let drive = CoincidenceDegree.check(&design, &self.limits)?;
@@ -110,24 +110,7 @@ impl Evaluator {
         let drive = checked.drive();
         let ring_outer_radius_mm = self.ring_outer_radius_mm(&design, drive)?;
         let takes_columns = self.takes_losses || self.takes_radial_forces;
-        let bytes = if takes_columns { Sweep::columns_bytes(&checked) } else { checked.peaks_bytes(None) };
-        if bytes > room_bytes {
-            return Err(NoValues::Interrupted(Interrupted::NeedsBytes(bytes)));
-        }
-        let take = |input_angles| {
-            let bytes = |input_angles| {
-                if takes_columns {
-                    Sweep::searched_bytes(&checked, input_angles)
-                } else {
-                    checked.peaks_bytes(Some(input_angles))
-                }
-            };
-            // It begins anew with the room that it asks for: with a half more, not with a little more each time.
-            let wanted = || Interrupted::NeedsBytes(bytes(input_angles + input_angles / 2));
-            if bytes(input_angles) <= room_bytes { Ok(()) } else { Err(wanted()) }
-        };
-        let loaded = |stop: &dyn Stop| self.loaded(&checked, takes_columns, stop);
-        let loaded = with_room(stop, take, loaded).map_err(NoValues::Interrupted)??;
+        let loaded = self.loaded(&checked, takes_columns, stop)?;
         Ok(self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) })?)
     }
 

@@ -1,50 +1,56 @@
-//! Ways to ask the service: its router alone, or over a real connection.
+//! Ways to ask the service: a process of its own for each test, over real connections.
 
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
-use std::sync::mpsc;
 use std::time::Duration;
 
-use axum::Router;
-use axum::body::Body;
-use axum::http::{HeaderMap, HeaderName, HeaderValue, Request};
-use axum::response::Response;
-use serde_json::Value;
-use tokio::net::TcpListener;
-use tokio::runtime::Runtime;
-use tokio::task::JoinHandle;
-use toothwave::app::App;
-use toothwave::compute::{Pool, Thread};
-use toothwave::config::Limits;
-use toothwave::keys::Keys;
-use toothwave::router::{Entry, router};
-use toothwave::studies::Keeping;
-use tower::ServiceExt as _;
+use axum::http::{HeaderMap, HeaderName, HeaderValue};
+use serde_json::{Value, json};
+
+use crate::designs::{shortest, with};
+use crate::serving::Process;
 
 /// Every path that a design document can be sent to.
 pub(crate) const ENDPOINTS: [&str; 4] =
     ["/v1/geometry", "/v1/coincidence-degree", "/v1/sweep", "/v1/drawings/assembly"];
 
+/// What a test sets of the service.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Limits {
+    pub(crate) max_states: u64,
+    pub(crate) max_body_bytes: usize,
+    pub(crate) max_concurrent_solves: u16,
+    pub(crate) deadline_ms: u64,
+    pub(crate) cache_max_bytes: u64,
+    pub(crate) max_unread_bytes: u64,
+}
+
 /// Limits that no test meets by accident; above all no test races the deadline.
 pub(crate) const LIMITS: Limits = Limits {
     max_states: 1_000_000,
-    max_profile_points: 1_000_000,
     max_body_bytes: 65_536,
     max_concurrent_solves: 2,
-    max_queued_solves: 32,
     deadline_ms: 600_000,
     cache_max_bytes: 268_435_456,
-    max_unread_bytes: 268_435_456,
-    max_connections: 64,
-    max_header_bytes: 16_384,
-    max_concurrent_batches: 4,
-    max_study_variants: 1_000_000,
-    max_study_bytes: 67_108_864,
-    max_concurrent_studies: 4,
-    study_deadline_ms: 600_000,
-    header_timeout_ms: 600_000,
+    max_unread_bytes: 1 << 30,
 };
+
+impl Limits {
+    fn arguments(&self) -> Vec<String> {
+        let Self { max_states, max_body_bytes, max_concurrent_solves, deadline_ms, cache_max_bytes, max_unread_bytes } =
+            self;
+        let flags = [
+            format!("--max-states={max_states}"),
+            format!("--max-body-bytes={max_body_bytes}"),
+            format!("--max-concurrent-solves={max_concurrent_solves}"),
+            format!("--deadline-ms={deadline_ms}"),
+            format!("--cache-max-bytes={cache_max_bytes}"),
+            format!("--max-unread-bytes={max_unread_bytes}"),
+        ];
+        flags.into()
+    }
+}
 
 /// What is asked.
 #[derive(Debug, Clone)]
@@ -76,15 +82,7 @@ impl Question {
         self
     }
 
-    pub(crate) fn request(&self) -> Request<Body> {
-        let mut request = Request::builder().method(self.method).uri(&self.path);
-        for (name, value) in &self.headers {
-            request = request.header(name, value);
-        }
-        request.body(Body::from(self.body.clone())).unwrap()
-    }
-
-    fn wire(&self) -> Vec<u8> {
+    pub(crate) fn wire(&self) -> Vec<u8> {
         let mut head = format!("{} {} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n", self.method, self.path);
         for (name, value) in &self.headers {
             head += &format!("{name}: {value}\r\n");
@@ -188,12 +186,9 @@ fn cache_status(header: &str) -> Vec<&str> {
     parameters
 }
 
-/// The service without a connection before it.
+/// A running service that ends with the test.
 #[derive(Debug, Clone)]
-pub(crate) struct Service {
-    pub(crate) app: Arc<App>,
-    router: Router,
-}
+pub(crate) struct Service(Arc<Process>);
 
 impl Service {
     pub(crate) fn new() -> Self {
@@ -201,47 +196,38 @@ impl Service {
     }
 
     pub(crate) fn within(limits: Limits) -> Self {
-        Self::within_for_origins(limits, &[])
+        Self::with(limits, &[])
     }
 
     pub(crate) fn for_origins(origins: &[&str]) -> Self {
-        Self::within_for_origins(LIMITS, origins)
+        let flags: Vec<_> = origins.iter().flat_map(|origin| ["--cors-origin", origin]).collect();
+        Self::with(LIMITS, &flags)
     }
 
-    pub(crate) fn within_for_origins(limits: Limits, origins: &[&str]) -> Self {
-        let app = App::new(limits);
-        let origins: Vec<_> = origins.iter().map(|&origin| origin.into()).collect();
-        let entry = Entry { cors_origins: origins, ..Entry::default() };
-        Self { router: router(Arc::clone(&app), &entry), app }
+    /// Within these limits, and with further arguments.
+    pub(crate) fn with(limits: Limits, arguments: &[&str]) -> Self {
+        let limits = limits.arguments();
+        let limits = limits.iter().map(String::as_str);
+        let all: Vec<_> = ["serve"].into_iter().chain(limits).chain(arguments.iter().copied()).collect();
+        Self(Arc::new(Process::started(&all)))
     }
 
-    /// With its studies kept somewhere, and served as they are in a whole service.
-    pub(crate) fn keeping(limits: Limits, keeping: Keeping) -> Self {
-        let app = App::keeping(Pool::new(limits), limits, keeping);
-        Self { router: router(Arc::clone(&app), &Entry::default()), app }
+    pub(crate) fn process(&self) -> &Process {
+        &self.0
     }
 
-    /// Behind a keys file of this text.
-    pub(crate) fn behind(keys: &str) -> Self {
-        let app = App::new(LIMITS);
-        let entry = Entry { keys: Some(Keys::parse(keys).unwrap()), ..Entry::default() };
-        Self { router: router(Arc::clone(&app), &entry), app }
+    /// The process alone, which no other part of the test uses any more.
+    pub(crate) fn into_process(self) -> Process {
+        Arc::try_unwrap(self.0).unwrap()
+    }
+
+    pub(crate) fn address(&self) -> SocketAddr {
+        self.0.address
     }
 
     pub(crate) async fn ask(&self, question: &Question) -> Answer {
-        self.send(question.request()).await
-    }
-
-    /// The answer with its body still to come.
-    pub(crate) async fn response(&self, request: Request<Body>) -> Response {
-        self.router.clone().oneshot(request).await.unwrap()
-    }
-
-    pub(crate) async fn send(&self, request: Request<Body>) -> Answer {
-        let response = self.response(request).await;
-        let (parts, body) = response.into_parts();
-        let body = axum::body::to_bytes(body, usize::MAX).await.unwrap().to_vec();
-        Answer { status: parts.status.as_u16(), headers: parts.headers, body }
+        let (address, question) = (self.address(), question.clone());
+        tokio::task::spawn_blocking(move || ask_at(address, &question)).await.unwrap()
     }
 
     /// Sends a design document.
@@ -257,39 +243,43 @@ impl Service {
     pub(crate) async fn get(&self, path: &str) -> Answer {
         self.ask(&Question::of("GET", path)).await
     }
-}
 
-/// The service behind a real socket, on threads of its own.
-#[derive(Debug)]
-pub(crate) struct Listening {
-    pub(crate) app: Arc<App>,
-    pub(crate) address: SocketAddr,
-    runtime: Option<Runtime>,
-}
-
-impl Listening {
-    pub(crate) fn within(limits: Limits) -> Self {
-        let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(4).enable_all().build().unwrap();
-        let app = App::new(limits);
-        let router = router(Arc::clone(&app), &Entry::default());
-        let listener = runtime.block_on(TcpListener::bind(("127.0.0.1", 0))).unwrap();
-        let address = listener.local_addr().unwrap();
-        runtime.spawn(async move { axum::serve(listener, router).await });
-        Self { app, address, runtime: Some(runtime) }
+    /// The value of a series of the metrics.
+    pub(crate) fn metric(&self, series: &str) -> f64 {
+        let metrics = ask_at(self.address(), &Question::of("GET", "/metrics"));
+        let line = metrics.text().lines().find(|line| line.starts_with(&format!("{series} ")));
+        let line = line.unwrap_or_else(|| panic!("no {series} in {}", metrics.text()));
+        line.rsplit_once(' ').unwrap().1.parse().unwrap()
     }
 
-    /// Runs what has to run where the service does.
-    pub(crate) fn run<T>(&self, future: impl Future<Output = T>) -> T {
-        self.runtime.as_ref().unwrap().block_on(future)
+    /// Asks again until a series has this value; fails if that takes too many tries.
+    pub(crate) fn until(&self, series: &str, value: f64) {
+        assert!((0..100_000).any(|_| self.metric(series) == value), "{series} never is {value}");
+    }
+
+    /// Sends a request without waiting for its answer.
+    pub(crate) fn send(&self, question: &Question) -> TcpStream {
+        let mut stream = TcpStream::connect(self.address()).unwrap();
+        stream.write_all(&question.wire()).unwrap();
+        stream
+    }
+
+    /// Occupies permits with computations that run until their clients leave.
+    pub(crate) fn occupied_by(&self, computations: u16) -> Vec<TcpStream> {
+        let before = self.metric("toothwave_solves_running");
+        let streams = (0..computations).map(|number| self.send(&endless(number))).collect();
+        self.until("toothwave_solves_running", before + f64::from(computations));
+        streams
     }
 }
 
-impl Drop for Listening {
-    fn drop(&mut self) {
-        if let Some(runtime) = self.runtime.take() {
-            runtime.shutdown_background();
-        }
-    }
+/// Limits under which [`endless`] computes for minutes.
+pub(crate) const ENDLESS: Limits = Limits { max_states: 100_000_000, max_unread_bytes: 1 << 40, ..LIMITS };
+
+/// A sweep that no test waits for; each number is another one.
+pub(crate) fn endless(number: u16) -> Question {
+    let document = with(&shortest(), "/sweep", json!({ "samples": 10_000_000 - u64::from(number) }));
+    Question::post("/v1/sweep", document.to_string())
 }
 
 /// Asks whatever listens at `address`; this thread waits for the answer.
@@ -299,6 +289,11 @@ pub(crate) fn ask_at(address: SocketAddr, question: &Question) -> Answer {
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
     stream.write_all(&question.wire()).unwrap();
+    answer_on(stream)
+}
+
+/// The answer that comes on a connection, until it is closed.
+pub(crate) fn answer_on(mut stream: TcpStream) -> Answer {
     let mut bytes = Vec::new();
     stream.read_to_end(&mut bytes).unwrap();
     let end = bytes.windows(4).position(|window| window == b"\r\n\r\n").expect("the head of an answer");
@@ -312,49 +307,23 @@ pub(crate) fn ask_at(address: SocketAddr, question: &Question) -> Answer {
         })
         .collect();
     let body = bytes[end + 4..].to_vec();
+    let body = if headers.get("transfer-encoding").is_some() { unchunked(&body) } else { body };
     let announced = headers.get("content-length").map(|length| length.to_str().unwrap().parse::<usize>().unwrap());
-    assert_eq!(announced.unwrap_or(body.len()), body.len(), "the whole body has arrived");
+    // The answer to HEAD announces a body that does not come.
+    assert!(body.is_empty() || announced.is_none_or(|length| length == body.len()), "the whole body has arrived");
     Answer { status, headers, body }
 }
 
-/// Lets other tasks and threads go on until something is true of them; fails when that takes forever.
-pub(crate) async fn until(what: &str, is_true: impl Fn() -> bool) {
-    for _ in 0..20_000_000 {
-        if is_true() {
-            return;
+/// A body without the lengths of its chunks (RFC 9112, section 7.1).
+fn unchunked(mut chunks: &[u8]) -> Vec<u8> {
+    let mut body = Vec::new();
+    loop {
+        let end = chunks.windows(2).position(|window| window == b"\r\n").expect("the length of a chunk");
+        let length = usize::from_str_radix(std::str::from_utf8(&chunks[..end]).unwrap(), 16).unwrap();
+        if length == 0 {
+            return body;
         }
-        tokio::task::yield_now().await;
-        std::thread::yield_now();
-    }
-    panic!("it never came true that {what}");
-}
-
-/// A solve that occupies a pool until it is told to end, or dropped.
-#[derive(Debug)]
-pub(crate) struct Occupied {
-    release: mpsc::Sender<()>,
-    solve: JoinHandle<Result<(), toothwave::problem::Problem>>,
-}
-
-impl Occupied {
-    pub(crate) async fn by_one(pool: &Pool) -> Self {
-        let (release, released) = mpsc::channel();
-        let before = pool.running();
-        let own = pool.clone();
-        let solve = tokio::spawn(async move {
-            own.run(own.deadline(), Thread::Blocking, move |_| {
-                // Dropped or told so: both mean that it is over.
-                let _ = released.recv();
-                Ok(())
-            })
-            .await
-        });
-        until("the pool is occupied", || pool.running() == before + 1).await;
-        Self { release, solve }
-    }
-
-    pub(crate) async fn end(self) {
-        self.release.send(()).unwrap();
-        self.solve.await.unwrap().unwrap();
+        body.extend_from_slice(&chunks[end + 2..end + 2 + length]);
+        chunks = &chunks[end + 4 + length..];
     }
 }

@@ -1,16 +1,12 @@
 //! Batches: a document a line, an answer a line, in order and whatever each comes to.
 
-use std::convert::Infallible;
-use std::io::Write as _;
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
 use std::process::{Command, Stdio};
 
-use axum::body::{Body, Bytes};
-use axum::http::Request;
-use futures_util::{StreamExt as _, stream};
 use serde_json::{Value, json};
-use toothwave::config::Limits;
 
-use crate::asking::{Answer, LIMITS, Listening, Occupied, Question, Service, ask_at, until};
+use crate::asking::{Answer, ENDLESS, LIMITS, Limits, Question, Service, answer_on, ask_at};
 use crate::designs::{of_the_paper, shortest, undercut, with};
 
 fn question(query: &str, body: impl Into<Vec<u8>>) -> Question {
@@ -106,21 +102,6 @@ async fn blank_lines_are_passed_over_and_a_line_too_long_is_a_problem_of_its_own
 }
 
 #[tokio::test]
-async fn a_line_may_arrive_in_any_pieces() {
-    let text = format!("{}\n{}", variant(0), variant(1));
-    for size in [1, 7, 100] {
-        let pieces: Vec<_> =
-            text.as_bytes().chunks(size).map(|piece| Ok::<_, std::io::Error>(Bytes::copy_from_slice(piece))).collect();
-        let request = Request::post("/v1/batch")
-            .header("content-type", "application/x-ndjson")
-            .body(Body::from_stream(stream::iter(pieces)))
-            .unwrap();
-        let found = lines(&Service::new().send(request).await);
-        assert!(found.len() == 2 && found.iter().all(|line| line["status"] == 200), "{size}");
-    }
-}
-
-#[tokio::test]
 async fn an_empty_batch_has_the_last_line_alone() {
     assert!(lines(&batch(&Service::new(), "", &[]).await).is_empty());
 }
@@ -135,63 +116,9 @@ async fn what_is_no_batch_is_refused() {
     service.ask(&question).await.refused(415, "unsupported_media_type");
 }
 
-/// A client of two cores' worth of long sweeps: its permits are taken, and still a neighbour's request is answered before the batch is.
-#[test]
-fn a_single_request_does_not_wait_for_a_batch() {
-    let service = Listening::within(Limits { max_concurrent_solves: 1, ..LIMITS });
-    let address = service.address;
-    let slow = with(&shortest(), "/sweep", json!({ "samples": 20_000 })).to_string();
-    let lines = vec![slow; 40].join("\n");
-    let batch = std::thread::spawn(move || ask_at(address, &question("?peaks_only=true", lines)));
-    service.run(until("the batch runs", || service.app.pool.batches() == 1 && service.app.pool.running() == 1));
-    let single = ask_at(address, &Question::post("/v1/sweep", variant(7).to_string()));
-    assert_eq!(single.status, 200);
-    assert!(!batch.is_finished(), "the neighbour came in between");
-    let answer = batch.join().unwrap();
-    assert_eq!(answer.text().lines().filter(|line| line.contains("\"status\":200")).count(), 40);
-}
-
-#[tokio::test]
-async fn a_batch_whose_client_leaves_frees_its_place_and_stops() {
-    let service = Service::within(Limits { max_concurrent_solves: 1, ..LIMITS });
-    let endless = stream::repeat_with(|| Ok::<_, std::io::Error>(Bytes::from(format!("{}\n", variant(0)))));
-    let request = Request::post("/v1/batch")
-        .header("content-type", "application/x-ndjson")
-        .body(Body::from_stream(endless))
-        .unwrap();
-    let response = service.response(request).await;
-    let mut body = response.into_body().into_data_stream();
-    assert!(body.next().await.is_some(), "answers come while the batch is still sent");
-    assert_eq!(service.app.pool.batches(), 1);
-    drop(body);
-    until("it has ended", || service.app.pool.batches() == 0 && service.app.pool.running() == 0).await;
-}
-
-#[tokio::test]
-async fn more_batches_than_are_admitted_are_refused_at_once() {
-    let service = Service::within(Limits { max_concurrent_batches: 1, ..LIMITS });
-    let place = service.app.pool.batch_place().unwrap();
-    let refused = batch(&service, "", &[variant(0).to_string()]).await;
-    assert_eq!(refused.header("retry-after"), "1");
-    refused.refused(503, "queue_full");
-    drop(place);
-    assert_eq!(lines(&batch(&service, "", &[variant(0).to_string()]).await).len(), 1);
-}
-
-#[tokio::test]
-async fn a_full_queue_is_no_reason_to_refuse_a_batchs_line() {
-    let service = Service::within(Limits { max_concurrent_solves: 1, max_queued_solves: 0, ..LIMITS });
-    let occupied = Occupied::by_one(&service.app.pool).await;
-    let app = service.app.clone();
-    let batch = tokio::spawn(async move { batch(&service, "", &[variant(0).to_string()]).await });
-    until("the batch waits", || app.pool.batches() == 1).await;
-    drop(occupied);
-    assert_eq!(lines(&batch.await.unwrap())[0]["status"], 200);
-}
-
 #[tokio::test]
 async fn a_line_beyond_the_deadline_is_a_problem_and_the_others_are_answered() {
-    let service = Service::within(Limits { deadline_ms: 400, max_states: 100_000_000, ..LIMITS });
+    let service = Service::within(Limits { deadline_ms: 400, ..ENDLESS });
     let endless = with(&shortest(), "/sweep", json!({ "samples": 10_000_000 })).to_string();
     let found =
         lines(&batch(&service, "?peaks_only=true", &[variant(0).to_string(), endless, variant(2).to_string()]).await);
@@ -232,212 +159,119 @@ fn uneven(count: u64) -> Vec<String> {
         .collect()
 }
 
-/// Lines of an answer as it goes over the wire, between the lengths of its pieces.
-fn answered(answer: &Answer) -> usize {
-    answer.text().lines().filter(|line| line.starts_with("{\"index\"")).count()
+/// The head of a batch that is sent in chunks, by a proxy or directly.
+fn open(service: &Service, is_behind_proxy: bool) -> TcpStream {
+    let mut stream = TcpStream::connect(service.address()).unwrap();
+    let forwarded = if is_behind_proxy { "x-forwarded-for: 192.0.2.1\r\n" } else { "" };
+    let head = "POST /v1/batch?peaks_only=true HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n";
+    let body = "content-type: application/x-ndjson\r\ntransfer-encoding: chunked\r\n\r\n";
+    stream.write_all(format!("{head}{forwarded}{body}").as_bytes()).unwrap();
+    stream
+}
+
+fn send(stream: &mut TcpStream, piece: &str) {
+    stream.write_all(format!("{:x}\r\n{piece}\r\n", piece.len()).as_bytes()).unwrap();
+}
+
+/// Reads until the answer contains this text.
+fn read_until(stream: &mut TcpStream, text: &str) {
+    let (mut read, mut buffer) = (String::new(), [0; 4096]);
+    while !read.contains(text) {
+        let length = stream.read(&mut buffer).unwrap();
+        assert!(length > 0, "{read}");
+        read.push_str(&String::from_utf8_lossy(&buffer[..length]));
+    }
 }
 
 #[test]
-fn many_batches_at_once_all_come_to_their_end() {
-    let service = Listening::within(Limits { max_concurrent_solves: 2, max_concurrent_batches: 8, ..LIMITS });
-    let address = service.address;
-    let asked = |_| std::thread::spawn(move || ask_at(address, &question("?peaks_only=true", uneven(300).join("\n"))));
-    let clients: Vec<_> = (0..8).map(asked).collect();
+fn line_may_arrive_in_any_pieces() {
+    let service = Service::new();
+    let mut stream = open(&service, false);
+    let text = format!("{}\n{}", variant(0), variant(1));
+    for piece in text.as_bytes().chunks(7) {
+        send(&mut stream, std::str::from_utf8(piece).unwrap());
+    }
+    stream.write_all(b"0\r\n\r\n").unwrap();
+    let found = lines(&answer_on(stream));
+    assert!(found.len() == 2 && found.iter().all(|line| line["status"] == 200));
+}
+
+#[test]
+fn lines_are_answered_while_others_are_sent() {
+    let service = Service::new();
+    let mut stream = open(&service, false);
+    send(&mut stream, &format!("{}\n", variant(0)));
+    read_until(&mut stream, "\"index\":0");
+    send(&mut stream, &format!("{}\n", variant(1)));
+    read_until(&mut stream, "\"index\":1");
+}
+
+/// nginx passes on no more of a request once its answer has begun.
+#[test]
+fn batch_behind_proxy_is_read_first() {
+    let service = Service::new();
+    let mut stream = open(&service, true);
+    for index in 0..100 {
+        send(&mut stream, &format!("{}\n", variant(index)));
+    }
+    stream.set_nonblocking(true).unwrap();
+    // Other requests are answered meanwhile, so that its answer could have begun.
+    assert_eq!(ask_at(service.address(), &Question::post("/v1/sweep", variant(7).to_string())).status, 200);
+    assert!(stream.read(&mut [0; 1]).is_err(), "no byte of the answer before the end of the batch");
+    stream.set_nonblocking(false).unwrap();
+    stream.write_all(b"0\r\n\r\n").unwrap();
+    assert_eq!(lines(&answer_on(stream)).len(), 100);
+}
+
+#[test]
+fn whole_batch_may_be_sent_before_reading() {
+    let service = Service::new();
+    let answer =
+        ask_at(service.address(), &question("?peaks_only=true", vec![variant(0).to_string(); 2_000].join("\n")));
+    assert_eq!(lines(&answer).len(), 2_000);
+}
+
+#[test]
+fn many_batches_all_end() {
+    let service = Service::new();
+    let address = service.address();
+    let asked = |_| std::thread::spawn(move || ask_at(address, &question("?peaks_only=true", uneven(100).join("\n"))));
+    let clients: Vec<_> = (0..16).map(asked).collect();
     for client in clients {
-        assert_eq!(answered(&client.join().unwrap()), 300);
+        assert_eq!(lines(&client.join().unwrap()).len(), 100);
     }
-}
-
-#[tokio::test]
-async fn batches_that_nobody_reads_hold_up_neither_single_requests_nor_other_batches() {
-    let service = Service::within(Limits { max_concurrent_solves: 2, max_concurrent_batches: 8, ..LIMITS });
-    let mut unread = Vec::new();
-    for _ in 0..6 {
-        let request = Request::post("/v1/batch")
-            .header("content-type", "application/x-ndjson")
-            .body(Body::from(uneven(300).join("\n")))
-            .unwrap();
-        let mut body = service.response(request).await.into_body().into_data_stream();
-        assert!(body.next().await.is_some());
-        unread.push(body);
-    }
-    for index in 0..4 {
-        service.post("/v1/sweep", &variant(100 + index)).await.found();
-    }
-    assert_eq!(lines(&batch(&service, "?peaks_only=true", &uneven(200)).await).len(), 200);
-    assert_eq!(service.app.pool.batches(), unread.len());
 }
 
 #[test]
-fn a_whole_batch_may_be_sent_before_its_answers_are_read() {
-    let service = Listening::within(Limits { max_concurrent_solves: 2, ..LIMITS });
-    let answer = ask_at(service.address, &question("", vec![variant(0).to_string(); 6_000].join("\n")));
-    assert_eq!(answered(&answer), 6_000);
-}
-
-/// A batch whose body is made of these pieces, the last of which may be a fault.
-async fn sent_in_pieces(service: &Service, pieces: Vec<Result<Bytes, std::io::Error>>) -> Vec<Value> {
-    let request = Request::post("/v1/batch?peaks_only=true")
-        .header("content-type", "application/x-ndjson")
-        .body(Body::from_stream(stream::iter(pieces)))
-        .unwrap();
-    service.send(request).await.text().lines().map(|line| serde_json::from_str(line).unwrap()).collect()
-}
-
-#[tokio::test]
-async fn a_batch_that_breaks_off_ends_with_a_line_that_says_so() {
-    let whole = Bytes::from(format!("{}\n{}\n{{\"dri", variant(0), variant(1)));
-    let found = sent_in_pieces(&Service::new(), vec![Ok(whole), Err(std::io::Error::other("reset"))]).await;
-    let [first, second, end] = found.as_slice() else { panic!("{found:?}") };
-    assert_eq!((&first["status"], &second["status"]), (&json!(200), &json!(200)));
-    assert_eq!((&end["asked"], &end["answered"]), (&json!(2), &json!(2)));
-    assert_eq!(end["problem"]["code"], "broken_body");
-}
-
-/// A document, and then this again and again, each time within the patience.
-async fn is_ended_that_drips(drip: &'static [u8]) {
-    let service = Service::within(Limits { header_timeout_ms: 30_000, ..LIMITS });
-    let drips = stream::unfold((), |()| async {
-        tokio::time::sleep(std::time::Duration::from_secs(20)).await;
-        Some((Ok::<_, std::io::Error>(Bytes::from_static(drip)), ()))
-    });
-    let request = Request::post("/v1/batch")
-        .header("content-type", "application/x-ndjson")
-        .body(Body::from_stream(stream::once(async { Ok(Bytes::from(format!("{}\n", variant(0)))) }).chain(drips)))
-        .unwrap();
-    let answer = service.send(request).await;
-    let end: Value = serde_json::from_str(answer.text().lines().last().unwrap()).unwrap();
-    assert_eq!((&end["asked"], &end["problem"]["code"]), (&json!(1), &json!("request_timeout")));
-    assert_eq!(service.app.pool.batches(), 0);
-}
-
-#[tokio::test(start_paused = true)]
-async fn a_batch_that_drips_is_ended() {
-    is_ended_that_drips(b" ").await;
-}
-
-/// They would bring enough if they asked anything.
-#[tokio::test(start_paused = true)]
-async fn a_batch_of_blank_lines_without_end_is_ended() {
-    is_ended_that_drips(&[b'\n'; 10_000]).await;
-}
-
-/// Something of a line each time, and less than 32 bytes a second of it.
-#[tokio::test(start_paused = true)]
-async fn a_batch_whose_line_never_comes_to_its_end_is_ended() {
-    for drip in [&b"{"[..], &[b'{'; 600]] {
-        is_ended_that_drips(drip).await;
-    }
-}
-
-/// Slower than a machine, faster than nothing: a document each few seconds.
-#[tokio::test(start_paused = true)]
-async fn a_batch_that_is_sent_bit_by_bit_is_answered() {
-    let documents = stream::unfold(0, |index| async move {
-        tokio::time::sleep(std::time::Duration::from_secs(4)).await;
-        (index < 40).then(|| (Ok::<_, std::io::Error>(Bytes::from(format!("{}\n", variant(index)))), index + 1))
-    });
-    let request = Request::post("/v1/batch?peaks_only=true")
-        .header("content-type", "application/x-ndjson")
-        .body(Body::from_stream(documents))
-        .unwrap();
-    let service = Service::within(Limits { header_timeout_ms: 30_000, ..LIMITS });
-    assert_eq!(lines(&service.send(request).await).len(), 40);
-}
-
-/// Whoever sent through a proxy got no answer at all, though the first line was there.
-#[tokio::test]
-async fn behind_a_proxy_lines_that_have_come_are_told_of_a_stop_though_more_is_to_come() {
+fn broken_batch_ends_with_its_reason() {
     let service = Service::new();
-    let arriving =
-        stream::iter([Ok::<_, Infallible>(Bytes::from(format!("{}\n", variant(0))))]).chain(stream::pending());
-    let request = Request::post("/v1/batch?peaks_only=true")
-        .header("content-type", "application/x-ndjson")
-        .header("x-forwarded-for", "192.0.2.1");
-    let mut response = std::pin::pin!(service.response(request.body(Body::from_stream(arriving)).unwrap()));
-    assert!(futures_util::poll!(&mut response).is_pending());
-    service.app.pool.close();
-    let first = response.await.into_body().into_data_stream().next().await.unwrap().unwrap();
-    let line: Value = serde_json::from_slice(&first).unwrap();
-    assert_eq!((line["index"].as_u64(), line["problem"]["code"].as_str()), (Some(0), Some("shutting_down")));
+    let mut stream = open(&service, false);
+    send(&mut stream, &format!("{}\n{}\n{{\"dri", variant(0), variant(1)));
+    read_until(&mut stream, "\"index\":1");
+    stream.write_all(b"no length\r\n").unwrap();
+    read_until(&mut stream, "\"code\":\"broken_body\"");
 }
 
-/// It held up the stop for as long as that may take, and broke off without its last line.
-#[tokio::test]
-async fn a_batch_of_a_silent_client_has_its_last_line_when_the_service_stops() {
+#[test]
+fn open_batch_has_last_line_when_service_stops() {
+    let service = Service::with(LIMITS, &["--shutdown-ms", "500"]);
+    let mut stream = open(&service, false);
+    send(&mut stream, &format!("{}\n", variant(0)));
+    read_until(&mut stream, "\"index\":0");
+    service.process().signalled("-TERM");
+    read_until(&mut stream, "\"code\":\"shutting_down\"");
+}
+
+#[test]
+fn unread_batches_hold_up_nobody() {
     let service = Service::new();
-    let arriving =
-        stream::iter([Ok::<_, Infallible>(Bytes::from(format!("{}\n", variant(0))))]).chain(stream::pending());
-    let request = Request::post("/v1/batch?peaks_only=true").header("content-type", "application/x-ndjson");
-    let response = service.response(request.body(Body::from_stream(arriving)).unwrap()).await;
-    let mut told = response.into_body().into_data_stream();
-    let first: Value = serde_json::from_slice(&told.next().await.unwrap().unwrap()).unwrap();
-    assert_eq!(first["status"], 200);
-    service.app.pool.close();
-    let end: Value = serde_json::from_slice(&told.next().await.unwrap().unwrap()).unwrap();
-    assert_eq!((&end["asked"], &end["answered"]), (&json!(1), &json!(1)));
-    assert_eq!(end["problem"]["code"], "shutting_down");
-    assert!(told.next().await.is_none());
-}
-
-/// nginx passes on no more of a request once its answer has begun: a batch of some megabytes broke off behind it.
-#[tokio::test]
-async fn behind_a_proxy_a_batch_is_read_before_its_answer_begins_and_directly_answered_while_it_is_sent() {
-    for (forwarded_for, is_answered_at_once) in [(None, true), (Some("192.0.2.1"), false)] {
-        let service = Service::new();
-        let (send, sent) = tokio::sync::mpsc::unbounded_channel::<Bytes>();
-        let arriving = stream::unfold(sent, |mut sent| async {
-            sent.recv().await.map(|piece| (Ok::<_, Infallible>(piece), sent))
-        });
-        let mut request = Request::post("/v1/batch?peaks_only=true").header("content-type", "application/x-ndjson");
-        if let Some(address) = forwarded_for {
-            request = request.header("x-forwarded-for", address);
-        }
-        let response = service.response(request.body(Body::from_stream(arriving)).unwrap());
-        let mut response = std::pin::pin!(response);
-        let line = |index| Bytes::from(format!("{}\n", variant(index)));
-        send.send(line(0)).unwrap();
-        // As long as it could have begun in.
-        let mut is_begun = false;
-        for _ in 0..1000 {
-            is_begun = is_begun || futures_util::poll!(&mut response).is_ready();
-            if is_begun {
-                break;
-            }
-            tokio::task::yield_now().await;
-        }
-        assert_eq!(is_begun, is_answered_at_once, "{forwarded_for:?}");
-        if !is_begun {
-            send.send(line(1)).unwrap();
-            drop(send);
-            let body = response.await.into_body();
-            let text = axum::body::to_bytes(body, usize::MAX).await.unwrap();
-            let last = text.split(|&byte| byte == b'\n').rfind(|line| !line.is_empty()).unwrap();
-            assert_eq!(last, br#"{"asked":2,"answered":2}"#);
-        }
+    let _unread: Vec<_> = (0..6).map(|_| service.send(&question("", uneven(300).join("\n")))).collect();
+    for index in 0..4 {
+        assert_eq!(
+            ask_at(service.address(), &Question::post("/v1/sweep", variant(100 + index).to_string())).status,
+            200
+        );
     }
-}
-
-#[tokio::test]
-async fn a_line_without_room_is_refused_in_its_place_and_the_others_are_answered() {
-    let service = Service::within(Limits { max_unread_bytes: 30_000_000, max_concurrent_solves: 1, ..LIMITS });
-    // Some 14 MB of answer, and half as much beside it while it is made.
-    let long = with(&variant(0), "/sweep", json!({ "samples": 10_000 })).to_string();
-    let found =
-        lines(&batch(&service, "", &[variant(1).to_string(), long.clone(), long, variant(2).to_string()]).await);
-    let codes: Vec<_> = found.iter().map(|line| line["problem"]["code"].as_str()).collect();
-    assert!(codes[0].is_none() && codes[3].is_none(), "{codes:?}");
-    assert!(codes[1..3].contains(&Some("too_many_unread_bytes")), "{codes:?}");
-    assert_eq!(service.app.room.taken_bytes(), 0);
-}
-
-#[tokio::test]
-async fn a_batch_takes_8_mib_and_one_more_for_each_permit_while_it_lasts() {
-    for max_concurrent_solves in [1, 3] {
-        let service = Service::within(Limits { max_concurrent_solves, ..LIMITS });
-        let response = service.response(question("", variant(0).to_string()).request()).await;
-        assert_eq!(service.app.room.taken_bytes(), (8 + max_concurrent_solves as u64) << 20);
-        drop(response);
-        assert_eq!(service.app.room.taken_bytes(), 0);
-    }
+    let answer = ask_at(service.address(), &question("?peaks_only=true", uneven(50).join("\n")));
+    assert_eq!(lines(&answer).len(), 50);
 }

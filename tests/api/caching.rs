@@ -1,16 +1,12 @@
 //! Results are kept by what they depend on, and solved once however many ask.
 
 use std::io::Read as _;
-use std::sync::{Arc, Barrier};
+use std::net::TcpStream;
 
 use flate2::read::GzDecoder;
 use serde_json::json;
-use toothwave::cache::Cache;
-use toothwave::config::Limits;
-use toothwave::negotiation::Representation;
-use toothwave_calculation::key::Key;
 
-use crate::asking::{Answer, ENDPOINTS, LIMITS, Listening, Occupied, Question, Service, ask_at, until};
+use crate::asking::{Answer, ENDLESS, ENDPOINTS, LIMITS, Limits, Question, Service, answer_on};
 use crate::designs::{bored, in_reverse, shortest, spelled_out, undercut, with};
 
 fn question(path: &str) -> Question {
@@ -248,129 +244,46 @@ async fn a_cache_that_keeps_nothing_does_not_say_that_it_stored_the_answer() {
     assert!(!answer.header("cache-status").contains("stored"), "{}", answer.header("cache-status"));
 }
 
-#[test]
-fn a_hundred_identical_requests_at_once_solve_once() {
-    let service = Listening::within(LIMITS);
+/// Each client spells the document its own way.
+fn equal_requests(service: &Service, count: usize) -> Vec<TcpStream> {
     let document = with(&spelled_out(), "/sweep/samples", json!(200)).to_string();
-    let start = Arc::new(Barrier::new(100));
-    let askers: Vec<_> = (0..100)
-        .map(|i| {
-            let (address, start) = (service.address, Arc::clone(&start));
-            // Each spells the document its own way.
-            let text = format!("{document}{}", " ".repeat(i));
-            std::thread::spawn(move || {
-                start.wait();
-                ask_at(address, &Question::post("/v1/sweep", text))
-            })
-        })
-        .collect();
-    let answers: Vec<_> = askers.into_iter().map(|asker| asker.join().unwrap()).collect();
+    let spelled = |spaces| Question::post("/v1/sweep", format!("{document}{}", " ".repeat(spaces)));
+    (0..count).map(|spaces| service.send(&spelled(spaces))).collect()
+}
+
+#[test]
+fn equal_requests_are_computed_once() {
+    let service = Service::new();
+    let answers: Vec<_> = equal_requests(&service, 100).into_iter().map(answer_on).collect();
     assert!(answers.iter().all(|answer| answer.status == 200));
     assert_eq!(answers.iter().filter(|answer| answer.is_miss()).count(), 1);
     assert_eq!(answers.iter().filter(|answer| answer.is_hit() || answer.is_collapsed()).count(), 99);
     assert!(answers.iter().all(|answer| answer.body == answers[0].body && answer.etag() == answers[0].etag()));
 }
 
-/// Asks in a task of its own, as a connection would.
-fn asked(service: &Service, question: Question) -> tokio::task::JoinHandle<Answer> {
-    let service = service.clone();
-    tokio::spawn(async move { service.ask(&question).await })
+#[test]
+fn equal_requests_take_one_place_in_the_queue() {
+    let service = Service::within(Limits { max_concurrent_solves: 1, ..ENDLESS });
+    let occupied = service.occupied_by(1);
+    // Thirty-two may wait, and these are more.
+    let mut equal = equal_requests(&service, 50);
+    service.until("toothwave_solves_queued", 1.0);
+    // The first one leaves; its computation is the others' too.
+    drop(equal.remove(0));
+    drop(occupied);
+    let answers: Vec<_> = equal.into_iter().map(answer_on).collect();
+    assert!(answers.iter().all(|answer| answer.status == 200), "{}", answers[0].text());
 }
 
-/// Lets every task go as far as it can without the pool.
-async fn settle() {
-    for _ in 0..1_000 {
-        tokio::task::yield_now().await;
-    }
-}
-
-#[tokio::test]
-async fn those_who_ask_while_it_is_solved_wait_for_that_solve() {
-    let service = Service::within(Limits { max_concurrent_solves: 1, max_queued_solves: 1, ..LIMITS });
-    let occupied = Occupied::by_one(&service.app.pool).await;
-    // The queue has one place: a second solve would be refused.
-    let askers: Vec<_> = (0..100).map(|_| asked(&service, question("/v1/sweep"))).collect();
-    settle().await;
-    assert_eq!(service.app.pool.admitted(), 2);
-    occupied.end().await;
-    let mut answers = Vec::new();
-    for asker in askers {
-        answers.push(asker.await.unwrap());
-    }
-    assert!(answers.iter().all(|answer| answer.status == 200));
-    assert_eq!(answers.iter().filter(|answer| answer.is_miss()).count(), 1);
-    assert_eq!(answers.iter().filter(|answer| answer.is_collapsed()).count(), 99);
-}
-
-#[tokio::test]
-async fn those_who_wait_get_their_answer_even_if_the_first_to_ask_leaves() {
-    let service = Service::within(Limits { max_concurrent_solves: 1, max_queued_solves: 1, ..LIMITS });
-    let occupied = Occupied::by_one(&service.app.pool).await;
-    let first = asked(&service, question("/v1/sweep"));
-    until("the first is admitted", || service.app.pool.admitted() == 2).await;
-    let followers: Vec<_> = (0..10).map(|_| asked(&service, question("/v1/sweep"))).collect();
-    settle().await;
-    first.abort();
-    assert!(first.await.unwrap_err().is_cancelled());
-    settle().await;
-    assert_eq!(service.app.pool.admitted(), 2, "its solve goes on");
-    occupied.end().await;
-    for follower in followers {
-        let answer = follower.await.unwrap();
-        assert_eq!(answer.status, 200);
-        assert!(answer.is_collapsed(), "{}", answer.header("cache-status"));
-    }
-}
-
-#[tokio::test]
-async fn a_solve_whose_clients_have_all_left_is_stopped_and_the_next_to_ask_gets_an_answer() {
-    let service = Service::within(Limits { max_concurrent_solves: 1, ..LIMITS });
-    // Seconds of solving and compressing; if it were not stopped, it would leave an answer in the cache.
-    let endless = with(&spelled_out(), "/sweep/samples", json!(100_000)).to_string();
-    let endless = Question::post("/v1/sweep", endless).with("accept-encoding", "gzip");
-    let askers: Vec<_> = (0..3).map(|_| asked(&service, endless.clone())).collect();
-    until("it runs", || service.app.pool.running() == 1).await;
-    settle().await;
-    for asker in askers {
-        asker.abort();
-        assert!(asker.await.unwrap_err().is_cancelled());
-    }
-    until("it has stopped", || service.app.pool.running() == 0).await;
-    settle().await;
-    assert_eq!(service.app.cache.size().entries, 0);
-
-    let occupied = Occupied::by_one(&service.app.pool).await;
-    let first = asked(&service, question("/v1/sweep"));
-    until("the first is admitted", || service.app.pool.admitted() == 2).await;
-    first.abort();
-    let second = asked(&service, question("/v1/sweep"));
-    assert!(first.await.unwrap_err().is_cancelled());
-    settle().await;
-    occupied.end().await;
-    assert_eq!(second.await.unwrap().status, 200);
-}
-
-#[tokio::test]
-async fn a_solve_that_no_thread_is_left_for_fails_instead_of_waiting() {
-    let ended = tokio::runtime::Builder::new_multi_thread().build().unwrap();
-    let handle = ended.handle().clone();
-    ended.shutdown_background();
-    let _there = handle.enter();
-    let cache = Cache::new(1 << 20);
-    let key = Key::new("sweep", &1.0, &Representation::JSON);
-    let problem = cache.solve_once(key, std::future::pending(), std::future::pending()).await.unwrap_err();
-    assert_eq!(problem.status, 500);
-}
-
-#[tokio::test]
-async fn those_who_wait_for_a_solve_that_fails_are_told_so() {
-    let service = Service::within(Limits { max_concurrent_solves: 1, max_queued_solves: 1, ..LIMITS });
-    let occupied = Occupied::by_one(&service.app.pool).await;
+#[test]
+fn all_who_wait_for_a_failure_are_told() {
+    let service = Service::within(Limits { max_concurrent_solves: 1, ..ENDLESS });
+    let occupied = service.occupied_by(1);
     let unloaded = with(&spelled_out(), "/drive/teeth/installed", json!(4)).to_string();
-    let askers: Vec<_> = (0..10).map(|_| asked(&service, Question::post("/v1/sweep", unloaded.clone()))).collect();
-    settle().await;
-    occupied.end().await;
-    for asker in askers {
-        asker.await.unwrap().refused(422, "no_tooth_in_mesh");
+    let waiting: Vec<_> = (0..10).map(|_| service.send(&Question::post("/v1/sweep", unloaded.clone()))).collect();
+    service.until("toothwave_solves_queued", 1.0);
+    drop(occupied);
+    for request in waiting {
+        answer_on(request).refused(422, "no_tooth_in_mesh");
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use serde_json::Value;
-use toothwave::problem::ProblemCode;
+use toothwave::http::problem::ProblemCode;
 use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::findings::FindingCode;
 
@@ -133,7 +133,7 @@ pub(crate) fn codes_of<'a>(objects: impl IntoIterator<Item = &'a Value>) -> Vec<
 
 #[test]
 fn every_kind_of_problem_has_its_status_and_a_type_of_its_own() {
-    use toothwave::problem::Problem;
+    use toothwave::http::problem::Problem;
     let expected = |code| match code {
         ProblemCode::MalformedJson | ProblemCode::BrokenBody | ProblemCode::InvalidQuery => 400,
         ProblemCode::Unauthorized => 401,

@@ -36,18 +36,6 @@ fn example(name: &str) -> String {
     format!("{}/../../examples/{name}.json", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// It waited for ever for who reads it.
-#[test]
-fn what_is_wrong_with_a_setting_is_not_said_for_ever_to_a_standard_error_that_nobody_reads() {
-    let (_reader, mut writer) = std::io::pipe().unwrap();
-    rustix::io::ioctl_fionbio(&writer, true).unwrap();
-    while writer.write(&[0; 4096]).is_ok() {}
-    rustix::io::ioctl_fionbio(&writer, false).unwrap();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_toothwave"));
-    let status = command.args(["serve", "--max-states", "x"]).stdout(Stdio::null()).stderr(writer).status().unwrap();
-    assert_eq!(status.code(), Some(2));
-}
-
 #[tokio::test]
 async fn json_is_the_body_that_the_service_answers_with() {
     for name in ["paper-5.1", "paper-5.2", "paper-5.2-bored", "ring-with-more-teeth", "balls", "flat-sided"] {

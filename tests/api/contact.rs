@@ -220,7 +220,7 @@ async fn a_sweep_to_a_tolerance_stands_on_both_sides_of_the_jump() {
 #[tokio::test]
 async fn a_tolerance_that_takes_too_many_states_is_refused_with_the_limit() {
     let limits = crate::asking::LIMITS;
-    let few = toothwave::config::Limits { max_states: 100, ..limits };
+    let few = crate::asking::Limits { max_states: 100, ..limits };
     let fine = with(&spelled_out(), "/sweep", json!({ "tolerance": 1e-9 }));
     let problem = Service::within(few).post("/v1/sweep", &fine).await.refused(422, "too_many_states");
     assert_eq!(problem["errors"][0]["pointer"], "/sweep/tolerance");

@@ -1,9 +1,8 @@
 //! Single items of the parts as they came out.
 
 use serde_json::{Value, json};
-use toothwave::config::Limits;
 
-use crate::asking::{LIMITS, Question, Service};
+use crate::asking::{LIMITS, Limits, Question, Service};
 use crate::designs::{spelled_out, with};
 
 /// Case 5.1 with clearances that cover what deviates by a few micrometres.

@@ -1,9 +1,8 @@
 //! Drives that nobody would draw: whatever the numbers, the service answers with numbers or says what is wrong.
 
 use serde_json::{Value, json};
-use toothwave::config::Limits;
 
-use crate::asking::{ENDPOINTS, LIMITS, Service};
+use crate::asking::{ENDPOINTS, LIMITS, Limits, Service};
 use crate::designs::{fixed, pointers};
 
 /// Numbers without a pattern, the same ones every time (Knuth's MMIX generator).
@@ -71,8 +70,7 @@ impl Dice {
 
 #[tokio::test]
 async fn whatever_the_numbers_there_is_an_answer_in_numbers_or_a_reason() {
-    let service =
-        Service::within(Limits { max_states: 5_000, max_profile_points: 5_000, cache_max_bytes: 0, ..LIMITS });
+    let service = Service::within(Limits { max_states: 5_000, cache_max_bytes: 0, ..LIMITS });
     let mut dice = Dice(2013);
     let mut answered = 0;
     for _ in 0..300 {

@@ -567,7 +567,7 @@ async fn a_duty_s_faults_are_told_at_their_places() {
 
 #[tokio::test]
 async fn all_points_of_a_duty_count_towards_the_states_that_may_be() {
-    let limits = toothwave::config::Limits { max_states: 600, ..crate::asking::LIMITS };
+    let limits = crate::asking::Limits { max_states: 600, ..crate::asking::LIMITS };
     // 40 intervals with 7 teeth.
     let service = Service::within(limits);
     assert_eq!(service.post("/v1/sweep", &on_duty(&[(20.0, 1500.0, 1.0)], plain())).await.status, 200);

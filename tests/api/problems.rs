@@ -1,32 +1,12 @@
 //! What bad input and trouble get: RFC 9457 problems, each with the headers that HTTP wants.
 
-use axum::body::Body;
-use axum::http::Request;
-use bytes_of::pending_forever;
+use std::io::Write as _;
+use std::net::TcpStream;
+
 use serde_json::json;
-use toothwave::compute::Thread;
-use toothwave::config::Limits;
 
-use crate::asking::{Answer, ENDPOINTS, LIMITS, Occupied, Question, Service};
+use crate::asking::{Answer, ENDLESS, ENDPOINTS, LIMITS, Limits, Question, Service, answer_on, ask_at, endless};
 use crate::designs::{shortest, with};
-
-/// Bodies that no client library would send.
-mod bytes_of {
-    use std::convert::Infallible;
-
-    use axum::body::Body;
-    use futures_util::stream;
-
-    /// A body that begins and never ends.
-    pub(super) fn pending_forever() -> Body {
-        Body::from_stream(stream::pending::<Result<Vec<u8>, Infallible>>())
-    }
-
-    /// A body whose length nobody announces.
-    pub(super) fn unannounced(text: String) -> Body {
-        Body::from_stream(stream::iter([Ok::<_, Infallible>(text.into_bytes())]))
-    }
-}
 
 fn sweep() -> Question {
     Question::post("/v1/sweep", shortest().to_string())
@@ -64,7 +44,7 @@ async fn provoked(service: &Service) -> Vec<(Answer, u16, &'static str)> {
 
 #[tokio::test]
 async fn every_problem_is_problem_json_with_type_title_status_detail_and_code() {
-    let service = Service::within(Limits { max_profile_points: 10_000, ..LIMITS });
+    let service = Service::within(Limits { max_states: 10_000, ..LIMITS });
     for (answer, status, code) in provoked(&service).await {
         answer.refused(status, code);
     }
@@ -82,15 +62,17 @@ async fn every_problem_carries_the_headers_that_browsers_ask_for() {
     }
 }
 
-#[tokio::test]
-async fn a_service_that_is_full_answers_browsers_too() {
-    let limits = Limits { max_concurrent_solves: 1, max_queued_solves: 0, ..LIMITS };
-    let service = Service::within_for_origins(limits, &["*"]);
-    let occupied = Occupied::by_one(&service.app.pool).await;
-    let answer = service.ask(&sweep().with("origin", "https://cad.example")).await;
+#[test]
+fn full_service_answers_browsers_and_says_when_to_retry() {
+    let limits = Limits { max_concurrent_solves: 1, ..ENDLESS };
+    let service = Service::with(limits, &["--cors-origin", "*"]);
+    let occupied = service.occupied_by(1);
+    let waiting: Vec<_> = (1..33).map(|number| service.send(&endless(number))).collect();
+    service.until("toothwave_solves_queued", 32.0);
+    let answer = ask_at(service.address(), &sweep().with("origin", "https://cad.example"));
     answer.refused(503, "queue_full");
-    assert_eq!(answer.header("access-control-allow-origin"), "*");
-    occupied.end().await;
+    assert_eq!((answer.header("access-control-allow-origin"), answer.header("retry-after")), ("*", "1"));
+    drop((occupied, waiting));
 }
 
 #[tokio::test]
@@ -323,41 +305,49 @@ async fn a_body_that_is_too_large_is_refused_with_its_length_and_the_limit() {
     }
 }
 
-#[tokio::test]
-async fn a_body_that_is_too_large_is_refused_even_where_nobody_announced_it() {
+/// A request whose body is sent in one chunk, so that nobody announces its length.
+fn unannounced(text: &str, end: &str) -> Vec<u8> {
+    let head = "POST /v1/sweep HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\ncontent-type: application/json";
+    format!("{head}\r\ntransfer-encoding: chunked\r\n\r\n{:x}\r\n{text}\r\n{end}", text.len()).into_bytes()
+}
+
+fn sent(service: &Service, bytes: &[u8]) -> Answer {
+    let mut stream = TcpStream::connect(service.address()).unwrap();
+    stream.write_all(bytes).unwrap();
+    answer_on(stream)
+}
+
+#[test]
+fn rejects_unannounced_body_over_limit() {
     let service = Service::within(Limits { max_body_bytes: 1_000, ..LIMITS });
     let padded = |length: usize| format!("{:length$}", shortest().to_string());
-    let request = |length| {
-        let request = Request::post("/v1/sweep").header("content-type", "application/json");
-        request.body(bytes_of::unannounced(padded(length))).unwrap()
-    };
-    assert_eq!(service.send(request(1_000)).await.status, 200);
-    let problem = service.send(request(1_001)).await.refused(413, "body_too_large");
-    assert_eq!(problem["detail"], "the body has more than the 1000 bytes of `max_body_bytes`");
+    assert_eq!(sent(&service, &unannounced(&padded(1_000), "0\r\n\r\n")).status, 200);
+    let problem = sent(&service, &unannounced(&padded(1_001), "0\r\n\r\n")).refused(413, "body_too_large");
+    assert!(problem["detail"].as_str().unwrap().contains("more than 1000"), "{problem}");
 }
 
-#[tokio::test]
-async fn a_body_that_is_announced_too_large_is_not_even_read() {
-    let request =
-        Request::post("/v1/sweep").header("content-type", "application/json").header("content-length", "65537");
-    let answer = Service::new().send(request.body(pending_forever()).unwrap()).await;
-    assert!(answer.refused(413, "body_too_large")["detail"].as_str().unwrap().contains("65537"));
+#[test]
+fn rejects_body_that_breaks_off() {
+    sent(&Service::new(), &unannounced("{\"dri", "no length\r\n")).refused(400, "broken_body");
 }
 
-#[tokio::test]
-async fn a_body_that_does_not_arrive_is_not_waited_for_beyond_the_deadline() {
+/// Most of it is still to come when the service knows the answer.
+#[test]
+fn client_that_sends_much_learns_the_refusal() {
+    let service = Service::new();
+    ask_at(service.address(), &Question::post("/v1/sweep", " ".repeat(900_000))).refused(413, "body_too_large");
+}
+
+#[test]
+fn body_that_stops_arriving_times_out() {
     let service = Service::within(Limits { deadline_ms: 5, ..LIMITS });
-    let request = Request::post("/v1/sweep").header("content-type", "application/json");
-    service.send(request.body(pending_forever()).unwrap()).await.refused(408, "request_timeout");
+    sent(&service, &unannounced("{", "")).refused(408, "request_timeout");
 }
 
 #[tokio::test]
 async fn a_body_is_json_by_its_content_type() {
     let service = Service::new();
-    let of_type = |content_type: &str| {
-        let request = Request::post("/v1/sweep").header("content-type", content_type);
-        request.body(Body::from(shortest().to_string())).unwrap()
-    };
+    let of_type = |content_type: &str| Question::post_as(content_type, "/v1/sweep", shortest().to_string());
     for content_type in [
         "application/json",
         "application/json; charset=utf-8",
@@ -365,7 +355,7 @@ async fn a_body_is_json_by_its_content_type() {
         "application/vnd.cad+json",
         "application/json;v=1",
     ] {
-        assert_eq!(service.send(of_type(content_type)).await.status, 200, "{content_type}");
+        assert_eq!(service.ask(&of_type(content_type)).await.status, 200, "{content_type}");
     }
     for content_type in [
         "text/plain",
@@ -377,10 +367,10 @@ async fn a_body_is_json_by_its_content_type() {
         "",
         ";",
     ] {
-        service.send(of_type(content_type)).await.refused(415, "unsupported_media_type");
+        service.ask(&of_type(content_type)).await.refused(415, "unsupported_media_type");
     }
-    let untyped = Request::post("/v1/sweep").body(Body::from(shortest().to_string())).unwrap();
-    let problem = service.send(untyped).await.refused(415, "unsupported_media_type");
+    let untyped = Question::of("POST", "/v1/sweep");
+    let problem = service.ask(&untyped).await.refused(415, "unsupported_media_type");
     assert!(problem["detail"].as_str().unwrap().contains("application/json"), "{problem}");
 }
 
@@ -394,34 +384,11 @@ async fn a_body_in_a_content_coding_is_refused() {
 }
 
 #[tokio::test]
-async fn a_full_service_says_when_to_try_again() {
-    let service = Service::within(Limits { max_concurrent_solves: 1, max_queued_solves: 0, ..LIMITS });
-    let occupied = Occupied::by_one(&service.app.pool).await;
-    let answer = service.ask(&sweep()).await;
-    answer.refused(503, "queue_full");
-    assert!(answer.header("retry-after").parse::<u32>().unwrap() >= 1);
-    occupied.end().await;
-    assert_eq!(service.ask(&sweep()).await.status, 200, "and then it has room");
-}
-
-#[tokio::test]
 async fn refusals_are_not_for_keeping() {
-    let service = Service::within(Limits { max_profile_points: 10_000, ..LIMITS });
+    let service = Service::within(Limits { max_states: 10_000, ..LIMITS });
     for (answer, status, _) in provoked(&service).await {
         for header in ["etag", "cache-status"] {
             assert_eq!(answer.header(header), "", "{status}");
         }
-    }
-}
-
-#[tokio::test]
-async fn a_panic_is_an_internal_error_that_tells_nothing_of_itself() {
-    let service = Service::new();
-    let pool = &service.app.pool;
-    for thread in [Thread::Blocking, Thread::Executor] {
-        let problem = pool.run::<()>(pool.deadline(), thread, |_| panic!("the flux capacitor")).await.unwrap_err();
-        assert_eq!(problem.status, 500);
-        assert!(!serde_json::to_string(&problem).unwrap().contains("flux"), "{problem}");
-        assert_eq!((pool.running(), pool.admitted()), (0, 0), "and its permit is back");
     }
 }

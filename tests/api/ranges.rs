@@ -2,9 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::asking::{LIMITS, Service};
+use crate::asking::{LIMITS, Limits, Service};
 use crate::designs::{eccentric, every_number, fixed, spelled_out, with};
-use toothwave::config::Limits;
 
 /// A field, the endpoint that reads it, a document that holds it, and its range.
 struct Field {

@@ -1,9 +1,8 @@
 //! Every reason why a drive, a load or a request cannot exist, as it comes over HTTP.
 
 use serde_json::{Value, json};
-use toothwave::config::Limits;
 
-use crate::asking::{ENDPOINTS, LIMITS, Service};
+use crate::asking::{ENDPOINTS, LIMITS, Limits, Service};
 use crate::codes::{codes_of, field_codes, words};
 use crate::designs::{eccentric, every_number, fixed, spelled_out, undercut, with, with_twice, without};
 
@@ -534,8 +533,8 @@ async fn profiles_larger_than_max_profile_points_are_refused_with_value_and_limi
         let points = length(&found["ring"]["profile"])
             + length(&found["wave_generator"]["profile"])
             + length(&found["tooth_center_path"]);
-        Service::within(Limits { max_profile_points: points, ..LIMITS }).post("/v1/geometry", &document).await.found();
-        let service = Service::within(Limits { max_profile_points: points - 1, ..LIMITS });
+        Service::within(Limits { max_states: points, ..LIMITS }).post("/v1/geometry", &document).await.found();
+        let service = Service::within(Limits { max_states: points - 1, ..LIMITS });
         let problem = service.post("/v1/geometry", &document).await.refused(422, "too_many_points");
         let error = &problem["errors"][0];
         assert_eq!(
@@ -554,7 +553,7 @@ async fn profiles_larger_than_max_profile_points_are_refused_with_value_and_limi
 
 #[tokio::test]
 async fn a_refusal_for_a_limit_names_the_limit_as_it_can_be_read() {
-    let service = Service::within(Limits { max_states: 1, max_profile_points: 1, max_body_bytes: 2_000, ..LIMITS });
+    let service = Service::within(Limits { max_states: 1, max_body_bytes: 2_000, ..LIMITS });
     let limits = service.get("/v1/limits").await.found();
     let long = format!("{}{}", spelled_out(), " ".repeat(2_000));
     for (path, body, limit) in [
@@ -605,7 +604,7 @@ async fn every_kind_of_fault_of_a_field_can_be_met_over_http() {
     let gap = [(RING_TEETH, json!(30)), (RADIUS, json!(4.0)), ("/model/clearance", json!({ "carrier_um": 5.0 }))]
         .into_iter()
         .fold(document.clone(), |document, (pointer, value)| with(&document, pointer, value));
-    let service = Service::within(Limits { max_states: 1, max_profile_points: 1, ..LIMITS });
+    let service = Service::within(Limits { max_states: 1, ..LIMITS });
     let mut errors = Vec::new();
     for text in texts.into_iter().chain([gap.to_string(), document.to_string()]) {
         for path in ["/v1/sweep", "/v1/geometry"] {

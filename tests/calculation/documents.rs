@@ -37,7 +37,7 @@ fn a_short_sweep_is_not_short_where_the_rings_teeth_bend() {
         "load": { "input_torque_nm": 20 },
         "model": { "ring_teeth_bend": false }
     });
-    let limits = Limits { max_states: 1_000_000, max_profile_points: 1_000_000 };
+    let limits = Limits::new(1_000_000, 1_000_000);
     let is_short = |document: &Value| {
         let checked = Sweep.check(&read(document).expect("a document"), &limits).expect("a drive");
         Sweep::is_short(&checked)
@@ -72,7 +72,7 @@ fn a_sweep_is_stopped_behind_its_solve_too() {
         },
         "load": { "input_torque_nm": 20 }
     });
-    let limits = Limits { max_states: 1_000_000, max_profile_points: 1_000_000 };
+    let limits = Limits::new(1_000_000, 1_000_000);
     let checked = Sweep.check(&read(&document).expect("a document"), &limits).expect("a drive");
     let never = StopsAfter { asked: Cell::new(0), times: u32::MAX };
     checked.solve(&never).expect("a sweep");

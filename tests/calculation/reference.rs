@@ -27,7 +27,7 @@ fn column<'a>(table: &'a Value, name: &str) -> &'a Vec<Value> {
 }
 
 fn asked(question: &impl Question, document: &Value) -> Value {
-    let limits = Limits { max_states: 1_000_000, max_profile_points: 1_000_000 };
+    let limits = Limits::new(1_000_000, 1_000_000);
     let answer = question.ask(document.to_string().as_bytes(), &limits, &Never).expect("an answer");
     serde_json::to_value(&answer).unwrap()
 }

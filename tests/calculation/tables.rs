@@ -8,7 +8,7 @@ use toothwave_calculation::question::{Limits, Question as _};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::Never;
 
-const LIMITS: Limits = Limits { max_states: 1_000_000, max_profile_points: 1 };
+const LIMITS: Limits = Limits::new(1_000_000, 1);
 
 fn drive() -> Value {
     json!({

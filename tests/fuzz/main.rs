@@ -19,7 +19,7 @@ use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::{Deviations, Never};
 
 /// Small enough for thousands of answers.
-const LIMITS: Limits = Limits { max_states: 2_000, max_profile_points: 20_000 };
+const LIMITS: Limits = Limits::new(2_000, 20_000);
 
 fn assert_answered<Q: Question>(question: Q, design: &Design) {
     let answered = question.check(design, &LIMITS).and_then(|checked| Q::answer(&checked, &Never));

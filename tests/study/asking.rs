@@ -9,8 +9,7 @@ use toothwave_calculation::question;
 use toothwave_solver::Never;
 use toothwave_study::{Gathered, Interrupted, Limits, Part, Study, Work};
 
-pub(crate) const CALCULATION: question::Limits =
-    question::Limits { max_states: 1_000_000, max_profile_points: 1_000_000 };
+pub(crate) const CALCULATION: question::Limits = question::Limits::new(1_000_000, 1_000_000);
 
 pub(crate) const LIMITS: Limits =
     Limits { calculation: CALCULATION, max_study_variants: 10_000_000, max_study_bytes: 1 << 30 };

@@ -379,7 +379,7 @@ struct Search {
 /// Looks for the largest value of every quantity; nothing where this way of looking cannot tell.
 ///
 /// # Errors
-/// Those of looking; [`SolveError::TooManyStates`] beyond the tolerance's limit, [`SolveError::Stopped`] where there is no room for more.
+/// Those of looking; [`SolveError::TooManyStates`] beyond the tolerance's limit, [`SolveError::Stopped`] if told to stop.
 pub(crate) fn search(
     look: &mut impl Look,
     pieces: impl Iterator<Item = Piece>,
@@ -392,11 +392,6 @@ pub(crate) fn search(
     if look.is_in_proportion() {
         STIFFNESSES.iter().for_each(|&quantity| is_sought[quantity] = false);
     }
-    let mut input_angles = 0;
-    let mut take_room = |wanted: usize| {
-        input_angles += wanted as u64;
-        if stop.has_room_for(input_angles) { Ok(()) } else { Err(SolveError::Stopped) }
-    };
     let (mut seen, mut states) = (Vec::new(), 0_u64);
     // Each is looked at: where slots and spaces are unlike there may be millions of laps, more than memory has room for.
     for piece in pieces {
@@ -405,7 +400,9 @@ pub(crate) fn search(
         if states > tolerance.max_states() {
             return Err(SolveError::TooManyStates { limit: tolerance.max_states() });
         }
-        take_room(of_piece.wanted.len())?;
+        if stop.stopped() {
+            return Err(SolveError::Stopped);
+        }
         seen.push(of_piece);
     }
     let mut search = Search { tolerance, lines, is_sought, seen, best: [Best::default(); QUANTITIES], states: 0 };
@@ -419,7 +416,6 @@ pub(crate) fn search(
         if wanted == 0 {
             return Ok(Some(Found { seen: search.seen, best: search.best }));
         }
-        take_room(wanted)?;
     }
     // What is left is more than rounding only where curves are no curves.
     let rounding = search.rounding(look.input_torque_nmm(), look.distance_at_corner_rad()?);

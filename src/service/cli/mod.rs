@@ -1,0 +1,254 @@
+//! The command line: the service, the same answers without it, and what containers need.
+
+mod batch;
+mod offline;
+mod study;
+
+use std::ffi::OsString;
+use std::io::{self, Read as _, Write as _};
+use std::net::{SocketAddr, TcpStream};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::{Args, Parser, Subcommand};
+use rustix::process::Signal;
+use tokio::runtime::Builder;
+use tokio::signal::unix::{SignalKind, signal};
+use toothwave_calculation::accuracy::Accuracy;
+use toothwave_calculation::coincidence_degree::CoincidenceDegree;
+use toothwave_calculation::drawing::Drawing;
+use toothwave_calculation::drawing::answer::DrawnPart;
+use toothwave_calculation::forms::Format;
+use toothwave_calculation::geometry::Geometry;
+use toothwave_calculation::sweep::Sweep;
+use tracing_subscriber::EnvFilter;
+
+use crate::http::endpoints::batch::{BatchEndpoint, BatchQuery};
+use crate::http::observe::note_problem;
+use crate::http::problem::Problem;
+use crate::http::{router, server};
+use crate::ops::config::Settings;
+use crate::ops::{keys, log};
+use offline::{FORMATS, PARTS, answer, one_of, print};
+
+/// The exit status of bad input, as most tools have it.
+const EXIT_BAD_INPUT: u8 = 2;
+
+/// Forces and contact stresses of discrete-tooth harmonic drives.
+#[derive(Debug, Parser)]
+#[command(name = "toothwave", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Serve over HTTP; the default if no command is given
+    Serve(Box<Settings>),
+    /// Profiles of the mating parts
+    Geometry(Offline),
+    /// How many teeth share the load
+    CoincidenceDegree(Offline),
+    /// Forces and contact stresses over one period
+    Sweep(Offline),
+    /// Each way of computing a design, with its error and its time
+    Accuracy(Offline),
+    /// A part, or all of them, as DXF, STEP or SVG
+    Draw {
+        /// Which part
+        #[arg(value_parser = one_of(&PARTS))]
+        part: DrawnPart,
+        /// A design document, or `-` for standard input
+        file: PathBuf,
+        /// Form of the answer
+        #[arg(long, value_parser = one_of(&FORMATS), default_value = "dxf")]
+        format: Format,
+    },
+    /// Many designs, one a line, on all cores; answers come as NDJSON in their order
+    Batch {
+        /// Design documents, one a line, or `-` for standard input
+        file: PathBuf,
+        /// What each is asked
+        #[arg(long, value_enum, default_value_t = BatchEndpoint::Sweep)]
+        endpoint: BatchEndpoint,
+        /// Of sweeps, the peaks without the states
+        #[arg(long)]
+        peaks_only: bool,
+    },
+    /// Many variants of one design, on all cores: a map, a search, a sensitivity or a tolerance study
+    Study {
+        /// A study document, or `-` for standard input
+        file: PathBuf,
+        /// Form of the answer
+        #[arg(long, value_parser = one_of(&FORMATS), default_value = "json")]
+        format: Format,
+    },
+    /// Ask a running service whether it is healthy; exit status 0 if so
+    Health {
+        /// Where it listens
+        #[arg(long, env = "TOOTHWAVE_LISTEN", value_name = "ADDR", default_value = "127.0.0.1:8080")]
+        address: SocketAddr,
+    },
+    /// Print the API document
+    Openapi,
+    /// Make a key: prints it once, with its line for the keys file
+    NewKey {
+        /// The name of its holder
+        name: String,
+    },
+}
+
+#[derive(Debug, Args)]
+struct Offline {
+    /// A design document, or `-` for standard input
+    file: PathBuf,
+    /// Form of the answer, if it has this one; `table` means `text`
+    #[arg(long, value_parser = one_of(&FORMATS), default_value = "text")]
+    format: Format,
+}
+
+/// Why a command failed.
+#[derive(Debug)]
+enum Failure {
+    /// The document, or a setting, is at fault.
+    BadInput(String),
+    /// The machine is: a file, a socket, a thread.
+    Io(io::Error),
+}
+
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        Self::Io(error)
+    }
+}
+
+impl From<Problem> for Failure {
+    fn from(problem: Problem) -> Self {
+        note_problem(&problem);
+        // The limits of the command line are fixed: it has no settings of these names.
+        let limits = ["`max_states`", "`max_profile_points`", "`max_study_variants`", "`max_study_bytes`"];
+        let text = limits.iter().fold(problem.to_string(), |text, limit| text.replace(limit, "the command line"));
+        match problem.cause {
+            Some(_) => Self::Io(io::Error::other(text)),
+            None => Self::BadInput(text),
+        }
+    }
+}
+
+/// Runs the command that the process was started with.
+pub fn run() -> ExitCode {
+    let cli = match Cli::try_parse_from(arguments()) {
+        Ok(cli) => cli,
+        Err(error) => return refuse(&error),
+    };
+    let result = match cli.command {
+        Command::Serve(settings) => run_service(&settings),
+        Command::Geometry(offline) => answer(Geometry, &offline.file, offline.format),
+        Command::CoincidenceDegree(offline) => answer(CoincidenceDegree, &offline.file, offline.format),
+        Command::Sweep(offline) => answer(Sweep, &offline.file, offline.format),
+        Command::Accuracy(offline) => answer(Accuracy, &offline.file, offline.format),
+        Command::Draw { part, file, format } => answer(Drawing(part), &file, format),
+        Command::Batch { file, endpoint, peaks_only } => batch::run(&file, BatchQuery { endpoint, peaks_only }),
+        Command::Study { file, format } => study::run(&file, format),
+        Command::Health { address } => health(address),
+        Command::NewKey { name } => new_key(&name),
+        Command::Openapi => print(|writer| writer.write_all(router::openapi_json().as_bytes())),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Failure::BadInput(text)) => complain(&text, ExitCode::from(EXIT_BAD_INPUT)),
+        Err(Failure::Io(error)) => complain(&error, ExitCode::FAILURE),
+    }
+}
+
+fn complain(what: &dyn std::fmt::Display, status: ExitCode) -> ExitCode {
+    // Standard error may be closed.
+    let _ = writeln!(io::stderr(), "toothwave: {}", printable(&what.to_string()));
+    status
+}
+
+/// A text without control characters for a terminal: it may quote a document that somebody else wrote.
+fn printable(text: &str) -> String {
+    let mut printable = String::with_capacity(text.len());
+    for character in text.chars() {
+        if character.is_control() && character != '\n' {
+            printable.extend(character.escape_default());
+        } else {
+            printable.push(character);
+        }
+    }
+    printable
+}
+
+/// Says what is wrong with the command line. clap names the first fault alone; of the settings in the environment, by which containers
+/// are configured, all are named.
+fn refuse(error: &clap::Error) -> ExitCode {
+    let status = ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(EXIT_BAD_INPUT));
+    let _ = error.print();
+    if error.use_stderr() {
+        let settings = Settings::augment_args(clap::Command::new("toothwave").no_binary_name(true));
+        for setting in settings.get_arguments().filter(|setting| setting.get_env().is_some()) {
+            let alone = clap::Command::new("toothwave").no_binary_name(true).arg(setting.clone());
+            if let Err(other) = alone.try_get_matches_from([""; 0])
+                && other.to_string() != error.to_string()
+            {
+                let _ = other.print();
+            }
+        }
+    }
+    status
+}
+
+/// The arguments of this process, with the command `serve` if none is given. Settings are read for that command alone, so that a fault in
+/// the environment does not stop the others.
+fn arguments() -> Vec<OsString> {
+    let mut arguments: Vec<_> = std::env::args_os().collect();
+    let names_command = arguments.get(1).is_some_and(|first| {
+        let first = first.to_string_lossy();
+        !first.starts_with('-') || ["-h", "--help", "-V", "--version"].contains(&&*first)
+    });
+    if !names_command {
+        arguments.insert(arguments.len().min(1), "serve".into());
+    }
+    arguments
+}
+
+fn run_service(settings: &Settings) -> Result<(), Failure> {
+    let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
+    let _written_at_end = log::start(filter);
+    let runtime = Builder::new_multi_thread().enable_all().build()?;
+    let result = runtime.block_on(async {
+        // A log file that reached its size limit is then an error like others, instead of the end of the process.
+        let _ignored = signal(SignalKind::from_raw(Signal::XFSZ.as_raw()))?;
+        server::serve(settings).await
+    });
+    // A computation that runs past its bound must not hold up the exit.
+    runtime.shutdown_background();
+    Ok(result?)
+}
+
+fn new_key(name: &str) -> Result<(), Failure> {
+    if name.contains(char::is_control) {
+        return Err(Failure::BadInput("the name of a key is one line of text".into()));
+    }
+    let (key, line) = keys::new_key(name).map_err(io::Error::other)?;
+    print(|writer| writeln!(writer, "key, for its holder:        {key}\nline, for the keys file:    {line}"))
+}
+
+fn health(mut address: SocketAddr) -> Result<(), Failure> {
+    const TIMEOUT: Duration = Duration::from_secs(2);
+    if address.ip().is_unspecified() {
+        // A service that listens on all addresses listens on this one too.
+        address.set_ip(if address.is_ipv4() { [127, 0, 0, 1].into() } else { std::net::Ipv6Addr::LOCALHOST.into() });
+    }
+    let connected = TcpStream::connect_timeout(&address, TIMEOUT);
+    let mut stream = connected.map_err(|error| io::Error::new(error.kind(), format!("{address}: {error}")))?;
+    stream.set_read_timeout(Some(TIMEOUT))?;
+    stream.set_write_timeout(Some(TIMEOUT))?;
+    write!(stream, "GET /health/live HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n")?;
+    let mut head = [0; 12];
+    stream.read_exact(&mut head)?;
+    if head == *b"HTTP/1.1 200" { Ok(()) } else { Err(io::Error::other("the service is not healthy").into()) }
+}

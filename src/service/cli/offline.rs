@@ -1,0 +1,125 @@
+//! One document, one answer, without a server.
+
+use std::fs::File;
+use std::io::{self, Read as _, Write};
+use std::iter;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use indicatif::{ProgressBar, ProgressStyle};
+use toothwave_calculation::drawing::answer::DrawnPart;
+use toothwave_calculation::forms::{Format, Forms};
+use toothwave_calculation::question::{Limits, Question};
+
+use super::Failure;
+use crate::http::problem::Problem;
+
+/// Without a server only memory limits what is computed: some two gigabytes of it.
+pub(super) const OFFLINE: Limits = Limits::new(20_000_000, 20_000_000);
+
+/// A choice on the command line: its word, another word for it, and what it means.
+pub(super) struct Choice<T> {
+    value: T,
+    word: &'static str,
+    alias: Option<&'static str>,
+    help: &'static str,
+}
+
+const fn choice<T>(value: T, word: &'static str, help: &'static str) -> Choice<T> {
+    Choice { value, word, alias: None, help }
+}
+
+pub(super) const FORMATS: [Choice<Format>; 8] = [
+    choice(Format::Json, "json", "As programs read it"),
+    choice(Format::Csv, "csv", "Columns"),
+    choice(Format::Arrow, "arrow", "Columns as an Apache Arrow stream"),
+    choice(Format::Parquet, "parquet", "Columns as an Apache Parquet file"),
+    Choice { value: Format::Text, word: "text", alias: Some("table"), help: "For a terminal" },
+    choice(Format::Svg, "svg", "A picture"),
+    choice(Format::Dxf, "dxf", "Outlines for CAD and workshops"),
+    choice(Format::Step, "step", "Solids for CAD"),
+];
+
+pub(super) const PARTS: [Choice<DrawnPart>; 5] = [
+    choice(DrawnPart::Ring, "ring", "The ring, x along the middle of a tooth space"),
+    choice(DrawnPart::WaveGenerator, "wave-generator", "The wave generator, x along its major axis"),
+    choice(DrawnPart::Carrier, "carrier", "The carrier, x along a slot"),
+    choice(DrawnPart::Tooth, "tooth", "A tooth"),
+    choice(DrawnPart::Assembly, "assembly", "All parts in the ring's frame, at the document's input angle"),
+];
+
+/// Reads one of these words.
+pub(super) fn one_of<T: Copy + Send + Sync + 'static>(
+    choices: &'static [Choice<T>],
+) -> impl TypedValueParser<Value = T> {
+    let values = choices.iter().map(|choice| PossibleValue::new(choice.word).aliases(choice.alias).help(choice.help));
+    PossibleValuesParser::new(values).try_map(|word| {
+        let chosen = choices.iter().find(|choice| choice.word == word || choice.alias == Some(&*word));
+        chosen.map(|choice| choice.value).ok_or("none of the choices")
+    })
+}
+
+/// Answers one document.
+pub(super) fn answer<Q: Question>(question: Q, file: &Path, format: Format) -> Result<(), Failure> {
+    log_errors();
+    require_form::<Q::Answer>(format)?;
+    let text = read(file)?;
+    print_answer(&question.ask(&text, &OFFLINE, &AtomicBool::new(false)).map_err(Problem::from)?, format)
+}
+
+/// Logs the causes of internal errors to standard error.
+pub(super) fn log_errors() {
+    tracing_subscriber::fmt().with_max_level(tracing::Level::ERROR).with_writer(io::stderr).init();
+}
+
+/// The bytes of a file, or of standard input.
+pub(super) fn read(file: &Path) -> Result<Vec<u8>, Failure> {
+    let mut text = Vec::new();
+    if file.as_os_str() == "-" {
+        io::stdin().read_to_end(&mut text)?;
+    } else {
+        File::open(file)
+            .and_then(|mut file| file.read_to_end(&mut text))
+            .map_err(|error| Failure::BadInput(format!("{}: {error}", file.display())))?;
+    }
+    Ok(text)
+}
+
+/// Checks that an answer has this form.
+pub(super) fn require_form<A: Forms>(format: Format) -> Result<(), Failure> {
+    let known: Vec<_> = iter::once(Format::Json).chain(A::FORMS.iter().map(|(format, _)| *format)).collect();
+    if known.contains(&format) {
+        return Ok(());
+    }
+    let name = |format: &Format| FORMATS.iter().find(|choice| choice.value == *format).map_or("", |choice| choice.word);
+    let names: Vec<_> = known.iter().map(name).collect();
+    Err(Failure::BadInput(format!("this answer has no form `{}`; choose one of {}", name(&format), names.join(", "))))
+}
+
+pub(super) fn print_answer(answer: &impl Forms, format: Format) -> Result<(), Failure> {
+    print(|writer| {
+        answer.write(format, writer)?;
+        // The other formats end their last line themselves.
+        if format == Format::Json { writeln!(writer) } else { Ok(()) }
+    })
+}
+
+/// Writes to standard output; a reader that has seen enough is no failure.
+pub(super) fn print(
+    write: impl FnOnce(&mut io::BufWriter<io::StdoutLock<'static>>) -> io::Result<()>,
+) -> Result<(), Failure> {
+    let mut writer = io::BufWriter::new(io::stdout().lock());
+    match write(&mut writer).and_then(|()| writer.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
+}
+
+/// A progress bar on standard error, if that is a terminal.
+pub(super) fn progress_bar() -> ProgressBar {
+    ProgressBar::new(0).with_style(
+        ProgressStyle::with_template("{bar:40} {percent}% {msg}, {elapsed} elapsed, {eta} left")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    )
+}

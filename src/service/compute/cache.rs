@@ -1,0 +1,284 @@
+//! Finished answers by the parameters that they follow from.
+//!
+//! **Cache.** Answers are weighed in bytes; bodies up to 1 MiB are kept. Requests that ask the same at the same time share one
+//! computation, which goes on until the last of them has left.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use axum::http::HeaderValue;
+use bytes::Bytes;
+use futures_util::FutureExt as _;
+use futures_util::future::{BoxFuture, Shared, WeakShared};
+use parking_lot::Mutex;
+use toothwave_calculation::key::Key;
+
+use crate::compute::budget::Reservation;
+use crate::http::negotiation::Representation;
+use crate::http::problem::Problem;
+
+/// Largest body that is kept.
+const MAX_BODY_BYTES: usize = 1 << 20;
+
+/// What an entry takes beside its body.
+const ENTRY_OVERHEAD_BYTES: usize = 640;
+
+/// Request texts whose key is remembered: one takes some 360 bytes.
+const MAX_REMEMBERED_REQUESTS: u64 = 65_536;
+
+/// A finished answer.
+#[derive(Debug, Clone)]
+pub struct Answer {
+    /// The body, encoded as its representation says.
+    pub body: Bytes,
+    /// What the body has reserved; nothing for a small one, or one from the cache.
+    pub reservation: Option<Arc<Reservation>>,
+    /// How long computing took.
+    pub solve: Duration,
+    /// The same as a header, made once for all requests.
+    pub server_timing: HeaderValue,
+}
+
+/// How a request came to its answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CacheStatus {
+    /// From the cache.
+    Hit,
+    /// Computed for this request.
+    Miss,
+    /// Computed for another request that came first.
+    Collapsed,
+}
+
+impl CacheStatus {
+    /// The value of the header `Cache-Status` (RFC 9211).
+    pub const fn header(self) -> &'static str {
+        match self {
+            Self::Hit => "toothwave; hit",
+            Self::Miss => "toothwave; fwd=miss",
+            Self::Collapsed => "toothwave; fwd=miss; collapsed",
+        }
+    }
+
+    /// The label of metrics.
+    pub const fn label(self) -> &'static str {
+        match self {
+            Self::Hit => "hit",
+            Self::Miss => "miss",
+            Self::Collapsed => "collapsed",
+        }
+    }
+}
+
+/// The hash of a request's text: equal texts need not be read twice.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct RequestHash([u8; 32]);
+
+impl RequestHash {
+    /// Of a body sent to an endpoint for one representation.
+    pub fn new(endpoint: &str, representation: Representation, body: &[u8]) -> Self {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(&[representation.format as u8, u8::from(representation.gzip)]);
+        hasher.update(endpoint.as_bytes()).update(b"\0").update(body);
+        Self(hasher.finalize().into())
+    }
+}
+
+type Outcome = Result<Answer, Problem>;
+
+/// Answers that are being computed, each with a number of its own. The requests that wait for one own it.
+type Flights = Arc<Mutex<HashMap<Key, (u64, WeakShared<BoxFuture<'static, Outcome>>)>>>;
+
+/// Finished answers, and those that are being computed; clones share them.
+#[derive(Debug, Clone)]
+pub struct Cache {
+    answers: moka::sync::Cache<Key, Answer>,
+    keys: moka::sync::Cache<RequestHash, Key>,
+    flights: Flights,
+}
+
+/// Removes a computation from the list when it ends or is dropped.
+struct RemoveOnDrop {
+    flights: Flights,
+    key: Key,
+    number: u64,
+}
+
+impl Drop for RemoveOnDrop {
+    fn drop(&mut self) {
+        let mut flights = self.flights.lock();
+        if flights.get(&self.key).is_some_and(|(number, _)| *number == self.number) {
+            flights.remove(&self.key);
+        }
+    }
+}
+
+impl Cache {
+    /// A cache of at most this many bytes.
+    pub fn new(max_bytes: u64) -> Self {
+        let weight = |answer: &Answer| u32::try_from(answer.body.len() + ENTRY_OVERHEAD_BYTES).unwrap_or(u32::MAX);
+        let answers = moka::sync::Cache::builder().max_capacity(max_bytes).weigher(move |_, answer| weight(answer));
+        let keys = moka::sync::Cache::new(MAX_REMEMBERED_REQUESTS.min(max_bytes / 4096));
+        Self { answers: answers.build(), keys, flights: Flights::default() }
+    }
+
+    /// Bytes and answers kept now.
+    pub fn size(&self) -> (u64, u64) {
+        self.answers.run_pending_tasks();
+        (self.answers.weighted_size(), self.answers.entry_count())
+    }
+
+    /// The answer of a key, if it is kept.
+    pub fn get(&self, key: Key) -> Option<Answer> {
+        self.answers.get(&key)
+    }
+
+    /// The key of a request text that was answered before.
+    pub fn key(&self, request: RequestHash) -> Option<Key> {
+        self.keys.get(&request)
+    }
+
+    /// Remembers the key of a request text that was answered.
+    pub fn remember(&self, request: RequestHash, key: Key) {
+        self.keys.insert(request, key);
+    }
+
+    /// The answer of a key: kept, or computed once for all requests that wait for it.
+    ///
+    /// # Errors
+    /// Those of `compute`; they are not kept.
+    pub async fn get_or_compute(
+        &self,
+        key: Key,
+        compute: impl Future<Output = Outcome> + Send + 'static,
+    ) -> Result<(Answer, CacheStatus), Problem> {
+        let (flight, status) = {
+            let mut flights = self.flights.lock();
+            if let Some(answer) = self.answers.get(&key) {
+                return Ok((answer, CacheStatus::Hit));
+            }
+            match flights.get(&key).and_then(|(_, flight)| flight.upgrade()) {
+                Some(flight) => (flight, CacheStatus::Collapsed),
+                None => {
+                    let (number, flight) = self.flight(key, compute);
+                    if let Some(flight) = flight.downgrade() {
+                        flights.insert(key, (number, flight));
+                    }
+                    (flight, CacheStatus::Miss)
+                }
+            }
+        };
+        flight.await.map(|answer| (answer, status))
+    }
+
+    fn flight(
+        &self,
+        key: Key,
+        compute: impl Future<Output = Outcome> + Send + 'static,
+    ) -> (u64, Shared<BoxFuture<'static, Outcome>>) {
+        static NUMBERS: AtomicU64 = AtomicU64::new(0);
+        let number = NUMBERS.fetch_add(1, Ordering::Relaxed);
+        let remove = RemoveOnDrop { flights: Arc::clone(&self.flights), key, number };
+        let answers = self.answers.clone();
+        let flight = async move {
+            let outcome = compute.await;
+            if let Ok(answer) = &outcome
+                && answer.body.len() <= MAX_BODY_BYTES
+            {
+                answers.insert(key, Answer { reservation: None, ..answer.clone() });
+            }
+            // From here on the answer is found in the cache.
+            drop(remove);
+            outcome
+        };
+        (number, flight.boxed().shared())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::time::Duration;
+
+    use axum::http::HeaderValue;
+    use bytes::Bytes;
+    use futures_util::poll;
+    use tokio::sync::oneshot;
+    use toothwave_calculation::key::Key;
+
+    use super::{Answer, Cache, CacheStatus, MAX_BODY_BYTES};
+    use crate::http::negotiation::Representation;
+    use crate::http::problem::Problem;
+
+    fn key(number: f64) -> Key {
+        Key::new("test", &number, &Representation::JSON)
+    }
+
+    fn answer(bytes: usize) -> Answer {
+        let server_timing = HeaderValue::from_static("");
+        Answer { body: Bytes::from(vec![0; bytes]), reservation: None, solve: Duration::ZERO, server_timing }
+    }
+
+    #[tokio::test]
+    async fn computation_outlives_its_first_request() {
+        let cache = Cache::new(1 << 20);
+        let (tell, told) = oneshot::channel();
+        let computed = Arc::new(AtomicUsize::new(0));
+        let compute = |told: Option<oneshot::Receiver<()>>| {
+            let computed = Arc::clone(&computed);
+            async move {
+                if let Some(told) = told {
+                    told.await.map_err(|error| Problem::internal(&error))?;
+                }
+                computed.fetch_add(1, Ordering::Relaxed);
+                Ok(answer(10))
+            }
+        };
+        let mut first = Box::pin(cache.get_or_compute(key(1.0), compute(Some(told))));
+        assert!(poll!(&mut first).is_pending());
+        let mut second = Box::pin(cache.get_or_compute(key(1.0), compute(None)));
+        assert!(poll!(&mut second).is_pending());
+        drop(first);
+        assert!(tell.send(()).is_ok());
+        assert!(second.await.is_ok_and(|(_, status)| status == CacheStatus::Collapsed));
+        let third = cache.get_or_compute(key(1.0), compute(None)).await;
+        assert!(third.is_ok_and(|(_, status)| status == CacheStatus::Hit));
+        assert_eq!(computed.load(Ordering::Relaxed), 1);
+        assert!(cache.flights.lock().is_empty());
+    }
+
+    #[tokio::test]
+    async fn abandoned_computation_is_dropped() {
+        let cache = Cache::new(1 << 20);
+        let (tell, told) = oneshot::channel::<()>();
+        let mut only = Box::pin(cache.get_or_compute(key(1.0), async {
+            told.await.map_err(|error| Problem::internal(&error))?;
+            Ok(answer(1))
+        }));
+        assert!(poll!(&mut only).is_pending());
+        drop(only);
+        assert!(tell.is_closed() && cache.flights.lock().is_empty());
+    }
+
+    #[tokio::test]
+    async fn keeps_no_body_over_limit() {
+        let cache = Cache::new(100 << 20);
+        for bytes in [MAX_BODY_BYTES, MAX_BODY_BYTES + 1] {
+            let computed = cache.get_or_compute(key(bytes as f64), async move { Ok(answer(bytes)) }).await;
+            assert!(computed.is_ok());
+        }
+        assert_eq!(cache.size().1, 1);
+    }
+
+    #[test]
+    fn weight_stays_within_limit() {
+        let cache = Cache::new(5 << 20);
+        for number in 0..20 {
+            cache.answers.insert(key(f64::from(number)), answer(1 << 20));
+        }
+        assert!(cache.size().0 <= 5 << 20);
+    }
+}

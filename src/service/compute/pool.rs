@@ -1,0 +1,345 @@
+//! Runs computations, a bounded number at once.
+//!
+//! **CPU.** Every computation holds one permit. There are N permits for single requests and as many for background work (batches,
+//! studies), whose threads run at `nice` 10: the kernel shares the cores between the two.
+//! **Queue.** Permits are given in the order of the requests. At most 32 requests wait; the next one gets 503 `queue_full`. At most 16
+//! batches run.
+//! **Time.** A computation looks at its stop flag. The flag is set when nobody waits for the result any more: the client has left, the
+//! deadline of the request is over, or the service stops.
+
+use std::io;
+use std::panic::{self, AssertUnwindSafe};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use metrics::{counter, histogram};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use rustix::process::setpriority_process;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
+use tokio_util::sync::CancellationToken;
+use tracing::Span;
+
+use crate::http::problem::{Problem, ProblemCode};
+
+/// Requests that may wait for a permit.
+pub const MAX_WAITING_REQUESTS: usize = 32;
+
+/// Batches that may run at once.
+pub const MAX_RUNNING_BATCHES: usize = 16;
+
+/// The `nice` value of background threads: beside a busy interactive thread they get a tenth of a core.
+const BACKGROUND_NICE: i32 = 10;
+
+/// Thirty years.
+const FAR_FUTURE: Duration = Duration::from_secs(30 * 365 * 24 * 3600);
+
+/// The permits and threads of one kind of work.
+#[derive(Debug)]
+struct Lane {
+    permits: Arc<Semaphore>,
+    threads: ThreadPool,
+}
+
+impl Lane {
+    fn start(name: &'static str, threads: usize, nice: i32) -> io::Result<Self> {
+        let renice = move |_| {
+            // Where the kernel refuses, background work competes as equal.
+            let _ = setpriority_process(None, nice);
+        };
+        let builder =
+            ThreadPoolBuilder::new().num_threads(threads).thread_name(move |number| format!("{name}-{number}"));
+        let threads_built = builder.start_handler(renice).build().map_err(io::Error::other)?;
+        Ok(Self { permits: Arc::new(Semaphore::new(threads)), threads: threads_built })
+    }
+
+    fn running(&self) -> usize {
+        self.threads.current_num_threads() - self.permits.available_permits()
+    }
+}
+
+#[derive(Debug)]
+struct Inner {
+    interactive: Lane,
+    background: Lane,
+    waiting: Arc<Semaphore>,
+    batches: Arc<Semaphore>,
+    stopping: CancellationToken,
+}
+
+/// The service's threads and permits; clones share them.
+#[derive(Debug, Clone)]
+pub struct Pool(Arc<Inner>);
+
+/// Sets the stop flag when the result is not awaited any more.
+struct StopOnDrop {
+    flag: Arc<AtomicBool>,
+    is_done: bool,
+}
+
+impl Drop for StopOnDrop {
+    fn drop(&mut self) {
+        if !self.is_done {
+            self.flag.store(true, Ordering::Relaxed);
+            counter!("toothwave_cancellations_total").increment(1);
+        }
+    }
+}
+
+impl Pool {
+    /// A pool with this many permits, and threads, of each kind.
+    ///
+    /// # Errors
+    /// If the system refuses a thread.
+    pub fn start(permits: usize) -> io::Result<Self> {
+        Ok(Self(Arc::new(Inner {
+            interactive: Lane::start("solve", permits, 0)?,
+            background: Lane::start("background", permits, BACKGROUND_NICE)?,
+            waiting: Arc::new(Semaphore::new(MAX_WAITING_REQUESTS)),
+            batches: Arc::new(Semaphore::new(MAX_RUNNING_BATCHES)),
+            stopping: CancellationToken::new(),
+        })))
+    }
+
+    /// Permits of each kind.
+    pub fn permits(&self) -> usize {
+        self.0.interactive.threads.current_num_threads()
+    }
+
+    /// Computations that run now, of requests and in the background.
+    pub fn running(&self) -> usize {
+        self.0.interactive.running() + self.0.background.running()
+    }
+
+    /// Requests that wait for a permit now.
+    pub fn waiting(&self) -> usize {
+        MAX_WAITING_REQUESTS - self.0.waiting.available_permits()
+    }
+
+    /// Batches that run now.
+    pub fn batches(&self) -> usize {
+        MAX_RUNNING_BATCHES - self.0.batches.available_permits()
+    }
+
+    /// Sets every stop flag, and refuses further computations with `shutting_down`.
+    pub fn stop(&self) {
+        self.0.stopping.cancel();
+    }
+
+    /// Completes when [`Self::stop`] was called.
+    pub async fn stopped(&self) {
+        self.0.stopping.cancelled().await;
+    }
+
+    /// Computes for a request. Dropping the future sets the stop flag.
+    ///
+    /// # Errors
+    /// `queue_full`, `shutting_down`, `internal_error` for a panic, and those of `job`.
+    pub async fn run<T: Send + 'static>(
+        &self,
+        job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let permit = self.interactive_permit().await?;
+        self.run_on(&self.0.interactive, permit, job).await
+    }
+
+    /// Computes for a request on the executor's own thread: for work of at most some 0.1 ms, of which a change of threads would be a quarter.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub async fn run_inline<T>(&self, job: impl FnOnce(&AtomicBool) -> Result<T, Problem>) -> Result<T, Problem> {
+        let _permit = self.interactive_permit().await?;
+        timed(|| caught(|| job(&AtomicBool::new(false))))
+    }
+
+    /// Computes in the background, for at most `time` once it has a permit. Dropping the future sets the stop flag.
+    ///
+    /// # Errors
+    /// As [`Self::run`], without `queue_full`, and `deadline_exceeded`.
+    pub async fn run_in_background<T: Send + 'static>(
+        &self,
+        time: Duration,
+        job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let permit = self.permit(&self.0.background).await?;
+        within(Deadline::after(time), self.run_on(&self.0.background, permit, job)).await
+    }
+
+    /// A place for a batch, to be held while it runs.
+    ///
+    /// # Errors
+    /// `queue_full` if 16 batches run.
+    pub fn begin_batch(&self) -> Result<OwnedSemaphorePermit, Problem> {
+        Arc::clone(&self.0.batches).try_acquire_owned().map_err(|_| {
+            let detail = format!(
+                "{MAX_RUNNING_BATCHES} batches run, the most that this service runs at once. Try again in a second"
+            );
+            Problem::new(ProblemCode::QueueFull, detail)
+        })
+    }
+
+    async fn interactive_permit(&self) -> Result<OwnedSemaphorePermit, Problem> {
+        let lane = &self.0.interactive;
+        if let Ok(permit) = Arc::clone(&lane.permits).try_acquire_owned() {
+            return Ok(permit);
+        }
+        let _place = self.0.waiting.try_acquire().map_err(|_| {
+            let detail = format!(
+                "{} computations run and {MAX_WAITING_REQUESTS} requests wait. Try again in a second",
+                self.permits()
+            );
+            Problem::new(ProblemCode::QueueFull, detail)
+        })?;
+        self.permit(lane).await
+    }
+
+    async fn permit(&self, lane: &Lane) -> Result<OwnedSemaphorePermit, Problem> {
+        tokio::select! {
+            biased;
+            () = self.0.stopping.cancelled() => Err(shutting_down()),
+            permit = Arc::clone(&lane.permits).acquire_owned() => permit.map_err(|error| Problem::internal(&error)),
+        }
+    }
+
+    async fn run_on<T: Send + 'static>(
+        &self,
+        lane: &Lane,
+        permit: OwnedSemaphorePermit,
+        job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let flag = Arc::new(AtomicBool::new(false));
+        let mut stop = StopOnDrop { flag: Arc::clone(&flag), is_done: false };
+        let (tell, told) = oneshot::channel();
+        let span = Span::current();
+        lane.threads.spawn(move || {
+            let result = span.in_scope(|| timed(|| caught(|| job(&flag))));
+            // Whoever gets the result finds the permit free.
+            drop(permit);
+            // Nobody may wait any more.
+            let _ = tell.send(result);
+        });
+        tokio::select! {
+            biased;
+            result = told => {
+                stop.is_done = true;
+                result.unwrap_or_else(|error| Err(Problem::internal(&error)))
+            }
+            () = self.0.stopping.cancelled() => Err(shutting_down()),
+        }
+    }
+}
+
+fn timed<T>(job: impl FnOnce() -> T) -> T {
+    let started = Instant::now();
+    let result = job();
+    histogram!("toothwave_solve_duration_seconds").record(started.elapsed());
+    result
+}
+
+/// The result of a job; a panic is an internal error.
+///
+/// # Errors
+/// Those of the job, and `internal_error`.
+pub fn caught<T>(job: impl FnOnce() -> Result<T, Problem>) -> Result<T, Problem> {
+    panic::catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|panic| Err(Problem::panicked(panic.as_ref())))
+}
+
+/// The result of a future that has until the deadline, at which it is dropped.
+///
+/// # Errors
+/// `deadline_exceeded`, and those of the future.
+pub async fn within<T>(deadline: Deadline, future: impl Future<Output = Result<T, Problem>>) -> Result<T, Problem> {
+    tokio::time::timeout_at(deadline.at, future).await.unwrap_or_else(|_| {
+        let detail =
+            format!("the request took longer than {} ms. Ask for less, or try again", deadline.span.as_millis());
+        Err(Problem::new(ProblemCode::DeadlineExceeded, detail))
+    })
+}
+
+/// The time by which a request is answered.
+#[derive(Debug, Clone, Copy)]
+pub struct Deadline {
+    /// When.
+    pub at: tokio::time::Instant,
+    span: Duration,
+}
+
+impl Deadline {
+    /// After this time from now.
+    pub fn after(span: Duration) -> Self {
+        let now = tokio::time::Instant::now();
+        // A span beyond all time means no deadline.
+        Self { at: now.checked_add(span).unwrap_or(now + FAR_FUTURE), span }
+    }
+}
+
+fn shutting_down() -> Problem {
+    Problem::new(ProblemCode::ShuttingDown, "the service is stopping. Try again: another one may have taken its place")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::sync::mpsc;
+    use std::time::Duration;
+
+    use futures_util::poll;
+
+    use super::{MAX_WAITING_REQUESTS, Pool};
+    use crate::http::problem::{Problem, ProblemCode};
+
+    /// A job that runs until its sender is dropped.
+    fn blocked() -> (mpsc::Sender<()>, impl FnOnce(&AtomicBool) -> Result<(), Problem>) {
+        let (release, released) = mpsc::channel::<()>();
+        (release, move |_: &AtomicBool| {
+            let _ = released.recv();
+            Ok(())
+        })
+    }
+
+    #[tokio::test]
+    async fn refuses_request_beyond_full_queue() {
+        let pool = Pool::start(1).expect("threads");
+        let (release, job) = blocked();
+        let mut running = Box::pin(pool.run(job));
+        assert!(poll!(&mut running).is_pending());
+        let mut waiting: Vec<_> = (0..MAX_WAITING_REQUESTS).map(|_| Box::pin(pool.run(|_| Ok(())))).collect();
+        for request in &mut waiting {
+            assert!(poll!(request).is_pending());
+        }
+        let refused = pool.run(|_| Ok(())).await;
+        assert_eq!(refused.map_err(|problem| problem.code), Err(ProblemCode::QueueFull));
+        drop(release);
+        assert!(running.await.is_ok());
+        for request in waiting {
+            assert!(request.await.is_ok());
+        }
+        assert_eq!((pool.running(), pool.waiting()), (0, 0));
+    }
+
+    #[tokio::test]
+    async fn background_work_leaves_interactive_permits_free() {
+        let pool = Pool::start(1).expect("threads");
+        let (release, job) = blocked();
+        let mut background = Box::pin(pool.run_in_background(Duration::MAX, job));
+        assert!(poll!(&mut background).is_pending());
+        assert_eq!(pool.run(|_| Ok(7)).await.ok(), Some(7));
+        drop(release);
+        assert!(background.await.is_ok());
+    }
+
+    #[tokio::test]
+    async fn dropped_request_sets_stop_flag() {
+        let pool = Pool::start(1).expect("threads");
+        let mut request = Box::pin(pool.run(|stop| {
+            while !stop.load(Ordering::Relaxed) {
+                std::thread::yield_now();
+            }
+            Ok(())
+        }));
+        assert!(poll!(&mut request).is_pending());
+        drop(request);
+        // The only permit comes back.
+        assert!(pool.run(|_| Ok(())).await.is_ok());
+    }
+}

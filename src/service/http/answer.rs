@@ -1,0 +1,418 @@
+//! The walk of a request that sends a design document: bytes, document, key, cache, checked parameters, answer, bytes.
+
+use std::io::{self, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use axum::body::Body;
+use axum::extract::Request;
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use bytes::{Bytes, BytesMut};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use futures_util::StreamExt as _;
+use toothwave_calculation::design::Design;
+use toothwave_calculation::forms::{Format, Forms};
+use toothwave_calculation::no_answer::NoAnswer;
+use toothwave_calculation::question::Question;
+use utoipa::IntoResponses;
+
+use super::negotiation::{self, Representation};
+use super::problem::{Problem, ProblemCode};
+use super::query::require_no_query;
+use crate::app::App;
+use crate::compute::budget::{Budget, FREE_BYTES, PART_OF_UNKNOWN_SIZE, Reservation};
+use crate::compute::cache::{Answer, CacheStatus, RequestHash};
+use crate::compute::pool::{Deadline, within};
+
+/// Documents up to this size are read on the executor: that takes some tenths of a millisecond.
+const SHORT_DOCUMENT_BYTES: usize = 8 << 10;
+
+/// The rest of a refused body that is still read, so that the client gets the refusal and not a reset connection.
+const MAX_DISCARDED_BYTES: usize = 1 << 20;
+
+/// How long computing took.
+pub const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
+
+/// Where the answer came from (RFC 9211).
+pub const CACHE_STATUS: HeaderName = HeaderName::from_static("cache-status");
+
+/// The statuses that every endpoint for design documents answers with, beside 200 and 304.
+#[derive(IntoResponses)]
+pub enum Problems {
+    /// The body is no JSON.
+    #[response(status = 400, content_type = "application/problem+json")]
+    Malformed(#[to_schema] Problem),
+    /// No representation that the client accepts.
+    #[response(status = 406, content_type = "application/problem+json")]
+    NotAcceptable(#[to_schema] Problem),
+    /// The body did not arrive in time.
+    #[response(status = 408, content_type = "application/problem+json")]
+    RequestTimeout(#[to_schema] Problem),
+    /// The body exceeds `max_body_bytes`.
+    #[response(status = 413, content_type = "application/problem+json")]
+    BodyTooLarge(#[to_schema] Problem),
+    /// The body is not sent as plain JSON.
+    #[response(status = 415, content_type = "application/problem+json")]
+    UnsupportedMediaType(#[to_schema] Problem),
+    /// JSON that is no design document, or describes no possible drive, load or request.
+    #[response(status = 422, content_type = "application/problem+json")]
+    Unprocessable(#[to_schema] Problem),
+    /// A fault of the service itself.
+    #[response(status = 500, content_type = "application/problem+json")]
+    Internal(#[to_schema] Problem),
+    /// The service is full, or the deadline stopped the computation; `Retry-After` says when to try again.
+    #[response(status = 503, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))]
+    Unavailable(#[to_schema] Problem),
+}
+
+/// Where an answer came from: an extension of the response, for log and metrics.
+#[derive(Debug, Clone, Copy)]
+pub struct Provenance {
+    /// Cache or computation.
+    pub status: CacheStatus,
+    /// How long computing took.
+    pub solve: Duration,
+}
+
+/// Answers a request, from the cache if possible.
+pub async fn respond<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Response {
+    let deadline = app.deadline();
+    within(deadline, walk(question, app, deadline, request)).await.unwrap_or_else(IntoResponse::into_response)
+}
+
+async fn walk<Q: Question>(
+    question: Q,
+    app: Arc<App>,
+    deadline: Deadline,
+    request: Request,
+) -> Result<Response, Problem> {
+    let Asked { headers, body, representation } = Asked::read::<Q>(&app, deadline, request).await?;
+    let hash = RequestHash::new(question.name(), representation, &body);
+    let known = app.cache.key(hash).and_then(|key| app.cache.get(key).map(|answer| (key, answer)));
+    let (key, answer, status) = match known {
+        Some((key, answer)) => (key, answer, CacheStatus::Hit),
+        None => {
+            let (design, (question, key)) = read_design(&app, body, move |design| {
+                let key = question.key(design, &representation);
+                (question, key)
+            })
+            .await?;
+            let (answer, status) = match app.cache.get(key) {
+                Some(answer) => (answer, CacheStatus::Hit),
+                None => {
+                    let checked = question.check(&design, &app.limits.of_calculation())?;
+                    let compute = compute::<Q>(Arc::clone(&app), checked, representation);
+                    app.cache.get_or_compute(key, compute).await?
+                }
+            };
+            app.cache.remember(hash, key);
+            (key, answer, status)
+        }
+    };
+    tracing::Span::current().record("design", tracing::field::display(key));
+    let etag = format!("\"{key}\"");
+    let provenance = Provenance { status, solve: answer.solve };
+    let response = if negotiation::is_not_modified(&headers, &etag) {
+        StatusCode::NOT_MODIFIED.into_response()
+    } else {
+        with_body(&app.budget, answer, representation).await?
+    };
+    Ok(with_cache_headers(response, provenance, key_header(&etag)))
+}
+
+/// Answers a request whose answer is measured at that moment: never from the cache.
+pub async fn respond_afresh<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Response {
+    let deadline = app.deadline();
+    let walk = async {
+        let Asked { body, representation, .. } = Asked::read::<Q>(&app, deadline, request).await?;
+        let (design, ()) = read_design(&app, body, |_| ()).await?;
+        let checked = question.check(&design, &app.limits.of_calculation())?;
+        let answer = compute::<Q>(Arc::clone(&app), checked, representation).await?;
+        with_body(&app.budget, answer, representation).await
+    };
+    let mut response = within(deadline, walk).await.unwrap_or_else(IntoResponse::into_response);
+    response.headers_mut().insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+    response
+}
+
+/// What all endpoints for design documents read of a request alike.
+struct Asked {
+    headers: HeaderMap,
+    body: Bytes,
+    representation: Representation,
+}
+
+impl Asked {
+    async fn read<Q: Question>(app: &App, deadline: Deadline, request: Request) -> Result<Self, Problem> {
+        let (Parts { headers, uri, .. }, body) = request.into_parts();
+        require_no_query(&uri)?;
+        negotiation::require_json(&headers)?;
+        let representation = Representation::negotiate(&headers, Q::Answer::FORMS.iter().map(|(format, _)| *format))?;
+        let body = read_body(app, deadline, &headers, body).await?;
+        Ok(Self { headers, body, representation })
+    }
+}
+
+/// The body of a request, at most `max_body_bytes` long.
+///
+/// # Errors
+/// `body_too_large`, `broken_body`, `request_timeout`, `shutting_down`.
+pub async fn read_body(app: &App, deadline: Deadline, headers: &HeaderMap, body: Body) -> Result<Bytes, Problem> {
+    let limit = app.limits.max_body_bytes;
+    let announced = headers.get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok()?.parse::<usize>().ok());
+    let mut pieces = body.into_data_stream();
+    let (mut whole, mut length) = (BytesMut::new(), 0);
+    let reading = async {
+        while let Some(piece) = pieces.next().await {
+            let piece = piece.map_err(|error| broken_body(&error))?;
+            length += piece.len();
+            if length <= limit {
+                whole.extend_from_slice(&piece);
+            } else if length > limit + MAX_DISCARDED_BYTES {
+                break;
+            }
+        }
+        Ok::<_, Problem>(())
+    };
+    let in_time = tokio::select! {
+        in_time = tokio::time::timeout_at(deadline.at, reading) => in_time,
+        () = app.pool.stopped() => return Err(Problem::new(ProblemCode::ShuttingDown, "the service is stopping. Try again")),
+    };
+    match in_time {
+        Ok(read) => read?,
+        Err(_) => {
+            let detail = format!("the body did not arrive within {} ms. Send it faster", app.limits.deadline_ms);
+            return Err(Problem::new(ProblemCode::RequestTimeout, detail));
+        }
+    }
+    if length > limit {
+        let length = announced.map_or_else(|| format!("more than {limit}"), |announced| announced.to_string());
+        let detail = format!("the body has {length} bytes. Send at most the {limit} of `max_body_bytes`");
+        return Err(Problem::new(ProblemCode::BodyTooLarge, detail));
+    }
+    Ok(whole.freeze())
+}
+
+/// The problem of a body that breaks off.
+pub fn broken_body(error: &dyn std::fmt::Display) -> Problem {
+    Problem::new(ProblemCode::BrokenBody, format!("the body cannot be read to its end: {error}"))
+}
+
+/// The design of a body, and what `tell` says of it. A long one would keep the executor from other requests.
+async fn read_design<T: Send + 'static>(
+    app: &App,
+    body: Bytes,
+    tell: impl FnOnce(&Design) -> T + Send + 'static,
+) -> Result<(Design, T), Problem> {
+    let is_short = body.len() <= SHORT_DOCUMENT_BYTES;
+    let read = move || {
+        let design = Design::read(&body)?;
+        let told = tell(&design);
+        Ok((design, told))
+    };
+    if is_short { read() } else { app.pool.run(move |_| read()).await }
+}
+
+/// Computes an answer in the bytes that it has reserved.
+async fn compute<Q: Question>(
+    app: Arc<App>,
+    checked: Q::Checked,
+    representation: Representation,
+) -> Result<Answer, Problem> {
+    let reservation = app.budget.reserve(bound::<Q>(&app.budget, &checked, representation.format)).await?;
+    let is_short = representation == Representation::JSON && reservation.is_none() && Q::is_short(&checked);
+    let job = move |stop: &AtomicBool| solve::<Q>(&checked, representation, reservation, stop);
+    if is_short { app.pool.run_inline(job).await } else { app.pool.run(job).await }
+}
+
+/// The upper bound of what an answer takes while it is computed and written.
+pub fn bound<Q: Question>(budget: &Budget, checked: &Q::Checked, format: Format) -> u64 {
+    match Q::max_bytes(checked, format) {
+        Some(bytes) => bytes,
+        None => budget.max_bytes() / PART_OF_UNKNOWN_SIZE,
+    }
+}
+
+/// Computes an answer and writes its bytes; of the reservation it keeps what these take.
+///
+/// # Errors
+/// Why there is no answer; `too_many_states` for one that outgrows its reservation.
+fn solve<Q: Question>(
+    checked: &Q::Checked,
+    representation: Representation,
+    reservation: Option<Reservation>,
+    stop: &AtomicBool,
+) -> Result<Answer, Problem> {
+    #[cfg(feature = "fault-injection")]
+    fail::fail_point!("solve");
+    let started = Instant::now();
+    let answer = Q::answer(checked, stop)?;
+    let solve = started.elapsed();
+    if let Some(reservation) = &reservation {
+        require_within(reservation, answer.bytes(representation.format))?;
+    }
+    let body = write(&answer, representation, stop)?;
+    drop(answer);
+    let server_timing = format!("solve;dur={:.3}", 1e3 * solve.as_secs_f64());
+    let server_timing = HeaderValue::try_from(server_timing).map_err(|error| Problem::internal(&error))?;
+    Ok(Answer { reservation: settle(reservation, body.len()), body, solve, server_timing })
+}
+
+/// Checks that an answer fits into what was reserved for it.
+///
+/// # Errors
+/// `too_many_states`.
+pub fn require_within(reservation: &Reservation, bytes: u64) -> Result<(), Problem> {
+    if bytes <= reservation.bytes() {
+        return Ok(());
+    }
+    let detail = format!(
+        "the answer takes {bytes} bytes, and {} are reserved for one whose size is not known before. Widen the tolerance",
+        reservation.bytes()
+    );
+    Err(Problem::new(ProblemCode::TooManyStates, detail))
+}
+
+/// What the bytes of an answer keep of its reservation: nothing if they are few.
+pub fn settle(reservation: Option<Reservation>, bytes: usize) -> Option<Arc<Reservation>> {
+    let mut reservation = reservation.filter(|_| bytes as u64 > FREE_BYTES)?;
+    reservation.shrink_to(bytes as u64);
+    Some(Arc::new(reservation))
+}
+
+/// Writes an answer as its representation says.
+///
+/// # Errors
+/// `deadline_exceeded` if the stop flag is set, and faults of the service.
+fn write<A: Forms>(
+    answer: &A,
+    Representation { format, gzip }: Representation,
+    stop: &AtomicBool,
+) -> Result<Bytes, Problem> {
+    let is_long = !gzip && format.writes_all_numbers();
+    let buffer = Vec::with_capacity(if is_long { answer.expected_bytes() } else { 0 });
+    let written = if gzip {
+        let mut writer = Stoppable::new(GzEncoder::new(buffer, Compression::fast()), stop);
+        answer.write(format, &mut writer).and_then(|()| writer.inner.finish())
+    } else {
+        let mut writer = Stoppable::new(buffer, stop);
+        answer.write(format, &mut writer).map(|()| writer.inner)
+    };
+    written.map(|bytes| bytes.into_boxed_slice().into()).map_err(|error| write_problem(&error, stop))
+}
+
+/// Why an answer could not be written into memory.
+pub fn write_problem(error: &io::Error, stop: &AtomicBool) -> Problem {
+    if stop.load(Ordering::Relaxed) { NoAnswer::stopped().into() } else { Problem::internal(error) }
+}
+
+/// Bytes written between two looks at the stop flag.
+const LOOK_EVERY_BYTES: usize = 1 << 16;
+
+/// A writer that fails once the stop flag is set.
+pub struct Stoppable<'a, W> {
+    /// Where the bytes go.
+    pub inner: W,
+    until_look: usize,
+    stop: &'a AtomicBool,
+}
+
+impl<'a, W> Stoppable<'a, W> {
+    /// Writes to `inner` until `stop` is set.
+    pub const fn new(inner: W, stop: &'a AtomicBool) -> Self {
+        Self { inner, until_look: LOOK_EVERY_BYTES, stop }
+    }
+
+    #[cold]
+    fn look(&mut self) -> io::Result<()> {
+        self.until_look = LOOK_EVERY_BYTES;
+        if self.stop.load(Ordering::Relaxed) { Err(io::Error::other("stopped")) } else { Ok(()) }
+    }
+}
+
+impl<W: Write> Write for Stoppable<'_, W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.write_all(bytes).map(|()| bytes.len())
+    }
+
+    // Called for every number.
+    #[inline]
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        match self.until_look.checked_sub(bytes.len()) {
+            Some(rest) => self.until_look = rest,
+            None => self.look()?,
+        }
+        self.inner.write_all(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.look()?;
+        self.inner.flush()
+    }
+}
+
+async fn with_body(
+    budget: &Budget,
+    answer: Answer,
+    Representation { format, gzip }: Representation,
+) -> Result<Response, Problem> {
+    let Answer { body, reservation, server_timing, .. } = answer;
+    // A large answer from the cache may leave it while a slow client reads.
+    let reservation = match reservation {
+        None => settle(budget.reserve(body.len() as u64).await?, body.len()),
+        reservation => reservation,
+    };
+    let body = match &reservation {
+        Some(reservation) => Reservation::hold(reservation, body),
+        None => body,
+    };
+    let mut response = (StatusCode::OK, body).into_response();
+    let headers = response.headers_mut();
+    // These, and those of the layers around.
+    headers.reserve(12);
+    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(negotiation::content_type(format)));
+    if gzip {
+        headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+    }
+    headers.insert(SERVER_TIMING, server_timing);
+    Ok(response)
+}
+
+fn key_header(etag: &str) -> HeaderValue {
+    // Hexadecimal digits and quotes always are a header value.
+    HeaderValue::from_str(etag).unwrap_or(HeaderValue::from_static(""))
+}
+
+/// The headers about caching that 200 and 304 share.
+fn with_cache_headers(mut response: Response, provenance: Provenance, etag: HeaderValue) -> Response {
+    response.extensions_mut().insert(provenance);
+    let headers = response.headers_mut();
+    headers.insert(header::ETAG, etag);
+    headers.insert(header::VARY, HeaderValue::from_static("accept, accept-encoding"));
+    headers.insert(CACHE_STATUS, HeaderValue::from_static(provenance.status.header()));
+    response
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+    use std::sync::atomic::AtomicBool;
+
+    use flate2::Compression;
+    use flate2::write::GzEncoder;
+
+    use super::{LOOK_EVERY_BYTES, Stoppable};
+
+    /// Of a megabyte of zeros a kilobyte comes out of the encoder: the look must not depend on it.
+    #[test]
+    fn stops_writing_compressible_answers_too() {
+        let stop = AtomicBool::new(true);
+        let mut writer = Stoppable::new(GzEncoder::new(Vec::new(), Compression::fast()), &stop);
+        let written = (0..LOOK_EVERY_BYTES).take_while(|_| writer.write_all(&[0; 1024]).is_ok()).count();
+        assert!(written * 1024 <= LOOK_EVERY_BYTES, "{written} KiB");
+    }
+}

@@ -1,0 +1,52 @@
+//! `POST /v1/drawings/{part}`: each mating part, or all of them in place, as outlines for CAD, workshops and eyes.
+
+use std::sync::Arc;
+
+use axum::extract::rejection::PathRejection;
+use axum::extract::{Path, Request, State};
+use axum::response::{IntoResponse, Response};
+use toothwave_calculation::design::Design;
+use toothwave_calculation::drawing::Drawing;
+use toothwave_calculation::drawing::answer::{DrawingAnswer, DrawnPart};
+use toothwave_calculation::json;
+
+use crate::app::App;
+use crate::http::answer::{Problems, respond};
+use crate::http::problem::{Problem, ProblemCode};
+
+/// The sections of a part, or of all parts in place.
+#[utoipa::path(
+    post,
+    path = "/v1/drawings/{part}",
+    tag = "drive",
+    request_body(content = Design, description = "Reads `drive`, `parts` and `profile.chord_tolerance_mm`, for `assembly` also `assembly`."),
+    params(
+        ("part" = DrawnPart, Path, description = "What is drawn.", example = "ring"),
+        ("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")
+    ),
+    responses(
+        (status = 200, description = "The drawing. As DXF (AutoCAD 2000, millimetres) a layer a part, every outline a circle or one closed polyline with arcs as bulges; as SVG the same in millimetres; as STEP (AP214) every prism a solid in place, curves as cubic splines through their points.",
+            content((DrawingAnswer = "application/json"), (String = "image/svg+xml"), (String = "image/vnd.dxf"), (String = "model/step")), headers(
+                ("ETag" = String, description = "Entity tag of this representation."),
+                ("Cache-Status" = String, description = "RFC 9211: `hit`, `fwd=miss`, `collapsed`."),
+                ("Server-Timing" = String, description = "`solve;dur=` and the milliseconds of the solve.")
+            )),
+        (status = 304, description = "The client has this representation already (`If-None-Match`)."),
+        (status = 404, description = "No such part.", body = Problem, content_type = "application/problem+json"),
+        Problems
+    )
+)]
+pub async fn drawing(
+    State(app): State<Arc<App>>,
+    part: Result<Path<DrawnPart>, PathRejection>,
+    request: Request,
+) -> Response {
+    match part {
+        Ok(Path(part)) => respond(Drawing(part), app, request).await,
+        Err(_) => {
+            let known: Vec<_> = DrawnPart::ALL.iter().map(json::word).collect();
+            let detail = format!("drawings there are of {}", known.join(", "));
+            Problem::new(ProblemCode::NotFound, detail).into_response()
+        }
+    }
+}

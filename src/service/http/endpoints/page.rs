@@ -1,0 +1,159 @@
+//! `GET /`: the designer's page, compiled in, so that it needs neither Node nor any network.
+
+use std::sync::LazyLock;
+
+use axum::extract::Path;
+use axum::extract::rejection::PathRejection;
+use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
+use axum::response::{IntoResponse, Response};
+
+use crate::http::negotiation;
+use crate::http::problem::{Problem, ProblemCode};
+
+/// Everything the page may load comes from this origin; nothing may be inline, framed or sent elsewhere.
+const CONTENT_SECURITY_POLICY: HeaderValue = HeaderValue::from_static(
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; \
+     base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+);
+
+/// A file of the page.
+struct Asset {
+    name: &'static str,
+    content_type: &'static str,
+    body: &'static [u8],
+}
+
+macro_rules! assets {
+    ($($name:literal as $content_type:expr),* $(,)?) => {
+        &[$(Asset { name: $name, content_type: $content_type, body: include_bytes!(concat!("../../page/", $name)) }),*]
+    };
+}
+
+const HTML: &str = "text/html; charset=utf-8";
+const CSS: &str = "text/css; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const TEXT: &str = "text/plain; charset=utf-8";
+const SVG: &str = "image/svg+xml";
+
+const INDEX: Asset = Asset { name: "index.html", content_type: HTML, body: include_bytes!("../../page/index.html") };
+
+const ASSETS: &[Asset] = assets![
+    "style.css" as CSS,
+    "studies.css" as CSS,
+    "icon.svg" as SVG,
+    "theme.js" as SCRIPT,
+    "main.js" as SCRIPT,
+    "access.js" as SCRIPT,
+    "accuracy.js" as SCRIPT,
+    "answers.js" as SCRIPT,
+    "ask.js" as SCRIPT,
+    "chart.js" as SCRIPT,
+    "design.js" as SCRIPT,
+    "dom.js" as SCRIPT,
+    "drawings.js" as SCRIPT,
+    "explore.js" as SCRIPT,
+    "find.js" as SCRIPT,
+    "findings.js" as SCRIPT,
+    "form.js" as SCRIPT,
+    "format.js" as SCRIPT,
+    "front.js" as SCRIPT,
+    "grids.js" as SCRIPT,
+    "history.js" as SCRIPT,
+    "large.js" as SCRIPT,
+    "lines.js" as SCRIPT,
+    "losses.js" as SCRIPT,
+    "mechanism.js" as SCRIPT,
+    "motion.js" as SCRIPT,
+    "parameters.js" as SCRIPT,
+    "pass.js" as SCRIPT,
+    "picture.js" as SCRIPT,
+    "plots.js" as SCRIPT,
+    "quantities.js" as SCRIPT,
+    "reasons.js" as SCRIPT,
+    "report.js" as SCRIPT,
+    "requirements.js" as SCRIPT,
+    "results.js" as SCRIPT,
+    "sensitivity.js" as SCRIPT,
+    "service.js" as SCRIPT,
+    "share.js" as SCRIPT,
+    "sight.js" as SCRIPT,
+    "states.js" as SCRIPT,
+    "studies.js" as SCRIPT,
+    "study-view.js" as SCRIPT,
+    "terms.js" as SCRIPT,
+    "tolerance.js" as SCRIPT,
+    "toolbar.js" as SCRIPT,
+    "views.js" as SCRIPT,
+    "vendor/uplot.js" as SCRIPT,
+    "vendor/uplot.css" as CSS,
+    "vendor/uplot.LICENSE" as TEXT,
+];
+
+/// The entity tag of all files together: a page is only ever whole, so one changed file renews them all.
+static ETAG: LazyLock<String> = LazyLock::new(|| {
+    let mut hasher = blake3::Hasher::new();
+    for asset in ASSETS.iter().chain([&INDEX]) {
+        hasher.update(asset.name.as_bytes()).update(asset.body);
+    }
+    let hash = hasher.finalize().to_hex();
+    format!("\"{}\"", &hash[..32])
+});
+
+/// The page itself.
+pub async fn index(headers: HeaderMap) -> Response {
+    serve(&INDEX, &headers)
+}
+
+/// The files that it loads.
+pub async fn asset(name: Result<Path<String>, PathRejection>, uri: Uri, headers: HeaderMap) -> Response {
+    // A name that is no text is no file's either.
+    let name = name.map(|Path(name)| name).unwrap_or_default();
+    match ASSETS.iter().find(|asset| asset.name == name) {
+        Some(asset) => serve(asset, &headers),
+        None => {
+            let detail = format!("nothing stands at `{}`; the page is at `/`", uri.path());
+            Problem::new(ProblemCode::NotFound, detail).into_response()
+        }
+    }
+}
+
+fn serve(asset: &Asset, headers: &HeaderMap) -> Response {
+    let etag = ETAG.as_str();
+    // Asked for anew each time, so that a page never mixes with the modules of an older service.
+    let cache_control = (header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
+    let tag = (header::ETAG, etag.to_owned());
+    // On 304 too: browsers take its headers over those that they kept.
+    let policy = (header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY);
+    let common = [cache_control, policy];
+    if negotiation::is_not_modified(headers, etag) {
+        return (StatusCode::NOT_MODIFIED, common, [tag]).into_response();
+    }
+    let content_type = (header::CONTENT_TYPE, HeaderValue::from_static(asset.content_type));
+    (common, [tag], [content_type], asset.body).into_response()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::path::Path;
+
+    use super::{ASSETS, INDEX};
+
+    fn files(folder: &Path, prefix: &str) -> BTreeSet<String> {
+        let entries = std::fs::read_dir(folder).expect("the folder is there").map(|entry| entry.expect("readable"));
+        entries
+            .flat_map(|entry| {
+                let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
+                if entry.path().is_dir() { files(&entry.path(), &format!("{name}/")) } else { BTreeSet::from([name]) }
+            })
+            .collect()
+    }
+
+    /// A module that is not served fails only in a browser.
+    #[test]
+    fn every_file_of_the_page_is_served() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("page");
+        let served = ASSETS.iter().chain([&INDEX]).map(|asset| asset.name.to_owned()).collect();
+        assert_eq!(files(&folder, ""), served);
+    }
+}

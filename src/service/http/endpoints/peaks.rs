@@ -1,0 +1,108 @@
+//! A sweep without its columns, as a batch answers it with `peaks_only`.
+
+use serde::{Serialize, Serializer};
+use toothwave_calculation::coincidence_degree::TeethInMeshAnswer;
+use toothwave_calculation::design::Design;
+use toothwave_calculation::findings::FindingAnswer;
+use toothwave_calculation::forms::{Form, Format, Forms};
+use toothwave_calculation::key::Encode;
+use toothwave_calculation::no_answer::NoAnswer;
+use toothwave_calculation::question::{Limits, Question, Stop};
+use toothwave_calculation::sweep::Sweep;
+use toothwave_calculation::sweep::answer::{ChecksAnswer, LoadAnswer, PeaksAnswer, SweepAnswer, TorqueCapacityAnswer};
+use toothwave_calculation::sweep::backing::EstimateAnswer;
+use toothwave_calculation::sweep::duty::DutyAnswer;
+use toothwave_calculation::sweep::losses::LossTotalsAnswer;
+use toothwave_calculation::sweep::model_error::ModelErrorAnswer;
+
+/// What a sweep is asked without its columns.
+#[derive(Debug)]
+pub struct PeaksOnly;
+
+/// A sweep that is written without its columns.
+#[derive(Debug)]
+pub struct PeaksOnlyAnswer(SweepAnswer);
+
+#[derive(Serialize)]
+struct View<'a> {
+    solver_version: &'static str,
+    build: &'static str,
+    coincidence_degree: f64,
+    period_deg: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sweep_period_deg: Option<f64>,
+    load: &'a LoadAnswer,
+    enters_under_load: bool,
+    peaks: &'a PeaksAnswer,
+    model_error: &'a ModelErrorAnswer,
+    series_compliance_estimates: &'a [EstimateAnswer],
+    teeth_in_mesh_per_zone: &'a TeethInMeshAnswer,
+    loaded_teeth_per_zone: &'a TeethInMeshAnswer,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    torque_capacity: &'a Option<TorqueCapacityAnswer>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    duty: &'a Option<DutyAnswer>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    losses: Option<&'a LossTotalsAnswer>,
+    checks: &'a ChecksAnswer,
+    findings: &'a [FindingAnswer],
+}
+
+impl Serialize for PeaksOnlyAnswer {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self(sweep) = self;
+        let view = View {
+            solver_version: sweep.solver_version,
+            build: sweep.build,
+            coincidence_degree: sweep.coincidence_degree,
+            period_deg: sweep.period_deg,
+            sweep_period_deg: sweep.sweep_period_deg,
+            load: &sweep.load,
+            enters_under_load: sweep.enters_under_load,
+            peaks: &sweep.peaks,
+            model_error: &sweep.model_error,
+            series_compliance_estimates: &sweep.series_compliance_estimates,
+            teeth_in_mesh_per_zone: &sweep.teeth_in_mesh_per_zone,
+            loaded_teeth_per_zone: &sweep.loaded_teeth_per_zone,
+            torque_capacity: &sweep.torque_capacity,
+            duty: &sweep.duty,
+            losses: sweep.losses.as_ref().map(|losses| &losses.totals),
+            checks: &sweep.checks,
+            findings: &sweep.findings,
+        };
+        view.serialize(serializer)
+    }
+}
+
+impl Forms for PeaksOnlyAnswer {
+    const FORMS: &'static [(Format, Form<Self>)] = &[];
+
+    fn held_bytes(&self, format: Format) -> u64 {
+        self.0.held_bytes(format)
+    }
+}
+
+impl Question for PeaksOnly {
+    type Checked = <Sweep as Question>::Checked;
+    type Answer = PeaksOnlyAnswer;
+
+    fn name(&self) -> &'static str {
+        "peaks"
+    }
+
+    fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
+        Sweep.reads(design)
+    }
+
+    fn check(&self, design: &Design, limits: &Limits) -> Result<Self::Checked, NoAnswer> {
+        Sweep.check(design, limits)
+    }
+
+    fn max_bytes(checked: &Self::Checked, format: Format) -> Option<u64> {
+        Sweep::max_bytes(checked, format)
+    }
+
+    fn answer(checked: &Self::Checked, stop: &dyn Stop) -> Result<Self::Answer, NoAnswer> {
+        Sweep::answer(checked, stop).map(PeaksOnlyAnswer)
+    }
+}

@@ -1,0 +1,12 @@
+//! HTTP: connections, paths, the walk of a request, problems.
+
+pub mod answer;
+pub mod endpoints;
+pub mod examples;
+pub mod negotiation;
+pub(crate) mod observe;
+mod openapi;
+pub mod problem;
+mod query;
+pub mod router;
+pub mod server;

@@ -1,0 +1,189 @@
+//! What the client sends and accepts: media types and codings.
+
+use std::borrow::Cow;
+use std::iter;
+use std::str::FromStr;
+
+use axum::http::{HeaderMap, HeaderName, header};
+use headers_accept::Accept;
+use mediatype::{MediaType, Name, names};
+use toothwave_calculation::forms::Format;
+use toothwave_calculation::key::{Encode, Encoder};
+
+use super::problem::{Problem, ProblemCode};
+
+/// The media type of a format.
+const fn media_type(format: Format) -> MediaType<'static> {
+    match format {
+        Format::Json => MediaType::new(names::APPLICATION, names::JSON),
+        Format::Csv => MediaType::new(names::TEXT, Name::new_unchecked("csv")),
+        Format::Arrow => MediaType::new(names::APPLICATION, Name::new_unchecked("vnd.apache.arrow.stream")),
+        Format::Parquet => MediaType::new(names::APPLICATION, Name::new_unchecked("vnd.apache.parquet")),
+        Format::Text => MediaType::new(names::TEXT, names::PLAIN),
+        Format::Svg => MediaType::from_parts(names::IMAGE, names::SVG, Some(names::XML), &[]),
+        Format::Dxf => MediaType::new(names::IMAGE, Name::new_unchecked("vnd.dxf")),
+        Format::Step => MediaType::new(names::MODEL, Name::new_unchecked("step")),
+    }
+}
+
+/// The `Content-Type` of an answer in a format.
+pub const fn content_type(format: Format) -> &'static str {
+    match format {
+        Format::Json => "application/json",
+        Format::Csv => "text/csv; charset=utf-8; header=present",
+        Format::Arrow => "application/vnd.apache.arrow.stream",
+        Format::Parquet => "application/vnd.apache.parquet",
+        Format::Text => "text/plain; charset=utf-8",
+        Format::Svg => "image/svg+xml",
+        Format::Dxf => "image/vnd.dxf",
+        Format::Step => "model/step",
+    }
+}
+
+/// Of a list of what is accepted, in bytes: each of its items is read, sorted and compared before anything else is known of a request, and browsers' have some hundred bytes.
+const MOST_OF_A_LIST: usize = 4096;
+
+/// A format with its coding: what an entity tag stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Representation {
+    /// The format.
+    pub format: Format,
+    /// Whether it is compressed.
+    pub gzip: bool,
+}
+
+impl Encode for Representation {
+    fn encode(&self, encoder: &mut Encoder) {
+        let Self { format, gzip } = self;
+        (format, gzip).encode(encoder);
+    }
+}
+
+impl Representation {
+    /// JSON, uncompressed.
+    pub const JSON: Self = Self { format: Format::Json, gzip: false };
+
+    /// The best of JSON and, after it, `others`, in the service's order, for what the request accepts.
+    ///
+    /// # Errors
+    /// `not_acceptable` where the client accepts none of them.
+    pub fn negotiate(headers: &HeaderMap, others: impl Iterator<Item = Format>) -> Result<Self, Problem> {
+        let gzip = accepts_gzip(headers);
+        let accepted = joined(headers, &header::ACCEPT);
+        if accepted.len() > MOST_OF_A_LIST {
+            let detail =
+                format!("`Accept` has {} bytes, more than the {MOST_OF_A_LIST} that are read of it", accepted.len());
+            return Err(Problem::new(ProblemCode::NotAcceptable, detail));
+        }
+        if accepted.trim().is_empty() {
+            return Ok(Self { format: Format::Json, gzip });
+        }
+        let formats: Vec<_> = iter::once(Format::Json).chain(others).collect();
+        let media_types: Vec<_> = formats.iter().copied().map(media_type).collect();
+        let best = Accept::from_str(&without_parameters(&accepted))
+            .ok()
+            .and_then(|accept| accept.negotiate(&media_types).cloned());
+        let format = formats.iter().copied().find(|format| best.as_ref() == Some(&media_type(*format)));
+        let format = format.ok_or_else(|| {
+            let offered: Vec<_> = media_types.iter().map(ToString::to_string).collect();
+            Problem::new(
+                ProblemCode::NotAcceptable,
+                format!("this path answers with {}, and the request accepts none of it", offered.join(" or ")),
+            )
+        })?;
+        Ok(Self { format, gzip })
+    }
+}
+
+/// Checks that the body is sent as JSON without a content coding.
+///
+/// # Errors
+/// `unsupported_media_type`.
+pub fn require_json(headers: &HeaderMap) -> Result<(), Problem> {
+    require_type(headers, "a design document as `application/json`", |media_type| {
+        media_type.subty == names::JSON || media_type.suffix == Some(names::JSON)
+    })
+}
+
+/// Checks that the body is sent as one JSON document a line.
+///
+/// # Errors
+/// `unsupported_media_type`.
+pub fn require_ndjson(headers: &HeaderMap) -> Result<(), Problem> {
+    let known = ["x-ndjson", "ndjson", "jsonl", "x-jsonlines"];
+    require_type(headers, "a design document a line as `application/x-ndjson`", |media_type| {
+        known.iter().any(|name| media_type.subty == *name)
+    })
+}
+
+/// Checks that the body has no coding and is an application's type that fits.
+fn require_type(headers: &HeaderMap, wanted: &str, fits: impl Fn(&MediaType<'_>) -> bool) -> Result<(), Problem> {
+    let unsupported =
+        |found: String| Err(Problem::new(ProblemCode::UnsupportedMediaType, format!("{found}; send {wanted}")));
+    let coding = joined(headers, &header::CONTENT_ENCODING);
+    if !coding.is_empty() && !coding.eq_ignore_ascii_case("identity") {
+        return unsupported(format!("the body is coded as `{coding}`, and no coding is read"));
+    }
+    let coding = joined(headers, &header::TRANSFER_ENCODING);
+    if !coding.is_empty() && !coding.eq_ignore_ascii_case("chunked") {
+        return unsupported(format!(
+            "the body is sent in the transfer codings `{coding}`, and `chunked` alone is read"
+        ));
+    }
+    let content_type = joined(headers, &header::CONTENT_TYPE);
+    if MediaType::parse(&content_type).is_ok_and(|media_type| media_type.ty == names::APPLICATION && fits(&media_type))
+    {
+        Ok(())
+    } else if content_type.is_empty() {
+        unsupported("the request has no `Content-Type`".into())
+    } else {
+        unsupported(format!("the body is sent as `{content_type}`"))
+    }
+}
+
+/// Media ranges with nothing but their weights, and only those that can be read: who asks for `application/json; charset=utf-8` takes JSON as it is, and older
+/// clients list `*` beside `*/*`. No type that is offered has a parameter with a quoted `,` or `;`.
+fn without_parameters(accepted: &str) -> String {
+    let ranges = accepted.split(',').map(|range| {
+        let (media_type, parameters) = range.split_once(';').unwrap_or((range, ""));
+        let weight =
+            parameters.split(';').find(|parameter| parameter.trim_start().to_ascii_lowercase().starts_with("q="));
+        weight.map_or_else(|| media_type.to_owned(), |weight| format!("{media_type};{}", weight.trim()))
+    });
+    ranges.filter(|range| MediaType::parse(range.trim()).is_ok()).collect::<Vec<_>>().join(",")
+}
+
+/// Whether the request prefers gzip to no coding at all.
+fn accepts_gzip(headers: &HeaderMap) -> bool {
+    let accepted = joined(headers, &header::ACCEPT_ENCODING);
+    if accepted.len() > MOST_OF_A_LIST {
+        return false;
+    }
+    let quality = |coding: &str| {
+        accepted.split(',').find_map(|item| {
+            let mut parts = item.split(';').map(str::trim);
+            let is_meant = parts.next().is_some_and(|name| name.eq_ignore_ascii_case(coding));
+            let weight = parts.find_map(|parameter| {
+                let (name, value) = parameter.split_once('=')?;
+                name.trim().eq_ignore_ascii_case("q").then_some(value.trim())
+            });
+            is_meant.then(|| weight.map_or(1.0, |weight| weight.parse().unwrap_or(0.0)))
+        })
+    };
+    let gzip = quality("gzip").or_else(|| quality("x-gzip")).or_else(|| quality("*")).unwrap_or(0.0);
+    gzip > 0.0 && gzip >= quality("identity").unwrap_or(0.0)
+}
+
+/// All lines of a header as one list; a value that is no text counts as absent.
+fn joined<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Cow<'a, str> {
+    let mut values = headers.get_all(name).iter().filter_map(|value| value.to_str().ok());
+    let first = values.next().unwrap_or_default();
+    values.fold(first.into(), |list, value| format!("{list},{value}").into())
+}
+
+/// Whether `If-None-Match` names this entity tag, compared weakly as the header wants it. `*`, which stands for any, is ignored: it is for
+/// what a client would overwrite, and one that has no answer would get none.
+pub fn is_not_modified(headers: &HeaderMap, etag: &str) -> bool {
+    let listed = joined(headers, &header::IF_NONE_MATCH);
+    listed.split(',').map(str::trim).any(|tag| tag.strip_prefix("W/").unwrap_or(tag) == etag)
+}

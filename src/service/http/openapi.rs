@@ -1,0 +1,240 @@
+//! The API document as generators of clients read it, and a rendering in OpenAPI 3.0.3 for those that do not know 3.1.
+
+use serde_json::{Map, Value, json};
+
+use super::problem::PROBLEM_JSON;
+
+const SCHEMAS: &str = "/components/schemas";
+
+/// What utoipa has no words for: where the service stands, one `Problem` for all, and variants with names and a discriminator.
+pub(crate) fn for_generators(document: &mut Value) {
+    document["servers"] = json!([{ "url": "/", "description": "The service that serves this document." }]);
+    for_each_object(document, &mut |object| {
+        if let Some(media) = object.get_mut(PROBLEM_JSON) {
+            *media = json!({ "schema": reference("Problem") });
+        }
+        parameter_that_is_never_null(object);
+        no_null_by_default(object);
+    });
+    default_words_beside_their_words(document);
+    join_variants(document);
+    name_variants(document);
+}
+
+/// A variant that is an object of its own and, beside it, the word that names it, becomes one object: where the one admits no other field, both
+/// together would admit nothing.
+fn join_variants(document: &mut Value) {
+    let Some(schemas) = document.pointer_mut(SCHEMAS).and_then(Value::as_object_mut) else { return };
+    let fields = schemas.clone();
+    let mut joined = Vec::new();
+    for variant in schemas.values_mut().filter_map(|schema| schema.get_mut("oneOf")?.as_array_mut()).flatten() {
+        let Some([own, word]) = variant.get("allOf").and_then(Value::as_array).map(Vec::as_slice) else { continue };
+        let name = own.get("$ref").and_then(Value::as_str).and_then(|path| path.rsplit('/').next());
+        let Some((name, object)) = name.and_then(|name| Some((name.to_owned(), fields.get(name)?))) else { continue };
+        let mut object = object.clone();
+        if let (Some(properties), Some(words)) =
+            (object["properties"].as_object_mut(), word.get("properties").and_then(Value::as_object))
+        {
+            properties.extend(words.clone());
+        }
+        let required = word.get("required").and_then(Value::as_array).into_iter().flatten();
+        let required = required.chain(object.get("required").and_then(Value::as_array).into_iter().flatten());
+        object["required"] = required.cloned().collect();
+        *variant = object;
+        joined.push(name);
+    }
+    let text = Value::Object(schemas.clone()).to_string();
+    schemas.retain(|name, _| !joined.contains(name) || text.contains(&format!("\"#{SCHEMAS}/{name}\"")));
+}
+
+/// A parameter may be left out, but no header or query has a null.
+fn parameter_that_is_never_null(object: &mut Map<String, Value>) {
+    if object.contains_key("in")
+        && let Some(kind) = object.get_mut("schema").and_then(|schema| schema.get_mut("type"))
+        && let Some(types) = kind.as_array_mut()
+    {
+        types.retain(|name| name != "null");
+        if let [one] = &types[..] {
+            *kind = one.clone();
+        }
+    }
+}
+
+/// Of a field that may be left out but not be null, null is no default, though utoipa writes it: generators refuse it, or send it.
+fn no_null_by_default(schema: &mut Map<String, Value>) {
+    if schema.get("default") == Some(&Value::Null) && !may_be_null(schema) {
+        schema.remove("default");
+    }
+}
+
+/// A default that is one of several words stands with these words, not beside the reference to them, of which a generator for C++ makes no value.
+fn default_words_beside_their_words(document: &mut Value) {
+    let mut moved = Vec::new();
+    for_each_object(document, &mut |object| {
+        if let Some(path) =
+            object.get("$ref").and_then(Value::as_str).map(|path| path.trim_start_matches('#').to_owned())
+            && object.get("default").is_some_and(Value::is_string)
+        {
+            moved.extend(object.remove("default").map(|word| (path, word)));
+        }
+    });
+    for (path, word) in moved {
+        if let Some(words) = document.pointer_mut(&path) {
+            words["default"] = word;
+        }
+    }
+}
+
+fn may_be_null(schema: &Map<String, Value>) -> bool {
+    schema.get("type").and_then(Value::as_array).is_some_and(|types| types.iter().any(|name| name == "null"))
+}
+
+/// Every choice between objects that a field of one word tells apart: each becomes a schema of its own, and the word a discriminator.
+fn name_variants(document: &mut Value) {
+    let Some(schemas) = document.pointer_mut(SCHEMAS).and_then(Value::as_object_mut) else { return };
+    let mut named = Map::new();
+    for (name, schema) in schemas.iter_mut() {
+        let Some(tag) = tag_of(schema) else { continue };
+        let mut mapping = Map::new();
+        let mut by_default = None;
+        for variant in schema["oneOf"].as_array_mut().into_iter().flatten() {
+            let Some(word) = word_of(variant, &tag).map(str::to_owned) else { continue };
+            by_default = without_tag(variant, &tag).or(by_default);
+            let variant_name = format!("{name}{}", capitalised(&word));
+            mapping.insert(word, json!(format!("#{SCHEMAS}/{variant_name}")));
+            named.insert(variant_name.clone(), std::mem::replace(variant, reference(&variant_name)));
+        }
+        if let (Some(variant), Some(variants)) = (by_default, schema["oneOf"].as_array_mut()) {
+            let variant_name = format!("{name}ByDefault");
+            variants.push(reference(&variant_name));
+            named.insert(variant_name, variant);
+        }
+        schema["discriminator"] = json!({ "propertyName": tag, "mapping": mapping });
+    }
+    schemas.append(&mut named);
+}
+
+/// The field that has one word in each variant.
+fn tag_of(schema: &Value) -> Option<String> {
+    let variants = schema.get("oneOf")?.as_array()?;
+    let is_tag = |tag: &&String| variants.iter().all(|variant| word_of(variant, tag).is_some());
+    variants.first()?.get("properties")?.as_object()?.keys().find(is_tag).cloned()
+}
+
+/// The one word that a field of a variant may have.
+fn word_of<'a>(variant: &'a Value, tag: &str) -> Option<&'a str> {
+    match variant.get("properties")?.get(tag)?.get("enum")?.as_array()?.as_slice() {
+        [word] => word.as_str(),
+        _ => None,
+    }
+}
+
+/// Requires the word of a variant. Where it was not required, the same variant without it, a variant of its own: generators tell
+/// variants apart by a word that all of them have, or by their fields.
+fn without_tag(variant: &mut Value, tag: &str) -> Option<Value> {
+    if variant.get("required").and_then(Value::as_array).is_some_and(|required| required.iter().any(|name| name == tag))
+    {
+        return None;
+    }
+    let mut by_default = variant.clone();
+    by_default.get_mut("properties")?.as_object_mut()?.remove(tag);
+    let required = variant.as_object_mut()?.entry("required").or_insert_with(|| json!([]));
+    required.as_array_mut()?.push(json!(tag));
+    Some(by_default)
+}
+
+fn capitalised(word: &str) -> String {
+    word.split('_').map(|part| part[..1].to_uppercase() + &part[1..]).collect()
+}
+
+fn reference(name: &str) -> Value {
+    json!({ "$ref": format!("#{SCHEMAS}/{name}") })
+}
+
+/// The same API in OpenAPI 3.0.3, in as far as its generators can read it: of several forms of an answer the JSON one, and no path
+/// whose question or answer has none.
+pub(crate) fn as_3_0(document: &Value) -> Value {
+    let mut document = document.clone();
+    document["openapi"] = json!("3.0.3");
+    if let Some(license) = document.pointer_mut("/info/license").and_then(Value::as_object_mut) {
+        license.remove("identifier");
+    }
+    for_each_object(&mut document, &mut schema_as_3_0);
+    for_each_object(&mut document, &mut |object| {
+        if let Some(content) = object.get_mut("content").and_then(Value::as_object_mut)
+            && content.contains_key("application/json")
+        {
+            content.retain(|media, _| media == "application/json");
+        }
+    });
+    if let Some(paths) = document["paths"].as_object_mut() {
+        for item in paths.values_mut().filter_map(Value::as_object_mut) {
+            item.retain(|_, operation| {
+                let question = operation.pointer("/requestBody/content");
+                question.is_none_or(|content| content.get("application/json").is_some())
+            });
+        }
+        paths.retain(|_, item| item.as_object().is_some_and(|item| !item.is_empty()));
+    }
+    document
+}
+
+/// A schema's words of 3.1 in those of 3.0. Whatever else is an object has none of them.
+fn schema_as_3_0(object: &mut Map<String, Value>) {
+    // A field that is itself called `type` holds a schema, which is an object, and stays.
+    if let Some(Value::Array(types)) = object.get("type").cloned() {
+        let (null, others): (Vec<_>, Vec<_>) = types.into_iter().partition(|kind| kind == "null");
+        if let [kind] = &others[..] {
+            object.insert("type".into(), kind.clone());
+        }
+        if !null.is_empty() {
+            object.insert("nullable".into(), json!(true));
+        }
+    }
+    for (exclusive, inclusive) in [("exclusiveMinimum", "minimum"), ("exclusiveMaximum", "maximum")] {
+        if let Some(bound) = object.get(exclusive).filter(|bound| bound.is_number()).cloned() {
+            object.insert(inclusive.into(), bound);
+            object.insert(exclusive.into(), json!(true));
+        }
+    }
+    if let Some(value) = object.get("const").filter(|value| !value.is_object()).cloned() {
+        object.remove("const");
+        object.insert("enum".into(), json!([value]));
+    }
+    if let Some(Value::Array(examples)) = object.get("examples").cloned() {
+        object.remove("examples");
+        object.insert("example".into(), examples.into_iter().next().unwrap_or_default());
+    }
+    for word in ["propertyNames", "contentMediaType"] {
+        if object.get(word).is_some_and(|value| value.is_object() || value.is_string()) {
+            object.remove(word);
+        }
+    }
+    for choice in ["oneOf", "anyOf"] {
+        if let Some(variants) = object.get_mut(choice).and_then(Value::as_array_mut) {
+            let count = variants.len();
+            variants.retain(|variant| variant.get("type") != Some(&json!("null")));
+            if variants.len() < count {
+                object.insert("nullable".into(), json!(true));
+            }
+        }
+    }
+    // Beside a reference 3.0 reads nothing.
+    if object.len() > 1
+        && let Some(target) = object.get("$ref").filter(|target| target.is_string()).cloned()
+    {
+        object.remove("$ref");
+        object.insert("allOf".into(), json!([{ "$ref": target }]));
+    }
+}
+
+fn for_each_object(value: &mut Value, change: &mut impl FnMut(&mut Map<String, Value>)) {
+    match value {
+        Value::Object(object) => {
+            change(object);
+            object.values_mut().for_each(|value| for_each_object(value, change));
+        }
+        Value::Array(values) => values.iter_mut().for_each(|value| for_each_object(value, change)),
+        _ => {}
+    }
+}

@@ -1,0 +1,272 @@
+//! The running service: accepts connections, and stops in order.
+//!
+//! **Connections.** At most 1024 are open; the next one gets a fixed 503. The head of a request arrives within 30 s. A client that
+//! takes nothing of its answer for 30 s is disconnected by the kernel (`TCP_USER_TIMEOUT`). Slow clients are the proxy's work.
+
+use std::io::{self, Write as _};
+use std::net::SocketAddr;
+use std::pin::pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::Body;
+use futures_util::FutureExt as _;
+use hyper::body::Incoming;
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::server::graceful::GracefulShutdown;
+use hyper_util::service::TowerToHyperService;
+use rustix::process::{Resource, getrlimit, setrlimit};
+use socket2::SockRef;
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::time::{sleep, timeout};
+use tokio_util::sync::CancellationToken;
+use tower::util::MapRequest;
+
+use super::router::{self, Access};
+use crate::app::App;
+use crate::ops::config::{CLIENT_TIMEOUT_MS, MAX_CONNECTIONS, MAX_HEADER_BYTES, Settings};
+use crate::ops::metrics;
+
+/// The service listens at least this long after it says that it is not ready.
+const NOTICE: Duration = Duration::from_millis(200);
+
+/// Running computations are stopped this long before the end of a shutdown, so that their clients are told.
+const LAST_ANSWERS: Duration = Duration::from_millis(300);
+
+/// After an error of the listener itself, such as too many open files.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+
+/// Time for a connection over the limit to take its refusal.
+const REFUSAL_TIMEOUT: Duration = Duration::from_secs(1);
+
+/// What a connection over the limit gets.
+const REFUSAL: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\ncontent-type: application/problem+json\r\nretry-after: 1\r\ncontent-length: 219\r\nconnection: close\r\n\r\n{\"type\":\"urn:toothwave:problem:too_many_connections\",\"title\":\"Too many connections are open\",\"status\":503,\"detail\":\"1024 connections are open, the most that this service serves. Try again\",\"code\":\"too_many_connections\"}";
+
+static OPEN_CONNECTIONS: AtomicUsize = AtomicUsize::new(0);
+
+/// Connections that are open now.
+pub fn open_connections() -> usize {
+    OPEN_CONNECTIONS.load(Ordering::Relaxed)
+}
+
+/// Serves until a signal, then finishes running requests within the bound of the settings, or until a second signal.
+///
+/// # Errors
+/// If the address cannot be listened on, or the system refuses threads or signals.
+pub async fn serve(settings: &Settings) -> io::Result<()> {
+    metrics::install();
+    // First: without a handler, the first process of a container ignores signals.
+    let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
+    let mut told_to_stop = async || {
+        tokio::select! {
+            _ = terminate.recv() => {}
+            _ = interrupt.recv() => {}
+        }
+    };
+    raise_file_limit();
+    let listener = TcpListener::bind(settings.listen)
+        .await
+        .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", settings.listen)))?;
+    let address = listener.local_addr()?;
+    let app = App::start(settings.limits())?;
+    let server = Server::new(&app, settings, address);
+    greet(address);
+    tokio::spawn(metrics::upkeep());
+    watch_keys(settings)?;
+    let stopping = async {
+        told_to_stop().await;
+        tracing::info!("stopping: not ready any more, still listening");
+        app.ready.store(false, Ordering::Relaxed);
+        tokio::select! {
+            () = sleep(NOTICE.max(settings.lame_duck())) => false,
+            () = told_to_stop() => true,
+        }
+    };
+    let is_told_twice = tokio::select! {
+        twice = stopping => twice,
+        () = server.accept(&listener) => false,
+    };
+    if !is_told_twice {
+        server.accept_waiting(&listener);
+        drop(listener);
+        tokio::select! {
+            () = server.finish(&app, settings.shutdown()) => {}
+            () = told_to_stop() => tracing::warn!("told to stop again: running requests are given up"),
+        }
+    }
+    tracing::info!("stopped");
+    Ok(())
+}
+
+/// Reads the keys file again at each hang-up signal.
+fn watch_keys(settings: &Settings) -> io::Result<()> {
+    let Some(keys) = settings.keys_file.clone() else { return Ok(()) };
+    let mut hang_up = signal(SignalKind::hangup())?;
+    tokio::spawn(async move {
+        while hang_up.recv().await.is_some() {
+            keys.reload();
+        }
+    });
+    Ok(())
+}
+
+/// Raises the number of files that the process may open as far as it may; otherwise it stays.
+fn raise_file_limit() {
+    let mut files = getrlimit(Resource::Nofile);
+    files.current = files.maximum;
+    let _ = setrlimit(Resource::Nofile, files);
+}
+
+struct Server {
+    router: Router,
+    http: http1::Builder,
+    places: Arc<Semaphore>,
+    graceful: GracefulShutdown,
+    closing: CancellationToken,
+}
+
+impl Server {
+    fn new(app: &Arc<App>, settings: &Settings, address: SocketAddr) -> Self {
+        let keys = settings.keys_file.clone();
+        if keys.is_none() && !address.ip().is_loopback() {
+            tracing::warn!(%address, "anyone who reaches this address may use the service: no keys file is set");
+        }
+        let access = Access {
+            cors_origins: settings.cors_origins.clone(),
+            // The page of another site could let its own name resolve to this machine, and has no key.
+            checks_host: keys.is_none() && address.ip().is_loopback(),
+            keys,
+        };
+        let mut http = http1::Builder::new();
+        http.timer(TokioTimer::new()).header_read_timeout(Duration::from_millis(CLIENT_TIMEOUT_MS));
+        http.max_header_size(MAX_HEADER_BYTES);
+        Self {
+            router: router::router(Arc::clone(app), &access),
+            http,
+            places: Arc::new(Semaphore::new(MAX_CONNECTIONS)),
+            graceful: GracefulShutdown::new(),
+            closing: CancellationToken::new(),
+        }
+    }
+
+    /// Accepts connections for ever.
+    async fn accept(&self, listener: &TcpListener) {
+        loop {
+            match listener.accept().await {
+                Ok((stream, _)) => self.take(stream),
+                Err(error)
+                    if matches!(error.kind(), io::ErrorKind::ConnectionAborted | io::ErrorKind::ConnectionReset) => {}
+                Err(error) => {
+                    tracing::error!(%error, "cannot accept a connection");
+                    sleep(ACCEPT_PAUSE).await;
+                }
+            }
+        }
+    }
+
+    /// Accepts the connections that wait, which closing the listener would cut.
+    fn accept_waiting(&self, listener: &TcpListener) {
+        for _ in 0..MAX_CONNECTIONS {
+            let Some(Ok((stream, _))) = tokio::task::unconstrained(listener.accept()).now_or_never() else { return };
+            self.take(stream);
+        }
+    }
+
+    fn take(&self, stream: TcpStream) {
+        // Without it small answers may wait for the acknowledgement of earlier ones.
+        let _ = stream.set_nodelay(true);
+        #[cfg(target_os = "linux")]
+        let _ = SockRef::from(&stream).set_tcp_user_timeout(Some(Duration::from_millis(CLIENT_TIMEOUT_MS)));
+        match Arc::clone(&self.places).try_acquire_owned() {
+            Ok(place) => self.serve(stream, place),
+            Err(_) => {
+                tokio::spawn(timeout(REFUSAL_TIMEOUT, refuse(stream)));
+            }
+        }
+    }
+
+    fn serve(&self, stream: TcpStream, place: OwnedSemaphorePermit) {
+        let has_asked = Arc::new(AtomicBool::new(false));
+        let asked = Arc::clone(&has_asked);
+        let service = MapRequest::new(self.router.clone(), move |request: hyper::Request<Incoming>| {
+            asked.store(true, Ordering::Relaxed);
+            request.map(Body::new)
+        });
+        let connection = self.http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
+        let connection = self.graceful.watch(connection);
+        let closing = self.closing.clone();
+        OPEN_CONNECTIONS.fetch_add(1, Ordering::Relaxed);
+        tokio::spawn(async move {
+            let _place = place;
+            let has_said_nothing = async {
+                closing.cancelled().await;
+                sleep(NOTICE).await;
+                if has_asked.load(Ordering::Relaxed) {
+                    std::future::pending::<()>().await;
+                }
+            };
+            tokio::select! {
+                // An error of a connection is its client's to know. The request, if there was one, has its own line in the log.
+                _ = connection => {}
+                // Browsers open connections in advance: they do not delay a shutdown.
+                () = has_said_nothing => {}
+            }
+            OPEN_CONNECTIONS.fetch_sub(1, Ordering::Relaxed);
+        });
+    }
+
+    /// Waits until all requests are answered; near the end of `bound` it stops their computations.
+    async fn finish(self, app: &App, bound: Duration) {
+        self.closing.cancel();
+        let mut finished = pin!(self.graceful.shutdown());
+        if timeout(bound.saturating_sub(LAST_ANSWERS), finished.as_mut()).await.is_err() {
+            tracing::warn!("requests still run: their computations are stopped");
+            app.pool.stop();
+            let _ = timeout(LAST_ANSWERS, finished).await;
+        }
+    }
+}
+
+/// Answers a connection over the limit. Its request is read first: closing a connection with unread bytes resets it.
+async fn refuse(mut stream: TcpStream) -> io::Result<()> {
+    let mut head = [0; 4096];
+    let _ = stream.read(&mut head).await?;
+    stream.write_all(REFUSAL).await?;
+    stream.shutdown().await
+}
+
+/// Says where the service is and what to try.
+fn greet(address: SocketAddr) {
+    let text = format!(
+        "toothwave {} listens on http://{address}
+The designer's page: http://{address}/
+To try in another terminal:
+  curl -s http://{address}/v1/examples/paper-5.1 | curl -s --json @- http://{address}/v1/coincidence-degree
+  curl -s http://{address}/v1/examples/paper-5.1 | curl -s --json @- http://{address}/v1/sweep
+The API: http://{address}/docs
+",
+        env!("CARGO_PKG_VERSION")
+    );
+    // Standard output may be closed, or a pipe that nobody reads.
+    std::thread::spawn(move || io::stdout().write_all(text.as_bytes()));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::REFUSAL;
+
+    #[test]
+    fn refusal_is_complete_problem() {
+        let text = std::str::from_utf8(REFUSAL).expect("text");
+        let (head, body) = text.split_once("\r\n\r\n").expect("a head and a body");
+        assert!(head.contains(&format!("content-length: {}\r\n", body.len())), "{}", body.len());
+        let problem: serde_json::Value = serde_json::from_str(body).expect("JSON");
+        assert_eq!(problem["code"], "too_many_connections");
+    }
+}

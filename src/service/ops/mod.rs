@@ -1,0 +1,6 @@
+//! What operators see: settings, log, metrics, keys.
+
+pub mod config;
+pub mod keys;
+pub mod log;
+pub mod metrics;
