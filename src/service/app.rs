@@ -3,6 +3,7 @@
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 use crate::compute::budget::Budget;
 use crate::compute::cache::Cache;
@@ -41,6 +42,11 @@ impl App {
 
     /// The deadline of a request that arrives now.
     pub fn deadline(&self) -> Deadline {
-        Deadline::after(std::time::Duration::from_millis(self.limits.deadline_ms))
+        Deadline::after(self.deadline_span())
+    }
+
+    /// The time that a computation may take.
+    pub const fn deadline_span(&self) -> Duration {
+        Duration::from_millis(self.limits.deadline_ms)
     }
 }

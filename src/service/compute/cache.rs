@@ -20,7 +20,7 @@ use crate::http::negotiation::Representation;
 use crate::http::problem::Problem;
 
 /// Largest body that is kept.
-const MAX_BODY_BYTES: usize = 1 << 20;
+pub const MAX_BODY_BYTES: usize = 1 << 20;
 
 /// What an entry takes beside its body.
 const ENTRY_OVERHEAD_BYTES: usize = 640;

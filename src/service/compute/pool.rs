@@ -9,13 +9,13 @@
 
 use std::io;
 use std::panic::{self, AssertUnwindSafe};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use metrics::{counter, histogram};
-use rayon::{ThreadPool, ThreadPoolBuilder};
-use rustix::process::setpriority_process;
+use parking_lot::Mutex;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 use tokio_util::sync::CancellationToken;
 use tracing::Span;
@@ -34,27 +34,39 @@ const BACKGROUND_NICE: i32 = 10;
 /// Thirty years.
 const FAR_FUTURE: Duration = Duration::from_secs(30 * 365 * 24 * 3600);
 
+type Job = Box<dyn FnOnce() + Send>;
+
 /// The permits and threads of one kind of work.
 #[derive(Debug)]
 struct Lane {
     permits: Arc<Semaphore>,
-    threads: ThreadPool,
+    count: usize,
+    jobs: mpsc::Sender<Job>,
 }
 
 impl Lane {
-    fn start(name: &'static str, threads: usize, nice: i32) -> io::Result<Self> {
-        let renice = move |_| {
-            // Where the kernel refuses, background work competes as equal.
-            let _ = setpriority_process(None, nice);
-        };
-        let builder =
-            ThreadPoolBuilder::new().num_threads(threads).thread_name(move |number| format!("{name}-{number}"));
-        let threads_built = builder.start_handler(renice).build().map_err(io::Error::other)?;
-        Ok(Self { permits: Arc::new(Semaphore::new(threads)), threads: threads_built })
+    fn start(name: &str, count: usize, nice: i32) -> io::Result<Self> {
+        let (jobs, waiting) = mpsc::channel::<Job>();
+        let waiting = Arc::new(Mutex::new(waiting));
+        for number in 0..count {
+            let waiting = Arc::clone(&waiting);
+            thread::Builder::new().name(format!("{name}-{number}")).spawn(move || {
+                if nice > 0 {
+                    // Linux applies this to the thread. If it refuses, background work competes as equal.
+                    let _ = rustix::process::nice(nice);
+                }
+                loop {
+                    let next = waiting.lock().recv();
+                    let Ok(job) = next else { return };
+                    job();
+                }
+            })?;
+        }
+        Ok(Self { permits: Arc::new(Semaphore::new(count)), count, jobs })
     }
 
     fn running(&self) -> usize {
-        self.threads.current_num_threads() - self.permits.available_permits()
+        self.count - self.permits.available_permits()
     }
 }
 
@@ -103,7 +115,7 @@ impl Pool {
 
     /// Permits of each kind.
     pub fn permits(&self) -> usize {
-        self.0.interactive.threads.current_num_threads()
+        self.0.interactive.count
     }
 
     /// Computations that run now, of requests and in the background.
@@ -211,13 +223,14 @@ impl Pool {
         let mut stop = StopOnDrop { flag: Arc::clone(&flag), is_done: false };
         let (tell, told) = oneshot::channel();
         let span = Span::current();
-        lane.threads.spawn(move || {
+        let job = Box::new(move || {
             let result = span.in_scope(|| timed(|| caught(|| job(&flag))));
             // Whoever gets the result finds the permit free.
             drop(permit);
             // Nobody may wait any more.
             let _ = tell.send(result);
         });
+        lane.jobs.send(job).map_err(|error| Problem::internal(&error))?;
         tokio::select! {
             biased;
             result = told => {

@@ -25,7 +25,7 @@ use super::problem::{Problem, ProblemCode};
 use super::query::require_no_query;
 use crate::app::App;
 use crate::compute::budget::{Budget, FREE_BYTES, PART_OF_UNKNOWN_SIZE, Reservation};
-use crate::compute::cache::{Answer, CacheStatus, RequestHash};
+use crate::compute::cache::{Answer, CacheStatus, MAX_BODY_BYTES, RequestHash};
 use crate::compute::pool::{Deadline, within};
 
 /// Documents up to this size are read on the executor: that takes some tenths of a millisecond.
@@ -302,7 +302,12 @@ fn write<A: Forms>(
         let mut writer = Stoppable::new(buffer, stop);
         answer.write(format, &mut writer).map(|()| writer.inner)
     };
-    written.map(|bytes| bytes.into_boxed_slice().into()).map_err(|error| write_problem(&error, stop))
+    written.map(without_spare).map_err(|error| write_problem(&error, stop))
+}
+
+/// The bytes of a buffer without its spare capacity. A body that may be cached is copied: the pages of the buffer are used again at once.
+fn without_spare(bytes: Vec<u8>) -> Bytes {
+    if bytes.len() <= MAX_BODY_BYTES { Bytes::copy_from_slice(&bytes) } else { bytes.into_boxed_slice().into() }
 }
 
 /// Why an answer could not be written into memory.

@@ -1,12 +1,12 @@
 //! `POST /v1/batch`: many design documents for one endpoint, a line each, answered in their order while they are read.
 //!
-//! Each line is one computation in the background. As many lines are computed at once as there are permits; the client reads their
-//! answers, or no further line is begun.
+//! Lines that have arrived are answered together, 5 ms of them in one computation in the background. As many computations run at once as
+//! there are permits. If the client does not read the answers, no further line is begun.
 
 use std::io::{self, Write as _};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-use std::time::Duration;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use axum::body::Body;
 use axum::extract::rejection::QueryRejection;
@@ -43,6 +43,15 @@ use crate::ops::config::CLIENT_TIMEOUT_MS;
 
 /// What is read of a batch before its answer begins, behind a proxy: nginx passes on no more of a request once its answer has begun.
 const READ_AHEAD_BYTES: usize = 8 << 20;
+
+/// Lines that are answered together at most.
+const CHUNK_LINES: usize = 64;
+
+/// A computation begins no further line after this time.
+const SLICE: Duration = Duration::from_millis(5);
+
+/// A computation begins no further line after this many bytes of answers.
+const SLICE_BYTES: usize = 1 << 20;
 
 /// The media type of a batch and of its answers.
 const NDJSON: &str = "application/x-ndjson";
@@ -166,41 +175,40 @@ pub fn computed_line(query: BatchQuery, index: u64, document: &[u8], limits: &Li
     line.unwrap_or_else(|problem| problem_line(index, problem))
 }
 
-/// What comes of a document when it is read.
-enum Read<C> {
-    /// Its line: the answer is small.
+/// A document that waits for its answer, or the reason why there is none.
+type Line = (u64, Result<Bytes, Problem>);
+
+/// Computes the line of a large answer, which has to fit into its reservation.
+type Compute = Box<dyn FnOnce(Option<&Reservation>, &AtomicBool) -> Result<Vec<u8>, Problem> + Send>;
+
+/// What comes of a document.
+enum Outcome {
+    /// Its line.
     Line(Vec<u8>),
-    /// Its answer has to reserve this many bytes.
-    Large(C, u64),
+    /// Its answer has to reserve this many bytes first.
+    Large(u64, Compute),
 }
 
-async fn line<Q: Question>(app: &App, question: Q, index: u64, document: Bytes) -> Result<Bytes, Problem> {
-    let limits = app.limits.of_calculation();
-    let budget = app.budget.clone();
-    let time = Duration::from_millis(app.limits.deadline_ms);
-    let read = app.pool.run_in_background(time, move |stop| {
-        let checked = question.check(&Design::read(&document)?, &limits)?;
-        let bytes = bound::<Q>(&budget, &checked, Format::Json);
-        if bytes > FREE_BYTES {
-            return Ok(Read::Large(checked, bytes));
-        }
-        answered::<Q>(index, &checked, None, stop).map(Read::Line)
-    });
-    match read.await? {
-        Read::Line(line) => Ok(line.into()),
-        Read::Large(checked, bytes) => {
-            let reservation = app.budget.reserve(bytes).await?;
-            let job = move |stop: &AtomicBool| {
-                let line = answered::<Q>(index, &checked, reservation.as_ref(), stop)?;
-                Ok((settle(reservation, line.len()), line))
-            };
-            let (reservation, line) = app.pool.run_in_background(time, job).await?;
-            Ok(match &reservation {
-                Some(reservation) => Reservation::hold(reservation, line.into()),
-                None => line.into(),
-            })
-        }
+/// What one computation has done; it outlives the computation if the deadline ends that.
+#[derive(Default)]
+struct Progress {
+    current: Option<u64>,
+    outcomes: Vec<(u64, Outcome)>,
+}
+
+fn outcome<Q: Question>(
+    app: &App,
+    question: &Q,
+    index: u64,
+    document: &[u8],
+    stop: &AtomicBool,
+) -> Result<Outcome, Problem> {
+    let checked = question.check(&Design::read(document)?, &app.limits.of_calculation())?;
+    let bytes = bound::<Q>(&app.budget, &checked, Format::Json);
+    if bytes <= FREE_BYTES {
+        return answered::<Q>(index, &checked, None, stop).map(Outcome::Line);
     }
+    Ok(Outcome::Large(bytes, Box::new(move |reservation, stop| answered::<Q>(index, &checked, reservation, stop))))
 }
 
 fn answered<Q: Question>(
@@ -218,8 +226,98 @@ fn answered<Q: Question>(
     answer_line(index, &answer, stop)
 }
 
+/// Answers lines until the time or the bytes of a slice are used up.
+fn work(app: &App, query: BatchQuery, lines: Vec<Line>, progress: &Mutex<Progress>, stop: &AtomicBool) {
+    let (started, mut bytes) = (Instant::now(), 0);
+    for (index, document) in lines {
+        progress.lock().current = Some(index);
+        let outcome = caught(|| match (document, query.endpoint) {
+            (Err(problem), _) => Err(problem),
+            (Ok(document), BatchEndpoint::Geometry) => outcome(app, &Geometry, index, &document, stop),
+            (Ok(document), BatchEndpoint::CoincidenceDegree) => {
+                outcome(app, &CoincidenceDegree, index, &document, stop)
+            }
+            (Ok(document), BatchEndpoint::Sweep) if query.peaks_only => {
+                outcome(app, &PeaksOnly, index, &document, stop)
+            }
+            (Ok(document), BatchEndpoint::Sweep) => outcome(app, &Sweep, index, &document, stop),
+        });
+        let mut progress = progress.lock();
+        // If the deadline has ended this line, its problem is told already.
+        if stop.load(Ordering::Relaxed) || progress.current.take() != Some(index) {
+            return;
+        }
+        let outcome = outcome.unwrap_or_else(|problem| Outcome::Line(problem_line(index, problem)));
+        bytes += if let Outcome::Line(line) = &outcome { line.len() } else { 0 };
+        progress.outcomes.push((index, outcome));
+        if started.elapsed() >= SLICE || bytes >= SLICE_BYTES {
+            return;
+        }
+    }
+}
+
+/// One computation further: what comes of at least the first of the lines, which are then removed.
+async fn advance(app: &Arc<App>, query: BatchQuery, lines: &mut Vec<Line>) -> Vec<(u64, Outcome)> {
+    let progress = Arc::new(Mutex::new(Progress::default()));
+    let job = {
+        let (app, progress, lines) = (Arc::clone(app), Arc::clone(&progress), lines.clone());
+        move |stop: &AtomicBool| {
+            work(&app, query, lines, &progress, stop);
+            Ok(())
+        }
+    };
+    let result = app.pool.run_in_background(app.deadline_span() + SLICE, job).await;
+    let mut progress = progress.lock();
+    let mut outcomes = std::mem::take(&mut progress.outcomes);
+    if let Err(problem) = result {
+        // Of the line that was computed. If none was, as when the service stops, of the next one: so every batch ends.
+        let next = lines.get(outcomes.len()).map(|(index, _)| *index).filter(|_| outcomes.is_empty());
+        if let Some(index) = progress.current.take().or(next) {
+            outcomes.push((index, Outcome::Line(problem_line(index, problem))));
+        }
+    }
+    lines.drain(..outcomes.len());
+    outcomes
+}
+
+/// The lines of a large answer, with the bytes that it has reserved.
+async fn large(app: &App, index: u64, bytes: u64, compute: Compute) -> Bytes {
+    let line = async {
+        let reservation = app.budget.reserve(bytes).await?;
+        let job = move |stop: &AtomicBool| {
+            let line = compute(reservation.as_ref(), stop)?;
+            Ok((settle(reservation, line.len()), line))
+        };
+        let (reservation, line) = app.pool.run_in_background(app.deadline_span(), job).await?;
+        Ok(match &reservation {
+            Some(reservation) => Reservation::hold(reservation, line.into()),
+            None => line.into(),
+        })
+    };
+    line.await.unwrap_or_else(|problem| problem_line(index, problem).into())
+}
+
+/// All answers of some lines: short ones together, large ones by themselves.
+async fn answer_all(app: Arc<App>, query: BatchQuery, mut lines: Vec<Line>) -> (u64, Vec<Bytes>) {
+    let (mut parts, mut short, mut count) = (Vec::new(), Vec::new(), 0);
+    while !lines.is_empty() {
+        for (index, outcome) in advance(&app, query, &mut lines).await {
+            count += 1;
+            match outcome {
+                Outcome::Line(line) => short.extend_from_slice(&line),
+                Outcome::Large(bytes, compute) => {
+                    parts.push(std::mem::take(&mut short).into());
+                    parts.push(large(&app, index, bytes, compute).await);
+                }
+            }
+        }
+    }
+    parts.push(short.into());
+    (count, parts)
+}
+
 /// The lines of a body that are not blank, until it ends; what ends it otherwise goes to `end`.
-fn lines(app: Arc<App>, body: Body, end: Arc<Mutex<BatchEnd>>) -> impl Stream<Item = (u64, Result<Bytes, Problem>)> {
+fn lines(app: Arc<App>, body: Body, end: Arc<Mutex<BatchEnd>>) -> impl Stream<Item = Line> {
     let limit = app.limits.max_body_bytes;
     let reader = StreamReader::new(body.into_data_stream().map_err(io::Error::other));
     // One byte more, for the carriage return of other systems.
@@ -272,26 +370,14 @@ fn answers(app: Arc<App>, query: BatchQuery, body: Body) -> impl Stream<Item = B
     let end = Arc::new(Mutex::new(BatchEnd::default()));
     let at_once = app.pool.permits();
     let (counted, ending) = (Arc::clone(&end), Arc::clone(&end));
-    let computed = lines(Arc::clone(&app), body, end).map(move |(index, document)| {
-        let app = Arc::clone(&app);
-        async move {
-            let line = match (document, query.endpoint) {
-                (Err(problem), _) => Err(problem),
-                (Ok(document), BatchEndpoint::Geometry) => line(&app, Geometry, index, document).await,
-                (Ok(document), BatchEndpoint::CoincidenceDegree) => {
-                    line(&app, CoincidenceDegree, index, document).await
-                }
-                (Ok(document), BatchEndpoint::Sweep) if query.peaks_only => {
-                    line(&app, PeaksOnly, index, document).await
-                }
-                (Ok(document), BatchEndpoint::Sweep) => line(&app, Sweep, index, document).await,
-            };
-            line.unwrap_or_else(|problem| problem_line(index, problem).into())
-        }
+    let chunks = lines(Arc::clone(&app), body, end).ready_chunks(CHUNK_LINES);
+    let answered = chunks.map(move |lines| answer_all(Arc::clone(&app), query, lines)).buffered(at_once);
+    let parts = answered.flat_map(move |(count, parts)| {
+        counted.lock().answered += count;
+        stream::iter(parts.into_iter().filter(|part| !part.is_empty()))
     });
-    let computed = computed.buffered(at_once).inspect(move |_| counted.lock().answered += 1);
     // Made when all lines before it have been given out.
-    computed.chain(stream::once(async move { ending.lock().line().into() }))
+    parts.chain(stream::once(async move { ending.lock().line().into() }))
 }
 
 /// A body whose beginning, or all of it, has arrived.
