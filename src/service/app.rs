@@ -29,7 +29,7 @@ pub struct App {
 impl App {
     /// An idle service within these limits, which keeps studies in memory.
     pub fn new(limits: Limits) -> Arc<Self> {
-        Self::keeping(Pool::new(limits), limits, Keeping::Memory)
+        Self::keeping(Pool::new(limits), limits, Keeping::in_memory())
     }
 
     /// An idle service within these limits, which the pool is within too, with its studies kept somewhere.
@@ -38,7 +38,7 @@ impl App {
         let pool = pool.beside(&room);
         Arc::new(Self {
             limits,
-            studies: Studies::new(pool.clone(), room.clone(), limits, keeping),
+            studies: Studies::new(pool.clone(), limits, keeping),
             pool,
             cache: Cache::new(limits.cache_max_bytes),
             room,

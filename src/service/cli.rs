@@ -27,12 +27,11 @@ use toothwave_calculation::forms::{Format, Forms};
 use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::question::{Limits, Question};
 use toothwave_calculation::sweep::Sweep;
-use toothwave_store::{Address, SCHEMA_VERSION, Store};
 use toothwave_study::{Gathered, Study, StudyAnswer, Work};
 use tracing_subscriber::EnvFilter;
 
 use crate::api::batch::{BatchEnd, BatchEndpoint, BatchQuery, answer_line};
-use crate::config::{Settings, StoreSettings, WorkerSettings};
+use crate::config::Settings;
 use crate::problem::Problem;
 use crate::room::Room;
 use crate::{keys, log, memory, observe, router, serve};
@@ -90,10 +89,12 @@ enum Command {
         #[arg(long, value_parser = one_of(&FORMATS), default_value = "json")]
         format: Format,
     },
-    /// Compute chunks of the studies that a PostgreSQL database holds, until told to stop
-    Worker(WorkerSettings),
-    /// Bring the database of studies to the schema of this build
-    Migrate(StoreSettings),
+    /// Commands of earlier builds
+    #[command(hide = true, aliases = ["migrate"])]
+    Worker {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        _any: Vec<OsString>,
+    },
     /// Ask a running service whether it is well; exit status 0 if so
     Health {
         /// Where it listens
@@ -173,8 +174,10 @@ pub fn run() -> ExitCode {
         Command::Draw { part, file, format } => answer(Drawing(part), &file, format),
         Command::Batch { file, endpoint, peaks_only } => batch(&file, BatchQuery { endpoint, peaks_only }),
         Command::Study { file, format } => study(&file, format),
-        Command::Worker(settings) => run_worker(&settings),
-        Command::Migrate(settings) => migrate(&settings),
+        Command::Worker { .. } => Err(Failure::BadInput(
+            "the commands `worker` and `migrate` were removed: `toothwave --studies FILE` computes its studies itself"
+                .into(),
+        )),
         Command::Health { address } => health(address),
         Command::NewKey { name } => new_key(&name),
         Command::Openapi => print(|writer| writer.write_all(router::openapi_json().as_bytes())),
@@ -286,13 +289,13 @@ fn arguments() -> Vec<OsString> {
     arguments
 }
 
-/// Threads on which a database's name is looked up. Where nobody answers each takes its time, whoever gave it up.
-const LOOK_UPS: usize = 4;
+/// Threads that wait for the file of studies, of which one at a time has it.
+const WAITING_THREADS: usize = 4;
 
 /// An executor, whose other threads nothing is solved on. Where the system refuses one of its own it would wait for the others for ever, but that such a panic ends the
 /// process.
 fn runtime() -> io::Result<Runtime> {
-    let runtime = with_threads(Builder::new_multi_thread().enable_all(), LOOK_UPS)?;
+    let runtime = with_threads(Builder::new_multi_thread().enable_all(), WAITING_THREADS)?;
     runtime.block_on(async {
         // Who is once waited for ends the process no more: a file that is as large as it may be, a log for instance, is an error like others, and
         // keys may be told to be read again before anybody does so.
@@ -326,47 +329,14 @@ fn end(runtime: Runtime, solves: Runtime) {
 }
 
 fn run_service(settings: &Settings) -> Result<(), Failure> {
-    let address = settings.store.address().map_err(Failure::BadInput)?;
-    let parts = settings.parts.of_service(address.as_ref()).map_err(Failure::BadInput)?;
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
     memory::keep_pages_small();
     log::start(filter)?;
     let (solves, runtime) = (threads_of_solves(settings.limits().max_concurrent_solves)?, runtime()?);
-    let result = runtime.block_on(serve::serve(settings, address.as_ref(), parts, solves.handle()));
+    let result = runtime.block_on(serve::serve(settings, solves.handle()));
     end(runtime, solves);
     log::flush();
     Ok(result?)
-}
-
-/// The database that the settings name: a file would be one process's alone.
-fn shared_database(settings: &StoreSettings) -> Result<Address, Failure> {
-    match settings.address().map_err(Failure::BadInput)? {
-        Some(address) if address.is_shared() => Ok(address),
-        Some(file) => Err(Failure::BadInput(format!(
-            "{file}: a file serves one process, the service, which computes its studies itself; workers share `postgres://…`"
-        ))),
-        None => Err(Failure::BadInput("`--studies postgres://…` names the database that holds the studies".into())),
-    }
-}
-
-fn run_worker(settings: &WorkerSettings) -> Result<(), Failure> {
-    let address = shared_database(&settings.store)?;
-    let parts = settings.parts.parts().map_err(Failure::BadInput)?;
-    let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
-    memory::keep_pages_small();
-    log::start(filter)?;
-    let (solves, runtime) = (threads_of_solves(settings.limits().max_concurrent_solves)?, runtime()?);
-    let result = runtime.block_on(serve::serve_chunks(settings, &address, parts, solves.handle()));
-    end(runtime, solves);
-    log::flush();
-    Ok(result?)
-}
-
-fn migrate(settings: &StoreSettings) -> Result<(), Failure> {
-    let address = shared_database(settings)?;
-    let runtime = Builder::new_current_thread().enable_all().build()?;
-    let before = runtime.block_on(async { Store::open(&address).await?.migrate().await }).map_err(io::Error::other)?;
-    print(|writer| writeln!(writer, "{address}: schema {before} before, {SCHEMA_VERSION} now"))
 }
 
 /// Without a server only memory limits what is computed: some two gigabytes of it.
@@ -526,7 +496,7 @@ mod tests {
 
     use clap::Parser as _;
 
-    use super::{Cli, Command, LOOK_UPS, end, runtime, threads_of_solves};
+    use super::{Cli, Command, WAITING_THREADS, end, runtime, threads_of_solves};
     use crate::compute::{Lane, Pool, Thread};
     use crate::problem::Problem;
 
@@ -541,7 +511,7 @@ mod tests {
         let solves = threads_of_solves(limits.max_concurrent_solves).expect("threads");
         let answer = runtime.block_on(async {
             let pool = Pool::new(limits).on(solves.handle());
-            let look_ups = (0..2 * LOOK_UPS).map(|_| {
+            let look_ups = (0..2 * WAITING_THREADS).map(|_| {
                 let (release, released) = mpsc::channel::<()>();
                 tokio::task::spawn_blocking(move || released.recv());
                 release

@@ -1,6 +1,5 @@
 //! Settings of the service: each a flag and a `TOOTHWAVE_…` variable.
 
-use std::fs;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -10,13 +9,11 @@ use axum::http::Uri;
 use clap::Args;
 use serde::Serialize;
 use toothwave_calculation::question;
-use toothwave_store::Address;
 use tracing_subscriber::EnvFilter;
 use utoipa::ToSchema;
 
 use crate::keys::Keys;
 use crate::machine;
-use crate::parts::Parts;
 use crate::room::SMALL_BYTES;
 
 /// Solves that may be allowed to run or to wait: more than any machine can, fewer than a semaphore can count.
@@ -60,9 +57,6 @@ const STATE_BYTES: u64 = 320;
 /// What a point takes in the longest form, STEP.
 const POINT_BYTES: u64 = 800;
 
-/// Chunks that a worker may compute at once: each holds a connection to the database.
-const MOST_CHUNKS: i64 = 1000;
-
 /// Bytes of a request's line and headers together, at most.
 pub const MAX_HEADER_BYTES: usize = 40_960;
 
@@ -105,7 +99,7 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_CACHE_MAX_BYTES", value_name = "BYTES")]
     pub cache_max_bytes: Option<u64>,
 
-    /// Most bytes of answers that nobody has read yet: being made, in batches, on their way, those up to 256 KiB not counted; of bodies above 128 KiB that arrive; and of studies that are kept
+    /// Most bytes of answers that nobody has read yet: being made, in batches, on their way, those up to 256 KiB not counted; and of bodies above 128 KiB that arrive
     /// [default: 512 MiB for each solve that runs at once, or half of the memory but for 64 MiB and 4 MiB for each solve beyond six]
     #[arg(long, env = "TOOTHWAVE_MAX_UNREAD_BYTES", value_name = "BYTES")]
     pub max_unread_bytes: Option<u64>,
@@ -114,7 +108,7 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_MAX_STUDY_VARIANTS", value_name = "N", default_value_t = 10_000_000)]
     pub max_study_variants: u64,
 
-    /// Most bytes that all studies which are kept in memory come to, and of stored ones those whose results are being read; they count as unread, those up to 256 KiB as far as there is room [default: 256 MiB, or a quarter of max-unread-bytes]
+    /// Most bytes that a study takes with its result, and without a file all studies together [default: 256 MiB, or a quarter of max-unread-bytes]
     #[arg(long, env = "TOOTHWAVE_MAX_STUDY_BYTES", value_name = "BYTES")]
     pub max_study_bytes: Option<u64>,
 
@@ -122,23 +116,19 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_STUDIES", value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(..=MOST_SOLVES))]
     pub max_concurrent_studies: u32,
 
-    /// Milliseconds after which a study that this process computes breaks off; those on PostgreSQL go on until they are cancelled
+    /// Milliseconds after which a study breaks off
     #[arg(long, env = "TOOTHWAVE_STUDY_DEADLINE_MS", value_name = "MS", default_value_t = 3_600_000)]
     pub study_deadline_ms: u64,
 
-    /// Where studies are kept
+    /// File in which studies are kept, or `off` for none [default: in memory]
+    #[arg(long, env = "TOOTHWAVE_STUDIES", value_name = "FILE|off", value_parser = studies)]
+    pub studies: Option<StudiesPlace>,
+
+    /// Settings of earlier builds
     #[command(flatten)]
-    pub store: StoreSettings,
+    pub removed: RemovedSettings,
 
-    /// Where their rows are kept
-    #[command(flatten)]
-    pub parts: PartsSettings,
-
-    /// Replicas of the service that answer in turn: of several, each refuses studies unless they share a PostgreSQL database
-    #[arg(long, env = "TOOTHWAVE_REPLICAS", value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
-    pub replicas: u32,
-
-    /// Seconds after which a stored study that nobody has asked for is forgotten
+    /// Seconds after which a study that nobody has asked for is forgotten
     #[arg(long, env = "TOOTHWAVE_STUDY_EXPIRY_S", value_name = "S", default_value_t = 2_592_000)]
     pub study_expiry_s: u64,
 
@@ -172,128 +162,39 @@ pub struct Settings {
     pub log: String,
 }
 
-/// Where studies are kept.
-#[derive(Debug, Clone, Args)]
-pub struct StoreSettings {
-    /// File in which studies are kept, or `postgres://USER@HOST/DATABASE` [default: none, in memory]
-    #[arg(long, env = "TOOTHWAVE_STUDIES", value_name = "FILE|ADDRESS", hide_env_values = true)]
-    pub studies: Option<String>,
-
-    /// File that holds the database's password; PGPASSWORD may hold it too
-    #[arg(long, env = "TOOTHWAVE_STUDIES_PASSWORD_FILE", value_name = "FILE")]
-    pub studies_password_file: Option<PathBuf>,
+/// Where studies are kept, if not in memory.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum StudiesPlace {
+    /// Nowhere.
+    Off,
+    /// In this file.
+    File(PathBuf),
 }
 
-/// Where rows of studies are kept besides.
-#[derive(Debug, Clone, Args)]
-pub struct PartsSettings {
-    /// Folder in which the rows of stored studies that this process computes are kept besides, a Parquet file for each chunk [default: none]
-    #[arg(long, env = "TOOTHWAVE_STUDY_PARTS", value_name = "FOLDER")]
-    pub study_parts: Option<PathBuf>,
-}
-
-impl PartsSettings {
-    /// Where rows are kept, if anywhere.
-    ///
-    /// # Errors
-    /// Where there is no such folder.
-    pub fn parts(&self) -> Result<Option<Parts>, String> {
-        self.study_parts.as_deref().map(Parts::new).transpose().map_err(|error| error.to_string())
-    }
-
-    /// The same of a service that keeps its studies there.
-    ///
-    /// # Errors
-    /// Besides where it computes none that are kept.
-    pub fn of_service(&self, studies: Option<&Address>) -> Result<Option<Parts>, String> {
-        let parts = self.parts()?;
-        match studies {
-            None if parts.is_some() => {
-                Err("`--study-parts` is for studies that are kept: name a file for them by `--studies`".into())
-            }
-            Some(address) if address.is_shared() && parts.is_some() => {
-                Err("`--study-parts` is for those who compute: of studies on a database that is `toothwave worker`"
-                    .into())
-            }
-            _ => Ok(parts),
+fn studies(text: &str) -> Result<StudiesPlace, String> {
+    match text {
+        "off" => Ok(StudiesPlace::Off),
+        "" | ":memory:" => Err("name a file; without this setting studies are kept in memory".into()),
+        address if address.starts_with("postgres:") || address.starts_with("postgresql:") => {
+            Err("studies are kept in a file of one service, no longer in PostgreSQL: use `--studies FILE`".into())
         }
+        file => Ok(StudiesPlace::File(file.into())),
     }
 }
 
-impl StoreSettings {
-    /// Where studies are kept, if not in memory.
-    ///
-    /// # Errors
-    /// Where the address is none or holds a password, or the password's file cannot be read. The text names no password.
-    pub fn address(&self) -> Result<Option<Address>, String> {
-        let Some(studies) = &self.studies else { return Ok(None) };
-        let password = match &self.studies_password_file {
-            Some(file) => {
-                let text = fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
-                Some(text.trim_end_matches(['\r', '\n']).to_owned())
-            }
-            None => None,
-        };
-        Address::new(studies, password.as_deref()).map(Some).map_err(|error| error.to_string())
-    }
-}
-
-/// The settings of `toothwave worker`.
+/// Settings that earlier builds had: each ends the start with a sentence that names its replacement.
 #[derive(Debug, Clone, Args)]
-pub struct WorkerSettings {
-    /// Where studies are kept
-    #[command(flatten)]
-    pub store: StoreSettings,
-
-    /// Where their rows are kept
-    #[command(flatten)]
-    pub parts: PartsSettings,
-
-    /// Chunks that are computed at once, and of up to three other studies one each beside them; at most one for each 32 MiB of the memory [default: the cores that the process may use]
-    #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_SOLVES", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_CHUNKS))]
-    pub max_concurrent_solves: Option<u32>,
-
-    /// Milliseconds that chunks which are begun get to come to their end after a signal to stop
-    #[arg(long, env = "TOOTHWAVE_SHUTDOWN_MS", value_name = "MS", default_value_t = 8_000)]
-    pub shutdown_ms: u64,
-
-    /// What is logged, as tracing-subscriber's EnvFilter reads it
-    #[arg(long, env = "TOOTHWAVE_LOG", value_name = "FILTER", default_value = "info", value_parser = log_filter)]
-    pub log: String,
+pub struct RemovedSettings {
+    #[arg(long, env = "TOOTHWAVE_REPLICAS", hide = true, value_parser = |_: &str| removed("let one service with `--studies FILE` take all studies, and start the others with `--studies off`"))]
+    replicas: Option<()>,
+    #[arg(long, env = "TOOTHWAVE_STUDY_PARTS", hide = true, value_parser = |_: &str| removed("read `/v1/studies/{id}/result` as Parquet"))]
+    study_parts: Option<()>,
+    #[arg(long, env = "TOOTHWAVE_STUDIES_PASSWORD_FILE", hide = true, value_parser = |_: &str| removed("use `--studies FILE`, which needs no password"))]
+    studies_password_file: Option<()>,
 }
 
-impl WorkerSettings {
-    /// Limits of a process that only computes chunks: each was admitted with its study.
-    pub fn limits(&self) -> Limits {
-        self.limits_of(machine::memory_bytes().unwrap_or(UNKNOWN_MEMORY_BYTES), cores())
-    }
-
-    /// Those on a machine with so much memory and so many cores for the process.
-    fn limits_of(&self, memory_bytes: u64, cores: usize) -> Limits {
-        Limits {
-            max_states: u64::MAX,
-            max_profile_points: u64::MAX,
-            max_body_bytes: 0,
-            // More threads would keep all of the memory between them, and leave none for what they compute.
-            max_concurrent_solves: self
-                .max_concurrent_solves
-                .map_or(cores, |solves| solves as usize)
-                .min(that_fit(memory_bytes, MEMORY_PER_SOLVE_BYTES)),
-            max_queued_solves: 0,
-            max_concurrent_batches: 0,
-            deadline_ms: u64::MAX,
-            cache_max_bytes: 0,
-            // It has no answers: variants take their part of all of the memory.
-            max_unread_bytes: memory_bytes,
-            max_study_variants: u64::MAX,
-            max_study_bytes: u64::MAX,
-            max_concurrent_studies: 0,
-            study_deadline_ms: u64::MAX,
-            max_connections: 0,
-            max_header_bytes: 0,
-            header_timeout_ms: 0,
-        }
-    }
+fn removed(replacement: &str) -> Result<(), String> {
+    Err(format!("this setting was removed: {replacement}"))
 }
 
 fn that_fit(memory_bytes: u64, each_bytes: u64) -> usize {
@@ -319,16 +220,15 @@ pub struct Limits {
     pub deadline_ms: u64,
     /// Most bytes of answers that the cache keeps.
     pub cache_max_bytes: u64,
-    /// Most bytes of answers that nobody has read yet: being made, in batches, on their way, those up to 256 KiB not counted; of bodies above 128 KiB that arrive; and of studies that are kept.
+    /// Most bytes of answers that nobody has read yet: being made, in batches, on their way, those up to 256 KiB not counted; and of bodies above 128 KiB that arrive.
     pub max_unread_bytes: u64,
     /// Most variants of a study.
     pub max_study_variants: u64,
-    /// Most bytes that all studies which are kept in memory come to, and of stored ones those whose results are being read; they are taken
-    /// of `max_unread_bytes`.
+    /// Most bytes that a study takes with its result, and without a file all studies together.
     pub max_study_bytes: u64,
     /// Studies that may run at once.
     pub max_concurrent_studies: usize,
-    /// Milliseconds after which a study that this process computes breaks off; one that a database shares goes on until it is cancelled.
+    /// Milliseconds after which a study breaks off.
     pub study_deadline_ms: u64,
     /// Connections that may be open at once.
     pub max_connections: usize,
@@ -486,19 +386,17 @@ mod tests {
     }
 
     #[test]
-    fn a_worker_has_no_more_slots_than_its_memory_has_room_for() {
-        #[derive(clap::Parser)]
-        struct WorkerLine {
-            #[command(flatten)]
-            settings: super::WorkerSettings,
+    fn removed_settings_name_their_replacement() {
+        for (words, replacement) in [
+            (["serve", "--replicas", "2"], "--studies off"),
+            (["serve", "--study-parts", "parts"], "/result"),
+            (["serve", "--studies-password-file", "password"], "--studies FILE"),
+            (["serve", "--studies", "postgres://any@db/studies"], "--studies FILE"),
+            (["serve", "--studies", ":memory:"], "name a file"),
+        ] {
+            let refused = Line::try_parse_from(words).err().map(|error| error.to_string()).unwrap_or_default();
+            assert!(refused.contains(replacement), "{refused}");
         }
-        let slots = |words: &[&str], memory_bytes| {
-            let line = WorkerLine::parse_from(words);
-            line.settings.limits_of(memory_bytes, 32).max_concurrent_solves
-        };
-        let words = ["worker", "--studies", "studies.sqlite", "--max-concurrent-solves", "16"];
-        assert_eq!([1 << 20, 128 << 20, 64 << 30].map(|bytes| slots(&words[..3], bytes)), [1, 4, 32]);
-        assert_eq!([128 << 20, 64 << 30].map(|bytes| slots(&words, bytes)), [4, 16], "nor where more are asked for");
     }
 
     #[test]

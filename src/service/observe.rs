@@ -20,7 +20,6 @@ use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use metrics_process::Collector;
 use toothwave_calculation::BUILD;
 use toothwave_calculation::json::word;
-use toothwave_store::Figures;
 use tracing::{Instrument, Span};
 
 use crate::app::App;
@@ -64,16 +63,6 @@ fn describe() {
     describe_counter!("toothwave_batch_documents_total", "Documents of batches answered.");
     describe_gauge!("toothwave_studies_running", "Studies that run.");
     describe_counter!("toothwave_study_variants_total", "Variants of studies looked at.");
-    describe_gauge!("toothwave_stored_studies", "Studies that the store holds.");
-    describe_gauge!("toothwave_study_chunks_done", "Chunks of stored studies that have a result.");
-    describe_gauge!(
-        "toothwave_study_chunks_waiting",
-        "Chunks of stored studies that have none yet, those in work among them."
-    );
-    describe_gauge!("toothwave_study_chunks_in_work", "Chunks of stored studies that somebody computes.");
-    describe_gauge!("toothwave_study_attempts", "Attempts at the chunks of stored studies.");
-    describe_gauge!("toothwave_study_gaps", "Chunks of stored studies that were given up.");
-    describe_gauge!("toothwave_study_oldest_age_seconds", "Since the oldest stored study that runs was asked for.");
     describe_counter!("toothwave_refusals_total", "Requests that were not taken on, by the reason.");
     describe_counter!("toothwave_cancellations_total", "Computations that were stopped.");
     describe_gauge!("toothwave_connections", "Connections that are open.");
@@ -108,21 +97,6 @@ pub fn render(app: &App) -> String {
         gauge!("toothwave_solves_queued").set(app.pool.waiting() as f64);
         gauge!("toothwave_connections").set(socket::open() as f64);
         gauge!("toothwave_unread_bytes").set(app.room.taken_bytes() as f64);
-    }
-    if let Some(figures) = app.studies.figures() {
-        let Figures { studies, done, waiting, in_work, attempts, gaps, oldest, .. } = figures;
-        for (name, count) in [
-            ("toothwave_stored_studies", studies),
-            ("toothwave_study_chunks_done", done),
-            ("toothwave_study_chunks_waiting", waiting),
-            ("toothwave_study_chunks_in_work", in_work),
-            ("toothwave_study_attempts", attempts),
-            ("toothwave_study_gaps", gaps),
-            ("toothwave_study_oldest_age_seconds", oldest.as_secs()),
-        ] {
-            #[expect(clippy::cast_precision_loss, reason = "a gauge")]
-            gauge!(name).set(count as f64);
-        }
     }
     gauge!("toothwave_build_info", "version" => env!("CARGO_PKG_VERSION"), "build" => BUILD).set(1.0);
     counter!("toothwave_sent_bytes_total").absolute(socket::sent_bytes());

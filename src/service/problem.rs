@@ -10,7 +10,6 @@ use serde::Serialize;
 use toothwave_calculation::field::FieldError;
 use toothwave_calculation::json;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode, clip};
-use toothwave_store::StoreError;
 use utoipa::ToSchema;
 
 /// The media type of problems.
@@ -112,9 +111,9 @@ pub enum ProblemCode {
     TooManyConnections,
     /// 503: so many bytes of answers are on their way to clients that there is no room for another.
     TooManyUnreadBytes,
-    /// 501: this is one of several replicas, and they share no store of studies.
-    NoSharedStore,
-    /// 503: the store of studies does not answer, or has another schema.
+    /// 501: the service was started without studies.
+    StudiesOff,
+    /// 503: the file of studies cannot be read or written, for instance because the disk is full.
     StoreUnavailable,
     /// 500: a fault of the service itself.
     InternalError,
@@ -147,7 +146,7 @@ impl ProblemCode {
             | Self::TooManyConnections
             | Self::TooManyUnreadBytes
             | Self::StoreUnavailable => StatusCode::SERVICE_UNAVAILABLE,
-            Self::NoSharedStore => StatusCode::NOT_IMPLEMENTED,
+            Self::StudiesOff => StatusCode::NOT_IMPLEMENTED,
             Self::InternalError => StatusCode::INTERNAL_SERVER_ERROR,
         }
     }
@@ -178,8 +177,8 @@ impl ProblemCode {
             Self::ShuttingDown => "The service is stopping",
             Self::TooManyConnections => "Too many connections are open",
             Self::TooManyUnreadBytes => "Clients have too many bytes of answers to read",
-            Self::NoSharedStore => "The replicas share no store of studies",
-            Self::StoreUnavailable => "The store of studies does not answer",
+            Self::StudiesOff => "This service takes no studies",
+            Self::StoreUnavailable => "The file of studies cannot be used now",
             Self::InternalError => "The service failed",
         }
     }
@@ -193,7 +192,7 @@ impl ProblemCode {
         Self::TooManyConnections,
         Self::TooManyUnreadBytes,
         Self::MisdirectedRequest,
-        Self::NoSharedStore,
+        Self::StudiesOff,
         Self::StoreUnavailable,
     ];
 }
@@ -222,18 +221,6 @@ impl From<NoAnswer> for Problem {
             NoAnswerCode::InternalError => Self::internal(&detail),
             _ => Self::at_fields(code.into(), detail, errors),
         }
-    }
-}
-
-/// What exactly is wrong with it is the operator's to know.
-impl From<StoreError> for Problem {
-    fn from(error: StoreError) -> Self {
-        tracing::warn!(%error, "the studies' store fails");
-        let detail = match error {
-            StoreError::OtherSchema { .. } | StoreError::InWork => error.to_string(),
-            _ => "the studies' store does not answer as it should; try again in a moment".into(),
-        };
-        Self::new(ProblemCode::StoreUnavailable, detail)
     }
 }
 

@@ -25,28 +25,21 @@ use tokio::task::{AbortHandle, unconstrained};
 use tokio::time::{Instant, sleep, timeout_at};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
-use toothwave_calculation::BUILD;
-use toothwave_store::{Address, Store};
 use tower::util::MapRequest;
 
 use crate::app::App;
 use crate::compute::Pool;
-use crate::config::{Limits, MAX_HEADER_BYTES, Settings, WorkerSettings};
+use crate::config::{Limits, MAX_HEADER_BYTES, Settings, StudiesPlace};
 use crate::observe;
-use crate::parts::Parts;
 use crate::router::{self, Entry};
 use crate::socket::{Seen, Socket};
-use crate::studies::Keeping;
-use crate::worker::{Capacity, PART_OF_CHUNKS, Workers};
+use crate::studies::{Keeping, Store};
 
 /// How long the service still listens at least after it has said that it is not ready, so that whoever asks can learn it.
 const NOTICE: Duration = Duration::from_millis(200);
 
 /// What running solves get at the end of the bound on a shutdown to be answered that it is over.
 const LAST_WORDS: Duration = Duration::from_millis(300);
-
-/// What a worker's chunks that did not come to their end get to be given back: with the bound on its shutdown below the ten seconds that container engines wait.
-const GIVING_BACK: Duration = Duration::from_millis(1500);
 
 /// What a client beyond the last connection gets for all of its request and answer, and then to take it.
 const REFUSAL: Duration = Duration::from_secs(1);
@@ -60,9 +53,6 @@ const MOST_AHEAD_BYTES: usize = 1 << 16;
 
 /// Files that are kept for all but admitted connections: those beyond the last one, the listener, what the runtime has, the keys file.
 const OTHER_FILES: u64 = SIDE_CONNECTIONS as u64 + 64;
-
-/// Of a worker, beside its slots: as many other studies as a service admits beside one by default.
-const SLOTS_FOR_OTHERS: usize = 3;
 
 /// Between two looks whether something that has come is still unread.
 const UNREAD_LOOK: Duration = Duration::from_millis(1);
@@ -94,12 +84,7 @@ fn listen_on(address: SocketAddr) -> io::Result<TcpListener> {
 ///
 /// # Errors
 /// Where the address cannot be listened on, or the process gets no signals.
-pub async fn serve(
-    settings: &Settings,
-    studies: Option<&Address>,
-    parts: Option<Parts>,
-    threads: &Handle,
-) -> io::Result<()> {
+pub async fn serve(settings: &Settings, threads: &Handle) -> io::Result<()> {
     observe::install_recorder();
     // First: as the only process of a container it would not be ended by a signal that nobody takes, and to open a store may take long.
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
@@ -110,15 +95,7 @@ pub async fn serve(
             _ = interrupt.recv() => {}
         }
     };
-    let keeping = match studies {
-        Some(address) if address.is_shared() || settings.replicas == 1 => Keeping::Store {
-            store: Store::open(address).await.map_err(io::Error::other)?,
-            expiry: Duration::from_secs(settings.study_expiry_s),
-            parts,
-        },
-        None if settings.replicas == 1 => Keeping::Memory,
-        _ => Keeping::Nowhere,
-    };
+    let keeping = keeping(settings)?;
     let listener = listen_on(settings.listen)
         .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", settings.listen)))?;
     let address = listener.local_addr()?;
@@ -132,6 +109,7 @@ pub async fn serve(
     let mut limits = settings.limits();
     limits.max_connections = connections_that_fit(limits.max_connections)?;
     let app = App::keeping(Pool::new(limits).on(threads), limits, keeping);
+    app.studies.load().await.map_err(io::Error::other)?;
     let entry = Entry {
         cors_origins: settings.cors_origins.clone(),
         // A page of another site that resolves its own name to this machine knows no key.
@@ -151,9 +129,9 @@ pub async fn serve(
         // Before clients are refused.
         app.pool.memory().clone().watch(not_done, move || app.cache.let_go())
     });
-    let store = tokio::spawn({
+    tokio::spawn({
         let app = Arc::clone(&app);
-        async move { app.studies.serve_store().await }
+        async move { app.studies.forget_old().await }
     });
     if let Some(keys) = keys {
         tokio::spawn(async move {
@@ -187,15 +165,8 @@ pub async fn serve(
         let ended = async {
             let until = Instant::now() + settings.shutdown();
             drain(server.open, &app, settings.shutdown()).await;
-            // Chunks that are in work are given back, so that they count as never begun.
-            let until = until.max(Instant::now() + LAST_WORDS);
-            let served = timeout_at(until, store).await;
-            // Not before: what is begun is answered from it.
-            let closed = timeout_at(until, app.studies.close_store()).await;
-            match served.and_then(|served| closed.map(|()| served)) {
-                Ok(Ok(())) => {}
-                Ok(Err(error)) => tracing::error!(%error, "the studies' store was not closed in order"),
-                Err(_) => tracing::warn!("the studies' store did not take back in time what was begun"),
+            if timeout_at(until.max(Instant::now() + LAST_WORDS), app.studies.closed()).await.is_err() {
+                tracing::warn!("studies did not stop in time; what is kept of them is whole");
             }
         };
         tokio::select! {
@@ -207,60 +178,18 @@ pub async fn serve(
     Ok(())
 }
 
-/// Computes chunks until a signal; those that are begun then come to their end within the bound of the settings, or until a second signal.
-///
-/// # Errors
-/// Where the process gets no signals.
-pub async fn serve_chunks(
-    settings: &WorkerSettings,
-    studies: &Address,
-    parts: Option<Parts>,
-    threads: &Handle,
-) -> io::Result<()> {
-    let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
-    let mut told_to_stop = async || {
-        tokio::select! {
-            _ = terminate.recv() => {}
-            _ = interrupt.recv() => {}
-        }
+/// Where the settings have studies kept.
+fn keeping(settings: &Settings) -> io::Result<Keeping> {
+    let file = match &settings.studies {
+        Some(StudiesPlace::Off) => return Ok(Keeping::Off),
+        Some(StudiesPlace::File(file)) => Some(file.as_path()),
+        None => None,
     };
-    // Each slot may have a connection and a file of rows.
-    open_as_many_files_as_possible();
-    let store = Store::open(studies).await.map_err(io::Error::other)?;
-    let limits = settings.limits();
-    let stopping = CancellationToken::new();
-    let patience = Duration::from_millis(settings.shutdown_ms);
-    let slots = limits.max_concurrent_solves;
-    if let Some(asked) = settings.max_concurrent_solves.filter(|&asked| asked as usize > slots) {
-        tracing::warn!(asked, slots, "fewer chunks at once than asked for: the memory has no room for more");
-    }
-    tracing::info!(studies = %studies, slots, build = BUILD, "working");
-    let changed = watch::Sender::default();
-    let capacity = Capacity {
-        slots,
-        slots_for_others: SLOTS_FOR_OTHERS,
-        chunks_bytes: limits.max_unread_bytes / PART_OF_CHUNKS,
-        variant_bytes: limits.max_unread_bytes / 2,
-        admitted_states: 0,
-    };
-    let pool = Pool::new(limits).on(threads);
-    tokio::spawn(pool.memory().clone().watch("no chunk is begun while another is in work", || {}));
-    let workers = Workers::new(store, parts, pool, capacity, changed, stopping.clone(), patience);
-    let stop = async {
-        told_to_stop().await;
-        tracing::info!("stopping: what is begun comes to its end");
-        stopping.cancel();
-        tokio::select! {
-            () = told_to_stop() => tracing::warn!("told to stop again: what still ran is given up"),
-            () = sleep(patience + GIVING_BACK) => tracing::warn!("the studies' store did not take back in time what was begun"),
-        }
-    };
-    tokio::select! {
-        () = workers.work() => {}
-        () = stop => {}
-    }
-    tracing::info!("stopped");
-    Ok(())
+    let store = Store::open(file).map_err(|error| match file {
+        Some(file) => io::Error::other(format!("{}: {error}", file.display())),
+        None => io::Error::other(error),
+    })?;
+    Ok(Keeping::In { store, expiry: Duration::from_secs(settings.study_expiry_s) })
 }
 
 /// Raises the number of files that the process may open as far as it may; where that is not allowed, it stays what it was.

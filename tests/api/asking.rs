@@ -215,7 +215,7 @@ impl Service {
         Self { router: router(Arc::clone(&app), &entry), app }
     }
 
-    /// With its studies kept somewhere, and served as they are in a whole service.
+    /// With its studies kept somewhere.
     pub(crate) fn keeping(limits: Limits, keeping: Keeping) -> Self {
         let app = App::keeping(Pool::new(limits), limits, keeping);
         Self { router: router(Arc::clone(&app), &Entry::default()), app }

@@ -834,30 +834,6 @@ async fn what_is_kept_of_a_study_counts_with_what_is_asked() {
     assert_eq!(service.get(&places[2]).await.status, 200);
 }
 
-/// To read one may take long, and neither health nor solves are to wait for it.
-#[tokio::test]
-async fn studies_are_read_one_at_a_time_beside_all_else() {
-    let service = Service::within(toothwave::config::Limits { deadline_ms: 5, ..crate::asking::LIMITS });
-    let (release, released) = std::sync::mpsc::channel::<()>();
-    let (begun, has_begun) = tokio::sync::oneshot::channel();
-    let pool = service.app.pool.clone();
-    let reading = tokio::spawn(async move {
-        let job = move || {
-            begun.send(()).unwrap();
-            // Dropped or told so: both mean that it is over.
-            let _ = released.recv();
-            Ok(())
-        };
-        pool.run_aside(tokio::time::Instant::now() + Duration::from_secs(600), 0, job).await
-    });
-    has_begun.await.unwrap();
-    let asked = map_over(&shortest(), &json!({ "/drive/teeth/radius_mm": { "one_of": [4.0] } }));
-    service.ask(&asked).await.refused(503, "deadline_exceeded");
-    assert_eq!(service.ask(&live()).await.status, 200);
-    release.send(()).unwrap();
-    reading.await.unwrap().unwrap();
-}
-
 // --- Time and joining
 
 /// Whoever joins another's solve has a deadline of its own: it began later.

@@ -248,26 +248,6 @@ async fn a_search_that_looks_further_than_was_expected_takes_room_on_its_way() {
     }
 }
 
-/// Of those that nobody waits to read: a study that is kept is none.
-#[tokio::test]
-async fn a_study_that_is_kept_leaves_its_own_result_and_others_the_room_that_is_left() {
-    let service = Service::within(Limits { max_unread_bytes: 2_000_000, max_study_bytes: 1_500_000, ..LIMITS });
-    let study = json!({
-        "study": "map", "base": shortest(), "over": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.0, "steps": 60_000 } },
-        "quantities": ["undercut"]
-    });
-    let question = Question::post("/v1/studies", study.to_string()).with("prefer", "wait=600");
-    let found = service.ask(&question).await.found();
-    assert!(service.app.room.taken_bytes() > 1_000_000);
-    let result = format!("/v1/studies/{}/result", found["id"].as_str().unwrap());
-    assert_eq!(service.get(&result).await.found(), found["result"]);
-    let unread = service.response(large(2000, 1).request()).await;
-    assert_eq!(unread.status(), 200);
-    service.ask(&large(2000, 2)).await.refused(503, "too_many_unread_bytes");
-    drop(unread);
-    service.ask(&large(2000, 2)).await.found();
-}
-
 #[tokio::test]
 async fn an_answer_larger_than_all_that_may_be_unread_is_given_when_it_is_alone() {
     for max_unread_bytes in [0, 10_000] {
@@ -297,22 +277,4 @@ async fn bodies_that_are_long_take_room_until_they_are_read() {
         let long = format!("{}{document}", " ".repeat(3 << 19));
         assert_eq!(service.ask(&Question::post("/v1/sweep", long)).await.status, 200);
     }
-}
-
-/// One of 4 MiB took 360, and ended a service of 256.
-#[tokio::test]
-async fn a_study_that_is_read_takes_room_for_what_its_document_may_come_to() {
-    let limits = Limits { max_body_bytes: 4 << 20, max_unread_bytes: 100 << 20, deadline_ms: 1000, ..LIMITS };
-    let service = Service::within(limits);
-    let document = |bytes: usize| format!(r#"{{ "study": "map", "base": [{}0] }}"#, r#"{"":0},"#.repeat(bytes / 7));
-    let ask = async |bytes| service.ask(&Question::post("/v1/studies", document(bytes))).await;
-    ask(1 << 20).await.refused(422, "invalid_document");
-    // An eighth is there besides.
-    let others = service.app.room.reserve(70 << 20).unwrap();
-    ask(1 << 20).await.refused(503, "too_many_unread_bytes");
-    ask(1 << 19).await.refused(422, "invalid_document");
-    drop(others);
-    // Of more than all the room as much as the memory really has; here nobody knows.
-    ask(3 << 20).await.refused(422, "invalid_document");
-    assert_eq!(service.app.room.taken_bytes(), 0);
 }

@@ -3,10 +3,11 @@
 use std::time::Duration;
 
 use futures_util::StreamExt as _;
+use futures_util::future::join_all;
 use serde_json::{Value, json};
 use toothwave::config::Limits;
 
-use crate::asking::{Answer, LIMITS, Occupied, Question, Service, until};
+use crate::asking::{Answer, LIMITS, Question, Service};
 use crate::designs::{every_number, shortest, spelled_out, undercut, with};
 use crate::openapi::document;
 
@@ -22,10 +23,18 @@ fn map(base: &Value, steps: u64) -> Value {
 
 /// As many variants as take a while.
 fn long() -> Value {
-    let mut study = map(&shortest(), 700);
-    study["over"]["/load/input_torque_nm"] = json!({ "min": 10.0, "max": 20.0, "steps": 700 });
+    let mut study = map(&shortest(), 300);
+    study["over"]["/load/input_torque_nm"] = json!({ "min": 10.0, "max": 20.0, "steps": 300 });
     study
 }
+
+/// As many variants, each of which takes longer than any test.
+fn slow(steps: u64) -> Value {
+    map(&with(&shortest(), "/sweep", json!({ "samples": 10_000_000 })), steps)
+}
+
+/// Limits that such studies keep.
+const SLOW: Limits = Limits { max_states: 1_000_000_000, ..LIMITS };
 
 async fn begun(service: &Service, study: &Value) -> Answer {
     service.ask(&Question::post("/v1/studies", study.to_string())).await
@@ -86,12 +95,11 @@ async fn who_does_not_wait_is_told_where_the_study_stands_and_its_events_end_wit
     assert_eq!(service.get(&place(&study)).await.found(), told);
 }
 
-/// A chunk may take minutes, and a proxy takes who says nothing for gone. Each event once came with the next change alone.
+/// A chunk may take minutes, and a proxy closes a connection on which nothing is sent.
 #[tokio::test]
-async fn events_tell_at_once_how_a_study_stands_and_give_a_sign_of_life_while_there_is_nothing_to_tell() {
-    let service = Service::within(Limits { max_concurrent_solves: 1, ..LIMITS });
-    let occupied = Occupied::by_one(&service.app.pool).await;
-    let study = begun(&service, &map(&shortest(), 5)).await.json();
+async fn events_tell_at_once_and_then_give_signs_of_life() {
+    let service = Service::within(SLOW);
+    let study = begun(&service, &slow(1)).await.json();
     let question = Question::of("GET", study["events_href"].as_str().unwrap());
     let mut events = service.response(question.request()).await.into_body().into_data_stream();
     tokio::time::pause();
@@ -101,7 +109,7 @@ async fn events_tell_at_once_how_a_study_stands_and_give_a_sign_of_life_while_th
     // A comment (HTML Living Standard, section 9.2).
     assert_eq!(events.next().await.unwrap().unwrap()[..], b":\n\n"[..]);
     tokio::time::resume();
-    drop(occupied);
+    assert_eq!(deleted(&service, &place(&study)).await, 204);
 }
 
 #[tokio::test]
@@ -115,27 +123,25 @@ async fn the_same_question_is_the_same_study_however_it_is_spelled() {
 }
 
 #[tokio::test]
-async fn a_cancelled_study_keeps_what_it_has_and_goes_on_when_it_is_asked_for_again() {
-    let service = Service::within(Limits { max_concurrent_solves: 1, ..LIMITS });
-    let occupied = Occupied::by_one(&service.app.pool).await;
-    let study = begun(&service, &map(&shortest(), 5)).await.json();
+async fn a_cancelled_study_continues_when_asked_again() {
+    let service = Service::new();
+    let study = begun(&service, &long()).await.json();
     assert_eq!((&study["state"], &study["looked_at"]), (&json!("running"), &json!(0)));
     assert_eq!(deleted(&service, &place(&study)).await, 204);
     assert_eq!(service.get(&place(&study)).await.found()["state"], "cancelled");
-    occupied.end().await;
     let partial = service.get(&format!("{}/result", place(&study))).await.found();
-    assert_eq!((&partial["is_complete"], &partial["possible"]["variant"]), (&json!(false), &json!([])));
-    let found = waited_for(&service, &map(&shortest(), 5)).await;
-    assert_eq!((&found["id"], &found["state"], &found["looked_at"]), (&study["id"], &json!("done"), &json!(5)));
+    assert_eq!(partial["is_complete"], false);
+    let found = waited_for(&service, &long()).await;
+    assert_eq!((&found["id"], &found["state"], &found["looked_at"]), (&study["id"], &json!("done"), &json!(90_000)));
+    assert!(found["result"] == waited_for(&Service::new(), &long()).await["result"]);
     // One that does not run any more is forgotten.
     assert_eq!(deleted(&service, &place(&study)).await, 204);
     service.get(&place(&study)).await.refused(404, "not_found");
     assert_eq!(deleted(&service, &place(&study)).await, 404);
 }
 
-/// In memory thousands of variants were lost, of which each may take seconds, and were counted as looked at.
 #[tokio::test]
-async fn a_study_that_is_cancelled_has_the_variants_that_it_says_it_has_looked_at() {
+async fn a_cancelled_study_has_the_variants_it_counts() {
     let service = Service::within(LIMITS);
     let study = begun(&service, &long()).await.json();
     let variants = async || {
@@ -143,7 +149,6 @@ async fn a_study_that_is_cancelled_has_the_variants_that_it_says_it_has_looked_a
         let has = |what: &str| partial[what]["variant"].as_array().unwrap().len() as u64;
         has("possible") + has("impossible")
     };
-    // After a second something is handed over, long before any piece is over.
     while variants().await == 0 {
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
@@ -151,7 +156,7 @@ async fn a_study_that_is_cancelled_has_the_variants_that_it_says_it_has_looked_a
     let stands = service.get(&place(&study)).await.found();
     let variants = variants().await;
     assert_eq!((&stands["state"], &stands["looked_at"]), (&json!("cancelled"), &json!(variants)));
-    assert!(variants < 490_000, "{variants}");
+    assert!(variants < 90_000, "{variants}");
 }
 
 /// What runs and is not kept could be cancelled by nobody, and would count nowhere.
@@ -176,7 +181,7 @@ async fn however_many_ask_for_a_study_and_cancel_it_at_once_none_runs_that_is_no
         client.await.unwrap();
     }
     while deleted(&service, &place(&study)).await != 404 {}
-    until("nothing runs", || service.app.pool.running() == 0).await;
+    assert_eq!(service.app.studies.running(), 0);
 }
 
 #[tokio::test]
@@ -205,14 +210,34 @@ async fn a_study_that_is_too_large_is_refused_with_the_limit_before_anything_run
 }
 
 #[tokio::test]
-async fn more_studies_than_may_run_are_refused_and_the_oldest_that_is_done_makes_room() {
-    let limits = Limits { max_concurrent_solves: 1, max_concurrent_studies: 1, max_study_bytes: 60_000, ..LIMITS };
-    let service = Service::within(limits);
-    let occupied = Occupied::by_one(&service.app.pool).await;
-    let first = begun(&service, &map(&shortest(), 5)).await.json();
+async fn more_studies_than_may_run_are_refused() {
+    let service = Service::within(Limits { max_concurrent_studies: 1, ..SLOW });
+    let running = begun(&service, &slow(1)).await.json();
+    assert_eq!(begun(&service, &slow(1)).await.status, 202, "it runs already");
     begun(&service, &map(&shortest(), 6)).await.refused(503, "queue_full");
-    occupied.end().await;
-    waited_for(&service, &map(&shortest(), 5)).await;
+    assert_eq!(deleted(&service, &place(&running)).await, 204);
+    waited_for(&service, &map(&shortest(), 6)).await;
+}
+
+#[tokio::test]
+async fn no_more_run_however_many_ask_at_once() {
+    let service = Service::within(Limits { max_concurrent_studies: 2, ..SLOW });
+    let studies: Vec<_> = (1..9).map(slow).collect();
+    let answers = join_all(studies.iter().map(|study| begun(&service, study))).await;
+    let (running, refused): (Vec<_>, Vec<_>) = answers.iter().partition(|answer| answer.status == 202);
+    assert_eq!(running.len(), 2);
+    for answer in refused {
+        answer.refused(503, "queue_full");
+    }
+    for study in running {
+        assert_eq!(deleted(&service, &place(&study.json())).await, 204);
+    }
+}
+
+#[tokio::test]
+async fn memory_forgets_the_oldest_that_is_done() {
+    let service = Service::within(Limits { max_study_bytes: 60_000, ..LIMITS });
+    let first = waited_for(&service, &map(&shortest(), 5)).await;
     let second = waited_for(&service, &map(&shortest(), 6)).await;
     assert_eq!(service.get(&place(&first)).await.status, 200, "there is room for two");
     waited_for(&service, &map(&shortest(), 7)).await;
@@ -221,15 +246,14 @@ async fn more_studies_than_may_run_are_refused_and_the_oldest_that_is_done_makes
 }
 
 #[tokio::test]
-async fn a_study_that_is_refused_makes_none_forgotten() {
-    let service = Service::within(Limits { max_concurrent_solves: 1, max_study_bytes: 145_000, ..LIMITS });
+async fn a_refused_study_makes_none_forgotten() {
+    let service = Service::within(Limits { max_study_bytes: 145_000, ..SLOW });
     let (one, other) =
         (waited_for(&service, &map(&shortest(), 5)).await, waited_for(&service, &map(&shortest(), 6)).await);
-    let occupied = Occupied::by_one(&service.app.pool).await;
     // 86 kB each: beside one that runs, which is never forgotten, no other has room whatever is.
-    let running = begun(&service, &map(&shortest(), 2000)).await.json();
+    let running = begun(&service, &slow(2000)).await.json();
     assert_eq!(running["state"], "running");
-    begun(&service, &map(&shortest(), 2001)).await.refused(503, "queue_full");
+    begun(&service, &slow(2001)).await.refused(503, "queue_full");
     for kept in [&one, &other] {
         assert_eq!(service.get(&place(kept)).await.status, 200, "it was there before");
     }
@@ -237,86 +261,7 @@ async fn a_study_that_is_refused_makes_none_forgotten() {
     assert_eq!(begun(&service, &map(&shortest(), 7)).await.status, 202);
     service.get(&place(&one)).await.refused(404, "not_found");
     assert_eq!(service.get(&place(&other)).await.status, 200);
-    occupied.end().await;
-}
-
-#[tokio::test]
-async fn a_study_that_unread_answers_leave_no_room_makes_none_forgotten() {
-    let service = Service::within(Limits { max_concurrent_solves: 1, max_unread_bytes: 1_000_000, ..LIMITS });
-    let occupied = Occupied::by_one(&service.app.pool).await;
-    // 336 kB, of which nothing needs to be computed.
-    let kept = begun(&service, &map(&shortest(), 10_000)).await.json();
-    assert_eq!(deleted(&service, &place(&kept)).await, 204);
-    let unread = service.app.room.reserve(600_000).unwrap();
-    begun(&service, &map(&shortest(), 20_000)).await.refused(503, "too_many_unread_bytes");
-    assert_eq!(service.get(&place(&kept)).await.found()["state"], "cancelled");
-    drop(unread);
-    assert_eq!(begun(&service, &map(&shortest(), 25_000)).await.status, 202);
-    service.get(&place(&kept)).await.refused(404, "not_found");
-    occupied.end().await;
-}
-
-/// What the work of a study with a long base takes was held until it was forgotten: of 64 KB with 16 solves all the room of a small service.
-#[tokio::test]
-async fn a_study_holds_room_for_its_work_while_that_goes_on_and_no_longer() {
-    let limits = Limits { max_concurrent_solves: 2, max_unread_bytes: 20 << 20, ..LIMITS };
-    let service = Service::within(limits);
-    let base = with(&shortest(), "/deviations", json!({ "ring_space_um": vec![0; 30_000] }));
-    let taken_bytes = || service.app.room.taken_bytes();
-    let occupied = async || [Occupied::by_one(&service.app.pool).await, Occupied::by_one(&service.app.pool).await];
-    let both = occupied().await;
-    let study = begun(&service, &map(&base, 5)).await.json();
-    let running_bytes = taken_bytes();
-    assert_eq!(deleted(&service, &place(&study)).await, 204);
-    for one in both {
-        one.end().await;
-    }
-    until("a cancelled study gives back what its work takes", || taken_bytes() < running_bytes / 2).await;
-    let both = occupied().await;
-    assert_eq!(begun(&service, &map(&base, 5)).await.json()["state"], "running");
-    assert_eq!(taken_bytes(), running_bytes, "it goes on");
-    for one in both {
-        one.end().await;
-    }
-    assert_eq!(waited_for(&service, &map(&base, 5)).await["state"], "done");
-    until("a done study gives back what its work takes", || taken_bytes() < running_bytes / 2).await;
-}
-
-/// What its work takes was wanted once more beside its rows, and more than there is.
-#[tokio::test]
-async fn a_study_that_takes_all_the_room_goes_on_as_it_began() {
-    let limits = Limits { max_unread_bytes: 8 << 20, max_study_bytes: 8 << 20, max_concurrent_solves: 1, ..LIMITS };
-    let service = Service::within(limits);
-    let mut study = map(&shortest(), 1275);
-    let choices: Vec<_> = (0..16).map(|choice| 1.0 + f64::from(choice)).collect();
-    study["over"]["/load/input_torque_nm"] = json!({ "one_of": choices });
-    study["over"]["/drive/teeth/width_mm"] = json!({ "one_of": choices });
-    study["quantities"] = json!(["undercut"]);
-    let occupied = Occupied::by_one(&service.app.pool).await;
-    let begun_once = begun(&service, &study).await.json();
-    assert_eq!(begun_once["state"], "running", "{begun_once}");
-    assert_eq!(deleted(&service, &place(&begun_once)).await, 204);
-    assert_eq!(begun(&service, &study).await.json()["state"], "running");
-    assert_eq!(deleted(&service, &place(&begun_once)).await, 204);
-    // Nor is anything forgotten for another while memory is scarce.
-    service.app.room.memory().set_scarce(true);
-    begun(&service, &map(&shortest(), 5)).await.refused(503, "too_many_unread_bytes");
-    assert_eq!(service.get(&place(&begun_once)).await.found()["state"], "cancelled");
-    occupied.end().await;
-}
-
-/// One such study that ran took all the room from others.
-#[tokio::test]
-async fn pieces_that_take_much_are_worked_on_side_by_side_as_far_as_an_eighth_of_the_room_goes() {
-    let limits = Limits { max_concurrent_solves: 8, max_unread_bytes: 20 << 20, ..LIMITS };
-    let service = Service::within(limits);
-    let mut occupied = Vec::new();
-    for _ in 0..limits.max_concurrent_solves {
-        occupied.push(Occupied::by_one(&service.app.pool).await);
-    }
-    let base = with(&shortest(), "/deviations", json!({ "ring_space_um": vec![0; 30_000] }));
-    assert_eq!(begun(&service, &map(&base, 50)).await.json()["state"], "running");
-    assert!(service.app.room.taken_bytes() < limits.max_unread_bytes / 4, "{}", service.app.room.taken_bytes());
+    assert_eq!(deleted(&service, &place(&running)).await, 204);
 }
 
 /// From seventeen islands on each piece was several of them, of which the first alone was looked at, and the study was done.

@@ -1,6 +1,7 @@
 //! `/v1/studies`: many variants of one design, and `/v1/quantities`, what can be asked of them.
 
 use std::convert::Infallible;
+use std::io;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -12,17 +13,19 @@ use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use futures_util::stream;
 use serde::Serialize;
 use toothwave_calculation::forms::{Form, Format, Forms};
 use toothwave_calculation::json::word;
 use toothwave_study::{QUANTITIES, Quantity, Study, StudyAnswer, StudyDocument};
+use tracing::Instrument as _;
 use utoipa::ToSchema;
 
-use super::{Problems, read_body, with_body, written};
+use super::{Problems, read_body};
 use crate::app::App;
 use crate::compute::Thread;
-use crate::frozen::reading_bytes;
 use crate::negotiation::{self, Representation};
 use crate::problem::{Problem, ProblemCode};
 use crate::query::require_no_query;
@@ -64,7 +67,7 @@ pub async fn quantities() -> Json<QuantitiesAnswer> {
         (status = 202, description = "It runs; `Location` says where it stands.", body = StudyResource, headers(("Location" = String, description = "The study."))),
         Problems,
         (status = 404, description = "It was forgotten before it was answered: others took its room, or deleted it. Ask again.", body = Problem, content_type = "application/problem+json"),
-        (status = 501, description = "This is one of several replicas that share no store.", body = Problem, content_type = "application/problem+json")
+        (status = 501, description = "The service was started without studies.", body = Problem, content_type = "application/problem+json")
     )
 )]
 pub async fn begin(State(app): State<Arc<App>>, request: Request) -> Response {
@@ -80,12 +83,11 @@ pub async fn begin(State(app): State<Arc<App>>, request: Request) -> Response {
     responses(
         (status = 200, description = "It.", body = StudyResource),
         (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
-        (status = 500, description = "What is kept of it is damaged.", body = Problem, content_type = "application/problem+json"),
-        (status = 503, description = "The store of studies does not answer, or the study could not be looked at in time; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
+        (status = 501, description = "The service was started without studies.", body = Problem, content_type = "application/problem+json"),
     )
 )]
 pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
-    match kept(&app, id).await {
+    match kept(&app, id) {
         Ok(kept) => no_store(Json(kept.resource()).into_response()),
         Err(problem) => problem.into_response(),
     }
@@ -100,22 +102,21 @@ pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRej
     responses(
         (status = 204, description = "It does not run any more, or is forgotten."),
         (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
-        (status = 503, description = "The store of studies does not answer, or a worker that stands still has a chunk of it in its hands; `Retry-After` says when to try again. Without that header the study may be cancelled, or forgotten, all the same.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
+        (status = 501, description = "The service was started without studies.", body = Problem, content_type = "application/problem+json"),
+        (status = 503, description = "The file of studies cannot be written now; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
     )
 )]
 pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
-    let cancelled = async {
-        let id = id_of(id)?;
-        let cancelled = app.pool.until_closed(app.studies.cancel_or_forget(&id)).await;
-        // At the end of a stop it may be on its way to the store.
-        let is_open = |problem: &Problem| problem.is_open || problem.code == ProblemCode::ShuttingDown;
-        if cancelled.map_err(|problem| Problem { is_open: is_open(&problem), ..problem })? {
-            Ok(StatusCode::NO_CONTENT)
-        } else {
-            Err(not_kept(&id))
-        }
+    let id = id_of(id);
+    let cancelled = {
+        let id = id.clone();
+        to_its_end(&app, async move |app| app.studies.cancel_or_forget(&id).await).await
     };
-    cancelled.await.into_response()
+    match cancelled {
+        Ok(true) => StatusCode::NO_CONTENT.into_response(),
+        Ok(false) => not_kept(&id).into_response(),
+        Err(problem) => problem.into_response(),
+    }
 }
 
 /// What a study has come to: whole, or as far as it has come.
@@ -128,9 +129,10 @@ pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRe
         (status = 200, description = "The result; `is_complete` says whether it is whole. As CSV a line each of what the study is about; as Apache Parquet the same columns.",
             content((StudyAnswer = "application/json"), (String = "text/csv"), (String = "application/vnd.apache.parquet"))),
         (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
+        (status = 501, description = "The service was started without studies.", body = Problem, content_type = "application/problem+json"),
         (status = 406, description = "No representation that the client accepts.", body = Problem, content_type = "application/problem+json"),
-        (status = 500, description = "A fault of the service itself.", body = Problem, content_type = "application/problem+json"),
-        (status = 503, description = "The service is full, results that are being read leave this one no room, the deadline stopped the computation, or the store of studies does not answer; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
+        (status = 500, description = "What is kept of the study is damaged, or the service itself failed.", body = Problem, content_type = "application/problem+json"),
+        (status = 503, description = "The service is full, the deadline stopped the computation, or the file of studies cannot be read now; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
     )
 )]
 pub async fn result(
@@ -139,9 +141,9 @@ pub async fn result(
     headers: HeaderMap,
 ) -> Response {
     let answer = async {
-        let kept = kept(&app, id).await?;
+        let kept = kept(&app, id)?;
         let representation = Representation::negotiate(&headers, StudyAnswer::FORMS.iter().map(|(format, _)| *format))?;
-        written_apart(&app, &kept, representation, |answer| answer).await
+        written(&app, &kept, representation, |answer| answer).await
     };
     no_store(answer.await.unwrap_or_else(IntoResponse::into_response))
 }
@@ -175,11 +177,11 @@ pub enum EventName {
     responses(
         (status = 200, description = "The events; they end when the study does.", body = StudyEvent, content_type = "text/event-stream"),
         (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
-        (status = 503, description = "The store of studies does not answer, or the study could not be looked at in time; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
+        (status = 501, description = "The service was started without studies.", body = Problem, content_type = "application/problem+json"),
     )
 )]
 pub async fn events(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
-    let kept = match kept(&app, id).await {
+    let kept = match kept(&app, id) {
         Ok(kept) => kept,
         Err(problem) => return problem.into_response(),
     };
@@ -192,7 +194,7 @@ pub async fn events(State(app): State<Arc<App>>, id: Result<Path<String>, PathRe
                 let next_look = async {
                     changed.await;
                     tokio::time::sleep(PAUSE).await;
-                    app.studies.is_asked_for(&kept);
+                    app.studies.touch(&kept);
                 };
                 tokio::select! {
                     () = next_look => {}
@@ -216,16 +218,23 @@ fn no_store(mut response: Response) -> Response {
     response
 }
 
-async fn kept(app: &App, id: Result<Path<String>, PathRejection>) -> Result<Arc<Kept>, Problem> {
-    let id = id_of(id)?;
-    app.pool.until_closed(app.studies.find(&id)).await?.ok_or_else(|| not_kept(&id))
+fn kept(app: &App, id: Result<Path<String>, PathRejection>) -> Result<Arc<Kept>, Problem> {
+    let id = id_of(id);
+    app.studies.find(&id)?.ok_or_else(|| not_kept(&id))
 }
 
-/// An id of other letters is no study's, and no database takes all of them: PostgreSQL no zero, and beyond ASCII what its encoding has.
-fn id_of(id: Result<Path<String>, PathRejection>) -> Result<String, Problem> {
-    let id = id.map(|Path(id)| id).unwrap_or_default();
-    let is_word = !id.is_empty() && id.bytes().all(|byte| byte.is_ascii_graphic());
-    if is_word { Ok(id) } else { Err(not_kept(&id)) }
+/// The id of a path; none is empty.
+fn id_of(id: Result<Path<String>, PathRejection>) -> String {
+    id.map(|Path(id)| id).unwrap_or_default()
+}
+
+/// Does what must not be left half done, even if the client leaves meanwhile.
+async fn to_its_end<T: Send + 'static, F: Future<Output = Result<T, Problem>> + Send + 'static>(
+    app: &Arc<App>,
+    change: impl FnOnce(Arc<App>) -> F,
+) -> Result<T, Problem> {
+    let changing = tokio::spawn(change(Arc::clone(app)).in_current_span());
+    changing.await.unwrap_or_else(|error| Err(Problem::internal(&error)))
 }
 
 fn not_kept(id: &str) -> Problem {
@@ -239,32 +248,17 @@ async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Respons
     require_no_query(&uri)?;
     negotiation::require_json(&headers)?;
     let representation = Representation::negotiate(&headers, std::iter::empty())?;
-    let body = read_body(app, &headers, body, deadline).await?;
+    let text = read_body(app, &headers, body, deadline).await?.to_vec();
+    let limits = app.limits.of_studies();
     // Its choices stand for hundreds of designs, so that a document of 64 KB may take long to be read.
-    let (question, limits) = (body.bytes.clone(), app.limits.of_studies());
-    let text_bytes = question.len() as u64;
-    let room = app.pool.room_aside(deadline, reading_bytes(text_bytes), body.room.held_bytes()).await?;
-    let read = move || {
-        let _room = room;
-        Ok(Study::read(&question, &limits)?)
-    };
-    let study = app.pool.run_aside(deadline, text_bytes, read).await?;
-    let kept = app.pool.until_closed(app.studies.begin(study, &body.bytes, deadline)).await?;
-    drop(body);
+    let read = move |_: &AtomicBool| Ok((Study::read(&text, &limits)?, text));
+    let (study, text) = app.pool.run(deadline, Thread::Blocking, read).await?;
+    let kept = to_its_end(app, async move |app| app.studies.begin(study, &text).await).await?;
     let wait = wait_wanted(&headers);
     if let Some(wait) = wait {
         let wait_until = deadline.min(tokio::time::Instant::now() + wait);
-        let is_over = async {
-            loop {
-                let changed = kept.watch();
-                if !kept.is_running() {
-                    return;
-                }
-                changed.await;
-            }
-        };
         tokio::select! {
-            _ = tokio::time::timeout_at(wait_until, is_over) => {}
+            _ = tokio::time::timeout_at(wait_until, kept.ended()) => {}
             () = app.studies.closing().cancelled() => {}
         }
     }
@@ -274,7 +268,7 @@ async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Respons
     } else {
         let resource = kept.resource();
         let with_result = move |answer| StudyResource { result: Some(answer), ..resource };
-        written_apart(app, &kept, representation, with_result).await?
+        written(app, &kept, representation, with_result).await?
     };
     if let Some(wait) = wait {
         let applied = format!("wait={}", wait.as_secs());
@@ -298,26 +292,38 @@ fn wait_wanted(headers: &HeaderMap) -> Option<Duration> {
     })
 }
 
-/// Writes what a study has come to, in whatever that is told, on a thread of its own, taking room for it.
-async fn written_apart<A: Forms + Send>(
-    app: &App,
+/// Computes what a study has come to, and writes it in whatever that is told.
+async fn written<A: Forms + Send>(
+    app: &Arc<App>,
     kept: &Arc<Kept>,
     representation: Representation,
     told: impl FnOnce(StudyAnswer) -> A + Send + 'static,
 ) -> Result<Response, Problem> {
-    let reading = app.pool.until_closed(app.studies.read(kept, app.pool.deadline())).await?;
-    let (columns_bytes, deadline) = (reading.columns_bytes(), app.pool.deadline());
-    // Of a map, with its text, of some twenty letters a number: what finds no room for that once it is made does not wait for it.
-    let is_long = kept.is_a_map() && !representation.gzip;
-    let expected_bytes = if is_long { columns_bytes.saturating_mul(7) / 2 } else { columns_bytes };
-    let waited = async { Ok(app.room.reserve_in_time(deadline, expected_bytes).await?) };
-    let reserved = app.pool.until_closed(waited).await?;
+    let Representation { format, gzip } = representation;
+    let (own, kept) = (Arc::clone(app), Arc::clone(kept));
     let job = move |stop: &AtomicBool| {
-        let answer = reading.answer();
-        written(told(answer), representation, reserved, columns_bytes, Duration::ZERO, None, stop)
+        let answer = told(own.studies.answer(&kept, stop)?);
+        bytes_of(&answer, representation).map_err(|error| Problem::internal(&error))
     };
-    let stored = app.pool.run(deadline, Thread::Blocking, job).await?;
-    with_body(app, deadline, stored, representation).await
+    let bytes = app.pool.run(app.pool.deadline(), Thread::Blocking, job).await?;
+    let mut response = (StatusCode::OK, bytes).into_response();
+    let headers = response.headers_mut();
+    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(negotiation::content_type(format)));
+    if gzip {
+        headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+    }
+    Ok(response)
+}
+
+fn bytes_of(answer: &impl Forms, Representation { format, gzip }: Representation) -> io::Result<Vec<u8>> {
+    if gzip {
+        let mut writer = GzEncoder::new(Vec::new(), Compression::fast());
+        answer.write(format, &mut writer)?;
+        return writer.finish();
+    }
+    let mut bytes = Vec::with_capacity(answer.expected_bytes());
+    answer.write(format, &mut bytes)?;
+    Ok(bytes)
 }
 
 impl Forms for StudyResource {
