@@ -9,6 +9,7 @@ use crate::compute::budget::Budget;
 use crate::compute::cache::Cache;
 use crate::compute::pool::{Deadline, Pool};
 use crate::ops::config::Limits;
+use crate::studies::{Keeping, Studies};
 
 /// What handlers share.
 #[derive(Debug)]
@@ -21,6 +22,8 @@ pub struct App {
     pub cache: Cache,
     /// What large answers may take.
     pub budget: Budget,
+    /// Studies, with what they have come to.
+    pub studies: Studies,
     /// False while the service stops, for readiness probes.
     pub ready: AtomicBool,
 }
@@ -30,10 +33,12 @@ impl App {
     ///
     /// # Errors
     /// If the system refuses a thread.
-    pub fn start(limits: Limits) -> io::Result<Arc<Self>> {
+    pub fn start(limits: Limits, keeping: Keeping) -> io::Result<Arc<Self>> {
+        let pool = Pool::start(limits.max_concurrent_solves)?;
         Ok(Arc::new(Self {
             limits,
-            pool: Pool::start(limits.max_concurrent_solves)?,
+            studies: Studies::new(pool.clone(), limits, keeping),
+            pool,
             cache: Cache::new(limits.cache_max_bytes),
             budget: Budget::new(limits.max_unread_bytes),
             ready: AtomicBool::new(true),

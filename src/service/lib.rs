@@ -8,3 +8,4 @@ pub mod cli;
 pub mod compute;
 pub mod http;
 pub mod ops;
+pub mod studies;

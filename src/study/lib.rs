@@ -29,7 +29,7 @@ pub use limit::Bound;
 pub use map::{AxisAnswer, MapAnswer};
 pub use quantity::{Needs, QUANTITIES, Quantity, Source};
 pub use rank::{QuantileAnswer, ShareAnswer};
-pub use rows::{GapAnswer, ImpossibleAnswer, PossibleAnswer, ReasonAnswer, RowsPart};
+pub use rows::{ImpossibleAnswer, PossibleAnswer, ReasonAnswer, RowsPart};
 pub use search::{FoundAnswer, FreeAnswer, IslandPart, LimitAnswer, RelaxationAnswer, ScanAnswer, SearchAnswer};
 pub use sensitivity::{SensitivityAnswer, SensitivityOfQuantity, SensitivityToInput};
 pub use study::{Gathered, Limits, Part, Study, Work};

@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 use crate::ask::{beyond, escaped, fault};
 use crate::document::{ChoiceDocument, MapDocument, OverDocument};
 use crate::evaluate::Evaluator;
-use crate::rows::{GapAnswer, ImpossibleAnswer, PossibleAnswer, ReasonAnswer, Rows, RowsPart, RowsView};
+use crate::rows::{ImpossibleAnswer, PossibleAnswer, ReasonAnswer, Rows, RowsPart, RowsView};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Domain, Template, Value, Variable};
 
@@ -218,17 +218,6 @@ impl Rows for Map {
     fn document<'t>(&self, template: &'t mut Template, variant: u64) -> &'t Tree {
         template.filled(&self.values(variant))
     }
-
-    fn places(&self) -> Vec<Column> {
-        let kind = |axis: &Axis| if axis.is_number { Content::Number } else { Content::Word };
-        let column = |(variable, axis): (&Variable, &Axis)| Column::new(variable.pointer.as_str(), kind(axis));
-        self.variables_with_axes().map(column).collect()
-    }
-
-    fn place(&self, variant: u64) -> Vec<Cell> {
-        let values = self.values(variant);
-        self.variables_with_axes().zip(values).map(|((variable, axis), value)| axis.cell(variable, value)).collect()
-    }
 }
 
 /// Quantities over a grid. The variants are numbered from 0, the last of `over` being the fastest.
@@ -240,10 +229,6 @@ pub struct MapAnswer {
     pub build: &'static str,
     /// Whether every variant was looked at.
     pub is_complete: bool,
-    /// Variants that were given up, where there are any.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schema(required = false)]
-    pub gaps: Vec<GapAnswer>,
     /// Variants of the grid.
     pub variants: u64,
     /// The axes of the grid.
@@ -281,7 +266,6 @@ impl MapAnswer {
             solver_version: toothwave_solver::VERSION,
             build: toothwave_calculation::BUILD,
             is_complete,
-            gaps: Vec::new(),
             variants: map.variants().unwrap_or(u64::MAX),
             over: map.variables_with_axes().map(|(variable, axis)| axis.answer(variable)).collect(),
             possible: PossibleAnswer {

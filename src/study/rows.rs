@@ -3,7 +3,6 @@
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
 use std::iter;
-use std::mem;
 use std::ops::{Range, RangeInclusive};
 
 use serde::{Deserialize, Serialize};
@@ -15,19 +14,10 @@ use crate::evaluate::{Evaluator, Interrupted, Outcome, Reason, Refusal};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{GRAIN_BYTES, Template};
 
-/// Variants of a chunk: some tens of milliseconds of the cheapest ones, so that a study keeps several cores busy and progress is seen.
-pub(crate) const CHUNK_VARIANTS: u64 = 4096;
-
 /// What tells the documents of the variants.
 pub(crate) trait Rows {
     /// The document of a variant, put into the template.
     fn document<'t>(&self, template: &'t mut Template, variant: u64) -> &'t Tree;
-
-    /// The columns of a table that say what a variant is, beside its number.
-    fn places(&self) -> Vec<Column>;
-
-    /// What stands there.
-    fn place(&self, variant: u64) -> Vec<Cell>;
 }
 
 /// Rows of consecutive variants.
@@ -147,19 +137,6 @@ impl RowsPart {
         let refusals = self.refusals.iter().map(RefusalNoted::bytes);
         let variants = size_of_val(self.answered.as_slice()) + size_of_val(self.refused.as_slice());
         variants + size_of_val(self.reasons.as_slice()) + columns.sum::<usize>() + refusals.sum::<usize>()
-    }
-
-    /// Its rows as a table.
-    pub(crate) fn table<'a>(&'a self, rows: &'a impl Rows, evaluator: &'a Evaluator) -> Table<'a> {
-        let names = evaluator.quantities.iter().map(|quantity| quantity.name);
-        let view = RowsView {
-            answered: &self.answered,
-            columns: names.zip(self.columns.iter().map(Vec::as_slice)).collect(),
-            refused: &self.refused,
-            reasons: &self.reasons,
-            codes: self.refusals.iter().map(|noted| noted.reason.code.as_str()).collect(),
-        };
-        view.table(rows.places(), |variant| rows.place(variant))
     }
 
     fn push(&mut self, variant: u64, outcome: Outcome) {
@@ -294,17 +271,6 @@ impl RowsWork {
         Ok(self.next == self.end)
     }
 
-    /// What has come since it was asked the last time.
-    pub(crate) fn hand_over(&mut self) -> RowsPart {
-        let quantities = self.part.columns.len();
-        mem::replace(&mut self.part, RowsPart::new(quantities))
-    }
-
-    /// The first variant that was not looked at.
-    pub(crate) const fn next(&self) -> u64 {
-        self.next
-    }
-
     pub(crate) fn finish(self) -> RowsPart {
         self.part
     }
@@ -348,17 +314,4 @@ pub struct ImpossibleAnswer {
     pub variant: Vec<u64>,
     /// Which of the reasons, from 0.
     pub reason: Vec<u32>,
-}
-
-/// Variants that were never looked at, because whatever looked at them came to an end with them.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
-pub struct GapAnswer {
-    /// The chunk that they belong to.
-    pub chunk: u64,
-    /// The first of them; of a search's island its first evaluation.
-    pub first_variant: u64,
-    /// How many they are.
-    pub variants: u64,
-    /// How often they were tried.
-    pub attempts: u64,
 }

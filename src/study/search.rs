@@ -20,7 +20,7 @@ use crate::map::asked;
 use crate::optimise::{Judged, Optimiser, Plan, Point, merged};
 use crate::quantity::{Needs, OUTER_DIAMETER_MM, Quantity, TRANSMISSION_RATIO};
 use crate::random::Stream;
-use crate::rows::{GapAnswer, ReasonAnswer, RefusalNoted, note};
+use crate::rows::{ReasonAnswer, RefusalNoted, note};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Domain, Template, Value, Variable};
 
@@ -645,10 +645,6 @@ pub struct SearchAnswer {
     pub build: &'static str,
     /// Whether every variant was looked at.
     pub is_complete: bool,
-    /// Variants that were given up, where there are any.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schema(required = false)]
-    pub gaps: Vec<GapAnswer>,
     /// Variants that were looked at.
     pub evaluated: u64,
     /// What was free.
@@ -809,7 +805,6 @@ impl SearchAnswer {
             solver_version: toothwave_solver::VERSION,
             build: toothwave_calculation::BUILD,
             is_complete,
-            gaps: Vec::new(),
             evaluated,
             free,
             front: front.iter().filter_map(&mut found).collect(),

@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 use crate::ask::{beyond, escaped, fault};
 use crate::document::{InputDocument, SensitivityDocument};
 use crate::evaluate::Evaluator;
-use crate::rows::{GapAnswer, ReasonAnswer, Rows, RowsPart};
+use crate::rows::{ReasonAnswer, Rows, RowsPart};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Domain, GRAIN_BYTES, Template, Value};
 
@@ -179,14 +179,6 @@ impl Rows for Sensitivity {
     fn document<'t>(&self, template: &'t mut Template, variant: u64) -> &'t Tree {
         template.filled(&self.values(variant).map(Value::Number).collect::<Vec<_>>())
     }
-
-    fn places(&self) -> Vec<Column> {
-        self.inputs.iter().map(|input| Column::new(input.pointer.as_str(), Content::Number)).collect()
-    }
-
-    fn place(&self, variant: u64) -> Vec<Cell> {
-        self.values(variant).map(Cell::Number).collect()
-    }
 }
 
 /// What each input does to each quantity.
@@ -198,10 +190,6 @@ pub struct SensitivityAnswer {
     pub build: &'static str,
     /// Whether every variant was looked at.
     pub is_complete: bool,
-    /// Variants that were given up, where there are any.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schema(required = false)]
-    pub gaps: Vec<GapAnswer>,
     /// Each quantity, with what moves it most first; none where the base itself has no answer.
     pub quantities: Vec<SensitivityOfQuantity>,
     /// Why variants have no answer. The base is variant 0, the input i less 2i + 1, more 2i + 2.
@@ -264,7 +252,6 @@ impl SensitivityAnswer {
             solver_version: toothwave_solver::VERSION,
             build: toothwave_calculation::BUILD,
             is_complete,
-            gaps: Vec::new(),
             quantities: quantities.collect(),
             reasons: rows.refusals.iter().map(ReasonAnswer::from).collect(),
         }

@@ -1,7 +1,7 @@
 //! The engine: a study is pure chunks, and a merge that does not depend on their order.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, HashSet};
-use std::io::{self, Write};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -23,10 +23,9 @@ use crate::evaluate::{Evaluator, Interrupted};
 use crate::limit;
 use crate::map::{Map, MapAnswer};
 use crate::quantity::{Needs, QUANTITIES, Quantity};
-use crate::rows::{CHUNK_VARIANTS, GapAnswer, Rows, RowsPart, RowsParts, RowsWork};
+use crate::rows::{Rows, RowsPart, RowsParts, RowsWork};
 use crate::search::{Island, IslandPart, Search, SearchAnswer};
 use crate::sensitivity::{Sensitivity, SensitivityAnswer};
-use crate::table::{CELL_BYTES, Table};
 use crate::tolerance::{Tolerance, ToleranceAnswer};
 use crate::variant::{Domain, Template, Variable};
 
@@ -172,7 +171,7 @@ impl Study {
             require_possible_ranges(&quantities, &template, &limits.calculation)?;
         }
         let evaluator = Evaluator::new(quantities, limits.calculation);
-        let study = Self { id, kind, template, evaluator, variants, chunk_variants: CHUNK_VARIANTS };
+        let study = Self { id, kind, template, evaluator, variants, chunk_variants: chunk_variants(variants) };
         #[expect(clippy::cast_precision_loss, reason = "told, not computed with")]
         if variants > limits.max_study_variants {
             let limit = limits.max_study_variants;
@@ -255,68 +254,13 @@ impl Study {
         Self { chunk_variants: variants.max(1), ..self }
     }
 
-    /// Variants of a chunk, about.
-    pub const fn chunk_variants(&self) -> u64 {
-        match &self.kind {
-            Kind::Search(search) => search.evaluations().div_ceil(search.islands()),
-            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => self.chunk_variants,
-        }
-    }
-
-    /// Whether its chunks come to rows, one a variant; an island of a search comes to designs.
-    pub const fn has_rows(&self) -> bool {
-        !matches!(self.kind, Kind::Search(_))
-    }
-
-    /// About what a row is as Parquet.
-    pub fn row_bytes(&self) -> u64 {
-        let places = match &self.kind {
-            Kind::Map(map) => map.places(),
-            Kind::Sensitivity(sensitivity) => sensitivity.places(),
-            Kind::Tolerance(tolerance) => tolerance.places(),
-            Kind::Search(_) => return 0,
-        };
-        // Its number and its reason besides.
-        CELL_BYTES * (places.len() + self.evaluator.quantities.len() + 2) as u64
-    }
-
-    /// About what it takes to write the rows of a chunk, its text among that.
-    pub fn rows_bytes(&self, part: &Part) -> u64 {
-        self.rows_table(part).map_or(0, |table| table.parquet_bytes() + table.text_bytes())
-    }
-
-    /// Writes the rows of a chunk as Apache Parquet, with the same bytes whoever does; of a map they have the columns of its result. Nothing
-    /// where there are none.
-    ///
-    /// # Errors
-    /// Those of the writer.
-    pub fn write_rows(&self, part: &Part, writer: &mut dyn Write) -> io::Result<()> {
-        self.rows_table(part).map_or(Ok(()), |table| table.write_parquet(writer))
-    }
-
-    fn rows_table<'a>(&'a self, part: &'a Part) -> Option<Table<'a>> {
-        let Part::Rows(rows) = part else { return None };
-        match &self.kind {
-            Kind::Map(map) => Some(rows.table(map, &self.evaluator)),
-            Kind::Sensitivity(sensitivity) => Some(rows.table(sensitivity, &self.evaluator)),
-            Kind::Tolerance(tolerance) => Some(rows.table(tolerance, &self.evaluator)),
-            Kind::Search(_) => None,
-        }
-    }
-
-    /// All that it consists of: its variants, or the islands of a search.
-    pub const fn span(&self) -> Range<u64> {
-        match &self.kind {
-            Kind::Search(search) => 0..search.islands(),
-            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => 0..self.variants,
-        }
-    }
-
-    /// Of that, what a chunk consists of.
+    /// What a chunk consists of: variants, or an island of a search.
     fn span_of(&self, chunk: u64) -> Range<u64> {
-        let (end, length) = (self.span().end, if self.has_rows() { self.chunk_variants } else { 1 });
-        let first = chunk.saturating_mul(length).min(end);
-        first..end.min(first.saturating_add(length))
+        if matches!(self.kind, Kind::Search(_)) {
+            return chunk..chunk + 1;
+        }
+        let first = chunk.saturating_mul(self.chunk_variants).min(self.variants);
+        first..self.variants.min(first.saturating_add(self.chunk_variants))
     }
 
     /// About what it takes to keep what it comes to.
@@ -358,11 +302,17 @@ impl Study {
         };
         self.stored_bytes().saturating_add((self.template.bytes() + of_kind) as u64)
     }
+}
 
-    /// About what a chunk takes that is in work, beside what it comes to.
-    pub fn working_bytes(&self) -> u64 {
-        self.template.clone_bytes() as u64
-    }
+/// Variants of a chunk. It follows from what is asked alone, so that any process cuts a study into the same chunks.
+fn chunk_variants(variants: u64) -> u64 {
+    /// Some tens of milliseconds of the cheapest variants.
+    const MOST_VARIANTS: u64 = 4096;
+    /// Of a study of slow variants little is lost with one chunk, and several cores are busy.
+    const LEAST_CHUNKS: u64 = 256;
+    /// Whoever reads a result goes through a list of them.
+    const MOST_CHUNKS: u64 = 100_000;
+    variants.div_ceil(LEAST_CHUNKS).clamp(1, MOST_VARIANTS).max(variants.div_ceil(MOST_CHUNKS))
 }
 
 /// That no object names a field twice: of two ranges or limits of one name one would be dropped without a word.
@@ -581,8 +531,6 @@ fn is_of_base(template: &Template, example: &Tree, error: &FieldError) -> bool {
 #[derive(Debug)]
 pub struct Work {
     study: Arc<Study>,
-    /// Of its span, the first that was not handed over.
-    first: u64,
     state: State,
     room_bytes: u64,
 }
@@ -596,20 +544,14 @@ enum State {
 impl Work {
     /// A chunk of a study, not begun yet.
     pub fn new(study: &Arc<Study>, chunk: u64) -> Self {
-        Self::of_span(study, study.span_of(chunk))
-    }
-
-    /// A part of [`Study::span`], of a search an island, not begun yet.
-    pub fn of_span(study: &Arc<Study>, span: Range<u64>) -> Self {
-        let first = span.start;
         let state = match &study.kind {
-            Kind::Search(search) => State::Island(Box::new(Island::new(search, study.template.clone(), first))),
+            Kind::Search(search) => State::Island(Box::new(Island::new(search, study.template.clone(), chunk))),
             Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => {
                 let quantities = study.evaluator.quantities.len();
-                State::Rows(RowsWork::new(study.template.clone(), quantities, span))
+                State::Rows(RowsWork::new(study.template.clone(), quantities, study.span_of(chunk)))
             }
         };
-        Self { study: Arc::clone(study), first, state, room_bytes: u64::MAX }
+        Self { study: Arc::clone(study), state, room_bytes: u64::MAX }
     }
 
     /// The same where there is room for so many bytes alone while a variant is computed.
@@ -640,25 +582,6 @@ impl Work {
         }
     }
 
-    /// What of rows has come since it was asked the last time, with the span that it is of; the rest is still to be worked on. An island has nothing before it is
-    /// over.
-    pub fn hand_over(&mut self) -> Option<(Range<u64>, Part)> {
-        let State::Rows(rows) = &mut self.state else { return None };
-        let part = rows.hand_over();
-        let span = self.first..rows.next();
-        self.first = span.end;
-        (!span.is_empty()).then_some((span, Part::Rows(part)))
-    }
-
-    /// What is left of that when it is over.
-    pub fn finish_span(self) -> (Range<u64>, Part) {
-        let end = match &self.state {
-            State::Rows(rows) => rows.next(),
-            State::Island(_) => self.first + 1,
-        };
-        (self.first..end, self.finish())
-    }
-
     /// What the chunk comes to, once it is over.
     pub fn finish(self) -> Part {
         match self.state {
@@ -678,100 +601,34 @@ impl Work {
 }
 
 /// The parts of a study, in whatever order they come.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Gathered {
     study: Arc<Study>,
-    /// By the first of the span that each is of. Shared with whoever makes an answer of them meanwhile.
-    parts: BTreeMap<u64, Gathering>,
-    /// Of the study's span, how much has not come.
-    missing: u64,
+    /// By their chunks.
+    parts: BTreeMap<u64, Part>,
     variants: u64,
-    refused: u64,
-    bytes: u64,
-    gaps: Vec<GapAnswer>,
-}
-
-/// A part with the end of the span that it is of.
-#[derive(Debug, Clone)]
-struct Gathering {
-    end: u64,
-    part: Arc<Part>,
 }
 
 impl Gathered {
     /// None yet.
     pub fn new(study: &Arc<Study>) -> Self {
-        let missing = study.span().end;
-        Self {
-            study: Arc::clone(study),
-            parts: BTreeMap::new(),
-            missing,
-            variants: 0,
-            refused: 0,
-            bytes: 0,
-            gaps: Vec::new(),
+        Self { study: Arc::clone(study), parts: BTreeMap::new(), variants: 0 }
+    }
+
+    /// Takes what a chunk has come to; a second time, or of a chunk that the study does not have, it changes nothing.
+    pub fn add(&mut self, chunk: u64, mut part: Part) {
+        if chunk < self.study.chunks()
+            && let Entry::Vacant(place) = self.parts.entry(chunk)
+        {
+            part.shrink();
+            self.variants += part.variants();
+            place.insert(part);
         }
-    }
-
-    /// The study.
-    pub const fn study(&self) -> &Arc<Study> {
-        &self.study
-    }
-
-    /// Takes what a chunk has come to; a second time it changes nothing.
-    pub fn add(&mut self, chunk: u64, part: Part) {
-        self.add_span(self.study.span_of(chunk), part);
-    }
-
-    /// The same of a part of the study's span that overlaps no other but itself.
-    pub fn add_span(&mut self, span: Range<u64>, mut part: Part) {
-        if span.is_empty() || self.has(span.start) {
-            return;
-        }
-        part.shrink();
-        self.missing -= span.end - span.start;
-        self.variants += part.variants();
-        self.refused += part.refused();
-        self.bytes += (size_of::<(u64, Gathering)>() + part.bytes()) as u64;
-        self.parts.insert(span.start, Gathering { end: span.end, part: Arc::new(part) });
-    }
-
-    fn has(&self, place: u64) -> bool {
-        self.parts.range(..=place).next_back().is_some_and(|(_, Gathering { end, .. })| place < *end)
-    }
-
-    /// Takes note of the chunks that will not come, each with how often it was tried.
-    pub fn give_up(&mut self, chunks: impl IntoIterator<Item = (u64, u64)>) {
-        let study = &self.study;
-        let gap = |(chunk, attempts): (u64, u64)| {
-            let first_variant = chunk * study.chunk_variants();
-            let variants = study.chunk_variants().min(study.variants - first_variant.min(study.variants));
-            GapAnswer { chunk, first_variant, variants, attempts }
-        };
-        self.gaps = chunks.into_iter().map(gap).collect();
-    }
-
-    /// Whether a chunk has not come yet.
-    pub fn lacks(&self, chunk: u64) -> bool {
-        let span = self.study.span_of(chunk);
-        !span.is_empty() && !self.has(span.start)
-    }
-
-    /// Of the study's span, what has not come yet.
-    pub fn missing(&self) -> impl Iterator<Item = Range<u64>> {
-        let starts = self.parts.keys().copied().chain([self.study.span().end]);
-        let ends = [0].into_iter().chain(self.parts.values().map(|gathering| gathering.end));
-        ends.zip(starts).map(|(end, start)| end..start).filter(|span| !span.is_empty())
-    }
-
-    /// About what has come takes in memory.
-    pub const fn bytes(&self) -> u64 {
-        self.bytes
     }
 
     /// Whether all have come.
-    pub const fn is_complete(&self) -> bool {
-        self.missing == 0
+    pub fn is_complete(&self) -> bool {
+        self.parts.len() as u64 == self.study.chunks()
     }
 
     /// Variants that were looked at.
@@ -779,25 +636,8 @@ impl Gathered {
         self.variants
     }
 
-    /// Of those, the ones without an answer.
-    pub const fn refused(&self) -> u64 {
-        self.refused
-    }
-
     /// What the study comes to, as far as it has come.
     pub fn answer(&self) -> StudyAnswer {
-        let mut answer = self.answer_without_gaps();
-        let gaps = match &mut answer {
-            StudyAnswer::Map(map) => &mut map.gaps,
-            StudyAnswer::Search(search) => &mut search.gaps,
-            StudyAnswer::Sensitivity(sensitivity) => &mut sensitivity.gaps,
-            StudyAnswer::Tolerance(tolerance) => &mut tolerance.gaps,
-        };
-        gaps.clone_from(&self.gaps);
-        answer
-    }
-
-    fn answer_without_gaps(&self) -> StudyAnswer {
         let study = &*self.study;
         let (evaluator, is_complete) = (&study.evaluator, self.is_complete());
         match &study.kind {
@@ -806,7 +646,7 @@ impl Gathered {
                 StudyAnswer::Map(MapAnswer::new(map, evaluator, rows, is_complete))
             }
             Kind::Search(search) => {
-                let islands = self.parts.values().filter_map(|gathering| match &*gathering.part {
+                let islands = self.parts.values().filter_map(|part| match part {
                     Part::Island(island) => Some(island),
                     Part::Rows(_) => None,
                 });
@@ -826,7 +666,7 @@ impl Gathered {
 
     /// All rows that have come.
     fn rows(&self) -> RowsParts<'_> {
-        let rows = self.parts.values().filter_map(|gathering| match &*gathering.part {
+        let rows = self.parts.values().filter_map(|part| match part {
             Part::Rows(rows) => Some(rows),
             Part::Island(_) => None,
         });

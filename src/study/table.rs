@@ -16,9 +16,6 @@ use toothwave_calculation::forms::csv_error;
 const GROUP_ROWS: usize = 1 << 16;
 const GROUP_CELLS: usize = 1 << 19;
 
-/// About what a cell is as Parquet: numbers are not compressed, and each row has a bit that says whether it has one.
-pub(crate) const CELL_BYTES: u64 = 9;
-
 /// What Parquet notes of each column of a group, to the end of the file.
 const NOTE_BYTES: u64 = 1 << 10;
 
@@ -117,11 +114,6 @@ impl Table<'_> {
         let of_row: u64 = self.columns.iter().map(Column::cell_bytes).sum();
         let groups = self.length.div_ceil(group_rows) as u64;
         self.length.min(group_rows) as u64 * of_row + groups.saturating_mul(columns).saturating_mul(NOTE_BYTES)
-    }
-
-    /// About how many bytes it is as Parquet.
-    pub(crate) fn text_bytes(&self) -> u64 {
-        (self.length as u64).saturating_mul(self.columns.len() as u64).saturating_mul(CELL_BYTES)
     }
 
     fn group_rows(&self) -> usize {

@@ -14,7 +14,7 @@ use crate::evaluate::Evaluator;
 use crate::limit::{Bound, Limit};
 use crate::random::Stream;
 use crate::rank::{QuantileAnswer, ShareAnswer, quantile, share};
-use crate::rows::{GapAnswer, ReasonAnswer, Rows, RowsPart, RowsParts};
+use crate::rows::{ReasonAnswer, Rows, RowsPart, RowsParts};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Domain, GRAIN_BYTES, Template, Value, Variable};
 
@@ -283,29 +283,6 @@ impl Rows for Tolerance {
         }
         template.filled(&numbers)
     }
-
-    /// What deviates, and the inputs as they were drawn; what single items were drawn to be is too long for a row.
-    fn places(&self) -> Vec<Column> {
-        let inputs = self.kinds.iter().filter(|kind| matches!(kind.place, Place::Number { .. }));
-        let mut columns = vec![Column::new("deviates", Content::Word)];
-        columns.extend(inputs.map(|kind| Column::new(kind.name.as_str(), Content::Number)));
-        columns
-    }
-
-    fn place(&self, variant: u64) -> Vec<Cell> {
-        let deviates = match self.drawn(variant) {
-            Drawn::Nominal => "nothing",
-            Drawn::All { .. } => "everything",
-            Drawn::Alone { kind, .. } => &self.kinds[kind].name,
-        };
-        let mut cells = vec![Cell::Word(deviates.into())];
-        cells.extend(self.kinds.iter().enumerate().filter_map(|(index, kind)| {
-            let Place::Number { value } = kind.place else { return None };
-            let drawn = self.stream(variant, index).map_or(0.0, |mut stream| kind.distribution.draw(&mut stream));
-            Some(Cell::Number(value + drawn))
-        }));
-        cells
-    }
 }
 
 /// What deviations do to each quantity.
@@ -317,10 +294,6 @@ pub struct ToleranceAnswer {
     pub build: &'static str,
     /// Whether every drive was looked at.
     pub is_complete: bool,
-    /// Variants that were given up, where there are any.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schema(required = false)]
-    pub gaps: Vec<GapAnswer>,
     /// Drives that were drawn and looked at.
     pub samples: u64,
     /// Of those, drives that cannot be put together because a part is too full. They enter no quantile.
@@ -490,7 +463,6 @@ impl ToleranceAnswer {
             solver_version: toothwave_solver::VERSION,
             build: toothwave_calculation::BUILD,
             is_complete,
-            gaps: Vec::new(),
             samples: looked_at,
             interference,
             impossible,

@@ -322,11 +322,6 @@ impl Template {
         self.own.values().map(|form| form.tree.bytes()).sum()
     }
 
-    /// About what a clone takes at most, once it has filled them all.
-    pub(crate) fn clone_bytes(&self) -> usize {
-        self.forms_bytes().min(self.longest_bytes().max(OWN_BYTES))
-    }
-
     /// About what its longest document takes.
     pub(crate) fn longest_bytes(&self) -> usize {
         self.examples().map(Tree::bytes).max().unwrap_or_default()

@@ -42,8 +42,8 @@ pub(crate) fn problem_codes() -> Vec<ProblemCode> {
         DeadlineExceeded => ShuttingDown,
         ShuttingDown => TooManyConnections,
         TooManyConnections => TooManyUnreadBytes,
-        TooManyUnreadBytes => NoSharedStore,
-        NoSharedStore => StoreUnavailable,
+        TooManyUnreadBytes => StudiesOff,
+        StudiesOff => StoreUnavailable,
         StoreUnavailable => InternalError;
         InternalError)
 }
@@ -158,7 +158,7 @@ fn every_kind_of_problem_has_its_status_and_a_type_of_its_own() {
         | ProblemCode::TooManyConnections
         | ProblemCode::TooManyUnreadBytes
         | ProblemCode::StoreUnavailable => 503,
-        ProblemCode::NoSharedStore => 501,
+        ProblemCode::StudiesOff => 501,
         ProblemCode::InternalError => 500,
     };
     let mut types: Vec<_> = problem_codes()

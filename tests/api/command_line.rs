@@ -194,6 +194,21 @@ fn a_command_that_is_misspelled_ends_with_status_2() {
 }
 
 #[test]
+fn removed_commands_name_their_replacement() {
+    for arguments in [
+        &["worker", "--studies", "postgres://any@db/studies"][..],
+        &["migrate", "--studies", "postgres://any@db/studies"],
+        &["worker"],
+        &["--studies", "postgres://any@db/studies"],
+        &["--replicas", "2"],
+    ] {
+        let output = run(arguments, b"");
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(stderr(&output).contains("--studies "), "{}", stderr(&output));
+    }
+}
+
+#[test]
 fn without_a_server_no_limit_but_the_documents_own_applies() {
     let many = with(&undercut(), "/sweep", json!({ "samples": 250_000 })).to_string();
     let output = run(&["sweep", "-", "--format", "table"], many.as_bytes());

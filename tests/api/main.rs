@@ -33,4 +33,6 @@ mod ranges;
 mod rules;
 mod serving;
 mod stopping;
+mod stored;
+mod studies;
 mod violations;

@@ -1,16 +1,13 @@
 //! Results as tables: Parquet holds what CSV does.
 
-use std::sync::Arc;
-
 use bytes::Bytes;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::record::Field;
 use serde_json::{Value, json};
 use toothwave_calculation::forms::{Format, Forms as _};
-use toothwave_solver::Never;
-use toothwave_study::{Gathered, Study, Work};
+use toothwave_study::Gathered;
 
-use crate::asking::{LIMITS, answer, gathered, paper, text, with};
+use crate::asking::{gathered, paper, text, with};
 
 fn cells_of_csv(gathered: &Gathered) -> Vec<Vec<String>> {
     let text = text(gathered, Format::Csv);
@@ -109,93 +106,6 @@ fn a_table_of_many_columns_is_written_in_groups_of_fewer_rows_and_says_what_it_h
     // A number takes 8 bytes at the very least.
     let beside = answer.held_bytes(Format::Parquet) - answer.held_bytes(Format::Csv);
     assert!(beside >= 8 * u64::try_from(most).unwrap(), "{beside} bytes for {most} cells");
-}
-
-/// The rows of all chunks, of so many variants each, under one head.
-fn cells_of_chunks(document: &Value, variants: u64) -> Vec<Vec<String>> {
-    let study = Study::read(document.to_string().as_bytes(), &LIMITS).unwrap().in_chunks_of(variants);
-    let study = Arc::new(study);
-    assert!(study.has_rows());
-    let mut cells = Vec::new();
-    for chunk in 0..study.chunks() {
-        let part = Work::new(&study, chunk).run(&Never).unwrap();
-        let [one, other] = [(); 2].map(|()| {
-            let mut bytes = Vec::new();
-            study.write_rows(&part, &mut bytes).unwrap();
-            bytes
-        });
-        assert!(study.rows_bytes(&part) > 2 * one.len() as u64, "its cells are there with the text of a group");
-        assert_eq!(one, other, "the bytes of a chunk follow from it");
-        let mut rows = cells_of_file(one);
-        let head = rows.remove(0);
-        if cells.is_empty() {
-            cells.push(head);
-        } else {
-            assert_eq!(head, cells[0]);
-        }
-        cells.extend(rows);
-    }
-    cells
-}
-
-#[test]
-fn the_rows_of_a_maps_chunks_are_those_of_its_result() {
-    let map = json!({
-        "study": "map", "base": paper(), "quantities": ["peak_stress_ring_mpa", "undercut"],
-        "over": {
-            "/drive/teeth/radius_mm": { "min": 3.0, "max": 8.0, "steps": 6 },
-            "/drive/ring/teeth": { "one_of": [26, 27] },
-            "/model/compatibility": { "one_of": ["projection", "virtual_work"] }
-        }
-    });
-    let whole = cells_of_parquet(&gathered(&map));
-    assert_eq!(whole.len(), 1 + 24);
-    // Chunks in which all have an answer, none has one, and some have one.
-    for variants in [1, 5, 24] {
-        assert_eq!(cells_of_chunks(&map, variants), whole);
-    }
-}
-
-#[test]
-fn the_rows_of_a_tolerance_studys_chunks_tell_what_was_drawn_and_what_came_of_it() {
-    let quantity = "peak_stress_ring_mpa";
-    let radius = "/drive/teeth/radius_mm";
-    let tolerance = json!({
-        "study": "tolerance", "base": with(&paper(), "/model", json!({ "clearance": { "ring_um": 10.0 } })), "samples": 50, "quantities": [quantity],
-        "deviations": { "ring_space_um": { "distribution": "uniform", "limit": 3.0 } },
-        "inputs": { radius: { "distribution": "normal", "sigma": 0.01 } }
-    });
-    let rows = cells_of_chunks(&tolerance, 7);
-    assert_eq!(rows[0], ["variant", "deviates", radius, quantity, "reason"]);
-    assert_eq!(rows.len(), 1 + 1 + 50 + 2 * 50);
-    assert!(rows[1..].iter().enumerate().all(|(variant, row)| row[0] == variant.to_string()));
-    let told = answer(&tolerance);
-    assert_eq!(rows[1][1..4], ["nothing", "5.0", &told["quantities"][0]["nominal"].to_string()]);
-    let of = |deviates: &str| rows[1..].iter().filter(|row| row[1] == deviates).collect::<Vec<_>>();
-    let mut drawn: Vec<f64> = of("everything").iter().map(|row| row[3].parse().unwrap()).collect();
-    drawn.sort_by(f64::total_cmp);
-    assert_eq!(drawn.len(), 50);
-    assert_eq!(told["quantities"][0]["largest"], drawn[49]);
-    assert_eq!(told["quantities"][0]["quantiles"][4]["value"], drawn[24]);
-    assert!(of("ring_space_um").iter().all(|row| row[2] == "5.0"));
-    // The drives whose radius alone deviates, asked of a map with those radii.
-    let alone = of(radius);
-    let radii: Vec<f64> = alone.iter().map(|row| row[2].parse().unwrap()).collect();
-    let map = json!({ "study": "map", "base": with(&tolerance["base"], "/deviations", json!({ "ring_space_um": vec![0.0; 26] })), "over": { radius: { "one_of": radii } }, "quantities": [quantity] });
-    for (row, of_map) in alone.iter().zip(&cells_of_parquet(&gathered(&map))[1..]) {
-        assert_eq!(row[2..4], of_map[1..3]);
-    }
-}
-
-#[test]
-fn the_rows_of_a_sensitivitys_chunks_have_its_inputs() {
-    let sensitivity = json!({ "study": "sensitivity", "base": paper(), "quantities": ["ring_root_radius_mm"], "inputs": {
-        "/drive/teeth/radius_mm": { "plus_minus": 0.5 }, "/drive/teeth/width_mm": { "plus_minus": 1.0 }
-    } });
-    let rows = cells_of_chunks(&sensitivity, 2);
-    assert_eq!(rows[0][..3], ["variant", "/drive/teeth/radius_mm", "/drive/teeth/width_mm"]);
-    let places: Vec<_> = rows[1..].iter().map(|row| (row[1].as_str(), row[2].as_str())).collect();
-    assert_eq!(places, [("5.0", "15.0"), ("4.5", "15.0"), ("5.5", "15.0"), ("5.0", "14.0"), ("5.0", "16.0")]);
 }
 
 /// More rows than a group of Parquet holds.

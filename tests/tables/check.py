@@ -1,21 +1,19 @@
 """Tables of the running service, read by pyarrow: Parquet of studies and Arrow streams of sweeps hold what CSV and JSON do.
 
-    check.py URL PARTS      with pyarrow installed (PyPI); the service keeps its studies in a file, and their rows in the folder PARTS
+    check.py URL      with pyarrow installed (PyPI)
 """
 
 import io
 import json
 import os
-import pathlib
 import sys
 import urllib.request
 
-import pyarrow.compute
 import pyarrow.csv
 import pyarrow.ipc
 import pyarrow.parquet
 
-URL, PARTS = sys.argv[1], pathlib.Path(sys.argv[2])
+URL = sys.argv[1]
 
 BASE = {
     "drive": {"wave_generator": {"semi_major_mm": 58.0, "semi_minor_mm": 56.0},
@@ -59,31 +57,6 @@ def check_study(study):
     print(study["study"], parquet.num_rows, "rows:", ", ".join(f"{field.name} {field.type}" for field in parquet.schema))
 
 
-def rows_of(study):
-    """All rows of a study as one data set, its result as a table, and of how many files the rows are."""
-    told = json.loads(ask("/v1/studies", study))
-    while told["state"] == "running":
-        told = json.loads(ask("/v1/studies", study))
-    folder, = PARTS.glob(f"{told['id']}-by-*")
-    result = pyarrow.parquet.read_table(io.BytesIO(ask(told["result_href"], accept="application/vnd.apache.parquet")))
-    return pyarrow.parquet.read_table(folder), result, len(list(folder.iterdir()))
-
-
-def check_rows():
-    """Of a map they are its result, in its order; those of a tolerance study are what its quantiles were taken of."""
-    grid = {"/drive/teeth/radius_mm": {"min": 3.0, "max": 8.0, "steps": 200}, "/load/input_torque_nm": {"min": 10.0, "max": 30.0, "steps": 200}}
-    rows, result, files = rows_of({"study": "map", "base": BASE, "quantities": ["peak_stress_ring_mpa"], "over": grid})
-    assert rows.equals(result) and rows.num_rows == 40_000, (rows, result)
-    print("rows of a map:", rows.num_rows, "in", files, "files")
-    rows, result, files = rows_of(STUDIES[3] | {"samples": 1001})
-    assert rows.column("variant").to_pylist() == list(range(rows.num_rows))
-    drawn = rows.filter(pyarrow.compute.equal(rows.column("deviates"), "everything"))
-    values = sorted(drawn.column("peak_stress_ring_mpa").to_pylist())
-    assert len(values) == 1001 and result.column("value").to_pylist()[4] == values[500]
-    assert all(abs(radius - 5.0) <= 0.006 for radius in drawn.column("/drive/teeth/radius_mm").to_pylist())
-    print("rows of a tolerance study:", rows.num_rows, "in", files, "files")
-
-
 def check_sweep(document):
     stream = pyarrow.ipc.open_stream(ask("/v1/sweep", document, "application/vnd.apache.arrow.stream"))
     table = stream.read_all()
@@ -99,7 +72,6 @@ def check_sweep(document):
 
 for each in STUDIES:
     check_study(each)
-check_rows()
 check_sweep({**BASE, "sweep": {"samples": 20_000}})
 check_sweep({
     **BASE,

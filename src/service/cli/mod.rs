@@ -85,6 +85,12 @@ enum Command {
         #[arg(long, value_parser = one_of(&FORMATS), default_value = "json")]
         format: Format,
     },
+    /// Commands of earlier builds
+    #[command(hide = true, aliases = ["migrate"])]
+    Worker {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        _any: Vec<OsString>,
+    },
     /// Ask a running service whether it is healthy; exit status 0 if so
     Health {
         /// Where it listens
@@ -152,6 +158,10 @@ pub fn run() -> ExitCode {
         Command::Draw { part, file, format } => answer(Drawing(part), &file, format),
         Command::Batch { file, endpoint, peaks_only } => batch::run(&file, BatchQuery { endpoint, peaks_only }),
         Command::Study { file, format } => study::run(&file, format),
+        Command::Worker { .. } => Err(Failure::BadInput(
+            "the commands `worker` and `migrate` were removed: `toothwave --studies FILE` computes its studies itself"
+                .into(),
+        )),
         Command::Health { address } => health(address),
         Command::NewKey { name } => new_key(&name),
         Command::Openapi => print(|writer| writer.write_all(router::openapi_json().as_bytes())),

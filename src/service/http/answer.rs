@@ -288,7 +288,7 @@ pub fn settle(reservation: Option<Reservation>, bytes: usize) -> Option<Arc<Rese
 ///
 /// # Errors
 /// `deadline_exceeded` if the stop flag is set, and faults of the service.
-fn write<A: Forms>(
+pub fn write<A: Forms>(
     answer: &A,
     Representation { format, gzip }: Representation,
     stop: &AtomicBool,

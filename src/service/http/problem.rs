@@ -111,9 +111,9 @@ pub enum ProblemCode {
     TooManyConnections,
     /// 503: so many bytes of answers are on their way to clients that there is no room for another.
     TooManyUnreadBytes,
-    /// 501: this is one of several replicas, and they share no store of studies.
-    NoSharedStore,
-    /// 503: the store of studies does not answer, or has another schema.
+    /// 501: the service was started without studies.
+    StudiesOff,
+    /// 503: the file of studies cannot be read or written, for instance because the disk is full.
     StoreUnavailable,
     /// 500: a fault of the service itself.
     InternalError,
@@ -146,7 +146,7 @@ impl ProblemCode {
             | Self::TooManyConnections
             | Self::TooManyUnreadBytes
             | Self::StoreUnavailable => StatusCode::SERVICE_UNAVAILABLE,
-            Self::NoSharedStore => StatusCode::NOT_IMPLEMENTED,
+            Self::StudiesOff => StatusCode::NOT_IMPLEMENTED,
             Self::InternalError => StatusCode::INTERNAL_SERVER_ERROR,
         }
     }
@@ -177,8 +177,8 @@ impl ProblemCode {
             Self::ShuttingDown => "The service is stopping",
             Self::TooManyConnections => "Too many connections are open",
             Self::TooManyUnreadBytes => "Clients have too many bytes of answers to read",
-            Self::NoSharedStore => "The replicas share no store of studies",
-            Self::StoreUnavailable => "The store of studies does not answer",
+            Self::StudiesOff => "This service takes no studies",
+            Self::StoreUnavailable => "The file of studies cannot be used now",
             Self::InternalError => "The service failed",
         }
     }
@@ -192,7 +192,7 @@ impl ProblemCode {
         Self::TooManyConnections,
         Self::TooManyUnreadBytes,
         Self::MisdirectedRequest,
-        Self::NoSharedStore,
+        Self::StudiesOff,
         Self::StoreUnavailable,
     ];
 }

@@ -8,7 +8,7 @@ use super::problem::{Problem, ProblemCode};
 ///
 /// # Errors
 /// `invalid_query`.
-pub(super) fn require_no_query(uri: &Uri) -> Result<(), Problem> {
+pub(crate) fn require_no_query(uri: &Uri) -> Result<(), Problem> {
     match uri.query() {
         None | Some("") => Ok(()),
         Some(query) => {

@@ -23,7 +23,7 @@ use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use super::answer::{CACHE_STATUS, SERVER_TIMING};
-use super::endpoints::{accuracy, batch, coincidence_degree, design, drawings, geometry, page, service, sweep};
+use super::endpoints::{accuracy, batch, coincidence_degree, design, drawings, geometry, page, service, studies, sweep};
 use super::observe;
 use super::problem::{PROBLEM_JSON, Problem, ProblemCode};
 use super::query::require_no_query;
@@ -56,7 +56,11 @@ fn api() -> OpenApiRouter<Arc<App>> {
         .routes(routes!(service::example))
         .routes(routes!(service::live))
         .routes(routes!(service::ready))
-        .routes(routes!(service::metrics));
+        .routes(routes!(service::metrics))
+        .routes(routes!(studies::quantities))
+        .routes(routes!(studies::study, studies::cancel))
+        .routes(routes!(studies::result))
+        .routes(routes!(studies::events));
     OpenApiRouter::with_openapi(Document::openapi())
         .routes(routes!(geometry::geometry))
         .routes(routes!(coincidence_degree::coincidence_degree))
@@ -65,6 +69,7 @@ fn api() -> OpenApiRouter<Arc<App>> {
         .routes(routes!(accuracy::accuracy))
         .routes(routes!(drawings::drawing))
         .routes(routes!(batch::batch))
+        .routes(routes!(studies::begin))
         // Endpoints that read a document refuse a query themselves.
         .merge(without_document.layer(middleware::from_fn(without_query)))
 }
@@ -258,6 +263,7 @@ fn cors(origins: &[String]) -> CorsLayer {
             header::LOCATION,
             header::RETRY_AFTER,
             CACHE_STATUS,
+            studies::PREFERENCE_APPLIED,
             SERVER_TIMING,
             observe::X_REQUEST_ID,
         ])

@@ -30,8 +30,9 @@ use tower::util::MapRequest;
 
 use super::router::{self, Access};
 use crate::app::App;
-use crate::ops::config::{CLIENT_TIMEOUT_MS, MAX_CONNECTIONS, MAX_HEADER_BYTES, Settings};
+use crate::ops::config::{CLIENT_TIMEOUT_MS, MAX_CONNECTIONS, MAX_HEADER_BYTES, Settings, StudiesPlace};
 use crate::ops::metrics;
+use crate::studies::{Keeping, Store};
 
 /// The service listens at least this long after it says that it is not ready.
 const NOTICE: Duration = Duration::from_millis(200);
@@ -74,10 +75,16 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
         .await
         .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", settings.listen)))?;
     let address = listener.local_addr()?;
-    let app = App::start(settings.limits())?;
+    let app = App::start(settings.limits(), keeping(settings)?)?;
+    app.studies.load().await.map_err(io::Error::other)?;
+    app.studies.forget_expired().await;
     let server = Server::new(&app, settings, address);
     greet(address);
     tokio::spawn(metrics::upkeep());
+    tokio::spawn({
+        let app = Arc::clone(&app);
+        async move { app.studies.forget_old().await }
+    });
     watch_keys(settings)?;
     let stopping = async {
         told_to_stop().await;
@@ -102,6 +109,20 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
     }
     tracing::info!("stopped");
     Ok(())
+}
+
+/// Where the settings have studies kept.
+fn keeping(settings: &Settings) -> io::Result<Keeping> {
+    let file = match &settings.studies {
+        Some(StudiesPlace::Off) => return Ok(Keeping::Off),
+        Some(StudiesPlace::File(file)) => Some(file.as_path()),
+        None => None,
+    };
+    let store = Store::open(file).map_err(|error| match file {
+        Some(file) => io::Error::other(format!("{}: {error}", file.display())),
+        None => io::Error::other(error),
+    })?;
+    Ok(Keeping::In { store, expiry: Duration::from_secs(settings.study_expiry_s) })
 }
 
 /// Reads the keys file again at each hang-up signal.
@@ -224,7 +245,12 @@ impl Server {
     /// Waits until all requests are answered; near the end of `bound` it stops their computations.
     async fn finish(self, app: &App, bound: Duration) {
         self.closing.cancel();
-        let mut finished = pin!(self.graceful.shutdown());
+        app.studies.close();
+        let finished = async {
+            self.graceful.shutdown().await;
+            app.studies.closed().await;
+        };
+        let mut finished = pin!(finished);
         if timeout(bound.saturating_sub(LAST_ANSWERS), finished.as_mut()).await.is_err() {
             tracing::warn!("requests still run: their computations are stopped");
             app.pool.stop();

@@ -1,6 +1,7 @@
 //! The settings of the service: each is a flag and a `TOOTHWAVE_…` variable. Everything else is a constant.
 
 use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use axum::http::Uri;
@@ -82,6 +83,14 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_CACHE_MAX_BYTES", value_name = "BYTES")]
     pub cache_max_bytes: Option<u64>,
 
+    /// File in which studies are kept, or `off` for a service without studies [default: in memory]
+    #[arg(long, env = "TOOTHWAVE_STUDIES", value_name = "FILE|off", value_parser = studies)]
+    pub studies: Option<StudiesPlace>,
+
+    /// Seconds after which a study that nobody asks for is removed
+    #[arg(long, env = "TOOTHWAVE_STUDY_EXPIRY_S", value_name = "S", default_value_t = 2_592_000)]
+    pub study_expiry_s: u64,
+
     /// File of key hashes (see `toothwave new-key`): with it every path but health and the page needs a bearer token
     #[arg(long, env = "TOOTHWAVE_KEYS_FILE", value_name = "FILE", value_parser = Keys::read)]
     pub keys_file: Option<Keys>,
@@ -101,6 +110,45 @@ pub struct Settings {
     /// What is logged, as tracing-subscriber's EnvFilter reads it
     #[arg(long, env = "TOOTHWAVE_LOG", value_name = "FILTER", default_value = "info", value_parser = log_filter)]
     pub log: String,
+
+    /// Settings of earlier builds
+    #[command(flatten)]
+    pub removed: RemovedSettings,
+}
+
+/// Where studies are kept, if not in memory.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum StudiesPlace {
+    /// Nowhere: there are none.
+    Off,
+    /// In this file.
+    File(PathBuf),
+}
+
+/// Settings of earlier builds: each ends the start with a sentence that names its replacement.
+#[derive(Debug, Clone, Args)]
+pub struct RemovedSettings {
+    #[arg(long, env = "TOOTHWAVE_REPLICAS", hide = true, value_parser = |_: &str| removed("start one service with `--studies FILE` for all studies, and the others with `--studies off`"))]
+    replicas: Option<()>,
+    #[arg(long, env = "TOOTHWAVE_STUDY_PARTS", hide = true, value_parser = |_: &str| removed("read `/v1/studies/{id}/result` as Parquet"))]
+    study_parts: Option<()>,
+    #[arg(long, env = "TOOTHWAVE_STUDIES_PASSWORD_FILE", hide = true, value_parser = |_: &str| removed("use `--studies FILE`, which needs no password"))]
+    studies_password_file: Option<()>,
+}
+
+fn removed(replacement: &str) -> Result<(), String> {
+    Err(format!("this setting was removed: {replacement}"))
+}
+
+fn studies(text: &str) -> Result<StudiesPlace, String> {
+    match text {
+        "off" => Ok(StudiesPlace::Off),
+        "" | ":memory:" => Err("name a file; without this setting studies are kept in memory".into()),
+        address if address.starts_with("postgres:") || address.starts_with("postgresql:") => {
+            Err("PostgreSQL is not supported any more: use `--studies FILE`".into())
+        }
+        file => Ok(StudiesPlace::File(file.into())),
+    }
 }
 
 /// The limits that a client can read.
@@ -251,6 +299,20 @@ mod tests {
             "https://a.example/",
         ] {
             assert!(origin(refused).is_err(), "{refused}");
+        }
+    }
+
+    #[test]
+    fn removed_settings_name_their_replacement() {
+        for (words, replacement) in [
+            (["serve", "--replicas", "2"], "--studies off"),
+            (["serve", "--study-parts", "parts"], "/result"),
+            (["serve", "--studies-password-file", "password"], "--studies FILE"),
+            (["serve", "--studies", "postgres://any@db/studies"], "--studies FILE"),
+            (["serve", "--studies", ":memory:"], "name a file"),
+        ] {
+            let refused = Line::try_parse_from(words).err().map(|error| error.to_string()).unwrap_or_default();
+            assert!(refused.contains(replacement), "{refused}");
         }
     }
 

@@ -98,6 +98,7 @@ pub fn render(app: &App) -> String {
         ("toothwave_cache_bytes", cache_bytes),
         ("toothwave_cache_entries", cache_entries),
         ("toothwave_batches_running", app.pool.batches() as u64),
+        ("toothwave_studies_running", app.studies.running() as u64),
         ("toothwave_solves_running", app.pool.running() as u64),
         ("toothwave_solves_queued", app.pool.waiting() as u64),
         ("toothwave_unread_bytes", app.budget.reserved_bytes()),

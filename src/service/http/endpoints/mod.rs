@@ -9,4 +9,5 @@ pub mod geometry;
 pub mod page;
 pub mod peaks;
 pub mod service;
+pub mod studies;
 pub mod sweep;
