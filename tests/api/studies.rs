@@ -324,12 +324,12 @@ async fn pieces_that_take_much_are_worked_on_side_by_side_as_far_as_an_eighth_of
 async fn a_search_of_many_islands_looks_at_all_of_them() {
     let service = Service::within(Limits { deadline_ms: 600_000, max_concurrent_solves: 2, ..LIMITS });
     let study = json!({
-        "study": "search", "base": shortest(), "evaluations": 106_250, "free": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.5 } },
+        "study": "search", "base": shortest(), "evaluations": 212_500, "free": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.5 } },
         "objectives": [{ "quantity": "slot_wall_mm", "goal": "max" }, { "quantity": "outer_diameter_mm", "goal": "min" }]
     });
     let found = waited_for(&service, &study).await;
-    assert_eq!((&found["state"], &found["looked_at"]), (&json!("done"), &json!(106_250)));
-    assert_eq!((&found["result"]["is_complete"], &found["result"]["evaluated"]), (&json!(true), &json!(106_250)));
+    assert_eq!((&found["state"], &found["looked_at"]), (&json!("done"), &json!(212_500)));
+    assert_eq!((&found["result"]["is_complete"], &found["result"]["evaluated"]), (&json!(true), &json!(212_500)));
 }
 
 #[tokio::test]
