@@ -6,26 +6,34 @@
 //! M. Goyal, Computer Science and Informatics 26, 1996, 30-45). Compared is with limits as by K. Deb (IEEE Transactions on Evolutionary
 //! Computation 6, 2002, 182-197): a point within all limits beats one beyond, and of two beyond the one that is less so. What nobody beats is
 //! kept in an archive, from which most steps begin. Either kind alone finds less in as many steps (docs/studies.md).
+//!
+//! If half of the evaluations found nothing within all limits, each limit gets a population of its own: there a point that exceeds the other
+//! limits less is better, and of two that exceed them equally the one that exceeds this limit less.
 
 use serde::{Deserialize, Serialize};
 
+use crate::front::Front;
 use crate::random::Stream;
 
 /// Points that evolve.
 const POPULATION: usize = 48;
 
-/// Points of the archive at most: of more the most crowded goes.
+/// Points of the archive at most.
 pub(crate) const MOST_OF_FRONT: usize = 100;
 
 /// Of the steps, the share that begins in the archive, where it has points.
 const FROM_ARCHIVE: f64 = 0.9;
 
-/// Distribution indices of crossover and mutation: the larger, the nearer children stay to their parents. Those of K. Deb's NSGA-II.
-const CROSSOVER_INDEX: f64 = 15.0;
-const MUTATION_INDEX: f64 = 20.0;
+/// Of the steps for a limit that is relaxed, the share that begins at its best point.
+const FROM_BEST: f64 = 0.5;
 
-/// What a limit that is looked past weighs.
-const LOOKED_PAST: f64 = 1e-3;
+/// Points of a limit that is relaxed that are judged anew, at least: as many as steps need.
+const LEAST_JUDGED_ANEW: usize = 8;
+
+/// Distribution indices of crossover and mutation: the larger, the nearer children stay to their parents. Twice those of
+/// K. Deb's NSGA-II: parents from the archive are near to the front already.
+const CROSSOVER_INDEX: f64 = 30.0;
+const MUTATION_INDEX: f64 = 40.0;
 
 /// What a point comes to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -76,15 +84,18 @@ pub struct Optimiser {
     plan: Plan,
     stream: Stream,
     shift: Vec<f64>,
-    /// Points that come first.
-    given: Vec<Vec<f64>>,
+    /// Points that come first, each with the population that it begins in.
+    given: Vec<(usize, Vec<f64>)>,
     asked: u64,
     scanned: u64,
-    population: Vec<Point>,
-    archive: Vec<Point>,
+    /// The one that keeps all limits, then, once they are needed, one for each limit that is relaxed.
+    populations: Vec<Vec<Point>>,
+    archive: Front,
     /// Of each limit, the point that exceeds it least and keeps all others.
     relaxations: Vec<Option<Point>>,
     nearest: Option<Point>,
+    /// The population that the point asked for last is for, and the member whose place it may take.
+    population: usize,
     parent: Option<usize>,
 }
 
@@ -93,11 +104,11 @@ impl Judged {
         self.violations.iter().all(|&violation| violation <= 0.0)
     }
 
-    fn beyond(&self, looked_past: Option<usize>) -> f64 {
-        let weighed = |(limit, violation): (usize, &f64)| {
-            if looked_past == Some(limit) { LOOKED_PAST * violation } else { *violation }
-        };
-        self.violations.iter().enumerate().map(weighed).sum()
+    /// How far the limits are exceeded together, the relaxed one apart, and how far that one is.
+    fn beyond(&self, relaxed: Option<usize>) -> (f64, f64) {
+        let own = relaxed.map_or(0.0, |limit| self.violations[limit]);
+        let others = self.violations.iter().enumerate().filter(|&(limit, _)| Some(limit) != relaxed);
+        (others.map(|(_, violation)| violation).sum(), own)
     }
 
     /// Whether it is nowhere worse, and somewhere better or the same everywhere.
@@ -106,9 +117,9 @@ impl Judged {
     }
 
     /// Whether it takes the place of another one.
-    fn is_no_worse(&self, other: &Self, looked_past: Option<usize>) -> bool {
-        let (own, others) = (self.beyond(looked_past), other.beyond(looked_past));
-        if own > 0.0 || others > 0.0 { own <= others } else { !other.covers(self) || self.covers(other) }
+    fn is_no_worse(&self, other: &Self, relaxed: Option<usize>) -> bool {
+        let (own, others) = (self.beyond(relaxed), other.beyond(relaxed));
+        if own > (0.0, 0.0) || others > (0.0, 0.0) { own <= others } else { !other.covers(self) || self.covers(other) }
     }
 }
 
@@ -121,12 +132,13 @@ impl Optimiser {
             stream: Stream::new(seed, stream),
             relaxations: vec![None; plan.limits],
             plan,
-            given,
+            given: given.into_iter().map(|place| (0, place)).collect(),
             asked: 0,
             scanned: 0,
-            population: Vec::new(),
-            archive: Vec::new(),
+            populations: vec![Vec::new()],
+            archive: Front::new(MOST_OF_FRONT),
             nearest: None,
+            population: 0,
             parent: None,
         }
     }
@@ -141,32 +153,46 @@ impl Optimiser {
         self.asked >= self.plan.evaluations
     }
 
-    /// The limit that is looked past at this time: where nothing good was found for long, each in turn.
-    fn looked_past(&self) -> Option<usize> {
-        let rest = self.asked.checked_sub(self.plan.evaluations / 2)?;
-        let limits = self.plan.limits as u64;
-        if !self.archive.is_empty() || limits == 0 {
-            return None;
+    /// The limit that a population relaxes.
+    const fn relaxed(population: usize) -> Option<usize> {
+        population.checked_sub(1)
+    }
+
+    /// The population whose turn it is: that which keeps all limits, or, where nothing good was found for long, those of the limits in turns.
+    fn next_population(&mut self) -> usize {
+        let is_late = 2 * self.asked > self.plan.evaluations;
+        if self.plan.limits == 0 || !is_late || !self.archive.points().is_empty() {
+            return 0;
         }
-        let each = (self.plan.evaluations.div_ceil(2) / limits).max(1);
-        usize::try_from(rest / each).ok().filter(|&limit| limit < self.plan.limits)
+        if self.populations.len() == 1 {
+            self.populations = vec![self.populations.swap_remove(0); 1 + self.plan.limits];
+        }
+        1 + usize::try_from(self.asked % self.plan.limits as u64).unwrap_or_default()
     }
 
     /// The next point.
     pub fn ask(&mut self) -> Vec<f64> {
         self.asked += 1;
         self.parent = None;
-        if let Some(given) = self.given.pop() {
-            return given;
+        self.population = 0;
+        if let Some((population, place)) = self.given.pop() {
+            self.population = population;
+            return place;
         }
         if self.scanned < self.plan.scan {
             self.scanned += 1;
             return self.scan_point(self.plan.scan_from + self.scanned - 1);
         }
-        if self.population.len() < 4 {
+        self.population = self.next_population();
+        if self.members().len() < 4 {
             return (0..self.plan.dimensions).map(|_| self.stream.share()).collect();
         }
         self.offspring()
+    }
+
+    /// Those of the population whose turn it is.
+    fn members(&self) -> &[Point] {
+        &self.populations[self.population]
     }
 
     /// A point of the sequence: multiples of the powers of 1/φ, `φ^(d+1) = φ + 1`, shifted, modulo 1.
@@ -182,17 +208,28 @@ impl Optimiser {
     }
 
     fn offspring(&mut self) -> Vec<f64> {
-        let target = self.stream.below(self.population.len());
+        let target = self.stream.below(self.members().len());
         self.parent = Some(target);
-        // Past a limit there are few steps, and those of the population are the more varied ones.
-        if self.looked_past().is_none() && self.stream.share() < 0.5 { self.crossed() } else { self.differed(target) }
+        // For one limit there are few steps, and those of the population are the more varied ones.
+        if self.population == 0 && self.stream.share() < 0.5 { self.crossed() } else { self.differed(target) }
     }
 
-    /// Where a step begins.
+    /// Where a step begins: mostly at the best that are known.
     fn begin(&mut self) -> Vec<f64> {
-        let is_archived = !self.archive.is_empty() && self.stream.share() < FROM_ARCHIVE;
-        let pool = if is_archived { &self.archive } else { &self.population };
-        pool[self.stream.below(pool.len())].place.clone()
+        let archive = self.archive.points();
+        if !archive.is_empty() && self.stream.share() < FROM_ARCHIVE {
+            return archive[self.stream.below(archive.len())].place.clone();
+        }
+        let members = &self.populations[self.population];
+        let chosen = self.stream.below(members.len());
+        match Self::relaxed(self.population) {
+            Some(_) if self.stream.share() < FROM_BEST => {
+                let by = |point: &&Point| point.judged.beyond(Self::relaxed(self.population));
+                let best = members.iter().min_by(|one, other| order(by(one), by(other)));
+                best.unwrap_or(&members[chosen]).place.clone()
+            }
+            _ => members[chosen].place.clone(),
+        }
     }
 
     /// Between and around two points, here and there a little off.
@@ -213,20 +250,17 @@ impl Optimiser {
 
     /// From a point along the difference of two others, as far as it is taken over into a member of the population.
     fn differed(&mut self, target: usize) -> Vec<f64> {
-        let count = self.population.len();
+        let count = self.members().len();
         let base = self.begin();
         let (one, other) = (self.stream.below(count), self.stream.below(count));
-        let pool = |index: usize, archive: &[Point], population: &[Point]| match archive.get(index) {
-            Some(point) => point.place.clone(),
-            None => population[index % population.len()].place.clone(),
-        };
-        let from_archive = self.archive.len() > 8 && self.stream.share() < 0.5;
-        let archive = if from_archive { self.archive.as_slice() } else { &[] };
-        let (one, other) = (pool(one, archive, &self.population), pool(other, archive, &self.population));
+        let from_archive = self.archive.points().len() > 8 && self.stream.share() < 0.5;
+        let archive = if from_archive { self.archive.points() } else { &[] };
+        let place = |index: usize| archive.get(index).unwrap_or(&self.members()[index]).place.clone();
+        let (one, other) = (place(one), place(other));
         let scale = 0.1 + 0.8 * self.stream.share();
         let crossing = if self.stream.share() < 0.5 { 0.9 } else { 0.3 };
         let forced = self.stream.below(self.plan.dimensions);
-        let mut child = self.population[target].place.clone();
+        let mut child = self.members()[target].place.clone();
         for axis in 0..self.plan.dimensions {
             if axis == forced || self.stream.share() < crossing {
                 let moved = base[axis] + scale * (one[axis] - other[axis]);
@@ -251,7 +285,7 @@ impl Optimiser {
     pub fn tell(&mut self, point: Option<Point>) {
         let Some(point) = point else { return };
         if point.judged.is_good() {
-            insert(&mut self.archive, point.clone());
+            self.archive.insert(point.clone());
         } else {
             let beyond = point.judged.beyond(None);
             if self.nearest.as_ref().is_none_or(|nearest| beyond < nearest.judged.beyond(None)) {
@@ -265,37 +299,49 @@ impl Optimiser {
                 }
             }
         }
-        let looked_past = self.looked_past();
+        let relaxed = Self::relaxed(self.population);
+        let members = &mut self.populations[self.population];
+        let beyond = |point: &Point| point.judged.beyond(relaxed);
         match self.parent.take() {
             Some(parent) => {
-                if point.judged.is_no_worse(&self.population[parent].judged, looked_past) {
-                    self.population[parent] = point;
+                if point.judged.is_no_worse(&members[parent].judged, relaxed) {
+                    members[parent] = point;
                 }
             }
-            None if self.population.len() < POPULATION => self.population.push(point),
+            None if members.len() < POPULATION => members.push(point),
             // Of the scan the best begin: each takes the place of the worst.
             None => {
-                let beyond = |point: &Point| point.judged.beyond(looked_past);
-                let worst = (0..POPULATION)
-                    .max_by(|&one, &other| beyond(&self.population[one]).total_cmp(&beyond(&self.population[other])));
-                if let Some(worst) = worst.filter(|&worst| beyond(&point) < beyond(&self.population[worst])) {
-                    self.population[worst] = point;
+                let worst = members.iter_mut().max_by(|one, other| order(beyond(one), beyond(other)));
+                if let Some(worst) = worst.filter(|worst| beyond(&point) < beyond(worst)) {
+                    *worst = point;
                 }
             }
         }
     }
 
-    /// Begins again from the same points, to be judged anew, with so many more after them.
+    /// Begins again from the best points, to be judged anew, with so many more after them.
     pub fn judge_anew(&mut self, more: u64) {
-        self.given.extend(self.population.drain(..).chain(self.archive.drain(..)).map(|point| point.place));
-        self.given.extend(self.relaxations.iter_mut().filter_map(Option::take).map(|point| point.place));
-        self.given.extend(self.nearest.take().map(|point| point.place));
+        let mut populations = std::mem::replace(&mut self.populations, vec![Vec::new()]);
+        if self.archive.points().is_empty() && populations.len() > 1 {
+            self.populations.resize(populations.len(), Vec::new());
+            let each = (POPULATION / self.plan.limits).max(LEAST_JUDGED_ANEW);
+            for (population, members) in populations.iter_mut().enumerate().skip(1) {
+                let by = |point: &Point| point.judged.beyond(Self::relaxed(population));
+                members.sort_by(|one, other| order(by(one), by(other)));
+                self.given.extend(members.drain(..).take(each).map(|point| (population, point.place)));
+            }
+        } else {
+            let main = populations.swap_remove(0).into_iter().chain(self.archive.take());
+            self.given.extend(main.map(|point| (0, point.place)));
+        }
+        let nearest = self.relaxations.iter_mut().filter_map(Option::take).chain(self.nearest.take());
+        self.given.extend(nearest.map(|point| (0, point.place)));
         self.plan.evaluations = self.asked + self.given.len() as u64 + more;
     }
 
     /// The points that nobody beats.
     pub fn front(&self) -> &[Point] {
-        &self.archive
+        self.archive.points()
     }
 
     /// Of each limit, the point that exceeds it least and keeps all others.
@@ -307,6 +353,10 @@ impl Optimiser {
     pub const fn nearest(&self) -> Option<&Point> {
         self.nearest.as_ref()
     }
+}
+
+fn order(one: (f64, f64), other: (f64, f64)) -> std::cmp::Ordering {
+    one.0.total_cmp(&other.0).then(one.1.total_cmp(&other.1))
 }
 
 /// How far apart two children of a crossing lie, over the distance of their parents, at a share of the probability.
@@ -321,180 +371,19 @@ fn offset(share: f64) -> f64 {
     if share < 0.5 { -off(share) } else { off(1.0 - share) }
 }
 
-/// Adds a point to a front, if nothing there is as good, and takes away what it beats.
-pub(crate) fn insert(front: &mut Vec<Point>, point: Point) {
-    if front.iter().any(|other| other.judged.covers(&point.judged)) {
-        return;
-    }
-    front.retain(|other| !point.judged.covers(&other.judged));
-    front.push(point);
-    thin(front, MOST_OF_FRONT);
-}
-
-/// Takes the most crowded away until no more than so many are left; the ends of each objective stay.
-pub(crate) fn thin(front: &mut Vec<Point>, most: usize) {
-    let mut rooms = Vec::new();
-    let mut before = Vec::new();
-    while front.len() > most {
-        let ranges = ranges(front);
-        // What was measured by other ranges is measured anew; else only what the last to go was nearest to.
-        let is_new = ranges != before;
-        if is_new {
-            rooms.clear();
-            rooms.extend((0..front.len()).map(|index| Room::of(index, front, &ranges)));
-            before.clone_from(&ranges);
-        }
-        let is_end = |point: &Point| {
-            ranges.iter().zip(&point.judged.objectives).any(|(Span { least, .. }, value)| value <= least)
-        };
-        let inner = (0..front.len()).filter(|&index| !is_end(&front[index]));
-        // Of equal ones the later.
-        let crowded =
-            inner.min_by(|&one, &other| rooms[one].squared.total_cmp(&rooms[other].squared).then(other.cmp(&one)));
-        let Some(crowded) = crowded else {
-            front.truncate(most);
-            return;
-        };
-        front.remove(crowded);
-        rooms.remove(crowded);
-        for (index, room) in rooms.iter_mut().enumerate() {
-            match room.nearest {
-                Some(nearest) if nearest == crowded => *room = Room::of(index, front, &ranges),
-                Some(nearest) if nearest > crowded => room.nearest = Some(nearest - 1),
-                _ => {}
-            }
-        }
-    }
-}
-
-/// Where the values of an objective lie.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Span {
-    least: f64,
-    width: f64,
-}
-
-fn ranges(front: &[Point]) -> Vec<Span> {
-    let objectives = front.first().map_or(0, |point| point.judged.objectives.len());
-    let range = |objective: usize| {
-        let values = front.iter().map(|point| point.judged.objectives[objective]);
-        let (least, largest) = values
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, largest), value| (least.min(value), largest.max(value)));
-        Span { least, width: (largest - least).max(f64::MIN_POSITIVE) }
-    };
-    (0..objectives).map(range).collect()
-}
-
-/// How far a point of a front is from the nearest other one.
-#[derive(Debug, Clone, Copy)]
-struct Room {
-    /// The square of the distance, objectives over their ranges.
-    squared: f64,
-    nearest: Option<usize>,
-}
-
-impl Room {
-    fn of(index: usize, front: &[Point], ranges: &[Span]) -> Self {
-        let own = &front[index].judged.objectives;
-        let mut room = Self { squared: f64::INFINITY, nearest: None };
-        for (other, point) in front.iter().enumerate().filter(|&(other, _)| other != index) {
-            let pairs = own.iter().zip(&point.judged.objectives).zip(ranges);
-            let squared = pairs.map(|((one, other), range)| ((one - other) / range.width).powi(2)).sum();
-            if squared < room.squared {
-                room = Self { squared, nearest: Some(other) };
-            }
-        }
-        room
-    }
-}
-
-/// Points of several fronts that are looked at together, at most: of more the front is thinned to half of them first.
-const MOST_AT_ONCE: usize = 2048;
-
-/// The front of several. It depends on their order only where there are more points than are looked at together: whoever merges gives the fronts
-/// by their numbers.
+/// The front of several. Whoever merges gives them by their numbers, since it depends on their order: so that the front of more islands is that
+/// of fewer with points added.
 pub fn merged(fronts: impl IntoIterator<Item = Point>) -> Vec<Point> {
-    let mut points = Vec::new();
+    let mut front = Front::new(2 * MOST_OF_FRONT);
     for point in fronts {
-        points.push(point);
-        if points.len() == MOST_AT_ONCE {
-            points = front_of(points);
-            thin(&mut points, MOST_AT_ONCE / 2);
-        }
+        front.insert(point);
     }
-    let mut front = front_of(points);
-    thin(&mut front, 2 * MOST_OF_FRONT);
-    front
-}
-
-/// Those that no other beats, by their objectives, then by their places.
-fn front_of(mut points: Vec<Point>) -> Vec<Point> {
-    points.sort_by(|one, other| {
-        let objectives = one.judged.objectives.iter().zip(&other.judged.objectives);
-        let places = one.place.iter().zip(&other.place);
-        objectives
-            .chain(places)
-            .map(|(one, other)| one.total_cmp(other))
-            .find(|order| order.is_ne())
-            .unwrap_or(std::cmp::Ordering::Equal)
-    });
-    let mut front: Vec<Point> = Vec::new();
-    for point in points {
-        // What comes later is nowhere better in the first objective that differs, so that it beats none before.
-        if !front.iter().any(|other| other.judged.covers(&point.judged)) {
-            front.push(point);
-        }
-    }
-    front
+    front.into_sorted()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{
-        CROSSOVER_INDEX, Judged, MUTATION_INDEX, Optimiser, Plan, Point, Stream, merged, offset, spread, thin,
-    };
-
-    fn points(count: usize, objectives: usize, seed: u64) -> Vec<Point> {
-        let mut stream = Stream::new(seed, 0);
-        let mut point = || {
-            let objectives: Vec<_> = (0..objectives).map(|_| (64.0 * stream.share()).floor() + 1.0).collect();
-            // On a sphere nobody beats another; whole numbers before bring equal distances.
-            let length = objectives.iter().map(|value| value * value).sum::<f64>().sqrt();
-            let objectives = objectives.iter().map(|value| -value / length).collect();
-            Point {
-                place: vec![stream.share()],
-                judged: Judged { objectives, violations: Vec::new() },
-                values: Vec::new(),
-            }
-        };
-        (0..count).map(|_| point()).collect()
-    }
-
-    /// As it is defined: all distances anew whenever one has gone.
-    fn thinned_slowly(front: &mut Vec<Point>, most: usize) {
-        while front.len() > most {
-            let objectives = front[0].judged.objectives.len();
-            let of = |objective: usize| front.iter().map(move |point| point.judged.objectives[objective]);
-            let least: Vec<f64> =
-                (0..objectives).map(|objective| of(objective).fold(f64::INFINITY, f64::min)).collect();
-            let widths: Vec<f64> = (0..objectives)
-                .map(|objective| of(objective).fold(f64::NEG_INFINITY, f64::max) - least[objective])
-                .collect();
-            let distance = |one: &Point, other: &Point| -> f64 {
-                (0..objectives)
-                    .map(|at| ((one.judged.objectives[at] - other.judged.objectives[at]) / widths[at]).powi(2))
-                    .sum()
-            };
-            let room = |index: usize| {
-                let others = (0..front.len()).filter(|&other| other != index);
-                others.map(|other| distance(&front[index], &front[other])).fold(f64::INFINITY, f64::min)
-            };
-            let is_end = |index: usize| (0..objectives).any(|at| front[index].judged.objectives[at] <= least[at]);
-            let crowded = (0..front.len()).filter(|&index| !is_end(index)).map(|index| (room(index), index));
-            let crowded = crowded.min_by(|one, other| one.0.total_cmp(&other.0).then(other.1.cmp(&one.1)));
-            front.remove(crowded.expect("a front that is thinned has members").1);
-        }
-    }
+    use super::{CROSSOVER_INDEX, Judged, MUTATION_INDEX, Optimiser, Plan, Point, offset, spread};
 
     /// By Deb and Agrawal the density of the spread is `(η + 1) β^η / 2` below 1 and `(η + 1) / (2 β^(η + 2))` above.
     #[test]
@@ -541,29 +430,5 @@ mod tests {
         // A quarter is mutated; of half that is crossed half is of unlike parents.
         assert!(moved.abs_diff(TRIES / 4) < 120, "{moved}");
         assert!(crossed.abs_diff(TRIES * 7 / 16) < 130, "{crossed}");
-    }
-
-    #[test]
-    fn the_crowded_go_as_if_all_distances_were_measured_anew() {
-        for (objectives, seed) in [(2, 1), (2, 2), (3, 3), (4, 4)] {
-            let mut front = points(150, objectives, seed);
-            let mut slowly = front.clone();
-            thin(&mut front, 40);
-            thinned_slowly(&mut slowly, 40);
-            assert_eq!(front, slowly, "{objectives} objectives");
-        }
-    }
-
-    /// As many as the islands of the largest search bring: it took hours.
-    #[test]
-    fn a_front_of_hundreds_of_thousands_is_merged() {
-        let front = merged(points(200_000, 2, 5));
-        assert!(front.len() > 100 && front.len() <= 200, "{}", front.len());
-        let objective =
-            |front: &[Point], at: usize| front.iter().map(|point| point.judged.objectives[at]).fold(0.0, f64::min);
-        let all = points(200_000, 2, 5);
-        for at in 0..2 {
-            assert_eq!(objective(&front, at).to_bits(), objective(&all, at).to_bits(), "the ends stay");
-        }
     }
 }

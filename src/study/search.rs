@@ -15,6 +15,7 @@ use utoipa::ToSchema;
 use crate::ask::{beyond, escaped, fault, index_of, named, whole};
 use crate::document::{FreeDocument, Goal, RangeDocument, RequireDocument, SearchDocument};
 use crate::evaluate::{Evaluator, Interrupted, Outcome};
+use crate::front::MOST_OBJECTIVES;
 use crate::limit::{Bound, Limit, limits};
 use crate::map::asked;
 use crate::optimise::{Judged, Optimiser, Plan, Point, merged};
@@ -25,7 +26,7 @@ use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Domain, Template, Value, Variable};
 
 /// Evaluations of an island, about; each is a chunk.
-const ISLAND_EVALUATIONS: u64 = 6250;
+const ISLAND_EVALUATIONS: u64 = 12_500;
 
 /// Of an island's evaluations, the share that scans.
 const SCAN_SHARE: u64 = 5;
@@ -41,9 +42,6 @@ const SAMPLES_OF_DUTY: f64 = 200.0;
 
 /// Intervals of the period that are looked at before, where the base says nothing.
 const SAMPLES: f64 = 16.0;
-
-/// Objectives at most.
-const MOST_OBJECTIVES: usize = 4;
 
 const KIND: &str = "/drive/wave_generator/kind";
 const TOOTH_COUNT: &str = "/drive/teeth/count";

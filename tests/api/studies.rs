@@ -221,12 +221,12 @@ async fn four_studies_run_however_many_ask() {
 async fn a_search_of_many_islands_looks_at_all_of_them() {
     let service = Service::within(LIMITS);
     let study = json!({
-        "study": "search", "base": shortest(), "evaluations": 106_250, "free": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.5 } },
+        "study": "search", "base": shortest(), "evaluations": 212_500, "free": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.5 } },
         "objectives": [{ "quantity": "slot_wall_mm", "goal": "max" }, { "quantity": "outer_diameter_mm", "goal": "min" }]
     });
     let found = waited_for(&service, &study).await;
-    assert_eq!((&found["state"], &found["looked_at"]), (&json!("done"), &json!(106_250)));
-    assert_eq!((&found["result"]["is_complete"], &found["result"]["evaluated"]), (&json!(true), &json!(106_250)));
+    assert_eq!((&found["state"], &found["looked_at"]), (&json!("done"), &json!(212_500)));
+    assert_eq!((&found["result"]["is_complete"], &found["result"]["evaluated"]), (&json!(true), &json!(212_500)));
 }
 
 #[tokio::test]

@@ -23,7 +23,7 @@ fn studies() -> [Value; 4] {
             "over": { "/drive/teeth/radius_mm": radius(70), "/load/input_torque_nm": { "min": 10, "max": 20, "steps": 70 } }
         }),
         json!({
-            "study": "search", "base": paper(), "evaluations": 12_500,
+            "study": "search", "base": paper(), "evaluations": 25_000,
             "free": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.5 }, "/drive/wave_generator/semi_minor_mm": { "min": 54.0, "max": 57.9 } },
             "require": { "undercut": false, "outer_diameter_mm": { "max": 165.0 } },
             "objectives": [{ "quantity": "peak_stress_mpa", "goal": "min" }, { "quantity": "outer_diameter_mm", "goal": "min" }]

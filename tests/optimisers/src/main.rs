@@ -15,6 +15,9 @@ use toothwave_solver::{
 use crate::optimise::{Judged, Optimiser, Plan, Point};
 
 // The product's own files, without all that stands around them.
+#[allow(dead_code, reason = "objectives are two here")]
+#[path = "../../../src/study/front.rs"]
+mod front;
 #[allow(dead_code, reason = "what a search merges is not asked for here")]
 #[path = "../../../src/study/optimise.rs"]
 mod optimise;
@@ -185,7 +188,7 @@ impl Counter {
 
 /// As many islands as a search of so many evaluations has.
 const fn islands(evaluations: u64) -> u64 {
-    let islands = evaluations / 6250;
+    let islands = evaluations / 12_500;
     if islands > 1 { islands } else { 1 }
 }
 
