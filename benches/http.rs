@@ -29,9 +29,8 @@ use harness::{Effort, Spread, machine, three_digits};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
-use toothwave::api::batch::{BatchEndpoint, BatchQuery, answer_line};
-use toothwave::config::Settings;
-use toothwave::room::Room;
+use toothwave::http::endpoints::batch::{BatchEndpoint, BatchQuery, computed_line};
+use toothwave::ops::config::Settings;
 use toothwave_calculation::design::Design;
 use toothwave_calculation::question::{Limits, Question};
 use toothwave_calculation::sweep::Sweep;
@@ -56,18 +55,7 @@ fn main() -> Result<(), Failure> {
     let machine = machine();
     let toothwave = {
         let mut command = Command::new(env!("CARGO_BIN_EXE_toothwave"));
-        // On one core one solve runs at a time: those of all connections must be able to wait.
-        command.args([
-            "serve",
-            "--listen",
-            "127.0.0.1:0",
-            "--log",
-            "warn",
-            "--max-queued-solves",
-            "64",
-            "--max-concurrent-batches",
-            "64",
-        ]);
+        command.args(["serve", "--listen", "127.0.0.1:0", "--log", "warn"]);
         Server::start(command, &cores)?
     };
     let bare = {
@@ -174,9 +162,9 @@ fn serve_bare() -> Result<(), Failure> {
     let limits = limits();
     let answer = Sweep.ask(DESIGN.as_bytes(), &limits, &AtomicBool::new(false))?;
     let bytes = serde_json::to_vec(&answer)?.into();
-    let (mut batch, room) = (Vec::new(), Room::new(u64::MAX));
+    let mut batch = Vec::new();
     for index in 0..BATCH as u64 {
-        batch.extend(answer_line(PEAKS, index, DESIGN.as_bytes(), &limits, &room, &AtomicBool::new(false)).text);
+        batch.extend(computed_line(PEAKS, index, DESIGN.as_bytes(), &limits));
     }
     let router = Router::new()
         .route("/serialised", post(serialised))
@@ -425,7 +413,7 @@ async fn measure(effort: Effort, machine: &str, toothwave: &Server, bare: &Serve
 /// Cached sweeps, sweeps to be solved and batches at more and more connections, each against the bare handler of the same bytes.
 async fn ladder(effort: Effort, toothwave: &Server, bare: &Server) -> Result<String, Failure> {
     let mut text = format!(
-        "\n## From 1 to 64 connections\n\n\
+        "\n## From 1 to 16 connections\n\n\
          Each against the axum handler that returns the same bytes. A batch has {BATCH} documents, each with another torque, and asks for the peaks alone. \
          Waiting times are the client's: at the median, and what 99 of 100 do not exceed.\n\n\
          | | connections | toothwave, requests a second | bare axum, requests a second | share | toothwave, ms: median, 99 % | bare axum, ms: median, 99 % |\n\
@@ -438,7 +426,8 @@ async fn ladder(effort: Effort, toothwave: &Server, bare: &Server) -> Result<Str
     ];
     let (rounds, duration) = effort.choose((5, Duration::from_millis(600)), (1, Duration::from_millis(100)));
     for (name, ours, theirs) in &kinds {
-        for connections in [1, 2, 4, 8, 16, 32, 64] {
+        // More batches are refused than 16.
+        for connections in [1, 2, 4, 8, 16] {
             let mut measured = Vec::new();
             closed_loop(toothwave, ours, connections, duration / 2).await?;
             for _ in 0..rounds {
@@ -479,7 +468,6 @@ async fn designs(effort: Effort, toothwave: &Server) -> Result<String, Failure> 
     let read = || Design::read(DESIGN.as_bytes());
     let design = read()?;
     let checked = Sweep.check(&design, &limits)?;
-    let room = Room::new(u64::MAX);
     let mut steps: [(&str, Step<'_>); 4] = [
         ("reading the document", Box::new(|| drop(black_box(read())))),
         ("checking it, and the drive's geometry", Box::new(|| drop(black_box(Sweep.check(&design, &limits))))),
@@ -487,7 +475,7 @@ async fn designs(effort: Effort, toothwave: &Server) -> Result<String, Failure> 
         (
             "all of a line, writing its answer included",
             Box::new(|| {
-                black_box(answer_line(PEAKS, 0, DESIGN.as_bytes(), &limits, &room, &never));
+                black_box(computed_line(PEAKS, 0, DESIGN.as_bytes(), &limits));
             }),
         ),
     ];
@@ -498,7 +486,7 @@ async fn designs(effort: Effort, toothwave: &Server) -> Result<String, Failure> 
          | step | µs |\n|---|---|\n",
         Spread::of(per_second).show(1.0),
         requests.length(),
-        answer_line(PEAKS, 0, DESIGN.as_bytes(), &limits, &room, &never).text.len(),
+        computed_line(PEAKS, 0, DESIGN.as_bytes(), &limits).len(),
     );
     for (name, step) in &mut steps {
         let mut times = Vec::new();
@@ -521,7 +509,7 @@ fn introduction(effort: Effort, machine: &str, body_bytes: usize, request_bytes:
          Written by `cargo bench --bench http`; run it again for your machine. The solver alone is measured in [speed-and-accuracy.md](speed-and-accuracy.md).\n\n\
          ## Method\n\n\
          Case 5.1, 50 intervals, as JSON without compression: the answer's body has {body_bytes} bytes, the request {request_bytes}. The service runs as the released program \
-         with its defaults but for the log filter `warn` (at `info` it writes a line for each request) and room for 64 waiting solves and 64 batches; a bare axum server runs beside it. Each is pinned to one and the same core \
+         with its defaults but for the log filter `warn` (at `info` it writes a line for each request); a bare axum server runs beside it. Each is pinned to one and the same core \
          and has one worker thread of tokio's usual runtime; the client is pinned to another core. Connections are kept, and each asks again \
          when it has its answer (closed loop). Torques differ by 1e-10 N·m where the cache must not know the answer. Rounds of {length} alternate between the two; a number is the median over the rounds, \
          with the quartiles in brackets, and a share is the median of the rounds' shares.\n\n\

@@ -42,25 +42,20 @@ pub(crate) enum Outcome {
     Refused(Refusal),
 }
 
-/// Why a variant was not computed yet. Whoever is to compute it is as it was before.
+/// The stop signal was seen before a variant was computed. Whoever is to compute it is as it was before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Interrupted {
-    /// The stop signal was seen.
-    Stopped,
-    /// It takes about so many bytes while it is computed, and there is not room for so many.
-    NeedsBytes(u64),
-}
+pub struct Stopped;
 
-/// The same, or what refuses it.
+/// Why a variant has no values.
 enum NoValues {
-    Interrupted(Interrupted),
+    Stopped,
     NoAnswer(NoAnswer),
 }
 
 impl<E: Into<NoAnswer>> From<E> for NoValues {
     fn from(error: E) -> Self {
         match error.into() {
-            NoAnswer { code: NoAnswerCode::Stopped, .. } => Self::Interrupted(Interrupted::Stopped),
+            NoAnswer { code: NoAnswerCode::Stopped, .. } => Self::Stopped,
             reason => Self::NoAnswer(reason),
         }
     }
@@ -90,11 +85,11 @@ impl Evaluator {
         }
     }
 
-    /// What becomes of a document where there is room for so many bytes while it is computed; a panic is an outcome too.
-    pub(crate) fn outcome(&self, document: &Tree, _room_bytes: u64, stop: &dyn Stop) -> Result<Outcome, Interrupted> {
+    /// What becomes of a document; a panic is an outcome too.
+    pub(crate) fn outcome(&self, document: &Tree, stop: &dyn Stop) -> Result<Outcome, Stopped> {
         caught(|| match self.answer(document, stop) {
             Ok(values) => Ok(Outcome::Answered(values)),
-            Err(NoValues::Interrupted(interrupted)) => Err(interrupted),
+            Err(NoValues::Stopped) => Err(Stopped),
             Err(NoValues::NoAnswer(reason)) => Ok(Outcome::Refused(reason.into())),
         })
     }
@@ -183,7 +178,7 @@ fn without_entry(pointer: &str) -> &str {
 }
 
 /// A fault at one variant is no reason to leave the others without an answer.
-fn caught(job: impl FnOnce() -> Result<Outcome, Interrupted>) -> Result<Outcome, Interrupted> {
+fn caught(job: impl FnOnce() -> Result<Outcome, Stopped>) -> Result<Outcome, Stopped> {
     panic::catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a text");

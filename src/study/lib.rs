@@ -25,7 +25,7 @@ mod variant;
 
 pub use answer::StudyAnswer;
 pub use document::*;
-pub use evaluate::{Interrupted, Reason};
+pub use evaluate::{Reason, Stopped};
 pub use limit::Bound;
 pub use map::{AxisAnswer, MapAnswer};
 pub use quantity::{Needs, QUANTITIES, Quantity, Source};

@@ -10,7 +10,7 @@ use toothwave_calculation::json::Tree;
 use toothwave_solver::Stop;
 use utoipa::ToSchema;
 
-use crate::evaluate::{Evaluator, Interrupted, Outcome, Reason, Refusal};
+use crate::evaluate::{Evaluator, Outcome, Reason, Refusal, Stopped};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{GRAIN_BYTES, Template};
 
@@ -255,16 +255,10 @@ impl RowsWork {
     }
 
     /// One variant further; whether that was the last one.
-    pub(crate) fn step(
-        &mut self,
-        rows: &impl Rows,
-        evaluator: &Evaluator,
-        room_bytes: u64,
-        stop: &dyn Stop,
-    ) -> Result<bool, Interrupted> {
+    pub(crate) fn step(&mut self, rows: &impl Rows, evaluator: &Evaluator, stop: &dyn Stop) -> Result<bool, Stopped> {
         if self.next < self.end {
             let document = rows.document(&mut self.template, self.next);
-            let outcome = evaluator.outcome(document, room_bytes, stop)?;
+            let outcome = evaluator.outcome(document, stop)?;
             self.part.push(self.next, outcome);
             self.next += 1;
         }

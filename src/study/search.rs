@@ -14,7 +14,7 @@ use utoipa::ToSchema;
 
 use crate::ask::{beyond, escaped, fault, index_of, named, whole};
 use crate::document::{FreeDocument, Goal, RangeDocument, RequireDocument, SearchDocument};
-use crate::evaluate::{Evaluator, Interrupted, Outcome};
+use crate::evaluate::{Evaluator, Outcome, Stopped};
 use crate::front::MOST_OBJECTIVES;
 use crate::limit::{Bound, Limit, limits};
 use crate::map::asked;
@@ -282,10 +282,10 @@ fn some_value(quantity: &'static Quantity, template: &Template, limits: &questio
         let mut stream = Stream::new(0, stream);
         let place: Vec<_> = template.variables().iter().map(|_| stream.share()).collect();
         let values = variable_values(&template, &place);
-        match evaluator.outcome(template.filled(&values), 0, &Never) {
+        match evaluator.outcome(template.filled(&values), &Never) {
             Ok(Outcome::Answered(values)) => values.first().copied(),
             // Of a drive alone nothing takes room.
-            Ok(Outcome::Refused(_)) | Err(Interrupted::Stopped | Interrupted::NeedsBytes(_)) => None,
+            Ok(Outcome::Refused(_)) | Err(Stopped) => None,
         }
     })
 }
@@ -544,13 +544,7 @@ impl Island {
     }
 
     /// One variant further; whether that was the last one.
-    pub(crate) fn step(
-        &mut self,
-        search: &Search,
-        evaluator: &Evaluator,
-        room_bytes: u64,
-        stop: &dyn Stop,
-    ) -> Result<bool, Interrupted> {
+    pub(crate) fn step(&mut self, search: &Search, evaluator: &Evaluator, stop: &dyn Stop) -> Result<bool, Stopped> {
         // A point that was asked for when the work was interrupted is taken up again.
         let (place, is_scanning) = match self.pending.take() {
             Some(pending) => pending,
@@ -560,7 +554,7 @@ impl Island {
             }
         };
         let values: Vec<Value> = variable_values(&self.template, &place);
-        let outcome = match evaluator.outcome(self.template.filled(&values), room_bytes, stop) {
+        let outcome = match evaluator.outcome(self.template.filled(&values), stop) {
             Ok(outcome) => outcome,
             Err(interrupted) => {
                 self.pending = Some((place, is_scanning));

@@ -19,7 +19,7 @@ use toothwave_solver::Stop;
 use crate::answer::StudyAnswer;
 use crate::ask::{all_named, beyond, fault};
 use crate::document::StudyDocument;
-use crate::evaluate::{Evaluator, Interrupted};
+use crate::evaluate::{Evaluator, Stopped};
 use crate::limit;
 use crate::map::{Map, MapAnswer};
 use crate::quantity::{Needs, QUANTITIES, Quantity};
@@ -532,7 +532,6 @@ fn is_of_base(template: &Template, example: &Tree, error: &FieldError) -> bool {
 pub struct Work {
     study: Arc<Study>,
     state: State,
-    room_bytes: u64,
 }
 
 #[derive(Debug)]
@@ -551,32 +550,21 @@ impl Work {
                 State::Rows(RowsWork::new(study.template.clone(), quantities, study.span_of(chunk)))
             }
         };
-        Self { study: Arc::clone(study), state, room_bytes: u64::MAX }
-    }
-
-    /// The same where there is room for so many bytes alone while a variant is computed.
-    #[must_use]
-    pub fn within(self, room_bytes: u64) -> Self {
-        Self { room_bytes, ..self }
-    }
-
-    /// The room that it has.
-    pub const fn room_bytes(&self) -> u64 {
-        self.room_bytes
+        Self { study: Arc::clone(study), state }
     }
 
     /// One variant further; whether that was the last one.
     ///
     /// # Errors
-    /// When `stop` says so, or where the variant takes more room than there is; the chunk is then as it was before.
-    pub fn step(&mut self, stop: &dyn Stop) -> Result<bool, Interrupted> {
-        let &mut Self { ref study, ref mut state, room_bytes, .. } = self;
+    /// If `stop` says so; the chunk is then as it was before.
+    pub fn step(&mut self, stop: &dyn Stop) -> Result<bool, Stopped> {
+        let Self { study, state } = self;
         let evaluator = &study.evaluator;
         match (&study.kind, state) {
-            (Kind::Map(map), State::Rows(rows)) => rows.step(map, evaluator, room_bytes, stop),
-            (Kind::Sensitivity(sensitivity), State::Rows(rows)) => rows.step(sensitivity, evaluator, room_bytes, stop),
-            (Kind::Tolerance(tolerance), State::Rows(rows)) => rows.step(tolerance, evaluator, room_bytes, stop),
-            (Kind::Search(search), State::Island(island)) => island.step(search, evaluator, room_bytes, stop),
+            (Kind::Map(map), State::Rows(rows)) => rows.step(map, evaluator, stop),
+            (Kind::Sensitivity(sensitivity), State::Rows(rows)) => rows.step(sensitivity, evaluator, stop),
+            (Kind::Tolerance(tolerance), State::Rows(rows)) => rows.step(tolerance, evaluator, stop),
+            (Kind::Search(search), State::Island(island)) => island.step(search, evaluator, stop),
             // Made for each other above.
             (Kind::Search(_), State::Rows(_)) | (_, State::Island(_)) => Ok(true),
         }
@@ -594,7 +582,7 @@ impl Work {
     ///
     /// # Errors
     /// As [`Self::step`].
-    pub fn run(mut self, stop: &dyn Stop) -> Result<Part, Interrupted> {
+    pub fn run(mut self, stop: &dyn Stop) -> Result<Part, Stopped> {
         while !self.step(stop)? {}
         Ok(self.finish())
     }

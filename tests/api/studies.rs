@@ -1,6 +1,7 @@
 //! Studies over HTTP: asked, waited for, watched, cancelled, gone on with, refused.
 
 use std::io::Read as _;
+use std::time::Duration;
 
 use futures_util::future::join_all;
 use serde_json::{Value, json};
@@ -30,7 +31,6 @@ fn long() -> Value {
 fn slow(steps: u64) -> Value {
     map(&with(&shortest(), "/sweep", json!({ "samples": 10_000_000 })), steps)
 }
-
 
 async fn begun(service: &Service, study: &Value) -> Answer {
     service.ask(&Question::post("/v1/studies", study.to_string())).await
@@ -121,7 +121,7 @@ async fn the_same_question_is_the_same_study_however_it_is_spelled() {
 async fn a_cancelled_study_continues_when_asked_again() {
     let service = Service::new();
     let study = begun(&service, &long()).await.json();
-    assert_eq!((&study["state"], &study["looked_at"]), (&json!("running"), &json!(0)));
+    assert_eq!(study["state"], "running");
     assert_eq!(deleted(&service, &place(&study)).await, 204);
     assert_eq!(service.get(&place(&study)).await.found()["state"], "cancelled");
     let partial = service.get(&format!("{}/result", place(&study))).await.found();

@@ -7,7 +7,7 @@ use toothwave_calculation::forms::{Format, Forms as _};
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_calculation::question;
 use toothwave_solver::Never;
-use toothwave_study::{Gathered, Interrupted, Limits, Part, Study, Work};
+use toothwave_study::{Gathered, Limits, Study, Work};
 
 pub(crate) const CALCULATION: question::Limits = question::Limits::new(1_000_000, 1_000_000);
 
@@ -68,22 +68,4 @@ pub(crate) fn with(document: &Value, pointer: &str, value: Value) -> Value {
         parent => parent[name] = value,
     }
     document
-}
-
-/// The first chunk of a study, worked out where there is room for so many bytes, and more each time that a variant needs more: and what was needed.
-pub(crate) fn beyond_room(study: &Arc<Study>, room_bytes: u64) -> (Part, Vec<u64>) {
-    let mut work = Work::new(study, 0).within(room_bytes);
-    let mut needed = Vec::new();
-    loop {
-        match work.step(&Never) {
-            Ok(true) => return (work.finish(), needed),
-            Ok(false) => {}
-            Err(Interrupted::NeedsBytes(bytes)) => {
-                assert!(bytes > work.room_bytes());
-                needed.push(bytes);
-                work = work.within(bytes);
-            }
-            Err(Interrupted::Stopped) => panic!("nobody stops it"),
-        }
-    }
 }

@@ -11,7 +11,7 @@ use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::{Never, Stop};
 use toothwave_study::{Gathered, Part, Study, Work};
 
-use crate::asking::{LIMITS, beyond_room, gathered, paper, study, text, with};
+use crate::asking::{LIMITS, gathered, paper, study, text, with};
 
 /// A study of each kind, each of several chunks.
 fn studies() -> [Value; 4] {
@@ -99,59 +99,6 @@ fn a_chunk_that_is_stopped_and_taken_up_again_has_the_same_bits() {
         }
         assert_eq!(work.finish(), whole, "{}", study.kind());
         assert!(stopped > 0 || study.kind() == "search", "{}", study.kind());
-    }
-}
-
-/// What takes columns of states says so before it has them, wherever it stands among variants that take none: so many bytes as they have, 96 of each state.
-#[test]
-fn a_variant_that_takes_more_room_than_there_is_says_how_much_and_is_taken_up_again_with_the_same_bits() {
-    let of_case = |key: &str, value: Value| {
-        let mut base = paper();
-        base["model"] = json!({ "compatibility": "virtual_work", "clearance": { "ring_um": 10 } });
-        base[key] = value;
-        base
-    };
-    let contact = json!({ "coefficient": 0.02 });
-    let cam = json!({ "kind": "plain", "coefficient": 0.02 });
-    let friction = of_case("friction", json!({ "wave_generator": cam, "ring": contact, "carrier": contact }));
-    let measured = of_case("deviations", json!({ "ring_runout": { "amount_um": 1, "angle_deg": 10 } }));
-    let over = json!({ "/sweep/samples": { "one_of": [2, 3, 5000, 4] } });
-    for (base, quantity, states_a_sample) in
-        [(friction, "efficiency_ring_fixed", 7), (measured, "peak_stress_ring_mpa", 26 * 7)]
-    {
-        let document = json!({ "study": "map", "base": base, "over": over, "quantities": [quantity] });
-        let study = study(&document).unwrap();
-        let whole = Work::new(&study, 0).run(&Never).unwrap();
-        let (part, needed) = beyond_room(&study, 1 << 16);
-        let last = *needed.last().unwrap();
-        assert!((96 * 5000 * states_a_sample..=200 * 5001 * states_a_sample).contains(&last), "{quantity}: {needed:?}");
-        assert_eq!(part, whole, "{quantity}");
-    }
-}
-
-/// Where light loads press teeth against corners a search looks at more input angles than any other, and nobody knows it before.
-#[test]
-fn a_search_for_peaks_that_looks_further_than_was_expected_asks_for_more_room_on_its_way() {
-    let base = json!({
-        "drive": {
-            "wave_generator": { "semi_major_mm": 50.7, "semi_minor_mm": 49.3 },
-            "teeth": { "count": 80, "radius_mm": 1.5, "width_mm": 10.0 },
-            "ring": { "teeth": 78 }
-        },
-        "load": { "input_torque_nm": 1.45e-6 },
-        "model": { "corner_contact": true, "clearance": { "carrier_um": 0.028, "ring_um": 0.0115 } },
-        "sweep": { "tolerance": 4.4e-9 }
-    });
-    let over = json!({ "/drive/teeth/width_mm": { "one_of": [10.0] } });
-    let sweep = Sweep.ask(base.to_string().as_bytes(), &LIMITS.calculation, &Never).unwrap();
-    let states_bytes = 96 * sweep.states.tooth.len() as u64;
-    for quantity in ["peak_force_n", "radial_force_max_n"] {
-        let document = json!({ "study": "map", "base": base, "over": over, "quantities": [quantity] });
-        let study = study(&document).unwrap();
-        let (part, needed) = beyond_room(&study, 1 << 16);
-        // What is known before is below what the states alone take.
-        assert!(needed[0] < states_bytes && states_bytes < *needed.last().unwrap(), "{quantity}: {needed:?}");
-        assert_eq!(part, Work::new(&study, 0).run(&Never).unwrap(), "{quantity}");
     }
 }
 

@@ -8,7 +8,7 @@ use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::Never;
 use toothwave_study::Study;
 
-use crate::asking::{CALCULATION, LIMITS, answer, beyond_room, faulty, gathered, paper, study, text, with};
+use crate::asking::{CALCULATION, LIMITS, answer, faulty, gathered, paper, study, text, with};
 
 fn map(over: Value, quantities: Value) -> Value {
     json!({ "study": "map", "base": paper(), "over": over, "quantities": quantities })
@@ -415,34 +415,4 @@ fn choices_give_what_a_range_of_the_same_values_gives() {
     });
     let of_range = with(&map(over, quantities), "/base", base);
     assert_eq!(answer(&of_choices)["possible"], answer(&of_range)["possible"]);
-}
-
-#[test]
-fn what_a_variant_takes_while_it_is_computed_is_told_where_its_states_are_kept() {
-    let sliding = json!({ "coefficient": 0.05 });
-    let friction =
-        json!({ "wave_generator": { "kind": "plain", "coefficient": 0.03 }, "ring": sliding, "carrier": sliding });
-    let base = with(&with(&paper(), "/friction", friction), "/load/input_speed_rpm", json!(1000.0));
-    let most_of = |document: &Value| {
-        let (_, needed) = beyond_room(&study(document).unwrap(), 0);
-        needed.into_iter().max().unwrap_or_default()
-    };
-    let of = |samples: Value, quantity: &str| {
-        let over =
-            json!({ "/drive/teeth/width_mm": { "min": 10.0, "max": 11.0, "steps": 2 }, "/sweep/samples": samples });
-        most_of(&with(&map(over, json!([quantity])), "/base", base.clone()))
-    };
-    let samples = |most: u64| json!({ "one_of": [50, most] });
-    // Seven teeth at each input angle, of each a force and a stress at three contacts.
-    assert!(of(samples(30_000), "efficiency_ring_fixed") >= 30_000 * 7 * 6 * 8);
-    assert_eq!(of(samples(30_000), "peak_force_n"), 0, "peaks keep none");
-    assert!(of(samples(60), "efficiency_ring_fixed") < 1 << 20);
-    let unlike = json!({ "slot_wall_um": (0..28).collect::<Vec<_>>() });
-    let to_a_tolerance = with(
-        &with(&with(&paper(), "/deviations", unlike), "/sweep", json!({ "tolerance": 1e-6 })),
-        "/model",
-        json!({}),
-    );
-    let over = json!({ "/drive/teeth/width_mm": { "min": 10.0, "max": 11.0, "steps": 2 } });
-    assert!(most_of(&with(&map(over, json!(["peak_force_n"])), "/base", to_a_tolerance)) > 64 * 7 * 28 * 8);
 }

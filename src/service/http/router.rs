@@ -23,7 +23,9 @@ use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use super::answer::{CACHE_STATUS, SERVER_TIMING};
-use super::endpoints::{accuracy, batch, coincidence_degree, design, drawings, geometry, page, service, studies, sweep};
+use super::endpoints::{
+    accuracy, batch, coincidence_degree, design, drawings, geometry, page, service, studies, sweep,
+};
 use super::observe;
 use super::problem::{PROBLEM_JSON, Problem, ProblemCode};
 use super::query::require_no_query;

@@ -23,8 +23,8 @@ use self::runner::Engine;
 use self::store::{NewStudy, now_s};
 pub use self::store::{Store, StoreError};
 use crate::compute::pool::Pool;
-use crate::ops::config::Limits;
 use crate::http::problem::{Problem, ProblemCode};
+use crate::ops::config::Limits;
 
 /// Between two times that old studies are forgotten.
 const FORGET: Duration = Duration::from_secs(60);
@@ -244,7 +244,7 @@ impl Studies {
             stop,
             closing: self.closing.clone(),
         };
-        self.runs.spawn(run.to_its_end().in_current_span());
+        self.runs.spawn(run.complete().in_current_span());
         Ok(kept)
     }
 
@@ -361,7 +361,7 @@ struct Run {
 }
 
 impl Run {
-    async fn to_its_end(self) {
+    async fn complete(self) {
         let Self { engine, kept, study, time, stop, closing } = self;
         let computing = runner::run(&engine, &kept, &study, &stop);
         let ended = runner::in_time(time, computing).await;
