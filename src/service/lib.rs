@@ -8,4 +8,5 @@ pub mod cli;
 pub mod compute;
 pub mod http;
 pub mod ops;
+pub mod page;
 pub mod studies;

@@ -120,70 +120,45 @@ pub enum ProblemCode {
 }
 
 impl ProblemCode {
+    /// Its HTTP status and its title.
+    const fn status_and_title(self) -> (u16, &'static str) {
+        match self {
+            Self::MalformedJson => (400, "The body is no JSON"),
+            Self::BrokenBody => (400, "The body broke off"),
+            Self::InvalidQuery => (400, "The path takes no such query"),
+            Self::Unauthorized => (401, "A key is needed"),
+            Self::NotFound => (404, "Nothing is at this path"),
+            Self::MethodNotAllowed => (405, "The path takes other methods"),
+            Self::NotAcceptable => (406, "No representation that the client accepts"),
+            Self::RequestTimeout => (408, "The body did not arrive in time"),
+            Self::BodyTooLarge => (413, "The body is too large"),
+            Self::UnsupportedMediaType => (415, "The body is not sent as plain JSON"),
+            Self::MisdirectedRequest => (421, "Unknown host name"),
+            Self::InvalidDocument => (422, "The document has another form than is read here"),
+            Self::ImpossibleDesign => (422, "Values that no design can have"),
+            Self::NoToothInMesh => (422, "At some input angle no tooth carries load"),
+            Self::ComplianceNotPositive => (422, "The projection form has no solution"),
+            Self::Interference => (422, "A part is too full"),
+            Self::TooManyStates => (422, "The sweep has too many states"),
+            Self::TooManyPoints => (422, "The profiles have too many points"),
+            Self::TooManyVariants => (422, "The study is too large"),
+            Self::InternalError => (500, "The service failed"),
+            Self::StudiesOff => (501, "This service takes no studies"),
+            Self::QueueFull => (503, "The service is full"),
+            Self::DeadlineExceeded => (503, "The deadline stopped the computation"),
+            Self::ShuttingDown => (503, "The service is stopping"),
+            Self::TooManyConnections => (503, "Too many connections are open"),
+            Self::TooManyUnreadBytes => (503, "Clients have too many bytes of answers to read"),
+            Self::StoreUnavailable => (503, "The file of studies cannot be used now"),
+        }
+    }
+
     /// Its HTTP status.
-    pub const fn status(self) -> StatusCode {
-        match self {
-            Self::MalformedJson | Self::BrokenBody | Self::InvalidQuery => StatusCode::BAD_REQUEST,
-            Self::Unauthorized => StatusCode::UNAUTHORIZED,
-            Self::NotFound => StatusCode::NOT_FOUND,
-            Self::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
-            Self::NotAcceptable => StatusCode::NOT_ACCEPTABLE,
-            Self::RequestTimeout => StatusCode::REQUEST_TIMEOUT,
-            Self::BodyTooLarge => StatusCode::PAYLOAD_TOO_LARGE,
-            Self::UnsupportedMediaType => StatusCode::UNSUPPORTED_MEDIA_TYPE,
-            Self::MisdirectedRequest => StatusCode::MISDIRECTED_REQUEST,
-            Self::InvalidDocument
-            | Self::ImpossibleDesign
-            | Self::NoToothInMesh
-            | Self::ComplianceNotPositive
-            | Self::Interference
-            | Self::TooManyStates
-            | Self::TooManyPoints
-            | Self::TooManyVariants => StatusCode::UNPROCESSABLE_ENTITY,
-            Self::QueueFull
-            | Self::DeadlineExceeded
-            | Self::ShuttingDown
-            | Self::TooManyConnections
-            | Self::TooManyUnreadBytes
-            | Self::StoreUnavailable => StatusCode::SERVICE_UNAVAILABLE,
-            Self::StudiesOff => StatusCode::NOT_IMPLEMENTED,
-            Self::InternalError => StatusCode::INTERNAL_SERVER_ERROR,
-        }
+    pub fn status(self) -> StatusCode {
+        StatusCode::from_u16(self.status_and_title().0).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR)
     }
 
-    const fn title(self) -> &'static str {
-        match self {
-            Self::MalformedJson => "The body is no JSON",
-            Self::BrokenBody => "The body broke off",
-            Self::InvalidQuery => "The query is not one of this path",
-            Self::Unauthorized => "A key is wanted",
-            Self::NotFound => "Nothing stands at this path",
-            Self::MethodNotAllowed => "The path knows other methods",
-            Self::NotAcceptable => "No representation that the client accepts",
-            Self::RequestTimeout => "The body did not arrive in time",
-            Self::BodyTooLarge => "The body is too large",
-            Self::UnsupportedMediaType => "The body is not sent as plain JSON",
-            Self::MisdirectedRequest => "Nobody is called so here",
-            Self::InvalidDocument => "The document has another form than is read here",
-            Self::ImpossibleDesign => "Values that no design can have",
-            Self::NoToothInMesh => "At some input angle no tooth carries load",
-            Self::ComplianceNotPositive => "The projection form has no solution",
-            Self::Interference => "A part is too full",
-            Self::TooManyStates => "The sweep has too many states",
-            Self::TooManyPoints => "The profiles have too many points",
-            Self::TooManyVariants => "The study is too large",
-            Self::QueueFull => "The service is full",
-            Self::DeadlineExceeded => "The deadline stopped the computation",
-            Self::ShuttingDown => "The service is stopping",
-            Self::TooManyConnections => "Too many connections are open",
-            Self::TooManyUnreadBytes => "Clients have too many bytes of answers to read",
-            Self::StudiesOff => "This service takes no studies",
-            Self::StoreUnavailable => "The file of studies cannot be used now",
-            Self::InternalError => "The service failed",
-        }
-    }
-
-    /// Where the service could answer but does not take it on now, or not for everybody.
+    /// Requests that the service could answer but refuses now, or to this client.
     pub const REFUSALS: [Self; 9] = [
         Self::Unauthorized,
         Self::QueueFull,
@@ -237,7 +212,7 @@ impl Problem {
         clip(&mut detail);
         Self {
             kind: format!("urn:toothwave:problem:{}", json::word(&code)),
-            title: code.title(),
+            title: code.status_and_title().1,
             status: code.status().as_u16(),
             detail,
             code,

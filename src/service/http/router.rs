@@ -23,14 +23,13 @@ use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use super::answer::{CACHE_STATUS, SERVER_TIMING};
-use super::endpoints::{
-    accuracy, batch, coincidence_degree, design, drawings, geometry, page, service, studies, sweep,
-};
+use super::endpoints::{accuracy, batch, coincidence_degree, design, drawings, geometry, service, studies, sweep};
 use super::observe;
 use super::problem::{PROBLEM_JSON, Problem, ProblemCode};
 use super::query::require_no_query;
 use crate::app::App;
 use crate::ops::keys::{self, Keys};
+use crate::page;
 
 #[derive(OpenApi)]
 #[openapi(

@@ -1,7 +1,7 @@
 //! A study as it stands: told to clients, changed by its run.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::AtomicU64;
 
 use parking_lot::Mutex;
 use serde::Serialize;
@@ -11,7 +11,6 @@ use toothwave_calculation::json::word;
 use toothwave_study::StudyAnswer;
 use utoipa::ToSchema;
 
-use super::runner::InWork;
 use super::store::StoredStudy;
 use crate::http::problem::{Problem, ProblemCode};
 
@@ -38,8 +37,6 @@ pub struct Kept {
     pub(super) chunks: u64,
     pub(super) bytes: u64,
     standing: watch::Sender<Standing>,
-    /// Variants of chunks that are computed now.
-    pub(super) in_work: Arc<AtomicU64>,
     pub(super) run: Mutex<CancellationToken>,
     /// When it was last asked for, in seconds since 1970, and when that was last written down.
     pub(super) asked_at_s: AtomicU64,
@@ -103,7 +100,6 @@ impl Kept {
             chunks,
             bytes,
             standing: watch::Sender::new(Standing { state, problem, looked_at, impossible }),
-            in_work: Arc::default(),
             run: Mutex::default(),
             asked_at_s: asked_at_s.into(),
             noted_at_s: asked_at_s.into(),
@@ -114,13 +110,12 @@ impl Kept {
     pub fn resource(&self) -> StudyResource {
         let standing = self.standing.borrow();
         let &Standing { state, ref problem, looked_at, impossible } = &*standing;
-        let in_work = if state == StudyState::Running { self.in_work.load(Ordering::Relaxed) } else { 0 };
         StudyResource {
             id: self.id.clone(),
             study: self.kind.clone(),
             state,
             variants: self.variants,
-            looked_at: looked_at + in_work,
+            looked_at,
             impossible,
             result_href: format!("/v1/studies/{}/result", self.id),
             events_href: format!("/v1/studies/{}/events", self.id),
@@ -157,16 +152,11 @@ impl Kept {
         let _ = self.standing.subscribe().wait_for(|standing| standing.state != StudyState::Running).await;
     }
 
-    pub(super) fn tell(&self) {
-        self.standing.send_modify(|_| {});
-    }
-
-    /// Counts a part that was kept, in the place of the variants in work.
-    pub(super) fn count(&self, variants: u64, refused: u64, in_work: InWork) {
+    /// Counts a part that was kept.
+    pub(super) fn count(&self, variants: u64, refused: u64) {
         self.standing.send_modify(|standing| {
             standing.looked_at += variants;
             standing.impossible += refused;
-            drop(in_work);
         });
     }
 

@@ -303,16 +303,11 @@ impl Studies {
         let _one_at_a_time = self.changing.lock().await;
         let is_old = |kept: &Arc<Kept>| !kept.is_running() && kept.asked_at_s.load(Ordering::Relaxed) < since_s;
         let old: Vec<_> = self.kept.lock().iter().filter(|kept| is_old(kept)).cloned().collect();
-        let forget = async {
-            for kept in &old {
-                self.forget(store, kept).await?;
+        for kept in old {
+            match self.forget(store, &kept).await {
+                Ok(()) => tracing::info!(study = kept.id, "removed a study that nobody asked for"),
+                Err(error) => tracing::warn!(%error, study = kept.id, "cannot remove an old study"),
             }
-            store.with(move |transaction| store::forget_of_other_builds(transaction, since_s)).await
-        };
-        match forget.await {
-            Ok(()) if old.is_empty() => {}
-            Ok(()) => tracing::info!(studies = old.len(), "forgotten: nobody has asked for them for long"),
-            Err(error) => tracing::warn!(%error, "old studies were not forgotten"),
         }
     }
 

@@ -1,8 +1,8 @@
 //! What a study comes to: its chunks are computed and kept, and its answer is made of the kept parts.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use futures_util::{StreamExt as _, stream};
 use metrics::counter;
@@ -15,9 +15,6 @@ use super::store::{self, NewPart, Store, StoredDocument};
 use super::{Kept, seal};
 use crate::compute::pool::Pool;
 use crate::http::problem::{Problem, ProblemCode};
-
-/// Within a chunk clients are told about the progress this often.
-const TELL: Duration = Duration::from_millis(100);
 
 /// What computes and keeps chunks.
 #[derive(Debug, Clone)]
@@ -40,7 +37,7 @@ pub(super) async fn run(
     let id = kept.id.clone();
     let done = store.with(move |transaction| store::chunks_done(transaction, &id)).await?;
     let missing = (0..study.chunks()).filter(|chunk| !done.contains(chunk));
-    let computed = stream::iter(missing).map(|chunk| compute_chunk(engine, kept, study, chunk));
+    let computed = stream::iter(missing).map(|chunk| compute_chunk(engine, study, chunk));
     let mut computed = computed.buffer_unordered(engine.pool.permits());
     loop {
         let next = tokio::select! {
@@ -49,10 +46,10 @@ pub(super) async fn run(
             () = stop.cancelled() => return Ok(false),
             next = computed.next() => next,
         };
-        let Some((part, in_work)) = next.transpose()? else { return Ok(true) };
+        let Some(part) = next.transpose()? else { return Ok(true) };
         let (variants, refused) = (part.variants, part.refused);
         store.with(move |transaction| store::keep(transaction, &part)).await?;
-        kept.count(variants, refused, in_work);
+        kept.count(variants, refused);
     }
 }
 
@@ -67,59 +64,18 @@ pub(super) async fn in_time(time: Duration, run: impl Future<Output = Result<boo
     })
 }
 
-/// Variants of a chunk that is computed now.
-#[derive(Debug)]
-pub(super) struct InWork {
-    all: Arc<AtomicU64>,
-    variants: u64,
-}
-
-impl InWork {
-    fn add_one(&mut self) {
-        self.variants += 1;
-        self.all.fetch_add(1, Ordering::Relaxed);
-    }
-}
-
-impl Drop for InWork {
-    fn drop(&mut self) {
-        self.all.fetch_sub(self.variants, Ordering::Relaxed);
-    }
-}
-
-async fn compute_chunk(
-    engine: &Engine,
-    kept: &Arc<Kept>,
-    study: &Arc<Study>,
-    chunk: u64,
-) -> Result<(NewPart, InWork), Problem> {
+async fn compute_chunk(engine: &Engine, study: &Arc<Study>, chunk: u64) -> Result<NewPart, Problem> {
     let work = Work::new(study, chunk);
-    let in_work = InWork { all: Arc::clone(&kept.in_work), variants: 0 };
-    let kept = Arc::clone(kept);
+    let id = study.id().to_string();
+    let job = move |stop: &AtomicBool| {
+        let part = work.run(stop).map_err(|_| NoAnswer::stopped())?;
+        let (variants, refused) = (part.variants(), part.refused());
+        counter!("toothwave_study_variants_total").increment(variants);
+        let sealed = seal::sealed(&id, chunk, &part).map_err(|error| Problem::internal(&error))?;
+        Ok(NewPart { study: id, chunk, variants, refused, sealed })
+    };
     // The run of a study has a time of its own.
-    engine.pool.run_in_background(Duration::MAX, move |stop| variants(&kept, chunk, work, in_work, stop)).await
-}
-
-fn variants(
-    kept: &Kept,
-    chunk: u64,
-    mut work: Work,
-    mut in_work: InWork,
-    stop: &AtomicBool,
-) -> Result<(NewPart, InWork), Problem> {
-    let mut told = Instant::now();
-    while !work.step(stop).map_err(|_| NoAnswer::stopped())? {
-        in_work.add_one();
-        if told.elapsed() > TELL {
-            told = Instant::now();
-            kept.tell();
-        }
-    }
-    let part = work.finish();
-    let (variants, refused) = (part.variants(), part.refused());
-    counter!("toothwave_study_variants_total").increment(variants);
-    let sealed = seal::sealed(&kept.id, chunk, &part).map_err(|error| Problem::internal(&error))?;
-    Ok((NewPart { study: kept.id.clone(), chunk, variants, refused, sealed }, in_work))
+    engine.pool.run_in_background(Duration::MAX, job).await
 }
 
 /// The study that a stored document asks for.

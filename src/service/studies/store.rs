@@ -5,7 +5,7 @@ use std::fs::OpenOptions;
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use parking_lot::Mutex;
 use rusqlite::{
@@ -16,9 +16,6 @@ use toothwave_calculation::origin;
 
 use super::StudyState;
 use crate::http::problem::{Problem, ProblemCode};
-
-/// A request waits for a stalled disk no longer than this.
-const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Marks a database as a file of studies: "toth".
 const APPLICATION_ID: i64 = 0x746f_7468;
@@ -62,8 +59,8 @@ pub enum StoreError {
     /// What SQLite says, for instance that the disk is full.
     #[error("the file of studies fails: {0}")]
     Failed(rusqlite::Error),
-    /// The disk stands still.
-    #[error("the file of studies did not answer within {} s", PATIENCE.as_secs())]
+    /// The thread that waited for the disk ended.
+    #[error("the file of studies does not answer")]
     Silent,
     /// Its content is not what was written.
     #[error("the file of studies is damaged: {0}. Restore it from a backup, or start with a new file.")]
@@ -221,9 +218,7 @@ impl Store {
         work: impl FnOnce(&Transaction<'_>) -> rusqlite::Result<T> + Send + 'static,
     ) -> Result<T, StoreError> {
         let store = self.clone();
-        let working = tokio::task::spawn_blocking(move || store.now(work));
-        let done = tokio::time::timeout(PATIENCE, working).await.map_err(|_| StoreError::Silent)?;
-        done.unwrap_or(Err(StoreError::Silent))
+        tokio::task::spawn_blocking(move || store.now(work)).await.unwrap_or(Err(StoreError::Silent))
     }
 
     /// Runs one short transaction on this thread.
@@ -256,17 +251,17 @@ fn require_schema(transaction: &Transaction<'_>) -> Result<(), StoreError> {
     }
 }
 
-/// The studies that this build can tell of, the one that was asked for longest ago first. Those that run and belong to another build or
-/// arithmetic become this one's, with nothing done.
+/// The studies of this build and arithmetic, the one that was asked for longest ago first. Of others those that run are computed again
+/// from their beginning, and the rest is removed: this build would give other bits.
 pub(super) fn load(transaction: &Transaction<'_>) -> rusqlite::Result<Vec<StoredStudy>> {
-    let others = "origin <> ?1 AND state = 'running' AND done < chunks";
-    let delete = format!("DELETE FROM parts WHERE study IN (SELECT id FROM studies WHERE {others})");
-    transaction.execute(&delete, [origin()])?;
+    let others = "origin <> ?1";
+    let is_over = "(state <> 'running' OR done = chunks)";
+    transaction.execute(&format!("DELETE FROM parts WHERE {others}"), [origin()])?;
+    transaction.execute(&format!("DELETE FROM studies WHERE {others} AND {is_over}"), [origin()])?;
     let adopt = format!("UPDATE studies SET origin = ?1, done = 0, looked_at = 0, impossible = 0 WHERE {others}");
     transaction.execute(&adopt, [origin()])?;
-    let mut statement =
-        transaction.prepare(&format!("SELECT {STUDY} FROM studies WHERE origin = ?1 ORDER BY asked_at_s"))?;
-    statement.query_map([origin()], stored_study)?.collect()
+    let mut statement = transaction.prepare(&format!("SELECT {STUDY} FROM studies ORDER BY asked_at_s"))?;
+    statement.query_map([], stored_study)?.collect()
 }
 
 fn stored_study(row: &Row<'_>) -> rusqlite::Result<StoredStudy> {
@@ -335,15 +330,6 @@ pub(super) fn touch(transaction: &Transaction<'_>, id: &str) -> rusqlite::Result
 pub(super) fn forget(transaction: &Transaction<'_>, id: &str) -> rusqlite::Result<()> {
     transaction.execute("DELETE FROM parts WHERE study = ?1", [id])?;
     transaction.execute("DELETE FROM studies WHERE id = ?1", [id])?;
-    Ok(())
-}
-
-/// Forgets the studies of other builds that nobody has asked for since then.
-pub(super) fn forget_of_other_builds(transaction: &Transaction<'_>, since_s: u64) -> rusqlite::Result<()> {
-    let others = "FROM studies WHERE origin <> ?1 AND asked_at_s < ?2";
-    transaction
-        .execute(&format!("DELETE FROM parts WHERE study IN (SELECT id {others})"), params![origin(), since_s])?;
-    transaction.execute(&format!("DELETE {others}"), params![origin(), since_s])?;
     Ok(())
 }
 

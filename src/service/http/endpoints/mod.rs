@@ -6,7 +6,6 @@ pub mod coincidence_degree;
 pub mod design;
 pub mod drawings;
 pub mod geometry;
-pub mod page;
 pub mod peaks;
 pub mod service;
 pub mod studies;

@@ -25,7 +25,7 @@ struct Asset {
 
 macro_rules! assets {
     ($($name:literal as $content_type:expr),* $(,)?) => {
-        &[$(Asset { name: $name, content_type: $content_type, body: include_bytes!(concat!("../../page/", $name)) }),*]
+        &[$(Asset { name: $name, content_type: $content_type, body: include_bytes!($name) }),*]
     };
 }
 
@@ -35,7 +35,7 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 const TEXT: &str = "text/plain; charset=utf-8";
 const SVG: &str = "image/svg+xml";
 
-const INDEX: Asset = Asset { name: "index.html", content_type: HTML, body: include_bytes!("../../page/index.html") };
+const INDEX: Asset = Asset { name: "index.html", content_type: HTML, body: include_bytes!("index.html") };
 
 const ASSETS: &[Asset] = assets![
     "style.css" as CSS,
@@ -153,7 +153,8 @@ mod tests {
     #[test]
     fn every_file_of_the_page_is_served() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("page");
-        let served = ASSETS.iter().chain([&INDEX]).map(|asset| asset.name.to_owned()).collect();
+        let named = ASSETS.iter().chain([&INDEX]).map(|asset| asset.name.to_owned());
+        let served = named.chain(["mod.rs".to_owned()]).collect();
         assert_eq!(files(&folder, ""), served);
     }
 }
