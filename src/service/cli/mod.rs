@@ -228,6 +228,9 @@ fn arguments() -> Vec<OsString> {
 fn run_service(settings: &Settings) -> Result<(), Failure> {
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
     let _written_at_end = log::start(filter);
+    // The allocator asks for pages of 2 MiB, and clearing one for each answer of 80 KB takes a sixth of its time.
+    #[cfg(target_os = "linux")]
+    let _ = rustix::thread::disable_transparent_huge_pages(true);
     let runtime = Builder::new_multi_thread().enable_all().build()?;
     let result = runtime.block_on(async {
         // A log file that reached its size limit is then an error like others, instead of the end of the process.
