@@ -30,6 +30,7 @@ pub mod router;
 pub mod serve;
 pub mod shelf;
 pub mod socket;
+pub mod static_file;
 pub mod studies;
 pub mod turns;
 pub mod worker;
