@@ -257,7 +257,7 @@ test('what the service sets by itself can be denied, and stands in the form as t
   const page = await bed.open();
   const { model: _, ...unnamed } = await bed.server.example('paper-5.2');
   await setDocument(page, unnamed);
-  await page.click('summary:has-text("What gives way behind the contacts")');
+  await page.click('summary:has-text("Compliance of the supports")');
   const before = await answered(page);
   const place = '/model/ring_teeth_bend';
   assert.equal(await page.inputValue(field(place)), '');
@@ -279,7 +279,7 @@ test('what gives way behind a contact moves the answer', async () => {
   const page = await bed.open();
   await pick(page, '/model/compatibility', 'virtual_work');
   const before = await answered(page);
-  await page.click('summary:has-text("What gives way behind the contacts")');
+  await page.click('summary:has-text("Compliance of the supports")');
   await enter(page, '/model/series_compliance_mm_per_n/ring', '1e-6');
   const after = await answered(page);
   assert.deepEqual(after.design.model.series_compliance_mm_per_n, { ring: 1e-6 });
@@ -454,7 +454,7 @@ test('parts off the axis are typed in the form, and lists in the JSON are told',
   assert.deepEqual(found.design.deviations, { ring_runout: { amount_um: 3, angle_deg: 40 } });
   assert.ok(found.sweep.sweep_period_deg > found.sweep.period_deg);
   await setDocument(page, { ...found.design, deviations: { wave_generator_lobe_um: [0, 2] } });
-  assert.match(await page.locator('#form summary', { hasText: 'Parts off the axis' }).textContent(), /1 list in the JSON/);
+  assert.match(await page.locator('#form summary', { hasText: 'Runout' }).textContent(), /1 list in the JSON/);
 });
 
 test('where parts are made otherwise than nominal, the picture says that it is not of these, and leads to the drawings, which are', async () => {

@@ -41,7 +41,7 @@ function expected({ geometry, coincidence, sweep }) {
     'Carrier fixed, its torque over the input’s': geometry.members.carrier_fixed.holding_torque_ratio,
     'Wave generator fixed, its over the ring’s': geometry.members.wave_generator_fixed.holding_torque_ratio,
     'Period of the load pattern': geometry.period_deg,
-    'Coincidence degree': coincidence.coincidence_degree,
+    'Contact ratio': coincidence.coincidence_degree,
     'Fewest teeth in mesh': coincidence.teeth_in_mesh_per_zone.min,
     'Most teeth in mesh': coincidence.teeth_in_mesh_per_zone.max,
     'Engagement begins': geometry.engagement.start_deg,

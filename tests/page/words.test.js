@@ -31,7 +31,7 @@ test('help, API, save and load are in the menu', async () => {
   for (const id of ['#help', '#api', '#save', '#load']) assert.ok(await page.isVisible(id), id);
   await pick(page, '#help');
   const help = await page.textContent('#help-dialog');
-  for (const word of ['Coincidence degree', 'Position ψ', 'Slots in theory', 'Projection', 'Virtual work', 'Journal of Chongqing University 36(1), 2013']) assert.ok(help.includes(word), word);
+  for (const word of ['Contact ratio', 'Position ψ', 'Slots in theory', 'Projection', 'Virtual work', 'Journal of Chongqing University 36(1), 2013']) assert.ok(help.includes(word), word);
   await page.keyboard.press('Escape');
   assert.ok(!(await page.isVisible('#help-dialog')));
 });
@@ -40,7 +40,7 @@ test('words have their definitions beside them, with mouse and keyboard', async 
   const page = await bed.open();
   const definition = page.locator('#definition');
   for (const [mark, wanted] of [
-    ['#key-figures .term', /Coincidence degree ε.*Position ψ/],
+    ['#key-figures .term', /Contact ratio ε.*Position ψ/],
     ['.field:has(> .entry #field-drive-teeth-count) .term', /Slots in theory/],
     ['.field:has(> #field-model-compatibility) .term', /Projection.*Virtual work.*Journal of Chongqing/],
     ['#position-term .term', /Position ψ/],

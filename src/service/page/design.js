@@ -23,7 +23,7 @@ const unlessDecided = (pointer, label) =>
   choice(pointer, label, [{ value: '', label: 'left to the service' }, { value: true, label: 'yes' }, { value: false, label: 'no' }]);
 const variant = (pointer, tag, label, options, more) => ({ kind: 'variant', pointer, tag, label, options, ...more });
 
-/** A gap at a contact; without any, the document has no clearance at all. */
+/** Clearance at a contact; without any, the document has no clearance at all. */
 const clearance = (contact, label, symbol) =>
   number(`/model/clearance/${contact}_um`, label, symbol, 'µm', { slider: WIDE, optional: () => 'none', step: 1 });
 
@@ -407,7 +407,7 @@ export const GROUPS = [
   {
     title: 'Friction and wear',
     pointer: '/friction',
-    hint: 'What the teeth run on decides what a turn costs; with an input speed it is told in watts, and with wear rates in micrometres an hour.',
+    hint: 'Friction gives the efficiency. With an input speed it also gives the power lost, and with wear rates the wear in µm/h.',
     summary: (design) => ({ plain: 'plain cam', race: 'race on a bearing', rolling: 'rolling' })[at(design, '/friction/wave_generator/kind')] ?? 'not computed',
     fields: [
       variant('/friction/wave_generator', 'kind', 'The teeth run on', [
@@ -419,9 +419,9 @@ export const GROUPS = [
     ],
   },
   {
-    title: 'What gives way behind the contacts',
+    title: 'Compliance of the supports',
     pointer: '/model/series_compliance_mm_per_n',
-    hint: 'Beside the contacts themselves, such as a bearing under the cam. Only virtual work takes it. Where neither a law nor this is chosen the ring’s teeth bend at pointed or bored tips, and with gaps the wave generator moves on there.',
+    hint: 'Added to the contacts themselves, such as that of a bearing under the cam. Only virtual work takes it.',
     summary: (design) => (Object.values(at(design, '/model/series_compliance_mm_per_n') ?? {}).some((value) => value) ? 'given' : 'nothing'),
     fields: [
       compliance('wave_generator', 'Compliance, wave generator'), compliance('ring', 'Compliance, ring'), compliance('carrier', 'Compliance, carrier'),
@@ -433,7 +433,7 @@ export const GROUPS = [
   {
     title: 'Modification',
     pointer: '/modification',
-    hint: 'On purpose, and of all teeth alike: what is above 0 opens a gap, what is below 0 has to find one in the model’s gaps. Only virtual work takes it.',
+    hint: 'Deliberate changes, alike for all teeth. A positive value opens clearance; a negative value needs clearance elsewhere. Only virtual work takes it.',
     summary: (design) => (isGiven(at(design, '/modification')) ? 'given' : 'none'),
     fields: [
       modified('ring_equidistant_um', 'Ring set back', 'Δ_K'),
@@ -451,9 +451,9 @@ export const GROUPS = [
     ],
   },
   {
-    title: 'Parts off the axis',
+    title: 'Runout',
     pointer: '/deviations',
-    hint: 'Directions are fixed in the part, from a lobe, a tooth space, a slot. What single teeth, slots, spaces and lobes were measured to deviate by are lists, which stand in the JSON.',
+    hint: 'Directions are fixed in the part. Measured deviations of single teeth, slots, spaces and lobes are lists in the JSON.',
     summary: (design) => {
       const lists = Object.values(at(design, '/deviations') ?? {}).filter((value) => Array.isArray(value) && value.length > 0).length;
       const own = isGiven(at(design, '/deviations')) ? 'given' : 'none';

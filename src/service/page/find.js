@@ -30,7 +30,7 @@ export class Find {
   constructor(section, { quantities, onOpen, onOpenBoth }) {
     this.quantities = quantities;
     this.button = html('button', { type: 'submit', class: 'primary' }, 'Find drives');
-    const formElement = html('form', { class: 'form', 'aria-label': 'Requirements', autocomplete: 'off', novalidate: true }, html('h2', {}, 'What must it do?'));
+    const formElement = html('form', { class: 'form', 'aria-label': 'Requirements', autocomplete: 'off', novalidate: true }, html('h2', {}, 'Requirements'));
     this.form = new Form(formElement, { onEdit: (requirements) => this.#edit(requirements), onEnd: () => this.#check() }, GROUPS, ROOT);
     formElement.append(html('div', { class: 'form-end' }, this.button));
     formElement.addEventListener('submit', (event) => {

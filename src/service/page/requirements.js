@@ -120,7 +120,7 @@ export const GROUPS = [
     ],
   },
   {
-    title: 'What it may bear',
+    title: 'Strength',
     pointer: `${ROOT}/bears`,
     open: true,
     hint: 'A Hertz stress, without a factor of safety: bearing steel and case-hardened steel bear 1500 MPa (ISO 281, ISO 6336-5), alloy steel of 300 HV some 770.',
@@ -158,7 +158,7 @@ export const GROUPS = [
     ],
   },
   {
-    title: 'What counts',
+    title: 'Goals',
     pointer: `${ROOT}/goals`,
     open: true,
     hint: 'One to four. With several there is no single best drive, but those that none beats in everything.',

@@ -144,7 +144,7 @@ const backingRows = Object.entries(BACKINGS).map(([key, label]) => {
 /** Always in sight, however far one scrolls. */
 const KEY_ROWS = [
   row('Ratio, ring fixed', '', '', ({ geometry }) => geometry?.transmission_ratio),
-  row('Coincidence degree', '', '', ({ coincidence }) => coincidence?.coincidence_degree, {
+  row('Contact ratio', '', '', ({ coincidence }) => coincidence?.coincidence_degree, {
     note: ({ coincidence }) => `from ψ ${number(coincidence.engagement.start_deg, 4)}°`,
     terms: ['coincidence', 'position'],
   }),
@@ -201,7 +201,7 @@ export const GROUPS = [
       row('Transmission error, peak to peak', '', 'deg', ({ sweep }) => sweep?.wind_up?.transmission_error_peak_to_peak_deg),
     ],
   },
-  { title: 'What a turn costs', offer: '/friction/wave_generator', rows: lossRows },
+  { title: 'Friction losses and wear', offer: '/friction/wave_generator', rows: lossRows },
   {
     title: 'Motion and mesh',
     rows: [
@@ -212,7 +212,7 @@ export const GROUPS = [
       row('Carrier fixed, its torque over the input’s', '', '', ({ geometry }) => geometry?.members.carrier_fixed.holding_torque_ratio, { followsFromRatio: true }),
       row('Wave generator fixed, its over the ring’s', '', '', ({ geometry }) => geometry?.members.wave_generator_fixed.holding_torque_ratio, { followsFromRatio: true }),
       row('Period of the load pattern', '', 'deg', ({ geometry }) => geometry?.period_deg),
-      row('Coincidence degree, all zones', 'ε', '', ({ coincidence }) => coincidence?.coincidence_degree, { significant: 7, terms: ['coincidence'] }),
+      row('Contact ratio, all zones', 'ε', '', ({ coincidence }) => coincidence?.coincidence_degree, { significant: 7, terms: ['coincidence'] }),
       row('Fewest teeth in mesh', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.min, { scoped: true }),
       row('Most teeth in mesh', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, { scoped: true }),
       row('Fewest teeth that carry', '', '', ({ sweep }) => sweep?.carrying_teeth?.min, { scoped: true }),
@@ -225,7 +225,7 @@ export const GROUPS = [
     ],
   },
   {
-    title: 'Parts and room',
+    title: 'Sizes and clearances',
     rows: [
       row('Ring root radius', '', 'mm', ({ geometry }) => geometry?.ring.root_radius_mm),
       row('Ring tip radius', '', 'mm', ({ geometry }) => geometry?.ring.tip_radius_mm),
@@ -248,7 +248,7 @@ export const GROUPS = [
     ],
   },
   {
-    title: 'Behind the contacts, estimated',
+    title: 'Compliance of the supports, estimated',
     isMore: true,
     // To work with, not to report: what was taken over stands in the design.
     isOnScreenAlone: true,

@@ -8,8 +8,8 @@ const PAPER =
 
 export const TERMS = {
   coincidence: {
-    title: 'Coincidence degree ε',
-    text: 'The contact ratio: how many teeth touch the ring’s flanks at once, on average over a turn and in all meshing zones together. More teeth share the load.',
+    title: 'Contact ratio ε',
+    text: 'The paper’s coincidence degree: how many teeth touch the ring’s flanks at once, on average over a turn and in all meshing zones together. More teeth share the load.',
   },
   position: {
     title: 'Position ψ',

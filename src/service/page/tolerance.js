@@ -53,7 +53,8 @@ export class Tolerance extends StudyView {
     const onChange = () => this.later();
     this.quantity = new Choice('Quantity', onChange);
     this.samples = new Choice('Drives', onChange);
-    this.samples.offer([{ options: [1000, 10_000, 100_000].map((count) => ({ value: String(count), label: number(count, 9) })) }], '1000');
+    this.samples.offer([{ options: [100, 1000, 10_000, 100_000].map((count) => ({ value: String(count), label: number(count, 9) })) }], '100');
+    this.samples.value = '100';
     this.ends = ['at least', 'at most'].map((words) => new NumberBox(`Good is ${words}`, onChange));
     this.unit = html('span', { class: 'unit' });
     this.rows = [...DEVIATIONS.map((kind) => ({ ...kind, list: 'deviations' })), ...INPUTS.map((kind) => ({ ...kind, list: 'inputs' }))].map((kind) => {
@@ -74,7 +75,7 @@ export class Tolerance extends StudyView {
       html('header', {}, html('h2', { id: 'tolerance-title', tabindex: '-1' }, 'Tolerances')),
       html('p', { class: 'none' }, 'Many drives are drawn, each with parts that deviate at random. The result shows how a quantity spreads, how many drives are good, and which tolerance matters most.'),
       html('div', { class: 'ask' }, html('div', { class: 'ask-row' }, this.quantity.element, this.samples.element, this.button), html('div', { class: 'ask-row' }, html('span', { class: 'range' }, 'Good from ', this.ends[0].input, ' to ', this.ends[1].input, ' ', this.unit))),
-      html('details', { class: 'deviations', open: true }, html('summary', {}, 'What deviates'), this.rows.map(({ element }) => element)),
+      html('details', { class: 'deviations', open: true }, html('summary', {}, 'Deviations'), this.rows.map(({ element }) => element)),
       this.progress.element,
       this.state,
       this.value,
@@ -129,7 +130,7 @@ export class Tolerance extends StudyView {
     const name = this.quantity.value;
     const require = min === undefined && max === undefined ? {} : { [name]: { ...(min === undefined ? {} : { min }), ...(max === undefined ? {} : { max }) } };
     const samples = Number(this.samples.value);
-    return { question: { study: 'tolerance', base, ...lists, quantities: [name], require, samples }, variants: samples, name };
+    return { question: { study: 'tolerance', base, ...lists, quantities: [name], require, samples }, variants: samples, name, isSlow: Object.keys(lists.deviations).length > 0 };
   }
 
   take(answer, { name, question }) {
