@@ -165,6 +165,28 @@ async fn a_weight_may_be_spelled_in_capitals() {
 }
 
 #[tokio::test]
+async fn page_and_api_document_are_served_compressed() {
+    let service = Service::new();
+    for path in ["/", "/page/main.js", "/page/style.css", "/openapi.json", "/openapi-3.0.json"] {
+        let asked = |coding| Question::of("GET", path).with("accept-encoding", coding);
+        let (plain, compressed) = (service.ask(&asked("identity")).await, service.ask(&asked("gzip")).await);
+        assert_eq!((plain.header("content-encoding"), compressed.header("content-encoding")), ("", "gzip"), "{path}");
+        assert!(2 * compressed.body.len() < plain.body.len(), "{path}: {} bytes", compressed.body.len());
+        let mut decoded = Vec::new();
+        GzDecoder::new(compressed.body.as_slice()).read_to_end(&mut decoded).unwrap();
+        assert!(decoded == plain.body, "{path}");
+        assert_ne!(plain.etag(), compressed.etag(), "{path}: each coding has its own tag");
+        for (answer, coding) in [(plain, "identity"), (compressed, "gzip")] {
+            let again = service.ask(&asked(coding).with("if-none-match", answer.etag())).await;
+            assert_eq!((again.status, again.body.len()), (304, 0), "{path}");
+            for seen in [&answer, &again] {
+                assert_eq!(seen.header("vary").to_ascii_lowercase(), "accept-encoding", "{path}");
+            }
+        }
+    }
+}
+
+#[tokio::test]
 async fn a_client_that_has_the_representation_gets_304_without_a_body() {
     let service = Service::new();
     for path in ENDPOINTS {

@@ -8,6 +8,8 @@ import { chromium } from 'playwright-core';
 
 export const BINARY = process.env.TOOTHWAVE_BIN ?? '../../target/debug/toothwave';
 const CHROMIUM = process.env.CHROMIUM ?? '/usr/bin/chromium';
+/** Where it is given the page's files come from this folder, and the binary need not be built anew for each change of them. */
+const PAGE_FOLDER = process.env.PAGE_FOLDER;
 
 async function freePort() {
   const probe = createServer().listen(0, '127.0.0.1');
@@ -104,7 +106,8 @@ export function testBed({ before, after, afterEach }, settings = []) {
 }
 
 /** A page that remembers what must not happen: errors, violations of its policy, requests to elsewhere. */
-export async function open(browser, server, { address = '', hasClock = false, ...options } = {}) {
+/** It opens on a link to an example, or, with `example: null`, as a new user meets it. */
+export async function open(browser, server, { address, example = 'paper-5.1', hasClock = false, ...options } = {}) {
   const context = await browser.newContext({
     viewport: { width: 1366, height: 900 },
     colorScheme: 'light',
@@ -129,12 +132,25 @@ export async function open(browser, server, { address = '', hasClock = false, ..
     const url = request.url();
     if (!url.startsWith(server.origin) && !url.startsWith('blob:') && !url.startsWith('data:')) page.faults.push(`request to ${url}`);
   });
+  if (PAGE_FOLDER) await servePageFrom(context, server, PAGE_FOLDER);
   // A clock that the test can put forward.
   if (hasClock) await page.clock.install();
-  await page.goto(`${server.origin}/${address}`);
+  const link = address ?? (example ? `#design=${Buffer.from(JSON.stringify(await server.example(example))).toString('base64url')}` : '');
+  await page.goto(`${server.origin}/${link}`);
   await settled(page);
   return page;
 }
+
+async function servePageFrom(context, server, folder) {
+  const { headers } = await fetch(server.origin);
+  const policy = { 'content-security-policy': headers.get('content-security-policy') };
+  await context.route((url) => url.origin === server.origin && /^\/(page\/.*)?$/.test(url.pathname), (route) => {
+    const name = new URL(route.request().url()).pathname.replace(/^\/(page\/)?/, '') || 'index.html';
+    return route.fulfill({ path: `${folder}/${name}`, headers: { ...policy, 'content-type': TYPES[name.split('.').at(-1)] } });
+  });
+}
+
+const TYPES = { html: 'text/html; charset=utf-8', js: 'text/javascript; charset=utf-8', css: 'text/css; charset=utf-8', svg: 'image/svg+xml' };
 
 /** Waits until the page shows the answers about the design that stands in its form. */
 export async function settled(page) {
@@ -143,8 +159,16 @@ export async function settled(page) {
   await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
 }
 
+/** Presses what may stand in a menu, which opens first. */
+export async function pick(page, selector) {
+  const target = page.locator(selector);
+  const menu = await target.evaluate((element) => element.closest('.menu:not(:popover-open)')?.id);
+  if (menu) await page.click(`[popovertarget="${menu}"]`);
+  await target.click();
+}
+
 export async function choose(page, example) {
-  await page.click(`[data-example="${example}"]`);
+  await pick(page, `[data-example="${example}"]`);
   await settled(page);
 }
 
@@ -158,7 +182,7 @@ export const notes = (pointer) => `#notes${pointer.replaceAll('/', '-')}`;
 
 /** Puts a document into the page as JSON. */
 export async function setDocument(page, design) {
-  await page.click('#open-document');
+  await pick(page, '#open-document');
   await page.fill('#document-text', JSON.stringify(design));
   await page.click('#document-apply');
   await settled(page);
@@ -166,7 +190,7 @@ export async function setDocument(page, design) {
 
 /** The design in the page, as its JSON. */
 export async function designOf(page) {
-  await page.click('#open-document');
+  await pick(page, '#open-document');
   const design = JSON.parse(await page.inputValue('#document-text'));
   await page.click('#document-close');
   return design;

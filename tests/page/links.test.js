@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import { after, afterEach, before, test } from 'node:test';
-import { choose, designOf, enter, field, setDocument, settled, testBed } from './harness.js';
+import { choose, designOf, enter, field, pick, setDocument, settled, testBed } from './harness.js';
 
 const RADIUS = '/drive/teeth/radius_mm';
 const bed = testBed({ before, after, afterEach });
@@ -11,7 +11,7 @@ const bed = testBed({ before, after, afterEach });
 const hash = (page) => page.evaluate(() => location.hash);
 
 async function linkOf(page) {
-  await page.click('#copy-link');
+  await pick(page, '#copy-link');
   return hash(page);
 }
 
@@ -23,7 +23,8 @@ test('a link that was cut short says so, and its address stays until something i
     await page.context().close();
     page = await bed.open({ address: cut, hasClock: true });
     assert.match(await page.textContent('#notice'), /damaged or was cut short.*ready design is shown instead/);
-    assert.deepEqual(await designOf(page), await bed.server.example('paper-5.1'));
+    const { drive, load } = await bed.server.example('paper-5.1');
+    assert.deepEqual(await designOf(page), { drive, load });
     // Much longer than the address is put off after a change.
     await page.clock.fastForward(10_000);
     await settled(page);
@@ -70,7 +71,7 @@ test('files of different designs have different names, and reloading adds nothin
   const page = await bed.open();
   const names = new Set();
   const saved = async () => {
-    const [download] = await Promise.all([page.waitForEvent('download'), page.click('#save')]);
+    const [download] = await Promise.all([page.waitForEvent('download'), pick(page, '#save')]);
     return { name: download.suggestedFilename(), buffer: await readFile(await download.path()) };
   };
   assert.equal((await saved()).name, 'the-papers-case-5.1.json', 'a ready design needs no more');
@@ -113,7 +114,7 @@ test('STEP and CSV are downloaded as the API answers them', async () => {
     ['states.csv', '/v1/sweep', 'text/csv'],
     ['profiles.csv', '/v1/geometry', 'text/csv'],
   ]) {
-    const [download] = await Promise.all([page.waitForEvent('download'), page.click(`[data-file="${file}"]`)]);
+    const [download] = await Promise.all([page.waitForEvent('download'), pick(page, `[data-file="${file}"]`)]);
     assert.ok(download.suggestedFilename().endsWith(`-${file}`));
     // A STEP file says when it was made, if it does.
     const plain = (bytes) => bytes.toString().replace(/\d{4}-\d\d-\d\dT[\d:]+/g, '');

@@ -2,6 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
+import { createCanvas } from '@napi-rs/canvas';
 import { getDocument } from 'pdfjs-dist/legacy/build/pdf.mjs';
 import { enter, setDocument, testBed } from './harness.js';
 
@@ -25,6 +26,36 @@ async function printed(page) {
   return pages;
 }
 
+/** Coloured pixels of a rendered page within a box in points, x to the right and y down from the upper left. */
+async function colouredPixels(pdfPage, { x, y, width, height }) {
+  const viewport = pdfPage.getViewport({ scale: 1 });
+  const canvas = createCanvas(viewport.width, viewport.height);
+  const canvasContext = canvas.getContext('2d');
+  await pdfPage.render({ canvasContext, viewport }).promise;
+  const { data } = canvasContext.getImageData(x, y, width, height);
+  let count = 0;
+  for (let at = 0; at < data.length; at += 4) if (Math.max(...data.subarray(at, at + 3)) - Math.min(...data.subarray(at, at + 3)) > 60) count += 1;
+  return count;
+}
+
+test('plots are printed', async () => {
+  const page = await bed.open();
+  for (const design of [await bed.server.example('paper-5.1'), await bed.server.example('paper-5.2')]) {
+    await setDocument(page, design);
+    const data = new Uint8Array(await page.pdf({ preferCSSPageSize: true, printBackground: true }));
+    const first = await (await getDocument({ data, verbosity: 0 }).promise).getPage(1);
+    const { items } = await first.getTextContent();
+    const [, , , top] = first.view;
+    for (const caption of ['Normal force, N', 'Contact stress, MPa']) {
+      const { transform } = items.find(({ str }) => str.startsWith(caption));
+      // Below its caption, as wide as a plot.
+      const box = { x: Math.round(transform[4]), y: Math.round(top - transform[5]) + 4, width: 250, height: 130 };
+      const count = await colouredPixels(first, box);
+      assert.ok(count >= 200, `${caption}: ${count} coloured pixels`);
+    }
+  }
+});
+
 test('an impossible design prints its inputs and why it is impossible, and no number of another', async () => {
   const page = await bed.open();
   await enter(page, '/drive/wave_generator/semi_minor_mm', 60);
@@ -43,7 +74,7 @@ test('an impossible design prints its inputs and why it is impossible, and no nu
 test('no head stands alone at the foot of a page', async () => {
   const page = await bed.open();
   const heads = await page.evaluate(() => [...document.querySelectorAll('h2, h3, .group th')].map((element) => element.childNodes[0]?.textContent.trim()).filter(Boolean));
-  assert.ok(heads.includes('Results') && heads.includes('Parts and room'));
+  assert.ok(heads.includes('Results') && heads.includes('Sizes and clearances'));
   const base = await bed.server.example('paper-5.2');
   for (const design of [
     await bed.server.example('paper-5.1'),

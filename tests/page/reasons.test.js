@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { drawableStudy, thinned } from '../../src/service/page/grids.js';
-import { roomFor, together } from '../../src/service/page/reasons.js';
+import { bestOf, held, roomFor, together } from '../../src/service/page/reasons.js';
 import { FIRST, faultsOf, searchesOf } from '../../src/service/page/requirements.js';
 
 const GOALS = [{ quantity: 'size', goal: 'min' }, { quantity: 'strength', goal: 'max' }];
@@ -16,7 +16,8 @@ test('of several searches the drives remain that no other beats, in the order of
   let state = 7;
   const next = () => (state = (state * 48271) % 2147483647) % 40;
   const fronts = [0, 1, 2].map(() => Array.from({ length: 60 }, () => drive(next(), next())));
-  const { front } = together(fronts.map((found, index) => ({ label: `kind ${index}`, answer: search(found) })), GOALS);
+  const { drives, limits } = together(fronts.map((found, index) => ({ label: `kind ${index}`, answer: search(found) })));
+  const { front } = held(bestOf(drives, GOALS), limits);
   const all = fronts.flat();
   const isBeaten = ({ quantities: { size, strength } }) =>
     all.some(({ quantities: other }) => other.size <= size && other.strength >= strength && (other.size < size || other.strength > strength));
@@ -30,7 +31,9 @@ test('of several searches the drives remain that no other beats, in the order of
 test('what fell to a limit is summed over searches, and close to it are those of the front within a hundredth', () => {
   const limits = (fell) => [{ quantity: 'size', bound: 'max', limit: 100, fell, fell_alone: 1, binds: 0 }];
   const answers = [search([drive(99.5, 5), drive(50, 3)], { limits: limits(4) }), search([drive(40, 1)], { limits: limits(3) })];
-  const { front, limits: [limit], scan } = together(answers.map((answer, index) => ({ label: String(index), answer })), GOALS);
+  const found = together(answers.map((answer, index) => ({ label: String(index), answer })));
+  const { front, limits: [limit] } = held(bestOf(found.drives, GOALS), found.limits);
+  const { scan } = found;
   assert.deepEqual([limit.fell, limit.fell_alone, limit.binds], [7, 2, 1]);
   assert.deepEqual(front.map(({ heldBy }) => heldBy.length), [0, 0, 1], 'each drive tells what holds it back');
   assert.deepEqual([scan.variants, scan.impossible], [20, 4]);
@@ -39,7 +42,7 @@ test('what fell to a limit is summed over searches, and close to it are those of
 test('of a search without drives the limit that has to give least stands first', () => {
   const limits = [{ quantity: 'size', bound: 'max', limit: 100, fell: 9, fell_alone: 0, binds: 0 }, { quantity: 'strength', bound: 'min', limit: 10, fell: 9, fell_alone: 0, binds: 0 }];
   const relaxations = [{ quantity: 'strength', bound: 'min', limit: 10, needed: 8 }, { quantity: 'size', bound: 'max', limit: 100, needed: 101.2 }];
-  const { without: [miss] } = together([{ label: 'one', answer: search([], { limits, relaxations, nearest_miss: drive(101, 10) }) }], GOALS);
+  const { without: [miss] } = together([{ label: 'one', answer: search([], { limits, relaxations, nearest_miss: drive(101, 10) }) }]);
   assert.deepEqual(miss.relaxations.map(({ quantity }) => quantity), ['size', 'strength']);
   assert.deepEqual(miss.miss.missed.map(({ quantity }) => quantity), ['size']);
 });

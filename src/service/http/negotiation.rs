@@ -154,7 +154,7 @@ fn without_parameters(accepted: &str) -> String {
 }
 
 /// Whether the request prefers gzip to no coding at all.
-fn accepts_gzip(headers: &HeaderMap) -> bool {
+pub fn accepts_gzip(headers: &HeaderMap) -> bool {
     let accepted = joined(headers, &header::ACCEPT_ENCODING);
     if accepted.len() > MOST_OF_A_LIST {
         return false;

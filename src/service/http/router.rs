@@ -6,7 +6,7 @@ use std::sync::{Arc, LazyLock};
 use axum::Router;
 use axum::extract::Request;
 use axum::http::uri::Authority;
-use axum::http::{HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
@@ -30,6 +30,7 @@ use super::query::require_no_query;
 use crate::app::App;
 use crate::ops::keys::{self, Keys};
 use crate::page;
+use crate::page::static_file::StaticFile;
 
 #[derive(OpenApi)]
 #[openapi(
@@ -156,8 +157,8 @@ pub fn router(app: Arc<App>, access: &Access) -> Router {
         .clone()
         .route("/", get(page::index))
         .route("/page/{*name}", get(page::asset))
-        .route("/openapi.json", get(|| openapi_document(openapi_json())))
-        .route("/openapi-3.0.json", get(|| openapi_document(openapi_3_0_json())))
+        .route("/openapi.json", get(openapi_document))
+        .route("/openapi-3.0.json", get(openapi_3_0_document))
         .merge(docs)
         .fallback(not_found)
         .method_not_allowed_fallback(method_not_allowed);
@@ -216,8 +217,16 @@ async fn without_query(request: Request, next: Next) -> Response {
     }
 }
 
-async fn openapi_document(document: &'static str) -> Response {
-    ([(header::CONTENT_TYPE, "application/json")], document).into_response()
+async fn openapi_document(headers: HeaderMap) -> Response {
+    static FILE: LazyLock<StaticFile> =
+        LazyLock::new(|| StaticFile::new("application/json", openapi_json().as_bytes()));
+    FILE.answer(&headers)
+}
+
+async fn openapi_3_0_document(headers: HeaderMap) -> Response {
+    static FILE: LazyLock<StaticFile> =
+        LazyLock::new(|| StaticFile::new("application/json", openapi_3_0_json().as_bytes()));
+    FILE.answer(&headers)
 }
 
 async fn not_found(request: Request) -> Problem {

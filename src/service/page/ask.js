@@ -41,11 +41,12 @@ export class Choice {
 /** A number as somebody types it; `value` is undefined where there is none. */
 export class NumberBox {
   #fault;
+  unit = '';
 
   constructor(label, onChange) {
     this.input = html('input', { type: 'text', class: 'number', inputmode: 'decimal', autocomplete: 'off', spellcheck: 'false', 'aria-label': label });
     this.input.addEventListener('change', () => {
-      this.#fault = typed(this.input.value).fault;
+      this.#fault = typed(this.input.value, this.unit).fault;
       if (this.#fault) this.input.setAttribute('aria-invalid', 'true');
       else this.input.removeAttribute('aria-invalid');
       onChange();
@@ -53,7 +54,7 @@ export class NumberBox {
   }
 
   get value() {
-    return typed(this.input.value).value;
+    return typed(this.input.value, this.unit).value;
   }
 
   set value(value) {

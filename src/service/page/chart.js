@@ -56,23 +56,37 @@ function axisLabel(text, center, y, width) {
   return svg('text', { x, y, class: 'axis-label', ...(length > room && { textLength: room, lengthAdjust: 'spacingAndGlyphs' }) }, text);
 }
 
-/** Empty axes: `{ root, plot, x(value), y(value), box, valueAt(px, py) }`. An axis is `{ min, max, label, labels }`, where `labels` name places
- *  from 0 on instead of numbers. */
+/** Numbers in words, with digits enough that no two of them look alike. */
+function apart(values) {
+  for (let digits = 5; ; digits += 1) {
+    const texts = values.map((value) => number(value, digits, digits - 2));
+    if (digits >= 15 || new Set(texts).size === texts.length) return texts;
+  }
+}
+
+/** Where an axis has a mark: `[{ value, text }]`. */
+function marksOf({ min, max }, most) {
+  const values = ticks(min, max, most);
+  const texts = apart(values);
+  return values.map((value, index) => ({ value, text: texts[index] }));
+}
+
+/** Empty axes: `{ root, plot, x(value), y(value), box, valueAt(px, py) }`. An axis is `{ min, max, label }`. */
 export function axes(width, height, xAxis, yAxis) {
-  const box = { left: LEFT, top: TOP, right: width - RIGHT, bottom: height - BOTTOM };
+  const [top, bottom] = [TOP, height - BOTTOM];
+  const yMarks = marksOf(yAxis, Math.max(2, Math.floor((bottom - top) / 44)));
+  pen.font = `12px ${getComputedStyle(document.body).fontFamily}`;
+  const left = Math.max(LEFT, 14 + Math.max(...yMarks.map(({ text }) => pen.measureText(text).width)));
+  const box = { left, top, right: width - RIGHT, bottom };
   const x = (value) => box.left + ((value - xAxis.min) / (xAxis.max - xAxis.min)) * (box.right - box.left);
   const y = (value) => box.bottom - ((value - yAxis.min) / (yAxis.max - yAxis.min)) * (box.bottom - box.top);
   const grid = svg('g', { class: 'grid' });
   const words = svg('g', { class: 'ticks' });
-  const placesOf = ({ min, max, labels }, most) => {
-    const stride = labels && Math.ceil(labels.length / most);
-    return labels ? labels.map((text, index) => ({ value: index, text })).filter((_, index) => index % stride === 0) : ticks(min, max, most).map((value) => ({ value, text: number(value, 5) }));
-  };
-  for (const { value, text } of placesOf(xAxis, Math.max(2, Math.floor((box.right - box.left) / 80)))) {
+  for (const { value, text } of marksOf(xAxis, Math.max(2, Math.floor((box.right - box.left) / 64)))) {
     grid.append(svg('line', { x1: x(value), x2: x(value), y1: box.top, y2: box.bottom }));
     words.append(svg('text', { x: x(value), y: box.bottom + 17, 'text-anchor': 'middle' }, text));
   }
-  for (const { value, text } of placesOf(yAxis, Math.max(2, Math.floor((box.bottom - box.top) / 44)))) {
+  for (const { value, text } of yMarks) {
     grid.append(svg('line', { x1: box.left, x2: box.right, y1: y(value), y2: y(value) }));
     words.append(svg('text', { x: box.left - 7, y: y(value) + 4, 'text-anchor': 'end' }, text));
   }

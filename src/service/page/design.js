@@ -23,7 +23,7 @@ const unlessDecided = (pointer, label) =>
   choice(pointer, label, [{ value: '', label: 'left to the service' }, { value: true, label: 'yes' }, { value: false, label: 'no' }]);
 const variant = (pointer, tag, label, options, more) => ({ kind: 'variant', pointer, tag, label, options, ...more });
 
-/** A gap at a contact; without any, the document has no clearance at all. */
+/** Clearance at a contact; without any, the document has no clearance at all. */
 const clearance = (contact, label, symbol) =>
   number(`/model/clearance/${contact}_um`, label, symbol, 'µm', { slider: WIDE, optional: () => 'none', step: 1 });
 
@@ -39,10 +39,10 @@ const material = (part, label) => ({
 
 /** How far a part as it is made is set back from the one that the mechanics know. */
 const setBack = (part, label, what) =>
-  number(`/parts/${part}/clearance_um`, what, '', 'µm', { of: label, optional: () => '0', step: 1 });
+  number(`/parts/${part}/clearance_um`, what, 'c', 'µm', { of: label, optional: () => '0', step: 1 });
 
 /** A radius that the mechanics leave free, with what is taken where it is left out. */
-const freeRadius = (part, label, key, what, otherwise) => number(`/parts/${part}/${key}_mm`, what, '', 'mm', { of: label, optional: () => otherwise });
+const freeRadius = (part, label, key, what, symbol, otherwise) => number(`/parts/${part}/${key}_mm`, what, symbol, 'mm', { of: label, optional: () => otherwise });
 
 /** What a document means that names no law, and no way of adding approaches up. */
 export const lawOf = (design) => at(design, '/model/stiffness/law') ?? (isBall(design) ? 'hertz' : compatibilityOf(design) === 'projection' ? 'linear' : 'johnson');
@@ -89,6 +89,13 @@ function withLaw(design) {
 const withProjectedLaw = (design) =>
   compatibilityOf(design) === 'projection' && !PROJECTED.has(lawOf(design)) ? changed(design, '/model/stiffness', { law: 'linear' }) : design;
 
+/** Input over output speed, ring fixed: what the counts of a document say, be the drive possible or not. */
+function ratioOf(design) {
+  const [count, teeth] = [at(design, '/drive/teeth/count'), at(design, '/drive/ring/teeth')];
+  const ratio = count / (count - teeth);
+  return Number.isFinite(ratio) ? Number(ratio.toPrecision(6)) : undefined;
+}
+
 /** The document with the counts that a ratio of input to output speed asks for, ring fixed: of the slots as many hold a tooth as
  *  before, all or every second and so on, where that is possible. */
 function withRatio(design, ratio) {
@@ -104,7 +111,8 @@ function withRatio(design, ratio) {
 
 const ratio = {
   ...whole('/ratio', 'Ratio, ring fixed', 'i_HG'),
-  derived: { read: ({ geometry }) => geometry && Number(geometry.transmission_ratio.toPrecision(6)), write: withRatio },
+  derived: { read: ratioOf, write: withRatio },
+  offersSearch: true,
   refuses: (value, design) => {
     const lobes = lobesOf(design);
     const others = lobes > 1 ? `, or ${lobes} times it is whole` : '';
@@ -120,16 +128,16 @@ const WIDTH = number('/drive/teeth/width_mm', 'Tooth width', 'L_1', 'mm', { slid
 
 /** Across the path; without one the part is straight there. */
 const groove = (contact, label) =>
-  number(`/drive/teeth/groove_radius_mm/${contact}`, label, '', 'mm', { slider: 0.05, optional: () => 'no groove', step: 0.1 });
+  number(`/drive/teeth/groove_radius_mm/${contact}`, label, 'r_g', 'mm', { slider: 0.05, optional: () => 'no groove', step: 0.1 });
 
 /** How far below a contact its body stands still. */
 const depth = (contact, label) =>
-  number(`/model/stiffness/depth_mm/${contact}`, label, '', 'mm', { optional: (design) => `r = ${at(design, '/drive/teeth/radius_mm') ?? ''}`, step: 0.5 });
+  number(`/model/stiffness/depth_mm/${contact}`, label, 'd', 'mm', { optional: (design) => `r = ${at(design, '/drive/teeth/radius_mm') ?? ''}`, step: 0.5 });
 
 const stiffness = (contact, label, symbol) => number(`/model/stiffness/${contact}_n_per_mm`, label, symbol, 'N/mm', { start: 500000, likely: 500000 });
 
 const compliance = (contact, label) =>
-  number(`/model/series_compliance_mm_per_n/${contact}`, label, '', 'mm/N', { optional: () => '0', likely: 1e-6, adjust: withVirtualWork });
+  number(`/model/series_compliance_mm_per_n/${contact}`, label, '1/k', 'mm/N', { optional: () => '0', likely: 1e-6, adjust: withVirtualWork });
 
 /** What the form starts friction with: a lubricated pair, and a light bearing under the middle of the race. */
 export const USUAL_FRICTION = { coefficient: 0.05, bearing: 0.002 };
@@ -155,8 +163,8 @@ export function withVirtualWork(design) {
   return changed(changed(design, '/model/stiffness/law', lawOf(design)), '/model/compatibility', 'virtual_work');
 }
 
-const modified = (key, label, more) => number(`/modification/${key}`, label, '', 'µm', { optional: () => '0', step: 1, adjust: withVirtualWork, ...more });
-const turned = (part, label) => modified(`${part}_rotation_arcsec`, label, { unit: '″' });
+const modified = (key, label, symbol, more) => number(`/modification/${key}`, label, symbol, 'µm', { optional: () => '0', step: 1, adjust: withVirtualWork, ...more });
+const turned = (part, label, symbol) => modified(`${part}_rotation_arcsec`, label, symbol, { unit: '″' });
 
 const RELIEF = '/modification/ring_tip_relief';
 const hasRelief = (design) => at(design, RELIEF) !== undefined;
@@ -165,8 +173,8 @@ const reliefOf = (_, { geometry }) => ({ amount_um: 5, start_deg: Math.floor((2 
 
 /** A part off the axis. */
 const runout = (part, label) => [
-  number(`/deviations/${part}_runout/amount_um`, label, '', 'µm', { optional: () => '0', step: 1, adjust: withVirtualWork }),
-  number(`/deviations/${part}_runout/angle_deg`, 'in the direction', '', 'deg', { of: label, optional: () => '0', step: 5, adjust: withVirtualWork }),
+  number(`/deviations/${part}_runout/amount_um`, label, 'e', 'µm', { optional: () => '0', step: 1, adjust: withVirtualWork }),
+  number(`/deviations/${part}_runout/angle_deg`, 'in the direction', 'α', 'deg', { of: label, optional: () => '0', step: 5, adjust: withVirtualWork }),
 ];
 
 const isGiven = (value) => (typeof value === 'object' && value !== null ? Object.values(value).some(isGiven) : Boolean(value));
@@ -190,7 +198,7 @@ const BEARING_LIFE = [
   ]),
 ];
 const wearRate = (contact, label) =>
-  number(`/friction/wear_rate_mm3_per_nm/${contact}`, label, '', 'mm³/(N·m)', { optional: () => '0', likely: 1e-8 });
+  number(`/friction/wear_rate_mm3_per_nm/${contact}`, label, 'w', 'mm³/(N·m)', { optional: () => '0', likely: 1e-8 });
 const ELSEWHERE = [
   number('/friction/ring/coefficient', 'Friction, teeth on the ring', 'μ_K', '', { slider: WIDE, likely: 0.05, step: 0.005 }),
   number('/friction/carrier/coefficient', 'Friction, teeth in the slots', 'μ_S', '', { slider: WIDE, likely: 0.05, step: 0.005 }),
@@ -293,7 +301,7 @@ export const GROUPS = [
     open: true,
     fields: [
       whole('/drive/ring/teeth', 'Ring teeth', 'Z_K', { step: 2, likely: 26 }),
-      number('/drive/ring/tip_radius_mm', 'Bored tip radius', '', 'mm', {
+      number('/drive/ring/tip_radius_mm', 'Bored tip radius', 'R_b', 'mm', {
         slider: 0.01,
         optional: (_, answers) => {
           const radius = answers.geometry?.ring.tip_radius_mm;
@@ -370,7 +378,7 @@ export const GROUPS = [
         '/model/compatibility',
         'Compatibility',
         [
-          { value: 'projection', label: 'Projection (the paper’s)', suits: (design) => !isBall(design) || lawOf(design) === 'fixed' },
+          { value: 'projection', label: 'As in the paper (projection)', suits: (design) => !isBall(design) || lawOf(design) === 'fixed' },
           { value: 'virtual_work', label: 'Virtual work' },
         ],
         { terms: ['projection', 'virtual_work', 'paper'], otherwise: compatibilityOf, adjust: withProjectedLaw },
@@ -391,15 +399,15 @@ export const GROUPS = [
           fields: [stiffness('wave_generator', 'At the wave generator', 'k_H'), stiffness('ring', 'At the ring', 'k_K'), stiffness('carrier', 'At the carrier', 'k_S')],
         },
       ], { otherwise: lawOf, adjust: withLaw }),
-      clearance('wave_generator', 'Gap at the wave generator', ''),
-      clearance('ring', 'Gap at the ring', ''),
-      clearance('carrier', 'Gap at the carrier', ''),
+      clearance('wave_generator', 'Clearance at the wave generator', 'c_H'),
+      clearance('ring', 'Clearance at the ring', 'c_K'),
+      clearance('carrier', 'Clearance at the carrier', 'c_S'),
     ],
   },
   {
     title: 'Friction and wear',
     pointer: '/friction',
-    hint: 'What the teeth run on decides what a turn costs; with an input speed it is told in watts, and with wear rates in micrometres an hour.',
+    hint: 'Friction gives the efficiency. With an input speed it also gives the power lost, and with wear rates the wear in µm/h.',
     summary: (design) => ({ plain: 'plain cam', race: 'race on a bearing', rolling: 'rolling' })[at(design, '/friction/wave_generator/kind')] ?? 'not computed',
     fields: [
       variant('/friction/wave_generator', 'kind', 'The teeth run on', [
@@ -411,9 +419,9 @@ export const GROUPS = [
     ],
   },
   {
-    title: 'What gives way behind the contacts',
+    title: 'Compliance of the supports',
     pointer: '/model/series_compliance_mm_per_n',
-    hint: 'Beside the contacts themselves, such as a bearing under the cam. Only virtual work takes it. Where neither a law nor this is chosen the ring’s teeth bend at pointed or bored tips, and with gaps the wave generator moves on there.',
+    hint: 'Added to the contacts themselves, such as that of a bearing under the cam. Only virtual work takes it.',
     summary: (design) => (Object.values(at(design, '/model/series_compliance_mm_per_n') ?? {}).some((value) => value) ? 'given' : 'nothing'),
     fields: [
       compliance('wave_generator', 'Compliance, wave generator'), compliance('ring', 'Compliance, ring'), compliance('carrier', 'Compliance, carrier'),
@@ -425,27 +433,27 @@ export const GROUPS = [
   {
     title: 'Modification',
     pointer: '/modification',
-    hint: 'On purpose, and of all teeth alike: what is above 0 opens a gap, what is below 0 has to find one in the model’s gaps. Only virtual work takes it.',
+    hint: 'Deliberate changes, alike for all teeth. A positive value opens clearance; a negative value needs clearance elsewhere. Only virtual work takes it.',
     summary: (design) => (isGiven(at(design, '/modification')) ? 'given' : 'none'),
     fields: [
-      modified('ring_equidistant_um', 'Ring set back'),
-      modified('ring_path_shift_um', 'Ring’s path outward'),
-      modified('ring_profile_shift_um', 'Ring’s profile outward'),
-      turned('ring', 'Ring’s flanks turned away'),
+      modified('ring_equidistant_um', 'Ring set back', 'Δ_K'),
+      modified('ring_path_shift_um', 'Ring’s path outward', 'Δ_d'),
+      modified('ring_profile_shift_um', 'Ring’s profile outward', 'Δ_R'),
+      turned('ring', 'Ring’s flanks turned away', 'θ_K'),
       flag(RELIEF, 'Tip relief of the ring', { starts: reliefOf, adjust: withVirtualWork }),
       number(`${RELIEF}/amount_um`, 'Relief at the tip', 'C', 'µm', { of: 'Tip relief', when: hasRelief, likely: 5, step: 1 }),
       number(`${RELIEF}/start_deg`, 'from the position', 'ψ_t', 'deg', { of: 'Tip relief', when: hasRelief, likely: 60, step: 1 }),
       number(`${RELIEF}/power`, 'to the power', 'n', '', { of: 'Tip relief', when: hasRelief, likely: 2, step: 0.5 }),
-      modified('wave_generator_equidistant_um', 'Wave generator set back'),
-      modified('slot_wall_um', 'Slot walls set back'),
-      turned('carrier', 'Carrier turned away'),
-      modified('tooth_radius_um', 'Teeth thinner in radius'),
+      modified('wave_generator_equidistant_um', 'Wave generator set back', 'Δ_H'),
+      modified('slot_wall_um', 'Slot walls set back', 'Δ_S'),
+      turned('carrier', 'Carrier turned away', 'θ_S'),
+      modified('tooth_radius_um', 'Teeth thinner in radius', 'Δ_r'),
     ],
   },
   {
-    title: 'Parts off the axis',
+    title: 'Runout',
     pointer: '/deviations',
-    hint: 'Directions are fixed in the part, from a lobe, a tooth space, a slot. What single teeth, slots, spaces and lobes were measured to deviate by are lists, which stand in the JSON.',
+    hint: 'Directions are fixed in the part. Measured deviations of single teeth, slots, spaces and lobes are lists in the JSON.',
     summary: (design) => {
       const lists = Object.values(at(design, '/deviations') ?? {}).filter((value) => Array.isArray(value) && value.length > 0).length;
       const own = isGiven(at(design, '/deviations')) ? 'given' : 'none';
@@ -481,7 +489,7 @@ export const GROUPS = [
       {
         title: 'Wave generator',
         fields: [
-          freeRadius('wave_generator', 'Wave generator', 'bore_radius', 'Bore radius', 'no bore'),
+          freeRadius('wave_generator', 'Wave generator', 'bore_radius', 'Bore radius', 'R_i', 'no bore'),
           setBack('wave_generator', 'Wave generator', 'Clearance inward'),
         ],
       },
@@ -489,7 +497,7 @@ export const GROUPS = [
       {
         title: 'Ring',
         fields: [
-          freeRadius('ring', 'Ring', 'outer_radius', 'Outer radius', '1.2 × root'),
+          freeRadius('ring', 'Ring', 'outer_radius', 'Outer radius', 'R_o', '1.2 × root'),
           setBack('ring', 'Ring', 'Clearance outward'),
           unlessSaid('/parts/ring/rim', 'Around its rim', [
             { value: 'housed', label: 'a rigid housing' },
@@ -501,8 +509,8 @@ export const GROUPS = [
         title: 'Carrier',
         hint: 'By default a tenth of the annulus between cam and ring tips stays free on either side.',
         fields: [
-          freeRadius('carrier', 'Carrier', 'inner_radius', 'Inner radius', 'tenth free'),
-          freeRadius('carrier', 'Carrier', 'outer_radius', 'Outer radius', 'tenth free'),
+          freeRadius('carrier', 'Carrier', 'inner_radius', 'Inner radius', 'R_i', 'tenth free'),
+          freeRadius('carrier', 'Carrier', 'outer_radius', 'Outer radius', 'R_o', 'tenth free'),
           setBack('carrier', 'Carrier', 'Clearance per wall'),
           unlessSaid('/parts/carrier/fingers', 'Its fingers are held', [
             { value: 'held_at_both_ends', label: 'at both ends' },
@@ -527,11 +535,11 @@ export const GROUPS = [
         label: 'Input angles',
         options: [
           { key: 'samples', label: 'equally spaced', preset: 50, field: whole('/sweep/samples', 'Samples of a period', 'N', { preset: 50 }) },
-          { key: 'tolerance', label: 'where the true peaks need them', preset: 1e-6, field: number('/sweep/tolerance', 'Relative tolerance', '', '') },
+          { key: 'tolerance', label: 'where the true peaks need them', preset: 1e-6, field: number('/sweep/tolerance', 'Relative tolerance', 'τ', '') },
         ],
       },
       flag('/sweep/wind_up', 'Wind-up and torsional stiffness too'),
-      number('/profile/chord_tolerance_mm', 'Chord tolerance', '', 'mm', { preset: 0.001, step: 0.001 }),
+      number('/profile/chord_tolerance_mm', 'Chord tolerance', 't', 'mm', { preset: 0.001, step: 0.001 }),
       choice('/profile/extent', 'Exported ring profile', [
         { value: 'tooth', label: 'One tooth' },
         { value: 'full', label: 'The whole ring' },

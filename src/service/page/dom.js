@@ -58,3 +58,12 @@ export function oncePerFrame(work) {
     });
   };
 }
+
+/** Puts an open popover below its button, or above it where there is no room. */
+export function placeBeside(popover, button) {
+  const { left, bottom, top } = button.getBoundingClientRect();
+  const { offsetWidth: width, offsetHeight: height } = popover;
+  const below = bottom + 6 + height <= innerHeight;
+  popover.style.left = `${Math.max(8, Math.min(left, document.documentElement.clientWidth - width - 8))}px`;
+  popover.style.top = `${below ? bottom + 6 : Math.max(8, top - 6 - height)}px`;
+}

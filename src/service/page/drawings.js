@@ -1,5 +1,5 @@
-// Drawings and plots as files, just as the service answers them. They are asked for on demand alone: parts that cannot be made
-// concern nothing but their drawings, and a slider that moves needs none.
+// What can be downloaded: drawings, plots and tables, just as the service answers them, and the printed report. They are asked for on demand
+// alone: parts that cannot be made concern nothing but their drawings, and a slider that moves needs none.
 
 import { changed, isSame } from './design.js';
 import { html, setText } from './dom.js';
@@ -7,9 +7,21 @@ import { reasonsOf } from './findings.js';
 import { ask } from './service.js';
 import { save } from './share.js';
 
-const MEDIA_TYPES = { dxf: 'image/vnd.dxf', step: 'model/step', svg: 'image/svg+xml', csv: 'text/csv' };
+/** By the ending of the file: what is accepted, and what else is asked. */
+const FORMATS = {
+  step: { label: 'STEP', accept: 'model/step' },
+  dxf: { label: 'DXF', accept: 'image/vnd.dxf' },
+  svg: { label: 'SVG', accept: 'image/svg+xml' },
+  '3mf': { label: '3MF', accept: 'model/3mf', query: '?preset=printing' },
+  stl: { label: 'STL', accept: 'model/stl', query: '?preset=printing' },
+  csv: { label: 'CSV', accept: 'text/csv' },
+  'comma.csv': { label: 'CSV 1,5', accept: 'text/csv', query: '?decimal=comma' },
+};
 
-const drawing = (part, name) => ({ part, name, path: `v1/drawings/${part}`, formats: ['dxf', 'step', 'svg'] });
+const DRAWN = ['step', 'dxf', 'svg', '3mf', 'stl'];
+const TABLE = ['csv', 'comma.csv'];
+
+const drawing = (part, name) => ({ part, name, path: `v1/drawings/${part}`, formats: DRAWN });
 
 const FILES = [
   drawing('assembly', 'Assembly'),
@@ -18,8 +30,8 @@ const FILES = [
   drawing('carrier', 'Carrier'),
   drawing('tooth', 'Tooth'),
   { part: 'plots', name: 'Force and stress plots', path: 'v1/sweep', formats: ['svg'] },
-  { part: 'states', name: 'Forces and stresses of all states', path: 'v1/sweep', formats: ['csv'] },
-  { part: 'profiles', name: 'Profiles as points', path: 'v1/geometry', formats: ['csv'] },
+  { part: 'states', name: 'Forces and stresses', path: 'v1/sweep', formats: TABLE },
+  { part: 'profiles', name: 'Profiles as points', path: 'v1/geometry', formats: TABLE },
 ];
 
 export class Drawings {
@@ -29,17 +41,18 @@ export class Drawings {
   /** Of the design at hand, the problem that a file was refused for. */
   #refusal;
 
-  /** `nameOf(ending)` names a file; `onRefusal()` when `problems` changed; `goTo(pointer)` and `labelOf(pointer)` as of the form. */
+  /** `nameOf(ending)` names a file; `onRefusal()` when `problems` changed; `onReport()` for the report; `goTo(pointer)` and `labelOf(pointer)` as of the form. */
   constructor({ list, state }, callbacks) {
     Object.assign(this, callbacks);
     this.state = state;
     for (const file of FILES) list.append(this.#build(file));
+    list.append(html('li', {}, html('span', {}, 'Report'), html('span', { class: 'cluster' }, html('button', { type: 'button', id: 'print', onclick: () => this.onReport() }, 'Print or PDF'))));
   }
 
   #build(file) {
     const { part, name, formats } = file;
     const buttons = formats.map((format) => {
-      const label = format.toUpperCase();
+      const { label } = FORMATS[format];
       return html('button', { type: 'button', 'data-file': `${part}.${format}`, 'aria-label': `${label}: ${name}`, onclick: () => this.#fetch(file, format) }, label);
     });
     return html('li', {}, html('span', {}, name, part === 'assembly' && [' at ', this.#angle]), html('span', { class: 'cluster' }, buttons));
@@ -64,13 +77,14 @@ export class Drawings {
   }
 
   async #fetch({ part, name, path }, format) {
+    const { accept, query = '' } = FORMATS[format];
     const design = this.#design;
     const asked = part === 'assembly' ? changed(design, '/assembly/input_angle_deg', this.#inputDeg) : design;
     const angle = part === 'assembly' ? `, input angle ${this.#angle.textContent}` : '';
     const fileName = this.nameOf(`-${part}.${format}`);
     this.state.replaceChildren(`Drawing ${name.toLowerCase()}…`);
     try {
-      const { answer, problem } = await ask(path, asked, { accept: MEDIA_TYPES[format] });
+      const { answer, problem } = await ask(`${path}${query}`, asked, { accept });
       if (problem) this.#refuse(name, problem, design);
       else {
         save(answer, fileName);

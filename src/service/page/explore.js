@@ -172,6 +172,7 @@ export class Explore extends StudyView {
       const { min, max } = rangeOf(chosen);
       [ends[0].value, ends[1].value] = [min, max];
       setText(unit, chosen.unit);
+      for (const end of ends) end.unit = chosen.unit;
     }
     if (!isQuiet) this.later();
   }

@@ -150,9 +150,9 @@ const KINDS = {
     why: 'The tooth that has just entered errs by more than the largest.',
   },
   projection_with_gap: {
-    title: 'Projection with a gap',
-    tests: 'The largest gap of a contact against none.',
-    basis: ['measured', 'Drives with gaps were calculated as elastic bodies.'],
+    title: 'Projection with clearance',
+    tests: 'The largest clearance of a contact against none.',
+    basis: ['measured', 'Drives with clearance were calculated as elastic bodies.'],
     why: 'With 10 µm at the ring the largest force came out 4 to 109 % too large.',
   },
   slender_fingers: {

@@ -5,7 +5,10 @@ import { linesOf, linesRead } from './lines.js';
 import { html, setAttributes, setChildren, setProperties, setText, symbol } from './dom.js';
 import { explanation, sentence, titleOf } from './findings.js';
 import { number, typed } from './format.js';
-import { term } from './terms.js';
+import { remedyOf } from './remedies.js';
+import { inputDifferences } from './report.js';
+import { TERMS, explained } from './terms.js';
+import { explanationOf } from './texts.en.js';
 
 /** Faults whose limit is itself a value that would do. */
 const LIMIT_WOULD_DO = new Set(['tooth_difference', 'installed_no_divisor', 'out_of_range', 'clearance_not_monotone']);
@@ -39,23 +42,30 @@ export class Form {
   #onEnd;
   #design = {};
   #answers = {};
-  #isOwn = false;
   #findings = [];
   #materials = [];
   #fillings = [];
+  /** What the last edit changed beside its own field: `{ pointer, differences }`. */
+  #told;
 
-  /** `onEdit(design, gesture)` at each change; changes of one gesture are one step to undo; `onEnd()` ends it. All fields stand below the
-   *  pointer `root`. */
-  constructor(container, { onEdit, onEnd }, groups = GROUPS, root = '') {
+  /** `onEdit(design, gesture)` at each change; changes of one gesture are one step to undo; `onEnd()` ends it; `onSearch(design)` looks for a drive
+   *  like it. All fields stand below the pointer `root`. */
+  constructor(container, { onEdit, onEnd, onSearch }, groups = GROUPS, root = '') {
     this.container = container;
     this.groups = groups;
     this.#onEdit = onEdit;
     this.#onEnd = onEnd;
+    this.onSearch = onSearch;
     const general = this.#notesFor(root, container);
     general.classList.add('general');
     for (const group of groups) container.append(this.#buildGroup(group));
     // Wherever the pointer is let go.
     for (const end of ['pointerup', 'pointercancel']) addEventListener(end, () => this.#release());
+    container.addEventListener('keydown', (event) => {
+      if (event.key !== 'F1') return;
+      event.preventDefault();
+      event.target.closest('.field')?.querySelector('.term')?.click();
+    });
   }
 
   get isHeld() {
@@ -145,9 +155,36 @@ export class Form {
     this.#edit(pointer, value === '' ? undefined : value, adjust);
   }
 
-  #replace(design, gesture) {
+  /** Takes another document, and tells what changes beside the field that was edited. */
+  #replace(design, pointer) {
+    const isOwn = (other) => other === pointer || other.startsWith(`${pointer}/`);
+    this.#told = { pointer, differences: inputDifferences(design, this.#design).filter(({ pointer: other }) => !isOwn(other)) };
     this.#design = design;
-    this.#onEdit(design, gesture);
+    this.#onEdit(design, pointer);
+  }
+
+  /** A label with a mark that explains its field; F1 in the field opens it too, so that Tab goes from field to field. */
+  #named(field, label) {
+    const text = explanationOf(field.pointer);
+    const terms = (field.terms ?? []).map((key) => TERMS[key]);
+    if (!text && terms.length === 0) return label;
+    const [base, index] = (field.symbol ?? '').split('_');
+    const title = `${fullLabel(field)}${base ? `, ${base}${index ? `_${index}` : ''}` : ''}`;
+    const mark = explained(...(text ? [{ title, text }] : []), ...terms);
+    mark.tabIndex = -1;
+    return html('span', { class: 'named' }, label, mark);
+  }
+
+  /** A button that applies the remedy of a finding, where that is a value. */
+  remedyButton(finding) {
+    const remedy = remedyOf(finding, this.#answers, this.#design);
+    if (!remedy) return undefined;
+    const apply = () => {
+      this.#replace(remedy.change(this.#design), finding.pointers[0]);
+      this.#onEnd();
+      this.setDesign(this.#design);
+    };
+    return html('button', { type: 'button', class: 'remedy', onclick: apply }, remedy.label);
   }
 
   #buildChoice(field, choose) {
@@ -161,7 +198,7 @@ export class Form {
       choose(select.value);
       this.#onEnd();
     });
-    const label = html('div', { class: 'choice-label' }, html('label', { for: id }, field.label), field.terms && term(...field.terms));
+    const label = html('div', { class: 'choice-label' }, this.#named(field, html('label', { for: id }, field.label)));
     const element = html('div', { class: 'field choice' }, label, select);
     // Where there is nothing to choose, nothing is asked.
     if (field.options.length === 1) for (const part of [label, select]) part.hidden = true;
@@ -188,7 +225,7 @@ export class Form {
       this.#edit(field.pointer, input.checked ? started : undefined, field.adjust);
       this.#onEnd();
     });
-    const element = html('div', { class: 'field flag' }, input, html('label', { for: id }, field.label));
+    const element = html('div', { class: 'field flag' }, input, this.#named(field, html('label', { for: id }, field.label)));
     this.#notesFor(field.pointer, element);
     this.#fields.set(field.pointer, { field, element, input });
     return element;
@@ -223,9 +260,8 @@ export class Form {
       'aria-describedby': `${field.unit ? `${idOf(field.pointer, 'unit')} ` : ''}${idOf(field.pointer, 'notes')}`,
     });
     const label = html('label', { for: id }, field.of && html('span', { class: 'hidden' }, `${field.of}: `), field.label, field.symbol && [' ', symbol(field.symbol)]);
-    const name = field.terms ? html('span', { class: 'named' }, label, term(...field.terms)) : label;
     const unit = html('span', { class: 'unit', id: idOf(field.pointer, 'unit') }, field.unit ?? '');
-    const element = html('div', { class: 'field number-field' }, name, html('span', { class: 'entry' }, input, unit));
+    const element = html('div', { class: 'field number-field' }, this.#named(field, label), html('span', { class: 'entry' }, input, unit));
     const entry = { field, element, input };
     if (field.slider) this.#addSlider(entry);
     this.#notesFor(field.pointer, element);
@@ -255,7 +291,7 @@ export class Form {
     const order = field.columns.map(({ unit }) => unit).join(', ');
     const input = html('textarea', { id, class: 'number', rows: 3, spellcheck: 'false', autocomplete: 'off', 'aria-describedby': `${idOf(field.pointer, 'unit')} ${idOf(field.pointer, 'notes')}` });
     const unit = html('span', { class: 'unit', id: idOf(field.pointer, 'unit') }, order);
-    const element = html('div', { class: 'field lines' }, html('label', { for: id }, field.label), unit, input);
+    const element = html('div', { class: 'field lines' }, this.#named(field, html('label', { for: id }, field.label)), unit, input);
     const entry = { field, element, input };
     this.#notesFor(field.pointer, element);
     this.#fields.set(field.pointer, entry);
@@ -272,17 +308,18 @@ export class Form {
   /** Takes what was typed into the document, or says at the field why not. */
   #take(entry) {
     const { field, input } = entry;
-    const { value, fault } = typed(input.value);
+    const { value, fault } = typed(input.value, field.unit);
     entry.fault = fault ?? (value === undefined ? undefined : field.refuses?.(value, this.#design));
     if (entry.fault !== undefined) this.#renderNotes();
     else if (field.derived) {
+      entry.isEdited = false;
       if (value !== undefined) this.#replace(field.derived.write(this.#design, value), field.pointer);
     } else this.#edit(field.pointer, value, field.adjust);
   }
 
   #stepBy(entry, sense) {
     const { field, input } = entry;
-    const { value } = typed(input.value);
+    const { value } = typed(input.value, field.unit);
     if (value === undefined) return;
     const step = field.step ?? entry.step ?? (field.whole ? 1 : niceStep(Math.max(Math.abs(value), SPANNED.least) / 100));
     const next = field.next?.(value, sense) ?? rounded(value + sense * step, step);
@@ -327,6 +364,7 @@ export class Form {
 
   /** Shows a document; sliders span anew around its values where `respan` says that it is another one. */
   setDesign(design, { respan = false } = {}) {
+    if (!isSame(design, this.#design)) this.#told = undefined;
     this.#design = design;
     for (const entry of this.#fields.values()) this.#showValue(entry, respan);
     for (const { group, summary } of this.#groups) setText(summary, group.summary?.(design) ?? '');
@@ -372,11 +410,11 @@ export class Form {
       return;
     }
     if (field.when) setProperties(entry.element, { hidden: !field.when(design) });
-    const value = field.derived ? field.derived.read(this.#isOwn ? this.#answers : {}) : (at(design, field.pointer) ?? field.preset);
+    const value = field.derived ? field.derived.read(design) : (at(design, field.pointer) ?? field.preset);
     const isTyping = document.activeElement === input;
     if (!isTyping) entry.fault = undefined;
     // What is being typed stays as it is spelled, as long as it means the value.
-    const isShown = isTyping && (field.derived ? entry.isEdited : typed(input.value).value === (at(design, field.pointer) ?? undefined));
+    const isShown = isTyping && (field.derived ? entry.isEdited : typed(input.value, field.unit).value === (at(design, field.pointer) ?? undefined));
     if (!isShown && entry.fault === undefined) setProperties(input, { value: typeof value === 'number' ? String(value) : '' });
     setProperties(input, { placeholder: String(field.optional?.(design, this.#answers) ?? field.preset ?? (field.derived ? '' : 'wanted')) });
     if (entry.slider) {
@@ -390,19 +428,14 @@ export class Form {
     }
   }
 
-  /** Shows what the service says: the last answers that there are, whether they are the document's own, why there are none, findings. */
-  setResult(answers, isOwn, reasons, findings) {
+  /** Shows what the service says: the last answers that there are, why the document has none, findings. */
+  setResult(answers, reasons, findings) {
     this.#answers = answers;
-    this.#isOwn = isOwn;
     this.reasons = reasons;
     this.#findings = findings;
     for (const entry of this.#fields.values()) {
       const { field } = entry;
       if (field.optional) setProperties(entry.input, { placeholder: String(field.optional(this.#design, answers)) });
-      if (field.derived) {
-        entry.isEdited &&= entry.fault !== undefined;
-        this.#showValue(entry, false);
-      }
       if (field.mark) this.#showMark(entry, field.mark(answers));
     }
     this.#renderNotes();
@@ -455,6 +488,7 @@ export class Form {
       if (reason.code === 'missing_field' && place === reason.pointer && contents.get(place).length > 0) continue;
       add(place, 'problem', JSON.stringify(reason), () => ({ element: this.#problemNote(reason, place) }));
     }
+    if (this.#told?.differences.length > 0) add(this.#placeOf(this.#told.pointer), 'info', JSON.stringify(this.#told), () => ({ element: this.#toldNote(this.#told) }));
     for (const finding of this.#findings) {
       for (const place of new Set(finding.pointers.map((pointer) => this.#placeOf(pointer)))) {
         add(place, finding.severity, finding.key, () => this.#findingNote(finding, place));
@@ -505,6 +539,13 @@ export class Form {
     return note;
   }
 
+  /** What an edit changed beside its own field. */
+  #toldNote({ pointer, differences }) {
+    const list = differences.map(({ label, value, reference }) => `${label[0].toLowerCase()}${label.slice(1)} ${reference} → ${value}`).join(', ');
+    const search = this.#fields.get(pointer)?.field.offersSearch && html('button', { type: 'button', class: 'link', onclick: () => this.onSearch(this.#design) }, 'Find a drive with this ratio');
+    return html('p', { class: 'note info told-note' }, `Also changed: ${list}. `, search && ['Sizes stay as they are. ', search]);
+  }
+
   #fix(pointer, value) {
     this.#edit(pointer, value);
     this.#settle(pointer);
@@ -531,7 +572,8 @@ export class Form {
       panel.hidden = !panel.hidden;
       button.setAttribute('aria-expanded', String(!panel.hidden));
     });
-    const element = html('div', {}, button, panel);
+    const remedy = html('div', {});
+    const element = html('div', {}, button, remedy, panel);
     // The first field is the one to change first; the others only refer to the finding.
     const isMinor = this.#placeOf(pointers[0]) !== place;
     let shown;
@@ -539,6 +581,7 @@ export class Form {
       if (isSame(finding, shown)) return;
       shown = finding;
       element.className = `note ${finding.severity}${isMinor ? ' minor' : ''}`;
+      setChildren(remedy, isMinor ? [] : [this.remedyButton(finding)].filter(Boolean));
       panel.replaceChildren(explanation(finding, (pointer) => this.labelOf(pointer), (pointer) => this.goTo(pointer)));
     };
     return { element, show };

@@ -47,14 +47,26 @@ const PLAIN = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
 const WITH_COMMA = /^([+-]?\d*),(\d*(?:e[+-]?\d+)?)$/i;
 const THOUSANDS = /^[+-]?[1-9]\d{0,2},\d{3}$/;
 
+/** Other ways to write a unit. */
+const SPELLINGS = { µm: ['um', 'μm'], 'N·m': ['Nm', 'N*m', 'N m'], '1/min': ['rpm', 'min-1', 'U/min'], deg: ['°'], '″': ['"', 'arcsec'] };
+
+/** The text without the unit of its field; another unit stays, and is a fault. */
+function withoutUnit(text, unit) {
+  const spellings = unit ? [unit, ...(SPELLINGS[unit] ?? [])] : [];
+  const found = spellings.find((spelling) => text.toLowerCase().endsWith(spelling.normalize('NFKC').toLowerCase()));
+  return found === undefined ? text : text.slice(0, -found.normalize('NFKC').length).trimEnd();
+}
+
 /** What a person typed as a number: `{ value }`, undefined where nothing stands there, or `{ fault }` in words. A comma is a decimal
- *  sign, as a point is; where it could part thousands as well, it is asked back. Spaces between digits are passed over. */
-export function typed(text) {
-  const compact = text.trim().replace(/(?<=\d)[\s\u00a0\u2009\u202f](?=\d)/g, '').replace(MINUS, '-');
+ *  sign, as a point is; where it could part thousands as well, it is asked back. Full-width characters, spaces between digits and the
+ *  field's own unit are understood. */
+export function typed(text, unit) {
+  const plainText = text.normalize('NFKC').replaceAll('。', '.').trim();
+  const compact = withoutUnit(plainText, unit).replace(/(?<=\d)[\s\u00a0\u2009\u202f](?=\d)/g, '').replace(MINUS, '-');
   if (compact === '') return { value: undefined };
   if (THOUSANDS.test(compact)) return { fault: `“${compact}” can mean ${compact.replace(',', '.')} or ${compact.replace(',', '')}: write which. The last number stands.` };
   const plain = compact.replace(WITH_COMMA, '$1.$2');
-  if (!PLAIN.test(plain)) return { fault: 'This is no number; the last one stands.' };
+  if (!PLAIN.test(plain)) return { fault: `This is not a number${unit ? ` in ${unit}` : ''}; the last one stands.` };
   const value = Number(plain);
   return Number.isFinite(value) ? { value } : { fault: 'This is more than a number can hold; the last one stands.' };
 }

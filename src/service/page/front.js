@@ -10,8 +10,6 @@ import { limitInWords } from './reasons.js';
 import { inputDifferences } from './report.js';
 
 const HEIGHT = 340;
-/** Rows of the table at first. */
-const MOST_ROWS = 40;
 /** Drives of one kind have one mark: `d` around the origin. */
 const MARKS = ['M5 0A5 5 0 1 1 -5 0A5 5 0 1 1 5 0Z', 'M-4.5 -4.5H4.5V4.5H-4.5Z', 'M0 -6L5.5 4.5H-5.5Z', 'M0 -6.5L6 0L0 6.5L-6 0Z'];
 
@@ -30,7 +28,6 @@ export class Front {
   /** Drives to compare, two at most. */
   #compared = [];
   #rows = [];
-  #showsAll = false;
 
   /** `onOpen(found)` and `onOpenBoth(found, reference)` when a drive is taken as design. */
   constructor(container, { quantities, onOpen, onOpenBoth }) {
@@ -43,7 +40,6 @@ export class Front {
     this.card = html('div', { class: 'drive-card' });
     this.figures = html('div', { class: 'drive-figures' });
     this.table = html('table', { class: 'drives' });
-    this.more = html('button', { type: 'button', class: 'link', onclick: () => this.#showAll() });
     this.comparison = html('section', { class: 'panel', 'aria-labelledby': 'comparison-title', hidden: true });
     this.panel = html(
       'section',
@@ -51,7 +47,6 @@ export class Front {
       html('header', {}, this.title, html('div', { class: 'ask-row' }, this.xChoice.element, this.yChoice.element)),
       html('div', { class: 'front' }, html('div', { class: 'drive-chart' }, this.chart, this.key), this.card, this.figures),
       html('div', { class: 'scroll drives-scroll', tabindex: '0', role: 'region', 'aria-label': 'Table of drives' }, this.table),
-      this.more,
     );
     container.append(this.panel, this.comparison);
     this.chart.addEventListener('pointerdown', (event) => this.#pick(event));
@@ -91,8 +86,7 @@ export class Front {
     const goals = this.#goals.map(({ quantity }) => quantity);
     const isMixed = new Set(this.#front.map(({ search }) => search)).size > 1;
     const head = ['Drive', '', ...(isMixed ? ['Kind'] : []), ...goals.map((name) => this.quantities.headed(name)), ...INPUTS.map(({ label }) => label), 'Compare'];
-    const shown = this.#showsAll ? this.#front : this.#front.slice(0, MOST_ROWS);
-    this.#rows = shown.map((found, index) => {
+    this.#rows = this.#front.map((found, index) => {
       const name = html('button', { type: 'button', class: 'link', onclick: () => this.#choose(index) }, found.name);
       const check = html('input', { type: 'checkbox', 'aria-label': `Compare ${found.name.toLowerCase()}`, onchange: () => this.#toggle(index) });
       const row = html(
@@ -112,16 +106,6 @@ export class Front {
       html('thead', {}, html('tr', {}, head.map((text, index) => (text === '' ? html('td', {}) : html('th', { scope: 'col', class: index > (isMixed ? 2 : 1) && 'numeric' }, text))))),
       html('tbody', {}, this.#rows.map(({ row }) => row)),
     );
-    this.more.hidden = shown.length === this.#front.length;
-    setText(this.more, `Show all ${this.#front.length}`);
-  }
-
-  #showAll() {
-    this.#showsAll = true;
-    this.#build();
-    this.#choose(this.#chosen);
-    this.#compare();
-    this.#rows[MOST_ROWS].name.focus();
   }
 
   #draw() {
@@ -173,7 +157,7 @@ export class Front {
       this.cardPicture,
       html('h3', {}, found.name),
       html('p', { class: 'none' }, found.label),
-      html('p', {}, found.heldBy.length > 0 ? `At its limits: ${found.heldBy.map((limit) => limitInWords(limit, this.quantities, { isWithin: true })).join('; ')}.` : 'No limit holds it back: what counts does.'),
+      html('p', {}, found.heldBy.length > 0 ? `Close to its limits: ${found.heldBy.map((limit) => limitInWords(limit, this.quantities, { isWithin: true })).join('; ')}.` : 'Not close to any limit.'),
       html(
         'div',
         { class: 'actions' },

@@ -26,7 +26,7 @@ export function linesRead({ columns }, text, before) {
       .trim()
       .split(/[\s;]+/)
       .filter((part) => !columns.some(({ unit }) => unit === part))
-      .map((part) => typed(part.replace(/%$/, '')).value);
+      .map((part, place) => typed(part, columns[place]?.unit).value);
     if (numbers.length !== columns.length || numbers.includes(undefined)) {
       return { fault: `Line ${index + 1} wants ${columns.length} numbers apart by spaces: ${columns.map(({ unit }) => unit).join(', ')}. The last duty stands.` };
     }

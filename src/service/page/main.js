@@ -29,9 +29,13 @@ import { Tolerance } from './tolerance.js';
 import { Toolbar } from './toolbar.js';
 import { Views } from './views.js';
 
-const FIRST_EXAMPLE = 'paper-5.1';
+/** The page opens on the drive of this example, calculated by the default model. */
+const FIRST_DRIVE = 'paper-5.1';
 /** Degrees of the input angle per second while it plays: a turn takes 20 seconds. */
 const PLAY_SPEED = 18;
+const MOST_TURNS = 3;
+/** Between two pictures while it plays: more of them would take more than a third of a core. */
+const FRAME_MS = 80;
 /** Positions closer than this are alike. */
 const ALIKE_DEG = 1e-6;
 const ADDRESS_DELAY_MS = 400;
@@ -56,9 +60,12 @@ const state = {
   selected: 3,
   from: 'ring',
   isPlaying: false,
+  view: 'design',
 };
 let motion;
 let gesture;
+/** While it plays: when the last picture was drawn, and how far it still turns. */
+let playing = {};
 
 const history = new History();
 const service = new Service({ onResult, onAway, onBusy, onSlow });
@@ -74,6 +81,10 @@ const form = new Form(byId('form'), {
     showComparison();
     render();
   },
+  onSearch(design) {
+    find.askLike(design, state.shown?.answers);
+    views.goTo('find');
+  },
 });
 
 const mechanism = new Mechanism(
@@ -84,10 +95,7 @@ const mechanism = new Mechanism(
       turnTo(deg);
     },
     onSelect: select,
-    onDrawings() {
-      byId('drawings-title').scrollIntoView({ block: 'start' });
-      byId('drawings-title').focus({ preventScroll: true });
-    },
+    onDrawings: () => byId('downloads').showPopover(),
   },
 );
 
@@ -115,11 +123,12 @@ const losses = new Losses({ panel: byId('losses'), compare: byId('compare-losses
 
 const drawings = new Drawings(
   { list: byId('drawings-list'), state: byId('drawings-state') },
-  { nameOf: fileName, onRefusal: showNotes, goTo: (pointer) => form.goTo(pointer), labelOf: (pointer) => form.labelOf(pointer) },
+  { nameOf: fileName, onRefusal: showNotes, onReport: () => window.print(), goTo: goToField, labelOf: (pointer) => form.labelOf(pointer) },
 );
 
 /** Parts that are far down the page. */
 const sight = {
+  mechanism: new Sight(byId('whole'), () => {}),
   plots: new Sight(byId('charts'), () => {
     showPlots();
     render();
@@ -142,12 +151,19 @@ const studies = {
   tolerance: new Tolerance(byId('tolerance'), { quantities }),
 };
 
-const views = new Views(byId('views'), (view) => {
+const views = new Views(byId('views'), (view, isFromAddress) => {
   if (view !== 'design') play(false);
   for (const [key, study] of Object.entries(studies)) study.show(key === view);
+  if (isFromAddress || !state.design) state.view = view;
+  else {
+    // Each view is a step of the browser's history.
+    writeAddress();
+    state.view = view;
+    window.history.pushState(null, '', address());
+  }
 });
 
-new Find(byId('find'), {
+const find = new Find(byId('find'), {
   quantities,
   onOpen(design, title) {
     takeDesign(design, { title, design });
@@ -218,8 +234,10 @@ function addressLater() {
 
 function writeAddress() {
   clearTimeout(addressTimer);
-  window.history.replaceState(null, '', share.toAddress(state.design, state.reference?.design));
+  window.history.replaceState(null, '', address());
 }
+
+const address = () => share.toAddress(state.design, state.reference?.design, state.view);
 
 // ---- what the service says
 
@@ -247,7 +265,7 @@ function onResult({ design, answers, problems, solveMs }) {
 /** At the fields: what keeps the drive from existing, and what a drawing was refused for. */
 function showNotes() {
   // Hints beside the fields stand on the last drive that could exist.
-  form.setResult(state.shown?.answers ?? {}, !document.body.classList.contains('stale'), reasonsOf([...state.problems, ...drawings.problems]), state.findings);
+  form.setResult(state.shown?.answers ?? {}, reasonsOf([...state.problems, ...drawings.problems]), state.findings);
 }
 
 /** In the line under the key figures, which is always there: what takes room of its own would push the page about. */
@@ -304,9 +322,9 @@ function findingNote(finding) {
   if (note.text !== text) {
     note.text = text;
     note.element.className = `note ${finding.severity}`;
-    note.explanation?.remove();
-    note.explanation = explanation(finding, (pointer) => form.labelOf(pointer), (pointer) => form.goTo(pointer));
-    note.element.append(note.explanation);
+    const parts = [explanation(finding, (pointer) => form.labelOf(pointer), (pointer) => form.goTo(pointer)), form.remedyButton(finding)].filter(Boolean);
+    note.parts?.forEach((part) => part.remove());
+    note.element.append(...(note.parts = parts));
   }
   return note.element;
 }
@@ -490,22 +508,25 @@ function showPeak({ input_angle_deg: inputDeg, position_deg: positionDeg }) {
   turnTo(inputDeg);
 }
 
-let lastFrame;
-function advance(now) {
-  if (!state.isPlaying) return;
-  // A frame after a hidden tab or a slow moment is not caught up with.
-  const seconds = Math.min(0.1, (now - (lastFrame ?? now)) / 1000);
-  lastFrame = now;
-  turnTo(state.inputDeg + seconds * PLAY_SPEED);
-  requestAnimationFrame(advance);
+/** Stops by itself after three turns, and where nobody sees it. */
+function advance() {
+  const now = performance.now();
+  if (playing.leftDeg <= 0 || document.hidden || !(sight.mechanism.isSeen || sight.plots.isSeen)) {
+    play(false);
+    return;
+  }
+  // A picture after a slow moment is not caught up with.
+  const stepDeg = (Math.min(200, now - playing.lastMs) / 1000) * PLAY_SPEED;
+  Object.assign(playing, { lastMs: now, leftDeg: playing.leftDeg - stepDeg });
+  turnTo(state.inputDeg + stepDeg);
 }
 
 function play(isPlaying) {
   if (isPlaying === state.isPlaying) return;
   state.isPlaying = isPlaying;
   setText(byId('play'), isPlaying ? 'Pause' : 'Play');
-  lastFrame = undefined;
-  if (isPlaying) requestAnimationFrame(advance);
+  clearInterval(playing.timer);
+  if (isPlaying) playing = { lastMs: performance.now(), leftDeg: 360 * MOST_TURNS, timer: setInterval(advance, FRAME_MS) };
   else render();
 }
 
@@ -608,11 +629,17 @@ function nextTheme() {
     // Storage may be forbidden; the theme then lasts as long as the page.
   }
   showTheme();
-  plots.restyle();
 }
 
 function showTheme() {
   setText(byId('theme'), `Theme: ${document.documentElement.dataset.theme ?? 'auto'}`);
+}
+
+/** Leads to a field from within a menu. */
+function goToField(pointer) {
+  byId('downloads').hidePopover();
+  views.goTo('design');
+  form.goTo(pointer);
 }
 
 function listen() {
@@ -626,8 +653,8 @@ function listen() {
     writeAddress();
     copy(location.href, currentTarget);
   });
-  click('print', () => window.print());
-  click('to-parts', () => form.goTo('/parts'));
+  click('to-parts', () => goToField('/parts'));
+  click('more', ({ currentTarget }) => setAttributes(currentTarget, { 'aria-expanded': byId('table').classList.toggle('all') }));
   click('theme', nextTheme);
   click('play', () => play(!state.isPlaying));
   click('tooth-before', () => select(state.selected - 1));
@@ -659,6 +686,17 @@ function listen() {
     byId('login-key').value = '';
   });
   access.listen(askForKey);
+  for (const menu of document.querySelectorAll('.menu')) {
+    const opener = document.querySelector(`[popovertarget="${menu.id}"]`);
+    menu.addEventListener('beforetoggle', () => {
+      const { left, bottom } = opener.getBoundingClientRect();
+      menu.style.setProperty('--left', `${left}px`);
+      menu.style.setProperty('--top', `${Math.max(8, bottom + 4)}px`);
+    });
+  }
+  // What only shows something new in its own place leaves the menu open. It closes first, so that the focus comes back to its button.
+  byId('menu').addEventListener('click', ({ target }) => target.closest('#theme, #copy-link') ?? byId('menu').hidePopover(), true);
+  byId('examples').addEventListener('click', () => byId('examples').hidePopover());
   // Their places are no part of the address, which is the design's.
   for (const link of document.querySelectorAll('.skip')) {
     link.addEventListener('click', (event) => {
@@ -699,16 +737,15 @@ function listen() {
     event.preventDefault();
   });
   addEventListener('hashchange', () => fromAddress());
-  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => plots.restyle());
   addEventListener('beforeprint', () => {
     byId('findings-table').replaceChildren(...findingsTable(state.findings));
     byId('report').replaceChildren(...reportOf(...reported(), location.href));
     document.documentElement.classList.add('printing');
-    plots.restyle(true);
+    plots.print(true);
   });
   addEventListener('afterprint', () => {
     document.documentElement.classList.remove('printing');
-    plots.restyle();
+    plots.print(false);
   });
 }
 
@@ -725,7 +762,8 @@ function reported() {
 function fromAddress({ atStart = false } = {}) {
   // A place in the page is no design.
   if (location.hash && document.getElementById(location.hash.slice(1))) return false;
-  const { design, reference, broken } = share.fromAddress(location.hash);
+  const { design, reference, view, broken } = share.fromAddress(location.hash);
+  views.show(view, true);
   if (broken.includes('design')) {
     const instead = atStart ? 'A ready design is shown instead' : 'Your design is kept';
     notify(`This link is damaged or was cut short: no design can be read from it. ${instead}; the address stays until you change something.`);
@@ -733,26 +771,27 @@ function fromAddress({ atStart = false } = {}) {
   }
   if (broken.includes('reference')) notify('This link is damaged or was cut short: its design is shown, but the reference cannot be read from it.');
   if (reference && !isSame(reference, state.reference?.design)) keepReference({ design: reference, origin: null }, undefined, { keepsAddress: true });
-  if (design) setDesign(design, { origin: null, respan: true, keepsAddress: broken.length > 0 });
+  const example = design && state.examples.find((candidate) => isSame(candidate.design, design));
+  if (design) setDesign(design, { origin: example ? originOf(example) : null, respan: true, keepsAddress: broken.length > 0 });
   return design !== undefined;
 }
 
 async function loadExamples() {
   const { examples } = await getJson('v1/examples');
-  return Promise.all(examples.map(async ({ name, title, href }) => ({ name, title, design: await getJson(href.slice(1)) })));
+  const loaded = await Promise.all(examples.map(async ({ name, title, href }) => ({ name, title, design: await getJson(href.slice(1)) })));
+  const { drive, load } = (loaded.find(({ name }) => name === FIRST_DRIVE) ?? loaded[0]).design;
+  return [{ name: 'first', title: 'First design: an ellipse with 28 rollers, default model', design: { drive, load } }, ...loaded];
 }
 
 function showExamples() {
   for (const example of state.examples) {
-    const label = example.name.replace('paper-', 'Case ').replaceAll('-', ' ');
-    example.button = html('button', { type: 'button', title: example.title, 'data-example': example.name }, label[0].toUpperCase() + label.slice(1));
+    example.button = html('button', { type: 'button', 'data-example': example.name }, example.title);
     example.button.addEventListener('click', () => {
       gesture = undefined;
       setDesign(example.design, { origin: originOf(example), respan: true });
     });
     byId('examples').append(example.button);
   }
-  new Toolbar(byId('examples'));
 }
 
 const originOf = ({ title, design }) => ({ title: title.split(':')[0], design });
@@ -776,9 +815,10 @@ async function start() {
   showExamples();
   // Names save typing; without them the numbers can still be entered.
   getJson('v1/materials').then(({ materials }) => form.offerMaterials(materials), () => {});
+  find.restore();
   if (!fromAddress({ atStart: true })) {
-    const first = state.examples.find(({ name }) => name === FIRST_EXAMPLE) ?? state.examples[0];
-    setDesign(first.design, { origin: originOf(first), respan: true, keepsAddress: location.hash !== '' });
+    const [first] = state.examples;
+    setDesign(first.design, { origin: originOf(first), respan: true, keepsAddress: share.fromAddress(location.hash).broken.length > 0 });
   }
   byId('legend').querySelector('.ramp').style.background = `linear-gradient(to right, ${[0, 0.25, 0.5, 0.75, 1].map(stressColor).join(', ')})`;
   if (!matchMedia('(prefers-reduced-motion: reduce)').matches) play(true);

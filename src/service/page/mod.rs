@@ -1,13 +1,16 @@
 //! `GET /`: the designer's page, compiled in, so that it needs neither Node nor any network.
 
+pub mod static_file;
+
+use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use axum::extract::Path;
 use axum::extract::rejection::PathRejection;
-use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
+use axum::http::{HeaderMap, HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 
-use crate::http::negotiation;
+use self::static_file::StaticFile;
 use crate::http::problem::{Problem, ProblemCode};
 
 /// Everything the page may load comes from this origin; nothing may be inline, framed or sent elsewhere.
@@ -32,7 +35,6 @@ macro_rules! assets {
 const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
-const TEXT: &str = "text/plain; charset=utf-8";
 const SVG: &str = "image/svg+xml";
 
 const INDEX: Asset = Asset { name: "index.html", content_type: HTML, body: include_bytes!("index.html") };
@@ -57,6 +59,7 @@ const ASSETS: &[Asset] = assets![
     "form.js" as SCRIPT,
     "format.js" as SCRIPT,
     "front.js" as SCRIPT,
+    "grades.js" as SCRIPT,
     "grids.js" as SCRIPT,
     "history.js" as SCRIPT,
     "large.js" as SCRIPT,
@@ -70,9 +73,11 @@ const ASSETS: &[Asset] = assets![
     "plots.js" as SCRIPT,
     "quantities.js" as SCRIPT,
     "reasons.js" as SCRIPT,
+    "remedies.js" as SCRIPT,
     "report.js" as SCRIPT,
     "requirements.js" as SCRIPT,
     "results.js" as SCRIPT,
+    "rounding.js" as SCRIPT,
     "sensitivity.js" as SCRIPT,
     "service.js" as SCRIPT,
     "share.js" as SCRIPT,
@@ -81,55 +86,40 @@ const ASSETS: &[Asset] = assets![
     "studies.js" as SCRIPT,
     "study-view.js" as SCRIPT,
     "terms.js" as SCRIPT,
+    "texts.en.js" as SCRIPT,
     "tolerance.js" as SCRIPT,
     "toolbar.js" as SCRIPT,
     "views.js" as SCRIPT,
-    "vendor/uplot.js" as SCRIPT,
-    "vendor/uplot.css" as CSS,
-    "vendor/uplot.LICENSE" as TEXT,
 ];
 
-/// The entity tag of all files together: a page is only ever whole, so one changed file renews them all.
-static ETAG: LazyLock<String> = LazyLock::new(|| {
-    let mut hasher = blake3::Hasher::new();
-    for asset in ASSETS.iter().chain([&INDEX]) {
-        hasher.update(asset.name.as_bytes()).update(asset.body);
-    }
-    let hash = hasher.finalize().to_hex();
-    format!("\"{}\"", &hash[..32])
+static FILES: LazyLock<BTreeMap<&str, StaticFile>> = LazyLock::new(|| {
+    let file = |asset: &Asset| (asset.name, StaticFile::new(asset.content_type, asset.body));
+    ASSETS.iter().chain([&INDEX]).map(file).collect()
 });
 
 /// The page itself.
 pub async fn index(headers: HeaderMap) -> Response {
-    serve(&INDEX, &headers)
+    serve(&FILES[INDEX.name], &headers)
 }
 
 /// The files that it loads.
 pub async fn asset(name: Result<Path<String>, PathRejection>, uri: Uri, headers: HeaderMap) -> Response {
     // A name that is no text is no file's either.
     let name = name.map(|Path(name)| name).unwrap_or_default();
-    match ASSETS.iter().find(|asset| asset.name == name) {
-        Some(asset) => serve(asset, &headers),
-        None => {
+    match FILES.get(name.as_str()) {
+        Some(file) if name != INDEX.name => serve(file, &headers),
+        _ => {
             let detail = format!("nothing stands at `{}`; the page is at `/`", uri.path());
             Problem::new(ProblemCode::NotFound, detail).into_response()
         }
     }
 }
 
-fn serve(asset: &Asset, headers: &HeaderMap) -> Response {
-    let etag = ETAG.as_str();
-    // Asked for anew each time, so that a page never mixes with the modules of an older service.
-    let cache_control = (header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
-    let tag = (header::ETAG, etag.to_owned());
+fn serve(file: &StaticFile, headers: &HeaderMap) -> Response {
+    let mut response = file.answer(headers);
     // On 304 too: browsers take its headers over those that they kept.
-    let policy = (header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY);
-    let common = [cache_control, policy];
-    if negotiation::is_not_modified(headers, etag) {
-        return (StatusCode::NOT_MODIFIED, common, [tag]).into_response();
-    }
-    let content_type = (header::CONTENT_TYPE, HeaderValue::from_static(asset.content_type));
-    (common, [tag], [content_type], asset.body).into_response()
+    response.headers_mut().insert(header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY);
+    response
 }
 
 #[cfg(test)]
@@ -154,7 +144,7 @@ mod tests {
     fn every_file_of_the_page_is_served() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("page");
         let named = ASSETS.iter().chain([&INDEX]).map(|asset| asset.name.to_owned());
-        let served = named.chain(["mod.rs".to_owned()]).collect();
+        let served = named.chain(["mod.rs".to_owned(), "static_file.rs".to_owned()]).collect();
         assert_eq!(files(&folder, ""), served);
     }
 }

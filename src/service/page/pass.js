@@ -93,26 +93,6 @@ export function passOf(design, sweep) {
   return pass;
 }
 
-/** The columns x and y's of a plot, with a gap at each break. */
-export function plotted(pass, abscissa, quantity, contacts) {
-  const xs = [];
-  const columns = contacts.map(() => []);
-  pass.x[abscissa].forEach((x, index) => {
-    if (pass.breaks.has(index)) {
-      xs.push((x + pass.x[abscissa][index - 1]) / 2);
-      for (const column of columns) column.push(null);
-    }
-    xs.push(x);
-    contacts.forEach((key, which) => columns[which].push(pass[quantity][key][index]));
-  });
-  // A jump at one place has the width of a hair, because the plots keep one value for one x.
-  const hair = 1e-9 * (xs.at(-1) - xs[0]);
-  for (let index = 1; index < xs.length; index += 1) {
-    if (xs[index] <= xs[index - 1]) xs[index] = xs[index - 1] + hair;
-  }
-  return [xs, ...columns];
-}
-
 /** The place of an abscissa's value between two points of the pass, or nothing outside it. */
 function placeOf(xs, x) {
   if (xs.length < 2 || x < xs[0] || x > xs.at(-1)) return undefined;

@@ -1,11 +1,11 @@
 // Forces and stresses over a tooth's pass, as the paper plots them: over the input angle, or over the place of the contact on
 // ring, cam or slot. Jumps stay jumps, peaks are marked, loaded teeth ride along, and a reference is drawn dashed.
 
-import uPlot from './vendor/uplot.js';
-import { html, oncePerFrame, setProperties, setText } from './dom.js';
+import { axes } from './chart.js';
+import { html, oncePerFrame, setAttributes, setProperties, setText, svg } from './dom.js';
 import { difference, fixed, number } from './format.js';
 import { CONTACTS } from './motion.js';
-import { ABSCISSAE, abscissaAt, plotted, readAt } from './pass.js';
+import { ABSCISSAE, abscissaAt, readAt } from './pass.js';
 
 const QUANTITIES = [
   { key: 'force', title: 'Normal force', unit: 'N', symbol: 'F', peak: 'force_n' },
@@ -14,223 +14,132 @@ const QUANTITIES = [
   { key: 'rubbing', title: 'Pressure times velocity', unit: 'MPa m/s', symbol: 'p·v', peak: 'rubbing', isKnown: (pass) => pass?.rubs === true },
 ];
 
-/** Room on either side of the pass, so that its first jump does not fall on the axis. */
+/** Room on either side of the pass, so that its first jump does not fall on the axis, and above the largest peak for its number. */
 const MARGIN = 0.02;
+const HEADROOM = 1.14;
 
-const HEIGHT = 260;
-const PRINT_HEIGHT = 200;
-const PRINT_WIDTH = 340;
-const FONT = '12px system-ui, sans-serif';
-
-/** Colours as the style sheet resolves them in the theme at hand. */
-function resolved(names) {
-  const probe = html('span', { hidden: true });
-  document.body.append(probe);
-  const colors = {};
-  for (const name of names) {
-    probe.style.color = `var(--${name})`;
-    colors[name] = getComputedStyle(probe).color;
-  }
-  probe.remove();
-  return colors;
-}
-
-const COLOR_NAMES = ['text', 'muted', 'line', 'surface', ...CONTACTS.map(({ key }) => `contact-${key}`)];
-
-const faded = (color, alpha) => {
-  const parts = color.match(/[\d.]+/g);
-  return color.startsWith('rgb') ? `rgba(${parts.slice(0, 3).join(', ')}, ${alpha})` : color;
-};
+const SCREEN = { height: 270 };
+/** Half a page's width in CSS pixels: letters then keep their size on paper. */
+const PAPER = { width: 340, height: 210 };
 
 class Plot {
   constructor(quantity, figure, container, owner) {
-    this.quantity = quantity;
-    this.figure = figure;
-    this.container = container;
-    this.owner = owner;
-    this.marks = html('canvas', { class: 'marks', 'aria-hidden': 'true' });
-  }
-
-  /** Builds the chart anew: uPlot fixes axes and colours when it is made. */
-  build() {
-    this.chart?.destroy();
-    const { owner, quantity } = this;
-    const { colors } = owner;
-    const abscissa = ABSCISSAE.find(({ key }) => key === owner.abscissa);
-    const axis = { stroke: colors.muted, font: FONT, labelFont: FONT, grid: { stroke: colors.line, width: 1 }, ticks: { show: false } };
-    const line = ({ key }, isReference) => ({
-      label: `${isReference ? 'reference ' : ''}${key}`,
-      stroke: faded(colors[`contact-${key}`], isReference ? 0.75 : 1),
-      width: isReference ? 1.2 : 2,
-      dash: isReference ? [5, 4] : undefined,
-      points: { show: false },
-      spanGaps: false,
-      pxAlign: 0,
-      show: owner.visible.has(key),
-    });
-    const options = {
-      width: owner.widthOf(this.container),
-      height: owner.isPrinting ? PRINT_HEIGHT : HEIGHT,
-      legend: { show: false },
-      cursor: {
-        drag: { x: false, y: false },
-        points: { size: 7 },
-        y: false,
-        sync: { key: 'pass', scales: ['x', null] },
-      },
-      scales: {
-        x: { time: false, range: (_, min, max) => [min - MARGIN * (max - min), max + MARGIN * (max - min)] },
-        y: { range: (_, __, max) => [0, (max > 0 ? max : 1) * 1.14] },
-      },
-      axes: [
-        { ...axis, label: abscissa.axis, labelSize: 20, size: 30 },
-        { ...axis, size: 56, values: (_, ticks) => ticks.map((tick) => number(tick, 4)) },
-      ],
-      series: [{}, ...CONTACTS.map((contact) => line(contact, false)), ...CONTACTS.map((contact) => line(contact, true))],
-      hooks: {
-        draw: [() => this.#drawJumpsAndPeaks()],
-        setCursor: [({ cursor }) => owner.onCursor(cursor.left >= 0 ? this.chart?.posToVal(cursor.left, 'x') : undefined)],
-        setSize: [() => this.#fitMarks()],
-      },
-    };
-    this.chart = new uPlot(options, this.data(), this.container);
-    this.chart.over.append(this.marks);
-    this.#fitMarks();
+    Object.assign(this, { quantity, figure, container, owner });
     this.#listen();
   }
 
-  data() {
-    const { owner, quantity } = this;
-    const keys = CONTACTS.map(({ key }) => key);
-    const isKnown = (pass) => pass && (quantity.isKnown?.(pass) ?? true);
-    const of = (pass) => (isKnown(pass) ? plotted(pass, owner.abscissa, quantity.key, keys) : [[], ...keys.map(() => [])]);
-    const own = of(owner.pass);
-    if (isKnown(owner.reference)) return uPlot.join([own, of(owner.reference)]);
-    const nothing = own[0].map(() => null);
-    return [...own, ...keys.map(() => nothing)];
+  /** Draws axes, lines, jumps and peaks anew; on paper in its own size. */
+  draw() {
+    const { owner, quantity, container } = this;
+    const { pass, abscissa } = owner;
+    const isKnown = (candidate) => candidate && (quantity.isKnown?.(candidate) ?? true);
+    setProperties(this.figure, { hidden: quantity.isKnown !== undefined && !isKnown(pass) });
+    setText(this.figure.querySelector('figcaption'), `${quantity.title}, ${quantity.unit}${pass?.isLargest ? ', the largest of all teeth' : ''}`);
+    this.frame = undefined;
+    const passes = [owner.reference, pass].filter(isKnown);
+    if (!isKnown(pass) || container.clientWidth === 0) {
+      container.replaceChildren();
+      return;
+    }
+    const keys = CONTACTS.map(({ key }) => key).filter((key) => owner.visible.has(key));
+    const xs = passes.flatMap(({ x }) => [x[abscissa][0], x[abscissa].at(-1)]);
+    const [from, to] = [Math.min(...xs), Math.max(...xs)];
+    const most = Math.max(0, ...passes.flatMap((each) => keys.map((key) => each[quantity.key][key].reduce((top, value) => Math.max(top, value), 0))));
+    const { width, height } = owner.isPrinting ? PAPER : { width: Math.max(200, container.clientWidth), ...SCREEN };
+    const { axis } = ABSCISSAE.find(({ key }) => key === abscissa);
+    const room = MARGIN * (to - from);
+    this.frame = axes(width, height, { label: axis, min: from - room, max: to + room }, { label: '', min: 0, max: (most || 1) * HEADROOM });
+    this.marks = svg('g', {});
+    this.cursor = svg('path', { class: 'cursor-mark' });
+    this.frame.plot.append(...passes.flatMap((each) => keys.map((key) => this.#line(each, key))), ...keys.map((key) => this.#jumps(key)), this.marks, this.cursor, ...this.#peaks(keys));
+    container.replaceChildren(this.frame.root);
+    this.drawTeeth(owner.teeth, owner.selected);
+    this.showCursor(undefined);
   }
 
-  update() {
-    const { isKnown } = this.quantity;
-    const wasHidden = this.figure.hidden;
-    setProperties(this.figure, { hidden: isKnown !== undefined && !isKnown(this.owner.pass) });
-    if (wasHidden && !this.figure.hidden) this.resize();
-    const { title, unit } = this.quantity;
-    setText(this.figure.querySelector('figcaption'), `${title}, ${unit}${this.owner.pass?.isLargest ? ', the largest of all teeth' : ''}`);
-    this.chart.setData(this.data());
+  #at(x, y) {
+    return `${this.frame.x(x).toFixed(1)} ${this.frame.y(y).toFixed(1)}`;
   }
 
-  resize() {
-    this.chart.setSize({ width: this.owner.widthOf(this.container), height: this.chart.height });
+  #line(pass, key) {
+    const [xs, ys] = [pass.x[this.owner.abscissa], pass[this.quantity.key][key]];
+    const d = xs.map((x, index) => `${index === 0 || pass.breaks.has(index) ? 'M' : 'L'}${this.#at(x, ys[index])}`).join('');
+    return svg('path', { d, class: `plot-line contact-${key}${pass === this.owner.pass ? '' : ' reference'}` });
   }
 
-  #fitMarks() {
-    if (!this.chart) return;
-    const { width, height } = this.chart.bbox;
-    Object.assign(this.marks, { width, height });
-    // A canvas that is given a size is empty.
-    this.drawTeeth(this.owner.teeth, this.owner.selected);
+  /** Dotted lines join both sides of a jump. */
+  #jumps(key) {
+    const { pass, abscissa } = this.owner;
+    const [xs, ys] = [pass.x[abscissa], pass[this.quantity.key][key]];
+    const entry = pass.entersUnderLoad && xs.length > 0 ? [`M${this.#at(xs[0], 0)}L${this.#at(xs[0], ys[0])}`] : [];
+    const jumps = [...pass.breaks].map((index) => `M${this.#at(xs[index - 1], ys[index - 1])}L${this.#at(xs[index], ys[index])}`);
+    return svg('path', { d: [...entry, ...jumps].join(''), class: `plot-jump contact-${key}` });
   }
 
-  #listen() {
-    const scrub = (event) => {
-      const box = this.chart.over.getBoundingClientRect();
-      this.owner.onScrub(this.chart.posToVal(event.clientX - box.left, 'x'));
-    };
-    let isDown = false;
-    this.chart.over.addEventListener('pointerdown', (event) => {
-      isDown = true;
-      this.chart.over.setPointerCapture(event.pointerId);
-      scrub(event);
-    });
-    this.chart.over.addEventListener('pointermove', (event) => isDown && scrub(event));
-    for (const end of ['pointerup', 'pointercancel']) this.chart.over.addEventListener(end, () => (isDown = false));
-  }
-
-  /** Dotted lines join both sides of a jump; a ring and a number mark each peak where the service reports it. */
-  #drawJumpsAndPeaks() {
-    const { owner, quantity, chart } = this;
-    const { pass, abscissa, colors } = owner;
-    if (!pass || !chart || this.figure.hidden) return;
-    const context = chart.ctx;
-    const ratio = uPlot.pxRatio;
-    const xs = pass.x[abscissa];
-    const at = (x, y) => [chart.valToPos(x, 'x', true), chart.valToPos(y, 'y', true)];
-    context.save();
-    context.lineWidth = 1.2 * ratio;
-    context.font = `600 ${11 * ratio}px system-ui, sans-serif`;
-    const labels = [];
-    for (const { key } of CONTACTS.filter((contact) => owner.visible.has(contact.key))) {
-      const values = pass[quantity.key][key];
-      context.strokeStyle = colors[`contact-${key}`];
-      context.setLineDash([1.5 * ratio, 2.5 * ratio]);
-      context.beginPath();
-      if (pass.entersUnderLoad && values.length > 0) {
-        context.moveTo(...at(xs[0], 0));
-        context.lineTo(...at(xs[0], values[0]));
-      }
-      for (const index of pass.breaks) {
-        context.moveTo(...at(xs[index - 1], values[index - 1]));
-        context.lineTo(...at(xs[index], values[index]));
-      }
-      context.stroke();
-      const peak = pass.peaks[key][quantity.peak];
+  /** A ring and a number mark each peak where the service reports it; a number that would touch the one above it goes below its peak. */
+  #peaks(keys) {
+    const { pass, abscissa } = this.owner;
+    const places = keys.flatMap((key) => {
+      const peak = pass.peaks[key][this.quantity.peak];
       const x = peak && abscissaAt(pass, abscissa, peak.position_deg);
-      if (x === undefined) continue;
-      const [left, top] = at(x, peak.value);
-      context.setLineDash([]);
-      context.fillStyle = colors.surface;
-      context.beginPath();
-      context.arc(left, top, 3.5 * ratio, 0, 2 * Math.PI);
-      context.fill();
-      context.stroke();
-      labels.push({ left, top: top - 8 * ratio, text: number(peak.value, 4), color: colors[`contact-${key}`] });
-    }
-    // A label that would touch the one above it goes below its peak.
-    labels.sort((one, other) => one.top - other.top);
+      return x === undefined ? [] : [{ key, text: number(peak.value, 4), left: this.frame.x(x), top: this.frame.y(peak.value) }];
+    });
+    places.sort((one, other) => one.top - other.top);
     let floor = -Infinity;
-    context.textAlign = 'center';
-    for (const label of labels) {
-      const isCrowded = label.top - floor < 18 * ratio;
-      const top = isCrowded ? Math.max(label.top + 25 * ratio, floor + 13 * ratio) : label.top;
-      context.lineWidth = 3 * ratio;
-      context.strokeStyle = colors.surface;
-      context.strokeText(label.text, label.left, top);
-      context.fillStyle = label.color;
-      context.fillText(label.text, label.left, top);
-      floor = top;
-    }
-    context.restore();
+    return places.flatMap(({ key, text, left, top }) => {
+      const above = top - 8;
+      const y = above - floor < 18 ? Math.max(above + 25, floor + 13) : above;
+      floor = y;
+      return [svg('circle', { class: `plot-peak contact-${key}`, cx: left, cy: top, r: 3.5 }), svg('text', { class: `plot-number contact-${key}`, x: left, y, 'text-anchor': 'middle' }, text)];
+    });
   }
 
-  /** Where the loaded teeth stand now; drawn over the chart, so that turning the drive does not draw the chart anew. */
+  /** Where the loaded teeth stand now; the lines stay as they are. */
   drawTeeth(teeth, selected) {
-    const { owner, quantity, chart } = this;
-    const context = this.marks.getContext('2d');
-    context.clearRect(0, 0, this.marks.width, this.marks.height);
-    if (!owner.pass || owner.isPrinting || this.figure.hidden) return;
-    const ratio = uPlot.pxRatio;
-    for (const { tooth, isCopy, positionDeg, ...loads } of teeth) {
+    const { owner, quantity, frame } = this;
+    if (!frame) return;
+    const marks = [];
+    for (const { tooth, isCopy, positionDeg, ...loads } of owner.isPrinting ? [] : teeth) {
       if (isCopy && tooth !== selected) continue;
       const x = abscissaAt(owner.pass, owner.abscissa, positionDeg);
       if (x === undefined) continue;
-      const left = chart.valToPos(x, 'x') * ratio;
-      if (tooth === selected) {
-        context.strokeStyle = faded(owner.colors.text, 0.55);
-        context.lineWidth = ratio;
-        context.beginPath();
-        context.moveTo(left, 0);
-        context.lineTo(left, this.marks.height);
-        context.stroke();
-      }
+      if (tooth === selected) marks.push({ class: 'plot-here', d: `M${frame.x(x)} ${frame.box.top}V${frame.box.bottom}` });
       for (const { key } of CONTACTS.filter((contact) => owner.visible.has(contact.key))) {
-        const value = loads[quantity.key][key];
-        context.fillStyle = owner.colors[`contact-${key}`];
-        context.beginPath();
-        context.arc(left, chart.valToPos(value, 'y') * ratio, (tooth === selected ? 4.5 : 2.8) * ratio, 0, 2 * Math.PI);
-        context.fill();
+        const size = tooth === selected ? 4.5 : 2.8;
+        marks.push({ class: `plot-mark contact-${key}`, d: `M${this.#at(x, loads[quantity.key][key])}m${-size} 0a${size} ${size} 0 1 0 ${2 * size} 0a${size} ${size} 0 1 0 ${-2 * size} 0` });
       }
     }
+    while (this.marks.childElementCount > marks.length) this.marks.lastChild.remove();
+    while (this.marks.childElementCount < marks.length) this.marks.append(svg('path', {}));
+    marks.forEach((mark, index) => setAttributes(this.marks.children[index], mark));
+  }
+
+  /** A line at a place, in every plot at once. */
+  showCursor(x) {
+    if (!this.frame) return;
+    const { top, bottom } = this.frame.box;
+    setAttributes(this.cursor, { d: x === undefined ? '' : `M${this.frame.x(x)} ${top}V${bottom}` });
+  }
+
+  #listen() {
+    const { owner, container } = this;
+    const place = ({ clientX }) => {
+      const { left, right } = this.frame?.box ?? {};
+      const px = clientX - container.getBoundingClientRect().left;
+      return px >= left && px <= right ? this.frame.valueAt(px, 0).x : undefined;
+    };
+    let isDown = false;
+    container.addEventListener('pointerdown', (event) => {
+      isDown = true;
+      container.setPointerCapture(event.pointerId);
+      owner.onScrub(place(event));
+    });
+    container.addEventListener('pointermove', (event) => {
+      owner.onCursor(place(event));
+      if (isDown) owner.onScrub(place(event));
+    });
+    container.addEventListener('pointerleave', () => owner.onCursor(undefined));
+    for (const end of ['pointerup', 'pointercancel']) container.addEventListener(end, () => (isDown = false));
   }
 }
 
@@ -248,7 +157,6 @@ export class Plots {
 
   /** `onScrub(positionDeg)` when a place in the plots is picked. */
   constructor({ abscissae, contacts, charts, readout }, onScrub) {
-    this.colors = resolved(COLOR_NAMES);
     this.scrubbed = onScrub;
     this.plots = QUANTITIES.map((quantity) => {
       const container = html('div', { class: 'chart', role: 'img', 'aria-label': `${quantity.title} over a tooth’s pass; the table of loaded teeth has the numbers` });
@@ -258,12 +166,7 @@ export class Plots {
     });
     this.#buildChoices(abscissae, contacts);
     this.#buildReadout(readout);
-    for (const plot of this.plots) plot.build();
-    new ResizeObserver(oncePerFrame(() => !this.isPrinting && this.plots.forEach((plot) => plot.resize()))).observe(charts);
-  }
-
-  widthOf(container) {
-    return this.isPrinting ? PRINT_WIDTH : Math.max(200, Math.floor(container.clientWidth));
+    new ResizeObserver(oncePerFrame(() => !this.isPrinting && this.draw())).observe(charts);
   }
 
   #buildChoices(abscissae, contacts) {
@@ -275,7 +178,7 @@ export class Plots {
         checked: key === this.abscissa,
         onchange: () => {
           this.abscissa = key;
-          this.rebuild();
+          this.draw();
         },
       });
       abscissae.append(html('label', {}, input, html('span', {}, label)));
@@ -287,7 +190,7 @@ export class Plots {
         onchange: () => {
           if (input.checked) this.visible.add(key);
           else this.visible.delete(key);
-          this.rebuild();
+          this.draw();
         },
       });
       contacts.append(
@@ -313,23 +216,21 @@ export class Plots {
     readout.append(html('table', { class: 'readout' }, this.place, html('thead', {}, html('tr', {}, html('td', {}), head)), html('tbody', {}, rows)));
   }
 
-  rebuild() {
-    for (const plot of this.plots) plot.build();
-    this.drawTeeth(this.teeth, this.selected);
+  draw() {
+    for (const plot of this.plots) plot.draw();
+    this.#readOut();
   }
 
-  /** Colours follow the theme; paper is always light. */
-  restyle(isPrinting = false) {
+  print(isPrinting) {
     this.isPrinting = isPrinting;
-    this.colors = resolved(COLOR_NAMES);
-    this.rebuild();
+    this.draw();
   }
 
   setPasses(pass, reference) {
     if (pass === this.pass && reference === this.reference) return;
     this.pass = pass;
     this.reference = reference;
-    for (const plot of this.plots) plot.update();
+    for (const plot of this.plots) plot.draw();
   }
 
   drawTeeth(teeth, selected) {
@@ -342,11 +243,12 @@ export class Plots {
   onCursor(x) {
     if (x === this.#cursorX) return;
     this.#cursorX = x;
+    for (const plot of this.plots) plot.showCursor(x);
     this.#readOut();
   }
 
   onScrub(x) {
-    const reading = this.pass && readAt(this.pass, this.abscissa, x);
+    const reading = x !== undefined && this.pass && readAt(this.pass, this.abscissa, x);
     if (reading) this.scrubbed(reading.position);
   }
 

@@ -8,7 +8,8 @@ import { getJson } from './service.js';
 const UNIT_ENDINGS = /_(nm_per_rad|mpa_m_per_s|mm|deg|mpa|nm|um|n|w)$/;
 
 const PHRASES = [
-  [/^carrier_finger_share$/, 'fingers of the carrier give way, over what a tooth does'],
+  [/^carrier_finger_share$/, 'finger deflection over contact deflection'],
+  [/^coincidence_degree$/, 'contact ratio'],
   [/^carrier_radial_space$/, 'height of the carrier'],
   [/_over_/, ' over '],
   [/_(min|least)$/, ', least'],

@@ -23,25 +23,40 @@ function beats(one, other, goals) {
   return gains.every((gain) => gain >= 0) && gains.some((gain) => gain > 0);
 }
 
-/** What several searches for the same goals come to together: the drives that none beats, in the order of the first goal, each with the limits
- *  that it is close to; each limit with what fell to it in all of them; and of each search that has nothing, the least change that would do. `answers` are `{ label, answer }`. */
-export function together(answers, goals) {
-  const all = answers.flatMap(({ label, answer }, search) => answer.front.map((found) => ({ ...found, label, search })));
-  const sense = goals[0]?.goal === 'max' ? -1 : 1;
-  const front = all
-    .filter((found) => !all.some((other) => beats(other, found, goals)))
-    .sort((one, other) => sense * (one.quantities[goals[0].quantity] - other.quantities[goals[0].quantity]))
-    .map((found, index) => ({ ...found, name: `Drive ${index + 1}` }));
+/** So many drives are shown: enough to choose from, few enough to look at. */
+const MOST_SHOWN = 40;
+
+/** Of drives in order so many that lie evenly, with both ends. */
+const spreadOut = (drives, most) => (drives.length <= most ? drives : Array.from({ length: most }, (_, index) => drives[Math.round((index * (drives.length - 1)) / (most - 1))]));
+
+/** The drives that none beats, in the order of the first goal, at most as many as are shown. */
+export function bestOf(drives, goals) {
+  const [{ quantity, goal }] = goals;
+  const sense = goal === 'max' ? -1 : 1;
+  const front = drives.filter((found) => !drives.some((other) => beats(other, found, goals)));
+  return spreadOut(front.sort((one, other) => sense * (one.quantities[quantity] - other.quantities[quantity])), MOST_SHOWN);
+}
+
+/** Names the drives, says of each which limits it is close to, and of each limit how many drives are close to it. */
+export function held(drives, limits) {
+  const front = drives.map((found, index) => ({ ...found, name: `Drive ${index + 1}`, heldBy: limits.filter((limit) => isClose(limit, found.quantities[limit.quantity])) }));
+  return { front, limits: limits.map((limit) => ({ ...limit, binds: front.filter(({ heldBy }) => heldBy.includes(limit)).length })).filter(({ fell, binds }) => fell > 0 || binds > 0) };
+}
+
+/** What several searches for the same goals come to together: all drives; each limit with what fell to it in all of them; and of each search
+ *  that has nothing, the least change that would do. `answers` are `{ label, question, answer }`. */
+export function together(answers) {
+  const drives = answers.flatMap(({ label, question, answer }, search) => answer.front.map((found) => ({ ...found, label, question, search })));
   const limits = new Map();
-  const scan = { variants: 0, good: 0, impossible: 0, reasons: new Map() };
+  const scan = { variants: 0, impossible: 0, reasons: new Map() };
   for (const { answer } of answers) {
     for (const limit of answer.limits) {
-      const sum = limits.get(keyOf(limit)) ?? { ...limit, fell: 0, fell_alone: 0, binds: 0 };
+      const sum = limits.get(keyOf(limit)) ?? { ...limit, fell: 0, fell_alone: 0 };
       sum.fell += limit.fell;
       sum.fell_alone += limit.fell_alone;
       limits.set(keyOf(limit), sum);
     }
-    for (const count of ['variants', 'good', 'impossible']) scan[count] += answer.scan[count];
+    for (const count of ['variants', 'impossible']) scan[count] += answer.scan[count];
     for (const { code, pointer, variants, detail } of answer.scan.reasons) {
       const key = `${code} ${pointer}`;
       const sum = scan.reasons.get(key) ?? { detail, variants: 0 };
@@ -49,23 +64,31 @@ export function together(answers, goals) {
       scan.reasons.set(key, sum);
     }
   }
-  for (const found of front) found.heldBy = [...limits.values()].filter((limit) => isClose(limit, found.quantities[limit.quantity]));
-  for (const limit of limits.values()) limit.binds = front.filter(({ heldBy }) => heldBy.includes(limit)).length;
   const without = answers.filter(({ answer }) => answer.front.length === 0);
   return {
-    front,
-    limits: [...limits.values()].filter(({ fell, binds }) => fell > 0 || binds > 0).sort((one, other) => other.fell - one.fell),
+    drives,
+    limits: [...limits.values()].sort((one, other) => other.fell - one.fell),
     scan: { ...scan, reasons: [...scan.reasons.values()].sort((one, other) => other.variants - one.variants) },
-    without: without.map(({ label, answer }) => ({ label, ...missOf(answer) })),
+    without: without.map(({ label, answer }) => ({ label, ...missOf(answer) })).sort((one, other) => leastChange(one) - leastChange(other)),
   };
 }
+
+const changeOf = ({ limit, needed }) => Math.abs(needed - limit) / scaleOf(limit);
+
+/** How far the limit that can give most easily has to. */
+const leastChange = ({ relaxations }) => (relaxations.length > 0 ? changeOf(relaxations[0]) : Infinity);
 
 /** Of a search that found nothing: the nearest miss with the limits that it misses, and each limit that could give alone, the one that has
  *  to give least first. */
 function missOf({ nearest_miss: miss, relaxations, limits }) {
   const missed = miss && limits.filter((limit) => beyond(limit, miss.quantities[limit.quantity]) > 0);
-  const change = ({ limit, needed }) => Math.abs(needed - limit) / scaleOf(limit);
-  return { miss: miss && { ...miss, missed }, relaxations: [...relaxations].sort((one, other) => change(one) - change(other)) };
+  return { miss: miss && { ...miss, missed }, relaxations: [...relaxations].sort((one, other) => changeOf(one) - changeOf(other)) };
+}
+
+/** A value in words that differ from those of its limit. */
+export function apart(quantities, name, value, limit) {
+  const digits = [4, 5, 6, 7, 8, 9].find((count) => quantities.shown(name, value, count) !== quantities.shown(name, limit, count));
+  return quantities.shown(name, value, digits ?? 9);
 }
 
 /** A limit in words; within a sentence they begin small. */

@@ -3,6 +3,7 @@
 
 import { at } from './design.js';
 import { CONTACTS } from './motion.js';
+import { standardRadiiMm } from './rounding.js';
 
 export const ROOT = '/find';
 
@@ -92,6 +93,7 @@ export const FIRST = {
     wave_generators: { harmonic_two: true, ellipse: true, eccentric: true },
     shapes: { cylinder: true },
     goals: { small: true, strong: true },
+    rounded: true,
     effort: 'usual',
   },
 };
@@ -118,7 +120,7 @@ export const GROUPS = [
     ],
   },
   {
-    title: 'What it may bear',
+    title: 'Strength',
     pointer: `${ROOT}/bears`,
     open: true,
     hint: 'A Hertz stress, without a factor of safety: bearing steel and case-hardened steel bear 1500 MPa (ISO 281, ISO 6336-5), alloy steel of 300 HV some 770.',
@@ -131,14 +133,16 @@ export const GROUPS = [
     title: 'Buildable',
     pointer: `${ROOT}/build`,
     open: true,
-    hint: 'Teeth that do not touch, inside a carrier, on flanks that are not too steep: always asked. What fingers give way is estimated for cylinders, held at both ends.',
+    hint: 'Teeth never touch each other, stay inside the carrier and meet flanks that are not too steep. The finger deflection is estimated for cylinders, held at both ends.',
     fields: [
       flag('undercut', 'Undercut ring tips are allowed'),
       number('wall', 'Wall between slots, over their width', '', '', { optional: () => 'not asked', step: 0.05 }),
       number('carrier_space_mm', 'Height of the carrier between wave generator and ring', '', 'mm', { optional: () => 'not asked', step: 0.5 }),
-      number('fingers', 'Its fingers may give way, over what a tooth does', '', '', { optional: () => 'not asked', step: 0.05 }),
+      number('fingers', 'Greatest finger deflection over contact deflection', '', '', { optional: () => 'not asked', step: 0.05 }),
       number('efficiency', 'Least efficiency', 'η', '', { optional: () => 'not asked', step: 0.01 }),
       number('friction', 'Coefficient of friction', 'μ', '', { likely: 0.05, step: 0.01 }),
+      flag('rounded', 'Round lengths to 0.01 mm'),
+      flag('standard', 'Standard diameters of rollers and balls'),
     ],
   },
   {
@@ -154,7 +158,7 @@ export const GROUPS = [
     ],
   },
   {
-    title: 'What counts',
+    title: 'Goals',
     pointer: `${ROOT}/goals`,
     open: true,
     hint: 'One to four. With several there is no single best drive, but those that none beats in everything.',
@@ -262,9 +266,15 @@ export function searchesOf(requirements) {
       }
       const toothMm = Math.min(0.3 * rootMm, (Math.PI * rootMm) / fewest);
       const widthMm = BEYOND * asked(requirements, 'width_mm');
+      const radiusRange = [0.08 * toothMm, Math.min(toothMm, widthMm)];
+      const radii = asked(requirements, 'standard') ? standardRadiiMm(shape.name, radiusRange) : undefined;
+      if (radii?.length === 0) {
+        searches.push({ label, fault: 'no standard diameter fits into this space' });
+        continue;
+      }
       const ranges = {
         ...Object.fromEntries(Object.entries(waveFree(rootMm, toothMm)).map(([name, ends]) => [`/drive/wave_generator/${name}`, range(ends)])),
-        '/drive/teeth/radius_mm': range([0.08 * toothMm, Math.min(toothMm, widthMm)]),
+        '/drive/teeth/radius_mm': radii === undefined ? range(radiusRange) : { one_of: radii },
         ...Object.fromEntries(Object.entries(shape.free(toothMm, widthMm)).map(([name, ends]) => [`/drive/teeth/${name}`, range(ends)])),
         ...(fewest === mostSlots ? {} : { '/drive/teeth/count': { min: fewest, max: mostSlots } }),
       };

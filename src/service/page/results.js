@@ -33,7 +33,7 @@ const BEYOND = {
   pressure_angle: 'a steeper flank',
   entry_under_load: 'teeth that enter under load',
   materials: 'unlike materials',
-  gap: 'larger gaps',
+  gap: 'larger clearances',
   wind_up: 'a larger wind-up',
   modification: 'its modification',
   series_compliance: 'what gives way behind its contacts',
@@ -144,7 +144,7 @@ const backingRows = Object.entries(BACKINGS).map(([key, label]) => {
 /** Always in sight, however far one scrolls. */
 const KEY_ROWS = [
   row('Ratio, ring fixed', '', '', ({ geometry }) => geometry?.transmission_ratio),
-  row('Coincidence degree', '', '', ({ coincidence }) => coincidence?.coincidence_degree, {
+  row('Contact ratio', '', '', ({ coincidence }) => coincidence?.coincidence_degree, {
     note: ({ coincidence }) => `from ψ ${number(coincidence.engagement.start_deg, 4)}°`,
     terms: ['coincidence', 'position'],
   }),
@@ -170,40 +170,9 @@ const KEY_ROWS = [
 
 export const GROUPS = [
   {
-    title: 'Motion and mesh',
-    rows: [
-      row('Ratio, ring fixed', 'i_HG', '', ({ geometry }) => geometry?.transmission_ratio),
-      row('Ratio, carrier fixed', 'i_HK', '', ({ geometry }) => geometry?.transmission_ratio_carrier_fixed),
-      row('Ratio of ring to carrier, wave generator fixed', 'i_KG', '', ({ geometry }) => geometry?.members.wave_generator_fixed.ratio),
-      row('Ring fixed, its torque over the input’s', '', '', ({ geometry }) => geometry?.members.ring_fixed.holding_torque_ratio, { followsFromRatio: true }),
-      row('Carrier fixed, its torque over the input’s', '', '', ({ geometry }) => geometry?.members.carrier_fixed.holding_torque_ratio, { followsFromRatio: true }),
-      row('Wave generator fixed, its over the ring’s', '', '', ({ geometry }) => geometry?.members.wave_generator_fixed.holding_torque_ratio, { followsFromRatio: true }),
-      row('Period of the load pattern', '', 'deg', ({ geometry }) => geometry?.period_deg),
-      row('Coincidence degree, all zones', 'ε', '', ({ coincidence }) => coincidence?.coincidence_degree, { significant: 7, terms: ['coincidence'] }),
-      row('Fewest teeth in mesh', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.min, { scoped: true }),
-      row('Most teeth in mesh', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, { scoped: true }),
-      row('Fewest teeth that carry', '', '', ({ sweep }) => sweep?.carrying_teeth?.min, { scoped: true }),
-      row('Most teeth that carry', '', '', ({ sweep }) => sweep?.carrying_teeth?.max, { scoped: true }),
-      row('Engagement begins, from a lobe’s middle', 'ψ_e', 'deg', ({ geometry }) => geometry?.engagement.start_deg, { terms: ['position'] }),
-      row('Undercut', '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
-        text: ({ geometry }) => (geometry.undercut.occurs ? 'yes' : 'no'),
-      }),
-      row('Critical tooth radius', 'r_c', 'mm', ({ geometry }) => geometry?.undercut.critical_tooth_radius_mm, { significant: 6 }),
-    ],
-  },
-  {
     title: 'Peaks over a period',
     told: (answers) => believed(({ force, stress }) => `force ${span(force)}, stress ${span(stress)}`, answers, true),
     rows: [...peakRows('force_n', 'Force', 'F', 'N'), ...peakRows('stress_mpa', 'Contact stress', 'σ', 'MPa')],
-  },
-  {
-    title: 'Below the surface, where the stress peaks',
-    rows: [
-      ...contactRows('half_width_mm', 'Half-width of the contact', 'w', 'mm'),
-      ...contactRows('half_length_mm', 'Half-length of the contact, along the axis', 'c', 'mm'),
-      ...contactRows('shear_stress_mpa', 'Largest shear stress', 'τ', 'MPa'),
-      ...contactRows('shear_depth_mm', 'Its depth', 'z', 'mm'),
-    ],
   },
   {
     title: 'Torque capacity at the allowable stress',
@@ -232,16 +201,31 @@ export const GROUPS = [
       row('Transmission error, peak to peak', '', 'deg', ({ sweep }) => sweep?.wind_up?.transmission_error_peak_to_peak_deg),
     ],
   },
+  { title: 'Friction losses and wear', offer: '/friction/wave_generator', rows: lossRows },
   {
-    title: 'Behind the contacts, estimated',
-    // To work with, not to report: what was taken over stands in the design.
-    isOnScreenAlone: true,
-    told: ({ sweep }) => (sweep?.series_compliance_estimates?.length > 0 ? 'From the parts as they are made; forces leave it out until it is taken over.' : ''),
-    rows: backingRows,
+    title: 'Motion and mesh',
+    rows: [
+      row('Ratio, ring fixed', 'i_HG', '', ({ geometry }) => geometry?.transmission_ratio),
+      row('Ratio, carrier fixed', 'i_HK', '', ({ geometry }) => geometry?.transmission_ratio_carrier_fixed),
+      row('Ratio of ring to carrier, wave generator fixed', 'i_KG', '', ({ geometry }) => geometry?.members.wave_generator_fixed.ratio),
+      row('Ring fixed, its torque over the input’s', '', '', ({ geometry }) => geometry?.members.ring_fixed.holding_torque_ratio, { followsFromRatio: true }),
+      row('Carrier fixed, its torque over the input’s', '', '', ({ geometry }) => geometry?.members.carrier_fixed.holding_torque_ratio, { followsFromRatio: true }),
+      row('Wave generator fixed, its over the ring’s', '', '', ({ geometry }) => geometry?.members.wave_generator_fixed.holding_torque_ratio, { followsFromRatio: true }),
+      row('Period of the load pattern', '', 'deg', ({ geometry }) => geometry?.period_deg),
+      row('Contact ratio, all zones', 'ε', '', ({ coincidence }) => coincidence?.coincidence_degree, { significant: 7, terms: ['coincidence'] }),
+      row('Fewest teeth in mesh', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.min, { scoped: true }),
+      row('Most teeth in mesh', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, { scoped: true }),
+      row('Fewest teeth that carry', '', '', ({ sweep }) => sweep?.carrying_teeth?.min, { scoped: true }),
+      row('Most teeth that carry', '', '', ({ sweep }) => sweep?.carrying_teeth?.max, { scoped: true }),
+      row('Engagement begins, from a lobe’s middle', 'ψ_e', 'deg', ({ geometry }) => geometry?.engagement.start_deg, { terms: ['position'] }),
+      row('Undercut', '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
+        text: ({ geometry }) => (geometry.undercut.occurs ? 'yes' : 'no'),
+      }),
+      row('Critical tooth radius', 'r_c', 'mm', ({ geometry }) => geometry?.undercut.critical_tooth_radius_mm, { significant: 6 }),
+    ],
   },
-  { title: 'What a turn costs', offer: '/friction/wave_generator', rows: lossRows },
   {
-    title: 'Parts and room',
+    title: 'Sizes and clearances',
     rows: [
       row('Ring root radius', '', 'mm', ({ geometry }) => geometry?.ring.root_radius_mm),
       row('Ring tip radius', '', 'mm', ({ geometry }) => geometry?.ring.tip_radius_mm),
@@ -254,7 +238,26 @@ export const GROUPS = [
     ],
   },
   {
+    title: 'Below the surface, where the stress peaks',
+    isMore: true,
+    rows: [
+      ...contactRows('half_width_mm', 'Half-width of the contact', 'w', 'mm'),
+      ...contactRows('half_length_mm', 'Half-length of the contact, along the axis', 'c', 'mm'),
+      ...contactRows('shear_stress_mpa', 'Largest shear stress', 'τ', 'MPa'),
+      ...contactRows('shear_depth_mm', 'Its depth', 'z', 'mm'),
+    ],
+  },
+  {
+    title: 'Compliance of the supports, estimated',
+    isMore: true,
+    // To work with, not to report: what was taken over stands in the design.
+    isOnScreenAlone: true,
+    told: ({ sweep }) => (sweep?.series_compliance_estimates?.length > 0 ? 'From the parts as they are made; forces leave it out until it is taken over.' : ''),
+    rows: backingRows,
+  },
+  {
     title: 'Checks of the calculation',
+    isMore: true,
     rows: [
       row('Torque balance, residual', '', '', ({ sweep }) => sweep?.checks.torque_balance_residual, { noDifference: true }),
       row('Period closure, residual', '', '', ({ sweep }) => sweep?.checks.period_closure_residual, { noDifference: true }),
@@ -308,7 +311,7 @@ export class Results {
       const told = group.told && html('span', { class: 'told' });
       if (told) this.#told.push({ group, told });
       const heading = html('tr', { class: group.isOnScreenAlone ? 'group unasked' : 'group' }, html('th', { scope: 'rowgroup', colspan: 5 }, group.title, offer && [' ', offer], told && [' ', told]));
-      const body = html('tbody', {}, heading);
+      const body = html('tbody', { class: group.isMore && 'more' }, heading);
       if (offer) this.#offers.push({ group, offer, heading });
       for (const entry of group.rows) {
         const value = html('data', { class: 'number' });

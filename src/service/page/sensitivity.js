@@ -92,6 +92,7 @@ export class Sensitivity extends StudyView {
       else this.#plusMinus.delete(pointer);
       this.later(0);
     });
+    box.unit = unit;
     box.value = Number(plusMinus.toPrecision(4));
     box.input.classList.add('cell-input');
     const bar = (end, kind) => {

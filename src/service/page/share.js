@@ -13,12 +13,12 @@ function decode(text) {
 
 const isObject = (value) => typeof value === 'object' && value !== null && !Array.isArray(value);
 
-/** What the address holds: `{ design, reference, broken }`, each of the first two undefined where there is none or none that can be
+/** What the address holds: `{ design, reference, view, broken }`, each of the first two undefined where there is none or none that can be
  *  read; `broken` names those. An address that holds something else, as a link that was cut short, is a broken design. */
 export function fromAddress(hash) {
   const text = hash.replace(/^#/, '');
   const parameters = new URLSearchParams(text);
-  const found = { broken: [] };
+  const found = { view: parameters.get('view') ?? 'design', broken: [] };
   for (const name of ['design', 'reference']) {
     if (!parameters.has(name)) continue;
     try {
@@ -29,12 +29,12 @@ export function fromAddress(hash) {
       found.broken.push(name);
     }
   }
-  if (text && !found.design && !found.broken.includes('design')) found.broken.push('design');
+  if (text && !parameters.has('view') && !found.design && !found.broken.includes('design')) found.broken.push('design');
   return found;
 }
 
-export function toAddress(design, reference) {
-  return `#design=${encode(design)}` + (reference ? `&reference=${encode(reference)}` : '');
+export function toAddress(design, reference, view) {
+  return `#${view === 'design' ? '' : `view=${view}&`}design=${encode(design)}${reference ? `&reference=${encode(reference)}` : ''}`;
 }
 
 export const toText = (design) => `${JSON.stringify(design, null, 2)}\n`;

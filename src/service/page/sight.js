@@ -4,7 +4,7 @@
 const NEAR = '100px';
 
 export class Sight {
-  isSeen = false;
+  isSeen = true;
 
   /** `onCome()` each time that the element comes into sight. */
   constructor(element, onCome) {

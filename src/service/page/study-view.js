@@ -8,7 +8,7 @@ import { Run } from './studies.js';
 
 const DELAY_MS = 300;
 
-/** Whoever extends it has `ask()`, which answers `{ question, variants, … }` or `{ fault }`, and `take(answer, asked)`; and `offer()`, called
+/** Whoever extends it has `ask()`, which answers `{ question, variants, isSlow, … }` or `{ fault }`, and `take(answer, asked)`; and `offer()`, called
  *  before that, where choices follow from the design. */
 export class StudyView {
   design;
@@ -40,13 +40,13 @@ export class StudyView {
     clearTimeout(this.#timer);
     this.#timer = setTimeout(() => {
       this.offer?.();
-      const { fault, variants, question } = this.ask();
+      const { fault, variants, question, isSlow } = this.ask();
       if (fault === undefined && this.#asked && isSame(this.#asked, question)) return;
-      if (fault === undefined && variants <= this.mostAtOnce) this.look();
+      if (fault === undefined && variants <= this.mostAtOnce && !isSlow) this.look();
       else {
         this.#run?.giveUp();
         this.progress.hide();
-        this.state.replaceChildren(fault ?? `${number(variants, 9)} variants are many: press “${this.button.textContent}” for them.`);
+        this.state.replaceChildren(fault ?? `${number(variants, 9)} variants ${isSlow ? 'take a while' : 'are many'}: press “${this.button.textContent}” for them.`);
       }
     }, delay);
   }

@@ -1,6 +1,6 @@
 // What the words mean, where they stand: a mark beside a word opens its definition, and the help lists all of them.
 
-import { html } from './dom.js';
+import { html, placeBeside } from './dom.js';
 
 const PAPER =
   'Wang Su, Bai Xin, Chen Shixian, Wang Chunyan: Research on analysis of force and contacting stress for the discrete teeth harmonic drives. ' +
@@ -8,8 +8,8 @@ const PAPER =
 
 export const TERMS = {
   coincidence: {
-    title: 'Coincidence degree ε',
-    text: 'The contact ratio: how many teeth touch the ring’s flanks at once, on average over a turn and in all meshing zones together. More teeth share the load.',
+    title: 'Contact ratio ε',
+    text: 'The paper’s coincidence degree: how many teeth touch the ring’s flanks at once, on average over a turn and in all meshing zones together. More teeth share the load.',
   },
   position: {
     title: 'Position ψ',
@@ -49,8 +49,11 @@ export const TERMS = {
 const definition = html('div', { id: 'definition', class: 'definition', popover: 'auto', role: 'note' });
 
 /** A mark that opens definitions beside it. */
-export function term(...keys) {
-  const names = keys.map((key) => TERMS[key].title).join(', ');
+export const term = (...keys) => explained(...keys.map((key) => TERMS[key]));
+
+/** The same of `{ title, text }`. */
+export function explained(...entries) {
+  const names = entries.map(({ title }) => title).join(', ');
   const button = html('button', { type: 'button', class: 'term', 'aria-label': `What is meant: ${names}` }, '?');
   // A press outside closes it before the click is heard, which would then open it anew.
   let wasOpen = false;
@@ -65,16 +68,12 @@ export function term(...keys) {
     wasOpen = false;
     if (definition.matches(':popover-open')) definition.hidePopover();
     if (closes) return;
-    definition.replaceChildren(html('dl', {}, keys.map((key) => [html('dt', {}, TERMS[key].title), html('dd', {}, TERMS[key].text)]).flat()));
+    definition.replaceChildren(html('dl', {}, entries.map(({ title, text }) => [html('dt', {}, title), html('dd', {}, text)]).flat()));
     // Beside its mark in the document too, so that the next press of Tab and a screen reader find it there; in a dialog nothing else
     // can be reached.
     button.after(definition);
     definition.showPopover();
-    const { left, bottom, top } = button.getBoundingClientRect();
-    const { offsetWidth: width, offsetHeight: height } = definition;
-    const below = bottom + 6 + height <= innerHeight;
-    definition.style.left = `${Math.max(8, Math.min(left, document.documentElement.clientWidth - width - 8))}px`;
-    definition.style.top = `${below ? bottom + 6 : Math.max(8, top - 6 - height)}px`;
+    placeBeside(definition, button);
   });
   return button;
 }

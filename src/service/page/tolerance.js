@@ -6,6 +6,7 @@ import { at, changed, compatibilityOf } from './design.js';
 import { html, oncePerFrame, setText, svg } from './dom.js';
 import { readable, sentence } from './findings.js';
 import { number } from './format.js';
+import { GRADE_NAMES, toleranceUm } from './grades.js';
 import { wordsOf } from './parameters.js';
 import { StudyView } from './study-view.js';
 
@@ -14,19 +15,16 @@ const MOST_AT_ONCE = 2000;
 const HEIGHT = 250;
 
 const DEVIATIONS = [
-  { name: 'tooth_radius_um', label: 'Radius of each tooth', unit: 'µm', limit: 2 },
+  { name: 'tooth_radius_um', label: 'Radius of each tooth', unit: 'µm', limit: 2, grade: 'IT6', middle: '/modification/tooth_radius_um' },
   { name: 'slot_angle_arcsec', label: 'Angle of each slot', unit: '″', limit: 20 },
-  { name: 'slot_wall_um', label: 'Wall of each slot', unit: 'µm', limit: 3 },
-  { name: 'ring_space_um', label: 'Depth of each ring space', unit: 'µm', limit: 5 },
+  { name: 'slot_wall_um', label: 'Wall of each slot', unit: 'µm', limit: 3, grade: 'IT7', middle: '/modification/slot_wall_um' },
+  { name: 'ring_space_um', label: 'Depth of each ring space', unit: 'µm', limit: 5, grade: 'IT7', middle: '/modification/ring_equidistant_um' },
   { name: 'ring_space_angle_arcsec', label: 'Angle of each ring space', unit: '″', limit: 20 },
   { name: 'wave_generator_lobe_um', label: 'Height of each lobe', unit: 'µm', limit: 5 },
   { name: 'wave_generator_runout', label: 'Runout of the wave generator', unit: 'µm', limit: 5 },
   { name: 'ring_runout', label: 'Runout of the ring', unit: 'µm', limit: 5 },
   { name: 'carrier_runout', label: 'Runout of the carrier', unit: 'µm', limit: 5 },
 ];
-/** Those that a design has at first: without clearance, single parts that deviate either way cannot be put together. */
-const FIRST_DEVIATIONS = new Set(['/drive/teeth/radius_mm', '/drive/teeth/width_mm']);
-
 /** What stands in the document and deviates in a whole drive. */
 const INPUTS = [
   { name: '/drive/teeth/radius_mm', label: 'Radius of all teeth', unit: 'mm', limit: 0.005 },
@@ -41,6 +39,10 @@ const DISTRIBUTIONS = [
   { value: 'normal', label: 'normal, ± is 3 σ' },
   { value: 'uniform', label: 'uniform' },
 ];
+const GRADED = [{ options: DISTRIBUTIONS }, { title: 'ISO 286, on the side that gives clearance', options: GRADE_NAMES.map((grade) => ({ value: grade, label: grade })) }];
+
+/** Half of the zone of a grade: a tolerance of a tooth's, slot's or space's width is two times that of its radius or wall. */
+const halfZoneUm = (grade, design) => toleranceUm(grade, 2 * at(design, '/drive/teeth/radius_mm')) / 4;
 
 export class Tolerance extends StudyView {
   #result;
@@ -51,25 +53,29 @@ export class Tolerance extends StudyView {
     const onChange = () => this.later();
     this.quantity = new Choice('Quantity', onChange);
     this.samples = new Choice('Drives', onChange);
-    this.samples.offer([{ options: [1000, 10_000, 100_000].map((count) => ({ value: String(count), label: number(count, 9) })) }], '1000');
+    this.samples.offer([{ options: [100, 1000, 10_000, 100_000].map((count) => ({ value: String(count), label: number(count, 9) })) }], '100');
+    this.samples.value = '100';
     this.ends = ['at least', 'at most'].map((words) => new NumberBox(`Good is ${words}`, onChange));
     this.unit = html('span', { class: 'unit' });
     this.rows = [...DEVIATIONS.map((kind) => ({ ...kind, list: 'deviations' })), ...INPUTS.map((kind) => ({ ...kind, list: 'inputs' }))].map((kind) => {
       const distribution = new Choice(kind.label, onChange);
-      distribution.offer([{ options: DISTRIBUTIONS }], FIRST_DEVIATIONS.has(kind.name) ? 'normal' : 'none');
+      distribution.offer(kind.grade ? GRADED : [{ options: DISTRIBUTIONS }], kind.grade ?? 'none');
+      if (kind.grade) distribution.value = kind.grade;
       const limit = new NumberBox(`${kind.label}: plus and minus, ${kind.unit}`, onChange);
       limit.value = kind.limit;
+      limit.unit = kind.unit;
       const range = html('span', { class: 'range' }, '± ', limit.input, html('span', { class: 'unit' }, kind.unit));
-      return { ...kind, distribution, limit, range, element: html('div', { class: 'ask-row deviation' }, distribution.element, range) };
+      const zone = html('span', { class: 'range' });
+      return { ...kind, distribution, limit, range, zone, element: html('div', { class: 'ask-row deviation' }, distribution.element, range, zone) };
     });
     this.value = html('p', { class: 'headline' });
     this.chart = html('div', { class: 'study-chart', role: 'img', 'aria-label': 'The spread of the quantity, as shares of drives below and in bins; the table below has the numbers' });
     this.tables = html('div', { class: 'tolerance-tables' });
     section.append(
       html('header', {}, html('h2', { id: 'tolerance-title', tabindex: '-1' }, 'Tolerances')),
-      html('p', { class: 'none' }, 'Drives with parts that deviate by chance, each swept over its period: how a quantity spreads, how many drives are good, and which tolerance matters most.'),
+      html('p', { class: 'none' }, 'Many drives are drawn, each with parts that deviate at random. The result shows how a quantity spreads, how many drives are good, and which tolerance matters most.'),
       html('div', { class: 'ask' }, html('div', { class: 'ask-row' }, this.quantity.element, this.samples.element, this.button), html('div', { class: 'ask-row' }, html('span', { class: 'range' }, 'Good from ', this.ends[0].input, ' to ', this.ends[1].input, ' ', this.unit))),
-      html('details', { class: 'deviations', open: true }, html('summary', {}, 'What deviates'), this.rows.map(({ element }) => element)),
+      html('details', { class: 'deviations', open: true }, html('summary', {}, 'Deviations'), this.rows.map(({ element }) => element)),
       this.progress.element,
       this.state,
       this.value,
@@ -84,17 +90,30 @@ export class Tolerance extends StudyView {
       this.quantities.groupsFor(this.design).map(({ title, quantities }) => ({ title, options: quantities.filter(({ is_flag: isFlag }) => !isFlag).map(({ name, label }) => ({ value: name, label })) })),
       FIRST_QUANTITY,
     );
-    setText(this.unit, this.quantities.get(this.quantity.value).unit);
-    for (const { list, name, element, distribution, range } of this.rows) {
+    const { unit } = this.quantities.get(this.quantity.value);
+    setText(this.unit, unit);
+    for (const end of this.ends) end.unit = unit;
+    for (const { list, name, element, distribution, range, zone } of this.rows) {
+      const { value } = distribution;
+      const isGraded = GRADE_NAMES.includes(value);
       element.hidden = list === 'inputs' && typeof at(this.design, name) !== 'number';
-      range.hidden = distribution.value === 'none';
+      range.hidden = value === 'none' || isGraded;
+      setText(zone, isGraded ? `0 to ${number(2 * halfZoneUm(value, this.design))}\u202fµm, normal` : '');
     }
   }
 
   ask() {
     const lists = { deviations: {}, inputs: {} };
-    for (const { list, name, distribution, limit, label, element } of this.rows) {
+    let base = changed(this.design, '/deviations', undefined);
+    for (const { list, name, distribution, limit, label, element, middle } of this.rows) {
       if (distribution.value === 'none' || element.hidden) continue;
+      if (GRADE_NAMES.includes(distribution.value)) {
+        // The zone lies beside the nominal size: its middle is a modification, and parts deviate around that.
+        const half = halfZoneUm(distribution.value, this.design);
+        base = changed(base, middle, (at(base, middle) ?? 0) + half);
+        lists.deviations[name] = { distribution: 'normal', limit: half, sigma: half / SIGMAS };
+        continue;
+      }
       const fault = limit.fault ?? (limit.value > 0 ? undefined : `${label}: how far it deviates is a number above 0.`);
       if (fault) return { fault };
       lists[list][name] = { distribution: distribution.value, limit: limit.value, ...(distribution.value === 'normal' ? { sigma: limit.value / SIGMAS } : {}) };
@@ -102,7 +121,7 @@ export class Tolerance extends StudyView {
     const kinds = Object.keys(lists.deviations).length + Object.keys(lists.inputs).length;
     if (kinds === 0) return { fault: 'Nothing deviates: choose at least one distribution.' };
     if (Object.keys(lists.deviations).length > 0 && compatibilityOf(this.design) === 'projection') {
-      return { fault: 'What single parts deviate by is calculated by virtual work alone: choose that in the form, under “Model”, or let all of them be exact.' };
+      return { fault: 'Deviations of single parts are calculated by virtual work alone: choose that in the form, under “Model”, or let all of them be exact.' };
     }
     const fault = this.ends.map((end) => end.fault).find((text) => text !== undefined);
     if (fault) return { fault };
@@ -111,7 +130,7 @@ export class Tolerance extends StudyView {
     const name = this.quantity.value;
     const require = min === undefined && max === undefined ? {} : { [name]: { ...(min === undefined ? {} : { min }), ...(max === undefined ? {} : { max }) } };
     const samples = Number(this.samples.value);
-    return { question: { study: 'tolerance', base: changed(this.design, '/deviations', undefined), ...lists, quantities: [name], require, samples }, variants: samples, name };
+    return { question: { study: 'tolerance', base, ...lists, quantities: [name], require, samples }, variants: samples, name, isSlow: Object.keys(lists.deviations).length > 0 };
   }
 
   take(answer, { name, question }) {
@@ -121,7 +140,7 @@ export class Tolerance extends StudyView {
     const percent = (value) => `${number(100 * value, 4)}\u202f%`;
     const parts = [
       share && `${percent(share.share)} of the drives are good (${percent(share.low)} to ${percent(share.high)} with 95\u202f% confidence).`,
-      interference > 0 && `${number(interference, 9)} of ${number(samples, 9)} cannot be put together${2 * interference > samples ? '; gaps in the model give their parts room' : ''}.`,
+      interference > 0 && `${number(interference, 9)} of ${number(samples, 9)} cannot be put together${2 * interference > samples ? '; clearances give their parts room' : ''}.`,
       impossible > 0 && `${number(impossible, 9)} have no answer.`,
     ].filter(Boolean);
     setText(this.value, parts.length > 0 ? parts.join(' ') : of ? `Of ${number(samples, 9)} drives nearly all lie between ${this.#level(of.quantiles[0].value)} and ${this.#level(of.quantiles.at(-1).value)}.` : '');
@@ -148,7 +167,7 @@ export class Tolerance extends StudyView {
     const tables = [];
     if (of) {
       const rows = of.quantiles.map(({ share, value, low, high }) => row(`${number(100 * share, 4)}\u202f%`, level(value), low === undefined && high === undefined ? 'too few drives' : `${level(low)} to ${level(high)}`));
-      tables.push(table('So many drives lie below', ['Share', this.quantities.get(name).label, '95\u202f% confidence'], [...rows, row('Without deviations', level(of.nominal), ''), row('Mean, standard deviation', level(of.mean), shown(of.standard_deviation))]));
+      tables.push(table('So many drives lie below', ['Share', this.quantities.get(name).label, '95\u202f% confidence'], [...rows, row('All parts in the middle of their zones', level(of.nominal), ''), row('Mean, standard deviation', level(of.mean), shown(of.standard_deviation))]));
       const kinds = new Map([...DEVIATIONS, ...INPUTS].map(({ name: kind, label }) => [kind, label]));
       const contributors = of.contributors.map(({ deviation, share, standard_deviation: deviates }) => {
         const line = row(kinds.get(deviation) ?? wordsOf(deviation).label, `${number(100 * share, 3)}\u202f%`, shown(deviates));

@@ -14,7 +14,7 @@ export const VIEWS = [
 export class Views {
   #buttons;
 
-  /** `onShow(key)` when another view is shown. */
+  /** `onShow(key, isFromAddress)` when another view is shown. */
   constructor(bar, onShow) {
     this.onShow = onShow;
     this.#buttons = new Map(VIEWS.map(({ key, label }) => [key, html('button', { type: 'button', 'data-view': key, onclick: () => this.show(key) }, label)]));
@@ -28,11 +28,11 @@ export class Views {
     for (const [key, button] of this.#buttons) button.setAttribute('aria-pressed', String(key === view));
   }
 
-  show(view) {
-    if (document.body.dataset.view === view) return;
+  show(view, isFromAddress = false) {
+    if (document.body.dataset.view === view || !this.#buttons.has(view)) return;
     this.#mark(view);
     scrollTo(0, 0);
-    this.onShow(view);
+    this.onShow(view, isFromAddress);
   }
 
   /** Shows a view from within another one, which goes, and the focus in it. */
