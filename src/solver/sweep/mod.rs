@@ -2,7 +2,7 @@
 
 mod adaptive;
 mod columns;
-mod fast;
+pub(crate) mod fast;
 mod plain;
 mod plain_look;
 mod points;
