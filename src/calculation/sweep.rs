@@ -13,7 +13,7 @@ use toothwave_solver::{
     model_error as error_of_model,
 };
 
-use crate::design::{BearingRating, Design, Duty, DutyPoint};
+use crate::design::{BearingRating, Design, Duty, DutyPoint, ModelDocument};
 use crate::field::FieldCode;
 use crate::findings::{FindingAnswer, drive_findings, write_findings};
 use crate::forms::{Form, Format, Forms, csv_error};
@@ -43,6 +43,8 @@ mod plots;
 #[derive(Debug)]
 pub struct CheckedSweep {
     drive: Drive,
+    model: ModelDocument,
+    of_document: Vec<FindingAnswer>,
     duty: CheckedDuty,
     deviations: Deviations,
     backings: Backings,
@@ -248,8 +250,8 @@ impl Question for Sweep {
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
-        let Design { drive, materials, load, friction, model, modification, deviations, sweep, parts, .. } = design;
-        (drive, materials, load, friction, model, (modification, deviations, sweep, parts.behind_contacts()))
+        let Design { drive, materials, load, friction, modification, deviations, sweep, parts, .. } = design;
+        (drive, materials, load, friction, design.model_in_key(), (modification, deviations, sweep, parts.under_load()))
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedSweep, NoAnswer> {
@@ -282,10 +284,13 @@ impl Question for Sweep {
                 return Err(too_many(code, field_code, "/sweep/samples", &detail, Some(states), limit));
             }
         }
-        let with_gaps = design.model.clearance.is_some() || load.has_gaps() || !deviations.is_nil();
-        let parts = design.parts_parameters();
+        let with_gaps = load.has_gaps() || !deviations.is_nil();
+        let parts = design.parts_parameters()?;
         let backings = Backings::of(&drive, &draft, &parts, design.support());
+        let model = design.complete_model(error_of_model::has_pointed_tips(&drive));
         Ok(CheckedSweep {
+            model,
+            of_document: FindingAnswer::of_document(design, true),
             backings,
             drive,
             duty: CheckedDuty::new(design, &load)?,
@@ -366,6 +371,7 @@ impl Question for Sweep {
             of_half_widths.iter().chain(&of_friction).chain(&of_bearing).chain(&of_projection).chain(&of_backing);
         let of_sweep = of_wind_up.iter().chain(of_model).chain(&of_contacts);
         findings.extend(of_sweep.map(|finding| FindingAnswer::new(finding, drive)));
+        findings.extend(checked.of_document.iter().cloned());
         let unloaded_wind_up_deg = if asks_without_load {
             Some(solver::unloaded_wind_up_deg(drive, load, deviations, &sweep, stop)?)
         } else {
@@ -395,6 +401,7 @@ impl Question for Sweep {
             }),
             losses,
             radial_force_n,
+            model: checked.model.clone(),
             model_error: ModelErrorAnswer::new(load, model_error),
             series_compliance_estimates: EstimateAnswer::all(backings, drive, load, shares.as_ref()),
             checks: ChecksAnswer {
