@@ -173,7 +173,7 @@ impl CheckedSweep {
             Some(_) => period::RadialForces::of(&self.drive, self.load(), &self.deviations, hardest, stop)?,
             None => None,
         };
-        let losses = period::Losses::of(&self.drive, self.load(), hardest, friction, stop)?;
+        let losses = self.losses(self.load(), hardest, friction, stop)?;
         let costs = self.costs(friction, &Swept { sweep: hardest, forces: forces.as_ref() }, &losses, stop)?;
         Ok(Some(costs.totals(self.duty.hardest, &hardest.states)))
     }
@@ -353,7 +353,7 @@ impl Question for Sweep {
         let mut losses = None;
         let mut points = duty.points.iter().map(|point| DutyPointAnswer::new(drive, point)).collect::<Vec<_>>();
         if let Some(friction) = friction {
-            let of_period = period::Losses::of(drive, load, &sweep, friction, stop)?;
+            let of_period = checked.losses(load, &sweep, friction, stop)?;
             let costs = checked.costs(friction, &Swept { sweep: &sweep, forces: forces.as_ref() }, &of_period, stop)?;
             for (point, cost) in points.iter_mut().zip(costs.of_points()) {
                 point.efficiency_ring_fixed = Some(cost.efficiency_ring_fixed);
@@ -453,11 +453,29 @@ impl CheckedSweep {
             }
             let sweep = self.solve_under(&point.load, stop)?;
             let forces = period::RadialForces::of(drive, &point.load, deviations, &sweep, stop)?;
-            let losses = period::Losses::of(drive, &point.load, &sweep, friction, stop)?;
+            let losses = self.losses(&point.load, &sweep, friction, stop)?;
             self.cost(point, friction, &Swept { sweep: &sweep, forces: forces.as_ref() }, &losses, stop)
         };
         let points = duty.points.iter().enumerate().map(of_point).collect::<Result<_, _>>()?;
         Ok(Costs { mechanism: Mechanism::of(drive), friction, bearing_rating: *bearing_rating, points })
+    }
+
+    /// What friction takes; of a sweep to a tolerance the means keep it.
+    fn losses(
+        &self,
+        load: &LoadCase,
+        sweep: &solver::Sweep,
+        friction: &Friction,
+        stop: &dyn Stop,
+    ) -> Result<period::Losses, SolveError> {
+        let Self { drive, deviations, points, .. } = self;
+        let losses = period::Losses::of(drive, load, sweep, friction, stop)?;
+        match points {
+            Points::Samples(_) => Ok(losses),
+            Points::Tolerance(tolerance) => {
+                losses.with_mean_to(tolerance.relative(), drive, load, deviations, friction, stop)
+            }
+        }
     }
 
     fn cost(

@@ -4,6 +4,7 @@
 mod contradictions;
 mod defaults;
 mod documents;
+mod losses;
 mod reference;
 mod schema;
 mod tables;

@@ -3,6 +3,7 @@
 mod adaptive;
 mod columns;
 pub(crate) mod fast;
+pub(crate) mod mean;
 mod plain;
 mod plain_look;
 mod points;
