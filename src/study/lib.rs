@@ -8,6 +8,7 @@ mod answer;
 mod ask;
 mod document;
 mod evaluate;
+mod identity;
 mod limit;
 mod map;
 pub mod optimise;
