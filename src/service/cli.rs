@@ -21,6 +21,7 @@ use tokio::runtime::{Builder, Runtime};
 use tokio::signal::unix::{SignalKind, signal};
 use toothwave_calculation::accuracy::Accuracy;
 use toothwave_calculation::coincidence_degree::CoincidenceDegree;
+use toothwave_calculation::convert::converted;
 use toothwave_calculation::drawing::Drawing;
 use toothwave_calculation::drawing::answer::DrawnPart;
 use toothwave_calculation::forms::{Format, Forms};
@@ -89,6 +90,11 @@ enum Command {
         /// Form of the answer
         #[arg(long, value_parser = one_of(&FORMATS), default_value = "json")]
         format: Format,
+    },
+    /// Print a document without its deprecated fields
+    Convert {
+        /// A design document or a study document, or `-` for standard input
+        file: PathBuf,
     },
     /// Compute chunks of the studies that a PostgreSQL database holds, until told to stop
     Worker(WorkerSettings),
@@ -173,6 +179,7 @@ pub fn run() -> ExitCode {
         Command::Draw { part, file, format } => answer(Drawing(part), &file, format),
         Command::Batch { file, endpoint, peaks_only } => batch(&file, BatchQuery { endpoint, peaks_only }),
         Command::Study { file, format } => study(&file, format),
+        Command::Convert { file } => convert(&file),
         Command::Worker(settings) => run_worker(&settings),
         Command::Migrate(settings) => migrate(&settings),
         Command::Health { address } => health(address),
@@ -390,6 +397,11 @@ fn read(file: &Path) -> Result<Vec<u8>, Failure> {
             .map_err(|error| Failure::BadInput(format!("{}: {error}", file.display())))?;
     }
     Ok(text)
+}
+
+fn convert(file: &Path) -> Result<(), Failure> {
+    let document = converted(&read(file)?).map_err(Problem::from)?;
+    print(|writer| writeln!(writer, "{document}"))
 }
 
 fn print_answer(answer: &impl Forms, format: Format) -> Result<(), Failure> {
