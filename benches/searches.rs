@@ -21,7 +21,7 @@ use toothwave_study::{Gathered, Limits, Study, Work};
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 const LIMITS: Limits = Limits {
-    calculation: question::Limits { max_states: 1_000_000, max_profile_points: 1_000_000 },
+    calculation: question::Limits::new(1_000_000, 1_000_000),
     max_study_variants: 1_000_000_000,
     max_study_bytes: 1 << 34,
 };
@@ -343,7 +343,7 @@ fn run(case: &Case) -> Value {
                     let needed = found.filter(|relaxed| relaxed["quantity"] == *name).map(|one| one["needed"].clone());
                     let found = result["relaxations"][*name].take();
                     let mut found = found.as_array().cloned().unwrap_or_default();
-                    found.push(needed.last().unwrap_or(Value::Null));
+                    found.push(needed.next_back().unwrap_or(Value::Null));
                     result["relaxations"][*name] = json!(found);
                 }
             }

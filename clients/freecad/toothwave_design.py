@@ -7,6 +7,7 @@ CONTACTS = (("wave_generator", "Wave generator"), ("ring", "Ring"), ("carrier", 
 PARTS = (CONTACTS[0], ("teeth", "Teeth"), *CONTACTS[1:])
 BY_DEFAULT = "default"  # a choice that the document leaves to the service
 FLAGS = {"yes": True, "no": False}
+SWITCHES = ("ring_teeth_bend", "wave_generator_moves", "corner_contact")  # deprecated, of the model
 LOBES = {"ellipse": 2, "eccentric": 1}  # of other kinds they are a field
 PROJECTED = ("linear", "palmgren", "fixed")  # the laws that `projection` takes
 
@@ -64,7 +65,7 @@ class Field:
         """Whether a document's value can stand in the field; what has several values, or is too much for FreeCAD, cannot."""
         if self.held and isinstance(value, (int, float)):
             return self.held[0] <= value <= self.held[1]
-        return not isinstance(value, dict)
+        return not isinstance(value, (dict, list))
 
     def is_shown(self, values):
         """Whether the document has such a field, as the choices stand."""
@@ -141,18 +142,9 @@ def _model():
         label, johnson = f"Depth, {label.lower()}", (law, ("johnson",))
         yield Field(pointer, name, label, group, 0.0, "mm", LENGTH_MM, blank="tooth radius", shown=johnson)
     for contact, label in CONTACTS:
-        pointer, name = f"/model/clearance/{contact}_um", f"{_named(label)}GapUm"
-        yield Field(pointer, name, f"Gap, {label.lower()}", group, 0.0, "µm", GAP_UM, blank="none")
-    for contact, label in CONTACTS:
         pointer, name = f"/model/series_compliance_mm_per_n/{contact}", f"{_named(label)}ComplianceMmPerN"
         yield Field(pointer, name, f"Compliance behind, {label.lower()}", group, 0.0, "mm/N", (0.0, 1e3), blank="none")
-    for key, name, label in (
-        ("ring_teeth_bend", "RingTeethBend", "Ring's teeth bend"),
-        ("wave_generator_moves", "WaveGeneratorMoves", "Wave generator moves on"),
-    ):
-        flags = (BY_DEFAULT, *FLAGS)
-        yield Field(f"/model/{key}", name, label, group, BY_DEFAULT, blank=free, choices=flags, is_flag=True)
-    yield Field("/model/corner_contact", "CornerContact", "Teeth meet tips' corners", group, False)
+    yield Field("/model/refinements", "Refinements", "Refinements", group, "auto", blank="by the geometry", choices=("auto", "none"))
     most, blank = 10**7, "50, or by the tolerance"
     yield Field("/sweep/samples", "Samples", "Input angles, intervals", group, 0, limits=(1, most), blank=blank)
     yield Field("/sweep/tolerance", "SweepTolerance", "or to a tolerance", group, 0.0, limits=(1e-12, 0.1), blank="left out")
@@ -289,11 +281,62 @@ def _join(document, others, place=""):
             raise NoDocument(f"{place}/{key} has a field of its own, and may not stand among the other fields too")
 
 
+# Properties of drives in files of earlier versions, and where their values stood in the document.
+RETIRED = {f"{_named(label)}GapUm": f"/model/clearance/{contact}_um" for contact, label in CONTACTS} | {
+    "RingTeethBend": "/model/ring_teeth_bend",
+    "WaveGeneratorMoves": "/model/wave_generator_moves",
+    "CornerContact": "/model/corner_contact",
+}
+
+
+def with_retired(document, values):
+    """The document with values of retired properties, by name; those that said nothing are left out."""
+    document = json.loads(json.dumps(document))
+    for name, value in values.items():
+        value = FLAGS.get(value, value) if isinstance(value, str) else value
+        if value not in (0.0, BY_DEFAULT) or name != "CornerContact" and value is False:
+            *parents, key = RETIRED[name].strip("/").split("/")
+            place = document
+            for parent in parents:
+                place = place.setdefault(parent, {})
+            place[key] = value
+    return document
+
+
+def converted(document):
+    """The document without the deprecated fields that have a replacement. Gaps that the parts contradict stay, for the service to refuse."""
+    model, parts = dict(document.get("model") or {}), dict(document.get("parts") or {})
+    gaps = model.pop("clearance", None) or {}
+    teeth = (parts.get("teeth") or {}).get("clearance_um", 0.0)
+    contradicted = {}
+    for part, _ in CONTACTS:
+        gap, given = gaps.get(f"{part}_um", 0.0), parts.get(part) or {}
+        made = given.get("clearance_um", 0.0) + teeth
+        if gap and not made:
+            parts[part] = given | {"clearance_um": gap}
+        elif gap and gap != made:
+            contradicted[f"{part}_um"] = gap
+    if contradicted:
+        model["clearance"] = contradicted
+    bend, moves, corner = (model.get(key) for key in SWITCHES)
+    # Without the geometry nobody knows what is left of `auto` then.
+    if not (moves is False and bend is None):
+        for key in SWITCHES:
+            model.pop(key, None)
+        auto = [] if False in (bend, moves) else ["auto"]
+        chosen = auto + [key for key, value in zip(SWITCHES, (bend, moves, corner)) if value]
+        if chosen != ["auto"]:
+            model["refinements"] = chosen or "none"
+    changed = {key: value for key, value in (("model", model), ("parts", parts)) if value}
+    return {key: value for key, value in document.items() if key not in ("model", "parts")} | changed
+
+
 def values_of(document):
     """The values of a design document, by property name; where it has none, what is meant then, or what the field begins with.
 
     Raises NoDocument where it has a value that its field cannot hold.
     """
+    document = converted(document)
     values = {field.name: _value_of(field, _found(document, field.pointer)) for field in FIELDS if field.pointer}
     shown = (field for field in FIELDS if field.pointer and not field.is_object and field.is_shown(values))
     own = {field.pointer for field in shown if field.takes(_found(document, field.pointer))}

@@ -98,7 +98,14 @@ class HarmonicDrive(Stateless):
                 obj.setEditorMode(field.name, SHOWN if field.is_shown(choices) else HIDDEN)
 
     def onDocumentRestored(self, obj):
+        retired = {name: getattr(obj, name) for name in toothwave_design.RETIRED if hasattr(obj, name)}
         self._complete(obj)
+        if retired:
+            document = toothwave_design.with_retired(document_of(obj), retired)
+            for name in retired:
+                obj.removeProperty(name)
+            set_document(obj, document)
+            FreeCAD.Console.PrintWarning(f"{obj.Label}: gaps are clearances of the parts now, and refinements one choice\n")
 
     def onChanged(self, obj, name):
         # The last field is there when all are; a file's properties come one by one.

@@ -14,7 +14,7 @@ use toothwave_solver::{
 };
 use utoipa::ToSchema;
 
-use crate::design::{CompatibilityDocument, Design, LawName};
+use crate::design::{CompatibilityDocument, Design, LawName, ModelDocument, Refinements};
 use crate::forms::{Form, Format, Forms, csv_error};
 use crate::json::word;
 use crate::key::Encode;
@@ -38,6 +38,8 @@ pub struct AccuracyAnswer {
     pub solver_version: &'static str,
     /// The build that computed it: equal builds on equal processors give equal bytes.
     pub build: &'static str,
+    /// The design's own model, complete: in the place of the document's `model` it asks the same.
+    pub model: ModelDocument,
     /// The relative error that was asked for.
     pub requested_error: f64,
     /// The fastest way of the design's own model that meets it; left out where none does.
@@ -97,6 +99,9 @@ pub struct UnavailableAnswer {
 #[derive(Debug)]
 pub struct CheckedAccuracy {
     drive: Drive,
+    model: ModelDocument,
+    /// What virtual work is refined by.
+    refinements: Refinements,
     load: LoadCase,
     deviations: Deviations,
     backings: Backings,
@@ -117,8 +122,8 @@ impl Question for Accuracy {
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
-        let Design { drive, materials, load, model, modification, deviations, accuracy, parts, .. } = design;
-        (drive, materials, load, model, modification, (deviations, accuracy, parts.behind_contacts()))
+        let Design { drive, materials, load, modification, deviations, accuracy, parts, .. } = design;
+        (drive, materials, load, design.model_in_key(), modification, (deviations, accuracy, parts.under_load()))
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedAccuracy, NoAnswer> {
@@ -128,8 +133,20 @@ impl Question for Accuracy {
         match (draft.drive(), load, design.requested_error()) {
             (Some(drive), Some(load), Ok(requested_error)) if violations.is_empty() => {
                 let (deviations, max_states) = (Deviations::from(&design.deviations), limits.max_searched_states);
-                let backings = Backings::of(&drive, &draft, &design.parts_parameters(), design.support());
-                Ok(CheckedAccuracy { drive, load, deviations, backings, requested_error, max_states })
+                let backings = Backings::of(&drive, &draft, &design.parts_parameters()?, design.support());
+                let has_pointed_tips = model_error::has_pointed_tips(&drive);
+                let model = design.complete_model(has_pointed_tips);
+                let refinements = design.refinements_by_virtual_work(has_pointed_tips);
+                Ok(CheckedAccuracy {
+                    drive,
+                    model,
+                    refinements,
+                    load,
+                    deviations,
+                    backings,
+                    requested_error,
+                    max_states,
+                })
             }
             (_, _, requested_error) => {
                 violations.extend(requested_error.err());
@@ -154,7 +171,7 @@ impl Question for Accuracy {
             error => error.into(),
         })?;
         let (mut ways, mut unavailable) = (Vec::new(), Vec::new());
-        for model in models(drive, &parameters) {
+        for model in models(drive, &parameters, checked.refinements) {
             let (compatibility, law) = (model.compatibility.into(), model.law.into());
             match Model::new(checked, &model, &own.peaks, stop) {
                 Ok(Some(model)) => model.measure(&mut ways, stop)?,
@@ -178,6 +195,7 @@ impl Question for Accuracy {
         Ok(AccuracyAnswer {
             solver_version: toothwave_solver::VERSION,
             build: crate::BUILD,
+            model: checked.model.clone(),
             requested_error,
             cheapest,
             ways,
@@ -195,7 +213,7 @@ fn admitted_samples(mesh: Mesh, max_states: u64) -> impl Iterator<Item = Samples
 
 /// The design's own model first, then every other form of compatibility with a law that it and the teeth take and that needs no
 /// further numbers.
-fn models(drive: &Drive, own: &LoadParameters) -> Vec<LoadParameters> {
+fn models(drive: &Drive, own: &LoadParameters, refinements: Refinements) -> Vec<LoadParameters> {
     let laws = match drive.parameters().tooth {
         ToothShape::Ball { .. } => vec![own.law, ContactLaw::Hertz],
         ToothShape::Cylinder { .. } | ToothShape::FlatSided { .. } => {
@@ -208,16 +226,12 @@ fn models(drive: &Drive, own: &LoadParameters) -> Vec<LoadParameters> {
     let mut models = vec![*own];
     for compatibility in [Compatibility::Projection, Compatibility::VirtualWork] {
         for &law in &laws {
-            // Of the forms beside it only that with its own law is refined as it is.
-            let is_refined = compatibility == Compatibility::VirtualWork && law == own.law;
-            let model = LoadParameters {
-                compatibility,
-                law,
-                ring_teeth_bend: own.ring_teeth_bend && is_refined,
-                wave_generator_moves: own.wave_generator_moves && is_refined,
-                corner_contact: own.corner_contact && compatibility == Compatibility::VirtualWork,
-                ..*own
+            let Refinements { ring_teeth_bend, wave_generator_moves, corner_contact } = match compatibility {
+                Compatibility::Projection => Refinements::NONE,
+                Compatibility::VirtualWork => refinements,
             };
+            let model =
+                LoadParameters { compatibility, law, ring_teeth_bend, wave_generator_moves, corner_contact, ..*own };
             let is_possible = compatibility == Compatibility::VirtualWork || law.is_of_projection();
             if is_possible && !models.contains(&model) {
                 models.push(model);

@@ -11,8 +11,7 @@ use toothwave_solver::profile::{Extent, ProfileParameters};
 use toothwave_solver::sweep::Points;
 use toothwave_solver::violation::{OfDutyPoint, SHARES_TOLERANCE};
 use toothwave_solver::{
-    Compatibility, ContactLaw, Deviations, DriveParameters, LoadParameters, Material, Materials, Modification,
-    Parameter, PerContact, Torque, Violation,
+    Compatibility, DriveParameters, LoadParameters, Material, Materials, Parameter, PerContact, Torque, Violation,
 };
 use utoipa::ToSchema;
 
@@ -25,16 +24,22 @@ mod deviations;
 mod drive;
 mod friction;
 mod load;
+mod model;
 mod modification;
 mod number;
+mod refinements;
+mod resolved;
 
 pub use asked::*;
 pub use deviations::*;
 pub use drive::*;
 pub use friction::*;
 pub use load::*;
+pub use model::*;
 pub use modification::*;
 pub use number::Whole;
+pub use refinements::*;
+pub use resolved::*;
 
 use drive::Counted;
 use number::given;
@@ -82,8 +87,8 @@ pub struct Design {
     /// What is asked of `/v1/accuracy`.
     #[serde(default)]
     pub accuracy: AccuracyDocument,
-    /// The parts as they are made: what the mechanics leave free. Drawings read it, and a sweep for what gives way behind the contacts, which its forces
-    /// leave out; forces on flat-sided teeth read the carrier's radii, between which the flats are borne.
+    /// The parts as they are made: clearances, and what the mechanics leave free. Forces read the clearances, those on flat-sided teeth also the carrier's
+    /// radii, between which the flats are borne. A sweep estimates from the rest what gives way behind the contacts, which its forces leave out.
     #[serde(default)]
     pub parts: PartsDocument,
     /// How the parts stand in a drawing of all of them.
@@ -141,35 +146,9 @@ impl Design {
         if self.sweep.tolerance.is_none() {
             self.sweep.samples.get_or_insert(DEFAULT_SAMPLES);
         }
-        self.model.corner_contact = self.model.corner_contact.filter(|&is_chosen| is_chosen);
-        if !self.is_model_by_default() {
-            let by_default = self.law_by_default();
-            self.model.stiffness.get_or_insert(by_default);
-            self.model.ring_teeth_bend.get_or_insert(false);
-            self.model.wave_generator_moves.get_or_insert(false);
-        }
+        let drive = self.drive_parameters();
+        self.deviations.leave_out_zeros(&drive);
         self
-    }
-
-    /// Whether the document leaves the model to what holds best, so that the drive decides what of it is refined. That of balls and of flat-sided teeth was not
-    /// held against elastic bodies.
-    fn is_model_by_default(&self) -> bool {
-        matches!(self.drive.teeth, TeethDocument::Cylinder(_))
-            && self.model.stiffness.is_none()
-            && self.model.compatibility == CompatibilityDocument::VirtualWork
-    }
-
-    /// The law of a document that names none: the one that holds best, and the paper's beside the paper's compatibility.
-    fn law_by_default(&self) -> StiffnessDocument {
-        match (&self.drive.teeth, self.model.compatibility) {
-            (TeethDocument::Ball(_), _) => StiffnessDocument::Hertz(HertzDocument::default()),
-            (TeethDocument::Cylinder(_) | TeethDocument::FlatSided(_), CompatibilityDocument::Projection) => {
-                StiffnessDocument::Linear(LinearDocument::default())
-            }
-            (TeethDocument::Cylinder(_) | TeethDocument::FlatSided(_), CompatibilityDocument::VirtualWork) => {
-                StiffnessDocument::Johnson(JohnsonDocument::default())
-            }
-        }
     }
 
     /// The drive's parameters.
@@ -213,6 +192,8 @@ impl Design {
     /// # Errors
     /// A fault where the document has no load, or not exactly one torque.
     pub fn load_parameters(&self, has_pointed_tips: bool) -> Result<LoadParameters, Fault> {
+        self.require_one_clearance()?;
+        self.require_one_choice_of_refinements()?;
         let load = self.load.as_ref().ok_or_else(|| {
             let detail = "forces need a load: give `load` an `input_torque_nm` or an `output_torque_nm`";
             Fault::of_field(FieldCode::MissingField, "load", detail.into())
@@ -227,18 +208,7 @@ impl Design {
             CompatibilityDocument::Projection => Compatibility::Projection,
             CompatibilityDocument::VirtualWork => Compatibility::VirtualWork,
         };
-        let modification = (&self.modification).into();
-        let clearance_um = self.model.clearance.as_ref().map_or_else(PerContact::default, |clearance| PerContact {
-            wave_generator: clearance.wave_generator_um,
-            ring: clearance.ring_um,
-            carrier: clearance.carrier_um,
-        });
-        let is_refined = self.is_model_by_default() && has_pointed_tips;
-        let has_gaps = || {
-            let deviations = Deviations::from(&self.deviations);
-            clearance_um != PerContact::default() || modification != Modification::NONE || !deviations.is_nil()
-        };
-        let moves_by_default = || is_refined && self.model.ring_teeth_bend.is_none() && has_gaps();
+        let Refinements { ring_teeth_bend, wave_generator_moves, corner_contact } = self.refinements(has_pointed_tips);
         Ok(LoadParameters {
             materials: Materials {
                 wave_generator: material(&self.materials.wave_generator),
@@ -248,14 +218,14 @@ impl Design {
             },
             torque,
             compatibility,
-            law: self.contact_law(),
+            law: (&self.stiffness()).into(),
             series_compliance_mm_per_n: (&self.model.series_compliance_mm_per_n).into(),
-            ring_teeth_bend: self.model.ring_teeth_bend.unwrap_or(is_refined),
-            wave_generator_moves: self.model.wave_generator_moves.unwrap_or_else(moves_by_default),
-            corner_contact: self.model.corner_contact.unwrap_or(false),
-            modification,
+            ring_teeth_bend,
+            wave_generator_moves,
+            corner_contact,
+            modification: (&self.modification).into(),
             carrier: self.carrier_of_flats(),
-            clearance_um,
+            clearance_um: self.clearances_um().gaps(),
             allowable_stress_mpa: load.allowable_stress_mpa.map(Into::into),
         })
     }
@@ -372,10 +342,6 @@ impl Design {
         }
     }
 
-    fn contact_law(&self) -> ContactLaw {
-        self.model.stiffness.as_ref().map_or_else(|| (&self.law_by_default()).into(), Into::into)
-    }
-
     /// Where a sweep looks.
     ///
     /// # Errors
@@ -406,19 +372,24 @@ impl Design {
     }
 
     /// What the mechanics leave free.
-    pub fn parts_parameters(&self) -> PartsParameters {
-        let PartsDocument { wave_generator, teeth, ring, carrier } = &self.parts;
-        PartsParameters {
+    ///
+    /// # Errors
+    /// A fault where the document gives a contact two gaps.
+    pub fn parts_parameters(&self) -> Result<PartsParameters, Fault> {
+        self.require_one_clearance()?;
+        let PartsDocument { wave_generator, ring, carrier, teeth: _ } = &self.parts;
+        let ClearancesUm { by_contact, teeth } = self.clearances_um();
+        Ok(PartsParameters {
             ring_outer_radius_mm: ring.outer_radius_mm,
             carrier_inner_radius_mm: carrier.inner_radius_mm,
             carrier_outer_radius_mm: carrier.outer_radius_mm,
             bore_radius_mm: wave_generator.bore_radius_mm,
-            wave_generator_clearance_um: wave_generator.clearance_um,
-            teeth_clearance_um: teeth.clearance_um,
-            ring_clearance_um: ring.clearance_um,
-            carrier_clearance_um: carrier.clearance_um,
+            wave_generator_clearance_um: by_contact.wave_generator,
+            teeth_clearance_um: teeth,
+            ring_clearance_um: by_contact.ring,
+            carrier_clearance_um: by_contact.carrier,
             modification: (&self.modification).into(),
-        }
+        })
     }
 
     /// How the parts are held, as far as the document says.

@@ -29,6 +29,7 @@ pub struct CheckedDrawing {
     subject: DrawnPart,
     chord_tolerance_mm: f64,
     input_angle_deg: Option<f64>,
+    of_document: Vec<FindingAnswer>,
 }
 
 /// A point's coordinates.
@@ -56,15 +57,15 @@ impl Question for Drawing {
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
         let assembly = (self.0 == DrawnPart::Assembly).then_some(&design.assembly);
-        (&design.drive, &design.parts, &design.modification, design.profile.chord_tolerance_mm, assembly)
+        (&design.drive, design.parts_in_key(), &design.modification, design.profile.chord_tolerance_mm, assembly)
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedDrawing, NoAnswer> {
         let subject = self.0;
-        let of_design = (&design.drive, &design.parts, &design.modification, design.profile.chord_tolerance_mm);
+        let of_design = (&design.drive, design.parts_in_key(), &design.modification, design.profile.chord_tolerance_mm);
         let parameters = design.drawing_parameters(limits.max_profile_points);
         let draft = Draft::new(&design.drive_parameters()).map_err(SolveError::from)?;
-        let drawing = solver::Drawing::new(&draft, subject.subject(), &design.parts_parameters(), &parameters);
+        let drawing = solver::Drawing::new(&draft, subject.subject(), &design.parts_parameters()?, &parameters);
         let drawing = drawing.map_err(|error| match error {
             DriveError::Impossible(violations) => NoAnswer::impossible(&design.as_written(&violations)),
             error @ DriveError::NotConverged(_) => error.into(),
@@ -73,6 +74,7 @@ impl Question for Drawing {
             drawing,
             design_hash: Key::new("design", &of_design, &(Format::Json, false)).to_string(),
             subject,
+            of_document: FindingAnswer::of_document(design, false),
             chord_tolerance_mm: parameters.chord_tolerance_mm,
             input_angle_deg: (subject == DrawnPart::Assembly).then_some(parameters.input_angle_deg),
         })
@@ -90,6 +92,7 @@ impl Question for Drawing {
         let drive = checked.drawing.drive();
         let mut findings = drive_findings(drive)?;
         findings.extend(of_parts.iter().map(|finding| FindingAnswer::new(finding, drive)));
+        findings.extend(checked.of_document.iter().cloned());
         Ok(DrawingAnswer {
             solver_version: toothwave_solver::VERSION,
             build: crate::BUILD,

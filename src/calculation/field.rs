@@ -125,7 +125,7 @@ impl From<&Violation> for FieldError {
                 (FieldCode::NoCarrierAnnulus, parameter, value_mm, limit_mm)
             }
             Violation::ClearanceNotMonotone { contact, clearance_um } => {
-                (FieldCode::ClearanceNotMonotone, Parameter::Clearance(contact), clearance_um, 0.0)
+                (FieldCode::ClearanceNotMonotone, Parameter::PartClearance(contact.mate()), clearance_um, 0.0)
             }
             Violation::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => {
                 (FieldCode::BoreLeavesNoFlank, TipRadius, tip_radius_mm, root_radius_mm)
@@ -212,9 +212,9 @@ pub fn pointer(parameter: Parameter) -> String {
         Parameter::OutputTorque => "/load/output_torque_nm".into(),
         Parameter::Stiffness(contact) => format!("/model/stiffness/{}_n_per_mm", contact_name(contact)),
         Parameter::Law => "/model/stiffness/law".into(),
-        Parameter::RingTeethBend => "/model/ring_teeth_bend".into(),
-        Parameter::WaveGeneratorMoves => "/model/wave_generator_moves".into(),
-        Parameter::CornerContact => "/model/corner_contact".into(),
+        Parameter::RingTeethBend | Parameter::WaveGeneratorMoves | Parameter::CornerContact => {
+            "/model/refinements".into()
+        }
         Parameter::Depth(contact) => format!("/model/stiffness/depth_mm/{}", contact_name(contact)),
         Parameter::SeriesCompliance(contact) => {
             format!("/model/series_compliance_mm_per_n/{}", contact_name(contact))

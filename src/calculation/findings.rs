@@ -9,6 +9,7 @@ use toothwave_solver::findings::{
 use toothwave_solver::{Drive, Finding, Parameter, SolveError, ToothShape, WaveGenerator};
 use utoipa::ToSchema;
 
+use crate::design::{DeprecatedField, Design, SetBackTwice};
 use crate::field::{contact_name, pointer};
 use crate::no_answer::NoAnswer;
 
@@ -101,6 +102,10 @@ pub enum FindingCode {
     StressAboveAllowable,
     /// A stress above the fatigue limit of bearing steel.
     StressAboveFatigueLimit,
+    /// A field that a later version will not know.
+    DeprecatedField,
+    /// A surface that a clearance and a modification set back.
+    SetBackTwice,
 }
 
 const RADIUS: &str = "/drive/teeth/radius_mm";
@@ -292,7 +297,7 @@ impl FindingAnswer {
             Finding::ProjectionWithGap { gap_um } => new(
                 Code::ProjectionWithGap,
                 Warning,
-                &["/model/compatibility", "/model/clearance"],
+                &["/model/compatibility", "/parts"],
                 gap_um,
                 0.0,
                 "µm",
@@ -506,6 +511,44 @@ impl FindingAnswer {
                 ),
                 &format!("lower the torque, {widen}, or let more of them mesh"),
             ),
+        }
+    }
+}
+
+impl FindingAnswer {
+    /// What a document itself gives rise to, for an answer to which the model matters or not.
+    pub(crate) fn of_document(design: &Design, is_of_model: bool) -> Vec<Self> {
+        let deprecated = design.deprecated_fields().into_iter();
+        let deprecated = deprecated.filter(|&field| is_of_model || field == DeprecatedField::Clearance);
+        deprecated.map(Self::of_deprecated).chain(design.set_back_twice().map(Self::of_set_back_twice)).collect()
+    }
+
+    /// That two fields set a surface back.
+    fn of_set_back_twice(SetBackTwice { part, modified, clearance_um, modification_um }: SetBackTwice) -> Self {
+        let pointers = [Parameter::PartClearance(part), Parameter::Modification(modified)].map(pointer);
+        Self {
+            code: FindingCode::SetBackTwice,
+            severity: Severity::Info,
+            detail: format!("`{}` and `{}` both set this surface back: the two add up", pointers[0], pointers[1]),
+            pointers: pointers.into(),
+            value: clearance_um + modification_um,
+            limit: clearance_um,
+            unit: "µm".into(),
+            advice: "leave one of them out, unless both are meant".into(),
+        }
+    }
+
+    /// That a document uses a field which a later version will not know.
+    fn of_deprecated(field: DeprecatedField) -> Self {
+        Self {
+            code: FindingCode::DeprecatedField,
+            severity: Severity::Info,
+            pointers: vec![field.pointer().into()],
+            value: 0.0,
+            limit: 0.0,
+            unit: String::new(),
+            detail: format!("the field `{}` is deprecated: version 0.3 will refuse it", field.pointer()),
+            advice: format!("use `{}`; `toothwave convert` changes a file", field.replacement()),
         }
     }
 }

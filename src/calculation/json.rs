@@ -217,8 +217,8 @@ pub fn path(pointer: &str) -> Option<Vec<String>> {
     Some(names.map(|name| name.replace("~1", "/").replace("~0", "~")).collect())
 }
 
-/// What a tree of a tree is asked for, so that it gives its arrays too.
-const ANY: &str = "any tree";
+/// Name of the newtype that a tree gives its arrays to as well.
+pub(crate) const ANY: &str = "any tree";
 
 impl<'de> Deserialize<'de> for Tree {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {

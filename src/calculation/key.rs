@@ -126,7 +126,7 @@ pub(crate) use encoded;
 encoded!(enum Format);
 
 /// A hash of everything that an answer's bytes depend on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub struct Key([u8; 32]);
 
 impl Key {

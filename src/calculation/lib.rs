@@ -11,6 +11,7 @@ pub mod accuracy;
 mod arithmetic;
 pub mod coincidence_degree;
 pub mod columns;
+pub mod convert;
 pub mod design;
 pub mod drawing;
 pub mod field;

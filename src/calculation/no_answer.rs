@@ -154,7 +154,7 @@ impl From<SolveError> for NoAnswer {
             SolveError::Interference { .. } => Self::new(
                 NoAnswerCode::Interference,
                 format!(
-                    "{detail}: a part is too full there. Make `model.clearance` larger, or `modification` and `deviations` smaller"
+                    "{detail}: a part is too full there. Make `parts.*.clearance_um` larger, or `modification` and `deviations` smaller"
                 ),
             ),
             SolveError::JohnsonBeyondHalfWidth { is_of_capacity: false, .. } => {
@@ -171,7 +171,9 @@ impl From<SolveError> for NoAnswer {
             SolveError::NoLeverArm => Self::new(NoAnswerCode::NoToothInMesh, detail),
             SolveError::TurnedPastTeeth => Self::new(
                 NoAnswerCode::ImpossibleDesign,
-                format!("{detail}. Lower the torque or close the gaps, or make `model.wave_generator_moves` false"),
+                format!(
+                    "{detail}. Lower the torque or close the gaps, or leave `wave_generator_moves` out of `model.refinements`"
+                ),
             ),
             SolveError::TooManyPoints { points, limit } => {
                 let detail = format!("{detail} by `max_profile_points`; widen the chord tolerance");

@@ -115,9 +115,19 @@ pub(crate) fn checked_load(
         use Parameter::{InputTorque, OutputTorque};
         duty.is_asked && matches!(violation, Violation::OutOfRange { parameter: InputTorque | OutputTorque, .. })
     };
+    let of_clearances = design.clearance_violations();
+    // A gap is too large as the clearances are that it is the sum of, or their sum is.
+    let as_clearance = |violation: Violation| match violation {
+        Violation::OutOfRange { parameter: Parameter::Clearance(contact), value, limit } => {
+            let parameter = Parameter::PartClearance(contact.mate());
+            of_clearances.is_empty().then_some(Violation::OutOfRange { parameter, value, limit })
+        }
+        other => Some(other),
+    };
     let load = LoadCase::new(&parameters)
-        .map_err(|found| violations.extend(found.into_iter().filter(|violation| !of_duty(violation))))
+        .map_err(|found| violations.extend(found.into_iter().filter(|found| !of_duty(found)).filter_map(as_clearance)))
         .ok();
+    violations.extend(of_clearances);
     violations.extend(design.duty_violations()?);
     violations.extend(parameters.clearance_violations(draft).map_err(SolveError::from)?);
     violations.extend(draft.drive().and_then(|drive| parameters.modification.violation_in(&drive)));

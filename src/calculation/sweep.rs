@@ -12,7 +12,7 @@ use toothwave_solver::{
     model_error as error_of_model,
 };
 
-use crate::design::{BearingRating, Design, Duty, DutyPoint};
+use crate::design::{BearingRating, Design, Duty, DutyPoint, ModelDocument};
 use crate::field::FieldCode;
 use crate::findings::{FindingAnswer, drive_findings, write_findings};
 use crate::forms::{Form, Format, Forms, csv_error};
@@ -42,6 +42,8 @@ mod plots;
 #[derive(Debug)]
 pub struct CheckedSweep {
     drive: Drive,
+    model: ModelDocument,
+    of_document: Vec<FindingAnswer>,
     duty: CheckedDuty,
     deviations: Deviations,
     backings: Backings,
@@ -127,7 +129,7 @@ impl CheckedSweep {
             Some(_) => period::RadialForces::of(&self.drive, self.load(), &self.deviations, hardest, stop)?,
             None => None,
         };
-        let losses = period::Losses::of(&self.drive, self.load(), hardest, friction, stop)?;
+        let losses = self.losses(self.load(), hardest, friction, stop)?;
         let costs = self.costs(friction, &Swept { sweep: hardest, forces: forces.as_ref() }, &losses, stop)?;
         Ok(Some(costs.totals(self.duty.hardest, &hardest.states)))
     }
@@ -204,8 +206,8 @@ impl Question for Sweep {
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
-        let Design { drive, materials, load, friction, model, modification, deviations, sweep, parts, .. } = design;
-        (drive, materials, load, friction, model, (modification, deviations, sweep, parts.behind_contacts()))
+        let Design { drive, materials, load, friction, modification, deviations, sweep, parts, .. } = design;
+        (drive, materials, load, friction, design.model_in_key(), (modification, deviations, sweep, parts.under_load()))
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedSweep, NoAnswer> {
@@ -238,10 +240,13 @@ impl Question for Sweep {
                 return Err(too_many(code, field_code, "/sweep/samples", &detail, Some(states), limit));
             }
         }
-        let with_gaps = design.model.clearance.is_some() || load.has_gaps() || !deviations.is_nil();
-        let parts = design.parts_parameters();
+        let with_gaps = load.has_gaps() || !deviations.is_nil();
+        let parts = design.parts_parameters()?;
         let backings = Backings::of(&drive, &draft, &parts, design.support());
+        let model = design.complete_model(error_of_model::has_pointed_tips(&drive));
         Ok(CheckedSweep {
+            model,
+            of_document: FindingAnswer::of_document(design, true),
             backings,
             drive,
             duty: CheckedDuty::new(design, &load)?,
@@ -305,7 +310,7 @@ impl Question for Sweep {
         let mut losses = None;
         let mut points = duty.points.iter().map(|point| DutyPointAnswer::new(drive, point)).collect::<Vec<_>>();
         if let Some(friction) = friction {
-            let of_period = period::Losses::of(drive, load, &sweep, friction, stop)?;
+            let of_period = checked.losses(load, &sweep, friction, stop)?;
             let costs = checked.costs(friction, &Swept { sweep: &sweep, forces: forces.as_ref() }, &of_period, stop)?;
             for (point, cost) in points.iter_mut().zip(costs.of_points()) {
                 point.efficiency_ring_fixed = Some(cost.efficiency_ring_fixed);
@@ -323,6 +328,7 @@ impl Question for Sweep {
             of_half_widths.iter().chain(&of_friction).chain(&of_bearing).chain(&of_projection).chain(&of_backing);
         let of_sweep = of_wind_up.iter().chain(of_model).chain(&of_contacts);
         findings.extend(of_sweep.map(|finding| FindingAnswer::new(finding, drive)));
+        findings.extend(checked.of_document.iter().cloned());
         let unloaded_wind_up_deg = if asks_without_load {
             Some(solver::unloaded_wind_up_deg(drive, load, deviations, &sweep, stop)?)
         } else {
@@ -352,6 +358,7 @@ impl Question for Sweep {
             }),
             losses,
             radial_force_n,
+            model: checked.model.clone(),
             model_error: ModelErrorAnswer::new(load, model_error),
             series_compliance_estimates: EstimateAnswer::all(backings, drive, load, shares.as_ref()),
             checks: ChecksAnswer {
@@ -403,11 +410,29 @@ impl CheckedSweep {
             }
             let sweep = self.solve_under(&point.load, stop)?;
             let forces = period::RadialForces::of(drive, &point.load, deviations, &sweep, stop)?;
-            let losses = period::Losses::of(drive, &point.load, &sweep, friction, stop)?;
+            let losses = self.losses(&point.load, &sweep, friction, stop)?;
             self.cost(point, friction, &Swept { sweep: &sweep, forces: forces.as_ref() }, &losses, stop)
         };
         let points = duty.points.iter().enumerate().map(of_point).collect::<Result<_, _>>()?;
         Ok(Costs { mechanism: Mechanism::of(drive), friction, bearing_rating: *bearing_rating, points })
+    }
+
+    /// What friction takes; of a sweep to a tolerance the means keep it.
+    fn losses(
+        &self,
+        load: &LoadCase,
+        sweep: &solver::Sweep,
+        friction: &Friction,
+        stop: &dyn Stop,
+    ) -> Result<period::Losses, SolveError> {
+        let Self { drive, deviations, points, .. } = self;
+        let losses = period::Losses::of(drive, load, sweep, friction, stop)?;
+        match points {
+            Points::Samples(_) => Ok(losses),
+            Points::Tolerance(tolerance) => {
+                losses.with_mean_to(tolerance.relative(), drive, load, deviations, friction, stop)
+            }
+        }
     }
 
     fn cost(

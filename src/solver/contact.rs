@@ -27,6 +27,15 @@ pub enum Contact {
 }
 
 impl Contact {
+    /// The part that teeth touch there.
+    pub const fn mate(self) -> Part {
+        match self {
+            Self::WaveGenerator => Part::WaveGenerator,
+            Self::Ring => Part::Ring,
+            Self::Carrier => Part::Carrier,
+        }
+    }
+
     /// In words.
     pub const fn name(self) -> &'static str {
         match self {

@@ -246,6 +246,11 @@ impl Modification {
             .then_some(Violation::TipReliefBeyondFlank { start_deg, engagement_start_deg })
     }
 
+    /// Whether none of its numbers opens or closes a gap.
+    pub fn is_nil(&self) -> bool {
+        self.first().is_none()
+    }
+
     /// The first of its numbers that opens or closes a gap.
     pub(crate) fn first(&self) -> Option<Parameter> {
         // Asked at every tooth.

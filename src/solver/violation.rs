@@ -598,7 +598,7 @@ impl std::fmt::Display for Violation {
             ),
             Self::ClearanceNotMonotone { clearance_um, .. } => write!(
                 f,
-                "`projection` weighs this gap of {clearance_um:?} µm negatively at some position, so that it would load a tooth instead of freeing it: choose `virtual_work` or no gap here"
+                "`projection` weighs this gap of {clearance_um:?} µm negatively at some position, so that it would load a tooth instead of freeing it: choose `virtual_work`, or no clearance of this part and of the teeth"
             ),
             Self::NeedsVirtualWork { .. } => {
                 write!(f, "`projection` does not take this: choose `virtual_work`, or leave it out")

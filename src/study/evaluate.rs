@@ -130,7 +130,7 @@ impl Evaluator {
 
     /// As drawn (docs/theory.md section 8). A ring that is none has no outer diameter.
     fn ring_outer_radius_mm(&self, design: &Design, drive: &Drive) -> Result<f64, NoAnswer> {
-        let parts = design.parts_parameters();
+        let parts = design.parts_parameters()?;
         let root_radius_mm = drive.root_radius_mm() + 1e-3 * parts.ring_clearance_um;
         let value = parts.ring_outer_radius_mm.unwrap_or(RIM * root_radius_mm);
         let limit = root_radius_mm * (1.0 + LEAST_WALL);

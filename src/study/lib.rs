@@ -9,6 +9,7 @@ mod ask;
 mod document;
 mod evaluate;
 mod front;
+mod identity;
 mod limit;
 mod map;
 pub mod optimise;

@@ -257,7 +257,7 @@ pub static QUANTITIES: [Quantity; 60] = [
         |variant| Ok(2.0 * variant.ring_outer_radius_mm),
     )
     .not_below_zero()
-    .depending_on(&["/drive", "/parts/ring"])
+    .depending_on(&["/drive", "/parts", "/model/clearance"])
     .said_by("/parts/ring/outer_radius_mm"),
     of_drive(
         "ring_root_radius_mm",

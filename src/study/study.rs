@@ -20,6 +20,7 @@ use crate::answer::StudyAnswer;
 use crate::ask::{all_named, beyond, fault};
 use crate::document::StudyDocument;
 use crate::evaluate::{Evaluator, Stopped};
+use crate::identity;
 use crate::limit;
 use crate::map::{Map, MapAnswer};
 use crate::quantity::{Needs, QUANTITIES, Quantity};
@@ -123,26 +124,32 @@ impl Study {
     /// # Errors
     /// As [`Self::read`].
     pub fn new(document: &StudyDocument, limits: &Limits) -> Result<Self, NoAnswer> {
-        let id = id(document, &limits.calculation)?;
+        let mut study = Self::unnamed(document, limits)?;
+        study.id = identity::id(document, &study.template, &study.evaluator.quantities, &limits.calculation)?;
+        Ok(study)
+    }
+
+    /// The study before its id is known.
+    fn unnamed(document: &StudyDocument, limits: &Limits) -> Result<Self, NoAnswer> {
         match document {
             StudyDocument::Map(map) => {
                 let (grid, template) = Map::new(map)?;
                 let quantities = asked_quantities(&map.quantities, &template)?;
                 let variants = grid.variants().unwrap_or(u64::MAX);
-                Self::checked(id, Kind::Map(grid), template, quantities, variants, limits)
+                Self::checked(Kind::Map(grid), template, quantities, variants, limits)
             }
             StudyDocument::Search(document) => {
                 let (search, template, quantities) = Search::new(document)?;
                 search.require_that_free_fields_matter(&template, &quantities, &limits.calculation)?;
                 let variants = search.evaluations();
-                Self::checked(id, Kind::Search(Box::new(search)), template, quantities, variants, limits)
+                Self::checked(Kind::Search(Box::new(search)), template, quantities, variants, limits)
             }
             StudyDocument::Sensitivity(document) => {
                 let (sensitivity, template) = Sensitivity::new(document)?;
                 let quantities = asked_quantities(&document.quantities, &template)?;
                 let variants = sensitivity.variants();
                 let kind = Kind::Sensitivity(sensitivity);
-                Self::checked(id, kind, template, quantities, variants, limits)?.with_possible_base(limits)
+                Self::checked(kind, template, quantities, variants, limits)?.with_possible_base(limits)
             }
             StudyDocument::Tolerance(document) => {
                 let (mut tolerance, template) = Tolerance::new(document)?;
@@ -150,13 +157,12 @@ impl Study {
                 tolerance.limits = limit::limits(&document.require, &mut quantities)?;
                 let variants = tolerance.variants();
                 let kind = Kind::Tolerance(tolerance);
-                Self::checked(id, kind, template, quantities, variants, limits)?.with_possible_base(limits)
+                Self::checked(kind, template, quantities, variants, limits)?.with_possible_base(limits)
             }
         }
     }
 
     fn checked(
-        id: Key,
         kind: Kind,
         template: Template,
         quantities: Vec<&'static Quantity>,
@@ -171,7 +177,8 @@ impl Study {
             require_possible_ranges(&quantities, &template, &limits.calculation)?;
         }
         let evaluator = Evaluator::new(quantities, limits.calculation);
-        let study = Self { id, kind, template, evaluator, variants, chunk_variants: chunk_variants(variants) };
+        let study =
+            Self { id: Key::default(), kind, template, evaluator, variants, chunk_variants: chunk_variants(variants) };
         #[expect(clippy::cast_precision_loss, reason = "told, not computed with")]
         if variants > limits.max_study_variants {
             let limit = limits.max_study_variants;
@@ -339,18 +346,6 @@ fn require_each_field_once(tree: &Tree) -> Result<(), Fault> {
     }
 }
 
-/// The hash of what is asked, within limits that some variants may be beyond: equal however the fields are ordered and the numbers spelled.
-fn id(document: &StudyDocument, limits: &question::Limits) -> Result<Key, NoAnswer> {
-    let text = serde_json::to_string(document).map_err(NoAnswer::internal)?;
-    let tree = json::tree(text.as_bytes())?;
-    // Nobody needs the one while the other is made.
-    drop(text);
-    let sorted = tree.sorted();
-    let text = serde_json::to_string(&sorted).map_err(NoAnswer::internal)?;
-    let within = format!("{} states, {} points", limits.max_states, limits.max_profile_points);
-    Ok(Key::new("study", &text.as_str(), &within.as_str()))
-}
-
 /// The quantities of these names; all that every document has what they need for, where none is named.
 fn asked_quantities(names: &[String], template: &Template) -> Result<Vec<&'static Quantity>, NoAnswer> {
     if names.is_empty() {
@@ -510,9 +505,15 @@ fn is_of_base(template: &Template, example: &Tree, error: &FieldError) -> bool {
             Some(Tree::Array(_)) => !template.varies_within(&[&error.pointer]),
             _ => false,
         },
-        FieldCode::ConflictingFields => {
-            !template.varies_within(&["/drive", "/load", "/model", "/modification", "/deviations", "/friction"])
-        }
+        FieldCode::ConflictingFields => !template.varies_within(&[
+            "/drive",
+            "/load",
+            "/model",
+            "/modification",
+            "/deviations",
+            "/friction",
+            "/parts",
+        ]),
         FieldCode::WrongLength => !template.varies_within(&["/drive", "/deviations"]),
         FieldCode::CamNotElongated => !template.varies_within(&["/drive/wave_generator"]),
         FieldCode::InstalledNoDivisor | FieldCode::GrooveTooTight | FieldCode::FlatTooLong => {

@@ -111,8 +111,10 @@ pub(crate) fn finding_codes() -> Vec<FindingCode> {
         FrictionBeyondMeasured => EfficiencyUncertain,
         EfficiencyUncertain => BearingLoadAboveHalfRating,
         BearingLoadAboveHalfRating => StressAboveAllowable,
-        StressAboveAllowable => StressAboveFatigueLimit;
-        StressAboveFatigueLimit)
+        StressAboveAllowable => StressAboveFatigueLimit,
+        StressAboveFatigueLimit => DeprecatedField,
+        DeprecatedField => SetBackTwice;
+        SetBackTwice)
 }
 
 /// The words of codes, as documents spell them, in alphabetical order.

@@ -9,10 +9,10 @@ use crate::designs::{bored, shortest, spelled_out, undercut, with};
 fn palmgren(ring_um: f64) -> Value {
     let model = json!({
         "compatibility": "virtual_work",
-        "stiffness": { "law": "palmgren" },
-        "clearance": { "ring_um": ring_um }
+        "stiffness": { "law": "palmgren" }
     });
-    with(&with(&spelled_out(), "/model", model), "/sweep", json!({ "samples": 50, "wind_up": true }))
+    let document = with(&with(&spelled_out(), "/model", model), "/sweep", json!({ "samples": 50, "wind_up": true }));
+    with(&document, "/parts", json!({ "ring": { "clearance_um": ring_um } }))
 }
 
 fn numbers(column: &Value) -> Vec<f64> {
@@ -117,7 +117,7 @@ async fn a_capacity_that_no_contact_limits_says_so() {
             },
             "materials": { "wave_generator": soft, "teeth": soft, "ring": soft, "carrier": soft },
             "load": { "input_torque_nm": 0.002, "allowable_stress_mpa": allowable_stress_mpa },
-            "model": { "clearance": { "ring_um": 10.0 } },
+            "parts": { "ring": { "clearance_um": 10.0 } },
             "sweep": { "samples": 20 }
         });
         let capacity = service.post("/v1/sweep", &asked).await.found()["torque_capacity"].clone();
@@ -175,16 +175,17 @@ async fn a_clearance_that_projection_would_turn_into_load_is_refused() {
     let more_ring_teeth = [("/drive/ring/teeth", json!(30)), ("/drive/teeth/radius_mm", json!(4.0))]
         .into_iter()
         .fold(spelled_out(), |document, (pointer, value)| with(&document, pointer, value));
-    let model = json!({ "compatibility": "projection", "clearance": { "carrier_um": 5.0 } });
-    let refused = Service::new().post("/v1/sweep", &with(&more_ring_teeth, "/model", model)).await;
+    let gap = |document: &Value, compatibility: &str| {
+        let document = with(document, "/model", json!({ "compatibility": compatibility }));
+        with(&document, "/parts", json!({ "carrier": { "clearance_um": 5.0 } }))
+    };
+    let refused = Service::new().post("/v1/sweep", &gap(&more_ring_teeth, "projection")).await;
     let problem = refused.refused(422, "impossible_design");
-    assert_eq!(problem["errors"][0]["pointer"], "/model/clearance/carrier_um");
+    assert_eq!(problem["errors"][0]["pointer"], "/parts/carrier/clearance_um");
     assert_eq!(problem["errors"][0]["code"], "clearance_not_monotone");
     // With fewer ring teeth it weighs the same gap positively, and virtual work weighs every gap so.
-    let model = json!({ "compatibility": "projection", "clearance": { "carrier_um": 5.0 } });
-    Service::new().post("/v1/sweep", &with(&spelled_out(), "/model", model)).await.found();
-    let model = json!({ "compatibility": "virtual_work", "clearance": { "carrier_um": 5.0 } });
-    Service::new().post("/v1/sweep", &with(&more_ring_teeth, "/model", model)).await.found();
+    Service::new().post("/v1/sweep", &gap(&spelled_out(), "projection")).await.found();
+    Service::new().post("/v1/sweep", &gap(&more_ring_teeth, "virtual_work")).await.found();
 }
 
 #[tokio::test]
@@ -247,7 +248,7 @@ async fn a_sweep_says_how_far_its_model_is_off_elastic_bodies_and_whether_this_d
     // The paper's model errs by more, where a gap is given by far more.
     let paper = told(&spelled_out()).await;
     assert_eq!(paper["measured"]["force"], json!({ "low": 0.01, "high": 0.08 }));
-    let gap = told(&with(&spelled_out(), "/model/clearance", json!({ "ring_um": 12.0 }))).await;
+    let gap = told(&with(&spelled_out(), "/parts", json!({ "ring": { "clearance_um": 12.0 } }))).await;
     assert_eq!(gap["measured"]["case"]["has_gaps"], true);
     assert!(gap["measured"]["force"]["high"].as_f64().unwrap() > 0.5);
     // What was measured of another law than Johnson's is that of three drives.
@@ -277,40 +278,37 @@ async fn a_sweep_says_how_far_its_model_is_off_elastic_bodies_and_whether_this_d
     assert_eq!(stiff["range"]["lobes"], 2);
 }
 
-/// What is named is computed as it is named; what is not is refined where it matters, and says so.
+/// Whatever law is named.
 #[tokio::test]
-async fn where_no_law_is_named_pointed_tips_bend_and_with_gaps_the_wave_generator_moves() {
+async fn by_default_pointed_tips_bend_and_gaps_move_on() {
     let service = Service::new();
-    let solved = async |drive: &Value, model: Value| {
-        let answer = service.post("/v1/sweep", &with(drive, "/model", model)).await.found();
-        (answer["states"].clone(), answer["model_error"]["measured"]["case"].clone())
+    let solved = async |drive: &Value, model: Value, ring_um: f64| {
+        let document = with(&with(drive, "/model", model), "/parts", json!({ "ring": { "clearance_um": ring_um } }));
+        let answer = service.post("/v1/sweep", &document).await.found();
+        (answer["states"].clone(), answer["model"]["refinements"].clone())
     };
-    let named = |bend: bool, moves: bool| json!({ "stiffness": { "law": "johnson" }, "ring_teeth_bend": bend, "wave_generator_moves": moves });
-    let gap = |mut model: Value| {
-        model["clearance"] = json!({ "ring_um": 10.0 });
-        model
-    };
+    let listed = |refinements: Value| json!({ "stiffness": { "law": "johnson" }, "refinements": refinements });
     let (pointed, natural) = (undercut(), shortest());
-    assert_eq!(solved(&pointed, json!({})).await, solved(&pointed, named(true, false)).await);
-    assert_eq!(solved(&pointed, gap(json!({}))).await, solved(&pointed, gap(named(true, true))).await);
-    assert_eq!(solved(&natural, json!({})).await, solved(&natural, named(false, false)).await);
-    assert_eq!(solved(&natural, gap(json!({}))).await, solved(&natural, gap(named(false, false))).await);
-    // A law that is named is as it was, and a choice that is made is kept.
-    let johnson = json!({ "stiffness": { "law": "johnson" } });
-    assert_eq!(solved(&pointed, gap(johnson)).await, solved(&pointed, gap(named(false, false))).await);
-    let stiff = json!({ "ring_teeth_bend": false });
-    assert_eq!(solved(&pointed, gap(stiff)).await, solved(&pointed, gap(named(false, false))).await);
-    assert_ne!(solved(&pointed, json!({})).await, solved(&pointed, named(false, false)).await);
-    assert_ne!(solved(&natural, gap(named(false, true))).await, solved(&natural, gap(json!({}))).await);
+    let (bend, both) = (json!(["ring_teeth_bend"]), json!(["ring_teeth_bend", "wave_generator_moves"]));
+    for model in [json!({}), json!({ "stiffness": { "law": "johnson" } })] {
+        assert_eq!(solved(&pointed, model.clone(), 0.0).await, solved(&pointed, listed(bend.clone()), 0.0).await);
+        assert_eq!(solved(&pointed, model.clone(), 10.0).await, solved(&pointed, listed(both.clone()), 10.0).await);
+        assert_eq!(solved(&natural, model.clone(), 0.0).await, solved(&natural, listed(json!("none")), 0.0).await);
+        assert_eq!(solved(&natural, model, 10.0).await, solved(&natural, listed(json!("none")), 10.0).await);
+    }
+    assert_ne!(solved(&pointed, json!({}), 0.0).await.0, solved(&pointed, listed(json!("none")), 0.0).await.0);
+    let moves = json!(["wave_generator_moves"]);
+    assert_ne!(solved(&natural, listed(moves), 10.0).await.0, solved(&natural, json!({}), 10.0).await.0);
     // Who never asked for it is told how to do without.
-    let wide = |choice: Value| with(&with(&bored(), "/model", choice), "/model/clearance", json!({ "ring_um": 300.0 }));
+    let wide =
+        |choice: Value| with(&with(&bored(), "/model", choice), "/parts", json!({ "ring": { "clearance_um": 300.0 } }));
     let problem = service.post("/v1/sweep", &wide(json!({}))).await.refused(422, "impossible_design");
-    assert!(problem["detail"].as_str().unwrap().ends_with("or make `model.wave_generator_moves` false"), "{problem}");
-    service.post("/v1/sweep", &wide(json!({ "wave_generator_moves": false }))).await.found();
-    // Nothing of it was held against elastic bodies under another law, or beside projection.
-    let refused = json!({ "compatibility": "projection", "wave_generator_moves": true });
+    let advice = "or leave `wave_generator_moves` out of `model.refinements`";
+    assert!(problem["detail"].as_str().unwrap().ends_with(advice), "{problem}");
+    service.post("/v1/sweep", &wide(json!({ "refinements": ["ring_teeth_bend"] }))).await.found();
+    let refused = json!({ "compatibility": "projection", "refinements": ["wave_generator_moves"] });
     let problem = service.post("/v1/sweep", &with(&pointed, "/model", refused)).await.refused(422, "impossible_design");
-    assert_eq!(problem["errors"][0]["pointer"], "/model/wave_generator_moves");
+    assert_eq!(problem["errors"][0]["pointer"], "/model/refinements");
 }
 
 /// Loads of teeth that meet the corner of a tip run on from nothing; the teeth are listed from the valley on, and say of no stress at the ring.

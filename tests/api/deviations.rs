@@ -7,10 +7,11 @@ use crate::designs::{spelled_out, with};
 
 /// Case 5.1 with clearances that cover what deviates by a few micrometres.
 fn cleared() -> Value {
-    let clearance = json!({ "wave_generator_um": 8.0, "ring_um": 8.0, "carrier_um": 8.0 });
-    let model = json!({ "compatibility": "virtual_work", "stiffness": { "law": "palmgren" }, "clearance": clearance });
+    let model = json!({ "compatibility": "virtual_work", "stiffness": { "law": "palmgren" } });
     let document = with(&spelled_out(), "/model", model);
-    with(&document, "/sweep", json!({ "samples": 4, "wind_up": true }))
+    let document = with(&document, "/sweep", json!({ "samples": 4, "wind_up": true }));
+    let clearance = json!({ "clearance_um": 8.0 });
+    with(&document, "/parts", json!({ "wave_generator": clearance, "ring": clearance, "carrier": clearance }))
 }
 
 fn with_deviations(deviations: Value) -> Value {

@@ -182,8 +182,8 @@ async fn a_design_as_a_whole_depends_on_what_its_parts_depend_on() {
     ] {
         assert_ne!(etag("/v1/design", &with(&spelled_out(), pointer, value)).await, first, "{pointer}");
     }
-    let drawn = with(&spelled_out(), "/parts", json!({ "teeth": { "clearance_um": 5.0 } }));
-    assert_eq!(etag("/v1/design", &drawn).await, first, "drawings alone read the clearance of the teeth");
+    let drawn = with(&spelled_out(), "/assembly", json!({ "input_angle_deg": 5.0 }));
+    assert_eq!(etag("/v1/design", &drawn).await, first, "drawings alone read the input angle");
 }
 
 #[tokio::test]

@@ -185,7 +185,7 @@ async fn a_stress_above_the_fatigue_limit_is_a_warning_for_each_contact() {
 /// Case 5.1 with gaps of a millimetre at the carrier.
 fn loose() -> Value {
     let document = with(&shortest(), "/model", json!({ "compatibility": "virtual_work" }));
-    with(&document, "/model/clearance", json!({ "carrier_um": 1000.0 }))
+    with(&document, "/parts", json!({ "carrier": { "clearance_um": 1000.0 } }))
 }
 
 #[tokio::test]
@@ -197,7 +197,7 @@ async fn a_wind_up_of_more_than_a_tenth_of_the_period_is_a_warning() {
     let finding = finding(&loose(), "wind_up_beyond_model").await;
     assert_numbers(&finding, most, 36.0 / 26.0, "deg");
     assert!(most > 36.0 / 26.0 && finding["severity"] == "warning");
-    let tight = with(&loose(), "/model/clearance", json!({ "carrier_um": 10.0 }));
+    let tight = with(&loose(), "/parts", json!({ "carrier": { "clearance_um": 10.0 } }));
     assert!(!codes_of(&findings(&tight).await).contains(&"wind_up_beyond_model".to_owned()));
 }
 
@@ -448,13 +448,13 @@ async fn projection_on_a_steep_flank_is_information_and_virtual_work_is_not() {
 
 #[tokio::test]
 async fn projection_with_a_gap_is_a_warning_and_virtual_work_is_not() {
-    let gap = |document: &Value| with(document, "/model/clearance", json!({ "ring_um": 4.0, "carrier_um": 2.5 }));
+    let gap = |document: &Value| {
+        with(document, "/parts", json!({ "ring": { "clearance_um": 4.0 }, "carrier": { "clearance_um": 2.5 } }))
+    };
     let found = finding(&gap(&spelled_out()), "projection_with_gap").await;
     assert_numbers(&found, 4.0, 0.0, "µm");
     assert_eq!(found["severity"], "warning");
-    for other in
-        [gap(&with(&shortest(), "/model", json!({}))), with(&gap(&spelled_out()), "/model/clearance", json!({}))]
-    {
+    for other in [gap(&with(&shortest(), "/model", json!({}))), with(&gap(&spelled_out()), "/parts", json!({}))] {
         assert!(!codes_of(&findings(&other).await).contains(&"projection_with_gap".to_owned()));
     }
 }
@@ -573,10 +573,12 @@ async fn every_kind_of_finding_can_be_met_over_http() {
         all.extend(findings(&document).await);
     }
     let wide = with(&shortest(), "/load/input_torque_nm", json!(2000.0));
-    let gap = with(&spelled_out(), "/model/clearance", json!({ "ring_um": 10.0 }));
+    let gap = with(&spelled_out(), "/parts", json!({ "ring": { "clearance_um": 10.0 } }));
     let steep_projection = with(&undercut(), "/model", of_the_paper());
+    let old = with(&shortest(), "/model", json!({ "clearance": { "ring_um": 3.0 } }));
+    let twice = with(&old, "/modification", json!({ "ring_equidistant_um": 3.0 }));
     for document in
-        [linear, brass, wide, loose(), rubbing(0.03), rubbing(0.2), limited(json!(500.0)), gap, steep_projection]
+        [linear, brass, wide, loose(), rubbing(0.03), rubbing(0.2), limited(json!(500.0)), gap, steep_projection, twice]
     {
         all.extend(findings(&document).await);
     }

@@ -438,7 +438,7 @@ fn alone(torque_nm: f64, speed_rpm: f64, friction: Value) -> Value {
 
 /// A clearance, so that forces are not in proportion to the torque.
 fn loose(document: &Value) -> Value {
-    with(document, "/model/clearance", json!({ "ring_um": 3.0 }))
+    with(document, "/parts", json!({ "ring": { "clearance_um": 3.0 } }))
 }
 
 #[tokio::test]

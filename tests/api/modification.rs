@@ -14,7 +14,7 @@ fn modified(modification: Value) -> Value {
 
 /// The same with gaps given as clearance.
 fn cleared(clearance: Value) -> Value {
-    with(&modified(json!({})), "/model/clearance", clearance)
+    with(&modified(json!({})), "/parts", clearance)
 }
 
 async fn swept(document: &Value) -> Value {
@@ -41,10 +41,10 @@ fn relief() -> Value {
 #[tokio::test]
 async fn a_surface_set_back_along_its_normals_is_a_clearance_at_its_contact() {
     let pairs = [
-        (json!({ "ring_equidistant_um": 10.0 }), json!({ "ring_um": 10.0 })),
-        (json!({ "wave_generator_equidistant_um": 10.0 }), json!({ "wave_generator_um": 10.0 })),
-        (json!({ "slot_wall_um": 10.0 }), json!({ "carrier_um": 10.0 })),
-        (json!({ "tooth_radius_um": 10.0 }), json!({ "wave_generator_um": 10.0, "ring_um": 10.0, "carrier_um": 10.0 })),
+        (json!({ "ring_equidistant_um": 10.0 }), json!({ "ring": { "clearance_um": 10.0 } })),
+        (json!({ "wave_generator_equidistant_um": 10.0 }), json!({ "wave_generator": { "clearance_um": 10.0 } })),
+        (json!({ "slot_wall_um": 10.0 }), json!({ "carrier": { "clearance_um": 10.0 } })),
+        (json!({ "tooth_radius_um": 10.0 }), json!({ "teeth": { "clearance_um": 10.0 } })),
     ];
     for (modification, clearance) in pairs {
         let (found, expected) = (swept(&modified(modification)).await, swept(&cleared(clearance)).await);
@@ -122,8 +122,8 @@ async fn a_part_too_full_is_an_interference_unless_a_clearance_covers_it() {
     let full = modified(json!({ "ring_equidistant_um": -4.0 }));
     let problem = Service::new().post("/v1/sweep", &full).await.refused(422, "interference");
     let detail = problem["detail"].as_str().unwrap();
-    assert!(detail.contains("deg") && detail.contains("µm") && detail.contains("`model.clearance`"), "{detail}");
-    let covered = with(&full, "/model/clearance", json!({ "ring_um": 5.0 }));
+    assert!(detail.contains("deg") && detail.contains("µm") && detail.contains("`parts.*.clearance_um`"), "{detail}");
+    let covered = with(&full, "/parts", json!({ "ring": { "clearance_um": 5.0 } }));
     let found = swept(&covered).await;
     let expected = swept(&cleared(json!({ "ring_um": 1.0 }))).await;
     let forces = |answer: &Value| numbers(&answer["states"]["force_ring_n"]);

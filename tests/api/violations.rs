@@ -266,7 +266,7 @@ impl SingleFault {
     }
 }
 
-const GAP_AT_CARRIER: &str = "/model/clearance/carrier_um";
+const GAP_AT_CARRIER: &str = CARRIER_CLEARANCE;
 const RING_OUTER: &str = "/parts/ring/outer_radius_mm";
 const RING_CLEARANCE: &str = "/parts/ring/clearance_um";
 const CARRIER_INNER: &str = "/parts/carrier/inner_radius_mm";
@@ -601,9 +601,10 @@ async fn every_kind_of_fault_of_a_field_can_be_met_over_http() {
         with(&document, RADIUS, json!(0.9)).to_string(),
         with(&document, TIP_RADIUS, json!(68.0)).to_string(),
     ];
-    let gap = [(RING_TEETH, json!(30)), (RADIUS, json!(4.0)), ("/model/clearance", json!({ "carrier_um": 5.0 }))]
-        .into_iter()
-        .fold(document.clone(), |document, (pointer, value)| with(&document, pointer, value));
+    let gap =
+        [(RING_TEETH, json!(30)), (RADIUS, json!(4.0)), ("/parts", json!({ "carrier": { "clearance_um": 5.0 } }))]
+            .into_iter()
+            .fold(document.clone(), |document, (pointer, value)| with(&document, pointer, value));
     let service = Service::within(Limits { max_states: 1, ..LIMITS });
     let mut errors = Vec::new();
     for text in texts.into_iter().chain([gap.to_string(), document.to_string()]) {

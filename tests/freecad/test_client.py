@@ -76,6 +76,8 @@ def api_values():
 
     def values(schema, place=""):
         for option in schema.get("oneOf", schema.get("allOf", [schema])):
+            if option.get("deprecated"):
+                continue
             option = schemas.get(option.get("$ref", "").rpartition("/")[2], option)
             if "oneOf" in option:
                 yield from values(option, place)
@@ -112,7 +114,7 @@ EVERYTHING = {
         "compatibility": "virtual_work",
         "stiffness": {"law": "johnson", "depth_mm": {"wave_generator": 5.0, "carrier": 7.0}},
         "series_compliance_mm_per_n": {"ring": 1e-7},
-        "clearance": {"wave_generator_um": 0.5, "carrier_um": 1.0},
+        "refinements": "none",
     },
     "modification": {
         "ring_equidistant_um": 4.0,
@@ -155,6 +157,16 @@ class Document(unittest.TestCase):
             values = toothwave_design.values_of(document)
             self.assertEqual(values["OtherFields"], "")
             self.assertEqual(toothwave_design.document_of(values), document)
+
+    def test_a_document_of_an_earlier_version_is_converted(self):
+        old = {"model": {"clearance": {"ring_um": 10.0, "carrier_um": 0.0}, "corner_contact": True}}
+        new = {"model": {"refinements": ["auto", "corner_contact"]}, "parts": {"ring": {"clearance_um": 10.0}}}
+        self.assertEqual(toothwave_design.converted(old), new)
+        self.assertEqual(toothwave_design.converted({"model": {"ring_teeth_bend": False}}), {"model": {"refinements": "none"}})
+        contradiction = {"model": {"clearance": {"ring_um": 10.0}}, "parts": {"teeth": {"clearance_um": 3.0}}}
+        self.assertEqual(toothwave_design.converted(contradiction), contradiction)
+        retired = {"RingGapUm": 5.0, "CarrierGapUm": 0.0, "CornerContact": False, "RingTeethBend": "default"}
+        self.assertEqual(toothwave_design.with_retired({}, retired), {"model": {"clearance": {"ring_um": 5.0}}})
 
     def test_the_service_answers_it_as_it_would_have_been_answered(self):
         with running_service() as url:
@@ -224,11 +236,11 @@ class Document(unittest.TestCase):
         self.assertEqual(toothwave_design.document_of(values), EVERYTHING)
 
     def test_what_the_service_sets_by_itself_is_denied_where_the_document_denies_it(self):
-        for flag in ("ring_teeth_bend", "wave_generator_moves"):
-            for value in (True, False):
-                design = complete(example("paper-5.2")) | {"model": {flag: value}}
-                with self.subTest(flag, value=value):
-                    self.assertEqual(toothwave_design.document_of(toothwave_design.values_of(design))["model"], {flag: value})
+        for refinements in ("none", ["ring_teeth_bend"], ["auto", "corner_contact"]):
+            design = complete(example("paper-5.2")) | {"model": {"refinements": refinements}}
+            with self.subTest(refinements):
+                through = toothwave_design.document_of(toothwave_design.values_of(design))
+                self.assertEqual(through["model"], {"refinements": refinements})
         silent = {name: part for name, part in complete(example("paper-5.2")).items() if name != "model"}
         self.assertNotIn("model", toothwave_design.document_of(toothwave_design.values_of(silent)))
 

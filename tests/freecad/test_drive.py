@@ -186,7 +186,7 @@ class Kinds(OfDrive):
     def test_deviations_of_a_measured_drive_are_computed_with(self):
         runout = {"deviations": {"ring_runout": {"amount_um": 2.0, "angle_deg": 40.0}}}
         toothwave_drive.set_document(self.drive, example("flat-sided") | {"sweep": {"samples": 4}} | runout)
-        self.drive.RingGapUm = 5.0  # else the ring interferes
+        self.drive.RingClearanceUm = 5.0  # else the ring interferes
         self.document.recompute()
         self.assertEqual(self.drive.Problem, "")
         self.assertEqual(toothwave_drive.document_of(self.drive)["deviations"], runout["deviations"])

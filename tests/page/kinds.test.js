@@ -247,7 +247,7 @@ test('the peaks say how far to believe them', async () => {
       'Besides, for a housed rim and fingers held at both ends: by the estimates −11 %, −25 to −20 % in earlier calculations of elastic bodies.',
     estimated,
   ]);
-  await setDocument(page, { ...unnamed, model: { clearance: { ring_um: 20 } } });
+  await setDocument(page, { ...unnamed, parts: { ring: { clearance_um: 20 } } });
   assert.match((await told())[0], /; not measured with larger clearances, a larger wind-up\.$/);
   await pick(page, LAW, 'fixed');
   assert.equal((await told())[0], 'The model’s own error: not measured under this law.');
@@ -259,20 +259,30 @@ test('what the service sets by itself can be denied, and stands in the form as t
   await setDocument(page, unnamed);
   await page.click('summary:has-text("Compliance of the supports")');
   const before = await answered(page);
-  const place = '/model/ring_teeth_bend';
+  const place = '/model/refinements';
   assert.equal(await page.inputValue(field(place)), '');
-  await pick(page, place, 'false');
+  await pick(page, place, 'none');
   const denied = await answered(page);
-  assert.equal(denied.design.model.ring_teeth_bend, false);
+  assert.equal(denied.design.model.refinements, 'none');
   assert.notEqual(denied.sweep.peaks.ring.force_n.value, before.sweep.peaks.ring.force_n.value);
-  await pick(page, place, 'true');
+  await pick(page, place, 'ring_teeth_bend');
   const named = await answered(page);
-  assert.equal(named.design.model.ring_teeth_bend, true);
+  assert.deepEqual(named.design.model.refinements, ['ring_teeth_bend']);
   assert.equal(named.sweep.peaks.ring.force_n.value, before.sweep.peaks.ring.force_n.value);
   await pick(page, place, '');
-  assert.equal((await designOf(page)).model?.ring_teeth_bend, undefined);
-  await setDocument(page, { ...unnamed, model: { ring_teeth_bend: false } });
-  assert.equal(await page.inputValue(field(place)), 'false');
+  assert.equal((await designOf(page)).model?.refinements, undefined);
+  await setDocument(page, { ...unnamed, model: { refinements: 'none' } });
+  assert.equal(await page.inputValue(field(place)), 'none');
+});
+
+test('an old document is converted, with a notice', async () => {
+  const page = await bed.open();
+  const { model: _, ...unnamed } = await bed.server.example('paper-5.2');
+  const old = { ...unnamed, model: { clearance: { ring_um: 10 }, corner_contact: true } };
+  const converted = { ...unnamed, model: { refinements: ['auto', 'corner_contact'] }, parts: { ring: { clearance_um: 10 } } };
+  await setDocument(page, old);
+  assert.deepEqual(await designOf(page), converted);
+  assert.match(await page.textContent('#notice-text'), /earlier version/);
 });
 
 test('what gives way behind a contact moves the answer', async () => {
@@ -415,12 +425,12 @@ test('every kind that the service has can be chosen, and has the fields that it 
 test('modification is typed in the form: each number moves the answer, and virtual work, which it wants, is chosen with it', async () => {
   const page = await bed.open();
   await page.evaluate(() => document.querySelectorAll('#form details').forEach((group) => (group.open = true)));
-  await enter(page, '/model/clearance/ring_um', 20);
+  await enter(page, '/parts/ring/clearance_um', 20);
   // A turned part is lost motion alone: the wind-up has it, no force.
   await page.check(field('/sweep/wind_up'));
   await enter(page, '/modification/ring_equidistant_um', 4);
   let found = await answered(page);
-  assert.deepEqual(found.design.model, { compatibility: 'virtual_work', stiffness: { law: 'linear' }, clearance: { ring_um: 20 } }, 'the law stays');
+  assert.deepEqual(found.design.model, { compatibility: 'virtual_work', stiffness: { law: 'linear' } }, 'the law stays');
   for (const name of ['ring_path_shift_um', 'ring_profile_shift_um', 'ring_rotation_arcsec', 'wave_generator_equidistant_um', 'slot_wall_um', 'carrier_rotation_arcsec', 'tooth_radius_um']) {
     const before = found.sweep;
     await enter(page, `/modification/${name}`, 2);
@@ -447,7 +457,7 @@ test('modification is typed in the form: each number moves the answer, and virtu
 test('parts off the axis are typed in the form, and lists in the JSON are told', async () => {
   const page = await bed.open();
   await page.evaluate(() => document.querySelectorAll('#form details').forEach((group) => (group.open = true)));
-  await enter(page, '/model/clearance/ring_um', 20);
+  await enter(page, '/parts/ring/clearance_um', 20);
   await enter(page, '/deviations/ring_runout/amount_um', 3);
   await enter(page, '/deviations/ring_runout/angle_deg', 40);
   const found = await answered(page);
@@ -464,7 +474,7 @@ test('where parts are made otherwise than nominal, the picture says that it is n
   await choose(page, 'balls');
   assert.ok(await told.isHidden());
   const { drive, load } = await designOf(page);
-  const made = { drive, load, model: { clearance: { ring_um: 20 } }, modification: { ring_equidistant_um: 10 } };
+  const made = { drive, load, modification: { ring_equidistant_um: 10 } };
   await setDocument(page, made);
   assert.equal(await told.textContent(), 'The picture is the nominal drive. The modification, of micrometres, is in the drawings, true to size.');
   // As it says: the picture's outline is the unmodified one's, the drawing's is not.

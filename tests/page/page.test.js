@@ -315,8 +315,8 @@ test('law, clearance, capacity, tolerance and wind-up are asked for in the form 
   assert.equal(await resultOf(page, 'Most teeth that carry'), undefined);
   await page.selectOption(field('/model/stiffness'), 'palmgren');
   await page.selectOption(field('/model/compatibility'), 'virtual_work');
-  await enter(page, '/model/clearance/ring_um', 4);
-  await enter(page, '/model/clearance/carrier_um', 1.5);
+  await enter(page, '/parts/ring/clearance_um', 4);
+  await enter(page, '/parts/carrier/clearance_um', 1.5);
   // What the design does not ask for yet leads to where it does.
   await page.click('#table button[aria-label^="Torque capacity"]');
   assert.equal(await page.evaluate(() => document.activeElement.id), 'field-load-allowable_stress_mpa');
@@ -331,7 +331,8 @@ test('law, clearance, capacity, tolerance and wind-up are asked for in the form 
   assert.deepEqual(design, {
     ...example,
     load: { input_torque_nm: 20, allowable_stress_mpa: 1500 },
-    model: { compatibility: 'virtual_work', stiffness: { law: 'palmgren' }, clearance: { ring_um: 4, carrier_um: 1.5 } },
+    model: { compatibility: 'virtual_work', stiffness: { law: 'palmgren' } },
+    parts: { ring: { clearance_um: 4 }, carrier: { clearance_um: 1.5 } },
     sweep: { wind_up: true, tolerance: 1e-7 },
   });
   await assertShows(design);
@@ -360,7 +361,7 @@ test('law, clearance, capacity, tolerance and wind-up are asked for in the form 
   assert.match(await limit.textContent(), new RegExp(capacity.limited_by.replace('_', ' ')));
   // Each has its reference and its difference.
   await page.click('#keep');
-  await enter(page, '/model/clearance/ring_um', 8);
+  await enter(page, '/parts/ring/clearance_um', 8);
   assert.match(await page.locator('#table tr', { hasText: 'Most wind-up' }).textContent(), /deg.*deg\+.*%/);
   assert.match(await page.locator('#table tr', { hasText: 'Output torque' }).textContent(), /N·m.*N·m[−+].*%/);
   // What only one of both has asked for is a dash for the other, without a unit.
@@ -372,8 +373,8 @@ test('law, clearance, capacity, tolerance and wind-up are asked for in the form 
   await page.selectOption(field('/load'), 'output_torque_nm');
   await page.selectOption(field('/sweep'), 'samples');
   await page.uncheck(field('/sweep/wind_up'));
-  await enter(page, '/model/clearance/ring_um', '');
-  await enter(page, '/model/clearance/carrier_um', '');
+  await enter(page, '/parts/ring/clearance_um', '');
+  await enter(page, '/parts/carrier/clearance_um', '');
   const back = await designOf(page);
   assert.deepEqual(back.load, { output_torque_nm: 280, allowable_stress_mpa: 1500 });
   assert.deepEqual(back.sweep, { samples: 50 });
@@ -383,7 +384,7 @@ test('law, clearance, capacity, tolerance and wind-up are asked for in the form 
 
 test('new findings explain themselves, new reasons stand at their fields', async () => {
   page = await open(browser, server);
-  await enter(page, '/model/clearance/ring_um', 3);
+  await enter(page, '/parts/ring/clearance_um', 3);
   await page.click(`${notes('/model/stiffness')} .finding`);
   assert.match(await page.textContent(notes('/model/stiffness')), /Linear law is too stiff.*What is tested.*µm against.*µm.*johnson/);
   await page.selectOption(field('/model/stiffness'), 'palmgren');
@@ -392,10 +393,10 @@ test('new findings explain themselves, new reasons stand at their fields', async
   assert.match(await page.textContent(notes('/model/stiffness')), /Palmgren’s law is for steel, ring/);
   await choose(page, 'ring-with-more-teeth');
   await page.selectOption(field('/model/compatibility'), 'projection');
-  await enter(page, '/model/clearance/carrier_um', 2);
-  assert.match(await page.textContent(notes('/model/clearance/carrier_um')), /negatively.*virtual_work/);
-  assert.equal(await page.getAttribute(field('/model/clearance/carrier_um'), 'aria-invalid'), 'true');
-  await page.click(`${notes('/model/clearance/carrier_um')} button:has-text("Set to 0")`);
+  await enter(page, '/parts/carrier/clearance_um', 2);
+  assert.match(await page.textContent(notes('/parts/carrier/clearance_um')), /negatively.*virtual_work/);
+  assert.equal(await page.getAttribute(field('/parts/carrier/clearance_um'), 'aria-invalid'), 'true');
+  await page.click(`${notes('/parts/carrier/clearance_um')} button:has-text("Set to 0")`);
   await settled(page);
   assert.ok(await page.isHidden('#impossible'));
   // Two of which only one may be given.
@@ -417,7 +418,7 @@ test('new findings explain themselves, new reasons stand at their fields', async
 
 test('with clearance, teeth that carry nothing are drawn and told so', async () => {
   page = await open(browser, server);
-  await enter(page, '/model/clearance/ring_um', 20);
+  await enter(page, '/parts/ring/clearance_um', 20);
   const design = await designOf(page);
   const { sweep } = await server.answers(design);
   await page.locator('#angle').fill('0');
@@ -1041,7 +1042,7 @@ for (const [name, options] of Object.entries({
     await choose(page, 'paper-5.2');
     await measure();
     await enter(page, '/load/allowable_stress_mpa', 1500);
-    await enter(page, '/model/clearance/ring_um', 2);
+    await enter(page, '/parts/ring/clearance_um', 2);
     for (const details of await page.$$('main details:not([open]) > summary')) if (await details.isVisible()) await details.click();
     await page.check(field('/sweep/wind_up'));
     await enter(page, BORE, 100);
@@ -1078,12 +1079,11 @@ const OF_DRAWINGS = ['groove_not_drawn', 'tooth_leaves_slot', 'thin_wall_as_made
 
 /** Designs with much to report, which together have every finding of a sweep. */
 const NO_STEEL = { wave_generator: { youngs_modulus_gpa: 70 }, ring: { youngs_modulus_gpa: 120 }, carrier: { youngs_modulus_gpa: 110 } };
-const CLEARANCE = { wave_generator_um: 2, ring_um: 5, carrier_um: 1 };
 const LONG_REPORTS = [
   {
     drive: { wave_generator: { semi_major_mm: 58, semi_minor_mm: 56 }, teeth: { radius_mm: 7, width_mm: 5, count: 28, installed: 28 }, ring: { teeth: 26, tip_radius_mm: 60 } },
     load: { input_torque_nm: 60, allowable_stress_mpa: 1500 },
-    model: { compatibility: 'virtual_work', stiffness: { law: 'linear' }, clearance: CLEARANCE },
+    model: { compatibility: 'virtual_work', stiffness: { law: 'linear' } },
     materials: { ring: { youngs_modulus_gpa: 120 } },
     sweep: { wind_up: true },
     parts: PARTS,
@@ -1091,7 +1091,7 @@ const LONG_REPORTS = [
   {
     drive: { wave_generator: { semi_major_mm: 58, semi_minor_mm: 46 }, teeth: { radius_mm: 4, width_mm: 2, count: 28, installed: 14 }, ring: { teeth: 30, tip_radius_mm: 57.23 } },
     load: { input_torque_nm: 200, allowable_stress_mpa: 1500 },
-    model: { compatibility: 'virtual_work', stiffness: { law: 'palmgren' }, clearance: CLEARANCE },
+    model: { compatibility: 'virtual_work', stiffness: { law: 'palmgren' } },
     materials: NO_STEEL,
     sweep: { wind_up: true },
     parts: PARTS,
@@ -1099,7 +1099,7 @@ const LONG_REPORTS = [
   {
     drive: { wave_generator: { semi_major_mm: 58, semi_minor_mm: 56 }, teeth: { radius_mm: 7, width_mm: 5, count: 28, installed: 28 }, ring: { teeth: 26, tip_radius_mm: 70.5 } },
     load: { input_torque_nm: 60, allowable_stress_mpa: 1500 },
-    model: { compatibility: 'virtual_work', stiffness: { law: 'palmgren' }, clearance: CLEARANCE },
+    model: { compatibility: 'virtual_work', stiffness: { law: 'palmgren' } },
     materials: NO_STEEL,
     sweep: { wind_up: true },
     parts: PARTS,
@@ -1132,7 +1132,9 @@ const OTHER_REPORTS = {
   },
   slender_fingers: { drive: CASE_5_1, load: { input_torque_nm: 20 }, parts: { carrier: { fingers: 'held_at_one_end' } } },
   soft_rim: { drive: CASE_5_1, load: { input_torque_nm: 20 }, parts: { ring: { rim: 'free' } } },
-  projection_with_gap: { drive: CASE_5_1, load: { input_torque_nm: 20 }, model: { compatibility: 'projection', clearance: { ring_um: 10 } } },
+  projection_with_gap: { drive: CASE_5_1, load: { input_torque_nm: 20 }, model: { compatibility: 'projection' }, parts: { ring: { clearance_um: 10 } } },
+  deprecated_field: { drive: CASE_5_1, load: { input_torque_nm: 20 }, model: { wave_generator_moves: false } },
+  set_back_twice: { drive: CASE_5_1, load: { input_torque_nm: 20 }, parts: { ring: { clearance_um: 1 } }, modification: { ring_equidistant_um: 1 } },
   johnson_beyond_half_width: { drive: CASE_5_1, load: { input_torque_nm: 2000 } },
   friction_beyond_measured: { drive: CASE_5_1, load: { input_torque_nm: 20 }, friction: rubbing(0.2) },
   efficiency_uncertain: { drive: CASE_5_1, load: { input_torque_nm: 20 }, friction: rubbing(0.03) },
@@ -1142,7 +1144,7 @@ const OTHER_REPORTS = {
     friction: { wave_generator: { kind: 'rolling', bearing_coefficient: 0.0015, bearing_radius_mm: 25, bearing_load_rating_n: 3000 }, ring: { coefficient: 0.02 }, carrier: { coefficient: 0.02 } },
   },
   stress_above_allowable: { drive: CASE_5_1, load: { input_torque_nm: 20, allowable_stress_mpa: 500 } },
-  wind_up_beyond_model: { drive: CASE_5_1, load: { input_torque_nm: 20 }, model: { ...VIRTUAL_WORK, clearance: { carrier_um: 1000 } } },
+  wind_up_beyond_model: { drive: CASE_5_1, load: { input_torque_nm: 20 }, model: VIRTUAL_WORK, parts: { carrier: { clearance_um: 1000 } } },
 };
 
 async function pagesOfReport() {

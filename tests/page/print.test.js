@@ -80,7 +80,7 @@ test('no head stands alone at the foot of a page', async () => {
     await bed.server.example('paper-5.1'),
     base,
     { ...base, sweep: { wind_up: true } },
-    { ...base, sweep: { wind_up: true }, load: { ...base.load, allowable_stress_mpa: 1500 }, model: { compatibility: 'virtual_work', clearance: { ring_um: 2 } } },
+    { ...base, sweep: { wind_up: true }, load: { ...base.load, allowable_stress_mpa: 1500 }, model: { compatibility: 'virtual_work' }, parts: { ring: { clearance_um: 2 } } },
   ]) {
     await setDocument(page, design);
     const pages = await printed(page);

@@ -70,7 +70,7 @@ test('where a key is wanted the page asks for it, keeps it in memory alone and g
 
 test('of very many input angles those are drawn that can be told apart, and the table has them all', async () => {
   const page = await bed.open();
-  const design = { ...(await bed.server.example('paper-5.2')), model: { compatibility: 'virtual_work', clearance: { ring_um: 1 } }, sweep: { samples: 4000 } };
+  const design = { ...(await bed.server.example('paper-5.2')), model: { compatibility: 'virtual_work' }, parts: { ring: { clearance_um: 1 } }, sweep: { samples: 4000 } };
   const found = await page.evaluate(async (asked) => {
     const { read } = await import('/page/answers.js');
     const { Motion } = await import('/page/motion.js');

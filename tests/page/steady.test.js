@@ -176,7 +176,7 @@ test('on a small screen the tools take one row, and views and tools one on a wid
 test('at 320 px nothing is wider than the screen, and every target is 24 px', async () => {
   const page = await bed.open({ viewport: { width: 320, height: 640 } });
   await page.click('#keep');
-  await setDocument(page, { ...(await bed.server.example('paper-5.2')), sweep: { wind_up: true }, model: { compatibility: 'virtual_work', stiffness: { law: 'fixed', wave_generator_n_per_mm: 5e5, ring_n_per_mm: 5e5, carrier_n_per_mm: 5e5 }, clearance: { ring_um: 1 } }, load: { input_torque_nm: 3, allowable_stress_mpa: 1500 } });
+  await setDocument(page, { ...(await bed.server.example('paper-5.2')), sweep: { wind_up: true }, model: { compatibility: 'virtual_work', stiffness: { law: 'fixed', wave_generator_n_per_mm: 5e5, ring_n_per_mm: 5e5, carrier_n_per_mm: 5e5 } }, parts: { ring: { clearance_um: 1 } }, load: { input_torque_nm: 3, allowable_stress_mpa: 1500 } });
   for (const details of await page.$$('main details:not([open]) > summary')) if (await details.isVisible()) await details.click();
   const seen = () =>
     page.evaluate(() => ({

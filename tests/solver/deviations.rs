@@ -3,7 +3,6 @@
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
-use std::sync::Mutex;
 
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::gaps::Runout;
@@ -13,7 +12,7 @@ use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::sweep::{self, Points, Sweep};
 use toothwave_solver::{
     ContactLaw, Deviations, Drive, DriveParameters, LoadCase, LoadParameters, Modification, Never, Parameter,
-    PerContact, SolveError, Stop, ToothShape, Violation, WaveGenerator,
+    PerContact, SolveError, ToothShape, Violation, WaveGenerator,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2_BORED, drive, ellipse, everywhere, load, swept};
@@ -385,47 +384,6 @@ fn a_sweep_to_a_tolerance_of_sixteen_million_unlike_laps_is_refused_before_they_
     let points = Points::tolerance(1e-3, 1_000_000).unwrap();
     let refused = swept_with(&drive, &load(20.0, VirtualWork), &deviations, points);
     assert_eq!(refused.err(), Some(SolveError::TooManyStates { limit: 1_000_000 }));
-}
-
-/// Has room for so many input angles, and notes what was asked.
-struct Room {
-    most: u64,
-    asked: Mutex<Vec<u64>>,
-}
-
-impl Stop for Room {
-    fn stopped(&self) -> bool {
-        false
-    }
-
-    fn has_room_for(&self, input_angles: u64) -> bool {
-        self.asked.lock().unwrap().push(input_angles);
-        input_angles <= self.most
-    }
-}
-
-/// From the first moments of the first lap on, long before all laps are laid out.
-#[test]
-fn a_search_asks_for_room_for_every_input_angle_before_it_has_it() {
-    let unlike = Deviations { slot_wall_um: (0..28).map(f64::from).collect(), ..Deviations::default() };
-    let tolerance = Points::tolerance(1e-6, 1_000_000).unwrap();
-    let load = LoadCase::new(&load(20.0, VirtualWork)).unwrap();
-    let swept_within = |most: u64| {
-        let room = Room { most, asked: Mutex::default() };
-        let swept = sweep::sweep_with_deviations(&drive(&PAPER_5_1), &load, &unlike, tolerance, &room);
-        (swept, room.asked.into_inner().unwrap())
-    };
-    let (swept, asked) = swept_within(u64::MAX);
-    let listed = swept.unwrap().input_angles.input_angle_deg.len() as u64;
-    assert!(asked.windows(2).all(|pair| pair[0] < pair[1]));
-    let (first, last) = (asked[0], asked[asked.len() - 1]);
-    assert!(first <= 17 && first * 28 < listed && listed <= last, "{first} {listed} {last}");
-    for most in [0, first, last - 1] {
-        let (refused, asked) = swept_within(most);
-        assert_eq!(refused.err(), Some(SolveError::Stopped));
-        assert!(asked.iter().all(|&angles| angles <= most || angles == asked[asked.len() - 1]), "{asked:?}");
-    }
-    assert!(swept_within(last).0.is_ok());
 }
 
 #[test]

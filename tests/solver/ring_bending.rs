@@ -92,6 +92,20 @@ fn a_bend_knows_no_scale() {
     }
 }
 
+/// The last ring is remembered.
+#[test]
+fn a_remembered_ring_bends_as_a_new_one() {
+    let (one, other) = (drive(&PAPER_5_2), drive(&PAPER_5_2_BORED));
+    let new = |drive| RingBending::new(drive, &Material::STEEL).unwrap();
+    let first = new(&one);
+    let remembered = new(&one);
+    let between = new(&other);
+    assert_eq!((first, remembered), (new(&one), first));
+    assert_ne!(between, first);
+    let softer = Material { poissons_ratio: 0.45, ..Material::STEEL };
+    assert_ne!(RingBending::new(&one, &softer).unwrap(), first);
+}
+
 /// By virtual work with stiffnesses of the designer's own there is one equation: each force is what is turned, by its arm, over the sum of what gives way.
 #[test]
 fn a_bend_stands_in_the_load_sharing_as_a_compliance_at_the_ring() {

@@ -6,8 +6,6 @@ use std::sync::{Arc, Mutex};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use toothwave_calculation::forms::{Format, Forms as _};
-use toothwave_calculation::question::Question as _;
-use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::{Never, Stop};
 use toothwave_study::{Gathered, Part, Study, Work};
 

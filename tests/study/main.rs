@@ -6,6 +6,7 @@
 )]
 
 mod asking;
+mod defaults;
 mod deviations;
 mod engine;
 mod maps;

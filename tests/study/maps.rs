@@ -8,7 +8,7 @@ use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::Never;
 use toothwave_study::Study;
 
-use crate::asking::{CALCULATION, LIMITS, answer, faulty, gathered, paper, study, text, with};
+use crate::asking::{CALCULATION, LIMITS, answer, faulty, gathered, paper, text, with};
 
 fn map(over: Value, quantities: Value) -> Value {
     json!({ "study": "map", "base": paper(), "over": over, "quantities": quantities })

@@ -566,10 +566,9 @@ fn what_a_quantity_is_not_said_to_depend_on_leaves_it_as_it_is() {
         "drive": { "wave_generator": { "semi_major_mm": 58.0, "semi_minor_mm": 56.0 }, "teeth": { "count": 28, "radius_mm": 5.0, "width_mm": 15.0 }, "ring": { "teeth": 26 } },
         "load": { "input_torque_nm": 20.0, "input_speed_rpm": 1000.0, "allowable_stress_mpa": 1500.0 },
         "materials": { "ring": { "youngs_modulus_gpa": 210.0, "poissons_ratio": 0.3 } },
-        "model": { "clearance": { "ring_um": 5.0 } },
         "modification": { "slot_wall_um": 1.0 },
         "friction": { "wave_generator": { "kind": "plain", "coefficient": 0.05 }, "ring": { "coefficient": 0.05 }, "carrier": { "coefficient": 0.05 } },
-        "parts": { "ring": { "clearance_um": 5.0 } },
+        "parts": { "ring": { "clearance_um": 5.0 }, "teeth": { "clearance_um": 1.0 } },
         "profile": { "chord_tolerance_mm": 0.001 },
         "sweep": { "samples": 16 }
     });
@@ -580,7 +579,7 @@ fn what_a_quantity_is_not_said_to_depend_on_leaves_it_as_it_is() {
         "/load/input_torque_nm",
         "/load/allowable_stress_mpa",
         "/materials/ring/youngs_modulus_gpa",
-        "/model/clearance/ring_um",
+        "/parts/teeth/clearance_um",
         "/modification/slot_wall_um",
         "/friction/ring/coefficient",
         "/parts/ring/clearance_um",

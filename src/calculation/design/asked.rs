@@ -74,7 +74,7 @@ pub enum ExtentDocument {
 }
 
 /// The parts as they are made. A part's clearance sets its working surface back into the part along the surface's normal; the
-/// gap at a contact is the sum of its two parts' clearances. Forces are computed with the gaps of `model.clearance`, not with these.
+/// gap at a contact is the sum of its two parts' clearances, in drawings and forces alike.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct PartsDocument {
@@ -89,10 +89,10 @@ pub struct PartsDocument {
 }
 
 impl PartsDocument {
-    /// What of them a load's answer hangs on: all that stands behind the teeth's contacts.
-    pub(crate) fn behind_contacts(&self) -> impl Encode + '_ {
-        let Self { wave_generator, ring, carrier, teeth: _ } = self;
-        (wave_generator, ring, ring.rim, carrier, carrier.fingers)
+    /// What of them a load's answer depends on: gaps, and what stands behind the contacts.
+    pub(crate) fn under_load(&self) -> impl Encode + '_ {
+        let Self { wave_generator, teeth, ring, carrier } = self;
+        (wave_generator, teeth, ring, ring.rim, carrier, carrier.fingers)
     }
 }
 

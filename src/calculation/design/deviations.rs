@@ -1,8 +1,8 @@
 //! Single items of the parts as they came out.
 
 use serde::{Deserialize, Serialize};
-use toothwave_solver::PerContact;
 use toothwave_solver::gaps::{Deviations, Runout};
+use toothwave_solver::{DriveParameters, PerContact};
 use utoipa::ToSchema;
 
 use crate::key::encoded;
@@ -49,6 +49,25 @@ pub struct RunoutDocument {
     /// In which direction.
     #[schema(minimum = -360.0, maximum = 360.0, default = 0.0)]
     pub angle_deg: f64,
+}
+
+impl DeviationsDocument {
+    /// Empties each list that has a zero for every item, which says the same.
+    pub(super) fn leave_out_zeros(&mut self, drive: &DriveParameters) {
+        let lobes = drive.wave_generator.lobes();
+        for (list, items) in [
+            (&mut self.tooth_radius_um, drive.installed),
+            (&mut self.slot_angle_arcsec, drive.installed),
+            (&mut self.slot_wall_um, drive.installed),
+            (&mut self.ring_space_um, drive.ring_teeth),
+            (&mut self.ring_space_angle_arcsec, drive.ring_teeth),
+            (&mut self.wave_generator_lobe_um, lobes),
+        ] {
+            if usize::try_from(items) == Ok(list.len()) && list.iter().all(|&value| value == 0.0) {
+                list.clear();
+            }
+        }
+    }
 }
 
 impl From<&DeviationsDocument> for Deviations {

@@ -238,6 +238,15 @@ impl LengthsByContactDocument {
 }
 
 impl TeethDocument {
+    /// Writes `installed` out where it is left out.
+    pub(super) fn install_all_by_default(&mut self) {
+        let count = self.counted().count;
+        let (Self::Cylinder(CylinderDocument { installed, .. })
+        | Self::Ball(BallDocument { installed, .. })
+        | Self::FlatSided(FlatSidedDocument { installed, .. })) = self;
+        installed.get_or_insert(count);
+    }
+
     pub(super) const fn counted(&self) -> Counted {
         match *self {
             Self::Cylinder(CylinderDocument { count, installed, radius_mm, .. })

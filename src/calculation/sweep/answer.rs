@@ -6,6 +6,7 @@ use toothwave_solver::{Drive, PerContact};
 use utoipa::ToSchema;
 
 use crate::coincidence_degree::TeethInMeshAnswer;
+use crate::design::ModelDocument;
 use crate::findings::FindingAnswer;
 use crate::sweep::backing::EstimateAnswer;
 use crate::sweep::contact::ContactName;
@@ -63,6 +64,8 @@ pub struct SweepAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub radial_force_n: Option<RadialForceAnswer>,
+    /// The complete model that was used: in the place of the document's `model` it gives the same answer.
+    pub model: ModelDocument,
     /// How far the model is off elastic bodies.
     pub model_error: ModelErrorAnswer,
     /// What gives way behind the contacts, estimated from the document's `parts`, each a number for `model.series_compliance_mm_per_n`; nothing of it is in the
@@ -144,11 +147,11 @@ pub struct StatesAnswer {
     pub force_carrier_n: Vec<f64>,
     /// Hertz stress σ_H between tooth and wave generator.
     pub stress_wave_generator_mpa: Vec<f64>,
-    /// Hertz stress σ_K between tooth and ring; 0 at a corner (`model.corner_contact`), of which none is told.
+    /// Hertz stress σ_K between tooth and ring; 0 at a corner (`corner_contact`), of which none is told.
     pub stress_ring_mpa: Vec<f64>,
     /// Hertz stress σ_S between tooth and carrier.
     pub stress_carrier_mpa: Vec<f64>,
-    /// Whether the tooth carries load, given `model.clearance` or `model.corner_contact`.
+    /// Whether the tooth carries load, where there are gaps or `corner_contact`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub loaded: Option<Vec<bool>>,

@@ -32,7 +32,8 @@ pub struct LossesAnswer {
     pub by_input_angle: LossesByInputAngleAnswer,
 }
 
-/// Losses over the period; over all points of a duty, as `duty` has it.
+/// Losses over the period; over all points of a duty, as `duty` has it. Of a sweep to a tolerance the means keep it, relative to the whole loss but to 1e-10 at
+/// the finest; wear, the bearing's load and the products of pressure and velocity are those of the listed input angles.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct LossTotalsAnswer {
     /// Efficiency over the period.

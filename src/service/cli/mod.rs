@@ -7,7 +7,7 @@ mod study;
 use std::ffi::OsString;
 use std::io::{self, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -17,6 +17,7 @@ use tokio::runtime::Builder;
 use tokio::signal::unix::{SignalKind, signal};
 use toothwave_calculation::accuracy::Accuracy;
 use toothwave_calculation::coincidence_degree::CoincidenceDegree;
+use toothwave_calculation::convert::converted;
 use toothwave_calculation::drawing::Drawing;
 use toothwave_calculation::drawing::answer::DrawnPart;
 use toothwave_calculation::forms::Format;
@@ -30,7 +31,7 @@ use crate::http::problem::Problem;
 use crate::http::{router, server};
 use crate::ops::config::Settings;
 use crate::ops::{keys, log};
-use offline::{FORMATS, PARTS, answer, one_of, print};
+use offline::{FORMATS, PARTS, answer, one_of, print, read};
 
 /// The exit status of bad input, as most tools have it.
 const EXIT_BAD_INPUT: u8 = 2;
@@ -84,6 +85,11 @@ enum Command {
         /// Form of the answer
         #[arg(long, value_parser = one_of(&FORMATS), default_value = "json")]
         format: Format,
+    },
+    /// Print a document without its deprecated fields
+    Convert {
+        /// A design document or a study document, or `-` for standard input
+        file: PathBuf,
     },
     /// Commands of earlier builds
     #[command(hide = true, aliases = ["migrate"])]
@@ -158,6 +164,7 @@ pub fn run() -> ExitCode {
         Command::Draw { part, file, format } => answer(Drawing(part), &file, format),
         Command::Batch { file, endpoint, peaks_only } => batch::run(&file, BatchQuery { endpoint, peaks_only }),
         Command::Study { file, format } => study::run(&file, format),
+        Command::Convert { file } => convert(&file),
         Command::Worker { .. } => Err(Failure::BadInput(
             "the commands `worker` and `migrate` were removed: `toothwave --studies FILE` computes its studies itself"
                 .into(),
@@ -240,6 +247,11 @@ fn run_service(settings: &Settings) -> Result<(), Failure> {
     // A computation that runs past its bound must not hold up the exit.
     runtime.shutdown_background();
     Ok(result?)
+}
+
+fn convert(file: &Path) -> Result<(), Failure> {
+    let document = converted(&read(file)?).map_err(Problem::from)?;
+    print(|writer| writeln!(writer, "{document}"))
 }
 
 fn new_key(name: &str) -> Result<(), Failure> {

@@ -18,14 +18,10 @@ const choice = (pointer, label, options, more) => ({ kind: 'choice', pointer, la
 const unlessSaid = (pointer, label, options) => choice(pointer, label, [{ value: '', label: 'not said' }, ...options]);
 /** What a document says with `true`, or, where it `starts` with an object, by having that object. */
 const flag = (pointer, label, more) => ({ kind: 'flag', pointer, label, ...more });
-/** What the service decides by the drive unless the document does. */
-const unlessDecided = (pointer, label) =>
-  choice(pointer, label, [{ value: '', label: 'left to the service' }, { value: true, label: 'yes' }, { value: false, label: 'no' }]);
 const variant = (pointer, tag, label, options, more) => ({ kind: 'variant', pointer, tag, label, options, ...more });
 
-/** Clearance at a contact; without any, the document has no clearance at all. */
-const clearance = (contact, label, symbol) =>
-  number(`/model/clearance/${contact}_um`, label, symbol, 'µm', { slider: WIDE, optional: () => 'none', step: 1 });
+/** How far a part is set back from the one without gaps: drawn, and open at its contact until the load closes it. */
+const clearance = (part, label) => number(`/parts/${part}/clearance_um`, label, '', 'µm', { slider: WIDE, optional: () => 'none', step: 1 });
 
 /** Steel, as the service fills in what a document leaves out. */
 const material = (part, label) => ({
@@ -36,10 +32,6 @@ const material = (part, label) => ({
     number(`/materials/${part}/poissons_ratio`, 'Poisson’s ratio', 'ν', '', { preset: 0.3, of: label, step: 0.01 }),
   ],
 });
-
-/** How far a part as it is made is set back from the one that the mechanics know. */
-const setBack = (part, label, what) =>
-  number(`/parts/${part}/clearance_um`, what, 'c', 'µm', { of: label, optional: () => '0', step: 1 });
 
 /** A radius that the mechanics leave free, with what is taken where it is left out. */
 const freeRadius = (part, label, key, what, symbol, otherwise) => number(`/parts/${part}/${key}_mm`, what, symbol, 'mm', { of: label, optional: () => otherwise });
@@ -399,9 +391,10 @@ export const GROUPS = [
           fields: [stiffness('wave_generator', 'At the wave generator', 'k_H'), stiffness('ring', 'At the ring', 'k_K'), stiffness('carrier', 'At the carrier', 'k_S')],
         },
       ], { otherwise: lawOf, adjust: withLaw }),
-      clearance('wave_generator', 'Clearance at the wave generator', 'c_H'),
-      clearance('ring', 'Clearance at the ring', 'c_K'),
-      clearance('carrier', 'Clearance at the carrier', 'c_S'),
+      clearance('wave_generator', 'Clearance of the wave generator'),
+      clearance('ring', 'Clearance of the ring'),
+      clearance('carrier', 'Clearance of each slot wall'),
+      clearance('teeth', 'Clearance of the teeth in radius'),
     ],
   },
   {
@@ -425,15 +418,21 @@ export const GROUPS = [
     summary: (design) => (Object.values(at(design, '/model/series_compliance_mm_per_n') ?? {}).some((value) => value) ? 'given' : 'nothing'),
     fields: [
       compliance('wave_generator', 'Compliance, wave generator'), compliance('ring', 'Compliance, ring'), compliance('carrier', 'Compliance, carrier'),
-      unlessDecided('/model/ring_teeth_bend', 'The ring’s teeth bend, the more the nearer to their tips'),
-      unlessDecided('/model/wave_generator_moves', 'The wave generator moves on under its teeth as it winds up'),
-      flag('/model/corner_contact', 'Teeth meet the corners of pointed or bored tips before they come to the flank'),
+      choice('/model/refinements', 'Refinements', [
+        { value: '', label: 'by the geometry' },
+        { value: 'none', label: 'none' },
+        { value: ['auto', 'corner_contact'], label: 'by the geometry, and teeth meet the corners of tips' },
+        { value: ['ring_teeth_bend'], label: 'the ring’s teeth bend' },
+        { value: ['wave_generator_moves'], label: 'the wave generator moves on' },
+        { value: ['ring_teeth_bend', 'wave_generator_moves'], label: 'the ring’s teeth bend, the wave generator moves on' },
+        { value: ['ring_teeth_bend', 'wave_generator_moves', 'corner_contact'], label: 'all three' },
+      ]),
     ],
   },
   {
     title: 'Modification',
     pointer: '/modification',
-    hint: 'Deliberate changes, alike for all teeth. A positive value opens clearance; a negative value needs clearance elsewhere. Only virtual work takes it.',
+    hint: 'Deliberate changes, alike for all teeth. A positive value opens clearance; a negative value needs clearance elsewhere: the clearances of the parts. Only virtual work takes it.',
     summary: (design) => (isGiven(at(design, '/modification')) ? 'given' : 'none'),
     fields: [
       modified('ring_equidistant_um', 'Ring set back', 'Δ_K'),
@@ -480,7 +479,7 @@ export const GROUPS = [
   {
     title: 'Parts as they are made',
     pointer: '/parts',
-    hint: 'Drawings read these, and what is estimated to give way behind the contacts; forces are computed with the gaps and compliances of the model, those on flat-sided teeth with the carrier’s radii too. The gap at a contact is the sum of its two parts’ clearances.',
+    hint: 'Drawings read these, and what is estimated to give way behind the contacts; forces on flat-sided teeth read the carrier’s radii too.',
     summary: (design) => {
       const given = Object.values(at(design, '/parts') ?? {}).flatMap((part) => Object.values(part ?? {})).filter((value) => value !== null);
       return given.length === 0 ? 'defaults' : `${given.length} given`;
@@ -490,15 +489,12 @@ export const GROUPS = [
         title: 'Wave generator',
         fields: [
           freeRadius('wave_generator', 'Wave generator', 'bore_radius', 'Bore radius', 'R_i', 'no bore'),
-          setBack('wave_generator', 'Wave generator', 'Clearance inward'),
         ],
       },
-      { title: 'Teeth', fields: [setBack('teeth', 'Teeth', 'Clearance in radius')] },
       {
         title: 'Ring',
         fields: [
           freeRadius('ring', 'Ring', 'outer_radius', 'Outer radius', 'R_o', '1.2 × root'),
-          setBack('ring', 'Ring', 'Clearance outward'),
           unlessSaid('/parts/ring/rim', 'Around its rim', [
             { value: 'housed', label: 'a rigid housing' },
             { value: 'free', label: 'nothing' },
@@ -511,7 +507,6 @@ export const GROUPS = [
         fields: [
           freeRadius('carrier', 'Carrier', 'inner_radius', 'Inner radius', 'R_i', 'tenth free'),
           freeRadius('carrier', 'Carrier', 'outer_radius', 'Outer radius', 'R_o', 'tenth free'),
-          setBack('carrier', 'Carrier', 'Clearance per wall'),
           unlessSaid('/parts/carrier/fingers', 'Its fingers are held', [
             { value: 'held_at_both_ends', label: 'at both ends' },
             { value: 'held_at_one_end', label: 'at one end' },

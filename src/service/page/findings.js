@@ -149,6 +149,18 @@ const KINDS = {
     basis: ['measured', 'The limit lies between drives that were calculated as elastic bodies.'],
     why: 'The tooth that has just entered errs by more than the largest.',
   },
+  deprecated_field: {
+    title: 'Deprecated field',
+    tests: 'Whether the document has a field that the next version will not know.',
+    basis: ['documentation', 'docs/migration.md names what takes its place.'],
+    why: 'The answer is right, and the next version will refuse the document.',
+  },
+  set_back_twice: {
+    title: 'Surface set back twice',
+    tests: 'What clearance and modification together set a surface back by, against the clearance alone.',
+    basis: ['documentation', 'The two add up, as the document says.'],
+    why: 'A gap that is entered in both places is twice as large as meant.',
+  },
   projection_with_gap: {
     title: 'Projection with clearance',
     tests: 'The largest clearance of a contact against none.',

@@ -3,6 +3,7 @@
 
 import * as access from './access.js';
 import { Accuracy } from './accuracy.js';
+import { CONVERTED, converted } from './convert.js';
 import { changed, isSame, withVirtualWork } from './design.js';
 import { html, oncePerFrame, setAttributes, setChildren, setProperties, setText } from './dom.js';
 import { Drawings } from './drawings.js';
@@ -557,8 +558,10 @@ async function copy(text, button) {
 function applyText(text, fileName) {
   const error = byId('document-error');
   try {
-    const design = share.fromText(text);
+    const read = share.fromText(text);
+    const design = converted(read);
     setDesign(design, { origin: fileName === undefined ? state.origin : { title: share.titleOfFile(fileName), design }, respan: true });
+    if (design !== read) notify(CONVERTED);
     error.hidden = true;
     byId('document').close();
   } catch (failure) {
@@ -762,7 +765,9 @@ function reported() {
 function fromAddress({ atStart = false } = {}) {
   // A place in the page is no design.
   if (location.hash && document.getElementById(location.hash.slice(1))) return false;
-  const { design, reference, view, broken } = share.fromAddress(location.hash);
+  const found = share.fromAddress(location.hash);
+  const [design, reference] = [found.design, found.reference].map((read) => read && converted(read));
+  const { view, broken } = found;
   views.show(view, true);
   if (broken.includes('design')) {
     const instead = atStart ? 'A ready design is shown instead' : 'Your design is kept';
@@ -771,6 +776,7 @@ function fromAddress({ atStart = false } = {}) {
   }
   if (broken.includes('reference')) notify('This link is damaged or was cut short: its design is shown, but the reference cannot be read from it.');
   if (reference && !isSame(reference, state.reference?.design)) keepReference({ design: reference, origin: null }, undefined, { keepsAddress: true });
+  if (design !== found.design || reference !== found.reference) notify(CONVERTED);
   const example = design && state.examples.find((candidate) => isSame(candidate.design, design));
   if (design) setDesign(design, { origin: example ? originOf(example) : null, respan: true, keepsAddress: broken.length > 0 });
   return design !== undefined;

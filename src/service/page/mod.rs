@@ -50,6 +50,7 @@ const ASSETS: &[Asset] = assets![
     "answers.js" as SCRIPT,
     "ask.js" as SCRIPT,
     "chart.js" as SCRIPT,
+    "convert.js" as SCRIPT,
     "design.js" as SCRIPT,
     "dom.js" as SCRIPT,
     "drawings.js" as SCRIPT,

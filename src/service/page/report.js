@@ -9,7 +9,7 @@ import { linesOf } from './lines.js';
 
 function shownValue(field, design) {
   const value = at(design, field.pointer);
-  const labelled = (wanted) => field.options.find((option) => option.value === wanted)?.label;
+  const labelled = (wanted) => field.options.find((option) => String(option.value) === String(wanted))?.label;
   // What has one kind alone is not told apart by it.
   if (field.kind === 'variant') return field.options.length > 1 ? labelled(kindOf(field, design)) : undefined;
   if (field.kind === 'choice') {

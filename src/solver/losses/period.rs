@@ -4,14 +4,17 @@ use crate::cam::ToothCenter;
 use crate::contact::{Contact, PerContact};
 use crate::drive::Drive;
 use crate::gaps::{Deviations, Gaps};
-use crate::load_sharing::{LoadCase, LoadedDrive};
+use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
 use crate::losses::bearing::{LoadForRevolutions, RollingElement};
 use crate::losses::duty::{ColumnForTime, mean_at_each_place};
 use crate::losses::wear::WearParameters;
 use crate::losses::{AtInputAngle, Friction, LoadedTooth, Mechanism, ToothSlip, mean_over_period};
+use crate::mesh::PlacedTooth;
 use crate::position::{Position, half_lobe_rad};
 use crate::ring::{FlankPoint, TipCorner};
 use crate::root::NotConverged;
+use crate::springs::WindUp;
+use crate::sweep::mean::means;
 use crate::sweep::{Peak, States, Sweep};
 use crate::{SolveError, Stop};
 
@@ -109,6 +112,48 @@ impl Losses {
             rolls,
             race_mm_per_rad,
         })
+    }
+
+    /// The same with the mean to a tolerance over the total, whatever the input angles of the sweep.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub fn with_mean_to(
+        self,
+        tolerance: f64,
+        drive: &Drive,
+        load: &LoadCase,
+        deviations: &Deviations,
+        friction: &Friction,
+        stop: &dyn Stop,
+    ) -> Result<Self, SolveError> {
+        let loaded = if deviations.is_nil() {
+            LoadedDrive::new(drive, load)?
+        } else {
+            LoadedDrive::deviating(drive, load, deviations)?
+        };
+        let mechanism = Mechanism { tells_items_apart: loaded.mesh().tells_items_apart(), ..Mechanism::of(drive) };
+        let input_torque_nmm = 1e3 * load.input_torque_nm(drive);
+        let corner = TipCorner::of(drive.ring_tooth())?;
+        let mut listed = Vec::new();
+        let work_over_torque =
+            |placed: &[PlacedTooth], teeth: &[ToothState], wind_up: &WindUp| -> Result<[f64; 4], SolveError> {
+                listed.clear();
+                for (PlacedTooth { lobe, .. }, tooth) in placed.iter().zip(teeth) {
+                    let force_n = loaded.forces_n(tooth, wind_up)?;
+                    let at_corner = corner.filter(|corner| corner.is_before_flank(&tooth.center.position));
+                    listed.push(LoadedTooth {
+                        corner: at_corner.map(|corner| corner.seen_from(&tooth.center)),
+                        ..LoadedTooth::new(*lobe, &tooth.center, &tooth.flank, force_n)
+                    });
+                }
+                let turning = mechanism.turning(friction, &listed);
+                let PerContact { wave_generator, ring, carrier } = turning.work_nmm_per_rad;
+                Ok([wave_generator, ring, carrier, turning.bearing_work_nmm_per_rad]
+                    .map(|work| work / input_torque_nmm))
+            };
+        let [wave_generator, ring, carrier, bearing] = means(&loaded, tolerance, work_over_torque, stop)?;
+        Ok(Self { mean: LossRatio { contacts: PerContact { wave_generator, ring, carrier }, bearing }, ..self })
     }
 
     /// The largest `p·v` of each contact over the states of the sweep that these losses belong to, at a turning of the wave generator

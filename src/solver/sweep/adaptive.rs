@@ -56,7 +56,7 @@ impl Moment {
     }
 
     /// Of a piece. A tooth that has reached the lobe has left.
-    fn of(piece: &Piece, fraction: f64) -> Self {
+    pub(crate) fn of(piece: &Piece, fraction: f64) -> Self {
         let exact = piece.exactly_at(fraction).next();
         Self { fraction, first: if fraction < 1.0 { 1 } else { 2 }, last: piece.places, exact }
     }

@@ -18,7 +18,7 @@
 mod centers;
 mod curve;
 mod gaps;
-mod lanes;
+pub(crate) mod lanes;
 mod laps;
 mod moments;
 mod pressures;

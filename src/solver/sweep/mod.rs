@@ -2,7 +2,8 @@
 
 mod adaptive;
 mod columns;
-mod fast;
+pub(crate) mod fast;
+pub(crate) mod mean;
 mod plain;
 mod plain_look;
 mod points;

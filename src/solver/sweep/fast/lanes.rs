@@ -1,12 +1,14 @@
 //! Elementary functions and columns without a branch or a call, so that the compiler makes vectors of them.
 
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+
 use pulp::Simd;
 
 /// States worked on in one stretch of straight code; a multiple of every vector's width.
 pub(super) const LANES: usize = 64;
 
 /// Doubles of the widest vector.
-pub(super) const VECTOR: usize = 8;
+pub(crate) const VECTOR: usize = 8;
 
 /// Terms of the arctangent's series at most. A drive that needs more goes the plain way.
 const MAX_TERMS: usize = 24;
@@ -29,13 +31,13 @@ const ARTANH: [f64; 9] =
 
 /// `ab + c`, rounded once where vectors can do that.
 #[inline(always)]
-pub(super) fn fused<V: Simd>(a: f64, b: f64, c: f64) -> f64 {
+pub(crate) fn fused<V: Simd>(a: f64, b: f64, c: f64) -> f64 {
     if V::IS_SCALAR { a * b + c } else { a.mul_add(b, c) }
 }
 
 /// `ln x` of a normal positive number, to two units of the last digit.
 #[inline(always)]
-pub(super) fn ln<V: Simd>(x: f64) -> f64 {
+pub(crate) fn ln<V: Simd>(x: f64) -> f64 {
     let shifted = x.to_bits().wrapping_add(FROM_ROOT_HALF);
     let exponent = f64::from_bits((shifted >> 52) | WHOLE.to_bits()) - (WHOLE + 1023.0);
     let mantissa = f64::from_bits((shifted & MANTISSA).wrapping_add(ROOT_HALF));
@@ -107,6 +109,42 @@ pub(super) fn ninth_root<V: Simd>(x: f64) -> f64 {
 #[inline(always)]
 pub(super) fn inverse_tenth_root<V: Simd>(x: f64) -> f64 {
     inverse_root::<V, 10>(x)
+}
+
+/// The coefficients of Cephes' `atan`, `x + x³ P(x²)/Q(x²)` up to 0.66.
+const ARCTANGENT_OVER: [f64; 5] = [
+    -8.750_608_600_031_904e-1,
+    -1.615_753_718_733_365e1,
+    -7.500_855_792_314_705e1,
+    -1.228_866_684_490_136_2e2,
+    -6.485_021_904_942_025e1,
+];
+const ARCTANGENT_UNDER: [f64; 6] = [
+    1.0,
+    2.485_846_490_142_306_3e1,
+    1.650_270_098_316_988_5e2,
+    4.328_810_604_912_903e2,
+    4.853_903_996_359_137e2,
+    1.945_506_571_482_614e2,
+];
+
+/// `atan2(y, x)`, not both of them 0, to two units of the last digit of its largest value.
+#[inline(always)]
+pub(crate) fn angle<V: Simd>(y: f64, x: f64) -> f64 {
+    const TAN_PI_8: f64 = 0.414_213_562_373_095_03;
+    let (rise, run) = (y.abs(), x.abs());
+    let is_steep = rise > run;
+    let (less, more) = if is_steep { (run, rise) } else { (rise, run) };
+    let is_far = less > TAN_PI_8 * more;
+    // tan(φ - π/4) = (t - 1)/(t + 1)
+    let t = if is_far { less - more } else { less } / if is_far { less + more } else { more };
+    let z = t * t;
+    let polynomial = |coefficients: &[f64]| coefficients.iter().fold(0.0, |sum, &next| fused::<V>(sum, z, next));
+    let series = fused::<V>(t * z, polynomial(&ARCTANGENT_OVER) / polynomial(&ARCTANGENT_UNDER), t);
+    let octant = if is_far { FRAC_PI_4 + series } else { series };
+    let quadrant = if is_steep { FRAC_PI_2 - octant } else { octant };
+    let half = if x < 0.0 { PI - quadrant } else { quadrant };
+    half.copysign(y)
 }
 
 /// How many terms of `atan q = q (1 - q²/3 + q⁴/5 - …)` reach the last digit for `0 ≤ q ≤ largest`.
@@ -208,6 +246,11 @@ mod tests {
             }
         }
         assert_eq!(cube_root::<V>(0.0).to_bits(), 0);
+        for step in -10_000..=10_000 {
+            let (sin, cos) = (f64::from(step) * PI * 1e-4).sin_cos();
+            let (found, expected) = (angle::<V>(3.0 * sin, 3.0 * cos), sin.atan2(cos));
+            assert!((found - expected).abs() <= 2.0 * f64::EPSILON * PI, "{found} is not {expected}");
+        }
     }
 
     #[test]

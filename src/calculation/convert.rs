@@ -1,0 +1,163 @@
+//! Documents of earlier versions, without their deprecated fields.
+
+use serde::{Serialize, Serializer};
+use toothwave_solver::drive::Draft;
+use toothwave_solver::{Contact, SolveError, model_error};
+
+use crate::design::{DeprecatedField, Design};
+use crate::field::{FieldCode, contact_name};
+use crate::json::{self, Fault, Tree};
+use crate::no_answer::NoAnswer;
+
+const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
+
+const SWITCHES: [DeprecatedField; 3] =
+    [DeprecatedField::RingTeethBend, DeprecatedField::WaveGeneratorMoves, DeprecatedField::CornerContact];
+
+/// What a study's document calls its lists of pointers into the design.
+const LISTS_OF_POINTERS: [&str; 3] = ["over", "free", "inputs"];
+
+/// The document that means the same without deprecated fields, of a design or of a study.
+///
+/// # Errors
+/// Where the text is no such document, where it contradicts itself, and where a field has no replacement that holds for all variants of a study.
+pub fn converted(text: &[u8]) -> Result<String, NoAnswer> {
+    let mut tree = json::tree(text)?;
+    if tree.at(&place(&["study"])).is_some() {
+        convert_study(&mut tree)?;
+    } else {
+        convert_design(&mut tree)?;
+    }
+    serde_json::to_string_pretty(&Written(&tree)).map_err(NoAnswer::internal)
+}
+
+fn place(names: &[&str]) -> Vec<String> {
+    names.iter().map(|&name| name.into()).collect()
+}
+
+fn number(tree: &Tree, names: &[&str]) -> f64 {
+    match tree.at(&place(names)) {
+        Some(Tree::Number(number)) => *number,
+        _ => 0.0,
+    }
+}
+
+fn convert_design(tree: &mut Tree) -> Result<(), NoAnswer> {
+    let design: Design = tree.read()?;
+    design.require_one_clearance()?;
+    design.require_one_choice_of_refinements()?;
+    move_clearance(tree);
+    if design.deprecated_fields().iter().any(|field| SWITCHES.contains(field)) {
+        let draft = Draft::new(&design.drive_parameters()).map_err(SolveError::from)?;
+        let drive = draft.drive().ok_or_else(|| NoAnswer::impossible(&design.as_written(draft.violations())))?;
+        let has_pointed_tips = model_error::has_pointed_tips(&drive);
+        remove_switches(tree);
+        let by_default: Design = tree.read()?;
+        if by_default.refinements(has_pointed_tips) != design.refinements(has_pointed_tips) {
+            let refinements = design.complete_model(has_pointed_tips).refinements;
+            let text = serde_json::to_vec(&refinements).map_err(NoAnswer::internal)?;
+            tree.set(&place(&["model", "refinements"]), json::tree(&text)?);
+        }
+    }
+    remove_if_empty(tree, "model");
+    Ok(())
+}
+
+/// Gives the gaps of `model.clearance` to the parts that teeth touch there, unless the parts have them.
+fn move_clearance(tree: &mut Tree) {
+    let teeth_um = number(tree, &["parts", "teeth", "clearance_um"]);
+    for contact in CONTACTS.map(contact_name) {
+        let gap_um = number(tree, &["model", "clearance", &format!("{contact}_um")]);
+        let part = ["parts", contact, "clearance_um"];
+        if gap_um != 0.0 && number(tree, &part) + teeth_um == 0.0 {
+            tree.set(&place(&part), Tree::Number(gap_um));
+        }
+    }
+    tree.remove(&place(&["model", "clearance"]));
+}
+
+fn remove_switches(tree: &mut Tree) {
+    for switch in SWITCHES {
+        if let Some(path) = json::path(switch.pointer()) {
+            tree.remove(&path);
+        }
+    }
+}
+
+fn remove_if_empty(tree: &mut Tree, name: &str) {
+    let path = place(&[name]);
+    if matches!(tree.at(&path), Some(Tree::Object(fields)) if fields.is_empty()) {
+        tree.remove(&path);
+    }
+}
+
+/// Of the base, the designs to start with, and the pointers to what varies.
+fn convert_study(tree: &mut Tree) -> Result<(), NoAnswer> {
+    let Tree::Object(fields) = tree else { return Ok(()) };
+    for (name, value) in fields {
+        match (name.as_str(), value) {
+            ("base", base) => convert_base(base).map_err(|found| found.within(name))?,
+            ("start", Tree::Array(designs)) => designs.iter_mut().for_each(move_clearance),
+            (list, Tree::Object(pointers)) if LISTS_OF_POINTERS.contains(&list) => {
+                for (pointer, _) in pointers {
+                    *pointer = converted_pointer(pointer).map_err(|found| found.within(list))?;
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn convert_base(base: &mut Tree) -> Result<(), Fault> {
+    for switch in SWITCHES {
+        if json::path(switch.pointer()).is_some_and(|path| base.at(&path).is_some()) {
+            return Err(no_replacement(switch));
+        }
+    }
+    let teeth_um = number(base, &["parts", "teeth", "clearance_um"]);
+    for contact in CONTACTS.map(contact_name) {
+        let gap_um = number(base, &["model", "clearance", &format!("{contact}_um")]);
+        let of_parts = number(base, &["parts", contact, "clearance_um"]) + teeth_um;
+        if gap_um != 0.0 && of_parts != 0.0 && gap_um.total_cmp(&of_parts).is_ne() {
+            let pointer = format!("/model/clearance/{contact}_um");
+            let detail =
+                format!("the gap is {gap_um:?} µm here, and {of_parts:?} µm by `parts`; leave out one of them");
+            return Err(Fault { pointer, code: FieldCode::ConflictingFields, detail });
+        }
+    }
+    move_clearance(base);
+    remove_if_empty(base, "model");
+    Ok(())
+}
+
+fn converted_pointer(pointer: &str) -> Result<String, Fault> {
+    if let Some(&switch) = SWITCHES.iter().find(|switch| switch.pointer() == pointer) {
+        return Err(no_replacement(switch));
+    }
+    let contact = pointer.strip_prefix("/model/clearance/").and_then(|name| name.strip_suffix("_um"));
+    Ok(contact.map_or_else(|| pointer.into(), |contact| format!("/parts/{contact}/clearance_um")))
+}
+
+fn no_replacement(switch: DeprecatedField) -> Fault {
+    let detail = "what takes its place depends on the geometry, which may vary; choose `model.refinements` instead";
+    Fault { pointer: switch.pointer().into(), code: FieldCode::ConflictingFields, detail: detail.into() }
+}
+
+/// A tree as people write it: whole numbers without a point.
+struct Written<'a>(&'a Tree);
+
+impl Serialize for Written<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        const MOST: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
+        match self.0 {
+            #[expect(clippy::cast_possible_truncation, reason = "whole, and below 2^53")]
+            Tree::Number(number) if number.fract() == 0.0 && number.abs() < MOST => {
+                serializer.serialize_i64(*number as i64)
+            }
+            Tree::Array(items) => serializer.collect_seq(items.iter().map(Written)),
+            Tree::Object(fields) => serializer.collect_map(fields.iter().map(|(name, value)| (name, Written(value)))),
+            other => other.serialize(serializer),
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! What the model of load sharing takes into account beyond its contact law.
+
+use std::borrow::Cow;
+
+use serde::de::{SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, OneOfBuilder, Schema, Type};
+use utoipa::openapi::{Ref, RefOr};
+use utoipa::{PartialSchema, ToSchema};
+
+use crate::json::ANY;
+use crate::key::encoded;
+
+/// A set of refinements, with `virtual_work` alone.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Refinements {
+    /// [`RefinementItem::RingTeethBend`].
+    pub ring_teeth_bend: bool,
+    /// [`RefinementItem::WaveGeneratorMoves`].
+    pub wave_generator_moves: bool,
+    /// [`RefinementItem::CornerContact`].
+    pub corner_contact: bool,
+}
+
+impl Refinements {
+    /// The empty set.
+    pub const NONE: Self = Self { ring_teeth_bend: false, wave_generator_moves: false, corner_contact: false };
+
+    /// Those of both sets.
+    #[must_use]
+    pub const fn with(self, other: Self) -> Self {
+        Self {
+            ring_teeth_bend: self.ring_teeth_bend || other.ring_teeth_bend,
+            wave_generator_moves: self.wave_generator_moves || other.wave_generator_moves,
+            corner_contact: self.corner_contact || other.corner_contact,
+        }
+    }
+}
+
+/// Which refinements a document asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RefinementsDocument {
+    /// Whether those that follow from the geometry.
+    pub auto: bool,
+    /// These besides.
+    pub listed: Refinements,
+}
+
+const AUTO: &str = "auto";
+const NONE: &str = "none";
+
+impl RefinementsDocument {
+    /// Those that follow from the geometry.
+    pub const AUTO: Self = Self { auto: true, listed: Refinements::NONE };
+
+    /// These and no others.
+    pub const fn only(listed: Refinements) -> Self {
+        Self { auto: false, listed }
+    }
+}
+
+impl Default for RefinementsDocument {
+    fn default() -> Self {
+        Self::AUTO
+    }
+}
+
+/// An item of the list: a refinement, or those that follow from the geometry.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RefinementItem {
+    /// Those that follow from the geometry.
+    Auto,
+    /// The ring's teeth bend, the more the nearer to their tips they are pressed.
+    RingTeethBend,
+    /// The wave generator moves on under its teeth as it winds up; otherwise its lever arms are those without load.
+    WaveGeneratorMoves,
+    /// Teeth press against the corner of a pointed or bored tip before they reach the flank. States are listed from the valley on, and those at a corner
+    /// have no stress at the ring. Balls never do.
+    CornerContact,
+}
+
+impl RefinementsDocument {
+    fn items(&self) -> impl Iterator<Item = RefinementItem> {
+        let Refinements { ring_teeth_bend, wave_generator_moves, corner_contact } = self.listed;
+        let items = [
+            (self.auto, RefinementItem::Auto),
+            (ring_teeth_bend, RefinementItem::RingTeethBend),
+            (wave_generator_moves, RefinementItem::WaveGeneratorMoves),
+            (corner_contact, RefinementItem::CornerContact),
+        ];
+        items.into_iter().filter_map(|(is_there, item)| is_there.then_some(item))
+    }
+
+    fn add(&mut self, item: RefinementItem) {
+        match item {
+            RefinementItem::Auto => self.auto = true,
+            RefinementItem::RingTeethBend => self.listed.ring_teeth_bend = true,
+            RefinementItem::WaveGeneratorMoves => self.listed.wave_generator_moves = true,
+            RefinementItem::CornerContact => self.listed.corner_contact = true,
+        }
+    }
+}
+
+impl Serialize for RefinementsDocument {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match (self.listed == Refinements::NONE, self.auto) {
+            (true, true) => serializer.serialize_str(AUTO),
+            (true, false) => serializer.serialize_str(NONE),
+            (false, _) => serializer.collect_seq(self.items()),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for RefinementsDocument {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct WordOrList;
+
+        impl<'de> Visitor<'de> for WordOrList {
+            type Value = RefinementsDocument;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                write!(f, "`{AUTO}`, `{NONE}` or a list of refinements")
+            }
+
+            fn visit_newtype_struct<D: Deserializer<'de>>(self, deserializer: D) -> Result<Self::Value, D::Error> {
+                deserializer.deserialize_any(self)
+            }
+
+            fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<Self::Value, E> {
+                match word {
+                    AUTO => Ok(RefinementsDocument::AUTO),
+                    NONE => Ok(RefinementsDocument::only(Refinements::NONE)),
+                    other => Err(E::unknown_variant(other, &[AUTO, NONE])),
+                }
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Self::Value, A::Error> {
+                let mut refinements = RefinementsDocument::only(Refinements::NONE);
+                while let Some(item) = items.next_element()? {
+                    refinements.add(item);
+                }
+                Ok(refinements)
+            }
+        }
+
+        deserializer.deserialize_newtype_struct(ANY, WordOrList)
+    }
+}
+
+impl PartialSchema for RefinementsDocument {
+    fn schema() -> RefOr<Schema> {
+        let word = ObjectBuilder::new().schema_type(Type::String).enum_values(Some([AUTO, NONE]));
+        let list = ArrayBuilder::new().items(Ref::from_schema_name(RefinementItem::name()));
+        OneOfBuilder::new()
+            .description(Some(
+                "Which refinements the model has: `auto`, `none`, or a list. `auto` follows from the geometry and not from the law: for cylinders under \
+                 `virtual_work` in a ring with pointed or bored tips it is `ring_teeth_bend`, with gaps also `wave_generator_moves`; elsewhere it is none. In a \
+                 list `auto` stands for these.",
+            ))
+            .item(word)
+            .item(list)
+            .default(Some(AUTO.into()))
+            .into()
+    }
+}
+
+impl ToSchema for RefinementsDocument {
+    fn name() -> Cow<'static, str> {
+        Cow::Borrowed("Refinements")
+    }
+
+    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
+        schemas.push((RefinementItem::name().into(), RefinementItem::schema()));
+    }
+}
+
+encoded! {
+    struct RefinementsDocument { auto, listed }
+    struct Refinements { ring_teeth_bend, wave_generator_moves, corner_contact }
+}

@@ -1,0 +1,327 @@
+//! What a document means where it leaves a field out, or uses a deprecated one.
+
+use toothwave_solver::drive::Draft;
+use toothwave_solver::violation::Modified;
+use toothwave_solver::{Deviations, Modification, Parameter, Part, PerContact, Violation, model_error};
+
+use super::{
+    ClearanceDocument, CompatibilityDocument, Design, HertzDocument, JohnsonDocument, LinearDocument, ModelDocument,
+    Refinements, RefinementsDocument, StiffnessDocument, TeethDocument,
+};
+use crate::field::{FieldCode, contact_name, pointer};
+use crate::json::Fault;
+use crate::key::Encode;
+
+/// How far the working surface of each part is set back.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ClearancesUm {
+    /// Of the parts that teeth touch.
+    pub by_contact: PerContact<f64>,
+    /// Of the teeth.
+    pub teeth: f64,
+}
+
+impl ClearancesUm {
+    /// The gap at each contact: the sum of its two parts' clearances.
+    pub fn gaps(&self) -> PerContact<f64> {
+        PerContact::of(|contact| self.by_contact.get(contact) + self.teeth)
+    }
+}
+
+/// A surface that a clearance sets back and a modification too.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SetBackTwice {
+    /// Whose.
+    pub part: Part,
+    /// The modification.
+    pub modified: Modified,
+    /// By the clearance.
+    pub clearance_um: f64,
+    /// By the modification.
+    pub modification_um: f64,
+}
+
+/// A deprecated field that a document uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DeprecatedField {
+    /// `model.clearance`.
+    Clearance,
+    /// `model.ring_teeth_bend`.
+    RingTeethBend,
+    /// `model.wave_generator_moves`.
+    WaveGeneratorMoves,
+    /// `model.corner_contact`.
+    CornerContact,
+}
+
+impl DeprecatedField {
+    /// JSON pointer to it.
+    pub const fn pointer(self) -> &'static str {
+        match self {
+            Self::Clearance => "/model/clearance",
+            Self::RingTeethBend => "/model/ring_teeth_bend",
+            Self::WaveGeneratorMoves => "/model/wave_generator_moves",
+            Self::CornerContact => "/model/corner_contact",
+        }
+    }
+
+    /// What takes its place.
+    pub const fn replacement(self) -> &'static str {
+        match self {
+            Self::Clearance => "parts.*.clearance_um",
+            Self::RingTeethBend | Self::WaveGeneratorMoves | Self::CornerContact => "model.refinements",
+        }
+    }
+}
+
+impl Design {
+    /// The deprecated fields that say something.
+    pub fn deprecated_fields(&self) -> Vec<DeprecatedField> {
+        let clearance = self.deprecated_gaps_um() != PerContact::default();
+        let mut fields: Vec<_> = clearance.then_some(DeprecatedField::Clearance).into_iter().collect();
+        fields.extend(self.model.switches().into_iter().filter_map(|(field, is_on)| is_on.map(|_| field)));
+        fields
+    }
+
+    /// The gaps of `model.clearance`.
+    fn deprecated_gaps_um(&self) -> PerContact<f64> {
+        self.model.clearance.as_ref().map_or_else(PerContact::default, |clearance| PerContact {
+            wave_generator: clearance.wave_generator_um,
+            ring: clearance.ring_um,
+            carrier: clearance.carrier_um,
+        })
+    }
+
+    /// The clearances of `parts` alone.
+    fn clearances_of_parts_um(&self) -> ClearancesUm {
+        let parts = &self.parts;
+        let by_contact = PerContact {
+            wave_generator: parts.wave_generator.clearance_um,
+            ring: parts.ring.clearance_um,
+            carrier: parts.carrier.clearance_um,
+        };
+        ClearancesUm { by_contact, teeth: parts.teeth.clearance_um }
+    }
+
+    /// The clearances of the parts. A gap of `model.clearance` is one of the part that the teeth touch there.
+    pub fn clearances_um(&self) -> ClearancesUm {
+        let (mut clearances, deprecated) = (self.clearances_of_parts_um(), self.deprecated_gaps_um());
+        let gaps = clearances.gaps();
+        for (contact, &gap_um) in deprecated.iter() {
+            if gap_um != 0.0 && *gaps.get(contact) == 0.0 {
+                *clearances.by_contact.get_mut(contact) = gap_um;
+            }
+        }
+        clearances
+    }
+
+    /// The surfaces that two fields set back.
+    pub fn set_back_twice(&self) -> impl Iterator<Item = SetBackTwice> + use<> {
+        let (clearances, modification) = (self.clearances_um(), Modification::from(&self.modification));
+        let PerContact { wave_generator, ring, carrier } = clearances.by_contact;
+        let pairs = [
+            (
+                Part::WaveGenerator,
+                wave_generator,
+                Modified::WaveGeneratorEquidistant,
+                modification.wave_generator_equidistant_um,
+            ),
+            (Part::Teeth, clearances.teeth, Modified::ToothRadius, modification.tooth_radius_um),
+            (Part::Ring, ring, Modified::RingEquidistant, modification.ring_equidistant_um),
+            (Part::Carrier, carrier, Modified::SlotWall, modification.slot_wall_um),
+        ];
+        let twice = pairs
+            .into_iter()
+            .filter(|&(_, clearance_um, _, modification_um)| clearance_um != 0.0 && modification_um != 0.0);
+        twice.map(|(part, clearance_um, modified, modification_um)| SetBackTwice {
+            part,
+            modified,
+            clearance_um,
+            modification_um,
+        })
+    }
+
+    /// That `model.clearance` gives a contact another gap than `parts`.
+    ///
+    /// # Errors
+    /// The fault.
+    pub fn require_one_clearance(&self) -> Result<(), Fault> {
+        let of_parts = self.clearances_of_parts_um().gaps();
+        for (contact, &gap_um) in self.deprecated_gaps_um().iter() {
+            let of_parts = *of_parts.get(contact);
+            if gap_um != 0.0 && of_parts != 0.0 && gap_um.total_cmp(&of_parts).is_ne() {
+                let detail = format!(
+                    "the gap is {gap_um:?} µm here, and {of_parts:?} µm by `parts.{}.clearance_um` and `parts.teeth.clearance_um`; leave out `model.clearance`, which is deprecated",
+                    contact_name(contact)
+                );
+                let pointer = pointer(Parameter::Clearance(contact));
+                return Err(Fault { pointer, code: FieldCode::ConflictingFields, detail });
+            }
+        }
+        Ok(())
+    }
+
+    /// That deprecated switches stand beside nothing that says otherwise.
+    ///
+    /// # Errors
+    /// The fault.
+    pub fn require_one_choice_of_refinements(&self) -> Result<(), Fault> {
+        let is_projection = self.model.compatibility == CompatibilityDocument::Projection;
+        let is_chosen = self.model.refinements != RefinementsDocument::AUTO;
+        for (field, is_on) in self.model.switches() {
+            let detail = match is_on {
+                Some(_) if is_chosen => {
+                    "`refinements` says already which refinements the model has; leave out this field, which is deprecated"
+                }
+                Some(true) if is_projection => "`projection` takes no refinement; choose `virtual_work`",
+                _ => continue,
+            };
+            let pointer = field.pointer().into();
+            return Err(Fault { pointer, code: FieldCode::ConflictingFields, detail: detail.into() });
+        }
+        Ok(())
+    }
+
+    /// Every clearance that is out of its range.
+    pub fn clearance_violations(&self) -> Vec<Violation> {
+        let ClearancesUm { by_contact, teeth } = self.clearances_of_parts_um();
+        let of_parts = by_contact.iter().map(|(contact, &value)| (Parameter::PartClearance(contact.mate()), value));
+        let of_teeth = [(Parameter::PartClearance(Part::Teeth), teeth)];
+        let deprecated = self.deprecated_gaps_um();
+        let deprecated = deprecated.iter().map(|(contact, &value)| (Parameter::Clearance(contact), value));
+        of_parts.chain(of_teeth).chain(deprecated).filter_map(|(parameter, value)| parameter.check(value)).collect()
+    }
+
+    /// Whether any contact has a gap.
+    fn has_gaps(&self) -> bool {
+        self.clearances_um().gaps() != PerContact::default()
+            || !Modification::from(&self.modification).is_nil()
+            || !Deviations::from(&self.deviations).is_nil()
+    }
+
+    /// What `auto` chooses under virtual work. Refinements of balls and of flat-sided teeth were not checked against elastic bodies.
+    fn refinements_by_geometry(&self, has_pointed_tips: bool) -> Refinements {
+        let is_refined = has_pointed_tips && matches!(self.drive.teeth, TeethDocument::Cylinder(_));
+        Refinements {
+            ring_teeth_bend: is_refined,
+            wave_generator_moves: is_refined && self.has_gaps(),
+            corner_contact: false,
+        }
+    }
+
+    /// The refinements that are asked for, for a drive that has pointed or bored tips or not. `projection` takes none: a list beside it is refused.
+    fn refinements_of(
+        &self,
+        asked: RefinementsDocument,
+        compatibility: CompatibilityDocument,
+        has_pointed_tips: bool,
+    ) -> Refinements {
+        let by_geometry = match compatibility {
+            CompatibilityDocument::VirtualWork if asked.auto => self.refinements_by_geometry(has_pointed_tips),
+            _ => Refinements::NONE,
+        };
+        let refinements = by_geometry.with(asked.listed);
+        let ModelDocument { ring_teeth_bend, wave_generator_moves, corner_contact, .. } = self.model;
+        Refinements {
+            ring_teeth_bend: ring_teeth_bend.unwrap_or(refinements.ring_teeth_bend),
+            // Where teeth were told not to bend, nothing was ever chosen by the geometry.
+            wave_generator_moves: wave_generator_moves
+                .unwrap_or(refinements.wave_generator_moves && ring_teeth_bend != Some(false)),
+            corner_contact: corner_contact.unwrap_or(refinements.corner_contact),
+        }
+    }
+
+    /// The refinements of the model.
+    pub fn refinements(&self, has_pointed_tips: bool) -> Refinements {
+        self.refinements_of(self.model.refinements, self.model.compatibility, has_pointed_tips)
+    }
+
+    /// The same under virtual work, whatever the document's compatibility.
+    pub fn refinements_by_virtual_work(&self, has_pointed_tips: bool) -> Refinements {
+        self.refinements_of(self.model.refinements, CompatibilityDocument::VirtualWork, has_pointed_tips)
+    }
+
+    /// The law of a document that names none: the one that holds best, and the paper's beside the paper's compatibility.
+    fn law_by_default(&self) -> StiffnessDocument {
+        match (&self.drive.teeth, self.model.compatibility) {
+            (TeethDocument::Ball(_), _) => StiffnessDocument::Hertz(HertzDocument::default()),
+            (TeethDocument::Cylinder(_) | TeethDocument::FlatSided(_), CompatibilityDocument::Projection) => {
+                StiffnessDocument::Linear(LinearDocument::default())
+            }
+            (TeethDocument::Cylinder(_) | TeethDocument::FlatSided(_), CompatibilityDocument::VirtualWork) => {
+                StiffnessDocument::Johnson(JohnsonDocument::default())
+            }
+        }
+    }
+
+    /// The contact law with all its numbers.
+    pub fn stiffness(&self) -> StiffnessDocument {
+        let mut stiffness = self.model.stiffness.clone().unwrap_or_else(|| self.law_by_default());
+        if let StiffnessDocument::Johnson(JohnsonDocument { depth_mm }) = &mut stiffness {
+            let radius_mm = self.drive.teeth.counted().radius_mm;
+            for depth_mm in [&mut depth_mm.wave_generator, &mut depth_mm.ring, &mut depth_mm.carrier] {
+                depth_mm.get_or_insert(radius_mm);
+            }
+        }
+        stiffness
+    }
+
+    /// The complete model, for a drive that has pointed or bored tips or not.
+    pub fn complete_model(&self, has_pointed_tips: bool) -> ModelDocument {
+        ModelDocument {
+            compatibility: self.model.compatibility,
+            stiffness: Some(self.stiffness()),
+            series_compliance_mm_per_n: self.model.series_compliance_mm_per_n.clone(),
+            refinements: RefinementsDocument::only(self.refinements(has_pointed_tips)),
+            ..ModelDocument::default()
+        }
+    }
+
+    /// The document with every default that follows from other fields, but for refinements that follow from the geometry.
+    pub fn with_defaults(mut self) -> Self {
+        self.model.stiffness = Some(self.stiffness());
+        self.model.clearance = self.clearance_in_key().cloned();
+        self.drive.teeth.install_all_by_default();
+        self
+    }
+
+    /// The parts as keys tell them apart.
+    pub(crate) fn parts_in_key(&self) -> impl Encode + '_ {
+        (&self.parts, self.clearance_in_key())
+    }
+
+    /// `model.clearance` where it says something.
+    fn clearance_in_key(&self) -> Option<&ClearanceDocument> {
+        self.model.clearance.as_ref().filter(|_| self.deprecated_gaps_um() != PerContact::default())
+    }
+
+    /// The model as keys tell models apart: a default that is written out is the same as one that is left out. Deprecated fields stay, as answers name them.
+    pub(crate) fn model_in_key(&self) -> ModelDocument {
+        let mut model = self.model.clone();
+        model.stiffness = Some(self.stiffness());
+        model.clearance = self.clearance_in_key().cloned();
+        let has_switch = model.switches().iter().any(|(_, is_on)| is_on.is_some());
+        // Only what is more than `auto` needs the geometry.
+        if model.refinements != RefinementsDocument::AUTO && !has_switch {
+            let drive = Draft::new(&self.drive_parameters()).ok().and_then(|draft| draft.drive());
+            let has_pointed_tips = drive.is_some_and(|drive| model_error::has_pointed_tips(&drive));
+            let of = |asked| self.refinements_of(asked, model.compatibility, has_pointed_tips);
+            let refinements = of(model.refinements);
+            let is_auto = refinements == of(RefinementsDocument::AUTO);
+            model.refinements =
+                if is_auto { RefinementsDocument::AUTO } else { RefinementsDocument::only(refinements) };
+        }
+        model
+    }
+}
+
+impl ModelDocument {
+    /// The deprecated switches.
+    const fn switches(&self) -> [(DeprecatedField, Option<bool>); 3] {
+        [
+            (DeprecatedField::RingTeethBend, self.ring_teeth_bend),
+            (DeprecatedField::WaveGeneratorMoves, self.wave_generator_moves),
+            (DeprecatedField::CornerContact, self.corner_contact),
+        ]
+    }
+}

@@ -1,0 +1,339 @@
+//! The system of boundary elements, put together and solved in columns that the compiler makes vectors of.
+
+use std::f64::consts::PI;
+
+use nalgebra::Vector2;
+use pulp::{Simd, WithSimd};
+
+use crate::ring_bending::boundary::{Element, KNOTS, Piece};
+use crate::root::NotConverged;
+use crate::sweep::fast::lanes::{VECTOR, angle, fused, ln};
+
+/// How much further than a half-plane the ring gives way under a force on each of the elements that are pressed, along the force.
+///
+/// # Errors
+/// [`NotConverged`] where the system has no solution.
+pub(super) fn further_than_half_plane(piece: &Piece, poissons_ratio: f64) -> Result<[f64; KNOTS], NotConverged> {
+    let singular = NotConverged { what: "bending of the ring's teeth", iterations: 1, bracket_width: f64::INFINITY };
+    pulp::Arch::new().dispatch(Solving { piece, poissons_ratio }).ok_or(singular)
+}
+
+struct Solving<'a> {
+    piece: &'a Piece,
+    poissons_ratio: f64,
+}
+
+impl WithSimd for Solving<'_> {
+    type Output = Option<[f64; KNOTS]>;
+
+    #[inline(always)]
+    fn with_simd<V: Simd>(self, _: V) -> Self::Output {
+        let points = Points::of(self.piece.elements());
+        let mut system = assembled::<V>(self.piece, &points, self.poissons_ratio);
+        if !system.eliminate::<V>() {
+            return None;
+        }
+        let pressed = self.piece.pressed();
+        let mut give = [0.0; KNOTS];
+        for (force, element) in pressed.iter().enumerate() {
+            let [x, y] = system.solution(force, 2 * (points.count - KNOTS + force));
+            give[force] = -(element.outward.x * x + element.outward.y * y);
+        }
+        Some(give)
+    }
+}
+
+/// The middles of all elements with the outward directions there, and whether they are held, in columns of whole vectors.
+struct Points {
+    count: usize,
+    x: Vec<f64>,
+    y: Vec<f64>,
+    outward_x: Vec<f64>,
+    outward_y: Vec<f64>,
+    /// 1 where the element is held, else 0.
+    held: Vec<f64>,
+}
+
+impl Points {
+    fn of(elements: &[Element]) -> Self {
+        // What fills the last vector up stands far away and counts for nothing.
+        const FAR: f64 = 1e3;
+        let column = |of: fn(&Element) -> f64, beyond: f64| {
+            let mut column: Vec<_> = elements.iter().map(of).collect();
+            column.resize(elements.len().next_multiple_of(VECTOR), beyond);
+            column
+        };
+        Self {
+            count: elements.len(),
+            x: column(|element| element.middle.x, FAR),
+            y: column(|element| element.middle.y, FAR),
+            outward_x: column(|element| element.outward.x, 0.0),
+            outward_y: column(|element| element.outward.y, 0.0),
+            held: column(|element| f64::from(u8::from(element.is_held)), 0.0),
+        }
+    }
+
+    /// With what fills the last vector up.
+    fn len(&self) -> usize {
+        self.x.len()
+    }
+}
+
+/// A vector at each point.
+struct Vectors {
+    x: Vec<f64>,
+    y: Vec<f64>,
+}
+
+/// What a vector of an element does at each point, for both of its components.
+struct Influence {
+    of_x: Vectors,
+    of_y: Vectors,
+}
+
+impl Vectors {
+    fn new(len: usize) -> Self {
+        Self { x: vec![0.0; len], y: vec![0.0; len] }
+    }
+}
+
+impl Influence {
+    fn new(len: usize) -> Self {
+        Self { of_x: Vectors::new(len), of_y: Vectors::new(len) }
+    }
+
+    fn columns_mut(&mut self) -> [&mut [f64]; 4] {
+        [&mut self.of_x.x, &mut self.of_x.y, &mut self.of_y.x, &mut self.of_y.y]
+    }
+}
+
+#[inline(always)]
+fn assembled<V: Simd>(piece: &Piece, points: &Points, poissons_ratio: f64) -> System {
+    let elements = piece.elements();
+    let len = points.len();
+    let first_pressed = elements.len() - KNOTS;
+    // What has to be added to the half-plane under each force: on free faces the opposite of its tractions, on held ones of its displacements. The face that
+    // bears the force bears no more than that.
+    let mut added = Vec::with_capacity(KNOTS);
+    for (force, element) in piece.pressed().iter().enumerate() {
+        let mut vectors = Vectors::new(len);
+        opposite_of_half_plane::<V>(element, points, poissons_ratio, &mut vectors);
+        (vectors.x[first_pressed + force], vectors.y[first_pressed + force]) = (0.0, 0.0);
+        added.push(vectors);
+    }
+    let mut system = System::new(elements.len(), len);
+    let (mut by_traction, mut by_motion) = (Influence::new(len), Influence::new(len));
+    for (at, element) in elements.iter().enumerate() {
+        influence::<V>(element, points, poissons_ratio, &mut by_traction, &mut by_motion);
+        by_motion.of_x.x[at] += 0.5;
+        by_motion.of_y.y[at] += 0.5;
+        for column in by_traction.columns_mut().into_iter().chain(by_motion.columns_mut()) {
+            column[elements.len()..].fill(0.0);
+        }
+        let (unknown, known, sign) =
+            if element.is_held { (&by_traction, &by_motion, -1.0) } else { (&by_motion, &by_traction, 1.0) };
+        for (column, of) in [&unknown.of_x, &unknown.of_y].into_iter().enumerate() {
+            let (x, y) = system.columns[2 * at + column].split_at_mut(len);
+            for i in 0..len {
+                (x[i], y[i]) = (sign * of.x[i], sign * of.y[i]);
+            }
+        }
+        for (force, added) in added.iter().enumerate() {
+            let (by_x, by_y) = (sign * added.x[at], sign * added.y[at]);
+            let (x, y) = system.columns[2 * elements.len() + force].split_at_mut(len);
+            for i in 0..len {
+                x[i] = fused::<V>(by_x, known.of_x.x[i], fused::<V>(by_y, known.of_y.x[i], x[i]));
+                y[i] = fused::<V>(by_x, known.of_x.y[i], fused::<V>(by_y, known.of_y.y[i], y[i]));
+            }
+        }
+    }
+    system
+}
+
+/// Kelvin's solution integrated over an element: what its own even unit traction moves each point by, and what its own even unit displacement does, in plane
+/// strain of a material with `E/(1 - ν²) = 1`.
+#[inline(always)]
+fn influence<V: Simd>(
+    element: &Element,
+    points: &Points,
+    poissons_ratio: f64,
+    by_traction: &mut Influence,
+    by_motion: &mut Influence,
+) {
+    let nu = poissons_ratio;
+    // 2G = E/(1 + ν) = 1 - ν, so 8πG(1 - ν) = 4π(1 - ν)².
+    let of_motion = 1.0 / (4.0 * PI * (1.0 - nu));
+    let of_traction = of_motion / (1.0 - nu);
+    let (stretch, share) = (3.0 - 4.0 * nu, 1.0 - 2.0 * nu);
+    let (a, o, half) = (element.along, element.outward, element.half);
+    let len = points.len();
+    let (point_x, point_y) = (&points.x[..len], &points.y[..len]);
+    let [txx, tyx, txy, tyy] = by_traction.columns_mut().map(|column| &mut column[..len]);
+    let [mxx, myx, mxy, myy] = by_motion.columns_mut().map(|column| &mut column[..len]);
+    for i in 0..len {
+        let (dx, dy) = (point_x[i] - element.middle.x, point_y[i] - element.middle.y);
+        let (x, y) = (dx * a.x + dy * a.y, dx * o.x + dy * o.y);
+        // The ends as seen from the point, along the element.
+        let (low, high) = (x - half, x + half);
+        let (low_squared, high_squared) = (low * low + y * y, high * high + y * y);
+        // In the middle of the element itself the principal value.
+        let seen_rad = angle::<V>(2.0 * half * y, low * high + y * y);
+        let seen_rad = if y == 0.0 { 0.0 } else { seen_rad };
+        let (ln_low, ln_high) = (ln::<V>(low_squared), ln::<V>(high_squared));
+        let ln_ratio = 0.5 * (ln_high - ln_low);
+        let ln_mean = 0.5 * (high * ln_high - low * ln_low) - 2.0 * half + y * seen_rad;
+        let (over_low, over_high) = (1.0 / low_squared, 1.0 / high_squared);
+        let cubic = 0.5 * (y * (high * over_high - low * over_low) + seen_rad);
+        let square = -0.5 * y * y * (over_high - over_low);
+        let traction = [
+            of_traction * (2.0 * half - y * seen_rad - stretch * ln_mean),
+            of_traction * y * ln_ratio,
+            of_traction * (y * seen_rad - stretch * ln_mean),
+        ];
+        let (even, odd) = (share * seen_rad, share * ln_ratio);
+        let motion = [
+            of_motion * (even + 2.0 * (seen_rad - cubic)),
+            of_motion * (2.0 * square - odd),
+            of_motion * (2.0 * square + odd),
+            of_motion * (even + 2.0 * cubic),
+        ];
+        // From the element's axes to those of the ring.
+        let [aa, ao, oo] = traction;
+        (txx[i], txy[i]) = (
+            aa * a.x * a.x + 2.0 * ao * a.x * o.x + oo * o.x * o.x,
+            aa * a.x * a.y + ao * (a.x * o.y + o.x * a.y) + oo * o.x * o.y,
+        );
+        (tyx[i], tyy[i]) = (txy[i], aa * a.y * a.y + 2.0 * ao * a.y * o.y + oo * o.y * o.y);
+        let [aa, ao, oa, oo] = motion;
+        let (to_x, to_y) = (aa * a.x + oa * o.x, aa * a.y + oa * o.y);
+        let (across_x, across_y) = (ao * a.x + oo * o.x, ao * a.y + oo * o.y);
+        (mxx[i], mxy[i]) = (to_x * a.x + across_x * o.x, to_x * a.y + across_x * o.y);
+        (myx[i], myy[i]) = (to_y * a.x + across_y * o.x, to_y * a.y + across_y * o.y);
+    }
+}
+
+/// Flamant's solution for a unit force into an element, on a half-plane of the same material: of each point the opposite of its displacement where it is held,
+/// but for a motion of the whole, elsewhere of the traction on its face.
+#[inline(always)]
+fn opposite_of_half_plane<V: Simd>(element: &Element, points: &Points, poissons_ratio: f64, vectors: &mut Vectors) {
+    // That of plane stress which plane strain is like.
+    let nu = poissons_ratio / (1.0 - poissons_ratio);
+    let inward = -element.outward;
+    let across = Vector2::new(-inward.y, inward.x);
+    // Counted from the direction away from the axis, so that it jumps towards the axis alone, where no ring is.
+    let away = element.middle.coords;
+    let to_away_rad = inward.perp(&away).atan2(inward.dot(&away));
+    let len = points.len();
+    let (point_x, point_y) = (&points.x[..len], &points.y[..len]);
+    let (outward_x, outward_y, held) = (&points.outward_x[..len], &points.outward_y[..len], &points.held[..len]);
+    let (to_x, to_y) = (&mut vectors.x[..len], &mut vectors.y[..len]);
+    for i in 0..len {
+        let (dx, dy) = (point_x[i] - element.middle.x, point_y[i] - element.middle.y);
+        let (depth, aside) = (dx * inward.x + dy * inward.y, dx * across.x + dy * across.y);
+        let squared = depth * depth + aside * aside;
+        let over_distance = 1.0 / squared.sqrt();
+        let (sin, cos) = (aside * over_distance, depth * over_distance);
+        let ln_distance = 0.5 * ln::<V>(squared);
+        let angle_rad = to_away_rad + angle::<V>(away.x * dy - away.y * dx, away.x * dx + away.y * dy);
+        let radial = -2.0 * cos * ln_distance - (1.0 - nu) * angle_rad * sin;
+        let around = 2.0 * sin * ln_distance + (1.0 + nu) * sin - (1.0 - nu) * angle_rad * cos;
+        let (outwards_x, outwards_y) = (cos * inward.x + sin * across.x, cos * inward.y + sin * across.y);
+        let (sideways_x, sideways_y) = (cos * across.x - sin * inward.x, cos * across.y - sin * inward.y);
+        let traction = -2.0 * cos * over_distance * (outwards_x * outward_x[i] + outwards_y * outward_y[i]);
+        let (x, y) = if held[i] > 0.0 {
+            (radial * outwards_x + around * sideways_x, radial * outwards_y + around * sideways_y)
+        } else {
+            (traction * outwards_x, traction * outwards_y)
+        };
+        (to_x[i], to_y[i]) = (-x / PI, -y / PI);
+    }
+}
+
+/// A dense system with several right-hand sides, by columns; the equations of x above those of y, each filled up with zeros to whole vectors.
+struct System {
+    unknowns: usize,
+    columns: Vec<Vec<f64>>,
+}
+
+impl System {
+    fn new(elements: usize, len: usize) -> Self {
+        let unknowns = 2 * elements;
+        Self { unknowns, columns: vec![vec![0.0; 2 * len]; unknowns + KNOTS] }
+    }
+
+    /// Gaussian elimination with partial pivoting, column by column; whether there is a solution.
+    #[inline(always)]
+    fn eliminate<V: Simd>(&mut self) -> bool {
+        let mut pivots = Vec::with_capacity(self.unknowns);
+        for at in 0..self.columns.len() {
+            let (before, from) = self.columns.split_at_mut(at);
+            let column = &mut from[0];
+            for (row, &pivot) in pivots.iter().enumerate() {
+                column.swap(row, pivot);
+            }
+            subtract_earlier::<V>(&before[..at.min(self.unknowns)], column);
+            if at >= self.unknowns {
+                continue;
+            }
+            let mut pivot = at;
+            for row in at + 1..column.len() {
+                if column[row].abs() > column[pivot].abs() {
+                    pivot = row;
+                }
+            }
+            let over_pivot = 1.0 / column[pivot];
+            if !over_pivot.is_finite() {
+                return false;
+            }
+            pivots.push(pivot);
+            for column in &mut self.columns[..=at] {
+                column.swap(at, pivot);
+            }
+            for value in &mut self.columns[at][at + 1..] {
+                *value *= over_pivot;
+            }
+        }
+        true
+    }
+
+    /// Two unknowns, from the first on, under a force.
+    fn solution(&self, force: usize, first: usize) -> [f64; 2] {
+        let mut values = self.columns[self.unknowns + force].clone();
+        for at in (first..self.unknowns).rev() {
+            let column = &self.columns[at];
+            values[at] /= column[at];
+            for row in first..at {
+                values[row] -= values[at] * column[row];
+            }
+        }
+        [values[first], values[first + 1]]
+    }
+}
+
+/// Takes what the columns before have eliminated off a column; four at once, so that it is read and written a quarter as often.
+#[inline(always)]
+fn subtract_earlier<V: Simd>(before: &[Vec<f64>], column: &mut [f64]) {
+    let (fours, rest) = before.as_chunks::<4>();
+    let mut row = 0;
+    for [a, b, c, d] in fours {
+        column[row + 1] -= column[row] * a[row + 1];
+        column[row + 2] -= column[row] * a[row + 2] + column[row + 1] * b[row + 2];
+        column[row + 3] -= column[row] * a[row + 3] + column[row + 1] * b[row + 3] + column[row + 2] * c[row + 3];
+        let [by_a, by_b, by_c, by_d] = [0, 1, 2, 3].map(|next| -column[row + next]);
+        row += 4;
+        let column = &mut column[row..];
+        let len = column.len();
+        let [a, b, c, d] = [a, b, c, d].map(|before| &before[row..][..len]);
+        for i in 0..len {
+            let first = fused::<V>(by_a, a[i], fused::<V>(by_b, b[i], column[i]));
+            column[i] = fused::<V>(by_c, c[i], fused::<V>(by_d, d[i], first));
+        }
+    }
+    for before in rest {
+        let by = -column[row];
+        row += 1;
+        for (value, &before) in column[row..].iter_mut().zip(&before[row..]) {
+            *value = fused::<V>(by, before, *value);
+        }
+    }
+}

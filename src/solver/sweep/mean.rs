@@ -1,0 +1,157 @@
+//! Means over the period of a sweep to a tolerance. They do not depend on where a sweep looked.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use crate::load_sharing::{LoadedDrive, ToothState};
+use crate::mesh::PlacedTooth;
+use crate::root::NotConverged;
+use crate::springs::WindUp;
+use crate::sweep::adaptive::Moment;
+use crate::sweep::search::Piece;
+use crate::{SolveError, Stop};
+
+/// Stretches that a piece between two jumps is cut into at first.
+const FIRST_STRETCHES: u32 = 4;
+
+/// The finest tolerance that rounding leaves reachable.
+const FINEST: f64 = 1e-10;
+
+/// Moments that are looked at in each lap, at most. Some two thousand are enough for the finest tolerance.
+const MOST_MOMENTS: u32 = 100_000;
+
+/// Several quantities at a moment.
+type Values<const N: usize> = [f64; N];
+
+/// A stretch of a lap with the values at its ends, its middle and its quarters.
+struct Stretch<const N: usize> {
+    piece: usize,
+    start: f64,
+    end: f64,
+    values: [Values<N>; 5],
+    /// How far Simpson's rule over the whole is from that over the halves, of all quantities together.
+    error: f64,
+}
+
+impl<const N: usize> Stretch<N> {
+    fn new(piece: usize, start: f64, end: f64, values: [Values<N>; 5]) -> Self {
+        let mut stretch = Self { piece, start, end, values, error: 0.0 };
+        // Over the halves the error of what is smooth is a fifteenth of the difference. Bends are not, and both are counted in full.
+        let [low, lower, middle, upper, high] = &stretch.values;
+        let differs = |n: usize| (low[n] - 4.0 * lower[n] + 6.0 * middle[n] - 4.0 * upper[n] + high[n]).abs();
+        stretch.error = (end - start) / 12.0 * (0..N).map(differs).sum::<f64>();
+        stretch
+    }
+
+    /// The integral over the halves.
+    fn area(&self, n: usize) -> f64 {
+        let [low, lower, middle, upper, high] = &self.values;
+        (self.end - self.start) / 12.0 * (low[n] + 4.0 * lower[n] + 2.0 * middle[n] + 4.0 * upper[n] + high[n])
+    }
+}
+
+/// By error.
+impl<const N: usize> Ord for Stretch<N> {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.error.total_cmp(&other.error)
+    }
+}
+
+impl<const N: usize> PartialOrd for Stretch<N> {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl<const N: usize> PartialEq for Stretch<N> {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl<const N: usize> Eq for Stretch<N> {}
+
+/// The means of quantities, none below zero, to a tolerance over the sum of them, but not below 1e-10: adaptive quadrature between the jumps, the stretch with the largest error
+/// first.
+///
+/// # Errors
+/// Those of the load sharing, and [`SolveError::Stopped`].
+pub(crate) fn means<const N: usize>(
+    loaded: &LoadedDrive<'_>,
+    tolerance: f64,
+    mut of: impl FnMut(&[PlacedTooth], &[ToothState], &WindUp) -> Result<Values<N>, SolveError>,
+    stop: &dyn Stop,
+) -> Result<Values<N>, SolveError> {
+    let mesh = *loaded.mesh();
+    let laps = if mesh.tells_items_apart() { mesh.laps() } else { 1 };
+    let pieces: Vec<_> = (0..laps).flat_map(|lap| Piece::of(loaded, lap)).collect();
+    let (mut placed, mut teeth, mut looked) = (Vec::new(), Vec::new(), 0_u64);
+    let mut look = |piece: usize, fraction: f64| {
+        if stop.stopped() {
+            return Err(SolveError::Stopped);
+        }
+        looked += 1;
+        let piece = &pieces[piece];
+        placed.clear();
+        placed.extend(Moment::of(piece, fraction).placed(&mesh, piece.lap));
+        teeth.clear();
+        for PlacedTooth { place, position, .. } in &placed {
+            teeth.push(loaded.tooth_at(place, *position)?);
+        }
+        Ok((of(&placed, &teeth, &loaded.wind_up(&teeth)?)?, looked))
+    };
+    let mut stretches = BinaryHeap::new();
+    for (at, piece) in pieces.iter().enumerate() {
+        let fraction = |step: u32| {
+            let share = f64::from(step) / f64::from(4 * FIRST_STRETCHES);
+            if step == 4 * FIRST_STRETCHES { piece.end } else { piece.start + share * (piece.end - piece.start) }
+        };
+        let mut values = Vec::new();
+        for step in 0..=4 * FIRST_STRETCHES {
+            values.push(look(at, fraction(step))?.0);
+        }
+        for stretch in 0..FIRST_STRETCHES {
+            let first = 4 * stretch;
+            let values = std::array::from_fn(|step| values[first as usize + step]);
+            stretches.push(Stretch::new(at, fraction(first), fraction(first + 4), values));
+        }
+    }
+    // Sums are made anew now and then, so that no rounding of them adds up.
+    loop {
+        let error: f64 = stretches.iter().map(|stretch| stretch.error).sum();
+        let areas = total(&stretches);
+        let allowed = tolerance.max(FINEST) * areas.iter().sum::<f64>();
+        if error <= allowed {
+            return Ok(areas.map(|area| area / laps as f64));
+        }
+        let mut excess = error - 0.5 * allowed;
+        while excess > 0.0 {
+            let Some(Stretch { piece, start, end, values: [low, lower, middle, upper, high], error }) = stretches.pop()
+            else {
+                break;
+            };
+            let at = |quarter: f64| start + 0.25 * quarter * (end - start);
+            let ((first, _), (second, _)) = (look(piece, at(0.5))?, look(piece, at(1.5))?);
+            let ((third, _), (fourth, looked)) = (look(piece, at(2.5))?, look(piece, at(3.5))?);
+            let halves = [
+                Stretch::new(piece, start, at(2.0), [low, first, lower, second, middle]),
+                Stretch::new(piece, at(2.0), end, [middle, third, upper, fourth, high]),
+            ];
+            excess -= error;
+            for half in halves {
+                excess += half.error;
+                stretches.push(half);
+            }
+            if looked > u64::from(MOST_MOMENTS).saturating_mul(pieces.len() as u64) {
+                let not_converged =
+                    NotConverged { what: "mean over the period", iterations: MOST_MOMENTS, bracket_width: error };
+                return Err(not_converged.into());
+            }
+        }
+    }
+}
+
+/// The integrals over all stretches.
+fn total<const N: usize>(stretches: &BinaryHeap<Stretch<N>>) -> Values<N> {
+    std::array::from_fn(|n| stretches.iter().map(|stretch| stretch.area(n)).sum())
+}

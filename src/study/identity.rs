@@ -1,0 +1,61 @@
+//! What tells a study from every other one.
+
+use toothwave_calculation::design::Design;
+use toothwave_calculation::json::{self, Tree};
+use toothwave_calculation::key::Key;
+use toothwave_calculation::no_answer::NoAnswer;
+use toothwave_calculation::question;
+
+use crate::document::StudyDocument;
+use crate::quantity::Quantity;
+use crate::variant::{Domain, Template, Variable};
+
+/// The hash of what is asked, within limits that some variants may be beyond: equal however the fields are ordered and the numbers spelled, and whether defaults
+/// are written out.
+pub(crate) fn id(
+    document: &StudyDocument,
+    template: &Template,
+    quantities: &[&'static Quantity],
+    limits: &question::Limits,
+) -> Result<Key, NoAnswer> {
+    let mut asked = tree_of(document)?;
+    let base = asked.remove(&["base".into()]).unwrap_or(Tree::Null);
+    let names = [String::from("quantities")];
+    if asked.at(&names).is_some() {
+        asked.set(&names, Tree::Array(quantities.iter().map(|quantity| Tree::Text(quantity.name.into())).collect()));
+    }
+    // The base is known by the designs at both ends of all ranges, and by what it has itself of what varies.
+    let end = |is_low: bool| {
+        move |variable: &Variable| match variable.domain {
+            Domain::Real { min, max } | Domain::Whole { min, max } => Some(if is_low { min } else { max }),
+            Domain::OneOf(_) => None,
+        }
+    };
+    let designs = template.examples_at(end(true)).chain(template.examples_at(end(false)));
+    let mut parts = designs.map(|design| hash_of(&complete(&design)?)).collect::<Result<Vec<_>, _>>()?;
+    let own = template.variables().iter().flat_map(|variable| {
+        [Tree::Text(variable.pointer.clone()), base.at(variable.path()).cloned().unwrap_or(Tree::Null)]
+    });
+    parts.push(hash_of(&Tree::Array(own.collect()))?);
+    parts.push(hash_of(&asked)?);
+    let within = format!("{} states, {} points", limits.max_states, limits.max_profile_points);
+    Ok(Key::new("study", &parts.join(" ").as_str(), &within.as_str()))
+}
+
+/// A design with all its defaults; as it is where it is none.
+fn complete(design: &Tree) -> Result<Tree, NoAnswer> {
+    match design.read::<Design>() {
+        Ok(read) => tree_of(&read.normalised().with_defaults()),
+        Err(_) => Ok(design.clone()),
+    }
+}
+
+fn tree_of(document: &impl serde::Serialize) -> Result<Tree, NoAnswer> {
+    let text = serde_json::to_vec(document).map_err(NoAnswer::internal)?;
+    Ok(json::tree(&text)?)
+}
+
+fn hash_of(tree: &Tree) -> Result<String, NoAnswer> {
+    let text = serde_json::to_string(&tree.clone().sorted()).map_err(NoAnswer::internal)?;
+    Ok(Key::new("study", &text.as_str(), &"").to_string())
+}

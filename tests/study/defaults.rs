@@ -1,0 +1,98 @@
+//! What a default that is written out, and the sweep beside a study, must not change.
+
+use serde_json::{Value, json};
+use toothwave_calculation::design::Design;
+use toothwave_calculation::question::Question as _;
+use toothwave_calculation::sweep::Sweep;
+use toothwave_solver::Never;
+
+use crate::asking::{CALCULATION, answer, study, with};
+
+fn examples() -> [Value; 3] {
+    [
+        include_str!("../../examples/paper-5.2.json"),
+        include_str!("../../examples/harmonic-three-lobes.json"),
+        include_str!("../../examples/flat-sided.json"),
+    ]
+    .map(|text| serde_json::from_str(text).unwrap())
+}
+
+/// All kinds of study of a base, over a number that defaults follow from.
+fn studies(base: &Value) -> Vec<Value> {
+    let radius_mm = base["drive"]["teeth"]["radius_mm"].as_f64().unwrap();
+    let range = json!({ "min": 0.9 * radius_mm, "max": radius_mm });
+    let radius = "/drive/teeth/radius_mm";
+    vec![
+        json!({ "study": "map", "base": base, "over": { radius: { "one_of": [radius_mm] } } }),
+        json!({ "study": "search", "base": base, "free": { radius: range }, "objectives": [{ "quantity": "peak_force_n", "goal": "min" }] }),
+        json!({ "study": "sensitivity", "base": base, "inputs": { radius: {} } }),
+        json!({ "study": "tolerance", "base": base, "inputs": { radius: { "distribution": "uniform", "limit": 0.001 } }, "samples": 10 }),
+    ]
+}
+
+#[test]
+fn a_default_written_out_keeps_the_id() {
+    for base in examples() {
+        let design = Design::read(base.to_string().as_bytes()).unwrap();
+        let mut whole = serde_json::to_value(&design).unwrap();
+        whole["drive"]["teeth"]["installed"] = json!(design.drive_parameters().installed);
+        whole["model"]["refinements"] = json!("auto");
+        if whole["model"]["stiffness"]["law"] == "johnson" {
+            whole["model"]["stiffness"]["depth_mm"] = json!({});
+        }
+        for (short, long) in studies(&base).iter().zip(studies(&whole)) {
+            assert_eq!(study(short).unwrap().id(), study(&long).unwrap().id(), "{long}");
+        }
+    }
+}
+
+#[test]
+fn what_is_no_default_changes_the_id() {
+    let [base, ..] = examples();
+    for (pointer, value) in [
+        ("/model/refinements", json!("none")),
+        ("/drive/teeth/installed", json!(20)),
+        ("/parts", json!({ "ring": { "clearance_um": 1.0 } })),
+    ] {
+        let base = with(&base, "/model", json!({}));
+        let other = with(&base, pointer, value);
+        for (one, other) in studies(&base).iter().zip(studies(&other)) {
+            assert_ne!(study(one).unwrap().id(), study(&other).unwrap().id(), "{other}");
+        }
+    }
+}
+
+#[test]
+fn a_study_has_the_loss_of_its_sweep() {
+    let base = json!({
+        "drive": {
+            "wave_generator": { "kind": "harmonic", "lobes": 2, "mean_radius_mm": 231.12997975753026, "amplitude_mm": 41.60339635635545 },
+            "teeth": { "count": 8, "radius_mm": 68.49251202065417, "width_mm": 195.7791649140081 },
+            "ring": { "teeth": 6, "tip_radius_mm": 330.67467672845333 }
+        },
+        "load": { "output_torque_nm": 81.02744671570262 },
+        "model": { "stiffness": { "law": "palmgren" }, "refinements": ["ring_teeth_bend"] },
+        "parts": {
+            "wave_generator": { "clearance_um": 32.427941756611055 },
+            "ring": { "clearance_um": 4.647819064937812 },
+            "carrier": { "clearance_um": 24.77145301233784 }
+        },
+        "sweep": { "tolerance": 0.01, "wind_up": true },
+        "friction": {
+            "wave_generator": { "kind": "race", "coefficient": 0.12805712193672292, "bearing_coefficient": 0.00536429680252209, "bearing_radius_mm": 218.62018263879833 },
+            "ring": { "coefficient": 0.10293595232186245 },
+            "carrier": { "coefficient": 0.04377392473226462 }
+        }
+    });
+    let map = json!({
+        "study": "map", "base": base, "over": { "/drive/teeth/radius_mm": { "one_of": [68.49251202065417] } },
+        "quantities": ["loss_ratio", "loss_ratio_wave_generator"]
+    });
+    let found = answer(&map);
+    let sweep = Sweep.ask(base.to_string().as_bytes(), &CALCULATION, &Never).unwrap();
+    let totals = sweep.losses.unwrap().totals;
+    let of_sweep = [totals.loss_ratio, totals.loss_ratio_by_place.wave_generator];
+    for (name, of_sweep) in ["loss_ratio", "loss_ratio_wave_generator"].into_iter().zip(of_sweep) {
+        assert_eq!(found["possible"]["quantities"][name][0].as_f64(), Some(of_sweep), "{name}");
+    }
+}
