@@ -152,7 +152,7 @@ impl Studies {
         if now_s.saturating_sub(kept.noted_at_s.load(Ordering::Relaxed)) > expiry.as_secs() / NOTE_SHARE {
             kept.noted_at_s.store(now_s, Ordering::Relaxed);
             let (store, id) = (store.clone(), kept.id.clone());
-            tokio::spawn(async move {
+            self.runs.spawn(async move {
                 if let Err(error) = store.with(move |transaction| store::touch(transaction, &id)).await {
                     tracing::warn!(%error, "that a study was asked for was not written down");
                 }
@@ -317,7 +317,7 @@ impl Studies {
         self.runs.close();
     }
 
-    /// When all studies have stopped.
+    /// When all studies have stopped, and all that was to be noted of them is.
     pub async fn closed(&self) {
         self.runs.wait().await;
     }
