@@ -334,8 +334,9 @@ async fn teeth_meet_the_corners_of_pointed_tips_where_that_is_chosen() {
     assert_eq!(sweep(json!({ "corner_contact": false })).await["states"], rigid["states"]);
     let refused = json!({ "compatibility": "projection", "corner_contact": true });
     let problem =
-        service.post("/v1/sweep", &with(&undercut(), "/model", refused)).await.refused(422, "impossible_design");
-    assert_eq!(problem["errors"][0]["pointer"], "/model/corner_contact");
+        service.post("/v1/sweep", &with(&undercut(), "/model", refused)).await.refused(422, "invalid_document");
+    let error = &problem["errors"][0];
+    assert_eq!((&error["pointer"], &error["code"]), (&json!("/model/corner_contact"), &json!("conflicting_fields")));
 }
 
 /// Forces, stresses and what is kept of them follow the designer's carrier.

@@ -380,7 +380,7 @@ async fn a_dxf_declares_millimetres_and_a_layer_a_part_and_closes_every_polyline
 #[tokio::test]
 async fn parts_change_no_load_and_are_read_by_drawings_and_by_the_estimates_of_what_gives_way() {
     let service = Service::new();
-    let document = made(r#"{ "ring": { "outer_radius_mm": 1, "clearance_um": -5 } }"#);
+    let document = made(r#"{ "ring": { "outer_radius_mm": 1 } }"#);
     for path in ["/v1/geometry", "/v1/coincidence-degree"] {
         service.post(path, &shortest()).await.found();
         assert!(service.post(path, &document).await.is_hit(), "{path}");

@@ -125,7 +125,7 @@ async fn a_part_too_full_is_an_interference_unless_a_clearance_covers_it() {
     assert!(detail.contains("deg") && detail.contains("µm") && detail.contains("`parts.*.clearance_um`"), "{detail}");
     let covered = with(&full, "/parts", json!({ "ring": { "clearance_um": 5.0 } }));
     let found = swept(&covered).await;
-    let expected = swept(&cleared(json!({ "ring_um": 1.0 }))).await;
+    let expected = swept(&cleared(json!({ "ring": { "clearance_um": 1.0 } }))).await;
     let forces = |answer: &Value| numbers(&answer["states"]["force_ring_n"]);
     assert_near(&forces(&found), &forces(&expected), 1e-9);
     // Geometry reads none of it.

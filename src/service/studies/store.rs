@@ -256,7 +256,8 @@ fn require_schema(transaction: &Transaction<'_>) -> Result<(), StoreError> {
 pub(super) fn load(transaction: &Transaction<'_>) -> rusqlite::Result<Vec<StoredStudy>> {
     let others = "origin <> ?1";
     let is_over = "(state <> 'running' OR done = chunks)";
-    transaction.execute(&format!("DELETE FROM parts WHERE {others}"), [origin()])?;
+    transaction
+        .execute(&format!("DELETE FROM parts WHERE study IN (SELECT id FROM studies WHERE {others})"), [origin()])?;
     transaction.execute(&format!("DELETE FROM studies WHERE {others} AND {is_over}"), [origin()])?;
     let adopt = format!("UPDATE studies SET origin = ?1, done = 0, looked_at = 0, impossible = 0 WHERE {others}");
     transaction.execute(&adopt, [origin()])?;

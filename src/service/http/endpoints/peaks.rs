@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer};
 use toothwave_calculation::coincidence_degree::TeethInMeshAnswer;
-use toothwave_calculation::design::Design;
+use toothwave_calculation::design::{Design, ModelDocument};
 use toothwave_calculation::findings::FindingAnswer;
 use toothwave_calculation::forms::{Form, Format, Forms};
 use toothwave_calculation::key::Encode;
@@ -34,6 +34,7 @@ struct View<'a> {
     load: &'a LoadAnswer,
     enters_under_load: bool,
     peaks: &'a PeaksAnswer,
+    model: &'a ModelDocument,
     model_error: &'a ModelErrorAnswer,
     series_compliance_estimates: &'a [EstimateAnswer],
     teeth_in_mesh_per_zone: &'a TeethInMeshAnswer,
@@ -60,6 +61,7 @@ impl Serialize for PeaksOnlyAnswer {
             load: &sweep.load,
             enters_under_load: sweep.enters_under_load,
             peaks: &sweep.peaks,
+            model: &sweep.model,
             model_error: &sweep.model_error,
             series_compliance_estimates: &sweep.series_compliance_estimates,
             teeth_in_mesh_per_zone: &sweep.teeth_in_mesh_per_zone,
