@@ -13,7 +13,7 @@ test('opens on the default model', async () => {
   assert.deepEqual(await designOf(page), { drive, load });
   const stress = () => resultOf(page, 'Contact stress, ring');
   const before = await stress();
-  await enter(page, '/model/clearance/ring_um', 10);
+  await enter(page, '/parts/ring/clearance_um', 10);
   const { sweep } = await bed.server.answers({ drive, load, model: { clearance: { ring_um: 10 } } });
   assert.equal(await stress(), sweep.peaks.ring.stress_mpa.value);
   assert.ok(Math.abs((await stress()) / before - 1) < 0.05, 'not the paper’s answer to it');
@@ -87,7 +87,7 @@ test('numbers are understood as people type them', async () => {
     await enter(page, RADIUS, text);
     assert.equal((await designOf(page)).drive.teeth.radius_mm, value, text);
   }
-  for (const [pointer, text, value] of [['/load/input_torque_nm', '12 Nm', 12], ['/load/input_speed_rpm', '1500rpm', 1500], ['/model/clearance/ring_um', '4 um', 4], ['/model/clearance/ring_um', '3µm', 3]]) {
+  for (const [pointer, text, value] of [['/load/input_torque_nm', '12 Nm', 12], ['/load/input_speed_rpm', '1500rpm', 1500], ['/parts/ring/clearance_um', '4 um', 4], ['/parts/ring/clearance_um', '3µm', 3]]) {
     await enter(page, pointer, text);
     assert.equal(pointer.split('/').slice(1).reduce((part, key) => part[key], await designOf(page)), value, text);
   }

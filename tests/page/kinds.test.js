@@ -378,6 +378,9 @@ const NOT_IN_THE_FORM = {
   '/assembly/input_angle_deg': 'turned in the picture',
   ...Object.fromEntries(['wave_generator', 'ring', 'carrier'].map((contact) => [`/load/allowable_stress_mpa/${contact}`, 'one for all has a field'])),
   ...Object.fromEntries(
+    ['clearance/wave_generator_um', 'clearance/ring_um', 'clearance/carrier_um', 'ring_teeth_bend', 'wave_generator_moves', 'corner_contact'].map((field) => [`/model/${field}`, 'deprecated: the page converts it']),
+  ),
+  ...Object.fromEntries(
     ['tooth_radius_um', 'slot_angle_arcsec', 'slot_wall_um', 'ring_space_um', 'ring_space_angle_arcsec', 'wave_generator_lobe_um'].map((list) => [`/deviations/${list}`, 'a list, measured and not typed']),
   ),
 };
