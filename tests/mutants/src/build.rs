@@ -96,14 +96,12 @@ pub enum Stage {
     All,
     /// Those beside what they are about.
     Units,
-    /// All of those that stand apart and no others, in a program that is quickly made.
-    Brief,
 }
 
 impl Stage {
     /// Whether what no test has noticed after it is missed.
     pub fn is_last(self) -> bool {
-        matches!(self, Self::All | Self::Brief)
+        self == Self::All
     }
 }
 

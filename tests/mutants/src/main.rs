@@ -1,11 +1,10 @@
 //! Tries the mutants that cargo-mutants lists, a batch of them by chance built into one test program.
 //!
-//!     schemata LIST ROOT COPY TARGET RESULTS [--seconds N] [--draw NAME] [--again] [--brief N] [--known REPORT] [--report REPORT]
+//!     schemata LIST ROOT COPY TARGET RESULTS [--seconds N] [--draw NAME] [--again] [--known REPORT] [--report REPORT]
 //!
 //! LIST is what `cargo mutants --list --json` writes of one crate, ROOT the tree, COPY one to change, TARGET where it is compiled, RESULTS a file that keeps what was found: a run
 //! that was broken off goes on from there, and mutants of files that have changed are tried anew; with --again also those that no test
-//! noticed. N seconds after the first was tried no further mutant is; each name of a draw has an order by chance of its own. With --brief N of them are tried, drawn by chance, and what tests beside the
-//! code alone may notice stays open. It fails where surely fewer are noticed than a known report says.
+//! noticed. N seconds after the first was tried no further mutant is; each name of a draw has an order by chance of its own. It fails where surely fewer are noticed than a known report says.
 
 mod build;
 mod mutant;
@@ -53,7 +52,7 @@ fn main() -> io::Result<ExitCode> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [list, root, copy, target, results, options @ ..] = arguments.as_slice() else {
         eprintln!(
-            "usage: schemata LIST ROOT COPY TARGET RESULTS [--seconds N] [--draw NAME] [--again] [--brief N] [--known REPORT] [--report REPORT]"
+            "usage: schemata LIST ROOT COPY TARGET RESULTS [--seconds N] [--draw NAME] [--again] [--known REPORT] [--report REPORT]"
         );
         return Ok(ExitCode::from(2));
     };
@@ -113,16 +112,13 @@ fn main() -> io::Result<ExitCode> {
             keep(verdicts, number, verdict, None)?;
         }
         let reached = fs::canonicalize(&results)?.with_extension(format!("{stage:?}"));
-        let tests = Tests::learn(&program, &tree, stage, &reached, threads)?;
+        let tests = Tests::learn(&program, &tree, &reached, threads)?;
         let built: Vec<usize> = these.iter().copied().filter(|number| !program.left.contains_key(number)).collect();
         started.get_or_init(Instant::now);
         let (next, found) = (AtomicUsize::new(0), Mutex::new((verdicts, &mut keep)));
         at_once(threads, || {
             while let Some(&number) = built.get(next.fetch_add(1, Relaxed)).filter(|_| !is_over()) {
-                let (mut verdict, by) = tests.verdict(number, &mutants[number], stage)?;
-                if stage == Stage::Brief && verdict.is_silent() && with_units.contains(&mutants[number].file) {
-                    verdict = Verdict::Open;
-                }
+                let (verdict, by) = tests.verdict(number, &mutants[number], stage)?;
                 let (verdicts, keep) = &mut *found.lock().map_err(|_| io::Error::other("a thread panicked"))?;
                 keep(verdicts, number, verdict, by)?;
             }
@@ -134,19 +130,11 @@ fn main() -> io::Result<ExitCode> {
     let draw = option("--draw").map_or("", String::as_str);
     let mut order: Vec<usize> = (0..mutants.len()).collect();
     order.sort_by_key(|&number| hash((mutants[number].name.clone() + draw).as_bytes()));
-    let brief: Option<usize> = option("--brief").map(|most| most.parse().map_err(io::Error::other)).transpose()?;
-    if let Some(most) = brief {
-        order.truncate(most);
-    }
     for batch in order.chunks(BATCH) {
         let those = |which: &dyn Fn(usize) -> bool| -> Vec<usize> {
             batch.iter().copied().filter(|&number| which(number)).collect()
         };
         let fresh = those(&|number| verdicts[number].is_none());
-        if brief.is_some() {
-            ask(&mut verdicts, &fresh, Stage::Brief)?;
-            continue;
-        }
         if fresh.len() > FEW && of.is_optimised {
             ask(&mut verdicts, &fresh, Stage::Quick)?;
         }

@@ -85,13 +85,13 @@ struct Reach {
 impl<'p> Tests<'p> {
     /// Runs each test by itself to see how long it takes and where it comes by. All pass where no mutant is chosen. What a program's tests
     /// reach is kept in a file.
-    pub fn learn(program: &'p Program, tree: &'p Tree, stage: Stage, kept: &Path, threads: usize) -> io::Result<Self> {
+    pub fn learn(program: &'p Program, tree: &'p Tree, kept: &Path, threads: usize) -> io::Result<Self> {
         let hash = crate::hash(&fs::read(&program.tests)?);
         let known = fs::read_to_string(kept).ok().and_then(|text| serde_json::from_str::<Reach>(&text).ok());
         let mut tests = Self { program, tree, runs: Vec::new(), records: Mutex::default(), reaching: BTreeMap::new() };
         let reach = match known.filter(|reach| reach.of_program == hash) {
             Some(reach) => reach,
-            None => Reach { of_program: hash, runs: tests.all_runs(stage, kept, threads)? },
+            None => Reach { of_program: hash, runs: tests.all_runs(kept, threads)? },
         };
         fs::write(kept, serde_json::to_string(&reach)?)?;
 
@@ -115,7 +115,7 @@ impl<'p> Tests<'p> {
     }
 
     /// Each test with the first of its cases, and with all where it has more.
-    fn all_runs(&self, stage: Stage, kept: &Path, threads: usize) -> io::Result<Vec<(Run, Vec<usize>)>> {
+    fn all_runs(&self, kept: &Path, threads: usize) -> io::Result<Vec<(Run, Vec<usize>)>> {
         let list = Command::new(&self.program.tests).args(["--list", "--format", "terse"]).output()?;
         let list = String::from_utf8_lossy(&list.stdout);
         let names: Vec<&str> = list.lines().filter_map(|line| line.strip_suffix(": test")).collect();
@@ -131,7 +131,7 @@ impl<'p> Tests<'p> {
                     }
                     run => run?,
                 };
-                if self.tree.of.waits || stage == Stage::Brief {
+                if self.tree.of.waits {
                     locked(&runs).push(all);
                     continue;
                 }
