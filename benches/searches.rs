@@ -340,7 +340,8 @@ fn run(case: &Case) -> Value {
                 rates.push(number(&answer["evaluated"]) / seconds);
                 for (name, _) in truth {
                     let found = answer["relaxations"].as_array().unwrap().iter();
-                    let needed = found.filter(|relaxed| relaxed["quantity"] == *name).map(|one| one["needed"].clone());
+                    let mut needed =
+                        found.filter(|relaxed| relaxed["quantity"] == *name).map(|one| one["needed"].clone());
                     let found = result["relaxations"][*name].take();
                     let mut found = found.as_array().cloned().unwrap_or_default();
                     found.push(needed.next_back().unwrap_or(Value::Null));

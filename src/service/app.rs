@@ -9,7 +9,7 @@ use crate::compute::budget::Budget;
 use crate::compute::cache::Cache;
 use crate::compute::pool::{Deadline, Pool};
 use crate::ops::config::Limits;
-use crate::studies::{Keeping, Studies};
+use crate::studies::{Storage, Studies};
 
 /// What handlers share.
 #[derive(Debug)]
@@ -30,14 +30,11 @@ pub struct App {
 
 impl App {
     /// An idle service within these limits.
-    ///
-    /// # Errors
-    /// If the system refuses a thread.
-    pub fn start(limits: Limits, keeping: Keeping) -> io::Result<Arc<Self>> {
+    pub fn start(limits: Limits, storage: Option<Storage>) -> io::Result<Arc<Self>> {
         let pool = Pool::start(limits.max_concurrent_solves)?;
         Ok(Arc::new(Self {
             limits,
-            studies: Studies::new(pool.clone(), limits, keeping),
+            studies: Studies::new(pool.clone(), limits, storage),
             pool,
             cache: Cache::new(limits.cache_max_bytes),
             budget: Budget::new(limits.max_unread_bytes),

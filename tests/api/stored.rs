@@ -256,8 +256,6 @@ async fn damage_to_the_file_never_becomes_a_number() {
     keeper.end();
     let whole = fs::read(&file.0).unwrap();
     for damage in [
-        "UPDATE studies SET variants = variants + 1",
-        "UPDATE studies SET document = CAST(replace(CAST(document AS TEXT), '3.0', '3.5') AS BLOB)",
         "UPDATE parts SET part = zeroblob(length(part)) WHERE chunk = 7",
         "UPDATE parts SET part = (SELECT part FROM parts WHERE chunk = 8) WHERE chunk = 7",
         "UPDATE parts SET chunk = 1000 WHERE chunk = 0",
@@ -273,6 +271,20 @@ async fn damage_to_the_file_never_becomes_a_number() {
         keeper.end();
         fs::write(&file.0, &whole).unwrap();
     }
+}
+
+#[tokio::test]
+async fn study_with_damaged_document_is_removed() {
+    let file = File::new();
+    let keeper = Keeper::of(&file);
+    let study = keeper.wait_for(&map(5)).await;
+    keeper.end();
+    let damage = "UPDATE studies SET document = CAST(replace(CAST(document AS TEXT), '3.0', '3.5') AS BLOB)";
+    assert_eq!(file.change(damage), 1);
+    let keeper = Keeper::of(&file);
+    keeper.0.get(&result(&study)).await.refused(404, "not_found");
+    assert_eq!(keeper.wait_for(&map(5)).await, study);
+    keeper.end();
 }
 
 /// Pages that SQLite itself finds broken.
@@ -295,21 +307,26 @@ async fn broken_pages_are_a_problem() {
 async fn parts_of_another_build_are_computed_again() {
     let file = File::new();
     let keeper = Keeper::of(&file);
-    let study = keeper.wait_for(&map(500)).await;
-    let other = keeper.wait_for(&map(5)).await;
+    let (running, done) = (keeper.wait_for(&map(500)).await, keeper.wait_for(&map(5)).await);
     keeper.end();
-    file.change("UPDATE studies SET origin = 'another', done = done - 1 WHERE variants = 500");
-    file.change("UPDATE parts SET origin = 'another'");
-    file.change("UPDATE studies SET origin = 'another', state = 'cancelled' WHERE variants = 5");
+    // Another build gives the same study another id.
+    let id = running["id"].as_str().unwrap();
+    file.change(&format!("UPDATE studies SET id = 'other', state = 'running' WHERE id = '{id}'"));
+    file.change(&format!("UPDATE parts SET study = 'other' WHERE study = '{id}'"));
+    file.change("UPDATE studies SET origin = 'another'");
     let keeper = Keeper::of(&file);
-    // One that does not run is not this build's to tell of.
-    keeper.0.get(&place(&other)).await.refused(404, "not_found");
-    while keeper.0.get(&place(&study)).await.found()["state"] == "running" {
+    // The result of one that does not run would have other bits in this build.
+    keeper.0.get(&place(&done)).await.refused(404, "not_found");
+    while keeper.0.get("/v1/studies/other").await.found()["state"] == "running" {
         tokio::task::yield_now().await;
     }
-    assert_eq!(keeper.0.get(&result(&study)).await.found(), study["result"]);
+    assert_eq!(keeper.0.get("/v1/studies/other/result").await.found(), running["result"]);
     keeper.end();
-    assert_eq!(file.change("DELETE FROM parts WHERE origin = 'another'"), 0, "the others are removed");
+    assert_eq!(file.change("DELETE FROM parts WHERE study <> 'other'"), 0);
+    // The next start finds it whole.
+    let keeper = Keeper::of(&file);
+    assert_eq!(keeper.0.get("/v1/studies/other/result").await.found(), running["result"]);
+    keeper.end();
 }
 
 #[tokio::test]

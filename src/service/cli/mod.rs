@@ -153,7 +153,11 @@ impl From<Problem> for Failure {
 pub fn run() -> ExitCode {
     let cli = match Cli::try_parse_from(arguments()) {
         Ok(cli) => cli,
-        Err(error) => return refuse(&error),
+        Err(error) => {
+            // Standard error may be closed.
+            let _ = error.print();
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(EXIT_BAD_INPUT));
+        }
     };
     let result = match cli.command {
         Command::Serve(settings) => run_service(&settings),
@@ -197,25 +201,6 @@ fn printable(text: &str) -> String {
         }
     }
     printable
-}
-
-/// Says what is wrong with the command line. clap names the first fault alone; of the settings in the environment, by which containers
-/// are configured, all are named.
-fn refuse(error: &clap::Error) -> ExitCode {
-    let status = ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(EXIT_BAD_INPUT));
-    let _ = error.print();
-    if error.use_stderr() {
-        let settings = Settings::augment_args(clap::Command::new("toothwave").no_binary_name(true));
-        for setting in settings.get_arguments().filter(|setting| setting.get_env().is_some()) {
-            let alone = clap::Command::new("toothwave").no_binary_name(true).arg(setting.clone());
-            if let Err(other) = alone.try_get_matches_from([""; 0])
-                && other.to_string() != error.to_string()
-            {
-                let _ = other.print();
-            }
-        }
-    }
-    status
 }
 
 /// The arguments of this process, with the command `serve` if none is given. Settings are read for that command alone, so that a fault in

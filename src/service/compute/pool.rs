@@ -38,13 +38,13 @@ type Job = Box<dyn FnOnce() + Send>;
 
 /// The permits and threads of one kind of work.
 #[derive(Debug)]
-struct Lane {
+struct Workers {
     permits: Arc<Semaphore>,
     count: usize,
     jobs: mpsc::Sender<Job>,
 }
 
-impl Lane {
+impl Workers {
     fn start(name: &str, count: usize, nice: i32) -> io::Result<Self> {
         let (jobs, waiting) = mpsc::channel::<Job>();
         let waiting = Arc::new(Mutex::new(waiting));
@@ -72,8 +72,8 @@ impl Lane {
 
 #[derive(Debug)]
 struct Inner {
-    interactive: Lane,
-    background: Lane,
+    interactive: Workers,
+    background: Workers,
     waiting: Arc<Semaphore>,
     batches: Arc<Semaphore>,
     stopping: CancellationToken,
@@ -100,13 +100,10 @@ impl Drop for StopOnDrop {
 
 impl Pool {
     /// A pool with this many permits, and threads, of each kind.
-    ///
-    /// # Errors
-    /// If the system refuses a thread.
     pub fn start(permits: usize) -> io::Result<Self> {
         Ok(Self(Arc::new(Inner {
-            interactive: Lane::start("solve", permits, 0)?,
-            background: Lane::start("background", permits, BACKGROUND_NICE)?,
+            interactive: Workers::start("solve", permits, 0)?,
+            background: Workers::start("background", permits, BACKGROUND_NICE)?,
             waiting: Arc::new(Semaphore::new(MAX_WAITING_REQUESTS)),
             batches: Arc::new(Semaphore::new(MAX_RUNNING_BATCHES)),
             stopping: CancellationToken::new(),
@@ -144,9 +141,7 @@ impl Pool {
     }
 
     /// Computes for a request. Dropping the future sets the stop flag.
-    ///
-    /// # Errors
-    /// `queue_full`, `shutting_down`, `internal_error` for a panic, and those of `job`.
+    /// Fails with `queue_full`, `shutting_down`, and `internal_error` for a panic.
     pub async fn run<T: Send + 'static>(
         &self,
         job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
@@ -156,18 +151,12 @@ impl Pool {
     }
 
     /// Computes for a request on the executor's own thread: for work of at most some 0.1 ms, of which a change of threads would be a quarter.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
     pub async fn run_inline<T>(&self, job: impl FnOnce(&AtomicBool) -> Result<T, Problem>) -> Result<T, Problem> {
         let _permit = self.interactive_permit().await?;
-        timed(|| caught(|| job(&AtomicBool::new(false))))
+        timed(|| catch_panic(|| job(&AtomicBool::new(false))))
     }
 
     /// Computes in the background, for at most `time` once it has a permit. Dropping the future sets the stop flag.
-    ///
-    /// # Errors
-    /// As [`Self::run`], without `queue_full`, and `deadline_exceeded`.
     pub async fn run_in_background<T: Send + 'static>(
         &self,
         time: Duration,
@@ -178,9 +167,7 @@ impl Pool {
     }
 
     /// A place for a batch, to be held while it runs.
-    ///
-    /// # Errors
-    /// `queue_full` if 16 batches run.
+    /// Fails with `queue_full` if 16 batches run.
     pub fn begin_batch(&self) -> Result<OwnedSemaphorePermit, Problem> {
         Arc::clone(&self.0.batches).try_acquire_owned().map_err(|_| {
             let detail = format!(
@@ -191,49 +178,49 @@ impl Pool {
     }
 
     async fn interactive_permit(&self) -> Result<OwnedSemaphorePermit, Problem> {
-        let lane = &self.0.interactive;
-        if let Ok(permit) = Arc::clone(&lane.permits).try_acquire_owned() {
+        let workers = &self.0.interactive;
+        if let Ok(permit) = Arc::clone(&workers.permits).try_acquire_owned() {
             return Ok(permit);
         }
-        let _place = self.0.waiting.try_acquire().map_err(|_| {
+        let _waiting = self.0.waiting.try_acquire().map_err(|_| {
             let detail = format!(
                 "{} computations run and {MAX_WAITING_REQUESTS} requests wait. Try again in a second",
                 self.permits()
             );
             Problem::new(ProblemCode::QueueFull, detail)
         })?;
-        self.permit(lane).await
+        self.permit(workers).await
     }
 
-    async fn permit(&self, lane: &Lane) -> Result<OwnedSemaphorePermit, Problem> {
+    async fn permit(&self, workers: &Workers) -> Result<OwnedSemaphorePermit, Problem> {
         tokio::select! {
             biased;
             () = self.0.stopping.cancelled() => Err(shutting_down()),
-            permit = Arc::clone(&lane.permits).acquire_owned() => permit.map_err(|error| Problem::internal(&error)),
+            permit = Arc::clone(&workers.permits).acquire_owned() => permit.map_err(|error| Problem::internal(&error)),
         }
     }
 
     async fn run_on<T: Send + 'static>(
         &self,
-        lane: &Lane,
+        workers: &Workers,
         permit: OwnedSemaphorePermit,
         job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
         let flag = Arc::new(AtomicBool::new(false));
         let mut stop = StopOnDrop { flag: Arc::clone(&flag), is_done: false };
-        let (tell, told) = oneshot::channel();
+        let (sender, receiver) = oneshot::channel();
         let span = Span::current();
         let job = Box::new(move || {
-            let result = span.in_scope(|| timed(|| caught(|| job(&flag))));
-            // Whoever gets the result finds the permit free.
+            let result = span.in_scope(|| timed(|| catch_panic(|| job(&flag))));
+            // Before the result is sent, so that its receiver finds the permit free.
             drop(permit);
-            // Nobody may wait any more.
-            let _ = tell.send(result);
+            // An error means that nobody waits for the result.
+            let _ = sender.send(result);
         });
-        lane.jobs.send(job).map_err(|error| Problem::internal(&error))?;
+        workers.jobs.send(job).map_err(|error| Problem::internal(&error))?;
         tokio::select! {
             biased;
-            result = told => {
+            result = receiver => {
                 stop.is_done = true;
                 result.unwrap_or_else(|error| Err(Problem::internal(&error)))
             }
@@ -250,17 +237,11 @@ fn timed<T>(job: impl FnOnce() -> T) -> T {
 }
 
 /// The result of a job; a panic is an internal error.
-///
-/// # Errors
-/// Those of the job, and `internal_error`.
-pub fn caught<T>(job: impl FnOnce() -> Result<T, Problem>) -> Result<T, Problem> {
+pub fn catch_panic<T>(job: impl FnOnce() -> Result<T, Problem>) -> Result<T, Problem> {
     panic::catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|panic| Err(Problem::panicked(panic.as_ref())))
 }
 
 /// The result of a future that has until the deadline, at which it is dropped.
-///
-/// # Errors
-/// `deadline_exceeded`, and those of the future.
 pub async fn within<T>(deadline: Deadline, future: impl Future<Output = Result<T, Problem>>) -> Result<T, Problem> {
     tokio::time::timeout_at(deadline.at, future).await.unwrap_or_else(|_| {
         let detail =
@@ -288,71 +269,4 @@ impl Deadline {
 
 fn shutting_down() -> Problem {
     Problem::new(ProblemCode::ShuttingDown, "the service is stopping. Try again: another one may have taken its place")
-}
-
-#[cfg(test)]
-mod tests {
-    use std::sync::atomic::{AtomicBool, Ordering};
-    use std::sync::mpsc;
-    use std::time::Duration;
-
-    use futures_util::poll;
-
-    use super::{MAX_WAITING_REQUESTS, Pool};
-    use crate::http::problem::{Problem, ProblemCode};
-
-    /// A job that runs until its sender is dropped.
-    fn blocked() -> (mpsc::Sender<()>, impl FnOnce(&AtomicBool) -> Result<(), Problem>) {
-        let (release, released) = mpsc::channel::<()>();
-        (release, move |_: &AtomicBool| {
-            let _ = released.recv();
-            Ok(())
-        })
-    }
-
-    #[tokio::test]
-    async fn refuses_request_beyond_full_queue() {
-        let pool = Pool::start(1).expect("threads");
-        let (release, job) = blocked();
-        let mut running = Box::pin(pool.run(job));
-        assert!(poll!(&mut running).is_pending());
-        let mut waiting: Vec<_> = (0..MAX_WAITING_REQUESTS).map(|_| Box::pin(pool.run(|_| Ok(())))).collect();
-        for request in &mut waiting {
-            assert!(poll!(request).is_pending());
-        }
-        let refused = pool.run(|_| Ok(())).await;
-        assert_eq!(refused.map_err(|problem| problem.code), Err(ProblemCode::QueueFull));
-        drop(release);
-        assert!(running.await.is_ok());
-        for request in waiting {
-            assert!(request.await.is_ok());
-        }
-        assert_eq!((pool.running(), pool.waiting()), (0, 0));
-    }
-
-    #[tokio::test]
-    async fn background_work_leaves_interactive_permits_free() {
-        let pool = Pool::start(1).expect("threads");
-        let (release, job) = blocked();
-        let mut background = Box::pin(pool.run_in_background(Duration::MAX, job));
-        assert!(poll!(&mut background).is_pending());
-        assert_eq!(pool.run(|_| Ok(7)).await.ok(), Some(7));
-        drop(release);
-        assert!(background.await.is_ok());
-    }
-
-    #[tokio::test]
-    async fn dropped_request_sets_stop_flag() {
-        let pool = Pool::start(1).expect("threads");
-        let mut request = Box::pin(pool.run(|stop| {
-            while !stop.load(Ordering::Relaxed) {
-                std::thread::yield_now();
-            }
-            Ok(())
-        }));
-        assert!(poll!(&mut request).is_pending());
-        drop(request);
-        // The only permit comes back.
-        assert!(pool.run(|_| Ok(())).await.is_ok());
-    }
 }

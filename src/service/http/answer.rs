@@ -1,4 +1,4 @@
-//! The walk of a request that sends a design document: bytes, document, key, cache, checked parameters, answer, bytes.
+//! Answers a request that sends a design document: bytes, document, key, cache, checked parameters, answer, bytes.
 
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -22,7 +22,6 @@ use utoipa::IntoResponses;
 
 use super::negotiation::{self, Representation};
 use super::problem::{Problem, ProblemCode};
-use super::query::require_no_query;
 use crate::app::App;
 use crate::compute::budget::{Budget, FREE_BYTES, PART_OF_UNKNOWN_SIZE, Reservation};
 use crate::compute::cache::{Answer, CacheStatus, MAX_BODY_BYTES, RequestHash};
@@ -81,16 +80,16 @@ pub struct Provenance {
 /// Answers a request, from the cache if possible.
 pub async fn respond<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Response {
     let deadline = app.deadline();
-    within(deadline, walk(question, app, deadline, request)).await.unwrap_or_else(IntoResponse::into_response)
+    within(deadline, answer_request(question, app, deadline, request)).await.unwrap_or_else(IntoResponse::into_response)
 }
 
-async fn walk<Q: Question>(
+async fn answer_request<Q: Question>(
     question: Q,
     app: Arc<App>,
     deadline: Deadline,
     request: Request,
 ) -> Result<Response, Problem> {
-    let Asked { headers, body, representation } = Asked::read::<Q>(&app, deadline, request).await?;
+    let DocumentRequest { headers, body, representation } = DocumentRequest::read::<Q>(&app, deadline, request).await?;
     let hash = RequestHash::new(question.name(), representation, &body);
     let known = app.cache.key(hash).and_then(|key| app.cache.get(key).map(|answer| (key, answer)));
     let (key, answer, status) = match known {
@@ -115,41 +114,47 @@ async fn walk<Q: Question>(
     };
     tracing::Span::current().record("design", tracing::field::display(key));
     let etag = format!("\"{key}\"");
-    let provenance = Provenance { status, solve: answer.solve };
-    let response = if negotiation::is_not_modified(&headers, &etag) {
+    let solve = answer.solve;
+    let mut response = if negotiation::is_not_modified(&headers, &etag) {
         StatusCode::NOT_MODIFIED.into_response()
     } else {
         with_body(&app.budget, answer, representation).await?
     };
-    Ok(with_cache_headers(response, provenance, key_header(&etag)))
+    response.extensions_mut().insert(Provenance { status, solve });
+    let headers = response.headers_mut();
+    // Hexadecimal digits and quotes always are a header value.
+    headers.insert(header::ETAG, HeaderValue::from_str(&etag).unwrap_or(HeaderValue::from_static("")));
+    headers.insert(header::VARY, HeaderValue::from_static("accept, accept-encoding"));
+    headers.insert(CACHE_STATUS, HeaderValue::from_static(status.header()));
+    Ok(response)
 }
 
-/// Answers a request whose answer is measured at that moment: never from the cache.
-pub async fn respond_afresh<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Response {
+/// Answers a request without the cache, because its answer is measured at that moment.
+pub async fn respond_uncached<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Response {
     let deadline = app.deadline();
-    let walk = async {
-        let Asked { body, representation, .. } = Asked::read::<Q>(&app, deadline, request).await?;
+    let answer = async {
+        let DocumentRequest { body, representation, .. } = DocumentRequest::read::<Q>(&app, deadline, request).await?;
         let (design, ()) = read_design(&app, body, |_| ()).await?;
         let checked = question.check(&design, &app.limits.of_calculation())?;
         let answer = compute::<Q>(Arc::clone(&app), checked, representation).await?;
         with_body(&app.budget, answer, representation).await
     };
-    let mut response = within(deadline, walk).await.unwrap_or_else(IntoResponse::into_response);
+    let mut response = within(deadline, answer).await.unwrap_or_else(IntoResponse::into_response);
     response.headers_mut().insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
     response
 }
 
-/// What all endpoints for design documents read of a request alike.
-struct Asked {
+/// A request with a design document.
+struct DocumentRequest {
     headers: HeaderMap,
     body: Bytes,
     representation: Representation,
 }
 
-impl Asked {
+impl DocumentRequest {
     async fn read<Q: Question>(app: &App, deadline: Deadline, request: Request) -> Result<Self, Problem> {
         let (Parts { headers, uri, .. }, body) = request.into_parts();
-        require_no_query(&uri)?;
+        negotiation::require_no_query(&uri)?;
         negotiation::require_json(&headers)?;
         let representation = Representation::negotiate(&headers, Q::Answer::FORMS.iter().map(|(format, _)| *format))?;
         let body = read_body(app, deadline, &headers, body).await?;
@@ -158,9 +163,7 @@ impl Asked {
 }
 
 /// The body of a request, at most `max_body_bytes` long.
-///
-/// # Errors
-/// `body_too_large`, `broken_body`, `request_timeout`, `shutting_down`.
+/// Fails with `body_too_large`, `broken_body`, `request_timeout` or `shutting_down`.
 pub async fn read_body(app: &App, deadline: Deadline, headers: &HeaderMap, body: Body) -> Result<Bytes, Problem> {
     let limit = app.limits.max_body_bytes;
     let announced = headers.get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok()?.parse::<usize>().ok());
@@ -202,22 +205,22 @@ pub fn broken_body(error: &dyn std::fmt::Display) -> Problem {
     Problem::new(ProblemCode::BrokenBody, format!("the body cannot be read to its end: {error}"))
 }
 
-/// The design of a body, and what `tell` says of it. A long one would keep the executor from other requests.
+/// The design of a body, and a value computed from it. A long document is read on a thread of the pool, not on the executor.
 async fn read_design<T: Send + 'static>(
     app: &App,
     body: Bytes,
-    tell: impl FnOnce(&Design) -> T + Send + 'static,
+    view: impl FnOnce(&Design) -> T + Send + 'static,
 ) -> Result<(Design, T), Problem> {
     let is_short = body.len() <= SHORT_DOCUMENT_BYTES;
     let read = move || {
         let design = Design::read(&body)?;
-        let told = tell(&design);
-        Ok((design, told))
+        let value = view(&design);
+        Ok((design, value))
     };
     if is_short { read() } else { app.pool.run(move |_| read()).await }
 }
 
-/// Computes an answer in the bytes that it has reserved.
+/// Reserves bytes, waits for a permit, and computes an answer.
 async fn compute<Q: Question>(
     app: Arc<App>,
     checked: Q::Checked,
@@ -237,10 +240,8 @@ pub fn bound<Q: Question>(budget: &Budget, checked: &Q::Checked, format: Format)
     }
 }
 
-/// Computes an answer and writes its bytes; of the reservation it keeps what these take.
-///
-/// # Errors
-/// Why there is no answer; `too_many_states` for one that outgrows its reservation.
+/// Computes an answer and writes its body, which then holds the rest of the reservation.
+/// Fails with `too_many_states` if it outgrows its reservation.
 fn solve<Q: Question>(
     checked: &Q::Checked,
     representation: Representation,
@@ -259,13 +260,10 @@ fn solve<Q: Question>(
     drop(answer);
     let server_timing = format!("solve;dur={:.3}", 1e3 * solve.as_secs_f64());
     let server_timing = HeaderValue::try_from(server_timing).map_err(|error| Problem::internal(&error))?;
-    Ok(Answer { reservation: settle(reservation, body.len()), body, solve, server_timing })
+    Ok(Answer { reservation: shrink_to_body(reservation, body.len()), body, solve, server_timing })
 }
 
 /// Checks that an answer fits into what was reserved for it.
-///
-/// # Errors
-/// `too_many_states`.
 pub fn require_within(reservation: &Reservation, bytes: u64) -> Result<(), Problem> {
     if bytes <= reservation.bytes() {
         return Ok(());
@@ -277,17 +275,15 @@ pub fn require_within(reservation: &Reservation, bytes: u64) -> Result<(), Probl
     Err(Problem::new(ProblemCode::TooManyStates, detail))
 }
 
-/// What the bytes of an answer keep of its reservation: nothing if they are few.
-pub fn settle(reservation: Option<Reservation>, bytes: usize) -> Option<Arc<Reservation>> {
+/// Gives back what a body does not need of its reservation: all of it if the body is small.
+pub fn shrink_to_body(reservation: Option<Reservation>, bytes: usize) -> Option<Arc<Reservation>> {
     let mut reservation = reservation.filter(|_| bytes as u64 > FREE_BYTES)?;
     reservation.shrink_to(bytes as u64);
     Some(Arc::new(reservation))
 }
 
 /// Writes an answer as its representation says.
-///
-/// # Errors
-/// `deadline_exceeded` if the stop flag is set, and faults of the service.
+/// Fails with `deadline_exceeded` if the stop flag is set.
 pub fn write<A: Forms>(
     answer: &A,
     Representation { format, gzip }: Representation,
@@ -296,10 +292,10 @@ pub fn write<A: Forms>(
     let is_long = !gzip && format.writes_all_numbers();
     let buffer = Vec::with_capacity(if is_long { answer.expected_bytes() } else { 0 });
     let written = if gzip {
-        let mut writer = Stoppable::new(GzEncoder::new(buffer, Compression::fast()), stop);
+        let mut writer = StoppableWriter::new(GzEncoder::new(buffer, Compression::fast()), stop);
         answer.write(format, &mut writer).and_then(|()| writer.inner.finish())
     } else {
-        let mut writer = Stoppable::new(buffer, stop);
+        let mut writer = StoppableWriter::new(buffer, stop);
         answer.write(format, &mut writer).map(|()| writer.inner)
     };
     written.map(without_spare).map_err(|error| write_problem(&error, stop))
@@ -315,31 +311,31 @@ pub fn write_problem(error: &io::Error, stop: &AtomicBool) -> Problem {
     if stop.load(Ordering::Relaxed) { NoAnswer::stopped().into() } else { Problem::internal(error) }
 }
 
-/// Bytes written between two looks at the stop flag.
-const LOOK_EVERY_BYTES: usize = 1 << 16;
+/// Bytes written between two checks of the stop flag.
+const STOP_CHECK_BYTES: usize = 1 << 16;
 
 /// A writer that fails once the stop flag is set.
-pub struct Stoppable<'a, W> {
+pub struct StoppableWriter<'a, W> {
     /// Where the bytes go.
     pub inner: W,
-    until_look: usize,
+    bytes_until_check: usize,
     stop: &'a AtomicBool,
 }
 
-impl<'a, W> Stoppable<'a, W> {
+impl<'a, W> StoppableWriter<'a, W> {
     /// Writes to `inner` until `stop` is set.
     pub const fn new(inner: W, stop: &'a AtomicBool) -> Self {
-        Self { inner, until_look: LOOK_EVERY_BYTES, stop }
+        Self { inner, bytes_until_check: STOP_CHECK_BYTES, stop }
     }
 
     #[cold]
-    fn look(&mut self) -> io::Result<()> {
-        self.until_look = LOOK_EVERY_BYTES;
+    fn check_stop(&mut self) -> io::Result<()> {
+        self.bytes_until_check = STOP_CHECK_BYTES;
         if self.stop.load(Ordering::Relaxed) { Err(io::Error::other("stopped")) } else { Ok(()) }
     }
 }
 
-impl<W: Write> Write for Stoppable<'_, W> {
+impl<W: Write> Write for StoppableWriter<'_, W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.write_all(bytes).map(|()| bytes.len())
     }
@@ -347,34 +343,33 @@ impl<W: Write> Write for Stoppable<'_, W> {
     // Called for every number.
     #[inline]
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
-        match self.until_look.checked_sub(bytes.len()) {
-            Some(rest) => self.until_look = rest,
-            None => self.look()?,
+        match self.bytes_until_check.checked_sub(bytes.len()) {
+            Some(rest) => self.bytes_until_check = rest,
+            None => self.check_stop()?,
         }
         self.inner.write_all(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.look()?;
+        self.check_stop()?;
         self.inner.flush()
     }
 }
 
-async fn with_body(
-    budget: &Budget,
-    answer: Answer,
-    Representation { format, gzip }: Representation,
-) -> Result<Response, Problem> {
+async fn with_body(budget: &Budget, answer: Answer, representation: Representation) -> Result<Response, Problem> {
     let Answer { body, reservation, server_timing, .. } = answer;
     // A large answer from the cache may leave it while a slow client reads.
     let reservation = match reservation {
-        None => settle(budget.reserve(body.len() as u64).await?, body.len()),
+        None => shrink_to_body(budget.reserve(body.len() as u64).await?, body.len()),
         reservation => reservation,
     };
-    let body = match &reservation {
-        Some(reservation) => Reservation::hold(reservation, body),
-        None => body,
-    };
+    let mut response = body_response(Reservation::hold(reservation, body), representation);
+    response.headers_mut().insert(SERVER_TIMING, server_timing);
+    Ok(response)
+}
+
+/// The response with this body.
+pub fn body_response(body: Bytes, Representation { format, gzip }: Representation) -> Response {
     let mut response = (StatusCode::OK, body).into_response();
     let headers = response.headers_mut();
     // These, and those of the layers around.
@@ -383,22 +378,6 @@ async fn with_body(
     if gzip {
         headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
     }
-    headers.insert(SERVER_TIMING, server_timing);
-    Ok(response)
-}
-
-fn key_header(etag: &str) -> HeaderValue {
-    // Hexadecimal digits and quotes always are a header value.
-    HeaderValue::from_str(etag).unwrap_or(HeaderValue::from_static(""))
-}
-
-/// The headers about caching that 200 and 304 share.
-fn with_cache_headers(mut response: Response, provenance: Provenance, etag: HeaderValue) -> Response {
-    response.extensions_mut().insert(provenance);
-    let headers = response.headers_mut();
-    headers.insert(header::ETAG, etag);
-    headers.insert(header::VARY, HeaderValue::from_static("accept, accept-encoding"));
-    headers.insert(CACHE_STATUS, HeaderValue::from_static(provenance.status.header()));
     response
 }
 
@@ -410,14 +389,14 @@ mod tests {
     use flate2::Compression;
     use flate2::write::GzEncoder;
 
-    use super::{LOOK_EVERY_BYTES, Stoppable};
+    use super::{STOP_CHECK_BYTES, StoppableWriter};
 
-    /// Of a megabyte of zeros a kilobyte comes out of the encoder: the look must not depend on it.
+    /// Of a megabyte of zeros a kilobyte comes out of the encoder: the check must not depend on it.
     #[test]
     fn stops_writing_compressible_answers_too() {
         let stop = AtomicBool::new(true);
-        let mut writer = Stoppable::new(GzEncoder::new(Vec::new(), Compression::fast()), &stop);
-        let written = (0..LOOK_EVERY_BYTES).take_while(|_| writer.write_all(&[0; 1024]).is_ok()).count();
-        assert!(written * 1024 <= LOOK_EVERY_BYTES, "{written} KiB");
+        let mut writer = StoppableWriter::new(GzEncoder::new(Vec::new(), Compression::fast()), &stop);
+        let written = (0..STOP_CHECK_BYTES).take_while(|_| writer.write_all(&[0; 1024]).is_ok()).count();
+        assert!(written * 1024 <= STOP_CHECK_BYTES, "{written} KiB");
     }
 }

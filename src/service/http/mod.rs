@@ -7,6 +7,5 @@ pub mod negotiation;
 pub(crate) mod observe;
 mod openapi;
 pub mod problem;
-mod query;
 pub mod router;
 pub mod server;

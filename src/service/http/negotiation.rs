@@ -1,10 +1,10 @@
-//! What the client sends and accepts: media types and codings.
+//! What the client sends and accepts: media types, codings, and queries where a path has none.
 
 use std::borrow::Cow;
 use std::iter;
 use std::str::FromStr;
 
-use axum::http::{HeaderMap, HeaderName, header};
+use axum::http::{HeaderMap, HeaderName, Uri, header};
 use headers_accept::Accept;
 use mediatype::{MediaType, Name, names};
 use toothwave_calculation::forms::Format;
@@ -64,9 +64,7 @@ impl Representation {
     pub const JSON: Self = Self { format: Format::Json, gzip: false };
 
     /// The best of JSON and, after it, `others`, in the service's order, for what the request accepts.
-    ///
-    /// # Errors
-    /// `not_acceptable` where the client accepts none of them.
+    /// Fails with `not_acceptable` if the client accepts none of them.
     pub fn negotiate(headers: &HeaderMap, others: impl Iterator<Item = Format>) -> Result<Self, Problem> {
         let gzip = accepts_gzip(headers);
         let accepted = joined(headers, &header::ACCEPT);
@@ -95,10 +93,18 @@ impl Representation {
     }
 }
 
+/// Checks that the request has no query, so that a misspelled one is not ignored.
+pub fn require_no_query(uri: &Uri) -> Result<(), Problem> {
+    match uri.query() {
+        None | Some("") => Ok(()),
+        Some(query) => {
+            let detail = format!("`{}` takes no query, and the request has `{query}`. Leave it out", uri.path());
+            Err(Problem::new(ProblemCode::InvalidQuery, detail))
+        }
+    }
+}
+
 /// Checks that the body is sent as JSON without a content coding.
-///
-/// # Errors
-/// `unsupported_media_type`.
 pub fn require_json(headers: &HeaderMap) -> Result<(), Problem> {
     require_type(headers, "a design document as `application/json`", |media_type| {
         media_type.subty == names::JSON || media_type.suffix == Some(names::JSON)
@@ -106,9 +112,6 @@ pub fn require_json(headers: &HeaderMap) -> Result<(), Problem> {
 }
 
 /// Checks that the body is sent as one JSON document a line.
-///
-/// # Errors
-/// `unsupported_media_type`.
 pub fn require_ndjson(headers: &HeaderMap) -> Result<(), Problem> {
     let known = ["x-ndjson", "ndjson", "jsonl", "x-jsonlines"];
     require_type(headers, "a design document a line as `application/x-ndjson`", |media_type| {

@@ -6,7 +6,7 @@ use std::any::Any;
 
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use toothwave_calculation::field::FieldError;
 use toothwave_calculation::json;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode, clip};
@@ -54,13 +54,10 @@ pub struct Problem {
     /// Of an internal error, why: for the log alone.
     #[serde(skip)]
     pub cause: Option<String>,
-    /// Whether what was asked may be done all the same: nobody is told to ask again.
-    #[serde(skip)]
-    pub is_open: bool,
 }
 
 /// Kinds of problem.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ProblemCode {
     /// 400: the body is no JSON.
@@ -218,7 +215,6 @@ impl Problem {
             code,
             errors,
             cause: None,
-            is_open: false,
         }
     }
 
@@ -253,7 +249,7 @@ impl IntoResponse for Problem {
         let status = self.code.status();
         let body = serde_json::to_vec(&self).unwrap_or_default();
         let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], body).into_response();
-        if status == StatusCode::SERVICE_UNAVAILABLE && !self.is_open {
+        if status == StatusCode::SERVICE_UNAVAILABLE {
             response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from(RETRY_AFTER_S));
         }
         response.extensions_mut().insert(self);

@@ -16,17 +16,17 @@ use tower::util::option_layer;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::cors::{AllowHeaders, AllowOrigin, Any, CorsLayer};
 use utoipa::openapi::security::{Http, HttpAuthScheme, SecurityRequirement, SecurityScheme};
-use utoipa::openapi::{self, Content, HeaderBuilder, Ref, ResponseBuilder};
+use utoipa::openapi::{self, Content, HeaderBuilder, Ref, RefOr, ResponseBuilder};
 use utoipa::{OpenApi, PartialSchema};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use super::answer::{CACHE_STATUS, SERVER_TIMING};
-use super::endpoints::{accuracy, batch, coincidence_degree, design, drawings, geometry, service, studies, sweep};
+use super::endpoints::{batch, calculations, design, drawings, service, studies};
+use super::negotiation::require_no_query;
 use super::observe;
 use super::problem::{PROBLEM_JSON, Problem, ProblemCode};
-use super::query::require_no_query;
 use crate::app::App;
 use crate::ops::keys::{self, Keys};
 use crate::page;
@@ -64,11 +64,11 @@ fn api() -> OpenApiRouter<Arc<App>> {
         .routes(routes!(studies::result))
         .routes(routes!(studies::events));
     OpenApiRouter::with_openapi(Document::openapi())
-        .routes(routes!(geometry::geometry))
-        .routes(routes!(coincidence_degree::coincidence_degree))
-        .routes(routes!(sweep::sweep))
+        .routes(routes!(calculations::geometry))
+        .routes(routes!(calculations::coincidence_degree))
+        .routes(routes!(calculations::sweep))
         .routes(routes!(design::design))
-        .routes(routes!(accuracy::accuracy))
+        .routes(routes!(calculations::accuracy))
         .routes(routes!(drawings::drawing))
         .routes(routes!(batch::batch))
         .routes(routes!(studies::begin))
@@ -115,6 +115,13 @@ fn pretty(document: &Value) -> String {
     text
 }
 
+/// The headers of answers that clients and the service may cache.
+const ANSWER_HEADERS: [(&str, &str); 3] = [
+    ("ETag", "Entity tag of this representation."),
+    ("Cache-Status", "RFC 9211: `hit`, `fwd=miss`, `collapsed`."),
+    ("Server-Timing", "`solve;dur=` and the milliseconds of the solve."),
+];
+
 /// What stands before every path: keys, which a service may want, and connections, of which there may be too many.
 fn describe_entry(document: &mut openapi::OpenApi) {
     const KEY: &str = "key";
@@ -140,6 +147,15 @@ fn describe_entry(document: &mut openapi::OpenApi) {
                 responses.insert("401".into(), wanted.clone().into());
             }
             responses.entry("400".into()).or_insert_with(|| query.clone().into());
+            // An answer that can be 304 has an entity tag, and comes from the cache or a computation.
+            if responses.contains_key("304")
+                && let Some(RefOr::T(answer)) = responses.get_mut("200")
+            {
+                answer.headers.extend(ANSWER_HEADERS.map(|(name, text)| {
+                    let header = HeaderBuilder::new().schema(Some(String::schema())).description(Some(text)).build();
+                    (name.into(), header.into())
+                }));
+            }
             responses.insert("421".into(), host.clone().into());
             responses.entry("503".into()).or_insert_with(|| full.clone().into());
         }
@@ -175,7 +191,7 @@ fn with_layers(paths: Router<Arc<App>>, app: Arc<App>, Access { cors_origins, ke
     paths
         .layer(
             // From the outside in; one stack, because every layer of a router boxes all its routes once more. A panic becomes a problem
-            // before it is counted, logged and given its headers; one of the counting itself is caught too.
+            // before it is counted, logged and given its headers; one of the counting itself is catch_panic too.
             ServiceBuilder::new()
                 .layer(CatchPanicLayer::custom(panicked))
                 .layer(middleware::from_fn_with_state(Arc::clone(&app), observe::observe))

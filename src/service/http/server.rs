@@ -32,12 +32,12 @@ use super::router::{self, Access};
 use crate::app::App;
 use crate::ops::config::{CLIENT_TIMEOUT_MS, MAX_CONNECTIONS, MAX_HEADER_BYTES, Settings, StudiesPlace};
 use crate::ops::metrics;
-use crate::studies::{Keeping, Store};
+use crate::studies::{Storage, Store};
 
 /// The service listens at least this long after it says that it is not ready.
 const NOTICE: Duration = Duration::from_millis(200);
 
-/// Running computations are stopped this long before the end of a shutdown, so that their clients are told.
+/// Running computations are stopped this long before the end of a shutdown, so that their clients get a response.
 const LAST_ANSWERS: Duration = Duration::from_millis(300);
 
 /// After an error of the listener itself, such as too many open files.
@@ -46,7 +46,7 @@ const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 /// Time for a connection over the limit to take its refusal.
 const REFUSAL_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// What a connection over the limit gets.
+/// The response to a connection over the limit.
 const REFUSAL: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\ncontent-type: application/problem+json\r\nretry-after: 1\r\ncontent-length: 219\r\nconnection: close\r\n\r\n{\"type\":\"urn:toothwave:problem:too_many_connections\",\"title\":\"Too many connections are open\",\"status\":503,\"detail\":\"1024 connections are open, the most that this service serves. Try again\",\"code\":\"too_many_connections\"}";
 
 static OPEN_CONNECTIONS: AtomicUsize = AtomicUsize::new(0);
@@ -57,14 +57,11 @@ pub fn open_connections() -> usize {
 }
 
 /// Serves until a signal, then finishes running requests within the bound of the settings, or until a second signal.
-///
-/// # Errors
-/// If the address cannot be listened on, or the system refuses threads or signals.
 pub async fn serve(settings: &Settings) -> io::Result<()> {
     metrics::install();
     // First: without a handler, the first process of a container ignores signals.
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
-    let mut told_to_stop = async || {
+    let mut stop_signal = async || {
         tokio::select! {
             _ = terminate.recv() => {}
             _ = interrupt.recv() => {}
@@ -75,46 +72,45 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
         .await
         .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", settings.listen)))?;
     let address = listener.local_addr()?;
-    let app = App::start(settings.limits(), keeping(settings)?)?;
+    let app = App::start(settings.limits(), study_storage(settings)?)?;
     app.studies.load().await.map_err(io::Error::other)?;
-    app.studies.forget_expired().await;
     let server = Server::new(&app, settings, address);
-    greet(address);
+    print_address(address);
     tokio::spawn(metrics::upkeep());
     tokio::spawn({
         let app = Arc::clone(&app);
-        async move { app.studies.forget_old().await }
+        async move { app.studies.keep_removing_expired().await }
     });
     watch_keys(settings)?;
     let stopping = async {
-        told_to_stop().await;
+        stop_signal().await;
         tracing::info!("stopping: not ready any more, still listening");
         app.ready.store(false, Ordering::Relaxed);
         tokio::select! {
-            () = sleep(NOTICE.max(settings.lame_duck())) => false,
-            () = told_to_stop() => true,
+            () = sleep(NOTICE.max(Duration::from_millis(settings.lame_duck_ms))) => false,
+            () = stop_signal() => true,
         }
     };
-    let is_told_twice = tokio::select! {
+    let has_second_signal = tokio::select! {
         twice = stopping => twice,
         () = server.accept(&listener) => false,
     };
-    if !is_told_twice {
+    if !has_second_signal {
         server.accept_waiting(&listener);
         drop(listener);
         tokio::select! {
-            () = server.finish(&app, settings.shutdown()) => {}
-            () = told_to_stop() => tracing::warn!("told to stop again: running requests are given up"),
+            () = server.finish(&app, Duration::from_millis(settings.shutdown_ms)) => {}
+            () = stop_signal() => tracing::warn!("second signal: running requests are given up"),
         }
     }
     tracing::info!("stopped");
     Ok(())
 }
 
-/// Where the settings have studies kept.
-fn keeping(settings: &Settings) -> io::Result<Keeping> {
+/// Opens the file of studies, or a database in memory.
+fn study_storage(settings: &Settings) -> io::Result<Option<Storage>> {
     let file = match &settings.studies {
-        Some(StudiesPlace::Off) => return Ok(Keeping::Off),
+        Some(StudiesPlace::Off) => return Ok(None),
         Some(StudiesPlace::File(file)) => Some(file.as_path()),
         None => None,
     };
@@ -122,7 +118,7 @@ fn keeping(settings: &Settings) -> io::Result<Keeping> {
         Some(file) => io::Error::other(format!("{}: {error}", file.display())),
         None => io::Error::other(error),
     })?;
-    Ok(Keeping::In { store, expiry: Duration::from_secs(settings.study_expiry_s) })
+    Ok(Some(Storage { store, expiry: Duration::from_secs(settings.study_expiry_s) }))
 }
 
 /// Reads the keys file again at each hang-up signal.
@@ -147,7 +143,7 @@ fn raise_file_limit() {
 struct Server {
     router: Router,
     http: http1::Builder,
-    places: Arc<Semaphore>,
+    connection_permits: Arc<Semaphore>,
     graceful: GracefulShutdown,
     closing: CancellationToken,
 }
@@ -170,7 +166,7 @@ impl Server {
         Self {
             router: router::router(Arc::clone(app), &access),
             http,
-            places: Arc::new(Semaphore::new(MAX_CONNECTIONS)),
+            connection_permits: Arc::new(Semaphore::new(MAX_CONNECTIONS)),
             graceful: GracefulShutdown::new(),
             closing: CancellationToken::new(),
         }
@@ -180,7 +176,7 @@ impl Server {
     async fn accept(&self, listener: &TcpListener) {
         loop {
             match listener.accept().await {
-                Ok((stream, _)) => self.take(stream),
+                Ok((stream, _)) => self.handle(stream),
                 Err(error)
                     if matches!(error.kind(), io::ErrorKind::ConnectionAborted | io::ErrorKind::ConnectionReset) => {}
                 Err(error) => {
@@ -195,28 +191,28 @@ impl Server {
     fn accept_waiting(&self, listener: &TcpListener) {
         for _ in 0..MAX_CONNECTIONS {
             let Some(Ok((stream, _))) = tokio::task::unconstrained(listener.accept()).now_or_never() else { return };
-            self.take(stream);
+            self.handle(stream);
         }
     }
 
-    fn take(&self, stream: TcpStream) {
+    fn handle(&self, stream: TcpStream) {
         // Without it small answers may wait for the acknowledgement of earlier ones.
         let _ = stream.set_nodelay(true);
         #[cfg(target_os = "linux")]
         let _ = SockRef::from(&stream).set_tcp_user_timeout(Some(Duration::from_millis(CLIENT_TIMEOUT_MS)));
-        match Arc::clone(&self.places).try_acquire_owned() {
-            Ok(place) => self.serve(stream, place),
+        match Arc::clone(&self.connection_permits).try_acquire_owned() {
+            Ok(permit) => self.serve_connection(stream, permit),
             Err(_) => {
                 tokio::spawn(timeout(REFUSAL_TIMEOUT, refuse(stream)));
             }
         }
     }
 
-    fn serve(&self, stream: TcpStream, place: OwnedSemaphorePermit) {
-        let has_asked = Arc::new(AtomicBool::new(false));
-        let asked = Arc::clone(&has_asked);
+    fn serve_connection(&self, stream: TcpStream, permit: OwnedSemaphorePermit) {
+        let has_request = Arc::new(AtomicBool::new(false));
+        let requested = Arc::clone(&has_request);
         let service = MapRequest::new(self.router.clone(), move |request: hyper::Request<Incoming>| {
-            asked.store(true, Ordering::Relaxed);
+            requested.store(true, Ordering::Relaxed);
             request.map(Body::new)
         });
         let connection = self.http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
@@ -224,11 +220,11 @@ impl Server {
         let closing = self.closing.clone();
         OPEN_CONNECTIONS.fetch_add(1, Ordering::Relaxed);
         tokio::spawn(async move {
-            let _place = place;
-            let has_said_nothing = async {
+            let _place = permit;
+            let closed_without_request = async {
                 closing.cancelled().await;
                 sleep(NOTICE).await;
-                if has_asked.load(Ordering::Relaxed) {
+                if has_request.load(Ordering::Relaxed) {
                     std::future::pending::<()>().await;
                 }
             };
@@ -236,7 +232,7 @@ impl Server {
                 // An error of a connection is its client's to know. The request, if there was one, has its own line in the log.
                 _ = connection => {}
                 // Browsers open connections in advance: they do not delay a shutdown.
-                () = has_said_nothing => {}
+                () = closed_without_request => {}
             }
             OPEN_CONNECTIONS.fetch_sub(1, Ordering::Relaxed);
         });
@@ -267,8 +263,8 @@ async fn refuse(mut stream: TcpStream) -> io::Result<()> {
     stream.shutdown().await
 }
 
-/// Says where the service is and what to try.
-fn greet(address: SocketAddr) {
+/// Prints the address of the service and commands to try.
+fn print_address(address: SocketAddr) {
     let text = format!(
         "toothwave {} listens on http://{address}
 The designer's page: http://{address}/
@@ -281,18 +277,4 @@ The API: http://{address}/docs
     );
     // Standard output may be closed, or a pipe that nobody reads.
     std::thread::spawn(move || io::stdout().write_all(text.as_bytes()));
-}
-
-#[cfg(test)]
-mod tests {
-    use super::REFUSAL;
-
-    #[test]
-    fn refusal_is_complete_problem() {
-        let text = std::str::from_utf8(REFUSAL).expect("text");
-        let (head, body) = text.split_once("\r\n\r\n").expect("a head and a body");
-        assert!(head.contains(&format!("content-length: {}\r\n", body.len())), "{}", body.len());
-        let problem: serde_json::Value = serde_json::from_str(body).expect("JSON");
-        assert_eq!(problem["code"], "too_many_connections");
-    }
 }

@@ -2,7 +2,6 @@
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
-use std::time::Duration;
 
 use axum::http::Uri;
 use clap::Args;
@@ -239,16 +238,6 @@ impl Settings {
             max_header_bytes: MAX_HEADER_BYTES,
             header_timeout_ms: CLIENT_TIMEOUT_MS,
         }
-    }
-
-    /// The time in which a stopping service still accepts requests.
-    pub const fn lame_duck(&self) -> Duration {
-        Duration::from_millis(self.lame_duck_ms)
-    }
-
-    /// The time that running requests get when the service stops.
-    pub const fn shutdown(&self) -> Duration {
-        Duration::from_millis(self.shutdown_ms)
     }
 }
 

@@ -35,9 +35,6 @@ struct Known {
 
 impl Keys {
     /// Reads a keys file.
-    ///
-    /// # Errors
-    /// What is wrong with it.
     pub fn read(path: &str) -> Result<Self, String> {
         let text = fs::read_to_string(path).map_err(|error| error.to_string())?;
         Ok(Self { path: path.into(), known: Arc::new(RwLock::new(parse(&text)?)) })
@@ -80,9 +77,6 @@ fn parse(text: &str) -> Result<Vec<Known>, String> {
 }
 
 /// A new key, and its line of a keys file.
-///
-/// # Errors
-/// If the system has no random bytes.
 pub fn new_key(name: &str) -> Result<(String, String), getrandom::Error> {
     let mut bytes = [0; KEY_BYTES];
     getrandom::fill(&mut bytes)?;

@@ -1,10 +1,10 @@
-//! The studies of the service: what requests ask of them. They run in this process and are kept in a file, or in memory.
+//! The studies of the service. They run in this process and are stored in an SQLite file, or in memory.
 //!
-//! Memory holds how every study stands; the file holds what it asks and what its chunks came to. After a restart studies that ran continue.
+//! This module has the record of every study. The file has their documents and parts. After a restart, studies that ran continue.
 
-mod kept;
+mod part_bytes;
+mod record;
 mod runner;
-mod seal;
 mod store;
 
 use std::sync::Arc;
@@ -12,38 +12,30 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use parking_lot::Mutex;
+use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use toothwave_study::{Study, StudyAnswer};
 use tracing::Instrument as _;
 
-use self::kept::problem_text;
-pub use self::kept::{Kept, StudyResource, StudyState};
-use self::runner::Engine;
-use self::store::{NewStudy, now_s};
+pub use self::record::{StudyRecord, StudyResource, StudyState};
+use self::runner::Run;
 pub use self::store::{Store, StoreError};
+use self::store::{StoredStudy, now_s};
 use crate::compute::pool::Pool;
 use crate::http::problem::{Problem, ProblemCode};
 use crate::ops::config::Limits;
 
-/// Between two times that old studies are forgotten.
-const FORGET: Duration = Duration::from_secs(60);
+/// Time between two removals of expired studies.
+const EXPIRY_CHECK: Duration = Duration::from_secs(60);
 
-/// That a study was asked for is written down if this share of its expiry has passed, so that readers seldom write.
-const NOTE_SHARE: u64 = 10;
-
-/// Where studies are kept.
+/// Where studies are stored.
 #[derive(Debug)]
-pub enum Keeping {
-    /// Nowhere: there are none.
-    Off,
-    /// In a file, or in memory.
-    In {
-        /// The file.
-        store: Store,
-        /// A study that nobody asks for is forgotten after this time.
-        expiry: Duration,
-    },
+pub struct Storage {
+    /// The file.
+    pub store: Store,
+    /// After this time without a request a study is removed.
+    pub expiry: Duration,
 }
 
 /// The studies of the service.
@@ -51,262 +43,200 @@ pub enum Keeping {
 pub struct Studies {
     pool: Pool,
     limits: Limits,
-    keeping: Keeping,
-    /// The one that began longest ago first.
-    kept: Mutex<Vec<Arc<Kept>>>,
-    /// Held while a study begins, is cancelled or forgotten: one at a time.
-    changing: tokio::sync::Mutex<()>,
+    storage: Option<Storage>,
+    /// In the order of their latest `POST`, the oldest first.
+    records: Mutex<Vec<Arc<StudyRecord>>>,
+    /// Held while a study begins, is cancelled or is removed: one at a time.
+    changes: tokio::sync::Mutex<()>,
     runs: TaskTracker,
     /// Cancelled when the service stops.
     closing: CancellationToken,
 }
 
 impl Studies {
-    /// None yet.
-    pub fn new(pool: Pool, limits: Limits, keeping: Keeping) -> Self {
+    /// No studies yet. Without a storage there never are any.
+    pub fn new(pool: Pool, limits: Limits, storage: Option<Storage>) -> Self {
         Self {
             pool,
             limits,
-            keeping,
-            kept: Mutex::default(),
-            changing: tokio::sync::Mutex::default(),
+            storage,
+            records: Mutex::default(),
+            changes: tokio::sync::Mutex::default(),
             runs: TaskTracker::new(),
             closing: CancellationToken::new(),
         }
     }
 
-    /// Loads the studies of the file, and lets those continue that ran.
-    ///
-    /// # Errors
-    /// If the file fails.
+    /// Loads the stored studies, and continues those that ran. Expired ones and those with a damaged document are removed.
     pub async fn load(&self) -> Result<(), StoreError> {
-        let Keeping::In { store, .. } = &self.keeping else { return Ok(()) };
+        let Some(Storage { store, .. }) = &self.storage else { return Ok(()) };
         for stored in store.with(store::load).await? {
-            let ends_at_s = stored.ends_at_s;
-            let kept = Kept::new(stored);
-            self.kept.lock().push(Arc::clone(&kept));
-            if kept.is_running()
-                && let Err(problem) = self.resume(store, &kept.id, ends_at_s).await
-            {
-                tracing::error!(study = kept.id, %problem, cause = problem.cause, "a study cannot continue");
-                kept.stand(StudyState::Failed, Some(problem));
-            }
-        }
-        Ok(())
-    }
-
-    async fn resume(&self, store: &Store, id: &str, ends_at_s: u64) -> Result<(), Problem> {
-        let own = id.to_owned();
-        let document = store.with(move |transaction| store::document(transaction, &own)).await?;
-        let document = document.ok_or_else(|| runner::forgotten(id))?;
-        let study = runner::read(id, &document)?;
-        let new = NewStudy {
-            // That of another build has another id here.
-            id: id.into(),
-            ends_at_s,
-            max_states: document.max_states,
-            max_profile_points: document.max_profile_points,
-            ..new_study(&study, &document.text)
-        };
-        self.let_run(store, new, study).await?;
-        Ok(())
-    }
-
-    /// Studies that run now.
-    pub fn running(&self) -> usize {
-        self.kept.lock().iter().filter(|kept| kept.is_running()).count()
-    }
-
-    fn store(&self) -> Result<&Store, Problem> {
-        match &self.keeping {
-            Keeping::In { store, .. } => Ok(store),
-            Keeping::Off => {
-                let detail = "this service takes no studies: it was started with `--studies off`";
-                Err(Problem::new(ProblemCode::StudiesOff, detail))
-            }
-        }
-    }
-
-    /// The study with this id, if it is kept, which was asked for now.
-    ///
-    /// # Errors
-    /// `studies_off` if there are none.
-    pub fn find(&self, id: &str) -> Result<Option<Arc<Kept>>, Problem> {
-        self.store()?;
-        let kept = self.known(id);
-        if let Some(kept) = &kept {
-            self.touch(kept);
-        }
-        Ok(kept)
-    }
-
-    fn known(&self, id: &str) -> Option<Arc<Kept>> {
-        self.kept.lock().iter().find(|kept| kept.id == id).cloned()
-    }
-
-    /// Notes that a study was asked for. Nobody waits until that is written down.
-    pub fn touch(&self, kept: &Kept) {
-        let Keeping::In { store, expiry } = &self.keeping else { return };
-        let now_s = now_s();
-        kept.asked_at_s.store(now_s, Ordering::Relaxed);
-        if now_s.saturating_sub(kept.noted_at_s.load(Ordering::Relaxed)) > expiry.as_secs() / NOTE_SHARE {
-            kept.noted_at_s.store(now_s, Ordering::Relaxed);
-            let (store, id) = (store.clone(), kept.id.clone());
-            self.runs.spawn(async move {
-                if let Err(error) = store.with(move |transaction| store::touch(transaction, &id)).await {
-                    tracing::warn!(%error, "that a study was asked for was not written down");
+            match stored.read() {
+                Ok(study) => drop(self.insert(store, stored, study)),
+                Err(problem) => {
+                    tracing::error!(study = stored.id, %problem, cause = problem.cause, "removed an unreadable study");
+                    store.with(move |transaction| store::remove(transaction, &stored.id)).await?;
                 }
-            });
+            }
         }
+        self.remove_expired().await;
+        Ok(())
     }
 
-    /// The study, which runs from now on if it is not done: one that is kept continues where it stands.
-    ///
-    /// # Errors
-    /// `queue_full` if as many run as the service admits, or memory has no place for it; `store_unavailable` if the file fails;
-    /// `studies_off` if there are none.
-    pub async fn begin(&self, study: Study, document: &[u8]) -> Result<Arc<Kept>, Problem> {
-        let store = self.store()?;
+    /// How many studies run.
+    pub fn running(&self) -> usize {
+        self.records.lock().iter().filter(|record| record.is_running()).count()
+    }
+
+    fn storage(&self) -> Result<&Storage, Problem> {
+        self.storage.as_ref().ok_or_else(|| {
+            let detail = "this service takes no studies, because it was started with `--studies off`";
+            Problem::new(ProblemCode::StudiesOff, detail)
+        })
+    }
+
+    fn record(&self, id: &str) -> Option<Arc<StudyRecord>> {
+        self.records.lock().iter().find(|record| record.id == id).cloned()
+    }
+
+    /// The study with this id, which a client requests now.
+    pub fn find(&self, id: &str) -> Result<Option<Arc<StudyRecord>>, Problem> {
+        self.storage()?;
+        Ok(self.record(id).inspect(|record| self.touch(record)))
+    }
+
+    /// Sets the time of the latest request to now. Nobody waits until it is stored.
+    pub fn touch(&self, record: &StudyRecord) {
+        let Some(Storage { store, .. }) = &self.storage else { return };
+        let now_s = now_s();
+        if record.asked_at_s.swap(now_s, Ordering::Relaxed) == now_s {
+            return;
+        }
+        let (store, id) = (store.clone(), record.id.clone());
+        self.runs.spawn(async move {
+            if let Err(error) = store.with(move |transaction| store::set_asked_at(transaction, &id, now_s)).await {
+                tracing::warn!(%error, "the time of a request for a study was not stored");
+            }
+        });
+    }
+
+    /// The study, which runs from now on if it is not done. If it has parts, it continues with them.
+    /// Fails with `queue_full` if too many studies run, or if memory has no space for another one.
+    pub async fn begin(&self, study: Study, document: &[u8]) -> Result<Arc<StudyRecord>, Problem> {
+        let Storage { store, .. } = self.storage()?;
         let id = study.id().to_string();
-        let _one_at_a_time = self.changing.lock().await;
-        if let Some(kept) = self.find(&id)?
-            && matches!(kept.state(), StudyState::Running | StudyState::Done)
+        let _one_at_a_time = self.changes.lock().await;
+        if let Some(record) = self.find(&id)?
+            && matches!(record.state(), StudyState::Running | StudyState::Done)
         {
-            // The one that was asked for last is forgotten last.
-            let mut all = self.kept.lock();
-            all.retain(|other| other.id != id);
-            all.push(Arc::clone(&kept));
-            return Ok(kept);
+            let mut records = self.records.lock();
+            records.retain(|other| other.id != id);
+            records.push(Arc::clone(&record));
+            return Ok(record);
         }
         let most = self.limits.max_concurrent_studies;
         if self.running() >= most {
             let detail = format!(
-                "{most} studies run, as many as `max_concurrent_studies` admits; try again in a moment, or cancel one"
+                "{most} studies run, the most that this service runs at once. Try again in a second, or cancel one"
             );
             return Err(Problem::new(ProblemCode::QueueFull, detail));
         }
-        let new = NewStudy {
-            ends_at_s: now_s()
-                .saturating_add(self.limits.study_deadline_ms.div_ceil(1000))
-                .min(i64::MAX.unsigned_abs()),
-            max_states: self.limits.max_states.min(i64::MAX.unsigned_abs()),
-            max_profile_points: self.limits.max_profile_points.min(i64::MAX.unsigned_abs()),
-            ..new_study(&study, document)
-        };
         if store.is_in_memory() {
-            for oldest in self.to_forget_for(&id, new.bytes)? {
-                self.forget(store, &oldest).await?;
+            for oldest in self.to_remove_for(&study)? {
+                self.remove(store, &oldest).await?;
             }
         }
-        Ok(self.let_run(store, new, Arc::new(study)).await?)
+        let stored = StoredStudy::new(&study, document, &self.limits);
+        let stored = store.with(move |transaction| store::begin(transaction, stored)).await?;
+        Ok(self.insert(store, stored, study))
     }
 
-    /// The oldest studies that memory keeps no longer so that another has a place: as many as it takes, and none that runs.
-    fn to_forget_for(&self, id: &str, bytes: u64) -> Result<Vec<Arc<Kept>>, Problem> {
-        let all = self.kept.lock();
-        let others = || all.iter().filter(|kept| kept.id != id);
-        let most_bytes = self.limits.max_study_bytes;
-        let mut all_bytes = bytes + others().map(|kept| kept.bytes).sum::<u64>();
-        let mut going = Vec::new();
-        for kept in others().filter(|kept| !kept.is_running()) {
-            if all_bytes <= most_bytes {
-                break;
-            }
-            all_bytes -= kept.bytes;
-            going.push(Arc::clone(kept));
+    /// The oldest studies that leave memory so that another one has space: as few as possible, and none that runs.
+    fn to_remove_for(&self, study: &Study) -> Result<Vec<Arc<StudyRecord>>, Problem> {
+        let (id, bytes, most_bytes) = (study.id().to_string(), record::bytes(study), self.limits.max_study_bytes);
+        let others = self.records.lock().iter().filter(|record| record.id != id).cloned().collect::<Vec<_>>();
+        let (running, idle): (Vec<_>, Vec<_>) = others.into_iter().partition(|record| record.is_running());
+        let sum = |records: &[Arc<StudyRecord>]| records.iter().map(|record| record.bytes()).sum::<u64>();
+        let needed_bytes = bytes + sum(&running);
+        if needed_bytes > most_bytes {
+            let detail = format!(
+                "the study takes {bytes} bytes: with those that run more than the {most_bytes} of `max_study_bytes`. Try again when one of them is done"
+            );
+            return Err(Problem::new(ProblemCode::QueueFull, detail));
         }
-        if all_bytes <= most_bytes {
-            return Ok(going);
-        }
-        let detail = format!(
-            "the study takes {bytes} bytes: with those that run more than the {most_bytes} of `max_study_bytes`; try again when one of them is done"
-        );
-        Err(Problem::new(ProblemCode::QueueFull, detail))
-    }
-
-    /// Writes down that a study runs, and lets it.
-    async fn let_run(&self, store: &Store, new: NewStudy, study: Arc<Study>) -> Result<Arc<Kept>, StoreError> {
-        let stored = store.with(move |transaction| store::begin(transaction, &new)).await?;
-        let time = Duration::from_secs(stored.ends_at_s.saturating_sub(now_s()));
-        let kept = Kept::new(stored);
-        {
-            let mut all = self.kept.lock();
-            all.retain(|other| other.id != kept.id);
-            all.push(Arc::clone(&kept));
-        }
-        let stop = self.closing.child_token();
-        *kept.run.lock() = stop.clone();
-        let run = Run {
-            engine: Engine { store: store.clone(), pool: self.pool.clone() },
-            kept: Arc::clone(&kept),
-            study,
-            time,
-            stop,
-            closing: self.closing.clone(),
+        let mut all_bytes = needed_bytes + sum(&idle);
+        let is_needed = |record: &Arc<StudyRecord>| {
+            let is_needed = all_bytes > most_bytes;
+            all_bytes -= record.bytes();
+            is_needed
         };
-        self.runs.spawn(run.complete().in_current_span());
-        Ok(kept)
+        Ok(idle.into_iter().take_while(is_needed).collect())
     }
 
-    /// Cancels a study that runs, and forgets one that does not; whether it was kept.
-    ///
-    /// # Errors
-    /// `store_unavailable` if the file fails; `studies_off` if there are none.
-    pub async fn cancel_or_forget(&self, id: &str) -> Result<bool, Problem> {
-        let store = self.store()?;
-        let _one_at_a_time = self.changing.lock().await;
-        let Some(kept) = self.known(id) else { return Ok(false) };
-        if !kept.is_running() {
-            self.forget(store, &kept).await?;
+    /// Adds the record of a study, in the place of an earlier one, and runs the study if that is its state.
+    fn insert(&self, store: &Store, stored: StoredStudy, study: Study) -> Arc<StudyRecord> {
+        let time = Duration::from_secs(stored.ends_at_s.saturating_sub(now_s()));
+        let record = Arc::new(StudyRecord::new(stored, &study, self.closing.child_token()));
+        let mut records = self.records.lock();
+        records.retain(|other| other.id != record.id);
+        records.push(Arc::clone(&record));
+        if record.is_running() {
+            let (store, pool) = (store.clone(), self.pool.clone());
+            let run = Run { store, pool, record: Arc::clone(&record), study: Arc::new(study), time };
+            self.runs.spawn(run.complete(self.closing.clone()).in_current_span());
+        }
+        record
+    }
+
+    /// Cancels a study that runs, and removes one that does not. False if there is no such study.
+    pub async fn cancel_or_remove(&self, id: &str) -> Result<bool, Problem> {
+        let Storage { store, .. } = self.storage()?;
+        let _one_at_a_time = self.changes.lock().await;
+        let Some(record) = self.record(id) else { return Ok(false) };
+        if !record.is_running() {
+            self.remove(store, &record).await?;
             return Ok(true);
         }
-        kept.run.lock().cancel();
-        // It ends at once, and keeps nothing from then on.
+        record.stop.cancel();
         tokio::select! {
-            () = kept.ended() => Ok(true),
+            () = record.ended() => Ok(true),
             () = self.closing.cancelled() => {
-                let detail = "the service is stopping, and the study continues when it starts again; ask again then";
+                let detail = "the service is stopping, and the study continues when it starts again. Cancel it then";
                 Err(Problem::new(ProblemCode::ShuttingDown, detail))
             }
         }
     }
 
-    async fn forget(&self, store: &Store, kept: &Arc<Kept>) -> Result<(), StoreError> {
-        let id = kept.id.clone();
-        store.with(move |transaction| store::forget(transaction, &id)).await?;
-        self.kept.lock().retain(|other| !Arc::ptr_eq(other, kept));
+    async fn remove(&self, store: &Store, record: &Arc<StudyRecord>) -> Result<(), StoreError> {
+        let id = record.id.clone();
+        store.with(move |transaction| store::remove(transaction, &id)).await?;
+        self.records.lock().retain(|other| !Arc::ptr_eq(other, record));
         Ok(())
     }
 
-    /// What a study has come to, computed on this thread.
-    ///
-    /// # Errors
-    /// If the file fails or is damaged, the study was forgotten, or `stop` says so.
-    pub fn answer(&self, kept: &Kept, stop: &AtomicBool) -> Result<StudyAnswer, Problem> {
-        runner::answer(self.store()?, kept, stop)
+    /// The answer from the parts that are stored, computed on this thread.
+    /// Fails if the file fails or is damaged, if the study was removed, or if `stop` is set.
+    pub fn answer(&self, record: &StudyRecord, stop: &AtomicBool) -> Result<StudyAnswer, Problem> {
+        runner::answer(&self.storage()?.store, record, stop)
     }
 
-    /// Forgets studies that nobody has asked for during their expiry, until the service stops.
-    pub async fn forget_old(&self) {
-        loop {
-            tokio::select! {
-                () = tokio::time::sleep(FORGET) => self.forget_expired().await,
-                () = self.closing.cancelled() => return,
-            }
+    /// Removes expired studies, again and again until the service stops.
+    pub async fn keep_removing_expired(&self) {
+        while timeout(EXPIRY_CHECK, self.closing.cancelled()).await.is_err() {
+            self.remove_expired().await;
         }
     }
 
-    /// Forgets once the studies that nobody has asked for during their expiry.
-    pub async fn forget_expired(&self) {
-        let Keeping::In { store, expiry } = &self.keeping else { return };
+    async fn remove_expired(&self) {
+        let Some(Storage { store, expiry }) = &self.storage else { return };
         let since_s = now_s().saturating_sub(expiry.as_secs());
-        let _one_at_a_time = self.changing.lock().await;
-        let is_old = |kept: &Arc<Kept>| !kept.is_running() && kept.asked_at_s.load(Ordering::Relaxed) < since_s;
-        let old: Vec<_> = self.kept.lock().iter().filter(|kept| is_old(kept)).cloned().collect();
-        for kept in old {
-            match self.forget(store, &kept).await {
-                Ok(()) => tracing::info!(study = kept.id, "removed a study that nobody asked for"),
-                Err(error) => tracing::warn!(%error, study = kept.id, "cannot remove an old study"),
+        let _one_at_a_time = self.changes.lock().await;
+        let is_old = |record: &StudyRecord| !record.is_running() && record.asked_at_s.load(Ordering::Relaxed) < since_s;
+        let old: Vec<_> = self.records.lock().iter().filter(|record| is_old(record)).cloned().collect();
+        for record in old {
+            match self.remove(store, &record).await {
+                Ok(()) => tracing::info!(study = record.id, "removed an expired study"),
+                Err(error) => tracing::warn!(%error, study = record.id, "cannot remove an expired study"),
             }
         }
     }
@@ -317,64 +247,16 @@ impl Studies {
         self.runs.close();
     }
 
-    /// When all studies have stopped, and all that was to be noted of them is.
+    /// Completes when all studies have stopped and the file has all that they stored.
     pub async fn closed(&self) {
         self.runs.wait().await;
+        if let Some(Storage { store, .. }) = &self.storage {
+            store.merge_log();
+        }
     }
 
-    /// When nobody is to wait for a study any more.
+    /// Cancelled when the service stops.
     pub const fn closing(&self) -> &CancellationToken {
         &self.closing
-    }
-}
-
-/// About what a study takes with its result, and what it asks.
-fn new_study(study: &Study, document: &[u8]) -> NewStudy {
-    /// What is noted of it besides.
-    const OTHER_BYTES: u64 = 4096;
-    NewStudy {
-        id: study.id().to_string(),
-        kind: study.kind(),
-        variants: study.variants(),
-        chunks: study.chunks(),
-        bytes: OTHER_BYTES + study.kept_bytes(),
-        ends_at_s: 0,
-        max_states: 0,
-        max_profile_points: 0,
-        document: document.into(),
-    }
-}
-
-/// A study that runs.
-struct Run {
-    engine: Engine,
-    kept: Arc<Kept>,
-    study: Arc<Study>,
-    time: Duration,
-    stop: CancellationToken,
-    closing: CancellationToken,
-}
-
-impl Run {
-    async fn complete(self) {
-        let Self { engine, kept, study, time, stop, closing } = self;
-        let computing = runner::run(&engine, &kept, &study, &stop);
-        let ended = runner::in_time(time, computing).await;
-        let (state, problem) = match ended {
-            Ok(true) => return kept.stand(StudyState::Done, None),
-            // It continues after the restart.
-            _ if closing.is_cancelled() => return,
-            Ok(false) => (StudyState::Cancelled, None),
-            Err(problem) => (StudyState::Failed, Some(problem)),
-        };
-        let (id, text) = (kept.id.clone(), problem.as_ref().map(problem_text));
-        if let Some(problem) = &problem {
-            tracing::warn!(study = id, %problem, cause = problem.cause, "a study failed");
-        }
-        let noted = engine.store.with(move |transaction| store::stop(transaction, &id, state, text.as_deref())).await;
-        if let Err(error) = noted {
-            tracing::warn!(%error, "how a study ended was not written down: it continues after a restart");
-        }
-        kept.stand(state, problem);
     }
 }

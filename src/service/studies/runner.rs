@@ -1,4 +1,4 @@
-//! What a study comes to: its chunks are computed and kept, and its answer is made of the kept parts.
+//! Runs a study: its chunks are computed in the background and stored, and its answer is made from the stored parts.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -6,135 +6,123 @@ use std::time::Duration;
 
 use futures_util::{StreamExt as _, stream};
 use metrics::counter;
+use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 use toothwave_calculation::no_answer::NoAnswer;
-use toothwave_calculation::question;
-use toothwave_study::{Gathered, Limits, Study, StudyAnswer, Work};
+use toothwave_study::{Gathered, Study, StudyAnswer, Work};
 
-use super::store::{self, NewPart, Store, StoredDocument};
-use super::{Kept, seal};
+use super::part_bytes;
+use super::record::{Progress, StudyRecord, StudyState};
+use super::store::{self, NewPart, Store};
 use crate::compute::pool::Pool;
 use crate::http::problem::{Problem, ProblemCode};
 
-/// What computes and keeps chunks.
-#[derive(Debug, Clone)]
-pub(super) struct Engine {
+/// A study that runs.
+pub(super) struct Run {
     pub(super) store: Store,
     pub(super) pool: Pool,
+    pub(super) record: Arc<StudyRecord>,
+    pub(super) study: Arc<Study>,
+    /// After this time the study fails.
+    pub(super) time: Duration,
 }
 
-/// Computes the chunks that have no part yet, until all have one or it is told to stop; whether all have one.
-///
-/// # Errors
-/// If a chunk fails, or its part cannot be kept.
-pub(super) async fn run(
-    engine: &Engine,
-    kept: &Arc<Kept>,
-    study: &Arc<Study>,
-    stop: &CancellationToken,
-) -> Result<bool, Problem> {
-    let store = &engine.store;
-    let id = kept.id.clone();
-    let done = store.with(move |transaction| store::chunks_done(transaction, &id)).await?;
-    let missing = (0..study.chunks()).filter(|chunk| !done.contains(chunk));
-    let computed = stream::iter(missing).map(|chunk| compute_chunk(engine, study, chunk));
-    let mut computed = computed.buffer_unordered(engine.pool.permits());
-    loop {
-        let next = tokio::select! {
-            // First: a study that is cancelled keeps nothing more.
-            biased;
-            () = stop.cancelled() => return Ok(false),
-            next = computed.next() => next,
+impl Run {
+    /// Runs until the study ends, or until the service stops: then it continues after the restart.
+    pub(super) async fn complete(self, service_stops: CancellationToken) {
+        let ended = timeout(self.time, self.compute_missing_chunks()).await.unwrap_or_else(|_| {
+            let detail = "the study did not finish within `study_deadline_ms`. What it has computed is stored. Request it again to continue";
+            Err(Problem::new(ProblemCode::DeadlineExceeded, detail))
+        });
+        let (state, problem) = match ended {
+            Ok(true) => (StudyState::Done, None),
+            _ if service_stops.is_cancelled() => return,
+            Ok(false) => (StudyState::Cancelled, None),
+            Err(problem) => (StudyState::Failed, Some(problem)),
         };
-        let Some(part) = next.transpose()? else { return Ok(true) };
-        let (variants, refused) = (part.variants, part.refused);
-        store.with(move |transaction| store::keep(transaction, &part)).await?;
-        kept.count(variants, refused);
+        let (id, stored_problem) = (self.record.id.clone(), problem.clone());
+        if let Some(problem) = &problem {
+            tracing::warn!(study = id, %problem, cause = problem.cause, "a study failed");
+        }
+        let stored = self.store.with(move |transaction| store::end(transaction, &id, state, stored_problem)).await;
+        if let Err(error) = stored {
+            tracing::warn!(%error, "the end of a study was not stored: it continues after a restart");
+        }
+        self.record.set_state(state, problem);
+    }
+
+    /// Computes until all chunks have a part; false if the run was cancelled before.
+    async fn compute_missing_chunks(&self) -> Result<bool, Problem> {
+        let id = self.record.id.clone();
+        let done = self.store.with(move |transaction| store::chunks_done(transaction, &id)).await?;
+        let missing = (0..self.study.chunks()).filter(|chunk| !done.contains(chunk));
+        let computed = stream::iter(missing).map(|chunk| self.compute(chunk));
+        let mut computed = computed.buffer_unordered(self.pool.permits());
+        loop {
+            let next = tokio::select! {
+                // First: a study that is cancelled stores nothing more.
+                biased;
+                () = self.record.stop.cancelled() => return Ok(false),
+                next = computed.next() => next,
+            };
+            let Some(part) = next.transpose()? else { return Ok(true) };
+            let progress = part.progress;
+            self.store.with(move |transaction| store::insert_part(transaction, &part)).await?;
+            self.record.count(progress);
+        }
+    }
+
+    async fn compute(&self, chunk: u64) -> Result<NewPart, Problem> {
+        let work = Work::new(&self.study, chunk);
+        // Not the id of `study`: a study that another build began has the id that this build gave it.
+        let study = self.record.id.clone();
+        let job = move |stop: &AtomicBool| {
+            let part = work.run(stop).map_err(|_| NoAnswer::stopped())?;
+            let progress = Progress { variants: part.variants(), impossible: part.refused() };
+            counter!("toothwave_study_variants_total").increment(progress.variants);
+            let bytes = part_bytes::encode(&study, chunk, &part).map_err(|error| Problem::internal(&error))?;
+            Ok(NewPart { study, chunk, progress, bytes })
+        };
+        // The run has a time limit of its own.
+        self.pool.run_in_background(Duration::MAX, job).await
     }
 }
 
-/// What comes of a run that may take so long.
-///
-/// # Errors
-/// `deadline_exceeded` if it takes longer, and those of the run.
-pub(super) async fn in_time(time: Duration, run: impl Future<Output = Result<bool, Problem>>) -> Result<bool, Problem> {
-    tokio::time::timeout(time, run).await.unwrap_or_else(|_| {
-        let detail = "the study did not finish within `study_deadline_ms`; what it has come to is kept, and the same question lets it go on";
-        Err(Problem::new(ProblemCode::DeadlineExceeded, detail))
-    })
-}
-
-async fn compute_chunk(engine: &Engine, study: &Arc<Study>, chunk: u64) -> Result<NewPart, Problem> {
-    let work = Work::new(study, chunk);
-    let id = study.id().to_string();
-    let job = move |stop: &AtomicBool| {
-        let part = work.run(stop).map_err(|_| NoAnswer::stopped())?;
-        let (variants, refused) = (part.variants(), part.refused());
-        counter!("toothwave_study_variants_total").increment(variants);
-        let sealed = seal::sealed(&id, chunk, &part).map_err(|error| Problem::internal(&error))?;
-        Ok(NewPart { study: id, chunk, variants, refused, sealed })
-    };
-    // The run of a study has a time of its own.
-    engine.pool.run_in_background(Duration::MAX, job).await
-}
-
-/// The study that a stored document asks for.
-///
-/// # Errors
-/// If it is damaged, or this build does not know such a study.
-pub(super) fn read(id: &str, document: &StoredDocument) -> Result<Arc<Study>, Problem> {
-    let &StoredDocument { max_states, max_profile_points, .. } = document;
-    // It was admitted when it began.
-    let calculation = question::Limits::new(max_states, max_profile_points);
-    let limits = Limits { calculation, max_study_variants: u64::MAX, max_study_bytes: u64::MAX };
-    if !document.is_intact() {
-        return Err(damaged(id, "its document is another"));
-    }
-    Ok(Arc::new(Study::read(&document.text, &limits)?))
-}
-
-/// What a study has come to: whole if it is done, else as far as it has come.
-///
-/// # Errors
-/// If what is kept of it is damaged, or it was forgotten in this moment.
-pub(super) fn answer(store: &Store, kept: &Kept, stop: &AtomicBool) -> Result<StudyAnswer, Problem> {
-    let id = &*kept.id;
-    let is_done = kept.is_done();
-    let document = store.now(|transaction| store::document(transaction, id))?.ok_or_else(|| forgotten(id))?;
-    let study = read(id, &document)?;
-    drop(document);
-    if (study.variants(), study.chunks()) != (kept.variants, kept.chunks) {
-        return Err(damaged(id, "it has other chunks"));
-    }
-    let mut gathered = Gathered::new(&study);
+/// The answer from the parts that are stored, computed on this thread.
+pub(super) fn answer(store: &Store, record: &StudyRecord, stop: &AtomicBool) -> Result<StudyAnswer, Problem> {
+    let id = &*record.id;
+    let is_done = record.state() == StudyState::Done;
+    let stored = || store.now(|transaction| store::study(transaction, id))?.ok_or_else(|| removed(id));
+    let mut gathered = Gathered::new(&Arc::new(stored()?.read()?));
     let mut from_chunk = 0;
     loop {
         let parts = store.now(|transaction| store::parts(transaction, id, from_chunk))?;
         let Some((last, _)) = parts.last() else { break };
         from_chunk = last + 1;
-        for (chunk, sealed) in &parts {
-            let part = seal::unsealed(id, *chunk, sealed);
-            gathered.add(*chunk, part.ok_or_else(|| damaged(id, &format!("the part of chunk {chunk} is another")))?);
+        for (chunk, bytes) in &parts {
+            let part = part_bytes::decode(id, *chunk, bytes);
+            gathered.add(*chunk, part.ok_or_else(|| damaged(id, &format!("the part of chunk {chunk}")))?);
         }
         if stop.load(Ordering::Relaxed) {
             return Err(NoAnswer::stopped().into());
         }
     }
     if is_done && !gathered.is_complete() {
-        let is_there = store.now(|transaction| store::document(transaction, id))?.is_some();
-        return Err(if is_there { damaged(id, "parts are missing") } else { forgotten(id) });
+        // Either the study was removed meanwhile, or its parts were lost.
+        stored()?;
+        return Err(damaged(id, "the number of parts"));
     }
     Ok(gathered.answer())
 }
 
-/// The problem of a study that is not in the file any more.
-pub(super) fn forgotten(id: &str) -> Problem {
-    let detail = format!("the study `{id}` was forgotten in this moment; ask for it again");
+fn removed(id: &str) -> Problem {
+    let detail = format!("the study `{id}` was removed during this request. Request it again");
     Problem::new(ProblemCode::NotFound, detail)
 }
 
-fn damaged(id: &str, what: &str) -> Problem {
-    let detail = "what is kept of the study is damaged; delete the study, and ask for it again";
+/// The problem of a study whose stored content has changed.
+pub(super) fn damaged(id: &str, what: &str) -> Problem {
+    let detail = "the stored study is damaged. Delete it and request it again";
     let cause = format!("the study {id} is damaged in its file: {what}");
     Problem { cause: Some(cause), ..Problem::new(ProblemCode::InternalError, detail) }
 }

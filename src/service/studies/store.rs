@@ -12,10 +12,15 @@ use rusqlite::{
     Connection, ErrorCode, OpenFlags, OptionalExtension as _, Row, Transaction, TransactionBehavior, named_params,
     params,
 };
-use toothwave_calculation::origin;
+use serde_json::json;
+use toothwave_calculation::json::word;
+use toothwave_calculation::{origin, question};
+use toothwave_study::Study;
 
-use super::StudyState;
+use super::record::{Progress, StudyState};
+use super::runner::damaged;
 use crate::http::problem::{Problem, ProblemCode};
+use crate::ops::config::Limits;
 
 /// Marks a database as a file of studies: "toth".
 const APPLICATION_ID: i64 = 0x746f_7468;
@@ -27,15 +32,10 @@ const SCHEMA_VERSION: i64 = 5;
 const SCHEMA: &str = "
 CREATE TABLE studies (
     id TEXT PRIMARY KEY,
-    kind TEXT NOT NULL,
     origin TEXT NOT NULL,
     state TEXT NOT NULL,
     problem TEXT,
-    variants INTEGER NOT NULL,
-    chunks INTEGER NOT NULL,
-    bytes INTEGER NOT NULL,
-    done INTEGER NOT NULL DEFAULT 0,
-    looked_at INTEGER NOT NULL DEFAULT 0,
+    variants INTEGER NOT NULL DEFAULT 0,
     impossible INTEGER NOT NULL DEFAULT 0,
     asked_at_s INTEGER NOT NULL,
     ends_at_s INTEGER NOT NULL,
@@ -47,7 +47,6 @@ CREATE TABLE studies (
 CREATE TABLE parts (
     study TEXT NOT NULL,
     chunk INTEGER NOT NULL,
-    origin TEXT NOT NULL,
     part BLOB NOT NULL,
     PRIMARY KEY (study, chunk)
 ) STRICT;
@@ -109,55 +108,71 @@ impl From<StoreError> for Problem {
     }
 }
 
-/// A study that begins, or continues.
-#[derive(Debug)]
-pub(super) struct NewStudy {
-    pub(super) id: String,
-    pub(super) kind: &'static str,
-    pub(super) variants: u64,
-    pub(super) chunks: u64,
-    /// What it takes with its result, about.
-    pub(super) bytes: u64,
-    pub(super) ends_at_s: u64,
-    pub(super) max_states: u64,
-    pub(super) max_profile_points: u64,
-    pub(super) document: Vec<u8>,
-}
-
-/// A study without its document.
+/// A study as it is stored.
 #[derive(Debug)]
 pub(super) struct StoredStudy {
     pub(super) id: String,
-    pub(super) kind: String,
     pub(super) state: StudyState,
-    pub(super) problem: Option<String>,
-    pub(super) variants: u64,
-    pub(super) chunks: u64,
-    pub(super) bytes: u64,
-    /// Variants of the chunks that have a part, and the ones of these without an answer.
-    pub(super) looked_at: u64,
-    pub(super) impossible: u64,
+    pub(super) problem: Option<Problem>,
+    pub(super) progress: Progress,
+    /// Seconds since 1970, as `ends_at_s`.
     pub(super) asked_at_s: u64,
     pub(super) ends_at_s: u64,
+    max_states: u64,
+    max_profile_points: u64,
+    document_hash: [u8; blake3::OUT_LEN],
+    document: Vec<u8>,
 }
 
-/// The columns of one.
-const STUDY: &str =
-    "id, kind, state, problem, variants, chunks, bytes, done, looked_at, impossible, asked_at_s, ends_at_s";
+impl StoredStudy {
+    /// A study that is requested now.
+    pub(super) fn new(study: &Study, document: &[u8], limits: &Limits) -> Self {
+        let (now_s, most) = (now_s(), i64::MAX.unsigned_abs());
+        Self {
+            id: study.id().to_string(),
+            state: StudyState::Running,
+            problem: None,
+            progress: Progress::default(),
+            asked_at_s: now_s,
+            ends_at_s: now_s.saturating_add(limits.study_deadline_ms.div_ceil(1000)).min(most),
+            max_states: limits.max_states.min(most),
+            max_profile_points: limits.max_profile_points.min(most),
+            document_hash: blake3::hash(document).into(),
+            document: document.into(),
+        }
+    }
 
-/// What a study asks, with the limits of each variant.
-#[derive(Debug)]
-pub(super) struct StoredDocument {
-    pub(super) text: Vec<u8>,
-    pub(super) max_states: u64,
-    pub(super) max_profile_points: u64,
-    hash: [u8; blake3::OUT_LEN],
-}
+    fn of_row(row: &Row<'_>) -> rusqlite::Result<Self> {
+        let problem: Option<String> = row.get("problem")?;
+        Ok(Self {
+            id: row.get("id")?,
+            state: match row.get_ref("state")?.as_str()? {
+                "running" => StudyState::Running,
+                "done" => StudyState::Done,
+                "failed" => StudyState::Failed,
+                _ => StudyState::Cancelled,
+            },
+            problem: problem
+                .and_then(|text| serde_json::from_str(&text).ok())
+                .map(|(code, detail): (_, String)| Problem::new(code, detail)),
+            progress: Progress { variants: row.get("variants")?, impossible: row.get("impossible")? },
+            asked_at_s: row.get("asked_at_s")?,
+            ends_at_s: row.get("ends_at_s")?,
+            max_states: row.get("max_states")?,
+            max_profile_points: row.get("max_profile_points")?,
+            document_hash: row.get("document_hash")?,
+            document: row.get("document")?,
+        })
+    }
 
-impl StoredDocument {
-    /// Whether it is what was written.
-    pub(super) fn is_intact(&self) -> bool {
-        blake3::hash(&self.text) == self.hash
+    /// What the stored document requests. It was within the limits of the service when the study began.
+    pub(super) fn read(&self) -> Result<Study, Problem> {
+        if blake3::hash(&self.document) != self.document_hash {
+            return Err(damaged(&self.id, "the document"));
+        }
+        let calculation = question::Limits::new(self.max_states, self.max_profile_points);
+        let limits = toothwave_study::Limits { calculation, max_study_variants: u64::MAX, max_study_bytes: u64::MAX };
+        Ok(Study::read(&self.document, &limits)?)
     }
 }
 
@@ -166,9 +181,8 @@ impl StoredDocument {
 pub(super) struct NewPart {
     pub(super) study: String,
     pub(super) chunk: u64,
-    pub(super) variants: u64,
-    pub(super) refused: u64,
-    pub(super) sealed: Vec<u8>,
+    pub(super) progress: Progress,
+    pub(super) bytes: Vec<u8>,
 }
 
 /// Seconds since 1970.
@@ -185,9 +199,6 @@ pub struct Store {
 
 impl Store {
     /// Opens a file, which is created if it does not exist; without one, a database in memory.
-    ///
-    /// # Errors
-    /// If the file cannot be opened, is damaged, is open elsewhere, or was written by another version.
     pub fn open(file: Option<&Path>) -> Result<Self, StoreError> {
         let mut connection = match file {
             Some(file) => {
@@ -207,7 +218,7 @@ impl Store {
         Ok(Self { connection: Arc::new(Mutex::new(connection)), is_in_memory: file.is_none() })
     }
 
-    /// Whether it ends with the process.
+    /// Whether the studies are lost at the end of the process.
     pub(super) const fn is_in_memory(&self) -> bool {
         self.is_in_memory
     }
@@ -219,6 +230,13 @@ impl Store {
     ) -> Result<T, StoreError> {
         let store = self.clone();
         tokio::task::spawn_blocking(move || store.now(work)).await.unwrap_or(Err(StoreError::Silent))
+    }
+
+    /// Writes the write-ahead log into the file. The process may exit before the connection is dropped, which would do the same.
+    pub(super) fn merge_log(&self) {
+        if let Err(error) = self.connection.lock().query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(())) {
+            tracing::warn!(%error, "the write-ahead log stays beside the file of studies");
+        }
     }
 
     /// Runs one short transaction on this thread.
@@ -251,125 +269,87 @@ fn require_schema(transaction: &Transaction<'_>) -> Result<(), StoreError> {
     }
 }
 
-/// The studies of this build and arithmetic, the one that was asked for longest ago first. Of others those that run are computed again
-/// from their beginning, and the rest is removed: this build would give other bits.
+/// All studies, the one that was requested longest ago first. Of other builds and other arithmetic, which give other bits, those that run
+/// begin again. The rest of them is removed.
 pub(super) fn load(transaction: &Transaction<'_>) -> rusqlite::Result<Vec<StoredStudy>> {
-    let others = "origin <> ?1";
-    let is_over = "(state <> 'running' OR done = chunks)";
-    transaction
-        .execute(&format!("DELETE FROM parts WHERE study IN (SELECT id FROM studies WHERE {others})"), [origin()])?;
-    transaction.execute(&format!("DELETE FROM studies WHERE {others} AND {is_over}"), [origin()])?;
-    let adopt = format!("UPDATE studies SET origin = ?1, done = 0, looked_at = 0, impossible = 0 WHERE {others}");
-    transaction.execute(&adopt, [origin()])?;
-    let mut statement = transaction.prepare(&format!("SELECT {STUDY} FROM studies ORDER BY asked_at_s"))?;
-    statement.query_map([], stored_study)?.collect()
+    let of_others = "DELETE FROM parts WHERE study IN (SELECT id FROM studies WHERE origin <> ?1)";
+    transaction.execute(of_others, [origin()])?;
+    transaction.execute("DELETE FROM studies WHERE origin <> ?1 AND state <> 'running'", [origin()])?;
+    let begin_again = "UPDATE studies SET origin = ?1, variants = 0, impossible = 0 WHERE origin <> ?1";
+    transaction.execute(begin_again, [origin()])?;
+    let mut statement = transaction.prepare("SELECT * FROM studies ORDER BY asked_at_s")?;
+    statement.query_map([], StoredStudy::of_row)?.collect()
 }
 
-fn stored_study(row: &Row<'_>) -> rusqlite::Result<StoredStudy> {
-    let (done, chunks): (u64, u64) = (row.get("done")?, row.get("chunks")?);
-    Ok(StoredStudy {
-        id: row.get("id")?,
-        kind: row.get("kind")?,
-        state: match row.get_ref("state")?.as_str()? {
-            _ if done == chunks => StudyState::Done,
-            "running" => StudyState::Running,
-            "failed" => StudyState::Failed,
-            _ => StudyState::Cancelled,
-        },
-        problem: row.get("problem")?,
-        variants: row.get("variants")?,
-        chunks,
-        bytes: row.get("bytes")?,
-        looked_at: row.get("looked_at")?,
-        impossible: row.get("impossible")?,
-        asked_at_s: row.get("asked_at_s")?,
-        ends_at_s: row.get("ends_at_s")?,
-    })
+/// The study with this id.
+pub(super) fn study(transaction: &Transaction<'_>, id: &str) -> rusqlite::Result<Option<StoredStudy>> {
+    transaction.query_row("SELECT * FROM studies WHERE id = ?1", [id], StoredStudy::of_row).optional()
 }
 
-/// Lets a study run, from its beginning or from where it stands.
-pub(super) fn begin(transaction: &Transaction<'_>, new: &NewStudy) -> rusqlite::Result<StoredStudy> {
-    let text = format!(
-        "
-        INSERT INTO studies (id, kind, origin, state, variants, chunks, bytes, asked_at_s, ends_at_s, max_states, max_profile_points,
-            document_hash, document)
-        VALUES (:id, :kind, :origin, 'running', :variants, :chunks, :bytes, :asked_at_s, :ends_at_s, :max_states, :max_profile_points,
-            :document_hash, :document)
-        ON CONFLICT (id) DO UPDATE SET state = 'running', problem = NULL, variants = :variants, chunks = :chunks,
-            ends_at_s = :ends_at_s, asked_at_s = :asked_at_s
-        RETURNING {STUDY}"
-    );
-    let hash = blake3::hash(&new.document);
+/// Stores a study that runs from now on. If it has parts, it continues with them.
+pub(super) fn begin(transaction: &Transaction<'_>, study: StoredStudy) -> rusqlite::Result<StoredStudy> {
+    let text = "
+        INSERT INTO studies (id, origin, state, asked_at_s, ends_at_s, max_states, max_profile_points, document_hash, document)
+        VALUES (:id, :origin, 'running', :asked_at_s, :ends_at_s, :max_states, :max_profile_points, :document_hash, :document)
+        ON CONFLICT (id) DO UPDATE SET state = 'running', problem = NULL, asked_at_s = :asked_at_s, ends_at_s = :ends_at_s
+        RETURNING *";
     let values = named_params! {
-        ":id": new.id, ":kind": new.kind, ":origin": origin(), ":variants": new.variants, ":chunks": new.chunks, ":bytes": new.bytes,
-        ":asked_at_s": now_s(), ":ends_at_s": new.ends_at_s, ":max_states": new.max_states,
-        ":max_profile_points": new.max_profile_points, ":document_hash": hash.as_bytes(),
-        ":document": new.document,
+        ":id": study.id, ":origin": origin(), ":asked_at_s": study.asked_at_s, ":ends_at_s": study.ends_at_s,
+        ":max_states": study.max_states, ":max_profile_points": study.max_profile_points,
+        ":document_hash": study.document_hash, ":document": study.document,
     };
-    transaction.query_row(&text, values, stored_study)
+    transaction.query_row(text, values, StoredStudy::of_row)
 }
 
-/// Notes how a study stands that does not run any more, with the problem that it has.
-pub(super) fn stop(
+/// Stores that a study does not run any more.
+pub(super) fn end(
     transaction: &Transaction<'_>,
     id: &str,
     state: StudyState,
-    problem: Option<&str>,
+    problem: Option<Problem>,
 ) -> rusqlite::Result<()> {
-    let word = toothwave_calculation::json::word(&state);
-    transaction.execute("UPDATE studies SET state = ?2, problem = ?3 WHERE id = ?1", params![id, word, problem])?;
+    let problem = problem.map(|Problem { code, detail, .. }| json!([code, detail]).to_string());
+    let text = "UPDATE studies SET state = ?2, problem = ?3 WHERE id = ?1";
+    transaction.execute(text, params![id, word(&state), problem])?;
     Ok(())
 }
 
-/// Notes that a study was asked for.
-pub(super) fn touch(transaction: &Transaction<'_>, id: &str) -> rusqlite::Result<()> {
-    transaction.execute("UPDATE studies SET asked_at_s = ?2 WHERE id = ?1", params![id, now_s()])?;
+/// Stores when a study was requested.
+pub(super) fn set_asked_at(transaction: &Transaction<'_>, id: &str, asked_at_s: u64) -> rusqlite::Result<()> {
+    transaction.execute("UPDATE studies SET asked_at_s = ?2 WHERE id = ?1", params![id, asked_at_s])?;
     Ok(())
 }
 
-/// Forgets a study with its parts.
-pub(super) fn forget(transaction: &Transaction<'_>, id: &str) -> rusqlite::Result<()> {
+/// Removes a study with its parts.
+pub(super) fn remove(transaction: &Transaction<'_>, id: &str) -> rusqlite::Result<()> {
     transaction.execute("DELETE FROM parts WHERE study = ?1", [id])?;
     transaction.execute("DELETE FROM studies WHERE id = ?1", [id])?;
     Ok(())
 }
 
-/// What a study asks, if it is there.
-pub(super) fn document(transaction: &Transaction<'_>, id: &str) -> rusqlite::Result<Option<StoredDocument>> {
-    let text = "SELECT document, document_hash, max_states, max_profile_points FROM studies WHERE id = ?1";
-    let read = |row: &Row<'_>| {
-        Ok(StoredDocument {
-            text: row.get("document")?,
-            hash: row.get("document_hash")?,
-            max_states: row.get("max_states")?,
-            max_profile_points: row.get("max_profile_points")?,
-        })
-    };
-    transaction.query_row(text, [id], read).optional()
-}
-
-/// Keeps a part, in the place of one of another build, and counts it.
-pub(super) fn keep(transaction: &Transaction<'_>, part: &NewPart) -> rusqlite::Result<()> {
-    let text = "INSERT OR REPLACE INTO parts (study, chunk, origin, part) VALUES (?1, ?2, ?3, ?4)";
-    transaction.prepare(text)?.execute(params![part.study, part.chunk, origin(), part.sealed])?;
-    let text =
-        "UPDATE studies SET done = done + 1, looked_at = looked_at + ?2, impossible = impossible + ?3 WHERE id = ?1";
-    transaction.prepare(text)?.execute(params![part.study, part.variants, part.refused])?;
+/// Stores a part.
+pub(super) fn insert_part(transaction: &Transaction<'_>, part: &NewPart) -> rusqlite::Result<()> {
+    let NewPart { study, chunk, progress: Progress { variants, impossible }, bytes } = part;
+    // A run that the deadline ended may have stored the same part.
+    let text = "INSERT OR IGNORE INTO parts VALUES (?1, ?2, ?3)";
+    if transaction.execute(text, params![study, chunk, bytes])? == 1 {
+        let text = "UPDATE studies SET variants = variants + ?2, impossible = impossible + ?3 WHERE id = ?1";
+        transaction.execute(text, params![study, variants, impossible])?;
+    }
     Ok(())
 }
 
-/// The chunks of a study that have a part of this build.
+/// The chunks of a study that have a part.
 pub(super) fn chunks_done(transaction: &Transaction<'_>, id: &str) -> rusqlite::Result<HashSet<u64>> {
-    let mut statement = transaction.prepare("SELECT chunk FROM parts WHERE study = ?1 AND origin = ?2")?;
-    statement.query_map(params![id, origin()], |row| row.get(0))?.collect()
+    let mut statement = transaction.prepare("SELECT chunk FROM parts WHERE study = ?1")?;
+    statement.query_map([id], |row| row.get(0))?.collect()
 }
 
-/// Some of a study's sealed parts of this build, from this chunk on.
+/// Some parts of a study, from this chunk on.
 pub(super) fn parts(transaction: &Transaction<'_>, id: &str, from_chunk: u64) -> rusqlite::Result<Vec<(u64, Vec<u8>)>> {
     /// Few enough that others wait for the file for some milliseconds.
     const AT_ONCE: i64 = 16;
-    let text = "SELECT chunk, part FROM parts WHERE study = ?1 AND origin = ?2 AND chunk >= ?3 ORDER BY chunk LIMIT ?4";
+    let text = "SELECT chunk, part FROM parts WHERE study = ?1 AND chunk >= ?2 ORDER BY chunk LIMIT ?3";
     let mut statement = transaction.prepare(text)?;
-    let rows = statement.query_map(params![id, origin(), from_chunk, AT_ONCE], |row| Ok((row.get(0)?, row.get(1)?)))?;
-    rows.collect()
+    statement.query_map(params![id, from_chunk, AT_ONCE], |row| Ok((row.get(0)?, row.get(1)?)))?.collect()
 }

@@ -34,8 +34,8 @@ use utoipa::ToSchema;
 use super::peaks::PeaksOnly;
 use crate::app::App;
 use crate::compute::budget::{FREE_BYTES, Reservation};
-use crate::compute::pool::caught;
-use crate::http::answer::{Stoppable, bound, broken_body, require_within, settle, write_problem};
+use crate::compute::pool::catch_panic;
+use crate::http::answer::{StoppableWriter, bound, broken_body, require_within, shrink_to_body, write_problem};
 use crate::http::negotiation;
 use crate::http::observe::note_problem;
 use crate::http::problem::{Problem, ProblemCode};
@@ -84,9 +84,6 @@ pub struct BatchQuery {
 
 impl BatchQuery {
     /// Checks that `peaks_only` is asked of sweeps.
-    ///
-    /// # Errors
-    /// `invalid_query`.
     pub fn require_possible(self) -> Result<(), Problem> {
         if self.peaks_only && self.endpoint != BatchEndpoint::Sweep {
             let detail = "only sweeps have peaks. Leave out `peaks_only`, or ask the endpoint `sweep`";
@@ -153,7 +150,7 @@ fn count(status: u16) {
 fn answer_line<A: Forms>(index: u64, answer: &A, stop: &AtomicBool) -> Result<Vec<u8>, Problem> {
     let status = StatusCode::OK.as_u16();
     let line = BatchLine { index, status, answer: Some(answer), problem: None };
-    let mut writer = Stoppable::new(Vec::with_capacity(answer.expected_bytes()), stop);
+    let mut writer = StoppableWriter::new(Vec::with_capacity(answer.expected_bytes()), stop);
     let written = columns::write(&line, &mut writer).and_then(|()| writer.write_all(b"\n"));
     written.map_err(|error| write_problem(&error, stop))?;
     count(status);
@@ -166,7 +163,7 @@ pub fn computed_line(query: BatchQuery, index: u64, document: &[u8], limits: &Li
         let never = AtomicBool::new(false);
         answer_line(index, &question.ask(document, limits, &never)?, &never)
     }
-    let line = caught(|| match query.endpoint {
+    let line = catch_panic(|| match query.endpoint {
         BatchEndpoint::Geometry => line(&Geometry, index, document, limits),
         BatchEndpoint::CoincidenceDegree => line(&CoincidenceDegree, index, document, limits),
         BatchEndpoint::Sweep if query.peaks_only => line(&PeaksOnly, index, document, limits),
@@ -181,7 +178,7 @@ type Line = (u64, Result<Bytes, Problem>);
 /// Computes the line of a large answer, which has to fit into its reservation.
 type Compute = Box<dyn FnOnce(Option<&Reservation>, &AtomicBool) -> Result<Vec<u8>, Problem> + Send>;
 
-/// What comes of a document.
+/// The outcome of a document.
 enum Outcome {
     /// Its line.
     Line(Vec<u8>),
@@ -189,7 +186,7 @@ enum Outcome {
     Large(u64, Compute),
 }
 
-/// What one computation has done; it outlives the computation if the deadline ends that.
+/// The outcomes of one slice. They are kept if the deadline ends the slice.
 #[derive(Default)]
 struct Progress {
     current: Option<u64>,
@@ -227,11 +224,11 @@ fn answered<Q: Question>(
 }
 
 /// Answers lines until the time or the bytes of a slice are used up.
-fn work(app: &App, query: BatchQuery, lines: Vec<Line>, progress: &Mutex<Progress>, stop: &AtomicBool) {
+fn answer_lines(app: &App, query: BatchQuery, lines: Vec<Line>, progress: &Mutex<Progress>, stop: &AtomicBool) {
     let (started, mut bytes) = (Instant::now(), 0);
     for (index, document) in lines {
         progress.lock().current = Some(index);
-        let outcome = caught(|| match (document, query.endpoint) {
+        let outcome = catch_panic(|| match (document, query.endpoint) {
             (Err(problem), _) => Err(problem),
             (Ok(document), BatchEndpoint::Geometry) => outcome(app, &Geometry, index, &document, stop),
             (Ok(document), BatchEndpoint::CoincidenceDegree) => {
@@ -243,7 +240,7 @@ fn work(app: &App, query: BatchQuery, lines: Vec<Line>, progress: &Mutex<Progres
             (Ok(document), BatchEndpoint::Sweep) => outcome(app, &Sweep, index, &document, stop),
         });
         let mut progress = progress.lock();
-        // If the deadline has ended this line, its problem is told already.
+        // If the deadline has ended this line, its problem is written already.
         if stop.load(Ordering::Relaxed) || progress.current.take() != Some(index) {
             return;
         }
@@ -256,13 +253,13 @@ fn work(app: &App, query: BatchQuery, lines: Vec<Line>, progress: &Mutex<Progres
     }
 }
 
-/// One computation further: what comes of at least the first of the lines, which are then removed.
-async fn advance(app: &Arc<App>, query: BatchQuery, lines: &mut Vec<Line>) -> Vec<(u64, Outcome)> {
+/// Computes one slice: the outcomes of the first line and of as many others as fit. Removes these lines.
+async fn compute_slice(app: &Arc<App>, query: BatchQuery, lines: &mut Vec<Line>) -> Vec<(u64, Outcome)> {
     let progress = Arc::new(Mutex::new(Progress::default()));
     let job = {
         let (app, progress, lines) = (Arc::clone(app), Arc::clone(&progress), lines.clone());
         move |stop: &AtomicBool| {
-            work(&app, query, lines, &progress, stop);
+            answer_lines(&app, query, lines, &progress, stop);
             Ok(())
         }
     };
@@ -281,18 +278,15 @@ async fn advance(app: &Arc<App>, query: BatchQuery, lines: &mut Vec<Line>) -> Ve
 }
 
 /// The lines of a large answer, with the bytes that it has reserved.
-async fn large(app: &App, index: u64, bytes: u64, compute: Compute) -> Bytes {
+async fn answer_large_line(app: &App, index: u64, bytes: u64, compute: Compute) -> Bytes {
     let line = async {
         let reservation = app.budget.reserve(bytes).await?;
         let job = move |stop: &AtomicBool| {
             let line = compute(reservation.as_ref(), stop)?;
-            Ok((settle(reservation, line.len()), line))
+            Ok((shrink_to_body(reservation, line.len()), line))
         };
         let (reservation, line) = app.pool.run_in_background(app.deadline_span(), job).await?;
-        Ok(match &reservation {
-            Some(reservation) => Reservation::hold(reservation, line.into()),
-            None => line.into(),
-        })
+        Ok(Reservation::hold(reservation, line.into()))
     };
     line.await.unwrap_or_else(|problem| problem_line(index, problem).into())
 }
@@ -301,13 +295,13 @@ async fn large(app: &App, index: u64, bytes: u64, compute: Compute) -> Bytes {
 async fn answer_all(app: Arc<App>, query: BatchQuery, mut lines: Vec<Line>) -> (u64, Vec<Bytes>) {
     let (mut parts, mut short, mut count) = (Vec::new(), Vec::new(), 0);
     while !lines.is_empty() {
-        for (index, outcome) in advance(&app, query, &mut lines).await {
+        for (index, outcome) in compute_slice(&app, query, &mut lines).await {
             count += 1;
             match outcome {
                 Outcome::Line(line) => short.extend_from_slice(&line),
                 Outcome::Large(bytes, compute) => {
                     parts.push(std::mem::take(&mut short).into());
-                    parts.push(large(&app, index, bytes, compute).await);
+                    parts.push(answer_large_line(&app, index, bytes, compute).await);
                 }
             }
         }
@@ -390,7 +384,7 @@ async fn read_ahead(app: &App, body: Body) -> Result<Body, Problem> {
             next = tokio::time::timeout_at(deadline.at, pieces.next()) => next,
             () = app.pool.stopped() => break,
         };
-        // What is late or broken is told by the last line.
+        // The last line reports what is late or broken.
         let Ok(Some(piece)) = next else { break };
         bytes += piece.as_ref().map_or(0, Bytes::len);
         read.push(piece);

@@ -154,11 +154,7 @@ fn part<Q: Question>(
     params(("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
     responses(
         (status = 200, description = "Each answer that there is, and of the others the problem: also where there is none at all.",
-            body = DesignAnswer, content_type = "application/json", headers(
-                ("ETag" = String, description = "Entity tag of this representation."),
-                ("Cache-Status" = String, description = "RFC 9211: `hit`, `fwd=miss`, `collapsed`."),
-                ("Server-Timing" = String, description = "`solve;dur=` and the milliseconds of the solve.")
-            )),
+            body = DesignAnswer, content_type = "application/json"),
         (status = 304, description = "The client has this representation already (`If-None-Match`)."),
         Problems
     )

@@ -26,11 +26,7 @@ use crate::http::problem::{Problem, ProblemCode};
     ),
     responses(
         (status = 200, description = "The drawing. As DXF (AutoCAD 2000, millimetres) a layer a part, every outline a circle or one closed polyline with arcs as bulges; as SVG the same in millimetres; as STEP (AP214) every prism a solid in place, curves as cubic splines through their points.",
-            content((DrawingAnswer = "application/json"), (String = "image/svg+xml"), (String = "image/vnd.dxf"), (String = "model/step")), headers(
-                ("ETag" = String, description = "Entity tag of this representation."),
-                ("Cache-Status" = String, description = "RFC 9211: `hit`, `fwd=miss`, `collapsed`."),
-                ("Server-Timing" = String, description = "`solve;dur=` and the milliseconds of the solve.")
-            )),
+            content((DrawingAnswer = "application/json"), (String = "image/svg+xml"), (String = "image/vnd.dxf"), (String = "model/step"))),
         (status = 304, description = "The client has this representation already (`If-None-Match`)."),
         (status = 404, description = "No such part.", body = Problem, content_type = "application/problem+json"),
         Problems

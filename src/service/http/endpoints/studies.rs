@@ -23,22 +23,21 @@ use utoipa::ToSchema;
 use crate::app::App;
 use crate::compute::budget::Reservation;
 use crate::compute::pool::within;
-use crate::http::answer::{Problems, read_body, settle, write};
+use crate::http::answer::{Problems, body_response, read_body, shrink_to_body, write};
 use crate::http::negotiation::{self, Representation};
 use crate::http::problem::{Problem, ProblemCode};
-use crate::http::query::require_no_query;
-use crate::studies::{Kept, StudyResource};
+use crate::studies::{StudyRecord, StudyResource, StudyState};
 
-/// What a client would rather have (RFC 7240).
+/// A header of the request (RFC 7240).
 const PREFER: HeaderName = HeaderName::from_static("prefer");
-/// What of a request's wishes was followed (RFC 7240).
+/// The header of the response that says which preference was followed (RFC 7240).
 pub const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
 
-/// Between two events of a study's progress.
-const PAUSE: Duration = Duration::from_millis(100);
+/// Time between two events of a study.
+const EVENT_PAUSE: Duration = Duration::from_millis(100);
 
-/// After so long without an event a comment is sent: a chunk may take minutes, and a proxy takes who says nothing for gone.
-const SIGN_OF_LIFE: Duration = Duration::from_secs(5);
+/// After this time without an event a comment is sent. A chunk may take minutes, and proxies close silent connections.
+const KEEP_ALIVE: Duration = Duration::from_secs(5);
 
 /// Every quantity that a study can be asked for.
 #[derive(Debug, Serialize, ToSchema)]
@@ -69,7 +68,7 @@ pub async fn quantities() -> Json<QuantitiesAnswer> {
     )
 )]
 pub async fn begin(State(app): State<Arc<App>>, request: Request) -> Response {
-    respond_to_question(&app, request).await.unwrap_or_else(IntoResponse::into_response)
+    respond_with_study(&app, request).await.unwrap_or_else(IntoResponse::into_response)
 }
 
 /// How a study stands.
@@ -85,8 +84,8 @@ pub async fn begin(State(app): State<Arc<App>>, request: Request) -> Response {
     )
 )]
 pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
-    match kept(&app, id) {
-        Ok(kept) => no_store(Json(kept.resource()).into_response()),
+    match find(&app, id) {
+        Ok(record) => no_store(Json(record.resource()).into_response()),
         Err(problem) => problem.into_response(),
     }
 }
@@ -106,13 +105,10 @@ pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRej
 )]
 pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
     let id = id_of(id);
-    let cancelled = {
-        let id = id.clone();
-        to_its_end(&app, async move |app| app.studies.cancel_or_forget(&id).await).await
-    };
-    match cancelled {
+    let own = id.clone();
+    match complete_change(&app, async move |app| app.studies.cancel_or_remove(&own).await).await {
         Ok(true) => StatusCode::NO_CONTENT.into_response(),
-        Ok(false) => not_kept(&id).into_response(),
+        Ok(false) => no_such_study(&id).into_response(),
         Err(problem) => problem.into_response(),
     }
 }
@@ -139,9 +135,9 @@ pub async fn result(
     headers: HeaderMap,
 ) -> Response {
     let answer = async {
-        let kept = kept(&app, id)?;
+        let record = find(&app, id)?;
         let representation = Representation::negotiate(&headers, StudyAnswer::FORMS.iter().map(|(format, _)| *format))?;
-        written(&app, &kept, representation, |answer| answer).await
+        answer_response(&app, &record, representation, |answer| answer).await
     };
     no_store(answer.await.unwrap_or_else(IntoResponse::into_response))
 }
@@ -179,36 +175,36 @@ pub enum EventName {
     )
 )]
 pub async fn events(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
-    let kept = match kept(&app, id) {
-        Ok(kept) => kept,
+    let record = match find(&app, id) {
+        Ok(record) => record,
         Err(problem) => return problem.into_response(),
     };
-    // How it stands at once, and then whenever that changes.
-    let events = stream::unfold(Some((kept, None)), move |next| {
+    // The state at once, and then after each change.
+    let events = stream::unfold(Some((record, None)), move |next| {
         let app = Arc::clone(&app);
         async move {
-            let (kept, changed) = next?;
+            let (record, changed) = next?;
             if let Some(changed) = changed {
-                let next_look = async {
+                let changed = async {
                     changed.await;
-                    tokio::time::sleep(PAUSE).await;
-                    app.studies.touch(&kept);
+                    tokio::time::sleep(EVENT_PAUSE).await;
+                    app.studies.touch(&record);
                 };
                 tokio::select! {
-                    () = next_look => {}
+                    () = changed => {}
                     () = app.studies.closing().cancelled() => return None,
                 }
             }
-            // Subscribed before it is looked at, so that nothing is missed.
-            let changed = kept.watch();
-            let resource = kept.resource();
-            let is_running = kept.is_running();
+            // Subscribed before the state is read, so that no change is missed.
+            let changed = record.changed();
+            let resource = record.resource();
+            let is_running = resource.state == StudyState::Running;
             let name = if is_running { EventName::Progress } else { EventName::End };
             let event = Event::default().event(word(&name)).json_data(&resource).unwrap_or_default();
-            Some((Ok::<_, Infallible>(event), is_running.then_some((kept, Some(changed)))))
+            Some((Ok::<_, Infallible>(event), is_running.then_some((record, Some(changed)))))
         }
     });
-    no_store(Sse::new(events).keep_alive(KeepAlive::new().interval(SIGN_OF_LIFE)).into_response())
+    no_store(Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE)).into_response())
 }
 
 fn no_store(mut response: Response) -> Response {
@@ -216,18 +212,18 @@ fn no_store(mut response: Response) -> Response {
     response
 }
 
-fn kept(app: &App, id: Result<Path<String>, PathRejection>) -> Result<Arc<Kept>, Problem> {
+fn find(app: &App, id: Result<Path<String>, PathRejection>) -> Result<Arc<StudyRecord>, Problem> {
     let id = id_of(id);
-    app.studies.find(&id)?.ok_or_else(|| not_kept(&id))
+    app.studies.find(&id)?.ok_or_else(|| no_such_study(&id))
 }
 
-/// The id of a path; none is empty.
+/// The id of a path. One that is no text is as unknown as the empty one.
 fn id_of(id: Result<Path<String>, PathRejection>) -> String {
     id.map(|Path(id)| id).unwrap_or_default()
 }
 
-/// Does what must not be left half done, even if the client leaves meanwhile.
-async fn to_its_end<T: Send + 'static, F: Future<Output = Result<T, Problem>> + Send + 'static>(
+/// Completes a change even if the client leaves meanwhile.
+async fn complete_change<T: Send + 'static, F: Future<Output = Result<T, Problem>> + Send + 'static>(
     app: &Arc<App>,
     change: impl FnOnce(Arc<App>) -> F,
 ) -> Result<T, Problem> {
@@ -235,38 +231,39 @@ async fn to_its_end<T: Send + 'static, F: Future<Output = Result<T, Problem>> + 
     changing.await.unwrap_or_else(|error| Err(Problem::internal(&error)))
 }
 
-fn not_kept(id: &str) -> Problem {
-    let detail = format!("no study `{id}` is kept: it was never asked for here, or was forgotten; ask for it again");
+fn no_such_study(id: &str) -> Problem {
+    let detail =
+        format!("this service has no study `{id}`: it was never requested here, or was removed. Request it again");
     Problem::new(ProblemCode::NotFound, detail)
 }
 
-async fn respond_to_question(app: &Arc<App>, request: Request) -> Result<Response, Problem> {
+async fn respond_with_study(app: &Arc<App>, request: Request) -> Result<Response, Problem> {
     let deadline = app.deadline();
     let (Parts { headers, uri, .. }, body) = request.into_parts();
-    require_no_query(&uri)?;
+    negotiation::require_no_query(&uri)?;
     negotiation::require_json(&headers)?;
     let representation = Representation::negotiate(&headers, std::iter::empty())?;
     let text = read_body(app, deadline, &headers, body).await?.to_vec();
     let limits = app.limits.of_studies();
-    // Its choices stand for hundreds of designs, so that a document of 64 KB may take long to be read.
+    // A document of 64 KB can take long to read, because its choices are hundreds of designs.
     let read = move |_: &AtomicBool| Ok((Study::read(&text, &limits)?, text));
     let (study, text) = within(deadline, app.pool.run(read)).await?;
-    let kept = to_its_end(app, async move |app| app.studies.begin(study, &text).await).await?;
+    let record = complete_change(app, async move |app| app.studies.begin(study, &text).await).await?;
     let wait = wait_wanted(&headers);
     if let Some(wait) = wait {
         let wait_until = deadline.at.min(tokio::time::Instant::now() + wait);
         tokio::select! {
-            _ = tokio::time::timeout_at(wait_until, kept.ended()) => {}
+            _ = tokio::time::timeout_at(wait_until, record.ended()) => {}
             () = app.studies.closing().cancelled() => {}
         }
     }
-    let mut response = if kept.is_running() {
-        let location = format!("/v1/studies/{}", kept.resource().id);
-        (StatusCode::ACCEPTED, [(header::LOCATION, location)], Json(kept.resource())).into_response()
+    let resource = record.resource();
+    let mut response = if resource.state == StudyState::Running {
+        let location = format!("/v1/studies/{}", resource.id);
+        (StatusCode::ACCEPTED, [(header::LOCATION, location)], Json(resource)).into_response()
     } else {
-        let resource = kept.resource();
         let with_result = move |answer| StudyResource { result: Some(answer), ..resource };
-        written(app, &kept, representation, with_result).await?
+        answer_response(app, &record, representation, with_result).await?
     };
     if let Some(wait) = wait {
         let applied = format!("wait={}", wait.as_secs());
@@ -290,32 +287,21 @@ fn wait_wanted(headers: &HeaderMap) -> Option<Duration> {
     })
 }
 
-/// Makes the answer of a study from its parts, and writes it in what `told` makes of it.
-async fn written<A: Forms + Send>(
+/// The response with a study's answer, in the view of it that the request wants.
+async fn answer_response<A: Forms + Send>(
     app: &Arc<App>,
-    kept: &Arc<Kept>,
+    record: &Arc<StudyRecord>,
     representation: Representation,
-    told: impl FnOnce(StudyAnswer) -> A + Send + 'static,
+    view: impl FnOnce(StudyAnswer) -> A + Send + 'static,
 ) -> Result<Response, Problem> {
-    let Representation { format, gzip } = representation;
-    let reservation = app.budget.reserve(format.bytes_with_text(kept.bytes())).await?;
-    let (own, kept) = (Arc::clone(app), Arc::clone(kept));
+    let reservation = app.budget.reserve(representation.format.bytes_with_text(record.bytes())).await?;
+    let (own, record) = (Arc::clone(app), Arc::clone(record));
     let job = move |stop: &AtomicBool| {
-        let body = write(&told(own.studies.answer(&kept, stop)?), representation, stop)?;
-        Ok((settle(reservation, body.len()), body))
+        let body = write(&view(own.studies.answer(&record, stop)?), representation, stop)?;
+        Ok((shrink_to_body(reservation, body.len()), body))
     };
     let (reservation, body) = within(app.deadline(), app.pool.run(job)).await?;
-    let body = match &reservation {
-        Some(reservation) => Reservation::hold(reservation, body),
-        None => body,
-    };
-    let mut response = (StatusCode::OK, body).into_response();
-    let headers = response.headers_mut();
-    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(negotiation::content_type(format)));
-    if gzip {
-        headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
-    }
-    Ok(response)
+    Ok(body_response(Reservation::hold(reservation, body), representation))
 }
 
 impl Forms for StudyResource {
