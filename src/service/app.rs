@@ -20,9 +20,9 @@ pub struct App {
     pub pool: Pool,
     /// Finished answers.
     pub cache: Cache,
-    /// What large answers may take.
+    /// The bytes that large answers share.
     pub budget: Budget,
-    /// Studies, with what they have come to.
+    /// Studies and their results.
     pub studies: Studies,
     /// False while the service stops, for readiness probes.
     pub ready: AtomicBool,

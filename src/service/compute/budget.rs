@@ -22,7 +22,7 @@ pub const PART_OF_UNKNOWN_SIZE: u64 = 8;
 /// A request waits for bytes at most this long.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// One permit stands for this many bytes.
+/// Bytes of one permit of the semaphore.
 const UNIT_BYTES: u64 = 1 << 10;
 
 /// Bytes that all large answers share; clones share the same budget.
@@ -58,17 +58,17 @@ impl Budget {
         Self { free: Arc::new(Semaphore::new(permits)), max_bytes }
     }
 
-    /// All of it.
+    /// The whole budget.
     pub const fn max_bytes(&self) -> u64 {
         self.max_bytes
     }
 
-    /// What is reserved now.
+    /// Bytes that are reserved now.
     pub fn reserved_bytes(&self) -> u64 {
         self.max_bytes.saturating_sub(self.free.available_permits() as u64 * UNIT_BYTES)
     }
 
-    /// Reserves for an answer of at most this many bytes; nothing for a free one.
+    /// Reserves for an answer of at most this many bytes. An answer of at most 256 KiB reserves nothing.
     pub async fn reserve(&self, bytes: u64) -> Result<Option<Reservation>, Problem> {
         if bytes <= FREE_BYTES {
             return Ok(None);

@@ -31,7 +31,7 @@ pub const MAX_RUNNING_BATCHES: usize = 16;
 /// The `nice` value of background threads: beside a busy interactive thread they get a tenth of a core.
 const BACKGROUND_NICE: i32 = 10;
 
-/// Thirty years.
+/// Thirty years: longer than any deadline, and short enough for timers.
 const FAR_FUTURE: Duration = Duration::from_secs(30 * 365 * 24 * 3600);
 
 type Job = Box<dyn FnOnce() + Send>;
@@ -250,7 +250,7 @@ pub async fn within<T>(deadline: Deadline, future: impl Future<Output = Result<T
     })
 }
 
-/// The time by which a request is answered.
+/// The time at which the work for a request is stopped.
 #[derive(Debug, Clone, Copy)]
 pub struct Deadline {
     /// When.

@@ -43,7 +43,7 @@ pub const fn content_type(format: Format) -> &'static str {
 /// Of a list of what is accepted, in bytes: each of its items is read, sorted and compared before anything else is known of a request, and browsers' have some hundred bytes.
 const MOST_OF_A_LIST: usize = 4096;
 
-/// A format with its coding: what an entity tag stands for.
+/// A format with its coding. Each representation has its own entity tag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Representation {
     /// The format.

@@ -122,7 +122,7 @@ const ANSWER_HEADERS: [(&str, &str); 3] = [
     ("Server-Timing", "`solve;dur=` and the milliseconds of the solve."),
 ];
 
-/// What stands before every path: keys, which a service may want, and connections, of which there may be too many.
+/// Describes what every path can answer before its handler runs: an unknown query, a missing key, another host, too many connections.
 fn describe_entry(document: &mut openapi::OpenApi) {
     const KEY: &str = "key";
     let mut scheme = Http::new(HttpAuthScheme::Bearer);

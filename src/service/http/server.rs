@@ -172,7 +172,7 @@ impl Server {
         }
     }
 
-    /// Accepts connections for ever.
+    /// Accepts connections until the service stops.
     async fn accept(&self, listener: &TcpListener) {
         loop {
             match listener.accept().await {
@@ -187,7 +187,7 @@ impl Server {
         }
     }
 
-    /// Accepts the connections that wait, which closing the listener would cut.
+    /// Accepts the connections that wait in the kernel, because closing the listener would reset them.
     fn accept_waiting(&self, listener: &TcpListener) {
         for _ in 0..MAX_CONNECTIONS {
             let Some(Ok((stream, _))) = tokio::task::unconstrained(listener.accept()).now_or_never() else { return };

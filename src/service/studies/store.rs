@@ -75,7 +75,7 @@ pub enum StoreError {
         /// The schema that it has.
         found: i64,
     },
-    /// Something else is kept there.
+    /// It is a database of another program.
     #[error("the file is a database of something else. Name a file that does not exist yet.")]
     Foreign,
 }
