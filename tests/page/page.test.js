@@ -679,7 +679,7 @@ test('a refused drawing shows its reasons at their fields, and nothing is downlo
   page.on('download', (download) => downloads.push(download.suggestedFilename()));
   const refused = () => page.waitForSelector('#drawings-state .problem');
   const group = 'details:has(> summary:has-text("Parts as they are made"))';
-  const impossible = { wave_generator: { bore_radius_mm: 57 }, carrier: { outer_radius_mm: 70 }, ring: { clearance_um: -1 } };
+  const impossible = { wave_generator: { bore_radius_mm: 57 }, carrier: { outer_radius_mm: 70 } };
   await setDocument({ ...(await server.example('paper-5.1')), parts: impossible });
   // The drive itself is not touched by it.
   assert.ok(await page.isHidden('#impossible'));
@@ -696,13 +696,6 @@ test('a refused drawing shows its reasons at their fields, and nothing is downlo
   assert.match(await page.textContent('#drawings-state'), /^Assembly: .*Nothing was downloaded/);
   assert.notEqual(await page.getAttribute(group, 'open'), null, 'the group is unfolded');
   assert.ok(await page.isHidden('#impossible'), 'the drive is possible');
-  // A reason whose limit would do offers it; changed, the design has not been refused yet.
-  await pick(page, '[data-file="ring.svg"]');
-  await page.waitForFunction(() => document.querySelector('#drawings-state').textContent.startsWith('Ring: '));
-  await page.click(`${notes('/parts/ring/clearance_um')} button:has-text("Set to 0")`);
-  await settled(page);
-  assert.equal(await page.textContent('#drawings-state'), '');
-  assert.equal(await page.textContent(notes('/parts/ring/clearance_um')), '');
   // Each part answers for itself, and a reason leads to its field.
   await pick(page, '[data-file="wave-generator.svg"]');
   await refused();

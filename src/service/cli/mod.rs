@@ -151,14 +151,7 @@ impl From<Problem> for Failure {
 
 /// Runs the command that the process was started with.
 pub fn run() -> ExitCode {
-    let cli = match Cli::try_parse_from(arguments()) {
-        Ok(cli) => cli,
-        Err(error) => {
-            // Standard error may be closed.
-            let _ = error.print();
-            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(EXIT_BAD_INPUT));
-        }
-    };
+    let cli = Cli::parse_from(arguments());
     let result = match cli.command {
         Command::Serve(settings) => run_service(&settings),
         Command::Geometry(offline) => answer(Geometry, &offline.file, offline.format),

@@ -656,7 +656,7 @@ function listen() {
     writeAddress();
     copy(location.href, currentTarget);
   });
-  click('to-parts', () => goToField('/parts'));
+  click('to-parts', () => goToField('/parts/wave_generator/bore_radius_mm'));
   click('more', ({ currentTarget }) => setAttributes(currentTarget, { 'aria-expanded': byId('table').classList.toggle('all') }));
   click('theme', nextTheme);
   click('play', () => play(!state.isPlaying));
