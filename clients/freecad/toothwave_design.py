@@ -65,7 +65,8 @@ class Field:
         """Whether a document's value can stand in the field; what has several values, or is too much for FreeCAD, cannot."""
         if self.held and isinstance(value, (int, float)):
             return self.held[0] <= value <= self.held[1]
-        return not isinstance(value, (dict, list))
+        # Of several choices a field shows none: the list stands among the other fields.
+        return not isinstance(value, dict) and not (self.choices and isinstance(value, list))
 
     def is_shown(self, values):
         """Whether the document has such a field, as the choices stand."""

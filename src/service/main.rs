@@ -9,7 +9,5 @@ use std::process::ExitCode;
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 fn main() -> ExitCode {
-    #[cfg(feature = "fault-injection")]
-    let _faults = fail::FailScenario::setup();
     toothwave::cli::run()
 }

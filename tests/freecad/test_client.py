@@ -52,6 +52,7 @@ NOT_IN_THE_FORM = {
     "/accuracy": "no drawing and no sweep reads it",
     "/parts/carrier/fingers": "no drawing and no spreadsheet cell reads it",
     "/parts/ring/rim": "no drawing and no spreadsheet cell reads it",
+    "/model/clearance": "deprecated: documents are converted",
     "/profile/extent": "no drawing and no sweep reads it",
     **{
         f"/deviations/{name}": "a list of measured items, one entry for each tooth, slot or space, is pasted as it is, not typed"

@@ -9,7 +9,7 @@ pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }
 
-/// Bytes of memory that this process may use: the machine's, or the limit of its control group (version 2) if that is lower.
+/// Bytes of memory that this process may use: the machine's, or the limit of its control group if that is lower.
 pub fn memory_bytes() -> Option<u64> {
     memory_bytes_below(Path::new("/"))
 }
@@ -28,7 +28,9 @@ fn memory_bytes_below(root: &Path) -> Option<u64> {
         let file = Path::new("sys/fs/cgroup").join(group).join("memory.max");
         read(&file)?.trim().parse::<u64>().ok()
     };
-    groups.filter_map(limit).chain(machine_bytes).min()
+    // In version 1 of control groups a container sees its own limit here.
+    let first = read(Path::new("sys/fs/cgroup/memory/memory.limit_in_bytes")).and_then(|text| text.trim().parse().ok());
+    groups.filter_map(limit).chain(machine_bytes).chain(first).min()
 }
 
 #[cfg(test)]
@@ -62,5 +64,7 @@ mod tests {
         assert_eq!(with("around", &[MACHINE, group, (own, "max\n"), (around, "1073741824\n")]), Some(1 << 30));
         let container = ("sys/fs/cgroup/memory.max", "536870912\n");
         assert_eq!(with("container", &[MACHINE, ("proc/self/cgroup", "0::/\n"), container]), Some(512 << 20));
+        let first = ("sys/fs/cgroup/memory/memory.limit_in_bytes", "268435456\n");
+        assert_eq!(with("first-version", &[MACHINE, first]), Some(256 << 20));
     }
 }

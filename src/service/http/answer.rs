@@ -248,8 +248,6 @@ fn solve<Q: Question>(
     reservation: Option<Reservation>,
     stop: &AtomicBool,
 ) -> Result<Answer, Problem> {
-    #[cfg(feature = "fault-injection")]
-    fail::fail_point!("solve");
     let started = Instant::now();
     let answer = Q::answer(checked, stop)?;
     let solve = started.elapsed();

@@ -21,7 +21,7 @@ const flag = (pointer, label, more) => ({ kind: 'flag', pointer, label, ...more 
 const variant = (pointer, tag, label, options, more) => ({ kind: 'variant', pointer, tag, label, options, ...more });
 
 /** How far a part is set back from the one without gaps: drawn, and open at its contact until the load closes it. */
-const clearance = (part, label) => number(`/parts/${part}/clearance_um`, label, '', 'µm', { slider: WIDE, optional: () => 'none', step: 1 });
+const clearance = (part, label) => number(`/parts/${part}/clearance_um`, label, 'c', 'µm', { slider: WIDE, optional: () => 'none', step: 1 });
 
 /** Steel, as the service fills in what a document leaves out. */
 const material = (part, label) => ({

@@ -214,8 +214,6 @@ fn answered<Q: Question>(
     reservation: Option<&Reservation>,
     stop: &AtomicBool,
 ) -> Result<Vec<u8>, Problem> {
-    #[cfg(feature = "fault-injection")]
-    fail::fail_point!("solve");
     let answer = Q::answer(checked, stop)?;
     if let Some(reservation) = reservation {
         require_within(reservation, answer.bytes(Format::Json))?;
