@@ -21,6 +21,7 @@ use parking_lot::Mutex;
 use serde::{Deserialize, Serialize};
 use tokio_util::codec::{AnyDelimiterCodec, AnyDelimiterCodecError, FramedRead};
 use tokio_util::io::StreamReader;
+use tokio_util::task::AbortOnDropHandle;
 use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::columns;
 use toothwave_calculation::design::Design;
@@ -289,23 +290,41 @@ async fn answer_large_line(app: &App, index: u64, bytes: u64, compute: Compute) 
     line.await.unwrap_or_else(|problem| problem_line(index, problem).into())
 }
 
-/// All answers of some lines: short ones together, large ones by themselves.
-async fn answer_all(app: Arc<App>, query: BatchQuery, mut lines: Vec<Line>) -> (u64, Vec<Bytes>) {
-    let (mut parts, mut short, mut count) = (Vec::new(), Vec::new(), 0);
-    while !lines.is_empty() {
-        for (index, outcome) in compute_slice(&app, query, &mut lines).await {
-            count += 1;
-            match outcome {
-                Outcome::Line(line) => short.extend_from_slice(&line),
-                Outcome::Large(bytes, compute) => {
-                    parts.push(std::mem::take(&mut short).into());
-                    parts.push(answer_large_line(&app, index, bytes, compute).await);
-                }
+/// A task of its own: a future that got a permit must be polled, also while the client reads nothing. Dropping it ends the task.
+async fn in_task<T: Send + 'static>(future: impl Future<Output = T> + Send + 'static) -> Option<T> {
+    let task = AbortOnDropHandle::new(tokio::spawn(future));
+    task.await.inspect_err(|panic| tracing::error!(%panic, "a batch broke off")).ok()
+}
+
+/// One slice of these lines, and the lines behind it.
+async fn slice(app: Arc<App>, query: BatchQuery, mut lines: Vec<Line>) -> (Vec<(u64, Outcome)>, Vec<Line>) {
+    let sliced = async move {
+        let outcomes = compute_slice(&app, query, &mut lines).await;
+        (outcomes, lines)
+    };
+    in_task(sliced).await.unwrap_or_default()
+}
+
+/// A part of the answer: lines that are written, or one that is to be computed.
+enum Part {
+    Lines(u64, Vec<u8>),
+    Large(u64, u64, Compute),
+}
+
+/// Short lines together, large ones by themselves.
+fn parts(outcomes: Vec<(u64, Outcome)>) -> Vec<Part> {
+    let mut parts = Vec::new();
+    for (index, outcome) in outcomes {
+        match (outcome, parts.last_mut()) {
+            (Outcome::Line(line), Some(Part::Lines(count, lines))) => {
+                lines.extend_from_slice(&line);
+                *count += 1;
             }
+            (Outcome::Line(line), _) => parts.push(Part::Lines(1, line)),
+            (Outcome::Large(bytes, compute), _) => parts.push(Part::Large(index, bytes, compute)),
         }
     }
-    parts.push(short.into());
-    (count, parts)
+    parts
 }
 
 /// The lines of a body that are not blank, until it ends; what ends it otherwise goes to `end`.
@@ -363,10 +382,33 @@ fn answers(app: Arc<App>, query: BatchQuery, body: Body) -> impl Stream<Item = B
     let at_once = app.pool.permits();
     let (counted, ending) = (Arc::clone(&end), Arc::clone(&end));
     let chunks = lines(Arc::clone(&app), body, end).ready_chunks(CHUNK_LINES);
-    let answered = chunks.map(move |lines| answer_all(Arc::clone(&app), query, lines)).buffered(at_once);
-    let parts = answered.flat_map(move |(count, parts)| {
+    let (first_app, next_app, large_app) = (Arc::clone(&app), Arc::clone(&app), app);
+    // The first slices of chunks are computed side by side; further ones when the client has read those before.
+    let first = chunks.map(move |lines| slice(Arc::clone(&first_app), query, lines)).buffered(at_once);
+    let slices = first.flat_map(move |first| {
+        let app = Arc::clone(&next_app);
+        stream::unfold((first, app), move |((mut outcomes, mut rest), app)| async move {
+            if outcomes.is_empty() && !rest.is_empty() {
+                (outcomes, rest) = slice(Arc::clone(&app), query, rest).await;
+            }
+            (!outcomes.is_empty()).then(|| (outcomes, ((Vec::new(), rest), app)))
+        })
+    });
+    let finished = slices.flat_map(|outcomes| stream::iter(parts(outcomes))).map(move |part| {
+        let app = Arc::clone(&large_app);
+        async move {
+            match part {
+                Part::Lines(count, lines) => (count, lines.into()),
+                Part::Large(index, bytes, compute) => {
+                    let line = in_task(async move { answer_large_line(&app, index, bytes, compute).await });
+                    (1, line.await.unwrap_or_default())
+                }
+            }
+        }
+    });
+    let parts = finished.buffered(at_once).map(move |(count, part)| {
         counted.lock().answered += count;
-        stream::iter(parts.into_iter().filter(|part| !part.is_empty()))
+        part
     });
     // Made when all lines before it have been given out.
     parts.chain(stream::once(async move { ending.lock().line().into() }))
