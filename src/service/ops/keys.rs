@@ -116,16 +116,3 @@ pub async fn require(State(keys): State<Keys>, request: Request, next: Next) -> 
     response.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
     response
 }
-
-#[cfg(test)]
-mod tests {
-    use super::{new_key, parse};
-
-    #[test]
-    fn rejects_keys_file_without_valid_keys() {
-        assert!(parse("# nothing\n\n").is_err());
-        assert!(parse("not-a-hash somebody\n").is_err());
-        let (_, line) = new_key("somebody").expect("random bytes");
-        assert!(parse(&format!("# one key\n{line}\n")).is_ok_and(|keys| keys.len() == 1));
-    }
-}

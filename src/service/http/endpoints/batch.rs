@@ -252,17 +252,27 @@ fn answer_lines(app: &App, query: BatchQuery, lines: Vec<Line>, progress: &Mutex
     }
 }
 
-/// Computes one slice: the outcomes of the first line and of as many others as fit. Removes these lines.
-async fn compute_slice(app: &Arc<App>, query: BatchQuery, lines: &mut Vec<Line>) -> Vec<(u64, Outcome)> {
+/// Runs a computation in a task of its own: a future that got a permit must be polled, also while the client reads nothing.
+async fn in_task<T: Send + 'static>(
+    computation: impl Future<Output = Result<T, Problem>> + Send + 'static,
+) -> Result<T, Problem> {
+    let task = AbortOnDropHandle::new(tokio::spawn(computation));
+    task.await.unwrap_or_else(|panic| Err(Problem::internal(&panic)))
+}
+
+/// Computes one slice: the outcomes of the first line and of as many others as fit, and the lines behind them.
+async fn slice(app: Arc<App>, query: BatchQuery, mut lines: Vec<Line>) -> (Vec<(u64, Outcome)>, Vec<Line>) {
     let progress = Arc::new(Mutex::new(Progress::default()));
-    let job = {
-        let (app, progress, lines) = (Arc::clone(app), Arc::clone(&progress), lines.clone());
-        move |stop: &AtomicBool| {
-            answer_lines(&app, query, lines, &progress, stop);
+    let (shared, waiting) = (Arc::clone(&progress), lines.clone());
+    let computation = async move {
+        let (pool, time) = (app.pool.clone(), app.deadline_span() + SLICE);
+        let job = move |stop: &AtomicBool| {
+            answer_lines(&app, query, waiting, &shared, stop);
             Ok(())
-        }
+        };
+        pool.run_in_background(time, job).await
     };
-    let result = app.pool.run_in_background(app.deadline_span() + SLICE, job).await;
+    let result = in_task(computation).await;
     let mut progress = progress.lock();
     let mut outcomes = std::mem::take(&mut progress.outcomes);
     if let Err(problem) = result {
@@ -273,12 +283,12 @@ async fn compute_slice(app: &Arc<App>, query: BatchQuery, lines: &mut Vec<Line>)
         }
     }
     lines.drain(..outcomes.len());
-    outcomes
+    (outcomes, lines)
 }
 
-/// The lines of a large answer, with the bytes that it has reserved.
-async fn answer_large_line(app: &App, index: u64, bytes: u64, compute: Compute) -> Bytes {
-    let line = async {
+/// The line of a large answer, with the bytes that it has reserved.
+async fn answer_large_line(app: Arc<App>, index: u64, bytes: u64, compute: Compute) -> Bytes {
+    let line = in_task(async move {
         let reservation = app.budget.reserve(bytes).await?;
         let job = move |stop: &AtomicBool| {
             let line = compute(reservation.as_ref(), stop)?;
@@ -286,23 +296,8 @@ async fn answer_large_line(app: &App, index: u64, bytes: u64, compute: Compute) 
         };
         let (reservation, line) = app.pool.run_in_background(app.deadline_span(), job).await?;
         Ok(Reservation::hold(reservation, line.into()))
-    };
+    });
     line.await.unwrap_or_else(|problem| problem_line(index, problem).into())
-}
-
-/// A task of its own: a future that got a permit must be polled, also while the client reads nothing. Dropping it ends the task.
-async fn in_task<T: Send + 'static>(future: impl Future<Output = T> + Send + 'static) -> Option<T> {
-    let task = AbortOnDropHandle::new(tokio::spawn(future));
-    task.await.inspect_err(|panic| tracing::error!(%panic, "a batch broke off")).ok()
-}
-
-/// One slice of these lines, and the lines behind it.
-async fn slice(app: Arc<App>, query: BatchQuery, mut lines: Vec<Line>) -> (Vec<(u64, Outcome)>, Vec<Line>) {
-    let sliced = async move {
-        let outcomes = compute_slice(&app, query, &mut lines).await;
-        (outcomes, lines)
-    };
-    in_task(sliced).await.unwrap_or_default()
 }
 
 /// A part of the answer: lines that are written, or one that is to be computed.
@@ -399,10 +394,7 @@ fn answers(app: Arc<App>, query: BatchQuery, body: Body) -> impl Stream<Item = B
         async move {
             match part {
                 Part::Lines(count, lines) => (count, lines.into()),
-                Part::Large(index, bytes, compute) => {
-                    let line = in_task(async move { answer_large_line(&app, index, bytes, compute).await });
-                    (1, line.await.unwrap_or_default())
-                }
+                Part::Large(index, bytes, compute) => (1, answer_large_line(app, index, bytes, compute).await),
             }
         }
     });
