@@ -165,7 +165,8 @@ async fn however_many_ask_for_a_study_and_cancel_it_at_once_none_runs_that_is_no
             for turn in 0..60 {
                 if (client + turn) % 2 == 0 {
                     let answer = begun(&service, &long()).await;
-                    assert!(matches!(answer.status, 200 | 202), "{}", answer.text());
+                    // 404: another client cancelled and deleted it before its answer was read.
+                    assert!(matches!(answer.status, 200 | 202 | 404), "{}", answer.text());
                 } else {
                     assert!(matches!(deleted(&service, &place).await, 204 | 404));
                 }
