@@ -1180,7 +1180,7 @@ test('a long report has two pages, with every finding, and can be read', async (
     const { findings } = (await server.answers(design)).sweep;
     for (const { code } of findings) codes.add(code);
     assert.equal(await pagesOfReport(), 2, `${findings.length} findings`);
-    const { table, parts, wanted, tooSmall, tooWide } = await onPaper(async (found) => {
+    const { table, parts, clearances, wanted, tooSmall, tooWide } = await onPaper(async (found) => {
       const { kindOf, readable, sentence } = await import('/page/findings.js');
       const { number, withUnit } = await import('/page/format.js');
       const small = [];
@@ -1194,6 +1194,7 @@ test('a long report has two pages, with every finding, and can be read', async (
       return {
         table: document.querySelector('#findings-table').innerText,
         parts: document.querySelector('.report-parts').innerText.match(/\d+(\.\d+)?/g).map(Number),
+        clearances: [...document.querySelectorAll('.report-design tr')].filter((row) => row.innerText.startsWith('Clearance of')).map((row) => Number.parseFloat(row.lastChild.innerText)),
         wanted: found.map((finding) => [
           kindOf(finding),
           withUnit(number(finding.value, 5), finding.unit),
@@ -1205,7 +1206,9 @@ test('a long report has two pages, with every finding, and can be read', async (
       };
     }, findings);
     for (const text of wanted.flat()) assert.ok(table.includes(text), `${text} in ${table}`);
-    assert.deepEqual(parts, Object.values(PARTS).flatMap(Object.values));
+    // Clearances stand with the model, everything else of the parts in the lines of parts.
+    assert.deepEqual(parts, Object.values(PARTS).flatMap(({ clearance_um, ...others }) => Object.values(others)));
+    assert.deepEqual(clearances, ['wave_generator', 'ring', 'carrier', 'teeth'].map((part) => PARTS[part].clearance_um));
     assert.deepEqual(tooSmall, []);
     assert.deepEqual(tooWide, []);
   }
