@@ -5,10 +5,12 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
+use tokio::sync::Semaphore;
+
 use crate::compute::budget::Budget;
 use crate::compute::cache::Cache;
 use crate::compute::pool::{Deadline, Pool};
-use crate::ops::config::Limits;
+use crate::ops::config::{Limits, MAX_CONNECTIONS};
 use crate::studies::{Storage, Studies};
 
 /// What handlers share.
@@ -24,6 +26,8 @@ pub struct App {
     pub budget: Budget,
     /// Studies and their results.
     pub studies: Studies,
+    /// One permit for each connection that may be opened.
+    pub connection_permits: Arc<Semaphore>,
     /// False while the service stops, for readiness probes.
     pub ready: AtomicBool,
 }
@@ -38,6 +42,7 @@ impl App {
             pool,
             cache: Cache::new(limits.cache_max_bytes),
             budget: Budget::new(limits.max_unread_bytes),
+            connection_permits: Arc::new(Semaphore::new(MAX_CONNECTIONS)),
             ready: AtomicBool::new(true),
         }))
     }

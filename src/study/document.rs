@@ -299,8 +299,8 @@ pub enum Goal {
 pub struct SensitivityDocument {
     /// The design.
     pub base: Base,
-    /// The inputs, by JSON pointer into the design. Left out, every number of `drive`, `materials` and `load` but counts, shares of the time and
-    /// zeros, by 1 %.
+    /// The inputs, by JSON pointer into the design. If left out: every number of `drive`, `materials` and `load`, defaults among them, but
+    /// counts, shares of the time and zeros, by 1 %.
     #[serde(default)]
     pub inputs: BTreeMap<String, InputDocument>,
     /// The quantities that are asked for, by name; all that the base has what they need for, where left out.

@@ -11,15 +11,19 @@ use crate::quantity::Quantity;
 use crate::variant::{Domain, Template, Variable};
 
 /// The hash of what is asked, within limits that some variants may be beyond: equal however the fields are ordered and the numbers spelled, and whether defaults
-/// are written out.
+/// are written out. The inputs of a sensitivity are known by their moves.
 pub(crate) fn id(
     document: &StudyDocument,
     template: &Template,
     quantities: &[&'static Quantity],
+    inputs: Option<Tree>,
     limits: &question::Limits,
 ) -> Result<Key, NoAnswer> {
     let mut asked = tree_of(document)?;
-    let base = asked.remove(&["base".into()]).unwrap_or(Tree::Null);
+    let base = complete(&asked.remove(&["base".into()]).unwrap_or(Tree::Null))?;
+    if let Some(inputs) = inputs {
+        asked.set(&["inputs".into()], inputs);
+    }
     let names = [String::from("quantities")];
     if asked.at(&names).is_some() {
         asked.set(&names, Tree::Array(quantities.iter().map(|quantity| Tree::Text(quantity.name.into())).collect()));
@@ -43,7 +47,7 @@ pub(crate) fn id(
 }
 
 /// A design with all its defaults; as it is where it is none.
-fn complete(design: &Tree) -> Result<Tree, NoAnswer> {
+pub(crate) fn complete(design: &Tree) -> Result<Tree, NoAnswer> {
     match design.read::<Design>() {
         Ok(read) => tree_of(&read.normalised().with_defaults()),
         Err(_) => Ok(design.clone()),

@@ -11,6 +11,7 @@ use utoipa::ToSchema;
 use crate::ask::{beyond, escaped, fault};
 use crate::document::{InputDocument, SensitivityDocument};
 use crate::evaluate::Evaluator;
+use crate::identity::complete;
 use crate::rows::{ReasonAnswer, Rows, RowsPart};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Domain, GRAIN_BYTES, Template, Value};
@@ -39,56 +40,28 @@ struct Input {
 
 impl Sensitivity {
     pub(crate) fn new(document: &SensitivityDocument) -> Result<(Self, Template), NoAnswer> {
-        let base = &document.base.0;
-        let mut inputs = document.inputs.clone();
-        if inputs.is_empty() {
-            for part in ["drive", "materials", "load"] {
-                let part = [part.to_owned()];
-                if let Some(tree) = base.at(&part) {
-                    numbers(tree, &format!("/{}", part[0]), &mut inputs);
-                }
-            }
-        }
-        let mut moved = Vec::new();
-        for (pointer, input) in &inputs {
-            moved.push(Input::new(base, pointer, input)?);
-        }
-        let free = |input: &Input| {
-            let range = Asked::Range { min: input.value - input.plus_minus, max: input.value + input.plus_minus };
-            (input.pointer.clone(), range)
+        let (base, inputs) = if document.inputs.is_empty() {
+            inputs_by_default(&document.base.0)?
+        } else {
+            (document.base.0.clone(), document.inputs.clone())
         };
-        let free: Vec<_> = moved.iter().map(free).collect();
-        let template = Template::new(base, &free, "inputs")?;
-        let is_given = !document.inputs.is_empty();
+        let (mut moved, template) = moves(&base, &inputs)?;
         for (input, variable) in moved.iter_mut().zip(template.variables()) {
             if matches!(variable.domain, Domain::Whole { .. }) {
-                if document
-                    .inputs
-                    .get(&input.pointer)
-                    .is_some_and(|input| input.plus_minus.is_some_and(|by| by.fract() != 0.0))
-                {
+                if inputs[&input.pointer].plus_minus.is_some_and(|by| by.fract() != 0.0) {
                     let at = format!("/inputs/{}/plus_minus", escaped(&input.pointer));
                     return Err(fault(&at, FieldCode::WrongType, "a whole number is wanted here"));
                 }
                 input.plus_minus = input.plus_minus.ceil();
             }
         }
-        // Counts are moved only where that is asked for: a drive with another number of teeth is another drive.
-        if !is_given {
-            let counted: Vec<_> =
-                template.variables().iter().map(|variable| matches!(variable.domain, Domain::Whole { .. })).collect();
-            if counted.contains(&true) {
-                let inputs = moved.iter().zip(&counted).filter(|(_, counted)| !**counted);
-                let inputs: BTreeMap<_, _> =
-                    inputs.map(|(input, _)| (input.pointer.clone(), InputDocument::default())).collect();
-                if inputs.is_empty() {
-                    let detail = "the base has no number but counts and zeros: name what is to be moved";
-                    return Err(fault("/inputs", FieldCode::MissingField, detail));
-                }
-                return Self::new(&SensitivityDocument { inputs, ..document.clone() });
-            }
-        }
         Ok((Self { inputs: moved }, template))
+    }
+
+    /// Each input with its move, however the document says them.
+    pub(crate) fn asked(&self) -> Tree {
+        let asked = |input: &Input| [Tree::Text(input.pointer.clone()), Tree::Number(input.plus_minus)];
+        Tree::Array(self.inputs.iter().flat_map(asked).collect())
     }
 
     /// What the answer takes: of each quantity an entry for each input.
@@ -106,6 +79,42 @@ impl Sensitivity {
     pub(crate) const fn variants(&self) -> u64 {
         1 + 2 * self.inputs.len() as u64
     }
+}
+
+/// The base with the defaults of `drive`, `materials` and `load`, and every number of these but counts and zeros: a drive with another
+/// number of teeth is another drive.
+fn inputs_by_default(base: &Tree) -> Result<(Tree, BTreeMap<String, InputDocument>), NoAnswer> {
+    let complete = complete(base)?;
+    let (mut base, mut inputs) = (base.clone(), BTreeMap::new());
+    for name in ["drive", "materials", "load"] {
+        let part = [name.to_owned()];
+        if let Some(tree) = complete.at(&part) {
+            base.set(&part, tree.clone());
+            numbers(tree, &format!("/{name}"), &mut inputs);
+        }
+    }
+    let (_, template) = moves(&base, &inputs)?;
+    for variable in template.variables().iter().filter(|variable| matches!(variable.domain, Domain::Whole { .. })) {
+        inputs.remove(&variable.pointer);
+    }
+    if inputs.is_empty() {
+        let detail = "the base has no number but counts and zeros: name what is to be moved";
+        return Err(fault("/inputs", FieldCode::MissingField, detail));
+    }
+    Ok((base, inputs))
+}
+
+/// How far each input is moved, and the template of the variants.
+fn moves(base: &Tree, inputs: &BTreeMap<String, InputDocument>) -> Result<(Vec<Input>, Template), NoAnswer> {
+    let moved: Vec<_> =
+        inputs.iter().map(|(pointer, input)| Input::new(base, pointer, input)).collect::<Result<_, _>>()?;
+    let free = |input: &Input| {
+        let range = Asked::Range { min: input.value - input.plus_minus, max: input.value + input.plus_minus };
+        (input.pointer.clone(), range)
+    };
+    let free: Vec<_> = moved.iter().map(free).collect();
+    let template = Template::new(base, &free, "inputs")?;
+    Ok((moved, template))
 }
 
 /// The numbers below a place that are not zero. Of a duty without its shares of the time, none of which moves alone.

@@ -125,7 +125,8 @@ impl Study {
     /// As [`Self::read`].
     pub fn new(document: &StudyDocument, limits: &Limits) -> Result<Self, NoAnswer> {
         let mut study = Self::unnamed(document, limits)?;
-        study.id = identity::id(document, &study.template, &study.evaluator.quantities, &limits.calculation)?;
+        let inputs = if let Kind::Sensitivity(sensitivity) = &study.kind { Some(sensitivity.asked()) } else { None };
+        study.id = identity::id(document, &study.template, &study.evaluator.quantities, inputs, &limits.calculation)?;
         Ok(study)
     }
 

@@ -185,15 +185,12 @@ fn complain(what: &dyn std::fmt::Display, status: ExitCode) -> ExitCode {
 
 /// A text without control characters for a terminal: it may quote a document that somebody else wrote.
 fn printable(text: &str) -> String {
-    let mut printable = String::with_capacity(text.len());
-    for character in text.chars() {
-        if character.is_control() && character != '\n' {
-            printable.extend(character.escape_default());
-        } else {
-            printable.push(character);
-        }
-    }
-    printable
+    let escaped = |character: char| match character {
+        '\n' => character.to_string(),
+        _ if character.is_control() => character.escape_default().to_string(),
+        _ => character.to_string(),
+    };
+    text.chars().map(escaped).collect()
 }
 
 /// The arguments of this process, with the command `serve` if none is given. Settings are read for that command alone, so that a fault in

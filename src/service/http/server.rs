@@ -7,7 +7,7 @@ use std::io::{self, Write as _};
 use std::net::SocketAddr;
 use std::pin::pin;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use axum::Router;
@@ -48,13 +48,6 @@ const REFUSAL_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// The response to a connection over the limit.
 const REFUSAL: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\ncontent-type: application/problem+json\r\nretry-after: 1\r\ncontent-length: 219\r\nconnection: close\r\n\r\n{\"type\":\"urn:toothwave:problem:too_many_connections\",\"title\":\"Too many connections are open\",\"status\":503,\"detail\":\"1024 connections are open, the most that this service serves. Try again\",\"code\":\"too_many_connections\"}";
-
-static OPEN_CONNECTIONS: AtomicUsize = AtomicUsize::new(0);
-
-/// Connections that are open now.
-pub fn open_connections() -> usize {
-    OPEN_CONNECTIONS.load(Ordering::Relaxed)
-}
 
 /// Serves until a signal, then finishes running requests within the bound of the settings, or until a second signal.
 pub async fn serve(settings: &Settings) -> io::Result<()> {
@@ -166,7 +159,7 @@ impl Server {
         Self {
             router: router::router(Arc::clone(app), &access),
             http,
-            connection_permits: Arc::new(Semaphore::new(MAX_CONNECTIONS)),
+            connection_permits: Arc::clone(&app.connection_permits),
             graceful: GracefulShutdown::new(),
             closing: CancellationToken::new(),
         }
@@ -218,7 +211,6 @@ impl Server {
         let connection = self.http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
         let connection = self.graceful.watch(connection);
         let closing = self.closing.clone();
-        OPEN_CONNECTIONS.fetch_add(1, Ordering::Relaxed);
         tokio::spawn(async move {
             let _place = permit;
             let closed_without_request = async {
@@ -234,7 +226,6 @@ impl Server {
                 // Browsers open connections in advance: they do not delay a shutdown.
                 () = closed_without_request => {}
             }
-            OPEN_CONNECTIONS.fetch_sub(1, Ordering::Relaxed);
         });
     }
 

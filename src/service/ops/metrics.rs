@@ -12,7 +12,7 @@ use toothwave_calculation::json::word;
 use super::log;
 use crate::app::App;
 use crate::http::problem::ProblemCode;
-use crate::http::server::open_connections;
+use crate::ops::config::MAX_CONNECTIONS;
 
 /// Upper bounds of the histograms' buckets in seconds: from a cache hit to the longest deadline.
 const BUCKETS_S: [f64; 12] = [1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 1e-2, 5e-2, 0.1, 0.5, 1.0, 10.0];
@@ -102,7 +102,7 @@ pub fn render(app: &App) -> String {
         ("toothwave_solves_running", app.pool.running() as u64),
         ("toothwave_solves_queued", app.pool.waiting() as u64),
         ("toothwave_unread_bytes", app.budget.reserved_bytes()),
-        ("toothwave_connections", open_connections() as u64),
+        ("toothwave_connections", (MAX_CONNECTIONS - app.connection_permits.available_permits()) as u64),
     ] {
         gauge!(name).set(value as f64);
     }

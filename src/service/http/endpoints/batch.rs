@@ -30,9 +30,9 @@ use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::question::{Limits, Question};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_calculation::sweep::answer::SweepAnswer;
+use toothwave_calculation::sweep::peaks_only::PeaksOnly;
 use utoipa::ToSchema;
 
-use super::peaks::PeaksOnly;
 use crate::app::App;
 use crate::compute::budget::{FREE_BYTES, Reservation};
 use crate::compute::pool::catch_panic;

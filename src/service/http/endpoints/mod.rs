@@ -4,6 +4,5 @@ pub mod batch;
 pub mod calculations;
 pub mod design;
 pub mod drawings;
-pub mod peaks;
 pub mod service;
 pub mod studies;
