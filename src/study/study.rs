@@ -1,4 +1,4 @@
-//! The engine: a study is pure chunks, and a merge that does not depend on their order.
+//! The engine of studies: pure chunks, and a merge that does not depend on their order.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, HashSet};
@@ -30,18 +30,18 @@ use crate::sensitivity::{Sensitivity, SensitivityAnswer};
 use crate::tolerance::{Tolerance, ToleranceAnswer};
 use crate::variant::{Domain, Template, Variable};
 
-/// What studies are computed at most.
+/// Limits of studies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Those of each variant.
+    /// Limits of each variant.
     pub calculation: question::Limits,
     /// Most variants of a study.
     pub max_study_variants: u64,
-    /// Most bytes of what studies come to.
+    /// Most bytes of a study with its result.
     pub max_study_bytes: u64,
 }
 
-/// A study that can be carried out.
+/// A checked study.
 #[derive(Debug)]
 pub struct Study {
     id: Key,
@@ -49,7 +49,7 @@ pub struct Study {
     template: Template,
     evaluator: Evaluator,
     variants: u64,
-    /// Of a chunk in rows.
+    /// Variants of a chunk with rows.
     chunk_variants: u64,
 }
 
@@ -61,24 +61,24 @@ enum Kind {
     Tolerance(Tolerance),
 }
 
-/// What a chunk comes to. It can be kept anywhere and merged in any order.
+/// Result of a chunk. Parts can be stored anywhere and merged in any order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Part {
-    /// Of a map, a sensitivity or a tolerance study.
+    /// Part of a map, a sensitivity or a tolerance study.
     Rows(RowsPart),
-    /// Of a search.
+    /// Part of a search.
     Island(IslandPart),
 }
 
 impl Part {
-    /// Gives back what it has not filled.
+    /// Frees unused capacity.
     fn shrink(&mut self) {
         if let Self::Rows(rows) = self {
             rows.shrink();
         }
     }
 
-    /// About what it takes in memory.
+    /// Estimated memory in bytes.
     pub fn bytes(&self) -> usize {
         size_of::<Self>()
             + match self {
@@ -87,7 +87,7 @@ impl Part {
             }
     }
 
-    /// Variants that it has looked at.
+    /// Number of computed variants.
     pub const fn variants(&self) -> u64 {
         match self {
             Self::Rows(rows) => (rows.answered.len() + rows.refused.len()) as u64,
@@ -95,7 +95,7 @@ impl Part {
         }
     }
 
-    /// Of those, the ones without an answer; of a search those of its scan.
+    /// Number of computed variants without an answer. For a search, those of its scan.
     pub const fn refused(&self) -> u64 {
         match self {
             Self::Rows(rows) => rows.refused.len() as u64,
@@ -105,13 +105,13 @@ impl Part {
 }
 
 impl Study {
-    /// The study that a text asks for.
+    /// Reads a study document and checks it.
     ///
     /// # Errors
-    /// Whatever is known to be impossible before anything is computed, at the field that says so.
+    /// Fails if the study is known to be impossible before it is computed. The error names the field.
     pub fn read(text: &[u8], limits: &Limits) -> Result<Self, NoAnswer> {
         let document = {
-            // Gone before more is made of it.
+            // The tree is dropped before the study is made.
             let tree = json::tree(text)?;
             require_each_field_once(&tree)?;
             tree.read()?
@@ -119,17 +119,17 @@ impl Study {
         Self::new(&document, limits)
     }
 
-    /// The study that a document asks for.
+    /// Checks a study document.
     ///
     /// # Errors
-    /// As [`Self::read`].
+    /// The same as [`Self::read`].
     pub fn new(document: &StudyDocument, limits: &Limits) -> Result<Self, NoAnswer> {
         let mut study = Self::unnamed(document, limits)?;
         study.id = identity::id(document, &study.template, &study.evaluator.quantities, &limits.calculation)?;
         Ok(study)
     }
 
-    /// The study before its id is known.
+    /// Makes the study without its id.
     fn unnamed(document: &StudyDocument, limits: &Limits) -> Result<Self, NoAnswer> {
         match document {
             StudyDocument::Map(map) => {
@@ -182,7 +182,7 @@ impl Study {
         #[expect(clippy::cast_precision_loss, reason = "told, not computed with")]
         if variants > limits.max_study_variants {
             let limit = limits.max_study_variants;
-            let detail = format!("the study has {variants} variants, more than the {limit} of `max_study_variants`");
+            let detail = format!("the study has {variants} variants. Use at most {limit} (`max_study_variants`)");
             let mut refused = beyond("", FieldCode::TooManyVariants, detail, variants as f64, limit as f64);
             refused.code = NoAnswerCode::TooManyVariants;
             return Err(refused);
@@ -192,7 +192,7 @@ impl Study {
         if bytes > limits.max_study_bytes {
             let limit = limits.max_study_bytes;
             let detail = format!(
-                "the study with what it comes to takes {bytes} bytes, more than the {limit} of `max_study_bytes`: ask for fewer variants or quantities, or of a shorter base"
+                "the study with its result needs {bytes} bytes, but `max_study_bytes` is {limit}. Use fewer variants or quantities, or a shorter base"
             );
             let mut refused = beyond("", FieldCode::TooManyVariants, detail, bytes as f64, limit as f64);
             refused.code = NoAnswerCode::TooManyVariants;
@@ -201,7 +201,7 @@ impl Study {
         Ok(study)
     }
 
-    /// The same study, of deviations from a design that can be, by whose nature it can deviate so.
+    /// Checks that the base design is possible, and that it can deviate as requested.
     fn with_possible_base(self, limits: &Limits) -> Result<Self, NoAnswer> {
         let mut template = self.template.clone();
         let mut refused = |rows: &dyn Rows, variant: u64| {

@@ -1,4 +1,4 @@
-//! A sweep without its columns, as a batch answers it with `peaks_only`.
+//! A sweep without its columns: the answer of a batch with `peaks_only`.
 
 use serde::{Serialize, Serializer};
 use toothwave_calculation::coincidence_degree::TeethInMeshAnswer;
@@ -15,11 +15,11 @@ use toothwave_calculation::sweep::duty::DutyAnswer;
 use toothwave_calculation::sweep::losses::LossTotalsAnswer;
 use toothwave_calculation::sweep::model_error::ModelErrorAnswer;
 
-/// What a sweep is asked without its columns.
+/// The question for a sweep without columns.
 #[derive(Debug)]
 pub struct PeaksOnly;
 
-/// A sweep that is written without its columns.
+/// The answer of a sweep without columns.
 #[derive(Debug)]
 pub struct PeaksOnlyAnswer(SweepAnswer);
 
