@@ -1,7 +1,7 @@
-//! From JSON text to wire types, with faults that name a code and a place.
+//! Parser from JSON text to document types, with errors that name a code and a place.
 //!
-//! serde_json alone would take an array for an object, keep no place, and tell kinds of fault apart only by their text. So
-//! the text becomes a tree first (no JSON: the first kind of fault), and the tree feeds serde through a deserializer whose error is a
+//! serde_json alone accepts an array for an object, keeps no place, and has no kinds of error. So the text first
+//! becomes a tree (malformed JSON fails here). The tree then feeds serde through a deserializer with the error type
 //! [`Fault`].
 
 use serde::de::{self, IntoDeserializer, MapAccess, Unexpected, Visitor};
@@ -9,30 +9,30 @@ use serde::{Deserialize, Serialize};
 
 use crate::field::FieldCode;
 
-/// Why a text is no document of the wanted form.
+/// Reason why a text is not a document of the expected form.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ReadError {
-    /// The text is no JSON.
+    /// The text is not JSON.
     Malformed {
-        /// What the parser says, with line and column.
+        /// Message of the parser, with line and column.
         detail: String,
     },
-    /// It is JSON of another form.
+    /// The JSON has another form.
     Fault(Fault),
 }
 
-/// A structural fault: the first one found.
+/// A structural error: the first one in the document.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fault {
     /// JSON pointer to the field.
     pub pointer: String,
-    /// Kind of fault.
+    /// Kind of error.
     pub code: FieldCode,
-    /// What is wrong and what would be right.
+    /// What is wrong and what to do.
     pub detail: String,
 }
 
-/// What some editors begin a UTF-8 text with; RFC 8259 lets a reader ignore it.
+/// Byte order mark of some editors. RFC 8259 allows a reader to ignore it.
 const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 
 /// Reads a document.
@@ -43,24 +43,25 @@ pub fn read<'de, T: Deserialize<'de>>(text: &[u8]) -> Result<T, ReadError> {
     tree(text)?.read().map_err(ReadError::Fault)
 }
 
-/// Reads the tree of a text, whatever it is.
+/// Parses a text to a tree.
 ///
 /// # Errors
 /// See [`ReadError`].
 pub fn tree(text: &[u8]) -> Result<Tree, ReadError> {
     let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
     if text.trim_ascii().is_empty() {
-        return Err(ReadError::Malformed { detail: "nothing was sent; send a design document".into() });
+        return Err(ReadError::Malformed { detail: "the body is empty. Send a design document".into() });
     }
     let mut parser = serde_json::Deserializer::from_slice(text);
     let tree: Tree = serde_path_to_error::deserialize(&mut parser).map_err(|error| {
-        // serde_json takes a number beyond the doubles and deep nesting for bad syntax; they are JSON all the same, if the rest is.
+        // serde_json reports a number beyond doubles, or deep nesting, as bad syntax. If the rest is valid, the text is
+        // JSON.
         let fault = match error.inner().to_string() {
             text if text.starts_with("number out of range") => {
-                Some((FieldCode::NumberTooLarge, "the number is beyond what a double can hold"))
+                Some((FieldCode::NumberTooLarge, "the number is too large for a double. Use a smaller one"))
             }
             text if text.starts_with("recursion limit exceeded") => {
-                Some((FieldCode::WrongType, "no document nests as deep as this"))
+                Some((FieldCode::WrongType, "the document has too many nested levels. Remove some"))
             }
             _ => None,
         };
@@ -81,12 +82,12 @@ pub fn tree(text: &[u8]) -> Result<Tree, ReadError> {
     Ok(tree)
 }
 
-/// A word of the API, as JSON spells it.
+/// Returns a word of the API, as in JSON.
 pub fn word(value: &impl Serialize) -> String {
     serde_json::to_value(value).ok().and_then(|value| Some(value.as_str()?.to_owned())).unwrap_or_default()
 }
 
-/// JSON as it stands in a text, or as it is put together: what documents are read from.
+/// A JSON value, parsed or constructed. Documents are read from it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Tree {
     /// `null`.
@@ -99,7 +100,7 @@ pub enum Tree {
     Text(String),
     /// An array.
     Array(Vec<Self>),
-    /// An object, its fields in the order in which they stand.
+    /// An object with its fields in order.
     Object(Vec<(String, Self)>),
 }
 
