@@ -168,7 +168,9 @@ impl Question for Accuracy {
             // No field of the document is wrong, because the reference's tolerance is fixed.
             SolveError::TooManyStates { limit } => NoAnswer::new(
                 NoAnswerCode::TooManyStates,
-                format!("a converged reference for this drive needs more than {limit} states (`max_states`). Use another drive or a higher limit"),
+                format!(
+                    "a converged reference for this drive needs more than the {limit} states that `max_states` allows"
+                ),
             ),
             error => error.into(),
         })?;

@@ -173,7 +173,8 @@ impl Axis {
                 // A whole quotient of whole numbers below 2^53 is exact.
                 let by = (max - min) / (steps - 1.0).max(1.0);
                 if by.fract() != 0.0 {
-                    let detail = format!("the field needs whole numbers, but these steps are {by:?} apart. Change `steps`");
+                    let detail =
+                        format!("the field needs whole numbers, but these steps are {by:?} apart. Change `steps`");
                     return Err(fault(&format!("{at}/steps"), FieldCode::WrongType, detail));
                 }
                 Values::Whole { min: *min, by, count: count(steps) }

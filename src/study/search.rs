@@ -238,7 +238,10 @@ impl Search {
         for (index, objective) in self.objectives.iter().enumerate() {
             let quantity = quantities[objective.quantity];
             if !is_affected(quantity) {
-                let detail = format!("no free field changes `{}`. Remove this objective, or free a field that changes it", quantity.name);
+                let detail = format!(
+                    "no free field changes `{}`. Remove this objective, or free a field that changes it",
+                    quantity.name
+                );
                 return Err(fault(&format!("/objectives/{index}/quantity"), FieldCode::Unaffected, detail));
             }
         }
@@ -255,7 +258,10 @@ impl Search {
                     Bound::Is => "",
                 };
                 let at = format!("/require/{}{end}", escaped(quantity.name));
-                let detail = format!("no free field changes `{}`, which is {value:?}. Change this limit, or free a field that changes it", quantity.name);
+                let detail = format!(
+                    "no free field changes `{}`, which is {value:?}. Change this limit, or free a field that changes it",
+                    quantity.name
+                );
                 return Err(beyond(&at, FieldCode::Unaffected, detail, limit.limit, value));
             }
         }
@@ -294,11 +300,7 @@ fn some_value(quantity: &'static Quantity, template: &Template, limits: &questio
 fn objectives(document: &SearchDocument, quantities: &mut Vec<&'static Quantity>) -> Result<Vec<Objective>, NoAnswer> {
     let asked = &document.objectives;
     if asked.is_empty() {
-        return Err(fault(
-            "/objectives",
-            FieldCode::MissingField,
-            "`objectives` is empty. Name a quantity and a goal",
-        ));
+        return Err(fault("/objectives", FieldCode::MissingField, "`objectives` is empty. Name a quantity and a goal"));
     }
     if asked.len() > MOST_OBJECTIVES {
         let detail = format!("use at most {MOST_OBJECTIVES} objectives; there are {}", asked.len());
@@ -373,7 +375,9 @@ fn from_envelope(
             {
                 let scale = if limit_mm > smallest_mm { largest } else { least };
                 let limit_mm = 2.0 * RIM * limit_mm / scale;
-                let detail = format!("a drive with an outer diameter of {diameter_mm:?} mm has lengths outside their allowed ranges. Change this limit");
+                let detail = format!(
+                    "a drive with an outer diameter of {diameter_mm:?} mm has lengths outside their allowed ranges. Change this limit"
+                );
                 return Err(beyond(
                     "/require/outer_diameter_mm/max",
                     FieldCode::OutOfRange,

@@ -155,9 +155,7 @@ impl Input {
         let least = LEAST_RELATIVE * value.abs();
         if plus_minus < least {
             let name = if input.relative.is_some() { "relative" } else { "plus_minus" };
-            let detail = format!(
-                "a step of {plus_minus:?} at {value:?} is lost in rounding. Use {least:?} or more"
-            );
+            let detail = format!("a step of {plus_minus:?} at {value:?} is lost in rounding. Use {least:?} or more");
             return Err(beyond(&format!("{at}/{name}"), FieldCode::OutOfRange, detail, plus_minus, least));
         }
         Ok(Self { pointer: pointer.into(), value: *value, plus_minus })

@@ -182,7 +182,9 @@ impl Study {
         #[expect(clippy::cast_precision_loss, reason = "told, not computed with")]
         if variants > limits.max_study_variants {
             let limit = limits.max_study_variants;
-            let detail = format!("the study has {variants} variants. Use at most {limit} (`max_study_variants`)");
+            let detail = format!(
+                "the study has {variants} variants, but `max_study_variants` allows at most {limit}. Use fewer"
+            );
             let mut refused = beyond("", FieldCode::TooManyVariants, detail, variants as f64, limit as f64);
             refused.code = NoAnswerCode::TooManyVariants;
             return Err(refused);
@@ -192,7 +194,7 @@ impl Study {
         if bytes > limits.max_study_bytes {
             let limit = limits.max_study_bytes;
             let detail = format!(
-                "the study with its result needs {bytes} bytes, but `max_study_bytes` is {limit}. Use fewer variants or quantities, or a shorter base"
+                "the study with its result needs {bytes} bytes, but `max_study_bytes` allows at most {limit}. Use fewer variants or quantities, or a shorter base"
             );
             let mut refused = beyond("", FieldCode::TooManyVariants, detail, bytes as f64, limit as f64);
             refused.code = NoAnswerCode::TooManyVariants;

@@ -73,7 +73,9 @@ impl Distribution {
                 let detail = format!("`{name}` is {value:?}. Use a value above zero");
                 Err(fault(&format!("{at}/{name}"), FieldCode::OutOfRange, detail))
             }
-            None => Err(fault(&format!("{at}/{name}"), FieldCode::MissingField, format!("`{name}` is missing. Add it"))),
+            None => {
+                Err(fault(&format!("{at}/{name}"), FieldCode::MissingField, format!("`{name}` is missing. Add it")))
+            }
         };
         match document.distribution {
             DistributionKind::Normal => {

@@ -132,12 +132,14 @@ impl Template {
             };
             match domain {
                 Domain::Real { min, max } if min > max => {
-                    let detail = format!("the range is empty: `min` {min:?} is above `max` {max:?}. Use a smaller `min`");
+                    let detail =
+                        format!("the range is empty: `min` {min:?} is above `max` {max:?}. Use a smaller `min`");
                     return Err(beyond(&format!("{}/min", at(pointer)), FieldCode::OutOfRange, detail, min, max));
                 }
                 Domain::Real { min, max } if !(max - min).is_finite() => {
-                    let detail =
-                        format!("the range from {min:?} to {max:?} is wider than the largest number. Use a narrower one");
+                    let detail = format!(
+                        "the range from {min:?} to {max:?} is wider than the largest number. Use a narrower one"
+                    );
                     return Err(beyond(&at(pointer), FieldCode::OutOfRange, detail, max, min));
                 }
                 Domain::OneOf(0) => {
@@ -183,7 +185,8 @@ impl Template {
                 found.pointer = match leading.filter(|_| !has_fields && found.code != FieldCode::MissingField) {
                     Some(variable) => {
                         found.code = FieldCode::UnknownField;
-                        found.detail = format!("a document of this base has no such field within `{}`. Remove it", found.pointer);
+                        found.detail =
+                            format!("a document of this base has no such field within `{}`. Remove it", found.pointer);
                         at(&variable.pointer)
                     }
                     None => template.blamed(&found.pointer),

@@ -38,7 +38,7 @@ const EXIT_BAD_INPUT: u8 = 2;
 
 /// Forces and contact stresses of discrete-tooth harmonic drives.
 #[derive(Debug, Parser)]
-#[command(name = "toothwave", version)]
+#[command(name = "toothwave", version, after_help = "Example: toothwave sweep design.json")]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -47,16 +47,22 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Serve over HTTP; the default without a command
+    #[command(after_help = "Example: toothwave serve --listen 127.0.0.1:8080 --studies studies.db")]
     Serve(Box<Settings>),
     /// Compute the profiles of the mating parts
+    #[command(after_help = "Example: toothwave geometry design.json")]
     Geometry(Offline),
     /// Compute the contact ratio (coincidence degree): how many teeth share the load
+    #[command(after_help = "Example: toothwave coincidence-degree design.json")]
     CoincidenceDegree(Offline),
     /// Compute forces and contact stresses over one period
+    #[command(after_help = "Example: toothwave sweep design.json --format csv > states.csv")]
     Sweep(Offline),
     /// Measure the error and the time of each computation method for a design
+    #[command(after_help = "Example: toothwave accuracy design.json")]
     Accuracy(Offline),
     /// Write one part, or the assembly, as DXF, STEP or SVG
+    #[command(after_help = "Example: toothwave draw ring design.json --format dxf > ring.dxf")]
     Draw {
         /// The part
         #[arg(value_parser = one_of(&PARTS))]
@@ -68,6 +74,7 @@ enum Command {
         format: Format,
     },
     /// Compute many designs, one a line, on all cores; write the answers as NDJSON in the same order
+    #[command(after_help = "Example: toothwave batch designs.ndjson --peaks-only > answers.ndjson")]
     Batch {
         /// File with one design document a line, or `-` for standard input
         file: PathBuf,
@@ -79,6 +86,7 @@ enum Command {
         peaks_only: bool,
     },
     /// Compute many variants of one design on all cores: map, search, sensitivity or tolerance study
+    #[command(after_help = "Example: toothwave study study.json --format csv > result.csv")]
     Study {
         /// A study document, or `-` for standard input
         file: PathBuf,
@@ -87,6 +95,7 @@ enum Command {
         format: Format,
     },
     /// Print a document without its deprecated fields
+    #[command(after_help = "Example: toothwave convert old.json > new.json")]
     Convert {
         /// A design document or a study document, or `-` for standard input
         file: PathBuf,
@@ -98,14 +107,17 @@ enum Command {
         _any: Vec<OsString>,
     },
     /// Check that a running service answers; exit status 0 if it does
+    #[command(after_help = "Example: toothwave health --address 127.0.0.1:8080")]
     Health {
         /// Address and port of the service
         #[arg(long, env = "TOOTHWAVE_LISTEN", value_name = "ADDR", default_value = "127.0.0.1:8080")]
         address: SocketAddr,
     },
     /// Print the API document
+    #[command(after_help = "Example: toothwave openapi > openapi.json")]
     Openapi,
     /// Make a key: print it once, with its line for the keys file
+    #[command(after_help = "Example: toothwave new-key 'drawing office'")]
     NewKey {
         /// Name of the key's owner
         name: String,
@@ -253,5 +265,9 @@ fn health(mut address: SocketAddr) -> Result<(), Failure> {
     write!(stream, "GET /health/live HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n")?;
     let mut head = [0; 12];
     stream.read_exact(&mut head)?;
-    if head == *b"HTTP/1.1 200" { Ok(()) } else { Err(io::Error::other("the service does not answer with status 200. Read its log").into()) }
+    if head == *b"HTTP/1.1 200" {
+        Ok(())
+    } else {
+        Err(io::Error::other("the service is not healthy. Read its log").into())
+    }
 }

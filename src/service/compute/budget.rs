@@ -77,7 +77,7 @@ impl Budget {
         let units = u32::try_from(bytes.div_ceil(UNIT_BYTES)).ok().filter(|_| bytes <= self.max_bytes);
         let Some(units) = units else {
             let detail = format!(
-                "the answer needs up to {bytes} bytes, but `max_unread_bytes` is {}. Request fewer states or points",
+                "the answer needs up to {bytes} bytes, but `max_unread_bytes` allows at most {}. Request fewer states or points",
                 self.max_bytes
             );
             return Err(Problem::new(ProblemCode::TooManyStates, detail));

@@ -170,9 +170,7 @@ impl Pool {
     /// Returns a permit that a batch holds while it runs. Fails with `queue_full` if 16 batches run.
     pub fn begin_batch(&self) -> Result<OwnedSemaphorePermit, Problem> {
         Arc::clone(&self.0.batches).try_acquire_owned().map_err(|_| {
-            let detail = format!(
-                "{MAX_RUNNING_BATCHES} batches run, which is the limit. Retry after 1 s"
-            );
+            let detail = format!("{MAX_RUNNING_BATCHES} batches run, which is the limit. Retry after 1 s");
             Problem::new(ProblemCode::QueueFull, detail)
         })
     }
@@ -244,8 +242,10 @@ pub fn catch_panic<T>(job: impl FnOnce() -> Result<T, Problem>) -> Result<T, Pro
 /// Returns the result of a future, which is dropped at the deadline.
 pub async fn within<T>(deadline: Deadline, future: impl Future<Output = Result<T, Problem>>) -> Result<T, Problem> {
     tokio::time::timeout_at(deadline.at, future).await.unwrap_or_else(|_| {
-        let detail =
-            format!("the request took longer than `deadline_ms` ({} ms). Request less, or retry", deadline.span.as_millis());
+        let detail = format!(
+            "the request took longer than `deadline_ms` ({} ms). Request less, or retry",
+            deadline.span.as_millis()
+        );
         Err(Problem::new(ProblemCode::DeadlineExceeded, detail))
     })
 }

@@ -188,7 +188,8 @@ pub async fn read_body(app: &App, deadline: Deadline, headers: &HeaderMap, body:
     match in_time {
         Ok(read) => read?,
         Err(_) => {
-            let detail = format!("the body did not arrive within `deadline_ms` ({} ms). Send it faster", app.limits.deadline_ms);
+            let detail =
+                format!("the body did not arrive within `deadline_ms` ({} ms). Send it faster", app.limits.deadline_ms);
             return Err(Problem::new(ProblemCode::RequestTimeout, detail));
         }
     }

@@ -23,9 +23,9 @@ macro_rules! examples {
 
 /// All examples.
 pub const EXAMPLES: &[Example] = examples! {
-    "paper-5.1": "Case 5.1 of the paper: no undercut, seven teeth in each zone",
-    "paper-5.2": "Case 5.2 of the paper: undercut, every second slot filled",
-    "paper-5.2-bored": "Case 5.2 with a ring bore of 52.8227 mm: three or four teeth in each zone, as in figures 20 to 25",
+    "paper-5.1": "The paper's case 5.1: no undercut, seven teeth in each zone",
+    "paper-5.2": "The paper's case 5.2: undercut, every second slot filled",
+    "paper-5.2-bored": "The paper's case 5.2 with a ring bore of 52.8227 mm: three or four teeth in each zone, as in its figures 20 to 25",
     "ring-with-more-teeth": "A ring with two teeth more than the carrier, fixed stiffnesses, virtual work",
     "eccentric-roller": "Rollers on an eccentric circle, a ring with one tooth more: the usual form of open wave reducers",
     "harmonic-three-lobes": "A harmonic cam of three lobes: three zones share the load",

@@ -69,8 +69,7 @@ impl Representation {
         let gzip = accepts_gzip(headers);
         let accepted = joined(headers, &header::ACCEPT);
         if accepted.len() > MOST_OF_A_LIST {
-            let detail =
-                format!("the header `Accept` has {} bytes. Send at most {MOST_OF_A_LIST}", accepted.len());
+            let detail = format!("the header `Accept` has {} bytes. Send at most {MOST_OF_A_LIST}", accepted.len());
             return Err(Problem::new(ProblemCode::NotAcceptable, detail));
         }
         if accepted.trim().is_empty() {
@@ -129,9 +128,7 @@ fn require_type(headers: &HeaderMap, wanted: &str, fits: impl Fn(&MediaType<'_>)
     }
     let coding = joined(headers, &header::TRANSFER_ENCODING);
     if !coding.is_empty() && !coding.eq_ignore_ascii_case("chunked") {
-        return unsupported(format!(
-            "the body has the transfer coding `{coding}`, and only `chunked` is supported"
-        ));
+        return unsupported(format!("the body has the transfer coding `{coding}`, and only `chunked` is supported"));
     }
     let content_type = joined(headers, &header::CONTENT_TYPE);
     if MediaType::parse(&content_type).is_ok_and(|media_type| media_type.ty == names::APPLICATION && fits(&media_type))

@@ -259,14 +259,19 @@ const DOCS_POLICY: HeaderValue = HeaderValue::from_static(
 /// Replaces the 404 and 400 responses of Swagger UI by problems, and adds the policy.
 async fn as_documentation(mut response: Response) -> Response {
     if matches!(response.status(), StatusCode::NOT_FOUND | StatusCode::BAD_REQUEST) {
-        return Problem::new(ProblemCode::NotFound, "the documentation has no such page. Start at `/docs`").into_response();
+        return Problem::new(ProblemCode::NotFound, "the documentation has no such page. Start at `/docs`")
+            .into_response();
     }
     response.headers_mut().insert(header::CONTENT_SECURITY_POLICY, DOCS_POLICY);
     response
 }
 
 async fn method_not_allowed(request: Request) -> Problem {
-    let detail = format!("`{}` does not support {}. The header `Allow` lists the supported methods", request.uri().path(), request.method());
+    let detail = format!(
+        "`{}` does not support {}. The header `Allow` lists the supported methods",
+        request.uri().path(),
+        request.method()
+    );
     Problem::new(ProblemCode::MethodNotAllowed, detail)
 }
 

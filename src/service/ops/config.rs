@@ -145,7 +145,9 @@ fn removed(replacement: &str) -> Result<(), String> {
 fn studies(text: &str) -> Result<StudiesPlace, String> {
     match text {
         "off" => Ok(StudiesPlace::Off),
-        "" | ":memory:" => Err("the file name is missing: name a file, or leave the setting out to keep studies in memory".into()),
+        "" | ":memory:" => {
+            Err("the file name is missing: name a file, or leave the setting out to keep studies in memory".into())
+        }
         address if address.starts_with("postgres:") || address.starts_with("postgresql:") => {
             Err("PostgreSQL is no longer supported: use `--studies FILE`".into())
         }

@@ -48,7 +48,9 @@ impl Keys {
                 tracing::info!(keys = known.len(), "reloaded the keys file");
                 *self.known.write() = known;
             }
-            Err(error) => tracing::error!(path = %self.path.display(), error, "cannot reload the keys file: the keys stay the same"),
+            Err(error) => {
+                tracing::error!(path = %self.path.display(), error, "cannot reload the keys file: the keys stay the same")
+            }
         }
     }
 
@@ -73,7 +75,11 @@ fn parse(text: &str) -> Result<Vec<Known>, String> {
             .map_err(|_| format!("line {number} does not begin with a hash of 64 hexadecimal digits. Make a line by `toothwave new-key NAME`"))?;
         keys.push(Known { hash, name: name.trim().into() });
     }
-    if keys.is_empty() { Err("the keys file has no key. Make one by `toothwave new-key NAME`".into()) } else { Ok(keys) }
+    if keys.is_empty() {
+        Err("the keys file has no key. Make one by `toothwave new-key NAME`".into())
+    } else {
+        Ok(keys)
+    }
 }
 
 /// Makes a new key, and its line for a keys file.

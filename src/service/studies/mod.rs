@@ -138,9 +138,7 @@ impl Studies {
         }
         let most = self.limits.max_concurrent_studies;
         if self.running() >= most {
-            let detail = format!(
-                "{most} studies run, which is the limit. Retry after 1 s, or cancel one"
-            );
+            let detail = format!("{most} studies run, which is the limit. Retry after 1 s, or cancel one");
             return Err(Problem::new(ProblemCode::QueueFull, detail));
         }
         if store.is_in_memory() {

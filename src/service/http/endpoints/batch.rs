@@ -349,8 +349,7 @@ fn lines(app: Arc<App>, body: Body, end: Arc<Mutex<BatchEnd>>) -> impl Stream<It
                     Ok(Some(Err(AnyDelimiterCodecError::MaxChunkLengthExceeded))) => {
                         // After this error the stream ends once; the next poll continues after the line.
                         framed.next().await;
-                        let detail =
-                            format!("the line has more than {limit} bytes (`max_body_bytes`). Shorten it");
+                        let detail = format!("the line has more than {limit} bytes (`max_body_bytes`). Shorten it");
                         Err(Problem::new(ProblemCode::BodyTooLarge, detail))
                     }
                     Ok(Some(Err(AnyDelimiterCodecError::Io(error)))) => {
@@ -358,7 +357,8 @@ fn lines(app: Arc<App>, body: Body, end: Arc<Mutex<BatchEnd>>) -> impl Stream<It
                         return None;
                     }
                     Err(_) => {
-                        let detail = format!("no line arrived for {CLIENT_TIMEOUT_MS} ms. Send the remaining lines again");
+                        let detail =
+                            format!("no line arrived for {CLIENT_TIMEOUT_MS} ms. Send the remaining lines again");
                         end.lock().problem = Some(Problem::new(ProblemCode::RequestTimeout, detail));
                         return None;
                     }

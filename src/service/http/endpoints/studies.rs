@@ -234,8 +234,7 @@ async fn complete_change<T: Send + 'static, F: Future<Output = Result<T, Problem
 }
 
 fn no_such_study(id: &str) -> Problem {
-    let detail =
-        format!("there is no study `{id}`: it was never requested here, or was removed. Request it again");
+    let detail = format!("there is no study `{id}`: it was never requested here, or was removed. Request it again");
     Problem::new(ProblemCode::NotFound, detail)
 }
 
