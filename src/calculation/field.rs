@@ -12,7 +12,7 @@ pub struct FieldError {
     pub pointer: String,
     /// Kind of error, as a stable word.
     pub code: FieldCode,
-    /// What is wrong and what to do.
+    /// Message: what is wrong and what to do.
     pub detail: String,
     /// Value of the field, if it is a number.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -28,7 +28,7 @@ pub struct Fault {
     pub pointer: String,
     /// Kind of error.
     pub code: FieldCode,
-    /// What is wrong and what to do.
+    /// Message: what is wrong and what to do.
     pub detail: String,
 }
 
@@ -384,7 +384,7 @@ impl<'de> MapAccess<'de> for Fields<'_> {
 
     fn next_value_seed<S: de::DeserializeSeed<'de>>(&mut self, seed: S) -> Result<S::Value, Fault> {
         let Some((key, value)) = self.current else {
-            return Err(de::Error::custom("a value was asked for before its key"));
+            return Err(de::Error::custom("a value was read before its key"));
         };
         seed.deserialize(value).map_err(|fault| fault.within(key))
     }

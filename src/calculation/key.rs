@@ -92,7 +92,7 @@ macro_rules! encode_tuples {
     ($(($($name:ident)+))+) => {$(
         impl<$($name: Encode),+> Encode for ($($name,)+) {
             fn encode(&self, encoder: &mut Encoder) {
-                #[allow(non_snake_case, reason = "the types' names stand for their values")]
+                #[allow(non_snake_case, reason = "the values have the names of their types")]
                 let ($($name,)+) = self;
                 $($name.encode(encoder);)+
             }

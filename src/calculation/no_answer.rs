@@ -13,7 +13,7 @@ use crate::json::{Fault, ReadError};
 pub struct NoAnswer {
     /// Kind of reason.
     pub code: NoAnswerCode,
-    /// What is wrong, where, and what to do.
+    /// Message: what is wrong, where, and what to do.
     pub detail: String,
     /// The wrong fields, at most the first 100.
     pub errors: Vec<FieldError>,

@@ -271,7 +271,7 @@ mod tests {
 
     /// All points are equal in the third objective. Only one of them is kept for it.
     #[test]
-    fn one_end_stays_for_each_objective() {
+    fn best_point_of_each_objective_stays() {
         let tied = |point: Point| Point {
             judged: Judged { objectives: [point.judged.objectives, vec![-14.0]].concat(), ..point.judged },
             ..point
@@ -287,7 +287,7 @@ mod tests {
         assert!(whole.points().len() > 1000 && share > 0.995 * all, "{share} of {all}");
     }
 
-    /// As many points as the islands of the largest search give: the merge must not be quadratic.
+    /// The islands of the largest search give this many points, so the merge must not be quadratic.
     #[test]
     fn merges_hundreds_of_thousands_of_points() {
         let front = merged(points(200_000, 2, 5));

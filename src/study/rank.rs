@@ -120,7 +120,7 @@ mod tests {
 
     /// P(B ≤ 39) = 0.0176, P(B ≤ 40) = 0.0284 for B of 100 tosses. Textbooks have this interval.
     #[test]
-    fn median_of_100_is_within_ranks_40_and_61() {
+    fn median_of_100_has_textbook_ranks() {
         assert_eq!(ranks(100, 0.5), Ranks { low: Some(40), high: Some(61) });
     }
 

@@ -31,10 +31,10 @@ const ISLAND_EVALUATIONS: u64 = 12_500;
 /// Divisor: this fraction of an island's evaluations is the scan.
 const SCAN_SHARE: u64 = 5;
 
-/// Evaluations at exact peaks in addition to those of the front.
+/// Evaluations with accurate peaks in addition to those of the front.
 const TRUE_EVALUATIONS: u64 = 300;
 
-/// Relative tolerance of exact peaks.
+/// Relative tolerance of accurate peaks.
 const TRUE_PEAKS: f64 = 1e-6;
 
 /// Samples of a front with a duty. A duty is swept over the same input angles at all its points, without a tolerance.
@@ -59,7 +59,7 @@ pub(crate) struct Search {
     evaluations: u64,
     seed: u64,
     start: Vec<Vec<f64>>,
-    /// Template for exact peaks, if the search itself uses sampled peaks.
+    /// Template for accurate peaks, if the search itself uses sampled peaks.
     at_true_peaks: Option<Template>,
 }
 
@@ -203,7 +203,7 @@ impl Search {
         self.islands * (8 * numbers * points) as u64
     }
 
-    /// Bytes of the template for exact peaks.
+    /// Bytes of the template for accurate peaks.
     pub(crate) fn template_bytes(&self) -> usize {
         self.at_true_peaks.as_ref().map_or(0, Template::bytes)
     }
@@ -365,7 +365,7 @@ fn from_envelope(
         let Some(diameter_mm) = range(OUTER_DIAMETER_MM).1 else {
             return Err(missing("set `max` of `outer_diameter_mm`"));
         };
-        // As drawn, with the rim.
+        // Half of the outer diameter without the rim of the drawn ring.
         let root_mm = 0.5 * diameter_mm / RIM;
         let range = Parameter::ToothRadius.range();
         for &(_, least, largest) in &lengths {
@@ -646,7 +646,7 @@ pub struct SearchAnswer {
     pub evaluated: u64,
     /// The free fields.
     pub free: Vec<FreeAnswer>,
-    /// Pareto front, ordered by the first objective. Its figures are exact peaks.
+    /// Pareto front, ordered by the first objective. Its figures are accurate peaks.
     pub front: Vec<FoundAnswer>,
     /// The limits, with the numbers of variants that violate them.
     pub limits: Vec<LimitAnswer>,
@@ -733,7 +733,7 @@ pub struct RelaxationAnswer {
     pub limit: f64,
     /// Value nearest to the limit for which a design was found.
     pub needed: f64,
-    /// That design.
+    /// The design with this value.
     pub found: FoundAnswer,
 }
 

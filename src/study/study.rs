@@ -179,7 +179,7 @@ impl Study {
         let evaluator = Evaluator::new(quantities, limits.calculation);
         let study =
             Self { id: Key::default(), kind, template, evaluator, variants, chunk_variants: chunk_variants(variants) };
-        #[expect(clippy::cast_precision_loss, reason = "told, not computed with")]
+        #[expect(clippy::cast_precision_loss, reason = "a number in a message")]
         if variants > limits.max_study_variants {
             let limit = limits.max_study_variants;
             let detail = format!(
@@ -190,7 +190,7 @@ impl Study {
             return Err(refused);
         }
         let bytes = study.kept_bytes().max(study.answer_bytes());
-        #[expect(clippy::cast_precision_loss, reason = "told, not computed with")]
+        #[expect(clippy::cast_precision_loss, reason = "a number in a message")]
         if bytes > limits.max_study_bytes {
             let limit = limits.max_study_bytes;
             let detail = format!(

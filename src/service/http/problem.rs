@@ -43,7 +43,7 @@ pub struct Problem {
     /// HTTP status.
     #[schema(minimum = 400, maximum = 599)]
     pub status: u16,
-    /// What is wrong, where, and what to do.
+    /// Message: what is wrong, where, and what to do.
     pub detail: String,
     /// Kind of problem, as a stable word.
     pub code: ProblemCode,

@@ -33,7 +33,7 @@ const STATE_BYTES: u64 = 350;
 /// Most variants of a study.
 const MAX_STUDY_VARIANTS: u64 = 10_000_000;
 
-/// Most bytes of all study results in memory.
+/// Most bytes of a study with its result, and of all studies together if they are in memory.
 const MAX_STUDY_BYTES: u64 = 256 << 20;
 
 /// Most studies that run at once.
@@ -178,7 +178,7 @@ pub struct Limits {
     pub max_unread_bytes: u64,
     /// Most variants of a study.
     pub max_study_variants: u64,
-    /// Most bytes of all study results in memory.
+    /// Most bytes of a study with its result, and of all studies together if they are in memory.
     pub max_study_bytes: u64,
     /// Most studies that run at once.
     pub max_concurrent_studies: usize,

@@ -65,9 +65,9 @@ pub struct StudyResource {
     pub state: StudyState,
     /// Variants of the study.
     pub variants: u64,
-    /// Computed variants. A search also counts the variants that it evaluates again at their exact peaks.
+    /// Computed variants. A search also counts the variants that it evaluates again with accurate peaks.
     pub looked_at: u64,
-    /// Computed variants without an answer.
+    /// Computed variants without an answer. A search counts those of its scan alone.
     pub impossible: u64,
     /// Path of the result. It is partial while the study runs.
     pub result_href: String,
