@@ -1,4 +1,4 @@
-//! What all requests share.
+//! State that all requests share.
 
 use std::io;
 use std::sync::Arc;
@@ -13,16 +13,16 @@ use crate::compute::pool::{Deadline, Pool};
 use crate::ops::config::{Limits, MAX_CONNECTIONS};
 use crate::studies::{Storage, Studies};
 
-/// What handlers share.
+/// Shared state of the request handlers.
 #[derive(Debug)]
 pub struct App {
-    /// Limits of the service.
+    /// Limits from the settings and the machine.
     pub limits: Limits,
-    /// Where computations run.
+    /// Threads and permits for computations.
     pub pool: Pool,
-    /// Finished answers.
+    /// Cache of finished answers.
     pub cache: Cache,
-    /// The bytes that large answers share.
+    /// Byte budget of the large answers.
     pub budget: Budget,
     /// Studies and their results.
     pub studies: Studies,
@@ -33,7 +33,7 @@ pub struct App {
 }
 
 impl App {
-    /// An idle service within these limits.
+    /// Starts an idle service with these limits.
     pub fn start(limits: Limits, storage: Option<Storage>) -> io::Result<Arc<Self>> {
         let pool = Pool::start(limits.max_concurrent_solves)?;
         Ok(Arc::new(Self {
@@ -47,12 +47,12 @@ impl App {
         }))
     }
 
-    /// The deadline of a request that arrives now.
+    /// Returns the deadline of a request that arrives now.
     pub fn deadline(&self) -> Deadline {
         Deadline::after(self.deadline_span())
     }
 
-    /// The time that a computation may take.
+    /// Time limit of a request.
     pub const fn deadline_span(&self) -> Duration {
         Duration::from_millis(self.limits.deadline_ms)
     }

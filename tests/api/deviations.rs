@@ -201,7 +201,7 @@ async fn of_thousands_of_entries_out_of_range_the_first_hundred_are_told() {
     for path in ["/v1/sweep", "/v1/accuracy"] {
         let problem = Service::new().post(path, &document).await.refused(422, "impossible_design");
         // Each of them, and that there are two lobes.
-        assert_eq!(problem["detail"], "5001 values are impossible; `errors` names the first 100", "{path}");
+        assert_eq!(problem["detail"], "5001 values are impossible. `errors` lists the first 100", "{path}");
         assert_eq!(problem["errors"].as_array().unwrap().len(), 100, "{path}");
     }
 }

@@ -151,7 +151,7 @@ test('an impossible drive shows its reasons at the fields, and nothing breaks', 
   await enter(page, SEMI_MINOR, 60);
   assert.match(await page.textContent(notes(SEMI_MAJOR)), /must exceed the semi-minor axis/);
   assert.equal(await page.getAttribute(field(SEMI_MAJOR), 'aria-invalid'), 'true');
-  assert.match(await page.textContent('#impossible'), /Values that no design can have/);
+  assert.match(await page.textContent('#impossible'), /The design is impossible/);
   assert.equal(await resultOf(page, 'Force, ring'), (await server.answers(await server.example('paper-5.1'))).sweep.peaks.ring.force_n.value);
   // Every reason at once, also in a folded group, each at its field.
   await enter(page, '/drive/teeth/count', 31);
@@ -998,7 +998,7 @@ test('results and findings are announced', async () => {
   await enter(page, RADIUS, 6.8);
   await page.waitForFunction(() => document.querySelector('#announcer').textContent.includes('Undercut ring tips'));
   await enter(page, RADIUS, 60);
-  await page.waitForFunction(() => document.querySelector('#announcer').textContent.startsWith('Values that no design can have'));
+  await page.waitForFunction(() => document.querySelector('#announcer').textContent.startsWith('The design is impossible'));
 });
 
 test('the service goes away and comes back', async () => {

@@ -347,15 +347,9 @@ fn a_newcomer_is_refused_at_what_was_given() {
             json!({ "min": 20 }),
             "/free",
             "missing_field",
-            "`transmission_ratio` from both sides",
+            "`min` and `max` of `transmission_ratio`",
         ),
-        (
-            "/require/outer_diameter_mm",
-            json!({ "min": 100 }),
-            "/free",
-            "missing_field",
-            "`outer_diameter_mm` from above",
-        ),
+        ("/require/outer_diameter_mm", json!({ "min": 100 }), "/free", "missing_field", "`max` of `outer_diameter_mm`"),
         (
             "/require/outer_diameter_mm",
             json!({ "max": -120 }),
@@ -387,7 +381,7 @@ fn a_newcomer_is_refused_at_what_was_given() {
             "missing_field",
             "`free`",
         ),
-        ("/start", json!([{}]), "/start/0/drive/teeth/count", "missing_field", "begin with"),
+        ("/start", json!([{}]), "/start/0/drive/teeth/count", "missing_field", "no value"),
         (
             "/start",
             json!([{ "drive": { "teeth": { "count": 40.5 } } }]),

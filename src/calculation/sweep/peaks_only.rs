@@ -1,4 +1,4 @@
-//! A sweep without its columns, as batches answer it with `peaks_only`.
+//! A sweep without its columns: the answer of a batch with `peaks_only`.
 
 use crate::coincidence_degree::TeethInMeshAnswer;
 use crate::design::{Design, ModelDocument};
@@ -15,11 +15,11 @@ use crate::sweep::losses::LossTotalsAnswer;
 use crate::sweep::model_error::ModelErrorAnswer;
 use serde::{Serialize, Serializer};
 
-/// What a sweep is asked without its columns.
+/// The question for a sweep without columns.
 #[derive(Debug)]
 pub struct PeaksOnly;
 
-/// A sweep that is written without its columns.
+/// The answer of a sweep without columns.
 #[derive(Debug)]
 pub struct PeaksOnlyAnswer(SweepAnswer);
 

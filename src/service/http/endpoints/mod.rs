@@ -1,4 +1,4 @@
-//! The endpoints: each handler with its description in the API document.
+//! The endpoints: handlers with their descriptions for the API document.
 
 pub mod batch;
 pub mod calculations;
