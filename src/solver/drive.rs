@@ -121,16 +121,16 @@ pub enum DriveError {
     /// All impossible values.
     #[error("the drive cannot exist")]
     Impossible(Vec<Violation>),
-    /// A geometric iteration hit its cap.
+    /// A geometric iteration reached its limit of steps.
     #[error(transparent)]
     NotConverged(#[from] NotConverged),
 }
 
 impl Drive {
-    /// Checks the parameters.
+    /// Checks the parameters and builds the drive.
     ///
+    /// # Errors
     /// Returns every reason why the drive cannot exist.
-    /// Every reason why the drive cannot exist.
     pub fn new(parameters: &DriveParameters) -> Result<Self, DriveError> {
         let draft = Draft::new(parameters)?;
         draft.drive().ok_or(DriveError::Impossible(draft.violations))
@@ -141,12 +141,12 @@ impl Drive {
         &self.parameters
     }
 
-    /// `U`: lobes of the wave generator.
+    /// Returns `U`, the number of lobes of the wave generator.
     pub fn lobes(&self) -> u32 {
         self.ring.flank.locus().lobes()
     }
 
-    /// Extent of a tooth along the axis: `L1`, a ball's diameter.
+    /// Returns the extent of a tooth along the axis: `L1`, or a ball's diameter.
     pub fn tooth_width_mm(&self) -> f64 {
         match self.parameters.tooth {
             ToothShape::Cylinder { width_mm } | ToothShape::FlatSided { width_mm, .. } => width_mm,
@@ -154,68 +154,68 @@ impl Drive {
         }
     }
 
-    /// Half the width of a slot without clearance.
+    /// Returns half the width of a slot without clearance.
     pub fn slot_half_width_mm(&self) -> f64 {
         self.parameters.tooth.half_width_in_slot_mm(self.parameters.tooth_radius_mm)
     }
 
-    /// The cam's largest distance from the axis, from where on the carrier can begin.
+    /// Returns the cam's largest distance from the axis, which is the smallest possible inner radius of the carrier.
     pub fn cam_outer_radius_mm(&self) -> f64 {
         self.ring.flank.locus().cam_outer_radius_mm()
     }
 
-    /// The ring's flank; through it the path of the teeth and the wave generator.
+    /// Returns the ring's flank, which contains the path of the teeth and the wave generator.
     pub const fn flank(&self) -> &RingFlank {
         &self.ring.flank
     }
 
-    /// One tooth of the ring.
+    /// Returns one tooth of the ring.
     pub const fn ring_tooth(&self) -> &RingTooth {
         &self.ring
     }
 
-    /// Where and why the flank ends towards the tip.
+    /// Returns the end of the flank towards the tip, and its cause.
     pub const fn flank_limit(&self) -> &FlankLimit {
         &self.ring.limit
     }
 
-    /// `s = sign(Z_G - Z_K)`.
+    /// Returns `s = sign(Z_G - Z_K)`.
     pub const fn sense(&self) -> f64 {
         if self.parameters.teeth > self.parameters.ring_teeth { 1.0 } else { -1.0 }
     }
 
-    /// `Z_G / U`: carrier torque over input torque.
+    /// Returns `Z_G / U`: carrier torque over input torque.
     pub fn teeth_per_wave(&self) -> f64 {
         self.parameters.teeth as f64 / f64::from(self.lobes())
     }
 
-    /// `i_HG = Z_G/(Z_G - Z_K)`: input speed over carrier speed, ring fixed.
+    /// Returns `i_HG = Z_G/(Z_G - Z_K)`: input speed over carrier speed, ring fixed.
     pub fn transmission_ratio(&self) -> f64 {
         self.sense() * self.teeth_per_wave()
     }
 
-    /// `i_HK = -Z_K/(Z_G - Z_K)`: input speed over ring speed, carrier fixed.
+    /// Returns `i_HK = -Z_K/(Z_G - Z_K)`: input speed over ring speed, carrier fixed.
     pub fn transmission_ratio_carrier_fixed(&self) -> f64 {
         -self.sense() * self.ring.flank.teeth_per_wave()
     }
 
-    /// Radius of the ring at the middle of its tooth space, `d_l + r`.
+    /// Returns the radius of the ring at the middle of its tooth space, `d_l + r`.
     pub fn root_radius_mm(&self) -> f64 {
         self.ring.flank.root_radius_mm()
     }
 
-    /// Radius of the ring's tips before any bore.
+    /// Returns the radius of the ring's tips before any bore.
     pub const fn natural_tip_radius_mm(&self) -> f64 {
         self.ring.natural_tip_radius_mm
     }
 
-    /// Radius of the ring's tips: natural, trimmed by undercut, or bored.
+    /// Returns the radius of the ring's tips: natural, trimmed by undercut, or bored.
     pub const fn tip_radius_mm(&self) -> f64 {
         self.ring.tip_radius_mm
     }
 
-    /// The engaged tooth with the largest pressure angles: at the steepest place of the path, or where the flank ends
-    /// before it.
+    /// Returns the engaged tooth with the largest pressure angles. It is at the steepest point of the path, or at the
+    /// end of the flank if that comes first.
     ///
     /// # Errors
     /// [`NotConverged`] from the path.
@@ -223,7 +223,7 @@ impl Drive {
         self.ring.steepest_engaged()
     }
 
-    /// Largest pressure angle β of the engaged flank.
+    /// Returns the largest pressure angle β of the engaged flank.
     ///
     /// # Errors
     /// [`NotConverged`] from the path.
@@ -235,7 +235,7 @@ impl Drive {
         Neighbours { locus: *self.ring.flank.locus(), installed: self.parameters.installed }
     }
 
-    /// Least distance of two neighbouring centres on their path.
+    /// Returns the least distance of two neighbouring centres on their path.
     ///
     /// # Errors
     /// [`NotConverged`] from the path.
@@ -243,13 +243,14 @@ impl Drive {
         self.neighbours().least_center_distance_mm()
     }
 
-    /// `d` at any angle from a lobe.
+    /// Returns `d` at any angle from a lobe.
     pub(crate) fn center_radius_at_mm(&self, angle_rad: f64) -> Result<f64, NotConverged> {
         self.ring.flank.locus().center_radius_at_mm(angle_rad)
     }
 
-    /// Thickness of the wall between two neighbouring slots where it is thinnest, at the carrier's inner edge on
-    /// the circle of the cam's outer radius `a`: `2 (√(a² - w²) sin(π/Z'_G) - w cos(π/Z'_G))`, w half the slot's width; not positive where the slots run into each other there.
+    /// Returns the least thickness of the wall between two neighbouring slots. It is at the carrier's inner edge, on
+    /// the circle of the cam's outer radius `a`: `2 (√(a² - w²) sin(π/Z'_G) - w cos(π/Z'_G))`, with w half the slot's
+    /// width. The result is not positive if the slots overlap there.
     pub fn slot_wall_mm(&self) -> f64 {
         let (a, r) = (self.cam_outer_radius_mm(), self.slot_half_width_mm());
         let (sin, cos) = self.neighbours().half_spacing_rad().sin_cos();
@@ -257,22 +258,22 @@ impl Drive {
     }
 }
 
-/// Parameters of which some may be impossible. Whatever can be checked is checked as soon as the values that it itself needs are possible:
-/// one impossible value hides no other.
+/// Parameters of which some may be impossible. Each check runs as soon as the values that it needs are possible, so one
+/// impossible value hides no other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draft {
     parameters: DriveParameters,
     violations: Vec<Violation>,
-    /// The cam's largest and least distance from the axis.
+    /// Largest and least distance of the cam from the axis.
     pub(crate) cam_outer_mm: Option<f64>,
     pub(crate) cam_inner_mm: Option<f64>,
-    /// How far the cam can be set back.
+    /// Largest possible inward offset of the cam.
     pub(crate) greatest_set_back_mm: Option<f64>,
     pub(crate) installed: Option<i64>,
     pub(crate) tooth_radius_mm: Option<f64>,
     /// Half the width of a slot.
     pub(crate) slot_half_width_mm: Option<f64>,
-    /// `s`, where carrier and ring differ by a tooth for each lobe.
+    /// `s`, if carrier and ring differ by one tooth for each lobe.
     pub(crate) sense: Option<f64>,
     pub(crate) ring: Option<RingTooth>,
 }

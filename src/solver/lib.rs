@@ -109,11 +109,11 @@ pub enum SolveError {
         of_capacity = if *.is_of_capacity { "no torque capacity can be told, as before any contact reaches its allowable stress " } else { "" }
     )]
     JohnsonBeyondHalfWidth {
-        /// The contact that is first.
+        /// The contact that reaches the limit first.
         contact: Contact,
-        /// Where its tooth stands.
+        /// Position of its tooth.
         position_deg: f64,
-        /// The half-width at which the law ends.
+        /// Half-width at which the law ends.
         half_width_limit_mm: f64,
         /// Input torque at this half-width, at the input angle in question.
         input_torque_limit_nm: f64,
@@ -149,9 +149,9 @@ pub enum SolveError {
     /// The profiles need more points than the limit.
     #[error("the profiles need {points} points or more at this chord tolerance, beyond the {limit} allowed")]
     TooManyPoints {
-        /// Points that the profiles need, or as many of them as were counted.
+        /// Number of points that the profiles need, or the number counted so far.
         points: u64,
-        /// The limit that was given.
+        /// Limit given by the caller.
         limit: u64,
     },
     /// The sweep needs more states than the limit.

@@ -295,7 +295,7 @@ pub struct LoadedDrive<'a> {
     drive: &'a Drive,
     mesh: Mesh,
     compatibility: Compatibility,
-    /// What a sum over the teeth that are listed is multiplied by, to be that over all.
+    /// Factor from a sum over the listed teeth to the sum over all teeth.
     zones: f64,
     input_torque_nmm: f64,
     law: ContactLaw,
