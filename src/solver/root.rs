@@ -12,12 +12,12 @@ pub struct NotConverged {
     pub bracket_width: f64,
 }
 
-/// Above what is ever needed: bisection takes below 60 steps, in the logarithm from the widest bracket that the ranges of the parameters
-/// allow (a/b = 1e12) as well as down to [`NOTHING`], and a bisection stands behind every step.
+/// Limit of steps, above any real need. Bisection takes below 60 steps, in the logarithm from the widest bracket in the
+/// ranges of the parameters (a/b = 1e12) as well as down to [`NOTHING`]. Every step can fall back to bisection.
 const MAX_ITERATIONS: u32 = 200;
 
-/// A root of [`bracketed`] this near to zero is zero for every purpose: its unknowns are angles in rad and shares of one. Without it a root
-/// that only rounding has put on this side of zero would be halved for without end.
+/// Absolute value below which a root of [`bracketed`] is zero: its unknowns are angles in rad and ratios. Without it,
+/// bisection towards a root at zero, moved by rounding, would not end.
 const NOTHING: f64 = 1e-16;
 
 /// A function's value and derivative.

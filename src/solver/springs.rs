@@ -335,8 +335,9 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         Rotation { closing_rad: self.first_closing_rad(), excess_rad: FARTHEST_RAD }
     }
 
-    /// The first summit of the torque over the rotation, on the way from none to `end`, that makes enough, or else the highest. The way is over at a summit at which
-    /// no spring has a gap left to close; one before that is passed, as the wave generator then comes to springs that hold it again, if only once they are pressed.
+    /// Returns the first maximum of the torque, up to `end`, that is at least `enough_nmm`, or else the highest. The
+    /// search ends at a maximum after which no gap is left to close. An earlier maximum is passed, because the wave
+    /// generator then meets further springs.
     fn summit(&self, end: &Rotation, enough_nmm: f64) -> Result<Summit, NotConverged> {
         /// Relative length of an interval whose ends show if the torque rises: at the maximum the torque varies by its
         /// square.
