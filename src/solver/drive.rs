@@ -21,7 +21,7 @@ pub struct DriveParameters {
     pub installed: i64,
     /// `r`: radius of a tooth.
     pub tooth_radius_mm: f64,
-    /// Shape of a tooth besides its radius.
+    /// Shape of a tooth, in addition to its radius.
     pub tooth: ToothShape,
     /// `Z_K`: number of ring teeth.
     pub ring_teeth: i64,

@@ -48,7 +48,7 @@ struct ShapedSpace {
     outermost_radius_mm: f64,
 }
 
-/// Shape of a flank besides its distance.
+/// Shape of a flank in addition to its distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ShapedFlank {
     flank: RingFlank,
@@ -194,7 +194,7 @@ impl ToothSpace {
 }
 
 impl ShapedFlank {
-    /// Builds the flank if anything besides its distance shapes it.
+    /// Builds the flank if more than its distance shapes it.
     fn new(drive: &Drive, flank: RingFlank, modification: &Modification) -> Option<Self> {
         let relief = modification.ring_tip_relief.filter(|relief| relief.amount_um != 0.0);
         let shaped = Self {

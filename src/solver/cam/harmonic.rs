@@ -228,7 +228,8 @@ impl Kind for Harmonic {
         None
     }
 
-    /// The lower root of `2r² + (A + 2B - eZ_K²) r + AB = 0`, `A = R0 - e`, `B = R0 + e(U² - 1)`; none where the roots are not real.
+    /// The lower root of `2r² + (A + 2B - eZ_K²) r + AB = 0`, `A = R0 - e`, `B = R0 + e(U² - 1)`; none if the roots
+    /// are complex.
     fn critical_tooth_radius_mm(&self, ring_teeth_per_lobe: f64) -> Option<f64> {
         let ring_teeth = ring_teeth_per_lobe * self.lobe_count();
         let a = self.mean_radius_mm - self.amplitude_mm;

@@ -298,7 +298,7 @@ impl EllipseShape {
     }
 }
 
-/// Results of a sweep besides its sink.
+/// Results of a sweep that are not in its sink.
 struct Filled {
     torque_balance_residual: f64,
     capacity: Option<TorqueCapacity>,

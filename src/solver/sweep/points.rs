@@ -6,9 +6,9 @@ use crate::violation::{Parameter, Violation};
 /// Input angles of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Points {
-    /// This many equal intervals of one period, both ends included.
+    /// Equal intervals of one period, both ends included.
     Samples(Samples),
-    /// As many as are needed to find the true extremes to a tolerance.
+    /// Input angles chosen so that the true extremes are found to a tolerance.
     Tolerance(Tolerance),
 }
 

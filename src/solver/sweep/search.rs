@@ -433,8 +433,8 @@ pub(crate) fn search(
 
 impl Search {
     /// Returns the effect of rounding of closing angles on the loads, including a bend counted several times. The
-    /// amplification is `Δφ K/M`, with M the given or the allowed torque. If teeth press against corners, Δφ is at least
-    /// [`Look::distance_at_corner_rad`].
+    /// amplification is `Δφ K/M`, with M the given or the allowed torque. If teeth press against corners, Δφ is at
+    /// least [`Look::distance_at_corner_rad`].
     fn rounding(&self, input_torque_nmm: f64, distance_at_corner_rad: f64) -> f64 {
         let [rotation_rad, stiffness_nmm_per_rad] = [LOADS, STIFFNESSES[0]].map(|quantity| self.best[quantity].value);
         let per_torque = self.best[CAPACITY].value.max(1.0 / input_torque_nmm);

@@ -218,8 +218,8 @@ impl Pressure {
     }
 
     /// Returns the pressure in the middle plane, integrated along the plane of motion. For an ellipse it is `π a p/2`
-    /// with its half-width a, otherwise the force over the width. It is 0 for a corner, which stays in contact: its wear
-    /// differs from a flank's.
+    /// with its half-width a, otherwise the force over the width. It is 0 for a corner, which stays in contact: its
+    /// wear differs from a flank's.
     pub fn line_load_n_per_mm(&self, force_n: f64, tooth_width_mm: f64) -> f64 {
         match self {
             Self::Line { .. } | Self::Flat(_) => force_n / tooth_width_mm,

@@ -1162,7 +1162,8 @@ impl<L: TwoParts> NoPowerLaw<L> {
         beyond.iter().all(|&beyond| beyond <= 0.0)
     }
 
-    /// Converts the forces to newtons, and the stiffnesses accordingly. Returns false if a contact is wider than the law allows.
+    /// Converts the forces to newtons, and the stiffnesses accordingly. Returns false if a contact is wider than the
+    /// law allows.
     #[inline(always)]
     fn finish(typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
         let (count, arm) = (teeth.count, &teeth.arm[..teeth.len]);
