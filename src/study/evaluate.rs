@@ -192,7 +192,7 @@ mod tests {
     use super::{Outcome, caught};
 
     #[test]
-    fn a_panic_at_one_variant_is_its_reason() {
+    fn panic_becomes_reason_of_its_variant() {
         let outcome = caught(|| panic!("on purpose"));
         assert!(
             matches!(outcome, Ok(Outcome::Refused(refusal)) if refusal.reason.code == "panic" && refusal.detail == "on purpose")

@@ -220,7 +220,7 @@ mod tests {
         std::array::from_fn(least)
     }
 
-    /// Counted in cells of a lattice.
+    /// The points lie on a lattice.
     #[test]
     fn hypervolume_is_count_of_cells() {
         const SIDE: u32 = 8;
@@ -267,7 +267,7 @@ mod tests {
         }
     }
 
-    /// All tie in the third objective: as its ends they filled the archive.
+    /// All points tie in the third objective, so each of them is an end of it.
     #[test]
     fn one_end_stays_for_each_objective() {
         let tied = |point: Point| Point {
@@ -285,9 +285,9 @@ mod tests {
         assert!(whole.points().len() > 1000 && share > 0.995 * all, "{share} of {all}");
     }
 
-    /// As many as the islands of the largest search bring: it took hours.
+    /// The islands of the largest search bring as many points.
     #[test]
-    fn a_front_of_hundreds_of_thousands_is_merged() {
+    fn merges_front_of_hundreds_of_thousands() {
         let front = merged(points(200_000, 2, 5));
         assert!(front.len() > 100 && front.len() <= 200, "{}", front.len());
         let objective =

@@ -387,7 +387,7 @@ mod tests {
 
     /// By Deb and Agrawal the density of the spread is `(η + 1) β^η / 2` below 1 and `(η + 1) / (2 β^(η + 2))` above.
     #[test]
-    fn children_are_as_often_nearer_to_each_other_than_their_parents_as_farther() {
+    fn crossover_spread_is_symmetric() {
         assert!((spread(0.5) - 1.0).abs() < 1e-15);
         for share in [0.01, 0.1, 0.3, 0.45] {
             let (nearer, farther) = (spread(share), spread(1.0 - share));
@@ -401,7 +401,7 @@ mod tests {
 
     /// By Deb and Goyal the density of the offset is `(η + 1) (1 - |δ|)^η / 2`.
     #[test]
-    fn mutations_go_either_way_alike_and_as_far_as_their_range() {
+    fn mutation_offset_is_symmetric_and_fills_range() {
         assert!((offset(0.0) + 1.0).abs() < 1e-15 && offset(0.5).abs() < 1e-15);
         for share in [0.01, 0.1, 0.3, 0.45] {
             assert!((offset(share) + offset(1.0 - share)).abs() < 1e-12);
@@ -409,9 +409,9 @@ mod tests {
         }
     }
 
-    /// Of points that lie on one face of the cube and are alike elsewhere, children lie there too, but for mutations.
+    /// If all points lie on one face of the cube, children lie there too, except for mutations.
     #[test]
-    fn a_child_stays_where_both_of_its_parents_are_and_within_the_cube() {
+    fn child_keeps_shared_coordinates_and_stays_in_cube() {
         const TRIES: u32 = 4000;
         let plan = Plan { dimensions: 4, limits: 0, scan_from: 0, scan: 0, evaluations: u64::MAX };
         let mut optimiser = Optimiser::new(plan, Vec::new(), 9, 0);

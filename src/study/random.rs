@@ -79,9 +79,9 @@ impl Stream {
 mod tests {
     use super::{Stream, philox};
 
-    /// The vectors that come with the authors' Random123.
+    /// Test vectors of the authors' Random123.
     #[test]
-    fn the_rounds_are_those_of_the_known_answers() {
+    fn generator_gives_known_answers() {
         assert_eq!(philox([0; 4], [0; 2]), [0x6627_e8d5, 0xe169_c58d, 0xbc57_ac4c, 0x9b00_dbd8]);
         assert_eq!(philox([u32::MAX; 4], [u32::MAX; 2]), [0x408f_276d, 0x41c8_3b0e, 0xa20b_c7c6, 0x6d54_51fd]);
         let counter = [0x243f_6a88, 0x85a3_08d3, 0x1319_8a2e, 0x0370_7344];
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_are_even_and_normal_numbers_normal() {
+    fn uniform_and_normal_numbers_have_their_distributions() {
         const COUNT: u32 = 100_000;
         let mut stream = Stream::new(7, 3);
         let shares: f64 = (0..COUNT).map(|_| stream.share()).sum();

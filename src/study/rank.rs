@@ -117,15 +117,15 @@ pub(crate) fn share(good: u64, count: u64) -> Option<ShareAnswer> {
 mod tests {
     use super::{Ranks, log_factorial, quantile, ranks, share};
 
-    /// P(B ≤ 39) = 0.0176, P(B ≤ 40) = 0.0284 for B of 100 tosses; the interval is the textbooks'.
+    /// P(B ≤ 39) = 0.0176 and P(B ≤ 40) = 0.0284 for B of 100 tosses. Textbooks give the same interval.
     #[test]
-    fn the_median_of_a_hundred_lies_between_the_40th_and_the_61st() {
+    fn median_of_100_lies_between_ranks_40_and_61() {
         assert_eq!(ranks(100, 0.5), Ranks { low: Some(40), high: Some(61) });
     }
 
     /// 0.5^5 on either side is above 2.5 %, 0.5^6 is not.
     #[test]
-    fn of_five_nothing_can_be_said_and_of_six_the_ends_hold_the_median() {
+    fn median_interval_needs_six_values() {
         assert_eq!(ranks(5, 0.5), Ranks { low: None, high: None });
         assert_eq!(ranks(6, 0.5), Ranks { low: Some(1), high: Some(6) });
     }
@@ -146,7 +146,7 @@ mod tests {
 
     /// Wilson's interval for 10 of 10 begins at 1/(1 + z²/n).
     #[test]
-    fn ten_good_ones_of_ten_are_no_certainty() {
+    fn ten_of_ten_is_not_certain() {
         let all = share(10, 10);
         let low = 1.0 / (1.0 + super::NORMAL_QUANTILE.powi(2) / 10.0);
         assert!(all.is_some_and(|all| (all.low - low).abs() < 1e-12 && all.high > 0.999_999), "{all:?}");

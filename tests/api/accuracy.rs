@@ -39,7 +39,7 @@ fn true_error(sweep: &Value, case: &Value) -> f64 {
 }
 
 #[tokio::test]
-async fn the_errors_that_are_told_are_the_errors_against_40_digits() {
+async fn reported_errors_match_40_digit_reference() {
     let cases = cases();
     assert!(cases.len() >= 6, "{}", cases.len());
     for case in &cases {
@@ -66,7 +66,7 @@ async fn the_errors_that_are_told_are_the_errors_against_40_digits() {
 }
 
 #[tokio::test]
-async fn the_cheapest_way_meets_the_requested_error_and_none_that_meets_it_is_faster() {
+async fn cheapest_way_is_fastest_within_requested_error() {
     for requested in [1e-2, 1e-4, 1e-8] {
         let document = with(&spelled_out(), "/accuracy", json!({ "requested_error": requested }));
         let answer = Service::new().post("/v1/accuracy", &document).await.found();
@@ -83,7 +83,7 @@ async fn the_cheapest_way_meets_the_requested_error_and_none_that_meets_it_is_fa
 }
 
 #[tokio::test]
-async fn every_form_and_law_is_tried_and_told_how_far_it_is_from_the_designs_own() {
+async fn reports_difference_of_every_model_to_own() {
     let answer = Service::new().post("/v1/accuracy", &spelled_out()).await.found();
     let models: std::collections::BTreeSet<_> = ways(&answer)
         .iter()
@@ -109,9 +109,9 @@ async fn every_form_and_law_is_tried_and_told_how_far_it_is_from_the_designs_own
     assert_eq!(answer["unavailable"], json!([]));
 }
 
-/// Case 5.2 with its teeth entering under load, of which the elements say nothing.
+/// Teeth of case 5.2 enter under load, which the finite elements do not cover.
 #[tokio::test]
-async fn of_a_drive_beyond_those_that_were_calculated_no_error_of_the_model_is_told() {
+async fn omits_model_error_beyond_calculated_drives() {
     let service = Service::new();
     let case_5_2: Value = serde_json::from_str(include_str!("../../examples/paper-5.2.json")).unwrap();
     let entering = with(&case_5_2, "/model", json!({}));
@@ -130,7 +130,7 @@ async fn of_a_drive_beyond_those_that_were_calculated_no_error_of_the_model_is_t
 }
 
 #[tokio::test]
-async fn a_model_without_an_answer_is_named_with_the_reason() {
+async fn names_model_without_answer_and_its_reason() {
     let document = [
         ("/drive/ring/teeth", json!(30)),
         ("/drive/teeth/radius_mm", json!(4.0)),
@@ -147,7 +147,7 @@ async fn a_model_without_an_answer_is_named_with_the_reason() {
 }
 
 #[tokio::test]
-async fn what_is_measured_is_never_cached() {
+async fn accuracy_answers_are_never_cached() {
     let service = Service::new();
     for _ in 0..2 {
         let answer = service.post("/v1/accuracy", &spelled_out()).await;

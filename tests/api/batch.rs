@@ -31,7 +31,7 @@ fn variant(index: u64) -> Value {
 }
 
 #[tokio::test]
-async fn every_document_is_answered_in_its_place_as_it_would_be_by_itself() {
+async fn answers_each_document_as_alone() {
     let service = Service::new();
     let impossible = with(&shortest(), "/drive/teeth/radius_mm", json!(0));
     let documents =
@@ -52,7 +52,7 @@ async fn every_document_is_answered_in_its_place_as_it_would_be_by_itself() {
 }
 
 #[tokio::test]
-async fn answers_keep_the_order_of_a_thousand_documents() {
+async fn answers_keep_order_of_a_thousand_documents() {
     let documents: Vec<_> = (0..1000).map(|index| variant(index).to_string()).collect();
     let found = lines(&batch(&Service::new(), "?peaks_only=true", &documents).await);
     assert_eq!(found.len(), 1000);
@@ -66,7 +66,7 @@ async fn answers_keep_the_order_of_a_thousand_documents() {
 }
 
 #[tokio::test]
-async fn the_peaks_alone_are_those_of_the_whole_answer() {
+async fn peaks_only_equal_peaks_of_full_answer() {
     let service = Service::new();
     let limited = with(&shortest(), "/load/allowable_stress_mpa", json!(1500.0));
     let cam = json!({ "kind": "plain", "coefficient": 0.03 });
@@ -89,7 +89,7 @@ async fn the_peaks_alone_are_those_of_the_whole_answer() {
 }
 
 #[tokio::test]
-async fn blank_lines_are_passed_over_and_a_line_too_long_is_a_problem_of_its_own() {
+async fn skips_blank_lines_and_reports_long_line() {
     let service = Service::within(Limits { max_body_bytes: 1_000, ..LIMITS });
     let long = format!("{:2000}", variant(1).to_string());
     let documents =
@@ -102,12 +102,12 @@ async fn blank_lines_are_passed_over_and_a_line_too_long_is_a_problem_of_its_own
 }
 
 #[tokio::test]
-async fn an_empty_batch_has_the_last_line_alone() {
+async fn empty_batch_answers_last_line_only() {
     assert!(lines(&batch(&Service::new(), "", &[]).await).is_empty());
 }
 
 #[tokio::test]
-async fn what_is_no_batch_is_refused() {
+async fn rejects_body_that_is_no_batch() {
     let service = Service::new();
     for query in ["?endpoint=accuracy", "?states=false", "?peaks_only=1", "?endpoint=geometry&peaks_only=true"] {
         batch(&service, query, &[variant(0).to_string()]).await.refused(400, "invalid_query");
@@ -117,7 +117,7 @@ async fn what_is_no_batch_is_refused() {
 }
 
 #[tokio::test]
-async fn a_line_beyond_the_deadline_is_a_problem_and_the_others_are_answered() {
+async fn line_over_deadline_fails_alone() {
     let service = Service::within(Limits { deadline_ms: 400, ..ENDLESS });
     let endless = with(&shortest(), "/sweep", json!({ "samples": 10_000_000 })).to_string();
     let found =
@@ -127,7 +127,7 @@ async fn a_line_beyond_the_deadline_is_a_problem_and_the_others_are_answered() {
 }
 
 #[test]
-fn without_a_server_a_batch_answers_the_same_lines() {
+fn command_line_batch_answers_same_lines() {
     let documents = format!("{}\n\n{{\n{}\n", variant(0), undercut());
     let mut child = Command::new(env!("CARGO_BIN_EXE_toothwave"))
         .args(["batch", "-", "--peaks-only"])
@@ -197,7 +197,7 @@ fn line_may_arrive_in_any_pieces() {
 }
 
 #[test]
-fn lines_are_answered_while_others_are_sent() {
+fn answers_lines_while_others_arrive() {
     let service = Service::new();
     let mut stream = open(&service, false);
     send(&mut stream, &format!("{}\n", variant(0)));
@@ -206,7 +206,7 @@ fn lines_are_answered_while_others_are_sent() {
     read_until(&mut stream, "\"index\":1");
 }
 
-/// nginx passes on no more of a request once its answer has begun.
+/// nginx forwards no more of a request once its answer has begun.
 #[test]
 fn batch_behind_proxy_is_read_first() {
     let service = Service::new();
@@ -253,7 +253,7 @@ fn broken_batch_ends_with_its_reason() {
 }
 
 #[test]
-fn open_batch_has_last_line_when_service_stops() {
+fn open_batch_gets_last_line_at_shutdown() {
     let service = Service::with(LIMITS, &["--shutdown-ms", "500"]);
     let mut stream = open(&service, false);
     send(&mut stream, &format!("{}\n", variant(0)));
@@ -263,7 +263,7 @@ fn open_batch_has_last_line_when_service_stops() {
 }
 
 #[test]
-fn unread_batches_hold_up_nobody() {
+fn unread_batches_delay_no_one() {
     let service = Service::new();
     let _unread: Vec<_> = (0..6).map(|_| service.send(&question("", uneven(300).join("\n")))).collect();
     for index in 0..4 {

@@ -134,7 +134,7 @@ pub(crate) fn codes_of<'a>(objects: impl IntoIterator<Item = &'a Value>) -> Vec<
 }
 
 #[test]
-fn every_kind_of_problem_has_its_status_and_a_type_of_its_own() {
+fn every_problem_has_status_and_unique_type() {
     use toothwave::http::problem::Problem;
     let expected = |code| match code {
         ProblemCode::MalformedJson | ProblemCode::BrokenBody | ProblemCode::InvalidQuery => 400,

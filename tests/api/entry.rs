@@ -44,7 +44,7 @@ impl Drop for KeysFile {
 const OTHERS: [&str; 5] = ["/v1/limits", "/v1/examples", "/metrics", "/openapi.json", "/docs/"];
 
 #[tokio::test]
-async fn with_keys_every_path_but_health_and_the_page_wants_one() {
+async fn keys_guard_all_but_health_and_page() {
     let (key, line) = new_key("a team");
     let file = KeysFile::of(&line);
     let service = Service::with(LIMITS, &["--keys-file", file.path()]);
@@ -70,7 +70,7 @@ async fn with_keys_every_path_but_health_and_the_page_wants_one() {
 }
 
 #[test]
-fn wrong_setting_ends_with_its_name() {
+fn wrong_setting_is_named_at_exit() {
     for (variable, value, named) in [
         ("TOOTHWAVE_MAX_STATES", "many", "max-states"),
         ("TOOTHWAVE_MAX_CONCURRENT_SOLVES", "0", "max-concurrent-solves"),
@@ -86,7 +86,7 @@ fn wrong_setting_ends_with_its_name() {
 }
 
 #[test]
-fn a_fault_in_the_settings_is_none_of_another_command() {
+fn wrong_setting_breaks_no_other_command() {
     let command = |arguments: &[&str]| {
         Command::new(env!("CARGO_BIN_EXE_toothwave"))
             .args(arguments)

@@ -69,7 +69,7 @@ impl Dice {
 }
 
 #[tokio::test]
-async fn whatever_the_numbers_there_is_an_answer_in_numbers_or_a_reason() {
+async fn any_numbers_get_finite_answer_or_reason() {
     let service = Service::within(Limits { max_states: 5_000, cache_max_bytes: 0, ..LIMITS });
     let mut dice = Dice(2013);
     let mut answered = 0;

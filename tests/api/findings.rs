@@ -59,7 +59,7 @@ fn assert_numbers(finding: &Value, value: f64, limit: f64, unit: &str) {
 }
 
 #[tokio::test]
-async fn undercut_is_a_warning_with_the_critical_radius() {
+async fn undercut_warning_states_critical_radius() {
     let finding = finding(&undercut(), "undercut").await;
     let found = Service::new().post("/v1/geometry", &undercut()).await.found();
     assert_numbers(&finding, 1.5, found["undercut"]["critical_tooth_radius_mm"].as_f64().unwrap(), "mm");
@@ -69,19 +69,19 @@ async fn undercut_is_a_warning_with_the_critical_radius() {
 }
 
 #[tokio::test]
-async fn undercut_that_a_bore_takes_away_is_no_more_than_information() {
+async fn undercut_removed_by_bore_is_information() {
     assert_eq!(finding(&bored(), "undercut").await["severity"], "info");
 }
 
 #[tokio::test]
-async fn a_bore_that_ends_the_flank_early_is_a_finding_with_the_natural_tip() {
+async fn bore_shortening_flank_states_natural_tip() {
     let natural =
         Service::new().post("/v1/geometry", &undercut()).await.found()["ring"]["tip_radius_mm"].as_f64().unwrap();
     assert_numbers(&finding(&bored(), "bore_shortens_flank").await, 52.8227, natural, "mm");
 }
 
 #[tokio::test]
-async fn a_bore_inside_the_natural_tip_changes_nothing_and_is_a_finding() {
+async fn bore_inside_natural_tip_has_no_effect() {
     let document = with(&spelled_out(), "/drive/ring/tip_radius_mm", json!(65.9));
     let found = finding(&document, "bore_without_effect").await;
     assert_numbers(&found, 65.9, 66.0, "mm");
@@ -120,7 +120,7 @@ fn thick() -> Value {
 }
 
 #[tokio::test]
-async fn a_thin_wall_between_slots_is_a_warning() {
+async fn thin_slot_wall_is_a_warning() {
     let half = std::f64::consts::PI / 28.0;
     let wall = 2.0 * ((58.0_f64 * 58.0 - 5.5 * 5.5).sqrt() * half.sin() - 5.5 * half.cos());
     assert_numbers(&finding(&thick(), "thin_slot_wall").await, wall, 2.75, "mm");
@@ -132,7 +132,7 @@ fn thin(radius_mm: f64) -> Value {
 }
 
 #[tokio::test]
-async fn a_loaded_tooth_that_leaves_the_carriers_annulus_is_a_warning_for_each_edge() {
+async fn loaded_tooth_beyond_carrier_warns_for_each_edge() {
     // Centres run from b + r to a + r; the annulus reaches from a to b + 2r.
     let findings = findings(&thin(1.9)).await;
     let beyond: Vec<_> = findings.iter().filter(|finding| finding["code"] == "tooth_beyond_carrier").collect();
@@ -156,7 +156,7 @@ fn steep() -> Value {
 }
 
 #[tokio::test]
-async fn a_steep_ring_flank_is_a_warning_with_its_pressure_angle() {
+async fn steep_ring_flank_warning_states_pressure_angle() {
     let finding = finding(&steep(), "steep_ring_flank").await;
     let geometry = Service::new().post("/v1/geometry", &steep()).await.found();
     assert_numbers(&finding, geometry["ring"]["pressure_angle_max_deg"].as_f64().unwrap(), 70.0, "deg");
@@ -169,7 +169,7 @@ fn overloaded() -> Value {
 }
 
 #[tokio::test]
-async fn a_stress_above_the_fatigue_limit_is_a_warning_for_each_contact() {
+async fn stress_above_fatigue_limit_warns_for_each_contact() {
     let found = Service::new().post("/v1/sweep", &overloaded()).await.found();
     let mut findings = findings(&overloaded()).await;
     // So heavy a load also winds the drive up beyond what the model holds for.
@@ -189,7 +189,7 @@ fn loose() -> Value {
 }
 
 #[tokio::test]
-async fn a_wind_up_of_more_than_a_tenth_of_the_period_is_a_warning() {
+async fn wind_up_above_tenth_of_period_warns() {
     let document = with(&loose(), "/sweep", json!({ "wind_up": true }));
     let found = Service::new().post("/v1/sweep", &document).await.found();
     let wind_up = found["wind_up"]["wind_up_deg"].as_array().unwrap();
@@ -202,7 +202,7 @@ async fn a_wind_up_of_more_than_a_tenth_of_the_period_is_a_warning() {
 }
 
 #[tokio::test]
-async fn a_sweep_tells_how_many_teeth_mesh_and_how_many_of_them_carry() {
+async fn sweep_counts_meshing_and_loaded_teeth() {
     let found = Service::new().post("/v1/sweep", &loose()).await.found();
     assert_eq!(found["teeth_in_mesh_per_zone"], json!({ "min": 7, "max": 7 }));
     let loaded = found["states"]["loaded"].as_array().unwrap();
@@ -222,14 +222,14 @@ async fn a_sweep_tells_how_many_teeth_mesh_and_how_many_of_them_carry() {
 }
 
 #[tokio::test]
-async fn stresses_are_no_finding_where_no_load_is_read() {
+async fn unread_load_gives_no_stress_finding() {
     for path in ["/v1/geometry", "/v1/coincidence-degree"] {
         assert!(findings_at(path, &overloaded()).await.is_empty());
     }
 }
 
 #[tokio::test]
-async fn all_endpoints_tell_the_same_of_the_drive_itself() {
+async fn all_endpoints_report_same_findings_of_drive() {
     for document in [undercut(), bored(), sparse(), thick(), thin(1.9), steep()] {
         let of_geometry = findings_at("/v1/geometry", &document).await;
         assert_eq!(findings_at("/v1/coincidence-degree", &document).await, of_geometry);
@@ -245,7 +245,7 @@ async fn findings_of_parts(document: &Value) -> Vec<Value> {
 }
 
 #[tokio::test]
-async fn a_carrier_as_drawn_that_does_not_hold_the_teeth_is_a_warning_for_each_edge() {
+async fn drawn_carrier_losing_teeth_warns_for_each_edge() {
     // Centres run from b + r to a + r; a wall stands r beside the slot's middle.
     let along = |radius_mm: f64| (radius_mm * radius_mm - 25.0).sqrt();
     for (radii, edge, expected) in [
@@ -263,7 +263,7 @@ async fn a_carrier_as_drawn_that_does_not_hold_the_teeth_is_a_warning_for_each_e
 }
 
 #[tokio::test]
-async fn a_tooth_that_leaves_its_slot_without_load_is_information() {
+async fn tooth_leaving_slot_unloaded_is_information() {
     // Case 5.2 as it is by default. Centres start at b + r = 50.8 mm, where the undercut flank is long past; the carrier starts a tenth
     // of the annulus outside the cam.
     let found = Service::new().post("/v1/geometry", &undercut()).await.found();
@@ -281,7 +281,7 @@ fn thin_walls() -> Value {
 }
 
 #[tokio::test]
-async fn rims_and_walls_of_a_micrometre_are_warnings() {
+async fn micrometre_rims_and_walls_are_warnings() {
     let findings = findings_of_parts(&thin_walls()).await;
     let [rim, wall] = &findings[..] else { panic!("{findings:?}") };
     for (finding, pointer) in [(rim, "/parts/ring/outer_radius_mm"), (wall, "/parts/wave_generator/bore_radius_mm")] {
@@ -299,7 +299,7 @@ fn cleared(clearance_um: f64) -> Value {
 }
 
 #[tokio::test]
-async fn a_clearance_that_itself_undercuts_the_ring_is_a_warning_with_the_distance_from_which_it_does() {
+async fn clearance_that_undercuts_ring_states_critical_distance() {
     // The path of the centres has at its tip the curvature radius that the flank may be away from it.
     let (a, b, r, k) = (58.0_f64, 56.0_f64, 5.0_f64, 13.0_f64);
     let critical_mm = (b + r) / (k * k * (a * a - b * b) / (a * a + b * r) - 1.0);
@@ -313,7 +313,7 @@ async fn a_clearance_that_itself_undercuts_the_ring_is_a_warning_with_the_distan
 }
 
 #[tokio::test]
-async fn what_sets_the_ring_back_until_it_is_undercut_is_pointed_at() {
+async fn undercut_by_offset_points_to_its_fields() {
     let modified = |document: &Value| with(document, "/modification", json!({ "ring_equidistant_um": 3000 }));
     let (clearance, equidistant, radius) =
         ("/parts/ring/clearance_um", "/modification/ring_equidistant_um", "/drive/teeth/radius_mm");
@@ -328,7 +328,7 @@ async fn what_sets_the_ring_back_until_it_is_undercut_is_pointed_at() {
 }
 
 #[tokio::test]
-async fn parts_that_are_not_drawn_are_not_judged() {
+async fn undrawn_parts_have_no_findings() {
     assert!(findings_at("/v1/drawings/tooth", &thin_walls()).await.is_empty());
     assert_eq!(findings_at("/v1/drawings/ring", &thin_walls()).await.len(), 1);
 }
@@ -341,7 +341,7 @@ fn rubbing(coefficient: f64) -> Value {
 }
 
 #[tokio::test]
-async fn friction_beyond_what_was_measured_is_a_warning_with_the_end_of_the_range() {
+async fn friction_beyond_measured_range_states_its_end() {
     let along = finding(&rubbing(0.06), "friction_beyond_measured").await;
     assert_numbers(&along, 0.06, 0.05, "");
     assert_eq!(along["severity"], "warning");
@@ -352,7 +352,7 @@ async fn friction_beyond_what_was_measured_is_a_warning_with_the_end_of_the_rang
 }
 
 #[tokio::test]
-async fn an_efficiency_that_may_be_far_off_is_information_with_its_error() {
+async fn uncertain_efficiency_is_information_with_its_error() {
     let found = Service::new().post("/v1/sweep", &rubbing(0.03)).await.found();
     let losses = &found["losses"];
     let share = 1.0 / losses["efficiency"]["ring_fixed"].as_f64().unwrap() - 1.0;
@@ -382,7 +382,7 @@ fn on_a_bearing(rating_n: f64, load: &Value) -> Value {
 }
 
 #[tokio::test]
-async fn a_bearing_that_bears_more_than_half_its_rating_is_a_warning_as_its_life_is_promised_up_to_there() {
+async fn bearing_above_half_rating_is_a_warning() {
     const CODE: &str = "bearing_load_above_half_rating";
     let single = |torque_nm: f64| json!({ "input_torque_nm": torque_nm, "input_speed_rpm": 1500.0 });
     let bearing = |found: &Value| found["losses"]["bearing"].clone();
@@ -408,7 +408,7 @@ fn limited(allowable: Value) -> Value {
 }
 
 #[tokio::test]
-async fn a_stress_above_the_allowable_one_is_a_warning_for_each_contact_with_its_own() {
+async fn stress_above_allowable_warns_for_each_contact() {
     let peaks = Service::new().post("/v1/sweep", &shortest()).await.found()["peaks"].clone();
     let peak = |contact: &str| peaks[contact]["stress_mpa"]["value"].as_f64().unwrap();
     let exceeded = async |allowable: Value| -> Vec<Value> {
@@ -435,7 +435,7 @@ async fn a_stress_above_the_allowable_one_is_a_warning_for_each_contact_with_its
 }
 
 #[tokio::test]
-async fn projection_on_a_steep_flank_is_information_and_virtual_work_is_not() {
+async fn steep_flank_is_information_under_projection_only() {
     let document = with(&undercut(), "/model", of_the_paper());
     let geometry = Service::new().post("/v1/geometry", &document).await.found();
     let found = finding(&document, "projection_on_steep_flank").await;
@@ -447,7 +447,7 @@ async fn projection_on_a_steep_flank_is_information_and_virtual_work_is_not() {
 }
 
 #[tokio::test]
-async fn projection_with_a_gap_is_a_warning_and_virtual_work_is_not() {
+async fn gap_is_a_warning_under_projection_only() {
     let gap = |document: &Value| {
         with(document, "/parts", json!({ "ring": { "clearance_um": 4.0 }, "carrier": { "clearance_um": 2.5 } }))
     };
@@ -472,7 +472,7 @@ async fn estimate(document: &Value, backing: &str) -> Value {
 }
 
 #[tokio::test]
-async fn fingers_held_at_one_end_and_a_free_rim_are_warnings_with_their_estimated_share() {
+async fn slender_fingers_and_soft_rim_state_estimated_share() {
     for (parts, backing, code, contact) in [
         (json!({ "carrier": { "fingers": "held_at_one_end" } }), "finger_at_one_end", "slender_fingers", "carrier"),
         (json!({ "ring": { "rim": "free" } }), "free_rim", "soft_rim", "ring"),
@@ -503,9 +503,8 @@ fn grooved(groove_radius_mm: f64) -> Value {
     json!({ "drive": { "wave_generator": cam, "teeth": teeth, "ring": { "teeth": 17 } }, "load": { "input_torque_nm": 0.3 } })
 }
 
-/// Contacts of 14 mm were answered in grooves for balls of 6 mm, without a word.
 #[tokio::test]
-async fn a_contact_that_is_longer_than_its_groove_is_wide_is_a_warning_at_each_that_is() {
+async fn contact_beyond_groove_warns_at_each_groove() {
     let document = grooved(3.001);
     let peaks = Service::new().post("/v1/sweep", &document).await.found()["peaks"].clone();
     let half_length_mm = |contact: &str| peaks[contact]["half_length_mm"].as_f64().unwrap();
@@ -526,9 +525,9 @@ async fn a_contact_that_is_longer_than_its_groove_is_wide_is_a_warning_at_each_t
     }
 }
 
-/// Of balls' grooves drawings have the path alone: a part that is made as drawn has none.
+/// Drawings show only the path of balls' grooves, so a part made as drawn has no groove.
 #[tokio::test]
-async fn each_groove_that_a_drawing_leaves_out_is_information() {
+async fn each_groove_not_drawn_is_information() {
     let document = grooved(3.1);
     for (part, contacts) in [
         ("ring", vec!["ring"]),
@@ -550,7 +549,7 @@ async fn each_groove_that_a_drawing_leaves_out_is_information() {
 }
 
 #[tokio::test]
-async fn every_kind_of_finding_can_be_met_over_http() {
+async fn every_finding_occurs_over_http() {
     let bore_without_effect = with(&shortest(), "/drive/ring/tip_radius_mm", json!(60.0));
     let linear = with(&spelled_out(), "/sweep", json!({ "wind_up": true }));
     let brass = [
@@ -591,9 +590,9 @@ async fn every_kind_of_finding_can_be_met_over_http() {
     assert_eq!(codes_of(&all), words(&finding_codes()));
 }
 
-/// Findings of an eccentric pointed at the semi-axes of an ellipse and gave advice about one, those of balls at a width.
+/// The fields differ between kinds of wave generators and shapes of teeth.
 #[tokio::test]
-async fn findings_name_fields_that_the_document_has_whatever_its_kind_and_shape() {
+async fn findings_point_to_fields_of_the_document() {
     let cylinders = |count: u32| json!({ "count": count, "installed": count, "radius_mm": 2.0, "width_mm": 12.0 });
     let eccentric = json!({ "kind": "eccentric", "radius_mm": 30.8, "eccentricity_mm": 2.4 });
     let harmonic = json!({ "kind": "harmonic", "lobes": 3, "mean_radius_mm": 48.0, "amplitude_mm": 2.2 });

@@ -51,7 +51,7 @@ fn assert_near(found: f64, expected: f64, relative: f64, what: &str) {
 }
 
 #[tokio::test]
-async fn case_5_1_loses_half_of_its_power_on_a_plain_cam_and_an_eighth_on_a_bearing() {
+async fn case_5_1_loses_known_shares_of_power() {
     let sliding = swept(&case_5_1(plain())).await["losses"].clone();
     assert!((float(&sliding["efficiency"]["ring_fixed"]) - 0.499).abs() < 5e-4, "{}", sliding["efficiency"]);
     assert_eq!(sliding["self_locking"]["ring_fixed"], json!(true));
@@ -66,7 +66,7 @@ async fn case_5_1_loses_half_of_its_power_on_a_plain_cam_and_an_eighth_on_a_bear
 }
 
 #[tokio::test]
-async fn power_in_is_power_out_and_what_is_lost() {
+async fn input_power_equals_output_power_plus_losses() {
     for friction in [plain(), on_bearing("race"), on_bearing("rolling")] {
         let found = swept(&case_5_1(friction)).await;
         let losses = &found["losses"];
@@ -94,7 +94,7 @@ async fn power_in_is_power_out_and_what_is_lost() {
 }
 
 #[tokio::test]
-async fn what_is_lost_is_friction_times_the_slips_of_the_states() {
+async fn losses_are_friction_times_slips_of_states() {
     for (kind, friction, of_cam) in [("plain", plain(), 0.03), ("race", on_bearing("race"), 0.05)] {
         let found = swept(&case_5_1(friction)).await;
         let (states, losses) = (&found["states"], &found["losses"]);
@@ -129,7 +129,7 @@ async fn what_is_lost_is_friction_times_the_slips_of_the_states() {
 }
 
 #[tokio::test]
-async fn pressure_times_velocity_has_its_largest_value_and_its_place() {
+async fn pressure_times_velocity_has_maximum_and_place() {
     let found = swept(&case_5_1(plain())).await;
     let (states, losses) = (&found["states"], &found["losses"]);
     // Wave generator against carrier, the ring fixed.
@@ -158,7 +158,7 @@ async fn pressure_times_velocity_has_its_largest_value_and_its_place() {
 }
 
 #[tokio::test]
-async fn nothing_is_computed_of_friction_that_is_left_out_and_no_power_without_a_speed() {
+async fn omitted_friction_computes_nothing() {
     let with_speed = swept(&without(&case_5_1(plain()), "/friction")).await;
     assert!(with_speed.get("losses").is_none());
     let mut without_either = case_5_1(plain());
@@ -177,7 +177,7 @@ async fn nothing_is_computed_of_friction_that_is_left_out_and_no_power_without_a
 }
 
 #[tokio::test]
-async fn every_impossible_value_of_friction_is_a_fault_at_its_field() {
+async fn each_impossible_friction_is_reported_at_its_field() {
     let errors = async |document: Value| -> Vec<(String, f64)> {
         let answer = Service::new().post("/v1/sweep", &document).await;
         let problem = answer.refused(422, "impossible_design");
@@ -216,7 +216,7 @@ async fn every_impossible_value_of_friction_is_a_fault_at_its_field() {
 }
 
 #[tokio::test]
-async fn a_fault_of_friction_s_form_is_told_at_its_field() {
+async fn structural_fault_of_friction_is_reported_at_its_field() {
     for (friction, pointer, code) in [
         (json!({}), "", "missing_field"),
         (on(&json!({ "coefficient": 0.03 })), "/wave_generator", "missing_field"),
@@ -238,14 +238,14 @@ async fn a_fault_of_friction_s_form_is_told_at_its_field() {
 }
 
 #[tokio::test]
-async fn a_bearing_without_a_rubbing_race_asks_for_no_coefficient_and_heeds_none() {
+async fn rolling_bearing_ignores_coefficient() {
     let mut bare = on_bearing("rolling");
     bare["wave_generator"].as_object_mut().unwrap().remove("coefficient");
     assert_eq!(swept(&case_5_1(bare)).await["losses"], swept(&case_5_1(on_bearing("rolling"))).await["losses"]);
 }
 
 #[tokio::test]
-async fn surfaces_without_friction_lose_nothing_and_numbers_stay_numbers() {
+async fn zero_friction_loses_nothing() {
     let nothing = json!({
         "wave_generator": { "kind": "plain", "coefficient": 0.0 }, "ring": { "coefficient": 0 }, "carrier": { "coefficient": 0 }
     });
@@ -258,7 +258,7 @@ async fn surfaces_without_friction_lose_nothing_and_numbers_stay_numbers() {
 }
 
 #[tokio::test]
-async fn a_tooth_with_flats_does_not_roll_and_loses_more_than_a_loose_one() {
+async fn flat_sided_teeth_do_not_roll_and_lose_more() {
     let flat = json!({ "shape": "flat_sided", "count": 28, "radius_mm": 5.0, "width_mm": 15.0, "flat_length_mm": 4.0 });
     let loose = swept(&case_5_1(on_bearing("race"))).await["losses"].clone();
     let found = swept(&with(&case_5_1(on_bearing("race")), "/drive/teeth", flat)).await["losses"].clone();
@@ -268,7 +268,7 @@ async fn a_tooth_with_flats_does_not_roll_and_loses_more_than_a_loose_one() {
 }
 
 #[tokio::test]
-async fn columns_of_losses_fit_the_states_at_any_sweep_and_of_unlike_zones() {
+async fn loss_columns_have_length_of_states() {
     let unlike = with(&shortest(), "/drive/teeth/count", json!(27));
     let unlike = with(&unlike, "/drive/ring/teeth", json!(25));
     for document in [undercut(), eccentric(), unlike] {
@@ -293,7 +293,7 @@ async fn columns_of_losses_fit_the_states_at_any_sweep_and_of_unlike_zones() {
 }
 
 #[tokio::test]
-async fn an_eccentric_is_pushed_across_its_eccentricity_by_the_torque_over_it() {
+async fn eccentric_radial_force_is_torque_over_eccentricity() {
     for sweep in [json!({ "samples": 9 }), json!({ "tolerance": 1e-4 })] {
         let found = swept(&with(&eccentric(), "/sweep", sweep)).await;
         let force = &found["radial_force_n"];
@@ -316,7 +316,7 @@ async fn text_of(document: &Value) -> String {
 }
 
 #[tokio::test]
-async fn losses_and_the_radial_force_can_be_read_as_text() {
+async fn text_contains_losses_and_radial_force() {
     let text = text_of(&case_5_1(plain())).await;
     for part in ["ring fixed            49.9", "(locks itself)", "input torque with losses", "power lost", "MPa m/s"] {
         assert!(text.contains(part), "{part} is not in {text}");
@@ -336,7 +336,7 @@ fn worn(friction: Value) -> Value {
 }
 
 #[tokio::test]
-async fn wear_is_a_depth_an_hour_with_its_place_and_of_a_race_all_round() {
+async fn wear_is_depth_per_hour_with_place() {
     let found = swept(&worn(plain())).await;
     let wear = found["losses"]["wear_mm_per_hour"].clone();
     // 120 passes an hour of a slot at one turn a minute: at 1500 turns, a cam against the carrier of 26/28 of that.
@@ -381,7 +381,7 @@ fn on_its_bearing(element: &str) -> Value {
 }
 
 #[tokio::test]
-async fn the_bearing_of_an_eccentric_lasts_as_iso_281_says() {
+async fn bearing_life_follows_iso_281() {
     for (element, exponent) in [("ball", 3.0), ("roller", 10.0 / 3.0)] {
         let found = swept(&on_its_bearing(element)).await;
         let bearing = &found["losses"]["bearing"];
@@ -410,7 +410,7 @@ async fn the_bearing_of_an_eccentric_lasts_as_iso_281_says() {
 }
 
 #[tokio::test]
-async fn a_bearing_without_a_load_across_it_has_no_life() {
+async fn bearing_without_radial_load_has_no_life() {
     let mut friction = on_bearing("race");
     friction["wave_generator"]["bearing_load_rating_n"] = json!(9000.0);
     let problem = Service::new().post("/v1/sweep", &case_5_1(friction)).await.refused(422, "impossible_design");
@@ -442,7 +442,7 @@ fn loose(document: &Value) -> Value {
 }
 
 #[tokio::test]
-async fn a_duty_has_the_peaks_of_its_hardest_point_and_the_means_of_all() {
+async fn duty_reports_hardest_peaks_and_overall_means() {
     for friction in [plain(), on_bearing("race")] {
         let found = swept(&loose(&on_duty(&DUTY, friction.clone()))).await;
         let mut points = Vec::new();
@@ -490,7 +490,7 @@ async fn a_duty_has_the_peaks_of_its_hardest_point_and_the_means_of_all() {
 }
 
 #[tokio::test]
-async fn a_duty_of_one_point_is_that_load() {
+async fn duty_of_one_point_equals_that_load() {
     let (mut one, mut other) =
         (swept(&on_duty(&[(20.0, 1500.0, 1.0)], plain())).await, swept(&alone(20.0, 1500.0, plain())).await);
     assert_eq!(one.as_object_mut().unwrap().remove("duty").unwrap()["hardest_point"], 0);
@@ -498,7 +498,7 @@ async fn a_duty_of_one_point_is_that_load() {
 }
 
 #[tokio::test]
-async fn a_duty_uses_up_a_bearings_life_point_by_point() {
+async fn duty_sums_bearing_damage_over_points() {
     let torque_nm = float(&eccentric()["load"]["input_torque_nm"]);
     let points = [(torque_nm, 1500.0, 0.75), (2.0 * torque_nm, 500.0, 0.25)];
     let duty: Vec<_> = points
@@ -522,7 +522,7 @@ async fn a_duty_uses_up_a_bearings_life_point_by_point() {
 }
 
 #[tokio::test]
-async fn without_friction_a_duty_has_peaks_and_points_alone() {
+async fn duty_without_friction_has_only_peaks_and_points() {
     let found = swept(&without(&on_duty(&DUTY, plain()), "/friction")).await;
     assert!(found.get("losses").is_none());
     assert_eq!(found["load"]["input_torque_nm"], 40.0);
@@ -531,7 +531,7 @@ async fn without_friction_a_duty_has_peaks_and_points_alone() {
 }
 
 #[tokio::test]
-async fn a_duty_s_faults_are_told_at_their_places() {
+async fn duty_faults_are_reported_at_their_places() {
     let errors = async |document: Value, code: &str| -> Vec<(String, String)> {
         let problem = Service::new().post("/v1/sweep", &document).await.refused(422, code);
         let errors = problem["errors"].as_array().unwrap().iter();
@@ -566,7 +566,7 @@ async fn a_duty_s_faults_are_told_at_their_places() {
 }
 
 #[tokio::test]
-async fn all_points_of_a_duty_count_towards_the_states_that_may_be() {
+async fn all_duty_points_count_towards_state_limit() {
     let limits = crate::asking::Limits { max_states: 600, ..crate::asking::LIMITS };
     // 40 intervals with 7 teeth.
     let service = Service::within(limits);
@@ -576,7 +576,7 @@ async fn all_points_of_a_duty_count_towards_the_states_that_may_be() {
 }
 
 #[tokio::test]
-async fn an_allowable_stress_is_a_number_or_one_for_each_contact() {
+async fn allowable_stress_is_number_or_one_per_contact() {
     let faulty = async |allowable: Value| {
         let document = with(&shortest(), "/load/allowable_stress_mpa", allowable);
         let problem = Service::new().post("/v1/sweep", &document).await.problem();
@@ -594,7 +594,7 @@ async fn an_allowable_stress_is_a_number_or_one_for_each_contact() {
 }
 
 #[tokio::test]
-async fn the_slips_stand_in_the_csv_behind_the_states() {
+async fn slips_follow_states_in_csv() {
     let unlike = with(&with(&shortest(), "/drive/teeth/count", json!(27)), "/drive/ring/teeth", json!(25));
     for document in [shortest(), loose(&with(&unlike, "/model", json!({ "compatibility": "virtual_work" })))] {
         let csv = async |document: &Value| -> Vec<Vec<String>> {

@@ -39,7 +39,7 @@ fn relief() -> Value {
 }
 
 #[tokio::test]
-async fn a_surface_set_back_along_its_normals_is_a_clearance_at_its_contact() {
+async fn offset_along_normals_equals_clearance() {
     let pairs = [
         (json!({ "ring_equidistant_um": 10.0 }), json!({ "ring": { "clearance_um": 10.0 } })),
         (json!({ "wave_generator_equidistant_um": 10.0 }), json!({ "wave_generator": { "clearance_um": 10.0 } })),
@@ -57,7 +57,7 @@ async fn a_surface_set_back_along_its_normals_is_a_clearance_at_its_contact() {
 }
 
 #[tokio::test]
-async fn a_turned_ring_or_carrier_is_lost_motion_alone() {
+async fn turned_ring_or_carrier_is_lost_motion() {
     // kτ and (Z_G/U)τ for every tooth: docs/theory.md section 4.8.
     let conjugate = swept(&modified(json!({}))).await;
     for (field, ratio) in [("ring_rotation_arcsec", 13.0), ("carrier_rotation_arcsec", 14.0)] {
@@ -71,7 +71,7 @@ async fn a_turned_ring_or_carrier_is_lost_motion_alone() {
 }
 
 #[tokio::test]
-async fn each_number_of_the_modification_moves_an_answer() {
+async fn each_modification_changes_an_answer() {
     let mut all = json!({
         "ring_equidistant_um": 10.0, "ring_path_shift_um": 3.0, "ring_profile_shift_um": 3.0, "ring_rotation_arcsec": 20.0,
         "wave_generator_equidistant_um": 1.0, "slot_wall_um": 1.0, "carrier_rotation_arcsec": 5.0, "tooth_radius_um": 0.5
@@ -93,7 +93,7 @@ async fn each_number_of_the_modification_moves_an_answer() {
 }
 
 #[tokio::test]
-async fn a_path_and_a_profile_moved_outward_take_load_from_where_the_flank_is_flat() {
+async fn outward_offsets_unload_flat_part_of_flank() {
     // Δ cos β and Δ cos(β - δ), with δ < β: the path's shift leaves the steep middle the smaller gap, so that it carries more there.
     let peak = async |modification: Value| {
         swept(&modified(modification)).await["peaks"]["ring"]["force_n"]["value"].as_f64().unwrap()
@@ -107,7 +107,7 @@ async fn a_path_and_a_profile_moved_outward_take_load_from_where_the_flank_is_fl
 }
 
 #[tokio::test]
-async fn teeth_on_a_relieved_tip_carry_less() {
+async fn teeth_on_relieved_tip_carry_less() {
     let last = |answer: &Value| {
         let states = &answer["states"];
         let pairs = numbers(&states["position_deg"]).into_iter().zip(numbers(&states["force_ring_n"]));
@@ -118,7 +118,7 @@ async fn teeth_on_a_relieved_tip_carry_less() {
 }
 
 #[tokio::test]
-async fn a_part_too_full_is_an_interference_unless_a_clearance_covers_it() {
+async fn interference_is_refused_unless_clearance_covers_it() {
     let full = modified(json!({ "ring_equidistant_um": -4.0 }));
     let problem = Service::new().post("/v1/sweep", &full).await.refused(422, "interference");
     let detail = problem["detail"].as_str().unwrap();
@@ -133,7 +133,7 @@ async fn a_part_too_full_is_an_interference_unless_a_clearance_covers_it() {
 }
 
 #[tokio::test]
-async fn projection_takes_no_modification_and_says_so_at_its_first_number() {
+async fn projection_rejects_modification_at_its_first_number() {
     let document = with(&modified(json!({ "slot_wall_um": 1.0 })), "/model", json!({ "compatibility": "projection" }));
     let refused = Service::new().post("/v1/sweep", &document).await;
     let problem = refused.refused(422, "impossible_design");
@@ -147,7 +147,7 @@ async fn projection_takes_no_modification_and_says_so_at_its_first_number() {
 }
 
 #[tokio::test]
-async fn a_tip_relief_beyond_the_flank_is_told_beside_other_faults_and_only_once() {
+async fn tip_relief_beyond_flank_is_reported_once() {
     let at = |start_deg: f64| {
         let relief = json!({ "amount_um": 6.0, "start_deg": start_deg, "power": 2.0 });
         with(&modified(json!({ "ring_tip_relief": relief })), "/load", json!({ "input_torque_nm": 0.0 }))
@@ -162,7 +162,7 @@ async fn a_tip_relief_beyond_the_flank_is_told_beside_other_faults_and_only_once
 }
 
 #[tokio::test]
-async fn a_tip_relief_may_start_anywhere_before_the_valley_of_a_single_lobe() {
+async fn single_lobe_tip_relief_may_start_anywhere() {
     let relief = json!({ "amount_um": 3.0, "start_deg": 120.0, "power": 1.0 });
     // So few teeth that the ring is not undercut, and the flank reaches the valley.
     let few = with(&with(&eccentric(), "/drive/teeth/count", json!(12)), "/drive/ring/teeth", json!(11));

@@ -27,7 +27,7 @@ fn described(path: &str) -> &str {
 }
 
 #[test]
-fn the_committed_document_is_the_one_that_the_code_describes() {
+fn committed_document_matches_code() {
     assert!(
         COMMITTED == toothwave::http::router::openapi_json(),
         "openapi/openapi.json is not what the code describes; write it anew with `cargo run -p toothwave -- openapi > openapi/openapi.json` and look at the difference"
@@ -35,7 +35,7 @@ fn the_committed_document_is_the_one_that_the_code_describes() {
 }
 
 #[test]
-fn every_reference_leads_somewhere() {
+fn every_reference_resolves() {
     let document = document();
     let mut references = 0;
     let mut pending = vec![document];
@@ -73,7 +73,7 @@ fn objects(document: &Value) -> Vec<&serde_json::Map<String, Value>> {
 }
 
 #[test]
-fn there_is_one_problem_and_every_refusal_refers_to_it() {
+fn every_refusal_refers_to_one_problem() {
     let problems: Vec<_> =
         objects(document()).into_iter().filter_map(|object| object.get("application/problem+json")).collect();
     assert!(problems.len() > 50, "{}", problems.len());
@@ -83,12 +83,12 @@ fn there_is_one_problem_and_every_refusal_refers_to_it() {
 }
 
 #[test]
-fn the_document_says_where_its_service_stands() {
+fn server_url_is_root() {
     assert_eq!(document()["servers"][0]["url"], "/");
 }
 
 #[test]
-fn every_variant_of_a_choice_has_a_name_and_the_word_that_leads_to_it() {
+fn every_variant_has_name_and_discriminator_word() {
     let schemas = document()["components"]["schemas"].as_object().unwrap();
     for (name, words) in [
         ("WaveGenerator", vec!["ellipse", "eccentric", "harmonic", "harmonic_path"]),
@@ -124,7 +124,7 @@ fn no_default_is_null_where_null_is_refused() {
 }
 
 #[test]
-fn a_default_word_stands_with_its_words_and_beside_no_reference() {
+fn default_words_are_never_beside_references() {
     assert_eq!(document()["components"]["schemas"]["ExtentDocument"]["default"], "tooth");
     for object in objects(document()) {
         assert!(!(object.contains_key("$ref") && object.get("default").is_some_and(Value::is_string)), "{object:?}");
@@ -132,7 +132,7 @@ fn a_default_word_stands_with_its_words_and_beside_no_reference() {
 }
 
 #[test]
-fn no_text_ends_a_comment_of_the_languages_that_clients_are_generated_in() {
+fn no_text_contains_comment_markers() {
     // Of k = E*/2 a generator for C++ makes a comment that ends within the formula.
     for object in objects(document()) {
         for text in object.values().filter_map(Value::as_str) {
@@ -142,7 +142,7 @@ fn no_text_ends_a_comment_of_the_languages_that_clients_are_generated_in() {
 }
 
 #[test]
-fn the_rendering_in_3_0_has_no_word_that_only_3_1_knows() {
+fn version_3_0_has_no_3_1_keywords() {
     let document: Value = serde_json::from_str(toothwave::http::router::openapi_3_0_json()).unwrap();
     assert_eq!(document["openapi"], "3.0.3");
     assert_eq!(document["info"]["license"].get("identifier"), None);
@@ -166,7 +166,7 @@ fn the_rendering_in_3_0_has_no_word_that_only_3_1_knows() {
 }
 
 #[tokio::test]
-async fn the_rendering_in_3_0_is_served_beside() {
+async fn version_3_0_is_served() {
     let answer = Service::new().ask(&Question::of("GET", "/openapi-3.0.json")).await;
     assert_eq!((answer.status, answer.text()), (200, toothwave::http::router::openapi_3_0_json()));
 }
@@ -180,7 +180,7 @@ fn every_schema_is_used() {
 }
 
 #[test]
-fn every_path_and_every_status_that_it_can_have_is_described() {
+fn every_path_and_status_is_described() {
     let solving = ["200", "304", "400", "406", "408", "413", "415", "422", "500", "503"];
     let mut expected: Vec<(&str, &str, &[&str])> =
         ENDPOINTS.iter().map(|&path| (described(path), "post", &solving[..])).collect();
@@ -223,7 +223,7 @@ fn every_path_and_every_status_that_it_can_have_is_described() {
 }
 
 #[test]
-fn every_problem_is_described_as_problem_json_and_every_503_of_a_solve_says_when_to_try_again() {
+fn problems_are_problem_json_with_retry_after() {
     let document = document();
     for path in ENDPOINTS {
         let responses = document["paths"][described(path)]["post"]["responses"].as_object().unwrap();
@@ -374,7 +374,7 @@ fn is_numeric(schema: &Value) -> bool {
 }
 
 #[test]
-fn every_number_of_the_design_document_has_the_range_that_is_checked() {
+fn every_number_has_the_checked_range() {
     let document = document();
     let all = below(document, &document["components"]["schemas"]["Design"], "");
     let parameters = parameters();
@@ -398,7 +398,7 @@ fn every_number_of_the_design_document_has_the_range_that_is_checked() {
 }
 
 #[test]
-fn every_default_of_the_schema_is_the_one_that_is_taken() {
+fn every_schema_default_is_the_applied_one() {
     let document = document();
     let all = below(document, &document["components"]["schemas"]["Design"], "");
     let mut defaults = 0;
@@ -429,7 +429,7 @@ fn equal(one: &Value, other: &Value) -> bool {
 }
 
 #[test]
-fn every_code_is_in_the_document() {
+fn document_contains_every_code() {
     let document = document();
     for (schema, words) in [
         ("ProblemCode", words(&problem_codes())),
@@ -457,7 +457,7 @@ fn docs_findings_explains_every_finding() {
 }
 
 #[test]
-fn docs_problems_explains_every_problem_and_every_fault_of_a_field() {
+fn docs_problems_explains_every_code() {
     let text = documentation("problems.md");
     for word in words(&problem_codes()).into_iter().chain(words(&field_codes())) {
         assert!(text.contains(&format!("`{word}`")), "docs/problems.md does not name `{word}`");
@@ -520,7 +520,7 @@ fn assert_all_described(document: &Value, schema: &Value, instance: &Value, what
 }
 
 #[tokio::test]
-async fn every_success_is_as_described() {
+async fn every_success_matches_its_schema() {
     let service = Service::new();
     let bore_without_effect = serde_json::from_str(designs::CONTRACT).unwrap();
     let overloaded = with(&spelled_out(), "/load/input_torque_nm", json!(2000.0));
@@ -554,7 +554,7 @@ async fn every_success_is_as_described() {
 }
 
 #[tokio::test]
-async fn every_304_is_as_described() {
+async fn every_304_matches_its_description() {
     let service = Service::new();
     for path in ENDPOINTS {
         let question = Question::post(path, shortest().to_string());
@@ -566,7 +566,7 @@ async fn every_304_is_as_described() {
 }
 
 #[tokio::test]
-async fn every_problem_is_as_described() {
+async fn every_problem_matches_its_schema() {
     let limits = Limits { max_states: 300, ..LIMITS };
     let service = Service::within(limits);
     let mut statuses = BTreeSet::new();
@@ -604,7 +604,7 @@ fn design_schema() -> Value {
 }
 
 #[tokio::test]
-async fn what_the_service_takes_the_schema_takes_too() {
+async fn schema_accepts_what_the_service_accepts() {
     let service = Service::new();
     let documents = [
         spelled_out(),
@@ -667,7 +667,7 @@ fn kinds() -> Vec<Value> {
 }
 
 #[tokio::test]
-async fn every_kind_shape_and_law_is_answered_and_as_described() {
+async fn every_kind_is_answered_as_described() {
     let service = Service::new();
     for document in kinds() {
         assert_valid(&design_schema(), &document, &document.to_string());
@@ -679,9 +679,9 @@ async fn every_kind_shape_and_law_is_answered_and_as_described() {
     }
 }
 
-/// Generators of clients tell kinds apart by the discriminator: each schema that it leads to requires the word that leads there.
+/// Generated clients tell kinds apart by this word.
 #[test]
-fn every_discriminator_leads_to_schemas_that_require_its_word() {
+fn every_discriminator_maps_to_schemas_requiring_its_word() {
     let document = document();
     let mut unions = 0;
     for (name, schema) in document["components"]["schemas"].as_object().unwrap() {
@@ -700,7 +700,7 @@ fn every_discriminator_leads_to_schemas_that_require_its_word() {
 }
 
 #[tokio::test]
-async fn what_the_service_refuses_by_form_or_range_the_schema_refuses_too() {
+async fn schema_refuses_invalid_form_and_range() {
     let service = Service::new();
     let schema = validator(&design_schema());
     let mut refused = vec![json!(null), json!([]), json!({}), json!("drive")];
@@ -725,7 +725,7 @@ async fn what_the_service_refuses_by_form_or_range_the_schema_refuses_too() {
 }
 
 #[test]
-fn the_example_in_the_document_is_a_design() {
+fn example_in_the_document_is_a_design() {
     let document = document();
     let example = &document["components"]["schemas"]["Design"]["example"];
     assert!(example.is_object());

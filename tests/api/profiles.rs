@@ -171,7 +171,7 @@ fn drives_and_tolerances(extent: &str) -> Vec<Value> {
 }
 
 #[tokio::test]
-async fn one_tooth_runs_from_one_symmetry_line_to_the_next() {
+async fn tooth_profile_spans_its_two_symmetry_lines() {
     for document in drives_and_tolerances("tooth") {
         let geometry = geometry(&document).await;
         let half = geometry.numbers.half_pitch();
@@ -185,7 +185,7 @@ async fn one_tooth_runs_from_one_symmetry_line_to_the_next() {
 }
 
 #[tokio::test]
-async fn copies_turned_by_a_tooth_join() {
+async fn copies_rotated_by_one_tooth_join() {
     for document in drives_and_tolerances("tooth") {
         let geometry = geometry(&document).await;
         for curve in [&geometry.ring, &geometry.path] {
@@ -197,7 +197,7 @@ async fn copies_turned_by_a_tooth_join() {
 }
 
 #[tokio::test]
-async fn one_tooth_is_its_own_mirror_image() {
+async fn tooth_profile_is_mirror_symmetric() {
     for document in drives_and_tolerances("tooth") {
         let geometry = geometry(&document).await;
         for curve in [&geometry.ring, &geometry.path] {
@@ -209,7 +209,7 @@ async fn one_tooth_is_its_own_mirror_image() {
 }
 
 #[tokio::test]
-async fn the_full_ring_is_closed_and_made_of_its_teeth() {
+async fn full_ring_is_closed_and_repeats_its_tooth() {
     for document in drives_and_tolerances("full") {
         let full = geometry(&document).await;
         let tooth = geometry(&with(&document, "/profile/extent", json!("tooth"))).await;
@@ -233,7 +233,7 @@ async fn the_full_ring_is_closed_and_made_of_its_teeth() {
 }
 
 #[tokio::test]
-async fn the_ring_runs_counter_clockwise_without_spikes() {
+async fn ring_runs_counter_clockwise_without_spikes() {
     for document in drives_and_tolerances("tooth") {
         let geometry = geometry(&document).await;
         for curve in [&geometry.ring, &geometry.path] {
@@ -250,7 +250,7 @@ async fn the_ring_runs_counter_clockwise_without_spikes() {
 }
 
 #[tokio::test]
-async fn the_radii_of_the_answer_are_those_of_the_profile() {
+async fn reported_radii_are_those_of_profile() {
     for document in drives_and_tolerances("tooth") {
         let geometry = geometry(&document).await;
         let radii: Vec<_> = geometry.ring.iter().map(|&point| radius(point)).collect();
@@ -265,7 +265,7 @@ async fn the_radii_of_the_answer_are_those_of_the_profile() {
 }
 
 #[tokio::test]
-async fn a_regular_tip_is_flat_and_b_plus_2r_from_the_axis() {
+async fn regular_tip_is_flat_at_known_radius() {
     for document in [shortest(), reversed()] {
         let geometry = geometry(&with(&document, "/profile", profile("tooth", 1e-6))).await;
         let Numbers { b, r, .. } = geometry.numbers;
@@ -278,7 +278,7 @@ async fn a_regular_tip_is_flat_and_b_plus_2r_from_the_axis() {
 }
 
 #[tokio::test]
-async fn an_undercut_tip_ends_in_a_point_on_its_symmetry_line() {
+async fn undercut_tip_ends_in_point_on_symmetry_line() {
     let geometry = geometry(&with(&undercut(), "/profile", profile("tooth", 1e-6))).await;
     let Numbers { b, r, .. } = geometry.numbers;
     let tip = geometry.ring[geometry.ring.len() - 1];
@@ -293,7 +293,7 @@ async fn an_undercut_tip_ends_in_a_point_on_its_symmetry_line() {
 }
 
 #[tokio::test]
-async fn a_bored_tip_has_its_land_on_the_bore_circle() {
+async fn bored_tip_has_land_on_bore_circle() {
     for tolerance in [1e-6, 1e-3, 1.0] {
         let geometry = geometry(&with(&bored(), "/profile", profile("tooth", tolerance))).await;
         assert_eq!(geometry.tip_radius(), 52.8227);
@@ -316,7 +316,7 @@ async fn a_bored_tip_has_its_land_on_the_bore_circle() {
 }
 
 #[tokio::test]
-async fn every_chord_of_the_ring_is_as_near_to_the_flank_as_was_asked() {
+async fn ring_chords_keep_tolerance() {
     for document in drives_and_tolerances("tooth") {
         let geometry = geometry(&document).await;
         let half: Vec<_> = geometry.ring.iter().copied().filter(|point| point.1 >= 0.0).collect();
@@ -326,7 +326,7 @@ async fn every_chord_of_the_ring_is_as_near_to_the_flank_as_was_asked() {
 }
 
 #[tokio::test]
-async fn every_chord_of_the_path_is_as_near_to_the_path_as_was_asked() {
+async fn path_chords_keep_tolerance() {
     for document in drives_and_tolerances("tooth") {
         let geometry = geometry(&document).await;
         let half: Vec<_> = geometry.path.iter().copied().filter(|point| point.1 >= 0.0).collect();
@@ -339,7 +339,7 @@ async fn every_chord_of_the_path_is_as_near_to_the_path_as_was_asked() {
 }
 
 #[tokio::test]
-async fn every_point_of_the_ring_lies_on_the_flank_or_its_land_and_every_point_of_the_path_on_the_path() {
+async fn points_of_ring_and_path_lie_on_curves() {
     for document in drives() {
         let document = with(&document, "/profile", profile("tooth", 1e-3));
         let geometry = geometry(&document).await;
@@ -362,7 +362,7 @@ async fn every_point_of_the_ring_lies_on_the_flank_or_its_land_and_every_point_o
 }
 
 #[tokio::test]
-async fn the_ring_is_r_away_from_the_path_everywhere_and_nowhere_nearer() {
+async fn ring_keeps_tooth_radius_from_path() {
     for document in drives() {
         let geometry = geometry(&with(&document, "/profile", profile("tooth", 1e-3))).await;
         let full: Vec<_> = (-2_000..=2_000)
@@ -382,7 +382,7 @@ async fn the_ring_is_r_away_from_the_path_everywhere_and_nowhere_nearer() {
 }
 
 #[tokio::test]
-async fn the_wave_generator_is_a_closed_ellipse_as_true_as_was_asked() {
+async fn wave_generator_is_closed_ellipse_within_tolerance() {
     for document in drives_and_tolerances("tooth") {
         let geometry = geometry(&document).await;
         let Numbers { a, b, tolerance_mm, .. } = geometry.numbers;
@@ -414,7 +414,7 @@ async fn the_wave_generator_is_a_closed_ellipse_as_true_as_was_asked() {
 }
 
 #[tokio::test]
-async fn a_finer_tolerance_takes_more_points_but_not_many_more_than_it_must() {
+async fn finer_tolerance_takes_few_more_points_than_needed() {
     for document in drives() {
         let count =
             async |tolerance: f64| geometry(&with(&document, "/profile", profile("tooth", tolerance))).await.ring.len();

@@ -171,7 +171,7 @@ async fn both_ends_of_every_range_are_accepted() {
 }
 
 #[tokio::test]
-async fn a_value_just_beyond_its_range_is_refused_with_the_limit() {
+async fn value_beyond_range_is_refused_with_limit() {
     for field in fields() {
         let beyond = if field.is_whole {
             [field.low - 1.0, field.high + 1.0]
@@ -210,7 +210,7 @@ async fn poissons_ratio_lies_strictly_between_its_limits() {
 }
 
 #[tokio::test]
-async fn every_number_of_the_document_has_a_range() {
+async fn every_number_has_a_range() {
     let known: Vec<_> = fields().into_iter().map(|field| field.pointer).collect();
     for pointer in crate::designs::pointers(&every_number(), Value::is_number) {
         assert!(known.contains(&pointer) || pointer.ends_with("/poissons_ratio"), "{pointer}");
@@ -232,7 +232,7 @@ fn scaled(scale: f64) -> Value {
 }
 
 #[tokio::test]
-async fn the_smallest_and_the_largest_drive_are_answered_like_any_other() {
+async fn smallest_and_largest_drive_are_answered() {
     let service = Service::new();
     for scale in [1e-6 / 5.0, 1e-3, 1.0, 1e3, 1e6 / 58.0] {
         for path in crate::asking::ENDPOINTS {
@@ -257,7 +257,7 @@ async fn the_smallest_and_the_largest_drive_are_answered_like_any_other() {
 }
 
 #[tokio::test]
-async fn the_weakest_and_the_strongest_of_everything_else_is_answered_with_numbers() {
+async fn extreme_values_give_finite_numbers() {
     let service = Service::new();
     let soft = json!({ "youngs_modulus_gpa": 1e-3, "poissons_ratio": (-1.0_f64).next_up() });
     let hard = json!({ "youngs_modulus_gpa": 1e5, "poissons_ratio": 0.5_f64.next_down() });

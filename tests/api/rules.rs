@@ -168,7 +168,7 @@ fn head_over_limit_is_refused() {
 
 // --- The log
 
-/// A pipe holds 64 KiB, some 250 lines.
+/// A pipe holds 64 KiB, about 250 lines.
 #[test]
 fn stuck_log_reader_blocks_nothing() {
     let process = Process::logging(&["serve"], Stdio::piped());

@@ -71,7 +71,7 @@ fn sweep(samples: u32) -> Question {
 }
 
 #[test]
-fn the_service_serves_with_and_without_saying_serve() {
+fn serves_with_and_without_subcommand_serve() {
     for arguments in [&["serve"][..], &[]] {
         let process = Process::started(arguments);
         ask_at(process.address, &sweep(50)).found();
@@ -120,14 +120,14 @@ fn settings_become_limits() {
 }
 
 #[test]
-fn an_origin_that_was_named_may_call_from_a_browser() {
+fn named_origin_may_call_from_browser() {
     let process = Process::started(&["serve", "--cors-origin", "https://one.example,https://two.example"]);
     let answer = ask_at(process.address, &sweep(50).with("origin", "https://two.example"));
     assert_eq!(answer.header("access-control-allow-origin"), "https://two.example");
 }
 
 #[test]
-fn every_request_has_one_log_line_without_a_number_of_its_design() {
+fn each_request_logs_one_line_without_design_numbers() {
     let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("log-{}", std::process::id()));
     let process = Process::logging(&["serve"], std::fs::File::create(&path).unwrap().into());
     // A torque that nothing else has anything of.
@@ -162,7 +162,7 @@ fn every_request_has_one_log_line_without_a_number_of_its_design() {
 }
 
 #[test]
-fn a_process_that_is_told_to_stop_exits_with_0() {
+fn terminated_process_exits_with_0() {
     for signal in ["-TERM", "-INT"] {
         let process = Process::started(&["serve"]);
         ask_at(process.address, &sweep(50)).found();
@@ -172,7 +172,7 @@ fn a_process_that_is_told_to_stop_exits_with_0() {
 }
 
 #[test]
-fn a_request_that_runs_when_the_process_is_told_to_stop_is_answered_first() {
+fn running_request_is_answered_before_exit() {
     let process = Process::started(&["serve", "--deadline-ms", "600000", "--shutdown-ms", "600000"]);
     let address = process.address;
     let asker = std::thread::spawn(move || ask_at(address, &sweep(30_000)));
@@ -191,7 +191,7 @@ fn a_request_that_runs_when_the_process_is_told_to_stop_is_answered_first() {
 }
 
 #[test]
-fn an_address_that_is_taken_is_an_error_that_names_it() {
+fn used_address_is_an_error_naming_it() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();
     let output = Command::new(env!("CARGO_BIN_EXE_toothwave")).args(["serve", "--listen", &address]).output().unwrap();
@@ -201,7 +201,7 @@ fn an_address_that_is_taken_is_an_error_that_names_it() {
 }
 
 #[test]
-fn a_limit_that_nothing_can_hold_is_no_reason_to_panic() {
+fn huge_limit_does_not_panic() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();
     for limit in ["--max-states", "--max-concurrent-solves"] {
@@ -213,7 +213,7 @@ fn a_limit_that_nothing_can_hold_is_no_reason_to_panic() {
 }
 
 #[test]
-fn a_body_larger_than_the_limit_is_refused_over_a_connection_too() {
+fn body_over_limit_is_refused_over_connection() {
     let process = Process::started(&["serve"]);
     let question = Question::post("/v1/sweep", " ".repeat(LIMITS.max_body_bytes + 1));
     let problem = ask_at(process.address, &question).refused(413, "body_too_large");

@@ -73,7 +73,7 @@ fn silent_connection_delays_no_stop() {
 }
 
 #[test]
-fn computation_beyond_shutdown_is_told_so() {
+fn computation_beyond_shutdown_gets_problem() {
     let service = Service::with(ENDLESS, &["--shutdown-ms", "1"]);
     let running = service.occupied_by(1);
     service.process().signalled("-TERM");

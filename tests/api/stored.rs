@@ -126,7 +126,7 @@ fn once(process: &Process, study: &Value, is_true: impl Fn(&Value) -> bool) -> V
 }
 
 #[tokio::test]
-async fn file_and_memory_give_the_same_bytes() {
+async fn file_and_memory_give_same_bytes() {
     let (file, memory) = (File::new(), Service::new());
     let keeper = Keeper::of(&file);
     let tolerance = json!({
@@ -150,7 +150,7 @@ async fn file_and_memory_give_the_same_bytes() {
 }
 
 #[tokio::test]
-async fn a_killed_service_continues_with_the_same_bits() {
+async fn killed_service_continues_with_same_bits() {
     let file = File::new();
     let process = Process::started(&["serve", "--studies", file.path()]);
     let study = begun_at(&process, &long());
@@ -165,9 +165,9 @@ async fn a_killed_service_continues_with_the_same_bits() {
     assert!(found == undisturbed(&long()).await);
 }
 
-/// A limit on the size of files is a full disk to whoever writes.
+/// A limit on file size acts like a full disk.
 #[tokio::test]
-async fn a_full_disk_fails_the_study_and_nothing_else() {
+async fn full_disk_fails_only_the_study() {
     let file = File::new();
     let mut command = Command::new("bash");
     let script = "ulimit -f 300; exec \"$0\" serve --log off --studies \"$1\" \"${@:2}\"";
@@ -196,7 +196,7 @@ fn refused_at_the_start(file: &File) -> String {
 }
 
 #[test]
-fn a_file_of_another_schema_is_refused_with_both_versions() {
+fn other_schema_version_is_refused_with_both_versions() {
     let file = File::new();
     file.change("CREATE TABLE schema_versions (version BIGINT PRIMARY KEY, applied_at_s BIGINT NOT NULL)");
     file.change("INSERT INTO schema_versions VALUES (4, 0)");
@@ -210,7 +210,7 @@ fn a_file_of_another_schema_is_refused_with_both_versions() {
 }
 
 #[test]
-fn a_file_of_something_else_is_left_alone() {
+fn foreign_file_is_left_alone() {
     let file = File::new();
     file.change("CREATE TABLE accounts (name TEXT)");
     let before = fs::read(&file.0).unwrap();
@@ -221,7 +221,7 @@ fn a_file_of_something_else_is_left_alone() {
 }
 
 #[test]
-fn a_file_serves_one_process() {
+fn file_serves_one_process() {
     let file = File::new();
     let _process = Process::started(&["serve", "--studies", file.path()]);
     let error = refused_at_the_start(&file);
@@ -229,7 +229,7 @@ fn a_file_serves_one_process() {
 }
 
 #[tokio::test]
-async fn a_cancelled_study_continues_after_a_restart() {
+async fn cancelled_study_continues_after_restart() {
     let file = File::new();
     let keeper = Keeper::of(&file);
     let study = keeper.ask(&long()).await.json();
@@ -247,9 +247,9 @@ async fn a_cancelled_study_continues_after_a_restart() {
     assert_eq!(keeper.delete(&study).await, 404);
 }
 
-/// Each result is refused; a study that runs is computed again as far as it is damaged, or refused.
+/// Each damaged result is refused. A running study is computed again or refused.
 #[tokio::test]
-async fn damage_to_the_file_never_becomes_a_number() {
+async fn damaged_file_never_gives_wrong_number() {
     let file = File::new();
     let keeper = Keeper::of(&file);
     let study = keeper.wait_for(&map(500)).await;
@@ -287,7 +287,7 @@ async fn study_with_damaged_document_is_removed() {
     keeper.end();
 }
 
-/// Pages that SQLite itself finds broken.
+/// SQLite itself detects that these pages are broken.
 #[tokio::test]
 async fn broken_pages_are_a_problem() {
     let file = File::new();
@@ -330,7 +330,7 @@ async fn parts_of_another_build_are_computed_again() {
 }
 
 #[tokio::test]
-async fn asking_keeps_a_study_from_expiring() {
+async fn reading_a_study_delays_its_expiry() {
     for read in ["", "/result", "/events"] {
         let file = File::new();
         let age = |seconds: u64| file.change(&format!("UPDATE studies SET asked_at_s = asked_at_s - {seconds}"));
@@ -363,7 +363,7 @@ async fn stored_study_outlives_smaller_limits() {
 }
 
 #[tokio::test]
-async fn a_service_without_studies_says_so() {
+async fn service_without_studies_says_so() {
     let service = Service::with(LIMITS, &["--studies", "off"]);
     let problem = service.ask(&waiting(&map(5))).await.refused(501, "studies_off");
     assert!(problem["detail"].as_str().unwrap().contains("--studies off"), "{problem}");

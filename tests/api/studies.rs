@@ -49,7 +49,7 @@ async fn deleted(service: &Service, place: &str) -> u16 {
 }
 
 #[tokio::test]
-async fn who_waits_for_a_study_gets_its_result_with_it() {
+async fn waiting_client_gets_study_with_result() {
     let service = Service::new();
     let found = waited_for(&service, &map(&shortest(), 5)).await;
     assert_eq!((&found["state"], &found["study"]), (&json!("done"), &json!("map")));
@@ -63,9 +63,9 @@ async fn who_waits_for_a_study_gets_its_result_with_it() {
     }
 }
 
-/// Seconds of three thousand years: as RFC 7240 has it, a number of any length.
+/// RFC 7240 allows a number of any length.
 #[tokio::test]
-async fn who_would_wait_for_ever_waits_as_long_as_anybody() {
+async fn wait_preference_may_have_any_length() {
     let service = Service::new();
     for (steps, wait) in [(5, "wait=99999999999"), (6, "wait=18446744073709551616")] {
         let asked = Question::post("/v1/studies", map(&shortest(), steps).to_string());
@@ -76,7 +76,7 @@ async fn who_would_wait_for_ever_waits_as_long_as_anybody() {
 }
 
 #[tokio::test]
-async fn who_does_not_wait_is_told_where_the_study_stands_and_its_events_end_with_it() {
+async fn study_without_wait_has_status_and_events() {
     let service = Service::new();
     let answer = begun(&service, &map(&shortest(), 5)).await;
     assert_eq!(answer.status, 202, "{}", answer.text());
@@ -91,9 +91,9 @@ async fn who_does_not_wait_is_told_where_the_study_stands_and_its_events_end_wit
     assert_eq!(service.get(&place(&study)).await.found(), told);
 }
 
-/// A chunk may take minutes, and a proxy closes a connection on which nothing is sent.
+/// A chunk may take minutes, and a proxy closes a silent connection.
 #[tokio::test]
-async fn events_come_at_once_and_then_as_comments() {
+async fn first_event_comes_at_once_and_comments_follow() {
     let service = Service::within(ENDLESS);
     let study = begun(&service, &slow(1)).await.json();
     let mut events = service.send(&Question::of("GET", study["events_href"].as_str().unwrap()));
@@ -108,7 +108,7 @@ async fn events_come_at_once_and_then_as_comments() {
 }
 
 #[tokio::test]
-async fn the_same_question_is_the_same_study_however_it_is_spelled() {
+async fn equal_question_is_same_study_however_spelled() {
     let service = Service::new();
     let first = waited_for(&service, &map(&shortest(), 3)).await;
     let spelled = map(&shortest(), 3).to_string().replace("3.0", "3e0").replace("28,", "28.0,");
@@ -118,7 +118,7 @@ async fn the_same_question_is_the_same_study_however_it_is_spelled() {
 }
 
 #[tokio::test]
-async fn a_cancelled_study_continues_when_asked_again() {
+async fn cancelled_study_continues_when_requested_again() {
     let service = Service::new();
     let study = begun(&service, &long()).await.json();
     assert_eq!(study["state"], "running");
@@ -136,7 +136,7 @@ async fn a_cancelled_study_continues_when_asked_again() {
 }
 
 #[tokio::test]
-async fn a_cancelled_study_has_the_variants_it_counts() {
+async fn cancelled_study_has_the_variants_it_counts() {
     let service = Service::within(LIMITS);
     let study = begun(&service, &long()).await.json();
     let variants = async || {
@@ -154,9 +154,9 @@ async fn a_cancelled_study_has_the_variants_it_counts() {
     assert!(variants < 90_000, "{variants}");
 }
 
-/// What runs and is not kept could be cancelled by nobody, and would count nowhere.
+/// Nobody could cancel a study that runs but is not listed.
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
-async fn however_many_ask_for_a_study_and_cancel_it_at_once_none_runs_that_is_not_kept() {
+async fn concurrent_requests_and_cancels_leave_no_unlisted_study() {
     let service = Service::new();
     let study = begun(&service, &long()).await.json();
     let clients = (0..16).map(|client| {
@@ -181,7 +181,7 @@ async fn however_many_ask_for_a_study_and_cancel_it_at_once_none_runs_that_is_no
 }
 
 #[tokio::test]
-async fn a_single_request_does_not_wait_for_a_study() {
+async fn single_request_does_not_wait_for_study() {
     let service = Service::within(Limits { max_concurrent_solves: 1, ..LIMITS });
     let study = begun(&service, &long()).await.json();
     service.post("/v1/sweep", &spelled_out()).await.found();
@@ -202,7 +202,7 @@ async fn rejects_study_over_limit() {
 }
 
 #[tokio::test]
-async fn four_studies_run_however_many_ask() {
+async fn at_most_four_studies_run() {
     let service = Service::within(ENDLESS);
     let studies: Vec<_> = (1..9).map(slow).collect();
     let answers = join_all(studies.iter().map(|study| begun(&service, study))).await;
@@ -217,9 +217,9 @@ async fn four_studies_run_however_many_ask() {
     waited_for(&service, &map(&shortest(), 6)).await;
 }
 
-/// From seventeen islands on each piece was several of them, of which the first alone was looked at, and the study was done.
+/// With 17 or more islands each chunk holds several.
 #[tokio::test]
-async fn a_search_of_many_islands_looks_at_all_of_them() {
+async fn search_of_many_islands_evaluates_all() {
     let service = Service::within(LIMITS);
     let study = json!({
         "study": "search", "base": shortest(), "evaluations": 212_500, "free": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.5 } },
@@ -231,7 +231,7 @@ async fn a_search_of_many_islands_looks_at_all_of_them() {
 }
 
 #[tokio::test]
-async fn what_cannot_be_is_said_at_the_field() {
+async fn invalid_study_is_refused_at_its_field() {
     let service = Service::new();
     let study = map(&shortest(), 5);
     for (document, pointer, code) in [
@@ -254,9 +254,9 @@ async fn what_cannot_be_is_said_at_the_field() {
     service.post_text("/v1/studies", "{").await.refused(400, "malformed_json");
 }
 
-/// A kind whose fields the search did not know was searched with nothing of it free, or refused as if something were missing.
+/// The kinds come from the API document, so a search cannot miss a kind's fields.
 #[tokio::test]
-async fn of_every_kind_of_wave_generator_and_tooth_in_the_api_document_all_lengths_are_free_in_a_search() {
+async fn search_frees_all_lengths_of_every_kind() {
     let service = Service::new();
     let schemas = &document()["components"]["schemas"];
     // Not free are the counts, and grooves, which a ball need not have.
@@ -285,7 +285,7 @@ async fn of_every_kind_of_wave_generator_and_tooth_in_the_api_document_all_lengt
 }
 
 #[tokio::test]
-async fn a_map_is_a_table_too() {
+async fn map_is_available_as_table() {
     let service = Service::new();
     let found = waited_for(&service, &map(&shortest(), 3)).await;
     let question = Question::of("GET", found["result_href"].as_str().unwrap()).with("accept", "text/csv");
@@ -329,7 +329,7 @@ fn rubbing() -> Value {
 }
 
 #[tokio::test]
-async fn every_quantity_is_what_its_pointer_leads_to() {
+async fn every_quantity_matches_value_at_its_pointer() {
     let service = Service::new();
     let mut compared = 0;
     let load = json!({ "input_torque_nm": 20.0, "input_speed_rpm": 1500.0, "allowable_stress_mpa": 1500.0 });
@@ -340,9 +340,8 @@ async fn every_quantity_is_what_its_pointer_leads_to() {
     assert!(compared > 100, "{compared} compared");
 }
 
-/// They once were those of the hardest point alone, which is neither what the answer has nor what the drive loses.
 #[tokio::test]
-async fn under_a_duty_the_losses_of_a_variant_are_those_over_all_its_points() {
+async fn losses_under_duty_cover_all_points() {
     let duty = json!({ "duty": [
         { "input_torque_nm": 20.0, "input_speed_rpm": 500.0, "share_of_time": 0.25 },
         { "input_torque_nm": 2.0, "input_speed_rpm": 3000.0, "share_of_time": 0.75 },
@@ -353,7 +352,7 @@ async fn under_a_duty_the_losses_of_a_variant_are_those_over_all_its_points() {
 }
 
 #[tokio::test]
-async fn every_quantity_ends_in_its_unit_and_says_what_it_means() {
+async fn every_quantity_names_unit_and_meaning() {
     let listed = Service::new().get("/v1/quantities").await.found();
     let listed = listed["quantities"].as_array().unwrap();
     for quantity in listed {

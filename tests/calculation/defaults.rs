@@ -84,13 +84,13 @@ fn assert_defaults_change_no_key(document: &Value) {
 }
 
 #[test]
-fn defaults_of_examples_written_out_change_no_key() {
+fn explicit_defaults_of_examples_keep_every_key() {
     examples().iter().for_each(assert_defaults_change_no_key);
 }
 
 proptest! {
     #[test]
-    fn defaults_of_any_document_written_out_change_no_key(seed: u64) {
+    fn explicit_defaults_of_any_document_keep_key(seed: u64) {
         assert_defaults_change_no_key(&Schemas::new().document(&mut Chance::new(seed)));
     }
 }
@@ -130,7 +130,7 @@ fn refined() -> Vec<Value> {
 }
 
 #[test]
-fn the_model_sent_back_gives_the_same_answer() {
+fn returned_model_gives_same_answer() {
     for document in refined() {
         let first = answer(&document);
         let mut sent_back = document.clone();
@@ -145,7 +145,7 @@ fn the_model_sent_back_gives_the_same_answer() {
 }
 
 #[test]
-fn naming_the_default_law_changes_no_force() {
+fn naming_default_law_changes_no_force() {
     let largest_n =
         |document: &Value| answer(document)["peaks"]["wave_generator"]["force_n"]["value"].as_f64().unwrap();
     let mut document = pointed();

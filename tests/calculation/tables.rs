@@ -33,7 +33,7 @@ fn entry(column: &dyn Array, row: usize) -> Value {
 }
 
 #[test]
-fn an_arrow_stream_has_the_columns_of_csv_and_the_numbers_of_json() {
+fn arrow_stream_has_csv_columns_and_json_numbers() {
     let friction = json!({ "wave_generator": { "kind": "plain", "coefficient": 0.03 }, "ring": { "coefficient": 0.05 }, "carrier": { "coefficient": 0.04 } });
     for document in [
         // More states than a batch holds.
@@ -76,9 +76,9 @@ fn an_arrow_stream_has_the_columns_of_csv_and_the_numbers_of_json() {
     }
 }
 
-/// Its buffer takes as much room, and would otherwise be there twice while it grows: of few teeth what stands by input angle is as long as the states.
+/// A growing buffer takes its memory twice. With few teeth, columns by input angle are as long as the state columns.
 #[test]
-fn how_long_a_sweep_gets_as_json_is_known_before_it_is_written() {
+fn json_length_of_sweep_is_known_beforehand() {
     let friction = json!({ "wave_generator": { "kind": "plain", "coefficient": 0.03 }, "ring": { "coefficient": 0.05 }, "carrier": { "coefficient": 0.04 } });
     let eccentric = json!({
         "wave_generator": { "kind": "eccentric", "radius_mm": 30.8, "eccentricity_mm": 1.2 },

@@ -342,9 +342,9 @@ fn any_member_of_the_family() {
     drawn(600, is_answered);
 }
 
-/// Documents of this kind would test nothing if none of them were possible.
+/// The fuzz documents would test nothing if none of them were possible.
 #[test]
-fn most_kinds_shapes_and_laws_are_among_those_that_have_an_answer() {
+fn most_kinds_shapes_and_laws_have_an_answer() {
     let mut answered = std::collections::BTreeSet::new();
     let mut state = 1_u64;
     for _ in 0..4_000 {

@@ -84,7 +84,7 @@ const AT_ONE_END: Support = Support { fingers: Some(Fingers::HeldAtOneEnd), rim:
 const FREE: Support = Support { fingers: None, rim: Some(Rim::Free) };
 
 #[test]
-fn fingers_bend_as_finite_elements_of_them_do() {
+fn finger_compliance_matches_finite_elements() {
     for finger in results().fingers {
         let Finger { length_mm, thickness_mm, height_mm, at_both_ends, compliance_mm_per_n } = finger;
         let held = if at_both_ends { Fingers::HeldAtBothEnds } else { Fingers::HeldAtOneEnd };
@@ -97,7 +97,7 @@ fn fingers_bend_as_finite_elements_of_them_do() {
 }
 
 #[test]
-fn a_free_rim_bends_as_finite_elements_of_it_do() {
+fn free_rim_compliance_matches_finite_elements() {
     for rim in results().free_rims {
         let FreeRim { inner_radius_mm, outer_radius_mm, width_mm, teeth, lobes, compliance_mm_per_n } = rim;
         let found = RimStrip { inner_radius_mm, outer_radius_mm, width_mm, teeth, lobes }
@@ -110,7 +110,7 @@ fn a_free_rim_bends_as_finite_elements_of_it_do() {
 }
 
 #[test]
-fn rims_and_cams_held_at_their_backs_give_way_as_finite_elements_of_them_do() {
+fn held_rims_and_cams_match_finite_elements() {
     for body in results().held_bodies {
         let HeldBody { surface_radius_mm, held_radius_mm, tooth_radius_mm, width_mm, teeth, compliance_mm_per_n } =
             body;
@@ -132,7 +132,7 @@ fn rims_and_cams_held_at_their_backs_give_way_as_finite_elements_of_them_do() {
 }
 
 #[test]
-fn a_body_held_at_half_a_pitch_gives_way_alike_by_either_form() {
+fn held_body_compliance_is_continuous_in_depth() {
     let strip = |depth_mm| HeldStrip { depth_mm, pitch_mm: 8.0, width_mm: 15.0 };
     let at = |depth_mm| strip(depth_mm).compliance_mm_per_n(&Material::STEEL, 2.0);
     assert!((at(4.0 - 1e-9) / at(4.0 + 1e-9) - 1.0).abs() < 1e-8);
@@ -141,7 +141,7 @@ fn a_body_held_at_half_a_pitch_gives_way_alike_by_either_form() {
 }
 
 #[test]
-fn a_finger_is_as_thick_as_the_walls_of_its_slots_are_apart_in_the_middle_of_its_height() {
+fn finger_thickness_is_wall_distance_at_mid_height() {
     let shares = shares(&PAPER_5_1, &johnson(20.0), AT_ONE_END).unwrap();
     let found = shares.shares.iter().find(|(estimate, _)| estimate.backing == Backing::FingerAtOneEnd).unwrap().0;
     // From 58.8 to 65.2 mm, where the middles of two slots are 2 · 62 sin(π/28) apart.
@@ -151,7 +151,7 @@ fn a_finger_is_as_thick_as_the_walls_of_its_slots_are_apart_in_the_middle_of_its
 }
 
 #[test]
-fn a_housed_rim_is_a_strip_as_deep_as_the_rim_on_which_a_tooth_presses_at_every_slots_pitch() {
+fn housed_rim_is_strip_with_slot_pitch() {
     let parts = PartsParameters { ring_outer_radius_mm: Some(88.0), ..PartsParameters::default() };
     let load = johnson(20.0);
     let backings = backings(&PAPER_5_1, &parts, AT_ONE_END);
@@ -164,9 +164,9 @@ fn a_housed_rim_is_a_strip_as_deep_as_the_rim_on_which_a_tooth_presses_at_every_
     assert!((found.compliance_mm_per_n / expected - 1.0).abs() < 1e-12, "{} {expected}", found.compliance_mm_per_n);
 }
 
-/// By Johnson's law for the teeth's own approach, each half of which is of its body's own elasticity.
+/// The teeth's own approach follows Johnson's law, with each half from its body's own elasticity.
 #[test]
-fn the_share_of_a_backing_is_its_part_of_what_a_tooth_gives_way_at_its_own_contacts() {
+fn backing_share_is_relative_to_own_contacts() {
     let bronze = Material { youngs_modulus_gpa: 110.0, poissons_ratio: 0.35 };
     let steel = Material::STEEL;
     let materials = Materials { wave_generator: steel, teeth: steel, ring: bronze, carrier: bronze };
@@ -190,9 +190,9 @@ fn the_share_of_a_backing_is_its_part_of_what_a_tooth_gives_way_at_its_own_conta
     assert!((share / expected - 1.0).abs() < 1e-12, "{share}, expected {expected}");
 }
 
-/// What the estimate says of a tooth holds for the drive, but for the load that shifts to teeth which press their fingers less.
+/// The estimate for one tooth holds for the drive, except for load that shifts to other teeth.
 #[test]
-fn fingers_held_at_one_end_double_the_wind_up_of_case_5_1_and_take_an_eighth_off_its_peak() {
+fn fingers_held_at_one_end_soften_case_5_1() {
     let plain = johnson(20.0);
     let of_fingers = shares(&PAPER_5_1, &plain, AT_ONE_END).unwrap();
     let estimate = of_fingers.shares.iter().find(|(estimate, _)| estimate.backing == Backing::FingerAtOneEnd).unwrap();
@@ -209,7 +209,7 @@ fn fingers_held_at_one_end_double_the_wind_up_of_case_5_1_and_take_an_eighth_off
 }
 
 #[test]
-fn a_free_rim_and_fingers_at_one_end_are_findings_and_stiff_parts_are_not() {
+fn only_soft_parts_are_findings() {
     let found = |parameters: &DriveParameters, load: &LoadParameters, support| {
         shares(parameters, load, support).map(|shares| findings::of_backing(&shares))
     };
@@ -235,7 +235,7 @@ fn a_free_rim_and_fingers_at_one_end_are_findings_and_stiff_parts_are_not() {
 }
 
 #[test]
-fn the_models_error_tells_how_the_parts_are_held() {
+fn model_error_reports_how_parts_are_held() {
     let held = |parameters: &DriveParameters, load: LoadParameters, support: Support| {
         let sweep = swept(parameters, &load, 50);
         let shares = shares(parameters, &load, support);
@@ -261,7 +261,7 @@ fn the_models_error_tells_how_the_parts_are_held() {
 }
 
 #[test]
-fn the_errors_of_all_that_gives_way_add_up_as_springs_in_a_row() {
+fn errors_of_backings_add_like_series_springs() {
     let both = Support { fingers: Some(Fingers::HeldAtOneEnd), rim: Some(Rim::Free) };
     let shares = shares(&PAPER_5_1, &johnson(20.0), both).unwrap();
     let sum = share(&shares, Backing::FreeRim) + share(&shares, Backing::FingerAtOneEnd);
@@ -269,7 +269,7 @@ fn the_errors_of_all_that_gives_way_add_up_as_springs_in_a_row() {
 }
 
 #[test]
-fn only_parts_that_can_be_made_and_pressed_along_a_line_have_estimates() {
+fn only_makeable_parts_with_line_contact_have_estimates() {
     let of = |parameters: &DriveParameters, parts: PartsParameters| -> Vec<Backing> {
         let case = LoadCase::new(&johnson(20.0)).unwrap();
         let estimates = backings(parameters, &parts, Support::default()).estimates(&drive(parameters), &case);

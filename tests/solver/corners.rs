@@ -88,7 +88,7 @@ fn at_angle(states: &States, input_angle_deg: f64) -> Vec<usize> {
 }
 
 #[test]
-fn finer_elements_find_the_same_force_at_a_corner() {
+fn corner_force_converges_with_finer_elements() {
     let [first, finest] = &results().convergence[..] else { panic!("two refinements") };
     assert!((first.wind_up_rad / finest.wind_up_rad - 1.0).abs() < 1e-3);
     let largest = finest.force_n.iter().copied().fold(0.0, f64::max);
@@ -97,10 +97,10 @@ fn finer_elements_find_the_same_force_at_a_corner() {
     }
 }
 
-/// The model is refined in all that it can be. Nearest to the flank's end, on either side, its tooth carries too much: the compliance of the ring's teeth knows a contact
-/// of one width, and here the corner cuts off a part of it.
+/// Beside the flank's end a tooth carries too much: the ring teeth's compliance assumes a contact of one width,
+/// and the corner cuts off a part of it.
 #[test]
-fn teeth_at_a_pointed_tip_carry_what_elastic_ones_do() {
+fn teeth_at_pointed_tip_match_finite_elements() {
     for case in results().cases {
         let Case { input_angle_deg, ring_gap_um, ref teeth, .. } = case;
         let refined = case.refined();
@@ -133,10 +133,9 @@ fn teeth_at_a_pointed_tip_carry_what_elastic_ones_do() {
     }
 }
 
-/// As `model_error` tells of other models: the ranges hold the errors of the largest force of each contact, of the pressure there and of the wind-up, and go no further than
-/// they have to.
+/// The ranges of `model_error` hold the errors of force, pressure and wind-up, and are no wider than needed.
 #[test]
-fn the_model_says_how_far_it_is_off_at_pointed_tips() {
+fn model_reports_its_error_at_pointed_tips() {
     for has_gaps in [false, true] {
         let mut found = [(f64::INFINITY, f64::NEG_INFINITY); 3];
         let mut told = None;
@@ -215,9 +214,9 @@ fn seen(drive: &Drive, position_deg: f64, turned_away_rad: f64) -> Seen {
 
 const STIFFNESS: PerContact<f64> = PerContact { wave_generator: 4e5, ring: 3e5, carrier: 5e5 };
 
-/// Each tooth before the flank is a point on three springs, pushed by the wave generator: two equations of equilibrium for the two ways that it can go.
+/// One spring is at the corner. The wave generator pushes the tooth: two equilibrium equations, two degrees of freedom.
 #[test]
-fn before_the_flank_a_tooth_is_a_point_on_three_springs_one_of_them_at_the_corner() {
+fn tooth_before_flank_is_point_on_three_springs() {
     let with_more = DriveParameters { ring_teeth: 82, ..PAPER_5_2 };
     for (parameters, turned_arcsec) in [(PAPER_5_2, 0.0), (PAPER_5_2_BORED, 0.0), (with_more, 0.0), (PAPER_5_2, 0.2)] {
         let gaps_mm = PerContact { wave_generator: 1e-4, ring: 2e-4, carrier: 3e-4 };
@@ -272,9 +271,9 @@ fn before_the_flank_a_tooth_is_a_point_on_three_springs_one_of_them_at_the_corne
     }
 }
 
-/// Without the option the same loads jump by half of the peak there.
+/// Without corner contact these loads jump by half of the peak.
 #[test]
-fn loads_run_on_through_the_flanks_end() {
+fn loads_are_continuous_at_flank_end() {
     for (bend, moves, gap_um) in [(false, false, 0.0), (true, false, 0.0), (true, true, 10.0)] {
         let pressed = LoadParameters {
             ring_teeth_bend: bend,
@@ -304,9 +303,9 @@ fn loads_run_on_through_the_flanks_end() {
     }
 }
 
-/// A contact that is α off the flank, of relative curvature Σ, is b wide where `α b + π Σ b²/4 = F/(L1 E*)`: of a blunt wedge, of Hertz's cylinder, and of both.
+/// A contact at angle α off the flank, of relative curvature Σ, has half width b by `α b + π Σ b²/4 = F/(L1 E*)`.
 #[test]
-fn a_narrower_contact_gives_way_by_the_logarithm_of_its_width() {
+fn narrower_contact_adds_logarithm_of_its_width() {
     let (drive, load) = (drive(&PAPER_5_2), LoadCase::new(&pressed_corners(3.0)).unwrap());
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
     let (flank, end) = (drive.flank(), drive.flank_limit().position);
@@ -348,10 +347,11 @@ fn a_narrower_contact_gives_way_by_the_logarithm_of_its_width() {
     }
 }
 
-/// Pressed at right angles to one face an apex gives way by `π (sin²w/(w + sin w cos w) + cos²w/(w - sin w cos w))` of a logarithm, w half of the wedge's angle, where a
-/// wall has 2 (J. H. Michell, 1900). The angle is measured between the flank's tangent and the tooth's symmetry line, or the land.
+/// J. H. Michell (1900): a force normal to one face of an apex with half angle w moves it by
+/// `π (sin²w/(w + sin w cos w) + cos²w/(w - sin w cos w))` of a logarithm, where a half-plane has 2.
+/// The angle is between the flank's tangent and the tooth's symmetry line, or the land.
 #[test]
-fn where_teeth_bend_a_corner_gives_way_as_the_apex_of_a_wedge() {
+fn corner_of_bending_teeth_deflects_as_wedge_apex() {
     let compliance_mm_per_n = (1.0 - 0.3 * 0.3) / 210e3 / (std::f64::consts::PI * 15.0);
     for parameters in [PAPER_5_2, PAPER_5_2_BORED] {
         let drive = drive(&parameters);
@@ -412,9 +412,9 @@ fn natural_tips_and_balls_have_no_corner() {
     }
 }
 
-/// Such a tooth is behind the corner in both directions, and the tangent of the line between them is positive again.
+/// Behind the corner in both directions, the tangent of the angle to the corner is positive again.
 #[test]
-fn a_tooth_that_is_past_the_corner_and_farther_out_carries_nothing() {
+fn tooth_beyond_corner_carries_nothing() {
     let wide_lands = DriveParameters {
         wave_generator: WaveGenerator::Eccentric { radius_mm: 36.0, eccentricity_mm: 0.1 },
         teeth: 6,
@@ -450,9 +450,9 @@ fn a_tooth_that_is_past_the_corner_and_farther_out_carries_nothing() {
     }
 }
 
-/// A bore has taken so much of the flank, and gaps are so wide, that no tooth comes to it before others carry at their corners.
+/// The bore leaves a short flank, and gaps are wide: all loaded teeth touch corners.
 #[test]
-fn where_corners_alone_carry_there_is_an_answer_without_stress_at_the_ring() {
+fn corners_alone_carry_without_ring_stress() {
     let bored = DriveParameters { installed: 80, tip_radius_mm: Some(53.2), ..PAPER_5_2 };
     let gaps = PerContact { ring: 50.0, ..PerContact::default() };
     let load = LoadParameters {
@@ -468,7 +468,7 @@ fn where_corners_alone_carry_there_is_an_answer_without_stress_at_the_ring() {
 }
 
 #[test]
-fn flats_that_have_left_their_slots_before_the_flank_carry_nothing() {
+fn flats_outside_slots_before_flank_carry_nothing() {
     let flats = DriveParameters {
         wave_generator: WaveGenerator::Ellipse { semi_major_mm: 51.0, semi_minor_mm: 49.0 },
         tooth: ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 0.8 },
@@ -485,9 +485,9 @@ fn flats_that_have_left_their_slots_before_the_flank_carry_nothing() {
     assert!((of_flats - of_cylinders).abs() < 1.0 && of_flats > 37.0, "{of_flats}, with cylinders {of_cylinders} deg");
 }
 
-/// The more the corner of one space is turned away the later it is met, by its own arm: to first order the way that a point makes which is turned about the axis.
+/// To first order the corner moves as a point turned about the axis.
 #[test]
-fn a_space_that_is_turned_takes_its_corner_away_by_its_arm() {
+fn turned_space_moves_its_corner_by_its_arm() {
     let drive = drive(&PAPER_5_2);
     let end_deg = drive.flank_limit().position.from_lobe_deg();
     for beyond_deg in [0.1, 1.0, 4.0] {
@@ -510,9 +510,9 @@ fn a_space_that_is_turned_takes_its_corner_away_by_its_arm() {
     }
 }
 
-/// By virtual work: what the wall leaves counts as much as the slot's force does.
+/// By virtual work, the wall's gap is weighted with the slot's force.
 #[test]
-fn a_slot_that_is_turned_takes_its_tooth_from_the_corner_by_the_share_of_the_slots_force() {
+fn turned_slot_moves_tooth_by_slot_force_share() {
     let drive = drive(&PAPER_5_2);
     let end_deg = drive.flank_limit().position.from_lobe_deg();
     let case = LoadCase::new(&pressed_corners(3.0)).unwrap();
@@ -534,9 +534,9 @@ fn a_slot_that_is_turned_takes_its_tooth_from_the_corner_by_the_share_of_the_slo
     }
 }
 
-/// It is the same drive at another input angle. By a law that counted the turn as a gap at the corner forces changed by a tenth, and doubled.
+/// A rotation of the whole ring or carrier, or equal gaps at all slots, give the same drive at another input angle.
 #[test]
-fn a_ring_or_a_carrier_that_is_turned_as_a_whole_changes_no_force_at_corners_nor_do_alike_gaps_at_all_slots() {
+fn rigid_rotation_changes_no_corner_force() {
     for (parameters, moves) in [(PAPER_5_2, true), (PAPER_5_2_BORED, true), (PAPER_5_2, false)] {
         let of = |load: LoadParameters| swept(&parameters, &load, 24);
         let plain = LoadParameters { wave_generator_moves: moves, ..pressed_corners(3.0) };
@@ -559,9 +559,9 @@ fn a_ring_or_a_carrier_that_is_turned_as_a_whole_changes_no_force_at_corners_nor
     }
 }
 
-/// Whether all of ring and carrier are turned, or each of their spaces and slots by as much.
+/// Either all of ring and carrier are turned, or each of their spaces and slots.
 #[test]
-fn what_is_turned_away_at_a_corner_adds_up_however_it_is_given() {
+fn corner_rotations_add_up_however_given() {
     let drive = drive(&PAPER_5_2);
     let (ring, carrier) = (3.0, 2.0);
     let forces = |is_ring_whole: bool, is_carrier_whole: bool| {
@@ -591,9 +591,9 @@ fn what_is_turned_away_at_a_corner_adds_up_however_it_is_given() {
     }
 }
 
-/// However far the wave generator turns: a tooth that no wall holds has no force at a corner either.
+/// A tooth outside its slot has no wall to hold it, and so no force at a corner.
 #[test]
-fn before_the_flank_a_flat_is_pressed_as_a_cylinder_is_until_it_has_left_its_slot() {
+fn flat_before_flank_is_pressed_as_cylinder() {
     let flats = DriveParameters {
         wave_generator: WaveGenerator::Ellipse { semi_major_mm: 51.0, semi_minor_mm: 49.0 },
         tooth: ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 0.8 },
@@ -629,9 +629,9 @@ fn corners_need_virtual_work() {
     assert_eq!(refused, Err(vec![Violation::NeedsVirtualWork { parameter: Parameter::CornerContact }]));
 }
 
-/// Every law, unlike zones, teeth with flats, a bored tip.
+/// Covers several laws, unlike zones, gaps and a bored tip.
 #[test]
-fn a_sweep_to_a_tolerance_finds_the_peaks_of_very_many_intervals() {
+fn tolerance_sweep_with_corners_finds_dense_peaks() {
     let unlike = DriveParameters { teeth: 81, installed: 27, ring_teeth: 79, ..PAPER_5_2 };
     let gaps = PerContact { ring: 4.0, ..PerContact::default() };
     for (parameters, of) in [
@@ -676,10 +676,10 @@ fn a_sweep_to_a_tolerance_finds_the_peaks_of_very_many_intervals() {
     }
 }
 
-/// A tooth that has nearly come to the flank keeps from its corner the difference of two distances of 39 mm: some 1e-14 mm are rounding, and under 0.3 mN·m the contacts
-/// give way by 1e-6 mm.
+/// Near the flank the distance to the corner is a difference of two lengths of 39 mm, so rounding is 1e-14 mm.
+/// Under 0.3 mN·m the approach is 1e-6 mm.
 #[test]
-fn under_the_lightest_loads_corners_leave_fewer_digits_and_the_answer_says_how_few() {
+fn lightest_corner_loads_report_their_lost_digits() {
     let parameters = DriveParameters {
         wave_generator: WaveGenerator::Ellipse { semi_major_mm: 37.925807356426894, semi_minor_mm: 37.83643056865192 },
         teeth: 232,
@@ -698,9 +698,9 @@ fn under_the_lightest_loads_corners_leave_fewer_digits_and_the_answer_says_how_f
     assert!(residuals.iter().all(|&residual| residual < 1e-7), "{residuals:?}");
 }
 
-/// What that rounding bends is no curve to be looked at ever nearer: the peaks are those of many intervals, as near as both know them.
+/// The sweep must not refine rounding noise. Its peaks are those of a dense sweep, within their accuracy.
 #[test]
-fn under_the_lightest_loads_corners_leave_the_extremes_as_many_digits_as_they_have() {
+fn lightest_corner_loads_keep_accurate_extremes() {
     let bored = DriveParameters { tip_radius_mm: Some(53.2), ..PAPER_5_2 };
     for (parameters, torque_nm) in [(bored, 1e-5), (bored, 1e-6), (PAPER_5_2, 1e-3), (PAPER_5_2, 1e-4)] {
         let of = LoadParameters { law: ContactLaw::Linear, ring_teeth_bend: false, ..pressed_corners(torque_nm) };
@@ -715,9 +715,9 @@ fn under_the_lightest_loads_corners_leave_the_extremes_as_many_digits_as_they_ha
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Who is helped turns less far: of any drive, senses and bores of all kinds, and the sweep's own checks hold.
+    /// Covers any drive, both senses of rotation and all bores, with the checks of the sweep itself.
     #[test]
-    fn teeth_at_corners_only_ever_help(parameters in any_swept_drive(), bends in any::<bool>(), ln_torque in -6.0_f64..6.0) {
+    fn corner_contact_never_increases_wind_up(parameters in any_swept_drive(), bends in any::<bool>(), ln_torque in -6.0_f64..6.0) {
         let pressed = LoadParameters { ring_teeth_bend: bends, ..pressed_corners(10.0_f64.powf(ln_torque)) };
         let rigid = LoadParameters { corner_contact: false, ..pressed };
         let drive = drive(&parameters);
@@ -740,9 +740,8 @@ proptest! {
     }
 }
 
-/// At the capacity, as the sweep there finds it, the largest stress is the allowable one.
 #[test]
-fn the_torque_that_corners_help_to_bear_makes_the_allowable_stress() {
+fn capacity_with_corners_reaches_allowable_stress() {
     let allowable = LoadParameters { allowable_stress_mpa: Some(PerContact::of(|_| 900.0)), ..pressed_corners(3.0) };
     let capacity_nm = swept(&PAPER_5_2, &allowable, 60).torque_capacity.unwrap().input_torque_nm;
     let peaks = swept(&PAPER_5_2, &pressed_corners(capacity_nm), 60).peaks;
@@ -750,9 +749,9 @@ fn the_torque_that_corners_help_to_bear_makes_the_allowable_stress() {
     assert!((largest_mpa / 900.0 - 1.0).abs() < 1e-9, "{largest_mpa} MPa");
 }
 
-/// Deviations list every tooth by itself; of nothing but a tooth that is thinner by nothing worth speaking of they change nothing.
+/// With deviations, every tooth is listed by itself.
 #[test]
-fn items_that_hardly_deviate_carry_what_alike_ones_do() {
+fn vanishing_deviation_changes_no_corner_load() {
     let deviations = Deviations { tooth_radius_um: [vec![1e-9], vec![0.0; 39]].concat(), ..Deviations::default() };
     let (drive, load) = (drive(&PAPER_5_2), LoadCase::new(&pressed_corners(3.0)).unwrap());
     let points = Points::samples(12).unwrap();
@@ -764,9 +763,9 @@ fn items_that_hardly_deviate_carry_what_alike_ones_do() {
     }
 }
 
-/// A tooth that cannot spin slips at the corner as its points and those of the ring move: by differences of where they are.
+/// The test takes differences of positions for a tooth that cannot spin.
 #[test]
-fn a_tooth_slips_over_the_corner_as_the_points_of_both_move() {
+fn corner_slip_follows_motion_of_contact_points() {
     let flats = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 0.5 };
     for ring_teeth in [78, 82] {
         let parameters = DriveParameters { tooth: flats, ring_teeth, ..PAPER_5_2 };

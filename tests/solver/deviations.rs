@@ -295,7 +295,7 @@ fn rotation_rad(chains: &[Chain], law: &ContactLaw, width_mm: f64, torque_nmm: f
 }
 
 #[test]
-fn every_state_of_a_sweep_with_deviations_is_that_of_free_teeth_on_springs() {
+fn deviation_states_match_free_teeth_on_springs() {
     let mut worst = 0.0_f64;
     for (index, p) in drives().iter().enumerate() {
         for (kinds, law) in ALL_KINDS.into_iter().zip([FIXED, ContactLaw::Palmgren].into_iter().cycle()) {
@@ -359,7 +359,7 @@ fn pattern(p: &DriveParameters, kinds: Kinds, load_periods: u64) -> BTreeSet<Ite
 }
 
 #[test]
-fn a_sweep_with_deviations_ends_where_the_items_that_deviate_meet_again_and_no_sooner() {
+fn deviation_sweep_ends_when_pattern_repeats() {
     for p in drives() {
         let drive = drive(&p);
         for kinds in ALL_KINDS {
@@ -373,9 +373,9 @@ fn a_sweep_with_deviations_ends_where_the_items_that_deviate_meet_again_and_no_s
     }
 }
 
-/// Each of the laps, slots by spaces, was once laid out before any was counted: gigabytes, and no stop was looked at.
+/// Listing all laps, slots by spaces, would take gigabytes.
 #[test]
-fn a_sweep_to_a_tolerance_of_sixteen_million_unlike_laps_is_refused_before_they_are_gone_through() {
+fn sixteen_million_laps_are_refused_at_once() {
     let p = of(ellipse(15_996.0, 15_995.0), 3999, 3999, 3997, 2.0);
     let unlike = |count: u32| (0..count).map(|item| f64::from(item % 7)).collect();
     let deviations = Deviations { slot_wall_um: unlike(3999), ring_space_um: unlike(3997), ..Deviations::default() };
@@ -387,7 +387,7 @@ fn a_sweep_to_a_tolerance_of_sixteen_million_unlike_laps_is_refused_before_they_
 }
 
 #[test]
-fn what_deviates_by_nothing_is_swept_as_one_zone_that_stands_for_all() {
+fn zero_deviations_sweep_one_zone() {
     let drive = drive(&PAPER_5_1);
     let nothing = Deviations {
         slot_wall_um: vec![0.0; 28],
@@ -401,7 +401,7 @@ fn what_deviates_by_nothing_is_swept_as_one_zone_that_stands_for_all() {
 }
 
 #[test]
-fn what_all_items_have_alike_is_a_modification() {
+fn equal_deviation_of_all_items_is_modification() {
     let drives = [PAPER_5_1, of(ellipse(58.0, 56.6), 13, 13, 15, 5.0), PAPER_5_2_BORED];
     for (p, moves) in drives.into_iter().flat_map(|p| [(p, false), (p, true)]) {
         let drive = drive(&p);
@@ -463,7 +463,7 @@ fn turned_by(list: &[f64], items: usize) -> Vec<f64> {
 }
 
 #[test]
-fn lists_that_begin_a_slot_and_m_spaces_later_are_the_drive_a_load_period_later() {
+fn rotated_lists_shift_sweep_by_a_load_period() {
     let p = of(ellipse(58.0, 56.0), 24, 12, 22, 5.0);
     let drive = drive(&p);
     let load = cleared(20.0, FIXED);
@@ -489,7 +489,7 @@ fn lists_that_begin_a_slot_and_m_spaces_later_are_the_drive_a_load_period_later(
 }
 
 #[test]
-fn an_eccentric_off_its_axis_is_one_of_another_eccentricity() {
+fn eccentric_off_axis_has_another_eccentricity() {
     // The circle itself, moved: distance of the tooth's centre from its middle, less both radii.
     let eccentric = |eccentricity_mm| WaveGenerator::Eccentric { radius_mm: 30.0, eccentricity_mm };
     let p = of(eccentric(1.0), 12, 12, 11, 4.0);
@@ -510,7 +510,7 @@ fn an_eccentric_off_its_axis_is_one_of_another_eccentricity() {
 }
 
 #[test]
-fn a_sweep_to_a_tolerance_finds_the_peaks_of_every_load_period() {
+fn tolerance_sweep_finds_peaks_of_all_load_periods() {
     for (index, p) in drives().iter().enumerate() {
         let drive = drive(p);
         let load =
@@ -545,7 +545,7 @@ fn a_sweep_to_a_tolerance_finds_the_peaks_of_every_load_period() {
 }
 
 #[test]
-fn where_all_items_have_alike_a_tolerance_finds_in_every_load_period_what_it_finds_in_one() {
+fn equal_deviations_have_peaks_of_one_period() {
     for p in [of(ellipse(58.0, 56.0), 14, 14, 12, 5.0), of(ellipse(58.0, 56.6), 13, 13, 15, 5.0), PAPER_5_2_BORED] {
         let drive = drive(&p);
         let torque = cleared(20.0, ContactLaw::Palmgren);
@@ -564,7 +564,7 @@ fn where_all_items_have_alike_a_tolerance_finds_in_every_load_period_what_it_fin
 }
 
 #[test]
-fn unlike_teeth_push_the_wave_generator_aside_with_the_sum_of_their_forces() {
+fn radial_force_of_unlike_teeth_is_their_sum() {
     for p in [of(ellipse(58.0, 56.0), 14, 14, 12, 5.0), of(ellipse(58.0, 56.0), 14, 14, 16, 5.0)] {
         let drive = drive(&p);
         let load = cleared(60.0, FIXED);
@@ -593,7 +593,7 @@ fn unlike_teeth_push_the_wave_generator_aside_with_the_sum_of_their_forces() {
 }
 
 #[test]
-fn a_part_too_full_is_told_with_its_slot_its_lobe_and_the_input_angle() {
+fn interference_names_slot_lobe_and_input_angle() {
     let drive = drive(&PAPER_5_1);
     let mut walls = vec![0.0; 28];
     // A gap of 8 µm at each contact is 16 µm at the root at least.
@@ -616,7 +616,7 @@ fn a_part_too_full_is_told_with_its_slot_its_lobe_and_the_input_angle() {
 }
 
 #[test]
-fn deviations_that_this_load_or_this_drive_cannot_have_are_all_told() {
+fn reports_all_impossible_deviations() {
     let drive = drive(&PAPER_5_1);
     let wrong = Deviations {
         slot_wall_um: vec![1.0; 27],
@@ -636,7 +636,7 @@ fn deviations_that_this_load_or_this_drive_cannot_have_are_all_told() {
 }
 
 #[test]
-fn the_wind_up_without_load_is_that_of_a_torque_that_goes_to_nothing() {
+fn unloaded_wind_up_is_limit_of_small_torque() {
     for p in drives() {
         let drive = drive(&p);
         let deviations = deviations(&p, ALL_KINDS[4], 11);

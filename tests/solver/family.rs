@@ -159,7 +159,7 @@ fn center_radius_mm(p: &DriveParameters, psi: f64) -> f64 {
 }
 
 #[test]
-fn path_slope_and_curvature_are_those_of_differences_on_the_path_itself() {
+fn path_slope_and_curvature_match_differences() {
     for p in family() {
         let drive = drive(&p);
         let (locus, lobes) = (drive.flank().locus(), drive.lobes());
@@ -190,7 +190,7 @@ fn path_slope_and_curvature_are_those_of_differences_on_the_path_itself() {
 }
 
 #[test]
-fn a_position_keeps_its_digits_towards_lobe_and_valley() {
+fn position_is_accurate_near_lobe_and_valley() {
     // Near either end lever arms are proportional to the distance from it: no digit may be lost on the way there.
     for p in family() {
         let drive = drive(&p);
@@ -208,7 +208,7 @@ fn a_position_keeps_its_digits_towards_lobe_and_valley() {
 }
 
 #[test]
-fn the_steepest_place_is_the_largest_slope_of_a_scan() {
+fn steepest_place_matches_scan() {
     for p in family() {
         let drive = drive(&p);
         let (locus, lobes) = (drive.flank().locus(), drive.lobes());
@@ -264,7 +264,7 @@ fn farthest_swept_mm(p: &DriveParameters, angle_rad: f64) -> f64 {
 }
 
 #[test]
-fn the_ring_of_every_kind_is_the_boundary_of_the_circles_swept_along_the_path() {
+fn ring_is_boundary_of_swept_circles() {
     for p in family() {
         let drive = drive(&p);
         let flank = drive.flank();
@@ -294,7 +294,7 @@ fn the_ring_of_every_kind_is_the_boundary_of_the_circles_swept_along_the_path() 
 }
 
 #[test]
-fn the_critical_radius_parts_swept_circles_that_reach_the_tip_from_those_that_pass_it() {
+fn critical_radius_separates_undercut_from_regular_tips() {
     let mut tried = 0;
     for p in family() {
         let unbored = DriveParameters { tip_radius_mm: None, ..p };
@@ -320,9 +320,9 @@ fn the_critical_radius_parts_swept_circles_that_reach_the_tip_from_those_that_pa
     assert!(tried > 10, "{tried}");
 }
 
-/// The lower root of theory 2.9, and that an undercut drive has one below its own radius.
+/// Theory 2.9. An undercut drive has a root below its own radius.
 #[test]
-fn the_critical_radius_of_a_harmonic_cam_is_the_lower_root_of_its_quadratic() {
+fn harmonic_critical_radius_is_lower_quadratic_root() {
     let mut undercut = 0;
     for (lobes, teeth, radius_mm, e) in [(1, 40, 57.0, 1.0), (2, 80, 57.0, 1.0), (3, 36, 48.0, 1.0), (4, 48, 60.0, 1.2)]
     {
@@ -340,9 +340,9 @@ fn the_critical_radius_of_a_harmonic_cam_is_the_lower_root_of_its_quadratic() {
     assert!(undercut > 1, "{undercut}");
 }
 
-/// The digits of a bore are those of its distance from the tip or the root: near either the position keeps as many.
+/// The position keeps as many digits as the bore's distance from tip or root has.
 #[test]
-fn a_bore_next_to_tip_or_root_of_a_harmonic_cams_ring_ends_the_flank_where_its_radius_is_reached() {
+fn harmonic_bore_is_accurate_near_tip_and_root() {
     for (lobes, teeth) in [(1, 30), (2, 28), (3, 36), (5, 50)] {
         let drive = drive(&of(harmonic(lobes, 57.0, 1.0), teeth, 2, teeth - lobes, 2.5));
         let flank = drive.flank();
@@ -358,7 +358,7 @@ fn a_bore_next_to_tip_or_root_of_a_harmonic_cams_ring_ends_the_flank_where_its_r
 }
 
 #[test]
-fn one_lobe_of_the_harmonic_cam_is_the_eccentric_circle_to_the_last_bit() {
+fn one_lobe_harmonic_cam_is_exact_eccentric() {
     for (teeth, ring_teeth) in [(20, 21), (21, 20)] {
         let circle = of(eccentric(30.8, 1.2), teeth, teeth, ring_teeth, 2.5);
         let support = of(harmonic(1, 30.8, 1.2), teeth, teeth, ring_teeth, 2.5);
@@ -370,7 +370,7 @@ fn one_lobe_of_the_harmonic_cam_is_the_eccentric_circle_to_the_last_bit() {
 }
 
 #[test]
-fn a_harmonic_cam_of_two_lobes_differs_from_the_ellipse_by_the_square_of_its_amplitude() {
+fn two_lobe_harmonic_cam_approaches_ellipse_quadratically() {
     let difference_mm = |e: f64| {
         let (one, other) =
             (of(harmonic(2, 57.0, e), 28, 28, 26, 5.0), of(ellipse(57.0 + e, 57.0 - e), 28, 28, 26, 5.0));
@@ -387,7 +387,7 @@ fn a_harmonic_cam_of_two_lobes_differs_from_the_ellipse_by_the_square_of_its_amp
 }
 
 #[test]
-fn as_the_stroke_goes_to_nothing_every_kind_becomes_a_circle() {
+fn small_stroke_makes_every_kind_a_circle() {
     let e = 1e-6;
     for (wave_generator, teeth, radius_mm) in [
         (eccentric(40.0, e), 21, 43.0),
@@ -439,7 +439,7 @@ fn in_mesh_by_fractions(installed: i64, lobes: i64, sample: i64, samples: i64, r
 }
 
 #[test]
-fn teeth_in_mesh_are_those_that_fractions_of_a_turn_find() {
+fn teeth_in_mesh_match_exact_fractions() {
     for (lobes, teeth, installed) in [
         (1, 20, 20),
         (1, 21, 7),
@@ -491,7 +491,7 @@ fn teeth_in_mesh_are_those_that_fractions_of_a_turn_find() {
 }
 
 #[test]
-fn a_cut_short_flank_takes_the_teeth_that_stand_on_it() {
+fn shortened_flank_counts_the_teeth_on_it() {
     for p in family() {
         let drive = drive(&p);
         let mesh = Mesh::new(&drive);
@@ -522,7 +522,7 @@ fn a_cut_short_flank_takes_the_teeth_that_stand_on_it() {
 }
 
 #[test]
-fn a_tooth_is_always_in_mesh_where_the_flank_spans_more_than_a_place() {
+fn always_carries_matches_brute_force() {
     let mut refused = 0;
     for lobes in 1..=6 {
         for installed in 2..30 {
@@ -550,7 +550,7 @@ proptest! {
     #![proptest_config(cases(192))]
 
     #[test]
-    fn loads_of_every_kind_agree_with_dense_solves(parameters in any_of_the_family()) {
+    fn loads_of_every_kind_match_dense_solves(parameters in any_of_the_family()) {
         prop_assert!(worst_difference(&parameters, Projection, EQUAL) < 1e-9);
         prop_assert!(worst_difference(&parameters, VirtualWork, UNEQUAL) < 1e-9);
     }
@@ -568,7 +568,7 @@ proptest! {
     }
 
     #[test]
-    fn a_sweep_to_a_tolerance_sees_what_many_samples_see(parameters in any_of_the_family()) {
+    fn tolerance_sweep_matches_many_samples(parameters in any_of_the_family()) {
         let drive = drive(&parameters);
         let to_tolerance = Points::tolerance(1e-4, 1_000_000).unwrap();
         let adaptive = sweep::sweep(&drive, &case(VirtualWork), to_tolerance, &Never).unwrap();
@@ -586,7 +586,7 @@ proptest! {
     }
 
     #[test]
-    fn the_wave_generators_outline_is_a_radius_inside_the_path(parameters in any_of_the_family(), place in 0.0_f64..1.0) {
+    fn wave_generator_outline_is_inner_offset_of_path(parameters in any_of_the_family(), place in 0.0_f64..1.0) {
         let drive = drive(&parameters);
         let request = ProfileParameters { chord_tolerance_mm: 1e-3, extent: Extent::Full, max_points: 1_000_000 };
         let outline = profiles(&drive, &request, &Never).unwrap().wave_generator;
@@ -646,7 +646,7 @@ fn along_normals_n(p: &DriveParameters, sample: u64, samples: u64, circle: Vecto
 }
 
 #[test]
-fn an_eccentric_cam_is_pushed_across_its_eccentricity_by_the_torque_over_it() {
+fn eccentric_radial_force_is_torque_over_eccentricity() {
     for p in [of(eccentric(30.8, 1.2), 20, 20, 21, 3.0), of(eccentric(20.0, 2.0), 16, 8, 15, 2.5)] {
         for sample in 0..5 {
             let (force_n, sum_n, torque_nmm) = forces(&p, sample, 5);
@@ -661,7 +661,7 @@ fn an_eccentric_cam_is_pushed_across_its_eccentricity_by_the_torque_over_it() {
 }
 
 #[test]
-fn lobes_that_are_loaded_alike_push_the_wave_generator_nowhere_and_others_do() {
+fn only_unequally_loaded_lobes_have_radial_force() {
     for p in [of(harmonic(4, 60.0, 1.2), 36, 18, 40, 4.0), of(harmonic(3, 48.0, 1.0), 30, 30, 27, 4.0), PAPER_5_1] {
         assert_eq!(forces(&p, 1, 5).0, Vector2::zeros());
     }
@@ -689,9 +689,9 @@ fn violations(p: &DriveParameters) -> Vec<Violation> {
     }
 }
 
-/// Of a path that is given: all its centres are as far from all of the cam as a tooth is thick, or the cam is none.
+/// On a given path, every centre keeps the tooth's radius from the whole cam, or the cam is refused.
 #[test]
-fn the_flanks_of_a_lobe_do_not_meet_however_large_the_stroke() {
+fn flanks_of_lobe_do_not_meet() {
     let mut are_hollow = 0;
     for lobes in [2, 3, 4, 7, 12] {
         for tooth_radius_mm in [0.1, 0.3, 0.6, 1.2] {
@@ -744,7 +744,7 @@ fn least_of_round_mm(lobes: i64, r: f64) -> f64 {
 }
 
 #[test]
-fn a_cam_that_is_too_small_for_its_stroke_is_told_how_large_it_must_be() {
+fn too_small_cam_is_refused_with_least_size() {
     for (wave_generator, parameter) in [
         (eccentric(1.0, 1.2), Parameter::EccentricRadius),
         (harmonic(3, 8.0, 1.0), Parameter::MeanRadius),
@@ -804,7 +804,7 @@ fn a_cam_that_is_too_small_for_its_stroke_is_told_how_large_it_must_be() {
 }
 
 #[test]
-fn carrier_and_ring_differ_by_a_tooth_for_each_lobe() {
+fn carrier_and_ring_differ_by_one_tooth_per_lobe() {
     for lobes in 1..=7 {
         let beside = |ring_teeth| of(harmonic(lobes, 100.0, 0.3), 30, 30, ring_teeth, 2.0);
         for ring_teeth in 20_i64..40 {
@@ -822,7 +822,7 @@ fn carrier_and_ring_differ_by_a_tooth_for_each_lobe() {
 }
 
 #[test]
-fn the_carrier_has_room_where_the_stroke_is_less_than_the_tooths_radius() {
+fn carrier_fits_if_stroke_is_below_tooth_radius() {
     for wave_generator in [eccentric(40.0, 1.0), harmonic(3, 40.0, 1.0), harmonic_path(3, 43.0, 1.0)] {
         let lobes = wave_generator.lobes();
         // Few ring teeth, so that the tip is regular.
@@ -834,7 +834,7 @@ fn the_carrier_has_room_where_the_stroke_is_less_than_the_tooths_radius() {
 }
 
 #[test]
-fn neighbouring_teeth_of_every_kind_may_not_touch() {
+fn neighbouring_teeth_of_every_kind_must_not_touch() {
     for wave_generator in
         [eccentric(40.0, 1.2), harmonic(3, 40.0, 1.2), harmonic(5, 40.0, 0.5), harmonic_path(3, 43.0, 1.2)]
     {
@@ -863,7 +863,7 @@ fn neighbouring_teeth_of_every_kind_may_not_touch() {
 }
 
 #[test]
-fn a_hollow_wave_generator_turns_but_is_a_finding() {
+fn hollow_wave_generator_runs_but_is_a_finding() {
     let path = |amplitude_mm| of(harmonic_path(3, 52.0, amplitude_mm), 12, 12, 9, 6.0);
     let is_told = |p: &DriveParameters| {
         let found = findings::of_drive(&drive(p)).unwrap();
@@ -879,7 +879,7 @@ fn a_hollow_wave_generator_turns_but_is_a_finding() {
 }
 
 #[test]
-fn one_tooth_a_zone_is_enough_where_the_zones_take_turns() {
+fn alternating_zones_need_only_one_tooth_each() {
     // Four teeth on three lobes: a third of a lobe is a place.
     let p = of(harmonic(3, 48.0, 1.0), 28, 4, 25, 4.0);
     let mesh = Mesh::new(&drive(&p));
@@ -893,7 +893,7 @@ fn one_tooth_a_zone_is_enough_where_the_zones_take_turns() {
 }
 
 #[test]
-fn clearances_and_power_laws_work_on_teeth_of_all_zones() {
+fn clearances_and_power_laws_balance_all_zones() {
     for p in family() {
         let mut load = load(7.0, VirtualWork);
         load.law = ContactLaw::Palmgren;
@@ -906,7 +906,7 @@ fn clearances_and_power_laws_work_on_teeth_of_all_zones() {
 }
 
 #[test]
-fn grooves_are_wider_than_balls_and_flats_shorter_than_the_tooth_is_thick() {
+fn grooves_exceed_balls_and_flats_are_short() {
     let ball = |radius| ToothShape::Ball {
         groove_radius_mm: PerContact { wave_generator: Some(radius), ring: None, carrier: Some(5.2) },
     };
@@ -922,7 +922,7 @@ fn grooves_are_wider_than_balls_and_flats_shorter_than_the_tooth_is_thick() {
 }
 
 #[test]
-fn flats_may_not_end_the_arc_before_the_steepest_contact_with_the_ring() {
+fn flat_cutting_steepest_contact_is_a_finding() {
     let with = |flat_length_mm| DriveParameters {
         tooth: ToothShape::FlatSided { width_mm: 15.0, flat_length_mm },
         ..PAPER_5_1
@@ -946,7 +946,7 @@ fn flats_may_not_end_the_arc_before_the_steepest_contact_with_the_ring() {
 }
 
 #[test]
-fn in_an_assembly_every_tooth_stands_in_its_slot_on_the_path() {
+fn assembly_places_every_tooth_on_path_in_slot() {
     for p in family() {
         let (n, input_angle_deg) = (p.installed as f64, 7.0_f64);
         let parameters = DrawingParameters { chord_tolerance_mm: 1e-2, max_points: 1_000_000, input_angle_deg };
@@ -967,7 +967,7 @@ fn in_an_assembly_every_tooth_stands_in_its_slot_on_the_path() {
 }
 
 #[test]
-fn a_bored_flank_of_every_kind_ends_where_it_meets_the_bore() {
+fn bored_flank_of_every_kind_ends_at_bore() {
     for unbored in family() {
         let unbored = DriveParameters { tip_radius_mm: None, ..unbored };
         let natural = drive(&unbored);

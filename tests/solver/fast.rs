@@ -390,9 +390,9 @@ fn any_samples() -> impl Strategy<Value = u64> {
 proptest! {
     #![proptest_config(cases(256))]
 
-    /// Over each other unlike zones are one: they were worked out tooth by tooth, thirty times as slowly.
+    /// Superposed, unlike zones form one zone. This is thirty times faster than tooth by tooth.
     #[test]
-    fn peaks_of_unlike_zones_are_those_of_all_their_teeth(
+    fn unlike_zones_match_plain_peaks(
         parameters in any_drive_of_unlike_zones(),
         law in prop::sample::select(vec![ContactLaw::Linear, ContactLaw::Palmgren, JOHNSON]),
         torque_exponent in -1.0_f64..2.0,
@@ -413,7 +413,7 @@ proptest! {
     #![proptest_config(cases(256))]
 
     #[test]
-    fn the_fast_path_agrees_with_the_plain_one(
+    fn fast_path_matches_plain_path(
         parameters in prop_oneof![any_swept_drive(), any_elliptic_drive(), any_drive_of_other_kinds()],
         by_virtual_work in any::<bool>(),
         [wave_generator, ring, carrier] in any_stiffnesses(),
@@ -436,7 +436,7 @@ proptest! {
     }
 
     #[test]
-    fn the_fast_path_agrees_with_the_plain_one_under_every_law_with_and_without_gaps(
+    fn fast_path_matches_plain_under_every_law(
         parameters in prop_oneof![any_swept_drive(), any_elliptic_drive(), any_drive_of_other_kinds()],
         by_virtual_work in any::<bool>(),
         law in any_law(),
@@ -509,7 +509,7 @@ proptest! {
     #![proptest_config(cases(256))]
 
     #[test]
-    fn the_fast_path_agrees_with_the_plain_one_for_balls_and_flat_sided_teeth(
+    fn fast_path_matches_plain_for_balls_and_flats(
         parameters in prop_oneof![any_swept_drive(), any_elliptic_drive(), any_drive_of_other_kinds()],
         teeth in any_other_teeth(),
         law in any_law(),
@@ -531,9 +531,9 @@ proptest! {
     }
 }
 
-/// Under 10 MPa at the slots the balls press in a hundred-thousandth of the gap that they close first: the last bits of the gap are 2e-11 of the torque.
+/// At 10 MPa the balls' approach is 1e-5 of the gap, so rounding of the gap is 2e-11 of the torque.
 #[test]
-fn a_capacity_far_below_the_load_is_known_to_what_gaps_leave_of_its_own_digits() {
+fn tiny_capacity_is_accurate_despite_wide_gaps() {
     let parameters = DriveParameters {
         wave_generator: ellipse(39.33379486205007, 39.27141175813306),
         teeth: 300,
@@ -557,7 +557,7 @@ fn a_capacity_far_below_the_load_is_known_to_what_gaps_leave_of_its_own_digits()
 }
 
 #[test]
-fn balls_take_the_fast_path_on_undercut_flanks_too_and_on_any_wave_generator() {
+fn undercut_balls_take_fast_path_on_any_generator() {
     let ball = ToothShape::Ball { groove_radius_mm: PerContact::default() };
     let on = |wave_generator: WaveGenerator| DriveParameters {
         wave_generator,
@@ -582,7 +582,7 @@ fn balls_take_the_fast_path_on_undercut_flanks_too_and_on_any_wave_generator() {
 }
 
 #[test]
-fn palmgrens_law_takes_the_fast_path_before_what_gives_way_behind_it_too() {
+fn palmgren_with_series_compliance_takes_fast_path() {
     let parts = PerContact { wave_generator: 1e-6, ring: 0.0, carrier: 3e-6 };
     for series_compliance_mm_per_n in [parts, everywhere(1e-9), everywhere(1e-3)] {
         for (gap_um, torque_nm) in [(0.0, 20.0), (3.0, 20.0), (3.0, 1e-3)] {
@@ -605,7 +605,7 @@ fn palmgrens_law_takes_the_fast_path_before_what_gives_way_behind_it_too() {
 }
 
 #[test]
-fn balls_and_flat_sided_teeth_take_the_fast_path() {
+fn balls_and_flat_sided_teeth_take_fast_path() {
     let groove_radius_mm = PerContact { wave_generator: Some(5.3), ring: Some(5.2), carrier: None };
     let ball = ToothShape::Ball { groove_radius_mm };
     let flat = |flat_length_mm| ToothShape::FlatSided { width_mm: 15.0, flat_length_mm };
@@ -639,9 +639,9 @@ fn balls_and_flat_sided_teeth_take_the_fast_path() {
     }
 }
 
-/// Their columns know Hertz's law alone.
+/// The fast columns of balls know only Hertz's law without a series compliance.
 #[test]
-fn balls_of_other_laws_or_with_what_gives_way_behind_them_are_computed_as_in_the_plain_path() {
+fn balls_beyond_plain_hertz_match_plain_path() {
     let ball = DriveParameters { tooth: ToothShape::Ball { groove_radius_mm: PerContact::default() }, ..PAPER_5_1 };
     for (law, series_compliance_mm_per_n) in [
         (ContactLaw::Hertz, everywhere(3e-6)),
@@ -769,7 +769,7 @@ proptest! {
     #![proptest_config(cases(256))]
 
     #[test]
-    fn the_fast_path_agrees_with_the_plain_one_on_parts_made_otherwise_than_conjugate(
+    fn fast_path_matches_plain_with_modifications(
         parameters in prop_oneof![any_swept_drive(), any_elliptic_drive(), any_drive_of_other_kinds(), any_drive_of_unlike_zones()],
         teeth in prop::option::of(any_other_teeth()),
         law in any_law(),
@@ -793,7 +793,7 @@ proptest! {
     }
 
     #[test]
-    fn the_fast_path_agrees_with_the_plain_one_where_single_items_deviate(
+    fn fast_path_matches_plain_with_deviations(
         parameters in prop_oneof![any_swept_drive(), any_elliptic_drive(), any_drive_of_other_kinds(), any_drive_of_unlike_zones()],
         teeth in prop::option::of(any_other_teeth()),
         law in any_law(),
@@ -824,9 +824,9 @@ proptest! {
 const JOHNSON: ContactLaw =
     ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
 
-/// One whose force is 3e-13 of the largest has six digits of it, and its stress as many.
+/// A force of 3e-13 of the largest has six correct digits, and so has its stress.
 #[test]
-fn the_stress_of_a_tooth_that_has_just_begun_to_carry_is_known_as_well_as_its_force() {
+fn stress_of_barely_loaded_tooth_is_accurate() {
     let wave_generator =
         WaveGenerator::HarmonicPath { lobes: 6, mean_path_radius_mm: 50.0, amplitude_mm: 0.001187144819369505 };
     let tooth_radius_mm = 2.694129592460173;
@@ -862,7 +862,7 @@ fn the_stress_of_a_tooth_that_has_just_begun_to_carry_is_known_as_well_as_its_fo
 }
 
 #[test]
-fn the_fast_path_is_taken_under_every_law_with_and_without_gaps() {
+fn fast_path_is_taken_under_every_law() {
     for law in [ContactLaw::Linear, ContactLaw::Palmgren, JOHNSON] {
         for gap_um in [0.0, 1.0] {
             let clearance_um = PerContact { wave_generator: gap_um, ring: gap_um, carrier: gap_um };
@@ -902,7 +902,7 @@ fn drives_that_may_deviate() -> Vec<DriveParameters> {
 }
 
 #[test]
-fn the_fast_path_is_taken_where_single_items_deviate_wherever_the_laps_of_a_sweep_begin() {
+fn deviations_take_fast_path_from_any_lap_start() {
     let kinds = [
         ([true, true, true, false, false, false], [false, false, true]),
         ([false, false, false, true, true, false], [false, true, false]),
@@ -928,7 +928,7 @@ fn the_fast_path_is_taken_where_single_items_deviate_wherever_the_laps_of_a_swee
 }
 
 #[test]
-fn where_single_items_deviate_and_where_zones_are_unlike_a_tolerance_is_kept_by_either_way_of_looking() {
+fn both_paths_keep_tolerance_with_deviations_and_unlike_zones() {
     // Where they look differs in the last digits, but for the first sixteen intervals.
     let mut looked_elsewhere = [0, 0];
     for (parameters, seed) in drives_that_may_deviate().into_iter().zip(1..) {
@@ -968,7 +968,7 @@ fn where_single_items_deviate_and_where_zones_are_unlike_a_tolerance_is_kept_by_
 }
 
 #[test]
-fn the_fast_path_is_taken_by_parts_made_otherwise_than_conjugate_and_by_unlike_zones() {
+fn modifications_and_unlike_zones_take_fast_path() {
     let relief = TipRelief { amount_um: 5.0, start_deg: 20.0, power: 2.0 };
     for (parameters, law) in drives_that_may_deviate()
         .into_iter()
@@ -1003,7 +1003,7 @@ fn the_fast_path_is_taken_by_parts_made_otherwise_than_conjugate_and_by_unlike_z
 }
 
 #[test]
-fn the_fast_path_is_taken_by_every_wave_generator() {
+fn every_wave_generator_takes_fast_path() {
     for wave_generator in [
         WaveGenerator::Eccentric { radius_mm: 57.0, eccentricity_mm: 1.0 },
         WaveGenerator::Harmonic { lobes: 1, mean_radius_mm: 57.0, amplitude_mm: 1.0 },
@@ -1027,7 +1027,7 @@ fn the_fast_path_is_taken_by_every_wave_generator() {
 }
 
 #[test]
-fn a_drive_whose_contacts_are_wider_than_johnsons_law_allows_is_refused_by_either_path() {
+fn both_paths_refuse_contacts_beyond_johnsons_law() {
     for torque_nm in [1e4, 1e5, 1e6, 1e7] {
         let load = LoadParameters { law: JOHNSON, ..load(torque_nm, Compatibility::VirtualWork) };
         assert_both_paths_agree(&PAPER_5_1, &load, 10);
@@ -1057,7 +1057,7 @@ fn a_drive_whose_contacts_are_wider_than_johnsons_law_allows_is_refused_by_eithe
 }
 
 #[test]
-fn a_torque_that_is_off_at_any_of_the_three_parts_is_seen() {
+fn residual_detects_torque_error_at_each_part() {
     let balance = TorqueBalance::new(&drive(&PAPER_5_1), 20_000.0);
     let right = PerContact { wave_generator: 20_000.0, ring: 260_000.0, carrier: 280_000.0 };
     assert!(balance.residual(&right) < 1e-15);
@@ -1079,9 +1079,9 @@ fn a_torque_that_is_off_at_any_of_the_three_parts_is_seen() {
     }
 }
 
-/// What no fast path reaches: pointed and bored tips by default. Studies ask it of as many intervals as a sweep may have.
+/// Default models of pointed and bored tips have no fast path. Studies ask for as many intervals as a sweep may have.
 #[test]
-fn peaks_that_are_worked_out_tooth_by_tooth_keep_no_states_either() {
+fn peaks_computed_tooth_by_tooth_keep_no_states() {
     let gap = PerContact { ring: 2.0, ..PerContact::default() };
     let unlike = DriveParameters { teeth: 81, installed: 27, ring_teeth: 79, tooth_radius_mm: 2.2, ..PAPER_5_2 };
     let johnson = LoadParameters { law: JOHNSON, ..load(3.0, Compatibility::VirtualWork) };
@@ -1105,7 +1105,7 @@ fn peaks_that_are_worked_out_tooth_by_tooth_keep_no_states_either() {
 }
 
 #[test]
-fn a_sweep_allocates_columns_and_nothing_a_state() {
+fn sweep_allocates_only_columns() {
     let allocations = |samples| {
         let load = load(20.0, Compatibility::Projection);
         let ((allocations, growths, _), sweep) = count_alloc(|| swept(&PAPER_5_1, &load, samples));

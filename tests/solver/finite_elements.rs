@@ -178,7 +178,7 @@ fn percent(share: f64) -> f64 {
 }
 
 #[test]
-fn single_contacts_have_the_pressure_of_hertz_and_the_approach_of_johnson() {
+fn single_contacts_match_hertz_pressure_and_johnson_approach() {
     for contact in results().single_contacts {
         let SingleContact { radius_mm, force_n_per_mm, depth_mm, pressure_mpa, approach_mm } = contact;
         let modulus_mpa = 210e3 / (1.0 - 0.3 * 0.3);
@@ -194,7 +194,7 @@ fn single_contacts_have_the_pressure_of_hertz_and_the_approach_of_johnson() {
 }
 
 #[test]
-fn finer_elements_change_nothing_that_is_compared() {
+fn finer_elements_change_no_compared_result() {
     let convergence = results().convergence;
     let [.., finer, finest] = &convergence[..] else { panic!("two refinements at least") };
     assert!((finer.force_n / finest.force_n - 1.0).abs() < 1e-3);
@@ -202,7 +202,7 @@ fn finer_elements_change_nothing_that_is_compared() {
 }
 
 #[test]
-fn the_default_model_agrees_with_elastic_bodies() {
+fn default_model_matches_elastic_bodies() {
     let cases = results().cases;
     assert_eq!(cases.len(), 20);
     for case in cases {
@@ -224,9 +224,9 @@ fn the_default_model_agrees_with_elastic_bodies() {
     }
 }
 
-/// What the model left out of these bodies was that the ring's teeth bend, and that the wave generator moves on under its teeth, which matters with gaps.
+/// The refinements are bending ring teeth and, with gaps, the moving wave generator.
 #[test]
-fn with_ring_teeth_that_bend_and_a_wave_generator_that_moves_the_model_agrees_within_a_half_per_cent() {
+fn refined_model_matches_elastic_bodies_more_closely() {
     for case in results().cases {
         for wave_generator_moves in [false, true] {
             let own = case.load(VirtualWork, case.johnson());
@@ -246,9 +246,9 @@ fn with_ring_teeth_that_bend_and_a_wave_generator_that_moves_the_model_agrees_wi
     }
 }
 
-/// What is told of a model is what was found of it: the ranges hold every error, and go no further than another calculation went.
+/// The reported ranges hold every error and are hardly wider.
 #[test]
-fn each_model_errs_as_much_as_it_says_that_it_does() {
+fn each_model_has_the_error_it_reports() {
     let cases = results().cases;
     let mut wrong = Vec::new();
     for (compatibility, law, ring_teeth_bend, wave_generator_moves) in [
@@ -302,13 +302,13 @@ fn each_model_errs_as_much_as_it_says_that_it_does() {
 }
 
 #[test]
-fn the_larger_error_of_a_range_is_the_one_farther_from_none_on_either_side() {
+fn larger_error_of_range_has_larger_magnitude() {
     assert_eq!(ErrorRange { low: -0.05, high: 0.03 }.largest(), 0.05);
     assert_eq!(ErrorRange { low: -0.01, high: 0.03 }.largest(), 0.03);
 }
 
 #[test]
-fn beyond_the_largest_pressure_angle_that_was_calculated_a_drive_is_told_to_be() {
+fn pressure_angle_above_calculated_drives_is_reported() {
     let mut told = Vec::new();
     for semi_minor_mm in [49.5, 49.3, 49.1, 48.9] {
         let parameters = DriveParameters { wave_generator: ellipse(50.7, semi_minor_mm), ..PAPER_5_2 };
@@ -325,10 +325,10 @@ fn beyond_the_largest_pressure_angle_that_was_calculated_a_drive_is_told_to_be()
     assert!(told.contains(&true) && told.contains(&false), "{told:?}");
 }
 
-/// Few flat-lobed teeth with a gap turn by several degrees before they touch, and stand elsewhere then: against a rigid tooth that closes the gap at the place where it stands
-/// as the cam has moved on, the arms of the place without load make the largest force 1.6 and 5 % too small.
+/// A few teeth with flat lobes and a gap turn by several degrees before they touch. The unloaded lever arms then
+/// make the largest force 1.6 % and 5 % too small.
 #[test]
-fn where_teeth_are_moved_on_through_a_gap_by_more_than_in_the_drives_that_were_calculated_a_drive_is_told_to_be_beyond()
+fn wind_up_above_calculated_drives_is_reported()
 {
     let path = |mean_path_radius_mm, amplitude_mm, tooth_radius_mm| DriveParameters {
         wave_generator: WaveGenerator::HarmonicPath { lobes: 2, mean_path_radius_mm, amplitude_mm },
@@ -379,7 +379,7 @@ fn where_teeth_are_moved_on_through_a_gap_by_more_than_in_the_drives_that_were_c
 }
 
 #[test]
-fn the_drives_that_were_calculated_lie_within_the_range_and_others_do_not() {
+fn only_calculated_drives_lie_within_range() {
     for case in results().cases {
         let (parameters, _) = case.drive_and_torque_nm();
         let drive = Drive::new(&parameters).unwrap();

@@ -122,7 +122,7 @@ fn assert_near(found_mm: f64, moved_mm: f64, size_mm: f64) {
 }
 
 #[test]
-fn a_ring_of_a_shifted_path_or_turned_opens_the_gap_between_the_real_curves() {
+fn shifted_or_turned_ring_opens_real_gap() {
     for p in [PAPER_5_1, larger()] {
         let drive = drive(&p);
         let s = drive.sense();
@@ -147,7 +147,7 @@ fn a_ring_of_a_shifted_path_or_turned_opens_the_gap_between_the_real_curves() {
 }
 
 #[test]
-fn an_equidistant_ring_is_farther_from_the_tooth_by_as_much_and_a_profile_moved_along_its_radii_by_the_cosine() {
+fn equidistant_opens_full_gap_and_profile_shift_cosine() {
     for p in [PAPER_5_1, larger()] {
         let drive = drive(&p);
         for degrees in DEGREES {
@@ -181,7 +181,7 @@ fn an_equidistant_ring_is_farther_from_the_tooth_by_as_much_and_a_profile_moved_
 }
 
 #[test]
-fn parts_off_their_axis_open_and_close_the_gaps_between_the_real_curves() {
+fn runout_changes_gaps_between_real_curves() {
     for p in [PAPER_5_1, larger()] {
         let drive = drive(&p);
         let s = drive.sense();
@@ -212,7 +212,7 @@ fn parts_off_their_axis_open_and_close_the_gaps_between_the_real_curves() {
 }
 
 #[test]
-fn walls_teeth_lobes_and_the_carriers_angle_open_the_gaps_that_they_name() {
+fn walls_teeth_lobes_and_rotation_open_their_gaps() {
     let drive = drive(&PAPER_5_1);
     let tooth = tooth_of(&drive, 40.0);
     let d = tooth.center.center_radius_mm;
@@ -251,7 +251,7 @@ fn walls_teeth_lobes_and_the_carriers_angle_open_the_gaps_that_they_name() {
 }
 
 #[test]
-fn tip_relief_starts_at_its_position_and_is_whole_at_the_flanks_end() {
+fn tip_relief_grows_from_start_to_flank_end() {
     let drive = drive(&PAPER_5_1);
     let relief = TipRelief { amount_um: 6.0, start_deg: 60.0, power: 2.0 };
     let modification = Modification { ring_tip_relief: Some(relief), ..Modification::default() };
@@ -268,7 +268,7 @@ fn tip_relief_starts_at_its_position_and_is_whole_at_the_flanks_end() {
 }
 
 #[test]
-fn a_turned_ring_or_carrier_is_lost_motion_alone() {
+fn turned_ring_or_carrier_is_lost_motion_alone() {
     // kτ and (Z_G/U)τ for every tooth alike: section 4.8.
     let drive = drive(&PAPER_5_1);
     let solved = |modification| {
@@ -295,7 +295,7 @@ fn a_turned_ring_or_carrier_is_lost_motion_alone() {
 }
 
 #[test]
-fn with_deviations_the_teeth_of_both_zones_share_the_load() {
+fn deviating_teeth_of_both_zones_share_load() {
     let drive = drive(&PAPER_5_1);
     let mesh = Mesh::new(&drive);
     let solved = |deviations: Option<&Deviations>, zones: u64| {
@@ -343,7 +343,7 @@ fn with_deviations_the_teeth_of_both_zones_share_the_load() {
 }
 
 #[test]
-fn the_space_of_a_tooth_follows_from_its_slot_and_lobe() {
+fn ring_space_follows_from_slot_and_lobe() {
     // In the ring's frame the tooth stands at the middle of its space, less what its position is through the ring: checked by angles alone.
     for p in [
         PAPER_5_1,
@@ -379,9 +379,9 @@ fn the_space_of_a_tooth_follows_from_its_slot_and_lobe() {
     }
 }
 
-/// A carrier turned by τ leaves room of `τ d` at every wall, some 11 µm here.
+/// A carrier turned by τ opens `τ d` at every wall, about 11 µm here.
 #[test]
-fn a_turned_carrier_makes_room_for_walls_that_are_too_full() {
+fn turned_carrier_makes_room_for_thick_walls() {
     let swept = |slot_wall_um, carrier_rotation_arcsec| {
         let modification = Modification { slot_wall_um, carrier_rotation_arcsec, ..Modification::default() };
         let case = LoadCase::new(&LoadParameters { modification, ..load(20.0, VirtualWork) }).unwrap();
@@ -393,7 +393,7 @@ fn a_turned_carrier_makes_room_for_walls_that_are_too_full() {
 }
 
 #[test]
-fn modification_and_deviations_need_virtual_work_and_lists_one_entry_for_each_item() {
+fn rejects_deviations_under_projection_or_of_wrong_length() {
     let modification = Modification { slot_wall_um: 1.0, ..Modification::default() };
     let refused = LoadCase::new(&LoadParameters { modification, ..load(20.0, Projection) }).unwrap_err();
     assert_eq!(refused, [Violation::NeedsVirtualWork { parameter: Parameter::Modification(Modified::SlotWall) }]);

@@ -205,7 +205,7 @@ fn worst_against_free_teeth(parameters: &DriveParameters, load: &LoadParameters)
 }
 
 #[test]
-fn johnsons_law_by_virtual_work_is_a_tooth_free_to_move_between_three_lines() {
+fn johnson_virtual_work_is_tooth_between_three_lines() {
     let with_gaps = |load: LoadParameters| LoadParameters {
         clearance_um: PerContact { wave_generator: 3.0, ring: 4.5, carrier: 6.0 },
         series_compliance_mm_per_n: PerContact { wave_generator: 0.0, ring: 1e-6, carrier: 7e-6 },
@@ -227,7 +227,7 @@ fn johnsons_law_by_virtual_work_is_a_tooth_free_to_move_between_three_lines() {
 }
 
 #[test]
-fn a_tooth_gives_way_by_johnsons_printed_formula_at_each_contact() {
+fn approach_follows_johnsons_printed_formula() {
     let load = mixed(20.0);
     let drive = drive(&PAPER_5_1);
     let case = LoadCase::new(&load).unwrap();
@@ -261,7 +261,7 @@ fn a_tooth_gives_way_by_johnsons_printed_formula_at_each_contact() {
 }
 
 #[test]
-fn case_5_1_by_virtual_work_and_johnson_stands_between_linear_and_palmgren() {
+fn case_5_1_johnson_lies_between_linear_and_palmgren() {
     let peak = |law| {
         let load = LoadParameters { law, ..load(20.0, VirtualWork) };
         let sweep = swept(&PAPER_5_1, &load, 50);
@@ -275,7 +275,7 @@ fn case_5_1_by_virtual_work_and_johnson_stands_between_linear_and_palmgren() {
 }
 
 #[test]
-fn under_johnsons_law_too_any_torque_up_to_its_end_and_any_gap_is_balanced() {
+fn johnsons_law_balances_any_torque_and_gap() {
     let mut worst = 0.0_f64;
     for parameters in [PAPER_5_1, PAPER_5_2] {
         for exponent in [-12, -8, -4, 0, 1] {
@@ -294,7 +294,7 @@ fn under_johnsons_law_too_any_torque_up_to_its_end_and_any_gap_is_balanced() {
 }
 
 #[test]
-fn johnsons_law_ends_where_a_contact_is_half_as_wide_as_the_tooth_and_says_at_which_torque() {
+fn johnsons_law_ends_at_half_width_with_torque() {
     let flats = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 4.0 };
     for drive in [drive(&PAPER_5_1), drive(&DriveParameters { tooth: flats, ..PAPER_5_1 })] {
         johnsons_law_ends_at_the_ring(&drive);
@@ -333,7 +333,7 @@ fn johnsons_law_ends_at_the_ring(drive: &Drive) {
 }
 
 #[test]
-fn a_contact_wider_than_a_tenth_of_the_tooth_is_a_finding() {
+fn contact_above_tenth_of_tooth_is_a_finding() {
     let found = |load: &LoadParameters| {
         let drive = drive(&PAPER_5_1);
         let sweep = swept(&PAPER_5_1, load, 10);
@@ -374,7 +374,7 @@ fn laws_of_searches() -> [LoadParameters; 3] {
 }
 
 #[test]
-fn stiffness_is_the_slope_of_torque_over_wind_up_and_capacity_the_torque_at_which_the_stress_is_reached() {
+fn stiffness_is_torque_slope_and_capacity_meets_stress() {
     for load in laws_of_searches() {
         let at = |torque_nm: f64| {
             let load = LoadParameters { torque: toothwave_solver::Torque::Input(torque_nm), ..load };
@@ -396,7 +396,7 @@ fn stiffness_is_the_slope_of_torque_over_wind_up_and_capacity_the_torque_at_whic
 }
 
 #[test]
-fn a_sweep_to_a_tolerance_finds_the_peaks_of_these_laws_too() {
+fn tolerance_sweep_finds_peaks_under_these_laws() {
     for load in laws_of_searches() {
         let case = LoadCase::new(&load).unwrap();
         let points = Points::tolerance(1e-6, 1_000_000).unwrap();
@@ -415,7 +415,7 @@ fn a_sweep_to_a_tolerance_finds_the_peaks_of_these_laws_too() {
 }
 
 #[test]
-fn projection_takes_neither_johnsons_law_nor_a_series_compliance() {
+fn projection_rejects_johnsons_law_and_series_compliance() {
     let refused = |parameters: LoadParameters| LoadCase::new(&parameters).unwrap_err();
     let projected = LoadParameters { law: R_DEEP, ..load(20.0, Projection) };
     assert_eq!(refused(projected), [Violation::NeedsVirtualWork { parameter: Parameter::Law }]);
@@ -430,7 +430,7 @@ fn projection_takes_neither_johnsons_law_nor_a_series_compliance() {
 }
 
 #[test]
-fn a_series_compliance_is_a_softer_stiffness_where_the_law_is_linear() {
+fn series_compliance_softens_linear_stiffness() {
     let stiffness = PerContact { wave_generator: 4e5, ring: 6e5, carrier: 2e5 };
     let series = PerContact { wave_generator: 1e-6, ring: 2e-6, carrier: 3e-6 };
     let springy = LoadParameters {
@@ -455,7 +455,7 @@ fn a_series_compliance_is_a_softer_stiffness_where_the_law_is_linear() {
 }
 
 #[test]
-fn a_ball_on_a_plane_approaches_as_the_closed_form_of_hertz_says() {
+fn ball_on_plane_has_hertz_closed_form_approach() {
     let (r, modulus) = (5.0_f64, 115e3_f64);
     let circle = EllipticContact::new(1.0 / r, 1.0 / r, modulus).unwrap();
     let sum = 2.0 / r;
@@ -491,7 +491,7 @@ fn elliptic_integrals(complement: f64) -> [f64; 2] {
 }
 
 #[test]
-fn the_half_axes_and_the_approach_of_any_ellipse_are_those_of_its_elliptic_integrals_to_the_last_digits() {
+fn ellipse_axes_and_approach_match_elliptic_integrals() {
     let (modulus_mpa, force_n) = (115e3, 100.0);
     for exponent in 1..60 {
         let (large, small) = (0.3, 0.3 * 10_f64.powf(-0.05 * f64::from(exponent)));
@@ -512,9 +512,9 @@ fn the_half_axes_and_the_approach_of_any_ellipse_are_those_of_its_elliptic_integ
     }
 }
 
-/// Of two bodies that swap materials the contact stays what it is; the material of the lower Poisson's ratio is sheared more, whichever it is.
+/// If two bodies swap materials, the contact stays. The body with the lower Poisson's ratio has the larger shear.
 #[test]
-fn the_shear_below_a_balls_contact_is_that_of_the_body_in_which_it_is_larger() {
+fn ball_contact_shear_is_larger_bodys() {
     let material = |poissons_ratio| Material { youngs_modulus_gpa: 200.0, poissons_ratio };
     let ball = DriveParameters { tooth: ToothShape::Ball { groove_radius_mm: PerContact::default() }, ..PAPER_5_1 };
     let peaks = |of_teeth, of_parts| {
@@ -532,7 +532,7 @@ fn the_shear_below_a_balls_contact_is_that_of_the_body_in_which_it_is_larger() {
 }
 
 #[test]
-fn a_very_long_ellipse_is_sheared_like_a_line() {
+fn very_long_ellipse_is_sheared_like_line() {
     let long = EllipticContact::new(1.0, 1e-20, 1e5).unwrap();
     for nu in [0.0, 0.3, 0.45] {
         let below = long.shear_below(nu);
@@ -559,7 +559,7 @@ fn half_space_deflection(long: f64, short: f64, x: f64, y: f64) -> f64 {
 }
 
 #[test]
-fn hertzs_pressure_over_the_ellipse_makes_the_two_bodies_touch_all_over_it() {
+fn hertz_pressure_closes_whole_contact_ellipse() {
     let modulus = 115e3;
     for (in_plane, axial) in [(0.4, 0.4 - 1e-9), (0.4, 0.2), (0.3, 0.008), (0.02, 0.2), (5.0, 0.008)] {
         let force_n = 730.0;
@@ -579,7 +579,7 @@ fn hertzs_pressure_over_the_ellipse_makes_the_two_bodies_touch_all_over_it() {
 }
 
 #[test]
-fn a_flat_gives_way_as_the_mean_of_an_evenly_pressed_rectangle() {
+fn flat_approach_is_mean_under_uniform_pressure() {
     let modulus = 115e3;
     for (length, width) in [(4.0_f64, 15.0_f64), (3.0, 3.0), (15.0, 4.0), (1e-4, 10.0)] {
         let flat = FlatContact::new(length, width);
@@ -621,7 +621,7 @@ fn a_flat_gives_way_as_the_mean_of_an_evenly_pressed_rectangle() {
 }
 
 #[test]
-fn flat_sided_teeth_share_the_load_with_any_law_of_cylinders() {
+fn flat_sided_teeth_work_with_any_cylinder_law() {
     let drive = drive(&PAPER_5_1);
     let shape = |outer_mm| ToothContact::FlatSided {
         flat_length_mm: 4.0,
@@ -652,16 +652,15 @@ fn flat_sided_teeth_share_the_load_with_any_law_of_cylinders() {
     assert!(matches!(left, Err(SolveError::FlatOffCarrier { .. })), "{left:?}");
 }
 
-/// They were borne by the default carrier, whatever radii the designer gave.
 #[test]
-fn a_flat_bears_half_its_length_on_either_side() {
+fn flat_half_width_is_half_its_length() {
     let tooth = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 6.0 };
     let peaks = swept(&DriveParameters { tooth, ..PAPER_5_1 }, &johnson(20.0), 4).peaks;
     assert!((peaks.carrier.half_width_mm / 3.0 - 1.0).abs() < 1e-14);
 }
 
 #[test]
-fn flats_are_borne_by_the_carrier_that_is_given() {
+fn given_carrier_bears_the_flats() {
     let flat_length_mm = 4.0;
     let parameters = DriveParameters { tooth: ToothShape::FlatSided { width_mm: 15.0, flat_length_mm }, ..PAPER_5_1 };
     let drive = drive(&parameters);
@@ -707,9 +706,8 @@ fn flats_are_borne_by_the_carrier_that_is_given() {
     }
 }
 
-/// The flat's linear part was left out where its weight is negative, and forces leave the model by as much.
 #[test]
-fn flat_sided_teeth_are_projected_only_where_no_part_of_their_approach_is_negative() {
+fn flat_projection_needs_non_negative_approach_terms() {
     let flat = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 4.0 };
     let forward = DriveParameters { tooth: flat, ..PAPER_5_1 };
     let backward = DriveParameters { ring_teeth: 30, tooth_radius_mm: 4.0, ..forward };
@@ -744,7 +742,7 @@ fn flat_sided_teeth_are_projected_only_where_no_part_of_their_approach_is_negati
 }
 
 #[test]
-fn palmgrens_law_is_not_questioned_at_a_flat_which_does_not_take_it() {
+fn palmgrens_law_is_not_questioned_at_flats() {
     let bronze = Material { youngs_modulus_gpa: 110.0, poissons_ratio: 0.34 };
     let flat = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 4.0 };
     let mut parameters = LoadParameters { law: ContactLaw::Palmgren, ..load(20.0, VirtualWork) };
@@ -763,7 +761,7 @@ fn palmgrens_law_is_not_questioned_at_a_flat_which_does_not_take_it() {
 }
 
 #[test]
-fn balls_take_hertz_or_fixed_and_no_other_tooth_takes_hertz() {
+fn only_balls_take_hertz_beside_fixed() {
     let drive = drive(&PAPER_5_1);
     let ball = ToothContact::Ball { groove_radius_mm: PerContact::default() };
     let accepts = |law, shape: &ToothContact| {
@@ -786,7 +784,7 @@ proptest! {
     #![proptest_config(cases(512))]
 
     #[test]
-    fn a_stress_is_that_of_its_force_for_every_ellipse(one in -6.0_f64..3.0, other in -6.0_f64..3.0, power in -6.0_f64..6.0) {
+    fn stress_matches_force_for_every_ellipse(one in -6.0_f64..3.0, other in -6.0_f64..3.0, power in -6.0_f64..6.0) {
         let contact = EllipticContact::new(10.0_f64.powf(one), 10.0_f64.powf(other), 1.1e5).unwrap();
         let force_n = 10.0_f64.powf(power);
         prop_assert!((contact.force_n(contact.stress_mpa(force_n)) / force_n - 1.0).abs() < 1e-14);

@@ -116,7 +116,7 @@ fn assert_near(found: f64, expected: f64, allowed: f64, what: &str) {
 }
 
 #[test]
-fn slip_rolling_and_losses_are_those_of_an_exact_equilibrium_with_vanishing_friction() {
+fn losses_match_exact_equilibrium_with_vanishing_friction() {
     let mut compared = 0;
     for case in Case::all() {
         let teeth = case.teeth();
@@ -191,7 +191,7 @@ fn loss_share_of(name: &str, efficiency: f64) -> f64 {
 }
 
 #[test]
-fn losses_err_by_the_square_of_the_coefficients() {
+fn loss_error_is_quadratic_in_coefficients() {
     let (mut compared, mut least, mut most) = (0, f64::INFINITY, 0.0_f64);
     for case in Case::all() {
         let teeth = case.teeth();
@@ -226,7 +226,7 @@ fn losses_err_by_the_square_of_the_coefficients() {
 }
 
 #[test]
-fn efficiencies_err_by_no_more_than_is_told() {
+fn efficiency_error_is_within_reported_bound() {
     let mut nearest = 0.0_f64;
     let mut beyond = 0;
     for case in Case::all() {
@@ -254,7 +254,7 @@ fn efficiencies_err_by_no_more_than_is_told() {
 }
 
 #[test]
-fn the_error_that_is_told_holds_up_to_a_coefficient_and_less_where_the_cam_drags() {
+fn reported_efficiency_error_has_range_of_validity() {
     let spinning = mechanism(&PAPER_5_1);
     let flat_sided = Mechanism { tooth_spins: false, ..spinning };
     let race = |on_balls| WaveGeneratorFriction::Race { coefficient: 0.08, bearing: bearing_of_5_1(on_balls) };
@@ -277,7 +277,7 @@ fn the_error_that_is_told_holds_up_to_a_coefficient_and_less_where_the_cam_drags
 }
 
 #[test]
-fn the_point_of_contact_moves_over_each_part_as_its_curve_says() {
+fn contact_point_moves_along_each_curve() {
     for case in Case::all() {
         let placed = case.0["placed"].as_array().unwrap();
         for (tooth, row) in case.teeth().iter().zip(placed) {
@@ -294,7 +294,7 @@ fn the_point_of_contact_moves_over_each_part_as_its_curve_says() {
 }
 
 #[test]
-fn the_radial_force_is_the_sum_of_the_teeths_forces() {
+fn radial_force_is_sum_of_tooth_forces() {
     for case in Case::all() {
         let (mechanism, teeth) = (case.mechanism(true), case.teeth());
         let total: f64 = teeth.iter().map(|tooth| tooth.force_n.wave_generator).sum();
@@ -359,7 +359,7 @@ fn mean_loss_ratio(parameters: &DriveParameters, mechanism: &Mechanism, friction
 }
 
 #[test]
-fn case_5_1_loses_half_of_its_power_on_a_plain_cam_and_an_eighth_on_a_bearing() {
+fn case_5_1_loses_known_shares_of_power() {
     let mechanism = mechanism(&PAPER_5_1);
     let efficiency = |friction: Friction| {
         let loss_ratio = mean_loss_ratio(&PAPER_5_1, &mechanism, &friction);
@@ -376,7 +376,7 @@ fn case_5_1_loses_half_of_its_power_on_a_plain_cam_and_an_eighth_on_a_bearing() 
 }
 
 #[test]
-fn power_in_is_power_out_and_what_is_lost() {
+fn input_power_equals_output_power_plus_losses() {
     let mechanism = mechanism(&PAPER_5_2);
     for friction in [plain(0.01, 0.02), plain(0.08, 0.1)] {
         let drive = drive(&PAPER_5_2);
@@ -441,7 +441,7 @@ proptest! {
     #![proptest_config(cases(96))]
 
     #[test]
-    fn the_race_turns_as_fast_as_loses_least(
+    fn race_speed_minimises_losses(
         parameters in any_swept_drive(),
         on_race in 0.0_f64..0.2, ring in 0.0_f64..0.2, carrier in 0.0_f64..0.2, on_balls in 0.0_f64..0.1,
         tooth_spins in any::<bool>(), sample in 0_u64..7, other in -2.0_f64..2.0,
@@ -469,7 +469,7 @@ proptest! {
     }
 
     #[test]
-    fn a_tooth_that_cannot_spin_loses_no_less_and_a_stuck_race_is_a_cam(
+    fn tooth_that_cannot_spin_loses_no_less(
         parameters in any_swept_drive(), on_cam in 0.001_f64..0.2, elsewhere in 0.001_f64..0.2, sample in 0_u64..7,
     ) {
         let drive = drive(&parameters);
@@ -496,7 +496,7 @@ proptest! {
 }
 
 #[test]
-fn a_tooth_without_load_loses_nothing_and_rolls_on_nothing() {
+fn unloaded_tooth_loses_nothing() {
     let drive = drive(&PAPER_5_1);
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
@@ -512,9 +512,9 @@ fn a_tooth_without_load_loses_nothing_and_rolls_on_nothing() {
     assert_eq!(more.loss_ratio(), all.loss_ratio());
 }
 
-/// The worn section of each part by two ways: depth over its flanks, and what the teeth take off. Teeth that cannot spin slip everywhere.
+/// Teeth that cannot spin slip at all parts.
 #[test]
-fn what_a_part_loses_is_what_the_teeth_take_off_it() {
+fn worn_section_equals_material_removed_by_teeth() {
     let drive = drive(&PAPER_5_2);
     let load = LoadCase::new(&load(3.0, Compatibility::VirtualWork)).unwrap();
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
@@ -553,7 +553,7 @@ fn what_a_part_loses_is_what_the_teeth_take_off_it() {
 }
 
 #[test]
-fn with_any_member_fixed_power_goes_through_and_torques_balance() {
+fn power_and_torques_balance_for_any_fixed_member() {
     for (teeth, installed, ring_teeth, lobes) in
         [(28, 28, 26, 2_u32), (28, 14, 30, 2), (28, 28, 27, 1), (33, 11, 36, 3)]
     {
@@ -582,7 +582,7 @@ fn with_any_member_fixed_power_goes_through_and_torques_balance() {
 }
 
 #[test]
-fn a_race_wears_all_round() {
+fn race_wears_evenly_around() {
     let drive = drive(&PAPER_5_1);
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
@@ -608,7 +608,7 @@ fn a_race_wears_all_round() {
 }
 
 #[test]
-fn a_tooth_that_cannot_spin_wears_its_slot_by_its_line_load_a_pass() {
+fn slot_wear_follows_line_load_per_pass() {
     let drive = drive(&PAPER_5_1);
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
@@ -629,7 +629,7 @@ fn a_tooth_that_cannot_spin_wears_its_slot_by_its_line_load_a_pass() {
 }
 
 #[test]
-fn pressure_times_velocity_is_the_hertz_pressure_at_the_slip() {
+fn pressure_times_velocity_is_hertz_pressure_times_slip() {
     let case = &Case::all()[0];
     let turning = case.mechanism(true).turning(&plain(0.03, 0.05), &case.teeth());
     let stress_mpa = PerContact { wave_generator: 800.0, ring: 900.0, carrier: 500.0 };
@@ -643,7 +643,7 @@ fn pressure_times_velocity_is_the_hertz_pressure_at_the_slip() {
 }
 
 #[test]
-fn a_bearing_lasts_as_iso_281_says() {
+fn bearing_life_follows_iso_281() {
     assert_near(RollingElement::Ball.life_h(10_000.0, 1_000.0, 1_000.0), 1e9 / 60e3, 1e-8, "ball");
     let roller = RollingElement::Roller.life_h(10_000.0, 1_000.0, 1_000.0);
     assert_near(roller, 1e6 * 10.0_f64.powf(10.0 / 3.0) / 60e3, 1e-7, "roller");
@@ -655,7 +655,7 @@ fn a_bearing_lasts_as_iso_281_says() {
 }
 
 #[test]
-fn a_duty_uses_up_a_bearings_life_point_by_point() {
+fn duty_sums_bearing_damage_over_points() {
     let points = [(0.5, 1500.0, 800.0), (0.3, 300.0, 3000.0), (0.2, 3000.0, 100.0)]
         .map(|(share_of_time, speed_rpm, mean_load_n)| BearingLoadForTime { share_of_time, speed_rpm, mean_load_n });
     for element in [RollingElement::Ball, RollingElement::Roller] {
@@ -669,7 +669,7 @@ fn a_duty_uses_up_a_bearings_life_point_by_point() {
 }
 
 #[test]
-fn a_duty_adds_energies_and_depths_where_they_are() {
+fn duty_adds_energies_and_local_depths() {
     let mechanism = mechanism(&PAPER_5_1);
     let points = [(0.5, 1500.0, 20.0, 0.08), (0.25, 300.0, 60.0, 0.2), (0.25, 3000.0, 5.0, 0.05)].map(
         |(share_of_time, input_speed_rpm, input_torque_nm, loss_ratio)| DutyPoint {
@@ -703,7 +703,7 @@ fn a_duty_adds_energies_and_depths_where_they_are() {
 }
 
 #[test]
-fn a_mean_over_a_period_counts_its_ends_half_and_a_jump_twice() {
+fn period_mean_halves_ends_and_splits_jumps() {
     let column = |points: &[(f64, f64)]| -> Vec<AtInputAngle> {
         points.iter().map(|&(input_angle, value)| AtInputAngle { input_angle, value }).collect()
     };
@@ -712,7 +712,7 @@ fn a_mean_over_a_period_counts_its_ends_half_and_a_jump_twice() {
 }
 
 #[test]
-fn impossible_friction_is_refused_with_every_value() {
+fn impossible_friction_reports_every_value() {
     let bearing = RaceBearing { coefficient: 2.0, radius_mm: 0.0 };
     let parameters = FrictionParameters {
         wave_generator: WaveGeneratorFriction::Race { coefficient: -0.1, bearing },
@@ -737,7 +737,7 @@ fn impossible_friction_is_refused_with_every_value() {
 }
 
 #[test]
-fn friction_of_nothing_takes_nothing() {
+fn zero_friction_loses_nothing() {
     let case = &Case::all()[0];
     let Turning { teeth, work_nmm_per_rad, .. } = case.mechanism(true).turning(&plain(0.0, 0.0), &case.teeth());
     assert!(teeth.iter().all(|slip| slip.rolls.is_none()));
@@ -746,7 +746,7 @@ fn friction_of_nothing_takes_nothing() {
 }
 
 #[test]
-fn a_period_loses_what_its_input_angles_lose_one_by_one() {
+fn period_loss_is_mean_over_input_angles() {
     for parameters in [PAPER_5_1, PAPER_5_2] {
         let (drive, mechanism) = (drive(&parameters), mechanism(&parameters));
         let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
@@ -772,9 +772,9 @@ fn a_period_loses_what_its_input_angles_lose_one_by_one() {
     }
 }
 
-/// With gaps the arms of the teeth are others by per cent, once the wave generator has moved on.
+/// With gaps the moved wave generator changes the teeth's lever arms by per cent.
 #[test]
-fn what_is_lost_is_what_the_forces_lose_at_their_slips_where_the_wave_generator_moves() {
+fn losses_equal_force_times_slip_with_moving_generator() {
     let drive = drive(&PAPER_5_2);
     let load = LoadCase::new(&LoadParameters {
         clearance_um: everywhere(5.0),
@@ -799,7 +799,7 @@ fn what_is_lost_is_what_the_forces_lose_at_their_slips_where_the_wave_generator_
 }
 
 #[test]
-fn pressure_times_velocity_peaks_where_the_product_of_a_state_is_largest() {
+fn pressure_times_velocity_peak_is_largest_product() {
     let drive = drive(&PAPER_5_1);
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
     let sweep = sweep(&drive, &load, Points::samples(40).unwrap(), &Never).unwrap();
@@ -818,7 +818,7 @@ fn pressure_times_velocity_peaks_where_the_product_of_a_state_is_largest() {
 }
 
 #[test]
-fn a_sweep_to_a_tolerance_loses_what_many_samples_lose() {
+fn tolerance_sweep_loses_as_many_samples() {
     for parameters in [PAPER_5_1, PAPER_5_2] {
         let drive = drive(&parameters);
         let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
@@ -839,7 +839,7 @@ fn a_sweep_to_a_tolerance_loses_what_many_samples_lose() {
 }
 
 #[test]
-fn a_race_runs_around_each_kind_of_cam_at_its_mean_radius() {
+fn race_runs_at_mean_radius_of_cam() {
     let radius_mm = |wave_generator: WaveGenerator| wave_generator.race_radius_mm(4.0);
     assert_eq!(radius_mm(WaveGenerator::Ellipse { semi_major_mm: 58.0, semi_minor_mm: 56.0 }), 57.0);
     assert_eq!(radius_mm(WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 }), 30.8);
@@ -851,7 +851,7 @@ fn a_race_runs_around_each_kind_of_cam_at_its_mean_radius() {
 }
 
 #[test]
-fn the_radial_force_of_a_sweep_is_that_of_the_torque_on_an_eccentric_and_none_on_lobes_alike() {
+fn sweep_radial_force_follows_torque_on_eccentric_only() {
     let parameters = DriveParameters {
         wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
         teeth: 28,
@@ -885,7 +885,7 @@ fn the_radial_force_of_a_sweep_is_that_of_the_torque_on_an_eccentric_and_none_on
 }
 
 #[test]
-fn losses_of_a_sweep_stop_when_told_to() {
+fn losses_stop_on_request() {
     let drive = drive(&PAPER_5_1);
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
     let sweep = sweep(&drive, &load, Points::samples(4).unwrap(), &Never).unwrap();
@@ -902,7 +902,7 @@ fn wear_parameters(mechanism: &Mechanism) -> WearParameters {
 }
 
 #[test]
-fn a_sweep_wears_each_part_as_its_states_do_and_a_race_all_round() {
+fn sweep_wear_is_that_of_its_states() {
     let (drive, mechanism) = (drive(&PAPER_5_1), mechanism(&PAPER_5_1));
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
@@ -955,7 +955,7 @@ fn a_sweep_wears_each_part_as_its_states_do_and_a_race_all_round() {
 }
 
 #[test]
-fn a_duty_wears_each_place_by_its_mean_and_not_by_the_mean_of_the_largest() {
+fn duty_wear_peaks_after_averaging_each_place() {
     let wear = |ring: [f64; 2], race| Wear {
         mm_per_hour: PerContact { wave_generator: Vec::new(), ring: ring.into(), carrier: vec![1.0, 2.0] },
         race_mm_per_hour: Some(race),
@@ -967,7 +967,7 @@ fn a_duty_wears_each_place_by_its_mean_and_not_by_the_mean_of_the_largest() {
 }
 
 #[test]
-fn a_ball_wears_its_groove_by_the_pressure_that_passes_over_its_middle() {
+fn ball_wears_groove_by_pressure_over_its_middle() {
     let shape =
         ToothShape::Ball { groove_radius_mm: PerContact { wave_generator: Some(5.4), ring: Some(5.3), carrier: None } };
     let parameters = DriveParameters { tooth: shape, ..PAPER_5_1 };
@@ -1011,7 +1011,7 @@ fn a_ball_wears_its_groove_by_the_pressure_that_passes_over_its_middle() {
 }
 
 #[test]
-fn the_bearing_of_an_eccentric_bears_the_force_across_it_at_the_speed_of_its_race() {
+fn eccentric_bearing_carries_radial_force_at_race_speed() {
     let parameters = DriveParameters {
         wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
         teeth: 28,
@@ -1052,9 +1052,9 @@ fn the_bearing_of_an_eccentric_bears_the_force_across_it_at_the_speed_of_its_rac
     }
 }
 
-/// Its component across the eccentricity makes the torque, wherever slots lie aside and whichever way that is said.
+/// Only its component across the eccentricity counts. Slot offsets come from a modification or from deviations.
 #[test]
-fn across_the_eccentricity_the_radial_force_makes_the_torque_whatever_gaps_there_are_at_the_slots() {
+fn radial_force_balances_torque_with_any_slot_gaps() {
     let drive = drive(&ECCENTRIC);
     let of_slots = |slot_wall_um: f64| Modification { slot_wall_um, ..Modification::default() };
     let of_each = |um: f64| Deviations { slot_wall_um: vec![um; 20], ..Deviations::default() };
@@ -1072,9 +1072,9 @@ fn across_the_eccentricity_the_radial_force_makes_the_torque_whatever_gaps_there
     }
 }
 
-/// Where a tooth enters under load the force across the bearing jumps, and either side of the jump has its own intervals.
+/// Where a tooth enters under load the radial force jumps, and each side of the jump has its own intervals.
 #[test]
-fn a_bearings_mean_load_takes_half_of_each_interval_at_either_end_jumps_too() {
+fn bearing_mean_load_uses_trapezoids_up_to_jumps() {
     let parameters = DriveParameters {
         wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
         teeth: 12,
@@ -1101,7 +1101,7 @@ fn a_bearings_mean_load_takes_half_of_each_interval_at_either_end_jumps_too() {
 }
 
 #[test]
-fn the_capacity_is_the_least_that_any_contact_allows() {
+fn capacity_is_least_over_contacts() {
     for parameters in [PAPER_5_1, PAPER_5_2] {
         let drive = drive(&parameters);
         let capacity = |allowable: PerContact<f64>| {

@@ -156,7 +156,7 @@ fn points(edge: &Edge) -> &[Point2<f64>] {
 }
 
 #[test]
-fn every_point_of_a_modified_flank_is_as_far_from_the_moved_path_as_the_modification_says() {
+fn modified_flank_is_offset_from_moved_path() {
     let mut worst: f64 = 0.0;
     for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()] {
         let flank_end_rad = drive(&p).flank_limit().position.from_lobe_rad;
@@ -217,7 +217,7 @@ fn swept_tip_mm(p: &DriveParameters, shift_mm: f64, disc_mm: f64) -> f64 {
 }
 
 #[test]
-fn a_shifted_path_has_its_tip_where_the_swept_discs_end_undercut_or_not() {
+fn shifted_path_tip_matches_swept_discs() {
     for p in [PAPER_5_1, PAPER_5_2, eccentric(), three_lobes()] {
         for (path_um, equidistant_um) in [(40.0, 0.0), (-40.0, 0.0), (25.0, -10.0), (-25.0, 10.0)] {
             let m = Modification { ring_path_shift_um: path_um, ring_equidistant_um: equidistant_um, ..NONE };
@@ -228,9 +228,9 @@ fn a_shifted_path_has_its_tip_where_the_swept_discs_end_undercut_or_not() {
     }
 }
 
-/// By the radius at which the swept path's own undercut begins, less and more of it: the flank's end leaves the tip like a square root.
+/// Radii lie just below and above the swept path's own threshold, where the flank's end moves like a square root.
 #[test]
-fn beside_the_threshold_of_undercut_a_shifted_path_ends_where_the_swept_discs_do() {
+fn shifted_path_ends_correctly_near_undercut_threshold() {
     let critical = drive(&PAPER_5_1).flank().critical_tooth_radius_mm().unwrap();
     for off in [-1e-3, -1e-5, 1e-5, 1e-4, 1e-3] {
         let p = DriveParameters { tooth_radius_mm: critical * (1.0 + off), ..PAPER_5_1 };
@@ -242,7 +242,7 @@ fn beside_the_threshold_of_undercut_a_shifted_path_ends_where_the_swept_discs_do
 }
 
 #[test]
-fn what_the_drawing_leaves_between_a_tooth_and_its_partners_is_the_gap_of_the_model() {
+fn drawn_distances_equal_model_gaps() {
     let size_um = 2.0;
     let modifications = [
         Modification { ring_equidistant_um: size_um, ..NONE },
@@ -316,7 +316,7 @@ fn distance(outline: &[Point2<f64>], point: Point2<f64>) -> f64 {
 }
 
 #[test]
-fn modified_outlines_close_and_their_curves_start_and_end_along_their_tangents() {
+fn modified_outlines_close_with_matching_tangents() {
     for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()] {
         for m in of_the_ring() {
             let ring = drawn(&p, Subject::Part(Part::Ring), &parts(m), 1e-6, 0.0).remove(0);
@@ -345,7 +345,7 @@ fn modified_outlines_close_and_their_curves_start_and_end_along_their_tangents()
 }
 
 #[test]
-fn turned_flanks_leave_an_arc_at_the_root_and_flanks_turned_together_a_land_at_the_tip() {
+fn turned_flanks_leave_arc_or_land() {
     let turned = |arcsec| space(&PAPER_5_1, Modification { ring_rotation_arcsec: arcsec, ..NONE });
     let [Edge::Curve { points: lower, .. }, Edge::Arc { radius_mm, sweep_rad, .. }, Edge::Curve { points: upper, .. }] =
         &turned(120.0)[..]
@@ -366,7 +366,7 @@ fn turned_flanks_leave_an_arc_at_the_root_and_flanks_turned_together_a_land_at_t
 }
 
 #[test]
-fn an_equidistant_modification_draws_what_a_clearance_of_its_size_draws() {
+fn equidistant_modification_draws_as_clearance() {
     for p in [PAPER_5_1, PAPER_5_2, eccentric()] {
         for (part, clearance, modification) in [
             (
@@ -397,7 +397,7 @@ fn an_equidistant_modification_draws_what_a_clearance_of_its_size_draws() {
 }
 
 #[test]
-fn a_carrier_beyond_the_tips_of_a_ring_that_is_set_forward_meets_it() {
+fn carrier_beyond_advanced_tips_is_refused() {
     let forward = [
         Modification { ring_equidistant_um: -30.0, ..NONE },
         Modification { ring_path_shift_um: -30.0, ..NONE },
@@ -424,7 +424,7 @@ fn a_carrier_beyond_the_tips_of_a_ring_that_is_set_forward_meets_it() {
 }
 
 #[test]
-fn a_rim_begins_outside_the_root_of_the_ring_as_it_is_made() {
+fn rim_starts_outside_root_as_made() {
     let of = |drive: &DriveParameters, modification: Modification, ring_clearance_um: f64| {
         let parts = PartsParameters { ring_outer_radius_mm: Some(60.0), ring_clearance_um, ..parts(modification) };
         let found = parts.violations(Part::Ring, &Draft::new(drive).unwrap());
@@ -455,7 +455,7 @@ fn a_rim_begins_outside_the_root_of_the_ring_as_it_is_made() {
 }
 
 #[test]
-fn a_drawing_has_no_more_points_than_are_expected_and_one_without_curves_none() {
+fn drawing_keeps_expected_point_count() {
     for p in [PAPER_5_1, PAPER_5_2, eccentric(), three_lobes()] {
         for (subject, has_curves) in [
             (Subject::Part(Part::Ring), true),
@@ -490,13 +490,13 @@ fn a_drawing_has_no_more_points_than_are_expected_and_one_without_curves_none() 
 }
 
 #[test]
-fn a_relief_of_nothing_draws_the_conjugate_ring() {
+fn zero_relief_draws_conjugate_ring() {
     let relief = Modification { ring_tip_relief: Some(TipRelief { amount_um: 0.0, ..RELIEF }), ..NONE };
     assert_eq!(space(&PAPER_5_1, relief), space(&PAPER_5_1, NONE));
 }
 
 #[test]
-fn a_space_is_one_curve_where_it_is_smooth_at_its_root_and_where_its_relief_starts_another() {
+fn smooth_space_is_one_curve_and_relief_another() {
     let curves = |start_deg, power| {
         let relief = TipRelief { start_deg, power, ..RELIEF };
         let edges = space(&PAPER_5_1, Modification { ring_tip_relief: Some(relief), ..NONE });
@@ -509,7 +509,7 @@ fn a_space_is_one_curve_where_it_is_smooth_at_its_root_and_where_its_relief_star
 }
 
 #[test]
-fn a_relief_lower_than_the_flank_leaves_the_rim_where_it_is() {
+fn low_relief_leaves_rim_unchanged() {
     let outer = |modification| {
         let ring = drawn(&PAPER_5_1, Subject::Part(Part::Ring), &parts(modification), 1e-2, 0.0).remove(0);
         ring.section.outer
@@ -531,9 +531,9 @@ fn told_reach_mm(p: &DriveParameters, parts: &PartsParameters) -> f64 {
 proptest! {
     #![proptest_config(cases(256))]
 
-    /// Within two tolerances of the drawn hole, between whose points the curve may reach farther by one.
+    /// Within two tolerances of the drawn hole: the curve may exceed its points by one tolerance.
     #[test]
-    fn the_rim_begins_where_the_hole_reaches_farthest_out(
+    fn rim_starts_where_hole_reaches_farthest(
         which in 0_usize..5,
         power in prop::sample::select(vec![0.1, 0.5, 1.0, 1.5, 2.0, 3.0, 10.0]),
         (amount, is_set_forward) in (-2.5_f64..0.5, prop::bool::weighted(0.2)),
@@ -577,9 +577,9 @@ proptest! {
     }
 }
 
-/// Near its start a relief of the first power from the root on grows faster than the flank falls, and of a power below one at once.
+/// Near its start a relief of power 1 or less grows faster than the flank falls.
 #[test]
-fn a_relief_that_leaves_the_root_outward_takes_from_the_rim() {
+fn outward_relief_at_root_reduces_rim() {
     for (amount_um, power, outer_mm) in [(500.0, 0.1, 68.2), (1000.0, 1.0, 68.02)] {
         let relief = TipRelief { amount_um, start_deg: 0.0, power };
         let parts = PartsParameters {
@@ -595,7 +595,7 @@ fn a_relief_that_leaves_the_root_outward_takes_from_the_rim() {
 }
 
 #[test]
-fn a_modification_that_leaves_no_outline_is_refused_with_the_number_at_fault() {
+fn excessive_modification_is_refused_at_its_number() {
     let refused = |p: &DriveParameters, part, modification| {
         let parameters = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 1_000_000, input_angle_deg: 0.0 };
         match Drawing::new(&Draft::new(p).unwrap(), Subject::Part(part), &parts(modification), &parameters) {
@@ -656,10 +656,10 @@ fn a_modification_that_leaves_no_outline_is_refused_with_the_number_at_fault() {
     );
 }
 
-/// Nearly round and bored, the flank ends where its height hardly changes; turned a little, it goes on to the valley, where a relief of the 52nd power has long
-/// left the ring.
+/// The cam is nearly round and the tip bored. A turned flank extends to the valley, where a relief of the 52nd
+/// power is far outside the ring.
 #[test]
-fn a_relief_that_rises_out_of_its_space_is_refused() {
+fn relief_rising_out_of_its_space_is_refused() {
     let p = DriveParameters {
         wave_generator: ellipse(34.253_525_011_805_64, 34.246_474_988_194_36),
         teeth: 28,
@@ -684,10 +684,9 @@ fn a_relief_that_rises_out_of_its_space_is_refused() {
     assert!(gentle.bodies(&Never).is_ok());
 }
 
-/// A relief that is set forward and grows with some power bends the flank once more, and once more again, where it overtakes what the path bends. The tangent at one end of such a
-/// stretch may lie along its chord, as if there was nothing between.
+/// A relief adds inflections where its curvature exceeds the path's. A tangent at one end may lie along the chord.
 #[test]
-fn a_chord_on_which_a_relieved_flank_bends_more_than_once_is_true_to_the_tolerance() {
+fn chord_with_several_inflections_keeps_tolerance() {
     let p = PAPER_5_1;
     let half_rad = 0.5 * PI;
     let k = p.ring_teeth as f64 / 2.0;
@@ -742,7 +741,7 @@ fn along(polygon: &[Point2<f64>]) -> impl Iterator<Item = Vector2<f64>> {
 }
 
 #[test]
-fn solids_have_polynomials_that_are_everywhere_within_a_hundredth_of_the_chord_tolerance() {
+fn solid_polynomials_keep_hundredth_of_chord_tolerance() {
     for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()] {
         for tolerance_mm in [1e-2, 1e-3, 1e-5] {
             let near_mm = 0.01 * tolerance_mm;
@@ -770,7 +769,7 @@ fn solids_have_polynomials_that_are_everywhere_within_a_hundredth_of_the_chord_t
 }
 
 #[test]
-fn polynomials_follow_each_other_along_one_tangent_and_end_with_their_curve() {
+fn polynomials_join_tangentially_and_end_with_curve() {
     for p in [PAPER_5_1, PAPER_5_2_BORED, eccentric(), three_lobes()] {
         for m in of_the_ring().into_iter().chain([NONE]) {
             for part in [Part::Ring, Part::WaveGenerator] {

@@ -168,7 +168,7 @@ pub(crate) const EQUAL: PerContact<f64> = PerContact { wave_generator: 1e6, ring
 pub(crate) const UNEQUAL: PerContact<f64> = PerContact { wave_generator: 1.3e6, ring: 0.7e6, carrier: 0.9e6 };
 
 #[test]
-fn projection_is_the_papers_3n_equations() {
+fn projection_matches_the_papers_3n_equations() {
     for parameters in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED] {
         for stiffness in [EQUAL, UNEQUAL] {
             let worst = worst_difference(&parameters, Projection, stiffness);
@@ -178,7 +178,7 @@ fn projection_is_the_papers_3n_equations() {
 }
 
 #[test]
-fn virtual_work_is_a_tooth_free_to_move_against_three_springs() {
+fn virtual_work_is_free_tooth_on_three_springs() {
     for parameters in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED] {
         for stiffness in [EQUAL, UNEQUAL] {
             let worst = worst_difference(&parameters, VirtualWork, stiffness);
@@ -191,14 +191,14 @@ proptest! {
     #![proptest_config(cases(128))]
 
     #[test]
-    fn the_closed_form_agrees_with_dense_solves_on_any_drive(parameters in any_swept_drive()) {
+    fn closed_form_matches_dense_solves(parameters in any_swept_drive()) {
         // The elimination's own error grows with the number of equations and with their scale.
         prop_assert!(worst_difference(&parameters, Projection, EQUAL) < 1e-9);
         prop_assert!(worst_difference(&parameters, VirtualWork, UNEQUAL) < 1e-9);
     }
 
     #[test]
-    fn the_ring_is_the_boundary_of_the_circles_swept_along_the_path(parameters in any_drive(), share in 0.02_f64..0.98) {
+    fn ring_is_boundary_of_swept_circles(parameters in any_drive(), share in 0.02_f64..0.98) {
         let drive = drive(&parameters);
         let flank = drive.flank();
         let end_rad = drive.flank_limit().position.from_lobe_rad;

@@ -45,7 +45,7 @@ fn on_both_walls(radius_mm: f64, wall_mm: f64, installed: i64) -> [Point2<f64>; 
 }
 
 #[test]
-fn the_wall_between_two_slots_is_as_thick_as_the_points_where_they_cut_the_inner_circle_are_apart() {
+fn slot_wall_thickness_is_distance_at_inner_circle() {
     for (tooth_radius_mm, is_wall) in [(5.0, true), (2.0, true), (7.0, false)] {
         let p = DriveParameters { tooth_radius_mm, ..PAPER_5_1 };
         let [near, next] = on_both_walls(58.0, tooth_radius_mm, p.installed);
@@ -59,7 +59,7 @@ fn the_wall_between_two_slots_is_as_thick_as_the_points_where_they_cut_the_inner
 }
 
 #[test]
-fn a_carrier_without_radii_leaves_a_tenth_of_the_annulus_free_on_either_side() {
+fn default_carrier_leaves_tenth_of_annulus_free() {
     let radii: Vec<_> = edges(&PAPER_5_1, Part::Carrier, &PartsParameters::default())
         .into_iter()
         .filter_map(|edge| match edge {
@@ -73,7 +73,7 @@ fn a_carrier_without_radii_leaves_a_tenth_of_the_annulus_free_on_either_side() {
 }
 
 #[test]
-fn a_tooth_presses_on_an_edge_of_the_carrier_where_its_centre_leaves_the_annulus() {
+fn tooth_presses_carrier_edge_outside_annulus() {
     let edges = |tooth_radius_mm| -> Vec<_> {
         let found = findings::of_drive(&drive(&DriveParameters { tooth_radius_mm, ..PAPER_5_1 })).unwrap();
         let edge = |finding: &Finding| match *finding {
@@ -90,7 +90,7 @@ fn a_tooth_presses_on_an_edge_of_the_carrier_where_its_centre_leaves_the_annulus
 }
 
 #[test]
-fn a_pointed_finger_ends_where_the_walls_of_its_two_slots_meet() {
+fn pointed_finger_ends_where_slot_walls_meet() {
     let p = DriveParameters { tooth_radius_mm: 7.0, ..PAPER_5_1 };
     let finger = edges(&p, Part::Carrier, &PartsParameters::default());
     let [Edge::Line { start: apex, end: outer }, Edge::Arc { .. }, Edge::Line { end: closed, .. }] = &finger[..] else {
@@ -105,7 +105,7 @@ fn a_pointed_finger_ends_where_the_walls_of_its_two_slots_meet() {
 }
 
 #[test]
-fn the_curves_of_a_wave_generator_start_and_end_across_the_radius_and_follow_each_other() {
+fn wave_generator_curves_join_and_end_radially() {
     for wave_generator in [
         PAPER_5_1.wave_generator,
         WaveGenerator::HarmonicPath { lobes: 3, mean_path_radius_mm: 63.0, amplitude_mm: 1.0 },
@@ -127,7 +127,7 @@ fn the_curves_of_a_wave_generator_start_and_end_across_the_radius_and_follow_eac
 }
 
 #[test]
-fn a_bore_leaves_some_of_the_wave_generator_as_it_is_made() {
+fn bore_must_leave_some_wave_generator() {
     let draft = Draft::new(&PAPER_5_1).unwrap();
     // Of 56 mm across, a quarter of a millimetre clear of the teeth and set back by a half.
     let modification = Modification { wave_generator_equidistant_um: 500.0, ..Modification::default() };
@@ -140,9 +140,9 @@ fn a_bore_leaves_some_of_the_wave_generator_as_it_is_made() {
     assert!(is_possible(55.249) && !is_possible(55.25) && !is_possible(56.0));
 }
 
-/// Set back by more its outline would have turned inside out where it is sharpest, or nothing would be left of it.
+/// The limit is the smaller of the least radius of curvature and the least radius. Beyond it the outline inverts.
 #[test]
-fn a_wave_generators_greatest_clearance_is_its_least_radius_of_curvature_or_its_least_radius() {
+fn greatest_cam_clearance_is_least_radius() {
     for (wave_generator, least_mm) in [
         (ellipse(58.0, 40.0), None),
         (WaveGenerator::Harmonic { lobes: 3, mean_radius_mm: 57.0, amplitude_mm: 1.0 }, None),
@@ -172,7 +172,7 @@ fn a_wave_generators_greatest_clearance_is_its_least_radius_of_curvature_or_its_
 }
 
 #[test]
-fn the_widest_finger_fills_the_annulus_between_slots_as_wide_as_teeth() {
+fn widest_finger_fills_annulus_between_slots() {
     let finger = widest_finger(&drive(&PAPER_5_1)).unwrap();
     let corners: Vec<_> = finger.iter().map(Edge::start).collect();
     let ([inner, inner_next], [outer, outer_next]) = (on_both_walls(58.0, 5.0, 28), on_both_walls(66.0, 5.0, 28));
@@ -183,7 +183,7 @@ fn the_widest_finger_fills_the_annulus_between_slots_as_wide_as_teeth() {
 }
 
 #[test]
-fn a_flat_sided_tooth_is_two_arcs_around_its_centre_joined_by_its_flats() {
+fn flat_sided_tooth_is_two_arcs_and_flats() {
     let tooth = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 6.0 };
     let p = DriveParameters { tooth, ..PAPER_5_1 };
     let outline = edges(&p, Part::Teeth, &PartsParameters::default());
@@ -206,7 +206,7 @@ fn a_flat_sided_tooth_is_two_arcs_around_its_centre_joined_by_its_flats() {
 }
 
 #[test]
-fn a_ring_made_with_clearance_is_undercut_by_its_own_distance_from_the_path() {
+fn clearance_undercuts_ring_by_offset_from_path() {
     let critical = drive(&PAPER_5_1).flank().critical_tooth_radius_mm().unwrap();
     let p = DriveParameters { tooth_radius_mm: 0.999 * critical, ..PAPER_5_1 };
     assert_eq!(drive(&p).flank_limit().end, FlankEnd::RegularTip);
@@ -226,7 +226,7 @@ fn a_ring_made_with_clearance_is_undercut_by_its_own_distance_from_the_path() {
 }
 
 #[test]
-fn a_bore_that_just_meets_an_undercut_tip_does_not_move_the_end_of_the_flank_outward() {
+fn bore_at_undercut_tip_keeps_flank_end() {
     let mut tried = 0;
     for tenth_um in 1..400_u32 {
         let unbored = DriveParameters { tooth_radius_mm: 0.7 + 1e-3 * f64::from(tenth_um), ..PAPER_5_2 };
@@ -244,7 +244,7 @@ fn a_bore_that_just_meets_an_undercut_tip_does_not_move_the_end_of_the_flank_out
 }
 
 #[test]
-fn a_clearance_that_alone_undercuts_the_ring_is_told_with_the_distance_from_which_on_it_does() {
+fn undercut_by_clearance_reports_critical_distance() {
     let critical = drive(&PAPER_5_1).flank().critical_tooth_radius_mm().unwrap();
     let p = DriveParameters { tooth_radius_mm: 0.999 * critical, ..PAPER_5_1 };
     let (a, b, r, k) = (58.0, 56.0, p.tooth_radius_mm, 13.0);
@@ -267,7 +267,7 @@ fn a_clearance_that_alone_undercuts_the_ring_is_told_with_the_distance_from_whic
 }
 
 #[test]
-fn walls_are_thin_below_a_quarter_of_a_slots_width() {
+fn wall_below_quarter_of_slot_width_is_thin() {
     // Slots of 10 mm; the ring's root at 58 + 2 · 5, the cam's least radius 56.
     for (thickness_mm, is_thin) in [(2.499, true), (2.501, false)] {
         let rim = PartsParameters { ring_outer_radius_mm: Some(68.0 + thickness_mm), ..PartsParameters::default() };
@@ -296,7 +296,7 @@ fn walls_are_thin_below_a_quarter_of_a_slots_width() {
 }
 
 #[test]
-fn a_tooth_leaves_a_slot_whose_walls_end_before_its_centre_does() {
+fn tooth_leaves_slot_with_short_walls() {
     // A wall that is 5 mm beside the slot's middle ends √(R² - 25) from the axis; centres run from 61 to 63 mm, loaded ones down to 61.
     let wall_end_mm = |radius_mm: f64| (radius_mm * radius_mm - 25.0_f64).sqrt();
     let of = |inner_mm, outer_mm| {
@@ -328,7 +328,7 @@ fn a_tooth_leaves_a_slot_whose_walls_end_before_its_centre_does() {
 }
 
 #[test]
-fn an_outline_is_refused_where_it_has_one_chord_more_than_allowed() {
+fn outline_with_one_chord_too_many_is_refused() {
     for (parameters, part) in [(PAPER_5_1, Part::Ring), (PAPER_5_2, Part::Ring), (PAPER_5_1, Part::WaveGenerator)] {
         let chords = |edge: &Edge| match edge {
             Edge::Curve { points, .. } => points.len() as u64 - 1,

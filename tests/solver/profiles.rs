@@ -114,7 +114,7 @@ proptest! {
     #![proptest_config(cases(192))]
 
     #[test]
-    fn no_point_of_a_curve_is_farther_from_its_chord_than_the_tolerance(
+    fn chords_keep_tolerance_at_every_point(
         p in any_of_the_family(),
         exponents in prop::collection::vec(RELATIVE_TOLERANCES, 12),
     ) {
@@ -127,9 +127,9 @@ proptest! {
     }
 }
 
-/// With the inflection near one end of a chord both its end tangents lie on one side of it.
+/// Both end tangents then lie on the same side of the chord.
 #[test]
-fn a_chord_with_an_inflection_near_its_end_is_true_to_the_tolerance() {
+fn chord_with_inflection_near_end_keeps_tolerance() {
     let p = DriveParameters {
         wave_generator: WaveGenerator::HarmonicPath {
             lobes: 2,
@@ -150,9 +150,9 @@ fn a_chord_with_an_inflection_near_its_end_is_true_to_the_tolerance() {
     }
 }
 
-/// Of a circle's chord over the angle θ its tangents stand `c tan(θ/2)/2` high. Positions are spaced by a few per cent more or less than the circle's own angles.
+/// The tangents of a chord over angle θ meet at height `c tan(θ/2)/2`. Spacing differs from the circle's by per cent.
 #[test]
-fn a_circle_is_halved_until_the_triangles_of_chords_and_tangents_are_as_low_as_the_tolerance() {
+fn circle_is_bisected_until_tangent_triangles_fit() {
     let radius_mm = 57.0;
     let wave_generator = WaveGenerator::Eccentric { radius_mm, eccentricity_mm: 1.0 };
     let p = DriveParameters { wave_generator, ring_teeth: 27, ..PAPER_5_1 };
@@ -168,7 +168,7 @@ fn a_circle_is_halved_until_the_triangles_of_chords_and_tangents_are_as_low_as_t
 }
 
 #[test]
-fn every_chord_is_true_to_the_tolerance() {
+fn every_chord_keeps_the_tolerance() {
     for parameters in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED] {
         for tolerance in [0.1, 0.01, 0.001] {
             let (coarse, fine) = (
@@ -188,7 +188,7 @@ proptest! {
     #![proptest_config(cases(96))]
 
     #[test]
-    fn a_profile_has_no_more_points_than_are_expected(parameters in any_drive(), tolerance in -6..0_i32, is_full in any::<bool>()) {
+    fn profile_has_at_most_expected_points(parameters in any_drive(), tolerance in -6..0_i32, is_full in any::<bool>()) {
         let extent = if is_full { Extent::Full } else { Extent::Tooth };
         let chord_tolerance_mm = 10.0_f64.powi(tolerance) * parameters.tooth_radius_mm;
         let drive = drive(&parameters);
@@ -200,7 +200,7 @@ proptest! {
     }
 
     #[test]
-    fn teeth_join_and_the_ring_closes(parameters in any_drive()) {
+    fn teeth_join_and_ring_closes(parameters in any_drive()) {
         let p = &parameters;
         let tooth = sampled(p, 1e-3 * p.tooth_radius_mm, Extent::Tooth).ring;
         let (first, last) = (tooth[0], tooth[tooth.len() - 1]);
@@ -217,7 +217,7 @@ proptest! {
     }
 
     #[test]
-    fn the_flank_runs_monotonically_from_root_to_tip_without_spikes(parameters in any_drive()) {
+    fn flank_runs_monotonically_without_spikes(parameters in any_drive()) {
         let drive = drive(&parameters);
         let tooth = sampled(&parameters, 1e-3 * parameters.tooth_radius_mm, Extent::Tooth).ring;
         let half = &tooth[tooth.len() / 2..];
@@ -233,7 +233,7 @@ proptest! {
 }
 
 #[test]
-fn the_whole_wave_generator_is_an_ellipse_and_the_whole_ring_and_path_repeat_from_tooth_to_tooth() {
+fn full_profiles_repeat_and_generator_is_ellipse() {
     for parameters in [PAPER_5_1, PAPER_5_2_BORED] {
         let all = sampled(&parameters, 1e-2, Extent::Full);
         let (a, b) = semi_axes_mm(&parameters);
@@ -253,14 +253,14 @@ fn the_whole_wave_generator_is_an_ellipse_and_the_whole_ring_and_path_repeat_fro
 }
 
 #[test]
-fn a_bored_tip_has_its_land_on_the_bore() {
+fn bored_tip_has_land_on_bore() {
     let ring = sampled(&PAPER_5_2_BORED, 1e-7, Extent::Tooth).ring;
     let on_land = ring.iter().filter(|point| (point.coords.norm() - 52.8227).abs() < 1e-12).count();
     assert!(on_land > 4, "{on_land} points");
 }
 
 #[test]
-fn a_profile_of_too_many_points_is_refused_with_their_number() {
+fn profile_with_too_many_points_reports_their_number() {
     let request = ProfileParameters { chord_tolerance_mm: 1e-3, extent: Extent::Full, max_points: 1000 };
     let refused = profiles(&drive(&PAPER_5_1), &request, &Never).unwrap_err();
     assert!(matches!(refused, SolveError::TooManyPoints { points, limit: 1000 } if points > 1000));
@@ -278,7 +278,7 @@ impl Stop for Halvings {
 }
 
 #[test]
-fn a_profile_of_far_too_many_points_is_given_up_before_it_is_whole() {
+fn far_too_large_profile_is_abandoned_early() {
     let halvings = Halvings::default();
     let request = ProfileParameters { chord_tolerance_mm: 1e-13, extent: Extent::Tooth, max_points: 1000 };
     let refused = profiles(&drive(&PAPER_5_1), &request, &halvings).unwrap_err();
@@ -289,7 +289,7 @@ fn a_profile_of_far_too_many_points_is_given_up_before_it_is_whole() {
 }
 
 #[test]
-fn a_profile_is_refused_where_it_has_one_point_more_than_allowed() {
+fn profile_with_one_point_too_many_is_refused() {
     for (parameters, extent) in
         [(PAPER_5_1, Extent::Tooth), (PAPER_5_1, Extent::Full), (PAPER_5_2, Extent::Full), (PAPER_5_2, Extent::Tooth)]
     {

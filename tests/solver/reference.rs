@@ -204,7 +204,7 @@ fn columns(states: &States) -> [(&'static str, &Vec<f64>); 11] {
 }
 
 #[test]
-fn geometry_and_mesh_agree_with_60_digits() {
+fn geometry_and_mesh_match_60_digits() {
     let mut worst = Worst::default();
     for case in Case::all() {
         let (name, drive) = (case.name(), case.drive());
@@ -276,7 +276,7 @@ fn see_sweep(case: &Case, worst: &mut Worst) {
 }
 
 #[test]
-fn every_column_of_a_sweep_agrees_with_60_digits() {
+fn every_sweep_column_matches_60_digits() {
     let mut worst = Worst::default();
     for case in Case::all() {
         see_sweep(&case, &mut worst);
@@ -285,7 +285,7 @@ fn every_column_of_a_sweep_agrees_with_60_digits() {
 }
 
 #[test]
-fn palmgrens_law_and_clearances_agree_with_60_digits() {
+fn palmgrens_law_and_clearances_match_60_digits() {
     let mut worst = Worst::default();
     for case in Case::all_of_contact() {
         see_sweep(&case, &mut worst);
@@ -335,7 +335,7 @@ fn see_states(case: &Case, worst: &mut Worst) {
 }
 
 #[test]
-fn johnsons_law_balls_series_compliance_and_gaps_under_projection_agree_with_40_digits() {
+fn further_laws_and_projected_gaps_match_40_digits() {
     let mut worst = Worst::default();
     for case in Case::all_of_laws() {
         see_states(&case, &mut worst);
@@ -362,7 +362,7 @@ struct Row {
 
 /// The table of docs/hard-cases.md and the figures of README.md: `cargo test -p toothwave-solver hard_cases -- --nocapture` prints it.
 #[test]
-fn hard_cases_stay_within_a_small_multiple_of_their_condition() {
+fn hard_cases_stay_near_their_condition() {
     let mut table: BTreeMap<String, Row> = BTreeMap::new();
     for case in Case::all().into_iter().chain(Case::all_of_contact()) {
         let row = table.entry(case.0["group"].as_str().unwrap().into()).or_default();

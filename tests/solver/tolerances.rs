@@ -28,9 +28,10 @@ fn six_peaks(sweep: &Sweep) -> Vec<Peak> {
     sweep.peaks.iter().flat_map(|(_, peaks)| [peaks.force_n, peaks.stress_mpa]).collect()
 }
 
-/// Three lobes over 37 teeth take turns: of three laps that are alike one is worked out, and a lap's first moment is listed as the last of the one before.
+/// Three lobes over 37 teeth have three equal laps, and one is computed. A lap's first moment counts again as the last
+/// of the lap before.
 #[test]
-fn a_sweep_of_several_laps_is_refused_where_it_counts_one_state_more_than_allowed() {
+fn multi_lap_sweep_keeps_state_limit() {
     let wave_generator = WaveGenerator::HarmonicPath { lobes: 3, mean_path_radius_mm: 52.0, amplitude_mm: 1.0 };
     let p =
         DriveParameters { wave_generator, teeth: 37, installed: 37, ring_teeth: 34, tooth_radius_mm: 2.5, ..PAPER_5_1 };
@@ -47,9 +48,9 @@ fn a_sweep_of_several_laps_is_refused_where_it_counts_one_state_more_than_allowe
     assert!(matches!(refused, SolveError::TooManyStates { limit } if limit == counted - 1), "{refused:?}");
 }
 
-/// A period of case 5.1 ends where its seventh tooth enters, and carries nothing yet.
+/// A period of case 5.1 ends where its seventh tooth enters without load.
 #[test]
-fn a_sweep_to_a_tolerance_lists_no_input_angle_twice_where_teeth_enter_at_a_regular_tip() {
+fn tolerance_sweep_lists_no_regular_angle_twice() {
     let angles_deg = swept_to(&PAPER_5_1, &load(20.0, VirtualWork), 1e-3).input_angles.input_angle_deg;
     assert!(angles_deg.windows(2).all(|pair| pair[0] < pair[1]));
     assert_eq!([angles_deg[0], angles_deg[angles_deg.len() - 1]], [0.0, 360.0 / 26.0]);
@@ -98,7 +99,7 @@ fn assert_entry_is_decided_once(parameters: &DriveParameters) -> bool {
 }
 
 #[test]
-fn a_bore_that_ends_the_flank_whole_spacings_from_the_major_axis_is_swept_alike_by_samples_and_to_a_tolerance() {
+fn bore_at_whole_spacings_is_swept_alike() {
     // Found in answers of 0.1: the wrong tooth stood at the end of the flank, and F_K was 3.6e18 N.
     let known = DriveParameters {
         wave_generator: ellipse(504.4784470731704, 498.60993196702196),
@@ -119,7 +120,7 @@ proptest! {
     #![proptest_config(cases(300))]
 
     #[test]
-    fn bores_a_few_roundings_around_whole_spacings_are_swept_alike(parameters in any_drive(), share in 0.0_f64..1.0) {
+    fn bores_near_whole_spacings_are_swept_alike(parameters in any_drive(), share in 0.0_f64..1.0) {
         let unbored = DriveParameters { tip_radius_mm: None, ..parameters };
         let Ok(possible) = Drive::new(&unbored) else { return Ok(()) };
         let most = Mesh::new(&possible).teeth_in_mesh().min;
@@ -133,7 +134,7 @@ proptest! {
 }
 
 #[test]
-fn undercut_flanks_and_tips_a_few_roundings_around_whole_spacings_are_swept_alike() {
+fn flanks_near_whole_spacings_are_swept_alike() {
     let mut tried = 0;
     for teeth in [12_i64, 16, 20, 22, 28, 40] {
         for flattening in [0.005, 0.01, 0.015, 0.02, 0.027, 0.034, 0.05, 0.07] {
@@ -234,7 +235,7 @@ pub(crate) fn designs() -> Vec<(DriveParameters, LoadParameters)> {
 }
 
 #[test]
-fn a_tolerance_holds_for_peaks_wind_up_stiffness_and_capacity_and_its_root_for_half_widths() {
+fn tolerance_holds_for_extremes_and_root_for_half_widths() {
     let mut worst = [0.0_f64; 5];
     for (parameters, load) in designs() {
         let dense = Extremes::of(&parameters, &swept(&parameters, &load, 6_000));
@@ -266,7 +267,7 @@ fn a_tolerance_holds_for_peaks_wind_up_stiffness_and_capacity_and_its_root_for_h
 }
 
 #[test]
-fn a_finer_tolerance_moves_nothing_by_more_than_the_coarser_one_allows_at_corners_and_jumps_too() {
+fn finer_tolerance_stays_within_coarser_one() {
     for (parameters, load) in designs() {
         let finest = Extremes::of(&parameters, &swept_to(&parameters, &load, 1e-12));
         for tolerance in [1e-3, 1e-5, 1e-8] {
@@ -291,7 +292,7 @@ proptest! {
     #![proptest_config(cases(200))]
 
     #[test]
-    fn a_tolerance_holds_on_any_drive_with_any_gap(
+    fn tolerance_holds_on_any_drive_with_any_gap(
         parameters in any_swept_drive(),
         exponents in prop::array::uniform3(-1.0_f64..2.0),
         is_linear in any::<bool>(),
@@ -316,7 +317,7 @@ proptest! {
 }
 
 #[test]
-fn the_capacity_is_that_of_the_angle_where_it_is_least_and_not_of_those_where_loads_peak() {
+fn capacity_is_found_away_from_load_peaks() {
     let mut load = load(1.0, VirtualWork);
     load.clearance_um.ring = 10.0;
     load.allowable_stress_mpa = Some(everywhere(1500.0));
@@ -327,7 +328,7 @@ fn the_capacity_is_that_of_the_angle_where_it_is_least_and_not_of_those_where_lo
 }
 
 #[test]
-fn without_gaps_the_capacity_is_the_torque_by_the_rule_of_three_for_every_single_exponent() {
+fn gapless_capacity_grows_with_stress_squared() {
     for law in [ContactLaw::Linear, ContactLaw::Palmgren] {
         for parameters in [PAPER_5_1, PAPER_5_2] {
             let mut load = load(7.0, VirtualWork);
@@ -377,7 +378,7 @@ fn states_worked_out(parameters: &DriveParameters, tolerance: f64) -> u64 {
 }
 
 #[test]
-fn a_sweep_to_a_tolerance_works_out_a_number_of_states_that_grows_with_the_teeth_and_not_with_their_square() {
+fn tolerance_sweep_cost_is_linear_in_teeth() {
     for teeth in [28, 200, 1000, 1800, 10_000] {
         for of_critical in [0.7, 1.5] {
             let parameters = of_many_teeth(teeth, of_critical);

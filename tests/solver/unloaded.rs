@@ -48,7 +48,7 @@ fn assert_found(found: &Extremes, dense: &Extremes, tolerance: f64, what: &str) 
 }
 
 #[test]
-fn case_5_1_without_load_errs_by_what_the_closing_angles_of_its_teeth_range_over() {
+fn case_5_1_unloaded_error_is_closing_angle_range() {
     let load = LoadParameters { clearance_um: AT_RING, ..load(20.0, VirtualWork) };
     let period_rad = (360.0_f64 / 26.0).to_radians();
     let dense: Vec<_> = (0..5000)
@@ -65,7 +65,7 @@ fn case_5_1_without_load_errs_by_what_the_closing_angles_of_its_teeth_range_over
 }
 
 #[test]
-fn with_deviations_no_position_is_missed() {
+fn no_position_is_missed_with_deviations() {
     for (index, p) in drives().iter().enumerate() {
         let drive = drive(p);
         for kinds in &ALL_KINDS[..3] {
@@ -154,7 +154,7 @@ fn loads(end_deg: f64) -> Vec<LoadParameters> {
 }
 
 #[test]
-fn of_any_gap_and_shape_no_dense_sweep_shows_more() {
+fn tolerance_finds_unloaded_extremes_for_every_shape() {
     for p in shapes() {
         for load in loads(drive(&p).flank_limit().position.from_lobe_deg()) {
             let what = format!("{load:?} {p:?}");
@@ -172,7 +172,7 @@ proptest! {
     #![proptest_config(cases(100))]
 
     #[test]
-    fn on_any_drive_with_any_gap_no_dense_sweep_shows_more(
+    fn tolerance_finds_unloaded_extremes_on_any_drive(
         parameters in any_swept_drive(),
         exponents in prop::array::uniform3(-1.0_f64..2.0),
         is_at_slot_alone in any::<bool>(),
@@ -195,7 +195,7 @@ proptest! {
 }
 
 #[test]
-fn a_sweep_that_is_asked_of_the_wind_up_without_load_has_two_more_input_angles_and_the_same_peaks() {
+fn unloaded_wind_up_adds_only_two_input_angles() {
     let load = LoadParameters { clearance_um: AT_RING, ..load(20.0, VirtualWork) };
     let drive = drive(&PAPER_5_1);
     let swept = |points| swept_with(&drive, &load, &Deviations::default(), points).unwrap();

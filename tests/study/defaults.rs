@@ -31,7 +31,7 @@ fn studies(base: &Value) -> Vec<Value> {
 }
 
 #[test]
-fn a_default_written_out_keeps_the_id() {
+fn explicit_default_keeps_the_id() {
     for base in examples() {
         let design = Design::read(base.to_string().as_bytes()).unwrap();
         let mut whole = serde_json::to_value(&design).unwrap();
@@ -47,7 +47,7 @@ fn a_default_written_out_keeps_the_id() {
 }
 
 #[test]
-fn what_is_no_default_changes_the_id() {
+fn non_default_value_changes_the_id() {
     let [base, ..] = examples();
     for (pointer, value) in [
         ("/model/refinements", json!("none")),
@@ -63,7 +63,7 @@ fn what_is_no_default_changes_the_id() {
 }
 
 #[test]
-fn a_study_has_the_loss_of_its_sweep() {
+fn study_has_the_losses_of_its_sweep() {
     let base = json!({
         "drive": {
             "wave_generator": { "kind": "harmonic", "lobes": 2, "mean_radius_mm": 231.12997975753026, "amplitude_mm": 41.60339635635545 },

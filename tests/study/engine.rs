@@ -44,7 +44,7 @@ fn kept(part: &Part) -> Part {
 }
 
 #[test]
-fn chunks_in_any_order_give_the_same_bits() {
+fn chunks_in_any_order_give_same_bits() {
     for document in studies() {
         let one_thread = text(&gathered(&document), Format::Json);
         let study = study(&document).unwrap();
@@ -77,7 +77,7 @@ impl Stop for Times {
 }
 
 #[test]
-fn a_chunk_that_is_stopped_and_taken_up_again_has_the_same_bits() {
+fn resumed_chunk_has_same_bits() {
     for document in studies() {
         let study = in_chunks_of(&document, 100);
         let whole = Work::new(&study, 0).run(&Never).unwrap();
@@ -100,9 +100,9 @@ fn a_chunk_that_is_stopped_and_taken_up_again_has_the_same_bits() {
     }
 }
 
-/// Of each quantity an entry for each input or kind of deviation, with its name: nine times what was counted.
+/// Each quantity has an entry with a name for each input or kind of deviation.
 #[test]
-fn what_the_answer_of_a_study_of_many_inputs_takes_is_known_before_it_is_made() {
+fn answer_size_of_many_inputs_is_known_beforehand() {
     let inputs = |what: &Value| (0..26).map(|i| (format!("/deviations/ring_space_um/{i}"), what.clone())).collect();
     let base = with(&paper(), "/deviations", json!({ "ring_space_um": vec![0.0; 26] }));
     let base = with(&base, "/model", json!({ "clearance": { "ring_um": 9.0 } }));
@@ -123,7 +123,7 @@ fn what_the_answer_of_a_study_of_many_inputs_takes_is_known_before_it_is_made() 
 }
 
 #[test]
-fn a_study_that_is_half_done_tells_what_it_has() {
+fn half_done_study_reports_what_it_has() {
     let [map, search, ..] = studies();
     for document in [map, search] {
         let study = in_chunks_of(&document, 100);
@@ -152,7 +152,7 @@ fn another_seed_is_another_study() {
 }
 
 #[test]
-fn a_study_in_chunks_of_any_size_has_the_same_bits() {
+fn study_in_any_chunk_size_has_same_bits() {
     for document in studies() {
         let whole = text(&gathered(&document), Format::Json);
         for variants in [1, 7, 1_000_000] {
@@ -167,7 +167,7 @@ fn a_study_in_chunks_of_any_size_has_the_same_bits() {
 }
 
 #[test]
-fn a_variant_alone_is_what_it_is_among_the_others() {
+fn variant_alone_equals_variant_among_others() {
     let [map, _, sensitivity, tolerance] = studies();
     for document in [map, sensitivity, tolerance] {
         let study = in_chunks_of(&document, 1);
@@ -182,7 +182,7 @@ fn a_variant_alone_is_what_it_is_among_the_others() {
 }
 
 #[test]
-fn chunks_follow_from_the_number_of_variants() {
+fn chunks_follow_from_number_of_variants() {
     let chunks = |steps: u64| {
         let over = json!({ "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.0, "steps": steps } });
         let map = json!({ "study": "map", "base": paper(), "over": over, "quantities": ["undercut"] });

@@ -54,7 +54,7 @@ fn assert_same(document: &Value) -> usize {
 }
 
 #[test]
-fn a_result_has_the_same_cells_as_parquet_and_as_csv() {
+fn parquet_and_csv_have_the_same_cells() {
     let radius = json!({ "min": 3.0, "max": 8.0, "steps": 11 });
     let map = json!({
         "study": "map", "base": paper(), "quantities": ["peak_stress_ring_mpa", "undercut"],
@@ -82,7 +82,7 @@ fn a_result_has_the_same_cells_as_parquet_and_as_csv() {
 }
 
 #[test]
-fn a_table_of_many_columns_is_written_in_groups_of_fewer_rows_and_says_what_it_holds_for_them() {
+fn wide_table_has_small_row_groups() {
     let fields = (0..200).map(|entry| (format!("/deviations/slot_wall_um/{entry}"), json!({ "one_of": [0] })));
     let mut over: serde_json::Map<_, _> = fields.collect();
     // Nearly all of them impossible, so that they take no time.
@@ -108,16 +108,16 @@ fn a_table_of_many_columns_is_written_in_groups_of_fewer_rows_and_says_what_it_h
     assert!(beside >= 8 * u64::try_from(most).unwrap(), "{beside} bytes for {most} cells");
 }
 
-/// More rows than a group of Parquet holds.
+/// It has more rows than one Parquet row group.
 #[test]
-fn a_large_map_comes_in_several_groups() {
+fn large_map_has_several_row_groups() {
     let steps = json!({ "min": 10.0, "max": 20.0, "steps": 70_000 });
     let map = json!({ "study": "map", "base": paper(), "quantities": ["transmission_ratio"], "over": { "/load/input_torque_nm": steps } });
     assert_eq!(assert_same(&map), 70_000);
 }
 
 #[test]
-fn the_text_of_many_inputs_has_its_room_before_it_is_written_and_less_than_twice_that() {
+fn text_size_of_many_inputs_is_estimated_beforehand() {
     let mut base = with(&paper(), "/model/compatibility", json!("virtual_work"));
     base["deviations"] = json!({ "tooth_radius_um": (1..=28).collect::<Vec<_>>() });
     let inputs: serde_json::Map<_, _> =

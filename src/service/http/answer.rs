@@ -389,7 +389,7 @@ mod tests {
 
     use super::{STOP_CHECK_BYTES, StoppableWriter};
 
-    /// Of a megabyte of zeros a kilobyte comes out of the encoder: the check must not depend on it.
+    /// A megabyte of zeros compresses to a kilobyte. The check must not depend on the compressed size.
     #[test]
     fn stops_writing_compressible_answers_too() {
         let stop = AtomicBool::new(true);
