@@ -119,7 +119,7 @@ mod tests {
 
     /// P(B ≤ 39) = 0.0176 and P(B ≤ 40) = 0.0284 for B of 100 tosses. Textbooks give the same interval.
     #[test]
-    fn median_of_100_lies_between_ranks_40_and_61() {
+    fn median_of_hundred_lies_between_known_ranks() {
         assert_eq!(ranks(100, 0.5), Ranks { low: Some(40), high: Some(61) });
     }
 

@@ -216,7 +216,7 @@ async fn each_impossible_friction_is_reported_at_its_field() {
 }
 
 #[tokio::test]
-async fn structural_fault_of_friction_is_reported_at_its_field() {
+async fn friction_of_wrong_form_is_reported_in_place() {
     for (friction, pointer, code) in [
         (json!({}), "", "missing_field"),
         (on(&json!({ "coefficient": 0.03 })), "/wave_generator", "missing_field"),
@@ -258,7 +258,7 @@ async fn zero_friction_loses_nothing() {
 }
 
 #[tokio::test]
-async fn flat_sided_teeth_do_not_roll_and_lose_more() {
+async fn flat_sided_teeth_slip_and_lose_more() {
     let flat = json!({ "shape": "flat_sided", "count": 28, "radius_mm": 5.0, "width_mm": 15.0, "flat_length_mm": 4.0 });
     let loose = swept(&case_5_1(on_bearing("race"))).await["losses"].clone();
     let found = swept(&with(&case_5_1(on_bearing("race")), "/drive/teeth", flat)).await["losses"].clone();

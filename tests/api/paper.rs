@@ -202,7 +202,7 @@ async fn case_5_1_has_known_places_of_peaks() {
 }
 
 #[tokio::test]
-async fn case_5_2_is_undercut_with_known_coincidence_degree() {
+async fn case_5_2_has_known_undercut() {
     let found = answered("/v1/coincidence-degree", &example("paper-5.2").await).await;
     assert_eq!(found["undercut"]["occurs"], true);
     assert_near(&found["coincidence_degree"], 9.690_577_523_835, 1e-12);
@@ -218,7 +218,7 @@ async fn case_5_2_is_undercut_with_known_coincidence_degree() {
 }
 
 #[tokio::test]
-async fn bored_case_5_2_has_the_papers_coincidence_degree() {
+async fn bored_case_5_2_matches_the_paper() {
     let document = example("paper-5.2-bored").await;
     assert_eq!(document["drive"]["ring"]["tip_radius_mm"], 52.8227);
     let found = answered("/v1/coincidence-degree", &document).await;
@@ -256,7 +256,7 @@ async fn states_are_equal_columns_in_order() {
 }
 
 #[tokio::test]
-async fn sweep_of_n_samples_has_n_plus_1_angles() {
+async fn sweep_has_one_angle_more_than_samples() {
     for samples in [1_u32, 2, 3, 50, 333] {
         let document = with(&designs::undercut(), "/sweep", json!({ "samples": samples }));
         let found = answered("/v1/sweep", &document).await;
@@ -429,7 +429,7 @@ async fn entering_and_leaving(document: &Value) -> (f64, f64) {
 }
 
 #[tokio::test]
-async fn case_5_2_load_jumps_only_at_tooth_entry() {
+async fn case_5_2_load_jumps_only_at_entry() {
     for document in [designs::undercut(), designs::bored()] {
         let document = with(&document, "/sweep", json!({ "samples": 1000 }));
         let (entering, leaving) = entering_and_leaving(&document).await;

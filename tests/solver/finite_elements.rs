@@ -328,8 +328,7 @@ fn pressure_angle_above_calculated_drives_is_reported() {
 /// A few teeth with flat lobes and a gap turn by several degrees before they touch. The unloaded lever arms then
 /// make the largest force 1.6 % and 5 % too small.
 #[test]
-fn wind_up_above_calculated_drives_is_reported()
-{
+fn wind_up_above_calculated_drives_is_reported() {
     let path = |mean_path_radius_mm, amplitude_mm, tooth_radius_mm| DriveParameters {
         wave_generator: WaveGenerator::HarmonicPath { lobes: 2, mean_path_radius_mm, amplitude_mm },
         teeth: 10,
