@@ -465,7 +465,7 @@ async fn case_5_2_entering_tooth_unloads_others() {
 }
 
 #[tokio::test]
-async fn case_5_1_load_rises_from_and_falls_to_zero() {
+async fn case_5_1_load_is_zero_at_ends() {
     let document = with(&designs::spelled_out(), "/sweep", json!({ "samples": 1000 }));
     let (entering, leaving) = entering_and_leaving(&document).await;
     assert!(entering < 2e-3 && leaving < 2e-3, "from {entering} to {leaving} of the peak");

@@ -63,7 +63,7 @@ async fn every_problem_carries_headers_for_browsers() {
 }
 
 #[test]
-fn full_service_answers_browsers_and_says_when_to_retry() {
+fn full_service_tells_browsers_when_to_retry() {
     let limits = Limits { max_concurrent_solves: 1, ..ENDLESS };
     let service = Service::with(limits, &["--cors-origin", "*"]);
     let occupied = service.occupied_by(1);
@@ -181,7 +181,7 @@ async fn unknown_documentation_path_is_not_found() {
 }
 
 #[tokio::test]
-async fn example_name_that_is_no_text_is_not_found() {
+async fn example_name_without_valid_text_is_not_found() {
     let answer = Service::new().get("/v1/examples/%FF").await;
     assert!([400, 404].contains(&answer.status));
     answer.problem();
@@ -293,7 +293,7 @@ async fn reads_limited_number_of_accept_ranges() {
 }
 
 #[tokio::test]
-async fn body_over_limit_is_refused_with_length_and_limit() {
+async fn refusal_of_large_body_states_length_and_limit() {
     let service = Service::within(Limits { max_body_bytes: 1_000, ..LIMITS });
     let padded = |length: usize| format!("{:length$}", shortest().to_string());
     for path in ENDPOINTS {

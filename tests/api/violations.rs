@@ -431,7 +431,7 @@ async fn detail_names_one_field_or_counts_several() {
 }
 
 #[tokio::test]
-async fn sweep_without_lever_arm_has_no_tooth_in_mesh() {
+async fn sweep_needs_lever_arm_at_every_angle() {
     let service = Service::new();
     // ψ_e = 90° and exactly one spacing of four teeth: at j = 0 the only tooth stands on the minor axis.
     let four = with(&spelled_out(), INSTALLED, json!(4));
@@ -484,7 +484,7 @@ async fn tooth_without_compliance_is_refused_under_projection_only() {
 }
 
 #[tokio::test]
-async fn carrier_may_have_more_or_fewer_teeth_than_ring() {
+async fn carrier_may_have_more_teeth_or_fewer() {
     for (ring, ratio, other) in [(26, 14.0, -13.0), (30, -14.0, 15.0)] {
         let document = with(&spelled_out(), RING_TEETH, json!(ring));
         let found = Service::new().post("/v1/geometry", &document).await.found();

@@ -192,7 +192,7 @@ fn backing_share_is_relative_to_own_contacts() {
 
 /// The estimate for one tooth holds for the drive, except for load that shifts to other teeth.
 #[test]
-fn fingers_held_at_one_end_soften_case_5_1() {
+fn fingers_held_at_one_end_soften_drive() {
     let plain = johnson(20.0);
     let of_fingers = shares(&PAPER_5_1, &plain, AT_ONE_END).unwrap();
     let estimate = of_fingers.shares.iter().find(|(estimate, _)| estimate.backing == Backing::FingerAtOneEnd).unwrap();

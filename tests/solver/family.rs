@@ -804,7 +804,7 @@ fn too_small_cam_is_refused_with_least_size() {
 }
 
 #[test]
-fn carrier_and_ring_differ_by_one_tooth_per_lobe() {
+fn tooth_counts_differ_by_one_per_lobe() {
     for lobes in 1..=7 {
         let beside = |ring_teeth| of(harmonic(lobes, 100.0, 0.3), 30, 30, ring_teeth, 2.0);
         for ring_teeth in 20_i64..40 {

@@ -928,7 +928,7 @@ fn deviations_take_fast_path_from_any_lap_start() {
 }
 
 #[test]
-fn both_paths_keep_tolerance_with_deviations_and_unlike_zones() {
+fn both_paths_keep_tolerance_with_unlike_teeth_or_zones() {
     // Where they look differs in the last digits, but for the first sixteen intervals.
     let mut looked_elsewhere = [0, 0];
     for (parameters, seed) in drives_that_may_deviate().into_iter().zip(1..) {

@@ -261,7 +261,7 @@ fn approach_follows_johnsons_printed_formula() {
 }
 
 #[test]
-fn case_5_1_johnson_lies_between_linear_and_palmgren() {
+fn johnson_lies_between_linear_and_palmgren() {
     let peak = |law| {
         let load = LoadParameters { law, ..load(20.0, VirtualWork) };
         let sweep = swept(&PAPER_5_1, &load, 50);

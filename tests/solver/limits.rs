@@ -304,7 +304,7 @@ fn draft_has_the_violations_of_its_drive() {
 }
 
 #[test]
-fn wind_up_above_tenth_of_period_is_a_finding() {
+fn wind_up_beyond_model_is_a_finding() {
     let drive = drive(&PAPER_5_1);
     // A carrier turned by τ takes up Z_G/U = 14 of it, and a light load nothing more.
     let found = |carrier_rotation_arcsec| {

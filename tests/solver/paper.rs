@@ -33,7 +33,7 @@ fn case_5_1_has_known_virtual_work_peaks() {
 }
 
 #[test]
-fn case_5_1_has_seven_states_at_each_angle() {
+fn case_5_1_has_seven_states_per_angle() {
     let states = swept(&PAPER_5_1, &load(20.0, Projection), 50).states;
     assert_eq!(states.len(), 51 * 7);
     assert!(!states.is_empty());
@@ -62,7 +62,7 @@ fn case_5_2_is_undercut_with_few_teeth() {
 }
 
 #[test]
-fn bored_case_5_2_has_three_or_four_teeth() {
+fn bored_case_5_2_has_few_teeth() {
     let drive = drive(&PAPER_5_2_BORED);
     assert_eq!(drive.flank_limit().end, FlankEnd::Bore);
     let mesh = Mesh::new(&drive);

@@ -235,7 +235,7 @@ pub(crate) fn designs() -> Vec<(DriveParameters, LoadParameters)> {
 }
 
 #[test]
-fn tolerance_holds_for_extremes_and_root_for_half_widths() {
+fn tolerance_bounds_extremes_and_root_bounds_half_widths() {
     let mut worst = [0.0_f64; 5];
     for (parameters, load) in designs() {
         let dense = Extremes::of(&parameters, &swept(&parameters, &load, 6_000));

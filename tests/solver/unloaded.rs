@@ -48,7 +48,7 @@ fn assert_found(found: &Extremes, dense: &Extremes, tolerance: f64, what: &str) 
 }
 
 #[test]
-fn case_5_1_unloaded_error_is_closing_angle_range() {
+fn unloaded_error_of_case_5_1_is_known() {
     let load = LoadParameters { clearance_um: AT_RING, ..load(20.0, VirtualWork) };
     let period_rad = (360.0_f64 / 26.0).to_radians();
     let dense: Vec<_> = (0..5000)

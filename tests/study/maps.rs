@@ -52,7 +52,7 @@ fn impossible_variants_are_counted_by_reason() {
 
 /// The root of the drawn ring is at 68 mm.
 #[test]
-fn ring_smaller_than_its_root_has_no_outer_diameter() {
+fn ring_inside_its_root_has_no_outer_diameter() {
     let over = json!({ "/parts/ring/outer_radius_mm": { "min": 66.0, "max": 72.0, "steps": 4 } });
     let found = answer(&map(over.clone(), json!(["outer_diameter_mm", "coincidence_degree"])));
     assert_eq!(numbers(&found["possible"]["quantities"]["outer_diameter_mm"]), [140.0, 144.0]);
