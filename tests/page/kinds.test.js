@@ -62,7 +62,7 @@ for (const [kind, fields, lobes] of [
   ['harmonic', ['lobes', 'mean_radius_mm', 'amplitude_mm'], 3],
   ['harmonic_path', ['lobes', 'mean_path_radius_mm', 'amplitude_mm'], 3],
 ]) {
-  test(`wave generator ${kind}: chosen, its ring follows, its result stands and its ${lobes} lobes are drawn`, async () => {
+  test(`wave generator ${kind} is calculated and drawn with ${lobes} lobes`, async () => {
     const page = await bed.open();
     if (kind === 'ellipse') await pick(page, WAVE_GENERATOR, 'eccentric');
     await pick(page, WAVE_GENERATOR, kind);
@@ -82,7 +82,7 @@ for (const [kind, fields, lobes] of [
   });
 }
 
-test('an ellipse becomes the other kinds of its own size, and comes back', async () => {
+test('ellipse changes to kinds of equal size and back', async () => {
   const page = await bed.open();
   await pick(page, WAVE_GENERATOR, 'eccentric');
   assert.deepEqual((await designOf(page)).drive.wave_generator, { kind: 'eccentric', radius_mm: 57, eccentricity_mm: 1 });
@@ -95,7 +95,7 @@ test('an ellipse becomes the other kinds of its own size, and comes back', async
   assert.deepEqual([drive.wave_generator, drive.ring.teeth], [{ semi_major_mm: 58, semi_minor_mm: 56 }, 26]);
 });
 
-test('a ring with more teeth than slots stays so when the lobes change', async () => {
+test('ring with more teeth stays so with other lobes', async () => {
   const page = await bed.open();
   await choose(page, 'ring-with-more-teeth');
   const { drive: before } = await designOf(page);
@@ -104,7 +104,7 @@ test('a ring with more teeth than slots stays so when the lobes change', async (
   assert.equal((await designOf(page)).drive.ring.teeth, before.teeth.count + 1);
 });
 
-test('unlike zones are told as such: all their teeth are counted, each on its lobe', async () => {
+test('unlike zones count all teeth, each on its lobe', async () => {
   const page = await bed.open();
   await pick(page, WAVE_GENERATOR, 'harmonic');
   await enter(page, `${WAVE_GENERATOR}/lobes`, 3);
@@ -133,7 +133,7 @@ test('unlike zones are told as such: all their teeth are counted, each on its lo
   assert.ok((await resultOf(page, 'Most teeth in mesh, each zone')) > 0);
 });
 
-test('a ratio counts in thirds where there are three lobes, in halves where there are two', async () => {
+test('ratio steps follow the number of lobes', async () => {
   const page = await bed.open();
   const counts = async (ratio) => {
     await page.fill(field('/ratio'), ratio);
@@ -154,7 +154,7 @@ for (const [shape, fields] of [
   ['ball', ['wave_generator', 'ring', 'carrier', 'count', 'installed']],
   ['flat_sided', ['width_mm', 'flat_length_mm', 'count', 'installed']],
 ]) {
-  test(`teeth ${shape}: chosen, only their fields are shown, their result stands and they are drawn`, async () => {
+  test(`teeth ${shape} have own fields, are calculated and drawn`, async () => {
     const page = await bed.open();
     if (shape === 'cylinder') await pick(page, TEETH, 'ball');
     await pick(page, TEETH, shape);
@@ -189,7 +189,7 @@ for (const [law, fields, pointer, value] of [
   ['johnson', ['wave_generator', 'ring', 'carrier'], `${LAW}/depth_mm/ring`, 8],
   ['fixed', ['wave_generator_n_per_mm', 'ring_n_per_mm', 'carrier_n_per_mm'], `${LAW}/ring_n_per_mm`, 400000],
 ]) {
-  test(`contact law ${law}: chosen, only its fields are shown, and what they say moves the answer`, async () => {
+  test(`contact law ${law} has own fields, which change answer`, async () => {
     const page = await bed.open();
     await pick(page, '/model/compatibility', 'virtual_work');
     await pick(page, LAW, law === 'linear' ? 'johnson' : law);
@@ -205,7 +205,7 @@ for (const [law, fields, pointer, value] of [
   });
 }
 
-test('projection takes no law of Johnson’s: choosing either leaves a design that is possible', async () => {
+test('choosing projection or Johnson’s law keeps design possible', async () => {
   const page = await bed.open();
   await pick(page, '/model/compatibility', 'projection');
   await pick(page, LAW, 'johnson');
@@ -214,7 +214,7 @@ test('projection takes no law of Johnson’s: choosing either leaves a design th
   assert.equal((await answered(page)).design.model.stiffness.law, 'linear');
 });
 
-test('a document that names no model shows the one that the service takes', async () => {
+test('document without model shows the service’s model', async () => {
   const page = await bed.open();
   const { model, ...unnamed } = await designOf(page);
   assert.ok(model, 'the paper’s examples name theirs');
@@ -232,7 +232,7 @@ test('a document that names no model shows the one that the service takes', asyn
   }
 });
 
-test('the peaks say how far to believe them', async () => {
+test('peaks state their model error', async () => {
   const page = await bed.open();
   const told = () => page.$$eval('#table .told', (lines) => lines.map((line) => line.textContent));
   // The paper's model, whose forces are too large; no wind-up is asked for.
@@ -253,7 +253,7 @@ test('the peaks say how far to believe them', async () => {
   assert.equal((await told())[0], 'The model’s own error: not measured under this law.');
 });
 
-test('what the service sets by itself can be denied, and stands in the form as the document has it', async () => {
+test('service’s choices can be overridden in the form', async () => {
   const page = await bed.open();
   const { model: _, ...unnamed } = await bed.server.example('paper-5.2');
   await setDocument(page, unnamed);
@@ -275,7 +275,7 @@ test('what the service sets by itself can be denied, and stands in the form as t
   assert.equal(await page.inputValue(field(place)), 'none');
 });
 
-test('an old document is converted, with a notice', async () => {
+test('old document is converted with a notice', async () => {
   const page = await bed.open();
   const { model: _, ...unnamed } = await bed.server.example('paper-5.2');
   const old = { ...unnamed, model: { clearance: { ring_um: 10 }, corner_contact: true } };
@@ -285,7 +285,7 @@ test('an old document is converted, with a notice', async () => {
   assert.match(await page.textContent('#notice-text'), /earlier version/);
 });
 
-test('what gives way behind a contact moves the answer', async () => {
+test('series compliance changes the answer', async () => {
   const page = await bed.open();
   await pick(page, '/model/compatibility', 'virtual_work');
   const before = await answered(page);
@@ -296,7 +296,7 @@ test('what gives way behind a contact moves the answer', async () => {
   assert.notEqual(after.sweep.peaks.ring.force_n.value, before.sweep.peaks.ring.force_n.value);
 });
 
-test('an estimate of what gives way behind a contact is taken over into the design', async () => {
+test('button copies a compliance estimate into the design', async () => {
   const page = await bed.open();
   await setDocument(page, { drive: (await designOf(page)).drive, load: { input_torque_nm: 20 }, parts: { carrier: { fingers: 'held_at_one_end' } } });
   const before = await answered(page);
@@ -315,7 +315,7 @@ test('an estimate of what gives way behind a contact is taken over into the desi
   assert.ok(!('fingers' in ((await answered(page)).design.parts?.carrier ?? {})));
 });
 
-test('an estimate taken over where the paper’s model is chosen brings the model along that takes it', async () => {
+test('copying an estimate replaces the paper’s model', async () => {
   const page = await bed.open();
   await setDocument(page, { drive: (await designOf(page)).drive, load: { input_torque_nm: 20 }, model: { compatibility: 'projection', stiffness: { law: 'linear' } } });
   await answered(page);
@@ -328,7 +328,7 @@ test('an estimate taken over where the paper’s model is chosen brings the mode
   assert.ok(sweep.peaks.ring.force_n.value > 0);
 });
 
-test('stresses by contact and lists of deviations are inputs that two designs may differ in', async () => {
+test('comparison lists stresses by contact and deviations', async () => {
   const page = await bed.open();
   const load = { input_torque_nm: 20 };
   const { drive } = await designOf(page);
@@ -343,7 +343,7 @@ test('stresses by contact and lists of deviations are inputs that two designs ma
   assert.match(told, /Teeth thinner in radius, each – → 28, 0 to 2.5 µm/);
 });
 
-test('a document with kinds spelled out opens as it is, in the form and in a link', async () => {
+test('document with explicit kinds opens in form and link', async () => {
   const design = {
     drive: {
       wave_generator: { kind: 'eccentric', radius_mm: 30.8, eccentricity_mm: 1.2 },
@@ -385,7 +385,7 @@ const NOT_IN_THE_FORM = {
   ),
 };
 
-test('whatever a design may say has a field, or a reason why it has none, and there is no field of which the service knows nothing', async () => {
+test('fields match the API document, with listed exceptions', async () => {
   const page = await bed.open();
   const { schemas } = (await (await fetch(`${bed.server.origin}/openapi.json`)).json()).components;
   const known = new Set([...valuesOf(schemas, schemas.Design)].map(({ pointer }) => pointer));
@@ -399,7 +399,7 @@ test('whatever a design may say has a field, or a reason why it has none, and th
   assert.deepEqual(Object.keys(NOT_IN_THE_FORM).filter((pointer) => !known.has(pointer) || fields.has(pointer)), []);
 });
 
-test('every kind that the service has can be chosen, and has the fields that it has there', async () => {
+test('every kind can be chosen and has its fields', async () => {
   const page = await bed.open();
   const { schemas } = (await (await fetch(`${bed.server.origin}/openapi.json`)).json()).components;
   const variants = await page.evaluate(async () => {
@@ -425,7 +425,7 @@ test('every kind that the service has can be chosen, and has the fields that it 
   }
 });
 
-test('modification is typed in the form: each number moves the answer, and virtual work, which it wants, is chosen with it', async () => {
+test('modification fields change the answer and choose virtual work', async () => {
   const page = await bed.open();
   await page.evaluate(() => document.querySelectorAll('#form details').forEach((group) => (group.open = true)));
   await enter(page, '/parts/ring/clearance_um', 20);
@@ -457,7 +457,7 @@ test('modification is typed in the form: each number moves the answer, and virtu
   assert.match(await page.textContent('#impossible'), /too full|less than nothing|run into/i);
 });
 
-test('parts off the axis are typed in the form, and lists in the JSON are told', async () => {
+test('form has runouts and counts lists in JSON', async () => {
   const page = await bed.open();
   await page.evaluate(() => document.querySelectorAll('#form details').forEach((group) => (group.open = true)));
   await enter(page, '/parts/ring/clearance_um', 20);
@@ -470,7 +470,7 @@ test('parts off the axis are typed in the form, and lists in the JSON are told',
   assert.match(await page.locator('#form summary', { hasText: 'Runout' }).textContent(), /1 list in the JSON/);
 });
 
-test('where parts are made otherwise than nominal, the picture says that it is not of these, and leads to the drawings, which are', async () => {
+test('nominal picture says so and links to drawings', async () => {
   const page = await bed.open();
   const told = page.locator('#legend .nominal');
   assert.ok(await told.isHidden());

@@ -15,7 +15,7 @@ async function linkOf(page) {
   return hash(page);
 }
 
-test('a link that was cut short says so, and its address stays until something is changed', async () => {
+test('truncated link reports it and keeps its address', async () => {
   let page = await bed.open();
   await enter(page, RADIUS, 4.5);
   const whole = await linkOf(page);
@@ -36,7 +36,7 @@ test('a link that was cut short says so, and its address stays until something i
   await page.waitForFunction((old) => location.hash !== old, '#desig');
 });
 
-test('of a link whose reference is cut short the design is shown', async () => {
+test('link with truncated reference shows its design', async () => {
   let page = await bed.open();
   await page.click('#keep');
   await enter(page, RADIUS, 4.5);
@@ -48,14 +48,14 @@ test('of a link whose reference is cut short the design is shown', async () => {
   assert.ok(await page.isHidden('#comparing'));
 });
 
-test('a link of version 0.1 opens', async () => {
+test('link of version 0.1 opens', async () => {
   const address = '#design=' + Buffer.from(JSON.stringify({ drive: { wave_generator: { semi_major_mm: 58, semi_minor_mm: 56 }, teeth: { count: 28, radius_mm: 5, width_mm: 15 }, ring: { teeth: 26 } }, load: { input_torque_nm: 20 } })).toString('base64url');
   const page = await bed.open({ address });
   assert.equal((await designOf(page)).drive.teeth.radius_mm, 5);
   assert.ok(await page.isHidden('#notice'));
 });
 
-test('skip links move the focus and leave the design in the address', async () => {
+test('skip links move focus and keep the address', async () => {
   const page = await bed.open();
   const address = await linkOf(page);
   await page.evaluate(() => document.activeElement.blur());
@@ -67,7 +67,7 @@ test('skip links move the focus and leave the design in the address', async () =
   }
 });
 
-test('files of different designs have different names, and reloading adds nothing to them', async () => {
+test('different designs have different file names', async () => {
   const page = await bed.open();
   const names = new Set();
   const saved = async () => {
@@ -97,7 +97,7 @@ test('files of different designs have different names, and reloading adds nothin
   assert.equal((await saved()).name.match(/[0-9a-f]{6}\.json$/)[0], before.match(/[0-9a-f]{6}\.json$/)[0]);
 });
 
-test('a file that holds no design is shown with the reason', async () => {
+test('file without design is shown with the reason', async () => {
   const page = await bed.open();
   await page.setInputFiles('#document-file', { name: 'broken.json', mimeType: 'application/json', buffer: Buffer.from('{ "drive": ') });
   await page.waitForSelector('#document-error:not([hidden])');
@@ -105,7 +105,7 @@ test('a file that holds no design is shown with the reason', async () => {
   assert.equal(await page.inputValue('#document-text'), '{ "drive": ');
 });
 
-test('STEP and CSV are downloaded as the API answers them', async () => {
+test('STEP and CSV files equal the API’s answers', async () => {
   const page = await bed.open();
   await enter(page, RADIUS, 4.5);
   const design = await designOf(page);

@@ -84,7 +84,7 @@ async function violations() {
   return found.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html).join(' | ')}`);
 }
 
-test('every example loads, and the table shows the service’s numbers', async () => {
+test('every example loads with the service’s numbers', async () => {
   page = await open(browser, server);
   const { examples } = await (await fetch(`${server.origin}/v1/examples`)).json();
   assert.ok(examples.length >= 4);
@@ -98,13 +98,13 @@ test('every example loads, and the table shows the service’s numbers', async (
   }
 });
 
-test('numbers are rounded for reading, not changed', async () => {
+test('numbers are rounded only for display', async () => {
   page = await open(browser, server);
   assert.match(await page.textContent('#key-figures'), /Largest force1549\.3 Nring, ψ 43\.7°/);
   assert.match(await page.textContent('#key-figures'), /Undercutnocritical r 6\.749 mm/);
 });
 
-test('a dragged slider answers live and is one step to undo', async () => {
+test('dragged slider answers live, one step to undo', async () => {
   page = await open(browser, server);
   const slider = await page.$(`.field:has(${field(RADIUS)}) input[type=range]`);
   const box = await slider.boundingBox();
@@ -129,7 +129,7 @@ test('a dragged slider answers live and is one step to undo', async () => {
   assert.ok(await page.isDisabled('#undo'));
 });
 
-test('the newest design wins over slow answers to older ones', async () => {
+test('newest design wins over slow older answers', async () => {
   page = await open(browser, server);
   let aborted = 0;
   page.on('requestfailed', (request) => (aborted += request.failure().errorText.includes('ABORTED') ? 1 : 0));
@@ -146,7 +146,7 @@ test('the newest design wins over slow answers to older ones', async () => {
   await page.unroute('**/v1/design');
 });
 
-test('an impossible drive shows its reasons at the fields, and nothing breaks', async () => {
+test('impossible drive shows its reasons at the fields', async () => {
   page = await open(browser, server);
   await enter(page, SEMI_MINOR, 60);
   assert.match(await page.textContent(notes(SEMI_MAJOR)), /must exceed the semi-minor axis/);
@@ -174,7 +174,7 @@ test('an impossible drive shows its reasons at the fields, and nothing breaks', 
   await assertShows(design);
 });
 
-test('without a load the geometry stands, and the load’s field says what is missing', async () => {
+test('geometry needs no load, and load field says so', async () => {
   page = await open(browser, server);
   await page.fill(field('/load/input_torque_nm'), '');
   await settled(page);
@@ -184,7 +184,7 @@ test('without a load the geometry stands, and the load’s field says what is mi
   assert.equal(await page.getAttribute('#whole .arrow', 'd'), '');
 });
 
-test('raising r of case 5.1 beyond 6.749 mm shows undercut and the critical radius', async () => {
+test('case 5.1 with larger r shows undercut', async () => {
   page = await open(browser, server);
   assert.match(await page.textContent('.field:has(#field-drive-teeth-radius_mm) .mark-text'), /undercut from 6\.749 mm/);
   await enter(page, RADIUS, 6.74);
@@ -204,7 +204,7 @@ test('raising r of case 5.1 beyond 6.749 mm shows undercut and the critical radi
   assert.equal(await page.evaluate(() => document.activeElement.id), 'field-drive-wave_generator-semi_minor_mm');
 });
 
-test('undo and redo, by button and by keyboard', async () => {
+test('buttons and keyboard undo and redo', async () => {
   page = await open(browser, server);
   await enter(page, RADIUS, 4.5);
   await page.locator(field(RADIUS)).blur();
@@ -224,7 +224,7 @@ test('undo and redo, by button and by keyboard', async () => {
   await assertShows(design);
 });
 
-test('the address holds design and reference', async () => {
+test('address holds design and reference', async () => {
   page = await open(browser, server);
   await page.click('#keep');
   await choose(page, 'paper-5.2');
@@ -247,7 +247,7 @@ test('the address holds design and reference', async () => {
   assert.deepEqual(await designOf(page), design);
 });
 
-test('the document is saved and loaded as a file', async () => {
+test('document is saved and loaded as file', async () => {
   page = await open(browser, server);
   await enter(page, RADIUS, 4.25);
   const [download] = await Promise.all([page.waitForEvent('download'), pick(page, '#save')]);
@@ -274,7 +274,7 @@ test('the document is saved and loaded as a file', async () => {
   assert.deepEqual(await designOf(page), design);
 });
 
-test('switching the torque’s shaft keeps the load; fixed stiffnesses come with their fields', async () => {
+test('switching the shaft keeps the load', async () => {
   page = await open(browser, server);
   const force = await resultOf(page, 'Force, ring');
   await page.selectOption(field('/load'), 'output_torque_nm');
@@ -309,7 +309,7 @@ function instants({ states }) {
 
 const range = (values) => [Math.min(...values), Math.max(...values)];
 
-test('law, clearance, capacity, tolerance and wind-up are asked for in the form and answered in the table', async () => {
+test('form asks for further options, table answers them', async () => {
   page = await open(browser, server);
   assert.equal(await resultOf(page, 'Least wind-up'), undefined);
   assert.equal(await resultOf(page, 'Most teeth that carry'), undefined);
@@ -382,7 +382,7 @@ test('law, clearance, capacity, tolerance and wind-up are asked for in the form 
   await assertShows(back);
 });
 
-test('new findings explain themselves, new reasons stand at their fields', async () => {
+test('findings explain themselves, reasons are at their fields', async () => {
   page = await open(browser, server);
   await enter(page, '/parts/ring/clearance_um', 3);
   await page.click(`${notes('/model/stiffness')} .finding`);
@@ -416,7 +416,7 @@ test('new findings explain themselves, new reasons stand at their fields', async
   assert.ok(await page.isHidden('#impossible'));
 });
 
-test('with clearance, teeth that carry nothing are drawn and told so', async () => {
+test('teeth that clearance unloads are drawn and labelled', async () => {
   page = await open(browser, server);
   await enter(page, '/parts/ring/clearance_um', 20);
   const design = await designOf(page);
@@ -442,7 +442,7 @@ test('with clearance, teeth that carry nothing are drawn and told so', async () 
   assert.match(await page.textContent('#tooth-state'), /no load/);
 });
 
-test('a jump that stands twice at one input angle is a jump in mechanism and plots', async () => {
+test('double angle is a jump in mechanism and plots', async () => {
   page = await open(browser, server);
   const found = await page.evaluate(async () => {
     const { Motion } = await import('/page/motion.js');
@@ -488,7 +488,7 @@ async function measure() {
   await page.waitForFunction(() => /Fastest within|No choice/.test(document.querySelector('#accuracy-state').textContent));
 }
 
-test('accuracy: measured on demand, equal to the API, and a row applies its choice', async () => {
+test('accuracy equals the API’s, and a row applies its choice', async () => {
   page = await open(browser, server);
   assert.equal(await page.textContent('#accuracy-list'), '');
   await measure();
@@ -535,7 +535,7 @@ test('accuracy: measured on demand, equal to the API, and a row applies its choi
   await page.waitForFunction(() => document.querySelector('#accuracy-state').textContent.includes('must exceed'));
 });
 
-test('accuracy: a fixed law has rows of its own, and they bring back the stiffnesses that were measured', async () => {
+test('accuracy rows of fixed law restore measured stiffnesses', async () => {
   page = await open(browser, server);
   await page.selectOption(field('/model/stiffness'), 'fixed');
   await enter(page, '/model/stiffness/ring_n_per_mm', 250000);
@@ -589,7 +589,7 @@ const DRAWN = ['ring', 'wave-generator', 'carrier', 'tooth'];
 const BORE = '/parts/wave_generator/bore_radius_mm';
 
 for (const [what, parts] of Object.entries({ default: undefined, given: PARTS })) {
-  test(`drawings are downloaded as the API answers them, named after the design and the part: ${what} parts`, async () => {
+  test(`drawings of ${what} parts equal the API’s and are named`, async () => {
     page = await open(browser, server);
     const design = { ...(await server.example('paper-5.1')), parts };
     await setDocument(design);
@@ -604,7 +604,7 @@ for (const [what, parts] of Object.entries({ default: undefined, given: PARTS })
   });
 }
 
-test('the sweep’s plots are downloaded as the API answers them', async () => {
+test('plot files equal the API’s answers', async () => {
   page = await open(browser, server);
   await enter(page, RADIUS, 4.5);
   const { name, bytes } = await downloaded('plots.svg');
@@ -612,7 +612,7 @@ test('the sweep’s plots are downloaded as the API answers them', async () => {
   assert.ok(bytes.equals(await server.file('/v1/sweep', await designOf(page), MEDIA_TYPES.svg)));
 });
 
-test('nothing is drawn that was not asked for', async () => {
+test('page requests no drawing by itself', async () => {
   page = await open(browser, server);
   let drawings = 0;
   page.on('request', (request) => (drawings += request.url().includes('/v1/drawings/') ? 1 : 0));
@@ -629,7 +629,7 @@ test('nothing is drawn that was not asked for', async () => {
   assert.equal(await page.textContent('#drawings-state'), '', 'what was said was about another design');
 });
 
-test('the assembly stands as the mechanism does, also whole turns on and while it moves', async () => {
+test('assembly file has the input angle on display', async () => {
   page = await open(browser, server);
   const design = { ...(await server.example('paper-5.1')), assembly: { input_angle_deg: 30 } };
   await setDocument(design);
@@ -673,7 +673,7 @@ test('the assembly stands as the mechanism does, also whole turns on and while i
   assert.equal(await page.textContent('#play'), 'Pause', 'and it moves on');
 });
 
-test('a refused drawing shows its reasons at their fields, and nothing is downloaded', async () => {
+test('refused drawing shows reasons and downloads nothing', async () => {
   page = await open(browser, server);
   const downloads = [];
   page.on('download', (download) => downloads.push(download.suggestedFilename()));
@@ -718,7 +718,7 @@ test('a refused drawing shows its reasons at their fields, and nothing is downlo
   assert.deepEqual(downloads, [name]);
 });
 
-test('parts stand in the form with their defaults, and undo, link and document hold them', async () => {
+test('undo, link and document keep the parts', async () => {
   page = await open(browser, server);
   const example = await server.example('paper-5.1');
   await pick(page, '#to-parts');
@@ -749,7 +749,7 @@ test('parts stand in the form with their defaults, and undo, link and document h
   assert.deepEqual(await designOf(page), { ...example, parts: PARTS });
 });
 
-test('a drawing that the service cannot be asked for says so', async () => {
+test('failed drawing request is reported', async () => {
   page = await open(browser, server);
   page.expectsOutage = true;
   await page.route('**/v1/drawings/**', (route) => route.abort());
@@ -757,7 +757,7 @@ test('a drawing that the service cannot be asked for says so', async () => {
   await page.waitForFunction(() => document.querySelector('#drawings-state').textContent === 'The calculation service does not answer.');
 });
 
-test('the drawing stands where the service says', async () => {
+test('drawing places teeth as the service does', async () => {
   page = await open(browser, server);
   for (const name of ['paper-5.1', 'paper-5.2', 'ring-with-more-teeth']) {
     await choose(page, name);
@@ -786,7 +786,7 @@ test('the drawing stands where the service says', async () => {
   }
 });
 
-test('forces balance in the drawing: both contacts lie on the tooth, and one period on the pattern repeats', async () => {
+test('drawn forces balance and repeat after a period', async () => {
   page = await open(browser, server);
   await choose(page, 'paper-5.2');
   const result = await page.evaluate(async () => {
@@ -822,7 +822,7 @@ test('forces balance in the drawing: both contacts lie on the tooth, and one per
   });
 });
 
-test('a jump is a break in the plots, and only where a tooth enters under load', async () => {
+test('plots break only where a tooth enters under load', async () => {
   page = await open(browser, server);
   const breaks = (name) =>
     page.evaluate(async (example) => {
@@ -837,7 +837,7 @@ test('a jump is a break in the plots, and only where a tooth enters under load',
   assert.deepEqual(await breaks('paper-5.2'), { jumps: 4, sorted: true });
 });
 
-test('of thousands of teeth the whole drive shows what can be told apart, and always the selected one', async () => {
+test('many teeth are thinned but the selected one stays', async () => {
   page = await open(browser, server);
   const teeth = { radius_mm: 1.2, width_mm: 15, count: 10000 };
   await setDocument({ drive: { wave_generator: { semi_major_mm: 5000.7, semi_minor_mm: 4999.3 }, teeth, ring: { teeth: 9998 } }, load: { input_torque_nm: 3 } });
@@ -850,7 +850,7 @@ test('of thousands of teeth the whole drive shows what can be told apart, and al
   for (const view of ['#whole', '#detail']) assert.equal(await page.getAttribute(`${view} .tooth.selected`, 'data-tooth'), String(tooth));
 });
 
-test('plots and mechanism are linked; peaks lead to their place', async () => {
+test('plots, peaks and mechanism are linked', async () => {
   page = await open(browser, server);
   for (const abscissa of ['input', 'ring', 'cam', 'slot']) {
     await page.check(`#abscissae input[value=${abscissa}]`, { force: true });
@@ -872,7 +872,7 @@ test('plots and mechanism are linked; peaks lead to their place', async () => {
   assert.match(await page.textContent('#tooth-state'), /ψ 70\.2°, σ up to 980 MPa/);
 });
 
-test('the loaded teeth stay marked in the plots when the window changes', async () => {
+test('loaded teeth stay marked in plots after resize', async () => {
   page = await open(browser, server);
   await page.setViewportSize({ width: 1300, height: 900 });
   await page.waitForFunction(() => document.querySelector('#charts .chart').clientWidth === document.querySelector('#charts .chart svg').clientWidth);
@@ -881,7 +881,7 @@ test('the loaded teeth stay marked in the plots when the window changes', async 
   assert.ok(marks.length === 2 && marks.every((count) => count > 3), `${marks}`);
 });
 
-test('a reference shows differences in tiles, table, plots and drawing', async () => {
+test('reference shows differences everywhere', async () => {
   page = await open(browser, server);
   await page.click('#keep');
   await choose(page, 'paper-5.2');
@@ -899,7 +899,7 @@ test('a reference shows differences in tiles, table, plots and drawing', async (
   assert.equal(await page.getAttribute('#whole .ghost', 'd'), '');
 });
 
-test('play, pause, drag; both angles are read out', async () => {
+test('play, pause and drag show both angles', async () => {
   page = await open(browser, server);
   const angle = async () => Number.parseFloat(await page.textContent('#angle-input'));
   assert.equal(await angle(), 0, 'at rest where reduced motion is wanted');
@@ -932,7 +932,7 @@ test('play, pause, drag; both angles are read out', async () => {
   await turned();
 });
 
-test('all of it by keyboard', async () => {
+test('keyboard operates the whole page', async () => {
   page = await open(browser, server);
   const tabTo = async (id) => {
     for (let presses = 0; presses < 160; presses += 1) {
@@ -1001,7 +1001,7 @@ test('results and findings are announced', async () => {
   await page.waitForFunction(() => document.querySelector('#announcer').textContent.startsWith('Values that no design can have'));
 });
 
-test('the service goes away and comes back', async () => {
+test('page recovers when the service returns', async () => {
   page = await open(browser, server);
   page.expectsOutage = true;
   const { port } = server;
@@ -1053,7 +1053,7 @@ for (const [name, options] of Object.entries({
   });
 }
 
-test('the theme is chosen and remembered', async () => {
+test('theme is chosen and remembered', async () => {
   page = await open(browser, server);
   const background = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
   const light = await background();
@@ -1158,7 +1158,7 @@ async function onPaper(look, argument) {
   return seen;
 }
 
-test('the report has one or two pages', async () => {
+test('report has one or two pages', async () => {
   page = await open(browser, server, { colorScheme: 'dark' });
   for (const name of ['paper-5.1', 'paper-5.2']) {
     await choose(page, name);
@@ -1166,7 +1166,7 @@ test('the report has one or two pages', async () => {
   }
 });
 
-test('a long report has two pages, with every finding, and can be read', async () => {
+test('long report has two readable pages with every finding', async () => {
   const known = (await (await fetch(`${server.origin}/openapi.json`)).json()).components.schemas.FindingCode;
   const codes = new Set();
   page = await open(browser, server, { colorScheme: 'dark' });
@@ -1223,7 +1223,7 @@ test('a long report has two pages, with every finding, and can be read', async (
   assert.deepEqual([...codes].sort(), others.sort(), 'every finding of a sweep stands in one of the reports');
 });
 
-test('headers: a strict policy, and files that are asked for anew', async () => {
+test('headers set a strict policy and revalidation', async () => {
   const index = await fetch(`${server.origin}/`);
   const policy = index.headers.get('content-security-policy');
   for (const part of ["default-src 'none'", "script-src 'self'", "style-src 'self'", "connect-src 'self'", "frame-ancestors 'none'"]) {
@@ -1240,7 +1240,7 @@ test('headers: a strict policy, and files that are asked for anew', async () => 
   assert.equal(missing.headers.get('content-type'), 'application/problem+json');
 });
 
-test('the browser draws every part’s SVG to scale', async () => {
+test('browser draws every part’s SVG to scale', async () => {
   const design = { ...(await server.example('paper-5.2')), parts: { wave_generator: { bore_radius_mm: 20 } } };
   const { semi_major_mm: a, semi_minor_mm: b } = design.drive.wave_generator;
   const { radius_mm: r } = design.drive.teeth;

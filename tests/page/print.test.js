@@ -56,7 +56,7 @@ test('plots are printed', async () => {
   }
 });
 
-test('an impossible design prints its inputs and why it is impossible, and no number of another', async () => {
+test('impossible design prints inputs and reasons, no old numbers', async () => {
   const page = await bed.open();
   await enter(page, '/drive/wave_generator/semi_minor_mm', 60);
   const pages = await printed(page);
@@ -71,7 +71,7 @@ test('an impossible design prints its inputs and why it is impossible, and no nu
   assert.match((await printed(page)).flat().join('\n'), /1549/);
 });
 
-test('no head stands alone at the foot of a page', async () => {
+test('no heading is alone at a page’s foot', async () => {
   const page = await bed.open();
   const heads = await page.evaluate(() => [...document.querySelectorAll('h2, h3, .group th')].map((element) => element.childNodes[0]?.textContent.trim()).filter(Boolean));
   assert.ok(heads.includes('Results') && heads.includes('Sizes and clearances'));
@@ -89,7 +89,7 @@ test('no head stands alone at the foot of a page', async () => {
   }
 });
 
-test('a comparison prints the inputs that differ', async () => {
+test('comparison prints the inputs that differ', async () => {
   const page = await bed.open();
   await page.click('#keep');
   await enter(page, '/load/input_torque_nm', 3);

@@ -12,7 +12,7 @@ const RADIUS = '/drive/teeth/radius_mm';
 // A machine that has much else to do is slow, not too slow.
 const bed = testBed({ before, after, afterEach }, ['--deadline-ms', '60000']);
 
-test('of a service that hangs the page tells, and goes on when it answers', async () => {
+test('page reports a hanging service and recovers', async () => {
   const page = await bed.open();
   page.expectsOutage = true;
   bed.server.process.kill('SIGSTOP');
@@ -31,7 +31,7 @@ test('of a service that hangs the page tells, and goes on when it answers', asyn
   assert.equal(await resultOf(page, 'Ring tip radius'), (await bed.server.ask('/v1/geometry', { ...(await bed.server.example('paper-5.1')), drive: { ...(await bed.server.example('paper-5.1')).drive, teeth: { count: 28, radius_mm: 4.5, width_mm: 15 } } })).ring.tip_radius_mm);
 });
 
-test('where a key is wanted the page asks for it, keeps it in memory alone and goes on', async () => {
+test('page asks for a key, keeps it in memory', async () => {
   const made = execFileSync(BINARY, ['new-key', 'a team'], { encoding: 'utf8' });
   const [key] = made.match(/tw_[0-9a-f]+/);
   const [line] = made.match(/[0-9a-f]{64} a team/);
@@ -68,7 +68,7 @@ test('where a key is wanted the page asks for it, keeps it in memory alone and g
   }
 });
 
-test('of very many input angles those are drawn that can be told apart, and the table has them all', async () => {
+test('many input angles are thinned in drawing only', async () => {
   const page = await bed.open();
   const design = { ...(await bed.server.example('paper-5.2')), model: { compatibility: 'virtual_work' }, parts: { ring: { clearance_um: 1 } }, sweep: { samples: 4000 } };
   const found = await page.evaluate(async (asked) => {
@@ -119,7 +119,7 @@ test('of very many input angles those are drawn that can be told apart, and the 
   console.log(`longest task with 6000 samples: ${await page.evaluate(() => window.longest)} ms`);
 });
 
-test('a page opened at a service that is silent says so, and begins when it answers', async () => {
+test('page opened at a silent service starts later', async () => {
   const server = await Server.start();
   const page = await open(bed.browser, server);
   page.expectsOutage = true;
@@ -137,7 +137,7 @@ test('a page opened at a service that is silent says so, and begins when it answ
   }
 });
 
-test('documents that came are kept while others are asked for again, so a page of many begins however many fail', async () => {
+test('page retries only the documents that failed', async () => {
   const page = await bed.open();
   page.expectsOutage = true;
   let asked = 0;

@@ -7,7 +7,7 @@ import { choose, field, settled, testBed } from './harness.js';
 const bed = testBed({ before, after, afterEach });
 const EXAMPLES = ['paper-5.1', 'paper-5.2', 'ring-with-more-teeth'];
 
-test('between two states the loads are those that the service finds there', async () => {
+test('loads between states match the service', async () => {
   const page = await bed.open();
   for (const name of EXAMPLES) {
     const worst = await page.evaluate(async (example) => {
@@ -44,7 +44,7 @@ test('between two states the loads are those that the service finds there', asyn
   }
 });
 
-test('where items deviate each tooth carries, in whatever turn, what the service finds for it', async () => {
+test('deviating teeth match the service in every turn', async () => {
   const page = await bed.open();
   const found = await page.evaluate(async () => {
     const { Motion } = await import('/page/motion.js');
@@ -98,7 +98,7 @@ test('where items deviate each tooth carries, in whatever turn, what the service
   }
 });
 
-test('the wall that holds a tooth is the one that its forces press it to, in either sense', async () => {
+test('holding wall balances the forces of its tooth', async () => {
   const page = await bed.open();
   for (const [name, wall] of [['paper-5.1', 'leading'], ['ring-with-more-teeth', 'trailing']]) {
     const { carrier } = await bed.server.ask('/v1/geometry', await bed.server.example(name));
@@ -123,7 +123,7 @@ test('the wall that holds a tooth is the one that its forces press it to, in eit
   }
 });
 
-test('the carrier’s outline is the service’s: fingers between cam and ring tips, walls as far from the slot’s middle as a tooth', async () => {
+test('carrier’s outline is that of the service', async () => {
   const page = await bed.open();
   for (const name of EXAMPLES) {
     await choose(page, name);
@@ -144,7 +144,7 @@ test('the carrier’s outline is the service’s: fingers between cam and ring t
   }
 });
 
-test('the other shaft’s torque is the service’s, and is not made up where there is none', async () => {
+test('other shaft’s torque comes from the service', async () => {
   const page = await bed.open();
   const { load } = (await bed.server.answers(await bed.server.example('paper-5.1'))).sweep;
   assert.deepEqual(load, { input_torque_nm: 20, output_torque_nm: 280 });
