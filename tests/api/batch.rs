@@ -1,4 +1,4 @@
-//! Batches: a document a line, an answer a line, in order and whatever each comes to.
+//! Batches: one document and one answer for each line, in order.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
@@ -25,7 +25,7 @@ fn lines(answer: &Answer) -> Vec<Value> {
     lines
 }
 
-/// Case 5.1 with another torque for each index, so that every answer tells whose it is.
+/// Returns case 5.1 with another torque for each index, so that each answer identifies its document.
 fn variant(index: u64) -> Value {
     with(&with(&shortest(), "/model", of_the_paper()), "/load/input_torque_nm", json!(20.0 + index as f64))
 }
@@ -152,14 +152,14 @@ fn command_line_batch_answers_same_lines() {
     assert_eq!((offline, end), (online.as_slice(), &json!({ "asked": 3, "answered": 3 })));
 }
 
-/// Documents of very different length, so that slices end anywhere.
+/// Returns documents of very different lengths, so that slices end anywhere.
 fn uneven(count: u64) -> Vec<String> {
     (0..count)
         .map(|index| with(&variant(index), "/sweep", json!({ "samples": 1 + 97 * index % 2000 })).to_string())
         .collect()
 }
 
-/// The head of a batch that is sent in chunks, by a proxy or directly.
+/// Sends the head of a batch in chunks, through a proxy or directly.
 fn open(service: &Service, is_behind_proxy: bool) -> TcpStream {
     let mut stream = TcpStream::connect(service.address()).unwrap();
     let forwarded = if is_behind_proxy { "x-forwarded-for: 192.0.2.1\r\n" } else { "" };

@@ -1,4 +1,4 @@
-//! Results are kept by what they depend on, and solved once however many ask.
+//! The cache: equal questions share a key and are solved once.
 
 use std::io::Read as _;
 use std::net::TcpStream;
@@ -65,7 +65,7 @@ async fn server_timing_reports_solve_on_hits_too() {
     assert_eq!(duration(&miss), duration(&hit), "that of the solve which made the bytes");
 }
 
-/// Every representation of a sweep.
+/// Requests every representation of a sweep.
 async fn representations(service: &Service) -> Vec<(&'static str, &'static str, Answer)> {
     let mut answers = Vec::new();
     for accept in ["application/json", "text/csv"] {
@@ -266,7 +266,7 @@ async fn empty_cache_reports_nothing_stored() {
     assert!(!answer.header("cache-status").contains("stored"), "{}", answer.header("cache-status"));
 }
 
-/// Each client spells the document its own way.
+/// Sends equal requests that are spelled differently.
 fn equal_requests(service: &Service, count: usize) -> Vec<TcpStream> {
     let document = with(&spelled_out(), "/sweep/samples", json!(200)).to_string();
     let spelled = |spaces| Question::post("/v1/sweep", format!("{document}{}", " ".repeat(spaces)));

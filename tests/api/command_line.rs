@@ -10,7 +10,7 @@ use crate::asking::{Question, Service};
 use crate::designs::{shortest, spelled_out, undercut, with, without};
 use crate::serving::Process;
 
-/// Commands and the paths that answer the same.
+/// Commands with the paths that give the same answers.
 const COMMANDS: [(&str, &str); 3] =
     [("geometry", "/v1/geometry"), ("coincidence-degree", "/v1/coincidence-degree"), ("sweep", "/v1/sweep")];
 
@@ -133,7 +133,7 @@ fn dash_reads_standard_input() {
     }
 }
 
-/// Documents that get no answer, of each kind.
+/// Returns documents that get no answer, of each kind.
 fn bad_documents() -> Vec<String> {
     vec![
         String::new(),

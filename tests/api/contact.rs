@@ -1,11 +1,11 @@
-//! Contact that is real: Palmgren's law, clearances, wind-up, torque capacity, sweeps to a tolerance.
+//! Contact: Palmgren's law, clearances, wind-up, torque capacity, tolerance sweeps.
 
 use serde_json::{Value, json};
 
 use crate::asking::Service;
 use crate::designs::{bored, shortest, spelled_out, undercut, with};
 
-/// Case 5.1 by virtual work and Palmgren's law, with a gap at the ring's normal.
+/// Returns case 5.1 by virtual work and Palmgren's law, with a gap at the ring's normal.
 fn palmgren(ring_um: f64) -> Value {
     let model = json!({
         "compatibility": "virtual_work",

@@ -1,11 +1,11 @@
-//! Single items of the parts as they came out.
+//! Deviations of single items.
 
 use serde_json::{Value, json};
 
 use crate::asking::{LIMITS, Limits, Question, Service};
 use crate::designs::{spelled_out, with};
 
-/// Case 5.1 with clearances that cover what deviates by a few micrometres.
+/// Returns case 5.1 with clearances that cover deviations of a few micrometres.
 fn cleared() -> Value {
     let model = json!({ "compatibility": "virtual_work", "stiffness": { "law": "palmgren" } });
     let document = with(&spelled_out(), "/model", model);
@@ -18,12 +18,12 @@ fn with_deviations(deviations: Value) -> Value {
     with(&cleared(), "/deviations", deviations)
 }
 
-/// A list of zeros but for one item.
+/// Returns a list of zeros except for one item.
 fn one(items: usize, item: usize, value: f64) -> Vec<f64> {
     (0..items).map(|other| if other == item { value } else { 0.0 }).collect()
 }
 
-/// Deviations of every kind.
+/// Returns deviations of every kind.
 fn every_kind() -> Value {
     json!({
         "tooth_radius_um": one(28, 3, 1.0), "slot_angle_arcsec": one(28, 4, 5.0), "slot_wall_um": one(28, 5, 1.0),
@@ -34,7 +34,7 @@ fn every_kind() -> Value {
     })
 }
 
-/// A document with a measured ring and a cam off its axis.
+/// Returns a document with a measured ring and a cam off its axis.
 pub(crate) fn deviating() -> Value {
     with_deviations(json!({ "ring_space_um": one(26, 6, 2.0), "wave_generator_runout": { "amount_um": 2.0 } }))
 }
@@ -311,7 +311,7 @@ async fn deviations_appear_in_csv_text_and_plots() {
     assert!(svg.contains("force, largest of all teeth, N"), "{svg}");
 }
 
-/// How many points each curve of a picture of plots has.
+/// Counts the points of each plotted curve.
 fn points_of_curves(svg: &str) -> Vec<usize> {
     let paths = svg.split("<path d=\"M ").skip(1).filter_map(|path| path.split_once('"'));
     paths.map(|(path, _)| path.split(" L ").count()).collect()

@@ -1,4 +1,4 @@
-//! What a design document may leave out, how it may be spelled, and what it may not say.
+//! Design documents: defaults, spelling and structural faults.
 
 use serde_json::{Value, json};
 
@@ -8,7 +8,7 @@ use crate::designs::{
     with_twice, without,
 };
 
-/// That the text is the same question as the document, whose answer the service has already.
+/// Asserts that the text is the same question as the document, whose answer is cached.
 async fn assert_same(service: &Service, path: &str, document: &Answer, text: &str) {
     let answer = service.post_text(path, text).await;
     assert_eq!(answer.status, 200, "{path}: {text}: {}", answer.text());
@@ -17,7 +17,7 @@ async fn assert_same(service: &Service, path: &str, document: &Answer, text: &st
     assert!(answer.is_hit(), "{path}: solved anew for {text}");
 }
 
-/// That all of these spell one design.
+/// Asserts that all spellings mean one design.
 async fn assert_all_same(document: &Value, spellings: impl IntoIterator<Item = String>) {
     let spellings: Vec<_> = spellings.into_iter().collect();
     for path in ENDPOINTS {
@@ -31,7 +31,7 @@ async fn assert_all_same(document: &Value, spellings: impl IntoIterator<Item = S
     }
 }
 
-/// All that may be left out of a document, each with another value than its default.
+/// Lists each optional field with a value other than its default.
 fn defaults() -> Vec<(&'static str, Value)> {
     vec![
         ("/drive/teeth/installed", json!(14)),

@@ -9,13 +9,13 @@ use crate::designs::{bored, shortest, undercut, with};
 
 const PARTS: [&str; 4] = ["ring", "wave-generator", "carrier", "tooth"];
 
-/// Case 5.1 with a `parts` group.
+/// Returns case 5.1 with a `parts` group.
 pub(crate) fn made(parts: &str) -> Value {
     let document = with(&shortest(), "/parts", serde_json::from_str(parts).unwrap());
     with(&document, "/assembly", json!({}))
 }
 
-/// Parts of case 5.1 that cannot be made: the code, the field, its value and the limit.
+/// Parts of case 5.1 that cannot be made, with code, field, value and limit.
 pub(crate) const MISFITS: [(&str, &str, &str, f64, f64); 8] = [
     (r#"{ "ring": { "outer_radius_mm": 68 } }"#, "ring_without_rim", "/parts/ring/outer_radius_mm", 68.0, 68.000_068),
     (r#"{ "carrier": { "inner_radius_mm": 58 } }"#, "carrier_meets_cam", "/parts/carrier/inner_radius_mm", 58.0, 58.0),
@@ -68,7 +68,7 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
 }
 
-/// The area of an outline: its chords' by the shoelace formula, and the segments between its arcs and their chords.
+/// Returns the area of an outline: the shoelace formula for its chords, plus the segments of its arcs.
 fn area_mm2(outline: &Value) -> f64 {
     if let Some(radius_mm) = outline["radius_mm"].as_f64() {
         return PI * radius_mm * radius_mm;
@@ -86,7 +86,7 @@ fn area_mm2(outline: &Value) -> f64 {
     outline["edges"].as_array().unwrap().iter().map(of_edge).sum()
 }
 
-/// The area of all prisms of a drawing of one part.
+/// Returns the area of all prisms in a drawing of one part.
 async fn part_area_mm2(part: &str, document: &Value) -> f64 {
     let drawing = drawn(part, document).await;
     let [body] = drawing["bodies"].as_array().unwrap().as_slice() else { panic!("{drawing}") };
@@ -265,7 +265,7 @@ async fn each_edge_starts_where_previous_ends() {
     }
 }
 
-/// The chords are true to this, far finer than what areas are compared to.
+/// Sets a chord tolerance far below the one of compared areas.
 fn finely(document: &Value) -> Value {
     with(document, "/profile", json!({ "chord_tolerance_mm": 1e-6 }))
 }
@@ -437,7 +437,7 @@ async fn engaged_teeth_touch_cam_and_ring() {
     }
 }
 
-/// The chords of an outline where it stands; arcs, which are lands here, as their three points.
+/// Returns the chords of a placed outline, with each arc (a land here) as three points.
 fn polygon(outline: &Value, placement: &Value) -> Vec<[f64; 2]> {
     let (sin, cos) = placement["rotation_deg"].as_f64().unwrap().to_radians().sin_cos();
     let edges = outline["edges"].as_array().unwrap();
@@ -445,7 +445,7 @@ fn polygon(outline: &Value, placement: &Value) -> Vec<[f64; 2]> {
     points.map(|(x, y)| [x * cos - y * sin, x * sin + y * cos]).collect()
 }
 
-/// The least distance of a point from a closed polygon.
+/// Returns the least distance of a point from a closed polygon.
 fn distance(polygon: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
     let of_chord = |(from, to): (&[f64; 2], &[f64; 2])| {
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);

@@ -1,4 +1,4 @@
-//! What AutoCAD requires of a DXF, as docs/dxf.md lists it: each line of that list is a test here.
+//! AutoCAD's requirements for DXF. Each line of the list in docs/dxf.md has a test.
 
 use std::collections::{HashMap, HashSet};
 
@@ -12,7 +12,7 @@ type Pair = (i32, String);
 
 const PARTS: [&str; 5] = ["ring", "wave-generator", "carrier", "tooth", "assembly"];
 
-/// The pairs of every part's drawing.
+/// Returns the pairs of every part's drawing.
 async fn drawings() -> Vec<Vec<Pair>> {
     let mut drawings = Vec::new();
     for part in PARTS {
@@ -32,7 +32,7 @@ async fn pairs(part: &str, document: &Value) -> Vec<Pair> {
     lines.chunks_exact(2).map(|pair| (pair[0].trim().parse().unwrap(), pair[1].to_owned())).collect()
 }
 
-/// The pairs between a section's name and its end.
+/// Returns the pairs between a section's name and its end.
 fn section<'a>(pairs: &'a [Pair], name: &str) -> &'a [Pair] {
     let is = |pair: &Pair, code: i32, value: &str| pair.0 == code && pair.1 == value;
     let start = pairs.windows(2).position(|two| is(&two[0], 0, "SECTION") && is(&two[1], 2, name));
@@ -41,7 +41,7 @@ fn section<'a>(pairs: &'a [Pair], name: &str) -> &'a [Pair] {
     &pairs[start..start + end]
 }
 
-/// The objects of a section: from one group 0 to the next.
+/// Splits a section into objects, each from one group 0 to the next.
 fn objects(pairs: &[Pair]) -> Vec<&[Pair]> {
     let mut starts: Vec<_> = (0..pairs.len()).filter(|&index| pairs[index].0 == 0).collect();
     starts.push(pairs.len());
@@ -53,7 +53,7 @@ fn value(object: &[Pair], code: i32) -> &str {
     &found.unwrap_or_else(|| panic!("no group {code} in {object:?}")).1
 }
 
-/// The records of a table, and what stands before them.
+/// Returns the head and the records of a table.
 fn table<'a>(pairs: &'a [Pair], name: &str) -> (&'a [Pair], Vec<&'a [Pair]>) {
     let objects = objects(section(pairs, "TABLES"));
     let start = objects.iter().position(|object| object[0].1 == "TABLE" && object[1].1 == name);
@@ -66,14 +66,14 @@ fn names<'a>(records: &[&'a [Pair]]) -> Vec<&'a str> {
     records.iter().map(|record| value(record, 2)).collect()
 }
 
-/// The object of a handle.
+/// Returns the object with this handle.
 fn object<'a>(pairs: &'a [Pair], handle: &str) -> &'a [Pair] {
     let objects = objects(section(pairs, "OBJECTS"));
     let found = objects.into_iter().find(|object| value(object, 5) == handle);
     found.unwrap_or_else(|| panic!("no object {handle}"))
 }
 
-/// The handle under a name in a dictionary.
+/// Returns the handle under a name in a dictionary.
 fn entry<'a>(dictionary: &'a [Pair], name: &str) -> &'a str {
     let place = dictionary.iter().position(|pair| pair.0 == 3 && pair.1 == name);
     let (code, handle) = &dictionary[place.unwrap_or_else(|| panic!("no {name} in {dictionary:?}")) + 1];
@@ -103,7 +103,7 @@ async fn header_names_version_and_next_handle() {
     }
 }
 
-/// Of everything but header and classes: group 5, and 105 of dimension styles.
+/// Returns all handles: group 5, and group 105 for dimension styles. Header and classes have none.
 fn handles(pairs: &[Pair]) -> Vec<u32> {
     ["TABLES", "BLOCKS", "ENTITIES", "OBJECTS"]
         .iter()

@@ -1,4 +1,4 @@
-//! Each endpoint reads only what it needs, requires only that, and caches by only that.
+//! Each endpoint requires, reads and caches by only the fields that it needs.
 
 use serde_json::{Value, json};
 
@@ -11,7 +11,7 @@ async fn etag(path: &str, document: &Value) -> String {
     answer.etag().to_owned()
 }
 
-/// Values that no drive or load can have, in the parts of a document that an endpoint does not read.
+/// Returns impossible values for parts of a document that an endpoint does not read.
 fn impossible(part: &str) -> Value {
     match part {
         "materials" => json!({ "ring": { "youngs_modulus_gpa": -210.0, "poissons_ratio": 7.0 } }),
@@ -132,7 +132,7 @@ async fn endpoints_have_separate_cache_entries() {
     assert_eq!(tags.len(), 3);
 }
 
-/// The names of the parts of `/v1/design`, and the endpoints that answer them by themselves.
+/// Parts of `/v1/design` with the endpoints that answer each part alone.
 const PARTS: [(&str, &str); 3] =
     [("geometry", "/v1/geometry"), ("coincidence_degree", "/v1/coincidence-degree"), ("sweep", "/v1/sweep")];
 

@@ -1,4 +1,4 @@
-//! Who may come in, and how much of a connection anyone gets.
+//! Keys, settings and host names.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
@@ -10,7 +10,7 @@ use crate::asking::{ENDPOINTS, LIMITS, Question, Service, ask_at};
 use crate::designs::shortest;
 use crate::serving::Process;
 
-/// A key, and its line of a keys file, as the command line makes them.
+/// Makes a key and its line of a keys file with the command line.
 fn new_key(name: &str) -> (String, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_toothwave")).args(["new-key", name]).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
@@ -18,7 +18,7 @@ fn new_key(name: &str) -> (String, String) {
     (values.next().unwrap(), values.next().unwrap())
 }
 
-/// A keys file that is removed with the test.
+/// A temporary keys file.
 struct KeysFile(PathBuf);
 
 impl KeysFile {

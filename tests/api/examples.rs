@@ -1,4 +1,4 @@
-//! The ready design documents.
+//! Example design documents.
 
 use serde_json::{Value, json};
 

@@ -1,4 +1,4 @@
-//! What a designer is told about drives that can exist.
+//! Findings about possible drives.
 
 use serde_json::{Value, json};
 
@@ -6,7 +6,7 @@ use crate::asking::{ENDPOINTS, Service};
 use crate::codes::{codes_of, finding_codes, words};
 use crate::designs::{bored, of_the_paper, shortest, spelled_out, undercut, with, without};
 
-/// The findings of an endpoint, each well formed.
+/// Returns the findings of an endpoint and checks their form.
 async fn findings_at(path: &str, document: &Value) -> Vec<Value> {
     let found = Service::new().post(path, document).await.found();
     let findings = found["findings"].as_array().unwrap().clone();
@@ -42,7 +42,7 @@ async fn findings(document: &Value) -> Vec<Value> {
     findings_at("/v1/sweep", document).await
 }
 
-/// The one finding of its kind.
+/// Returns the only finding with this code.
 async fn finding(document: &Value, code: &str) -> Value {
     let mut findings = findings(document).await;
     findings.retain(|finding| finding["code"] == code);
@@ -100,7 +100,7 @@ async fn bore_inside_natural_tip_has_no_effect() {
     }
 }
 
-/// Case 5.1 with thirty teeth, every fifth slot filled: one or two teeth in each zone.
+/// Returns case 5.1 with thirty teeth and every fifth slot filled: one or two teeth in each zone.
 fn sparse() -> Value {
     let document =
         with(&shortest(), "/drive/teeth", json!({ "count": 30, "installed": 6, "radius_mm": 5.0, "width_mm": 15.0 }));
@@ -114,7 +114,7 @@ async fn few_teeth_in_mesh_are_a_warning() {
     assert_eq!(finding["severity"], "warning");
 }
 
-/// Case 5.1 with teeth so thick that the slots' walls are not.
+/// Returns case 5.1 with thick teeth, so that slot walls are thin.
 fn thick() -> Value {
     with(&shortest(), "/drive/teeth/radius_mm", json!(5.5))
 }
@@ -126,7 +126,7 @@ async fn thin_slot_wall_is_a_warning() {
     assert_numbers(&finding(&thick(), "thin_slot_wall").await, wall, 2.75, "mm");
 }
 
-/// Case 5.1 with teeth thinner than the cam's stroke, or as thick, or a little thicker.
+/// Returns case 5.1 with teeth about as thick as the cam's stroke.
 fn thin(radius_mm: f64) -> Value {
     with(&shortest(), "/drive/teeth/radius_mm", json!(radius_mm))
 }
@@ -143,7 +143,7 @@ async fn loaded_tooth_beyond_carrier_warns_for_each_edge() {
     assert!(!codes_of(&stays).contains(&"tooth_beyond_carrier".to_owned()));
 }
 
-/// A deep ellipse under many small teeth.
+/// Returns a deep ellipse with many small teeth.
 fn steep() -> Value {
     json!({
         "drive": {
@@ -163,7 +163,7 @@ async fn steep_ring_flank_warning_states_pressure_angle() {
     assert!(finding["value"].as_f64().unwrap() > 70.0);
 }
 
-/// Case 5.1 under a hundred times its torque: ten times its stresses, all beyond 1500 MPa.
+/// Returns case 5.1 under a hundred times its torque: stresses are ten times larger, all above 1500 MPa.
 fn overloaded() -> Value {
     with(&with(&shortest(), "/model", of_the_paper()), "/load/input_torque_nm", json!(2000.0))
 }
@@ -182,7 +182,7 @@ async fn stress_above_fatigue_limit_warns_for_each_contact() {
     }
 }
 
-/// Case 5.1 with gaps of a millimetre at the carrier.
+/// Returns case 5.1 with gaps of a millimetre at the carrier.
 fn loose() -> Value {
     let document = with(&shortest(), "/model", json!({ "compatibility": "virtual_work" }));
     with(&document, "/parts", json!({ "carrier": { "clearance_um": 1000.0 } }))
@@ -238,7 +238,7 @@ async fn all_endpoints_report_same_findings_of_drive() {
     }
 }
 
-/// The findings of an assembly beyond those of its drive.
+/// Returns the findings of an assembly without those of its drive.
 async fn findings_of_parts(document: &Value) -> Vec<Value> {
     let of_drive = findings_at("/v1/geometry", document).await.len();
     findings_at("/v1/drawings/assembly", document).await.split_off(of_drive)
@@ -274,7 +274,7 @@ async fn tooth_leaving_slot_unloaded_is_information() {
     assert_numbers(finding, 50.8, (inner_mm * inner_mm - 2.25).sqrt(), "mm");
 }
 
-/// Case 5.1 with a rim and a cam's wall of a micrometre.
+/// Returns case 5.1 with a rim and a cam wall of one micrometre.
 fn thin_walls() -> Value {
     let parts = json!({ "ring": { "outer_radius_mm": 68.001 }, "wave_generator": { "bore_radius_mm": 55.999 } });
     with(&shortest(), "/parts", parts)
@@ -292,7 +292,7 @@ async fn micrometre_rims_and_walls_are_warnings() {
     assert!(findings_of_parts(&with(&shortest(), "/parts", thick)).await.is_empty());
 }
 
-/// Case 5.1 with a ring whose clearance takes the flank beyond the critical distance.
+/// Returns case 5.1 with a ring clearance that moves the flank beyond the critical distance.
 fn cleared(clearance_um: f64) -> Value {
     let parts = json!({ "ring": { "clearance_um": clearance_um, "outer_radius_mm": 90 } });
     with(&shortest(), "/parts", parts)
@@ -333,7 +333,7 @@ async fn undrawn_parts_have_no_findings() {
     assert_eq!(findings_at("/v1/drawings/ring", &thin_walls()).await.len(), 1);
 }
 
-/// Case 5.1 with the same friction everywhere, on a plain cam.
+/// Returns case 5.1 with a plain cam and equal friction everywhere.
 fn rubbing(coefficient: f64) -> Value {
     let contact = json!({ "coefficient": coefficient });
     let cam = json!({ "kind": "plain", "coefficient": coefficient });
@@ -364,7 +364,7 @@ async fn uncertain_efficiency_is_information_with_its_error() {
     assert!(!codes_of(&findings(&rubbing(0.005)).await).contains(&"efficiency_uncertain".to_owned()));
 }
 
-/// An eccentric drive on a bearing of this rating.
+/// Returns an eccentric drive on a bearing of this rating.
 fn on_a_bearing(rating_n: f64, load: &Value) -> Value {
     let contact = json!({ "coefficient": 0.02 });
     let bearing = json!({
@@ -402,7 +402,7 @@ async fn bearing_above_half_rating_is_a_warning() {
     assert_numbers(&finding(&duty, CODE).await, load_n, 0.95 * load_n, "N");
 }
 
-/// Case 5.1 with stresses that its contacts may have.
+/// Returns case 5.1 with these allowable stresses.
 fn limited(allowable: Value) -> Value {
     with(&shortest(), "/load/allowable_stress_mpa", allowable)
 }
@@ -459,12 +459,12 @@ async fn gap_is_a_warning_under_projection_only() {
     }
 }
 
-/// Case 5.1 under the default model, its parts held so.
+/// Returns case 5.1 under the default model with these parts.
 fn held(parts: Value) -> Value {
     with(&shortest(), "/parts", parts)
 }
 
-/// The estimate of one kind in a sweep's answer.
+/// Returns one compliance estimate of a sweep's answer.
 async fn estimate(document: &Value, backing: &str) -> Value {
     let found = Service::new().post("/v1/sweep", document).await.found();
     let estimates = found["series_compliance_estimates"].as_array().unwrap();
@@ -495,7 +495,7 @@ async fn slender_fingers_and_soft_rim_state_estimated_share() {
     }
 }
 
-/// Balls of 3 mm around an eccentric circle, in grooves of this radius everywhere.
+/// Returns a drive with balls of 3 mm around an eccentric circle, in equal grooves.
 fn grooved(groove_radius_mm: f64) -> Value {
     let grooves = json!({ "wave_generator": groove_radius_mm, "ring": groove_radius_mm, "carrier": groove_radius_mm });
     let teeth = json!({ "shape": "ball", "count": 16, "radius_mm": 3.0, "groove_radius_mm": grooves });

@@ -1,4 +1,4 @@
-//! What a turn costs: friction in the document, losses in a sweep's answer.
+//! Friction in the document and losses in a sweep's answer.
 
 use std::f64::consts::PI;
 
@@ -9,7 +9,7 @@ use crate::designs::{eccentric, shortest, undercut, with, without};
 
 const CONTACTS: [&str; 3] = ["wave_generator", "ring", "carrier"];
 
-/// Friction with this wave generator, 0.05 at ring and carrier.
+/// Returns friction with this wave generator and 0.05 at ring and carrier.
 pub(crate) fn on(wave_generator: &Value) -> Value {
     json!({ "wave_generator": wave_generator, "ring": { "coefficient": 0.05 }, "carrier": { "coefficient": 0.05 } })
 }
@@ -23,7 +23,7 @@ fn on_bearing(kind: &str) -> Value {
     on(&bearing)
 }
 
-/// Case 5.1 by virtual work and the linear law over 40 intervals, as section 10.3 has it, at 1500 revolutions a minute.
+/// Returns case 5.1 by virtual work and the linear law with 40 intervals at 1500 rpm (docs/theory.md, section 10.3).
 fn case_5_1(friction: Value) -> Value {
     let model = json!({ "compatibility": "virtual_work", "stiffness": { "law": "linear" } });
     let document = with(&shortest(), "/model", model);
@@ -371,7 +371,7 @@ async fn wear_is_depth_per_hour_with_place() {
     assert!(on_race["carrier"]["position_deg"].is_number());
 }
 
-/// An eccentric drive on its bearing.
+/// Returns an eccentric drive on its bearing.
 fn on_its_bearing(element: &str) -> Value {
     let bearing = json!({
         "kind": "rolling", "bearing_coefficient": 0.0015, "bearing_radius_mm": 25.0,
@@ -419,7 +419,7 @@ async fn bearing_without_radial_load_has_no_life() {
     assert_eq!(error["pointer"], "/friction/wave_generator/bearing_load_rating_n");
 }
 
-/// Case 5.1 with a duty, worn.
+/// Returns case 5.1 with a duty and wear.
 fn on_duty(points: &[(f64, f64, f64)], friction: Value) -> Value {
     let points: Vec<_> = points
         .iter()
@@ -436,7 +436,7 @@ fn alone(torque_nm: f64, speed_rpm: f64, friction: Value) -> Value {
     with(&worn(friction), "/load", json!({ "input_torque_nm": torque_nm, "input_speed_rpm": speed_rpm }))
 }
 
-/// A clearance, so that forces are not in proportion to the torque.
+/// Adds a clearance, so that forces are not proportional to the torque.
 fn loose(document: &Value) -> Value {
     with(document, "/parts", json!({ "ring": { "clearance_um": 3.0 } }))
 }

@@ -1,18 +1,18 @@
-//! Parts made otherwise than conjugate on purpose.
+//! Modified parts.
 
 use serde_json::{Value, json};
 
 use crate::asking::Service;
 use crate::designs::{eccentric, pointers, spelled_out, with};
 
-/// Case 5.1 by virtual work with a modification, wind-up asked for.
+/// Returns case 5.1 by virtual work with a modification and wind-up.
 fn modified(modification: Value) -> Value {
     let model = json!({ "compatibility": "virtual_work", "stiffness": { "law": "palmgren" } });
     let document = with(&with(&spelled_out(), "/model", model), "/sweep", json!({ "wind_up": true }));
     with(&document, "/modification", modification)
 }
 
-/// The same with gaps given as clearance.
+/// Returns the same with gaps given as clearances.
 fn cleared(clearance: Value) -> Value {
     with(&modified(json!({})), "/parts", clearance)
 }

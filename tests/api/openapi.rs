@@ -1,4 +1,4 @@
-//! The API document: it is the one that is committed, it holds together, and the service does what it says.
+//! The API document: it is committed, consistent, and describes the service.
 
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
@@ -12,7 +12,7 @@ use crate::asking::{Answer, ENDPOINTS, LIMITS, Limits, Question, Service};
 use crate::codes::{field_codes, finding_codes, problem_codes, words};
 use crate::designs::{self, bored, eccentric, every_number, fixed, shortest, spelled_out, undercut, with, without};
 
-/// The document as it is committed.
+/// The committed document.
 pub(crate) const COMMITTED: &str = include_str!("../../openapi/openapi.json");
 
 pub(crate) fn document() -> &'static Value {
@@ -21,7 +21,7 @@ pub(crate) fn document() -> &'static Value {
     &DOCUMENT
 }
 
-/// The path as the document has it.
+/// Returns the path's template in the document.
 fn described(path: &str) -> &str {
     if path.starts_with("/v1/drawings/") { "/v1/drawings/{part}" } else { path }
 }
@@ -56,7 +56,7 @@ fn every_reference_resolves() {
     assert!(references > 20, "{references} references");
 }
 
-/// Every object of a document.
+/// Returns every object of a document.
 fn objects(document: &Value) -> Vec<&serde_json::Map<String, Value>> {
     let (mut found, mut pending) = (Vec::new(), vec![document]);
     while let Some(value) = pending.pop() {
@@ -245,7 +245,7 @@ fn problems_are_problem_json_with_retry_after() {
     }
 }
 
-/// Every parameter that has a range.
+/// Lists every parameter that has a range.
 fn parameters() -> Vec<Parameter> {
     let parts = [Part::WaveGenerator, Part::Teeth, Part::Ring, Part::Carrier];
     let contacts = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
@@ -328,7 +328,7 @@ fn parameters() -> Vec<Parameter> {
     parameters
 }
 
-/// The schemas of a schema's fields by name, references and alternatives followed.
+/// Returns the schemas of a schema's fields by name. Follows references and alternatives.
 fn fields_of<'a>(document: &'a Value, schema: &'a Value) -> Vec<(&'a str, &'a Value)> {
     let mut fields = Vec::new();
     if let Some(reference) = schema["$ref"].as_str() {
@@ -345,13 +345,13 @@ fn fields_of<'a>(document: &'a Value, schema: &'a Value) -> Vec<(&'a str, &'a Va
     fields
 }
 
-/// What a schema offers to choose from, references followed.
+/// Returns the alternatives of a schema. Follows references.
 fn alternatives<'a>(document: &'a Value, schema: &'a Value) -> Vec<&'a Value> {
     let schema = schema["$ref"].as_str().map_or(schema, |reference| document.pointer(&reference[1..]).unwrap());
     schema["oneOf"].as_array().into_iter().flatten().collect()
 }
 
-/// The schemas of all fields below a schema, by pointer.
+/// Returns the schemas of all fields below a schema, by pointer.
 fn below<'a>(document: &'a Value, schema: &'a Value, pointer: &str) -> Vec<(String, &'a Value)> {
     let mut all = Vec::new();
     for (name, schema) in fields_of(document, schema) {
@@ -416,7 +416,7 @@ fn every_schema_default_is_the_applied_one() {
     assert!(defaults >= 8, "{defaults} defaults");
 }
 
-/// Equal as JSON, where 210 is 210.0.
+/// True if both are equal as JSON, with 210 equal to 210.0.
 fn equal(one: &Value, other: &Value) -> bool {
     match (one, other) {
         (Value::Number(one), Value::Number(other)) => one.as_f64() == other.as_f64(),
@@ -464,7 +464,7 @@ fn docs_problems_explains_every_code() {
     }
 }
 
-/// A schema of the document, with all that it refers to.
+/// Compiles a schema of the document with all its references.
 fn validator(schema: &Value) -> jsonschema::Validator {
     let schema = json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -480,7 +480,7 @@ fn assert_valid(schema: &Value, instance: &Value, what: &str) {
     assert!(errors.is_empty(), "{what}: {errors:#?}");
 }
 
-/// That the answer is one which the document describes for the path.
+/// Asserts that the document describes this answer for the path.
 fn assert_described(method: &str, path: &str, answer: &Answer) {
     let document = document();
     let what = format!("{method} {path}: {}", answer.status);
@@ -498,7 +498,7 @@ fn assert_described(method: &str, path: &str, answer: &Answer) {
     assert_all_described(document, schema, &instance, &what);
 }
 
-/// That every field of the instance stands in its schema: schemas of answers admit more, so that answers may grow.
+/// Asserts that the schema has every field of the instance. Schemas of answers allow more, so that answers can grow.
 fn assert_all_described(document: &Value, schema: &Value, instance: &Value, what: &str) {
     if let Some(items) = schema.get("items").or_else(|| {
         let reference = schema["$ref"].as_str()?;
@@ -627,7 +627,7 @@ async fn schema_accepts_what_the_service_accepts() {
     }
 }
 
-/// Of each kind, shape and law one, with its word and, where it is the default, without.
+/// Returns one document for each kind, shape and law. Defaults appear with and without their word.
 fn kinds() -> Vec<Value> {
     let wave_generators = [
         json!({ "kind": "ellipse", "semi_major_mm": 49.0, "semi_minor_mm": 47.0 }),

@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::asking::{ENDLESS, ENDPOINTS, LIMITS, Limits, Question, Service, endless};
 use crate::designs::spelled_out;
 
-/// The names of all series in Prometheus' text, those of a histogram as its name.
+/// Returns the names of all series in Prometheus text, with one name for each histogram.
 fn series(text: &str) -> BTreeSet<String> {
     let names = text.lines().filter(|line| !line.starts_with('#') && !line.is_empty()).map(|line| {
         let name = line.split(['{', ' ']).next().unwrap();
@@ -78,7 +78,7 @@ async fn unknown_path_creates_no_metric() {
     assert!(!service.get("/metrics").await.text().contains("scanner"));
 }
 
-/// Everything the page at `/docs/` loads, and the page itself.
+/// Requests the page at `/docs/` and everything that it loads.
 async fn pages(service: &Service) -> Vec<(String, String)> {
     let page = service.get("/docs/").await;
     assert_eq!((page.status, page.header("content-type").split(';').next()), (200, Some("text/html")));

@@ -1,11 +1,11 @@
-//! The contract's examples, and the paper's cases as separate calculations found them.
+//! The documented examples, and the paper's cases against separate calculations.
 
 use serde_json::{Value, json};
 
 use crate::asking::{Answer, ENDPOINTS, Question, Service};
 use crate::designs::{self, with};
 
-/// The columns of `states` by name, in the contract's order.
+/// The columns of `states` by name, in documented order.
 const COLUMNS: [&str; 12] = [
     "input_angle_deg",
     "tooth",
@@ -21,7 +21,7 @@ const COLUMNS: [&str; 12] = [
     "stress_carrier_mpa",
 ];
 
-/// All that the contract's example says of an answer: names, types, values to 1e-12. Where it elides with `[]`, numbers are due.
+/// Asserts that the answer has the documented names, types and values (to 1e-12). A documented `[]` stands for numbers.
 fn assert_says(found: &Value, expected: &Value, at: &str) {
     match expected {
         Value::Object(fields) => {
@@ -49,7 +49,7 @@ async fn answered(path: &str, document: &Value) -> Value {
     Service::new().post(path, document).await.found()
 }
 
-/// The same document as the contract prints it and as the service offers it under the paper's name.
+/// Returns case 5.1 as documented and as the service's example.
 async fn case_5_1() -> [Value; 2] {
     let contract = serde_json::from_str(designs::CONTRACT).unwrap();
     [contract, example("paper-5.1").await]
@@ -67,7 +67,7 @@ fn numbers(answer: &Value, name: &str) -> Vec<f64> {
     column(answer, name).into_iter().map(|value| value.as_f64().unwrap()).collect()
 }
 
-/// The states of each input angle, by index.
+/// Returns the index range of the states at each input angle.
 fn by_input_angle(answer: &Value) -> Vec<std::ops::Range<usize>> {
     let angles = numbers(answer, "input_angle_deg");
     let mut groups = Vec::new();
@@ -167,7 +167,7 @@ async fn case_5_1_has_no_findings() {
     }
 }
 
-/// The six peaks, to the three decimals that separate calculations give.
+/// Asserts the six peaks to three decimals, known from separate calculations.
 async fn assert_peaks(compatibility: &str, expected: [f64; 6]) {
     let document = with(&designs::spelled_out(), "/model/compatibility", json!(compatibility));
     let peaks = &answered("/v1/sweep", &document).await["peaks"];
@@ -409,7 +409,7 @@ async fn peaks_are_column_maxima_with_their_state() {
     }
 }
 
-/// Force at the wave generator when a tooth is first and last seen, over the peak.
+/// Returns the force at the wave generator over the peak, in a tooth's first and last state.
 async fn entering_and_leaving(document: &Value) -> (f64, f64) {
     let found = answered("/v1/sweep", document).await;
     let groups = by_input_angle(&found);

@@ -1,4 +1,4 @@
-//! What bad input and trouble get: RFC 9457 problems, each with the headers that HTTP wants.
+//! Responses to bad input and faults: RFC 9457 problems with the headers that HTTP requires.
 
 use std::io::Write as _;
 use std::net::TcpStream;
@@ -12,7 +12,7 @@ fn sweep() -> Question {
     Question::post("/v1/sweep", shortest().to_string())
 }
 
-/// A problem of each kind that a request alone can provoke, with its status and code.
+/// Provokes each problem that a request alone can cause. Returns it with expected status and code.
 async fn provoked(service: &Service) -> Vec<(Answer, u16, &'static str)> {
     let huge = " ".repeat(LIMITS.max_body_bytes + 1);
     let impossible = with(&shortest(), "/drive/teeth/radius_mm", json!(0.0)).to_string();
@@ -305,7 +305,7 @@ async fn refusal_of_large_body_states_length_and_limit() {
     }
 }
 
-/// A request whose body is sent in one chunk, so that nobody announces its length.
+/// Makes a request with a chunked body, so that no header states its length.
 fn unannounced(text: &str, end: &str) -> Vec<u8> {
     let head = "POST /v1/sweep HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\ncontent-type: application/json";
     format!("{head}\r\ntransfer-encoding: chunked\r\n\r\n{:x}\r\n{text}\r\n{end}", text.len()).into_bytes()

@@ -1,7 +1,7 @@
-//! The profiles as they come over HTTP, against curves that are worked out here in another way.
+//! Profiles over HTTP against independently calculated curves.
 //!
-//! The service samples over the tooth's position ψ, which it inverts for the cam's normal; here the angle φ of that normal is
-//! the parameter, so that nothing needs inverting (docs/theory.md section 2).
+//! The service samples over the tooth's position ψ and inverts it for the cam's normal. Here the angle φ of that normal
+//! is the parameter, so that nothing needs an inversion (docs/theory.md section 2).
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -12,7 +12,7 @@ use crate::designs::{bored, shortest, undercut, with};
 
 type Point = (f64, f64);
 
-/// A drive's numbers.
+/// Parameters of a drive.
 #[derive(Clone, Copy)]
 struct Numbers {
     a: f64,
@@ -34,12 +34,12 @@ impl Numbers {
         }
     }
 
-    /// Half the angle between two teeth of the ring.
+    /// Returns half the angle between two teeth of the ring.
     fn half_pitch(&self) -> f64 {
         PI / self.ring_teeth
     }
 
-    /// Where a tooth that touches the cam at the normal angle φ stands: ψ in degrees, its centre, and its contact on the ring.
+    /// Returns a tooth that touches the cam at the normal angle φ: ψ in degrees, centre, and contact on the ring.
     fn tooth(&self, phi: f64) -> (f64, Point, Point) {
         let (sin, cos) = phi.sin_cos();
         let h = (self.a * cos).hypot(self.b * sin);
@@ -53,7 +53,7 @@ impl Numbers {
         (psi.to_degrees(), center, (center.0 + normal.0, center.1 + normal.1))
     }
 
-    /// The normal angle of a tooth at ψ, by bisection.
+    /// Returns the normal angle of a tooth at ψ, by bisection.
     fn normal_angle(&self, psi_deg: f64) -> f64 {
         let (mut low, mut high) = (0.0, FRAC_PI_2);
         for _ in 0..200 {
@@ -95,7 +95,7 @@ fn points(profile: &Value) -> Vec<Point> {
     x.into_iter().zip(y).collect()
 }
 
-/// Distance of a point from a polyline.
+/// Returns the distance of a point from a polyline.
 fn distance_from(polyline: &[Point], p: Point) -> f64 {
     let from_chord = |ends: &[Point]| {
         let (start, end) = (ends[0], ends[1]);
@@ -135,7 +135,7 @@ impl Geometry {
         self.answer["ring"]["tip_radius_mm"].as_f64().unwrap()
     }
 
-    /// The ring's flank on the side of positive angles, finely, root first.
+    /// Samples the ring's flank at positive angles, from the root.
     fn flank(&self, count: u32) -> Vec<Point> {
         let end = self.numbers.normal_angle(self.start_deg());
         (0..=count).map(|i| self.numbers.tooth(end * f64::from(i) / f64::from(count)).2).collect()
@@ -146,7 +146,7 @@ fn profile(extent: &str, chord_tolerance_mm: f64) -> Value {
     json!({ "extent": extent, "chord_tolerance_mm": chord_tolerance_mm })
 }
 
-/// A ring with more teeth than the carrier, and few of them.
+/// Returns a drive whose ring has few teeth, but more than the carrier.
 fn reversed() -> Value {
     json!({
         "drive": {
@@ -157,12 +157,12 @@ fn reversed() -> Value {
     })
 }
 
-/// A regular tip, an undercut one, a bored one, and a ring of few teeth.
+/// Returns drives with a regular, an undercut and a bored tip, and one with few ring teeth.
 fn drives() -> [Value; 4] {
     [shortest(), undercut(), bored(), reversed()]
 }
 
-/// The drives at several tolerances.
+/// Returns the drives at several tolerances.
 fn drives_and_tolerances(extent: &str) -> Vec<Value> {
     let drives = drives();
     let with_tolerance =

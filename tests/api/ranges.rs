@@ -1,11 +1,11 @@
-//! The ranges that the contract promises: both ends belong to them, and what is just beyond is refused.
+//! The documented ranges. Both ends are accepted, and values just beyond are refused.
 
 use serde_json::{Value, json};
 
 use crate::asking::{LIMITS, Limits, Service};
 use crate::designs::{eccentric, every_number, fixed, spelled_out, with};
 
-/// A field, the endpoint that reads it, a document that holds it, and its range.
+/// A field with its range, the endpoint that reads it, and a document that holds it.
 struct Field {
     pointer: String,
     path: &'static str,
@@ -142,7 +142,7 @@ fn fields() -> Vec<Field> {
     fields
 }
 
-/// The limit that the service says the value is beyond, if it says so of this field.
+/// Returns the exceeded limit if the service reports one at this field.
 async fn limit_exceeded(field: &Field, value: f64) -> Option<f64> {
     // A small limit, so that a sweep of many samples is refused for that alone, and soon.
     let service = Service::within(Limits { max_states: 1_000, ..LIMITS });
@@ -217,7 +217,7 @@ async fn every_number_has_a_range() {
     }
 }
 
-/// A drive of this size, all else in proportion.
+/// Returns a drive scaled in proportion.
 fn scaled(scale: f64) -> Value {
     json!({
         "drive": {

@@ -1,4 +1,4 @@
-//! The six rules of the service, each by a test that exceeds it.
+//! The six rules of the service. Each test exceeds one of them.
 
 use std::fs::File;
 use std::io::{Read as _, Write as _};
@@ -18,7 +18,7 @@ const BATCHES_RUNNING: &str = "toothwave_batches_running";
 
 const ONE_SOLVE: Limits = Limits { max_concurrent_solves: 1, ..ENDLESS };
 
-/// A sweep whose answer has some 30 MB; each number is another one.
+/// Returns a request for a sweep whose answer has about 30 MB. Each number gives another sweep.
 fn large(number: u32) -> Question {
     Question::post("/v1/sweep", with(&shortest(), "/sweep", json!({ "samples": 20_000 + number })).to_string())
 }

@@ -1,4 +1,4 @@
-//! The service as a process: started, asked, and told to stop.
+//! The process of the service: start, requests and stop.
 
 use std::io::{BufRead as _, BufReader};
 use std::net::{SocketAddr, TcpListener};
@@ -15,22 +15,22 @@ use crate::designs::{shortest, with};
 pub(crate) struct Process {
     pub(crate) child: Child,
     pub(crate) address: SocketAddr,
-    /// Kept open: a process that greets into a closed pipe would fail for that.
+    /// Kept open, because the process fails if it greets into a closed pipe.
     _greeting: BufReader<ChildStdout>,
 }
 
 impl Process {
-    /// Started with these arguments on a port of the system's choice, which its greeting names.
+    /// Starts a process with these arguments on a free port, which its greeting names.
     pub(crate) fn started(arguments: &[&str]) -> Self {
         Self::logging(&[arguments, &["--log", "off"]].concat(), Stdio::null())
     }
 
-    /// The same, with its log at the default level.
+    /// Starts a process with its log at the default level.
     pub(crate) fn logging(arguments: &[&str], log: Stdio) -> Self {
         Self::of(Command::new(env!("CARGO_BIN_EXE_toothwave")).args(arguments), log)
     }
 
-    /// The same, started by this command.
+    /// Starts a process with this command.
     pub(crate) fn of(command: &mut Command, log: Stdio) -> Self {
         command.args(["--listen", "127.0.0.1:0"]);
         let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(log).spawn().unwrap();
@@ -46,7 +46,7 @@ impl Process {
         assert!(status.success());
     }
 
-    /// Its exit status; a process that does not end fails the test instead of holding it up.
+    /// Waits for the exit status. Fails if the process does not end.
     pub(crate) fn ended(mut self) -> ExitStatus {
         for _ in 0..60_000 {
             if let Some(status) = self.child.try_wait().unwrap() {

@@ -1,4 +1,4 @@
-//! Studies that are kept in a file, over restarts and whatever happens to the file.
+//! Studies in a file: restarts, damage and other builds.
 
 use std::fs;
 use std::path::PathBuf;
@@ -15,7 +15,7 @@ use crate::serving::Process;
 
 const EXPIRY_S: u64 = 100_000;
 
-/// A file of its own, gone with it.
+/// A temporary file.
 struct File(PathBuf);
 
 impl File {
@@ -29,7 +29,7 @@ impl File {
         self.0.to_str().unwrap()
     }
 
-    /// Changes what is kept, while no service has it open; how many rows.
+    /// Changes the file's rows while no service has it open. Returns their number.
     fn change(&self, text: &str) -> usize {
         Connection::open(&self.0).unwrap().execute(text, []).unwrap()
     }
@@ -56,7 +56,7 @@ impl Keeper {
         Self(Service::with(limits, &["--studies", file.path(), &expiry]))
     }
 
-    /// The process is told to stop, and has.
+    /// Stops the process and waits for its end.
     fn end(self) {
         let process = self.0.into_process();
         process.signalled("-TERM");
@@ -88,7 +88,7 @@ fn map(steps: u64) -> Value {
     })
 }
 
-/// As many variants as take a while.
+/// Returns a study that runs for a while.
 fn long() -> Value {
     let mut study = map(300);
     study["over"]["/load/input_torque_nm"] = json!({ "min": 10.0, "max": 20.0, "steps": 300 });
@@ -103,7 +103,7 @@ fn result(study: &Value) -> String {
     format!("{}/result", place(study))
 }
 
-/// The result of a study that nothing disturbs.
+/// Returns the result of an undisturbed study.
 async fn undisturbed(study: &Value) -> Value {
     Service::new().ask(&waiting(study)).await.found()["result"].clone()
 }
@@ -114,7 +114,7 @@ fn begun_at(process: &Process, study: &Value) -> Value {
     answer.json()
 }
 
-/// The study once something is true of how it stands.
+/// Waits until the study's status meets a condition.
 fn once(process: &Process, study: &Value, is_true: impl Fn(&Value) -> bool) -> Value {
     loop {
         let stands = ask_at(process.address, &Question::of("GET", &place(study))).found();

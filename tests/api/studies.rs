@@ -1,4 +1,4 @@
-//! Studies over HTTP: asked, waited for, watched, cancelled, gone on with, refused.
+//! Studies over HTTP: start, wait, events, cancel, resume and refusals.
 
 use std::io::Read as _;
 use std::time::Duration;
@@ -20,14 +20,14 @@ fn map(base: &Value, steps: u64) -> Value {
     })
 }
 
-/// As many variants as take a while.
+/// Returns a study that runs for a while.
 fn long() -> Value {
     let mut study = map(&shortest(), 300);
     study["over"]["/load/input_torque_nm"] = json!({ "min": 10.0, "max": 20.0, "steps": 300 });
     study
 }
 
-/// As many variants, each of which takes longer than any test.
+/// Returns a study with this many variants, each slower than any test.
 fn slow(steps: u64) -> Value {
     map(&with(&shortest(), "/sweep", json!({ "samples": 10_000_000 })), steps)
 }
@@ -302,8 +302,7 @@ async fn map_is_available_as_table() {
     assert!(answer.body.starts_with(b"PAR1") && answer.body.ends_with(b"PAR1"));
 }
 
-/// Each quantity of a document that every answer has, against the answer that holds it.
-/// How many quantities of a document were held against what their pointers lead to.
+/// Compares each quantity with the value at its pointer in the answers. Returns the number of compared quantities.
 async fn held_against_their_pointers(service: &Service, document: &Value) -> usize {
     let listed = service.get("/v1/quantities").await.found();
     let listed = listed["quantities"].as_array().unwrap();

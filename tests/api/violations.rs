@@ -1,4 +1,4 @@
-//! Every reason why a drive, a load or a request cannot exist, as it comes over HTTP.
+//! Reasons for impossible drives, loads and requests, over HTTP.
 
 use serde_json::{Value, json};
 
@@ -15,7 +15,7 @@ async fn errors_of(service: &Service, path: &str, document: &Value) -> Vec<Value
     problem["errors"].as_array().unwrap().clone()
 }
 
-/// That a change of case 5.1 makes one value impossible, to every endpoint.
+/// Asserts that every endpoint refuses a change of case 5.1 at one value.
 async fn assert_impossible(changes: &[(&str, Value)], code: &str, pointer: &str, value: f64, limit: f64) {
     let document =
         changes.iter().fold(spelled_out(), |document, (pointer, value)| with(&document, pointer, value.clone()));
@@ -235,7 +235,7 @@ async fn reports_contradictions_beside_values_out_of_range() {
     assert_eq!(errors.len(), 8, "{errors:?}");
 }
 
-/// A fault of case 5.1: the changes that make it, what it is reported as, and what else it follows from.
+/// A fault of case 5.1, with the changes that cause it, its report, and the fields on which it depends.
 struct SingleFault {
     changes: &'static [(&'static str, f64)],
     code: &'static str,
@@ -276,7 +276,7 @@ const BORE: &str = "/parts/wave_generator/bore_radius_mm";
 const CAM_CLEARANCE: &str = "/parts/wave_generator/clearance_um";
 const TEETH_CLEARANCE: &str = "/parts/teeth/clearance_um";
 
-/// Every fault that the drive alone can have, by the least that it follows from.
+/// All faults of a drive, each with the fewest fields on which it depends.
 const FAULTS_OF_DRIVE: [SingleFault; 14] = [
     single(&[(SEMI_MAJOR, 2e6)], "out_of_range", SEMI_MAJOR, &[]),
     single(&[(SEMI_MINOR, -1.0)], "out_of_range", SEMI_MINOR, &[]),
@@ -460,7 +460,7 @@ async fn sweep_needs_lever_arm_at_every_angle() {
     }
 }
 
-/// A ring with more teeth than the carrier, soft at the slots: the projection of their approach turns against the rest.
+/// Returns a drive with more ring teeth and soft slots: projecting their approach gives a negative compliance.
 fn softly_held(compatibility: &str, carrier_n_per_mm: f64) -> Value {
     json!({
         "drive": {

@@ -1,4 +1,4 @@
-//! Quantities that two fields can set: a contradiction is refused, what adds up gets a finding.
+//! Quantities that two fields can set. A contradiction is refused, and values that add up give a finding.
 
 use serde_json::{Value, json};
 use toothwave_calculation::convert::converted;
@@ -12,14 +12,14 @@ use toothwave_solver::Never;
 
 const LIMITS: Limits = Limits::new(1_000_000, 1_000_000);
 
-/// The default model.
+/// Returns case 5.2 under the default model.
 fn case_5_2() -> Value {
     let mut document: Value = serde_json::from_str(include_str!("../../examples/paper-5.2.json")).unwrap();
     document.as_object_mut().unwrap().remove("model");
     document
 }
 
-/// Case 5.2 with these fields.
+/// Returns case 5.2 with these fields.
 fn with(changes: &Value) -> Value {
     let mut document = case_5_2();
     for (name, value) in changes.as_object().unwrap() {
@@ -172,7 +172,7 @@ fn surface_set_back_twice_has_finding() {
     }
 }
 
-/// With all numbers as doubles.
+/// Converts all numbers to doubles.
 fn plain(value: &Value) -> Value {
     match value {
         Value::Number(number) => json!(number.as_f64()),

@@ -1,4 +1,4 @@
-//! A document as JSON, and as the key of its answers.
+//! Design documents as JSON, and their cache keys.
 
 use std::cell::Cell;
 
@@ -49,7 +49,7 @@ fn short_sweep_has_no_bending_ring_teeth() {
     assert!(is_short(&document), "natural tips have no corner");
 }
 
-/// Asked so often whether to go on, and then it is not to.
+/// A stop flag that is set after so many reads.
 struct StopsAfter {
     asked: Cell<u32>,
     times: u32,
@@ -86,7 +86,7 @@ fn sweep_stops_after_its_solve_too() {
     }
 }
 
-/// The keys of all questions, one after the other.
+/// Concatenates the keys of all questions.
 pub(crate) fn keys(design: &Design) -> Vec<Key> {
     let form = Format::Json;
     let mut keys = vec![
@@ -105,7 +105,7 @@ fn with(document: &Value, pointer: &str, value: Value) -> Value {
     document
 }
 
-/// Another value of the same type, where there is one that is read as another.
+/// Returns another value of the same type, if one reads differently.
 fn other(value: &Value) -> Option<Value> {
     match value {
         Value::Number(number) => {
@@ -119,7 +119,7 @@ fn other(value: &Value) -> Option<Value> {
     }
 }
 
-/// That a document is refused for one fault, at this place.
+/// Asserts that a document is refused for one fault at this place.
 fn assert_fault(document: &Value, pointer: &str, code: FieldCode) {
     let refused = read(document).unwrap_err();
     assert_eq!(refused.code, NoAnswerCode::InvalidDocument, "{document}");

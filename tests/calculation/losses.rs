@@ -1,4 +1,4 @@
-//! Losses of a sweep to a tolerance.
+//! Losses of a tolerance sweep.
 
 use serde_json::{Value, json};
 use toothwave_calculation::question::{Limits, Question};
@@ -14,7 +14,7 @@ fn loss_ratio(document: &Value, sweep: Value) -> f64 {
     answer.losses.unwrap().totals.loss_ratio
 }
 
-/// Corners of tips, gaps, and teeth that begin to roll elsewhere within a period.
+/// Returns a document with corner contact, gaps, and teeth that change their rolling contact within a period.
 fn document() -> Value {
     json!({
         "drive": {

@@ -1,4 +1,5 @@
-//! Whole documents of every kind against `tests/reference/family.py`, which works them out to 25 digits by other means; worst: 4.6e-15 of a column's peak.
+//! Documents of every kind against `tests/reference/family.py`, an independent calculation to 25 digits.
+//! The worst error is 4.6e-15 of a column's peak.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +9,7 @@ use toothwave_calculation::question::{Limits, Question};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::Never;
 
-/// What is allowed beside the column's largest value over the states looked at: the documents' numbers are those of the reference to the last bit.
+/// Allowed error over the column's largest compared value. The reference has exactly the documents' numbers.
 const TOLERANCE: f64 = 1e-12;
 
 const CONTACTS: [&str; 3] = ["wave_generator", "ring", "carrier"];

@@ -1,4 +1,4 @@
-//! A sweep's states as an Arrow stream: the columns of CSV and JSON, without text.
+//! A sweep's states as an Arrow stream, with the columns of CSV and JSON.
 
 use arrow_array::{Array, BooleanArray, Float64Array, StringArray, UInt32Array};
 use arrow_ipc::reader::StreamReader;
@@ -18,7 +18,7 @@ fn drive() -> Value {
     })
 }
 
-/// An entry as JSON has it.
+/// Returns an entry as JSON.
 fn entry(column: &dyn Array, row: usize) -> Value {
     let column = column.as_any();
     if let Some(numbers) = column.downcast_ref::<Float64Array>() {

@@ -1,4 +1,5 @@
-//! What gives way behind the contacts, against finite elements of the same bodies (`tests/finite_elements/backing.py`) and against the model itself.
+//! Compliance of the supports, against finite elements of the same bodies (`tests/finite_elements/backing.py`)
+//! and against the model itself.
 
 use std::f64::consts::PI;
 
@@ -69,7 +70,7 @@ fn backings(parameters: &DriveParameters, parts: &PartsParameters, support: Supp
     Backings::of(&drive(parameters), &Draft::new(parameters).unwrap(), parts, support)
 }
 
-/// Estimates and shares of a drive under a load.
+/// Estimates the compliances of a loaded drive and their shares.
 fn shares(parameters: &DriveParameters, load: &LoadParameters, support: Support) -> Option<Shares> {
     let sweep = swept(parameters, load, 50);
     let backings = backings(parameters, &PartsParameters::default(), support);

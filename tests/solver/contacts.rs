@@ -1,4 +1,4 @@
-//! Forces with gaps, and what each part of the model is there for, against the equations themselves.
+//! Forces with gaps, against the equations themselves.
 
 use toothwave_solver::drive::Draft;
 use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
@@ -9,7 +9,7 @@ use toothwave_solver::{
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, ellipse, load, swept};
 
-/// The paper's weights [3][6], by angles, or those of virtual work, by forces.
+/// Returns the paper's weights [3][6] by angles, or those of virtual work by forces.
 fn weights(drive: &Drive, tooth: &ToothState, compatibility: Compatibility) -> PerContact<f64> {
     let (cam, ring) = (tooth.center.tan_pressure_angle.atan(), tooth.flank.tan_pressure_angle.atan());
     match compatibility {

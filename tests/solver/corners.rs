@@ -1,4 +1,5 @@
-//! Teeth against the corners of pointed and bored tips: against finite elements, against springs put up from the geometry alone, and what must hold of any load.
+//! Contact at the corners of pointed and bored tips: against finite elements, against springs made from the geometry,
+//! and invariants of any load.
 
 use nalgebra::{Matrix2, Point2, Rotation2, Vector2};
 use proptest::prelude::*;
@@ -50,7 +51,7 @@ struct Tooth {
 }
 
 impl Case {
-    /// The load, with all of the model refined that can be, and depths of bodies that are held where those of the case are.
+    /// Returns the load with all refinements, and with depths up to where the case's bodies are held.
     fn refined(&self) -> LoadParameters {
         LoadParameters {
             law: ContactLaw::Johnson { depth_mm: PerContact::of(|_| Some(self.depth_mm)) },
@@ -72,7 +73,7 @@ fn results() -> Results {
     serde_json::from_str(include_str!("../finite_elements/corners.json")).unwrap()
 }
 
-/// ψ_e of case 5.2.
+/// Position ψ_e of the flank's end in case 5.2, in degrees.
 const FLANK_END_DEG: f64 = 43.607_599;
 
 const JOHNSON: ContactLaw =
@@ -82,7 +83,7 @@ fn pressed_corners(torque_nm: f64) -> LoadParameters {
     LoadParameters { law: JOHNSON, corner_contact: true, ..load(torque_nm, VirtualWork) }
 }
 
-/// Of a sweep the states at an input angle.
+/// Returns the states at an input angle.
 fn at_angle(states: &States, input_angle_deg: f64) -> Vec<usize> {
     (0..states.len()).filter(|&at| (states.input_angle_deg[at] - input_angle_deg).abs() < 1e-9).collect()
 }
@@ -184,7 +185,7 @@ fn model_reports_its_error_at_pointed_tips() {
     }
 }
 
-/// What a tooth does, from where its centre and the corner are: directions of its forces, and what its circle keeps from the corner, in the slot's frame.
+/// A tooth and its corner in the slot's frame: directions of its forces, and the gap between its circle and the corner.
 struct Seen {
     to_cam: Vector2<f64>,
     to_ring: Vector2<f64>,
@@ -192,7 +193,7 @@ struct Seen {
     gap_mm: f64,
 }
 
-/// The corner from the flank's end, by angles alone, the ring turned away by an angle.
+/// Calculates the corner from the flank's end by angles alone, with the ring rotated.
 fn seen(drive: &Drive, position_deg: f64, turned_away_rad: f64) -> Seen {
     let (flank, lobes) = (drive.flank(), drive.lobes());
     let end = flank.locus().at(drive.flank_limit().position).unwrap();

@@ -1,5 +1,5 @@
-//! Sweeps of drives of which single items deviate, against a calculation of their own: teeth placed by angles, each a chain of springs with the
-//! gaps of its slot, its ring space and its lobe, and one rotation found by halving.
+//! Sweeps with deviations against an independent calculation. It places teeth by angles, each a chain of springs with
+//! the gaps of its slot, ring space and lobe, and finds the rotation by bisection.
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
@@ -32,7 +32,7 @@ fn of(wave_generator: WaveGenerator, teeth: i64, installed: i64, ring_teeth: i64
     }
 }
 
-/// One lobe and more, zones alike and not, both senses, every slot filled and every second; flanks that end at the tip, and before it.
+/// Returns drives of one or more lobes: alike and unlike zones, both senses, full and half-filled slots, any flank end.
 pub(crate) fn drives() -> Vec<DriveParameters> {
     let harmonic =
         |lobes, mean_radius_mm, amplitude_mm| WaveGenerator::Harmonic { lobes, mean_radius_mm, amplitude_mm };
@@ -49,7 +49,7 @@ pub(crate) fn drives() -> Vec<DriveParameters> {
     ]
 }
 
-/// Numbers that seem to be at random, between -1 and 1.
+/// Returns a generator of pseudo-random numbers between -1 and 1.
 fn random(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {
@@ -59,7 +59,7 @@ fn random(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// Which kinds of item deviate.
+/// The kinds of items that deviate.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Kinds {
     pub(crate) slots: bool,
@@ -81,7 +81,7 @@ fn count(of: i64) -> usize {
     usize::try_from(of).unwrap()
 }
 
-/// Every deviation of the kinds, some micrometres large.
+/// Returns deviations of these kinds, some micrometres large.
 pub(crate) fn deviations(p: &DriveParameters, kinds: Kinds, seed: u64) -> Deviations {
     let mut random = random(seed);
     let mut list = |is_wanted: bool, items: i64, size: f64| {
@@ -106,7 +106,7 @@ pub(crate) fn deviations(p: &DriveParameters, kinds: Kinds, seed: u64) -> Deviat
     found
 }
 
-/// What covers them.
+/// Returns a load with clearances that cover the deviations.
 pub(crate) fn cleared(torque_nm: f64, law: ContactLaw) -> LoadParameters {
     LoadParameters {
         law,
@@ -124,11 +124,11 @@ pub(crate) fn swept_with(
     sweep::sweep_with_deviations(drive, &LoadCase::new(load).unwrap(), deviations, points, &Never)
 }
 
-/// A tooth as angles place it: no whole number of the solver's is used.
+/// A tooth placed by angles, without the solver's integers.
 #[derive(Debug, Clone, Copy)]
 struct Placed {
     slot: u64,
-    /// Lobe, ring space.
+    /// Lobe that the tooth is on.
     lobe: u64,
     ring_space: u64,
     position_rad: f64,
@@ -139,7 +139,7 @@ const fn whole(value: f64) -> u64 {
     value as u64
 }
 
-/// All teeth between a lobe and the valley ahead of it, with the lobe that each is on, when the input has turned.
+/// Returns all teeth between a lobe and the next valley, with their lobes, after an input rotation.
 fn placed_by_angles(p: &DriveParameters, input_rad: f64) -> Vec<Placed> {
     let lobes = p.wave_generator.lobes() as f64;
     let s = if p.teeth > p.ring_teeth { 1.0 } else { -1.0 };
@@ -168,7 +168,7 @@ fn placed_by_angles(p: &DriveParameters, input_rad: f64) -> Vec<Placed> {
     placed
 }
 
-/// `h`, `h'` of the support function.
+/// Returns `h` and `h'` of the support function.
 fn support(p: &DriveParameters, normal_rad: f64) -> (f64, f64) {
     let (sin, cos) = normal_rad.sin_cos();
     match p.wave_generator {
@@ -187,7 +187,7 @@ fn support(p: &DriveParameters, normal_rad: f64) -> (f64, f64) {
     }
 }
 
-/// A tooth as a chain of springs: travel arm, total gap, force ratios, direction of the wave generator's normal in its frame.
+/// A tooth as a chain of springs: travel arm, total gap, force ratios and direction of the wave generator's normal.
 struct Chain {
     placed: Placed,
     arm_mm: f64,
@@ -245,7 +245,7 @@ fn chain(p: &DriveParameters, load: &LoadParameters, deviations: &Deviations, pl
     Chain { placed, arm_mm: d * gamma.sin(), gap_mm, ratio, normal_rad: in_cam }
 }
 
-/// How far the wave generator turns before the first of all teeth between lobe and flank has closed its gaps, when the input has turned.
+/// Returns the input rotation at which the first tooth between lobe and flank end has closed its gaps.
 pub(crate) fn first_closing_rad(
     p: &DriveParameters,
     load: &LoadParameters,
@@ -258,7 +258,7 @@ pub(crate) fn first_closing_rad(
     chains.map(|chain| chain.gap_mm / chain.arm_mm).fold(f64::INFINITY, f64::min)
 }
 
-/// `F_H` of each chain when the wave generator has turned by `rotation_rad`.
+/// Returns `F_H` of each chain after a rotation of the wave generator.
 fn forces_n(chains: &[Chain], law: &ContactLaw, width_mm: f64, rotation_rad: f64) -> Vec<f64> {
     chains
         .iter()
@@ -282,7 +282,7 @@ fn forces_n(chains: &[Chain], law: &ContactLaw, width_mm: f64, rotation_rad: f64
         .collect()
 }
 
-/// The rotation that makes the torque, by halving.
+/// Finds the rotation for a torque by bisection.
 fn rotation_rad(chains: &[Chain], law: &ContactLaw, width_mm: f64, torque_nmm: f64) -> f64 {
     let (mut low, mut high) = (0.0, 10.0);
     for _ in 0..200 {
@@ -341,10 +341,10 @@ fn deviation_states_match_free_teeth_on_springs() {
     assert!(worst < 1e-12, "{worst:e}");
 }
 
-/// Where a tooth stands, and its slot, ring space and lobe as far as they are wanted.
+/// A tooth's position with its slot, ring space and lobe if these are compared.
 type Items = (u64, Option<u64>, Option<u64>, Option<u64>);
 
-/// Which items stand together, as far as they deviate: for every slot where it stands on its lobe, and what is where.
+/// Returns the combinations of deviating items: each slot's position on its lobe, with its items.
 fn pattern(p: &DriveParameters, kinds: Kinds, load_periods: u64) -> BTreeSet<Items> {
     let removal = (p.teeth / p.installed) as f64;
     // A quarter of the way, so that none stands at a lobe or in a valley.

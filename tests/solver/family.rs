@@ -1,4 +1,4 @@
-//! Every kind of wave generator, any number of lobes and of installed teeth, against constructions that share no formula with the solver:
+//! All kinds of wave generators, with any number of lobes and installed teeth, against independent constructions:
 //! supporting lines and circles, differences, swept circles, rational numbers.
 
 use std::f64::consts::PI;
@@ -53,7 +53,7 @@ const fn of(
     }
 }
 
-/// Drives of every kind: one lobe to seven, zones alike and not, regular and undercut, convex and hollow, both senses.
+/// Returns drives of every kind: one to seven lobes, alike and unlike zones, regular and undercut, convex and hollow.
 fn family() -> Vec<DriveParameters> {
     let bored = |parameters: DriveParameters, tip_radius_mm| DriveParameters {
         tip_radius_mm: Some(tip_radius_mm),
@@ -88,7 +88,7 @@ fn family() -> Vec<DriveParameters> {
     ]
 }
 
-/// Any drive of the family that can be swept.
+/// Generates drives of the family that can be swept.
 pub(crate) fn any_of_the_family() -> impl Strategy<Value = DriveParameters> {
     let numbers = (0_usize..4, 1_i64..8, 2_i64..40, 1_i64..4, 0.1_f64..0.8, 0.02_f64..0.9, any::<bool>());
     (numbers, prop::option::of(0.05_f64..1.0)).prop_filter_map(
@@ -117,7 +117,7 @@ pub(crate) fn any_of_the_family() -> impl Strategy<Value = DriveParameters> {
     )
 }
 
-/// A tooth's centre by its place on the cam alone, without the solver: on a line that supports the cam, on the circle, or given.
+/// Returns the distance of a tooth's centre without the solver: by a supporting line, by the circle, or as given.
 fn center_radius_mm(p: &DriveParameters, psi: f64) -> f64 {
     let r = p.tooth_radius_mm;
     let by_support = |support: &dyn Fn(f64) -> (f64, f64), lobes: i64| {
@@ -238,8 +238,8 @@ fn steepest_place_matches_scan() {
     }
 }
 
-/// How far from the axis any tooth reaches, over a whole turn, in the direction `angle_rad` of the ring's frame: the ring's path is
-/// `d(kθ)`, scanned and refined, without the solver.
+/// Returns the farthest reach of any tooth in the direction `angle_rad` of the ring's frame, over a whole turn.
+/// It scans and refines the ring's path `d(kθ)` without the solver.
 fn farthest_swept_mm(p: &DriveParameters, angle_rad: f64) -> f64 {
     const SCAN: u32 = 600;
     let r = p.tooth_radius_mm;
@@ -419,7 +419,7 @@ fn case(compatibility: toothwave_solver::Compatibility) -> LoadCase {
     LoadCase::new(&load(7.0, compatibility)).unwrap()
 }
 
-/// The teeth in mesh at a sample by fractions of a turn, in whole numbers: slot and lobe.
+/// Returns slot and lobe of the teeth in mesh at a sample, by fractions of a turn in whole numbers.
 fn in_mesh_by_fractions(installed: i64, lobes: i64, sample: i64, samples: i64, reach: (i64, i64)) -> Vec<(u64, u32)> {
     let mut found = Vec::new();
     for slot in 0..installed {
@@ -634,7 +634,7 @@ fn forces(p: &DriveParameters, sample: u64, samples: u64) -> (Vector2<f64>, f64,
     (Mechanism::of(&drive).radial_force_n(&loads), sum_n, loaded.input_torque_nmm())
 }
 
-/// The sum of the forces at the cam, along the lines from the circle's centre to the teeth's centres.
+/// Returns the sum of the forces at the cam along the lines from the circle's centre to the teeth's centres.
 fn along_normals_n(p: &DriveParameters, sample: u64, samples: u64, circle: Vector2<f64>) -> Vector2<f64> {
     let states = swept(p, &load(7.0, VirtualWork), samples).states;
     let angle_deg = Mesh::new(&drive(p)).input_angle_deg(sample, Samples::new(samples).unwrap());
@@ -737,7 +737,7 @@ fn flanks_of_lobe_do_not_meet() {
     assert!(are_hollow > 3, "{are_hollow} whose flanks meet before anything else is wrong");
 }
 
-/// By the two conditions at lobe and valley, of an amplitude of 10 mm.
+/// Returns the least radius from the conditions at lobe and valley, for an amplitude of 10 mm.
 fn least_of_round_mm(lobes: i64, r: f64) -> f64 {
     let u = lobes as f64;
     (r + 10.0).max(0.5 * (r + (r * (r + 40.0 * u * u)).sqrt()) - 10.0)

@@ -1,4 +1,4 @@
-//! The fast path against the plain one, in everything that a sweep returns, on any drive.
+//! The fast path against the plain path, in all results of a sweep, on any drive.
 
 use alloc_counter::count_alloc;
 use proptest::prelude::*;
@@ -15,14 +15,14 @@ use toothwave_solver::{
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, cases, drive, ellipse, everywhere, load, swept};
 
-/// How far two ways to the same number may be apart, over what its terms came to.
+/// Allowed difference of two calculations, relative to the sum of the terms.
 const ROUNDING: f64 = 1e-12;
 
 fn largest(column: &[f64]) -> f64 {
     column.iter().fold(0.0_f64, |most, value| most.max(value.abs()))
 }
 
-/// Drives far more elliptic than [`any_swept_drive`] has them, as far as the fast path goes: a/b to 5.
+/// Generates drives more elliptic than those of [`any_swept_drive`], up to the fast path's limit a/b = 5.
 fn any_elliptic_drive() -> impl Strategy<Value = DriveParameters> {
     let shape = (1.2_f64..5.0, 0.0_f64..1.0, 0.0_f64..1.0);
     (shape, 4_i64..40, prop::sample::select(vec![1_i64, 2]), 0.05_f64..0.95, any::<bool>()).prop_filter_map(
@@ -49,7 +49,7 @@ fn any_elliptic_drive() -> impl Strategy<Value = DriveParameters> {
     )
 }
 
-/// Wave generators that are no ellipse, of all strokes from next to nothing to hollow valleys.
+/// Generates wave generators other than ellipses, with strokes from tiny to hollow valleys.
 pub(crate) fn any_drive_of_other_kinds() -> impl Strategy<Value = DriveParameters> {
     let counts = (1_u32..8, 2_i64..20, prop::sample::select(vec![1_i64, 2]), any::<bool>());
     let shape = (any::<bool>(), -4.0_f64..0.0, 0.05_f64..0.95, prop::option::of(0.0_f64..1.0));
@@ -74,7 +74,8 @@ pub(crate) fn any_drive_of_other_kinds() -> impl Strategy<Value = DriveParameter
     )
 }
 
-/// A drive with centres around 50 mm that exists and has a lever arm at every input angle; `bore` is how much of its stroke it takes from the ring's teeth.
+/// Returns a possible drive with centres near 50 mm and a lever arm at every angle.
+/// `bore` is the share of the stroke that is bored away from the ring's teeth.
 fn carrying(
     wave_generator: WaveGenerator,
     [teeth, installed, ring_teeth]: [i64; 3],
@@ -95,7 +96,7 @@ fn carrying(
     Mesh::new(&possible).always_carries().then_some(parameters)
 }
 
-/// Wave generators of all kinds with as many slots as make their zones unlike.
+/// Generates all kinds of wave generators with slot counts that make their zones unlike.
 pub(crate) fn any_drive_of_unlike_zones() -> impl Strategy<Value = DriveParameters> {
     let counts = (2_i64..8, 5_i64..60, prop::sample::select(vec![1_i64, 2]), any::<bool>());
     let shape = (0_u32..3, -4.0_f64..0.0, 0.05_f64..0.9, prop::option::of(0.0_f64..1.0));
@@ -121,7 +122,7 @@ pub(crate) fn any_drive_of_unlike_zones() -> impl Strategy<Value = DriveParamete
     )
 }
 
-/// Columns by name.
+/// Returns the columns with their names.
 fn columns(sweep: &Sweep) -> Vec<(&'static str, &Vec<f64>)> {
     let (states, angles) = (&sweep.states, &sweep.input_angles);
     vec![
@@ -142,7 +143,7 @@ fn columns(sweep: &Sweep) -> Vec<(&'static str, &Vec<f64>)> {
     ]
 }
 
-/// How much a relative error of the flank's terms becomes in the stress at the ring: `1 + rκ` may be a small difference.
+/// Returns the amplification of a flank's relative error in the ring's stress. `1 + rκ` may be a small difference.
 fn amplification(drive: &Drive, position_deg: f64) -> f64 {
     let lobes = drive.lobes();
     let valley_deg = 180.0 / f64::from(lobes);
@@ -160,7 +161,7 @@ fn amplification(drive: &Drive, position_deg: f64) -> f64 {
     1.0 + (1.0 + r_over_d * (1.0 + bending)) / point.regularity
 }
 
-/// How much a relative error of a closing angle becomes in what is turned beyond it: `1 + Δφ K/M0`, K the stiffness, where there are gaps.
+/// Returns the amplification of a closing angle's error: `1 + Δφ K/M0` with the stiffness K if there are gaps, else 1.
 fn amplification_by_gaps(drive: &Drive, load: &LoadCase, deviations: &Deviations, plain: &Sweep) -> f64 {
     if !load.has_gaps() && deviations.is_nil() {
         return 1.0;
@@ -172,8 +173,8 @@ fn amplification_by_gaps(drive: &Drive, load: &LoadCase, deviations: &Deviations
     1.0 + rotations.zip(stiffnesses).map(|(rad, stiffness)| rad * stiffness / output_nm).fold(0.0, f64::max)
 }
 
-/// The same under a capacity's own torque, which may be many orders below the load's; 1 where there is no answer under it. Below the least torque that a
-/// load may have it grows at most as the torque falls: no law presses in less than in proportion.
+/// Returns the same at the capacity's own torque, which may be far below the load's, or 1 without an answer there.
+/// Below the least allowed torque it grows at most as the torque falls: no approach falls faster than its force.
 fn amplification_by_gaps_under(
     drive: &Drive,
     load: &LoadParameters,
@@ -193,8 +194,8 @@ fn amplification_by_gaps_under(
     1.0 + (amplified - 1.0) * input_torque_nm / capacity_nm
 }
 
-/// How much more of it the stiffness shows at each input angle, where a law has a slope of its own: that of a tooth that has just begun to carry, the logarithm of
-/// which moves with that of its force by a seventh at most, while what presses it is a small difference.
+/// Returns the further amplification in the stiffness at each input angle, for laws with a varying slope. A barely
+/// loaded tooth has an approach that is a small difference, and its slope changes by at most a seventh of its force.
 fn amplification_of_stiffness(plain: &Sweep) -> Vec<f64> {
     let states = &plain.states;
     let angles = plain.input_angles.input_angle_deg.iter();
@@ -213,7 +214,7 @@ fn assert_both_paths_agree(parameters: &DriveParameters, load: &LoadParameters, 
     assert_both_paths_agree_on(parameters, load, &Deviations::default(), samples);
 }
 
-/// The same of parts that deviate.
+/// Compares both paths with deviations.
 fn assert_both_paths_agree_on(
     parameters: &DriveParameters,
     load: &LoadParameters,
@@ -343,7 +344,7 @@ fn assert_both_paths_agree_on(
     }
 }
 
-/// That peaks alone are those of a sweep in which the teeth of all zones are listed, up to rounding; where they stand, another lap may tell as well.
+/// Asserts that peaks alone equal those of a sweep over all zones, up to rounding. Their places may be in another lap.
 fn assert_same_peaks(
     drive: &Drive,
     peaks: &SweepPeaks,
@@ -467,7 +468,7 @@ proptest! {
     }
 }
 
-/// Of balls in grooves of any closeness or none, and of flats of any length that the drive's teeth can have; the shape by itself where they can have none.
+/// Generates balls with any grooves or none, and flats of any possible length. Drives without room keep their teeth.
 pub(crate) fn any_other_teeth() -> impl Strategy<Value = OtherTeeth> {
     let wider = || prop::option::of((-3.0_f64..1.0).prop_map(|exponent| 1.0 + 10.0_f64.powf(exponent)));
     prop_oneof![
@@ -482,9 +483,9 @@ pub(crate) fn any_other_teeth() -> impl Strategy<Value = OtherTeeth> {
 
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum OtherTeeth {
-    /// Of grooves the radius over the ball's.
+    /// Groove radii over the ball's radius.
     Balls(PerContact<Option<f64>>),
-    /// Length of the flat over the longest that the ring's contacts leave.
+    /// Length of the flat over the greatest length possible at the ring's contacts.
     Flats(f64),
 }
 
@@ -664,7 +665,7 @@ fn any_law() -> impl Strategy<Value = ContactLaw> {
     ]
 }
 
-/// Parts made otherwise than conjugate, of the size of the first; too full where what covers them is not enough.
+/// Generates modifications of one common size. Some are not covered by gaps and give an interference.
 fn any_modification() -> impl Strategy<Value = Modification> {
     let part = || prop_oneof![Just(0.0), -1.0_f64..1.0];
     let relief = (0.0_f64..1.0, prop_oneof![Just(1.0), Just(2.0), 0.1_f64..5.0]);
@@ -699,7 +700,7 @@ fn any_modification() -> impl Strategy<Value = Modification> {
     )
 }
 
-/// With a tip relief that begins where the drive has a flank: so many turns, of which a flank has a part.
+/// Moves the start of a tip relief onto the drive's flank.
 fn begun_on_flank(modification: Modification, parameters: &DriveParameters) -> Modification {
     let end_deg = drive(parameters).flank_limit().position.from_lobe_deg();
     let ring_tip_relief = modification
@@ -708,7 +709,7 @@ fn begun_on_flank(modification: Modification, parameters: &DriveParameters) -> M
     Modification { ring_tip_relief, ..modification }
 }
 
-/// Numbers for the items of a drive, which seem to be at random, of the kinds that are wanted.
+/// Pseudo-random deviations of the chosen kinds.
 #[derive(Debug, Clone, Copy)]
 struct Deviating {
     size: f64,
@@ -762,7 +763,7 @@ impl Deviating {
     }
 }
 
-/// States of a sweep that both ways are asked for at most.
+/// Largest number of states in a comparison of both paths.
 const MOST_STATES: u64 = 30_000;
 
 proptest! {
@@ -820,7 +821,7 @@ proptest! {
     }
 }
 
-/// Johnson's law with its own depths.
+/// Johnson's law with its default depths.
 const JOHNSON: ContactLaw =
     ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
 
@@ -883,7 +884,7 @@ fn fast_path_is_taken_under_every_law() {
     }
 }
 
-/// Drives of one lobe to four, zones alike and not.
+/// Returns drives of one to four lobes, with alike and unlike zones.
 fn drives_that_may_deviate() -> Vec<DriveParameters> {
     let of = |wave_generator: WaveGenerator, teeth, ring_teeth| DriveParameters {
         wave_generator,

@@ -1,6 +1,6 @@
 //! The default model, virtual work with Johnson's law, against elastic bodies in contact (`tests/finite_elements`, docs/validation.md).
 //!
-//! Each case is one input angle of a drive, its parts held 5 mm behind the contacts, which is the depth that Johnson's law is given.
+//! Each case is one input angle of a drive. Its parts are held 5 mm behind the contacts, the depth in Johnson's law.
 
 use std::f64::consts::PI;
 
@@ -15,7 +15,7 @@ use toothwave_solver::{
 
 use crate::drives::{ECCENTRIC, PAPER_5_1, PAPER_5_2, ellipse, load, swept};
 
-/// Each input angle of the cases is one of so many equal intervals of its drive's period.
+/// Intervals in a period. Each case has the input angle of one of them.
 const INTERVALS: u64 = 240;
 
 #[derive(Deserialize)]
@@ -31,7 +31,7 @@ struct SingleContact {
     force_n_per_mm: f64,
     depth_mm: f64,
     pressure_mpa: f64,
-    /// Of the blocks on both sides to each other.
+    /// Approach of the blocks on both sides.
     approach_mm: f64,
 }
 
@@ -55,25 +55,25 @@ struct Case {
 #[derive(Deserialize)]
 struct Tooth {
     position_deg: f64,
-    /// At wave generator, ring and carrier.
+    /// Forces at wave generator, ring and carrier.
     force_n: [f64; 3],
     pressure_mpa: [f64; 3],
 }
 
-/// How far the model is off, as shares.
+/// Errors of the model as shares.
 struct Errors {
-    /// Of the largest force at the wave generator.
+    /// Error of the largest force at the wave generator.
     peak: f64,
-    /// Of the largest force of each contact.
+    /// Error of the largest force at each contact.
     force: [f64; 3],
-    /// Of the worst tooth's force there, over the largest.
+    /// Largest error of a tooth's force at the wave generator, over the largest force.
     worst_tooth: f64,
-    /// Of the pressure where each contact has its largest force: the narrower a contact, the fewer elements share it.
+    /// Error of the pressure at each contact's largest force. Narrow contacts have few elements.
     stress: [f64; 3],
     wind_up: f64,
 }
 
-/// What is allowed of each of the default model's.
+/// Allowed errors of the default model.
 struct Allowed {
     peak: f64,
     worst_tooth: f64,
@@ -91,7 +91,7 @@ impl Case {
         format!("{drive} at {input_angle_deg} deg, {ring_gap_um} µm at the ring, {slot_gap_um} µm at the slot")
     }
 
-    /// The ring of case 5.2 has pointed teeth, which bend; the model knows nothing of that, and its tooth nearest to the tip carries too much.
+    /// Returns the allowed errors. The model ignores that the pointed ring teeth of case 5.2 bend.
     fn allowed(&self) -> Allowed {
         match self.drive.as_str() {
             "5.2" => Allowed { peak: 0.05, worst_tooth: 0.08, stress: [0.055; 3], wind_up: 0.06 },
@@ -112,7 +112,7 @@ impl Case {
         }
     }
 
-    /// Johnson's law for bodies that are held where those of the case are.
+    /// Returns Johnson's law with depths up to where the case's bodies are held.
     fn johnson(&self) -> ContactLaw {
         ContactLaw::Johnson { depth_mm: PerContact::of(|_| Some(self.depth_mm)) }
     }
@@ -127,7 +127,7 @@ impl Case {
         }
     }
 
-    /// The model of its teeth: each lies aside in its slot by the gap there, and so far back on the flank.
+    /// Returns the model's errors. Each tooth lies offset in its slot by the gap, and so farther back on the flank.
     fn errors_under(&self, load: &LoadParameters) -> Errors {
         let (parameters, _) = self.drive_and_torque_nm();
         let drive = Drive::new(&parameters).unwrap();

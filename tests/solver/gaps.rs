@@ -1,4 +1,4 @@
-//! Gaps of modified and deviating parts, against the real curves, moved.
+//! Gaps of modified and deviating parts, against the real curves after their motion.
 
 use std::f64::consts::PI;
 
@@ -17,7 +17,7 @@ use toothwave_solver::{
 
 use crate::drives::{PAPER_5_1, drive, ellipse, load, semi_axes_mm};
 
-/// Small enough for first order, large enough for its digits.
+/// A size small enough for first order, and large enough for accurate differences.
 const SMALL_UM: f64 = 1e-3;
 const SMALL_MM: f64 = 1e-6;
 const SMALL_ARCSEC: f64 = 1e-2;
@@ -31,7 +31,7 @@ fn unit(angle_rad: f64) -> Vector2<f64> {
     Vector2::new(angle_rad.cos(), angle_rad.sin())
 }
 
-/// The path of the teeth's centres around the cam, by the angle of the cam's normal, all the way around: no formula of the solver's.
+/// Returns the path of centres around the cam by the cam's normal angle, without the solver.
 fn path_at_normal(p: &DriveParameters, normal_rad: f64) -> Vector2<f64> {
     let ((a, b), r) = (semi_axes_mm(p), p.tooth_radius_mm);
     let n = unit(normal_rad);
@@ -39,7 +39,7 @@ fn path_at_normal(p: &DriveParameters, normal_rad: f64) -> Vector2<f64> {
     Vector2::new(a * a / h * n.x, b * b / h * n.y) + n * r
 }
 
-/// Distance of the centre at a position, by bisection of the normal's angle.
+/// Returns the centre's distance at a position, by bisection of the normal's angle.
 fn distance_at(p: &DriveParameters, position_rad: f64) -> f64 {
     let turn = (position_rad / PI).floor() * PI;
     let (mut low, mut high) = (turn - 0.6, turn + PI + 0.6);
@@ -61,7 +61,7 @@ fn distance_at(p: &DriveParameters, position_rad: f64) -> f64 {
     path_at_normal(p, 0.5 * (low + high)).norm()
 }
 
-/// The centres' path in the ring's frame, in a space, by position: shifted outward by `shift_mm` along its radii.
+/// Returns the path of centres in a ring space by position, shifted outward by `shift_mm` along its radii.
 fn path_in_ring(p: &DriveParameters, space: u64, position_rad: f64, shift_mm: f64) -> Vector2<f64> {
     let k = p.ring_teeth as f64 / 2.0;
     let s = if p.teeth > p.ring_teeth { 1.0 } else { -1.0 };
@@ -69,7 +69,7 @@ fn path_in_ring(p: &DriveParameters, space: u64, position_rad: f64, shift_mm: f6
     unit(angle) * (distance_at(p, position_rad) + shift_mm)
 }
 
-/// How far a point is from a curve on the side `outward` of it: along the curve's normal at the nearest point, by parabolas around `near`.
+/// Returns a point's signed distance from a curve along the normal at the nearest point, by parabolas around `near`.
 fn signed_distance(point: Vector2<f64>, outward: Vector2<f64>, near: f64, curve: impl Fn(f64) -> Vector2<f64>) -> f64 {
     // The tangent by central differences; Newton's method on (P - C(t))·C'(t), for which a rough second difference is enough.
     let tangent = |t: f64| (curve(t + 1e-5) - curve(t - 1e-5)) / 2e-5;
@@ -102,7 +102,7 @@ fn tooth_of(drive: &Drive, degrees: f64) -> ToothState {
 
 const DEGREES: [f64; 5] = [3.0, 25.0, 45.0, 68.0, 86.0];
 
-/// The gap at the ring where its path has been moved by `moved`, and by `shift_mm` along its radii.
+/// Returns the gap at the ring after `moved` is applied to its path, shifted by `shift_mm` along its radii.
 fn gap_of_moved_ring(
     p: &DriveParameters,
     place: &Place,

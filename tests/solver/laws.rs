@@ -1,4 +1,4 @@
-//! Johnson's law, series compliance, balls and flats, against formulas and constructions of their own.
+//! Johnson's law, series compliance, balls and flats, against independent formulas and constructions.
 
 use std::f64::consts::PI;
 
@@ -27,7 +27,7 @@ fn johnson(torque_nm: f64) -> LoadParameters {
     LoadParameters { law: R_DEEP, ..load(torque_nm, VirtualWork) }
 }
 
-/// Titanium teeth between ceramic, cast iron and bronze, at depths of their own.
+/// Returns a load with titanium teeth, ceramic, cast iron and bronze parts, each with its own depth.
 fn mixed(torque_nm: f64) -> LoadParameters {
     let material = |youngs_modulus_gpa, poissons_ratio| Material { youngs_modulus_gpa, poissons_ratio };
     LoadParameters {
@@ -44,7 +44,7 @@ fn mixed(torque_nm: f64) -> LoadParameters {
     }
 }
 
-/// Johnson's approach as it is printed, with its half-width.
+/// Returns Johnson's printed approach and its half-width.
 fn printed_approach_mm(
     load: &LoadParameters,
     r: f64,
@@ -79,7 +79,7 @@ fn directions(drive: &Drive, tooth: &ToothState) -> [Vector2<f64>; 3] {
 
 const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
 
-/// The force under which a contact gives way so far, by bisection in its logarithm.
+/// Returns the force for an approach, by bisection in its logarithm.
 fn force_of(approach_mm: f64, law: impl Fn(f64) -> f64) -> f64 {
     if approach_mm <= 0.0 {
         return 0.0;
@@ -92,7 +92,7 @@ fn force_of(approach_mm: f64, law: impl Fn(f64) -> f64) -> f64 {
     (low * high).sqrt()
 }
 
-/// The three forces on a tooth whose centre is free: moved by Newton's method until its contacts, which press only, balance.
+/// Returns the forces on a tooth with a free centre. Newton's method moves it until its pressing contacts balance.
 fn free_tooth(
     drive: &Drive,
     tooth: &ToothState,
@@ -163,7 +163,7 @@ fn free_tooth(
     forces(v)
 }
 
-/// The largest difference of the solver's forces from those of free teeth at its wind-up, over the peak, and of the torque they make.
+/// Returns the largest difference from free teeth at the solver's wind-up, in forces over the peak and in torque.
 fn worst_against_free_teeth(parameters: &DriveParameters, load: &LoadParameters) -> f64 {
     let samples = Samples::new(3).unwrap();
     let drive = drive(parameters);
@@ -359,7 +359,7 @@ fn contact_above_tenth_of_tooth_is_a_finding() {
     assert!(matches!(found(&shallow)[..], [Finding::JohnsonBeyondHalfWidth { contact: Contact::Carrier, .. }]));
 }
 
-/// Laws without a closed form, with gaps.
+/// Returns laws without a closed form, with gaps.
 fn laws_of_searches() -> [LoadParameters; 3] {
     let gapped = |load: LoadParameters| LoadParameters {
         clearance_um: PerContact { wave_generator: 0.0, ring: 10.0, carrier: 2.0 },
@@ -477,7 +477,7 @@ fn ball_on_plane_has_hertz_closed_form_approach() {
     assert!((below.share - 0.310).abs() < 5e-4 && (below.depth - 0.481).abs() < 1e-3, "{below:?}");
 }
 
-/// The complete elliptic integrals of both kinds, by the arithmetic-geometric mean, for a complementary modulus.
+/// Returns both complete elliptic integrals of a complementary modulus, by the arithmetic-geometric mean.
 fn elliptic_integrals(complement: f64) -> [f64; 2] {
     let (mut a, mut b, mut weight, mut sum) = (1.0, complement, 0.5, 0.5 * (1.0 - complement) * (1.0 + complement));
     for _ in 0..8 {
@@ -541,8 +541,8 @@ fn very_long_ellipse_is_sheared_like_line() {
     }
 }
 
-/// The deflection of a half-space at `(x, y)` under Hertz's pressure of unit peak over an ellipse of half-axes `long`, `short`, times π E*: the sum of
-/// the pressure along all lines through the point. Over a chord from the point, at the angle t, the pressure is the root of a quadratic.
+/// Returns the deflection of a half-space at `(x, y)`, times π E*, under Hertz's pressure of unit peak over an ellipse.
+/// It sums the pressure along all lines through the point. On each chord the pressure is the root of a quadratic.
 fn half_space_deflection(long: f64, short: f64, x: f64, y: f64) -> f64 {
     const STEPS: u32 = 20_000;
     let mut sum = 0.0;

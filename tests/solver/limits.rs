@@ -1,4 +1,4 @@
-//! What cannot exist, and what must be said of what can.
+//! Impossible parameters, and findings about possible ones.
 
 use toothwave_solver::drive::{Draft, DriveError};
 use toothwave_solver::{
@@ -96,7 +96,7 @@ fn three_teeth_are_nearest_across_major_axis() {
     assert!((told - least).abs() < 1e-12 * least, "{told} is not {least}");
 }
 
-/// The radius above which teeth touch, of which a drive with teeth of such a radius is told.
+/// Returns the touching radius that the violation of these parameters reports.
 fn touching_radius_mm(parameters: &DriveParameters) -> f64 {
     let found = violations(parameters);
     let radius = found.iter().find_map(|violation| match violation {
@@ -114,7 +114,7 @@ fn teeth_touch(parameters: &DriveParameters) -> bool {
     }
 }
 
-/// Drives whose teeth touch: round and elliptic, with few teeth and many, slots left out, and the ends of the ranges.
+/// Returns drives with touching teeth: round and elliptic, few and many teeth, empty slots, and ends of ranges.
 fn touching_drives() -> Vec<DriveParameters> {
     let of = |semi_major_mm, semi_minor_mm, teeth, installed, tooth_radius_mm| DriveParameters {
         wave_generator: ellipse(semi_major_mm, semi_minor_mm),

@@ -76,7 +76,7 @@ impl Case {
             .collect()
     }
 
-    /// Friction of an entry, its coefficients times a factor, with the mechanism that its teeth make.
+    /// Returns an entry's friction, with coefficients times a factor, and its mechanism.
     fn friction(&self, entry: &Value, factor: f64) -> (Mechanism, Friction) {
         let coefficient = per_contact(&entry["coefficient"]);
         let bearing = RaceBearing {
@@ -102,7 +102,7 @@ impl Case {
     }
 }
 
-/// Three numbers in the order of the contacts.
+/// Reads three numbers in the order of the contacts.
 fn per_contact(values: &Value) -> PerContact<f64> {
     PerContact {
         wave_generator: number(&values[0]).unwrap(),
@@ -172,7 +172,7 @@ const fn code(contact: Contact) -> &'static str {
     }
 }
 
-/// First-order efficiencies with the names that friction.json has for them.
+/// Returns first-order efficiencies with their names in friction.json.
 fn efficiencies(mechanism: &Mechanism, loss_ratio: f64) -> [(&'static str, Fixed, f64); 6] {
     let of = |fixed| mechanism.efficiency(fixed, loss_ratio);
     [
@@ -185,7 +185,7 @@ fn efficiencies(mechanism: &Mechanism, loss_ratio: f64) -> [(&'static str, Fixed
     ]
 }
 
-/// The loss over the power at the driven end that makes an efficiency.
+/// Returns the loss over the power at the driven end for an efficiency.
 fn loss_share_of(name: &str, efficiency: f64) -> f64 {
     if name.ends_with("back_driven") { 1.0 - efficiency } else { 1.0 / efficiency - 1.0 }
 }
@@ -311,7 +311,7 @@ fn radial_force_is_sum_of_tooth_forces() {
     }
 }
 
-/// The teeth in mesh of one zone, as the load sharing makes them.
+/// Returns the loaded teeth of one zone from the load sharing.
 fn teeth_at(loaded: &LoadedDrive<'_>, sample: u64, samples: u64) -> Vec<LoadedTooth> {
     let mesh = Mesh::new(loaded.drive());
     let states: Vec<_> = mesh
@@ -342,7 +342,7 @@ fn bearing_of_5_1(coefficient: f64) -> RaceBearing {
     RaceBearing { coefficient, radius_mm: 52.0 }
 }
 
-/// The mean of ν over 40 intervals of a period, `virtual_work`, 20 N·m.
+/// Returns the mean of ν over 40 intervals of a period, by `virtual_work` at 20 N·m.
 fn mean_loss_ratio(parameters: &DriveParameters, mechanism: &Mechanism, friction: &Friction) -> f64 {
     let drive = drive(parameters);
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
@@ -406,7 +406,7 @@ fn input_power_equals_output_power_plus_losses() {
     }
 }
 
-/// What a turn takes at a given speed of the race, each tooth's spin found among all three that let a contact roll.
+/// Returns the loss per radian at a given race speed. Each tooth's spin is the best of those with one rolling contact.
 fn lost_at(mechanism: &Mechanism, friction: &FrictionParameters, teeth: &[LoadedTooth], race_mm_per_rad: f64) -> f64 {
     let (WaveGeneratorFriction::Race { coefficient, .. } | WaveGeneratorFriction::Plain { coefficient }) =
         friction.wave_generator
@@ -893,7 +893,7 @@ fn losses_stop_on_request() {
     assert_eq!(stopped, Err(SolveError::Stopped));
 }
 
-/// What wears at 1000 revolutions a minute, with rates that tell the parts apart.
+/// Returns wear parameters at 1000 rpm, with a different rate for each part.
 fn wear_parameters(mechanism: &Mechanism) -> WearParameters {
     WearParameters {
         rate_mm3_per_nm: PerContact { wave_generator: 1e-6, ring: 2e-6, carrier: 3e-6 },

@@ -1,4 +1,4 @@
-//! Outlines of modified parts, against the path of the teeth's centres as the cam's support function gives it: no curve of the solver's.
+//! Outlines of modified parts, against the path of centres from the cam's support function, independent of the solver.
 
 use std::f64::consts::PI;
 
@@ -21,7 +21,7 @@ use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, cases, drive, ellipse
 const NONE: Modification = Modification::NONE;
 const ARCSEC: f64 = PI / 648_000.0;
 
-/// One lobe, and a ring with more teeth than the carrier.
+/// Returns a drive with one lobe and a ring with more teeth than the carrier.
 fn eccentric() -> DriveParameters {
     DriveParameters {
         wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
@@ -33,7 +33,7 @@ fn eccentric() -> DriveParameters {
     }
 }
 
-/// Three lobes.
+/// Returns a drive with three lobes.
 fn three_lobes() -> DriveParameters {
     DriveParameters {
         wave_generator: WaveGenerator::Harmonic { lobes: 3, mean_radius_mm: 48.0, amplitude_mm: 1.0 },
@@ -47,7 +47,7 @@ fn three_lobes() -> DriveParameters {
 
 const RELIEF: TipRelief = TipRelief { amount_um: 30.0, start_deg: 20.0, power: 2.0 };
 
-/// Each of the ring's modifications by itself, both ways, and all together.
+/// Returns each modification of the ring alone, in both directions, and all together.
 fn of_the_ring() -> Vec<Modification> {
     let reliefs = [(30.0, 2.0), (-20.0, 1.5), (30.0, 1.0), (10.0, 0.5), (25.0, 3.0)];
     let relief =
@@ -76,7 +76,7 @@ fn unit(angle_rad: f64) -> Vector2<f64> {
     Vector2::new(angle_rad.cos(), angle_rad.sin())
 }
 
-/// A tooth's centre around the cam, by the angle of the cam's normal: `(h + r) n + h' n'`.
+/// Returns a tooth's centre by the cam's normal angle: `(h + r) n + h' n'`.
 fn center(p: &DriveParameters, normal_rad: f64) -> Vector2<f64> {
     let (support, slope) = match p.wave_generator {
         WaveGenerator::Ellipse { semi_major_mm: a, semi_minor_mm: b } => {
@@ -97,7 +97,7 @@ fn center(p: &DriveParameters, normal_rad: f64) -> Vector2<f64> {
     (support + p.tooth_radius_mm) * n + slope * Vector2::new(-n.y, n.x)
 }
 
-/// The same in the ring, its radius larger by the shift, and its position ψ.
+/// Returns the shifted centre in the ring's frame, with its position ψ.
 fn in_ring(p: &DriveParameters, normal_rad: f64, shift_mm: f64) -> (Vector2<f64>, f64) {
     let k = p.ring_teeth as f64 / p.wave_generator.lobes() as f64;
     let center = center(p, normal_rad);
@@ -105,7 +105,7 @@ fn in_ring(p: &DriveParameters, normal_rad: f64, shift_mm: f64) -> (Vector2<f64>
     (unit(position / k) * (center.norm() + shift_mm), position)
 }
 
-/// The least distance of a point from the shifted path of one space, and the position that is nearest.
+/// Returns the least distance of a point from the shifted path of one space, and the nearest position.
 fn from_path(p: &DriveParameters, point: Vector2<f64>, shift_mm: f64) -> (f64, f64) {
     let end = PI / p.wave_generator.lobes() as f64;
     let distance = |normal: f64| (point - in_ring(p, normal, shift_mm).0).norm();
@@ -139,7 +139,7 @@ fn edges(outline: &Outline) -> &[Edge] {
     }
 }
 
-/// The ring's edges in one tooth space, from tip to tip.
+/// Returns the ring's edges in one tooth space, from tip to tip.
 fn space(p: &DriveParameters, modification: Modification) -> Vec<Edge> {
     let ring = drawn(p, Subject::Part(Part::Ring), &parts(modification), 1e-4, 0.0).remove(0);
     let edges = edges(&ring.section.holes[0]);
@@ -195,7 +195,7 @@ fn modified_flank_is_offset_from_moved_path() {
     println!("worst distance from the moved path: {worst:.1e} mm");
 }
 
-/// The farthest that the discs around the shifted path of all spaces reach along the symmetry line of a tooth: its tip.
+/// Returns the tip radius: the farthest reach of discs on the shifted path along a tooth's symmetry line.
 fn swept_tip_mm(p: &DriveParameters, shift_mm: f64, disc_mm: f64) -> f64 {
     let line = unit(PI / p.ring_teeth as f64);
     let end = PI / p.wave_generator.lobes() as f64;
@@ -305,7 +305,7 @@ fn placed(edges: &[Edge], rotation_rad: f64) -> Vec<Point2<f64>> {
     edges.iter().flat_map(of_edge).map(|point| rotation * point).collect()
 }
 
-/// The least distance of a point from the chords of a closed outline.
+/// Returns the least distance of a point from the chords of a closed outline.
 fn distance(outline: &[Point2<f64>], point: Point2<f64>) -> f64 {
     let of_chord = |(from, to): (&Point2<f64>, &Point2<f64>)| {
         let along = to - from;
@@ -517,7 +517,7 @@ fn low_relief_leaves_rim_unchanged() {
     assert_eq!(outer(Modification { ring_tip_relief: Some(RELIEF), ..NONE }), outer(NONE));
 }
 
-/// What the rim is counted from: a ring that ends there is refused, and told how far out it has to end.
+/// Returns the ring's reach, derived from the limit that a refusal of a too small ring reports.
 fn told_reach_mm(p: &DriveParameters, parts: &PartsParameters) -> f64 {
     let without_rim = PartsParameters { ring_outer_radius_mm: Some(1.0), ..*parts };
     let violations = without_rim.violations(Part::Ring, &Draft::new(p).unwrap());
@@ -716,7 +716,7 @@ fn chord_with_several_inflections_keeps_tolerance() {
     }
 }
 
-/// Bézier's polygons of all curves.
+/// Returns the Bézier polygons of all curves.
 fn polynomials(edges: &[Edge]) -> Vec<Vec<Point2<f64>>> {
     let of_edge = |edge: &Edge| match edge {
         Edge::Curve { polynomials, .. } => polynomials.clone(),
@@ -725,7 +725,7 @@ fn polynomials(edges: &[Edge]) -> Vec<Vec<Point2<f64>>> {
     edges.iter().flat_map(of_edge).collect()
 }
 
-/// Points of a polynomial by Bernstein's own sum, both ends included.
+/// Samples a polynomial with Bernstein's sum, including both ends.
 fn along(polygon: &[Point2<f64>]) -> impl Iterator<Item = Vector2<f64>> {
     let degree = polygon.len() - 1;
     (0..=60).map(move |i| {

@@ -1,4 +1,4 @@
-//! The wave generator that moves on under its teeth as it winds up: against the path of the teeth's centres itself, and against a plain search for the rotation.
+//! The wave generator moves under its teeth as it winds up. Tests compare with the path of centres and a plain search.
 
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::gaps::TipRelief;
@@ -36,7 +36,7 @@ fn at(drive: &Drive, position_rad: f64) -> toothwave_solver::cam::ToothCenter {
     drive.flank().locus().at(folded).unwrap()
 }
 
-/// `d tan γ`, of which the sign turns with the side of the lobe.
+/// Returns `d tan γ`, with the sign of the side of the lobe.
 fn slope_mm(drive: &Drive, position_rad: f64) -> f64 {
     let tooth = at(drive, position_rad);
     position_rad.signum() * tooth.center_radius_mm * tooth.tan_pressure_angle
@@ -65,7 +65,7 @@ fn tooth_moves_along_centre_path_to_second_order() {
     }
 }
 
-/// The teeth of one input angle, and what they carry.
+/// Returns the teeth of one input angle with their forces.
 fn shared(loaded: &LoadedDrive<'_>, sample: u64) -> (Vec<ToothState>, WindUp, Vec<f64>) {
     let samples = Samples::new(7).unwrap();
     let placed = loaded.mesh().placed_at(sample, samples);
@@ -393,7 +393,7 @@ fn allowable_stress_is_reached_under_torque_capacity() {
     }
 }
 
-/// Teeth so soft that the wave generator turns far beyond the first of them.
+/// Material so soft that the wave generator turns far past the first tooth.
 const PLASTIC: Materials = {
     let soft = Material { youngs_modulus_gpa: 3.5, poissons_ratio: 0.4 };
     Materials { wave_generator: soft, teeth: soft, ring: soft, carrier: soft }
@@ -409,7 +409,8 @@ const FINE_ECCENTRIC: DriveParameters = DriveParameters {
     tip_radius_mm: None,
 };
 
-/// The rotation and the torque of the first maximum beyond which no tooth has a gap left to close, in small steps and then by thirds; none within a quarter of a lobe.
+/// Returns rotation and torque of the first maximum after all gaps are closed, within a quarter of a lobe.
+/// It searches in small steps, then by thirds.
 fn first_maximum(teeth: &[ToothState], lobes: u32) -> Option<(f64, f64)> {
     const STEPS: u32 = 1000;
     let springs = Springs::new(teeth, f64::from(lobes));
@@ -435,7 +436,7 @@ fn first_maximum(teeth: &[ToothState], lobes: u32) -> Option<(f64, f64)> {
     Some((low, torque_nmm(low)))
 }
 
-/// Soft drives with few teeth in mesh and with many, those of eccentrics with pointed tips.
+/// Returns soft drives with few and many teeth in mesh, and eccentric ones with pointed tips.
 fn soft_drives() -> Vec<(DriveParameters, f64)> {
     let mut drives = vec![(FINE_ECCENTRIC, 0.0), (PAPER_5_2, 0.0), (PAPER_5_2, 30.0), (PAPER_5_2_BORED, 10.0)];
     // The same sequence each time.
@@ -467,7 +468,7 @@ fn soft_drives() -> Vec<(DriveParameters, f64)> {
     drives
 }
 
-/// Calls with the teeth of some input angles of soft drives, and the maximum of their torque.
+/// Calls a function with teeth of some input angles of soft drives, and their maximum torque.
 fn at_soft_teeth(mut look: impl FnMut(&LoadedDrive<'_>, &[ToothState], (f64, f64))) {
     let mut looked = 0;
     for (parameters, ring_um) in soft_drives() {

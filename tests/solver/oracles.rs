@@ -1,4 +1,4 @@
-//! Against constructions that share no formula with the solver: dense systems of equations, and swept circles.
+//! Independent constructions: dense systems of equations and swept circles.
 
 use std::f64::consts::PI;
 
@@ -13,7 +13,7 @@ use crate::drives::{
     PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, any_swept_drive, cases, drive, load, semi_axes_mm,
 };
 
-/// The directions of the three forces on a tooth, in its slot's frame: x outward, y in the sense of the input.
+/// Returns the directions of the three forces on a tooth in its slot's frame: x outward, y in the sense of the input.
 ///
 /// Turning +, the wave generator pushes outward and forward. For s = +1 the ring pushes inward and forward and the slot holds
 /// the tooth back; for s = -1 the ring pushes backward and the slot forward.
@@ -30,7 +30,7 @@ fn lever_mm(tooth: &ToothState) -> f64 {
     tooth.center.center_radius_mm * tooth.center.tan_pressure_angle.atan().sin()
 }
 
-/// The paper's 3n equations as printed: equilibrium [1], torque [2], compatibility of neighbours [3]-[7].
+/// Solves the paper's 3n equations as printed: equilibrium [1], torque [2], compatibility of neighbours [3]-[7].
 fn forces_by_projection(
     drive: &Drive,
     teeth: &[ToothState],
@@ -83,7 +83,7 @@ fn forces_by_projection(
         .collect()
 }
 
-/// Teeth whose centres are free to move in two directions against three springs each, and one rotation for all.
+/// Solves for teeth with free centres against three springs each, and one common rotation.
 fn forces_by_springs(
     drive: &Drive,
     teeth: &[ToothState],
@@ -129,7 +129,7 @@ fn forces_by_springs(
         .collect()
 }
 
-/// The largest difference between the closed form and a dense solve over a few input angles, over the largest force.
+/// Returns the largest difference between the closed form and a dense solve at some angles, over the largest force.
 pub(crate) fn worst_difference(
     parameters: &DriveParameters,
     compatibility: Compatibility,
@@ -211,8 +211,8 @@ proptest! {
     }
 }
 
-/// How far from the axis any circle on the path reaches in the direction `angle_rad` of the ring's frame, by a scan over the
-/// whole tooth space and its neighbours, refined around its maximum.
+/// Returns the farthest reach of any circle on the path in the direction `angle_rad` of the ring's frame.
+/// It scans the tooth space and its neighbours and refines the maximum.
 fn farthest_swept_mm(drive: &Drive, angle_rad: f64) -> f64 {
     const SCAN: u32 = 4000;
     let p = drive.parameters();

@@ -1,4 +1,4 @@
-//! The paper's cases, as separate calculations found them (docs/theory.md section 6).
+//! The paper's cases against separate calculations (docs/theory.md section 6).
 
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::mesh::{Mesh, TeethInMesh};
@@ -6,7 +6,7 @@ use toothwave_solver::ring::FlankEnd;
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, load, swept};
 
-/// Six peaks to the three decimals that are known.
+/// Asserts six peaks to three decimals.
 fn assert_peaks(compatibility: toothwave_solver::Compatibility, expected: [f64; 6]) {
     let peaks = swept(&PAPER_5_1, &load(20.0, compatibility), 50).peaks;
     let found = [

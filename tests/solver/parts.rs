@@ -1,4 +1,4 @@
-//! Parts as they are made, and the room that they leave each other.
+//! Parts as they are made, and the space between them.
 
 use std::f64::consts::PI;
 
@@ -14,7 +14,7 @@ use toothwave_solver::{
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, drive, ellipse};
 
-/// The first closed path of a part's section.
+/// Returns the first closed path of a part's section.
 fn edges(parameters: &DriveParameters, part: Part, parts: &PartsParameters) -> Vec<Edge> {
     let drawing = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 1_000_000, input_angle_deg: 0.0 };
     let draft = Draft::new(parameters).unwrap();
@@ -30,14 +30,14 @@ fn edges(parameters: &DriveParameters, part: Part, parts: &PartsParameters) -> V
         .unwrap()
 }
 
-/// What there is to say about a part as it is made.
+/// Returns the findings about a part as it is made.
 fn findings_as_made(parameters: &DriveParameters, part: Part, parts: &PartsParameters) -> Vec<Finding> {
     let drawing = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 1_000_000, input_angle_deg: 0.0 };
     let draft = Draft::new(parameters).unwrap();
     Drawing::new(&draft, Subject::Part(part), parts, &drawing).unwrap().findings().unwrap()
 }
 
-/// Where a wall of slot 0 cuts a circle, and its mirror image in the line between the slots 0 and 1.
+/// Returns where a wall of slot 0 meets a circle, and the mirror image at the wall of slot 1.
 fn on_both_walls(radius_mm: f64, wall_mm: f64, installed: i64) -> [Point2<f64>; 2] {
     let near = Point2::new((radius_mm * radius_mm - wall_mm * wall_mm).sqrt(), wall_mm);
     let to_next = Rotation2::new(2.0 * PI / installed as f64);

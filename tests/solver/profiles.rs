@@ -1,4 +1,4 @@
-//! The sampled profiles: true to the chord tolerance, closed, joining.
+//! Sampled profiles: chord tolerance, closure and joints.
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
@@ -17,7 +17,7 @@ fn sampled(parameters: &DriveParameters, chord_tolerance_mm: f64, extent: Extent
     profiles(&drive(parameters), &request, &Never).unwrap()
 }
 
-/// Distance of a point from a polyline's nearest segment.
+/// Returns the distance of a point from the nearest segment of a polyline.
 fn distance_mm(point: &Point2<f64>, polyline: &Polyline) -> f64 {
     let to_segment = |pair: &[Point2<f64>]| {
         let along = pair[1] - pair[0];
@@ -27,7 +27,7 @@ fn distance_mm(point: &Point2<f64>, polyline: &Polyline) -> f64 {
     polyline.windows(2).map(to_segment).fold(f64::INFINITY, f64::min)
 }
 
-/// The farthest that the fine polyline strays from the coarse one.
+/// Returns the largest distance of the fine polyline from the coarse one.
 fn deviation_mm(fine: &Polyline, coarse: &Polyline) -> f64 {
     fine.iter().step_by(7).map(|point| distance_mm(point, coarse)).fold(0.0, f64::max)
 }
@@ -36,7 +36,7 @@ fn unit(angle_rad: f64) -> Vector2<f64> {
     Vector2::new(angle_rad.cos(), angle_rad.sin())
 }
 
-/// Points of ring, path and cam from the root, the lobe on, by their closed forms over the cam's normal or, where the path is given, over ψ.
+/// Samples ring, path and cam from root and lobe on, by closed forms over the cam's normal, or over ψ on a given path.
 fn closed_forms(p: &DriveParameters) -> [Polyline; 3] {
     let (r, lobes) = (p.tooth_radius_mm, p.wave_generator.lobes() as f64);
     let k = p.ring_teeth as f64 / lobes;
@@ -77,7 +77,7 @@ fn closed_forms(p: &DriveParameters) -> [Polyline; 3] {
     curves
 }
 
-/// How far the closed forms are from the chords, over the tolerance: of ring, path and cam.
+/// Returns the largest distances of ring, path and cam from the chords, over the tolerance.
 fn deviations_over_tolerance(p: &DriveParameters, curves: &[Polyline; 3], tolerance_mm: f64) -> [f64; 3] {
     let profiles = sampled(p, tolerance_mm, Extent::Tooth);
     let from_middle = |curve: &Polyline| curve[curve.len() / 2..].to_vec();
@@ -102,12 +102,12 @@ fn deviations_over_tolerance(p: &DriveParameters, curves: &[Polyline; 3], tolera
     })
 }
 
-/// Beside the tolerance, what rounding adds.
+/// True if the deviation is within tolerance and rounding.
 fn is_true(deviation_over_tolerance: f64) -> bool {
     deviation_over_tolerance <= 1.0 + 1e-6
 }
 
-/// From this many points on a chord of 40 might be passed by between two points of the closed form.
+/// Exponents of relative tolerances. Below them, closed forms are sampled too coarsely to test each chord.
 const RELATIVE_TOLERANCES: std::ops::Range<f64> = -6.0..-2.5;
 
 proptest! {
@@ -266,7 +266,7 @@ fn profile_with_too_many_points_reports_their_number() {
     assert!(matches!(refused, SolveError::TooManyPoints { points, limit: 1000 } if points > 1000));
 }
 
-/// Counts how often it is asked; each halving of a chord asks once.
+/// A stop flag that counts the bisections of chords.
 #[derive(Default)]
 struct Halvings(AtomicU64);
 

@@ -25,7 +25,7 @@ fn scaled(p: &DriveParameters, factor: f64) -> DriveParameters {
     }
 }
 
-/// The six columns of forces and stresses with their peaks.
+/// Returns the six columns of forces and stresses with their peaks.
 fn loads(sweep: &Sweep) -> Vec<(&Vec<f64>, f64)> {
     let force = sweep.states.force_n.iter().map(|(c, column)| (column, sweep.peaks.get(c).force_n.value));
     let stress = sweep.states.stress_mpa.iter().map(|(c, column)| (column, sweep.peaks.get(c).stress_mpa.value));
@@ -102,7 +102,7 @@ proptest! {
     }
 }
 
-/// The largest step of `F_K` from one sample to the next, over its peak, for teeth that are in mesh at both.
+/// Returns the largest step of `F_K` between samples, over its peak, for teeth in mesh at both samples.
 fn largest_step(parameters: &DriveParameters, samples: u64) -> f64 {
     let sweep = swept(parameters, &load(3.0, Projection), samples);
     let states = &sweep.states;

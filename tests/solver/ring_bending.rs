@@ -1,4 +1,4 @@
-//! How the ring's teeth bend: against finite elements, and what a bend must do to the loads.
+//! Bending of the ring's teeth: against finite elements, and its effect on loads.
 
 use serde_json::Value;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
@@ -10,13 +10,13 @@ use toothwave_solver::{
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, ellipse, load, swept};
 
-/// `(1 - ν²)/(π E L1)` of a ring.
+/// Returns `(1 - ν²)/(π E L1)` of a ring.
 fn unit_mm_per_n(drive: &Drive, ring: &Material) -> f64 {
     let modulus_mpa = 1e3 * ring.youngs_modulus_gpa / (1.0 - ring.poissons_ratio.powi(2));
     1.0 / (std::f64::consts::PI * modulus_mpa * drive.tooth_width_mm())
 }
 
-/// What the ring gives way by at a position beyond what it does at its root, in [`unit_mm_per_n`].
+/// Returns the ring's compliance at a position minus the one at its root, in [`unit_mm_per_n`].
 fn beyond_root(drive: &Drive, ring: &Material) -> impl Fn(f64) -> f64 {
     let bending = RingBending::new(drive, ring).unwrap();
     let unit_mm_per_n = unit_mm_per_n(drive, ring);

@@ -1,4 +1,4 @@
-//! The sharing of a load over springs, and light loads on wide gaps.
+//! Load sharing among springs, and light loads across wide gaps.
 
 use std::cell::Cell;
 use std::f64::consts::PI;
@@ -178,7 +178,7 @@ fn early_tooth_of_tiny_arm_costs_no_digits() {
     assert_eq!(wind_up.rotation.closing_rad, 1.1);
 }
 
-/// Counts how often it is looked at.
+/// A spring that counts its reads.
 struct Counted(Spring, Cell<u64>);
 
 impl AsRef<Spring> for Counted {
@@ -285,7 +285,7 @@ proptest! {
     }
 }
 
-/// Springs of a few powers, whose arms decline to nothing somewhere within two radians.
+/// Generates springs of several power laws whose arms decline to zero within two radians.
 fn any_declining_spring() -> impl Strategy<Value = Spring> {
     let exponent = prop::sample::select(vec![1.0, 0.9, 2.0 / 3.0, 0.5]);
     let gap = prop::option::of(0.02_f64..0.5);
@@ -309,7 +309,8 @@ fn any_declining_spring() -> impl Strategy<Value = Spring> {
     })
 }
 
-/// The maxima of the torque up to that beyond which no spring has a gap left to close, in steps and then by thirds: rotations and torques.
+/// Returns rotations and torques of all maxima up to the first after all gaps are closed.
+/// It searches in steps, then by thirds.
 fn maxima(springs: &[Spring]) -> Vec<(f64, f64)> {
     let all = Springs::new(springs, 2.0);
     let at = |turned_rad: f64| Rotation { closing_rad: 0.0, excess_rad: turned_rad };
@@ -337,7 +338,7 @@ fn maxima(springs: &[Spring]) -> Vec<(f64, f64)> {
     maxima
 }
 
-/// Into so many the way up to the last gap is divided, and two radians beyond it.
+/// Number of steps over the rotation up to two radians past the last gap.
 const STEPS: u32 = 4000;
 
 proptest! {

@@ -1,4 +1,4 @@
-//! Sweeps to a tolerance: what they promise, where teeth enter, and what they cost.
+//! Tolerance sweeps: their guarantees, the entry of teeth, and their cost.
 
 use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
@@ -15,7 +15,7 @@ use crate::drives::{
     semi_axes_mm, swept,
 };
 
-/// More than any of these sweeps takes.
+/// A limit above the need of these sweeps.
 const MAX_STATES: u64 = 10_000_000;
 
 fn swept_to(parameters: &DriveParameters, load: &LoadParameters, tolerance: f64) -> Sweep {
@@ -58,7 +58,7 @@ fn tolerance_sweep_lists_no_regular_angle_twice() {
 
 // --- Where a tooth enters
 
-/// The bore that ends the flank of a drive at so many spacings from the major axis, but for rounding.
+/// Returns the bore that ends the flank this many spacings from the major axis, up to rounding.
 fn bore_at(unbored: &Drive, spacings: u64) -> Option<f64> {
     let flank = unbored.flank();
     let position = Position::of_turn(spacings, unbored.parameters().installed.unsigned_abs(), 2)?;
@@ -66,12 +66,12 @@ fn bore_at(unbored: &Drive, spacings: u64) -> Option<f64> {
     Some(flank.radius_mm(&center, &flank.at(&center)))
 }
 
-/// The values up to four units in the last place around one.
+/// Returns the values up to four units in the last place around a value.
 fn around(value: f64) -> impl Iterator<Item = f64> {
     (value.to_bits() - 4..=value.to_bits() + 4).map(f64::from_bits)
 }
 
-/// That both ways to sweep a drive agree about its teeth and its loads.
+/// Asserts that both kinds of sweep agree about teeth and loads.
 fn assert_entry_is_decided_once(parameters: &DriveParameters) -> bool {
     let Ok(possible) = Drive::new(parameters) else { return false };
     let mesh = Mesh::new(&possible);
@@ -181,7 +181,7 @@ fn flanks_near_whole_spacings_are_swept_alike() {
 struct Extremes {
     peaks: Vec<Peak>,
     half_widths_mm: Vec<f64>,
-    /// Wind-up and stiffness.
+    /// Largest wind-up and stiffness.
     most: [f64; 2],
     least: [f64; 2],
     transmission_error_deg: f64,
@@ -202,7 +202,7 @@ impl Extremes {
     }
 }
 
-/// Designs whose extremes stand at summits, at entries, at corners and at jumps of the stiffness.
+/// Returns designs with extremes at smooth maxima, entries, corners and jumps of the stiffness.
 pub(crate) fn designs() -> Vec<(DriveParameters, LoadParameters)> {
     let mut designs = Vec::new();
     let elliptic = DriveParameters {
@@ -344,7 +344,7 @@ fn gapless_capacity_grows_with_stress_squared() {
 
 // --- What it costs
 
-/// A drive of so many teeth, its radius this many times the critical one.
+/// Returns a drive with this many teeth and this multiple of the critical radius.
 pub(crate) fn of_many_teeth(teeth: i64, of_critical: f64) -> DriveParameters {
     let sin = (std::f64::consts::PI / teeth as f64).sin();
     let (a, ring) = (58.0, (teeth - 2) as f64 / 2.0);
@@ -361,7 +361,7 @@ pub(crate) fn of_many_teeth(teeth: i64, of_critical: f64) -> DriveParameters {
     }
 }
 
-/// The fewest states with which a sweep is content.
+/// Returns the least limit of states that a sweep accepts.
 fn states_worked_out(parameters: &DriveParameters, tolerance: f64) -> u64 {
     let (drive, load) = (drive(parameters), LoadCase::new(&load(20.0, Projection)).unwrap());
     let is_enough = |max_states| match sweep(&drive, &load, Points::tolerance(tolerance, max_states).unwrap(), &Never) {

@@ -1,4 +1,4 @@
-//! True peaks alone, no column kept: what they promise, against dense samples, the sweep to a tolerance and the reference, and what they cost.
+//! True peaks without columns: guarantees against dense samples, tolerance sweeps and the reference, and their cost.
 
 use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
@@ -29,7 +29,7 @@ fn to(parameters: &DriveParameters, load: &LoadParameters, tolerance: f64) -> Sw
         .unwrap_or_else(|error| panic!("{error} of {parameters:?} {load:?}"))
 }
 
-/// Everything that has a largest value, by name; of what has a least value too, its reciprocal.
+/// Returns every largest value by name, and the reciprocal of every least value.
 fn extremes(peaks: &SweepPeaks) -> Vec<(&'static str, f64)> {
     let mut extremes = Vec::new();
     for (_, contact) in peaks.contacts.iter() {
@@ -46,7 +46,7 @@ fn extremes(peaks: &SweepPeaks) -> Vec<(&'static str, f64)> {
     extremes
 }
 
-/// That no extreme of so many intervals is missed by more than the tolerance.
+/// Asserts that no extreme of a dense sweep is missed by more than the tolerance.
 fn assert_found(parameters: &DriveParameters, load: &LoadParameters, samples: u64, tolerance: f64) {
     let dense = of(parameters, load, Points::samples(samples).unwrap()).unwrap();
     let found = to(parameters, load, tolerance);
@@ -456,7 +456,7 @@ fn true_peaks_match_the_reference() {
 
 // --- What they cost
 
-/// The fewest states with which they are found.
+/// Returns the least limit of states that the search accepts.
 fn states_worked_out(parameters: &DriveParameters, load: &LoadParameters, tolerance: f64) -> u64 {
     let is_enough = |max_states| match of(parameters, load, Points::tolerance(tolerance, max_states).unwrap()) {
         Ok(_) => true,

@@ -1,4 +1,5 @@
-//! Where the wind-up without load is least and largest, found by a sweep to a tolerance: against dense positions, of a calculation of its own where that knows the gaps.
+//! Extremes of the unloaded wind-up from tolerance sweeps, against dense positions. An independent calculation is used
+//! where it knows the gaps.
 
 use proptest::prelude::*;
 use toothwave_solver::Compatibility::VirtualWork;
@@ -21,7 +22,7 @@ fn to(tolerance: f64) -> Points {
     Points::tolerance(tolerance, MAX_STATES).unwrap().also_without_load()
 }
 
-/// Input angles of a sweep, and the wind-up without load there.
+/// Returns a sweep's input angles and its unloaded wind-up.
 fn without_load(
     p: &DriveParameters,
     load: &LoadParameters,
@@ -38,7 +39,7 @@ fn extremes(p: &DriveParameters, load: &LoadParameters, points: Points) -> Extre
     Extremes::of(&without_load(p, load, &Deviations::default(), points).1)
 }
 
-/// That what was found misses nothing of what is dense beyond the tolerance. It is taken on somewhere, and so exceeds nothing.
+/// Asserts that the extremes miss the dense ones by at most the tolerance. Found values exist, so they exceed nothing.
 fn assert_found(found: &Extremes, dense: &Extremes, tolerance: f64, what: &str) {
     let least_missed = found.least - dense.least;
     let largest_missed = dense.largest - found.largest;
@@ -110,7 +111,7 @@ fn of(wave_generator: WaveGenerator, teeth: i64, ring_teeth: i64, tooth_radius_m
     }
 }
 
-/// Regular, undercut and bored flanks, zones unlike, one lobe and three, few teeth.
+/// Returns regular, undercut and bored flanks, unlike zones, one and three lobes, and few teeth.
 fn shapes() -> Vec<DriveParameters> {
     vec![
         PAPER_5_1,

@@ -1,4 +1,4 @@
-//! What a default that is written out, and the sweep beside a study, must not change.
+//! Defaults written out, and consistency of studies with sweeps.
 
 use serde_json::{Value, json};
 use toothwave_calculation::design::Design;
@@ -17,7 +17,7 @@ fn examples() -> [Value; 3] {
     .map(|text| serde_json::from_str(text).unwrap())
 }
 
-/// All kinds of study of a base, over a number that defaults follow from.
+/// Returns all kinds of studies over a number on which defaults depend.
 fn studies(base: &Value) -> Vec<Value> {
     let radius_mm = base["drive"]["teeth"]["radius_mm"].as_f64().unwrap();
     let range = json!({ "min": 0.9 * radius_mm, "max": radius_mm });

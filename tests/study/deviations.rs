@@ -264,7 +264,7 @@ fn histogram_holds_every_drive_once() {
     assert_eq!(histogram, json!({ "edges": [14.0, 14.0], "drives": [20_000] }));
 }
 
-/// tests/reference/tolerances.py: other load sharing, and which tooth meets which space counted anew.
+/// Reads the results of tests/reference/tolerances.py, which calculates load sharing and meshing spaces independently.
 fn reference() -> Value {
     serde_json::from_str(include_str!("../reference/tolerances.json")).unwrap()
 }

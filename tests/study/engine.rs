@@ -1,4 +1,4 @@
-//! The engine: chunks are pure, and merged in any order to the same bits.
+//! The engine: chunks are pure, and merging in any order gives the same bits.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -11,7 +11,7 @@ use toothwave_study::{Gathered, Part, Study, Work};
 
 use crate::asking::{LIMITS, gathered, paper, study, text, with};
 
-/// A study of each kind, each of several chunks.
+/// Returns a study of each kind with several chunks each.
 fn studies() -> [Value; 4] {
     let radius = |steps: u64| json!({ "min": 3.0, "max": 7.5, "steps": steps });
     let normal = json!({ "distribution": "normal", "sigma": 0.01, "limit": 0.03 });
@@ -38,7 +38,7 @@ fn in_chunks_of(document: &Value, variants: u64) -> Arc<Study> {
     Arc::new(Study::read(document.to_string().as_bytes(), &LIMITS).unwrap().in_chunks_of(variants))
 }
 
-/// A part as a store would keep it.
+/// Returns a part after a round trip through the store.
 fn kept(part: &Part) -> Part {
     serde_json::from_str(&serde_json::to_string(part).unwrap()).unwrap()
 }
@@ -65,7 +65,7 @@ fn chunks_in_any_order_give_same_bits() {
     }
 }
 
-/// Stops when it is asked a certain time.
+/// A stop flag that the test sets.
 struct Times {
     is_set: AtomicBool,
 }

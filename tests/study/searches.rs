@@ -9,7 +9,7 @@ use toothwave_study::{Limits, Study};
 
 use crate::asking::{CALCULATION, LIMITS, answer, faulty, paper, study, with};
 
-/// Two objectives that pull at the teeth's radius, the diameter being theirs, and a limit.
+/// Returns a search with two opposing objectives of the teeth's radius and one limit.
 fn search() -> Value {
     json!({
         "study": "search", "base": paper(), "evaluations": 4000,
@@ -23,7 +23,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
 }
 
-/// The area between a front and a corner that everything beats; both objectives are to be greatest.
+/// Returns the area between a front and a reference corner. Both objectives are maximised.
 fn hypervolume(points: &[(f64, f64)], corner: (f64, f64)) -> f64 {
     let mut points: Vec<_> = points.iter().filter(|point| point.0 > corner.0 && point.1 > corner.1).collect();
     points.sort_by(|one, other| other.0.total_cmp(&one.0));
@@ -265,7 +265,7 @@ fn ratio_torque_and_space_suffice_for_a_drive() {
     }
 }
 
-/// What a designer knows who has no drive yet.
+/// Returns requirements without a drive.
 fn requirements() -> Value {
     json!({
         "study": "search", "evaluations": 2000,

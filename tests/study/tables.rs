@@ -1,4 +1,4 @@
-//! Results as tables: Parquet holds what CSV does.
+//! Results as tables: Parquet and CSV hold the same cells.
 
 use bytes::Bytes;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
@@ -15,7 +15,7 @@ fn cells_of_csv(gathered: &Gathered) -> Vec<Vec<String>> {
     csv.records().map(|row| row.unwrap().iter().map(str::to_owned).collect()).collect()
 }
 
-/// The names, then the rows as CSV spells them.
+/// Returns the names, then the rows in CSV spelling.
 fn cells_of_parquet(gathered: &Gathered) -> Vec<Vec<String>> {
     let mut bytes = Vec::new();
     gathered.answer().write(Format::Parquet, &mut bytes).unwrap();
