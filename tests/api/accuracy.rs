@@ -56,7 +56,7 @@ async fn reported_errors_match_40_digit_reference() {
             };
             let sweep = service.post("/v1/sweep", &with(&case["document"], "/sweep", points)).await.found();
             let (told, known) = (way["error"].as_f64().unwrap(), true_error(&sweep, case));
-            // The hardest of them has a condition of 1e-9.
+            // The hardest case has a condition of 1e-9.
             assert!((told - known).abs() <= 1e-6 * known + 2e-9, "{}: {told:e}, not {known:e}: {way}", case["name"]);
             assert_eq!(way["states"], sweep["states"]["tooth"].as_array().unwrap().len());
             seen += 1;
@@ -94,7 +94,7 @@ async fn reports_difference_of_every_model_to_own() {
     for way in ways(&answer) {
         let is_own = way["compatibility"] == "projection" && way["law"] == "linear";
         let difference = way["model_difference"].as_f64().unwrap();
-        // Whole hundredths of the force: johnson 1, palmgren by virtual work 1, linear 3, the projections 11 and 8.
+        // In hundredths of the force: johnson 1, palmgren by virtual work 1, linear 3, the projections 11 and 8.
         let expected = match (way["compatibility"].as_str().unwrap(), way["law"].as_str().unwrap()) {
             ("virtual_work", "linear") => 0.03,
             ("virtual_work", _) => 0.01,
@@ -115,10 +115,10 @@ async fn omits_model_error_beyond_calculated_drives() {
     let service = Service::new();
     let case_5_2: Value = serde_json::from_str(include_str!("../../examples/paper-5.2.json")).unwrap();
     let entering = with(&case_5_2, "/model", json!({}));
-    // Narrower, so that its fingers are stiff enough.
+    // A smaller width makes its fingers stiff enough.
     let narrow = with(&with(&case_5_2, "/drive/teeth/width_mm", json!(5.0)), "/load/input_torque_nm", json!(1.0));
     let pressed = with(&narrow, "/model", json!({ "corner_contact": true }));
-    // Fingers that are held at one end take 13 % off case 5.1's largest force.
+    // Fingers held at one end reduce case 5.1's largest force by 13 %.
     let case_5_1 = with(&spelled_out(), "/model", json!({}));
     let slender = with(&case_5_1, "/parts", json!({ "carrier": { "fingers": "held_at_one_end" } }));
     for (document, expected) in [(entering, None), (pressed, Some(0.04)), (case_5_1, Some(0.01)), (slender, None)] {

@@ -284,7 +284,7 @@ pub(crate) fn endless(number: u16) -> Question {
 
 /// Asks the listener at `address` and blocks this thread for the answer.
 pub(crate) fn ask_at(address: SocketAddr, question: &Question) -> Answer {
-    // Far beyond any answer: so that a service that hangs fails the test instead of hanging it too.
+    // Longer than any answer takes, so that a hanging service fails the test.
     const PATIENCE: Duration = Duration::from_secs(300);
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -309,7 +309,7 @@ pub(crate) fn answer_on(mut stream: TcpStream) -> Answer {
     let body = bytes[end + 4..].to_vec();
     let body = if headers.get("transfer-encoding").is_some() { unchunked(&body) } else { body };
     let announced = headers.get("content-length").map(|length| length.to_str().unwrap().parse::<usize>().unwrap());
-    // The answer to HEAD announces a body that does not come.
+    // A response to HEAD states a length but has no body.
     assert!(body.is_empty() || announced.is_none_or(|length| length == body.len()), "the whole body has arrived");
     Answer { status, headers, body }
 }

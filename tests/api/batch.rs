@@ -59,7 +59,7 @@ async fn answers_keep_order_of_a_thousand_documents() {
     let first = found[0]["answer"]["peaks"]["ring"]["force_n"]["value"].as_f64().unwrap();
     for (index, line) in found.iter().enumerate() {
         assert_eq!(line["index"], index);
-        // Forces go with the torque.
+        // Forces are proportional to the torque.
         let force_n = line["answer"]["peaks"]["ring"]["force_n"]["value"].as_f64().unwrap();
         assert!((force_n / first / ((20.0 + index as f64) / 20.0) - 1.0).abs() < 1e-12, "{index}");
     }
@@ -215,7 +215,7 @@ fn batch_behind_proxy_is_read_first() {
         send(&mut stream, &format!("{}\n", variant(index)));
     }
     stream.set_nonblocking(true).unwrap();
-    // Other requests are answered meanwhile, so that its answer could have begun.
+    // The service answers other requests meanwhile, so the batch's answer could have begun.
     assert_eq!(ask_at(service.address(), &Question::post("/v1/sweep", variant(7).to_string())).status, 200);
     assert!(stream.read(&mut [0; 1]).is_err(), "no byte of the answer before the end of the batch");
     stream.set_nonblocking(false).unwrap();

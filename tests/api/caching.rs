@@ -287,10 +287,10 @@ fn equal_requests_are_computed_once() {
 fn equal_requests_take_one_queue_place() {
     let service = Service::within(Limits { max_concurrent_solves: 1, ..ENDLESS });
     let occupied = service.occupied_by(1);
-    // Thirty-two may wait, and these are more.
+    // The queue holds 32 requests, and these are more.
     let mut equal = equal_requests(&service, 50);
     service.until("toothwave_solves_queued", 1.0);
-    // The first one leaves; its computation is the others' too.
+    // The first client leaves, but the others share its computation.
     drop(equal.remove(0));
     drop(occupied);
     let answers: Vec<_> = equal.into_iter().map(answer_on).collect();

@@ -18,7 +18,7 @@ fn run(arguments: &[&str], input: &[u8]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_toothwave"));
     let command = command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
-    // A process that does not read its input has closed it, and that is its right.
+    // A process may close its input without reading it.
     let _ = child.stdin.take().unwrap().write_all(input);
     child.wait_with_output().unwrap()
 }
@@ -157,7 +157,7 @@ async fn bad_input_exits_2_with_details_of_service() {
             let output = run(&["sweep", "-", "--format", format], document.as_bytes());
             assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0), "{document}");
             let errors: Vec<_> = problem["errors"].as_array().into_iter().flatten().collect();
-            // Of several errors the service's detail is but their number.
+            // If there are several errors, the service's detail is only their number.
             let detail = problem[if errors.len() > 1 { "title" } else { "detail" }].as_str().unwrap();
             assert!(stderr(&output).contains(detail), "{problem} is not\n{}", stderr(&output));
             assert!(!stderr(&output).contains("`errors`"), "{}", stderr(&output));
@@ -253,7 +253,7 @@ fn health_succeeds_for_running_service() {
     let process = Process::started(&["serve"]);
     let output = run(&["health", "--address", &process.address.to_string()], b"");
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    // What listens everywhere is asked here, and what is said by a variable need not be said again.
+    // A wildcard address is asked on this host, and the environment variable sets the address too.
     let everywhere = format!("0.0.0.0:{}", process.address.port());
     let mut command = Command::new(env!("CARGO_BIN_EXE_toothwave"));
     assert!(command.arg("health").env("TOOTHWAVE_LISTEN", everywhere).status().unwrap().success());
@@ -269,7 +269,7 @@ fn health_fails_without_toothwave_service() {
     let address = other.local_addr().unwrap().to_string();
     let answering = std::thread::spawn(move || {
         let (mut stream, _) = other.accept().unwrap();
-        // The asker may be gone before it has heard everything.
+        // The client may close before it has read everything.
         let _ = stream.write_all(b"HTTP/1.1 503 Service Unavailable\r\n\r\n");
     });
     assert!(!run(&["health", "--address", &address], b"").status.success());

@@ -25,7 +25,8 @@ fn codes(answer: &Value) -> Vec<&str> {
 
 #[tokio::test]
 async fn ring_gaps_raise_peak_and_unload_teeth() {
-    // Two independent calculations; the means are over a finer sweep than 50 intervals, where a tooth on the minor axis counts for none.
+    // Known from two independent calculations. The mean needs a sweep finer than 50 intervals, because a tooth on the
+    // minor axis counts as unloaded.
     let known = [(0.0, 1395.05, 7.00), (5.0, 1640.15, 5.31), (10.0, 1837.15, 4.60), (20.0, 2169.7, 3.89)];
     for (ring_um, peak_n, loaded) in known {
         let document = with(&palmgren(ring_um), "/sweep", json!({ "samples": 2000, "wind_up": true }));
@@ -156,7 +157,7 @@ async fn reports_capacity_within_johnsons_law() {
         let stress_mpa = there["peaks"]["wave_generator"]["stress_mpa"]["value"].as_f64().unwrap();
         assert!((stress_mpa / 541.5 - 1.0).abs() < tolerance, "{torque_nm} N·m, {stress_mpa} MPa");
     }
-    // Where the law ends before any stress is reached there is no capacity, and the refusal says that it is about that, and under which torque.
+    // If the law ends before a contact reaches its stress, the refusal names the stress and the torque at that end.
     let sweep = json!({ "samples": 7 });
     let beyond = soft(json!({ "input_torque_nm": 0.01, "allowable_stress_mpa": 700.0 }), &sweep);
     let problem = service.post("/v1/sweep", &beyond).await.refused(422, "impossible_design");
@@ -183,7 +184,7 @@ async fn rejects_clearance_that_projection_turns_into_load() {
     let problem = refused.refused(422, "impossible_design");
     assert_eq!(problem["errors"][0]["pointer"], "/parts/carrier/clearance_um");
     assert_eq!(problem["errors"][0]["code"], "clearance_not_monotone");
-    // With fewer ring teeth it weighs the same gap positively, and virtual work weighs every gap so.
+    // Projection weighs the gap positively with fewer ring teeth, and virtual work always does.
     Service::new().post("/v1/sweep", &gap(&spelled_out(), "projection")).await.found();
     Service::new().post("/v1/sweep", &gap(&more_ring_teeth, "virtual_work")).await.found();
 }
@@ -208,7 +209,7 @@ async fn tolerance_sweep_has_both_sides_of_jump() {
     let document: Value = serde_json::from_str(include_str!("../../examples/paper-5.2.json")).unwrap();
     let answer =
         Service::new().post("/v1/sweep", &with(&document, "/sweep", json!({ "tolerance": 1e-9 }))).await.found();
-    // 40 digits of it are in tests/reference/extremes.json: it stands just before a tooth enters.
+    // The peak is just before a tooth enters. tests/reference/extremes.json has 40 digits of it.
     let peak = &answer["peaks"]["wave_generator"]["force_n"];
     assert!((peak["value"].as_f64().unwrap() - 525.554_176_523).abs() < 1e-6, "{peak}");
     let entry_deg = peak["input_angle_deg"].as_f64().unwrap();
@@ -245,23 +246,23 @@ async fn sweep_reports_model_error_and_its_range() {
         "has_pointed_tips": false
     });
     assert_eq!(stiff["measured"]["case"], case);
-    // The paper's model errs by more, where a gap is given by far more.
+    // The paper's model has a larger error, with a gap a far larger one.
     let paper = told(&spelled_out()).await;
     assert_eq!(paper["measured"]["force"], json!({ "low": 0.01, "high": 0.08 }));
     let gap = told(&with(&spelled_out(), "/parts", json!({ "ring": { "clearance_um": 12.0 } }))).await;
     assert_eq!(gap["measured"]["case"]["has_gaps"], true);
     assert!(gap["measured"]["force"]["high"].as_f64().unwrap() > 0.5);
-    // What was measured of another law than Johnson's is that of three drives.
+    // Laws other than Johnson's were measured on three drives only.
     assert_eq!((&paper["is_within"], &paper["beyond"]), (&json!(false), &json!(["law"])));
     assert_eq!((&gap["is_within"], &gap["beyond"]), (&json!(false), &json!(["law", "gap"])));
     let pointed = told(&undercut()).await;
     assert_eq!(pointed["measured"]["case"]["has_pointed_tips"], true);
     assert_eq!(pointed["measured"]["case"]["ring_teeth_bend"], true);
     assert_eq!(pointed["measured"]["force"], json!({ "low": -0.01, "high": 0.0 }));
-    // Its carrier's fingers are a millimetre and a half high; the elastic bodies had none.
+    // The carrier's fingers are 1.5 mm high, and the elastic bodies had none.
     assert_eq!(pointed["beyond"], json!(["entry_under_load", "soft_backing"]));
     assert_eq!(pointed["held"]["case"], "slender_fingers");
-    // Where its slots run into each other there is no finger to estimate.
+    // If slots run into each other, there is no finger to estimate.
     let thick = with(&shortest(), "/drive/teeth/radius_mm", json!(6.7));
     let open = with(&thick, "/parts", json!({ "carrier": { "inner_radius_mm": 58.5, "outer_radius_mm": 61.0 } }));
     assert_eq!(told(&open).await["beyond"], json!(["soft_backing"]));
@@ -299,7 +300,7 @@ async fn default_refinements_follow_from_tips_and_gaps() {
     assert_ne!(solved(&pointed, json!({}), 0.0).await.0, solved(&pointed, listed(json!("none")), 0.0).await.0);
     let moves = json!(["wave_generator_moves"]);
     assert_ne!(solved(&natural, listed(moves), 10.0).await.0, solved(&natural, json!({}), 10.0).await.0);
-    // Who never asked for it is told how to do without.
+    // The default refinement's refusal says how to turn it off.
     let wide =
         |choice: Value| with(&with(&bored(), "/model", choice), "/parts", json!({ "ring": { "clearance_um": 300.0 } }));
     let problem = service.post("/v1/sweep", &wide(json!({}))).await.refused(422, "impossible_design");

@@ -51,7 +51,7 @@ fn numbers(column: &Value) -> Vec<f64> {
 async fn deviations_list_all_zones_by_slot() {
     let nominal = swept(&cleared()).await;
     assert!(nominal.get("sweep_period_deg").is_none() && nominal["states"].get("lobe").is_none());
-    // Load periods: one for the cam, as many as slots or ring spaces with it, half of them without (docs/theory.md section 4.8).
+    // Load periods: one for the cam; with it as many as slots or ring spaces, else half (docs/theory.md section 4.8).
     for (deviations, periods) in [
         (json!({ "wave_generator_runout": { "amount_um": 2.0 } }), 1.0),
         (json!({ "slot_wall_um": one(28, 5, 1.0) }), 14.0),
@@ -67,7 +67,7 @@ async fn deviations_list_all_zones_by_slot() {
         let angles = numbers(&states["input_angle_deg"]);
         assert_eq!(angles.last(), answer["sweep_period_deg"].as_f64().as_ref());
         assert_eq!(numbers(&answer["wind_up"]["input_angle_deg"]).len() as f64, 4.0 * periods + 1.0);
-        // Seven teeth of either zone.
+        // Each zone has seven teeth.
         assert_eq!(angles.iter().filter(|&&angle| angle == 0.0).count(), 14);
         assert!(numbers(&states["tooth"]).iter().all(|&slot| slot < 28.0));
         let lobes = numbers(&states["lobe"]);
@@ -81,7 +81,7 @@ async fn deviations_list_all_zones_by_slot() {
         let error_deg = answer["wind_up"]["unloaded_transmission_error_peak_to_peak_deg"].as_f64().unwrap();
         assert!((14.0 * error_deg / range(&unloaded) - 1.0).abs() < 1e-12);
         assert!(answer["checks"]["period_closure_residual"].as_f64().unwrap() < 1e-11);
-        // Unlike lobes no longer balance each other.
+        // Unlike lobes do not balance each other.
         let aside = numbers(&answer["radial_force_n"]["value"]);
         assert!(aside.iter().any(|&force_n| force_n > 0.1), "{deviations}");
     }
@@ -110,7 +110,7 @@ async fn geometry_has_ratios_for_each_fixed_member() {
 
 #[tokio::test]
 async fn each_deviation_changes_an_answer() {
-    // One interval of each of the 364 load periods is enough to see it.
+    // One interval in each of the 364 load periods shows the difference.
     let document = with(&with_deviations(every_kind()), "/sweep/samples", json!(1));
     let found = async |document: &Value| {
         let answer = swept(document).await;
@@ -191,7 +191,7 @@ async fn reports_misfit_list_and_entries_at_their_places() {
             ("/load/input_torque_nm", "out_of_range", 0.0, 1e-12),
         ]
     );
-    // Whoever reads no deviations is not bothered by them.
+    // Geometry does not read deviations.
     Service::new().post("/v1/geometry", &document).await.found();
 }
 
@@ -200,7 +200,7 @@ async fn reports_first_hundred_of_many_bad_entries() {
     let document = with_deviations(json!({ "wave_generator_lobe_um": vec![2e6; 5000] }));
     for path in ["/v1/sweep", "/v1/accuracy"] {
         let problem = Service::new().post(path, &document).await.refused(422, "impossible_design");
-        // Each of them, and that there are two lobes.
+        // All entries are out of range, and the list is too long for two lobes.
         assert_eq!(problem["detail"], "5001 values are impossible; `errors` names the first 100", "{path}");
         assert_eq!(problem["errors"].as_array().unwrap().len(), 100, "{path}");
     }
@@ -244,7 +244,7 @@ async fn reports_interference_with_slot_lobe_and_input_angle() {
 
 #[tokio::test]
 async fn deviation_sweep_keeps_limit_on_states() {
-    // Some 14 teeth at each of 364 times 4 input angles.
+    // About 14 teeth at each of 364 times 4 input angles.
     let document = with_deviations(every_kind());
     let service = Service::within(Limits { max_states: 10_000, ..LIMITS });
     let problem = service.post("/v1/sweep", &document).await.refused(422, "too_many_states");
@@ -266,7 +266,7 @@ async fn accuracy_includes_deviations() {
     // At least twelve teeth of both zones at eleven input angles.
     let coarsest = ways.iter().find(|way| way["samples"] == 10).unwrap();
     assert!(coarsest["states"].as_u64().unwrap() >= 11 * 12, "{coarsest}");
-    // `projection` does not take them.
+    // `projection` does not support deviations.
     let unavailable = answer["unavailable"].as_array().unwrap();
     assert!(unavailable.iter().all(|model| model["compatibility"] == "projection"), "{unavailable:?}");
     assert!(!unavailable.is_empty());
@@ -277,7 +277,7 @@ async fn only_equal_deviations_share_a_key() {
     let key = async |document: &Value| Service::new().post("/v1/sweep", document).await.etag().to_owned();
     let own = key(&with_deviations(json!({ "wave_generator_lobe_um": [0.0, 1.0] }))).await;
     assert_eq!(own, key(&with_deviations(json!({ "wave_generator_lobe_um": [-0.0, 1], "slot_wall_um": [] }))).await);
-    // An entry that wanders from one list into the next would leave the same numbers in a row.
+    // An entry moved to the next list would leave the same sequence of numbers.
     let lists = [
         json!({ "wave_generator_lobe_um": [1.0, 0.0] }),
         json!({ "wave_generator_runout": { "angle_deg": 1.0 } }),
@@ -355,7 +355,7 @@ async fn plot_with_deviations_shows_largest_tooth_load() {
     assert!(places.len() * 10 < stated, "{} places of {stated} states", places.len());
     let question = Question::post("/v1/sweep", document.to_string()).with("accept", "image/svg+xml");
     assert_eq!(points_of_curves(Service::new().ask(&question).await.text()), [places.len(); 6]);
-    // Swept to a tolerance the teeth come by at places of their own: as many stretches of the pass.
+    // In a tolerance sweep teeth have different positions, so the curve divides the pass into intervals.
     let document = with(&with(&document, "/sweep", json!({ "tolerance": 1e-3 })), "/load/input_torque_nm", json!(5.0));
     let question = Question::post("/v1/sweep", document.to_string()).with("accept", "image/svg+xml");
     let curves = points_of_curves(Service::new().ask(&question).await.text());
@@ -376,7 +376,7 @@ async fn plot_curve_of_unlike_zones_ends_at_jumps() {
     assert_eq!(found["enters_under_load"], true);
     let question = Question::post("/v1/sweep", unlike.to_string()).with("accept", "image/svg+xml");
     let curves = points_of_curves(Service::new().ask(&question).await.text());
-    // As many teeth come after a tooth while it meshes, at each of which it jumps.
+    // Each tooth that enters while another one meshes adds a jump to its curve.
     let jumps = usize::try_from(found["teeth_in_mesh_per_zone"]["min"].as_u64().unwrap()).unwrap();
     assert_eq!(curves.iter().filter(|points| **points > 5).count(), 6 * (jumps + 1), "{curves:?}");
 }

@@ -63,7 +63,7 @@ fn defaults() -> Vec<(&'static str, Value)> {
 #[tokio::test]
 async fn each_omitted_field_means_its_default() {
     let document = defaults_spelled_out();
-    // A law that is left out is one that no name stands for: what holds best for the drive at hand.
+    // No name stands for an omitted law: the drive decides.
     let fields = defaults().into_iter().map(|(pointer, _)| pointer).filter(|&pointer| pointer != "/model/stiffness");
     let shortened = fields.map(|pointer| without(&document, pointer).to_string());
     assert_all_same(&document, shortened).await;
@@ -287,7 +287,7 @@ async fn rejects_array_in_place_of_object() {
     let service = Service::new();
     for document in [spelled_out(), every_number()] {
         for pointer in pointers(&document, Value::is_object) {
-            // The values of the object's fields in order, which a lenient reader would take for it.
+            // The values of the object's fields in order. A lenient reader would accept them.
             let fields = document.pointer(&pointer).unwrap().as_object().unwrap();
             for array in [json!([]), fields.values().cloned().collect::<Value>()] {
                 for path in ENDPOINTS {
@@ -566,7 +566,7 @@ async fn rejects_text_that_is_not_utf_8() {
 #[tokio::test]
 async fn syntax_error_outranks_earlier_faults() {
     let service = Service::new();
-    // Each would be the first structural fault of a document; but there is no document.
+    // Each text has a structural fault before its syntax error.
     for text in [
         "{\"colour\": 1, ",
         "{\"drive\": 1e999, ",

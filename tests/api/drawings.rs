@@ -149,7 +149,7 @@ async fn step_at_ten_nanometres_is_small() {
     });
     let (of_10_nm, of_1_nm) = (of_10_nm.await, of_1_nm.await);
     let polynomials = |text: &str| text.matches("=B_SPLINE_CURVE_WITH_KNOTS(").count();
-    // Each stands twice, below and above.
+    // Each edge appears twice, at the bottom and at the top.
     assert_eq!(polynomials(&of_10_nm), 2 * 5 * 26);
     assert!(of_10_nm.len() < 240_000, "{} bytes", of_10_nm.len());
     assert!(polynomials(&of_1_nm) < 2 * 8 * 26, "{}", polynomials(&of_1_nm));

@@ -203,7 +203,7 @@ async fn sweep_states_both_torques_and_entry_under_load() {
         let input_nm = design["load"]["input_torque_nm"].as_f64().unwrap();
         assert_eq!(sweep["load"], json!({ "input_torque_nm": input_nm, "output_torque_nm": input_nm * ratio }));
         assert_eq!(sweep["enters_under_load"], enters_under_load, "{example}");
-        // Given at the other shaft it is the same load.
+        // The same load may be given at the other shaft.
         let turned = with(&design, "/load", json!({ "output_torque_nm": input_nm * ratio }));
         assert_eq!(service.post("/v1/sweep", &turned).await.json()["load"], sweep["load"]);
     }
@@ -219,7 +219,7 @@ async fn geometry_states_holding_wall_and_slot_wall() {
     let backward = carrier(&service.post("/v1/geometry", &without(&against, "/drive/ring/tip_radius_mm")).await.json());
     assert_eq!((&forward["loaded_wall"], &backward["loaded_wall"]), (&json!("leading"), &json!("trailing")));
     assert_eq!(forward["finger"]["corners"]["x_mm"].as_array().unwrap().len(), 4);
-    // Slots that run into each other leave a pointed finger, wider ones none.
+    // Slots that run into each other leave a pointed finger, and wider slots none.
     let of_radius = |radius_mm: f64| {
         with(&without(&design, "/drive/ring/tip_radius_mm"), "/drive/teeth/radius_mm", json!(radius_mm))
     };

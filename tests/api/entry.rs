@@ -48,7 +48,7 @@ async fn keys_guard_all_but_health_and_page() {
     let (key, line) = new_key("a team");
     let file = KeysFile::of(&line);
     let service = Service::with(LIMITS, &["--keys-file", file.path()]);
-    // The page asks for the key itself; it holds nothing secret.
+    // The page asks for the key itself and holds nothing secret.
     for path in ["/health/live", "/health/ready", "/", "/page/main.js"] {
         assert_eq!(service.get(path).await.status, 200);
     }
@@ -63,7 +63,7 @@ async fn keys_guard_all_but_health_and_page() {
         let open = service.ask(&question.with("authorization", &format!("bearer {key}"))).await;
         assert_eq!(open.status, 200);
     }
-    // Nor does it tell strangers what stands where.
+    // An unauthorized client cannot learn which paths exist.
     for path in ["/nowhere", "/page", "/pages/main.js"] {
         service.get(path).await.refused(401, "unauthorized");
     }
@@ -131,7 +131,7 @@ fn local_service_rejects_foreign_host_names() {
         assert_eq!(status(&format!("host: {host}\r\n")).0, "200", "{host}");
     }
     let strangers = ["rebound.example", "localhost.example:8080", "10.0.0.1", "127.0.0.1.example", ""];
-    // None of these is a name.
+    // None of these is a valid name.
     let malformed =
         ["[::1]rebound.example", "rebound.example@127.0.0.1", "127.0.0.1:x", "localhost\r\nhost: rebound.example"];
     for host in strangers.into_iter().chain(malformed) {

@@ -18,7 +18,7 @@ async fn every_material_has_source_and_fits_a_document() {
     assert!(materials.len() >= 4);
     for material in materials {
         assert!(material["elasticity_source"].as_str().unwrap().len() > 20);
-        // A stress stands beside its source or not at all.
+        // A stress always has its source.
         assert_eq!(material.get("allowable_stress_mpa").is_some(), material.get("allowable_stress_source").is_some());
         let elastic = json!({
             "youngs_modulus_gpa": material["youngs_modulus_gpa"], "poissons_ratio": material["poissons_ratio"]

@@ -91,7 +91,7 @@ async fn bore_inside_natural_tip_has_no_effect() {
         let mut with_bore = service.post(path, &document).await.found();
         let mut without = service.post(path, &spelled_out()).await.found();
         assert_ne!(with_bore["findings"], without["findings"]);
-        // The hash is one of what was asked.
+        // The hash depends on the document.
         for field in ["findings", "design_hash"] {
             with_bore.as_object_mut().unwrap().remove(field);
             without.as_object_mut().unwrap().remove(field);
@@ -172,7 +172,7 @@ fn overloaded() -> Value {
 async fn stress_above_fatigue_limit_warns_for_each_contact() {
     let found = Service::new().post("/v1/sweep", &overloaded()).await.found();
     let mut findings = findings(&overloaded()).await;
-    // So heavy a load also winds the drive up beyond what the model holds for.
+    // This load also gives a wind-up beyond the model.
     findings.retain(|finding| finding["code"] != "wind_up_beyond_model");
     assert_eq!(findings.len(), 3, "{findings:?}");
     for (finding, contact) in findings.iter().zip(["wave_generator", "ring", "carrier"]) {
@@ -264,8 +264,8 @@ async fn drawn_carrier_losing_teeth_warns_for_each_edge() {
 
 #[tokio::test]
 async fn tooth_leaving_slot_unloaded_is_information() {
-    // Case 5.2 as it is by default. Centres start at b + r = 50.8 mm, where the undercut flank is long past; the carrier starts a tenth
-    // of the annulus outside the cam.
+    // Case 5.2 by default: centres start at b + r = 50.8 mm, far past the undercut flank. The carrier starts a tenth of
+    // the annulus outside the cam.
     let found = Service::new().post("/v1/geometry", &undercut()).await.found();
     let inner_mm = 50.7 + 0.1 * (found["ring"]["tip_radius_mm"].as_f64().unwrap() - 50.7);
     let findings = findings_of_parts(&undercut()).await;
@@ -300,7 +300,7 @@ fn cleared(clearance_um: f64) -> Value {
 
 #[tokio::test]
 async fn clearance_that_undercuts_ring_states_critical_distance() {
-    // The path of the centres has at its tip the curvature radius that the flank may be away from it.
+    // At the tip, the path of centres has the critical distance as its radius of curvature.
     let (a, b, r, k) = (58.0_f64, 56.0_f64, 5.0_f64, 13.0_f64);
     let critical_mm = (b + r) / (k * k * (a * a - b * b) / (a * a + b * r) - 1.0);
     let codes = async |clearance_um: f64| codes_of(&findings_of_parts(&cleared(clearance_um)).await);
@@ -357,7 +357,7 @@ async fn uncertain_efficiency_is_information_with_its_error() {
     let losses = &found["losses"];
     let share = 1.0 / losses["efficiency"]["ring_fixed"].as_f64().unwrap() - 1.0;
     let finding = finding(&rubbing(0.03), "efficiency_uncertain").await;
-    // On a plain cam ten times the coefficient of what is lost over what comes out.
+    // Plain cam: ten times the coefficient of the losses over the output.
     assert_numbers(&finding, 10.0 * 0.03 * share, 0.05, "");
     assert_numbers(&finding, losses["efficiency_error"].as_f64().unwrap(), 0.05, "");
     assert_eq!(finding["severity"], "info");
@@ -394,7 +394,7 @@ async fn bearing_above_half_rating_is_a_warning() {
     assert_numbers(&overloaded, load_n, 0.999_999_5 * load_n, "N");
     assert_eq!(overloaded["severity"], "warning");
     assert!(!codes_of(&findings(&on_a_bearing(2.000_001 * load_n, &single(2.0))).await).contains(&CODE.to_owned()));
-    // A duty whose mean load is below half the rating, and one of whose points is not.
+    // The duty's mean load is below half the rating, but one point is above.
     let point = |torque_nm: f64, share: f64| json!({ "input_torque_nm": torque_nm, "input_speed_rpm": 1500.0, "share_of_time": share });
     let duty = on_a_bearing(1.9 * load_n, &json!({ "duty": [point(0.2, 0.9), point(2.0, 0.1)] }));
     let mean_n = bearing(&Service::new().post("/v1/sweep", &duty).await.found())["mean_load_n"].as_f64().unwrap();
@@ -422,13 +422,13 @@ async fn stress_above_allowable_warns_for_each_contact() {
     assert_eq!(finding["severity"], "warning");
     assert!(finding["pointers"].as_array().unwrap().contains(&json!("/materials/ring")));
     assert_eq!(exceeded(json!(1.0)).await.len(), 3);
-    // The fatigue limit has a finding of its own, which says the same.
+    // The finding of the fatigue limit covers this one.
     let codes = codes_of(&findings(&with(&overloaded(), "/load/allowable_stress_mpa", json!(1500.0))).await);
     assert!(
         !codes.contains(&"stress_above_allowable".to_owned())
             && codes.contains(&"stress_above_fatigue_limit".to_owned())
     );
-    // What a contact bears with a hair to spare, it may: with a stress to reach the sweep goes state by state, and rounds otherwise.
+    // A margin of 1e-12 covers rounding: with an allowable stress the sweep goes state by state.
     let hair = 1.0 + 1e-12;
     let just = json!({ "wave_generator": hair * peak("wave_generator"), "ring": hair * peak("ring"), "carrier": hair * peak("carrier") });
     assert!(exceeded(just).await.is_empty());
@@ -483,12 +483,12 @@ async fn slender_fingers_and_soft_rim_state_estimated_share() {
         let found = finding(&document, code).await;
         assert_numbers(&found, estimate["share"].as_f64().unwrap(), 0.2, "");
         assert_eq!(found["severity"], "warning");
-        // Taken over into the design it is in the forces, and no longer left out.
+        // A compliance copied into the design is part of the forces.
         let series = json!({ contact: estimate["compliance_mm_per_n"] });
         let taken = with(&document, "/model", json!({ "series_compliance_mm_per_n": series }));
         assert!(!codes_of(&findings(&taken).await).contains(&code.to_owned()));
     }
-    // Held at both ends, those of case 5.2 are slender still; those of case 5.1 are not.
+    // With both ends held, the fingers of case 5.2 are still slender and those of case 5.1 are not.
     assert_eq!(finding(&undercut(), "slender_fingers").await["severity"], "info");
     for parts in [json!({}), json!({ "carrier": { "fingers": "held_at_both_ends" }, "ring": { "rim": "housed" } })] {
         assert!(findings(&held(parts)).await.is_empty());
@@ -508,12 +508,12 @@ async fn contact_beyond_groove_warns_at_each_groove() {
     let document = grooved(3.001);
     let peaks = Service::new().post("/v1/sweep", &document).await.found()["peaks"].clone();
     let half_length_mm = |contact: &str| peaks[contact]["half_length_mm"].as_f64().unwrap();
-    // The edges of a groove that is t deep: a chord of its circle.
+    // Width at the edges of a groove of depth t: a chord of its circle.
     let (groove_mm, depth_mm) = (3.001_f64, 1.5_f64);
     let edge_mm = (groove_mm * groove_mm - (groove_mm - depth_mm) * (groove_mm - depth_mm)).sqrt();
     let mut told = findings(&document).await;
     told.retain(|finding| finding["code"] == "contact_beyond_groove");
-    // The slots hold a ball as closely, but with less force.
+    // The slots hold a ball as closely, but with a smaller force.
     assert!(half_length_mm("carrier") < edge_mm && told.len() == 2, "{told:?}");
     for (finding, contact) in told.iter().zip(["wave_generator", "ring"]) {
         assert_numbers(finding, half_length_mm(contact), edge_mm, "mm");

@@ -59,7 +59,7 @@ async fn case_5_1_loses_known_shares_of_power() {
     let on_race = swept(&case_5_1(on_bearing("race"))).await["losses"].clone();
     assert!((float(&on_race["efficiency"]["ring_fixed"]) - 0.874).abs() < 5e-4, "{}", on_race["efficiency"]);
     assert_eq!(on_race["self_locking"]["ring_fixed"], json!(false));
-    // A race that does not rub flatters.
+    // Without a rubbing race the estimate is too favourable.
     let rolling = swept(&case_5_1(on_bearing("rolling"))).await["losses"].clone();
     assert!(float(&rolling["efficiency"]["ring_fixed"]) > float(&on_race["efficiency"]["ring_fixed"]));
     assert_eq!(rolling["loss_ratio_by_place"]["wave_generator"], json!(0.0));
@@ -76,13 +76,13 @@ async fn input_power_equals_output_power_plus_losses() {
         let lost_w = float(&losses["power_loss_w"]);
         assert_near(in_w, out_w + lost_w, 1e-12, "power in");
         assert_near(float(&losses["efficiency"]["ring_fixed"]), out_w / in_w, 1e-12, "efficiency");
-        // From behind, the power at the output is that of the output's torque and speed.
+        // If back-driven, the input power is that of output torque and speed.
         assert_near(float(&losses["efficiency"]["ring_fixed_back_driven"]) * out_w, out_w - lost_w, 1e-11, "behind");
         for (whole, places) in [("loss_ratio", "loss_ratio_by_place"), ("power_loss_w", "power_loss_by_place_w")] {
             let sum: f64 = losses[places].as_object().unwrap().values().map(float).sum();
             assert_near(sum, float(&losses[whole]), 1e-12, whole);
         }
-        // The same flanks at the same slips, whichever member stands still: 26 ring teeth, 28 of the carrier, two lobes.
+        // Flanks and slips are the same for any fixed member: 26 ring teeth, 28 of the carrier, two lobes.
         let ratio = float(&losses["loss_ratio"]);
         for (fixed, share) in [("ring", 26.0 / 28.0), ("carrier", 1.0), ("wave_generator", 2.0 / 28.0)] {
             let driven = float(&losses["efficiency"][format!("{fixed}_fixed")]);
@@ -119,7 +119,7 @@ async fn losses_are_friction_times_slips_of_states() {
             if kind == "plain" {
                 assert_near(ratio, lost_nmm / 20e3, 1e-12, "loss ratio");
             } else {
-                // The bearing takes the rest.
+                // The rest is lost in the bearing.
                 assert!(ratio > lost_nmm / 20e3 && ratio < 2.0 * lost_nmm / 20e3, "{ratio} {lost_nmm}");
             }
             let driven = float(&losses["by_input_angle"]["efficiency"]["ring_fixed"][at]);
@@ -132,7 +132,7 @@ async fn losses_are_friction_times_slips_of_states() {
 async fn pressure_times_velocity_has_maximum_and_place() {
     let found = swept(&case_5_1(plain())).await;
     let (states, losses) = (&found["states"], &found["losses"]);
-    // Wave generator against carrier, the ring fixed.
+    // Speed of the wave generator against the carrier, with the ring fixed.
     let turning_rad_per_s = 1500.0 * PI / 30.0 * 26.0 / 28.0;
     for contact in CONTACTS {
         let stresses = floats(&states[format!("stress_{contact}_mpa")]);
@@ -149,7 +149,7 @@ async fn pressure_times_velocity_has_maximum_and_place() {
             .unwrap();
         assert_near(values[at], most, 1e-12, contact);
     }
-    // Twice as fast is twice as much.
+    // Double speed gives double values.
     let faster = swept(&with(&case_5_1(plain()), "/load/input_speed_rpm", json!(3000.0))).await["losses"].clone();
     let at_ring = |losses: &Value| float(&losses["pressure_velocity_mpa_m_per_s"]["ring"]["value"]);
     assert_near(at_ring(&faster), 2.0 * at_ring(losses), 1e-14, "p·v");
@@ -170,7 +170,7 @@ async fn omitted_friction_computes_nothing() {
     for of_speed in ["power_loss_w", "power_loss_by_place_w", "pressure_velocity_mpa_m_per_s"] {
         assert!(with_friction["losses"].get(of_speed).is_none(), "{of_speed}");
     }
-    // Normal forces and the torque at the input stay those without friction.
+    // Normal forces and input torque stay those without friction.
     for field in ["states", "peaks", "load", "checks"] {
         assert_eq!(frictionless[field].take(), with_friction[field], "{field}");
     }
@@ -204,7 +204,7 @@ async fn each_impossible_friction_is_reported_at_its_field() {
     ]
     .map(|(pointer, limit)| (pointer.to_owned(), limit));
     assert_eq!(errors(case_5_1(wrong("race"))).await, expected);
-    // With those of the load and the drive at once.
+    // All faults are reported together with those of load and drive.
     let document = with(&case_5_1(wrong("rolling")), "/load/input_speed_rpm", json!(0.0));
     let document = with(&document, "/drive/teeth/radius_mm", json!(-5.0));
     let found = errors(document).await;
@@ -304,7 +304,7 @@ async fn eccentric_radial_force_is_torque_over_eccentricity() {
             assert_near(value * direction_deg.to_radians().sin(), -5e3 / 1.2, 1e-9, "across");
         }
     }
-    // Two lobes that are loaded alike balance each other.
+    // Two equally loaded lobes balance each other.
     assert!(swept(&shortest()).await.get("radial_force_n").is_none());
 }
 
@@ -339,7 +339,7 @@ fn worn(friction: Value) -> Value {
 async fn wear_is_depth_per_hour_with_place() {
     let found = swept(&worn(plain())).await;
     let wear = found["losses"]["wear_mm_per_hour"].clone();
-    // 120 passes an hour of a slot at one turn a minute: at 1500 turns, a cam against the carrier of 26/28 of that.
+    // A slot has 120 passes an hour at one turn a minute; here 1500 turns, and 26/28 of that against the carrier.
     let (states, slips) = (&found["states"], &found["losses"]["slip_mm_per_rad"]["carrier"]);
     let at = (0..states["tooth"].as_array().unwrap().len())
         .find(|&state| {
@@ -348,7 +348,8 @@ async fn wear_is_depth_per_hour_with_place() {
         })
         .unwrap();
     let force_n = float(&states["force_carrier_n"][at]);
-    // How far the slot's wall slips under the tooth for each mm that the tooth advances along it, d tan γ a radian: d times the slope of the path.
+    // Slip of the slot's wall per mm of the tooth's advance along it. The advance is d tan γ a radian: d times
+    // the path's slope.
     let d_mm = float(&states["center_radius_mm"][at]);
     let k = 13.0;
     let tan_ring = float(&states["force_carrier_n"][at]) / float(&states["force_ring_n"][at]);
@@ -358,7 +359,7 @@ async fn wear_is_depth_per_hour_with_place() {
     let slip = float(&slips[at]).abs() / (d_mm * tan_cam);
     let expected = 3e-6 * 1e-3 * force_n / 15.0 * slip * 120.0 * 1500.0 * 26.0 / 28.0;
     assert_near(float(&wear["carrier"]["value"]), expected, 1e-9, "slot");
-    // Twice the rate, twice the depth; no speed, no hour.
+    // Double rate gives double depth. Without a speed there is no depth an hour.
     let doubled = with(&worn(plain()), "/friction/wear_rate_mm3_per_nm/carrier", json!(6e-6));
     let doubled = swept(&doubled).await["losses"]["wear_mm_per_hour"].clone();
     assert_near(float(&doubled["carrier"]["value"]), 2.0 * expected, 1e-9, "slot");
@@ -392,14 +393,14 @@ async fn bearing_life_follows_iso_281() {
         assert!((least..=most).contains(&load_n), "{least} {load_n} {most}");
         let millions = (9000.0 / load_n).powf(exponent);
         assert_near(float(&bearing["life_million_revolutions"]), millions, 1e-12, "life");
-        // 28 teeth and 27 of the ring; at rest against the carrier the race turns as the wave generator does against it.
+        // 28 teeth and 27 ring teeth. A race at rest against the carrier turns like the wave generator against it.
         let speed_rpm = 1500.0 * 27.0 / 28.0;
         assert_near(float(&bearing["speed_rpm"]), speed_rpm, 1e-12, "speed");
         assert_near(float(&bearing["life_h"]), 1e6 * millions / 60.0 / speed_rpm, 1e-12, "hours");
     }
     let still = swept(&without(&on_its_bearing("ball"), "/load/input_speed_rpm")).await["losses"]["bearing"].clone();
     assert_eq!(still.as_object().unwrap().len(), 2, "{still}");
-    // Half the load, eight times the life, where all forces are in proportion.
+    // Half the load gives eight times the life, because all forces are proportional.
     let linear = json!({ "compatibility": "virtual_work", "stiffness": { "law": "linear" } });
     let whole = with(&on_its_bearing("ball"), "/model", linear);
     let torque = float(&eccentric()["load"]["input_torque_nm"]);
@@ -449,7 +450,7 @@ async fn duty_reports_hardest_peaks_and_overall_means() {
         for (torque_nm, speed_rpm, _) in DUTY {
             points.push(swept(&loose(&alone(torque_nm, speed_rpm, friction.clone()))).await);
         }
-        // The second has the largest torque.
+        // The second point has the largest torque.
         for field in ["peaks", "states", "load", "checks", "loaded_teeth_per_zone"] {
             assert_eq!(found[field], points[1][field], "{field}");
         }

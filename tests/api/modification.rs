@@ -94,7 +94,7 @@ async fn each_modification_changes_an_answer() {
 
 #[tokio::test]
 async fn outward_offsets_unload_flat_part_of_flank() {
-    // Δ cos β and Δ cos(β - δ), with δ < β: the path's shift leaves the steep middle the smaller gap, so that it carries more there.
+    // Gaps are Δ cos β and Δ cos(β - δ), with δ < β. The path's shift leaves a smaller gap in the steep middle.
     let peak = async |modification: Value| {
         swept(&modified(modification)).await["peaks"]["ring"]["force_n"]["value"].as_f64().unwrap()
     };
@@ -128,7 +128,7 @@ async fn interference_is_refused_unless_clearance_covers_it() {
     let expected = swept(&cleared(json!({ "ring": { "clearance_um": 1.0 } }))).await;
     let forces = |answer: &Value| numbers(&answer["states"]["force_ring_n"]);
     assert_near(&forces(&found), &forces(&expected), 1e-9);
-    // Geometry reads none of it.
+    // Geometry does not read modifications.
     Service::new().post("/v1/geometry", &full).await.found();
 }
 
@@ -141,7 +141,7 @@ async fn projection_rejects_modification_at_its_first_number() {
     assert_eq!(errors.len(), 1, "{problem}");
     assert_eq!(errors[0]["pointer"], "/modification/slot_wall_um");
     assert_eq!(errors[0]["code"], "conflicting_fields");
-    // Where it says nothing, it is none.
+    // A modification of zeros is none.
     let nothing = with(&document, "/modification", json!({ "slot_wall_um": 0.0 }));
     Service::new().post("/v1/sweep", &nothing).await.found();
 }
@@ -164,7 +164,7 @@ async fn tip_relief_beyond_flank_is_reported_once() {
 #[tokio::test]
 async fn single_lobe_tip_relief_may_start_anywhere() {
     let relief = json!({ "amount_um": 3.0, "start_deg": 120.0, "power": 1.0 });
-    // So few teeth that the ring is not undercut, and the flank reaches the valley.
+    // With few teeth the ring is not undercut, and the flank reaches the valley.
     let few = with(&with(&eccentric(), "/drive/teeth/count", json!(12)), "/drive/ring/teeth", json!(11));
     let document = with(&few, "/modification", json!({ "ring_tip_relief": relief }));
     let document = with(&document, "/model", json!({ "compatibility": "virtual_work" }));

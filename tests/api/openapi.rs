@@ -102,7 +102,7 @@ fn every_variant_has_name_and_discriminator_word() {
     ] {
         let (schema, mapping) = (&schemas[name], &schemas[name]["discriminator"]["mapping"]);
         let tag = schema["discriminator"]["propertyName"].as_str().unwrap();
-        // A word that may be left out has a variant of its own.
+        // An optional word has a variant without it.
         let by_default = usize::from(["WaveGenerator", "Teeth"].contains(&name));
         assert_eq!(schema["oneOf"].as_array().unwrap().len(), words.len() + by_default);
         for word in words {
@@ -133,7 +133,7 @@ fn default_words_are_never_beside_references() {
 
 #[test]
 fn no_text_contains_comment_markers() {
-    // Of k = E*/2 a generator for C++ makes a comment that ends within the formula.
+    // A generator for C++ puts `k = E*/2` into a comment and so ends it.
     for object in objects(document()) {
         for text in object.values().filter_map(Value::as_str) {
             assert!(!text.contains("*/") && !text.contains("/*"), "{text}");
@@ -187,7 +187,7 @@ fn every_path_and_status_is_described() {
     expected.extend([
         ("/v1/design", "post", &solving[..]),
         ("/v1/batch", "post", &["200", "400", "415", "503"]),
-        // Measured for each answer, so there is nothing that a client could have already.
+        // Each answer is measured anew, so 304 does not exist.
         ("/v1/accuracy", "post", &["200", "400", "406", "408", "413", "415", "422", "500", "503"]),
         ("/v1/studies", "post", &["200", "202", "400", "406", "408", "413", "415", "422", "500", "501", "503"]),
         ("/v1/studies/{id}", "get", &["200", "404", "501"]),
@@ -339,7 +339,7 @@ fn fields_of<'a>(document: &'a Value, schema: &'a Value) -> Vec<(&'a str, &'a Va
             fields.extend(fields_of(document, alternative));
         }
     }
-    // The first entry of a list stands for all.
+    // The first entry represents a list.
     fields.extend(schema.get("items").map(|schema| ("0", schema)));
     fields.extend(schema["properties"].as_object().into_iter().flatten().map(|(name, schema)| (name.as_str(), schema)));
     fields
@@ -357,7 +357,7 @@ fn below<'a>(document: &'a Value, schema: &'a Value, pointer: &str) -> Vec<(Stri
     for (name, schema) in fields_of(document, schema) {
         let pointer = format!("{pointer}/{name}");
         all.extend(below(document, schema, &pointer));
-        // What is a list is looked at by its first item, what may be a number or an object by either.
+        // A list is followed at its first item, and a number or object at both alternatives.
         if let Some(items) = schema.get("items") {
             all.extend(below(document, items, &format!("{pointer}/0")));
         }
@@ -504,7 +504,7 @@ fn assert_all_described(document: &Value, schema: &Value, instance: &Value, what
         let reference = schema["$ref"].as_str()?;
         document.pointer(&reference[1..])?.get("items")
     }) {
-        // All items are alike: a few thousand numbers more tell nothing.
+        // All items are alike, so a few suffice.
         for item in instance.as_array().into_iter().flatten().take(3) {
             assert_all_described(document, items, item, what);
         }
@@ -716,7 +716,7 @@ async fn schema_refuses_invalid_form_and_range() {
         }
     }
     for document in refused {
-        // A value out of its range is refused by those endpoints that read it: no single one reads all.
+        // No endpoint reads all values, so those that read this one must refuse it.
         let statuses =
             [service.post("/v1/sweep", &document).await.status, service.post("/v1/geometry", &document).await.status];
         assert!(statuses.contains(&422), "{document}");

@@ -18,7 +18,7 @@ fn series(text: &str) -> BTreeSet<String> {
 
 #[tokio::test]
 async fn documented_series_are_the_exported_ones() {
-    // What each of them counts, once.
+    // Causes one count in each series.
     let service = Service::within(Limits { deadline_ms: 200, ..ENDLESS });
     service.post("/v1/sweep", &spelled_out()).await.found();
     let line = Question::post_as("application/x-ndjson", "/v1/batch", spelled_out().to_string());

@@ -374,7 +374,8 @@ async fn wave_generator_angle_is_place_of_contact() {
         let (angles, positions) = (numbers(&found, "wave_generator_angle_deg"), numbers(&found, "position_deg"));
         for (i, d) in numbers(&found, "center_radius_mm").into_iter().enumerate() {
             let (sin, cos) = positions[i].to_radians().sin_cos();
-            // From the minor axis, on the ellipse, exactly r away from the tooth's centre, and the nearest place so.
+            // The angle counts from the minor axis. Its point on the ellipse is r from the tooth's centre, the least
+            // distance.
             let distance = |angle_deg: f64| {
                 let (y, x) = angle_deg.to_radians().sin_cos();
                 let radius = a * b / (a * x).hypot(b * y);

@@ -164,7 +164,7 @@ async fn unknown_path_is_not_found() {
     {
         for method in ["GET", "POST"] {
             let answer = service.ask(&Question::of(method, path)).await;
-            // A path with a name in it knows GET alone, whatever the name.
+            // A path with a name allows only GET, for any name.
             if (method, path) != ("POST", "/v1/examples/paper-5.3") {
                 answer.refused(404, "not_found");
             }
@@ -233,7 +233,7 @@ async fn accept_header_chooses_best_format() {
         ("application/json; charset=utf-8", "application/json"),
         ("text/csv; charset=utf-8; header=present", "text/csv"),
         ("text/csv;charset=utf-8;q=0.5, application/json;charset=utf-8;q=0.4", "text/csv"),
-        // What cannot be read is passed over, as empty items are, and a list in quotes.
+        // Unreadable items are skipped, like empty ones and a quoted list.
         ("text/html, image/gif, image/jpeg, *; q=.2, */*; q=.2", "application/json"),
         ("text/csv, ,", "text/csv"),
         ("text/csv, text/x;a=\"b,c\"", "text/csv"),

@@ -271,7 +271,7 @@ async fn regular_tip_is_flat_at_known_radius() {
         let Numbers { b, r, .. } = geometry.numbers;
         assert!((geometry.tip_radius() - (b + 2.0 * r)).abs() <= 1e-12);
         let (tip, before) = (geometry.ring[geometry.ring.len() - 1], geometry.ring[geometry.ring.len() - 2]);
-        // The flank meets the symmetry line at a right angle, as nearly as the last chord shows it.
+        // The flank meets the symmetry line at a right angle, up to the length of the last chord.
         let inward = (radius(before) - radius(tip)) / distance(before, tip);
         assert!(inward.abs() < 0.05, "{inward}");
     }
@@ -283,10 +283,10 @@ async fn undercut_tip_ends_in_point_on_symmetry_line() {
     let Numbers { b, r, .. } = geometry.numbers;
     let tip = geometry.ring[geometry.ring.len() - 1];
     assert!(radius(tip) > b + 2.0 * r, "it is cut back");
-    // The flank itself gets there, at ψ_e, and not a land.
+    // The flank itself ends there, at ψ_e, without a land.
     let (_, _, end) = geometry.numbers.tooth(geometry.numbers.normal_angle(geometry.start_deg()));
     assert!(distance(end, tip) <= 1e-9, "{end:?} is not {tip:?}");
-    // Seen along the symmetry line the last chord falls inward steeply, and its mirror image on the next tooth rises so.
+    // Along the symmetry line the last chord falls steeply inward, and its mirror image on the next tooth rises.
     let before = geometry.ring[geometry.ring.len() - 2];
     let steepness = (radius(before) - radius(tip)) / distance(before, tip);
     assert!(steepness > 0.5, "the two flanks meet in a blunt {steepness}");
@@ -343,7 +343,7 @@ async fn points_of_ring_and_path_lie_on_curves() {
     for document in drives() {
         let document = with(&document, "/profile", profile("tooth", 1e-3));
         let geometry = geometry(&document).await;
-        // So fine that its own chords are 1e-9 mm away from the curve.
+        // These chords are within 1e-9 mm of the curve.
         let flank = geometry.flank(50_000);
         let path: Vec<_> =
             (0..=50_000).map(|i| geometry.numbers.tooth(FRAC_PI_2 * f64::from(i) / 50_000.0).1).collect();
@@ -419,7 +419,7 @@ async fn finer_tolerance_takes_few_more_points_than_needed() {
         let count =
             async |tolerance: f64| geometry(&with(&document, "/profile", profile("tooth", tolerance))).await.ring.len();
         let (coarse, fine) = (count(1e-4).await, count(1e-6).await);
-        // Chords over a smooth arc: ten times as many for a hundredth of the tolerance.
+        // A smooth arc needs ten times as many chords for a hundredth of the tolerance.
         assert!(fine > 4 * coarse && fine < 25 * coarse, "{coarse} and {fine} points");
     }
 }

@@ -112,7 +112,7 @@ fn fields() -> Vec<Field> {
     fields.push(modification("carrier_rotation_arcsec", -1e5, 1e5));
     fields.push(modification("ring_tip_relief/amount_um", -1e6, 1e6));
     fields.push(modification("ring_tip_relief/power", 0.1, 100.0));
-    // One entry after the other would be another document each.
+    // Testing each entry would need another document each.
     let items = |count: usize| vec![0.0; count];
     let deviating = with(
         &with(&spelled_out(), "/model", json!({ "compatibility": "virtual_work" })),
@@ -144,7 +144,7 @@ fn fields() -> Vec<Field> {
 
 /// Returns the exceeded limit if the service reports one at this field.
 async fn limit_exceeded(field: &Field, value: f64) -> Option<f64> {
-    // A small limit, so that a sweep of many samples is refused for that alone, and soon.
+    // With a small limit, a sweep of many samples is refused quickly and only for that.
     let service = Service::within(Limits { max_states: 1_000, ..LIMITS });
     let document = with(&field.document, &field.pointer, json!(value));
     let answer = service.post(field.path, &document).await;
@@ -239,7 +239,8 @@ async fn smallest_and_largest_drive_are_answered() {
             let found = service.post(path, &scaled(scale)).await.found();
             let is_crushed = scale < 1e-2 && path == "/v1/sweep";
             let codes: Vec<_> = found["findings"].as_array().unwrap().iter().map(|one| &one["code"]).collect();
-            // Under 20 N·m a drive of a hundredth of the size is pressed flat: its stresses, and in the end its wind-up too, are beyond everything.
+            // Under 20 N·m a drive of a hundredth of the size is overloaded: all stresses, and finally the wind-up,
+            // exceed their limits.
             let stresses = codes.iter().filter(|&&code| code == "stress_above_fatigue_limit").count();
             assert_eq!(stresses, usize::from(is_crushed) * 3, "{scale}: {codes:?}");
             assert!(
@@ -248,7 +249,7 @@ async fn smallest_and_largest_drive_are_answered() {
             );
         }
         let found = service.post("/v1/sweep", &scaled(scale)).await.found();
-        // Forces go with torque over length, stresses with the root of torque over volume.
+        // Forces scale as torque over length, stresses as the root of torque over volume.
         let force_n = found["peaks"]["wave_generator"]["force_n"]["value"].as_f64().unwrap() * scale;
         assert!((force_n / 1_429.443_293_502_519 - 1.0).abs() < 1e-9, "{force_n}");
         let stress_mpa = found["peaks"]["wave_generator"]["stress_mpa"]["value"].as_f64().unwrap() * scale.powf(1.5);

@@ -107,7 +107,7 @@ fn unread_answers_never_exceed_budget() {
     let budget_bytes = 160 << 20;
     let service = Service::within(Limits { max_unread_bytes: budget_bytes, cache_max_bytes: 0, ..LIMITS });
     let unread: Vec<_> = (0..12).map(|number| service.send(&large(number))).collect();
-    // Health and small answers come all the same, and the reservations never add up to more.
+    // Health and small answers still arrive, and reservations never exceed the budget.
     for number in 0..50 {
         assert_eq!(ask_at(service.address(), &small(30.0 + f64::from(number))).status, 200);
         assert!(service.metric(UNREAD_BYTES) <= budget_bytes as f64);

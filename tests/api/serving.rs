@@ -60,7 +60,7 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // Already gone where the test asked it to end.
+        // The process may have ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -130,7 +130,7 @@ fn named_origin_may_call_from_browser() {
 fn each_request_logs_one_line_without_design_numbers() {
     let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("log-{}", std::process::id()));
     let process = Process::logging(&["serve"], std::fs::File::create(&path).unwrap().into());
-    // A torque that nothing else has anything of.
+    // No other number contains this torque.
     let design = with(&shortest(), "/load/input_torque_nm", json!(17.931)).to_string();
     let question = Question::post("/v1/sweep", design).with("x-request-id", "drawing-4711");
     for _ in 0..2 {
@@ -176,7 +176,7 @@ fn running_request_is_answered_before_exit() {
     let process = Process::started(&["serve", "--deadline-ms", "600000", "--shutdown-ms", "600000"]);
     let address = process.address;
     let asker = std::thread::spawn(move || ask_at(address, &sweep(30_000)));
-    // Some rounds until the solve has begun; should it be quick, the answer is there before the signal all the same.
+    // Waits until the solve has begun. A fast solve answers before the signal, which is fine too.
     for _ in 0..10_000 {
         let metrics = ask_at(address, &Question::of("GET", "/metrics"));
         if metrics.text().contains("toothwave_solves_running 1") || asker.is_finished() {
@@ -205,7 +205,7 @@ fn huge_limit_does_not_panic() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();
     for limit in ["--max-states", "--max-concurrent-solves"] {
-        // Whether it is refused or taken for "no limit": with this address the process ends in any case.
+        // The limit may be refused or accepted, but the used address ends the process.
         let arguments = ["serve", "--listen", &address, limit, "18446744073709551615"];
         let output = Command::new(env!("CARGO_BIN_EXE_toothwave")).args(arguments).output().unwrap();
         assert!(matches!(output.status.code(), Some(1 | 2)), "{limit}: {:?}", output.status);

@@ -100,7 +100,7 @@ fn second_signal_stops_at_once() {
         let _running = service.occupied_by(1);
         let process = service.into_process();
         process.signalled("-TERM");
-        // The first one is taken up before the second one comes.
+        // The first signal is handled before the second arrives.
         let is_ready = || {
             let mut stream = TcpStream::connect(process.address).ok()?;
             stream.write_all(b"GET /health/ready HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n").ok()?;

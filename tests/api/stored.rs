@@ -265,7 +265,7 @@ async fn damaged_file_never_gives_wrong_number() {
         let keeper = Keeper::of(&file);
         let problem = keeper.0.get(&result(&study)).await.refused(500, "internal_error");
         assert!(problem["detail"].as_str().unwrap().contains("damaged"), "{damage}: {problem}");
-        // Whoever follows the advice has it again.
+        // The advice in the problem restores the study.
         assert_eq!(keeper.delete(&study).await, 204);
         assert_eq!(keeper.wait_for(&map(500)).await, study);
         keeper.end();
@@ -315,7 +315,7 @@ async fn parts_of_another_build_are_computed_again() {
     file.change(&format!("UPDATE parts SET study = 'other' WHERE study = '{id}'"));
     file.change("UPDATE studies SET origin = 'another'");
     let keeper = Keeper::of(&file);
-    // The result of one that does not run would have other bits in this build.
+    // A finished study's result would have other bits in this build.
     keeper.0.get(&place(&done)).await.refused(404, "not_found");
     while keeper.0.get("/v1/studies/other").await.found()["state"] == "running" {
         tokio::task::yield_now().await;
@@ -323,7 +323,7 @@ async fn parts_of_another_build_are_computed_again() {
     assert_eq!(keeper.0.get("/v1/studies/other/result").await.found(), running["result"]);
     keeper.end();
     assert_eq!(file.change("DELETE FROM parts WHERE study <> 'other'"), 0);
-    // The next start finds it whole.
+    // The next start finds a complete study.
     let keeper = Keeper::of(&file);
     assert_eq!(keeper.0.get("/v1/studies/other/result").await.found(), running["result"]);
     keeper.end();

@@ -129,7 +129,7 @@ async fn cancelled_study_continues_when_requested_again() {
     let found = waited_for(&service, &long()).await;
     assert_eq!((&found["id"], &found["state"], &found["looked_at"]), (&study["id"], &json!("done"), &json!(90_000)));
     assert!(found["result"] == waited_for(&Service::new(), &long()).await["result"]);
-    // One that does not run any more is forgotten.
+    // A study that no longer runs is deleted.
     assert_eq!(deleted(&service, &place(&study)).await, 204);
     service.get(&place(&study)).await.refused(404, "not_found");
     assert_eq!(deleted(&service, &place(&study)).await, 404);
@@ -259,7 +259,7 @@ async fn invalid_study_is_refused_at_its_field() {
 async fn search_frees_all_lengths_of_every_kind() {
     let service = Service::new();
     let schemas = &document()["components"]["schemas"];
-    // Not free are the counts, and grooves, which a ball need not have.
+    // Counts are not free, nor are grooves, which are optional.
     let apart = ["kind", "shape", "lobes", "count", "installed", "groove_radius_mm"];
     for (union, place) in [("WaveGenerator", "/drive/wave_generator"), ("Teeth", "/drive/teeth")] {
         let discriminator = &schemas[union]["discriminator"];

@@ -620,7 +620,7 @@ async fn every_field_fault_occurs_over_http() {
     let modified = with(&document, "/modification", json!({ "slot_wall_um": -6000.0 }));
     errors.extend(errors_at("/v1/drawings/assembly", &modified).await);
     let mut codes = words(&field_codes());
-    // Those of studies, met among the studies.
+    // Faults of studies are covered by the tests of studies.
     codes.retain(|code| !["too_many_variants", "unaffected"].contains(&code.as_str()));
     assert_eq!(codes_of(&errors), codes);
 }

@@ -97,7 +97,7 @@ fn gap_is_sum_of_two_clearances() {
     let of_ring = json!({ "parts": { "ring": { "clearance_um": 10.0 } } });
     let gap_n = largest_n(&of_ring);
     assert!((without_n - 450.7).abs() < 0.05 && (gap_n - 709.9).abs() < 0.05, "{without_n} and {gap_n}");
-    // Of all contacts alike: each part a half, or the teeth all of it.
+    // A clearance of all contacts gives each part one half, or the teeth all of it.
     let halves =
         ["wave_generator", "ring", "carrier", "teeth"].map(|part| (part.to_owned(), json!({ "clearance_um": 5.0 })));
     let halves = json!({ "parts": halves.into_iter().collect::<serde_json::Map<_, _>>() });
@@ -138,7 +138,7 @@ fn deprecated_clearance_means_the_same_in_parts() {
     };
     assert_eq!(drawn(&old)["bodies"], drawn(&new)["bodies"]);
     assert!(codes(&drawn(&old)).iter().any(|(code, _)| code == "deprecated_field"));
-    // What both say is no contradiction.
+    // Equal values are no contradiction.
     let both = json!({ "model": old["model"], "parts": new["parts"] });
     assert_eq!(largest_n(&both).to_bits(), largest_n(&new).to_bits());
 }

@@ -111,7 +111,7 @@ fn other(value: &Value) -> Option<Value> {
         Value::Number(number) => {
             let number = number.as_f64().unwrap();
             let other = if number.fract() == 0.0 { number + 1.0 } else { number * 0.75 };
-            // Beyond 2^53 a number is the next one too.
+            // Above 2^53, adding one gives the same double.
             (other.total_cmp(&number).is_ne()).then(|| json!(other))
         }
         Value::Bool(value) => Some(json!(!value)),
@@ -159,7 +159,7 @@ proptest! {
     #[test]
     fn structural_fault_is_reported_at_its_place(seed: u64) {
         let document = Schemas::new().document(&mut Chance::new(seed));
-        // No refinement is a list of none.
+        // An empty list means no refinement.
         for pointer in leaves(&document, "").into_iter().filter(|pointer| pointer != "/model/refinements") {
             assert_fault(&with(&document, &pointer, json!([])), &pointer, FieldCode::WrongType);
         }
@@ -291,6 +291,6 @@ fn each_deviation_reaches_the_solver() {
     };
     let design = read(&document).unwrap();
     assert_eq!(Deviations::from(&design.deviations), expected);
-    // What was written reads back as itself.
+    // A written document reads back as itself.
     assert_eq!(read(&serde_json::to_value(&design).unwrap()).unwrap(), design);
 }

@@ -48,7 +48,7 @@ fn every_kind_matches_the_reference() {
         let period_deg = number(&answer["period_deg"]);
         let lobes = states.get("lobe").and_then(Value::as_array);
         assert_eq!(lobes.is_none(), case["alike"].as_bool().unwrap(), "{name}");
-        // By column: what it is off by, and its largest value.
+        // Error and largest value of each column.
         let mut columns: BTreeMap<String, (f64, f64)> = BTreeMap::new();
         let mut compare = |name: &str, found: f64, expected: f64| {
             compared += 1;
@@ -82,7 +82,7 @@ fn every_kind_matches_the_reference() {
                     }
                 }
             }
-            // What is listed besides stands at a regular tip, where it bears nothing.
+            // Additional states are unloaded teeth at a regular tip.
             for &row in &rows {
                 let position_deg = number(&column(states, "position_deg")[row]);
                 let is_known = teeth.iter().any(|tooth| (number(&tooth["position_deg"]) - position_deg).abs() < 1e-9);
@@ -122,7 +122,7 @@ fn speeds_are_those_of_rolling_contacts() {
             let member = &answer["members"][format!("{fixed}_fixed")];
             let found = number(&member["ratio"]);
             assert!((found / ratio - 1.0).abs() < 1e-15, "{}, {fixed} fixed: {found} is not {ratio}", case["name"]);
-            // What goes in comes out, and the three torques balance.
+            // Power is conserved and the three torques balance.
             let held = number(&member["holding_torque_ratio"]);
             assert!((held - (ratio - 1.0)).abs() < 1e-14 * ratio.abs(), "{}, {fixed} fixed: {held}", case["name"]);
         }

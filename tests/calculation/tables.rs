@@ -36,7 +36,7 @@ fn entry(column: &dyn Array, row: usize) -> Value {
 fn arrow_stream_has_csv_columns_and_json_numbers() {
     let friction = json!({ "wave_generator": { "kind": "plain", "coefficient": 0.03 }, "ring": { "coefficient": 0.05 }, "carrier": { "coefficient": 0.04 } });
     for document in [
-        // More states than a batch holds.
+        // The sweep has more states than a batch holds.
         json!({ "drive": drive(), "load": { "input_torque_nm": 20.0 }, "sweep": { "samples": 10_000 } }),
         json!({ "drive": drive(), "load": { "input_torque_nm": 20.0 }, "friction": friction, "model": { "clearance": { "ring_um": 5.0 } } }),
         json!({ "drive": drive(), "load": { "input_torque_nm": 20.0 }, "deviations": { "wave_generator_lobe_um": [0.0, 1.0] }, "model": { "clearance": { "wave_generator_um": 5.0 } }, "sweep": { "samples": 5 } }),
@@ -96,7 +96,7 @@ fn json_length_of_sweep_is_known_beforehand() {
         let mut bytes = Vec::new();
         answer.write(Format::Json, &mut bytes).unwrap();
         let share = answer.expected_bytes() as f64 / bytes.len() as f64;
-        // Efficiencies of which nothing is left are short.
+        // Efficiencies of zero have short text.
         assert!((1.0..1.35).contains(&share), "{share} of {} bytes", bytes.len());
     }
 }

@@ -24,18 +24,18 @@ const LIMITS: Limits = Limits::new(2_000, 20_000);
 fn assert_answered<Q: Question>(question: Q, design: &Design) {
     let answered = question.check(design, &LIMITS).and_then(|checked| Q::answer(&checked, &Never));
     match answered {
-        // serde_json writes null where a number is none.
+        // serde_json writes a non-finite number as null.
         Ok(answer) => {
             for format in Q::Answer::FORMS.iter().map(|(format, _)| *format).chain([Format::Json]) {
                 let mut written = Vec::new();
                 answer.write(format, &mut written).unwrap();
-                // Bytes of the numbers that the text has too.
+                // The bytes of numbers also appear in the text.
                 if matches!(format, Format::Arrow | Format::Parquet) {
                     continue;
                 }
                 let text = String::from_utf8(written).unwrap();
                 let is_none = match format {
-                    // serde_json writes null where a number is none; elsewhere a word may be `info`.
+                    // serde_json writes a non-finite number as null. In other formats a word may contain `inf`.
                     Format::Json => text.contains("null"),
                     Format::Text => text.contains("NaN"),
                     _ => text.contains("NaN") || text.contains("inf"),
@@ -148,7 +148,7 @@ fn document(bytes: &[u8; 20]) -> Value {
     if rest[6] % 2 == 0 {
         load["input_speed_rpm"] = json!(10.0_f64.powi(i32::from(rest[6] % 13) - 6));
     }
-    // Radii about where they have to lie, clearances from none to more than a tooth.
+    // Radii near their possible range, and clearances from zero to above a tooth.
     let about = |byte: u8| 0.5 + f64::from(byte) / 170.0;
     let clearance = |byte: u8| if byte < 128 { 0.0 } else { 1e3 * r * (f64::from(byte) - 127.0) / 100.0 };
     let parts = json!({
@@ -271,7 +271,7 @@ fn relative(bytes: &[u8; 48]) -> Value {
         model["corner_contact"] = json!(true);
     }
     if gap % 2 == 0 {
-        // Most often enough for what is too full.
+        // Most often enough to cover an interference.
         let clearance = |_| 1e3 * r * 10.0_f64.powi(-i32::from(gap % 9));
         let gaps = by_contact(7, &clearance);
         model["clearance"] = json!({ "wave_generator_um": gaps["wave_generator"], "ring_um": gaps["ring"], "carrier_um": gaps["carrier"] });

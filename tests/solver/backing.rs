@@ -121,7 +121,7 @@ fn held_rims_and_cams_match_finite_elements() {
             width_mm,
         };
         let found = strip.compliance_mm_per_n(&Material::STEEL, tooth_radius_mm);
-        // A rim is a strip; a deep cam narrows towards its bore, and its load is not even.
+        // A rim is a strip. A deep cam narrows towards its bore, and its load is uneven.
         let is_rim = held_radius_mm > surface_radius_mm;
         let of_steel = 0.91 / (PI * 210e3 * width_mm);
         let allowed = if is_rim { 0.1 * of_steel } else { 0.3 * compliance_mm_per_n };
@@ -137,7 +137,7 @@ fn held_body_compliance_is_continuous_in_depth() {
     let strip = |depth_mm| HeldStrip { depth_mm, pitch_mm: 8.0, width_mm: 15.0 };
     let at = |depth_mm| strip(depth_mm).compliance_mm_per_n(&Material::STEEL, 2.0);
     assert!((at(4.0 - 1e-9) / at(4.0 + 1e-9) - 1.0).abs() < 1e-8);
-    // The nearer it is held the less it gives way, at last less than the law has counted already.
+    // A body held nearer is stiffer, finally stiffer than the contact law already assumes.
     assert!(at(8.0) > at(4.0) && at(4.0) > at(2.0) && at(0.5) < 0.0);
 }
 
@@ -145,7 +145,7 @@ fn held_body_compliance_is_continuous_in_depth() {
 fn finger_thickness_is_wall_distance_at_mid_height() {
     let shares = shares(&PAPER_5_1, &johnson(20.0), AT_ONE_END).unwrap();
     let found = shares.shares.iter().find(|(estimate, _)| estimate.backing == Backing::FingerAtOneEnd).unwrap().0;
-    // From 58.8 to 65.2 mm, where the middles of two slots are 2 · 62 sin(π/28) apart.
+    // From 58.8 to 65.2 mm. The middles of two slots are 2 · 62 sin(π/28) apart.
     let beam = FingerBeam { length_mm: 15.0, thickness_mm: 124.0 * (PI / 28.0).sin() - 10.0, height_mm: 6.4 };
     let expected = beam.compliance_mm_per_n(&Material::STEEL, Fingers::HeldAtOneEnd);
     assert!((found.compliance_mm_per_n / expected - 1.0).abs() < 1e-12, "{} {expected}", found.compliance_mm_per_n);
@@ -159,7 +159,7 @@ fn housed_rim_is_strip_with_slot_pitch() {
     let case = LoadCase::new(&load).unwrap();
     let estimates = backings.estimates(&drive(&PAPER_5_1), &case);
     let found = estimates.iter().find(|estimate| estimate.backing == Backing::HousedRim).unwrap();
-    // Of teeth on the root circle of 68 mm, the rim deeper than half their pitch.
+    // Teeth press on the root circle of 68 mm. The rim is deeper than half their pitch.
     let strip = HeldStrip { depth_mm: 20.0, pitch_mm: 2.0 * PI * 68.0 / 28.0, width_mm: 15.0 };
     let expected = strip.compliance_mm_per_n(&Material::STEEL, 5.0);
     assert!((found.compliance_mm_per_n / expected - 1.0).abs() < 1e-12, "{} {expected}", found.compliance_mm_per_n);
@@ -204,7 +204,7 @@ fn fingers_held_at_one_end_soften_drive() {
     let peak = after.peaks.wave_generator.force_n.value / before.peaks.wave_generator.force_n.value;
     assert!((1.9..2.0).contains(&wind_up) && (0.86..0.885).contains(&peak), "{wind_up}, {peak}");
     assert!((1.0..1.2).contains(&((1.0 + estimate.1) / wind_up)), "share {}", estimate.1);
-    // What is given is no longer left out.
+    // A given compliance no longer counts as left out.
     let left = shares(&PAPER_5_1, &given, AT_ONE_END).unwrap();
     assert!(left.shares.iter().all(|(estimate, _)| estimate.backing != Backing::FingerAtOneEnd));
 }
@@ -222,13 +222,13 @@ fn only_soft_parts_are_findings() {
     );
     let free = found(&PAPER_5_1, &johnson(20.0), FREE).unwrap();
     assert!(matches!(free[..], [Finding::SoftRim { share, is_free: true }] if share > 10.0), "{free:?}");
-    // Those of case 5.2 are a millimetre and a half high: slender however they are held.
+    // The fingers of case 5.2 are 1.5 mm high and so slender with any support.
     let low = found(&PAPER_5_2, &johnson(3.0), Support::default()).unwrap();
     assert!(
         matches!(low[..], [Finding::SlenderFingers { share, is_held_at_one_end: false }] if share > 0.2 && share < 1.0),
         "{low:?}"
     );
-    // Under other laws wind-up is further off by itself.
+    // Other laws have a larger error of the wind-up anyway.
     let fixed = ContactLaw::Fixed(PerContact { wave_generator: 4e5, ring: 4e5, carrier: 4e5 });
     for law in [fixed, ContactLaw::Linear, ContactLaw::Palmgren] {
         assert_eq!(found(&PAPER_5_1, &LoadParameters { law, ..johnson(20.0) }, AT_ONE_END), None);

@@ -94,7 +94,7 @@ fn is_refused(parameters: &DriveParameters, contact: Contact) -> bool {
 #[test]
 fn projection_takes_gaps_of_positive_weight_only() {
     let backwards = DriveParameters { ring_teeth: 30, tooth_radius_mm: 4.0, ..PAPER_5_1 };
-    // γ + β beyond 90°: the ring's weight cos(γ + β) is negative there.
+    // With γ + β above 90° the ring's weight cos(γ + β) is negative.
     let steep = DriveParameters {
         wave_generator: ellipse(58.0, 20.0),
         tip_radius_mm: Some(58.5),

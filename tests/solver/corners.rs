@@ -142,7 +142,7 @@ fn model_reports_its_error_at_pointed_tips() {
         let mut told = None;
         let results = results();
         let cases = results.cases.iter().filter(|case| (case.ring_gap_um > 0.0) == has_gaps);
-        // Without a gap the wave generator stays, if the document does not say otherwise.
+        // Without a gap the wave generator does not move by default.
         let moves = |&moves: &bool| moves || !has_gaps;
         for (case, wave_generator_moves) in
             cases.flat_map(|case| [true, false].into_iter().filter(moves).map(move |moves| (case, moves)))
@@ -200,7 +200,8 @@ fn seen(drive: &Drive, position_deg: f64, turned_away_rad: f64) -> Seen {
     let corner = flank.point(&end, &flank.at(&end));
     let tooth = flank.locus().at(Position::from_lobe(position_deg.to_radians(), lobes)).unwrap();
     let k = flank.teeth_per_wave();
-    // In the ring's frame the tooth has gone back by ψ/k, s aside, from the middle of its space; the slot's frame is turned so, and turned over where s is -1.
+    // In the ring's frame the tooth has moved back by ψ/k, in sense s, from the middle of its space. The slot's frame
+    // is rotated likewise, and mirrored if s is -1.
     let in_slot = Rotation2::new(turned_away_rad - position_deg.to_radians() / k) * corner;
     let (sense, d) = (drive.sense(), tooth.center_radius_mm);
     let way = Point2::new(in_slot.x, -sense * in_slot.y) - Point2::new(d, 0.0);
@@ -238,7 +239,7 @@ fn tooth_before_flank_is_point_on_three_springs() {
             let position = Position::from_lobe(states.position_deg[at].to_radians(), drive.lobes());
             let center = drive.flank().locus().at(position).unwrap();
             let arm_mm = center.cam_contact.lever_arm_mm;
-            // It is there when the wave generator has made up for the ring's turn and for the gap of its slot.
+            // Contact starts when the rotation has closed the ring's rotation and the slot's gap.
             let turned = turned
                 - drive.flank().teeth_per_wave() * turned_rad
                 - drive.teeth_per_wave() * gaps_mm.carrier / center.center_radius_mm;
@@ -324,7 +325,7 @@ fn narrower_contact_adds_logarithm_of_its_width() {
             let per_mm = ring_n / (15.0 * modulus_mpa);
             let half_mm = 2.0 * per_mm / (angle_rad + (angle_rad * angle_rad + 4.0 * square * per_mm).sqrt());
             let u = half_mm / (per_mm / square).sqrt();
-            // What the same contacts give way by if none is narrower, by Johnson (docs/theory.md 4.3).
+            // Approach of the same contacts without narrowing, by Johnson (docs/theory.md 4.3).
             let of_contact = |force_n: f64, curvature: f64| {
                 let half_mm = (4.0 * force_n / (std::f64::consts::PI * 15.0 * modulus_mpa * curvature)).sqrt();
                 0.5 * growth_mm_per_n
@@ -380,7 +381,7 @@ fn corner_of_bending_teeth_deflects_as_wedge_apex() {
         let ratio = rigid.force_ratio.ring;
         let to_corner = seen(&drive, at_corner.from_lobe_deg(), 0.0).to_ring;
         let angle_rad = at_end.tan_pressure_angle.atan() - (-to_corner.y / to_corner.x).atan() - 0.05 / 39.0;
-        // Beside what bends in proportion to the force there is the logarithm of the contact's width.
+        // Bending is proportional to the force; the rest is the logarithm of the contact's width.
         let per_n = |cam_force_n: f64| {
             let approach_mm = |tooth: &ToothState| tooth.spring.approach.approach_mm(cam_force_n);
             (approach_mm(&bending) - approach_mm(&rigid)) / (cam_force_n * ratio * ratio)
@@ -552,7 +553,7 @@ fn rigid_rotation_changes_no_corner_force() {
                 }
             }
         }
-        // Aside by the same everywhere, but for a tooth being a few per cent farther out at the lobe than in the valley.
+        // The offset is equal everywhere, but a tooth is some per cent farther out at the lobe than in the valley.
         let carrier =
             |carrier| of(LoadParameters { clearance_um: PerContact { carrier, ..PerContact::default() }, ..plain });
         let near = carrier(10.0).peaks.wave_generator.force_n.value / as_it_is.peaks.wave_generator.force_n.value;
@@ -656,7 +657,7 @@ fn tolerance_sweep_with_corners_finds_dense_peaks() {
         near("wind-up", largest(&found), largest(&dense));
         let capacity = |sweep: &Sweep| 1.0 / sweep.torque_capacity.unwrap().input_torque_nm;
         near("reciprocal of the capacity", capacity(&found), capacity(&dense));
-        // Where a tooth comes to the flank is looked at, and there the ring's stress begins.
+        // The sweep examines the angle at which a tooth reaches the flank, where the ring's stress begins.
         let (states, end_deg) = (&found.states, drive.flank_limit().position.from_lobe_deg());
         let stress_at_end = |is_told: bool| {
             let is_it = |at: usize| {
@@ -665,7 +666,7 @@ fn tolerance_sweep_with_corners_finds_dense_peaks() {
             (0..states.len()).any(is_it)
         };
         assert!(stress_at_end(true) && stress_at_end(false));
-        // And no other tooth is moved for it.
+        // No other tooth is moved for this.
         let spacing_deg = 360.0 / parameters.installed as f64;
         for at in 1..states.len() {
             let apart_deg = states.position_deg[at] - states.position_deg[at - 1];
@@ -725,7 +726,7 @@ proptest! {
         let sweeps = [pressed, rigid].map(|load| {
             sweep::sweep(&drive, &LoadCase::new(&load).unwrap(), Points::samples(20).unwrap(), &Never)
         });
-        // What bends too wide for Johnson's law is refused.
+        // Bending teeth may exceed Johnson's law and are then refused.
         if let [Ok(pressed), Ok(rigid)] = sweeps {
             prop_assert!(pressed.states.len() >= rigid.states.len());
             prop_assert_eq!(pressed.mesh.coincidence_degree(), rigid.mesh.coincidence_degree());
@@ -786,7 +787,8 @@ fn corner_slip_follows_motion_of_contact_points() {
                 let position = Position::from_lobe(position_deg.to_radians(), 2);
                 drive.flank().locus().at(position).unwrap().center_radius_mm
             };
-            // A radian of the wave generator against the carrier brings the tooth a radian nearer to the lobe, and turns the ring by -s/k.
+            // If the wave generator turns by a radian against the carrier, the tooth comes a radian nearer to the lobe
+            // and the ring turns by -s/k.
             let step_deg = 1e-4;
             let lift = center_mm(states.position_deg[at] - step_deg) - center_mm(states.position_deg[at] + step_deg);
             let outward = lift / (2.0 * step_deg).to_radians();

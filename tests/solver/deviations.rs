@@ -154,7 +154,7 @@ fn placed_by_angles(p: &DriveParameters, input_rad: f64) -> Vec<Placed> {
         if position_rad < 1e-9 {
             continue;
         }
-        // The middle of the space lies where the tooth would stand at the root.
+        // The middle of the space is the tooth's place at the root.
         let middle = in_ring + s * position_rad * lobes / p.ring_teeth as f64;
         let space = (middle * p.ring_teeth as f64 / (2.0 * PI)).round();
         assert!((space - middle * p.ring_teeth as f64 / (2.0 * PI)).abs() < 1e-6, "{p:?}");
@@ -204,7 +204,7 @@ fn chain(p: &DriveParameters, load: &LoadParameters, deviations: &Deviations, pl
     let lobes = p.wave_generator.lobes() as f64;
     let s = if p.teeth > p.ring_teeth { 1.0 } else { -1.0 };
     let r = p.tooth_radius_mm;
-    // The normal at which the tooth's centre stands at its position, by halving: the centre lags its normal.
+    // Finds the normal for the tooth's position by bisection: the centre lags its normal.
     let (mut low, mut high) = (0.0, PI / lobes);
     for _ in 0..100 {
         let middle: f64 = 0.5 * (low + high);
@@ -347,7 +347,7 @@ type Items = (u64, Option<u64>, Option<u64>, Option<u64>);
 /// Returns the combinations of deviating items: each slot's position on its lobe, with its items.
 fn pattern(p: &DriveParameters, kinds: Kinds, load_periods: u64) -> BTreeSet<Items> {
     let removal = (p.teeth / p.installed) as f64;
-    // A quarter of the way, so that none stands at a lobe or in a valley.
+    // An angle at a quarter, so that no tooth is at a lobe or in a valley.
     let input_rad = (load_periods as f64 + 0.26) * 2.0 * PI * removal / p.ring_teeth as f64;
     let found = placed_by_angles(p, input_rad);
     let of = |is_wanted: bool, item: u64| is_wanted.then_some(item);
@@ -430,7 +430,7 @@ fn equal_deviation_of_all_items_is_modification() {
         };
         let alike = swept(&p, &modified, 4);
         let told_apart = swept_with(&drive, &torque, &deviating, Points::samples(4).unwrap()).unwrap();
-        // One load period after the other, and in each as many teeth in every zone.
+        // Load periods follow each other, each with as many teeth in every zone.
         let angles = alike.input_angles.input_angle_deg.len() - 1;
         for (angle, wind_up_deg) in told_apart.input_angles.wind_up_deg.iter().enumerate() {
             let expected_deg = alike.input_angles.wind_up_deg[angle % angles];
@@ -444,7 +444,7 @@ fn equal_deviation_of_all_items_is_modification() {
         let zones = alike.mesh.zones_in_torque();
         let whole = f64::from(alike.input_angles.loaded_teeth[1]) * zones;
         assert_eq!(f64::from(told_apart.input_angles.loaded_teeth[1]), whole);
-        // Losses follow, whichever way the zones are listed.
+        // Losses are the same for either listing of zones.
         let friction = Friction::new(&FrictionParameters {
             wave_generator: WaveGeneratorFriction::Plain { coefficient: 0.02 },
             ring_coefficient: 0.05,
@@ -468,7 +468,7 @@ fn rotated_lists_shift_sweep_by_a_load_period() {
     let drive = drive(&p);
     let load = cleared(20.0, FIXED);
     let mut from_0 = deviations(&p, ALL_KINDS[6], 5);
-    // A direction cannot be turned by whole items in every part.
+    // A runout's direction cannot be rotated by whole items of every part.
     from_0.runout = PerContact::default();
     let from_1 = Deviations {
         tooth_radius_um: turned_by(&from_0.tooth_radius_um, 1),
@@ -490,7 +490,7 @@ fn rotated_lists_shift_sweep_by_a_load_period() {
 
 #[test]
 fn eccentric_off_axis_has_another_eccentricity() {
-    // The circle itself, moved: distance of the tooth's centre from its middle, less both radii.
+    // The moved circle: distance of the tooth's centre from its middle, minus both radii.
     let eccentric = |eccentricity_mm| WaveGenerator::Eccentric { radius_mm: 30.0, eccentricity_mm };
     let p = of(eccentric(1.0), 12, 12, 11, 4.0);
     let none = cleared(20.0, FIXED);
@@ -535,7 +535,7 @@ fn tolerance_sweep_finds_peaks_of_all_load_periods() {
             for (fine, found) in pairs.chain(wind_ups).chain(capacities) {
                 let beyond = (found - fine) / fine.abs();
                 assert!(beyond > -1e-6, "{found} misses {fine}: {p:?} {kinds:?}");
-                // The samples themselves miss the peaks by a little.
+                // The samples miss the peaks by a little.
                 assert!(beyond < 1e-2, "{found} is far above {fine}: {p:?} {kinds:?}");
             }
             let (first, last) = (found.states.input_angle_deg[0], found.states.input_angle_deg[found.states.len() - 1]);
@@ -586,7 +586,7 @@ fn radial_force_of_unlike_teeth_is_their_sum() {
             assert!(turned.min(360.0 - turned) < 1e-6);
             assert!(forces.force_n[angle] > 1e-3 * all);
         }
-        // Where the zones are alike there is nothing.
+        // Alike zones have no radial force.
         let alike = sweep::sweep(&drive, &case, Points::samples(2).unwrap(), &Never).unwrap();
         assert_eq!(RadialForces::of(&drive, &case, &Deviations::default(), &alike, &Never).unwrap(), None);
     }
@@ -629,7 +629,7 @@ fn reports_all_impossible_deviations() {
     assert!(violations.iter().any(counted), "{violations:?}");
     assert!(violations.contains(&Violation::NeedsVirtualWork { parameter: Parameter::Deviations }));
     assert_eq!(violations.len(), 4, "{violations:?}");
-    // What is nil has to fit too.
+    // Zero deviations need the right length too.
     let nil = Deviations { slot_wall_um: vec![0.0; 27], ..Deviations::default() };
     let refused = swept_with(&drive, &load(20.0, Projection), &nil, Points::samples(4).unwrap()).unwrap_err();
     assert!(matches!(refused, SolveError::Impossible(violations) if violations.len() == 1));
@@ -640,7 +640,7 @@ fn unloaded_wind_up_is_limit_of_small_torque() {
     for p in drives() {
         let drive = drive(&p);
         let deviations = deviations(&p, ALL_KINDS[4], 11);
-        // Teeth of both zones, teeth of one zone, and both to a tolerance, where loads jump and angles stand twice.
+        // Cases: teeth of both zones, teeth of one zone, and a tolerance sweep with jumps at double angles.
         for (deviations, points) in [
             (&deviations, Points::samples(5).unwrap()),
             (&Deviations::default(), Points::samples(5).unwrap()),

@@ -116,7 +116,7 @@ pub(crate) fn any_drive() -> impl Strategy<Value = DriveParameters> {
             let installed = 2 * half;
             let teeth = installed * removal;
             let semi_minor_mm = a * (1.0 - flattening);
-            // Thick enough to fill that share of the room between neighbours.
+            // Fills this share of the space between neighbours.
             let sin = (std::f64::consts::PI / installed as f64).sin();
             let tooth_radius_mm = thickness * semi_minor_mm * sin / (1.0 - sin);
             let parameters = DriveParameters {

@@ -53,7 +53,8 @@ fn peak_contact_has_hertz_width_and_shear() {
                 [("half_width_mm", found.half_width_mm), ("shear_stress_mpa", shear), ("shear_depth_mm", depth)]
             {
                 let value = number(&expected[kind]).unwrap();
-                // The width follows the place of the peak to first order, and the place is known to the root of the tolerance.
+                // The width follows the peak's position to first order. The position's error is the root of the
+                // tolerance.
                 worst.see(kind, &name, (found - value).abs(), 1e-4 * value);
             }
         }

@@ -126,7 +126,7 @@ fn center_radius_mm(p: &DriveParameters, psi: f64) -> f64 {
             let (sin, cos) = phi.sin_cos();
             Vector2::new((h + r) * cos - slope * sin, (h + r) * sin + slope * cos)
         };
-        // The polar angle grows with the normal's; within half a lobe of ψ, so that no turn is lost.
+        // The polar angle grows with the normal's. It stays within half a lobe of ψ, so no turn is lost.
         let (mut low, mut high) = (psi - 0.5 * PI / lobes as f64, psi + 2.0 * PI / lobes as f64);
         for _ in 0..200 {
             let middle = 0.5 * (low + high);
@@ -145,7 +145,7 @@ fn center_radius_mm(p: &DriveParameters, psi: f64) -> f64 {
             2,
         ),
         WaveGenerator::Eccentric { radius_mm, eccentricity_mm: e } => {
-            // The far intersection of a ray from the axis with the circle of radius R0 + r about (e, 0).
+            // The far intersection of a ray from the axis with the circle of radius R0 + r around (e, 0).
             e * psi.cos() + ((radius_mm + r).powi(2) - (e * psi.sin()).powi(2)).sqrt()
         }
         WaveGenerator::Harmonic { lobes, mean_radius_mm, amplitude_mm: e } => {
@@ -178,7 +178,7 @@ fn path_slope_and_curvature_match_differences() {
             let t_psi = -bend / d + t * t;
             let scale = 1.0 + t_psi.abs();
             assert!((tooth.tan_pressure_angle_derivative - t_psi).abs() < 1e-5 * scale, "{t_psi} of {p:?}");
-            // The path's curvature by its polar form, and the cam's as that of a parallel curve.
+            // Curvature of the path in polar form, and of the cam as a parallel curve.
             let path = (d * d + 2.0 * slope * slope - d * bend) / (d * d + slope * slope).powf(1.5);
             let cam = path / (1.0 - p.tooth_radius_mm * path);
             let found = tooth.cam_contact.curvature_per_mm;
@@ -191,7 +191,7 @@ fn path_slope_and_curvature_match_differences() {
 
 #[test]
 fn position_is_accurate_near_lobe_and_valley() {
-    // Near either end lever arms are proportional to the distance from it: no digit may be lost on the way there.
+    // Near either end, lever arms are proportional to the distance from it and must keep their digits.
     for p in family() {
         let drive = drive(&p);
         let (locus, lobes) = (drive.flank().locus(), drive.lobes());
@@ -300,7 +300,7 @@ fn critical_radius_separates_undercut_from_regular_tips() {
         let unbored = DriveParameters { tip_radius_mm: None, ..p };
         let Some(critical_mm) = drive(&unbored).flank().critical_tooth_radius_mm() else { continue };
         let valley_rad = PI / p.wave_generator.lobes() as f64;
-        // How far the union reaches on the tip's line beyond the tooth in the valley itself.
+        // Reach of the union on the tip's line beyond the tooth in the valley.
         let beyond_mm = |factor: f64| {
             let thicker = DriveParameters { tooth_radius_mm: critical_mm * factor, ..unbored };
             let regular_mm = center_radius_mm(&thicker, valley_rad) + thicker.tooth_radius_mm;
@@ -529,13 +529,13 @@ fn always_carries_matches_brute_force() {
             let p = of(harmonic(lobes, 100.0, 0.3), installed, installed, installed + lobes, 3.0);
             let Ok(drive) = Drive::new(&p) else { continue };
             let mesh = Mesh::new(&drive);
-            // By brute force over many moments, none of them an entry: is there one without a tooth that has a lever arm?
+            // Brute force over many moments, none of them an entry: is there a moment without a tooth with a lever arm?
             let carries = (0..840).all(|sample| {
                 (0..installed).any(|slot| {
                     let place = (slot * 840 - sample) * lobes;
                     let turn = 840 * installed;
                     let from_lobe = (place.rem_euclid(turn) + turn / 2 - 1) % turn - turn / 2 + 1;
-                    // In the valley there is no lever arm either.
+                    // In the valley there is no lever arm.
                     from_lobe > 0 && 2 * from_lobe < turn
                 })
             });
@@ -579,7 +579,7 @@ proptest! {
             let dense = dense.peaks.get(contact);
             prop_assert!(peaks.force_n.value >= dense.force_n.value * (1.0 - 1e-4), "{:?}", contact);
             prop_assert!(peaks.stress_mpa.value >= dense.stress_mpa.value * (1.0 - 1e-4), "{:?}", contact);
-            // What lies between two of the samples is not much more, but where a tooth may stand alone just off the lobe.
+            // Between samples values are hardly larger, except where a tooth is alone just off the lobe.
             let is_steady = Mesh::new(&drive).engaged_spacings() > 2.5;
             prop_assert!(!is_steady || peaks.force_n.value <= dense.force_n.value * 1.1, "{:?}", contact);
         }
@@ -601,7 +601,7 @@ proptest! {
             prop_assert!(radius_mm < locus.cam_outer_radius_mm() * (1.0 + 1e-12));
             prop_assert!(radius_mm > locus.cam_inner_radius_mm() * (1.0 - 1e-12));
         }
-        // No point comes nearer to a tooth's centre than its radius, and some touch it.
+        // Every point keeps a radius from every tooth's centre, and some touch it.
         let psi = 2.0 * PI * place;
         let d = center_radius_mm(&parameters, psi);
         let center = Point2::new(d * psi.cos(), d * psi.sin());
@@ -653,7 +653,7 @@ fn eccentric_radial_force_is_torque_over_eccentricity() {
             let WaveGenerator::Eccentric { eccentricity_mm, .. } = p.wave_generator else { panic!("{p:?}") };
             let across_n = -torque_nmm / eccentricity_mm;
             assert!((force_n.y - across_n).abs() < 1e-12 * across_n.abs(), "{} is not {across_n}", force_n.y);
-            // All normals meet in the centre of the circle.
+            // All normals meet at the circle's centre.
             let pushed_n = along_normals_n(&p, sample, 5, Vector2::new(eccentricity_mm, 0.0));
             assert!((force_n + pushed_n).norm() < 1e-11 * sum_n, "{force_n} is not {}", -pushed_n);
         }
@@ -665,7 +665,7 @@ fn only_unequally_loaded_lobes_have_radial_force() {
     for p in [of(harmonic(4, 60.0, 1.2), 36, 18, 40, 4.0), of(harmonic(3, 48.0, 1.0), 30, 30, 27, 4.0), PAPER_5_1] {
         assert_eq!(forces(&p, 1, 5).0, Vector2::zeros());
     }
-    // The sum over all lobes, where it is taken and not known: two of the four lobes are alike.
+    // The sum over all lobes, calculated and not assumed: two of the four lobes are alike.
     let p = of(harmonic(4, 60.0, 1.2), 36, 18, 40, 4.0);
     let drive = drive(&p);
     let mesh = Mesh::new(&drive);
@@ -707,7 +707,7 @@ fn flanks_of_lobe_do_not_meet() {
             let least_mm = least_mm.unwrap();
             let is_by_flanks = least_mm > 1.001 * least_of_round_mm(lobes, tooth_radius_mm);
             are_hollow += i32::from(is_by_flanks);
-            // A lobe that is hardly too sharp cuts off next to nothing.
+            // A lobe that is barely too sharp loses almost nothing.
             let by = if is_by_flanks { 1e-3 } else { 2e-2 };
             for share in [1.0 - by, 1.0 + by] {
                 let (p, found) = of_radius(least_mm * share);
@@ -718,7 +718,7 @@ fn flanks_of_lobe_do_not_meet() {
                     (d * psi.cos(), d * psi.sin())
                 };
                 let centers: Vec<_> = (-20_000..20_000).map(|i| center(half_rad * f64::from(i) / 20_000.0)).collect();
-                // Finely in the valley, where large strokes are sharp.
+                // Fine steps in the valley, where large strokes have sharp curves.
                 let nearest_mm = (0..150)
                     .map(|i| {
                         let psi = half_rad * (1.0 - 0.93_f64.powi(i));
@@ -782,7 +782,8 @@ fn too_small_cam_is_refused_with_least_size() {
         }
         assert!(is_too_small(of_radius(least_mm)));
         assert!(!is_too_small(of_radius(least_mm * (1.0 + 1e-12))), "{least_mm} of {p:?}");
-        // Just above it the cam is sharp and convex at its sharpest, or its valley touches the axis; just below a cusp has turned inside out.
+        // Just above the limit the cam is convex at its sharpest point, or its valley touches the axis. Just below,
+        // a cusp is inverted.
         let sharpest = |radius_mm: f64| {
             let p = DriveParameters { wave_generator: of_radius(radius_mm), ..p };
             (0..=400)
@@ -814,7 +815,7 @@ fn tooth_counts_differ_by_one_per_lobe() {
         let Violation::ToothDifference { instead, .. } = violations(&beside(30))[0] else { panic!("{lobes}") };
         assert_eq!((instead.below, instead.above), (Some(30 - lobes), Some(30 + lobes)));
     }
-    // A ring of fewer teeth than there are lobes is no ring.
+    // A ring needs at least one tooth for each lobe.
     let Violation::ToothDifference { instead, .. } = violations(&of(harmonic(3, 100.0, 0.3), 5, 5, 2, 2.0))[0] else {
         panic!("a ring of two teeth")
     };
@@ -825,7 +826,7 @@ fn tooth_counts_differ_by_one_per_lobe() {
 fn carrier_fits_if_stroke_is_below_tooth_radius() {
     for wave_generator in [eccentric(40.0, 1.0), harmonic(3, 40.0, 1.0), harmonic_path(3, 43.0, 1.0)] {
         let lobes = wave_generator.lobes();
-        // Few ring teeth, so that the tip is regular.
+        // Few ring teeth keep the tip regular.
         let of_radius = |tooth_radius_mm| of(wave_generator, 3 * lobes, 3 * lobes, 2 * lobes, tooth_radius_mm);
         assert!(Drive::new(&of_radius(1.001)).is_ok());
         let found = violations(&of_radius(0.999));
@@ -847,7 +848,7 @@ fn neighbouring_teeth_of_every_kind_must_not_touch() {
             _ => None,
         });
         let limit_mm = limit_mm.unwrap_or_else(|| panic!("{touching:?}"));
-        // Least distance of two centres a spacing apart, by a fine scan without the solver.
+        // Least distance of two neighbouring centres, by a fine scan without the solver.
         let gap_mm = |r: f64| {
             let p = of_radius(r);
             let spacing = 2.0 * PI / teeth as f64;
@@ -869,7 +870,7 @@ fn hollow_wave_generator_runs_but_is_a_finding() {
         let found = findings::of_drive(&drive(p)).unwrap();
         found.iter().any(|finding| matches!(finding, Finding::HollowWaveGenerator { .. }))
     };
-    // Straight at R/(U² + 1), which is not hollow yet.
+    // At R/(U² + 1) the valley is straight, which is not hollow yet.
     assert!(is_told(&path(5.21)) && !is_told(&path(5.2)) && !is_told(&path(5.19)));
     let valley =
         |p: &DriveParameters| drive(p).flank().locus().at(Position::valley(3)).unwrap().cam_contact.curvature_per_mm;
@@ -880,14 +881,14 @@ fn hollow_wave_generator_runs_but_is_a_finding() {
 
 #[test]
 fn alternating_zones_need_only_one_tooth_each() {
-    // Four teeth on three lobes: a third of a lobe is a place.
+    // Four teeth on three lobes: each place is a third of a lobe.
     let p = of(harmonic(3, 48.0, 1.0), 28, 4, 25, 4.0);
     let mesh = Mesh::new(&drive(&p));
     assert!(!mesh.zones_are_alike() && mesh.always_carries());
     assert_eq!(mesh.teeth_in_mesh(), TeethInMesh { min: 2, max: 2 });
     let sweep: Sweep = swept(&p, &load(5.0, VirtualWork), 30);
     assert!(sweep.torque_balance_residual < 1e-13 && sweep.period_closure_residual < 1e-13);
-    // Three of them stand alike on three lobes, each a zone's only one, which has no lever arm at times.
+    // Three teeth on three lobes are alike. Each is alone in its zone and has no lever arm at some angles.
     let p = of(harmonic(3, 48.0, 1.0), 30, 3, 27, 4.0);
     assert!(!Mesh::new(&drive(&p)).always_carries());
 }
@@ -927,7 +928,7 @@ fn flat_cutting_steepest_contact_is_a_finding() {
         tooth: ToothShape::FlatSided { width_mm: 15.0, flat_length_mm },
         ..PAPER_5_1
     };
-    // The contact that lies farthest from the slot's middle line, by the flank's points in the tooth's own frame.
+    // The contact farthest from the slot's middle line, by the flank's points in the tooth's frame.
     let drive_of = drive(&PAPER_5_1);
     let flank = drive_of.flank();
     let farthest_mm = (1..1000)
@@ -979,7 +980,7 @@ fn bored_flank_of_every_kind_ends_at_bore() {
             let end = bored.flank_limit();
             assert_eq!(end.end, FlankEnd::Bore);
             let tooth = bored.flank().locus().at(end.position).unwrap();
-            // The flank is the tooth's radius off the path, along its normal.
+            // The flank is one radius from the path along its normal.
             let ring_teeth_per_lobe = unbored.ring_teeth as f64 / f64::from(bored.lobes());
             let (r, tan) = (unbored.tooth_radius_mm, tooth.tan_pressure_angle * ring_teeth_per_lobe);
             let along_mm = tooth.center_radius_mm + r / tan.hypot(1.0);

@@ -234,7 +234,7 @@ fn assert_both_paths_agree_on(
         )
     };
     let (Ok(fast), Ok(plain)) = &answers else {
-        // What has no answer has none by either way, for the same reason.
+        // Both paths must give the same error.
         assert_eq!(format!("{:?}", answers.0.map(|_| ())), format!("{:?}", answers.1.map(|_| ())));
         return;
     };
@@ -248,11 +248,11 @@ fn assert_both_paths_agree_on(
     let of_plain = &plain.states.force_n;
     for ((name, fast), (_, plain)) in columns(fast).into_iter().zip(columns(plain)) {
         assert_eq!(fast.len(), plain.len(), "{name}");
-        // The angle on the ring is the difference of two, of which the first is at most a quarter turn over k.
+        // The angle on the ring is a difference. Its first term is at most a quarter turn over k.
         let valley_deg = 180.0 / f64::from(drive.lobes());
         let of_terms = if name == "angle on the ring" { valley_deg / drive.flank().teeth_per_wave() } else { 0.0 };
         let scale = largest(plain).max(of_terms);
-        // A stress is a root of its force, and relatively no further off: of a tooth that has just begun to carry both are small differences.
+        // A stress follows its force with the same relative error. For a barely loaded tooth both are small.
         let forces = match name {
             _ if by_gaps == 1.0 => None,
             "stress at the cam" => Some(&of_plain.wave_generator),
@@ -276,7 +276,7 @@ fn assert_both_paths_agree_on(
     }
     for (contact, peaks) in fast.peaks.iter() {
         let expected = plain.peaks.get(contact);
-        // Where two states are as high, rounding decides which is the peak; its value is the column's in either case.
+        // If two states are equally high, rounding decides which is the peak. Its value is the column's either way.
         let amplified = amplification(&drive, expected.stress_mpa.position_deg);
         let amplified = by_gaps * if contact == Contact::Ring { amplified } else { 1.0 };
         let pairs = [(peaks.force_n, expected.force_n, by_gaps), (peaks.stress_mpa, expected.stress_mpa, amplified)];
@@ -305,7 +305,7 @@ fn assert_both_paths_agree_on(
             assert_eq!(peaks.shear.is_some(), expected.shear.is_some());
             if let Some((found, expected)) = peaks.shear.zip(expected.shear) {
                 assert_near("shear", found.stress_mpa, expected.stress_mpa);
-                // The depth of a largest value is known to half the digits.
+                // The depth of the maximum has half of the digits.
                 let off = (found.depth_mm / expected.depth_mm - 1.0).abs();
                 assert!(off <= 1e-7 * amplified.max(1.0), "{contact:?}: depth of shear of {parameters:?}");
             }
@@ -380,7 +380,7 @@ fn assert_same_peaks(
 }
 
 fn any_stiffnesses() -> impl Strategy<Value = [f64; 3]> {
-    // Near enough to each other for `projection` to have a solution on every drive.
+    // Similar stiffnesses, so that `projection` has a solution on every drive.
     prop_oneof![Just([1e6; 3]), prop::array::uniform3(0.9e6_f64..1.1e6)]
 }
 
@@ -452,7 +452,7 @@ proptest! {
         let is_projection = !by_virtual_work && matches!(law, ContactLaw::Linear | ContactLaw::Palmgren);
         let mut series_compliance_mm_per_n = PerContact::default();
         if is_projection {
-            // The only gap that `projection` weighs alike on every drive.
+            // Only the wave generator's gap has the same `projection` weight on every drive.
             (clearance_um.ring, clearance_um.carrier) = (0.0, 0.0);
         } else {
             let [wave_generator, ring, carrier] = series;
@@ -569,7 +569,7 @@ fn undercut_balls_take_fast_path_on_any_generator() {
     let case = LoadCase::new(&load).unwrap();
     for parameters in [
         PAPER_5_2,
-        // A thousandth beyond the threshold of undercut.
+        // A thousandth above the undercut threshold.
         DriveParameters { tooth_radius_mm: 6.756, ..PAPER_5_1 },
         on(WaveGenerator::Eccentric { radius_mm: 57.0, eccentricity_mm: 1.0 }),
         on(WaveGenerator::Harmonic { lobes: 7, mean_radius_mm: 57.0, amplitude_mm: 0.3 }),
@@ -878,7 +878,7 @@ fn fast_path_is_taken_under_every_law() {
                 let load = LoadCase::new(&load).unwrap();
                 sweep_plain(&drive(&PAPER_5_1), &load, Points::samples(50).unwrap(), &Never).unwrap()
             });
-            // The same numbers but for their last digits, which no two ways share throughout.
+            // Equal except in the last digits, which differ between the paths.
             assert_ne!(fast.states.stress_mpa, plain.states.stress_mpa, "{law:?} {gap_um}");
         }
     }
@@ -930,7 +930,7 @@ fn deviations_take_fast_path_from_any_lap_start() {
 
 #[test]
 fn both_paths_keep_tolerance_with_unlike_teeth_or_zones() {
-    // Where they look differs in the last digits, but for the first sixteen intervals.
+    // The paths examine different places in the last digits, after the first sixteen intervals.
     let mut looked_elsewhere = [0, 0];
     for (parameters, seed) in drives_that_may_deviate().into_iter().zip(1..) {
         let drive = drive(&parameters);
@@ -981,7 +981,7 @@ fn modifications_and_unlike_zones_take_fast_path() {
             Modification { ring_tip_relief: Some(relief), ..Modification::NONE },
             Modification { ring_equidistant_um: 4.0, ring_path_shift_um: -3.0, ..Modification::NONE },
             Modification { ring_profile_shift_um: 3.0, tooth_radius_um: 1.0, slot_wall_um: 2.0, ..Modification::NONE },
-            // Lost motion alone makes up for what the ring has too much of.
+            // The lost motion covers the ring's interference.
             Modification { ring_rotation_arcsec: 200.0, ring_equidistant_um: -1.0, ..Modification::NONE },
             Modification { carrier_rotation_arcsec: 9.0, wave_generator_equidistant_um: 1.0, ..Modification::NONE },
         ] {
@@ -1017,7 +1017,7 @@ fn every_wave_generator_takes_fast_path() {
         let parameters = DriveParameters { wave_generator, ring_teeth: 28 - lobes, ..PAPER_5_1 };
         let load = LoadParameters { law: JOHNSON, ..load(20.0, Compatibility::VirtualWork) };
         let case = LoadCase::new(&load).unwrap();
-        // Some tiles turn far, and have lanes that hold no tooth.
+        // Some tiles cover large rotations and have empty lanes.
         for samples in [50, 5000] {
             assert_both_paths_agree(&parameters, &load, samples);
             let plain = sweep_plain(&drive(&parameters), &case, Points::samples(samples).unwrap(), &Never).unwrap();
@@ -1033,13 +1033,13 @@ fn both_paths_refuse_contacts_beyond_johnsons_law() {
         let load = LoadParameters { law: JOHNSON, ..load(torque_nm, Compatibility::VirtualWork) };
         assert_both_paths_agree(&PAPER_5_1, &load, 10);
     }
-    // A capacity may be wanted that lies beyond.
+    // The capacity may lie beyond the law's end.
     for exponent in 0..38 {
         let allowable_stress_mpa = Some(everywhere(1e3 * 1.2_f64.powi(exponent)));
         let load = LoadParameters { law: JOHNSON, allowable_stress_mpa, ..load(20.0, Compatibility::VirtualWork) };
         assert_both_paths_agree(&PAPER_5_1, &load, 10);
     }
-    // The load at which the law ends at some input angle, from below and from above.
+    // The load at which the law ends at some input angle, from both sides.
     let ends = |torque_nm: f64| {
         let load =
             LoadCase::new(&LoadParameters { law: JOHNSON, ..load(torque_nm, Compatibility::VirtualWork) }).unwrap();
@@ -1095,11 +1095,11 @@ fn peaks_computed_tooth_by_tooth_keep_no_states() {
         let load = LoadParameters { allowable_stress_mpa: Some(everywhere(900.0)), ..load };
         let (drive, case) = (drive(&parameters), LoadCase::new(&load).unwrap());
         let of = |samples| count_alloc(|| peaks(&drive, &case, Points::samples(samples).unwrap(), &Never).unwrap());
-        // The boundary elements of the ring are solved by the first.
+        // The first sweep solves the ring's boundary elements.
         of(10);
         let ((_, growths, _), few) = of(1000);
         assert_eq!(few, SweepPeaks::from(&swept(&parameters, &load, 1000)), "{parameters:?} {load:?}");
-        // An input angle may have its own: columns would grow by the logarithm of their length besides.
+        // Each input angle may have a fixed number of allocations. Growing columns would add a logarithm.
         let ((_, more_growths, _), _) = of(5000);
         assert_eq!((more_growths - growths) % 4000, 0, "{parameters:?} {load:?}");
     }
@@ -1115,6 +1115,6 @@ fn sweep_allocates_only_columns() {
     let (few_states, of_few) = allocations(50);
     let (many_states, of_many) = allocations(5000);
     assert!(many_states > 90 * few_states, "{few_states}, {many_states}");
-    // Columns that grow are moved a number of times that rises with the logarithm of their length.
+    // Growing columns are moved as often as the logarithm of their length.
     assert!(of_few <= of_many && of_many < of_few + 30, "{of_few}, {of_many}");
 }

@@ -185,7 +185,7 @@ fn single_contacts_match_hertz_pressure_and_johnson_approach() {
         let half_width_mm = (8.0 * force_n_per_mm * radius_mm / (PI * modulus_mpa)).sqrt();
         let hertz_mpa = 2.0 * force_n_per_mm / (PI * half_width_mm);
         assert!((pressure_mpa / hertz_mpa - 1.0).abs() < 0.015, "{pressure_mpa} MPa, by Hertz {hertz_mpa}");
-        // Both sides of the disc come nearer to it (docs/theory.md 4.3).
+        // Both sides of the disc approach it (docs/theory.md 4.3).
         let johnson_mm = force_n_per_mm / (PI * modulus_mpa)
             * (2.0 * (4.0 * radius_mm / half_width_mm).ln() - 1.0 + 2.0 * (2.0 * depth_mm / half_width_mm).ln()
                 - 0.3 / 0.7);
@@ -290,7 +290,7 @@ fn each_model_has_the_error_it_reports() {
                 let named =
                     format!("{compatibility:?}, {law:?}, {refined}, {wanted:?}: {what} {least:+.4} to {largest:+.4}");
                 let is_held = low <= least && largest <= high;
-                // There an earlier calculation went further.
+                // An earlier calculation had a wider range there.
                 let slack = if has_pointed_tips && has_gaps && what == "force" { 0.045 } else { 0.015 };
                 if !is_held || low < least - 0.015 || high > largest + slack {
                     wrong.push(format!("{named}, told {low:+} to {high:+}"));
@@ -347,7 +347,8 @@ fn wind_up_above_calculated_drives_is_reported() {
         let case = LoadCase::new(&load).unwrap();
         let error = model_error::of(&drive, &case, &Deviations::default(), &sweep, None).unwrap();
         assert_eq!(error.beyond, [Beyond::WindUp]);
-        // d = R + e cos 2ψ: the cam turns by x until R + e cos 2(ψ - x) has risen by the gap over cos β, tan β = k T, and presses with the arm of that place.
+        // d = R + e cos 2ψ. The cam turns by x until R + e cos 2(ψ - x) has risen by the gap over cos β, where
+        // tan β = k T. It presses with the arm of that place.
         let WaveGenerator::HarmonicPath { mean_path_radius_mm, amplitude_mm, .. } = parameters.wave_generator else {
             unreachable!("made above");
         };
@@ -368,7 +369,7 @@ fn wind_up_above_calculated_drives_is_reported() {
             let closes = teeth.filter(|&psi| psi < 0.5 * PI).filter_map(|psi| Some((turned(psi)?, psi)));
             let (x, psi) = closes.min_by(|one, other| one.0.total_cmp(&other.0)).unwrap();
             let t = slope(psi - x) / d(psi - x);
-            // Two zones, the torque over the arm, which is that of the tangential part of F_H.
+            // Two zones share the torque. The arm belongs to the tangential part of F_H.
             0.5 * 1e-2 / (d(psi - x) * t) * t.hypot(1.0)
         };
         let rigid_n = (0..400).map(|step| force_n(f64::from(step) / 400.0 * 0.2 * PI)).fold(0.0, f64::max);
@@ -388,13 +389,13 @@ fn only_calculated_drives_lie_within_range() {
             let sweep = swept(parameters, load, INTERVALS);
             model_error::of(&drive, &LoadCase::new(load).unwrap(), &Deviations::default(), &sweep, None).unwrap().beyond
         };
-        // Of a drive with pointed tips the angles of entry are left out.
+        // For a drive with pointed tips, the angles of entry are not covered.
         let expected = if case.drive == "5.2" { vec![Beyond::EntryUnderLoad] } else { Vec::new() };
         assert_eq!(beyond(&parameters, &own), expected, "{}", case.name());
         if drive.lobes() == 2 && case.drive == "5.1" && !LoadCase::new(&own).unwrap().has_gaps() {
             let gaps = PerContact { ring: 10.5, ..PerContact::default() };
             assert_eq!(beyond(&parameters, &LoadParameters { clearance_um: gaps, ..own }), [Beyond::Gap]);
-            // The same drive a tenth as large: what is a gap there hangs on the size.
+            // At a tenth of the size the limit of a gap scales too.
             let small = DriveParameters {
                 wave_generator: ellipse(5.8, 5.6),
                 tooth_radius_mm: 0.5,
@@ -419,7 +420,7 @@ fn only_calculated_drives_lie_within_range() {
             let mut brass = own;
             brass.materials.carrier.youngs_modulus_gpa = 100.0;
             assert_eq!(beyond(&parameters, &brass), [Beyond::Materials]);
-            // Near the root contacts are wider than where their stress is largest, and reach 0.035 of the radius from 85 N·m on.
+            // Near the root contacts are wider than at the largest stress: 0.035 of the radius above 85 N·m.
             for (torque_nm, expected) in [(80.0, vec![]), (100.0, vec![Beyond::HalfWidth])] {
                 let torque = Torque::Input(torque_nm);
                 assert_eq!(beyond(&parameters, &LoadParameters { torque, ..own }), expected, "{torque_nm} N·m");
@@ -428,11 +429,11 @@ fn only_calculated_drives_lie_within_range() {
                 beyond(&parameters, &LoadParameters { torque: Torque::Input(200.0), ..own }),
                 [Beyond::HalfWidth]
             );
-            // A law that is given little depth ends before.
+            // A law with a small depth ends earlier.
             let depth_mm = PerContact { ring: Some(0.5), ..PerContact::default() };
             let shallow = LoadParameters { law: ContactLaw::Johnson { depth_mm }, torque: Torque::Input(40.0), ..own };
             assert_eq!(beyond(&parameters, &shallow), [Beyond::HalfWidth]);
-            // Other laws err otherwise with any other size or load.
+            // Errors of other laws depend on size and load.
             for law in [ContactLaw::Palmgren, ContactLaw::Linear] {
                 assert_eq!(beyond(&parameters, &LoadParameters { law, ..own }), [Beyond::Law], "{law:?}");
             }

@@ -71,7 +71,7 @@ fn path_in_ring(p: &DriveParameters, space: u64, position_rad: f64, shift_mm: f6
 
 /// Returns a point's signed distance from a curve along the normal at the nearest point, by parabolas around `near`.
 fn signed_distance(point: Vector2<f64>, outward: Vector2<f64>, near: f64, curve: impl Fn(f64) -> Vector2<f64>) -> f64 {
-    // The tangent by central differences; Newton's method on (P - C(t))·C'(t), for which a rough second difference is enough.
+    // The tangent is a central difference. Newton's method on (P - C(t))·C'(t) needs only a rough second difference.
     let tangent = |t: f64| (curve(t + 1e-5) - curve(t - 1e-5)) / 2e-5;
     let mut t = near;
     for _ in 0..30 {
@@ -117,7 +117,7 @@ fn gap_of_moved_ring(
 
 #[track_caller]
 fn assert_near(found_mm: f64, moved_mm: f64, size_mm: f64) {
-    // Second order in the size, and the digits of 60 mm at a millionth.
+    // Allows the second order in the size, and rounding of 60 mm over a millionth.
     assert!((found_mm - moved_mm).abs() < 1e-6 * size_mm, "{found_mm:e} is not {moved_mm:e}");
 }
 
@@ -156,7 +156,7 @@ fn equidistant_opens_full_gap_and_profile_shift_cosine() {
             let none = Deviations::default();
             let position = degrees.to_radians();
             let center = path_in_ring(&p, 0, position, 0.0);
-            // The flank as points: the path's neighbours, and a radius along the normal.
+            // The flank as points: neighbours on the path, plus a radius along the normal.
             let flank = |t: f64, r: f64| {
                 let (before, after) = (path_in_ring(&p, 0, t - 1e-5, 0.0), path_in_ring(&p, 0, t + 1e-5, 0.0));
                 let along = (after - before).normalize();
@@ -195,14 +195,14 @@ fn runout_changes_gaps_between_real_curves() {
             for lobe in [0, 1] {
                 let place = Place { slot: 9, ring_space: 4, lobe };
                 let found = gaps_of(&drive, Modification::default(), &deviations, &place, &tooth);
-                // The cam's own frame: the tooth stands at the position from its lobe.
+                // In the cam's frame the tooth is at its position from the lobe.
                 let turn = PI * lobe as f64;
                 let center = unit(position + turn) * distance_at(&p, position);
                 let cam = signed_distance(center, center, position + turn, |t| path_at_normal(&p, t) + off);
                 assert_near(found.wave_generator, -cam, SMALL_MM);
                 let ring = gap_of_moved_ring(&p, &place, degrees, 0.0, |c| c + off);
                 assert_near(found.ring, ring, SMALL_MM);
-                // A plane wall at the tooth's side, forward of it for s = +1.
+                // A plane wall beside the tooth, ahead of it for s = +1.
                 let slot = 2.0 * PI * 9.0 / p.installed as f64;
                 let wall = Rotation2::new(slot) * Vector2::new(0.0, s);
                 assert_near(found.carrier, wall.dot(&off), SMALL_MM);
@@ -308,7 +308,7 @@ fn deviating_teeth_of_both_zones_share_load() {
         let mut teeth = Vec::new();
         for lobe in 0..zones {
             for placed in mesh.placed_at(1, Samples::new(4).unwrap()) {
-                // Half a turn on stand the teeth of the second lobe.
+                // The teeth of the second lobe are half a turn away.
                 let place = Place::new(&drive, placed.number + 14 * lobe, lobe);
                 teeth.push(loaded.tooth_at(&place, placed.position)?);
             }
@@ -322,7 +322,7 @@ fn deviating_teeth_of_both_zones_share_load() {
     };
     let (alike, half) = solved(None, 1).unwrap();
     assert!((2.0 * half / 20e3 - 1.0).abs() < 1e-14);
-    // A deviation where no loaded tooth stands changes nothing, but for the second zone in the list.
+    // A deviation at an unloaded tooth changes only the list, which has the second zone.
     let elsewhere =
         Deviations { slot_wall_um: (0..28).map(|i| f64::from(u8::from(i == 10))).collect(), ..Deviations::default() };
     let (both, torque) = solved(Some(&elsewhere), 2).unwrap();
@@ -330,13 +330,13 @@ fn deviating_teeth_of_both_zones_share_load() {
     for (one, other) in both.iter().zip(alike.iter().chain(&alike)) {
         assert!((one - other).abs() < 1e-9);
     }
-    // A cam off its axis loads one zone more than the other.
+    // A cam off its axis loads one zone more.
     let off = PerContact { wave_generator: Runout { amount_um: 2.0, angle_deg: 40.0 }, ..PerContact::default() };
     let (unlike, torque) = solved(Some(&Deviations { runout: off, ..Deviations::default() }), 2).unwrap();
     assert!((torque / 20e3 - 1.0).abs() < 1e-14);
     let sums: Vec<f64> = unlike.chunks(alike.len()).map(|zone| zone.iter().sum()).collect();
     assert!(sums[0] > 1.1 * sums[1], "{sums:?}");
-    // More than the clearance covers.
+    // The runout exceeds the clearance.
     let far = PerContact { wave_generator: Runout { amount_um: 60.0, angle_deg: 40.0 }, ..PerContact::default() };
     let refused = solved(Some(&Deviations { runout: far, ..Deviations::default() }), 2);
     assert!(matches!(refused, Err(SolveError::Interference { gap_um, .. }) if gap_um < 0.0), "{refused:?}");
@@ -344,7 +344,8 @@ fn deviating_teeth_of_both_zones_share_load() {
 
 #[test]
 fn ring_space_follows_from_slot_and_lobe() {
-    // In the ring's frame the tooth stands at the middle of its space, less what its position is through the ring: checked by angles alone.
+    // In the ring's frame the tooth is at the middle of its space, minus its position through the ring. Only angles are
+    // used here.
     for p in [
         PAPER_5_1,
         larger(),

@@ -103,7 +103,7 @@ fn free_tooth(
     let along = directions(drive, tooth);
     let d = tooth.center.center_radius_mm;
     let pushed_mm = rotation_rad * d * tooth.center.tan_pressure_angle.atan().sin();
-    // How far each contact is pressed when the centre moves by v: the cam comes nearer by what it has turned.
+    // Approach of each contact if the centre moves by v. The cam comes nearer by its rotation.
     let pressed = |v: Vector2<f64>| {
         [
             pushed_mm - v.dot(&along[0]) - gap_mm.wave_generator,
@@ -119,7 +119,7 @@ fn free_tooth(
         let step = 1e-5 * force_n;
         2.0 * step / (law(CONTACTS[i], tooth, force_n + step) - law(CONTACTS[i], tooth, force_n - step))
     };
-    // Each contact at first takes the part that statics gives it, so that all three press.
+    // Starts with the shares of statics, so that all three contacts press.
     let mut v = {
         let reach = |ratio: f64, i: usize, f: f64| law(CONTACTS[i], tooth, f * ratio);
         let ratio = tooth.force_ratio;
@@ -142,7 +142,7 @@ fn free_tooth(
             .lu()
             .solve(&Vector2::new(ring, carrier))
             .unwrap()
-            // Somewhere beside the answer, or Newton's method would have nothing to do.
+            // Starts beside the solution, so that Newton's method has work.
             * 1.001
     };
     for _ in 0..60 {
@@ -309,7 +309,7 @@ fn johnsons_law_ends_at_the_ring(drive: &Drive) {
         panic!("{refused:?}")
     };
     assert_eq!(half_width_limit_mm, 2.5);
-    // Just below the torque that it names the first input angle has an answer, with that half-width; just above it has none.
+    // Just below the reported torque the first input angle has an answer with that half-width. Just above it has none.
     let loaded = |torque_nm: f64| {
         let case = LoadCase::new(&johnson(torque_nm)).unwrap();
         let loaded = LoadedDrive::new(drive, &case).unwrap();
@@ -326,7 +326,7 @@ fn johnsons_law_ends_at_the_ring(drive: &Drive) {
     };
     assert!((loaded(input_torque_limit_nm * (1.0 - 1e-9)).unwrap() / 2.5 - 1.0).abs() < 1e-8);
     assert!(loaded(input_torque_limit_nm * (1.0 + 1e-9)).is_err());
-    // A capacity beyond is none.
+    // No capacity exists beyond the law's end.
     let parameters = LoadParameters { allowable_stress_mpa: Some(everywhere(1e6)), ..johnson(20.0) };
     let refused = sweep::sweep(drive, &LoadCase::new(&parameters).unwrap(), Points::samples(4).unwrap(), &Never);
     assert!(matches!(refused, Err(SolveError::JohnsonBeyondHalfWidth { .. })), "{refused:?}");
@@ -407,7 +407,7 @@ fn tolerance_sweep_finds_peaks_under_these_laws() {
             for (found, sampled) in
                 [(peaks.force_n.value, sampled.force_n.value), (peaks.stress_mpa.value, sampled.stress_mpa.value)]
             {
-                // Samples miss a kink by as much as they are apart.
+                // Samples miss a kink by up to their distance.
                 assert!(found >= sampled * (1.0 - 1e-6) && found <= sampled * (1.0 + 2e-4), "{found} {sampled}");
             }
         }
@@ -505,7 +505,7 @@ fn ellipse_axes_and_approach_match_elliptic_integrals() {
         let cubed_mm3 = 3.0 * force_n * second / (PI * modulus_mpa * (large + small) * ratio * ratio);
         let approach_mm = force_n.powf(2.0 / 3.0) * ellipse.coefficient();
         let expected_mm = 1.5 * force_n * first / (PI * modulus_mpa * long_mm);
-        // Differences of integrals lose digits to a nearly round ellipse.
+        // Differences of integrals lose digits for a nearly round ellipse.
         assert!((curvatures / (large / small) - 1.0).abs() < 1e-14 / m, "{ratio}: {curvatures}");
         assert!((long_mm.powi(3) / cubed_mm3 - 1.0).abs() < 1e-14, "{ratio}: {long_mm} mm");
         assert!((approach_mm / expected_mm - 1.0).abs() < 1e-14, "{ratio}: {approach_mm} mm");
@@ -583,7 +583,7 @@ fn flat_approach_is_mean_under_uniform_pressure() {
     let modulus = 115e3;
     for (length, width) in [(4.0_f64, 15.0_f64), (3.0, 3.0), (15.0, 4.0), (1e-4, 10.0)] {
         let flat = FlatContact::new(length, width);
-        // Over the distances (u, v) of two points, each (l - u)(L - v) often: in the corner u = v = 0 by polar coordinates.
+        // Over the distances (u, v) of two points, each with weight (l - u)(L - v). Polar coordinates at u = v = 0.
         let steps = 400;
         let nodes = |n: u32| (0..n).map(move |i| (f64::from(i) + 0.5) / f64::from(n));
         let corner = (width / length).atan();
@@ -671,7 +671,7 @@ fn given_carrier_bears_the_flats() {
         assert!(load.carrier_violations(&draft).is_empty());
         let found = sweep::sweep(&drive, &LoadCase::new(&load).unwrap(), Points::samples(8).unwrap(), &Never).unwrap();
         assert!(found.torque_balance_residual < 1e-14);
-        // Between the cam at 58 mm and the tips at 66 mm, a tenth of the room free on either side.
+        // Between the cam at 58 mm and the tips at 66 mm, with a tenth of the space free on each side.
         let (inner_mm, outer_mm) = (inner_mm.unwrap_or(58.8), outer_mm.unwrap_or(65.2));
         for state in 0..found.states.len() {
             let d = found.states.center_radius_mm[state];
@@ -700,7 +700,7 @@ fn given_carrier_bears_the_flats() {
             Err(SolveError::Impossible(violations)) => assert_eq!(parameter(&violations), at_fault),
             other => panic!("{other:?}"),
         }
-        // Cylinders do not ask for it.
+        // Cylinders do not depend on the carrier.
         let cylinders = crate::drives::drive(&PAPER_5_1);
         assert!(sweep::sweep(&cylinders, &case, Points::samples(8).unwrap(), &Never).is_ok());
     }

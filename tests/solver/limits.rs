@@ -71,7 +71,7 @@ fn neighbouring_teeth_must_not_touch() {
 
 #[test]
 fn three_teeth_are_nearest_across_major_axis() {
-    // A third of a turn apart, they stand nearer to the minor axis than the pair that straddles it.
+    // A third of a turn apart, they are nearer to the minor axis than the pair on both sides of it.
     let p = DriveParameters {
         wave_generator: ellipse(58.0, 50.0),
         teeth: 12,
@@ -154,8 +154,8 @@ fn reported_touching_radius_is_the_threshold() {
 
 #[test]
 fn touching_radius_matches_search_on_cam_points() {
-    // Independent of the solver's path: the cam's points by the ellipse's parameter, centres along their normals, and a bisection over
-    // the radius of the least distance of pairs whose polar angles differ by one spacing.
+    // Independent of the solver's path: cam points by the ellipse's parameter, and centres along their normals.
+    // Bisection over the radius uses the least distance of pairs whose polar angles differ by one spacing.
     for p in touching_drives() {
         let (a, b) = semi_axes_mm(&p);
         if p.installed > 100 || a > 10.0 * b {
@@ -208,7 +208,7 @@ fn thicker_teeth_have_narrower_gaps() {
         let mut last = f64::INFINITY;
         for share in 1..40 {
             let tooth_radius_mm = limit * f64::from(share) / 40.0;
-            // Wide enough a bore that no thin tooth wants for an annulus.
+            // A wide bore, so that thin teeth leave an annulus.
             let Ok(drive) = Drive::new(&DriveParameters {
                 tooth_radius_mm,
                 tip_radius_mm: Some(semi_axes_mm(&p).0 + tooth_radius_mm),
@@ -306,7 +306,7 @@ fn draft_has_the_violations_of_its_drive() {
 #[test]
 fn wind_up_beyond_model_is_a_finding() {
     let drive = drive(&PAPER_5_1);
-    // A carrier turned by τ takes up Z_G/U = 14 of it, and a light load nothing more.
+    // A carrier turned by τ gives a wind-up of Z_G/U = 14 times τ, and a light load adds nothing.
     let found = |carrier_rotation_arcsec| {
         let modification = Modification { carrier_rotation_arcsec, ..Modification::default() };
         let load = LoadParameters { modification, ..load(1e-9, Compatibility::VirtualWork) };
@@ -475,7 +475,7 @@ fn bore_inside_natural_tip_is_only_a_finding() {
     let p = DriveParameters { tip_radius_mm: Some(65.9), ..PAPER_5_1 };
     let found = findings::of_drive(&drive(&p)).unwrap();
     assert!(matches!(found[..], [Finding::BoreWithoutEffect { .. }]), "{found:?}");
-    // A bore that just meets the natural tip says what is there anyway.
+    // A bore at the natural tip has no effect.
     let exact = drive(&DriveParameters { tip_radius_mm: Some(66.0), ..PAPER_5_1 });
     assert_eq!(findings::of_drive(&exact).unwrap(), []);
     let load = load(20.0, Compatibility::Projection);
@@ -518,7 +518,7 @@ fn sweep_stops_on_request() {
 
 #[test]
 fn radii_around_critical_radius_give_a_drive() {
-    // Found by fuzzing: rounding alone decides here on which side of the threshold the drive is.
+    // Found by fuzzing: rounding decides on which side of the threshold the drive is.
     let known = DriveParameters {
         wave_generator: ellipse(46.8, 42.0),
         teeth: 16,

@@ -135,7 +135,7 @@ fn losses_match_exact_equilibrium_with_vanishing_friction() {
             for (index, slip) in turning.teeth.iter().enumerate() {
                 let expected = per_contact(&limit["slip_mm_per_rad"][index]);
                 let rolls = limit["rolls"][index].as_str();
-                // Where the race's speed lets two contacts roll at once either may be named.
+                // If the race's speed lets two contacts roll at once, either may be named.
                 let is_named = |contact: Contact| {
                     rolls == Some(code(contact)) || expected.get(contact).abs() < 1e-10 * way && rolls.is_some()
                 };
@@ -196,7 +196,7 @@ fn loss_error_is_quadratic_in_coefficients() {
     for case in Case::all() {
         let teeth = case.teeth();
         for entry in case.frictions() {
-            // Over the loss itself, so that one order is left.
+            // Relative to the loss itself, so one order remains.
             let errors: Vec<_> = entry["exact"].as_array().unwrap()[1..]
                 .iter()
                 .map(|exact| {
@@ -210,7 +210,7 @@ fn loss_error_is_quadratic_in_coefficients() {
                 .collect();
             for (coarse, fine) in errors[0].iter().zip(errors[1]) {
                 let name = format!("{} / {}: from {coarse:e} to {fine:e}", case.name(), entry["name"]);
-                // A quarter of the coefficients. Where orders cancel each other the first of them shows later.
+                // A quarter of the coefficients. If orders cancel, the first order shows later.
                 assert!(fine.abs() < 0.34 * coarse.abs() + 1.5e-3, "{name}");
                 if coarse.abs() > 0.01 {
                     (least, most) = (least.min(fine / coarse), most.max(fine / coarse));
@@ -268,7 +268,7 @@ fn reported_efficiency_error_has_range_of_validity() {
     assert_eq!(told(&spinning, &with(rolling, 0.1)), (2.5 * 0.1 * 0.25, true));
     assert_eq!(told(&flat_sided, &with(rolling, 0.1)), (9.5 * 0.1 * 0.25, true));
     assert!(!told(&spinning, &with(rolling, 0.101)).1);
-    // 57/52 of these stand for the race's radius over the bearing's.
+    // The factor 57/52 is the race's radius over the bearing's.
     let (light, _) = told(&spinning, &with(race(0.01 * 57.0 / 52.0), 0.05));
     assert_near(light, (2.5 * 0.08 + 10.0 * 0.01) * 0.25, 1e-15, "light bearing");
     let (stiff, is_within) = told(&spinning, &with(race(0.09 * 57.0 / 52.0), 0.05));
@@ -286,7 +286,7 @@ fn contact_point_moves_along_each_curve() {
             for contact in CONTACTS {
                 let expected = *expected.get(contact);
                 let what = format!("{} at {contact:?}", case.name());
-                // 1 + rκ itself is given to half a unit in its last place.
+                // 1 + rκ has half a unit of error in its last place.
                 assert_near(*found.get(contact), expected, 1e-13 * expected, &what);
             }
         }
@@ -385,7 +385,8 @@ fn input_power_equals_output_power_plus_losses() {
         let turning = mechanism.turning(&friction, &teeth_at(&loaded, 3, 20));
         let turning_rad_per_s = mechanism.turning_rad_per_s(1500.0);
         let lost_w = power_w(turning.lost_nmm_per_rad(), turning_rad_per_s);
-        // Speeds of wave generator, ring and carrier against the member that stands still, at this speed of the first against the last.
+        // Speeds of wave generator, ring and carrier against the fixed member, at this speed of the first
+        // against the last.
         let k = mechanism.ring_teeth_per_wave();
         let (cam, ring) = (turning_rad_per_s, -mechanism.sense() / k * turning_rad_per_s);
         for fixed in Fixed::ALL {
@@ -394,7 +395,7 @@ fn input_power_equals_output_power_plus_losses() {
                 Fixed::Carrier => 0.0,
                 Fixed::WaveGenerator => cam,
             };
-            // The torques without friction, of the teeth on the three; each driven end keeps its own.
+            // Torques without friction of the teeth on the three members. Each driven end keeps its own.
             let torque_nm = [-3.0, 3.0 * k * -mechanism.sense(), 3.0 * (k + mechanism.sense()) * mechanism.sense()];
             let powers_w = [torque_nm[0] * (cam - still), torque_nm[1] * (ring - still), torque_nm[2] * -still];
             assert!(powers_w.iter().sum::<f64>().abs() < 1e-10);
@@ -487,7 +488,7 @@ proptest! {
         let stuck = spinning.turning(&with(race(2.0 * on_cam), elsewhere), &teeth);
         prop_assert_eq!(stuck.race_mm_per_rad, 0.0);
         prop_assert_eq!(stuck.lost_nmm_per_rad(), lost(&spinning, &friction));
-        // A race that is free loses less than the cam, and no less than one that does not rub on the teeth at all.
+        // A free race loses less than the cam, and at least as much as a race without rubbing.
         let free = lost(&spinning, &with(race(0.0), elsewhere));
         let rolling = lost(&spinning, &with(WaveGeneratorFriction::Rolling { bearing: bearing(0.0) }, elsewhere));
         prop_assert!(free <= lost(&spinning, &friction) * (1.0 + 1e-14));
@@ -537,14 +538,14 @@ fn worn_section_equals_material_removed_by_teeth() {
             let depth = mechanism.wear_mm_per_hour(&friction, &wear, tooth, slip, &line_load);
             let advance = mechanism.advance_mm_per_rad(tooth);
             worn = PerContact::of(|contact| worn.get(contact) + depth.get(contact) * advance.get(contact) * step_rad);
-            // Friction's work without its coefficient, in N·m an hour, over all teeth of both zones.
+            // Friction work without its coefficient, in N·m an hour, over all teeth of both zones.
             taken = PerContact::of(|contact| {
                 let sliding_nm = 1e-3 * tooth.force_n.get(contact) * slip.slip_mm_per_rad.get(contact).abs();
                 taken.get(contact) + 2.0 / samples as f64 * rate / width_mm * sliding_nm * turning_rad_per_s * 3600.0
             });
         }
     }
-    // Loaded flanks: of the cam one a lobe, of the ring one a space, of the carrier one a slot.
+    // Loaded flanks: one for each lobe, ring space and slot.
     for (contact, flanks) in [(Contact::WaveGenerator, 2.0), (Contact::Ring, 78.0), (Contact::Carrier, 40.0)] {
         let (worn_mm2, taken_mm2) = (flanks * worn.get(contact), *taken.get(contact));
         assert!(taken_mm2 > 0.0, "{contact:?}");
@@ -565,7 +566,8 @@ fn power_and_torques_balance_for_any_fixed_member() {
         let (drive, mechanism) = (drive(&p), mechanism(&p));
         assert_eq!(mechanism.speed_ratio(Fixed::Ring), drive.transmission_ratio());
         assert_eq!(mechanism.speed_ratio(Fixed::Carrier), drive.transmission_ratio_carrier_fixed());
-        // While the wave generator turns once, seen from the carrier, the ring turns by U teeth: any turning of all is added on top.
+        // During one turn of the wave generator against the carrier, the ring turns by U teeth. A common rotation
+        // is added.
         let (own, ring, carrier) = (1.0, -f64::from(lobes) * drive.sense() / ring_teeth as f64, 0.0);
         for (fixed, driving, driven, standing) in [
             (Fixed::Ring, own, carrier, ring),
@@ -602,7 +604,7 @@ fn race_wears_evenly_around() {
             mechanism.wear_mm_per_hour(&friction, &wear, tooth, slip, &line_load).wave_generator
         })
         .sum();
-    // Volume over surface: friction's work over its coefficient is force times way.
+    // Volume over surface: friction work over its coefficient is force times distance.
     let way_nm_per_h = 1e-3 * turning.work_nmm_per_rad.wave_generator / 0.05 * wear.turning_rad_per_s * 3600.0;
     assert_near(depth_mm, 2e-6 * way_nm_per_h / (2.0 * PI * 57.0 * 15.0), 1e-12 * depth_mm, "depth");
 }
@@ -648,7 +650,7 @@ fn bearing_life_follows_iso_281() {
     let roller = RollingElement::Roller.life_h(10_000.0, 1_000.0, 1_000.0);
     assert_near(roller, 1e6 * 10.0_f64.powf(10.0 / 3.0) / 60e3, 1e-7, "roller");
     assert_eq!(RollingElement::Ball.life_h(10_000.0, 0.0, 1_000.0), f64::INFINITY);
-    // Half of the turns without load: the other half decides, and P falls by the cube root of two.
+    // Half of the turns are unloaded, so P falls by the cube root of two.
     let loads = [(2_000.0, 1.0), (0.0, 1.0)].map(|(load_n, revolutions)| LoadForRevolutions { load_n, revolutions });
     assert_near(RollingElement::Ball.mean_load_n(&loads), 2_000.0 / 2.0_f64.cbrt(), 1e-9, "mean load");
     assert_eq!(RollingElement::Ball.mean_load_n(&loads[1..]), 0.0);
@@ -659,7 +661,7 @@ fn duty_sums_bearing_damage_over_points() {
     let points = [(0.5, 1500.0, 800.0), (0.3, 300.0, 3000.0), (0.2, 3000.0, 100.0)]
         .map(|(share_of_time, speed_rpm, mean_load_n)| BearingLoadForTime { share_of_time, speed_rpm, mean_load_n });
     for element in [RollingElement::Ball, RollingElement::Roller] {
-        // Palmgren and Miner: each hour takes its share of the life that it would have alone.
+        // Palmgren and Miner: each hour uses its share of the life under that load alone.
         let used: f64 = points
             .iter()
             .map(|point| point.share_of_time / element.life_h(9e3, point.mean_load_n, point.speed_rpm))
@@ -692,13 +694,13 @@ fn duty_adds_energies_and_local_depths() {
     assert_near(mechanism.efficiency(Fixed::Ring, duty.loss_ratio).driven, taken_w / given_w, 1e-14, "efficiency");
     assert_near(duty.power_loss_w, lost_w, 1e-12 * lost_w, "power");
     assert_near(duty.input_speed_rpm, speed_rpm, 1e-12 * speed_rpm, "speed");
-    // Shares need not be of one.
+    // Shares need not add up to one.
     let doubled = points.map(|point| DutyPoint { share_of_time: 2.0 * point.share_of_time, ..point });
     assert_eq!(mechanism.duty(&doubled), duty);
 
     let early = ColumnForTime { share_of_time: 3.0, column: &[4.0, 0.0, 1.0] };
     let late = ColumnForTime { share_of_time: 1.0, column: &[0.0, 8.0, 1.0] };
-    // The greatest depth is 3, not the 5 that the mean of the greatest would be.
+    // The greatest depth is 3. The mean of the greatest depths would be 5.
     assert_eq!(mean_at_each_place(&[early, late]), [3.0, 2.0, 1.0]);
 }
 
@@ -792,7 +794,7 @@ fn losses_equal_force_times_slip_with_moving_generator() {
             let slip_mm = losses.slip_mm_per_rad.get(contact)[state].abs();
             coefficient.get(contact) * states.force_n.get(contact)[state] * slip_mm
         });
-        // Of two zones that are alike, under 3 N·m.
+        // Two alike zones under 3 N·m.
         let expected = 2.0 * lost_nmm.sum::<f64>() / 3000.0;
         assert_near(loss_ratio, expected, 1e-12 * expected, "loss ratio");
     }
@@ -807,7 +809,7 @@ fn pressure_times_velocity_peak_is_largest_product() {
     let peaks = losses.pressure_velocity_peaks(&sweep, 50.0);
     for contact in CONTACTS {
         let products = sweep.states.stress_mpa.get(contact).iter().zip(losses.slip_mm_per_rad.get(contact));
-        // Both in mm, turned into metres.
+        // Both are in mm and are converted to metres.
         let values: Vec<_> = products.map(|(stress_mpa, slip)| stress_mpa * (slip * 50.0).abs() / 1000.0).collect();
         let largest = values.iter().copied().fold(0.0, f64::max);
         let peak = peaks.get(contact);
@@ -825,7 +827,7 @@ fn tolerance_sweep_loses_as_many_samples() {
         let mean = |points| {
             let sweep = sweep(&drive, &load, points, &Never).unwrap();
             let losses = Losses::of(&drive, &load, &sweep, &plain(0.03, 0.05), &Never).unwrap();
-            // Where a tooth enters the angle stands twice, and counts twice here too.
+            // At a tooth's entry the angle appears twice and counts twice here too.
             assert_eq!(losses.loss_ratio.len(), sweep.input_angles.input_angle_deg.len());
             losses.mean.total()
         };
@@ -875,7 +877,7 @@ fn sweep_radial_force_follows_torque_on_eccentric_only() {
     };
     assert_across(forces(&parameters, &rigid).unwrap(), 1e-8);
     assert_eq!(forces(&PAPER_5_1, &rigid), None);
-    // To second order in the wind-up where the wave generator moves on under its teeth; what is lost motion alone moves nothing.
+    // Exact to second order in the wind-up if the wave generator moves. Lost motion alone moves nothing.
     let gap = PerContact { ring: 8.0, ..PerContact::default() };
     let moving = LoadParameters { clearance_um: gap, wave_generator_moves: true, ..rigid };
     let turned = Modification { ring_rotation_arcsec: 60.0, ..Modification::default() };
@@ -976,7 +978,7 @@ fn ball_wears_groove_by_pressure_over_its_middle() {
         LoadCase::new(&LoadParameters { law: ContactLaw::Hertz, ..load(20.0, Compatibility::VirtualWork) }).unwrap();
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
     let sweep = sweep(&drive, &load, Points::samples(6).unwrap(), &Never).unwrap();
-    // So rough a cam makes the teeth roll on it, and slip at ring and slot.
+    // On a rough cam teeth roll there and slip at ring and slot.
     let (friction, parameters) = (plain(0.2, 0.05), wear_parameters(&mechanism));
     let losses = Losses::of(&drive, &load, &sweep, &friction, &Never).unwrap();
     let wear = Wear::of(&drive, &load, &sweep, &losses, &friction, &parameters, &Never).unwrap();
@@ -992,7 +994,7 @@ fn ball_wears_groove_by_pressure_over_its_middle() {
                 let Pressure::Ellipse(ellipse) = pressures.get(contact) else { panic!("a ball touches in an ellipse") };
                 let force_n = *tooth.force_n.get(contact);
                 let half_mm = ellipse.half_width_mm(force_n);
-                // Hertz's semi-ellipse, x = a sin t, by the rule of midpoints.
+                // Hertz's semi-ellipse, x = a sin t, by the midpoint rule.
                 let steps = 200;
                 let step = PI / f64::from(steps);
                 let across = (0..steps).map(|i| (-0.5 * PI + (f64::from(i) + 0.5) * step).cos().powi(2)).sum::<f64>();
@@ -1031,7 +1033,7 @@ fn eccentric_bearing_carries_radial_force_at_race_speed() {
         BearingLoad::of(&mechanism, element, &sweep, &losses, &forces)
     };
     for (element, exponent) in [(RollingElement::Ball, 3.0), (RollingElement::Roller, 10.0 / 3.0)] {
-        // A race at rest against the carrier turns as the wave generator does, at every angle alike.
+        // A race at rest against the carrier turns like the wave generator at every angle.
         let still = of(WaveGeneratorFriction::Rolling { bearing }, element).unwrap();
         assert_near(still.speed_ratio, 1.0, 1e-14, "speed");
         let powers: Vec<_> = forces
@@ -1043,7 +1045,7 @@ fn eccentric_bearing_carries_radial_force_at_race_speed() {
         let mean_n = mean_over_period(&powers).powf(1.0 / exponent);
         assert_near(still.mean_load_n, mean_n, 1e-12 * mean_n, "mean load");
         assert!(still.mean_load_n >= 5e3 / 1.2);
-        // One that rubs on the teeth follows them: it turns at another speed (section 10.2).
+        // A race that rubs on the teeth follows them at another speed (section 10.2).
         let rubbing = of(WaveGeneratorFriction::Race { coefficient: 0.05, bearing }, element).unwrap();
         assert!((0.79..0.98).contains(&rubbing.speed_ratio), "{rubbing:?}");
         // A bearing rougher than the teeth does not turn.
@@ -1111,7 +1113,7 @@ fn capacity_is_least_over_contacts() {
             sweep(&drive, &load, Points::samples(30).unwrap(), &Never).unwrap().torque_capacity.unwrap()
         };
         let allowable = PerContact { wave_generator: 1200.0, ring: 900.0, carrier: 400.0 };
-        // Alone, the others being as good as unlimited.
+        // Each contact alone, with the others unlimited.
         let alone = CONTACTS.map(|contact| {
             let mut limits = everywhere(1e6);
             *limits.get_mut(contact) = *allowable.get(contact);

@@ -174,8 +174,8 @@ fn modified_flank_is_offset_from_moved_path() {
                         relief.amount_um * share.powf(relief.power)
                     });
                     let off = distance - p.tooth_radius_mm - 1e-3 * (m.ring_equidistant_um + relief_um);
-                    // The position of the nearest point is known to the square root of a distance's digits; a relief of a power below
-                    // one is steep where it starts.
+                    // The nearest position has half of a distance's digits. A relief with a power below one is
+                    // steep at its start.
                     let steep = m.ring_tip_relief.is_some_and(|relief| relief.power < 1.0);
                     let allowed = if m.ring_tip_relief.is_none() {
                         1e-12
@@ -279,7 +279,7 @@ fn drawn_distances_equal_model_gaps() {
                 let at = drive.flank().locus().at(Position::from_lobe(from_lobe, lobes)).unwrap();
                 let gaps = Gaps::new(&drive, &PerContact::default(), m, None);
                 let gap = gaps.at(&Place::default(), &at, &drive.flank().at(&at));
-                // The wall under load: ahead of the tooth where the carrier turns forward, behind it elsewhere.
+                // The wall under load is ahead of the tooth if the carrier turns forward, else behind it.
                 let finger = if sense > 0.0 { slot } else { (slot + fingers - 1) % fingers };
                 let walls = placed(edges(&carrier.section.outer), carrier.placements[finger].rotation_rad);
                 for (name, outline, gap_mm) in [
@@ -324,7 +324,7 @@ fn modified_outlines_close_with_matching_tangents() {
             for (edge, next) in edges.iter().zip(edges.iter().cycle().skip(1)) {
                 assert_eq!(edge.end(), next.start());
                 let Edge::Curve { points, start_tangent, end_tangent, .. } = edge else { continue };
-                // A chord of a thousandth of a radian turns by as much; a steep start of a relief by more.
+                // A chord of a thousandth of a radian turns by as much, at a steep start of a relief by more.
                 let steep = m.ring_tip_relief.is_some_and(|relief| relief.power < 2.0);
                 let [first, second, .., before, last] = &points[..] else { panic!("{points:?}") };
                 for (chord, tangent) in [(second - first, start_tangent), (last - before, end_tangent)] {
@@ -353,7 +353,7 @@ fn turned_flanks_leave_arc_or_land() {
         panic!("{:?}", turned(120.0))
     };
     assert!((radius_mm - 68.0).abs() < 1e-12 && (sweep_rad - 240.0 * ARCSEC).abs() < 1e-15);
-    // Thinned from both sides, the ring's teeth are points, farther out than the regular tip at 66.
+    // Thinned from both sides, the ring's teeth are points outside the regular tip at 66.
     let tip = lower[0].coords.norm();
     assert!(tip > 66.0 && tip < 66.2 && (upper.last().unwrap().coords.norm() - tip).abs() < 1e-12, "{tip}");
     let together = turned(-120.0);
@@ -417,7 +417,7 @@ fn carrier_beyond_advanced_tips_is_refused() {
         assert!((limit - 65.97).abs() < 1e-9, "{limit} of {modification:?}");
         assert_eq!(of(modification, limit - 1e-6, 0.0), []);
         assert!(!of(modification, limit + 1e-6, 0.0).is_empty());
-        // A clearance sets it back, though no farther than it would be.
+        // A clearance sets it back, but not beyond its nominal place.
         assert_eq!(of(modification, 65.99, 30.0), []);
     }
     assert_eq!(of(NONE, 65.99, 0.0), []);
@@ -436,7 +436,7 @@ fn rim_starts_outside_root_as_made() {
     };
     let set_back = Modification { ring_equidistant_um: 30.0, ..NONE };
     let shifted = Modification { ring_path_shift_um: 40.0, ring_profile_shift_um: -15.0, ..NONE };
-    // a + 2r, and what sets the flank back; a millionth of it is no rim yet.
+    // a + 2r plus all offsets of the flank. A rim must exceed it by a millionth.
     for (modification, clearance_um, root_mm) in [
         (NONE, 0.0, 68.0),
         (NONE, 20.0, 68.02),
@@ -447,9 +447,9 @@ fn rim_starts_outside_root_as_made() {
         let limit = of(&PAPER_5_1, modification, clearance_um);
         assert!((limit - root_mm * (1.0 + 1e-6)).abs() < 1e-9, "{limit}, not {root_mm}");
     }
-    // However wrong other parts are.
+    // Wrong values of other parts do not matter.
     assert_eq!(of(&PAPER_5_1, Modification { slot_wall_um: 2e6, ..set_back }, 0.0), of(&PAPER_5_1, set_back, 0.0));
-    // Where the drive is none, as far as is known.
+    // For an impossible drive, the known values count.
     let impossible = DriveParameters { ring_teeth: 20, ..PAPER_5_1 };
     assert!((of(&impossible, NONE, 20.0) - 68.02 * (1.0 + 1e-6)).abs() < 1e-9);
 }
@@ -504,7 +504,7 @@ fn smooth_space_is_one_curve_and_relief_another() {
         edges.len()
     };
     assert_eq!([curves(20.0, 2.0), curves(20.0, 1.0), curves(20.0, 0.5)], [3, 3, 3]);
-    // A relief from the root on leaves it along the curve by a power above one, and bent otherwise.
+    // A relief from the root continues the curve tangentially with a power above one, else with a bend.
     assert_eq!([curves(0.0, 2.0), curves(0.0, 1.0), curves(0.0, 0.5)], [1, 2, 2]);
 }
 
@@ -611,7 +611,7 @@ fn excessive_modification_is_refused_at_its_number() {
             Modification { ring_equidistant_um: -5000.0, ..NONE },
             nothing(Modified::RingEquidistant, -5000.0, Some(-5000.0)),
         ),
-        // 26 teeth stand 24 923 arc seconds from the middle of a space to that of a tooth.
+        // With 26 teeth, the middle of a space is 24 923 arc seconds from that of a tooth.
         (
             Part::Ring,
             Modification { ring_rotation_arcsec: 25_000.0, ..NONE },
@@ -646,7 +646,7 @@ fn excessive_modification_is_refused_at_its_number() {
     let parameter = Parameter::Modification(Modified::SlotWall);
     let out_of_range = Violation::OutOfRange { parameter, value: 2e6, limit: 1e6 };
     assert!(refused(&p, Part::Carrier, far).contains(&out_of_range));
-    // A flank set so far inside that the bore takes it whole.
+    // The flank is set so far inside that the bore removes it.
     let root_mm = Drive::new(&PAPER_5_2_BORED).unwrap().root_radius_mm();
     let least_um = 1e3 * (52.8227 - root_mm);
     let found = refused(&PAPER_5_2_BORED, Part::Ring, Modification { ring_equidistant_um: least_um - 1.0, ..NONE });
@@ -758,7 +758,7 @@ fn solid_polynomials_keep_hundredth_of_chord_tolerance() {
             if let WaveGenerator::Ellipse { semi_major_mm: a, semi_minor_mm: b } = p.wave_generator {
                 let cam = drawn(&p, Subject::Part(Part::WaveGenerator), &parts(NONE), tolerance_mm, 0.0).remove(0);
                 for point in polynomials(self::edges(&cam.section.outer)).iter().flat_map(|polygon| along(polygon)) {
-                    // To the first order, the distance from the ellipse.
+                    // Distance from the ellipse to first order.
                     let slope = 2.0 * (point.x / (a * a)).hypot(point.y / (b * b));
                     let off_mm = ((point.x / a).powi(2) + (point.y / b).powi(2) - 1.0).abs() / slope;
                     assert!(off_mm < 1.1 * near_mm, "{off_mm} of {near_mm}");

@@ -93,7 +93,7 @@ fn loads_balance_torque_with_moved_arms() {
                     let psi = tooth.center.position.from_lobe_rad;
                     let cos = 1.0 / tooth.center.tan_pressure_angle.hypot(1.0);
                     let decline = (slope_mm(&drive, psi + 1e-5) - slope_mm(&drive, psi - 1e-5)) / 2e-5;
-                    // The wave generator needs this rotation to move the tooth aside in its slot, to its place on the flank.
+                    // This rotation moves the tooth across its slot to its place on the flank.
                     let lost_rad = drive.teeth_per_wave() * 1e-3 * clearance_um.carrier / tooth.center.center_radius_mm;
                     let turned_rad = turned_rad - lost_rad;
                     let way_mm = cos * (slope_mm(&drive, psi) * turned_rad - 0.5 * decline * turned_rad * turned_rad);
@@ -121,7 +121,7 @@ fn loads_balance_torque_with_moved_arms() {
                 );
                 for (tooth, force_n) in teeth.iter().zip(&forces) {
                     let expected_n = turned(tooth, high).0;
-                    // A light load across wide gaps has lost some digits to the differences.
+                    // A light load across wide gaps loses some digits in differences.
                     assert!((force_n - expected_n).abs() < 1e-4 * peak_n, "{name}: {force_n} N, {expected_n} N");
                 }
                 // The torque's derivative is the stiffness.
@@ -188,7 +188,7 @@ fn tooth_in_valley_closes_gap_after_rotation() {
         let further = Rotation { closing_rad, excess_rad: 0.5 * closing_rad };
         assert!(tooth.spring.force_n(&further).unwrap() > 0.0);
         assert!(tooth.spring.turned_static_arm_mm(&further) > 0.0);
-        // Beside one that has an arm it carries its part.
+        // It carries its share beside a tooth with an arm.
         let lifted = loaded.tooth(Position::from_lobe(1.0 / f64::from(lobes), lobes)).unwrap();
         let both = [lifted, tooth];
         let springs = Springs::new(&both, f64::from(lobes));
@@ -213,7 +213,7 @@ fn slot_gaps_close_at_rigid_body_rotation() {
         for share in [0.3, 0.6, 0.9, 0.97] {
             let position_rad = share * drive.flank_limit().position.from_lobe_rad;
             let tooth = loaded.tooth(Position::from_lobe(position_rad, drive.lobes())).unwrap();
-            // There on the flank the tooth lies at its wall, so far aside in a slot that stands k times as far before it.
+            // On the flank the tooth is at its wall, offset in a slot that is k times as far ahead.
             let on_flank_mm = at(&drive, position_rad).center_radius_mm;
             let aside_rad = (1e-3 * carrier_um / on_flank_mm).asin();
             let slot_rad = position_rad + k * aside_rad;
@@ -246,7 +246,7 @@ fn tooth_of_turned_slot_closes_remaining_gaps() {
             let decline_mm =
                 cos * (slope_mm(&drive, position_rad + 1e-5) - slope_mm(&drive, position_rad - 1e-5)) / 2e-5;
             let slot_rad = drive.teeth_per_wave() * (arcsec / 3600.0).to_radians();
-            // An arm that grows begins where the valley passes.
+            // A growing arm starts when the valley passes.
             let from_rad = if decline_mm < 0.0 { slot_rad.max(arm_mm / decline_mm) } else { slot_rad };
             let way_mm = |turned_rad: f64| arm_mm * turned_rad - 0.5 * decline_mm * turned_rad * turned_rad;
             let closing_rad = tooth.spring.closing_rad;
@@ -439,7 +439,7 @@ fn first_maximum(teeth: &[ToothState], lobes: u32) -> Option<(f64, f64)> {
 /// Returns soft drives with few and many teeth in mesh, and eccentric ones with pointed tips.
 fn soft_drives() -> Vec<(DriveParameters, f64)> {
     let mut drives = vec![(FINE_ECCENTRIC, 0.0), (PAPER_5_2, 0.0), (PAPER_5_2, 30.0), (PAPER_5_2_BORED, 10.0)];
-    // The same sequence each time.
+    // A reproducible sequence.
     let mut state = 7_u64;
     let mut random = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -522,7 +522,7 @@ fn capacity_never_falls_with_higher_allowable_stress() {
             assert!(limit.input_torque_nmm >= before_nmm * (1.0 - 1e-9), "{stress_mpa} MPa: {limit:?} {before_nmm}");
             assert!(limit.input_torque_nmm <= most_nmm * (1.0 + 1e-9), "{stress_mpa} MPa: {limit:?} {most_nmm}");
             if limit.turns_past_teeth {
-                // Where the maximum is a corner, as a tooth is let go, its torque is off in proportion to its place.
+                // If a tooth is released at the maximum, the torque's error is proportional to the place's.
                 assert!((limit.input_torque_nmm / most_nmm - 1.0).abs() < 1e-8, "{limit:?} {most_nmm}");
             }
             before_nmm = limit.input_torque_nmm;
@@ -550,7 +550,7 @@ fn unlimited_capacity_reports_wave_generator_passing_teeth() {
         assert!(torques_nm.is_sorted(), "{torques_nm:?}");
         assert_eq!(capacities.map(|capacity| capacity.turns_past_teeth), [false, false, true], "{torques_nm:?}");
     }
-    // A load that is answered without an allowable stress was refused with this one, which no contact reaches.
+    // An allowable stress that no contact reaches must not cause a refusal.
     assert!(capacity(&PAPER_5_2_BORED, 10.0, 300.0).turns_past_teeth);
 }
 

@@ -66,7 +66,7 @@ fn forces_by_projection(
         }
     }
     right[2 * n] = torque_nmm;
-    // Rows of like size, or the elimination loses digits that the equations have.
+    // Rows of similar size keep the elimination accurate.
     for mut row in matrix.row_iter_mut().skip(2 * n + 1) {
         let largest = row.amax();
         if largest > 0.0 {
@@ -192,7 +192,7 @@ proptest! {
 
     #[test]
     fn closed_form_matches_dense_solves(parameters in any_swept_drive()) {
-        // The elimination's own error grows with the number of equations and with their scale.
+        // The elimination's own error grows with the number and the scale of the equations.
         prop_assert!(worst_difference(&parameters, Projection, EQUAL) < 1e-9);
         prop_assert!(worst_difference(&parameters, VirtualWork, UNEQUAL) < 1e-9);
     }

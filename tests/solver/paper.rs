@@ -55,7 +55,7 @@ fn case_5_2_is_undercut_with_few_teeth() {
     let drive = drive(&PAPER_5_2);
     assert_eq!(drive.flank_limit().end, FlankEnd::Undercut);
     let mesh = Mesh::new(&drive);
-    // 9.690577523835 are the digits known, cut and not rounded.
+    // 9.690577523835 is truncated, not rounded.
     assert!((mesh.coincidence_degree() - 9.690_577_523_835_5).abs() <= 5e-13, "{}", mesh.coincidence_degree());
     assert!((drive.flank_limit().position.from_lobe_deg() - 43.60759885726).abs() < 5e-12);
     assert_eq!(mesh.teeth_in_mesh(), TeethInMesh { min: 4, max: 5 });

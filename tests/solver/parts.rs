@@ -49,7 +49,7 @@ fn slot_wall_thickness_is_distance_at_inner_circle() {
     for (tooth_radius_mm, is_wall) in [(5.0, true), (2.0, true), (7.0, false)] {
         let p = DriveParameters { tooth_radius_mm, ..PAPER_5_1 };
         let [near, next] = on_both_walls(58.0, tooth_radius_mm, p.installed);
-        // Beyond the line between the slots the wall is less than nothing.
+        // Beyond the line between the slots the wall thickness is negative.
         let between = Rotation2::new(PI / 28.0).inverse() * near;
         let wall = (near - next).norm().copysign(-between.y);
         let found = drive(&p).slot_wall_mm();
@@ -97,7 +97,7 @@ fn pointed_finger_ends_where_slot_walls_meet() {
         panic!("{finger:?}")
     };
     assert_eq!(apex, closed);
-    // On the wall of slot 0, and as far from the middle of slot 1.
+    // On the wall of slot 0, and equally far from the middle of slot 1.
     assert!((apex.y - 7.0).abs() < 1e-12 && (outer.y - 7.0).abs() < 1e-12);
     let from_next = Rotation2::new(-2.0 * PI / 28.0) * apex;
     assert!((from_next.y + 7.0).abs() < 1e-12, "{from_next}");
@@ -129,7 +129,7 @@ fn wave_generator_curves_join_and_end_radially() {
 #[test]
 fn bore_must_leave_some_wave_generator() {
     let draft = Draft::new(&PAPER_5_1).unwrap();
-    // Of 56 mm across, a quarter of a millimetre clear of the teeth and set back by a half.
+    // Least radius 56 mm, minus a clearance of 0.25 mm and an offset of 0.5 mm.
     let modification = Modification { wave_generator_equidistant_um: 500.0, ..Modification::default() };
     let is_possible = |bore_mm| {
         let bore_radius_mm = Some(bore_mm);
@@ -192,7 +192,7 @@ fn flat_sided_tooth_is_two_arcs_and_flats() {
     else {
         panic!("{outline:?}")
     };
-    // Of the radius 5, with flats of the length 6: corners at (±3, ±4).
+    // Radius 5 with flats of length 6: corners at (±3, ±4).
     let corners = [(3.0, -4.0), (3.0, 4.0), (-3.0, 4.0), (-3.0, -4.0)].map(|(x, y)| Point2::new(x, y));
     for (i, edge) in [right, upper, left, lower].into_iter().enumerate() {
         assert!((edge.start() - corners[i]).norm() < 1e-14 * 5.0, "{edge:?}");
@@ -248,7 +248,7 @@ fn undercut_by_clearance_reports_critical_distance() {
     let critical = drive(&PAPER_5_1).flank().critical_tooth_radius_mm().unwrap();
     let p = DriveParameters { tooth_radius_mm: 0.999 * critical, ..PAPER_5_1 };
     let (a, b, r, k) = (58.0, 56.0, p.tooth_radius_mm, 13.0);
-    // As above: the clearance at which the flank's curvature radius at the tip is nothing.
+    // As above: at this clearance the flank's radius of curvature at the tip is zero.
     let narrowing = k * k * (a * a - b * b) / (a * a + b * r);
     let most_um = 1e3 * (b + 2.0 * r - r * narrowing) / (narrowing - 1.0);
     let of = |parameters: &DriveParameters, ring_clearance_um| {
@@ -262,7 +262,7 @@ fn undercut_by_clearance_reports_critical_distance() {
     };
     assert!((distance_mm - (r + 1.001e-3 * most_um)).abs() < 1e-12);
     assert!((critical_distance_mm - (r + 1e-3 * most_um)).abs() < 1e-9, "{critical_distance_mm} at {most_um} µm");
-    // What undercuts without it is not the clearance's doing.
+    // An undercut without the clearance gives no finding about it.
     assert_eq!(of(&PAPER_5_2, 1.0), []);
 }
 
@@ -297,7 +297,7 @@ fn wall_below_quarter_of_slot_width_is_thin() {
 
 #[test]
 fn tooth_leaves_slot_with_short_walls() {
-    // A wall that is 5 mm beside the slot's middle ends √(R² - 25) from the axis; centres run from 61 to 63 mm, loaded ones down to 61.
+    // A wall 5 mm from the slot's middle ends √(R² - 25) from the axis. Centres run from 61 mm to 63 mm, loaded too.
     let wall_end_mm = |radius_mm: f64| (radius_mm * radius_mm - 25.0_f64).sqrt();
     let of = |inner_mm, outer_mm| {
         let parts = PartsParameters {
@@ -314,7 +314,7 @@ fn tooth_leaves_slot_with_short_walls() {
         };
         found.iter().map(edge).collect::<Vec<_>>()
     };
-    // Between 60.9 and 63.1 there is wall for all.
+    // Between 60.9 and 63.1 the wall holds all teeth.
     let (enough_inner, enough_outer) = (60.9_f64.hypot(5.0), 63.1_f64.hypot(5.0));
     assert_eq!(of(enough_inner, enough_outer), []);
     for (found, edge, center_mm, radius_mm) in [

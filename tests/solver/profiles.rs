@@ -88,7 +88,7 @@ fn deviations_over_tolerance(p: &DriveParameters, curves: &[Polyline; 3], tolera
         profiles.wave_generator[..=of_half_lobe].to_vec(),
     ];
     std::array::from_fn(|i| {
-        // Both run the same way: the nearest chord of a point is looked for from that of the point before it on.
+        // Both curves have the same direction, so the search for a nearest chord starts at the previous one.
         let mut nearest = 0;
         let mut worst_mm = 0.0_f64;
         for point in &curves[i] {
@@ -175,7 +175,7 @@ fn every_chord_keeps_the_tolerance() {
                 sampled(&parameters, tolerance, Extent::Tooth),
                 sampled(&parameters, tolerance / 400.0, Extent::Tooth),
             );
-            // The fine curve is itself a 400th off.
+            // The fine curve has an error of 1/400 itself.
             let allowed = tolerance * (1.0 + 1.0 / 400.0);
             assert!(deviation_mm(&fine.ring, &coarse.ring) <= allowed);
             assert!(deviation_mm(&fine.tooth_center_path, &coarse.tooth_center_path) <= allowed);
@@ -283,7 +283,7 @@ fn far_too_large_profile_is_abandoned_early() {
     let request = ProfileParameters { chord_tolerance_mm: 1e-13, extent: Extent::Tooth, max_points: 1000 };
     let refused = profiles(&drive(&PAPER_5_1), &request, &halvings).unwrap_err();
     assert!(matches!(refused, SolveError::TooManyPoints { points: 1001, limit: 1000 }), "{refused:?}");
-    // A chord takes a halving, and the last one some more on the way down to it.
+    // Each chord takes one bisection, and the last one some more.
     let halvings = halvings.0.into_inner();
     assert!(halvings < 1100, "{halvings}");
 }

@@ -60,7 +60,7 @@ proptest! {
     fn doubled_drive_carries_same_forces_under_doubled_torque(parameters in any_swept_drive()) {
         let small = swept(&parameters, &load(3.0, VirtualWork), 10);
         let large = swept(&scaled(&parameters, 2.0), &load(6.0, VirtualWork), 10);
-        // A factor of two is exact in doubles, so the same digits come out.
+        // A factor of two is exact in doubles, so the digits are equal.
         prop_assert_eq!(&small.states.force_n, &large.states.force_n);
         for (contact, column) in small.states.stress_mpa.iter() {
             for (small, large) in column.iter().zip(large.states.stress_mpa.get(contact)) {
@@ -110,7 +110,7 @@ fn largest_step(parameters: &DriveParameters, samples: u64) -> f64 {
     let mut before = std::collections::BTreeMap::new();
     let mut largest = 0.0_f64;
     for (tooth, force) in states.tooth.iter().zip(force) {
-        // A tooth stands once at each angle, so what it bore last it bore at the angle before.
+        // A tooth appears once at each angle, so its previous load is at the previous angle.
         if let Some(last) = before.insert(tooth, force) {
             largest = largest.max((force - last).abs());
         }
@@ -166,6 +166,6 @@ fn flank_ends_near_axis_above_critical_radius() {
     let at = |factor: f64| drive(&DriveParameters { tooth_radius_mm: critical * factor, ..PAPER_5_1 });
     assert_eq!(at(1.0 - 1e-9).flank_limit().end, FlankEnd::RegularTip);
     let short = |relative: f64| at(1.0 + relative).flank_limit().position.from_valley_rad;
-    // Like a square root: a hundredth of the distance, a tenth of the angle.
+    // Like a square root: a hundredth of the distance gives a tenth of the angle.
     assert!((short(1e-6) / short(1e-8) - 10.0).abs() < 1e-2);
 }

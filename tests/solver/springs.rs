@@ -121,7 +121,7 @@ fn equal_rotation_is_lost_motion_under_any_load() {
 
 #[test]
 fn tooth_on_minor_axis_never_closes_slot_gap() {
-    // Gap and lever arm vanish there together; once it counted as closed from the start and alone carried what it could not.
+    // Gap and lever arm vanish there together, so the tooth must not count as closed.
     let drive = drive(&PAPER_5_1);
     let mut parameters = load(1e-9, VirtualWork);
     parameters.clearance_um.carrier = 1000.0;
@@ -161,7 +161,7 @@ fn crate_refuses_gap_that_projection_turns_into_load() {
 
 #[test]
 fn early_tooth_of_tiny_arm_costs_no_digits() {
-    // It would have to turn by 1e9 rad to make the torque alone; beside it the next one is pressed by 1e-15 of what the first has turned.
+    // The first tooth alone would need 1e9 rad. The next one's approach is 1e-15 of the first one's way.
     let approach = Approach::Linear { compliance_mm_per_n: 1e-6 };
     let spring = |arm_mm: f64, closing_rad| Spring {
         travel_arm_mm: arm_mm,
@@ -195,7 +195,7 @@ fn loaded_teeth_are_found_in_few_passes() {
             travel_arm_mm: 1.0,
             static_arm_mm: 1.0,
             arm_decline_mm_per_rad: 0.0,
-            // In no order, and all unlike.
+            // Unsorted and all different.
             closing_rad: 1e-6 * f64::from(i * 7919 % count),
             approach: Approach::Power { exponent: 0.9, coefficient: 1e-6, compliance_mm_per_n: 0.0 },
         };
@@ -261,7 +261,7 @@ proptest! {
         let approach_mm = approach.approach_mm(force_n);
         let found = approach.force(approach_mm).unwrap();
         prop_assert!((found.force_n / force_n - 1.0).abs() < 1e-14, "{approach:?}, {force_n:e}, {:e}", found.force_n / force_n - 1.0);
-        // The exponent is the slope of the logarithms.
+        // The exponent is the slope in logarithms.
         let step = 1e-5_f64;
         let rise = (approach.approach_mm(force_n * (1.0 + step)) / approach.approach_mm(force_n * (1.0 - step))).ln() / (2.0 * step);
         prop_assert!((found.exponent - rise).abs() < 1e-8, "{} {rise}", found.exponent);
@@ -276,7 +276,7 @@ proptest! {
         for spring in &springs {
             let force_n = spring.force_n(&wind_up.rotation).unwrap();
             torque += 2.0 * force_n * spring.static_arm_mm;
-            // Each carries exactly where its gap is closed.
+            // A spring carries exactly if its gap is closed.
             prop_assert!((force_n > 0.0) == (wind_up.rotation_rad() > spring.closing_rad) || (spring.closing_rad - wind_up.rotation_rad()).abs() < 1e-15 * spring.closing_rad);
         }
         prop_assert!((torque / torque_nmm - 1.0).abs() < 1e-13, "{:e}", torque / torque_nmm - 1.0);
@@ -296,7 +296,7 @@ fn any_declining_spring() -> impl Strategy<Value = Spring> {
         } else {
             Approach::Power { exponent, coefficient, compliance_mm_per_n: 0.0 }
         };
-        // Where its arm ends a tooth has not gone any farther.
+        // The gap must close before the arm ends.
         let gap = gap.unwrap_or(0.0);
         let left_mm = travel_arm_mm * (1.0 - gap);
         Spring {
@@ -355,7 +355,7 @@ proptest! {
         prop_assume!(most_nmm > 0.0);
         for share in [share, 0.95, 0.999] {
             let sought_nmm = share * most_nmm;
-            // Within rounding and steps of another maximum either may be found.
+            // Near another maximum, within rounding and steps, either may be found.
             if maxima.iter().any(|(_, torque_nmm)| (torque_nmm / sought_nmm - 1.0).abs() < 1e-4) {
                 continue;
             }

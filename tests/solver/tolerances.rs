@@ -85,7 +85,7 @@ fn assert_entry_is_decided_once(parameters: &DriveParameters) -> bool {
         assert!(sweep.torque_balance_residual < 1e-12, "{:e} of {parameters:?}", sweep.torque_balance_residual);
         assert!(sweep.period_closure_residual < 1e-12, "{:e} of {parameters:?}", sweep.period_closure_residual);
         let (states, angles) = (sweep.states.len() as u64, sweep.input_angles.input_angle_deg.len() as u64);
-        // One fewer where a tooth leaves, and carries nothing, at the very instant before another enters.
+        // One fewer if an unloaded tooth leaves at the very instant before another enters.
         assert!((angles * teeth.min - 1..=angles * teeth.max).contains(&states), "{parameters:?}");
     }
     for (by_samples, to_tolerance) in six_peaks(&by_samples).iter().zip(six_peaks(&to_tolerance)) {
@@ -100,7 +100,7 @@ fn assert_entry_is_decided_once(parameters: &DriveParameters) -> bool {
 
 #[test]
 fn bore_at_whole_spacings_is_swept_alike() {
-    // Found in answers of 0.1: the wrong tooth stood at the end of the flank, and F_K was 3.6e18 N.
+    // Found in 0.1: rounding put the wrong tooth at the end of the flank.
     let known = DriveParameters {
         wave_generator: ellipse(504.4784470731704, 498.60993196702196),
         teeth: 24,
@@ -155,7 +155,7 @@ fn flanks_near_whole_spacings_are_swept_alike() {
             for tooth_radius_mm in around(critical) {
                 tried += u32::from(assert_entry_is_decided_once(&of_radius(tooth_radius_mm)));
             }
-            // Thicker teeth end the flank earlier: halve for the radius at which it ends whole spacings from the major axis.
+            // Thicker teeth end the flank earlier. Bisection finds the radius with a flank end at whole spacings.
             let spacings =
                 |radius: f64| Drive::new(&of_radius(radius)).map(|drive| Mesh::new(&drive).engaged_spacings());
             let (mut thin, mut thick) = (critical * 1.001, critical * 1.5);
@@ -246,7 +246,7 @@ fn tolerance_bounds_extremes_and_root_bounds_half_widths() {
                 assert!(missing <= allowed, "{kind}: {missing:e} of {allowed:e} at {context}");
                 worst[kind] = worst[kind].max(missing / allowed);
             };
-            // Whatever a sweep finds is a value that is taken on: it can miss an extreme, but not exceed it.
+            // A sweep finds real values, so it can miss an extreme but not exceed it.
             for (found, dense) in found.peaks.iter().zip(&dense.peaks) {
                 see(0, 1.0 - found.value / dense.value, tolerance);
             }
@@ -258,7 +258,7 @@ fn tolerance_bounds_extremes_and_root_bounds_half_widths() {
             see(2, error_missed * drive(&parameters).teeth_per_wave(), tolerance * dense.most[0]);
             see(3, found.capacity_nm / dense.capacity_nm - 1.0, tolerance);
             for (found, dense) in found.half_widths_mm.iter().zip(&dense.half_widths_mm) {
-                // The dense sweep itself knows the place to a 6000th of the period.
+                // The dense sweep knows the position to 1/6000 of the period.
                 see(4, (found / dense - 1.0).abs(), tolerance.sqrt() + 1e-3);
             }
         }
@@ -349,7 +349,7 @@ pub(crate) fn of_many_teeth(teeth: i64, of_critical: f64) -> DriveParameters {
     let sin = (std::f64::consts::PI / teeth as f64).sin();
     let (a, ring) = (58.0, (teeth - 2) as f64 / 2.0);
     let tooth_radius_mm = 0.8 * a * sin / (1.0 - sin);
-    // k² (a² - b²) r_c = a²b, but for small terms.
+    // k² (a² - b²) r_c = a²b up to small terms.
     let stroke_mm = a * a / (2.0 * ring * ring * (tooth_radius_mm / of_critical));
     DriveParameters {
         wave_generator: ellipse(a, a - stroke_mm),

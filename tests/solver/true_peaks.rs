@@ -73,7 +73,7 @@ fn no_dense_sweep_exceeds_true_peaks() {
         for tolerance in [1e-1, 1e-3, 1e-6, 1e-9, 1e-12] {
             let found = to(&parameters, &load, tolerance);
             for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
-                // Rounding alone parts the two by some units of the last digit.
+                // Rounding causes a difference of some units in the last digit.
                 let missing = 1.0 - found / dense;
                 assert!(
                     missing <= tolerance.max(1e-11),
@@ -99,7 +99,7 @@ fn hundred_thousand_samples_approach_true_peaks() {
         let found = to(&parameters, &load, 1e-9);
         for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
             assert!(found >= dense * (1.0 - 1e-9), "{name}: {found} {dense}");
-            // Loads, and with gaps the stiffness too, jump at some instant that samples miss by one interval.
+            // Loads, and with gaps the stiffness too, jump at an instant that samples miss by one interval.
             let is_stiffness = name.ends_with("stiffness");
             assert!(is_stiffness || found <= dense * (1.0 + 1e-3), "{name}: {found} {dense} {load:?} {parameters:?}");
         }

@@ -86,7 +86,7 @@ fn no_position_is_missed_with_deviations() {
                 let (angles_deg, unloaded_deg) = without_load(p, &load, &deviations, to(tolerance));
                 let found = Extremes::of(&unloaded_deg);
                 assert_found(&found, &dense, tolerance, &format!("{kinds:?} {p:?}"));
-                // What is least is least there; what is largest may stand where a tooth enters.
+                // The minimum occurs at its own angle. The maximum may be at a tooth's entry.
                 let (angle_deg, _) = angles_deg
                     .iter()
                     .zip(&unloaded_deg)
@@ -146,7 +146,7 @@ fn loads(end_deg: f64) -> Vec<LoadParameters> {
         LoadParameters { modification: shifted, ..of_gaps(AT_RING) },
         LoadParameters { modification: relieved(2.0, 0.3), ..of_gaps(everywhere(3.0)) },
         LoadParameters { modification: relieved(1.0, 0.5), ..of_gaps(AT_RING) },
-        // Nothing is open before the relief begins.
+        // No gap is open before the relief begins.
         LoadParameters { modification: relieved(2.0, 0.2), ..of_gaps(PerContact::default()) },
         LoadParameters { wave_generator_moves: true, ..of_gaps(AT_RING) },
         LoadParameters { corner_contact: true, ..of_gaps(AT_RING) },
@@ -185,7 +185,7 @@ proptest! {
         let clearance_um = if is_at_slot_alone { PerContact { carrier, ..PerContact::default() } } else { of_all };
         let load = LoadParameters { clearance_um, wave_generator_moves: moves, ..load(20.0, VirtualWork) };
         let case = LoadCase::new(&load).unwrap();
-        // A wave generator that moves may turn past its teeth.
+        // A moving wave generator may turn past its teeth.
         let drive = drive(&parameters);
         if let Ok(dense) = sweep::sweep(&drive, &case, Points::samples(1500).unwrap(), &Never) {
             let dense_deg = sweep::unloaded_wind_up_deg(&drive, &case, &Deviations::default(), &dense, &Never).unwrap();
@@ -208,7 +208,7 @@ fn unloaded_wind_up_adds_only_two_input_angles() {
         assert!((found.force_n.value / peaks.force_n.value - 1.0).abs() < 1e-6);
         assert!((found.stress_mpa.value / peaks.stress_mpa.value - 1.0).abs() < 1e-6);
     }
-    // Equal intervals stay what they are.
+    // Sweeps by samples do not change.
     let points = Points::samples(50).unwrap();
     assert_eq!(swept(points).states, swept(points.also_without_load()).states);
 }

@@ -82,7 +82,7 @@ fn only_possible_counts_have_differences() {
         (number(&input["at_minus"]), number(&input["at_plus"]), number(&input["plus_minus"])),
         (13.5, 14.5, 1.0)
     );
-    // With a ring of its own no other count fits.
+    // With a fixed ring no other count fits.
     let found = answer(&with(&study, "/base/drive/ring", json!({ "teeth": 26 })));
     assert_eq!(found["quantities"][0]["inputs"][0].get("at_plus"), None);
     assert_eq!(found["reasons"][0]["code"], "tooth_difference");
@@ -167,7 +167,7 @@ fn quantiles_of_linear_quantity_follow_its_inputs() {
     assert_eq!(number(&of["nominal"]), 68.0);
     assert!((number(&of["mean"]) - 68.0).abs() < 5.0 * 0.02 / 20_000_f64.sqrt());
     assert!((number(&of["standard_deviation"]) / 0.02 - 1.0).abs() < 0.02);
-    // Twice the width of its interval of 95 % is eight standard errors.
+    // Twice the width of its 95 % interval is eight standard errors.
     let is_near = |quantile: &Value, expected: f64| {
         let [low, high, value] = ["low", "high", "value"].map(|name| number(&quantile[name]));
         low <= value && value <= high && (value - expected).abs() < 2.0 * (high - low)
@@ -176,7 +176,7 @@ fn quantiles_of_linear_quantity_follow_its_inputs() {
     for (quantile, standard) in of["quantiles"].as_array().unwrap().iter().zip(standard) {
         assert!(is_near(quantile, 68.0 + 0.02 * standard), "{quantile}: {standard}");
     }
-    // Uniform: every share is a place of its own.
+    // Uniform: each share is a position.
     let of = answer(&tolerance(json!({ "distribution": "uniform", "limit": 0.05 })))["quantities"][0].clone();
     for quantile in of["quantiles"].as_array().unwrap() {
         let expected = 68.0 + 0.1 * (2.0 * number(&quantile["share"]) - 1.0);
@@ -254,7 +254,7 @@ fn histogram_holds_every_drive_once() {
     assert!(drives.iter().all(|drives| (drives - expected).abs() < 5.0 * expected.sqrt()), "{drives:?}");
     let even = edges.windows(2).all(|pair| (pair[1] - pair[0] - (edges[55] - edges[0]) / 55.0).abs() < 1e-12);
     assert!(even, "{edges:?}");
-    // A quantity that nothing moves is in one bin.
+    // A constant quantity has one bin.
     let still = with(
         &tolerance(json!({ "distribution": "uniform", "limit": 0.05 })),
         "/quantities",
@@ -304,7 +304,7 @@ fn quantiles_match_an_independent_sampler() {
         for quantile in of["quantiles"].as_array().unwrap() {
             let (share, value) = (number(&quantile["share"]), number(&quantile["value"]));
             let below = |value: f64| column.partition_point(|&other| other <= value) as f64 / others;
-            // Beyond the digits that are written down.
+            // The reference has no further digits.
             let (fewest, most) = (below(value * (1.0 - 1e-8)), below(value * (1.0 + 1e-8)));
             let room = 4.0 * (share * (1.0 - share) * (1.0 / own + 1.0 / others)).sqrt() + 1.0 / own;
             assert!(
@@ -397,7 +397,7 @@ fn deviations_of_impossible_base_are_refused_beforehand() {
     let moved = json!({ "study": "sensitivity", "base": paper(), "quantities": ["slot_wall_mm"] });
     let count = json!({ "/drive/teeth/count": { "distribution": "uniform", "limit": 1.0 } });
     for (document, at, code) in [
-        // The paper's model takes no deviations.
+        // The paper's model does not support deviations.
         (drawn.clone(), "/deviations", "conflicting_fields"),
         (with(&taking, "/base/drive/teeth/radius_mm", json!(9.0)), "/base/drive/teeth/radius_mm", "teeth_touch"),
         (with(&moved, "/base/drive/teeth/radius_mm", json!(9.0)), "/base/drive/teeth/radius_mm", "teeth_touch"),

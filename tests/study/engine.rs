@@ -55,7 +55,7 @@ fn chunks_in_any_order_give_same_bits() {
             chunks.into_par_iter().for_each(|chunk| {
                 let part = kept(&Work::new(&study, chunk).run(&Never).unwrap());
                 several.lock().unwrap().add(chunk, part.clone());
-                // A second time it changes nothing.
+                // Adding a part twice changes nothing.
                 several.lock().unwrap().add(chunk, part);
             });
         });
@@ -86,7 +86,7 @@ fn resumed_chunk_has_same_bits() {
         let mut stopped = 0;
         let mut steps = 0_u32;
         loop {
-            // Every third time it is told to stop while it works on a variant.
+            // Every third step is stopped while it works on a variant.
             steps += 1;
             stop.is_set.store(steps.is_multiple_of(3), Ordering::Relaxed);
             match work.step(&stop) {
@@ -116,7 +116,7 @@ fn answer_size_of_many_inputs_is_known_beforehand() {
         let study = study(&document).unwrap();
         let mut text = Vec::new();
         gathered(&document).answer().write(Format::Json, &mut text).unwrap();
-        // Names and numbers take about as much as their text.
+        // Names and numbers take about the size of their text.
         let (told, text) = (study.told_bytes(), text.len() as u64);
         assert!((text / 2..4 * text).contains(&told), "{told} for {text} of text: {}", document["study"]);
     }

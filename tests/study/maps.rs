@@ -61,7 +61,7 @@ fn ring_inside_its_root_has_no_outer_diameter() {
         (&reason["code"], &reason["pointer"]),
         (&json!("ring_without_rim"), &json!("/parts/ring/outer_radius_mm"))
     );
-    // As in answers without drawings, what nobody asks for is no reason.
+    // As in answers without drawings, an unrequested quantity gives no reason.
     let found = answer(&map(over, json!(["coincidence_degree"])));
     assert_eq!(found["possible"]["variant"], json!([0, 1, 2, 3]));
 }
@@ -85,7 +85,7 @@ fn every_whole_number_of_range_is_a_step() {
     let study = json!({ "study": "map", "base": base, "over": { "/drive/teeth/count": { "min": 19.5, "max": 24 } }, "quantities": ["transmission_ratio"] });
     let found = answer(&study);
     assert_eq!(numbers(&found["over"][0]["values"]), [20.0, 21.0, 22.0, 23.0, 24.0]);
-    // The ring has a tooth fewer for each of the two lobes where nothing is said.
+    // By default the ring has one tooth fewer for each of the two lobes.
     assert_eq!(numbers(&found["possible"]["quantities"]["transmission_ratio"]), [10.0, 10.5, 11.0, 11.5, 12.0]);
 }
 
@@ -98,7 +98,7 @@ fn fields_of_other_kinds_are_left_out() {
     let found = answer(&json!({ "study": "map", "base": base, "over": over, "quantities": ["ring_root_radius_mm"] }));
     assert_eq!(found["over"][0]["choices"], json!(["ellipse", "harmonic"]));
     assert_eq!(numbers(&found["possible"]["quantities"]["ring_root_radius_mm"]), [68.0, 68.0]);
-    // Without a choice a field too many stays a fault.
+    // Without a choice, an additional field is a fault.
     let study = json!({ "study": "map", "base": base, "over": { "/drive/teeth/radius_mm": { "min": 4, "max": 5, "steps": 2 } } });
     assert_eq!(faulty(&study), ("/base/drive/wave_generator/amplitude_mm".into(), "unknown_field".into()));
 }
@@ -131,7 +131,7 @@ fn impossible_map_is_refused_at_its_field() {
         (json!({ "min": 3.0, "steps": 2 }), "", "missing_field"),
         (json!({ "min": 3.0, "max": 5.0, "one_of": [3.0] }), "", "conflicting_fields"),
         (json!({ "one_of": [] }), "/one_of", "out_of_range"),
-        // Its values were infinite, and none at all.
+        // The values would be infinite or not a number.
         (json!({ "min": -1e308, "max": 1e308, "steps": 3 }), "", "out_of_range"),
         (json!({ "min": null, "max": 5.0 }), "/min", "wrong_type"),
     ] {
@@ -162,7 +162,7 @@ fn unknown_field_of_base_is_refused() {
         (radii(), "/drive/teeth/instaled", json!(14)),
         (compatibilities, "/model/stiffnes", json!({ "law": "linear" })),
         (shapes.clone(), "/drive/teeth/groove_radius", json!({ "ring": 5.0 })),
-        // Of a shape that is none of the choices.
+        // This field belongs to a shape outside the choices.
         (shapes.clone(), "/drive/teeth/flat_length_mm", json!(3.0)),
     ] {
         let study = map(over, json!(["coincidence_degree"]));
@@ -170,7 +170,7 @@ fn unknown_field_of_base_is_refused() {
         let study = with(&study, "/base", with(&base, place, value));
         assert_eq!(faulty(&study), (format!("/base{place}"), "unknown_field".into()), "{place}");
     }
-    // What one of the choices has is left out of the others.
+    // A field of one choice is left out of the others.
     let base = with(&paper(), "/drive/teeth/groove_radius_mm", json!({ "ring": 6.0 }));
     answer(&with(&map(shapes, json!(["coincidence_degree"])), "/base", base));
 }
@@ -283,7 +283,7 @@ fn pointer_past_a_value_is_at_fault() {
         let at = format!("/over/{}", pointer.replace('/', "~1"));
         assert_eq!(of(pointer), (at, "unknown_field".into()));
     }
-    // Where the base has no fields of a kind, they may still be put there.
+    // An omitted object of the base may get fields.
     let base = with(&paper(), "/load/allowable_stress_mpa", json!(1500.0));
     let alone = json!({ "one_of": [1500.0] });
     let over = json!({
@@ -323,7 +323,7 @@ fn duty_losses_cover_all_points() {
     for (name, of_sweep) in names.into_iter().zip(of_sweep) {
         assert_eq!(numbers(&found["possible"]["quantities"][name])[0], of_sweep, "{name}");
     }
-    // Without friction it is that which is wanting.
+    // Without friction, the fault is the missing friction.
     let base = with(&paper(), "/load", base["load"].clone());
     let study = json!({ "study": "map", "base": base, "over": over, "quantities": ["power_loss_w"] });
     assert_eq!(faulty(&study), ("/base/friction".into(), "missing_field".into()));
@@ -366,7 +366,7 @@ fn map_without_possible_variant_is_refused_beforehand() {
     ] {
         assert_eq!(faulty(&document), (at, code.to_owned()), "{document}");
     }
-    // A single value may be asked for, and teeth that touch at some radii are what a map is for.
+    // A single value is allowed, and teeth may touch at some radii of a map.
     assert_eq!(numbers(&answer(&radius(json!({ "min": 4.0, "max": 4.0, "steps": 1 })))["possible"]["variant"]), [0.0]);
     let some = answer(&with(&steps(), "/base/drive/teeth/radius_mm", json!(9.0)));
     assert_eq!(numbers(&some["possible"]["variant"]).len(), 5);
@@ -390,7 +390,7 @@ fn finger_compliance_matches_estimate_of_sweep() {
         shares.push(share);
     }
     assert!(shares[0] > 0.0 && shares[1] > 10.0 * shares[0], "{shares:?}");
-    // The linear law, whose own error is as large, has none.
+    // The linear law has an error as large and so no estimate.
     let linear = answer(&map(over, json!(["carrier_finger_share"])));
     assert_eq!(numbers(&linear["possible"]["quantities"]["carrier_finger_share"]), [0.0]);
 }

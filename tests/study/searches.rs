@@ -114,7 +114,7 @@ fn reasons_outside_the_front_add_up() {
     let scan = &found["scan"];
     let limit = &found["limits"][0];
     assert_eq!((&limit["quantity"], &limit["bound"]), (&json!("undercut"), &json!("is")));
-    // There is one limit: what falls, falls to it alone.
+    // There is one limit, so each failed variant fails it alone.
     assert_eq!(limit["fell"], limit["fell_alone"]);
     let count = |value: &Value| value.as_u64().unwrap();
     assert_eq!(count(&scan["variants"]), 800);
@@ -326,7 +326,7 @@ fn incomplete_request_is_refused_at_a_given_field() {
     };
     let mut others = Vec::new();
     for (pointer, value, at, code, says) in [
-        // Two lobes: ratios are halves.
+        // With two lobes, ratios are multiples of one half.
         (
             "/require/transmission_ratio",
             json!({ "min": 19.6, "max": 19.9 }),
@@ -548,7 +548,7 @@ fn search_without_effective_free_field_is_refused() {
         }
     }
     assert!(others.is_empty(), "{}", others.join("\n"));
-    // What is kept whatever is free is no fault, nor a range of which a part can be.
+    // A limit that always holds is no fault, nor is a range that is possible in part.
     for document in [
         requiring("transmission_ratio", json!({ "min": 13.0 })),
         with(&search(), radius, json!({ "min": -2.0, "max": 5.0 })),
@@ -616,7 +616,7 @@ fn result_size_of_long_document_is_bounded() {
         })
     };
     let bytes = |entries| study(&of(entries)).unwrap().answer_bytes();
-    // 200 designs, each with eight bytes an entry at least.
+    // 200 designs with at least eight bytes an entry.
     assert!(bytes(9000) - bytes(1000) >= 200 * 8 * 8000);
     let limits = Limits { max_study_bytes: 8 << 20, ..LIMITS };
     let read = |entries| Study::read(of(entries).to_string().as_bytes(), &limits);

@@ -76,7 +76,7 @@ fn parquet_and_csv_have_the_same_cells() {
         "inputs": { "/drive/teeth/radius_mm": normal }
     });
     assert_eq!(assert_same(&tolerance), 9);
-    // Where nothing was found there are the names.
+    // Without results, the table has only names.
     let impossible = with(&search, "/require", json!({ "outer_diameter_mm": { "max": 1.0 } }));
     assert_eq!(assert_same(&impossible), 0);
 }
@@ -85,7 +85,7 @@ fn parquet_and_csv_have_the_same_cells() {
 fn wide_table_has_small_row_groups() {
     let fields = (0..200).map(|entry| (format!("/deviations/slot_wall_um/{entry}"), json!({ "one_of": [0] })));
     let mut over: serde_json::Map<_, _> = fields.collect();
-    // Nearly all of them impossible, so that they take no time.
+    // Nearly all variants are impossible, which makes them fast.
     over.insert("/drive/teeth/radius_mm".into(), json!({ "min": 1.0, "max": 900.0, "steps": 6000 }));
     let drive = json!({
         "wave_generator": { "semi_major_mm": 600.0, "semi_minor_mm": 599.0 },
@@ -103,7 +103,7 @@ fn wide_table_has_small_row_groups() {
     let most =
         groups.iter().map(|group| group.num_rows() * i64::try_from(group.columns().len()).unwrap()).max().unwrap();
     assert!(groups.len() > 1 && most <= 1 << 19, "{most} cells in one of {} groups", groups.len());
-    // A number takes 8 bytes at the very least.
+    // A number takes at least 8 bytes.
     let beside = answer.held_bytes(Format::Parquet) - answer.held_bytes(Format::Csv);
     assert!(beside >= 8 * u64::try_from(most).unwrap(), "{beside} bytes for {most} cells");
 }
