@@ -172,7 +172,7 @@ mod tests {
 
     use super::*;
 
-    /// Points on a straight line at lengths that a function gives.
+    /// Returns points on a straight line at the lengths of a function.
     fn line(points: usize, at: impl Fn(f64) -> f64) -> SampledCurve {
         let places = (0..points).map(|i| i as f64 / (points - 1) as f64);
         SampledCurve {

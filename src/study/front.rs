@@ -200,7 +200,7 @@ mod tests {
         Point { place: Vec::new(), judged: Judged { objectives, violations: Vec::new() }, values: Vec::new() }
     }
 
-    /// On a sphere no point beats another; whole numbers before bring equal ones.
+    /// Returns points on a sphere, where none dominates another. Leading whole numbers bring equal ones.
     fn points(count: usize, objectives: usize, seed: u64) -> Vec<Point> {
         let mut stream = Stream::new(seed, 0);
         let mut one = || {

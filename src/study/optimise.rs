@@ -427,7 +427,7 @@ mod tests {
             moved += u32::from(!is_at(2, 0.5));
             crossed += u32::from(!is_at(3, 0.2) && !is_at(3, 0.7));
         }
-        // A quarter is mutated; of half that is crossed half is of unlike parents.
+        // A quarter is mutated. Half is crossed, and half of that has unlike parents.
         assert!(moved.abs_diff(TRIES / 4) < 120, "{moved}");
         assert!(crossed.abs_diff(TRIES * 7 / 16) < 130, "{crossed}");
     }

@@ -1,4 +1,4 @@
-// What a new user meets: the first design, choices that change others, remedies, numbers as people type them.
+// A new user: first design, choices that change others, remedies, numbers as people type them.
 
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
@@ -61,7 +61,7 @@ test('button applies a remedy with a value', async () => {
     await settled(page);
     assert.ok((await codes(await designOf(page))).filter((other) => other === code).length < count, `${code} is gone`);
   }
-  // At the field too.
+  // The field has the button too.
   await setDocument(page, REMEDIED.undercut);
   await page.click(`${notes(RADIUS)} .remedy`);
   await settled(page);

@@ -1,4 +1,4 @@
-// Wave generators, teeth and contact laws of each kind: chosen in the form, calculated, drawn.
+// Each kind of wave generators, teeth and contact laws: chosen in the form, calculated, drawn.
 
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
@@ -45,7 +45,7 @@ const balance = (page, design, { geometry, sweep }) =>
             const reach = key === 'carrier' ? motion.toSlotWallMm : motion.toothRadius;
             worst.outline = Math.max(worst.outline, Math.abs(distance - reach));
           }
-          // A tooth that has only just come to the flank carries nothing yet.
+          // A tooth that has just reached the flank is unloaded.
           if (force.ring > 0) worst.force = Math.max(worst.force, Math.hypot(sum.x, sum.y) / force.ring);
           worst.outline = Math.max(worst.outline, Math.abs(motion.positionDeg(tooth, angle) - positionDeg) % (2 * motion.halfLobeDeg - 1e-9));
           worst.lobes.add(zone);
@@ -114,7 +114,7 @@ test('unlike zones count all teeth, each on its lobe', async () => {
   const worst = await balance(page, found.design, found);
   assert.equal(worst.lobes, 3);
   assert.ok(worst.force < 2e-3 && worst.outline < 2e-3, JSON.stringify(worst));
-  // One curve: what a tooth carries follows from where it stands alone.
+  // One curve: a tooth's load depends only on its place.
   const { positions, breaks } = await page.evaluate(
     async ({ design, sweep }) => {
       const { passOf } = await import('/page/pass.js');
@@ -125,7 +125,7 @@ test('unlike zones count all teeth, each on its lobe', async () => {
   );
   positions.forEach((deg, index) => assert.ok(index === 0 || deg < positions[index - 1] - 1e-9));
   assert.equal(breaks, 0, 'nothing jumps');
-  // With a slot number that three lobes share alike, one zone stands for all.
+  // With a slot count divisible by three, one zone represents all.
   await enter(page, `${TEETH}/installed`, '');
   await enter(page, `${TEETH}/count`, 30);
   await enter(page, '/drive/ring/teeth', 27);
@@ -167,7 +167,7 @@ for (const [shape, fields] of [
     assert.ok(worst.force < 2e-3 && worst.outline < 2e-3, JSON.stringify(worst));
     const tags = await page.$$eval('#whole .tooth', (teeth) => [...new Set(teeth.map(({ tagName }) => tagName))]);
     assert.deepEqual(tags, [shape === 'flat_sided' ? 'path' : 'circle']);
-    // A slot is as wide as what lies on its walls.
+    // Slot width follows from the tooth's part at its walls.
     const corner = found.geometry.carrier.finger.corners.y_mm[0];
     assert.ok(Math.abs(corner - Math.sqrt(25 - (found.design.drive.teeth.flat_length_mm ?? 0) ** 2 / 4)) < 1e-9);
     if (shape === 'ball') {
@@ -235,7 +235,7 @@ test('document without model shows the service’s model', async () => {
 test('peaks state their model error', async () => {
   const page = await bed.open();
   const told = () => page.$$eval('#table .told', (lines) => lines.map((line) => line.textContent));
-  // The paper's model, whose forces are too large; no wind-up is asked for.
+  // The paper's model, whose forces are too large, without wind-up.
   const estimated = 'From the parts as they are made; forces leave it out until it is taken over.';
   assert.deepEqual(await told(), ['The model’s own error: force +1 to +8 %, stress −1 to +5 %; not measured with other sizes and loads under its law.', '', estimated]);
   const { model, ...unnamed } = await designOf(page);
@@ -309,7 +309,7 @@ test('button copies a compliance estimate into the design', async () => {
   assert.equal(after.design.model.series_compliance_mm_per_n.carrier, Number(estimate.toPrecision(3)));
   assert.ok(!after.sweep.findings.some(({ code }) => code === 'slender_fingers'));
   assert.ok(after.sweep.peaks.carrier.force_n.value < before.sweep.peaks.carrier.force_n.value);
-  // What is said of the fingers can be unsaid.
+  // The choice of fingers can be removed.
   await page.click('summary:has-text("Parts as they are made")');
   await pick(page, '/parts/carrier/fingers', '');
   assert.ok(!('fingers' in ((await answered(page)).design.parts?.carrier ?? {})));
@@ -372,7 +372,7 @@ function* valuesOf(schemas, schema, pointer = '') {
   else if (schema.type !== 'null') yield { pointer, schema };
 }
 
-// What has no field on the page, and why; it stands in the JSON.
+// Values without a field on the page, with the reason. The JSON view has them.
 const NOT_IN_THE_FORM = {
   '/accuracy/requested_error': 'chosen where accuracy is measured',
   '/assembly/input_angle_deg': 'turned in the picture',
@@ -417,7 +417,7 @@ test('every kind can be chosen and has its fields', async () => {
     assert.deepEqual(Object.keys(variants[place]).toSorted(), Object.keys(mapping).toSorted());
     for (const [word, reference] of Object.entries(mapping)) {
       const own = [...valuesOf(schemas, { $ref: reference }, place)].map(({ pointer }) => pointer);
-      // On a race that does not rub nothing depends on its coefficient.
+      // The coefficient of a race without rubbing has no effect.
       const unshown = word === 'rolling' ? ['coefficient'] : [];
       const expected = own.filter((pointer) => ![propertyName, ...common, ...unshown].includes(pointer.slice(place.length + 1)));
       assert.deepEqual(variants[place][word].toSorted(), expected.toSorted(), `${union} ${word}`);
@@ -429,7 +429,7 @@ test('modification fields change the answer and choose virtual work', async () =
   const page = await bed.open();
   await page.evaluate(() => document.querySelectorAll('#form details').forEach((group) => (group.open = true)));
   await enter(page, '/parts/ring/clearance_um', 20);
-  // A turned part is lost motion alone: the wind-up has it, no force.
+  // A turned part gives only lost motion, which changes the wind-up but no force.
   await page.check(field('/sweep/wind_up'));
   await enter(page, '/modification/ring_equidistant_um', 4);
   let found = await answered(page);
@@ -452,7 +452,7 @@ test('modification fields change the answer and choose virtual work', async () =
   await settled(page);
   assert.ok(await page.isHidden(field('/modification/ring_tip_relief/power')));
   assert.deepEqual((await designOf(page)).modification, found.design.modification);
-  // A tooth that is too full is told in the service's words.
+  // An interference is reported in the service's words.
   await enter(page, '/modification/tooth_radius_um', -400);
   assert.match(await page.textContent('#impossible'), /too full|less than nothing|run into/i);
 });
@@ -480,7 +480,7 @@ test('nominal picture says so and links to drawings', async () => {
   const made = { drive, load, modification: { ring_equidistant_um: 10 } };
   await setDocument(page, made);
   assert.equal(await told.textContent(), 'The picture is the nominal drive. The modification, of micrometres, is in the drawings, true to size.');
-  // As it says: the picture's outline is the unmodified one's, the drawing's is not.
+  // The picture's outline is that of the unmodified ring, unlike the drawing's.
   const ring = async (design) => (await bed.server.ask('/v1/drawings/ring', design)).bodies[0].holes[0];
   const outline = await page.getAttribute('#whole .part-ring', 'd');
   assert.notDeepEqual(await ring(made), await ring({ ...made, modification: {} }));

@@ -1,4 +1,4 @@
-// Links, files and names: what holds a design, and what is said where it does not.
+// Links, files and names: which of them hold a design, and messages for others.
 
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
@@ -25,7 +25,7 @@ test('truncated link reports it and keeps its address', async () => {
     assert.match(await page.textContent('#notice'), /damaged or was cut short.*ready design is shown instead/);
     const { drive, load } = await bed.server.example('paper-5.1');
     assert.deepEqual(await designOf(page), { drive, load });
-    // Much longer than the address is put off after a change.
+    // Waits longer than the page delays its address after a change.
     await page.clock.fastForward(10_000);
     await settled(page);
     assert.equal(await hash(page), cut);
@@ -90,7 +90,7 @@ test('different designs have different file names', async () => {
     if (round === 0) await page.setInputFiles('#document-file', { name, mimeType: 'application/json', buffer });
     await settled(page);
   }
-  // The order of its fields makes no other design.
+  // The order of fields does not change the design.
   const design = await designOf(page);
   const before = (await saved()).name;
   await setDocument(page, Object.fromEntries(Object.entries(design).reverse()));
@@ -116,7 +116,7 @@ test('STEP and CSV files equal the API’s answers', async () => {
   ]) {
     const [download] = await Promise.all([page.waitForEvent('download'), pick(page, `[data-file="${file}"]`)]);
     assert.ok(download.suggestedFilename().endsWith(`-${file}`));
-    // A STEP file says when it was made, if it does.
+    // A STEP file may contain its time.
     const plain = (bytes) => bytes.toString().replace(/\d{4}-\d\d-\d\dT[\d:]+/g, '');
     assert.equal(plain(await readFile(await download.path())), plain(await bed.server.file(path, design, accept)), file);
   }

@@ -27,7 +27,7 @@ test('losses of three bearings are compared and applied', async () => {
   assert.ok(plain < 0.55 && race > 0.85 && rolling > race, JSON.stringify(rows));
   assert.match(rows[0].text, /locks itself/);
   assert.match(await page.textContent('#losses-table caption'), /taken for the comparison.*0\.05.*0\.002/);
-  // The design itself is as it was, until a row is chosen.
+  // The design does not change until a row is chosen.
   assert.equal((await designOf(page)).friction, undefined);
   assert.ok(await page.isHidden('#key-figures .tile:has-text("Efficiency")'));
   await page.click('#losses-table tr[data-kind="race"] button');
@@ -38,7 +38,7 @@ test('losses of three bearings are compared and applied', async () => {
   assert.equal(await page.getAttribute('#losses-table tr[data-kind="race"] button', 'aria-pressed'), 'true');
   await page.click('#compare-losses');
   await page.waitForFunction(() => document.querySelector('#losses-state').textContent === '');
-  // Whatever the efficiencies hang on.
+  // Efficiencies depend on these.
   const compared = await designOf(page);
   for (const change of [{ deviations: { ring_runout: { amount_um: 7, angle_deg: 0 } } }, { parts: { carrier: { outer_radius_mm: 65 } } }]) {
     await setDocument(page, { ...compared, ...change });
@@ -91,7 +91,7 @@ test('results, plot, table and colours match the service', async () => {
   near(await resultOf(page, 'Pressure times velocity, carrier'), losses.pressure_velocity_mpa_m_per_s.carrier.value, 'p·v');
   near(await resultOf(page, 'Wear, wave generator'), 1000 * losses.wear_mm_per_hour.wave_generator.value, 'wear');
   assert.ok(await page.isVisible('#charts figure:has-text("Pressure times velocity")'));
-  // The curve has the service's own peak.
+  // The curve has the peak of the service's answer.
   const peaks = await page.evaluate(
     async ({ asked, sweep }) => {
       const [{ passOf }, { drawable }] = await Promise.all([import('/page/pass.js'), import('/page/states.js')]);
@@ -102,14 +102,14 @@ test('results, plot, table and colours match the service', async () => {
   );
   for (const [contact, peak] of Object.entries(peaks)) near(peak, losses.pressure_velocity_mpa_m_per_s[contact].value, contact);
   assert.ok(states.tooth.length > 0);
-  // Teeth are coloured by it where it is chosen.
+  // Teeth can be coloured by it.
   const colours = () => page.$$eval('#whole .tooth', (teeth) => teeth.map(({ style }) => style.fill));
   const before = await colours();
   await page.selectOption('#legend select', 'rubbing');
   await settled(page);
   assert.notDeepEqual(await colours(), before);
   assert.match(await page.textContent('#legend'), /MPa m\/s/);
-  // Without a speed there is none of it, and stress colours again.
+  // Without a speed it is missing, and stress gives the colours again.
   await enter(page, '/load/input_speed_rpm', '');
   assert.ok(await page.isHidden('#charts figure:has-text("Pressure times velocity")'));
   assert.match(await page.textContent('#legend'), /highest contact stress/);

@@ -1,4 +1,4 @@
-// Numbers as people type them, counts that follow each other, fields of kinds.
+// Numbers as people type them, dependent counts, fields of kinds.
 
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
@@ -57,7 +57,7 @@ test('empty field says what it needs', async () => {
     await settled(page);
     assert.equal(await page.textContent(notes(pointer)), '');
   }
-  // What has a default can be emptied while it is typed anew.
+  // A field with a default may be empty during typing.
   await page.click('summary:has-text("Sweep and profile")');
   await page.fill(field('/sweep/samples'), '');
   await settled(page);
@@ -86,7 +86,7 @@ test('another ratio changes the counts without an error', async () => {
   const { drive } = await designOf(page);
   assert.deepEqual([drive.teeth.count, drive.ring.teeth], [30, 32]);
   assert.equal((await bed.server.ask('/v1/geometry', await designOf(page))).transmission_ratio, -15);
-  // With every second slot filled it stays every second.
+  // With every second slot filled, this ratio is kept.
   await choose(page, 'paper-5.2');
   const before = (await bed.server.example('paper-5.2')).drive.teeth;
   assert.equal(before.count / before.installed, 2);

@@ -91,7 +91,7 @@ test('every example loads with the service’s numbers', async () => {
   for (const { name } of examples) {
     await choose(page, name);
     assert.equal(await page.getAttribute(`[data-example="${name}"]`, 'aria-pressed'), 'true');
-    // The mouse still stands on it.
+    // The mouse is still over it.
     const [color, background] = await page.$eval(`[data-example="${name}"]`, (button) => ['color', 'backgroundColor'].map((key) => getComputedStyle(button)[key]));
     assert.notEqual(color, background, 'a pressed button can be read');
     await assertShows(await server.example(name));
@@ -114,7 +114,7 @@ test('dragged slider answers live, one step to undo', async () => {
   for (let step = 1; step <= 8; step += 1) {
     const before = await page.textContent('#key-figures');
     await page.mouse.move(middle - step * 6, height);
-    // While the pointer is still down the numbers follow, and the picture never goes away.
+    // While the pointer is down, numbers follow and the picture stays.
     await page.waitForFunction((old) => document.querySelector('#key-figures').textContent !== old, before);
     assert.ok((await page.getAttribute('#whole .part-ring', 'd')).length > 1000);
   }
@@ -135,7 +135,7 @@ test('newest design wins over slow older answers', async () => {
   page.on('requestfailed', (request) => (aborted += request.failure().errorText.includes('ABORTED') ? 1 : 0));
   await page.route('**/v1/design', async (route) => {
     const { radius_mm: radius } = route.request().postDataJSON().drive.teeth;
-    // Browser and service race: the older the design, the later its answer.
+    // The older the design, the later its answer.
     await new Promise((resolve) => setTimeout(resolve, radius < 4.5 ? 0 : 3000));
     await route.continue().catch(() => undefined);
   });
@@ -153,7 +153,7 @@ test('impossible drive shows its reasons at the fields', async () => {
   assert.equal(await page.getAttribute(field(SEMI_MAJOR), 'aria-invalid'), 'true');
   assert.match(await page.textContent('#impossible'), /Values that no design can have/);
   assert.equal(await resultOf(page, 'Force, ring'), (await server.answers(await server.example('paper-5.1'))).sweep.peaks.ring.force_n.value);
-  // Every reason at once, also in a folded group, each at its field.
+  // All reasons appear at once at their fields, also in a folded group.
   await enter(page, '/drive/teeth/count', 31);
   await page.click('summary:has-text("Materials")');
   await enter(page, '/materials/ring/poissons_ratio', 0.7);
@@ -162,7 +162,7 @@ test('impossible drive shows its reasons at the fields', async () => {
   }
   await enter(page, '/materials/ring/poissons_ratio', 0.3);
   await enter(page, SEMI_MINOR, 56);
-  // A reason whose limit would do offers it.
+  // A reason whose limit would be enough offers it.
   await enter(page, '/drive/teeth/count', 30);
   await enter(page, '/drive/teeth/installed', '');
   await page.click(`${notes('/drive/ring/teeth')} button`);
@@ -199,7 +199,7 @@ test('case 5.1 with larger r shows undercut', async () => {
   assert.match(explanation, /What to change.*thinner/);
   assert.match(await page.textContent('#key-figures'), /Undercutyescritical r 6\.749 mm/);
   assert.match(await page.textContent('#findings'), /Undercut ring tips/);
-  // From the finding to the other fields that it is about.
+  // The finding links to its other fields.
   await page.click(`${notes(RADIUS)} .explanation button:has-text("Semi-minor axis")`);
   assert.equal(await page.evaluate(() => document.activeElement.id), 'field-drive-wave_generator-semi_minor_mm');
 });
@@ -240,7 +240,7 @@ test('address holds design and reference', async () => {
   assert.deepEqual(await designOf(page), design);
   await assertShows(design);
   await page.waitForFunction(() => document.querySelector('#comparing').textContent.includes('case 5.1'));
-  // A link pasted into an open page is followed too, and a broken one does no harm.
+  // A link pasted into an open page works, and a broken one does no harm.
   assert.equal(await page.textContent('#design-name'), 'A design of your own');
   await page.evaluate(() => (location.hash = '#design=broken'));
   await settled(page);
@@ -264,7 +264,7 @@ test('document is saved and loaded as file', async () => {
   await page.fill('#document-text', '{ "drive": ');
   await page.click('#document-apply');
   assert.match(await page.textContent('#document-error'), /no JSON/);
-  // A document with a field that the service does not know is shown, with the reason and a way out.
+  // A document with an unknown field is shown with the reason and a way out.
   await page.fill('#document-text', JSON.stringify({ ...design, colour: 'blue' }));
   await page.click('#document-apply');
   await settled(page);
@@ -317,7 +317,7 @@ test('form asks for further options, table answers them', async () => {
   await page.selectOption(field('/model/compatibility'), 'virtual_work');
   await enter(page, '/parts/ring/clearance_um', 4);
   await enter(page, '/parts/carrier/clearance_um', 1.5);
-  // What the design does not ask for yet leads to where it does.
+  // A result that was not requested links to its option.
   await page.click('#table button[aria-label^="Torque capacity"]');
   assert.equal(await page.evaluate(() => document.activeElement.id), 'field-load-allowable_stress_mpa');
   await enter(page, '/load/allowable_stress_mpa', 1500);
@@ -359,17 +359,17 @@ test('form asks for further options, table answers them', async () => {
   }
   const limit = page.locator('#table tr', { hasText: 'Limited by' });
   assert.match(await limit.textContent(), new RegExp(capacity.limited_by.replace('_', ' ')));
-  // Each has its reference and its difference.
+  // Each value has its reference and its difference.
   await page.click('#keep');
   await enter(page, '/parts/ring/clearance_um', 8);
   assert.match(await page.locator('#table tr', { hasText: 'Most wind-up' }).textContent(), /deg.*deg\+.*%/);
   assert.match(await page.locator('#table tr', { hasText: 'Output torque' }).textContent(), /N·m.*N·m[−+].*%/);
-  // What only one of both has asked for is a dash for the other, without a unit.
+  // A value of only one design is a dash for the other one, without a unit.
   await enter(page, '/load/allowable_stress_mpa', '');
   assert.match(await page.locator('#table tr', { hasText: 'Output torque' }).textContent(), /^Output torque MG–\d[\d.]*N·m$/);
   await page.click('#undo');
   await settled(page);
-  // The torque's other shaft keeps the rest of the load, and what is emptied is left out of the document.
+  // Switching the torque's shaft keeps the rest of the load, and empty values leave the document.
   await page.selectOption(field('/load'), 'output_torque_nm');
   await page.selectOption(field('/sweep'), 'samples');
   await page.uncheck(field('/sweep/wind_up'));
@@ -399,7 +399,7 @@ test('findings explain themselves, reasons are at their fields', async () => {
   await page.click(`${notes('/parts/carrier/clearance_um')} button:has-text("Set to 0")`);
   await settled(page);
   assert.ok(await page.isHidden('#impossible'));
-  // Two of which only one may be given.
+  // The document may have only one of the two.
   const design = await server.example('paper-5.1');
   await pick(page, '#open-document');
   await page.fill('#document-text', JSON.stringify({ ...design, load: { input_torque_nm: 20, output_torque_nm: 280, allowable_stress_mpa: 900 }, sweep: { samples: 20, tolerance: 1e-4 } }));
@@ -508,7 +508,7 @@ test('accuracy equals the API’s, and a row applies its choice', async () => {
   const palmgren = answer.ways.findIndex(({ compatibility, law }) => compatibility === 'virtual_work' && law === 'palmgren');
   assert.match(shown[palmgren].note, new RegExp(`^Virtual work, Palmgren peaks differ by ${(100 * answer.ways[palmgren].model_difference).toFixed(2)}`));
   assert.equal(await page.getAttribute('#accuracy-list button:has-text("50 samples")', 'aria-pressed'), 'true');
-  // Another number of samples is no other question; another model is.
+  // The number of samples does not change the question, but the model does.
   await page.click('#accuracy-list button[aria-label="200 samples: use with Projection, linear"]');
   await settled(page);
   assert.deepEqual(await designOf(page), { ...original, sweep: { samples: 200 } });
@@ -524,12 +524,12 @@ test('accuracy equals the API’s, and a row applies its choice', async () => {
   await page.click('#undo');
   await settled(page);
   assert.deepEqual(await designOf(page), { ...original, sweep: { samples: 200 } });
-  // The error that is wanted is part of the design, and asks anew.
+  // The requested error is part of the design and starts a new request.
   await page.selectOption('#accuracy-wanted', '0.01');
   await page.waitForFunction(() => document.querySelector('#accuracy-state').textContent.startsWith('Fastest within 0.01'));
   assert.equal((await designOf(page)).accuracy.requested_error, 0.01);
   assert.equal(await page.locator('#accuracy-list .cheapest').count(), 1);
-  // A design that cannot exist has no accuracy, but reasons.
+  // An impossible design has no accuracy but reasons.
   await enter(page, SEMI_MINOR, 60);
   await page.click('#measure');
   await page.waitForFunction(() => document.querySelector('#accuracy-state').textContent.includes('must exceed'));
@@ -553,7 +553,7 @@ test('accuracy rows of fixed law restore measured stiffnesses', async () => {
   };
   assert.deepEqual((await use('50 samples: use with Virtual work, Palmgren')).model, { compatibility: 'virtual_work', stiffness: { law: 'palmgren' } });
   assert.deepEqual((await use('50 samples: use with Virtual work, fixed')).model, { ...original.model, compatibility: 'virtual_work' });
-  // Other stiffnesses are another question, of which the rows know nothing.
+  // Other stiffnesses are another question, for which the rows do not hold.
   await enter(page, '/model/stiffness/ring_n_per_mm', 400000);
   assert.match(await page.textContent('#accuracy-state'), /another design; measure again/);
   const back = await use('100 samples: use with Projection, fixed');
@@ -649,12 +649,12 @@ test('assembly file has the input angle on display', async () => {
   }
   assert.match(await page.textContent('#drawings-list'), /Assembly at 43\.7°/);
   assert.deepEqual(await designOf(page), design, 'the document keeps its own angle');
-  // The place of a peak is exact, not as it is rounded to be read.
+  // The position of a peak is exact, not rounded for display.
   await page.locator('#table tr', { hasText: 'Contact stress, ring' }).locator('button').click();
   await settled(page);
   const { sweep } = await server.answers(design);
   assert.deepEqual((await sent('assembly.svg')).document, at(sweep.peaks.ring.stress_mpa.input_angle_deg));
-  // A turn further the carrier stands elsewhere.
+  // After a turn the carrier has another position.
   await page.locator('#angle').fill('350');
   await page.locator('#whole').scrollIntoViewIfNeeded();
   const box = await page.locator('#whole').boundingBox();
@@ -681,7 +681,7 @@ test('refused drawing shows reasons and downloads nothing', async () => {
   const group = 'details:has(> summary:has-text("Parts as they are made"))';
   const impossible = { wave_generator: { bore_radius_mm: 57 }, carrier: { outer_radius_mm: 70 } };
   await setDocument({ ...(await server.example('paper-5.1')), parts: impossible });
-  // The drive itself is not touched by it.
+  // The drive itself is still possible.
   assert.ok(await page.isHidden('#impossible'));
   assert.equal(await page.getAttribute(group, 'open'), null);
   await assertShows(await designOf(page));
@@ -696,7 +696,7 @@ test('refused drawing shows reasons and downloads nothing', async () => {
   assert.match(await page.textContent('#drawings-state'), /^Assembly: .*Nothing was downloaded/);
   assert.notEqual(await page.getAttribute(group, 'open'), null, 'the group is unfolded');
   assert.ok(await page.isHidden('#impossible'), 'the drive is possible');
-  // Each part answers for itself, and a reason leads to its field.
+  // Each part has its own reasons, and each reason links to its field.
   await pick(page, '[data-file="wave-generator.svg"]');
   await refused();
   assert.match(await page.textContent(notes(BORE)), /A bore of 57(\.0)? mm cuts the wave generator open/);
@@ -710,7 +710,7 @@ test('refused drawing shows reasons and downloads nothing', async () => {
   assert.deepEqual(downloads, []);
   const { name } = await downloaded('wave-generator.svg');
   assert.match(name, /^the-papers-case-5\.1-changed-[0-9a-f]{6}-wave-generator\.svg$/);
-  // A drive that cannot exist has no drawings, and its reasons stand once at their fields.
+  // An impossible drive has no drawings, and each reason appears once at its field.
   await enter(page, SEMI_MINOR, 60);
   await pick(page, '[data-file="tooth.dxf"]');
   await refused();
@@ -741,7 +741,7 @@ test('undo, link and document keep the parts', async () => {
   assert.ok(await page.isDisabled('#undo'));
   await page.click('#redo');
   assert.deepEqual((await designOf(page)).parts, { wave_generator: { bore_radius_mm: 20 } });
-  // What is emptied is left out, with the group that it was the last of.
+  // An emptied value leaves the document, and so does an emptied group.
   await enter(page, BORE, '');
   assert.deepEqual(await designOf(page), example);
   await page.context().close();
@@ -928,7 +928,7 @@ test('play, pause and drag show both angles', async () => {
   assert.notEqual(await page.textContent('#tooth-name'), 'Tooth 3');
   await page.context().close();
   page = await open(browser, server, { reducedMotion: 'no-preference' });
-  // It moves by itself where motion is welcome.
+  // The animation starts if the user has not asked for reduced motion.
   await turned();
 });
 
@@ -948,7 +948,7 @@ test('keyboard operates the whole page', async () => {
   };
   await page.keyboard.press('Tab');
   assert.equal(await page.evaluate(() => document.activeElement.className), 'skip');
-  // A menu opens by keyboard and closes when something is chosen.
+  // The keyboard opens a menu, which closes after a choice.
   await tabTo('[popovertarget=examples], [popovertarget=examples] ~ *');
   for (let moves = 0; moves < 8 && !(await page.evaluate(() => document.activeElement.matches('[popovertarget=examples]'))); moves += 1) await page.keyboard.press('ArrowRight');
   await page.keyboard.press('Enter');
@@ -1016,7 +1016,7 @@ test('page recovers when the service returns', async () => {
   const design = await designOf(page);
   assert.equal(design.drive.teeth.radius_mm, 4.75);
   await assertShows(design);
-  // An idle page notices too.
+  // An idle page notices it too.
   await server.stop();
   await page.waitForSelector('#away:not([hidden])', { timeout: 9000 });
   server = await Server.start(port);
@@ -1109,7 +1109,7 @@ const OTHER_REPORTS = {
     load: { input_torque_nm: 20 },
   },
   flat_cuts_the_contact: { drive: { ...CASE_5_1, teeth: { ...CASE_5_1.teeth, shape: 'flat_sided', flat_length_mm: 9.7 } }, load: { input_torque_nm: 20 }, model: VIRTUAL_WORK },
-  // In grooves that hold them as closely as this the contacts are nearly as long as the balls are wide.
+  // In such tight grooves the contacts are nearly as long as the balls are wide.
   contact_beyond_groove: {
     drive: {
       wave_generator: { kind: 'eccentric', radius_mm: 30, eccentricity_mm: 1 },
@@ -1206,7 +1206,7 @@ test('long report has two readable pages with every finding', async () => {
       };
     }, findings);
     for (const text of wanted.flat()) assert.ok(table.includes(text), `${text} in ${table}`);
-    // Clearances stand with the model, everything else of the parts in the lines of parts.
+    // Clearances are listed with the model, all other values with their parts.
     assert.deepEqual(parts, Object.values(PARTS).flatMap(({ clearance_um, ...others }) => Object.values(others)));
     assert.deepEqual(clearances, ['wave_generator', 'ring', 'carrier', 'teeth'].map((part) => PARTS[part].clearance_um));
     assert.deepEqual(tooSmall, []);
@@ -1233,7 +1233,7 @@ test('headers set a strict policy and revalidation', async () => {
   const etag = (await fetch(`${server.origin}/page/main.js`)).headers.get('etag');
   const again = await fetch(`${server.origin}/page/main.js`, { headers: { 'if-none-match': etag } });
   assert.equal(again.status, 304);
-  // A browser takes the headers of a 304 over those that it kept: another policy there would stop the page's own scripts.
+  // A browser takes the headers of a 304. Another policy there would block the page's own scripts.
   assert.equal(again.headers.get('content-security-policy'), policy);
   const missing = await fetch(`${server.origin}/page/nothing.js`);
   assert.equal(missing.status, 404);
@@ -1260,7 +1260,7 @@ test('browser draws every part’s SVG to scale', async () => {
       const [path] = paths;
       const { width, height } = path.getBBox();
       const has = (x, y) => path.isPointInFill(new DOMPoint(x, y));
-      // By the shoelace formula along the outline, where there is one.
+      // The shoelace formula along the outline, if there is one.
       const length = path.getTotalLength();
       const points = [...Array(4000).keys()].map((index) => path.getPointAtLength((length * index) / 4000));
       const area = points.reduce((sum, { x, y }, index) => sum + x * points[(index + 1) % 4000].y - points[(index + 1) % 4000].x * y, 0) / 2;

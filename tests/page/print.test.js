@@ -1,4 +1,4 @@
-// What comes out on paper.
+// Printing.
 
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
@@ -48,7 +48,7 @@ test('plots are printed', async () => {
     const [, , , top] = first.view;
     for (const caption of ['Normal force, N', 'Contact stress, MPa']) {
       const { transform } = items.find(({ str }) => str.startsWith(caption));
-      // Below its caption, as wide as a plot.
+      // The plot is below its caption and has its width.
       const box = { x: Math.round(transform[4]), y: Math.round(top - transform[5]) + 4, width: 250, height: 130 };
       const count = await colouredPixels(first, box);
       assert.ok(count >= 200, `${caption}: ${count} coloured pixels`);
@@ -66,7 +66,7 @@ test('impossible design prints inputs and reasons, no old numbers', async () => 
   assert.match(text, /Semi-major axis: .*must exceed/);
   assert.match(text, /Semi-minor axis\s+60/);
   assert.doesNotMatch(text, /1549|Largest stress|980/);
-  // Possible again, it prints all.
+  // A possible design prints everything again.
   await enter(page, '/drive/wave_generator/semi_minor_mm', 56);
   assert.match((await printed(page)).flat().join('\n'), /1549/);
 });

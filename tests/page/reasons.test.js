@@ -1,4 +1,4 @@
-// What the page works out of studies' answers by itself, without a browser.
+// Calculations of the page from studies' answers, without a browser.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -12,7 +12,7 @@ const drive = (size, strength) => ({ design: { size, strength }, quantities: { s
 const search = (front, more) => ({ front, limits: [], scan: { variants: 10, good: 1, impossible: 2, reasons: [] }, relaxations: [], ...more });
 
 test('several searches join to one sorted front', () => {
-  // Pseudo-random, so that many are beaten across searches and a few are alike.
+  // Pseudo-random, with many dominated drives across searches and a few equal ones.
   let state = 7;
   const next = () => (state = (state * 48271) % 2147483647) % 40;
   const fronts = [0, 1, 2].map(() => Array.from({ length: 60 }, () => drive(next(), next())));

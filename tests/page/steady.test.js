@@ -1,4 +1,4 @@
-// Nothing moves under the hand, everything can be reached and hit.
+// Layout is stable, and every control can be reached and hit.
 
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
@@ -27,7 +27,7 @@ async function dragged(page, pointer, shares) {
   for (const share of shares) {
     const before = await page.inputValue(field(pointer));
     await page.mouse.move(box.x + box.width * share, y);
-    // A browser hands pointer events on by the frame.
+    // A browser delivers pointer events once a frame.
     await page.waitForFunction(([selector, old]) => document.querySelector(selector).value !== old, [field(pointer), before]);
     await settled(page);
     all.push(await places(page));
@@ -38,7 +38,7 @@ async function dragged(page, pointer, shares) {
 for (const [name, viewport] of Object.entries({ wide: { width: 1366, height: 900 }, tablet: { width: 820, height: 1180 } })) {
   test(`nothing moves while slider passes limits: ${name}`, async () => {
     const page = await bed.open({ viewport });
-    // Past the undercut, and past the smallest semi-minor axis that a cam can have.
+    // Beyond undercut, and beyond the least semi-minor axis of a cam.
     const all = await dragged(page, RADIUS, [0.75, 0.95, 0.5]);
     for (const each of all) assert.deepEqual(each, all[0]);
     await page.mouse.move(1, 1);
@@ -136,7 +136,7 @@ test('names and placeholders are never cut', async () => {
   const design = await bed.server.example('paper-5.1');
   design.model = { compatibility: 'virtual_work', stiffness: { law: 'johnson' } };
   design.friction = { wave_generator: { kind: 'plain', coefficient: 0.05 }, ring: { coefficient: 0.05 }, carrier: { coefficient: 0.05 } };
-  // A natural tip radius that takes three digits and a point.
+  // A natural tip radius with three digits and a point.
   const roller = { ...(await bed.server.example('eccentric-roller')), friction: design.friction };
   const page = await bed.open();
   for (const [shown, width, height] of [design, roller].flatMap((shown) => [[shown, 320, 640], [shown, 768, 1024], [shown, 1366, 900], [shown, 1920, 1080]])) {

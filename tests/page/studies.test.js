@@ -244,7 +244,7 @@ test('ratio, torque and space give drives to open', async () => {
   assert.ok(2 * 1.2 * geometry.ring.root_radius_mm <= 120);
   assert.ok(sweep.torque_capacity.output_torque_nm >= 200);
   assert.equal(sweep.load.output_torque_nm, 200);
-  // What a finding warns of was among the limits.
+  // The limits cover all warnings.
   assert.deepEqual(geometry.findings.filter(({ severity }) => severity === 'warning'), []);
 });
 
@@ -280,7 +280,7 @@ test('smallest drive has no findings and all drawings', async () => {
   assert.ok(sweep.series_compliance_estimates.find(({ backing }) => backing === 'finger_at_both_ends').share <= 0.2);
   assert.ok(sweep.torque_capacity.output_torque_nm >= 200);
   for (const part of ['assembly', 'ring', 'wave-generator', 'carrier', 'tooth']) {
-    // Of each part one, since Chromium drops what a page downloads beyond ten files a second.
+    // One file for each part, since Chromium drops downloads beyond ten a second.
     const [download] = await Promise.all([page.waitForEvent('download'), pick(page, `[data-file="${part}.dxf"]`)]);
     assert.ok((await readFile(await download.path())).length > 500, part);
     for (const [accept, beginning] of [['model/step', 'ISO-10303-21;'], ['image/svg+xml', '<svg ']]) {
@@ -320,7 +320,7 @@ test('two drives are compared at one scale', async () => {
   assert.match(await page.textContent('#comparison-title'), /Drive 1, and…/);
   await checks.nth(4).check();
   assert.equal(await page.textContent('#comparison-title'), 'Drive 1 and drive 5');
-  // Pictures are drawn when they are seen.
+  // Pictures are drawn when they become visible.
   await page.locator('#find .pair').scrollIntoViewIfNeeded();
   const viewBoxes = () => page.$$eval('#find .pair svg', (pictures) => pictures.map((picture) => picture.getAttribute('viewBox')));
   await page.waitForFunction(() => document.querySelectorAll('#find .pair svg').length === 2);
@@ -415,7 +415,7 @@ test('tolerances start from grades of each part', async () => {
   assert.deepEqual(question.base.modification, { tooth_radius_um: 2.25, slot_wall_um: 3.75, ring_equidistant_um: 3.75 }, 'the middles of the zones');
   assert.deepEqual(question.deviations.slot_wall_um, { distribution: 'normal', limit: 3.75, sigma: 1.25 });
   await page.click('#tolerance .study-progress button');
-  // Parts within such zones can always be put together.
+  // Parts within these zones always fit together.
   let study = await bed.server.ask('/v1/studies', { ...question, samples: 10, quantities: ['peak_stress_mpa'] });
   while (study.state === 'running') study = await (await fetch(`${bed.server.origin}/v1/studies/${study.id}`)).json();
   const { interference, impossible } = await (await fetch(bed.server.origin + study.result_href)).json();
@@ -491,7 +491,7 @@ test('sensitivity ranks inputs by their effect', async () => {
   for (const [cell, value] of [[2, await largest(58 * 0.99)], [3, await largest(58 * 1.01)]]) {
     assert.equal(numberIn(rows[0][cell]), Number(Math.abs(value - base).toPrecision(3)), 'as a sweep of its own');
   }
-  // Moved by its tolerance the axis does less than what else moves by 1 %.
+  // Moved by its tolerance, the axis has less effect than other inputs moved by 1 %.
   await page.locator('#sensitivity tbody tr').first().locator('input').fill('0.0001');
   await page.keyboard.press('Tab');
   await page.waitForFunction(() => !document.querySelector('#sensitivity tbody th').textContent.startsWith('Semi-major'));
@@ -506,7 +506,7 @@ test('tolerances report spread, yield and main contributor', async () => {
   await page.locator('#tolerance .ask-row').first().locator('select').nth(1).selectOption('1000');
   await page.locator('#tolerance .ask-row').first().locator('select').first().selectOption('peak_stress_mpa');
   await page.waitForFunction(() => /Peak stress.*Width of all teeth/s.test(document.querySelector('#tolerance .tolerance-tables').textContent));
-  // Half the square root of a width: 15 mm ± 0.05 mm moves 980.44 MPa by a third of a percent over its half, evenly.
+  // Stress goes as the root of the width: 15 mm ± 0.05 mm moves 980.44 MPa uniformly by half of a third of a percent.
   const quantile = async (share) => numberIn(await page.locator('#tolerance tr', { hasText: new RegExp(`^${share}.%`) }).locator('td').first().textContent());
   const median = await quantile(50);
   assert.ok(Math.abs(median - 980.44) < 0.3, String(median));

@@ -1,4 +1,4 @@
-// What a new user is told: what this is, what words mean, what differs.
+// Introduction, definitions and differences for a new user.
 
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
@@ -10,7 +10,7 @@ test('introduction has few sentences and can be hidden', async () => {
   const page = await bed.open();
   assert.match(await page.textContent('#intro p'), /wave generator, here an ellipse, pushes loose teeth.*Change the design/);
   for (const label of ['Ring', 'Tooth', 'Carrier', 'Wave generator']) assert.ok((await page.textContent('.picture')).includes(label));
-  // No label is cut off.
+  // No label is truncated.
   const cut = await page.$$eval('.picture text', (texts) => texts.filter((text) => {
     const [own, whole] = [text.getBoundingClientRect(), text.ownerSVGElement.getBoundingClientRect()];
     return own.left < whole.left || own.right > whole.right;

@@ -929,7 +929,7 @@ fn deviations_take_fast_path_from_any_lap_start() {
 }
 
 #[test]
-fn both_paths_keep_tolerance_with_unlike_teeth_or_zones() {
+fn both_paths_keep_tolerance_with_unlike_items() {
     // The paths examine different places in the last digits, after the first sixteen intervals.
     let mut looked_elsewhere = [0, 0];
     for (parameters, seed) in drives_that_may_deviate().into_iter().zip(1..) {

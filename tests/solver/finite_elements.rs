@@ -1,4 +1,5 @@
-//! The default model, virtual work with Johnson's law, against elastic bodies in contact (`tests/finite_elements`, docs/validation.md).
+//! The default model, virtual work with Johnson's law, against elastic bodies in contact
+//! (`tests/finite_elements`, docs/validation.md).
 //!
 //! Each case is one input angle of a drive. Its parts are held 5 mm behind the contacts, the depth in Johnson's law.
 

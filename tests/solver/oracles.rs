@@ -15,8 +15,8 @@ use crate::drives::{
 
 /// Returns the directions of the three forces on a tooth in its slot's frame: x outward, y in the sense of the input.
 ///
-/// Turning +, the wave generator pushes outward and forward. For s = +1 the ring pushes inward and forward and the slot holds
-/// the tooth back; for s = -1 the ring pushes backward and the slot forward.
+/// In the positive sense, the wave generator pushes outward and forward. For s = +1 the ring pushes inward and forward
+/// and the slot holds the tooth back. For s = -1 the ring pushes backward and the slot forward.
 fn directions(drive: &Drive, tooth: &ToothState) -> PerContact<Vector2<f64>> {
     let (cam, ring) = (tooth.center.tan_pressure_angle.atan(), tooth.flank.tan_pressure_angle.atan());
     PerContact {

@@ -360,7 +360,8 @@ struct Row {
     multiple: f64,
 }
 
-/// The table of docs/hard-cases.md and the figures of README.md: `cargo test -p toothwave-solver hard_cases -- --nocapture` prints it.
+/// `cargo test -p toothwave-solver hard_cases -- --nocapture` prints the table of docs/hard-cases.md and the figures of
+/// README.md.
 #[test]
 fn hard_cases_stay_near_their_condition() {
     let mut table: BTreeMap<String, Row> = BTreeMap::new();

@@ -138,7 +138,7 @@ mod tests {
         let first = budget.reserve(6 * MIB).await.expect("room").expect("a large one");
         let mut second = Box::pin(budget.reserve(6 * MIB));
         assert!(poll!(&mut second).is_pending());
-        // First come, first served: a small one does not overtake.
+        // Reservations are served in order, so a small one does not overtake.
         let mut third = Box::pin(budget.reserve(MIB));
         assert!(poll!(&mut third).is_pending());
         assert!(budget.reserve(1000).await.expect("free").is_none());

@@ -140,7 +140,7 @@ mod tests {
             .collect()
     }
 
-    /// A module that is not served fails only in a browser.
+    /// A missing module fails only in a browser.
     #[test]
     fn every_file_of_the_page_is_served() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("page");

@@ -879,7 +879,7 @@ mod tests {
     use crate::Drive;
     use crate::sweep::tried::PAPER_5_1;
 
-    /// A lap of sixteen intervals of one tooth, each moment put down by such a function.
+    /// Returns a lap of sixteen intervals of one tooth, with each moment recorded by a function.
     fn seen_by(put_down: impl Fn(&mut Seen, f64)) -> Seen {
         let piece = Piece { lap: 0, start: 0.0, end: 1.0, places: 1, at_start: None, at_end: None };
         let mut seen = Seen::new(piece, 1);
@@ -890,12 +890,12 @@ mod tests {
         seen
     }
 
-    /// A curve as the first load of the tooth.
+    /// Returns a lap with a curve as the tooth's first load.
     fn seen_of(curve: impl Fn(f64) -> f64) -> Seen {
         seen_by(|seen, fraction| seen.push(fraction)[0] = curve(fraction))
     }
 
-    /// That on every stretch what the curve is said to stay below is not below its largest value there; how far it is above at most.
+    /// Asserts that bounds on every stretch are not below its maximum. Returns their largest excess.
     fn assert_bounded(curve: impl Fn(f64) -> f64, off: Option<f64>) -> f64 {
         let seen = seen_of(&curve);
         let run = Run { seen: &seen, moments: &seen.order, is_first: true, is_last: true };
@@ -970,7 +970,7 @@ mod tests {
         }
     }
 
-    /// A tooth that is pressed, or not, by such a curve.
+    /// Returns a lap of a tooth that is pressed by a curve.
     fn seen_of_a_tooth(pressed: impl Fn(f64) -> f64) -> Seen {
         seen_by(|seen, fraction| {
             seen.push(fraction)[LOADS] = 2.0;
@@ -1008,7 +1008,7 @@ mod tests {
         };
         for step in 0..1000 {
             let (summit, sign) = (0.001 * f64::from(step), if step % 2 == 0 { 1.0 } else { -1.0 });
-            // It stands above nothing over a half of an interval.
+            // The curve is positive over half of an interval.
             let half = 0.25 / 16.0;
             let mut seen = seen_of_a_tooth(|x| sign * (half * half - (x - summit) * (x - summit)));
             let beside = (1..17).find(|&at| seen.fractions[at] > summit).unwrap_or(16);
