@@ -304,7 +304,7 @@ async fn default_refinements_follow_from_tips_and_gaps() {
     let wide =
         |choice: Value| with(&with(&bored(), "/model", choice), "/parts", json!({ "ring": { "clearance_um": 300.0 } }));
     let problem = service.post("/v1/sweep", &wide(json!({}))).await.refused(422, "impossible_design");
-    let advice = "or leave `wave_generator_moves` out of `model.refinements`";
+    let advice = "or remove `wave_generator_moves` from `model.refinements`";
     assert!(problem["detail"].as_str().unwrap().ends_with(advice), "{problem}");
     service.post("/v1/sweep", &wide(json!({ "refinements": ["ring_teeth_bend"] }))).await.found();
     let refused = json!({ "compatibility": "projection", "refinements": ["wave_generator_moves"] });

@@ -201,7 +201,7 @@ async fn reports_first_hundred_of_many_bad_entries() {
     for path in ["/v1/sweep", "/v1/accuracy"] {
         let problem = Service::new().post(path, &document).await.refused(422, "impossible_design");
         // All entries are out of range, and the list is too long for two lobes.
-        assert_eq!(problem["detail"], "5001 values are impossible; `errors` names the first 100", "{path}");
+        assert_eq!(problem["detail"], "5001 values are impossible. `errors` lists the first 100", "{path}");
         assert_eq!(problem["errors"].as_array().unwrap().len(), 100, "{path}");
     }
 }

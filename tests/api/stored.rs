@@ -214,7 +214,7 @@ fn foreign_file_is_left_alone() {
     let file = File::new();
     file.change("CREATE TABLE accounts (name TEXT)");
     let before = fs::read(&file.0).unwrap();
-    assert!(refused_at_the_start(&file).contains("something else"));
+    assert!(refused_at_the_start(&file).contains("another program"));
     assert!(fs::read(&file.0).unwrap() == before);
     fs::write(&file.0, [b'x'; 10_000]).unwrap();
     assert!(refused_at_the_start(&file).contains("damaged"));

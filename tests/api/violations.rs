@@ -546,7 +546,7 @@ async fn profiles_over_max_profile_points_are_refused() {
             (Some(points as f64), Some((points - 1) as f64))
         );
         let detail = problem["detail"].as_str().unwrap();
-        assert!(detail.ends_with("widen the chord tolerance"), "{detail}");
+        assert!(detail.ends_with("Use a larger chord tolerance"), "{detail}");
         assert!(detail.contains(&points.to_string()) && detail.contains(&(points - 1).to_string()), "{detail}");
     }
 }

@@ -42,7 +42,7 @@ class PlugIn(unittest.TestCase):
             design.write_text(example.replace("58.0", "50.0"), encoding="utf-8")
             done = run(url, design)
         self.assertEqual(done.returncode, 1)
-        self.assertIn("Values that no design can have\n/drive/wave_generator/semi_major_mm: ", done.stderr)
+        self.assertIn("The design is impossible\n/drive/wave_generator/semi_major_mm: ", done.stderr)
 
 
 class NoAnswer(unittest.TestCase):

@@ -78,9 +78,9 @@ async function assertShows(design) {
   }
 }
 
-async function violations() {
+async function violations(within = 'html') {
   await page.evaluate(await readFile(AXE, 'utf8'));
-  const { violations: found } = await page.evaluate(() => window.axe.run());
+  const { violations: found } = await page.evaluate((selector) => window.axe.run(selector), within);
   return found.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html).join(' | ')}`);
 }
 
@@ -151,7 +151,7 @@ test('impossible drive shows its reasons at the fields', async () => {
   await enter(page, SEMI_MINOR, 60);
   assert.match(await page.textContent(notes(SEMI_MAJOR)), /must exceed the semi-minor axis/);
   assert.equal(await page.getAttribute(field(SEMI_MAJOR), 'aria-invalid'), 'true');
-  assert.match(await page.textContent('#impossible'), /Values that no design can have/);
+  assert.match(await page.textContent('#impossible'), /The design is impossible/);
   assert.equal(await resultOf(page, 'Force, ring'), (await server.answers(await server.example('paper-5.1'))).sweep.peaks.ring.force_n.value);
   // All reasons appear at once at their fields, also in a folded group.
   await enter(page, '/drive/teeth/count', 31);
@@ -998,7 +998,7 @@ test('results and findings are announced', async () => {
   await enter(page, RADIUS, 6.8);
   await page.waitForFunction(() => document.querySelector('#announcer').textContent.includes('Undercut ring tips'));
   await enter(page, RADIUS, 60);
-  await page.waitForFunction(() => document.querySelector('#announcer').textContent.startsWith('Values that no design can have'));
+  await page.waitForFunction(() => document.querySelector('#announcer').textContent.startsWith('The design is impossible'));
 });
 
 test('page recovers when the service returns', async () => {
@@ -1025,7 +1025,6 @@ test('page recovers when the service returns', async () => {
 
 for (const [name, options] of Object.entries({
   light: {},
-  dark: { colorScheme: 'dark' },
   narrow: { viewport: { width: 390, height: 844 } },
   tablet: { viewport: { width: 820, height: 1180 }, colorScheme: 'dark' },
 })) {
@@ -1049,7 +1048,7 @@ for (const [name, options] of Object.entries({
     await enter(page, SEMI_MINOR, 60);
     assert.deepEqual(await violations(), [], 'an impossible design');
     await pick(page, '#open-document');
-    assert.deepEqual(await violations(), [], 'the document');
+    assert.deepEqual(await violations('#document'), [], 'the document');
   });
 }
 

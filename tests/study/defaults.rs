@@ -1,6 +1,6 @@
 //! Defaults written out, and consistency of studies with sweeps.
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use toothwave_calculation::design::Design;
 use toothwave_calculation::question::Question as _;
 use toothwave_calculation::sweep::Sweep;
@@ -43,6 +43,27 @@ fn explicit_default_keeps_the_id() {
         for (short, long) in studies(&base).iter().zip(studies(&whole)) {
             assert_eq!(study(short).unwrap().id(), study(&long).unwrap().id(), "{long}");
         }
+    }
+}
+
+#[test]
+fn inputs_written_out_keep_the_id() {
+    for base in examples() {
+        let whole = serde_json::to_value(Design::read(base.to_string().as_bytes()).unwrap()).unwrap();
+        let short = json!({ "study": "sensitivity", "base": base });
+        let found = answer(&short);
+        let inputs = found["quantities"][0]["inputs"].as_array().unwrap();
+        let inputs: Map<_, _> = inputs
+            .iter()
+            .map(|input| (input["pointer"].as_str().unwrap().to_owned(), json!({ "relative": 0.01 })))
+            .collect();
+        let ids = [
+            short,
+            json!({ "study": "sensitivity", "base": whole }),
+            json!({ "study": "sensitivity", "base": whole, "inputs": inputs }),
+        ]
+        .map(|document| study(&document).unwrap().id());
+        assert_eq!([ids[0]; 3], ids, "{base}");
     }
 }
 

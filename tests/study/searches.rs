@@ -346,15 +346,9 @@ fn incomplete_request_is_refused_at_a_given_field() {
             json!({ "min": 20 }),
             "/free",
             "missing_field",
-            "`transmission_ratio` from both sides",
+            "`min` and `max` of `transmission_ratio`",
         ),
-        (
-            "/require/outer_diameter_mm",
-            json!({ "min": 100 }),
-            "/free",
-            "missing_field",
-            "`outer_diameter_mm` from above",
-        ),
+        ("/require/outer_diameter_mm", json!({ "min": 100 }), "/free", "missing_field", "`max` of `outer_diameter_mm`"),
         (
             "/require/outer_diameter_mm",
             json!({ "max": -120 }),
@@ -386,7 +380,7 @@ fn incomplete_request_is_refused_at_a_given_field() {
             "missing_field",
             "`free`",
         ),
-        ("/start", json!([{}]), "/start/0/drive/teeth/count", "missing_field", "begin with"),
+        ("/start", json!([{}]), "/start/0/drive/teeth/count", "missing_field", "no value"),
         (
             "/start",
             json!([{ "drive": { "teeth": { "count": 40.5 } } }]),
