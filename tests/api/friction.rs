@@ -323,12 +323,12 @@ async fn text_contains_losses_and_radial_force() {
     }
     assert!(!text_of(&without(&case_5_1(plain()), "/friction")).await.contains("efficiency"));
     assert!(text_of(&eccentric()).await.contains("largest force on the wave generator"));
-    let text = text_of(&worn(on_bearing("race"))).await;
+    let text = text_of(&with_wear(on_bearing("race"))).await;
     assert!(text.contains("mm/h") && text.contains("all round"), "{text}");
     assert!(text_of(&on_its_bearing("ball")).await.contains("million revolutions"));
 }
 
-fn worn(friction: Value) -> Value {
+fn with_wear(friction: Value) -> Value {
     let rates = json!({ "wave_generator": 1e-6, "ring": 2e-6, "carrier": 3e-6 });
     let mut friction = friction;
     friction["wear_rate_mm3_per_nm"] = rates;
@@ -337,7 +337,7 @@ fn worn(friction: Value) -> Value {
 
 #[tokio::test]
 async fn wear_is_depth_per_hour_with_place() {
-    let found = swept(&worn(plain())).await;
+    let found = swept(&with_wear(plain())).await;
     let wear = found["losses"]["wear_mm_per_hour"].clone();
     // A slot has 120 passes an hour at one turn a minute; here 1500 turns, and 26/28 of that against the carrier.
     let (states, slips) = (&found["states"], &found["losses"]["slip_mm_per_rad"]["carrier"]);
@@ -360,13 +360,13 @@ async fn wear_is_depth_per_hour_with_place() {
     let expected = 3e-6 * 1e-3 * force_n / 15.0 * slip * 120.0 * 1500.0 * 26.0 / 28.0;
     assert_near(float(&wear["carrier"]["value"]), expected, 1e-9, "slot");
     // Double rate gives double depth. Without a speed there is no depth an hour.
-    let doubled = with(&worn(plain()), "/friction/wear_rate_mm3_per_nm/carrier", json!(6e-6));
+    let doubled = with(&with_wear(plain()), "/friction/wear_rate_mm3_per_nm/carrier", json!(6e-6));
     let doubled = swept(&doubled).await["losses"]["wear_mm_per_hour"].clone();
     assert_near(float(&doubled["carrier"]["value"]), 2.0 * expected, 1e-9, "slot");
     assert_eq!(doubled["wave_generator"], wear["wave_generator"]);
-    let still = swept(&without(&worn(plain()), "/load/input_speed_rpm")).await;
+    let still = swept(&without(&with_wear(plain()), "/load/input_speed_rpm")).await;
     assert!(still["losses"].get("wear_mm_per_hour").is_none());
-    let on_race = swept(&worn(on_bearing("race"))).await["losses"]["wear_mm_per_hour"].clone();
+    let on_race = swept(&with_wear(on_bearing("race"))).await["losses"]["wear_mm_per_hour"].clone();
     assert_eq!(on_race["wave_generator"].as_object().unwrap().keys().collect::<Vec<_>>(), ["value"]);
     assert!(float(&on_race["wave_generator"]["value"]) > 0.0);
     assert!(on_race["carrier"]["position_deg"].is_number());
@@ -428,13 +428,13 @@ fn on_duty(points: &[(f64, f64, f64)], friction: Value) -> Value {
             json!({ "input_torque_nm": torque_nm, "input_speed_rpm": speed_rpm, "share_of_time": share })
         })
         .collect();
-    with(&worn(friction), "/load", json!({ "duty": points }))
+    with(&with_wear(friction), "/load", json!({ "duty": points }))
 }
 
 const DUTY: [(f64, f64, f64); 3] = [(10.0, 1500.0, 0.5), (40.0, 300.0, 0.3), (20.0, 3000.0, 0.2)];
 
 fn alone(torque_nm: f64, speed_rpm: f64, friction: Value) -> Value {
-    with(&worn(friction), "/load", json!({ "input_torque_nm": torque_nm, "input_speed_rpm": speed_rpm }))
+    with(&with_wear(friction), "/load", json!({ "input_torque_nm": torque_nm, "input_speed_rpm": speed_rpm }))
 }
 
 /// Adds a clearance, so that forces are not proportional to the torque.

@@ -104,11 +104,11 @@ fn result(study: &Value) -> String {
 }
 
 /// Returns the result of an undisturbed study.
-async fn undisturbed(study: &Value) -> Value {
+async fn undisturbed_result(study: &Value) -> Value {
     Service::new().ask(&waiting(study)).await.found()["result"].clone()
 }
 
-fn begun_at(process: &Process, study: &Value) -> Value {
+fn start_at(process: &Process, study: &Value) -> Value {
     let answer = ask_at(process.address, &Question::post("/v1/studies", study.to_string()));
     assert_eq!(answer.status, 202, "{}", answer.text());
     answer.json()
@@ -153,7 +153,7 @@ async fn file_and_memory_give_same_bytes() {
 async fn killed_service_continues_with_same_bits() {
     let file = File::new();
     let process = Process::started(&["serve", "--studies", file.path()]);
-    let study = begun_at(&process, &long());
+    let study = start_at(&process, &long());
     let stands = once(&process, &study, |stands| stands["looked_at"].as_u64() > Some(1000));
     assert_eq!(stands["state"], "running");
     process.signalled("-KILL");
@@ -162,7 +162,7 @@ async fn killed_service_continues_with_same_bits() {
     let stands = once(&process, &study, |stands| stands["state"] != "running");
     assert_eq!((&stands["state"], &stands["looked_at"]), (&json!("done"), &json!(90_000)));
     let found = ask_at(process.address, &Question::of("GET", &result(&study))).found();
-    assert!(found == undisturbed(&long()).await);
+    assert!(found == undisturbed_result(&long()).await);
 }
 
 /// A limit on file size acts like a full disk.
@@ -174,7 +174,7 @@ async fn full_disk_fails_only_the_study() {
     command.args(["-c", script, env!("CARGO_BIN_EXE_toothwave"), file.path()]);
     let process = Process::of(&mut command, Stdio::null());
     let small = ask_at(process.address, &waiting(&map(5))).found();
-    let study = begun_at(&process, &long());
+    let study = start_at(&process, &long());
     let stands = once(&process, &study, |stands| stands["state"] != "running");
     assert_eq!((&stands["state"], &stands["problem"]["code"]), (&json!("failed"), &json!("store_unavailable")));
     assert!(stands["looked_at"].as_u64() < Some(90_000), "{stands}");
@@ -183,11 +183,11 @@ async fn full_disk_fails_only_the_study() {
     process.ended();
     let keeper = Keeper::of(&file);
     assert_eq!(keeper.0.get(&result(&small)).await.found(), small["result"]);
-    assert!(keeper.wait_for(&long()).await["result"] == undisturbed(&long()).await);
+    assert!(keeper.wait_for(&long()).await["result"] == undisturbed_result(&long()).await);
     keeper.end();
 }
 
-fn refused_at_the_start(file: &File) -> String {
+fn refusal_at_start(file: &File) -> String {
     let mut command = Command::new("timeout");
     let service = ["60", env!("CARGO_BIN_EXE_toothwave"), "serve", "--listen", "127.0.0.1:0", "--studies"];
     let output = command.args(service).arg(file.path()).output().unwrap();
@@ -200,12 +200,12 @@ fn other_schema_version_is_refused_with_both_versions() {
     let file = File::new();
     file.change("CREATE TABLE schema_versions (version BIGINT PRIMARY KEY, applied_at_s BIGINT NOT NULL)");
     file.change("INSERT INTO schema_versions VALUES (4, 0)");
-    let error = refused_at_the_start(&file);
+    let error = refusal_at_start(&file);
     assert!(error.contains("schema 4") && error.contains("schema 5") && error.contains(file.path()), "{error}");
     fs::remove_file(&file.0).unwrap();
     Keeper::of(&file).end();
     Connection::open(&file.0).unwrap().pragma_update(None, "user_version", 6).unwrap();
-    let error = refused_at_the_start(&file);
+    let error = refusal_at_start(&file);
     assert!(error.contains("schema 6"), "{error}");
 }
 
@@ -214,17 +214,17 @@ fn foreign_file_is_left_alone() {
     let file = File::new();
     file.change("CREATE TABLE accounts (name TEXT)");
     let before = fs::read(&file.0).unwrap();
-    assert!(refused_at_the_start(&file).contains("another program"));
+    assert!(refusal_at_start(&file).contains("another program"));
     assert!(fs::read(&file.0).unwrap() == before);
     fs::write(&file.0, [b'x'; 10_000]).unwrap();
-    assert!(refused_at_the_start(&file).contains("damaged"));
+    assert!(refusal_at_start(&file).contains("damaged"));
 }
 
 #[test]
 fn file_serves_one_process() {
     let file = File::new();
     let _process = Process::started(&["serve", "--studies", file.path()]);
-    let error = refused_at_the_start(&file);
+    let error = refusal_at_start(&file);
     assert!(error.contains("another process") && error.contains(file.path()), "{error}");
 }
 
@@ -239,7 +239,7 @@ async fn cancelled_study_continues_after_restart() {
     keeper.end();
     let keeper = Keeper::of(&file);
     assert_eq!(keeper.0.get(&place(&study)).await.found(), cancelled);
-    assert!(keeper.wait_for(&long()).await["result"] == undisturbed(&long()).await);
+    assert!(keeper.wait_for(&long()).await["result"] == undisturbed_result(&long()).await);
     assert_eq!(keeper.delete(&study).await, 204);
     keeper.0.get(&place(&study)).await.refused(404, "not_found");
     keeper.end();

@@ -32,11 +32,11 @@ fn slow(steps: u64) -> Value {
     map(&with(&shortest(), "/sweep", json!({ "samples": 10_000_000 })), steps)
 }
 
-async fn begun(service: &Service, study: &Value) -> Answer {
+async fn start_study(service: &Service, study: &Value) -> Answer {
     service.ask(&Question::post("/v1/studies", study.to_string())).await
 }
 
-async fn waited_for(service: &Service, study: &Value) -> Value {
+async fn wait_for(service: &Service, study: &Value) -> Value {
     service.ask(&Question::post("/v1/studies", study.to_string()).with("prefer", WAIT)).await.found()
 }
 
@@ -44,14 +44,14 @@ fn place(study: &Value) -> String {
     format!("/v1/studies/{}", study["id"].as_str().unwrap())
 }
 
-async fn deleted(service: &Service, place: &str) -> u16 {
+async fn delete(service: &Service, place: &str) -> u16 {
     service.ask(&Question::of("DELETE", place)).await.status
 }
 
 #[tokio::test]
 async fn waiting_client_gets_study_with_result() {
     let service = Service::new();
-    let found = waited_for(&service, &map(&shortest(), 5)).await;
+    let found = wait_for(&service, &map(&shortest(), 5)).await;
     assert_eq!((&found["state"], &found["study"]), (&json!("done"), &json!("map")));
     assert_eq!((&found["variants"], &found["looked_at"], &found["impossible"]), (&json!(5), &json!(5), &json!(0)));
     assert_eq!(service.get(found["result_href"].as_str().unwrap()).await.found(), found["result"]);
@@ -78,7 +78,7 @@ async fn wait_preference_may_have_any_length() {
 #[tokio::test]
 async fn study_without_wait_has_status_and_events() {
     let service = Service::new();
-    let answer = begun(&service, &map(&shortest(), 5)).await;
+    let answer = start_study(&service, &map(&shortest(), 5)).await;
     assert_eq!(answer.status, 202, "{}", answer.text());
     let study = answer.json();
     assert_eq!(answer.header("location"), place(&study));
@@ -95,7 +95,7 @@ async fn study_without_wait_has_status_and_events() {
 #[tokio::test]
 async fn first_event_comes_at_once_and_comments_follow() {
     let service = Service::within(ENDLESS);
-    let study = begun(&service, &slow(1)).await.json();
+    let study = start_study(&service, &slow(1)).await.json();
     let mut events = service.send(&Question::of("GET", study["events_href"].as_str().unwrap()));
     let (mut read, mut buffer) = (String::new(), [0; 4096]);
     // A comment is a line that begins with a colon (HTML Living Standard, section 9.2).
@@ -104,41 +104,41 @@ async fn first_event_comes_at_once_and_comments_follow() {
         assert!(length > 0, "{read}");
         read.push_str(&String::from_utf8_lossy(&buffer[..length]));
     }
-    assert_eq!(deleted(&service, &place(&study)).await, 204);
+    assert_eq!(delete(&service, &place(&study)).await, 204);
 }
 
 #[tokio::test]
 async fn equal_question_is_same_study_however_spelled() {
     let service = Service::new();
-    let first = waited_for(&service, &map(&shortest(), 3)).await;
+    let first = wait_for(&service, &map(&shortest(), 3)).await;
     let spelled = map(&shortest(), 3).to_string().replace("3.0", "3e0").replace("28,", "28.0,");
     let other = service.ask(&Question::post("/v1/studies", spelled).with("prefer", WAIT)).await.found();
     assert_eq!(first["id"], other["id"]);
-    assert_ne!(first["id"], waited_for(&service, &map(&shortest(), 4)).await["id"]);
+    assert_ne!(first["id"], wait_for(&service, &map(&shortest(), 4)).await["id"]);
 }
 
 #[tokio::test]
 async fn cancelled_study_continues_when_requested_again() {
     let service = Service::new();
-    let study = begun(&service, &long()).await.json();
+    let study = start_study(&service, &long()).await.json();
     assert_eq!(study["state"], "running");
-    assert_eq!(deleted(&service, &place(&study)).await, 204);
+    assert_eq!(delete(&service, &place(&study)).await, 204);
     assert_eq!(service.get(&place(&study)).await.found()["state"], "cancelled");
     let partial = service.get(&format!("{}/result", place(&study))).await.found();
     assert_eq!(partial["is_complete"], false);
-    let found = waited_for(&service, &long()).await;
+    let found = wait_for(&service, &long()).await;
     assert_eq!((&found["id"], &found["state"], &found["looked_at"]), (&study["id"], &json!("done"), &json!(90_000)));
-    assert!(found["result"] == waited_for(&Service::new(), &long()).await["result"]);
+    assert!(found["result"] == wait_for(&Service::new(), &long()).await["result"]);
     // A study that no longer runs is deleted.
-    assert_eq!(deleted(&service, &place(&study)).await, 204);
+    assert_eq!(delete(&service, &place(&study)).await, 204);
     service.get(&place(&study)).await.refused(404, "not_found");
-    assert_eq!(deleted(&service, &place(&study)).await, 404);
+    assert_eq!(delete(&service, &place(&study)).await, 404);
 }
 
 #[tokio::test]
 async fn cancelled_study_has_the_variants_it_counts() {
     let service = Service::within(LIMITS);
-    let study = begun(&service, &long()).await.json();
+    let study = start_study(&service, &long()).await.json();
     let variants = async || {
         let partial = service.get(&format!("{}/result", place(&study))).await.found();
         let has = |what: &str| partial[what]["variant"].as_array().unwrap().len() as u64;
@@ -147,7 +147,7 @@ async fn cancelled_study_has_the_variants_it_counts() {
     while variants().await == 0 {
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
-    assert_eq!(deleted(&service, &place(&study)).await, 204);
+    assert_eq!(delete(&service, &place(&study)).await, 204);
     let stands = service.get(&place(&study)).await.found();
     let variants = variants().await;
     assert_eq!((&stands["state"], &stands["looked_at"]), (&json!("cancelled"), &json!(variants)));
@@ -158,17 +158,17 @@ async fn cancelled_study_has_the_variants_it_counts() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
 async fn concurrent_requests_and_cancels_leave_no_unlisted_study() {
     let service = Service::new();
-    let study = begun(&service, &long()).await.json();
+    let study = start_study(&service, &long()).await.json();
     let clients = (0..16).map(|client| {
         let (service, place) = (service.clone(), place(&study));
         tokio::spawn(async move {
             for turn in 0..60 {
                 if (client + turn) % 2 == 0 {
-                    let answer = begun(&service, &long()).await;
+                    let answer = start_study(&service, &long()).await;
                     // 404: another client cancelled and deleted it before its answer was read.
                     assert!(matches!(answer.status, 200 | 202 | 404), "{}", answer.text());
                 } else {
-                    assert!(matches!(deleted(&service, &place).await, 204 | 404));
+                    assert!(matches!(delete(&service, &place).await, 204 | 404));
                 }
             }
         })
@@ -176,25 +176,25 @@ async fn concurrent_requests_and_cancels_leave_no_unlisted_study() {
     for client in clients.collect::<Vec<_>>() {
         client.await.unwrap();
     }
-    while deleted(&service, &place(&study)).await != 404 {}
+    while delete(&service, &place(&study)).await != 404 {}
     service.until("toothwave_studies_running", 0.0);
 }
 
 #[tokio::test]
 async fn single_request_does_not_wait_for_study() {
     let service = Service::within(Limits { max_concurrent_solves: 1, ..LIMITS });
-    let study = begun(&service, &long()).await.json();
+    let study = start_study(&service, &long()).await.json();
     service.post("/v1/sweep", &spelled_out()).await.found();
     let stands = service.get(&place(&study)).await.found();
     assert_eq!(stands["state"], "running", "{stands}");
-    assert_eq!(deleted(&service, &place(&study)).await, 204);
+    assert_eq!(delete(&service, &place(&study)).await, 204);
 }
 
 #[tokio::test]
 async fn rejects_study_over_limit() {
     let mut study = map(&shortest(), 10_000);
     study["over"]["/load/input_torque_nm"] = json!({ "min": 10.0, "max": 20.0, "steps": 1001 });
-    let problem = begun(&Service::new(), &study).await.refused(422, "too_many_variants");
+    let problem = start_study(&Service::new(), &study).await.refused(422, "too_many_variants");
     assert!(problem["detail"].as_str().unwrap().contains("max_study_variants"), "{problem}");
     let error = &problem["errors"][0];
     assert_eq!(error["code"], "too_many_variants");
@@ -205,16 +205,16 @@ async fn rejects_study_over_limit() {
 async fn at_most_four_studies_run() {
     let service = Service::within(ENDLESS);
     let studies: Vec<_> = (1..9).map(slow).collect();
-    let answers = join_all(studies.iter().map(|study| begun(&service, study))).await;
+    let answers = join_all(studies.iter().map(|study| start_study(&service, study))).await;
     let (running, refused): (Vec<_>, Vec<_>) = answers.iter().partition(|answer| answer.status == 202);
     assert_eq!(running.len(), 4);
     for answer in refused {
         answer.refused(503, "queue_full");
     }
     for study in running {
-        assert_eq!(deleted(&service, &place(&study.json())).await, 204);
+        assert_eq!(delete(&service, &place(&study.json())).await, 204);
     }
-    waited_for(&service, &map(&shortest(), 6)).await;
+    wait_for(&service, &map(&shortest(), 6)).await;
 }
 
 /// With 17 or more islands each chunk holds several.
@@ -225,7 +225,7 @@ async fn search_of_many_islands_evaluates_all() {
         "study": "search", "base": shortest(), "evaluations": 212_500, "free": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.5 } },
         "objectives": [{ "quantity": "slot_wall_mm", "goal": "max" }, { "quantity": "outer_diameter_mm", "goal": "min" }]
     });
-    let found = waited_for(&service, &study).await;
+    let found = wait_for(&service, &study).await;
     assert_eq!((&found["state"], &found["looked_at"]), (&json!("done"), &json!(212_500)));
     assert_eq!((&found["result"]["is_complete"], &found["result"]["evaluated"]), (&json!(true), &json!(212_500)));
 }
@@ -241,16 +241,16 @@ async fn invalid_study_is_refused_at_its_field() {
         (with(&study, "/base/load", json!({})), "/base/load", "missing_field"),
         (with(&study, "/colour", json!(1)), "/colour", "unknown_field"),
     ] {
-        let (at, found, _) = begun(&service, &document).await.faulty_field();
+        let (at, found, _) = start_study(&service, &document).await.faulty_field();
         assert_eq!((at.as_str(), found.as_str()), (pointer, code));
     }
     let search = json!({
         "study": "search", "base": shortest(), "free": { "/drive/teeth/radius_mm": { "min": 4.0, "max": 5.0 } },
         "objectives": [{ "quantity": "transmission_ratio", "goal": "max" }]
     });
-    let (at, found, _) = begun(&service, &search).await.faulty_field();
+    let (at, found, _) = start_study(&service, &search).await.faulty_field();
     assert_eq!((at.as_str(), found.as_str()), ("/objectives/0/quantity", "unaffected"));
-    begun(&service, &json!("map")).await.refused(422, "invalid_document");
+    start_study(&service, &json!("map")).await.refused(422, "invalid_document");
     service.post_text("/v1/studies", "{").await.refused(400, "malformed_json");
 }
 
@@ -269,7 +269,7 @@ async fn search_frees_all_lengths_of_every_kind() {
             let fields = schemas[name]["properties"].as_object().unwrap().keys();
             let lengths = fields.filter(|field| !apart.contains(&field.as_str()));
             let base = with(&json!({ "drive": {}, "load": { "output_torque_nm": 20.0 } }), place, json!({ tag: word }));
-            let found = waited_for(&service, &json!({
+            let found = wait_for(&service, &json!({
                 "study": "search", "evaluations": 200, "base": base,
                 "require": { "transmission_ratio": { "min": 19.5, "max": 20.5 }, "outer_diameter_mm": { "max": 120.0 } },
                 "objectives": [{ "quantity": "outer_diameter_mm", "goal": "min" }]
@@ -287,7 +287,7 @@ async fn search_frees_all_lengths_of_every_kind() {
 #[tokio::test]
 async fn map_is_available_as_table() {
     let service = Service::new();
-    let found = waited_for(&service, &map(&shortest(), 3)).await;
+    let found = wait_for(&service, &map(&shortest(), 3)).await;
     let question = Question::of("GET", found["result_href"].as_str().unwrap()).with("accept", "text/csv");
     let answer = service.ask(&question).await;
     assert_eq!(answer.status, 200);
@@ -303,11 +303,11 @@ async fn map_is_available_as_table() {
 }
 
 /// Compares each quantity with the value at its pointer in the answers. Returns the number of compared quantities.
-async fn held_against_their_pointers(service: &Service, document: &Value) -> usize {
+async fn count_matching_pointers(service: &Service, document: &Value) -> usize {
     let listed = service.get("/v1/quantities").await.found();
     let listed = listed["quantities"].as_array().unwrap();
     let study = json!({ "study": "map", "base": with(document, "/sweep", json!({ "wind_up": true })), "over": { "/drive/teeth/radius_mm": { "one_of": [document["drive"]["teeth"]["radius_mm"]] } } });
-    let found = waited_for(service, &study).await;
+    let found = wait_for(service, &study).await;
     let mut compared = 0;
     for (name, values) in found["result"]["possible"]["quantities"].as_object().unwrap() {
         let quantity = listed.iter().find(|quantity| quantity["name"] == **name).unwrap();
@@ -334,7 +334,7 @@ async fn every_quantity_matches_value_at_its_pointer() {
     let load = json!({ "input_torque_nm": 20.0, "input_speed_rpm": 1500.0, "allowable_stress_mpa": 1500.0 });
     let full = with(&with(&shortest(), "/load", load), "/friction", rubbing());
     for document in [full, undercut(), every_number()] {
-        compared += held_against_their_pointers(&service, &document).await;
+        compared += count_matching_pointers(&service, &document).await;
     }
     assert!(compared > 100, "{compared} compared");
 }
@@ -346,7 +346,7 @@ async fn losses_under_duty_cover_all_points() {
         { "input_torque_nm": 2.0, "input_speed_rpm": 3000.0, "share_of_time": 0.75 },
     ] });
     let document = with(&with(&shortest(), "/load", duty), "/friction", rubbing());
-    let compared = held_against_their_pointers(&Service::new(), &document).await;
+    let compared = count_matching_pointers(&Service::new(), &document).await;
     assert!(compared > 40, "{compared} compared");
 }
 

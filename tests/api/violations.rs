@@ -461,7 +461,7 @@ async fn sweep_needs_lever_arm_at_every_angle() {
 }
 
 /// Returns a drive with more ring teeth and soft slots: projecting their approach gives a negative compliance.
-fn softly_held(compatibility: &str, carrier_n_per_mm: f64) -> Value {
+fn soft_slots(compatibility: &str, carrier_n_per_mm: f64) -> Value {
     json!({
         "drive": {
             "wave_generator": { "semi_major_mm": 40.6, "semi_minor_mm": 39.4 },
@@ -477,10 +477,10 @@ fn softly_held(compatibility: &str, carrier_n_per_mm: f64) -> Value {
 async fn tooth_without_compliance_is_refused_under_projection_only() {
     let service = Service::new();
     let problem =
-        service.post("/v1/sweep", &softly_held("projection", 1e3)).await.refused(422, "compliance_not_positive");
+        service.post("/v1/sweep", &soft_slots("projection", 1e3)).await.refused(422, "compliance_not_positive");
     assert!(problem["detail"].as_str().unwrap().contains("virtual_work"), "{problem}");
-    service.post("/v1/sweep", &softly_held("virtual_work", 1e3)).await.found();
-    service.post("/v1/sweep", &softly_held("projection", 1e9)).await.found();
+    service.post("/v1/sweep", &soft_slots("virtual_work", 1e3)).await.found();
+    service.post("/v1/sweep", &soft_slots("projection", 1e9)).await.found();
 }
 
 #[tokio::test]

@@ -705,7 +705,7 @@ fn flanks_of_lobe_do_not_meet() {
             };
             let (_, least_mm) = of_radius(1e-3);
             let least_mm = least_mm.unwrap();
-            let is_by_flanks = least_mm > 1.001 * least_of_round_mm(lobes, tooth_radius_mm);
+            let is_by_flanks = least_mm > 1.001 * least_radius_mm(lobes, tooth_radius_mm);
             are_hollow += i32::from(is_by_flanks);
             // A lobe that is barely too sharp loses almost nothing.
             let by = if is_by_flanks { 1e-3 } else { 2e-2 };
@@ -738,7 +738,7 @@ fn flanks_of_lobe_do_not_meet() {
 }
 
 /// Returns the least radius from the conditions at lobe and valley, for an amplitude of 10 mm.
-fn least_of_round_mm(lobes: i64, r: f64) -> f64 {
+fn least_radius_mm(lobes: i64, r: f64) -> f64 {
     let u = lobes as f64;
     (r + 10.0).max(0.5 * (r + (r * (r + 40.0 * u * u)).sqrt()) - 10.0)
 }

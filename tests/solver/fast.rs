@@ -701,7 +701,7 @@ fn any_modification() -> impl Strategy<Value = Modification> {
 }
 
 /// Moves the start of a tip relief onto the drive's flank.
-fn begun_on_flank(modification: Modification, parameters: &DriveParameters) -> Modification {
+fn start_on_flank(modification: Modification, parameters: &DriveParameters) -> Modification {
     let end_deg = drive(parameters).flank_limit().position.from_lobe_deg();
     let ring_tip_relief = modification
         .ring_tip_relief
@@ -785,7 +785,7 @@ proptest! {
         let [wave_generator, ring, carrier] = clearance;
         let load = LoadParameters {
             law: if is_ball { ContactLaw::Hertz } else { law },
-            modification: begun_on_flank(modification, &parameters),
+            modification: start_on_flank(modification, &parameters),
             clearance_um: PerContact { wave_generator, ring, carrier },
             allowable_stress_mpa: allowable_stress_mpa.map(everywhere),
             ..load(10.0_f64.powf(torque_exponent), Compatibility::VirtualWork)
@@ -812,7 +812,7 @@ proptest! {
         let is_ball = matches!(parameters.tooth, ToothShape::Ball { .. });
         let load = LoadParameters {
             law: if is_ball { ContactLaw::Hertz } else { law },
-            modification: modification.map_or(Modification::NONE, |modification| begun_on_flank(modification, &parameters)),
+            modification: modification.map_or(Modification::NONE, |modification| start_on_flank(modification, &parameters)),
             clearance_um: everywhere(clearance_um),
             allowable_stress_mpa: allowable_stress_mpa.map(everywhere),
             ..load(10.0_f64.powf(torque_exponent), Compatibility::VirtualWork)

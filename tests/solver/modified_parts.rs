@@ -518,7 +518,7 @@ fn low_relief_leaves_rim_unchanged() {
 }
 
 /// Returns the ring's reach, derived from the limit that a refusal of a too small ring reports.
-fn told_reach_mm(p: &DriveParameters, parts: &PartsParameters) -> f64 {
+fn reported_reach_mm(p: &DriveParameters, parts: &PartsParameters) -> f64 {
     let without_rim = PartsParameters { ring_outer_radius_mm: Some(1.0), ..*parts };
     let violations = without_rim.violations(Part::Ring, &Draft::new(p).unwrap());
     let limit = violations.iter().find_map(|violation| match *violation {
@@ -562,7 +562,7 @@ proptest! {
         let farthest = |points: &[Point2<f64>]| points.iter().map(|point| point.coords.norm()).fold(0.0, f64::max);
         let drawn_mm = of_hole.iter().map(|edge| farthest(points(edge)).max(edge.start().coords.norm())).fold(0.0, f64::max);
 
-        let reach_mm = told_reach_mm(&p, &parts);
+        let reach_mm = reported_reach_mm(&p, &parts);
         prop_assert!(reach_mm >= drawn_mm * (1.0 - 1e-11), "{reach_mm} told, {drawn_mm} drawn");
         prop_assert!(reach_mm <= drawn_mm + 2.0 * tolerance_mm, "{reach_mm} told, {drawn_mm} drawn");
         let Outline::Circle { radius_mm } = section.outer else { panic!("{:?}", section.outer) };

@@ -362,7 +362,7 @@ pub(crate) fn of_many_teeth(teeth: i64, of_critical: f64) -> DriveParameters {
 }
 
 /// Returns the least limit of states that a sweep accepts.
-fn states_worked_out(parameters: &DriveParameters, tolerance: f64) -> u64 {
+fn least_state_limit(parameters: &DriveParameters, tolerance: f64) -> u64 {
     let (drive, load) = (drive(parameters), LoadCase::new(&load(20.0, Projection)).unwrap());
     let is_enough = |max_states| match sweep(&drive, &load, Points::tolerance(tolerance, max_states).unwrap(), &Never) {
         Ok(_) => true,
@@ -385,7 +385,7 @@ fn tolerance_sweep_cost_is_linear_in_teeth() {
             let end = drive(&parameters).flank_limit().end;
             assert_eq!(end == FlankEnd::Undercut, of_critical > 1.0);
             let in_mesh = Mesh::new(&drive(&parameters)).teeth_in_mesh().max;
-            let states = states_worked_out(&parameters, 1e-4);
+            let states = least_state_limit(&parameters, 1e-4);
             println!(
                 "{teeth} teeth, {end:?}: {states} states worked out, {} times the teeth in mesh",
                 states / in_mesh

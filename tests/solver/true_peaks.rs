@@ -457,7 +457,7 @@ fn true_peaks_match_the_reference() {
 // --- What they cost
 
 /// Returns the least limit of states that the search accepts.
-fn states_worked_out(parameters: &DriveParameters, load: &LoadParameters, tolerance: f64) -> u64 {
+fn least_state_limit(parameters: &DriveParameters, load: &LoadParameters, tolerance: f64) -> u64 {
     let is_enough = |max_states| match of(parameters, load, Points::tolerance(tolerance, max_states).unwrap()) {
         Ok(_) => true,
         Err(SolveError::TooManyStates { .. }) => false,
@@ -490,7 +490,7 @@ fn true_peaks_need_some_hundred_states() {
         ("5.2 johnson", PAPER_5_2, without(JOHNSON), 230),
         ("threshold", threshold, linear, 350),
     ] {
-        let states = states_worked_out(&parameters, &load, 1e-9);
+        let states = least_state_limit(&parameters, &load, 1e-9);
         println!("{name}: {states} states");
         assert!(states <= most, "{name}: {states} states");
     }
@@ -502,7 +502,7 @@ fn true_peaks_cost_is_linear_in_teeth() {
         for teeth in [28, 200, 1000, 10_000] {
             let parameters = of_many_teeth(teeth, of_critical);
             let in_mesh = Mesh::new(&drive(&parameters)).teeth_in_mesh().max;
-            let states = states_worked_out(&parameters, &load(20.0, Projection), 1e-6);
+            let states = least_state_limit(&parameters, &load(20.0, Projection), 1e-6);
             println!(
                 "{teeth} teeth, {of_critical} of the critical radius: {} times the teeth in mesh",
                 states / in_mesh
