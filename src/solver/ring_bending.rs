@@ -128,9 +128,9 @@ fn spline_bends(x: &[f64; KNOTS], y: &[f64; KNOTS]) -> [f64; KNOTS] {
 mod tests {
     use super::*;
 
-    /// A sine over half a wave has no bend at its ends, as the spline has none.
+    /// Half a period of a sine has no second derivative at its ends, like the natural spline.
     #[test]
-    fn a_spline_bends_as_the_curve_whose_points_it_goes_through() {
+    fn spline_has_second_derivatives_of_sine() {
         let x: [f64; KNOTS] = std::array::from_fn(|knot| knot as f64 / (KNOTS - 1) as f64);
         let x = x.map(|x| x * (0.5 + 0.5 * x));
         let bends = spline_bends(&x, &x.map(|x| (PI * x).sin()));
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn a_spline_has_one_slope_on_either_side_of_its_points_and_no_bend_at_its_ends() {
+    fn spline_is_smooth_and_natural() {
         let x: [f64; KNOTS] = std::array::from_fn(|knot| (1.0 + knot as f64).ln() + 0.1 * (knot % 3) as f64);
         let y: [f64; KNOTS] = std::array::from_fn(|knot| (2.5 * knot as f64).sin());
         let bends = spline_bends(&x, &y);

@@ -879,7 +879,7 @@ mod tests {
     use crate::Drive;
     use crate::sweep::tried::PAPER_5_1;
 
-    /// A lap of sixteen intervals of one tooth, each moment put down by such a function.
+    /// Returns a lap of sixteen intervals of one tooth, with each moment recorded by a function.
     fn seen_by(put_down: impl Fn(&mut Seen, f64)) -> Seen {
         let piece = Piece { lap: 0, start: 0.0, end: 1.0, places: 1, at_start: None, at_end: None };
         let mut seen = Seen::new(piece, 1);
@@ -890,12 +890,12 @@ mod tests {
         seen
     }
 
-    /// A curve as the first load of the tooth.
+    /// Returns a lap with a curve as the tooth's first load.
     fn seen_of(curve: impl Fn(f64) -> f64) -> Seen {
         seen_by(|seen, fraction| seen.push(fraction)[0] = curve(fraction))
     }
 
-    /// That on every stretch what the curve is said to stay below is not below its largest value there; how far it is above at most.
+    /// Asserts that bounds on every stretch are not below its maximum. Returns their largest excess.
     fn assert_bounded(curve: impl Fn(f64) -> f64, off: Option<f64>) -> f64 {
         let seen = seen_of(&curve);
         let run = Run { seen: &seen, moments: &seen.order, is_first: true, is_last: true };
@@ -918,7 +918,7 @@ mod tests {
     }
 
     #[test]
-    fn smooth_curves_stay_below_their_bounds_which_are_near() {
+    fn smooth_curves_stay_below_close_bounds() {
         for step in 0..50 {
             let summit = f64::from(step) * 0.02;
             let above = assert_bounded(|x| 1.0 + (1.5 * (x - summit)).cos(), Some(OFF_SMOOTH));
@@ -927,7 +927,7 @@ mod tests {
     }
 
     #[test]
-    fn curves_that_begin_with_a_power_stay_below_their_bounds() {
+    fn curves_starting_with_power_stay_below_bounds() {
         for step in 0..50 {
             let summit = f64::from(step) * 0.002;
             for power in [2.11, 2.5] {
@@ -937,7 +937,7 @@ mod tests {
     }
 
     #[test]
-    fn curves_with_a_corner_anywhere_stay_below_their_bounds() {
+    fn curves_with_corner_stay_below_bounds() {
         for step in 0..400 {
             let corner = f64::from(step) * 0.002_47;
             for (before, after) in [(1.0, 1.0), (0.1, 3.0), (2.0, 0.2)] {
@@ -946,9 +946,9 @@ mod tests {
         }
     }
 
-    /// What the polynomials through the first four, five and six of the nodes differ by in the middle, as Lagrange has them.
+    /// The terms are differences at the middle between the polynomials through four, five and six nodes.
     #[test]
-    fn a_polynomial_may_be_off_by_what_its_last_terms_come_to_in_the_middle() {
+    fn polynomial_error_follows_from_last_lagrange_terms() {
         let curve = |x: f64| (40.0 * x).sin() + (7.0 * x).exp();
         let seen = seen_of(curve);
         let run = Run { seen: &seen, moments: &seen.order, is_first: true, is_last: true };
@@ -970,7 +970,7 @@ mod tests {
         }
     }
 
-    /// A tooth that is pressed, or not, by such a curve.
+    /// Returns a lap of a tooth that is pressed by a curve.
     fn seen_of_a_tooth(pressed: impl Fn(f64) -> f64) -> Seen {
         seen_by(|seen, fraction| {
             seen.push(fraction)[LOADS] = 2.0;
@@ -979,7 +979,7 @@ mod tests {
     }
 
     #[test]
-    fn a_piece_is_cut_where_a_tooth_stands_at_the_start_of_the_relief() {
+    fn splits_piece_where_tooth_reaches_relief_start() {
         let mesh = Mesh::new(&Drive::new(&PAPER_5_1).expect("a possible drive"));
         let whole = Piece { lap: 0, start: 0.0, end: 1.0, places: 7, at_start: None, at_end: None };
         for start_deg in [1.0, 13.4, 20.0, 31.0, 50.0, 89.0] {
@@ -994,9 +994,9 @@ mod tests {
         }
     }
 
-    /// The secants on either side of an interval of a parabola meet in its middle.
+    /// The secants on both sides of a parabola's interval meet in its middle.
     #[test]
-    fn a_tooth_that_carries_or_does_not_between_two_moments_alone_is_suspected_halfway() {
+    fn suspects_change_between_moments_at_interval_middle() {
         let judge = Judge {
             best: [1.0; QUANTITIES],
             relative: 1e-6,
@@ -1008,7 +1008,7 @@ mod tests {
         };
         for step in 0..1000 {
             let (summit, sign) = (0.001 * f64::from(step), if step % 2 == 0 { 1.0 } else { -1.0 });
-            // It stands above nothing over a half of an interval.
+            // The curve is positive over half of an interval.
             let half = 0.25 / 16.0;
             let mut seen = seen_of_a_tooth(|x| sign * (half * half - (x - summit) * (x - summit)));
             let beside = (1..17).find(|&at| seen.fractions[at] > summit).unwrap_or(16);
@@ -1024,7 +1024,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tooth_that_stays_well_on_one_side_of_nothing_is_not_suspected() {
+    fn does_not_suspect_tooth_far_from_zero() {
         for step in 0..100 {
             let phase = 0.07 * f64::from(step);
             for sign in [1.0, -1.0] {
@@ -1035,7 +1035,7 @@ mod tests {
     }
 
     #[test]
-    fn the_summit_of_a_polynomial_is_found_wherever_it_stands() {
+    fn finds_maximum_of_polynomial_at_any_position() {
         for step in 1..200 {
             let summit = f64::from(step) * 0.005;
             let seen = seen_of(|x| 3.0 - (x - summit) * (x - summit));

@@ -239,7 +239,7 @@ mod tests {
         for step in -100_000..100_000 {
             let x = 1.0 + f64::from(step) * 9e-6;
             assert!(close(ln::<V>(x), x.ln()), "ln {x}");
-            // Roots of powers of ten, to 10 units of the last digit: by powers, since no library has them all.
+            // Roots of powers of ten, to 10 units of the last digit, by powers, since no library has all of them.
             let (cube, ninth, tenth) = (x.powi(3), x.powi(9), x.powi(10));
             for root in [cube_root::<V>(cube), ninth_root::<V>(ninth), 1.0 / inverse_tenth_root::<V>(tenth)] {
                 assert!((root - x).abs() <= 10.0 * f64::EPSILON * x, "{root} is not {x}");
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn logarithms_and_roots_are_right_to_a_few_units_of_the_last_digit_on_any_machine() {
+    fn logarithms_and_roots_are_accurate_to_last_digits() {
         assert_to_a_few_units::<pulp::Scalar>();
         #[cfg(target_arch = "x86_64")]
         assert_to_a_few_units::<pulp::x86::V3>();
