@@ -1,4 +1,4 @@
-//! What AutoCAD requires of a DXF, as docs/dxf.md lists it: each line of that list is a test here.
+//! What AutoCAD requires of a DXF, as docs/reference/dxf.md lists it: each line of that list is a test here.
 
 use std::collections::{HashMap, HashSet};
 

@@ -1,7 +1,7 @@
 //! The profiles as they come over HTTP, against curves that are worked out here in another way.
 //!
 //! The service samples over the tooth's position ψ, which it inverts for the cam's normal; here the angle φ of that normal is
-//! the parameter, so that nothing needs inverting (docs/theory.md section 2).
+//! the parameter, so that nothing needs inverting (docs/explanation/theory.md section 2).
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -1,4 +1,4 @@
-//! The default model, virtual work with Johnson's law, against elastic bodies in contact (`tests/finite_elements`, docs/validation.md).
+//! The default model, virtual work with Johnson's law, against elastic bodies in contact (`tests/finite_elements`, docs/explanation/validation.md).
 //!
 //! Each case is one input angle of a drive, its parts held 5 mm behind the contacts, which is the depth that Johnson's law is given.
 
@@ -185,7 +185,7 @@ fn single_contacts_have_the_pressure_of_hertz_and_the_approach_of_johnson() {
         let half_width_mm = (8.0 * force_n_per_mm * radius_mm / (PI * modulus_mpa)).sqrt();
         let hertz_mpa = 2.0 * force_n_per_mm / (PI * half_width_mm);
         assert!((pressure_mpa / hertz_mpa - 1.0).abs() < 0.015, "{pressure_mpa} MPa, by Hertz {hertz_mpa}");
-        // Both sides of the disc come nearer to it (docs/theory.md 4.3).
+        // Both sides of the disc come nearer to it (docs/explanation/theory.md 4.3).
         let johnson_mm = force_n_per_mm / (PI * modulus_mpa)
             * (2.0 * (4.0 * radius_mm / half_width_mm).ln() - 1.0 + 2.0 * (2.0 * depth_mm / half_width_mm).ln()
                 - 0.3 / 0.7);

@@ -360,7 +360,7 @@ struct Row {
     multiple: f64,
 }
 
-/// The table of docs/hard-cases.md and the figures of README.md: `cargo test -p toothwave-solver hard_cases -- --nocapture` prints it.
+/// The table of tests/reference/hard-cases.md and the figures of README.md: `cargo test -p toothwave-solver hard_cases -- --nocapture` prints it.
 #[test]
 fn hard_cases_stay_within_a_small_multiple_of_their_condition() {
     let mut table: BTreeMap<String, Row> = BTreeMap::new();
