@@ -1,6 +1,7 @@
 """Checks the documentation: length of sentences, number of words, links. tests/docs/check.py [--verbose]
 
-Code blocks do not count. A code span counts as one word. A cell of a table is checked for length and is not part of the mean.
+Code blocks do not count. A code span is one word. A sentence in a cell of a table has the same limit, and is not part of the mean. Pages
+that tests/docs/generate.py writes are counted apart. Links are checked in every text, sentences in those for users.
 """
 
 import re
@@ -12,24 +13,28 @@ MEAN_WORDS, MOST_WORDS = 16, 40  # of a sentence
 README_WORDS, DOCS_WORDS, DOCS_WITHOUT_PROOFS_WORDS = 900, 38_000, 14_000
 PROOFS = {"docs/explanation/theory.md", "docs/explanation/validation.md"}
 FREE_SENTENCES = {"docs/explanation/theory.md"}
+FOR_USERS = ("README.md", "SECURITY.md", "CHANGELOG.md", "docs/", "clients/")
+GENERATED = "<!-- Written by "
+LABEL = re.compile(r"^\*\*[^*]{1,40}[.:]\*\*[.:]?\s*")
 SOURCES = {".css", ".html", ".js", ".json", ".md", ".py", ".rs", ".toml", ".yaml", ".conf", ""}
 NOT_OURS = {"target", ".git", "node_modules"}
 
 LINK = re.compile(r"!?\[((?:[^\[\]]|\[[^\[\]]*\])*)\]\(([^()\s]+)\)")
 LIST_ITEM = re.compile(r"\s*(?:[-*+]|\d+\.)\s+")
+BULLET = re.compile(r"\s*[-*+]\s+")
 SENTENCE_END = re.compile(r"(?<=[.!?。！？])[\"')*_]*\s+(?=[\"'(*_`\[]*[^\sa-z])")
 NOT_AN_END = re.compile(r"\b(?:e\.g|i\.e|vs|cf|Fig|No|doi|[A-Z])\.$")
 
 
 def pages():
-    """README, docs and the texts beside the code, by their path from the root."""
+    """All texts by their path from the root."""
     files = sorted(file for file in ROOT.rglob("*.md") if not NOT_OURS & set(file.relative_to(ROOT).parts))
     return {file.relative_to(ROOT).as_posix(): file.read_text(encoding="utf-8") for file in files}
 
 
 def blocks(text):
     """Pieces of text outside of code: (kind, text), with kind `prose`, `cell` or `heading`."""
-    prose, in_fence, after_blank = [], False, True
+    prose, in_fence, in_list, after_blank = [], False, False, True
 
     def flush():
         if prose:
@@ -54,9 +59,14 @@ def blocks(text):
             for cell in re.split(r"(?<!\\)\|", line.strip().strip("|")):
                 yield "cell", cell.strip()
         else:
-            if LIST_ITEM.match(line):
+            # A number at the start of a line begins an item only after a blank line or another item.
+            if BULLET.match(line) or (LIST_ITEM.match(line) and (not prose or in_list)):
                 yield from flush()
-            prose.append(LIST_ITEM.sub("", line, count=1).strip())
+                in_list = True
+                line = LIST_ITEM.sub("", line, count=1)
+            elif not prose:
+                in_list = False
+            prose.append(line.strip())
         after_blank = False
     yield from flush()
 
@@ -73,7 +83,7 @@ def words(text):
 
 def sentences(text):
     parts = []
-    for part in SENTENCE_END.split(plain(text)):
+    for part in SENTENCE_END.split(plain(LABEL.sub("", text))):
         if parts and NOT_AN_END.search(parts[-1]):
             parts[-1] += " " + part
         else:
@@ -123,33 +133,35 @@ def main(verbose):
     texts, faults = pages(), []
     lengths, counts = [], {}
     for name, text in texts.items():
-        own = []
+        faults += broken_links(name, texts)
+        if not name.startswith(FOR_USERS):
+            continue
+        counts[name], own = 0, []
         for kind, block in blocks(text):
-            counts[name] = counts.get(name, 0) + words(plain(block))
-            for sentence in sentences(block) if kind != "heading" else []:
+            counts[name] += words(plain(block))
+            for sentence in sentences(block) if kind != "heading" and name not in FREE_SENTENCES else []:
                 length = words(sentence)
                 if kind == "prose":
                     own.append(length)
-                if length > MOST_WORDS and name not in FREE_SENTENCES:
+                if length > MOST_WORDS:
                     faults.append(f"{name}: {length} words: {sentence[:90]}…")
-        if name not in FREE_SENTENCES:
-            lengths += own
-        if verbose and own:
-            print(f"{name}: {counts[name]} words, {sum(own) / len(own):.1f} a sentence, the longest {max(own)}")
-        faults += broken_links(name, texts)
+        lengths += own
+        if verbose:
+            print(f"{name}: {counts[name]} words" + (f", {sum(own) / len(own):.1f} a sentence, the longest {max(own)}" if own else ""))
     faults += broken_mentions()
-    mean = sum(lengths) / len(lengths)
-    docs = {name: count for name, count in counts.items() if name.startswith("docs/")}
-    all_docs, without_proofs = sum(docs.values()), sum(count for name, count in docs.items() if name not in PROOFS)
-    print(f"{mean:.1f} words a sentence, README {counts['README.md']} words, docs {all_docs}, without theory and validation {without_proofs}")
-    for count, most, what in [
-        (mean, MEAN_WORDS, "words a sentence in the mean"),
+    docs = {name: count for name, count in counts.items() if name.startswith("docs/") and GENERATED not in texts[name]}
+    limits = [
+        (sum(lengths) / len(lengths), MEAN_WORDS, "words a sentence in the mean"),
         (counts["README.md"], README_WORDS, "words in README.md"),
-        (all_docs, DOCS_WORDS, "words in docs/"),
-        (without_proofs, DOCS_WITHOUT_PROOFS_WORDS, "words in docs/ without theory and validation"),
-    ]:
+        (sum(docs.values()), DOCS_WORDS, "words in docs/"),
+        (sum(count for name, count in docs.items() if name not in PROOFS), DOCS_WITHOUT_PROOFS_WORDS, "of these without theory and validation"),
+    ]
+    for count, most, what in limits:
+        print(f"{count:6.5g} {what}, at most {most}")
         if count > most:
             faults.append(f"{count:.5g} {what}, more than {most}")
+    generated = sum(count for name, count in counts.items() if name.startswith("docs/") and GENERATED in texts[name])
+    print(f"{generated:6} words in pages that follow from the code")
     if faults:
         sys.exit("\n".join(faults))
 

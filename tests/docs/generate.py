@@ -73,8 +73,8 @@ class Document:
         named = {variant["properties"][word]["enum"][0]: variant for variant in variants if word in variant["properties"]}
         bare = [set(variant["properties"]) for variant in variants if word not in variant["properties"]]
         default = [name for name, variant in named.items() if set(variant["properties"]) - {word} in bare]
-        texts = "; ".join(f"`{name}`: {first_sentence(variant['description'])}" for name, variant in named.items())
-        row = {"description": f"{schema['description']} {texts}.", "enum": list(named)}
+        texts = " ".join(f"`{name}`: {first_sentence(variant['description'])}." for name, variant in named.items())
+        row = {"description": f"{schema['description']} {texts}", "enum": list(named)}
         yield f"{path}/{word}", {**row, "default": default[0]} if default else row, not default and "left out" not in schema["description"]
         fields = {}
         for name, variant in named.items():
