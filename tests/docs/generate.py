@@ -24,7 +24,7 @@ UNITS = [
 LAST_PART = r"^(.*/)(carrier|ring|teeth|wave_generator)(?=$|/|_runout)"
 SECTIONS = {
     "drive": "`drive` is required: every endpoint reads it.",
-    "load": "A sweep needs it.",
+    "load": "",
     "materials": "",
     "model": "`compatibility` is `virtual_work` if left out. The answer's `model` is the complete model that was used.",
     "parts": "",
