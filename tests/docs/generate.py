@@ -1,7 +1,8 @@
 """Writes the pages of docs/reference that follow from the code: design document, quantities, settings.
 
     tests/docs/generate.py BINARY            writes them
-    tests/docs/generate.py BINARY --check    says whether they are as the code has them, and whether every code has its place
+    tests/docs/generate.py BINARY --check    compares them with the code, and findings.md and problems.md with the codes that there are;
+                                             sends every design document of README and docs to the service
 
 BINARY is the program `toothwave`: its `openapi` and `serve --help` say what there is, and a service of its own lists the quantities.
 """
@@ -12,10 +13,13 @@ import os
 import re
 import subprocess
 import sys
+import urllib.error
 import urllib.request
+from contextlib import contextmanager
 from pathlib import Path
 
-REFERENCE = Path(__file__).resolve().parents[2] / "docs" / "reference"
+ROOT = Path(__file__).resolve().parents[2]
+REFERENCE = ROOT / "docs" / "reference"
 WRITTEN = "<!-- Written by tests/docs/generate.py from the code. -->"
 UNITS = [
     ("_mm3_per_nm", "mm³/(N·m)"), ("_mm_per_n", "mm/N"), ("_n_per_mm", "N/mm"), ("_nm", "N·m"), ("_mpa", "MPa"), ("_gpa", "GPa"),
@@ -228,15 +232,31 @@ def of(binary, *words):
     return subprocess.run([binary, *words], env=clean, check=True, capture_output=True, text=True).stdout
 
 
-def listed_quantities(binary):
-    service = subprocess.Popen([binary, "--listen", "127.0.0.1:0"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+@contextmanager
+def service(binary):
+    """The address of a service, while it is used."""
+    process = subprocess.Popen([binary, "--listen", "127.0.0.1:0"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     try:
-        address = next(found[0] for line in service.stdout if (found := re.search(r"http://[0-9.:]+", line)))
-        with urllib.request.urlopen(f"{address}/v1/quantities", timeout=10) as answer:
-            return json.load(answer)["quantities"]
+        yield next(found[0] for line in process.stdout if (found := re.search(r"http://[0-9.:]+", line)))
     finally:
-        service.terminate()
-        service.wait()
+        process.terminate()
+        process.wait()
+
+
+def listed_quantities(address):
+    with urllib.request.urlopen(f"{address}/v1/quantities", timeout=10) as answer:
+        return json.load(answer)["quantities"]
+
+
+def refused_documents(address):
+    """Design documents of the texts that have no sweep."""
+    for file in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]:
+        for text in re.findall(r"^(?:```json|cat > .* <<'END')\n(\{\s*\"drive\".*?)^(?:```|END)$", file.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL):
+            request = urllib.request.Request(f"{address}/v1/sweep", text.encode(), {"Content-Type": "application/json"})
+            try:
+                urllib.request.urlopen(request, timeout=60).close()
+            except urllib.error.HTTPError as error:
+                yield f"{file.relative_to(ROOT)}: {error.read().decode()}\n{text}"
 
 
 def differing_codes(document):
@@ -254,12 +274,14 @@ def differing_codes(document):
 
 def main(binary, is_check):
     document = Document(json.loads(of(binary, "openapi")))
-    pages = {
-        "design-document.md": design_document(document),
-        "quantities.md": quantities(listed_quantities(binary)),
-        "settings.md": settings(of(binary, "serve", "--help")),
-    }
     faults = list(differing_codes(document))
+    with service(binary) as address:
+        pages = {
+            "design-document.md": design_document(document),
+            "quantities.md": quantities(listed_quantities(address)),
+            "settings.md": settings(of(binary, "serve", "--help")),
+        }
+        faults += refused_documents(address)
     for name, text in pages.items():
         file = REFERENCE / name
         if not is_check:
