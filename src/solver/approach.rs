@@ -1,4 +1,4 @@
-//! The approach of a tooth along `F_H` as a function of that force (docs/theory.md sections 4.3 to 4.5).
+//! The approach of a tooth along `F_H` as a function of that force (docs/explanation/theory.md sections 4.3 to 4.5).
 
 use crate::root::{NotConverged, ValueAndSlope, newton_from_below};
 
@@ -27,7 +27,7 @@ pub enum Approach {
 }
 
 /// `ξ = F (A + B ln(F_r/F) + K ln(2/u - 1))`, `1/u = z + √(1 + z²)`, `z² = F_z/F`: u is how wide the contact with a corner is, over how wide one with a smooth
-/// surface would be. The last part is increasing and bent downwards as the others are (docs/theory.md section 4.4, `corner_contact`).
+/// surface would be. The last part is increasing and bent downwards as the others are (docs/explanation/theory.md section 4.4, `corner_contact`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corner {
     smooth: Logarithmic,

@@ -10,7 +10,7 @@ use crate::ring::{FlankLimit, RingFlank, RingTooth};
 use crate::root::{NotConverged, bracketed};
 use crate::violation::{Alternatives, Parameter, Violation};
 
-/// What describes a drive (docs/theory.md section 1).
+/// What describes a drive (docs/explanation/theory.md section 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriveParameters {
     /// What pushes the teeth outward.
@@ -29,7 +29,7 @@ pub struct DriveParameters {
     pub tip_radius_mm: Option<f64>,
 }
 
-/// The shape of a tooth of the radius `r` (docs/theory.md section 2.10).
+/// The shape of a tooth of the radius `r` (docs/explanation/theory.md section 2.10).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ToothShape {
     /// A cylinder along the axis.
@@ -446,7 +446,7 @@ impl Neighbours {
         Ok(Some(Violation::TeethTouch { tooth_diameter_mm, center_distance_mm, touching_radius_mm }))
     }
 
-    /// Least distance of two neighbouring centres on their path (docs/theory.md section 7): around an ellipse of those either side of the
+    /// Least distance of two neighbouring centres on their path (docs/explanation/theory.md section 7): around an ellipse of those either side of the
     /// minor axis; of two teeth or three, which are more than a right angle apart, of those either side of the major axis, since these are
     /// nearer to the minor one.
     fn least_center_distance_mm(&self) -> Result<f64, NotConverged> {

@@ -1,7 +1,7 @@
 //! Geometry, load sharing and contact stress of discrete-tooth harmonic drives.
 //!
 //! The crate is arithmetic alone: pure functions, no input or output, no clock, no logging. The equations, with
-//! their sources, stand in `docs/theory.md`; every formula below names its section there, and in brackets the
+//! their sources, stand in `docs/explanation/theory.md`; every formula below names its section there, and in brackets the
 //! number it has in the paper (Wang, Bai, Chen, Wang, Journal of Chongqing University 36(1), 2013, 35-42).
 //!
 //! # Parts

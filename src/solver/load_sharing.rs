@@ -1,4 +1,4 @@
-//! Equilibrium of a tooth and compatibility of all of them at one input angle (docs/theory.md section 4).
+//! Equilibrium of a tooth and compatibility of all of them at one input angle (docs/explanation/theory.md section 4).
 
 use std::f64::consts::PI;
 
@@ -626,7 +626,7 @@ impl<'a> LoadedDrive<'a> {
     }
 
     /// How much shorter the arm of a tooth becomes for each radian that the wave generator moves on under it: that of `d tan γ cos γ`, γ in the
-    /// cosine staying, by the position (docs/theory.md section 4.4).
+    /// cosine staying, by the position (docs/explanation/theory.md section 4.4).
     fn arm_decline_mm_per_rad(&self, center: &ToothCenter) -> f64 {
         if !self.wave_generator_moves {
             return 0.0;
@@ -678,7 +678,7 @@ impl<'a> LoadedDrive<'a> {
         self.flat().is_some_and(|flat| flat.borne_mm(center.center_radius_mm) <= 0.0)
     }
 
-    /// The pressure at the middle of each contact of a tooth, summed along its way over the part: what wears it (docs/theory.md
+    /// The pressure at the middle of each contact of a tooth, summed along its way over the part: what wears it (docs/explanation/theory.md
     /// section 10.4).
     ///
     /// # Errors

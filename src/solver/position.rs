@@ -1,4 +1,4 @@
-//! A tooth's position ψ from the lobe it is on, kept exact at both ends of half a lobe (docs/theory.md section 3).
+//! A tooth's position ψ from the lobe it is on, kept exact at both ends of half a lobe (docs/explanation/theory.md section 3).
 
 use std::f64::consts::PI;
 

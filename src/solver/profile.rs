@@ -332,7 +332,7 @@ fn inflections_seen(arc: &[CurvePoint]) -> usize {
     arc.windows(2).filter(|pair| pair[0].bend * pair[1].bend < 0.0).count()
 }
 
-/// An upper bound of the distance between an arc with one inflection at most and its chord (docs/theory.md section 2.8).
+/// An upper bound of the distance between an arc with one inflection at most and its chord (docs/explanation/theory.md section 2.8).
 ///
 /// A convex arc lies in the triangle of its chord and its end tangents, whose height is
 /// `c sin α sin β / sin(α + β)`; an arc with one inflection stays below the tangent at one end and above that at the other, within

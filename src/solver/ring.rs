@@ -1,4 +1,4 @@
-//! The ring's flank: the outer parallel curve of the centres' path at the tooth radius (docs/theory.md section 2), or, in a ring
+//! The ring's flank: the outer parallel curve of the centres' path at the tooth radius (docs/explanation/theory.md section 2), or, in a ring
 //! made with clearance, a little farther out.
 
 use std::f64::consts::PI;
@@ -102,7 +102,7 @@ impl RingTooth {
     }
 }
 
-/// The corner in which a pointed or bored flank ends, as teeth see it that have not come to the flank yet (docs/theory.md section 4.4, `corner_contact`).
+/// The corner in which a pointed or bored flank ends, as teeth see it that have not come to the flank yet (docs/explanation/theory.md section 4.4, `corner_contact`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TipCorner {
     flank: RingFlank,
@@ -160,7 +160,7 @@ impl TipCorner {
     }
 
     /// What a force on the flank moves the corner by more than it would move a wall, for each unit of the logarithm by which it is nearer to it and over
-    /// `(1 - ν²)/(π E L1)`: by the solution for a wedge that is pressed at its apex (docs/theory.md section 4.4, `corner_contact`).
+    /// `(1 - ν²)/(π E L1)`: by the solution for a wedge that is pressed at its apex (docs/explanation/theory.md section 4.4, `corner_contact`).
     pub(crate) fn bending_growth(&self) -> f64 {
         let normal_rad = self.flank_end.tan_pressure_angle.atan();
         // Half of the angle between the flank and its mirror image, or the land.

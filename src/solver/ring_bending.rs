@@ -1,4 +1,4 @@
-//! How much further the ring gives way under a tooth towards its tips than at its root (docs/theory.md section 4.3, `ring_teeth_bend`).
+//! How much further the ring gives way under a tooth towards its tips than at its root (docs/explanation/theory.md section 4.3, `ring_teeth_bend`).
 //!
 //! A force on the flank moves it as it would move a half-plane, and further, because the other faces of the ring's tooth bear nothing: what the
 //! half-plane bears there has to be taken off the ring again. That is a problem of the boundary alone, without any singularity at the force, and

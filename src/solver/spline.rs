@@ -1,4 +1,4 @@
-//! Curves as few polynomials, for what draws solids (docs/theory.md section 8).
+//! Curves as few polynomials, for what draws solids (docs/explanation/theory.md section 8).
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! Load sharing (docs/theory.md section 4.5): which rotation of the wave generator makes its torque, over springs, one a tooth. It knows
+//! Load sharing (docs/explanation/theory.md section 4.5): which rotation of the wave generator makes its torque, over springs, one a tooth. It knows
 //! neither geometry nor shape.
 
 use std::f64::consts::PI;

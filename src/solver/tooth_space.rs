@@ -1,4 +1,4 @@
-//! The ring's tooth space as it is made: its flank set back by a clearance and shaped by a modification (docs/theory.md section 8).
+//! The ring's tooth space as it is made: its flank set back by a clearance and shaped by a modification (docs/explanation/theory.md section 8).
 
 use nalgebra::{Point2, Unit, Vector2};
 

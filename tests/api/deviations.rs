@@ -51,7 +51,7 @@ fn numbers(column: &Value) -> Vec<f64> {
 async fn deviations_list_all_zones_by_slot() {
     let nominal = swept(&cleared()).await;
     assert!(nominal.get("sweep_period_deg").is_none() && nominal["states"].get("lobe").is_none());
-    // Load periods: one for the cam; with it as many as slots or ring spaces, else half (docs/theory.md section 4.8).
+    // Load periods: one for the cam; with it as many as slots or ring spaces, else half (docs/explanation/theory.md section 4.8).
     for (deviations, periods) in [
         (json!({ "wave_generator_runout": { "amount_um": 2.0 } }), 1.0),
         (json!({ "slot_wall_um": one(28, 5, 1.0) }), 14.0),

@@ -1,4 +1,4 @@
-//! AutoCAD's requirements for DXF. Each line of the list in docs/dxf.md has a test.
+//! AutoCAD's requirements for DXF. Each line of the list in docs/reference/dxf.md has a test.
 
 use std::collections::{HashMap, HashSet};
 

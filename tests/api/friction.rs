@@ -23,7 +23,7 @@ fn on_bearing(kind: &str) -> Value {
     on(&bearing)
 }
 
-/// Returns case 5.1 by virtual work and the linear law with 40 intervals at 1500 rpm (docs/theory.md, section 10.3).
+/// Returns case 5.1 by virtual work and the linear law with 40 intervals at 1500 rpm (docs/explanation/theory.md, section 10.3).
 fn case_5_1(friction: Value) -> Value {
     let model = json!({ "compatibility": "virtual_work", "stiffness": { "law": "linear" } });
     let document = with(&shortest(), "/model", model);

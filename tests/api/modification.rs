@@ -58,7 +58,7 @@ async fn offset_along_normals_equals_clearance() {
 
 #[tokio::test]
 async fn turned_ring_or_carrier_is_lost_motion() {
-    // kτ and (Z_G/U)τ for every tooth: docs/theory.md section 4.8.
+    // kτ and (Z_G/U)τ for every tooth: docs/explanation/theory.md section 4.8.
     let conjugate = swept(&modified(json!({}))).await;
     for (field, ratio) in [("ring_rotation_arcsec", 13.0), ("carrier_rotation_arcsec", 14.0)] {
         let turned = swept(&modified(json!({ field: 36.0 }))).await;

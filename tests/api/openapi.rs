@@ -444,7 +444,7 @@ fn document_contains_every_code() {
 }
 
 fn documentation(name: &str) -> String {
-    let path = format!("{}/../../docs/{name}", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/../../docs/reference/{name}", env!("CARGO_MANIFEST_DIR"));
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
@@ -452,7 +452,7 @@ fn documentation(name: &str) -> String {
 fn docs_findings_explains_every_finding() {
     let text = documentation("findings.md");
     for word in words(&finding_codes()) {
-        assert!(text.contains(&format!("`{word}`")), "docs/findings.md does not name `{word}`");
+        assert!(text.contains(&format!("`{word}`")), "docs/reference/findings.md does not name `{word}`");
     }
 }
 
@@ -460,7 +460,7 @@ fn docs_findings_explains_every_finding() {
 fn docs_problems_explains_every_code() {
     let text = documentation("problems.md");
     for word in words(&problem_codes()).into_iter().chain(words(&field_codes())) {
-        assert!(text.contains(&format!("`{word}`")), "docs/problems.md does not name `{word}`");
+        assert!(text.contains(&format!("`{word}`")), "docs/reference/problems.md does not name `{word}`");
     }
 }
 

@@ -28,7 +28,7 @@ async fn documented_series_are_the_exported_ones() {
     for series in series(&text) {
         assert!(text.contains(&format!("# HELP {series} ")), "{series} says nothing of itself");
     }
-    let documented: BTreeSet<String> = include_str!("../../docs/operations.md")
+    let documented: BTreeSet<String> = include_str!("../../docs/reference/service.md")
         .split('`')
         .filter(|word| word.starts_with("toothwave_") || word.starts_with("process_"))
         .map(|word| word.split('{').next().unwrap().to_owned())

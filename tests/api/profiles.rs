@@ -1,7 +1,7 @@
 //! Profiles over HTTP against independently calculated curves.
 //!
 //! The service samples over the tooth's position ψ and inverts it for the cam's normal. Here the angle φ of that normal
-//! is the parameter, so that nothing needs an inversion (docs/theory.md section 2).
+//! is the parameter, so that nothing needs an inversion (docs/explanation/theory.md section 2).
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

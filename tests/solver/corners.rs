@@ -325,7 +325,7 @@ fn narrower_contact_adds_logarithm_of_its_width() {
             let per_mm = ring_n / (15.0 * modulus_mpa);
             let half_mm = 2.0 * per_mm / (angle_rad + (angle_rad * angle_rad + 4.0 * square * per_mm).sqrt());
             let u = half_mm / (per_mm / square).sqrt();
-            // Approach of the same contacts without narrowing, by Johnson (docs/theory.md 4.3).
+            // Approach of the same contacts without narrowing, by Johnson (docs/explanation/theory.md 4.3).
             let of_contact = |force_n: f64, curvature: f64| {
                 let half_mm = (4.0 * force_n / (std::f64::consts::PI * 15.0 * modulus_mpa * curvature)).sqrt();
                 0.5 * growth_mm_per_n

@@ -1,5 +1,5 @@
 //! The default model, virtual work with Johnson's law, against elastic bodies in contact
-//! (`tests/finite_elements`, docs/validation.md).
+//! (`tests/finite_elements`, docs/explanation/validation.md).
 //!
 //! Each case is one input angle of a drive. Its parts are held 5 mm behind the contacts, the depth in Johnson's law.
 
@@ -186,7 +186,7 @@ fn single_contacts_match_hertz_pressure_and_johnson_approach() {
         let half_width_mm = (8.0 * force_n_per_mm * radius_mm / (PI * modulus_mpa)).sqrt();
         let hertz_mpa = 2.0 * force_n_per_mm / (PI * half_width_mm);
         assert!((pressure_mpa / hertz_mpa - 1.0).abs() < 0.015, "{pressure_mpa} MPa, by Hertz {hertz_mpa}");
-        // Both sides of the disc approach it (docs/theory.md 4.3).
+        // Both sides of the disc approach it (docs/explanation/theory.md 4.3).
         let johnson_mm = force_n_per_mm / (PI * modulus_mpa)
             * (2.0 * (4.0 * radius_mm / half_width_mm).ln() - 1.0 + 2.0 * (2.0 * depth_mm / half_width_mm).ln()
                 - 0.3 / 0.7);

@@ -1,4 +1,4 @@
-//! The paper's cases against separate calculations (docs/theory.md section 6).
+//! The paper's cases against separate calculations (docs/explanation/theory.md section 6).
 
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::mesh::{Mesh, TeethInMesh};

@@ -360,7 +360,7 @@ struct Row {
     multiple: f64,
 }
 
-/// `cargo test -p toothwave-solver hard_cases -- --nocapture` prints the table of docs/hard-cases.md and the figures of
+/// `cargo test -p toothwave-solver hard_cases -- --nocapture` prints the table of tests/reference/hard-cases.md and the figures of
 /// README.md.
 #[test]
 fn hard_cases_stay_near_their_condition() {

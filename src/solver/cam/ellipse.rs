@@ -1,4 +1,4 @@
-//! The ellipse, described by its support function over the angle φ of its outward normal (docs/theory.md sections 2.1 to 2.3).
+//! The ellipse, described by its support function over the angle φ of its outward normal (docs/explanation/theory.md sections 2.1 to 2.3).
 
 use nalgebra::{Point2, Unit, Vector2};
 

@@ -1,5 +1,5 @@
 //! The support function `h = R0 + e cos Uφ`; with one lobe exactly the circle of radius R0 about a point e beside the axis
-//! (docs/theory.md section 2.9).
+//! (docs/explanation/theory.md section 2.9).
 
 use crate::cam::kind::{CamContact, Given, Hollow, Kind, ToothCenter};
 use crate::position::{Position, half_lobe_rad};

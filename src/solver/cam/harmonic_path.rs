@@ -1,5 +1,5 @@
 //! The cam that moves the centres along `d = R + e cos Uψ`: explicit in the position, and hollow in its valleys where the stroke is large
-//! (docs/theory.md section 2.9).
+//! (docs/explanation/theory.md section 2.9).
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! What a kind of wave generator is: where it holds a tooth, and what it answers about itself (docs/theory.md section 2).
+//! What a kind of wave generator is: where it holds a tooth, and what it answers about itself (docs/explanation/theory.md section 2).
 
 use nalgebra::{Point2, Unit, Vector2};
 

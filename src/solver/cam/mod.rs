@@ -1,4 +1,4 @@
-//! Wave generators, one file a kind (docs/theory.md section 2).
+//! Wave generators, one file a kind (docs/explanation/theory.md section 2).
 //!
 //! A further kind is a file that implements `Kind` (`kind.rs`) and says what is given for it, a line of [`Cam`] with its arm in `Cam::kind`, and
 //! a line of [`WaveGenerator`] with its arms in `WaveGenerator::given` and `WaveGenerator::cam`.
@@ -112,7 +112,7 @@ impl WaveGenerator {
         self.given().is_path
     }
 
-    /// `R_race`: speed of a race along the cam over its turning (docs/theory.md section 10.2).
+    /// `R_race`: speed of a race along the cam over its turning (docs/explanation/theory.md section 10.2).
     pub fn race_radius_mm(&self, tooth_radius_mm: f64) -> f64 {
         let Given { mean_radius_mm, is_path, .. } = self.given();
         if is_path { mean_radius_mm - tooth_radius_mm } else { mean_radius_mm }

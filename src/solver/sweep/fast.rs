@@ -457,7 +457,7 @@ impl Kernel {
         })
     }
 
-    /// The capacity where all loads are in proportion (docs/theory.md section 4.7): that of the stress nearest to what is allowed.
+    /// The capacity where all loads are in proportion (docs/explanation/theory.md section 4.7): that of the stress nearest to what is allowed.
     fn in_proportion(
         &self,
         loaded: &LoadedDrive<'_>,

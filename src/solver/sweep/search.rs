@@ -1,4 +1,4 @@
-//! Where the extremes of a sweep stand (docs/theory.md section 9, *True extremes*).
+//! Where the extremes of a sweep stand (docs/explanation/theory.md section 9, *True extremes*).
 //!
 //! A lap is cut where a tooth enters. In between, every load of every tooth and every total of them all is a smooth curve over the input
 //! angle, with gaps between two changes of the teeth that carry. A few moments show where the curves may be largest: polynomials through six of

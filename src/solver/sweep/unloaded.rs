@@ -1,4 +1,4 @@
-//! How far the wave generator turns before the first tooth has closed its gaps: the wind-up without load (docs/theory.md section 4.8), and where it is
+//! How far the wave generator turns before the first tooth has closed its gaps: the wind-up without load (docs/explanation/theory.md section 4.8), and where it is
 //! least and largest (section 9).
 
 use std::ops::Range;

@@ -1,4 +1,4 @@
-//! The flat of a flat-sided tooth on the wall of its slot (docs/theory.md sections 4.3 and 5).
+//! The flat of a flat-sided tooth on the wall of its slot (docs/explanation/theory.md sections 4.3 and 5).
 
 use std::f64::consts::PI;
 

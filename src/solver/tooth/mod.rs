@@ -1,4 +1,4 @@
-//! What a contact of a tooth is: how it gives way under a force and what pressure the force makes (docs/theory.md sections 4.3 and 5).
+//! What a contact of a tooth is: how it gives way under a force and what pressure the force makes (docs/explanation/theory.md sections 4.3 and 5).
 
 pub mod flat;
 pub(crate) mod line;

@@ -1,4 +1,4 @@
-//! Wave generators other than ellipses: mesh and load follow from `d`, `T` and `T_ψ` of the teeth's centres alone (docs/theory.md sections 2.9 and 3).
+//! Wave generators other than ellipses: mesh and load follow from `d`, `T` and `T_ψ` of the teeth's centres alone (docs/explanation/theory.md sections 2.9 and 3).
 
 use super::lanes::LANES;
 use crate::cam::{Harmonic, HarmonicPath};

@@ -1,4 +1,4 @@
-//! Curves that take too long at every state, as sums of Chebyshev polynomials over the range that a drive has of them (docs/theory.md section 9, *Fast path*).
+//! Curves that take too long at every state, as sums of Chebyshev polynomials over the range that a drive has of them (docs/explanation/theory.md section 9, *Fast path*).
 
 use std::f64::consts::PI;
 

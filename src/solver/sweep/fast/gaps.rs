@@ -1,4 +1,4 @@
-//! Where gaps close, in columns (docs/theory.md sections 4.4 and 4.8): the formulas are those of [`crate::gaps`], parted into what the position decides and
+//! Where gaps close, in columns (docs/explanation/theory.md sections 4.4 and 4.8): the formulas are those of [`crate::gaps`], parted into what the position decides and
 //! what the items have, so that positions that come again in every lap are worked out once.
 
 use std::f64::consts::PI;

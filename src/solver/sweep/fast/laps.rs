@@ -1,4 +1,4 @@
-//! Which samples of a sweep stand where in which lap of its mesh, and which teeth stand there (docs/theory.md sections 3 and 9).
+//! Which samples of a sweep stand where in which lap of its mesh, and which teeth stand there (docs/explanation/theory.md sections 3 and 9).
 
 use crate::mesh::{Mesh, Neighbours, Place, Samples};
 

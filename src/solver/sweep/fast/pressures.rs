@@ -1,4 +1,4 @@
-//! Contacts that are no lines, in columns: the ellipses of balls and the flats of flat-sided teeth (docs/theory.md sections 4.3 and 5).
+//! Contacts that are no lines, in columns: the ellipses of balls and the flats of flat-sided teeth (docs/explanation/theory.md sections 4.3 and 5).
 
 use pulp::Simd;
 

@@ -1,4 +1,4 @@
-//! How the teeth at an input angle share the load, for a tile of input angles together (docs/theory.md section 9, *Fast path*).
+//! How the teeth at an input angle share the load, for a tile of input angles together (docs/explanation/theory.md section 9, *Fast path*).
 //!
 //! The springs are those of [`crate::springs`], in columns. With gaps every search comes down to the rotation from above: each force is convex
 //! in the rotation, so that the tangents of all of them, wherever they touch, together never make more torque than the springs, and their root
