@@ -209,7 +209,7 @@ impl From<&Drive> for UndercutAnswer {
 }
 
 impl SlotWall {
-    /// The ring pushes a tooth in the input's direction for s = +1, and against it for s = -1 (docs/theory.md section
+    /// The ring pushes a tooth in the input's direction for s = +1, and against it for s = -1 (docs/explanation/theory.md section
     /// 5).
     fn loaded(drive: &Drive) -> Self {
         if drive.sense() > 0.0 { Self::Leading } else { Self::Trailing }

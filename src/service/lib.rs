@@ -1,6 +1,7 @@
 //! toothwave: the calculation service for discrete-tooth harmonic drives.
 //!
-//! A request takes one path: bytes, document, key, cache, checked parameters, answer, bytes. This crate contains HTTP
+//! A request takes one path: bytes, document, key, cache, checked parameters, answer, bytes. Bytes that were seen before
+//! lead to their key at once. This crate contains HTTP
 //! and the command line. `toothwave_calculation` contains documents and answers, and `toothwave_solver` the formulas.
 
 pub mod app;

@@ -1,4 +1,4 @@
-//! The three contacts of a tooth: materials, stiffness, Hertz stress (docs/theory.md sections 4 and 5).
+//! The three contacts of a tooth: materials, stiffness, Hertz stress (docs/explanation/theory.md sections 4 and 5).
 
 use std::f64::consts::PI;
 

@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_spline_has_one_slope_on_either_side_of_its_points_and_no_bend_at_its_ends() {
+    fn spline_is_smooth_and_natural() {
         let x: [f64; KNOTS] = std::array::from_fn(|knot| (1.0 + knot as f64).ln() + 0.1 * (knot % 3) as f64);
         let y: [f64; KNOTS] = std::array::from_fn(|knot| (2.5 * knot as f64).sin());
         let bends = spline_bends(&x, &y);

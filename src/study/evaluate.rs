@@ -128,7 +128,7 @@ impl Evaluator {
         Ok(Loaded { checked, peaks: (&sweep).into(), losses, radial_forces })
     }
 
-    /// Outer radius of the ring as it is drawn (docs/theory.md section 8). An impossible ring has no outer diameter.
+    /// Outer radius of the ring as it is drawn (docs/explanation/theory.md section 8). An impossible ring has no outer diameter.
     fn ring_outer_radius_mm(&self, design: &Design, drive: &Drive) -> Result<f64, NoAnswer> {
         let parts = design.parts_parameters()?;
         let root_radius_mm = drive.root_radius_mm() + 1e-3 * parts.ring_clearance_um;

@@ -7,7 +7,7 @@
 //! 1996, 30-45). Limits are handled as by K. Deb (IEEE Transactions on Evolutionary Computation 6, 2002, 182-197): a
 //! feasible point beats an infeasible one, and the smaller violation beats the larger one. An archive keeps the
 //! non-dominated points, and most steps start there. Each kind of step alone finds less in as many steps
-//! (docs/studies.md).
+//! (benches/results/searches.md).
 //!
 //! If half of the evaluations found no feasible point, each limit gets its own population. There the smaller violation
 //! of the other limits is better, then the smaller violation of this limit.

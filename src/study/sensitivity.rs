@@ -98,10 +98,6 @@ fn inputs_by_default(base: &Tree) -> Result<(Tree, BTreeMap<String, InputDocumen
     for variable in template.variables().iter().filter(|variable| matches!(variable.domain, Domain::Whole { .. })) {
         inputs.remove(&variable.pointer);
     }
-    if inputs.is_empty() {
-        let detail = "the base has no numbers except counts and zeros. Name the inputs here";
-        return Err(fault("/inputs", FieldCode::MissingField, detail));
-    }
     Ok((base, inputs))
 }
 

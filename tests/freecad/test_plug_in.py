@@ -1,4 +1,4 @@
-"""docs/plug-ins.md shows a whole program: the file itself, and it runs."""
+"""docs/how-to/plug-ins.md shows a whole program: the file itself, and it runs."""
 
 import importlib.util
 import os
@@ -22,7 +22,7 @@ def run(url, design):
 class PlugIn(unittest.TestCase):
     def test_the_page_shows_the_file_verbatim(self):
         self.assertIn(
-            f"```python\n{PROGRAM.read_text(encoding='utf-8')}```\n", (ROOT / "docs/plug-ins.md").read_text(encoding="utf-8")
+            f"```python\n{PROGRAM.read_text(encoding='utf-8')}```\n", (ROOT / "docs/how-to/plug-ins.md").read_text(encoding="utf-8")
         )
 
     def test_it_gets_every_part_and_what_it_has_is_not_sent_again(self):

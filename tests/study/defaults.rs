@@ -1,4 +1,4 @@
-//! What a default that is written out, and the sweep beside a study, must not change.
+//! Defaults written out, and consistency of studies with sweeps.
 
 use serde_json::{Map, Value, json};
 use toothwave_calculation::design::Design;
@@ -17,7 +17,7 @@ fn examples() -> [Value; 3] {
     .map(|text| serde_json::from_str(text).unwrap())
 }
 
-/// All kinds of study of a base, over a number that defaults follow from.
+/// Returns all kinds of studies over a number on which defaults depend.
 fn studies(base: &Value) -> Vec<Value> {
     let radius_mm = base["drive"]["teeth"]["radius_mm"].as_f64().unwrap();
     let range = json!({ "min": 0.9 * radius_mm, "max": radius_mm });
@@ -31,7 +31,7 @@ fn studies(base: &Value) -> Vec<Value> {
 }
 
 #[test]
-fn a_default_written_out_keeps_the_id() {
+fn explicit_default_keeps_the_id() {
     for base in examples() {
         let design = Design::read(base.to_string().as_bytes()).unwrap();
         let mut whole = serde_json::to_value(&design).unwrap();
@@ -68,7 +68,7 @@ fn inputs_written_out_keep_the_id() {
 }
 
 #[test]
-fn what_is_no_default_changes_the_id() {
+fn non_default_value_changes_the_id() {
     let [base, ..] = examples();
     for (pointer, value) in [
         ("/model/refinements", json!("none")),
@@ -84,7 +84,7 @@ fn what_is_no_default_changes_the_id() {
 }
 
 #[test]
-fn a_study_has_the_loss_of_its_sweep() {
+fn study_has_the_losses_of_its_sweep() {
     let base = json!({
         "drive": {
             "wave_generator": { "kind": "harmonic", "lobes": 2, "mean_radius_mm": 231.12997975753026, "amplitude_mm": 41.60339635635545 },

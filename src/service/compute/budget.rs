@@ -18,10 +18,10 @@ use crate::http::problem::{Problem, ProblemCode};
 pub const FREE_BYTES: u64 = 256 << 10;
 
 /// Divisor of the budget. A sweep with a tolerance has an unknown size and reserves this fraction.
-pub const PART_OF_UNKNOWN_SIZE: u64 = 8;
+pub const UNKNOWN_SIZE_DIVISOR: u64 = 8;
 
 /// Longest wait of a request for bytes.
-const PATIENCE: Duration = Duration::from_secs(5);
+const MAX_WAIT: Duration = Duration::from_secs(5);
 
 /// Bytes of one semaphore permit.
 const UNIT_BYTES: u64 = 1 << 10;
@@ -82,7 +82,7 @@ impl Budget {
             );
             return Err(Problem::new(ProblemCode::TooManyStates, detail));
         };
-        match timeout(PATIENCE, Arc::clone(&self.free).acquire_many_owned(units)).await {
+        match timeout(MAX_WAIT, Arc::clone(&self.free).acquire_many_owned(units)).await {
             Ok(permit) => {
                 let permit = permit.map_err(|error| Problem::internal(&error))?;
                 Ok(Some(Reservation { permit, bytes }))

@@ -88,7 +88,8 @@ impl RequestHash {
 
 type Outcome = Result<Answer, Problem>;
 
-/// Running computations by key, each with its own number. The waiting requests own them.
+/// Running computations by key, owned by the requests that wait for them. The number tells a computation from a later
+/// one of the same key, so that the end of the first does not remove the second.
 type Flights = Arc<Mutex<HashMap<Key, (u64, WeakShared<BoxFuture<'static, Outcome>>)>>>;
 
 /// Finished answers and running computations. Clones share them.

@@ -5,7 +5,7 @@
 //! **Queue.** Permits are granted in the order of the requests. At most 32 requests wait; the next one gets 503
 //! `queue_full`. At most 16 batches run.
 //! **Time.** A computation checks its stop flag. The flag is set when the client leaves, when the deadline of the
-//! request passes, or when the service stops.
+//! request passes, or when the service stops. Computations below some 0.1 ms run to their end.
 
 use std::io;
 use std::panic::{self, AssertUnwindSafe};
@@ -243,7 +243,7 @@ pub fn catch_panic<T>(job: impl FnOnce() -> Result<T, Problem>) -> Result<T, Pro
 pub async fn within<T>(deadline: Deadline, future: impl Future<Output = Result<T, Problem>>) -> Result<T, Problem> {
     tokio::time::timeout_at(deadline.at, future).await.unwrap_or_else(|_| {
         let detail = format!(
-            "the request took longer than `deadline_ms` ({} ms). Request less, or retry",
+            "the computation took longer than {} ms, the limit that follows from `deadline_ms`. Request less, or retry",
             deadline.span.as_millis()
         );
         Err(Problem::new(ProblemCode::DeadlineExceeded, detail))

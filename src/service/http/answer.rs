@@ -23,7 +23,7 @@ use utoipa::IntoResponses;
 use super::negotiation::{self, Representation};
 use super::problem::{Problem, ProblemCode};
 use crate::app::App;
-use crate::compute::budget::{Budget, FREE_BYTES, PART_OF_UNKNOWN_SIZE, Reservation};
+use crate::compute::budget::{Budget, FREE_BYTES, Reservation, UNKNOWN_SIZE_DIVISOR};
 use crate::compute::cache::{Answer, CacheStatus, MAX_BODY_BYTES, RequestHash};
 use crate::compute::pool::{Deadline, within};
 
@@ -238,7 +238,7 @@ async fn compute<Q: Question>(
 pub fn bound<Q: Question>(budget: &Budget, checked: &Q::Checked, format: Format) -> u64 {
     match Q::max_bytes(checked, format) {
         Some(bytes) => bytes,
-        None => budget.max_bytes() / PART_OF_UNKNOWN_SIZE,
+        None => budget.max_bytes() / UNKNOWN_SIZE_DIVISOR,
     }
 }
 

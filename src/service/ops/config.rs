@@ -1,4 +1,5 @@
-//! The settings of the service: each is a flag and a `TOOTHWAVE_…` variable. All other limits are constants.
+//! The settings of the service: each is a flag and a `TOOTHWAVE_…` variable. All other limits are constants, or parts of
+//! the memory limit.
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
@@ -11,7 +12,7 @@ use tracing_subscriber::EnvFilter;
 use utoipa::ToSchema;
 
 use super::keys::Keys;
-use crate::compute::budget::PART_OF_UNKNOWN_SIZE;
+use crate::compute::budget::UNKNOWN_SIZE_DIVISOR;
 use crate::compute::machine;
 use crate::compute::pool::{MAX_RUNNING_BATCHES, MAX_WAITING_REQUESTS};
 
@@ -63,7 +64,7 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_SOLVES", value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub max_concurrent_solves: Option<u16>,
 
-    /// Time limit of a request from its arrival, in milliseconds
+    /// Time limit of a request from its arrival, and of each line of a batch, in milliseconds
     #[arg(long, env = "TOOTHWAVE_DEADLINE_MS", value_name = "MS", default_value_t = 10_000)]
     pub deadline_ms: u64,
 
@@ -170,7 +171,7 @@ pub struct Limits {
     pub max_queued_solves: usize,
     /// Most batches that run at once.
     pub max_concurrent_batches: usize,
-    /// Time limit of a request from its arrival, in milliseconds.
+    /// Time limit of a request from its arrival, and of each line of a batch, in milliseconds.
     pub deadline_ms: u64,
     /// Size of the answer cache in bytes.
     pub cache_max_bytes: u64,
@@ -195,7 +196,7 @@ pub struct Limits {
 impl Limits {
     /// Returns the limits of the calculation.
     pub const fn of_calculation(&self) -> question::Limits {
-        let searched_states = self.max_unread_bytes / PART_OF_UNKNOWN_SIZE / STATE_BYTES;
+        let searched_states = self.max_unread_bytes / UNKNOWN_SIZE_DIVISOR / STATE_BYTES;
         question::Limits {
             max_states: self.max_states,
             max_profile_points: self.max_profile_points,

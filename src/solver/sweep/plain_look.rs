@@ -129,7 +129,7 @@ mod tests {
     use crate::{Compatibility, ContactLaw, Drive, LoadParameters, Material, Materials, Modification, Never, Torque};
 
     #[test]
-    fn the_teeth_that_are_pressed_are_those_that_carry() {
+    fn pressed_teeth_are_those_that_carry() {
         let drive = Drive::new(&PAPER_5_1).expect("a possible drive");
         let steel = Material::STEEL;
         let case = LoadCase::new(&LoadParameters {

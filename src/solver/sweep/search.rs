@@ -931,7 +931,7 @@ mod tests {
     }
 
     #[test]
-    fn smooth_curves_stay_below_their_bounds_which_are_near() {
+    fn smooth_curves_stay_below_close_bounds() {
         for step in 0..50 {
             let summit = f64::from(step) * 0.02;
             let above = assert_bounded(|x| 1.0 + (1.5 * (x - summit)).cos(), Some(OFF_SMOOTH));
@@ -940,7 +940,7 @@ mod tests {
     }
 
     #[test]
-    fn curves_that_begin_with_a_power_stay_below_their_bounds() {
+    fn curves_starting_with_power_stay_below_bounds() {
         for step in 0..50 {
             let summit = f64::from(step) * 0.002;
             for power in [2.11, 2.5] {
@@ -950,7 +950,7 @@ mod tests {
     }
 
     #[test]
-    fn curves_with_a_corner_anywhere_stay_below_their_bounds() {
+    fn curves_with_corner_stay_below_bounds() {
         for step in 0..400 {
             let corner = f64::from(step) * 0.002_47;
             for (before, after) in [(1.0, 1.0), (0.1, 3.0), (2.0, 0.2)] {
@@ -993,7 +993,7 @@ mod tests {
     }
 
     #[test]
-    fn a_piece_is_cut_where_a_tooth_stands_at_the_start_of_the_relief() {
+    fn splits_piece_where_tooth_reaches_relief_start() {
         let mesh = Mesh::new(&Drive::new(&PAPER_5_1).expect("a possible drive"));
         let whole = Piece { lap: 0, start: 0.0, end: 1.0, places: 7, at_start: None, at_end: None };
         for start_deg in [1.0, 13.4, 20.0, 31.0, 50.0, 89.0] {
@@ -1008,7 +1008,7 @@ mod tests {
         }
     }
 
-    /// The secants on either side of an interval of a parabola meet in its middle.
+    /// The secants on both sides of a parabola's interval meet in its middle.
     #[test]
     fn suspects_load_change_between_two_moments() {
         let judge = Judge {
@@ -1038,7 +1038,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tooth_that_stays_well_on_one_side_of_nothing_is_not_suspected() {
+    fn does_not_suspect_tooth_far_from_zero() {
         for step in 0..100 {
             let phase = 0.07 * f64::from(step);
             for sign in [1.0, -1.0] {
@@ -1049,7 +1049,7 @@ mod tests {
     }
 
     #[test]
-    fn the_summit_of_a_polynomial_is_found_wherever_it_stands() {
+    fn finds_maximum_of_polynomial_at_any_position() {
         for step in 1..200 {
             let summit = f64::from(step) * 0.005;
             let seen = seen_of(|x| 3.0 - (x - summit) * (x - summit));

@@ -241,7 +241,7 @@ fn answer_lines(app: &App, query: BatchQuery, lines: Vec<Line>, progress: &Mutex
             (Ok(document), BatchEndpoint::Sweep) => outcome(app, &Sweep, index, &document, stop),
         });
         let mut progress = progress.lock();
-        // If the deadline has ended this line, its problem is already written.
+        // `slice` reports a line that the deadline has ended.
         if stop.load(Ordering::Relaxed) || progress.current.take() != Some(index) {
             return;
         }
@@ -254,7 +254,8 @@ fn answer_lines(app: &App, query: BatchQuery, lines: Vec<Line>, progress: &Mutex
     }
 }
 
-/// Runs a computation in its own task. A future with a permit must be polled even while the client does not read.
+/// Runs a computation in its own task, which goes on while the client does not read. Otherwise it would keep its permit
+/// from other requests for as long as the client likes.
 async fn in_task<T: Send + 'static>(
     computation: impl Future<Output = Result<T, Problem>> + Send + 'static,
 ) -> Result<T, Problem> {
@@ -278,13 +279,14 @@ async fn slice(app: Arc<App>, query: BatchQuery, mut lines: Vec<Line>) -> (Vec<(
     let mut progress = progress.lock();
     let mut outcomes = std::mem::take(&mut progress.outcomes);
     if let Err(problem) = result {
-        // The problem belongs to the current line. If there is none, as when the service stops, it belongs to the next
-        // line, so every batch ends.
+        // The problem belongs to the current line, or to the first line if none has begun, as when the service stops.
+        // So every slice answers at least one line, and every batch ends.
         let next = lines.get(outcomes.len()).map(|(index, _)| *index).filter(|_| outcomes.is_empty());
         if let Some(index) = progress.current.take().or(next) {
             outcomes.push((index, Outcome::Line(problem_line(index, problem))));
         }
     }
+    // Lines are answered in order: the outcomes are those of the first lines.
     lines.drain(..outcomes.len());
     (outcomes, lines)
 }
@@ -381,7 +383,7 @@ fn answers(app: Arc<App>, query: BatchQuery, body: Body) -> impl Stream<Item = B
     let (counted, ending) = (Arc::clone(&end), Arc::clone(&end));
     let chunks = lines(Arc::clone(&app), body, end).ready_chunks(CHUNK_LINES);
     let (first_app, next_app, large_app) = (Arc::clone(&app), Arc::clone(&app), app);
-    // The first slices of chunks run in parallel. Further slices run after the client has read those.
+    // The first slices of several chunks run in parallel. The next slice of a chunk begins when the stream is polled for it.
     let first = chunks.map(move |lines| slice(Arc::clone(&first_app), query, lines)).buffered(at_once);
     let slices = first.flat_map(move |first| {
         let app = Arc::clone(&next_app);
@@ -419,7 +421,7 @@ async fn read_ahead(app: &App, body: Body) -> Result<Body, Problem> {
             next = tokio::time::timeout_at(deadline.at, pieces.next()) => next,
             () = app.pool.stopped() => break,
         };
-        // The last line reports a timeout or a broken body.
+        // A timeout or a broken body appears again when the batch reads on.
         let Ok(Some(piece)) = next else { break };
         bytes += piece.as_ref().map_or(0, Bytes::len);
         read.push(piece);

@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn smooth_curves_are_known_to_their_last_digits_on_any_machine() {
+    fn smooth_curves_are_accurate_to_last_digits() {
         assert_right::<pulp::Scalar>();
         #[cfg(target_arch = "x86_64")]
         assert_right::<pulp::x86::V3>();
@@ -172,14 +172,14 @@ mod tests {
     }
 
     #[test]
-    fn a_curve_with_a_corner_or_without_a_value_is_not_known() {
+    fn rejects_curve_with_corner_or_missing_value() {
         assert!(Curves::around([-1.0, 1.0].into_iter(), |x: f64| Some([x.abs()])).is_none());
         assert!(Curves::around([0.5, 1.0].into_iter(), |x: f64| (x > 0.6).then_some([x])).is_none());
         assert!(Curves::around([0.5, 1.0].into_iter(), |_| Some([f64::NAN])).is_none());
     }
 
     #[test]
-    fn a_place_beyond_the_range_is_told_of_unless_no_tooth_stands_there() {
+    fn reports_position_beyond_range_of_present_teeth_only() {
         let curves = Curves::around([1.0, 2.0].into_iter(), |x| Some([x])).expect("a straight line");
         let mut at = [1.5; LANES];
         at[7] = 2.5;

@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn logarithms_and_roots_are_right_to_a_few_units_of_the_last_digit_on_any_machine() {
+    fn logarithms_and_roots_are_accurate_to_last_digits() {
         assert_to_a_few_units::<pulp::Scalar>();
         #[cfg(target_arch = "x86_64")]
         assert_to_a_few_units::<pulp::x86::V3>();
