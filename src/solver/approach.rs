@@ -1,4 +1,4 @@
-//! Approach of a tooth along `F_H` as a function of that force (docs/theory.md sections 4.3 to 4.5).
+//! Approach of a tooth along `F_H` as a function of that force (docs/explanation/theory.md sections 4.3 to 4.5).
 
 use crate::root::{NotConverged, ValueAndSlope, newton_from_below};
 
@@ -28,7 +28,7 @@ pub enum Approach {
 
 /// `ξ = F (A + B ln(F_r/F) + K ln(2/u - 1))`, `1/u = z + √(1 + z²)`, `z² = F_z/F`. Here u is the width of the contact
 /// with a corner over that with a smooth surface. The last term is increasing and concave like the others
-/// (docs/theory.md section 4.4, `corner_contact`).
+/// (docs/explanation/theory.md section 4.4, `corner_contact`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corner {
     smooth: Logarithmic,

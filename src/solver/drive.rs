@@ -10,7 +10,7 @@ use crate::ring::{FlankLimit, RingFlank, RingTooth};
 use crate::root::{NotConverged, bracketed};
 use crate::violation::{Alternatives, Parameter, Violation};
 
-/// Parameters of a drive (docs/theory.md section 1).
+/// Parameters of a drive (docs/explanation/theory.md section 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriveParameters {
     /// Wave generator, which pushes the teeth outward.
@@ -29,7 +29,7 @@ pub struct DriveParameters {
     pub tip_radius_mm: Option<f64>,
 }
 
-/// Shape of a tooth of radius `r` (docs/theory.md section 2.10).
+/// Shape of a tooth of radius `r` (docs/explanation/theory.md section 2.10).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ToothShape {
     /// A cylinder along the axis.
@@ -447,9 +447,9 @@ impl Neighbours {
         Ok(Some(Violation::TeethTouch { tooth_diameter_mm, center_distance_mm, touching_radius_mm }))
     }
 
-    /// Returns the least distance of two neighbouring centres on their path (docs/theory.md section 7). On an ellipse
-    /// it is that of the pair across the minor axis. With two or three teeth, which are more than a right angle apart,
-    /// the pair across the major axis is closer to the minor axis.
+    /// Returns the least distance of two neighbouring centres on their path (docs/explanation/theory.md section 7). On
+    /// an ellipse it is that of the pair across the minor axis. With two or three teeth, which are more than a right
+    /// angle apart, the pair across the major axis is closer to the minor axis.
     fn least_center_distance_mm(&self) -> Result<f64, NotConverged> {
         if !matches!(self.locus.cam(), Cam::Ellipse(_)) {
             return self.least_scanned_distance_mm();

@@ -1,8 +1,9 @@
 //! Geometry, load sharing and contact stress of discrete-tooth harmonic drives.
 //!
-//! The crate consists of pure functions: no input or output, no clock, no logging. The file `docs/theory.md` derives
-//! the equations. Every formula below names its section there. A number in brackets is the number of an equation in the
-//! paper (Wang, Bai, Chen, Wang, Journal of Chongqing University 36(1), 2013, 35-42).
+//! The crate consists of pure functions: no input or output, no clock, no logging. The file
+//! `docs/explanation/theory.md` derives the equations. Every formula below names its section there. A number in
+//! brackets is the number of an equation in the paper (Wang, Bai, Chen, Wang, Journal of Chongqing University 36(1),
+//! 2013, 35-42).
 //!
 //! # Parts
 //!

@@ -1,4 +1,4 @@
-//! Equilibrium of a tooth, and compatibility of all teeth at one input angle (docs/theory.md section 4).
+//! Equilibrium of a tooth, and compatibility of all teeth at one input angle (docs/explanation/theory.md section 4).
 
 use std::f64::consts::PI;
 
@@ -635,7 +635,8 @@ impl<'a> LoadedDrive<'a> {
     }
 
     /// Returns the decrease of a tooth's lever arm for each radian of wind-up of the wave generator. It is the
-    /// derivative of `d tan γ cos γ` by the position, with γ in the cosine constant (docs/theory.md section 4.4).
+    /// derivative of `d tan γ cos γ` by the position, with γ in the cosine constant (docs/explanation/theory.md section
+    /// 4.4).
     fn arm_decline_mm_per_rad(&self, center: &ToothCenter) -> f64 {
         if !self.wave_generator_moves {
             return 0.0;
@@ -689,7 +690,7 @@ impl<'a> LoadedDrive<'a> {
     }
 
     /// Returns the pressure at the middle of each contact of a tooth, integrated along its path over the part. Wear
-    /// follows from it (docs/theory.md section 10.4).
+    /// follows from it (docs/explanation/theory.md section 10.4).
     ///
     /// # Errors
     /// [`NotConverged`] from the ellipse, [`SolveError::FlatOffCarrier`] if a flat-sided tooth has left its slot.

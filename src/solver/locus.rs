@@ -1,4 +1,4 @@
-//! Path of a tooth's centre over its position ψ (docs/theory.md section 2).
+//! Path of a tooth's centre over its position ψ (docs/explanation/theory.md section 2).
 
 use crate::cam::{Cam, CamPoint, ToothCenter};
 use crate::position::{Position, half_lobe_rad};

@@ -1,4 +1,4 @@
-//! Mesh: the teeth that carry load at an input angle (docs/theory.md section 3).
+//! Mesh: the teeth that carry load at an input angle (docs/explanation/theory.md section 3).
 
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;

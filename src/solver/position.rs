@@ -1,4 +1,4 @@
-//! Position ψ of a tooth on its lobe, exact at both ends of half a lobe (docs/theory.md section 3).
+//! Position ψ of a tooth on its lobe, exact at both ends of half a lobe (docs/explanation/theory.md section 3).
 
 use std::f64::consts::PI;
 

@@ -335,7 +335,7 @@ fn inflections_seen(arc: &[CurvePoint]) -> usize {
 }
 
 /// Returns an upper bound of the distance between an arc with at most one inflection and its chord
-/// (docs/theory.md section 2.8).
+/// (docs/explanation/theory.md section 2.8).
 ///
 /// A convex arc is within the triangle of its chord and its end tangents, whose height is `c sin α sin β / sin(α + β)`.
 /// An arc with one inflection is below the tangent at one end and above that at the other, within

@@ -1,5 +1,5 @@
-//! Flank of the ring: the outer parallel curve of the centres' path at the tooth radius (docs/theory.md section 2). In
-//! a ring made with clearance it is slightly farther out.
+//! Flank of the ring: the outer parallel curve of the centres' path at the tooth radius (docs/explanation/theory.md
+//! section 2). In a ring made with clearance it is slightly farther out.
 
 use std::f64::consts::PI;
 
@@ -102,8 +102,8 @@ impl RingTooth {
     }
 }
 
-/// Corner at the end of a pointed or bored flank, as seen from teeth before the flank (docs/theory.md section 4.4,
-/// `corner_contact`).
+/// Corner at the end of a pointed or bored flank, as seen from teeth before the flank (docs/explanation/theory.md
+/// section 4.4, `corner_contact`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TipCorner {
     flank: RingFlank,
@@ -162,7 +162,7 @@ impl TipCorner {
 
     /// Returns the extra displacement of the corner under a force on the flank, relative to a plane wall. It is for
     /// each unit of the logarithm of the distance, over `(1 - ν²)/(π E L1)`. It follows from the solution for a wedge
-    /// loaded at its apex (docs/theory.md section 4.4, `corner_contact`).
+    /// loaded at its apex (docs/explanation/theory.md section 4.4, `corner_contact`).
     pub(crate) fn bending_growth(&self) -> f64 {
         let normal_rad = self.flank_end.tan_pressure_angle.atan();
         // Half of the angle between the flank and its mirror image, or the land.

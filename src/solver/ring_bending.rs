@@ -1,5 +1,5 @@
-//! Bending of the ring's teeth: extra compliance of the ring under a tooth compared with its root (docs/theory.md
-//! section 4.3, `ring_teeth_bend`).
+//! Bending of the ring's teeth: extra compliance of the ring under a tooth compared with its root
+//! (docs/explanation/theory.md section 4.3, `ring_teeth_bend`).
 //!
 //! A force on the flank displaces it as it would a half-plane, plus more, because the other faces of the ring's tooth
 //! are free: the half-plane's tractions there have to be removed. The extra part is a boundary problem without a
@@ -133,7 +133,7 @@ mod tests {
 
     /// A sine over half a wave has no curvature at its ends, like the natural spline.
     #[test]
-    fn spline_matches_second_derivative_of_sine() {
+    fn spline_has_second_derivatives_of_sine() {
         let x: [f64; KNOTS] = std::array::from_fn(|knot| knot as f64 / (KNOTS - 1) as f64);
         let x = x.map(|x| x * (0.5 + 0.5 * x));
         let bends = spline_bends(&x, &x.map(|x| (PI * x).sin()));

@@ -1,5 +1,5 @@
-//! Load sharing (docs/theory.md section 4.5): the rotation of the wave generator that balances its torque, with one
-//! spring for each tooth. It is independent of geometry and tooth shape.
+//! Load sharing (docs/explanation/theory.md section 4.5): the rotation of the wave generator that balances its torque,
+//! with one spring for each tooth. It is independent of geometry and tooth shape.
 
 use std::f64::consts::PI;
 

@@ -1,5 +1,5 @@
 //! Tooth space of the ring as made: its flank offset by a clearance and shaped by a modification
-//! (docs/theory.md section 8).
+//! (docs/explanation/theory.md section 8).
 
 use nalgebra::{Point2, Unit, Vector2};
 

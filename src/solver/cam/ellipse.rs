@@ -1,5 +1,5 @@
-//! Ellipse, described by its support function over the angle φ of its outward normal (docs/theory.md sections 2.1 to
-//! 2.3).
+//! Ellipse, described by its support function over the angle φ of its outward normal (docs/explanation/theory.md
+//! sections 2.1 to 2.3).
 
 use nalgebra::{Point2, Unit, Vector2};
 

@@ -1,5 +1,5 @@
 //! Support function `h = R0 + e cos Uφ`. With one lobe it is exactly the circle of radius R0 about a point at the
-//! distance e from the axis (docs/theory.md section 2.9).
+//! distance e from the axis (docs/explanation/theory.md section 2.9).
 
 use crate::cam::kind::{CamContact, Given, Hollow, Kind, ToothCenter};
 use crate::position::{Position, half_lobe_rad};

@@ -1,5 +1,5 @@
 //! Cam that moves the tooth centres along `d = R + e cos Uψ`. It is explicit in the position, and concave in its
-//! valleys for large strokes (docs/theory.md section 2.9).
+//! valleys for large strokes (docs/explanation/theory.md section 2.9).
 
 use std::f64::consts::PI;
 

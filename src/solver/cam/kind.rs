@@ -1,5 +1,5 @@
 //! Interface of a kind of wave generator: the position of a tooth and the geometry of the cam
-//! (docs/theory.md section 2).
+//! (docs/explanation/theory.md section 2).
 
 use nalgebra::{Point2, Unit, Vector2};
 

@@ -1,4 +1,4 @@
-//! Wave generators, one file for each kind (docs/theory.md section 2).
+//! Wave generators, one file for each kind (docs/explanation/theory.md section 2).
 //!
 //! To add a kind, add a file that implements `Kind` (`kind.rs`) and returns its parameters. Then add a variant of
 //! [`Cam`] with its arm in `Cam::kind`, and a variant of [`WaveGenerator`] with its arms in `WaveGenerator::given` and
@@ -113,7 +113,8 @@ impl WaveGenerator {
         self.given().is_path
     }
 
-    /// Returns `R_race`: speed of a race along the cam over its angular velocity (docs/theory.md section 10.2).
+    /// Returns `R_race`: speed of a race along the cam over its angular velocity (docs/explanation/theory.md section
+    /// 10.2).
     pub fn race_radius_mm(&self, tooth_radius_mm: f64) -> f64 {
         let Given { mean_radius_mm, is_path, .. } = self.given();
         if is_path { mean_radius_mm - tooth_radius_mm } else { mean_radius_mm }

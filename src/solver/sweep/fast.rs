@@ -460,8 +460,8 @@ impl Kernel {
         })
     }
 
-    /// Returns the capacity if all loads are proportional (docs/theory.md section 4.7): that of the stress nearest to
-    /// its limit.
+    /// Returns the capacity if all loads are proportional (docs/explanation/theory.md section 4.7): that of the stress
+    /// nearest to its limit.
     fn in_proportion(
         &self,
         loaded: &LoadedDrive<'_>,

@@ -1,4 +1,4 @@
-//! Search for the extremes of a sweep (docs/theory.md section 9, *True extremes*).
+//! Search for the extremes of a sweep (docs/explanation/theory.md section 9, *True extremes*).
 //!
 //! A lap is cut where a tooth enters. Between two cuts, every load of every tooth and every total is a smooth curve
 //! over the input angle. With gaps, the curves are smooth between two changes of the set of carrying teeth. A few
@@ -962,7 +962,7 @@ mod tests {
     /// Error estimate from the polynomials through the first four, five and six nodes, in Lagrange's form, in the
     /// middle.
     #[test]
-    fn polynomial_error_is_sum_of_last_terms_at_middle() {
+    fn polynomial_error_follows_from_last_lagrange_terms() {
         let curve = |x: f64| (40.0 * x).sin() + (7.0 * x).exp();
         let seen = seen_of(curve);
         let run = Run { seen: &seen, moments: &seen.order, is_first: true, is_last: true };
@@ -1010,7 +1010,7 @@ mod tests {
 
     /// The secants on both sides of a parabola's interval meet in its middle.
     #[test]
-    fn suspects_load_change_between_two_moments() {
+    fn suspects_change_between_moments_at_interval_middle() {
         let judge = Judge {
             best: [1.0; QUANTITIES],
             relative: 1e-6,

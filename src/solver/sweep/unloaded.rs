@@ -1,5 +1,5 @@
 //! Wind-up without load: the rotation of the wave generator until the first tooth has closed its gaps
-//! (docs/theory.md section 4.8), and the search for its extremes (section 9).
+//! (docs/explanation/theory.md section 4.8), and the search for its extremes (section 9).
 
 use std::ops::Range;
 

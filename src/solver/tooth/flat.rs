@@ -1,4 +1,4 @@
-//! Contact of the flat of a flat-sided tooth with the wall of its slot (docs/theory.md sections 4.3 and 5).
+//! Contact of the flat of a flat-sided tooth with the wall of its slot (docs/explanation/theory.md sections 4.3 and 5).
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,5 @@
-//! Line contact: Hertz pressure, and the approach of a cylinder between two bodies (docs/explanation/theory.md sections 4.3 and 5).
+//! Line contact: Hertz pressure, and the approach of a cylinder between two bodies (docs/explanation/theory.md sections
+//! 4.3 and 5).
 
 use std::f64::consts::{LN_2, PI};
 

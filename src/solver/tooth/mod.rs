@@ -1,4 +1,4 @@
-//! Contacts of a tooth: approach and pressure under a force (docs/theory.md sections 4.3 and 5).
+//! Contacts of a tooth: approach and pressure under a force (docs/explanation/theory.md sections 4.3 and 5).
 
 pub mod flat;
 pub(crate) mod line;

@@ -1,4 +1,4 @@
-//! Point contact: Hertz's ellipse (docs/theory.md sections 4.3 and 5).
+//! Point contact: Hertz's ellipse (docs/explanation/theory.md sections 4.3 and 5).
 
 use std::f64::consts::{FRAC_2_PI, PI};
 

@@ -1,5 +1,5 @@
 //! Wave generators other than ellipses. Mesh and load follow from `d`, `T` and `T_ψ` of the teeth's centres
-//! (docs/theory.md sections 2.9 and 3).
+//! (docs/explanation/theory.md sections 2.9 and 3).
 
 use super::lanes::LANES;
 use crate::cam::{Harmonic, HarmonicPath};

@@ -1,5 +1,5 @@
 //! Curves that are too slow to evaluate at every state, as sums of Chebyshev polynomials over a drive's range
-//! (docs/theory.md section 9, *Fast path*).
+//! (docs/explanation/theory.md section 9, *Fast path*).
 
 use std::f64::consts::PI;
 

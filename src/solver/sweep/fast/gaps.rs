@@ -1,6 +1,6 @@
-//! Closing angles of gaps, in columns (docs/theory.md sections 4.4 and 4.8). The formulas are those of [`crate::gaps`],
-//! split into a part of the position and a part of the items, so that positions that repeat in every lap are evaluated
-//! once.
+//! Closing angles of gaps, in columns (docs/explanation/theory.md sections 4.4 and 4.8). The formulas are those of
+//! [`crate::gaps`], split into a part of the position and a part of the items, so that positions that repeat in every
+//! lap are evaluated once.
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,5 @@
-//! Assignment of a sweep's samples to laps of its mesh, and the teeth at each sample (docs/theory.md sections 3 and 9).
+//! Assignment of a sweep's samples to laps of its mesh, and the teeth at each sample (docs/explanation/theory.md
+//! sections 3 and 9).
 
 use crate::mesh::{Mesh, Neighbours, Place, Samples};
 

@@ -1,5 +1,5 @@
 //! Contacts other than line contacts, in columns: the ellipses of balls and the flats of flat-sided teeth
-//! (docs/theory.md sections 4.3 and 5).
+//! (docs/explanation/theory.md sections 4.3 and 5).
 
 use pulp::Simd;
 

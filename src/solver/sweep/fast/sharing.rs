@@ -1,5 +1,5 @@
-//! Load sharing among the teeth at an input angle, for a tile of input angles together (docs/theory.md section 9, *Fast
-//! path*).
+//! Load sharing among the teeth at an input angle, for a tile of input angles together (docs/explanation/theory.md
+//! section 9, *Fast path*).
 //!
 //! The springs are those of [`crate::springs`], in columns. With gaps every search approaches the rotation from above.
 //! Each force is convex in the rotation, so the sum of all tangents never exceeds the springs' torque, and its root is
