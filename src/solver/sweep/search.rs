@@ -274,9 +274,9 @@ impl Seen {
         })
     }
 
-    /// Returns a fraction at which some tooth may change between carrying and not carrying, though it does neither at
-    /// both of two successive moments. The lines through the neighbouring moments, extended, meet beyond zero; a curve
-    /// that bends towards zero stays on this side of both lines.
+    /// Returns a fraction between two successive moments at which some tooth may carry although it is open at both, or
+    /// may be open although it carries at both. The lines through the neighbouring moments, extended, then meet beyond
+    /// zero. A curve that bends towards zero stays on this side of both lines.
     fn suspected_change(&self, at: usize) -> Option<f64> {
         let moments = [at.checked_sub(1), Some(at), Some(at + 1), Some(at + 2)];
         let [before, one, other, after] = moments.map(|at| self.order.get(at?).copied());
@@ -700,7 +700,7 @@ struct Candidate {
 struct Run<'a> {
     seen: &'a Seen,
     moments: &'a [usize],
-    /// True if the run ends with the piece, and not with a change of these teeth.
+    /// True if the piece, and not a change of these teeth, bounds the run at its start or its end.
     is_first: bool,
     is_last: bool,
 }

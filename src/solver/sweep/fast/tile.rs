@@ -51,8 +51,8 @@ impl SineTable {
 ///
 /// The position of a tooth is a sum of three angles: its own at the start of the run, one of the tile, and one of the
 /// input angle within the tile. The first and the last form a pattern common to all tiles, so each tile needs the sine
-/// of one angle only. Positions decrease towards the lobe, so the sum cancels only for the tooth next to the lobe. That
-/// tooth is computed from the end of the tile.
+/// of one angle only. Teeth move towards the lobe, so the sum cancels only for the tooth next to it. That tooth is
+/// computed from the end of the tile.
 pub(super) struct Run {
     first: u64,
     end: u64,
