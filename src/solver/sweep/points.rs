@@ -48,9 +48,9 @@ impl Points {
 /// Accuracy of the extremes of a sweep.
 ///
 /// The relative tolerance applies to the largest value of every force and stress, and to the torque capacity. It also
-/// applies to the least and the largest wind-up and torsional stiffness. Its square root applies to the positions of the extremes and to
-/// half-widths. The error of the transmission error is the tolerance times the wind-up. The same holds without load, if
-/// that is searched for.
+/// applies to the least and the largest wind-up and torsional stiffness. Its square root applies to the positions of
+/// the extremes and to half-widths. The error of the transmission error is the tolerance times the wind-up. The same
+/// holds without load, if that is searched for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
     relative: f64,

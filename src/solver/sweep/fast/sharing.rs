@@ -2,8 +2,8 @@
 //! section 9, *Fast path*).
 //!
 //! The springs are those of [`crate::springs`], in columns. With gaps every search approaches the rotation from above.
-//! Each force is convex in the rotation, so the sum of all tangents never exceeds the springs' torque. Its root is at or
-//! beyond the true one. A tooth that is open there is open at the true rotation too.
+//! Each force is convex in the rotation, so the sum of all tangents never exceeds the springs' torque. Its root is at
+//! or beyond the true one. A tooth that is open there is open at the true rotation too.
 
 use pulp::Simd;
 
