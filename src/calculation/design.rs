@@ -73,10 +73,11 @@ pub struct Design {
     /// The model of load sharing.
     #[serde(default)]
     pub model: ModelDocument,
-    /// Modification: intentional differences of the parts from the conjugate shape. Default: none.
+    /// Modification: intentional differences of the parts from the conjugate shape. A positive value opens a gap.
+    /// Default: none.
     #[serde(default)]
     pub modification: ModificationDocument,
-    /// Deviations of individual items of the parts. Default: none.
+    /// Deviations of individual items of the parts. A positive value opens a gap. Default: none.
     #[serde(default)]
     pub deviations: DeviationsDocument,
     /// Input angles of a sweep.

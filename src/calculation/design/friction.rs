@@ -30,13 +30,13 @@ pub struct FrictionDocument {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct WearRatesDocument {
-    /// Wear rate of the wave generator or its race, in mm³/(N·m). Default: 0.
+    /// At the wave generator or its race, in mm³/(N·m). Default: 0.
     #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub wave_generator: f64,
-    /// Wear rate of the ring, in mm³/(N·m). Default: 0.
+    /// At the ring, in mm³/(N·m). Default: 0.
     #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub ring: f64,
-    /// Wear rate of the carrier, in mm³/(N·m). Default: 0.
+    /// At the carrier, in mm³/(N·m). Default: 0.
     #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub carrier: f64,
 }
@@ -53,7 +53,7 @@ pub enum BearingElementDocument {
     Roller,
 }
 
-/// Friction of a contact.
+/// Friction of a sliding contact.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct CoefficientDocument {

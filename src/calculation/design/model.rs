@@ -17,7 +17,7 @@ pub struct ModelDocument {
     /// Compatibility: relation of the approaches at a tooth's contacts. Default: `virtual_work`.
     #[serde(default)]
     pub compatibility: CompatibilityDocument,
-    /// Contact law. Default: `hertz` for balls, `linear` for other teeth with `projection`, otherwise `johnson`.
+    /// Contact law. If left out: `hertz` for balls, `linear` for other teeth with `projection`, otherwise `johnson`.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub stiffness: Option<StiffnessDocument>,
