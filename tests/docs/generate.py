@@ -217,13 +217,13 @@ def settings(help_text):
         variable = re.search(r" \[env: (\w+)=[^\]]*\]", text)
         given = re.search(r" \[default: ([^\]]*)\]", text)
         meaning = re.sub(r" \[(env|default): [^\]]*\]", "", text)
-        rows.append([f"`--{flag} {value}`".replace("|", r"\|"), f"`{variable[1]}`", given[1] if given else "none", meaning + "."])
+        rows.append([f"`--{flag} {value}`", f"`{variable[1]}`", given[1] if given else "none", meaning + "."])
     return "\n\n".join([
         "# Settings",
         WRITTEN,
         "Each setting of `toothwave serve` is a flag and a variable. A flag counts before a variable. *Memory limit* means the limit of the\n"
         "control group, or the memory of the machine if that is less. The image sets `TOOTHWAVE_LISTEN` to `0.0.0.0:8080`.",
-        table([[cell.replace(r"\|", "|") for cell in row] for row in rows]),
+        table(rows),
     ]) + "\n"  # fmt: skip
 
 
