@@ -1,7 +1,7 @@
 //! Identity of a study.
 
 use toothwave_calculation::design::Design;
-use toothwave_calculation::json::{self, Tree};
+use toothwave_calculation::json::{self, Tree, path};
 use toothwave_calculation::key::Key;
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_calculation::question;
@@ -52,6 +52,17 @@ pub(crate) fn complete(design: &Tree) -> Result<Tree, NoAnswer> {
         Ok(read) => tree_of(&read.normalised().with_defaults()),
         Err(_) => Ok(design.clone()),
     }
+}
+
+/// Returns the base with the default of each number that it leaves out at these pointers.
+pub(crate) fn with_defaults_at<'a>(base: &Tree, pointers: impl Iterator<Item = &'a String>) -> Result<Tree, NoAnswer> {
+    let mut written = base.clone();
+    for place in pointers.filter_map(|pointer| path(pointer)).filter(|place| base.at(place).is_none()) {
+        if let Some(default @ Tree::Number(_)) = complete(base)?.at(&place) {
+            written.set(&place, default.clone());
+        }
+    }
+    Ok(written)
 }
 
 fn tree_of(document: &impl serde::Serialize) -> Result<Tree, NoAnswer> {

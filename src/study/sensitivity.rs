@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 use crate::ask::{beyond, escaped, fault};
 use crate::document::{InputDocument, SensitivityDocument};
 use crate::evaluate::Evaluator;
-use crate::identity::complete;
+use crate::identity::{complete, with_defaults_at};
 use crate::rows::{ReasonAnswer, Rows, RowsPart};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Domain, GRAIN_BYTES, Template, Value};
@@ -44,7 +44,7 @@ impl Sensitivity {
         let (base, inputs) = if document.inputs.is_empty() {
             inputs_by_default(&document.base.0)?
         } else {
-            (document.base.0.clone(), document.inputs.clone())
+            (with_defaults_at(&document.base.0, document.inputs.keys())?, document.inputs.clone())
         };
         let (mut moved, template) = moves(&base, &inputs)?;
         for (input, variable) in moved.iter_mut().zip(template.variables()) {
@@ -138,7 +138,7 @@ impl Input {
     fn new(base: &Tree, pointer: &str, input: &InputDocument) -> Result<Self, NoAnswer> {
         let at = format!("/inputs/{}", escaped(pointer));
         let Some(Tree::Number(value)) = path(pointer).and_then(|path| base.at(&path)) else {
-            let detail = "the base has no number here. Write it into the base, even if it is the default";
+            let detail = "the base has no number here. Write it into the base";
             return Err(fault(&at, FieldCode::MissingField, detail));
         };
         let plus_minus = match (input.plus_minus, input.relative) {

@@ -11,6 +11,7 @@ use utoipa::ToSchema;
 use crate::ask::{escaped, fault, whole};
 use crate::document::{DistributionDocument, DistributionKind, ToleranceDocument};
 use crate::evaluate::Evaluator;
+use crate::identity::with_defaults_at;
 use crate::limit::{Bound, Limit};
 use crate::random::Stream;
 use crate::rank::{QuantileAnswer, ShareAnswer, quantile, share};
@@ -107,10 +108,21 @@ impl Distribution {
     }
 }
 
+/// Returns false for deviations that are empty or zero, as by default.
+fn deviates(given: &Tree) -> bool {
+    match given {
+        Tree::Null => false,
+        Tree::Number(value) => *value != 0.0,
+        Tree::Array(items) => items.iter().any(deviates),
+        Tree::Object(fields) => fields.iter().any(|(_, value)| deviates(value)),
+        Tree::Bool(_) | Tree::Text(_) => true,
+    }
+}
+
 impl Tolerance {
     /// Makes the study without limits, because these refer to quantities.
     pub(crate) fn new(document: &ToleranceDocument) -> Result<(Self, Template), NoAnswer> {
-        let base = &document.base.0;
+        let base = &with_defaults_at(&document.base.0, document.inputs.keys())?;
         let samples = whole("/samples", document.samples.value(), 10.0, 1e8)?;
         let seed = whole("/seed", document.seed.value(), 0.0, 9_007_199_254_740_991.0)?;
         if document.deviations.is_empty() && document.inputs.is_empty() {
@@ -122,7 +134,7 @@ impl Tolerance {
         for (pointer, distribution) in &document.inputs {
             let at = format!("/inputs/{}", escaped(pointer));
             let Some(Tree::Number(value)) = path(pointer).and_then(|path| base.at(&path)) else {
-                let detail = "the base has no number here. Write it into the base, even if it is the default";
+                let detail = "the base has no number here. Write it into the base";
                 return Err(fault(&at, FieldCode::MissingField, detail));
             };
             free.push((pointer.clone(), Asked::Range { min: *value, max: *value }));
@@ -143,7 +155,7 @@ impl Tolerance {
         for (name, distribution) in &document.deviations {
             let at = format!("/deviations/{}", escaped(name));
             let path = vec!["deviations".to_owned(), name.clone()];
-            if base.at(&path).is_some() {
+            if base.at(&path).is_some_and(deviates) {
                 let detail = "the study sets these deviations. Remove them from the base";
                 return Err(fault(
                     &format!("/base/deviations/{}", escaped(name)),

@@ -30,6 +30,26 @@ fn studies(base: &Value) -> Vec<Value> {
     ]
 }
 
+/// Numbers that the base leaves out can be inputs, and empty deviations are no deviations.
+#[test]
+fn written_defaults_are_the_same_base() {
+    let [base, ..] = examples();
+    let modulus = "/materials/ring/youngs_modulus_gpa";
+    let uniform = json!({ "distribution": "uniform", "limit": 1.0 });
+    let written = with(&with(&base, modulus, json!(210.0)), "/model", json!({}));
+    let short = with(&base, "/model", json!({}));
+    let with_deviations =
+        with(&written, "/deviations", json!({ "slot_wall_um": [], "ring_runout": { "amount_um": 0 } }));
+    for inputs in [
+        json!({ "study": "sensitivity", "inputs": { modulus: {} } }),
+        json!({ "study": "tolerance", "inputs": { modulus: uniform }, "deviations": { "slot_wall_um": uniform, "ring_runout": uniform }, "samples": 10 }),
+    ] {
+        let ids =
+            [&short, &written, &with_deviations].map(|base| study(&with(&inputs, "/base", base.clone())).unwrap().id());
+        assert_eq!(ids, [ids[0]; 3], "{inputs}");
+    }
+}
+
 #[test]
 fn explicit_default_keeps_the_id() {
     for base in examples() {
